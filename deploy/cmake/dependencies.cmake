@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: Apache-2.0
+# Every third-party library of the project, all Debian 12 packages (deploy/scripts/install_deps.sh).
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(glm REQUIRED)
+find_package(tl-expected REQUIRED)
+find_package(OpenEXR REQUIRED)
+find_package(Protobuf REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(fmt REQUIRED)
+find_package(Boost 1.74 REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(glfw3 3.3 REQUIRED)
+pkg_check_modules(epoxy REQUIRED IMPORTED_TARGET epoxy)
+pkg_check_modules(egl REQUIRED IMPORTED_TARGET egl)
+pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
+
+# Header-only packages without a usable config file.
+find_path(EMIT_TINYGLTF_DIR tiny_gltf.h REQUIRED)
+find_path(EMIT_STB_DIR stb_image_write.h PATH_SUFFIXES stb REQUIRED)

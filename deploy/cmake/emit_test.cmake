@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+find_package(GTest REQUIRED)
+include(GoogleTest)
+include(ProcessorCount)
+
+# emit_test(NAME name LABEL label SOURCES ... LIBS ... [SERIAL] [TIMEOUT seconds])
+# One GoogleTest executable; each TEST becomes a CTest case carrying the label.
+function(emit_test)
+  cmake_parse_arguments(arg "SERIAL" "NAME;LABEL;TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 300)
+  endif()
+  add_executable(${arg_NAME} ${arg_SOURCES})
+  target_link_libraries(${arg_NAME} PRIVATE emit_options ${arg_LIBS} GTest::gmock GTest::gtest_main)
+  target_include_directories(${arg_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
+  target_compile_definitions(${arg_NAME} PRIVATE
+    EMIT_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}/tests"
+    EMIT_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
+    EMIT_TEST_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}"
+    EMIT_TEST_SHARE_DIR="${EMIT_SHARE_DIR}")
+  set_target_properties(${arg_NAME} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
+  set(properties LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
+  if(arg_SERIAL)
+    list(APPEND properties RUN_SERIAL TRUE)
+  endif()
+  gtest_discover_tests(${arg_NAME} TEST_PREFIX "${arg_LABEL}." PROPERTIES ${properties}
+    DISCOVERY_TIMEOUT 60)
+endfunction()

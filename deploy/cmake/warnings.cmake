@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+# emit_options: what every target of the project compiles with.
+add_library(emit_options INTERFACE)
+target_compile_options(emit_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast
+  -Wnon-virtual-dtor -Woverloaded-virtual -Wcast-align -Wnull-dereference -Wimplicit-fallthrough
+  # Results must not depend on whether the compiler found a multiply-add.
+  -ffp-contract=off)
+target_compile_definitions(emit_options INTERFACE GLM_FORCE_EXPLICIT_CTOR GLM_ENABLE_EXPERIMENTAL)
+if(EMIT_WARNINGS_AS_ERRORS)
+  target_compile_options(emit_options INTERFACE -Werror)
+endif()
+if(EMIT_SANITIZE)
+  target_compile_options(emit_options INTERFACE -fsanitize=${EMIT_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=all -g)
+  target_link_options(emit_options INTERFACE -fsanitize=${EMIT_SANITIZE})
+  # g++ 12 reports false null dereferences and maybe-uninitialised reads in instrumented code.
+  target_compile_options(emit_options INTERFACE -Wno-null-dereference -Wno-maybe-uninitialized)
+endif()

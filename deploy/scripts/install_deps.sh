@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Installs the Debian 12 packages that emitd needs to build, run and pass its tests.
+# Uses sudo when not root. Prints what it installs; installs nothing that is already there.
+set -euo pipefail
+
+build_tools=(g++ cmake ninja-build pkg-config git ca-certificates)
+libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libstb-dev
+           libopenexr-dev libboost-dev libprotobuf-dev protobuf-compiler libspdlog-dev libfmt-dev
+           libtomlplusplus-dev libcli11-dev libexpected-dev libgtest-dev libgmock-dev)
+runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
+checkers=(clang-format clang-tidy)
+
+packages=("${build_tools[@]}" "${libraries[@]}" "${runtime[@]}")
+if [[ "${1:-}" == "--with-checkers" ]]; then
+  packages+=("${checkers[@]}")
+elif [[ $# -gt 0 ]]; then
+  echo "usage: install_deps.sh [--with-checkers]" >&2
+  exit 2
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  if ! dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q '^install ok installed$'; then
+    missing+=("$package")
+  fi
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  echo "install_deps: all ${#packages[@]} packages are present"
+  exit 0
+fi
+
+as_root=()
+if [[ $(id -u) -ne 0 ]]; then
+  command -v sudo >/dev/null || { echo "install_deps: run as root or install sudo" >&2; exit 1; }
+  as_root=(sudo)
+fi
+echo "install_deps: installing ${missing[*]}"
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -q
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/physics/frames.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+/// The whole interface between the renderer and the rest of emitd.
+///
+/// Lifecycle (one thread owns a Renderer from create() to destruction, it owns the GL context):
+///   auto renderer = Renderer::create(scenario, options);
+///   renderer->apply_entities(sim_time_ns, updates);
+///   auto slot = renderer->submit(request);        // never blocks on the device
+///   const FrameView& frame = renderer->collect(*slot);   // or poll(*slot) first
+///   ... stream frame.planes ...                    // memory stays valid until
+///   renderer->release(*slot);                      // release, which any thread may call
+namespace emit::renderer {
+
+struct DeviceOptions {
+  int gpu_index = -1;          ///< EGL device; -1: first hardware device, else Mesa surfaceless
+  bool debug_context = false;  ///< GL debug output; slow
+};
+
+struct OutputOptions {
+  bool temperature = false;   ///< surface temperature, K; NaN where there is only sky
+  bool depth = false;         ///< distance along the boresight, m; +Inf where there is only sky
+  bool object = false;        ///< object id as float; 0 where there is only sky
+  std::uint32_t slots = 3;    ///< read-back ring, 2..16: frames in flight plus frames being streamed
+  bool stage_timing = false;  ///< waits for the device after each stage: fills stages_ms, slower
+};
+
+struct EntityUpdate {
+  std::uint32_t entity_id = 0;
+  physics::Pose pose;
+  bool on = true;
+  bool teleport = false;  ///< jump: no motion between the previous pose and this one
+};
+
+struct FrameRequest {
+  std::uint64_t frame_number = 0;
+  std::int64_t sim_time_ns = 0;      ///< what the image shows: entities at this instant
+  std::int64_t thermal_time_ns = 0;  ///< where the thermal clock stands; behind sim time in a hold
+  physics::Pose sensor_pose;         ///< body frame of the seeker head, x along the boresight
+};
+
+/// Time per stage of Table 3; only with OutputOptions::stage_timing.
+struct StageTimes {
+  double geometry_ms = 0.0;
+  double occlusion_ms = 0.0;
+  double shadow_ms = 0.0;
+  double thermal_ms = 0.0;
+  double radiance_ms = 0.0;
+  double readback_ms = 0.0;
+};
+
+/// Counted on the device for every frame: nothing is silently repaired.
+struct FrameStats {
+  std::uint32_t nonfinite_px = 0;   ///< NaN or Inf pixels, written as 0
+  std::uint32_t clamped_px = 0;     ///< inputs of a model outside its valid range
+  std::uint32_t surface_px = 0;     ///< pixels that show geometry
+};
+
+/// One rendered frame. Rows go down, row-major, float32, no padding.
+struct FrameView {
+  std::uint64_t frame_number = 0;
+  std::int64_t sim_time_ns = 0;
+  physics::Pose sensor_pose;
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+  std::vector<std::span<const float>> radiance_w_m2_sr;  ///< one plane per scenario band, its order
+  std::span<const float> temperature_k;                  ///< empty unless asked for
+  std::span<const float> depth_m;
+  std::span<const float> object_id;
+  FrameStats stats;
+  StageTimes stages_ms;
+};
+
+struct SceneStats {
+  std::uint64_t triangles = 0;  ///< drawn when everything is in view, instances counted
+  std::uint32_t instances = 0;
+  std::vector<std::string> warnings;  ///< unmapped materials and what else the loader could not map
+};
+
+using SlotIndex = std::uint32_t;
+
+class Renderer {
+ public:
+  /// Loads the scene, creates the GL context and takes all memory. Setup only.
+  /// Errors: gpu (no device, naming what was tried), not_found/parse (file and element), config.
+  [[nodiscard]] static physics::Result<std::unique_ptr<Renderer>> create(
+      const scene::ScenarioDesc& scenario, const DeviceOptions& device,
+      const OutputOptions& output);
+  virtual ~Renderer() = default;
+
+  /// Appends poses to the entities' history at `sim_time_ns`; from then on they override the
+  /// scenario's trajectory. Unknown ids are not applied. Returns the number applied. RT-safe.
+  virtual std::size_t apply_entities(std::int64_t sim_time_ns,
+                                     std::span<const EntityUpdate> updates) noexcept = 0;
+
+  /// Weather from `sample.sim_time_ns` on, overriding the scenario's. False when its store is full.
+  virtual bool apply_weather(const scene::WeatherSample& sample) noexcept = 0;
+
+  /// Forgets live poses and weather: the state of create(). RT-safe.
+  virtual void reset() noexcept = 0;
+
+  /// Records and issues a frame; -1 when every slot is in use. RT-safe.
+  [[nodiscard]] virtual int submit(const FrameRequest& request) noexcept = 0;
+  /// True when collect() would not wait.
+  [[nodiscard]] virtual bool poll(SlotIndex slot) noexcept = 0;
+  /// Waits for the frame of a slot that submit() returned. The view lives until release().
+  [[nodiscard]] virtual const FrameView& collect(SlotIndex slot) noexcept = 0;
+  /// Gives the slot back. Any thread.
+  virtual void release(SlotIndex slot) noexcept = 0;
+
+  /// World pose and on state of an entity at an instant, as the shadow history sees it.
+  [[nodiscard]] virtual bool entity_pose_at(std::uint32_t entity_id, std::int64_t sim_time_ns,
+                                            physics::Pose& pose, bool& on) const noexcept = 0;
+  /// Sensor pose of the scenario's own trajectory.
+  [[nodiscard]] virtual physics::Pose scenario_sensor_pose_at(
+      std::int64_t sim_time_ns) const noexcept = 0;
+
+  [[nodiscard]] virtual const SceneStats& scene_stats() const noexcept = 0;
+  /// GL_RENDERER and GL_VERSION, for logs, goldens and benchmarks.
+  [[nodiscard]] virtual const std::string& device_name() const noexcept = 0;
+};
+
+}  // namespace emit::renderer
