@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "emit/physics/sun.hpp"
+#include "emit/physics/weather.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+namespace emit::renderer {
+
+/// Sun and weather of a scenario at any instant of the thermal history, with changes that the host
+/// sent. Owner: Renderer. Real time: everything but the constructor is RT-safe.
+class Environment {
+ public:
+  static constexpr std::size_t kMaxLiveSamples = 4096;
+
+  explicit Environment(const scene::ScenarioDesc& scenario);
+
+  /// Holds from its time on until the next one. False when the store is full or time goes back.
+  bool append(const scene::WeatherSample& sample) noexcept;
+  void reset() noexcept { live_.clear(); }
+
+  [[nodiscard]] physics::SunPosition sun_at(std::int64_t sim_time_ns) const noexcept;
+  [[nodiscard]] physics::Forcing forcing_at(std::int64_t sim_time_ns,
+                                            const physics::SunPosition& sun) const noexcept;
+
+ private:
+  physics::GeoPlace place_;
+  std::int64_t epoch_utc_ns_ = 0;
+  physics::ClearSky clear_sky_;
+  std::vector<physics::WeatherRow> table_;
+  std::vector<physics::WeatherRow> live_;
+};
+
+}  // namespace emit::renderer

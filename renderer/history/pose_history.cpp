@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "history/pose_history.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace emit::renderer {
+namespace {
+
+constexpr double kThinPositionM = 0.01;
+constexpr double kThinAngleRad = 1e-3;
+constexpr std::int64_t kThinSpanNs = 1'000'000'000;
+constexpr double kMovingMPerS = 0.05;
+
+double angle_between_rad(const glm::dquat& a, const glm::dquat& b) noexcept {
+  return 2.0 * std::acos(std::min(1.0, std::abs(glm::dot(a, b))));
+}
+
+bool close(const physics::Pose& a, const physics::Pose& b) noexcept {
+  return glm::distance(a.position_world_m, b.position_world_m) < kThinPositionM &&
+         angle_between_rad(a.world_from_body, b.world_from_body) < kThinAngleRad;
+}
+
+double fraction(std::int64_t begin_ns, std::int64_t end_ns, std::int64_t at_ns) noexcept {
+  return end_ns > begin_ns
+             ? static_cast<double>(at_ns - begin_ns) / static_cast<double>(end_ns - begin_ns)
+             : 1.0;
+}
+
+bool moves(const scene::Keyframe& from, const scene::Keyframe& to) noexcept {
+  const double seconds = static_cast<double>(to.sim_time_ns - from.sim_time_ns) * 1e-9;
+  return !to.teleport && seconds > 0.0 &&
+         glm::distance(from.pose.position_world_m, to.pose.position_world_m) >
+             kMovingMPerS * seconds;
+}
+
+}  // namespace
+
+PoseHistory::PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement)
+    : scripted_(object.trajectory) {
+  live_.reserve(kMaxLivePoses);
+  events_ns_.reserve(kMaxEvents);
+  if (scripted_.empty()) {
+    scripted_.push_back({.sim_time_ns = 0, .pose = placement, .on = object.on});
+  }
+  note_scripted_events();
+}
+
+void PoseHistory::note_scripted_events() noexcept {
+  bool moving = false;
+  for (std::size_t i = 1; i < scripted_.size(); ++i) {
+    const scene::Keyframe& from = scripted_[i - 1];
+    const scene::Keyframe& to = scripted_[i];
+    const bool moving_now = moves(from, to);
+    if (moving_now != moving) note_event(from.sim_time_ns);
+    moving = moving_now;
+    if (from.on != to.on || to.teleport) note_event(to.sim_time_ns);
+  }
+  if (moving) note_event(scripted_.back().sim_time_ns);
+}
+
+void PoseHistory::note_event(std::int64_t sim_time_ns) noexcept {
+  if (!events_ns_.empty() && events_ns_.back() >= sim_time_ns) return;
+  if (events_ns_.size() == kMaxEvents) events_ns_.erase(events_ns_.begin());
+  events_ns_.push_back(sim_time_ns);
+}
+
+bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on,
+                         bool teleport) noexcept {
+  if (!live_.empty() && sim_time_ns < live_.back().sim_time_ns) return false;
+  const scene::Keyframe next{.sim_time_ns = sim_time_ns, .pose = pose, .on = on,
+                             .teleport = teleport};
+  if (live_.empty()) {
+    // What the script planned after this instant will not happen.
+    const TrajectoryState planned = trajectory_at(scripted_, sim_time_ns);
+    while (!events_ns_.empty() && events_ns_.back() >= sim_time_ns) events_ns_.pop_back();
+    if (planned.on != on || !close(planned.pose, pose)) note_event(sim_time_ns);
+    live_.push_back(next);
+    moving_ = false;
+    return true;
+  }
+  const scene::Keyframe& last = live_.back();
+  if (sim_time_ns == last.sim_time_ns) {
+    live_.back() = next;
+    return true;
+  }
+  const bool moving_now = moves(last, next);
+  if (moving_now != moving_) note_event(last.sim_time_ns);
+  moving_ = moving_now;
+  if (last.on != on || teleport) note_event(sim_time_ns);
+
+  if (live_.size() >= 2 && !teleport && !last.teleport && last.on == on) {
+    const scene::Keyframe& before = live_[live_.size() - 2];
+    const bool short_span = sim_time_ns - before.sim_time_ns <= kThinSpanNs;
+    const bool at_rest = close(before.pose, last.pose) && close(last.pose, pose);
+    const physics::Pose expected =
+        physics::interpolate(before.pose, pose,
+                             fraction(before.sim_time_ns, sim_time_ns, last.sim_time_ns));
+    if (before.on == on && (at_rest || (short_span && close(expected, last.pose)))) {
+      live_.back() = next;
+      return true;
+    }
+  }
+  if (live_.size() == kMaxLivePoses) {
+    // Keeps the newest half whole and every other pose of the oldest half.
+    const auto half = live_.begin() + kMaxLivePoses / 2;
+    auto write = live_.begin() + 1;
+    for (auto read = live_.begin() + 2; read < half; read += 2) *write++ = *read;
+    dropped_ += static_cast<std::uint64_t>(half - write);
+    live_.erase(write, half);
+  }
+  live_.push_back(next);
+  return true;
+}
+
+void PoseHistory::reset() noexcept {
+  live_.clear();
+  moving_ = false;
+  // The script's own events may have been cut by live poses.
+  events_ns_.clear();
+  note_scripted_events();
+}
+
+TrajectoryState PoseHistory::at(std::int64_t sim_time_ns) const noexcept {
+  if (!live_.empty() && sim_time_ns >= live_.front().sim_time_ns) {
+    return trajectory_at(live_, sim_time_ns);
+  }
+  return trajectory_at(scripted_, sim_time_ns);
+}
+
+double PoseHistory::path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {
+  constexpr int kSamples = 8;
+  double path_m = 0.0;
+  TrajectoryState from = at(begin_ns);
+  for (int i = 1; i <= kSamples; ++i) {
+    const TrajectoryState to = at(begin_ns + (end_ns - begin_ns) * i / kSamples);
+    if (from.on && to.on) {
+      path_m += glm::distance(from.pose.position_world_m, to.pose.position_world_m);
+    }
+    from = to;
+  }
+  return path_m;
+}
+
+}  // namespace emit::renderer

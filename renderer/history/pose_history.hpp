@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "emit/physics/frames.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "history/trajectory.hpp"
+
+namespace emit::renderer {
+
+/// Where an entity was and whether it was there, at any instant of the thermal history: the
+/// scenario's trajectory, overridden from the first live pose on by what the host sent.
+/// Owner: Renderer. Thread: the renderer's. Real time: append, reset, at, path_m RT-safe (memory is
+/// taken by the constructor).
+class PoseHistory {
+ public:
+  static constexpr std::size_t kMaxLivePoses = 16384;
+  static constexpr std::size_t kMaxEvents = 256;
+
+  /// `placement` holds until the first keyframe of an entity without trajectory.
+  PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement);
+
+  /// Adds a live pose. Poses on the straight line between their neighbours are thinned out (to
+  /// 1 cm and 1 mrad, at most one second apart while moving). A time before the newest live pose
+  /// is refused (false).
+  bool append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on, bool teleport) noexcept;
+  /// Forgets the live poses.
+  void reset() noexcept;
+
+  [[nodiscard]] TrajectoryState at(std::int64_t sim_time_ns) const noexcept;
+
+  /// Length of the way between two instants, sampled at eight points; jumps do not count.
+  [[nodiscard]] double path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept;
+
+  /// Instants at which the entity appears, vanishes, starts or stops, ascending.
+  [[nodiscard]] std::span<const std::int64_t> events_ns() const noexcept { return events_ns_; }
+
+  /// Live poses dropped because the store was full; the oldest are halved in density then.
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
+
+ private:
+  void note_event(std::int64_t sim_time_ns) noexcept;
+  void note_scripted_events() noexcept;
+
+  scene::Trajectory scripted_;
+  scene::Trajectory live_;
+  std::vector<std::int64_t> events_ns_;
+  bool moving_ = false;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace emit::renderer

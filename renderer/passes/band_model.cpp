@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/band_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "emit/physics/band_radiance_lut.hpp"
+#include "emit/physics/clear_sky.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+
+physics::Band band_from(const scene::SpectralBand& desc) {
+  physics::Band band{desc.lo_um, desc.hi_um, {}};
+  for (const scene::ResponseSample& sample : desc.response) {
+    band.response.push_back({sample.wavelength_um, sample.response_frac});
+  }
+  return band;
+}
+
+/// Cosine-weighted mean over the sky of 1 - tau^m(elevation), by the midpoint rule in sin^2.
+double sky_hemisphere_frac(double vertical_transmittance_frac) {
+  constexpr int kRings = 256;
+  double sum = 0.0;
+  for (int i = 0; i < kRings; ++i) {
+    const double sin_elevation = std::sqrt((i + 0.5) / kRings);
+    const double mass =
+        physics::relative_air_mass(physics::Radians(std::asin(sin_elevation)));
+    sum += 1.0 - std::pow(vertical_transmittance_frac, mass);
+  }
+  return sum / kRings;
+}
+
+const scene::BandAtmosphere* atmosphere_of(const scene::ScenarioDesc& scenario,
+                                           const std::string& band) {
+  if (!scenario.atmosphere.enabled) return nullptr;
+  for (const scene::BandAtmosphere& entry : scenario.atmosphere.bands) {
+    if (entry.band == band) return &entry;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario) {
+  if (scenario.bands.empty() || scenario.bands.size() > EMIT_MAX_BANDS) {
+    return make_error(ErrorCode::config, fmt::format("{} bands: 1 to {} are possible",
+                                                     scenario.bands.size(), EMIT_MAX_BANDS));
+  }
+  BandModel model;
+  for (const scene::SpectralBand& desc : scenario.bands) {
+    Entry entry{.band = band_from(desc)};
+    const auto lut = physics::BandRadianceLut::build(entry.band);
+    if (!lut) {
+      return make_error(ErrorCode::config,
+                        fmt::format("band '{}': {}", desc.name, lut.error().text));
+    }
+    gpu::BandParams params{};
+    const auto layout = lut->shader_layout(0);
+    params.lut_first_k = layout[0];
+    params.lut_nodes_per_k = layout[1];
+    params.lut_last_node = layout[2];
+    params.terms_amplitude_frac = glm::vec4(1.0F, 0.0F, 0.0F, 0.0F);
+    params.terms_extinction_per_m = glm::vec4(0.0F);
+    params.vertical_transmittance_frac = 1.0F;
+    if (const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name)) {
+      if (atmosphere->terms.size() > EMIT_MAX_ATMOSPHERE_TERMS) {
+        return make_error(ErrorCode::config,
+                          fmt::format("atmosphere of band '{}': {} terms, {} are possible",
+                                      desc.name, atmosphere->terms.size(),
+                                      EMIT_MAX_ATMOSPHERE_TERMS));
+      }
+      params.terms_amplitude_frac = glm::vec4(0.0F);
+      for (std::size_t i = 0; i < atmosphere->terms.size(); ++i) {
+        const auto k = static_cast<glm::length_t>(i);
+        params.terms_amplitude_frac[k] =
+            static_cast<float>(atmosphere->terms[i].amplitude_frac);
+        params.terms_extinction_per_m[k] =
+            static_cast<float>(atmosphere->terms[i].extinction_per_km * 1e-3);
+      }
+      entry.vertical_transmittance_frac = atmosphere->vertical_transmittance_frac;
+      params.vertical_transmittance_frac =
+          static_cast<float>(atmosphere->vertical_transmittance_frac);
+    }
+    entry.sun_radiance_w_m2_sr =
+        physics::band_radiance(entry.band, physics::Kelvin(physics::kSunTemperatureK))
+            .radiance_w_m2_sr;
+    entry.sky_hemisphere_frac = sky_hemisphere_frac(entry.vertical_transmittance_frac);
+    model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
+    model.tables_.insert(model.tables_.end(), lut->nodes().begin(), lut->nodes().end());
+    model.params_.push_back(params);
+    model.entries_.push_back(std::move(entry));
+  }
+  return model;
+}
+
+void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept {
+  const double disc_sr_projected =
+      physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+  const double air_mass = physics::relative_air_mass(sun.elevation);
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Entry& entry = entries_[i];
+    gpu::BandParams& params = params_[i];
+    const double air_w_m2_sr =
+        physics::band_radiance(entry.band, physics::Kelvin(forcing.air_k)).radiance_w_m2_sr;
+    params.air_radiance_w_m2_sr = static_cast<float>(air_w_m2_sr);
+    params.surroundings_radiance_w_m2_sr = static_cast<float>(
+        physics::band_radiance(entry.band, physics::Kelvin(forcing.environment_k))
+            .radiance_w_m2_sr);
+    params.sky_hemisphere_w_m2_sr = static_cast<float>(air_w_m2_sr * entry.sky_hemisphere_frac);
+    // Without direct sun in the forcing (overcast) none is reflected either.
+    const bool sun_shines =
+        forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) > 0.0 && air_mass > 0.0;
+    params.sun_irradiance_w_m2 =
+        sun_shines ? static_cast<float>(entry.sun_radiance_w_m2_sr * disc_sr_projected *
+                                        (1.0 - forcing.cloud_frac) *
+                                        std::pow(entry.vertical_transmittance_frac, air_mass))
+                   : 0.0F;
+  }
+}
+
+std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material> materials,
+                                                 const scene::ScenarioDesc& scenario,
+                                                 double reference_k) {
+  std::vector<gpu::MaterialParams> out;
+  out.reserve(materials.size());
+  for (const scene::Material& material : materials) {
+    gpu::MaterialParams params{};
+    params.solar_absorptance_frac = static_cast<float>(material.solar_absorptance_frac);
+    params.emissivity_frac = static_cast<float>(material.emissivity_frac);
+    if (!material.layers.empty()) {
+      params.conductance_w_m2_k = static_cast<float>(material.layers[0].conductivity_w_m_k /
+                                                     material.layers[0].thickness_m);
+    }
+    params.base_k = static_cast<float>(material.base_k);
+    params.initial_offset_k = static_cast<float>(
+        material.initial_k.value_or(scenario.thermal.initial_k) - reference_k);
+    if (material.prescribed_k) {
+      params.prescribed = 1.0F;
+      params.prescribed_offset_k = static_cast<float>(*material.prescribed_k - reference_k);
+    }
+    for (std::size_t b = 0; b < scenario.bands.size() && b < EMIT_MAX_BANDS; ++b) {
+      const auto known = std::find_if(
+          material.band_emissivity.begin(), material.band_emissivity.end(),
+          [&](const scene::BandEmissivity& e) { return e.band == scenario.bands[b].name; });
+      params.band_emissivity_frac[static_cast<glm::length_t>(b)] =
+          static_cast<float>(known != material.band_emissivity.end() ? known->emissivity_frac
+                                                                     : material.emissivity_frac);
+    }
+    out.push_back(params);
+  }
+  return out;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <span>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/physics/planck.hpp"
+#include "emit/physics/weather.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "shared/frame_params.glsl.h"
+
+namespace emit::renderer {
+
+/// Blackbody tables and atmosphere of the scenario's bands.
+/// Owner: Renderer. Real time: update is RT-safe, build is setup only.
+class BandModel {
+ public:
+  /// Errors (config): more than EMIT_MAX_BANDS bands, or a band that is not valid.
+  [[nodiscard]] static physics::Result<BandModel> build(const scene::ScenarioDesc& scenario);
+
+  /// Air, surroundings and sun at the frame's instant.
+  void update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept;
+
+  [[nodiscard]] std::span<const gpu::BandParams> params() const noexcept { return params_; }
+  /// T ln L tables, one band after the other.
+  [[nodiscard]] std::span<const float> tables() const noexcept { return tables_; }
+  [[nodiscard]] std::uint32_t nodes_per_band() const noexcept { return nodes_per_band_; }
+
+ private:
+  struct Entry {
+    physics::Band band;
+    double sun_radiance_w_m2_sr = 0.0;      ///< photosphere, in band
+    double sky_hemisphere_frac = 0.0;       ///< hemisphere mean over blackbody at air temperature
+    double vertical_transmittance_frac = 1.0;
+  };
+  std::vector<Entry> entries_;
+  std::vector<gpu::BandParams> params_;
+  std::vector<float> tables_;
+  std::uint32_t nodes_per_band_ = 0;
+};
+
+/// Materials as the shaders read them. `reference_k` is what temperature offsets count from.
+[[nodiscard]] std::vector<gpu::MaterialParams> material_params(
+    std::span<const scene::Material> materials, const scene::ScenarioDesc& scenario,
+    double reference_k);
+
+}  // namespace emit::renderer

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/compute_passes.hpp"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "shared/bindings.glsl.h"
+
+namespace emit::renderer {
+namespace {
+
+void dispatch_pixels(std::uint32_t width_px, std::uint32_t height_px) noexcept {
+  glDispatchCompute((width_px + 7) / 8, (height_px + 7) / 8, 1);
+}
+
+gl::Texture make_texture(GLenum format, std::uint32_t width_px, std::uint32_t height_px) {
+  return gl::Texture(format, static_cast<GLsizei>(width_px), static_cast<GLsizei>(height_px));
+}
+
+}  // namespace
+
+physics::Result<OcclusionPass> OcclusionPass::create(std::uint32_t width_px,
+                                                     std::uint32_t height_px) {
+  OcclusionPass pass;
+  auto program = gl::Program::compute("passes/occlusion.comp");
+  if (!program) return tl::unexpected(std::move(program.error()));
+  pass.program_ = std::move(*program);
+  pass.sky_frac_ = make_texture(GL_R32F, width_px, height_px);
+  pass.width_px_ = width_px;
+  pass.height_px_ = height_px;
+  return pass;
+}
+
+void OcclusionPass::dispatch() const noexcept {
+  program_.use();
+  glBindImageTexture(EMIT_IMG_OCCLUSION, sky_frac_.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  dispatch_pixels(width_px_, height_px_);
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
+void OcclusionPass::bind_texture() const noexcept { sky_frac_.bind(EMIT_TEX_OCCLUSION); }
+
+physics::Result<ThermalPass> ThermalPass::create(std::uint32_t width_px, std::uint32_t height_px,
+                                                 const scene::ThermalOptions& options) {
+  ThermalPass pass;
+  std::vector<gl::Define> defines = {
+      {"EMIT_BLOCKER_TAPS", fmt::format("{}u", options.blocker_taps)},
+      {"EMIT_FILTER_TAPS", fmt::format("{}u", options.filter_taps)}};
+  auto step_program = gl::Program::compute("passes/thermal.comp", defines);
+  if (!step_program) return tl::unexpected(std::move(step_program.error()));
+  defines.push_back({"EMIT_SUN_ONLY", "1"});
+  auto sun_program = gl::Program::compute("passes/thermal.comp", defines);
+  if (!sun_program) return tl::unexpected(std::move(sun_program.error()));
+  pass.step_program_ = std::move(*step_program);
+  pass.sun_program_ = std::move(*sun_program);
+  pass.state_ = make_texture(GL_RG32F, width_px, height_px);
+  pass.sun_now_ = make_texture(GL_R32F, width_px, height_px);
+  pass.width_px_ = width_px;
+  pass.height_px_ = height_px;
+  return pass;
+}
+
+void ThermalPass::dispatch(const gl::Program& program) const noexcept {
+  program.use();
+  glBindImageTexture(EMIT_IMG_STATE, state_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32F);
+  glBindImageTexture(EMIT_IMG_SUN_NOW, sun_now_.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
+  dispatch_pixels(width_px_, height_px_);
+  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
+void ThermalPass::dispatch_step() const noexcept {
+  dispatch(step_program_);
+}
+
+void ThermalPass::dispatch_sun_only() const noexcept {
+  dispatch(sun_program_);
+}
+
+void ThermalPass::bind_textures() const noexcept {
+  state_.bind(EMIT_TEX_STATE);
+  sun_now_.bind(EMIT_TEX_SUN_NOW);
+}
+
+physics::Result<RadiancePass> RadiancePass::create(std::uint32_t width_px,
+                                                   std::uint32_t height_px) {
+  RadiancePass pass;
+  auto program = gl::Program::compute("passes/radiance.comp");
+  if (!program) return tl::unexpected(std::move(program.error()));
+  pass.program_ = std::move(*program);
+  pass.width_px_ = width_px;
+  pass.height_px_ = height_px;
+  return pass;
+}
+
+void RadiancePass::dispatch() const noexcept {
+  program_.use();
+  dispatch_pixels(width_px_, height_px_);
+}
+
+}  // namespace emit::renderer

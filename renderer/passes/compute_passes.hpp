@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+
+#include "emit/scene/scene_desc.hpp"
+#include "gl/objects.hpp"
+#include "gl/program.hpp"
+
+/// Paper parts 2, 4 and 5: full-screen work in compute shaders of 8 x 8 pixels. Storage blocks are
+/// bound by the renderer; each pass binds the textures and images it owns.
+namespace emit::renderer {
+
+class OcclusionPass {
+ public:
+  [[nodiscard]] static physics::Result<OcclusionPass> create(std::uint32_t width_px,
+                                                             std::uint32_t height_px);
+  void dispatch() const noexcept;
+  void bind_texture() const noexcept;
+
+ private:
+  gl::Program program_;
+  gl::Texture sky_frac_;
+  std::uint32_t width_px_ = 0;
+  std::uint32_t height_px_ = 0;
+};
+
+class ThermalPass {
+ public:
+  [[nodiscard]] static physics::Result<ThermalPass> create(std::uint32_t width_px,
+                                                           std::uint32_t height_px,
+                                                           const scene::ThermalOptions& options);
+  /// Advances every visible point over the interval bound as EMIT_BIND_STEP.
+  void dispatch_step() const noexcept;
+  /// Only stores the shade of that interval, for reflected sunlight.
+  void dispatch_sun_only() const noexcept;
+  void bind_textures() const noexcept;
+
+ private:
+  void dispatch(const gl::Program& program) const noexcept;
+
+  gl::Program step_program_;
+  gl::Program sun_program_;
+  gl::Texture state_;    ///< two modes, offsets in K
+  gl::Texture sun_now_;  ///< visible share of the sun's disc at the frame's instant
+  std::uint32_t width_px_ = 0;
+  std::uint32_t height_px_ = 0;
+};
+
+class RadiancePass {
+ public:
+  [[nodiscard]] static physics::Result<RadiancePass> create(std::uint32_t width_px,
+                                                            std::uint32_t height_px);
+  void dispatch() const noexcept;
+
+ private:
+  gl::Program program_;
+  std::uint32_t width_px_ = 0;
+  std::uint32_t height_px_ = 0;
+};
+
+}  // namespace emit::renderer

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "history/pose_history.hpp"
+#include "passes/light_fit.hpp"
+#include "passes/scene_buffers.hpp"
+
+namespace emit::renderer {
+
+/// Instanced draw of one mesh range: records [first_record, first_record + count).
+struct DrawCommand {
+  SceneBuffers::DrawRange range;
+  std::int32_t base_vertex = 0;
+  std::uint32_t first_record = 0;
+  std::uint32_t count = 0;
+};
+struct CommandRange {
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+};
+
+/// What is drawn in one frame: instance transforms relative to the camera, and per pass the draws
+/// that survive culling by their boxes. Owner: Renderer. Real time: all but the constructor RT-safe
+/// (capacity for the worst case is taken there).
+class DrawLists {
+ public:
+  /// `max_passes`: most shadow passes (steps x cascades) of a frame.
+  DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
+            std::uint32_t max_steps, std::uint32_t max_passes);
+
+  /// Starts a frame: all instances at `sim_time_ns` around a camera at `camera_world_m`.
+  void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
+             std::span<const PoseHistory> entities) noexcept;
+  /// Draws of the camera; double-sided ones apart.
+  void cull_view(const ViewVolume& view, CommandRange& single_sided,
+                 CommandRange& double_sided) noexcept;
+  /// Moves entities to their poses at `sample_ns` for the shadow passes that follow. Casters that
+  /// travel farther than their own size between the two instants are left out: what shade they cast
+  /// lasts a smaller share of the interval than size / way, and one pose would paint all of it.
+  void pose_casters(std::int64_t sample_ns, std::int64_t begin_ns, std::int64_t end_ns,
+                    std::span<const PoseHistory> entities) noexcept;
+  [[nodiscard]] CommandRange cull_light(const LightFrustum& frustum) noexcept;
+
+  [[nodiscard]] std::span<const gpu::InstanceParams> instance_params() const noexcept {
+    return params_;
+  }
+  [[nodiscard]] std::span<const DrawRecord> records() const noexcept { return records_; }
+  [[nodiscard]] std::span<const DrawCommand> commands(CommandRange range) const noexcept {
+    return std::span(commands_).subspan(range.first, range.count);
+  }
+  [[nodiscard]] std::size_t max_instance_params() const noexcept { return params_.capacity(); }
+  [[nodiscard]] std::size_t max_records() const noexcept { return records_.capacity(); }
+  /// Box around everything, relative to the camera, at the frame's instant.
+  [[nodiscard]] const scene::Aabb& bounds() const noexcept { return bounds_; }
+
+ private:
+  struct Placed {
+    scene::Aabb box;         ///< relative to the camera
+    std::uint32_t slot = 0;  ///< in params_
+    bool on = true;
+  };
+  void place(std::uint32_t instance, std::uint32_t slot, const glm::dmat4& world_from_mesh,
+             bool on) noexcept;
+
+  const SceneBuffers& scene_;
+  std::vector<std::int32_t> history_of_instance_;  ///< -1: static
+  std::vector<std::uint32_t> moving_;              ///< instances of entities
+  std::vector<double> size_of_instance_m_;
+  std::vector<Placed> view_placed_;
+  std::vector<Placed> light_placed_;
+  std::vector<gpu::InstanceParams> params_;
+  std::vector<DrawRecord> records_;
+  std::vector<DrawCommand> commands_;
+  glm::dvec3 camera_world_m_{0.0};
+  scene::Aabb bounds_;
+};
+
+}  // namespace emit::renderer

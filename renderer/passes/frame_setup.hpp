@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <span>
+#include <vector>
+
+#include "emit/physics/frames.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "history/step_plan.hpp"
+#include "passes/light_fit.hpp"
+#include "shared/frame_params.glsl.h"
+
+/// Fills the structs that the shaders read from the plain state of a frame. RT-safe.
+namespace emit::renderer {
+
+/// Camera part of FrameParams, and the same volume in double for culling and fitting.
+struct CameraSetup {
+  ViewVolume view;
+  double pixel_rad = 0.0;  ///< angle of one pixel at the boresight
+};
+[[nodiscard]] CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pose,
+                                     gpu::FrameParams& params) noexcept;
+
+/// Light frusta, fluxes and sun of one interval. The frusta are fitted around what the camera sees
+/// for the sun at the interval's sample.
+/// Returns the fitted frusta for culling; count 0 when no map is needed.
+[[nodiscard]] LightFrusta set_step(const HistoryInterval& interval, const CameraSetup& camera,
+                                   const scene::ThermalOptions& options, bool first, bool last,
+                                   std::uint32_t relaxation_offset,
+                                   gpu::StepParams& params) noexcept;
+
+/// The interval that stands for the frame's instant alone: sun and shade now.
+[[nodiscard]] HistoryInterval instant_interval(const StepPlan& plan,
+                                               std::int64_t sim_time_ns) noexcept;
+
+/// Disc samples of the soft shadows: equal areas, golden angle, places along the drift stratified
+/// independently of the radius.
+[[nodiscard]] gpu::TapParams shadow_taps(std::uint32_t blocker_taps, std::uint32_t filter_taps) noexcept;
+
+/// Exact gains of every material over an interval.
+void set_relaxation(const HistoryInterval& interval, std::span<const scene::Material> materials,
+                    std::span<gpu::RelaxationParams> params) noexcept;
+
+}  // namespace emit::renderer

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/raster_passes.hpp"
+
+#include <cstdint>
+#include <initializer_list>
+
+namespace emit::renderer {
+namespace {
+
+void issue(std::span<const DrawCommand> commands) noexcept {
+  for (const DrawCommand& command : commands) {
+    const auto offset = static_cast<std::uintptr_t>(command.range.first_index) * 4U;
+    glDrawElementsInstancedBaseVertexBaseInstance(
+        GL_TRIANGLES, static_cast<GLsizei>(command.range.index_count), GL_UNSIGNED_INT,
+        reinterpret_cast<const void*>(offset), static_cast<GLsizei>(command.count),
+        command.base_vertex, command.first_record);
+  }
+}
+
+physics::Result<void> check_complete(const gl::Framebuffer& framebuffer, const char* name) {
+  if (glCheckNamedFramebufferStatus(framebuffer.id(), GL_DRAW_FRAMEBUFFER) ==
+      GL_FRAMEBUFFER_COMPLETE) {
+    return {};
+  }
+  return physics::make_error(physics::ErrorCode::gpu,
+                             std::string(name) + ": the driver refuses the render target");
+}
+
+}  // namespace
+
+SceneVertexArray::SceneVertexArray(const SceneBuffers& scene, const gl::Buffer& records)
+    : array_(gl::VertexArray::make()) {
+  const GLuint id = array_.id();
+  glVertexArrayElementBuffer(id, scene.indices());
+  glVertexArrayVertexBuffer(id, 0, scene.positions(), 0, 3 * sizeof(float));
+  glVertexArrayAttribFormat(id, EMIT_ATTR_POSITION, 3, GL_FLOAT, GL_FALSE, 0);
+  glVertexArrayAttribBinding(id, EMIT_ATTR_POSITION, 0);
+  glVertexArrayVertexBuffer(id, 1, scene.normals(), 0, 4 * sizeof(std::int16_t));
+  glVertexArrayAttribFormat(id, EMIT_ATTR_NORMAL, 4, GL_SHORT, GL_TRUE, 0);
+  glVertexArrayAttribBinding(id, EMIT_ATTR_NORMAL, 1);
+  glVertexArrayVertexBuffer(id, 2, records.id(), 0, sizeof(DrawRecord));
+  glVertexArrayAttribIFormat(id, EMIT_ATTR_DRAW, 2, GL_UNSIGNED_INT, 0);
+  glVertexArrayAttribBinding(id, EMIT_ATTR_DRAW, 2);
+  glVertexArrayBindingDivisor(id, 2, 1);
+  for (const GLuint attribute :
+       std::initializer_list<GLuint>{EMIT_ATTR_POSITION, EMIT_ATTR_NORMAL, EMIT_ATTR_DRAW}) {
+    glEnableVertexArrayAttrib(id, attribute);
+  }
+}
+
+physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px,
+                                                   std::uint32_t height_px) {
+  GeometryPass pass;
+  auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag");
+  if (!program) return tl::unexpected(std::move(program.error()));
+  pass.program_ = std::move(*program);
+  pass.width_px_ = static_cast<GLsizei>(width_px);
+  pass.height_px_ = static_cast<GLsizei>(height_px);
+  pass.depth_m_ = gl::Texture(GL_R32F, pass.width_px_, pass.height_px_);
+  pass.normal_ = gl::Texture(GL_RG16_SNORM, pass.width_px_, pass.height_px_);
+  pass.ids_ = gl::Texture(GL_RG16UI, pass.width_px_, pass.height_px_);
+  pass.depth_buffer_ = gl::Texture(GL_DEPTH_COMPONENT32F, pass.width_px_, pass.height_px_);
+  pass.framebuffer_ = gl::Framebuffer::make();
+  const GLuint id = pass.framebuffer_.id();
+  glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.depth_m_.id(), 0);
+  glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.normal_.id(), 0);
+  glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
+  glNamedFramebufferTexture(id, GL_DEPTH_ATTACHMENT, pass.depth_buffer_.id(), 0);
+  const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+  glNamedFramebufferDrawBuffers(id, 3, targets);
+  if (auto ok = check_complete(pass.framebuffer_, "geometry buffer"); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  return pass;
+}
+
+void GeometryPass::draw(const SceneVertexArray& vertices,
+                        std::span<const DrawCommand> single_sided,
+                        std::span<const DrawCommand> double_sided) const noexcept {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
+  glViewport(0, 0, width_px_, height_px_);
+  const GLfloat sky[4] = {EMIT_SKY_DEPTH_M, 0.0F, 0.0F, 0.0F};
+  const GLfloat zero[4] = {0.0F, 0.0F, 0.0F, 0.0F};
+  const GLuint none[4] = {0, 0, 0, 0};
+  const GLfloat far_away = 0.0F;  // reversed z
+  glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 0, sky);
+  glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 1, zero);
+  glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 2, none);
+  glClearNamedFramebufferfv(framebuffer_.id(), GL_DEPTH, 0, &far_away);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glFrontFace(GL_CW);  // image row 0 is at the bottom of GL's window: the view is mirrored
+  glCullFace(GL_BACK);
+  program_.use();
+  vertices.bind();
+  glEnable(GL_CULL_FACE);
+  issue(single_sided);
+  glDisable(GL_CULL_FACE);
+  issue(double_sided);
+}
+
+void GeometryPass::bind_textures() const noexcept {
+  depth_m_.bind(EMIT_TEX_DEPTH);
+  normal_.bind(EMIT_TEX_NORMAL);
+  ids_.bind(EMIT_TEX_IDS);
+}
+
+physics::Result<ShadowPass> ShadowPass::create(std::uint32_t size_px, std::uint32_t layers) {
+  ShadowPass pass;
+  auto program = gl::Program::graphics("passes/shadow.vert", "");
+  if (!program) return tl::unexpected(std::move(program.error()));
+  pass.program_ = std::move(*program);
+  pass.size_px_ = static_cast<GLsizei>(size_px);
+  pass.maps_ = gl::Texture(GL_DEPTH_COMPONENT32F, pass.size_px_, pass.size_px_,
+                           static_cast<GLsizei>(layers));
+  for (std::uint32_t i = 0; i < layers; ++i) {
+    pass.framebuffers_[i] = gl::Framebuffer::make();
+    const GLuint id = pass.framebuffers_[i].id();
+    glNamedFramebufferTextureLayer(id, GL_DEPTH_ATTACHMENT, pass.maps_.id(), 0,
+                                   static_cast<GLint>(i));
+    glNamedFramebufferDrawBuffer(id, GL_NONE);
+    if (auto ok = check_complete(pass.framebuffers_[i], "shadow map"); !ok) {
+      return tl::unexpected(std::move(ok.error()));
+    }
+  }
+  return pass;
+}
+
+void ShadowPass::draw(const SceneVertexArray& vertices, std::uint32_t cascade,
+                      std::span<const DrawCommand> commands) const noexcept {
+  const gl::Framebuffer& framebuffer = framebuffers_[cascade];
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.id());
+  glViewport(0, 0, size_px_, size_px_);
+  const GLfloat far_away = 1.0F;
+  glClearNamedFramebufferfv(framebuffer.id(), GL_DEPTH, 0, &far_away);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glDisable(GL_CULL_FACE);
+  program_.use();
+  glUniform1ui(0, cascade);
+  vertices.bind();
+  issue(commands);
+}
+
+void ShadowPass::bind_texture() const noexcept { maps_.bind(EMIT_TEX_SHADOW); }
+
+}  // namespace emit::renderer

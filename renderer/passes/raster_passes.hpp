@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "gl/objects.hpp"
+#include "gl/program.hpp"
+#include "passes/draw_lists.hpp"
+#include "passes/scene_buffers.hpp"
+
+namespace emit::renderer {
+
+/// Vertex array that reads SceneBuffers and one draw record per instance.
+class SceneVertexArray {
+ public:
+  SceneVertexArray(const SceneBuffers& scene, const gl::Buffer& records);
+  void bind() const noexcept { glBindVertexArray(array_.id()); }
+
+ private:
+  gl::VertexArray array_;
+};
+
+/// Paper part 1: linear depth, normal, material index and object id of the visible surface.
+class GeometryPass {
+ public:
+  [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
+                                                            std::uint32_t height_px);
+  void draw(const SceneVertexArray& vertices, std::span<const DrawCommand> single_sided,
+            std::span<const DrawCommand> double_sided) const noexcept;
+  /// Binds depth, normal and ids to their texture units.
+  void bind_textures() const noexcept;
+
+ private:
+  gl::Program program_;
+  gl::Texture depth_m_;
+  gl::Texture normal_;
+  gl::Texture ids_;
+  gl::Texture depth_buffer_;
+  gl::Framebuffer framebuffer_;
+  GLsizei width_px_ = 0;
+  GLsizei height_px_ = 0;
+};
+
+/// Paper part 3: depth seen from the sun, one layer per cascade, drawn anew for every step.
+class ShadowPass {
+ public:
+  [[nodiscard]] static physics::Result<ShadowPass> create(std::uint32_t size_px,
+                                                          std::uint32_t layers);
+  /// Draws into the layer of `cascade`, with the interval bound as EMIT_BIND_STEP.
+  void draw(const SceneVertexArray& vertices, std::uint32_t cascade,
+            std::span<const DrawCommand> commands) const noexcept;
+  void bind_texture() const noexcept;
+
+ private:
+  gl::Program program_;
+  gl::Texture maps_;
+  gl::Framebuffer framebuffers_[4];
+  GLsizei size_px_ = 0;
+};
+
+}  // namespace emit::renderer

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/readback_ring.hpp"
+
+namespace emit::renderer {
+
+ReadbackRing::ReadbackRing(std::uint32_t slots, std::size_t bytes_per_slot) : count_(slots) {
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    constexpr GLbitfield kFlags =
+        GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT | GL_CLIENT_STORAGE_BIT;
+    slots_[i].buffer = gl::Buffer(bytes_per_slot, nullptr, kFlags);
+    slots_[i].mapped = slots_[i].buffer.map_persistent(GL_MAP_READ_BIT);
+  }
+}
+
+ReadbackRing::~ReadbackRing() {
+  for (Slot& slot : slots_) {
+    if (slot.fence != nullptr) glDeleteSync(slot.fence);
+  }
+}
+
+bool ReadbackRing::mapped() const noexcept {
+  for (std::uint32_t i = 0; i < count_; ++i) {
+    if (slots_[i].mapped == nullptr) return false;
+  }
+  return true;
+}
+
+int ReadbackRing::acquire() noexcept {
+  for (std::uint32_t k = 0; k < count_; ++k) {
+    const std::uint32_t i = (next_ + k) % count_;
+    if (!slots_[i].used.exchange(true, std::memory_order_acq_rel)) {
+      next_ = (i + 1) % count_;
+      return static_cast<int>(i);
+    }
+  }
+  return -1;
+}
+
+void ReadbackRing::copy_from(const gl::Buffer& source, std::uint32_t slot) noexcept {
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+  glCopyNamedBufferSubData(source.id(), slots_[slot].buffer.id(), 0, 0,
+                           static_cast<GLsizeiptr>(source.bytes()));
+  glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
+  if (slots_[slot].fence != nullptr) glDeleteSync(slots_[slot].fence);
+  slots_[slot].fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  glFlush();
+}
+
+bool ReadbackRing::ready(std::uint32_t slot) noexcept {
+  if (slots_[slot].fence == nullptr) return true;
+  const GLenum state = glClientWaitSync(slots_[slot].fence, 0, 0);
+  return state != GL_TIMEOUT_EXPIRED;
+}
+
+bool ReadbackRing::wait(std::uint32_t slot) noexcept {
+  if (slots_[slot].fence == nullptr) return false;
+  constexpr GLuint64 kSecondNs = 1'000'000'000;
+  GLenum state = GL_TIMEOUT_EXPIRED;
+  while (state == GL_TIMEOUT_EXPIRED) {
+    state = glClientWaitSync(slots_[slot].fence, GL_SYNC_FLUSH_COMMANDS_BIT, kSecondNs);
+  }
+  glDeleteSync(slots_[slot].fence);
+  slots_[slot].fence = nullptr;
+  return state != GL_WAIT_FAILED;
+}
+
+void ReadbackRing::release(std::uint32_t slot) noexcept {
+  slots_[slot].used.store(false, std::memory_order_release);
+}
+
+}  // namespace emit::renderer

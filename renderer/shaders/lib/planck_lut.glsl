@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef EMIT_LIB_PLANCK_LUT
+#define EMIT_LIB_PLANCK_LUT
+
+// In-band radiance of a blackbody from the table T ln L over T that
+// emit/physics/band_radiance_lut.hpp builds (physics.md eq. 8).
+// The including shader defines EMIT_PLANCK_LUT(index), the float at that place of its buffer, and
+// hands over the layout as the C++ side computed it:
+//   layout.x  temperature of the first node, K
+//   layout.y  nodes per kelvin
+//   layout.z  number of nodes - 1
+//   layout.w  index of the first node in the buffer
+// Interpolation is done here: texture filters keep only 8 bits of the fraction.
+
+// Radiance in W m-2 sr-1. Outside the table its nearest end is used and `clamped` is set (never
+// cleared). NaN counts as below the table.
+float planck_lut_radiance_w_m2_sr(float temperature_k, vec4 layout_lut, inout bool clamped) {
+  float place = (temperature_k - layout_lut.x) * layout_lut.y;
+  float t = temperature_k;
+  if (!(place >= 0.0)) {
+    clamped = true;
+    place = 0.0;
+    t = layout_lut.x;
+  } else if (place > layout_lut.z) {
+    clamped = true;
+    place = layout_lut.z;
+    t = layout_lut.x + layout_lut.z / layout_lut.y;
+  }
+  float node = min(floor(place), layout_lut.z - 1.0);
+  int first = int(layout_lut.w) + int(node);
+  float y = mix(EMIT_PLANCK_LUT(first), EMIT_PLANCK_LUT(first + 1), place - node);
+  return exp(y / t);
+}
+
+#endif

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reading the geometry buffer.
+#include "shared/frame_params.glsl.h"
+#include "passes/octahedral.glsl"
+
+layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
+layout(binding = EMIT_TEX_DEPTH) uniform sampler2D depth_texture;
+layout(binding = EMIT_TEX_NORMAL) uniform sampler2D normal_texture;
+layout(binding = EMIT_TEX_IDS) uniform usampler2D ids_texture;
+
+float gbuffer_depth_m(ivec2 px) { return texelFetch(depth_texture, px, 0).r; }
+
+vec3 gbuffer_normal(ivec2 px) { return unit_from_octahedral(texelFetch(normal_texture, px, 0).rg); }
+
+// x = material, y = object id
+uvec2 gbuffer_ids(ivec2 px) { return texelFetch(ids_texture, px, 0).rg; }
+
+// Unnormalised direction through a pixel's centre, relworld axes, unit length along the boresight.
+vec3 view_ray(ivec2 px) {
+  vec2 ndc = (vec2(px) + 0.5) / vec2(frame.format_px.xy) * 2.0 - 1.0;
+  return mat3(frame.relworld_from_sensor) * vec3(ndc * frame.tan_half_fov.xy, 1.0);
+}

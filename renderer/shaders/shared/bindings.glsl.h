@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every binding number of the GPU path, for C++ and GLSL.
+#pragma once
+
+// Uniform blocks: read with the same index by every pixel.
+#define EMIT_BIND_FRAME 0
+#define EMIT_BIND_STEP 1
+#define EMIT_BIND_BANDS 2
+#define EMIT_BIND_TAPS 3
+
+// Shader storage blocks: written.
+#define EMIT_BIND_OUTPUT 0
+#define EMIT_BIND_STATS 1
+
+// Texture units. Tables that every pixel reads at its own place are buffer textures: software
+// rasterisers fetch those much faster than storage blocks.
+#define EMIT_TEX_DEPTH 0
+#define EMIT_TEX_NORMAL 1
+#define EMIT_TEX_IDS 2
+#define EMIT_TEX_SHADOW 3
+#define EMIT_TEX_OCCLUSION 4
+#define EMIT_TEX_STATE 5
+#define EMIT_TEX_SUN_NOW 6
+#define EMIT_TEX_MATERIALS 7
+#define EMIT_TEX_RELAXATION 8
+#define EMIT_TEX_BAND_LUT 9
+#define EMIT_TEX_INSTANCES 10
+
+// Image units.
+#define EMIT_IMG_OCCLUSION 0
+#define EMIT_IMG_STATE 1
+#define EMIT_IMG_SUN_NOW 2
+
+// Vertex attributes.
+#define EMIT_ATTR_POSITION 0
+#define EMIT_ATTR_NORMAL 1
+#define EMIT_ATTR_DRAW 2
+
+#define EMIT_MAX_CASCADES 4
+#define EMIT_MAX_BANDS 4
+#define EMIT_MAX_MODES 2
+#define EMIT_MAX_ATMOSPHERE_TERMS 4
+#define EMIT_MAX_TAPS 256
+
+// Boresight distance in the geometry buffer where no surface is seen.
+#define EMIT_SKY_DEPTH_M 1e30f
+
+// FrameParams.format_px.w
+#define EMIT_OUTPUT_TEMPERATURE 1u
+#define EMIT_OUTPUT_DEPTH 2u
+#define EMIT_OUTPUT_OBJECT 4u
+
+// StepParams.info.z
+#define EMIT_STEP_FIRST 1u
+#define EMIT_STEP_SUN_UP 2u
+#define EMIT_STEP_SUN_NOW 4u

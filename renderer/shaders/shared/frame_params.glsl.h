@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "shared/bindings.glsl.h"
+#include "shared/cpp_glsl.glsl.h"
+// "relworld": world axes (east, north, up), origin at the camera, metres.
+EMIT_SHARED_BEGIN
+
+struct FrameParams {
+  mat4 clip_from_relworld;    // reversed z, infinite far plane; image row 0 at NDC y = -1
+  mat4 relworld_from_sensor;  // rotation
+  vec4 tan_half_fov;          // x, y; z = near plane in m; w = pixels per unit tangent
+  uvec4 format_px;            // width, height, pixels per plane, EMIT_OUTPUT_* flags
+  vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K
+  uvec4 bands;                // x = number of bands, y = nodes of a band's table
+  vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
+};
+
+// One placed mesh, four texels of the instance table: rows of the affine relworld_from_mesh.
+struct InstanceParams {
+  vec4 relworld_from_mesh_row0;
+  vec4 relworld_from_mesh_row1;
+  vec4 relworld_from_mesh_row2;
+  vec4 ids;  // x = object id (1 + index of the scenario's object), exact in float32
+};
+
+// Four texels of the material table.
+struct MaterialParams {
+  float solar_absorptance_frac;
+  float emissivity_frac;
+  float conductance_w_m2_k;   // lambda / d of Eq. 5
+  float base_k;
+  float initial_offset_k;     // surface at history start, minus the reference temperature
+  float prescribed_offset_k;  // if prescribed
+  float prescribed;           // 1: temperature is given; 0: simulated
+  float pad;
+  vec4 band_emissivity_frac;  // by scenario band
+  vec4 spare;
+};
+
+// One light frustum of a history step: light coordinates in metres.
+struct CascadeParams {
+  vec4 light_row0;  // dot(row, vec4(p_relworld, 1)) = metres from the map's left edge
+  vec4 light_row1;  // ... from its first row
+  vec4 light_row2;  // ... behind the light's near plane
+  vec4 scale;       // x, y = 1 / extent; z = 1 / depth range; w = boresight distance where it ends
+  vec4 drift;       // xy = way of a shadow over the interval per metre between blocker and receiver
+};
+
+// Disc samples of the soft shadows (xy, radius 1) and their place along the drift (z, -0.5..0.5).
+struct TapParams {
+  vec4 blocker[EMIT_MAX_TAPS];
+  vec4 filter_[EMIT_MAX_TAPS];
+};
+
+// One interval of the thermal history; "start" and "end" are its two ends.
+struct StepParams {
+  CascadeParams cascades[EMIT_MAX_CASCADES];
+  vec4 sun_start;   // xyz = unit vector towards the sun, w = direct normal flux after clouds, W m-2
+  vec4 sun_end;
+  vec4 flux_start;  // x = S_i, y = R_LW, z = exitance of the surroundings (R_e / emissivity), W m-2
+  vec4 flux_end;
+  vec4 casters;     // x = height of the highest caster above the camera, m; y = sine of the sun's elevation
+  uvec4 info;       // x = number of cascades; y = offset into relaxation table; z = EMIT_STEP_* flags
+};
+
+// Two texels of the relaxation table: exact exponential step of one material over one interval (lib/relaxation.glsl).
+struct RelaxationParams {
+  vec4 mode0;  // gain of the drive at the start, at the end, weight of the mode, 0
+  vec4 mode1;
+};
+
+struct BandParams {
+  vec4 terms_amplitude_frac;
+  vec4 terms_extinction_per_m;
+  float air_radiance_w_m2_sr;          // blackbody at air temperature
+  float surroundings_radiance_w_m2_sr; // blackbody at environment temperature
+  float sky_hemisphere_w_m2_sr;        // cosine-weighted mean over the sky
+  float vertical_transmittance_frac;   // ground to space
+  float sun_irradiance_w_m2;           // in band, normal to the sun, at the ground
+  float lut_first_k;                   // layout of the band's T ln L table
+  float lut_nodes_per_k;
+  float lut_last_node;
+};
+
+
+// Counters of one frame, written with atomics.
+struct FrameStatsGpu {
+  uint nonfinite_px;
+  uint clamped_px;
+  uint surface_px;
+  uint pad;
+};
+
+EMIT_SHARED_END
