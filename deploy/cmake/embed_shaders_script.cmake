@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+cmake_minimum_required(VERSION 3.25)
 # Run by emit_embed_shaders: writes OUTPUT from the FILES (comma separated) under ROOT.
 string(REPLACE "," ";" files "${FILES}")
 file(WRITE ${OUTPUT} "// Generated from ${ROOT}; do not edit.\n#include \"gl/shader_source.hpp\"\n\nnamespace emit::gl {\nnamespace {\nconstexpr EmbeddedShader kShaders[] = {\n")

@@ -95,12 +95,12 @@ physics::Result<Program> Program::graphics(std::string_view vertex_path,
   return Program(*program);
 }
 
-GLint Program::buffer_variable_offset(const char* name) const noexcept {
-  const GLuint index = glGetProgramResourceIndex(id_, GL_BUFFER_VARIABLE, name);
+GLint Program::uniform_offset(const char* name) const noexcept {
+  const GLuint index = glGetProgramResourceIndex(id_, GL_UNIFORM, name);
   if (index == GL_INVALID_INDEX) return -1;
   const GLenum property = GL_OFFSET;
   GLint offset = -1;
-  glGetProgramResourceiv(id_, GL_BUFFER_VARIABLE, index, 1, &property, 1, nullptr, &offset);
+  glGetProgramResourceiv(id_, GL_UNIFORM, index, 1, &property, 1, nullptr, &offset);
   return offset;
 }
 

@@ -30,8 +30,8 @@ class Program {
 
   void use() const noexcept { glUseProgram(id_); }
   [[nodiscard]] GLuint id() const noexcept { return id_; }
-  /// Byte offset that the driver gave a member of a storage block ("block[0].member"), -1 if absent.
-  [[nodiscard]] GLint buffer_variable_offset(const char* name) const noexcept;
+  /// Byte offset that the driver gave a member of a uniform block, -1 if it is not in use.
+  [[nodiscard]] GLint uniform_offset(const char* name) const noexcept;
 
  private:
   explicit Program(GLuint id) noexcept : id_(id) {}

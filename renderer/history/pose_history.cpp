@@ -92,32 +92,63 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
   moving_ = moving_now;
   if (last.on != on || teleport) note_event(sim_time_ns);
 
-  if (live_.size() >= 2 && !teleport && !last.teleport && last.on == on) {
-    const scene::Keyframe& before = live_[live_.size() - 2];
-    const bool short_span = sim_time_ns - before.sim_time_ns <= kThinSpanNs;
-    const bool at_rest = close(before.pose, last.pose) && close(last.pose, pose);
-    const physics::Pose expected =
-        physics::interpolate(before.pose, pose,
-                             fraction(before.sim_time_ns, sim_time_ns, last.sim_time_ns));
-    if (before.on == on && (at_rest || (short_span && close(expected, last.pose)))) {
-      live_.back() = next;
-      return true;
-    }
+  if (replaces_last(next)) {
+    live_.back() = next;
+    return true;
   }
-  if (live_.size() == kMaxLivePoses) {
-    // Keeps the newest half whole and every other pose of the oldest half.
-    const auto half = live_.begin() + kMaxLivePoses / 2;
-    auto write = live_.begin() + 1;
-    for (auto read = live_.begin() + 2; read < half; read += 2) *write++ = *read;
-    dropped_ += static_cast<std::uint64_t>(half - write);
-    live_.erase(write, half);
-  }
+  skipped_count_ = 0;
+  skipped_stride_ = 1;
+  skipped_phase_ = 0;
+  if (live_.size() == kMaxLivePoses) make_room();
   live_.push_back(next);
   return true;
 }
 
+/// True when the newest pose may go because the way from the one before it to `next` passes it and
+/// everything already thinned out in between.
+bool PoseHistory::replaces_last(const scene::Keyframe& next) noexcept {
+  if (live_.size() < 2) return false;
+  const scene::Keyframe& before = live_[live_.size() - 2];
+  const scene::Keyframe& last = live_.back();
+  if (next.teleport || last.teleport || last.on != next.on || before.on != next.on) return false;
+  const bool at_rest = close(before.pose, last.pose) && close(before.pose, next.pose);
+  if (!at_rest && next.sim_time_ns - before.sim_time_ns > kThinSpanNs) return false;
+  const auto fits = [&](const scene::Keyframe& key) {
+    return close(physics::interpolate(
+                     before.pose, next.pose,
+                     fraction(before.sim_time_ns, next.sim_time_ns, key.sim_time_ns)),
+                 key.pose);
+  };
+  if (!fits(last)) return false;
+  for (std::size_t i = 0; i < skipped_count_; ++i) {
+    if (!fits(skipped_[i])) return false;
+  }
+  if (++skipped_phase_ >= skipped_stride_) {
+    skipped_phase_ = 0;
+    if (skipped_count_ == skipped_.size()) {
+      for (std::size_t i = 0; 2 * i + 1 < skipped_.size(); ++i) skipped_[i] = skipped_[2 * i + 1];
+      skipped_count_ = skipped_.size() / 2;
+      skipped_stride_ *= 2;
+    }
+    skipped_[skipped_count_++] = last;
+  }
+  return true;
+}
+
+/// Keeps the newest half whole and every other pose of the oldest half.
+void PoseHistory::make_room() noexcept {
+  const auto half = live_.begin() + kMaxLivePoses / 2;
+  auto write = live_.begin() + 1;
+  for (auto read = live_.begin() + 2; read < half; read += 2) *write++ = *read;
+  dropped_ += static_cast<std::uint64_t>(half - write);
+  live_.erase(write, half);
+}
+
 void PoseHistory::reset() noexcept {
   live_.clear();
+  skipped_count_ = 0;
+  skipped_stride_ = 1;
+  skipped_phase_ = 0;
   moving_ = false;
   // The script's own events may have been cut by live poses.
   events_ns_.clear();

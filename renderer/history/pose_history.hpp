@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,9 +23,9 @@ class PoseHistory {
   /// `placement` holds until the first keyframe of an entity without trajectory.
   PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement);
 
-  /// Adds a live pose. Poses on the straight line between their neighbours are thinned out (to
-  /// 1 cm and 1 mrad, at most one second apart while moving). A time before the newest live pose
-  /// is refused (false).
+  /// Adds a live pose. Poses that lie on the way between their neighbours are thinned out (to 1 cm
+  /// and 1 mrad, at most one second apart while moving). A time before the newest live pose is
+  /// refused (false).
   bool append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on, bool teleport) noexcept;
   /// Forgets the live poses.
   void reset() noexcept;
@@ -42,12 +43,19 @@ class PoseHistory {
 
  private:
   void note_event(std::int64_t sim_time_ns) noexcept;
+  [[nodiscard]] bool replaces_last(const scene::Keyframe& next) noexcept;
+  void make_room() noexcept;
   void note_scripted_events() noexcept;
 
   scene::Trajectory scripted_;
   scene::Trajectory live_;
   std::vector<std::int64_t> events_ns_;
   bool moving_ = false;
+  // Thinned-out poses since the last kept one, a sample of them: what the next pose must fit.
+  std::array<scene::Keyframe, 16> skipped_;
+  std::size_t skipped_count_ = 0;
+  std::size_t skipped_stride_ = 1;
+  std::size_t skipped_phase_ = 0;
   std::uint64_t dropped_ = 0;
 };
 

@@ -127,7 +127,8 @@ gpu::TapParams shadow_taps(std::uint32_t blocker_taps, std::uint32_t filter_taps
       const double place = (i + 0.5) * kGoldenFrac;
       out[i] = glm::vec4(static_cast<float>(radius * std::cos(kGoldenAngleRad * i)),
                          static_cast<float>(radius * std::sin(kGoldenAngleRad * i)),
-                         static_cast<float>(place - std::floor(place) - 0.5), 0.0F);
+                         static_cast<float>(place - std::floor(place) - 0.5),
+                         static_cast<float>(std::pow((i + 0.5) / count, 2)));
     }
   };
   fill(params.blocker, blocker_taps);

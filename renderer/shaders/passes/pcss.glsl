@@ -27,48 +27,53 @@ float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
   vec2 slope = -n_light.xy / min(n_light.z, -0.05);
 
   vec2 map_px = vec2(textureSize(shadow_maps, 0).xy);
-  vec2 texel_m = 1.0 / (scale.xy * map_px);
+  vec2 px_per_m = scale.xy * map_px;
+  vec2 texel_m = 1.0 / px_per_m;
   float texel_max_m = max(texel_m.x, texel_m.y);
   float bias_m = 0.1 * texel_max_m * (1.0 + length(slope)) + 1e-3;
   float tan_sun = tan(EMIT_SUN_SEMI_ANGLE_RAD);
 
+  // From here on in texels across the map and in its own unit of depth.
+  vec2 at_px = light_m.xy * px_per_m;
+  vec2 drift_px = drift * px_per_m;
+  vec2 slope_px = slope * texel_m * scale.z;
+  float limit = (light_m.z - bias_m) * scale.z;
+
   // Blockers may stand anywhere below the highest caster, along the line to the sun.
   float rise_to_top_m = max(casters.x - p_relworld_m.z, 0.0);
   float max_gap_m = min(light_m.z, rise_to_top_m / max(casters.y, 1e-3) + texel_max_m);
-  float search_m = max(max_gap_m * tan_sun, 1.5 * texel_max_m);
-  float blocker_sum_m = 0.0;
+  vec2 search_px = max(max_gap_m * tan_sun, 1.5 * texel_max_m) * px_per_m;
+  float blocker_sum = 0.0;
   float blockers = 0.0;
   for (uint i = 0u; i < EMIT_BLOCKER_TAPS; ++i) {
     // Near blockers drift little, far ones much: the taps try distances from near to far.
-    float try_frac = (float(i) + 0.5) / float(EMIT_BLOCKER_TAPS);
-    vec2 offset_m = taps.blocker[i].xy * search_m +
-                    drift * (taps.blocker[i].z * max_gap_m * try_frac * try_frac);
-    ivec2 texel = ivec2(floor((light_m.xy + offset_m) / texel_m));
-    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, ivec2(map_px)))) continue;
-    float depth_m = texelFetch(shadow_maps, ivec3(texel, int(cascade)), 0).r / scale.z;
-    float plane_m = light_m.z + dot(slope, (vec2(texel) + 0.5) * texel_m - light_m.xy);
-    if (depth_m < plane_m - bias_m) {
-      blocker_sum_m += depth_m;
+    vec4 tap = taps.blocker[i];
+    vec2 texel = floor(at_px + tap.xy * search_px + drift_px * (tap.z * tap.w * max_gap_m));
+    if (any(lessThan(texel, vec2(0.0))) || any(greaterThanEqual(texel, map_px))) continue;
+    float depth = texelFetch(shadow_maps, ivec3(ivec2(texel), int(cascade)), 0).r;
+    if (depth < limit + dot(slope_px, texel + 0.5 - at_px)) {
+      blocker_sum += depth;
       blockers += 1.0;
     }
   }
   if (blockers == 0.0) return 1.0;
 
-  float gap_m = max(light_m.z - blocker_sum_m / blockers, 0.0);
-  float filter_m = max(gap_m * tan_sun, 0.5 * texel_max_m);
+  float gap_m = max(light_m.z - blocker_sum / (blockers * scale.z), 0.0);
+  vec2 filter_px = max(gap_m * tan_sun, 0.5 * texel_max_m) * px_per_m;
+  vec2 gap_drift_px = drift_px * gap_m;
+  vec2 texel_uv = 1.0 / map_px;
+  // Steps of the plane to the gathered texels, in the order (0,1) (1,1) (1,0) (0,0).
+  vec4 rise = vec4(slope_px.y, slope_px.x + slope_px.y, slope_px.x, 0.0);
   float lit = 0.0;
   for (uint i = 0u; i < EMIT_FILTER_TAPS; ++i) {
-    vec2 offset_m = taps.filter_[i].xy * filter_m + drift * (taps.filter_[i].z * gap_m);
     // Bilinear mean of four comparisons, each on the receiver's plane at its texel's centre.
-    vec2 at = (light_m.xy + offset_m) / texel_m - 0.5;
-    vec2 corner = floor(at);
-    vec2 weight = at - corner;
-    vec4 depth_m = textureGather(shadow_maps, vec3((corner + 1.0) / map_px, float(cascade))) / scale.z;
-    float plane_m = light_m.z + dot(slope, (corner + 0.5) * texel_m - light_m.xy) - bias_m;
-    vec2 rise_m = slope * texel_m;
-    // Gather order: (0,1) (1,1) (1,0) (0,0).
-    vec4 plane4_m = plane_m + vec4(rise_m.y, rise_m.x + rise_m.y, rise_m.x, 0.0);
-    vec4 open = vec4(greaterThanEqual(depth_m, plane4_m));
+    vec4 tap = taps.filter_[i];
+    vec2 offset_px = tap.xy * filter_px + gap_drift_px * tap.z - 0.5;
+    vec2 corner = floor(at_px + offset_px);
+    vec2 weight = at_px + offset_px - corner;
+    vec4 depth = textureGather(shadow_maps, vec3((corner + 1.0) * texel_uv, float(cascade)));
+    vec4 plane = limit + dot(slope_px, corner + 0.5 - at_px) + rise;
+    vec4 open = vec4(greaterThanEqual(depth, plane));
     vec2 rows = mix(open.wx, open.zy, weight.x);
     lit += mix(rows.x, rows.y, weight.y);
   }

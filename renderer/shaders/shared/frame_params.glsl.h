@@ -46,7 +46,8 @@ struct CascadeParams {
   vec4 drift;       // xy = way of a shadow over the interval per metre between blocker and receiver
 };
 
-// Disc samples of the soft shadows (xy, radius 1) and their place along the drift (z, -0.5..0.5).
+// Disc samples of the soft shadows: xy = place in the unit disc, z = place along the drift (-0.5..0.5),
+// w = share of the greatest blocker distance that a search tap assumes for its drift.
 struct TapParams {
   vec4 blocker[EMIT_MAX_TAPS];
   vec4 filter_[EMIT_MAX_TAPS];

@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <glm/ext/vector_double3.hpp>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "node.hpp"
+
+/// The key table: every key of every file is one Key<T>, which reads, checks, prints and
+/// documents itself. T is the plain struct (or a small draft around it) that the key fills.
+namespace emit::config {
+
+/// What the documentation says about a key.
+struct KeySpec {
+  std::string name;
+  std::string type;
+  std::string unit;
+  std::string range;
+  std::string meaning;
+  bool required = false;
+};
+
+/// Interval a number must lie in; also its text for messages and documentation.
+struct Range {
+  double lo = -std::numeric_limits<double>::infinity();
+  double hi = std::numeric_limits<double>::infinity();
+  bool lo_open = false;
+
+  [[nodiscard]] bool contains(double value) const noexcept {
+    return std::isfinite(value) && (lo_open ? value > lo : value >= lo) && value <= hi;
+  }
+  [[nodiscard]] std::string to_string() const;
+};
+[[nodiscard]] inline Range between(double lo, double hi) {
+  return {lo, hi, false};
+}
+[[nodiscard]] inline Range above(double lo) {
+  return {lo, Range{}.hi, true};
+}
+[[nodiscard]] inline Range above_to(double lo, double hi) {
+  return {lo, hi, true};
+}
+[[nodiscard]] inline Range at_least(double lo) {
+  return {lo, Range{}.hi, false};
+}
+[[nodiscard]] inline Range any_number() {
+  return {};
+}
+
+template <class T>
+struct Key {
+  KeySpec spec;
+  std::function<void(T&, const Node&, Diagnostics&)> read;
+  /// TOML text of the value; empty when there is nothing to write.
+  std::function<std::optional<std::string>(const T&)> write;
+};
+template <class T>
+using KeyTable = std::vector<Key<T>>;
+
+// Reading of single values; on a fault they report it and leave `out` alone.
+void read_number(const Node& node, const std::string& name, const Range& range, double& out,
+                 Diagnostics& diagnostics);
+void read_integer(const Node& node, const std::string& name, std::int64_t lo, std::int64_t hi,
+                  std::int64_t& out, Diagnostics& diagnostics);
+void read_boolean(const Node& node, const std::string& name, bool& out, Diagnostics& diagnostics);
+bool read_text(const Node& node, const std::string& name, std::string& out,
+               Diagnostics& diagnostics);
+void read_path(const Node& node, const std::string& name, std::filesystem::path& out,
+               Diagnostics& diagnostics);
+void read_vector(const Node& node, const std::string& name, std::size_t count, double* out,
+                 Diagnostics& diagnostics);
+void read_instant(const Node& node, const std::string& name, std::int64_t& out,
+                  Diagnostics& diagnostics);
+/// Reports `node` unless it is a table / an array of tables.
+bool expect_table(const Node& node, const std::string& name, Diagnostics& diagnostics);
+bool expect_table_array(const Node& node, const std::string& name, Diagnostics& diagnostics);
+
+/// "unknown key 'x', did you mean 'y'?"
+[[nodiscard]] std::string unknown_key_text(std::string_view key,
+                                           const std::vector<std::string_view>& known);
+
+/// Shortest decimal that gives `value` back when multiplied by `scale`.
+[[nodiscard]] std::string unscaled_number(double value, double scale);
+
+/// Reads every member of `table` by `keys`: unknown ones, faulty values and missing required ones
+/// are reported. `also_known` are keys of the same table that the caller reads itself.
+template <class T>
+void read_table(const Node& table, const KeyTable<T>& keys, T& out, Diagnostics& diagnostics,
+                const std::vector<std::string_view>& also_known = {}) {
+  for (const Member& member : table.members) {
+    const Key<T>* found = nullptr;
+    for (const Key<T>& key : keys) {
+      if (key.spec.name == member.key) {
+        found = &key;
+        break;
+      }
+    }
+    if (found != nullptr) {
+      found->read(out, member.value, diagnostics);
+      continue;
+    }
+    bool known = false;
+    for (const std::string_view name : also_known) {
+      known = known || name == member.key;
+    }
+    if (!known) {
+      std::vector<std::string_view> names = also_known;
+      for (const Key<T>& key : keys) {
+        names.push_back(key.spec.name);
+      }
+      diagnostics.add(member.key_at, unknown_key_text(member.key, names));
+    }
+  }
+  for (const Key<T>& key : keys) {
+    if (key.spec.required && !table.has(key.spec.name)) {
+      diagnostics.add(table.at, "key '" + key.spec.name + "' is missing");
+    }
+  }
+}
+
+/// Appends "name = value" lines.
+template <class T>
+void write_table(const T& value, const KeyTable<T>& keys, std::string& out) {
+  for (const Key<T>& key : keys) {
+    if (const std::optional<std::string> text = key.write(value)) {
+      out += key.spec.name + " = " + *text + "\n";
+    }
+  }
+}
+/// The same as an inline table.
+template <class T>
+std::string inline_table(const T& value, const KeyTable<T>& keys) {
+  std::string out = "{";
+  for (const Key<T>& key : keys) {
+    if (const std::optional<std::string> text = key.write(value)) {
+      out += (out.size() > 1 ? ", " : " ") + key.spec.name + " = " + *text;
+    }
+  }
+  return out + " }";
+}
+
+/// Which member a key fills, for const and mutable structs alike.
+#define EMIT_FIELD(member)    \
+  [](auto& object) -> auto& { \
+    return object.member;     \
+  }
+
+template <class T, class Field>
+Key<T> number(std::string name, std::string unit, Range range, Field field, std::string meaning,
+              double scale = 1.0) {
+  Key<T> key;
+  key.spec = {name, "float", std::move(unit), range.to_string(), std::move(meaning), false};
+  key.read = [name, range, field, scale](T& out, const Node& node, Diagnostics& diagnostics) {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    read_number(node, name, range, value, diagnostics);
+    if (!std::isnan(value)) {
+      field(out) = value * scale;
+    }
+  };
+  key.write = [field, scale](const T& in) -> std::optional<std::string> {
+    if constexpr (std::is_same_v<std::decay_t<decltype(field(in))>, std::optional<double>>) {
+      if (!field(in)) {
+        return std::nullopt;
+      }
+      return unscaled_number(*field(in), scale);
+    } else {
+      return unscaled_number(field(in), scale);
+    }
+  };
+  return key;
+}
+
+/// A time kept as int64 ns; `scale_ns` is the unit of the file (1e9 for seconds).
+template <class T, class Field>
+Key<T> nanoseconds(std::string name, std::string unit, double scale_ns, Range range, Field field,
+                   std::string meaning) {
+  Key<T> key;
+  key.spec = {name, "float", std::move(unit), range.to_string(), std::move(meaning), false};
+  key.read = [name, range, field, scale_ns](T& out, const Node& node, Diagnostics& diagnostics) {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    read_number(node, name, range, value, diagnostics);
+    if (!std::isnan(value)) {
+      field(out) = std::llround(value * scale_ns);
+    }
+  };
+  key.write = [field, scale_ns](const T& in) -> std::optional<std::string> {
+    return toml_number(static_cast<double>(field(in)) / scale_ns);
+  };
+  return key;
+}
+
+template <class T, class Field>
+Key<T> integer(std::string name, std::string unit, std::int64_t lo, std::int64_t hi, Field field,
+               std::string meaning) {
+  Key<T> key;
+  key.spec = {name,
+              "integer",
+              std::move(unit),
+              std::to_string(lo) + " .. " + std::to_string(hi),
+              std::move(meaning),
+              false};
+  key.read = [name, lo, hi, field](T& out, const Node& node, Diagnostics& diagnostics) {
+    auto& member = field(out);
+    auto value = static_cast<std::int64_t>(member);
+    read_integer(node, name, lo, hi, value, diagnostics);
+    member = static_cast<std::decay_t<decltype(member)>>(value);
+  };
+  key.write = [field](const T& in) -> std::optional<std::string> {
+    return std::to_string(field(in));
+  };
+  return key;
+}
+
+template <class T, class Field>
+Key<T> boolean(std::string name, Field field, std::string meaning) {
+  Key<T> key;
+  key.spec = {name, "boolean", "", "true, false", std::move(meaning), false};
+  key.read = [name, field](T& out, const Node& node, Diagnostics& diagnostics) {
+    read_boolean(node, name, field(out), diagnostics);
+  };
+  key.write = [field](const T& in) -> std::optional<std::string> {
+    return field(in) ? "true" : "false";
+  };
+  return key;
+}
+
+template <class T, class Field>
+Key<T> text(std::string name, Field field, std::string meaning) {
+  Key<T> key;
+  key.spec = {name, "string", "", "", std::move(meaning), false};
+  key.read = [name, field](T& out, const Node& node, Diagnostics& diagnostics) {
+    read_text(node, name, field(out), diagnostics);
+  };
+  key.write = [field](const T& in) -> std::optional<std::string> { return toml_string(field(in)); };
+  return key;
+}
+
+/// One of several words; V is what each stands for (an enumerator, or the word itself).
+template <class T, class Field, class V>
+Key<T> choice(std::string name, std::vector<std::pair<std::string, V>> options, Field field,
+              std::string meaning) {
+  std::string listed;
+  for (const auto& option : options) {
+    listed += (listed.empty() ? "" : ", ") + option.first;
+  }
+  Key<T> key;
+  key.spec = {name, "string", "", listed, std::move(meaning), false};
+  key.read = [name, options, listed, field](T& out, const Node& node, Diagnostics& diagnostics) {
+    std::string word;
+    if (!read_text(node, name, word, diagnostics)) {
+      return;
+    }
+    for (const auto& option : options) {
+      if (option.first == word) {
+        field(out) = option.second;
+        return;
+      }
+    }
+    diagnostics.add(node.at, "'" + name + "' is '" + word + "', must be one of: " + listed);
+  };
+  key.write = [options, field](const T& in) -> std::optional<std::string> {
+    for (const auto& option : options) {
+      if (option.second == field(in)) {
+        return toml_string(option.first);
+      }
+    }
+    return std::nullopt;
+  };
+  return key;
+}
+
+template <class T, class Field>
+Key<T> path(std::string name, Field field, std::string meaning) {
+  Key<T> key;
+  key.spec = {name, "path", "", "", std::move(meaning), false};
+  key.read = [name, field](T& out, const Node& node, Diagnostics& diagnostics) {
+    read_path(node, name, field(out), diagnostics);
+  };
+  key.write = [field](const T& in) -> std::optional<std::string> {
+    if (field(in).empty()) {
+      return std::nullopt;
+    }
+    return toml_string(field(in).string());
+  };
+  return key;
+}
+
+/// A key with its own reader and writer.
+template <class T>
+Key<T> custom(KeySpec spec, std::function<void(T&, const Node&, Diagnostics&)> read,
+              std::function<std::optional<std::string>(const T&)> write) {
+  return {std::move(spec), std::move(read), std::move(write)};
+}
+
+/// Not written while `present` says there is no value.
+template <class T, class Present>
+Key<T> written_if(Present present, Key<T> key) {
+  key.write = [present, inner = std::move(key.write)](const T& in) -> std::optional<std::string> {
+    if (!present(in)) {
+      return std::nullopt;
+    }
+    return inner(in);
+  };
+  return key;
+}
+
+template <class T>
+Key<T> required(Key<T> key) {
+  key.spec.required = true;
+  return key;
+}
+
+}  // namespace emit::config

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "emit/config/daemon_config.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "key.hpp"
+
+/// The one key table, by section. Drafts hold what a file may say before it is resolved.
+namespace emit::config {
+
+/// Position and one of three spellings of the attitude.
+struct PoseDraft {
+  glm::dvec3 position_m{0.0, 0.0, 0.0};
+  double heading_rad = 0.0;
+  double pitch_rad = 0.0;
+  double roll_rad = 0.0;
+  std::optional<glm::dvec3> look_at_m;
+  std::optional<std::array<double, 4>> attitude_wxyz;
+};
+struct InstanceDraft {
+  PoseDraft pose;
+};
+struct KeyframeDraft {
+  std::int64_t time_ns = 0;
+  PoseDraft pose;
+  bool on = true;
+  bool teleport = false;
+};
+struct ObjectDraft {
+  scene::ObjectDesc desc;
+  PoseDraft pose;
+  std::vector<InstanceDraft> instances;
+  std::vector<KeyframeDraft> trajectory;
+  std::filesystem::path trajectory_file;
+};
+struct SensorDraft {
+  scene::SensorDesc desc;
+  PoseDraft pose;
+  std::vector<KeyframeDraft> trajectory;
+  std::filesystem::path trajectory_file;
+};
+struct WeatherDraft {
+  std::filesystem::path file;
+  scene::ClearSkyDesc clear_sky;
+  std::vector<scene::WeatherSample> samples;
+};
+struct AtmosphereDraft {
+  bool enabled = true;
+  std::string model = "midlatitude_summer";
+  std::filesystem::path file;
+  std::vector<scene::BandAtmosphere> bands;
+};
+struct BandDraft {
+  scene::SpectralBand desc;
+  std::filesystem::path response_file;
+};
+/// Keys above the first section.
+struct ScenarioHead {
+  std::string name;
+  std::int64_t epoch_utc_ns = 0;
+  std::vector<std::filesystem::path> materials;
+  std::string default_material;
+};
+struct DaemonHead {
+  std::string scenario;
+};
+
+/// Defaults that differ from those of the plain structs.
+[[nodiscard]] SensorDraft default_sensor();
+[[nodiscard]] ScenarioHead default_scenario_head();
+
+[[nodiscard]] const KeyTable<ScenarioHead>& scenario_head_keys();
+[[nodiscard]] const KeyTable<scene::Place>& place_keys();
+[[nodiscard]] const KeyTable<WeatherDraft>& weather_keys();
+[[nodiscard]] const KeyTable<scene::WeatherSample>& weather_sample_keys();
+[[nodiscard]] const KeyTable<AtmosphereDraft>& atmosphere_keys();
+[[nodiscard]] const KeyTable<scene::BandAtmosphere>& band_atmosphere_keys();
+[[nodiscard]] const KeyTable<scene::ThermalOptions>& thermal_keys();
+[[nodiscard]] const KeyTable<scene::DisplayOptions>& display_keys();
+[[nodiscard]] const KeyTable<SensorDraft>& sensor_keys();
+[[nodiscard]] const KeyTable<BandDraft>& band_keys();
+[[nodiscard]] const KeyTable<scene::ChannelDesc>& channel_keys();
+[[nodiscard]] const KeyTable<ObjectDraft>& object_keys();
+[[nodiscard]] const KeyTable<InstanceDraft>& instance_keys();
+[[nodiscard]] const KeyTable<KeyframeDraft>& keyframe_keys();
+[[nodiscard]] const KeyTable<scene::Material>& material_keys();
+[[nodiscard]] const KeyTable<scene::Layer>& layer_keys();
+[[nodiscard]] const KeyTable<scene::RelaxationMode>& mode_keys();
+
+[[nodiscard]] const KeyTable<DaemonHead>& daemon_head_keys();
+[[nodiscard]] const KeyTable<SourceConfig>& source_keys();
+[[nodiscard]] const KeyTable<PacingConfig>& pacing_keys();
+[[nodiscard]] const KeyTable<HostConfig>& host_keys();
+[[nodiscard]] const KeyTable<ControlConfig>& control_keys();
+[[nodiscard]] const KeyTable<StreamConfig>& stream_keys();
+[[nodiscard]] const KeyTable<JournalConfig>& journal_keys();
+[[nodiscard]] const KeyTable<DeviceConfig>& device_keys();
+[[nodiscard]] const KeyTable<LogConfig>& log_keys();
+
+inline constexpr std::string_view kShippedLibrary = "share:materials/library.toml";
+/// Most relaxation modes a material may have: the emit2014 model keeps two states per sample.
+inline constexpr std::size_t kMaxModes = 2;
+
+/// A section as documentation, override routing and the environment see it.
+struct SectionDoc {
+  std::string path;    ///< "thermal"; "" for the head; "object.instances" for a nested table
+  bool array = false;  ///< an array of tables
+  std::string summary;
+  struct Row {
+    KeySpec spec;
+    std::string default_text;
+  };
+  std::vector<Row> rows;
+};
+[[nodiscard]] const std::vector<SectionDoc>& scenario_sections();
+[[nodiscard]] const std::vector<SectionDoc>& daemon_sections();
+
+template <class T>
+SectionDoc section_doc(std::string path, bool array, std::string summary, const KeyTable<T>& keys,
+                       const T& defaults) {
+  SectionDoc doc{std::move(path), array, std::move(summary), {}};
+  for (const Key<T>& key : keys) {
+    doc.rows.push_back(
+        {key.spec, key.spec.required ? std::string("required") : key.write(defaults).value_or("")});
+  }
+  return doc;
+}
+
+/// Array of tables under a key, one element per table.
+template <class T>
+void read_array(const Node& node, const std::string& name, const KeyTable<T>& keys,
+                const T& defaults, std::vector<T>& out, Diagnostics& diagnostics) {
+  if (!expect_table_array(node, name, diagnostics)) {
+    return;
+  }
+  out.clear();
+  for (const Node& item : node.items) {
+    T element = defaults;
+    read_table(item, keys, element, diagnostics);
+    out.push_back(std::move(element));
+  }
+}
+template <class T>
+std::optional<std::string> write_array(const std::vector<T>& elements, const KeyTable<T>& keys) {
+  if (elements.empty()) {
+    return std::nullopt;
+  }
+  std::string out = "[\n";
+  for (const T& element : elements) {
+    out += "  " + inline_table(element, keys) + ",\n";
+  }
+  return out + "]";
+}
+
+/// vector3 and quaternion as TOML arrays.
+[[nodiscard]] std::string toml_vector(const double* values, std::size_t count);
+
+}  // namespace emit::config

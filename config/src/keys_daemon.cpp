@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "keys.hpp"
+
+/// Keys of the daemon's configuration.
+namespace emit::config {
+
+const KeyTable<DaemonHead>& daemon_head_keys() {
+  static const KeyTable<DaemonHead> keys = {
+      text<DaemonHead>("scenario", EMIT_FIELD(scenario),
+                       "Scenario file, or the name of a shipped one. May be absent only with a "
+                       "canned source."),
+  };
+  return keys;
+}
+
+const KeyTable<SourceConfig>& source_keys() {
+  static const KeyTable<SourceConfig> keys = {
+      choice<SourceConfig>("kind",
+                           std::vector<std::pair<std::string, SourceKind>>{
+                               {"renderer", SourceKind::renderer}, {"canned", SourceKind::canned}},
+                           EMIT_FIELD(kind),
+                           "Where frames come from: rendered, or pre-rendered (to test a rig)."),
+      path<SourceConfig>("canned_dir", EMIT_FIELD(canned_dir),
+                         "Folder of `frame_*.exr` with a `radiance` channel, shown in name order, "
+                         "again and again. Absent: a moving test pattern."),
+      integer<SourceConfig>("canned_width_px", "px", 1, 16384, EMIT_FIELD(canned_width_px),
+                            "Columns of the test pattern."),
+      integer<SourceConfig>("canned_height_px", "px", 1, 16384, EMIT_FIELD(canned_height_px),
+                            "Rows of the test pattern."),
+      integer<SourceConfig>("canned_frames", "", 1, 1024, EMIT_FIELD(canned_frames),
+                            "Length of the test pattern in frames."),
+  };
+  return keys;
+}
+
+const KeyTable<PacingConfig>& pacing_keys() {
+  static const KeyTable<PacingConfig> keys = {
+      choice<PacingConfig>(
+          "mode",
+          std::vector<std::pair<std::string, PacingMode>>{{"host-step", PacingMode::host_step},
+                                                          {"ig-clock", PacingMode::ig_clock}},
+          EMIT_FIELD(mode),
+          "host-step: pose k triggers frame k. ig-clock: own period, newest pose."),
+      number<PacingConfig>("rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
+                           "Frame rate of ig-clock."),
+      nanoseconds<PacingConfig>("budget_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(budget_ns),
+                                "host-step: deadline after the pose arrived; 0: none."),
+      nanoseconds<PacingConfig>("horizon_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(horizon_ns),
+                                "Poses are extrapolated this far at most; then the frame is "
+                                "flagged stale."),
+      nanoseconds<PacingConfig>("display_delay_ms", "ms", 1e6, between(0, 60000),
+                                EMIT_FIELD(display_delay_ns),
+                                "ig-clock: poses are predicted to the start of the slot plus this; "
+                                "at most horizon_ms."),
+  };
+  return keys;
+}
+
+const KeyTable<HostConfig>& host_keys() {
+  static const KeyTable<HostConfig> keys = {
+      text<HostConfig>("udp", EMIT_FIELD(udp),
+                       "`address:port` for host frames as datagrams; empty: off."),
+  };
+  return keys;
+}
+
+const KeyTable<ControlConfig>& control_keys() {
+  static const KeyTable<ControlConfig> keys = {
+      text<ControlConfig>(
+          "tcp", EMIT_FIELD(tcp),
+          "`address:port` of control, host and stream connections; port 0: any free "
+          "one."),
+      integer<ControlConfig>("max_clients", "", 1, 1024, EMIT_FIELD(max_clients),
+                             "Connections at a time."),
+      integer<ControlConfig>("max_record_bytes", "bytes", 1024, 268435456,
+                             EMIT_FIELD(max_record_bytes),
+                             "Longest message a client may send; longer ones close the "
+                             "connection."),
+  };
+  return keys;
+}
+
+const KeyTable<StreamConfig>& stream_keys() {
+  static const KeyTable<StreamConfig> keys = {
+      integer<StreamConfig>("queue_frames", "", 1, 13, EMIT_FIELD(queue_frames),
+                            "Frames that wait for a slow client before the oldest goes."),
+      integer<StreamConfig>("udp_fragment_payload_bytes", "bytes", 256, 65000,
+                            EMIT_FIELD(udp_fragment_payload_bytes),
+                            "Pixel bytes per datagram; 8900 needs jumbo frames beyond loopback, "
+                            "1400 fits any Ethernet."),
+      integer<StreamConfig>("udp_send_buffer_bytes", "bytes", 65536, 1073741824,
+                            EMIT_FIELD(udp_send_buffer_bytes), "Socket send buffer."),
+      integer<StreamConfig>("multicast_ttl", "", 0, 255, EMIT_FIELD(multicast_ttl),
+                            "Routers that multicast frames may pass; 0: this host only."),
+  };
+  return keys;
+}
+
+const KeyTable<JournalConfig>& journal_keys() {
+  static const KeyTable<JournalConfig> keys = {
+      path<JournalConfig>("file", EMIT_FIELD(file),
+                          "Journal written while running; absent: only for a recorder that asks."),
+      integer<JournalConfig>("ring_entries", "", 64, 1048576, EMIT_FIELD(ring_entries),
+                             "Entries between the frame loop and the journal's writer."),
+  };
+  return keys;
+}
+
+const KeyTable<DeviceConfig>& device_keys() {
+  static const KeyTable<DeviceConfig> keys = {
+      integer<DeviceConfig>("gpu_index", "", -1, 63, EMIT_FIELD(gpu_index),
+                            "EGL device; -1: the first hardware device, else software."),
+  };
+  return keys;
+}
+
+const KeyTable<LogConfig>& log_keys() {
+  static const KeyTable<LogConfig> keys = {
+      choice<LogConfig>(
+          "level",
+          std::vector<std::pair<std::string, std::string>>{
+              {"error", "error"}, {"warn", "warn"}, {"info", "info"}, {"debug", "debug"}},
+          EMIT_FIELD(level), "Least severity that is logged."),
+      path<LogConfig>("file", EMIT_FIELD(file), "Log file; absent: standard error."),
+  };
+  return keys;
+}
+
+}  // namespace emit::config

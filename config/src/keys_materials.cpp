@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "keys.hpp"
+
+/// Keys of materials, in a scenario and in library files alike.
+namespace emit::config {
+
+using scene::Layer;
+using scene::Material;
+using scene::RelaxationMode;
+
+const KeyTable<Layer>& layer_keys() {
+  static const KeyTable<Layer> keys = {
+      required(number<Layer>("thickness_m", "m", above_to(0, 100), EMIT_FIELD(thickness_m),
+                             "Thickness.")),
+      required(number<Layer>("conductivity_w_m_k", "W m-1 K-1", above_to(0, 1000),
+                             EMIT_FIELD(conductivity_w_m_k), "Thermal conductivity.")),
+      required(number<Layer>("density_kg_m3", "kg m-3", above_to(0, 25000),
+                             EMIT_FIELD(density_kg_m3), "Density.")),
+      required(number<Layer>("specific_heat_j_kg_k", "J kg-1 K-1", above_to(0, 20000),
+                             EMIT_FIELD(specific_heat_j_kg_k), "Specific heat.")),
+  };
+  return keys;
+}
+
+const KeyTable<RelaxationMode>& mode_keys() {
+  static const KeyTable<RelaxationMode> keys = {
+      required(number<RelaxationMode>("tau_s", "s", above_to(0, 1e8), EMIT_FIELD(tau_s),
+                                      "Time constant.")),
+      required(number<RelaxationMode>("weight_frac", "", between(0, 1), EMIT_FIELD(weight_frac),
+                                      "Share of the step response; all add up to 1.")),
+  };
+  return keys;
+}
+
+const KeyTable<Material>& material_keys() {
+  static const KeyTable<Material> keys = {
+      required(text<Material>("name", EMIT_FIELD(name), "Unique name.")),
+      required(number<Material>("solar_absorptance_frac", "", between(0, 1),
+                                EMIT_FIELD(solar_absorptance_frac),
+                                "Absorbed share of sunlight: 1 - albedo.")),
+      required(number<Material>("emissivity_frac", "", between(0.01, 1),
+                                EMIT_FIELD(emissivity_frac),
+                                "Total hemispherical emissivity, long-wave.")),
+      custom<Material>(
+          {"band_emissivity_frac", "table", "", "0 .. 1",
+           "Band name = emissivity in that band; other bands use emissivity_frac.", false},
+          [](Material& out, const Node& node, Diagnostics& diagnostics) {
+            if (!expect_table(node, "band_emissivity_frac", diagnostics)) {
+              return;
+            }
+            for (const Member& member : node.members) {
+              double value = 0.0;
+              read_number(member.value, member.key, between(0, 1), value, diagnostics);
+              out.band_emissivity.push_back({member.key, value});
+            }
+          },
+          [](const Material& in) -> std::optional<std::string> {
+            if (in.band_emissivity.empty()) {
+              return std::nullopt;
+            }
+            std::string out = "{";
+            for (const scene::BandEmissivity& entry : in.band_emissivity) {
+              out += (out.size() > 1 ? ", " : " ") + toml_string(entry.band) + " = " +
+                     toml_number(entry.emissivity_frac);
+            }
+            return out + " }";
+          }),
+      custom<Material>(
+          {"layers", "array of tables", "", "1 .. 16",
+           "Outermost first; emit2014 uses the first. Required without prescribed_k. See `layers` "
+           "below.",
+           false},
+          [](Material& out, const Node& node, Diagnostics& diagnostics) {
+            read_array(node, "layers", layer_keys(), Layer{}, out.layers, diagnostics);
+            if (out.layers.size() > 16) {
+              diagnostics.add(node.at, "'layers' has " + std::to_string(out.layers.size()) +
+                                           " entries, at most 16 are taken");
+            }
+          },
+          [](const Material& in) { return write_array(in.layers, layer_keys()); }),
+      written_if([](const Material& in) { return in.base_k > 0.0; },
+                 number<Material>("base_k", "K", between(150, 2000), EMIT_FIELD(base_k),
+                                  "Core temperature under the last layer. Required without "
+                                  "prescribed_k.")),
+      number<Material>("initial_k", "K", between(150, 2000), EMIT_FIELD(initial_k),
+                       "Surface temperature at the start of the history; thermal.initial_k if "
+                       "absent."),
+      custom<Material>(
+          {"modes", "array of tables", "", "1 .. 2, weights add up to 1",
+           "Relaxation modes. If absent: derived from the first layer by the slab formula "
+           "(slab_modes.hpp). See `modes` below.",
+           false},
+          [](Material& out, const Node& node, Diagnostics& diagnostics) {
+            const std::size_t faults = diagnostics.size();
+            read_array(node, "modes", mode_keys(), RelaxationMode{}, out.modes, diagnostics);
+            if (diagnostics.size() != faults) {
+              return;
+            }
+            if (out.modes.empty() || out.modes.size() > kMaxModes) {
+              diagnostics.add(node.at, "'modes' has " + std::to_string(out.modes.size()) +
+                                           " entries, must have 1 or 2");
+              return;
+            }
+            double sum = 0.0;
+            for (const RelaxationMode& mode : out.modes) {
+              sum += mode.weight_frac;
+            }
+            if (std::abs(sum - 1.0) > 1e-6) {
+              diagnostics.add(
+                  node.at, "the weights of 'modes' add up to " + toml_number(sum) + ", must be 1");
+            }
+          },
+          [](const Material& in) { return write_array(in.modes, mode_keys()); }),
+      number<Material>("prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
+                       "A part of given temperature (hot parts): no thermal simulation."),
+      text<Material>("source", EMIT_FIELD(source), "Where the numbers come from."),
+      text<Material>("uncertainty", EMIT_FIELD(uncertainty), "What is known about their error."),
+  };
+  return keys;
+}
+
+}  // namespace emit::config

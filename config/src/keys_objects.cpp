@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/physics/constants.hpp"
+#include "keys.hpp"
+
+/// Keys of what stands and moves in the world: objects, the sensor, their placements.
+namespace emit::config {
+
+using physics::kDegree;
+
+namespace {
+
+template <class T, class Field>
+Key<T> vector3(std::string name, std::string unit, Field field, std::string meaning) {
+  Key<T> key;
+  key.spec = {name, "array of 3 floats", std::move(unit), "finite", std::move(meaning), false};
+  key.read = [name, field](T& out, const Node& node, Diagnostics& diagnostics) {
+    double values[3] = {0.0, 0.0, 0.0};
+    const std::size_t faults = diagnostics.size();
+    read_vector(node, name, 3, values, diagnostics);
+    if (diagnostics.size() == faults) {
+      field(out) = glm::dvec3(values[0], values[1], values[2]);
+    }
+  };
+  key.write = [field](const T& in) -> std::optional<std::string> {
+    const std::optional<glm::dvec3> value = field(in);
+    if (!value) {
+      return std::nullopt;
+    }
+    const double values[3] = {value->x, value->y, value->z};
+    return toml_vector(values, 3);
+  };
+  return key;
+}
+
+/// An angle that is written only where angles are the chosen spelling of the attitude.
+template <class T, class Field, class Pose>
+Key<T> angle(std::string name, Range range, Field field, Pose pose, std::string meaning) {
+  Key<T> key = number<T>(std::move(name), "deg", range, field, std::move(meaning), kDegree);
+  key.write = [inner = std::move(key.write), pose](const T& in) -> std::optional<std::string> {
+    if (pose(in).attitude_wxyz || pose(in).look_at_m) {
+      return std::nullopt;
+    }
+    return inner(in);
+  };
+  return key;
+}
+
+template <class T, class Pose>
+void append_pose_keys(KeyTable<T>& keys, Pose pose, const std::string& subject) {
+  keys.push_back(vector3<T>(
+      "position_m", "m", [pose](auto& object) -> auto& { return pose(object).position_m; },
+      "Position of " + subject + ": east, north, up from the world origin."));
+  keys.push_back(angle<T>(
+      "heading_deg",
+      between(-360, 360), [pose](auto& object) -> auto& { return pose(object).heading_rad; }, pose,
+      "Heading, clockwise from north."));
+  keys.push_back(angle<T>(
+      "pitch_deg",
+      between(-90, 90), [pose](auto& object) -> auto& { return pose(object).pitch_rad; }, pose,
+      "Pitch, nose up."));
+  keys.push_back(angle<T>(
+      "roll_deg",
+      between(-360, 360), [pose](auto& object) -> auto& { return pose(object).roll_rad; }, pose,
+      "Roll, right side down."));
+  keys.push_back(vector3<T>(
+      "look_at_m", "m", [pose](auto& object) -> auto& { return pose(object).look_at_m; },
+      "In place of angles: world point that the x axis points to, with the least roll."));
+  keys.push_back(custom<T>(
+      {"attitude_wxyz", "array of 4 floats", "", "norm 0.99 .. 1.01",
+       "In place of angles: quaternion `world_from_body`.", false},
+      [pose](T& out, const Node& node, Diagnostics& diagnostics) {
+        std::array<double, 4> q{1.0, 0.0, 0.0, 0.0};
+        const std::size_t faults = diagnostics.size();
+        read_vector(node, "attitude_wxyz", 4, q.data(), diagnostics);
+        if (diagnostics.size() != faults) {
+          return;
+        }
+        const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        if (!(norm >= 0.99 && norm <= 1.01)) {
+          diagnostics.add(node.at, "'attitude_wxyz' has norm " + toml_number(norm) + ", must be 1");
+          return;
+        }
+        pose(out).attitude_wxyz = q;
+      },
+      [pose](const T& in) -> std::optional<std::string> {
+        if (!pose(in).attitude_wxyz) {
+          return std::nullopt;
+        }
+        return toml_vector(pose(in).attitude_wxyz->data(), 4);
+      }));
+}
+
+template <class T>
+void append_trajectory_keys(KeyTable<T>& keys) {
+  keys.push_back(custom<T>(
+      {"trajectory", "array of tables", "", "ascending in time",
+       "Keyframes: linear in position, shortest arc in attitude. See `trajectory` below.", false},
+      [](T& out, const Node& node, Diagnostics& diagnostics) {
+        read_array(node, "trajectory", keyframe_keys(), KeyframeDraft{}, out.trajectory,
+                   diagnostics);
+      },
+      [](const T& in) { return write_array(in.trajectory, keyframe_keys()); }));
+  keys.push_back(path<T>(
+      "trajectory_file", EMIT_FIELD(trajectory_file),
+      "CSV `time_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg,on` (`on` optional) in place of "
+      "`trajectory`."));
+}
+
+}  // namespace
+
+const KeyTable<InstanceDraft>& instance_keys() {
+  static const KeyTable<InstanceDraft> keys = [] {
+    KeyTable<InstanceDraft> table;
+    append_pose_keys<InstanceDraft>(table, EMIT_FIELD(pose), "the instance");
+    return table;
+  }();
+  return keys;
+}
+
+const KeyTable<KeyframeDraft>& keyframe_keys() {
+  static const KeyTable<KeyframeDraft> keys = [] {
+    KeyTable<KeyframeDraft> table = {
+        required(nanoseconds<KeyframeDraft>("time_s", "s", 1e9, between(-1e9, 1e9),
+                                            EMIT_FIELD(time_ns), "Sim time; ascending.")),
+    };
+    append_pose_keys<KeyframeDraft>(table, EMIT_FIELD(pose), "the body");
+    table.push_back(
+        boolean<KeyframeDraft>("on", EMIT_FIELD(on), "Present from here until the next keyframe."));
+    table.push_back(
+        boolean<KeyframeDraft>("teleport", EMIT_FIELD(teleport),
+                               "A jump: nothing is interpolated from the keyframe before."));
+    return table;
+  }();
+  return keys;
+}
+
+const KeyTable<ObjectDraft>& object_keys() {
+  static const KeyTable<ObjectDraft> keys = [] {
+    KeyTable<ObjectDraft> table = {
+        text<ObjectDraft>("name", EMIT_FIELD(desc.name), "Unique name; the file's name if absent."),
+        integer<ObjectDraft>("entity_id", "", 0, 4294967295, EMIT_FIELD(desc.entity_id),
+                             "0: static scenery. Otherwise a moving entity that host frames "
+                             "address; unique."),
+        required(path<ObjectDraft>("gltf", EMIT_FIELD(desc.gltf), "glTF 2.0 file (.glb, .gltf).")),
+        text<ObjectDraft>("material", EMIT_FIELD(desc.material),
+                          "Material of all glTF materials that material_map does not list. Empty: "
+                          "the one of the same name, else default_material."),
+        custom<ObjectDraft>(
+            {"material_map", "table", "", "", "glTF material name = material of the library.",
+             false},
+            [](ObjectDraft& out, const Node& node, Diagnostics& diagnostics) {
+              if (!expect_table(node, "material_map", diagnostics)) {
+                return;
+              }
+              for (const Member& member : node.members) {
+                read_text(member.value, member.key, out.desc.material_map[member.key], diagnostics);
+              }
+            },
+            [](const ObjectDraft& in) -> std::optional<std::string> {
+              if (in.desc.material_map.empty()) {
+                return std::nullopt;
+              }
+              std::string out = "{";
+              for (const auto& [gltf_name, material] : in.desc.material_map) {
+                out += (out.size() > 1 ? ", " : " ") + toml_string(gltf_name) + " = " +
+                       toml_string(material);
+              }
+              return out + " }";
+            }),
+        number<ObjectDraft>("scale", "", above_to(0, 1e6), EMIT_FIELD(desc.scale),
+                            "Uniform scale of the geometry."),
+        boolean<ObjectDraft>("on", EMIT_FIELD(desc.on),
+                             "Entities: present until host or trajectory says otherwise."),
+    };
+    append_pose_keys<ObjectDraft>(table, EMIT_FIELD(pose), "the object");
+    table.push_back(custom<ObjectDraft>(
+        {"instances", "array of tables", "", "",
+         "Many placements in place of position and angles; see `instances` below. Static scenery "
+         "only.",
+         false},
+        [](ObjectDraft& out, const Node& node, Diagnostics& diagnostics) {
+          read_array(node, "instances", instance_keys(), InstanceDraft{}, out.instances,
+                     diagnostics);
+        },
+        [](const ObjectDraft& in) { return write_array(in.instances, instance_keys()); }));
+    append_trajectory_keys(table);
+    return table;
+  }();
+  return keys;
+}
+
+SensorDraft default_sensor() {
+  SensorDraft draft;
+  draft.desc.name = "seeker";
+  draft.desc.fov_h_rad = 20.0 * kDegree;
+  return draft;
+}
+
+const KeyTable<SensorDraft>& sensor_keys() {
+  static const KeyTable<SensorDraft> keys = [] {
+    KeyTable<SensorDraft> table = {
+        text<SensorDraft>("name", EMIT_FIELD(desc.name), "Name in the frames' attributes."),
+        integer<SensorDraft>("width_px", "px", 1, 16384, EMIT_FIELD(desc.width_px), "Columns."),
+        integer<SensorDraft>("height_px", "px", 1, 16384, EMIT_FIELD(desc.height_px), "Rows."),
+        number<SensorDraft>("fov_h_deg", "deg", between(0.01, 170), EMIT_FIELD(desc.fov_h_rad),
+                            "Horizontal field of view; pixels are square.", kDegree),
+        number<SensorDraft>("near_m", "m", between(1e-4, 1e4), EMIT_FIELD(desc.near_m),
+                            "Distance of the near plane; nothing closer is drawn."),
+    };
+    append_pose_keys<SensorDraft>(table, EMIT_FIELD(pose), "a sensor that does not move");
+    append_trajectory_keys(table);
+    return table;
+  }();
+  return keys;
+}
+
+}  // namespace emit::config

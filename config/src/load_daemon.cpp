@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <charconv>
+
+#include "data_files.hpp"
+#include "overrides.hpp"
+#include "resolve.hpp"
+
+namespace emit::config {
+
+using physics::Result;
+
+namespace {
+
+/// host:port with a port of 0..65535; IPv6 addresses stand in brackets.
+bool is_endpoint(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) {
+    return false;
+  }
+  const std::string_view host = text.substr(0, colon);
+  const std::string_view port = text.substr(colon + 1);
+  const bool bracketed = host.front() == '[' && host.back() == ']' && host.size() > 2;
+  if (!bracketed && host.find_first_of(":[] ") != std::string_view::npos) {
+    return false;
+  }
+  unsigned value = 0;
+  const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
+  return parsed.ec == std::errc() && parsed.ptr == port.data() + port.size() && value <= 65535;
+}
+
+void check_endpoint(const Node& table, std::string_view key, const std::string& value,
+                    bool may_be_empty, Diagnostics& diagnostics) {
+  if ((may_be_empty && value.empty()) || is_endpoint(value)) {
+    return;
+  }
+  diagnostics.add(key_location(table, key), fmt::format("'{}' is '{}', must be address:port{}", key,
+                                                        value, may_be_empty ? " or empty" : ""));
+}
+
+void resolve_daemon_scenario(const Node& root, const std::string& text, DaemonConfig& daemon,
+                             Diagnostics& diagnostics) {
+  if (text.empty()) {
+    if (daemon.source.kind == SourceKind::renderer) {
+      diagnostics.add(key_location(root, "scenario"),
+                      "key 'scenario' is missing (only a canned source goes without)");
+    }
+    return;
+  }
+  const Location& at = key_location(root, "scenario");
+  std::error_code code;
+  Result<std::filesystem::path> path =
+      resolve_path(text, at.source ? at.source->directory : std::filesystem::path());
+  if (!path || !std::filesystem::is_regular_file(*path, code)) {
+    path = resolve_scenario(text);
+  }
+  if (!path) {
+    diagnostics.add(at, path.error().text);
+    return;
+  }
+  daemon.scenario = std::filesystem::absolute(*path, code).lexically_normal();
+}
+
+void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
+  Diagnostics reported_before;  // section() reported wrong kinds already
+  const Node& pacing = section(root, "pacing", reported_before);
+  if (daemon.pacing.mode == PacingMode::ig_clock &&
+      daemon.pacing.display_delay_ns > daemon.pacing.horizon_ns) {
+    diagnostics.add(key_location(pacing, "display_delay_ms"),
+                    fmt::format("'display_delay_ms' ({}) is beyond 'horizon_ms' ({}): every frame "
+                                "would be stale",
+                                static_cast<double>(daemon.pacing.display_delay_ns) / 1e6,
+                                static_cast<double>(daemon.pacing.horizon_ns) / 1e6));
+  }
+  check_endpoint(section(root, "control", reported_before), "tcp", daemon.control.tcp, false,
+                 diagnostics);
+  check_endpoint(section(root, "host", reported_before), "udp", daemon.host.udp, true, diagnostics);
+  if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {
+    std::error_code code;
+    if (!std::filesystem::is_directory(daemon.source.canned_dir, code)) {
+      diagnostics.add(
+          key_location(section(root, "source", reported_before), "canned_dir"),
+          fmt::format("'canned_dir': {}: no such folder", daemon.source.canned_dir.string()));
+    }
+  }
+}
+
+}  // namespace
+
+Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
+                                 std::span<const std::string> overrides,
+                                 const LoadOptions& options) {
+  Result<Node> parsed = parse_toml_file(file);
+  if (!parsed) {
+    return tl::unexpected<physics::Error>(parsed.error());
+  }
+  Node& root = *parsed;
+  Diagnostics diagnostics;
+  apply_environment(root, daemon_sections(), options, diagnostics);
+  for (const std::string& text : overrides) {
+    apply_override(root, text, diagnostics);
+  }
+  std::vector<std::string_view> names;
+  for (const SectionDoc& doc : daemon_sections()) {
+    if (!doc.path.empty()) {
+      names.push_back(doc.path);
+    }
+  }
+  DaemonConfig daemon;
+  daemon.file = file;
+  DaemonHead head;
+  read_table(root, daemon_head_keys(), head, diagnostics, names);
+  read_table(section(root, "source", diagnostics), source_keys(), daemon.source, diagnostics);
+  read_table(section(root, "pacing", diagnostics), pacing_keys(), daemon.pacing, diagnostics);
+  read_table(section(root, "host", diagnostics), host_keys(), daemon.host, diagnostics);
+  read_table(section(root, "control", diagnostics), control_keys(), daemon.control, diagnostics);
+  read_table(section(root, "stream", diagnostics), stream_keys(), daemon.stream, diagnostics);
+  read_table(section(root, "journal", diagnostics), journal_keys(), daemon.journal, diagnostics);
+  read_table(section(root, "device", diagnostics), device_keys(), daemon.device, diagnostics);
+  read_table(section(root, "log", diagnostics), log_keys(), daemon.log, diagnostics);
+  resolve_daemon_scenario(root, head.scenario, daemon, diagnostics);
+  check_combinations(root, daemon, diagnostics);
+  if (!diagnostics.empty()) {
+    return tl::unexpected<physics::Error>(diagnostics.error());
+  }
+  return daemon;
+}
+
+}  // namespace emit::config

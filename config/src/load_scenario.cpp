@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "emit/physics/constants.hpp"
+#include "overrides.hpp"
+#include "resolve.hpp"
+
+namespace emit::config {
+
+using physics::Result;
+using scene::ScenarioDesc;
+
+const Node& section(const Node& root, std::string_view name, Diagnostics& diagnostics) {
+  static const Node kEmpty;
+  const Node* node = root.find(name);
+  if (node == nullptr || !expect_table(*node, std::string(name), diagnostics)) {
+    return kEmpty;
+  }
+  return *node;
+}
+
+const std::vector<Node>& section_array(const Node& root, const std::string& name,
+                                       Diagnostics& diagnostics) {
+  static const std::vector<Node> kEmpty;
+  const Node* node = root.find(name);
+  if (node == nullptr || !expect_table_array(*node, name, diagnostics)) {
+    return kEmpty;
+  }
+  return node->items;
+}
+
+const Location& key_location(const Node& table, std::string_view key) noexcept {
+  const Node* node = table.find(key);
+  return node != nullptr ? node->at : table.at;
+}
+
+void report_file_error(const physics::Error& error, const Node& table, std::string_view key,
+                       Diagnostics& diagnostics) {
+  diagnostics.add(key_location(table, key), fmt::format("'{}': {}", key, error.text));
+}
+
+namespace {
+
+void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diagnostics) {
+  const Node& table = section(root, "weather", diagnostics);
+  WeatherDraft draft;
+  const std::size_t faults = diagnostics.size();
+  read_table(table, weather_keys(), draft, diagnostics);
+  scenario.clear_sky = draft.clear_sky;
+  const bool has_file = !draft.file.empty();
+  const bool has_samples = table.has("sample");
+  if (has_file && has_samples) {
+    diagnostics.add(key_location(table, "file"), "use only one of 'file' and [[weather.sample]]");
+    return;
+  }
+  if (has_file || has_samples) {
+    for (const Member& member : table.members) {
+      if (member.key != "file" && member.key != "sample" &&
+          std::any_of(weather_keys().begin(), weather_keys().end(),
+                      [&member](const auto& key) { return key.spec.name == member.key; })) {
+        diagnostics.add(member.key_at,
+                        fmt::format("'{}' has no effect: the weather comes from {}", member.key,
+                                    has_file ? "a file" : "[[weather.sample]]"));
+      }
+    }
+  }
+  if (has_file) {
+    auto loaded = load_weather_csv(draft.file);
+    if (!loaded) {
+      report_file_error(loaded.error(), table, "file", diagnostics);
+      return;
+    }
+    scenario.weather = std::move(*loaded);
+    return;
+  }
+  scenario.weather = std::move(draft.samples);
+  for (std::size_t i = 1; i < scenario.weather.size() && diagnostics.size() == faults; ++i) {
+    if (scenario.weather[i].sim_time_ns <= scenario.weather[i - 1].sim_time_ns) {
+      diagnostics.add(key_location(table.find("sample")->items[i], "time_s"),
+                      "'time_s' is not later than in the sample before");
+    }
+  }
+  if (draft.clear_sky.dew_point_k > draft.clear_sky.air_mean_k + draft.clear_sky.air_amplitude_k) {
+    diagnostics.add(
+        key_location(table, "dew_point_k"),
+        fmt::format("'dew_point_k' ({}) is above the warmest air ({})", draft.clear_sky.dew_point_k,
+                    draft.clear_sky.air_mean_k + draft.clear_sky.air_amplitude_k));
+  }
+}
+
+void resolve_display(const Node& root, ScenarioDesc& scenario, Diagnostics& diagnostics) {
+  const Node& table = section(root, "display", diagnostics);
+  read_table(table, display_keys(), scenario.display, diagnostics);
+  if (scenario.display.min_k >= scenario.display.max_k) {
+    diagnostics.add(key_location(table, table.has("max_k") ? "max_k" : "min_k"),
+                    fmt::format("'max_k' ({}) must be above 'min_k' ({})", scenario.display.max_k,
+                                scenario.display.min_k));
+  }
+}
+
+/// Keys of the root that are sections of their own.
+std::vector<std::string_view> section_names() {
+  std::vector<std::string_view> names;
+  for (const SectionDoc& doc : scenario_sections()) {
+    if (!doc.path.empty() && doc.path.find('.') == std::string::npos) {
+      names.push_back(doc.path);
+    }
+  }
+  return names;
+}
+
+void resolve_head(const Node& root, ScenarioDesc& scenario, ScenarioHead& head,
+                  Diagnostics& diagnostics) {
+  head = default_scenario_head();
+  head.name = scenario.file.stem().string();
+  head.default_material.clear();
+  if (!root.has("materials")) {
+    head.materials.clear();
+    auto shipped = find_data_file("materials/library.toml");
+    if (shipped) {
+      head.materials.push_back(*shipped);
+    } else if (!root.has("material")) {
+      diagnostics.add(root.at, "no materials: " + shipped.error().text);
+    }
+  }
+  read_table(root, scenario_head_keys(), head, diagnostics, section_names());
+  scenario.name = head.name;
+  scenario.epoch_utc_ns = head.epoch_utc_ns;
+}
+
+void resolve_default_material(const Node& root, const ScenarioHead& head, ScenarioDesc& scenario,
+                              Diagnostics& diagnostics) {
+  const auto exists = [&scenario](const std::string& name) {
+    return std::any_of(scenario.materials.begin(), scenario.materials.end(),
+                       [&name](const scene::Material& material) { return material.name == name; });
+  };
+  scenario.default_material = root.has("default_material")
+                                  ? head.default_material
+                                  : default_scenario_head().default_material;
+  if (exists(scenario.default_material)) {
+    return;
+  }
+  diagnostics.add(key_location(root, "default_material"),
+                  root.has("default_material")
+                      ? fmt::format("there is no material '{}'", scenario.default_material)
+                      : fmt::format("there is no material '{}': set default_material",
+                                    scenario.default_material));
+}
+
+}  // namespace
+
+Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
+                                   std::span<const std::string> overrides,
+                                   const LoadOptions& options) {
+  Result<Node> parsed = parse_toml_file(file);
+  if (!parsed) {
+    return tl::unexpected<physics::Error>(parsed.error());
+  }
+  Node& root = *parsed;
+  Diagnostics diagnostics;
+  apply_environment(root, scenario_sections(), options, diagnostics);
+  for (const std::string& text : overrides) {
+    if (!addresses_element_of(text, "material")) {
+      apply_override(root, text, diagnostics);
+    }
+  }
+
+  ScenarioDesc scenario;
+  scenario.file = file;
+  ScenarioHead head;
+  resolve_head(root, scenario, head, diagnostics);
+
+  // Overrides reach library materials too, so they wait until all tables are together.
+  Node pool;
+  Node list;
+  list.kind = Node::Kind::array;
+  list.items = collect_material_nodes(root, head.materials, diagnostics);
+  pool.members.push_back({"material", root.at, std::move(list)});
+  for (const std::string& text : overrides) {
+    if (addresses_element_of(text, "material")) {
+      apply_override(pool, text, diagnostics);
+    }
+  }
+
+  scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 0.0};
+  read_table(section(root, "place", diagnostics), place_keys(), scenario.place, diagnostics);
+  resolve_weather(root, scenario, diagnostics);
+  read_table(section(root, "thermal", diagnostics), thermal_keys(), scenario.thermal, diagnostics);
+  resolve_display(root, scenario, diagnostics);
+
+  const std::vector<scene::SpectralBand> declared = resolve_declared_bands(root, diagnostics);
+  const std::vector<std::string> known = known_band_names(declared);
+  scenario.channels = resolve_channels(root, known, diagnostics);
+  scenario.bands = bands_in_use(scenario.channels, declared);
+  scenario.atmosphere = resolve_atmosphere(root, scenario.bands, diagnostics);
+
+  scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
+  resolve_default_material(root, head, scenario, diagnostics);
+  scenario.sensor = resolve_sensor(root, diagnostics);
+  scenario.objects =
+      resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);
+  if (!diagnostics.empty()) {
+    return tl::unexpected<physics::Error>(diagnostics.error());
+  }
+  return scenario;
+}
+
+}  // namespace emit::config

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/config/load.hpp"
+#include "keys.hpp"
+
+/// The effective configuration, written by the same key table that reads it.
+namespace emit::config {
+
+namespace {
+
+PoseDraft draft_of(const physics::Pose& pose) {
+  PoseDraft draft;
+  draft.position_m = pose.position_world_m;
+  const glm::dquat& q = pose.world_from_body;
+  draft.attitude_wxyz = {q.w, q.x, q.y, q.z};
+  return draft;
+}
+
+std::vector<KeyframeDraft> drafts_of(const scene::Trajectory& trajectory) {
+  std::vector<KeyframeDraft> drafts;
+  for (const scene::Keyframe& keyframe : trajectory) {
+    drafts.push_back(
+        {keyframe.sim_time_ns, draft_of(keyframe.pose), keyframe.on, keyframe.teleport});
+  }
+  return drafts;
+}
+
+template <class T>
+bool is_pose_key(const Key<T>& key) {
+  for (const Key<InstanceDraft>& pose_key : instance_keys()) {
+    if (pose_key.spec.name == key.spec.name) {
+      return true;
+    }
+  }
+  return false;
+}
+
+template <class T>
+KeyTable<T> without_pose(const KeyTable<T>& keys) {
+  KeyTable<T> out;
+  for (const Key<T>& key : keys) {
+    if (!is_pose_key(key)) {
+      out.push_back(key);
+    }
+  }
+  return out;
+}
+
+template <class T>
+void print_section(const std::string& title, const T& value, const KeyTable<T>& keys,
+                   std::string& out) {
+  out += "\n" + title + "\n";
+  write_table(value, keys, out);
+}
+
+void print_object(const scene::ObjectDesc& object, std::string& out) {
+  ObjectDraft draft;
+  draft.desc = object;
+  draft.trajectory = drafts_of(object.trajectory);
+  const bool pose_at_object = object.instances.size() == 1;
+  if (pose_at_object) {
+    draft.pose = draft_of(object.instances.front());
+  } else {
+    for (const physics::Pose& instance : object.instances) {
+      draft.instances.push_back({draft_of(instance)});
+    }
+  }
+  print_section("[[object]]", draft, pose_at_object ? object_keys() : without_pose(object_keys()),
+                out);
+}
+
+}  // namespace
+
+std::string print_scenario(const scene::ScenarioDesc& scenario) {
+  std::string out;
+  ScenarioHead head;
+  head.name = scenario.name;
+  head.epoch_utc_ns = scenario.epoch_utc_ns;
+  head.default_material = scenario.default_material;
+  write_table(head, scenario_head_keys(), out);  // materials = []: all are written out below
+  print_section("[place]", scenario.place, place_keys(), out);
+
+  WeatherDraft weather;
+  weather.clear_sky = scenario.clear_sky;
+  weather.samples = scenario.weather;
+  KeyTable<WeatherDraft> weather_table = weather_keys();
+  if (!scenario.weather.empty()) {
+    std::erase_if(weather_table, [](const auto& key) { return key.spec.name != "sample"; });
+  }
+  print_section("[weather]", weather, weather_table, out);
+
+  AtmosphereDraft atmosphere;
+  atmosphere.enabled = scenario.atmosphere.enabled;
+  atmosphere.model = "none";
+  atmosphere.bands = scenario.atmosphere.bands;
+  print_section("[atmosphere]", atmosphere, atmosphere_keys(), out);
+
+  print_section("[thermal]", scenario.thermal, thermal_keys(), out);
+
+  SensorDraft sensor;
+  sensor.desc = scenario.sensor;
+  sensor.trajectory = drafts_of(scenario.sensor.trajectory);
+  print_section("[sensor]", sensor, without_pose(sensor_keys()), out);
+
+  print_section("[display]", scenario.display, display_keys(), out);
+  for (const scene::SpectralBand& band : scenario.bands) {
+    print_section("[[band]]", BandDraft{band, {}}, band_keys(), out);
+  }
+  for (const scene::ChannelDesc& channel : scenario.channels) {
+    print_section("[[channel]]", channel, channel_keys(), out);
+  }
+  for (const scene::ObjectDesc& object : scenario.objects) {
+    print_object(object, out);
+  }
+  for (const scene::Material& material : scenario.materials) {
+    print_section("[[material]]", material, material_keys(), out);
+  }
+  return out;
+}
+
+std::string print_daemon(const DaemonConfig& daemon) {
+  std::string out;
+  write_table(DaemonHead{daemon.scenario.string()}, daemon_head_keys(), out);
+  print_section("[source]", daemon.source, source_keys(), out);
+  print_section("[pacing]", daemon.pacing, pacing_keys(), out);
+  print_section("[host]", daemon.host, host_keys(), out);
+  print_section("[control]", daemon.control, control_keys(), out);
+  print_section("[stream]", daemon.stream, stream_keys(), out);
+  print_section("[journal]", daemon.journal, journal_keys(), out);
+  print_section("[device]", daemon.device, device_keys(), out);
+  print_section("[log]", daemon.log, log_keys(), out);
+  return out;
+}
+
+}  // namespace emit::config

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "emit/config/slab_modes.hpp"
+#include "resolve.hpp"
+
+namespace emit::config {
+
+using scene::Material;
+
+namespace {
+
+std::string node_name(const Node& material) {
+  const Node* name = material.find("name");
+  return name != nullptr && name->kind == Node::Kind::text ? name->text : std::string();
+}
+
+void append_library(const std::filesystem::path& file, std::vector<Node>& nodes,
+                    Diagnostics& diagnostics, const Location& named_at) {
+  physics::Result<Node> library = parse_toml_file(file);
+  if (!library) {
+    if (library.error().code == physics::ErrorCode::config) {
+      diagnostics.add(named_at, fmt::format("material library: {}", library.error().text));
+    } else {
+      diagnostics.add(named_at, fmt::format("'materials': {}", library.error().text));
+    }
+    return;
+  }
+  for (Member& member : library->members) {
+    if (member.key != "material") {
+      diagnostics.add(member.key_at, unknown_key_text(member.key, {"material"}));
+    } else if (expect_table_array(member.value, "material", diagnostics)) {
+      for (Node& item : member.value.items) {
+        nodes.push_back(std::move(item));
+      }
+    }
+  }
+}
+
+void check_material(const Material& material, const Node& node,
+                    const std::vector<std::string>& known_bands, Diagnostics& diagnostics) {
+  if (node.has("name") && material.name.empty()) {
+    diagnostics.add(key_location(node, "name"), "'name' is empty");
+  }
+  if (!material.prescribed_k) {
+    for (const std::string_view key : {"layers", "base_k"}) {
+      if (!node.has(key)) {
+        diagnostics.add(node.at,
+                        fmt::format("key '{}' is missing (material '{}' has no prescribed_k)", key,
+                                    material.name));
+      }
+    }
+    if (const Node* layers = node.find("layers");
+        layers != nullptr && layers->kind == Node::Kind::array && layers->items.empty()) {
+      diagnostics.add(layers->at, "'layers' needs at least one layer");
+    }
+  }
+  if (const Node* bands = node.find("band_emissivity_frac");
+      bands != nullptr && bands->kind == Node::Kind::table) {
+    for (const Member& member : bands->members) {
+      if (std::find(known_bands.begin(), known_bands.end(), member.key) == known_bands.end()) {
+        diagnostics.add(member.key_at, fmt::format("there is no band '{}'", member.key));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Node> collect_material_nodes(const Node& root,
+                                         const std::vector<std::filesystem::path>& libraries,
+                                         Diagnostics& diagnostics) {
+  std::vector<Node> nodes;
+  for (const std::filesystem::path& library : libraries) {
+    append_library(library, nodes, diagnostics, key_location(root, "materials"));
+  }
+  // Two libraries must not silently compete; the scenario's own entries win on purpose.
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const std::string name = node_name(nodes[i]);
+    for (std::size_t j = 0; j < i && !name.empty(); ++j) {
+      if (node_name(nodes[j]) == name) {
+        diagnostics.add(nodes[i].at, fmt::format("material '{}' is already defined at {}", name,
+                                                 nodes[j].at.to_string()));
+        break;
+      }
+    }
+  }
+  std::vector<Node> own = section_array(root, "material", diagnostics);
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const std::string name = node_name(own[i]);
+    for (std::size_t j = 0; j < i && !name.empty(); ++j) {
+      if (node_name(own[j]) == name) {
+        diagnostics.add(
+            key_location(own[i], "name"),
+            fmt::format("material '{}' is already defined at {}", name, own[j].at.to_string()));
+        break;
+      }
+    }
+  }
+  for (Node& node : own) {
+    const std::string name = node_name(node);
+    const auto same = std::find_if(nodes.begin(), nodes.end(), [&name](const Node& other) {
+      return !name.empty() && node_name(other) == name;
+    });
+    if (same != nodes.end()) {
+      *same = std::move(node);
+    } else {
+      nodes.push_back(std::move(node));
+    }
+  }
+  return nodes;
+}
+
+std::vector<Material> resolve_materials(const std::vector<Node>& nodes,
+                                        const std::vector<std::string>& known_bands,
+                                        Diagnostics& diagnostics) {
+  std::vector<Material> materials;
+  for (const Node& node : nodes) {
+    Material material;
+    const std::size_t faults = diagnostics.size();
+    read_table(node, material_keys(), material, diagnostics);
+    check_material(material, node, known_bands, diagnostics);
+    if (diagnostics.size() == faults && material.modes.empty() && !material.layers.empty()) {
+      material.modes =
+          slab_modes(material.layers.front(), kSlabModesFilmWPerM2K, static_cast<int>(kMaxModes));
+    }
+    materials.push_back(std::move(material));
+  }
+  return materials;
+}
+
+}  // namespace emit::config

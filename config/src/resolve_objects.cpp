@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "resolve.hpp"
+
+namespace emit::config {
+
+using physics::Pose;
+using scene::Keyframe;
+using scene::Material;
+using scene::ObjectDesc;
+using scene::Trajectory;
+
+namespace {
+
+constexpr std::string_view kPoseKeys[] = {"position_m", "heading_deg", "pitch_deg",
+                                          "roll_deg",   "look_at_m",   "attitude_wxyz"};
+
+const Member* first_pose_key(const Node& node) {
+  for (const std::string_view key : kPoseKeys) {
+    if (const Member* member = node.find_member(key)) {
+      return member;
+    }
+  }
+  return nullptr;
+}
+
+Pose resolve_pose(const PoseDraft& draft, const Node& node, Diagnostics& diagnostics) {
+  Pose pose;
+  pose.position_world_m = draft.position_m;
+  const bool angles = node.has("heading_deg") || node.has("pitch_deg") || node.has("roll_deg");
+  if (static_cast<int>(angles) + static_cast<int>(draft.look_at_m.has_value()) +
+          static_cast<int>(draft.attitude_wxyz.has_value()) >
+      1) {
+    diagnostics.add(
+        key_location(node, draft.look_at_m ? "look_at_m" : "attitude_wxyz"),
+        "use only one of 'look_at_m', 'attitude_wxyz' and heading_deg, pitch_deg, roll_deg");
+    return pose;
+  }
+  if (draft.attitude_wxyz) {
+    const std::array<double, 4>& q = *draft.attitude_wxyz;
+    const double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    // One that is already unit within rounding stays as it is, so that printing and loading
+    // again gives the same bits.
+    const double scale = std::abs(norm2 - 1.0) < 1e-12 ? 1.0 : 1.0 / std::sqrt(norm2);
+    pose.world_from_body = glm::dquat(q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale);
+  } else if (draft.look_at_m) {
+    if (glm::distance(*draft.look_at_m, draft.position_m) < 1e-6) {
+      diagnostics.add(key_location(node, "look_at_m"), "'look_at_m' is the position itself");
+      return pose;
+    }
+    pose.world_from_body = physics::world_from_body_look_at(draft.position_m, *draft.look_at_m);
+  } else {
+    pose.world_from_body = physics::world_from_body_heading_pitch_roll(
+        draft.heading_rad, draft.pitch_rad, draft.roll_rad);
+  }
+  return pose;
+}
+
+/// `drafts` as read from node["trajectory"], or the file named by trajectory_file.
+Trajectory resolve_trajectory(const std::vector<KeyframeDraft>& drafts,
+                              const std::filesystem::path& file, const Node& node,
+                              Diagnostics& diagnostics) {
+  if (node.has("trajectory") && node.has("trajectory_file")) {
+    diagnostics.add(key_location(node, "trajectory_file"),
+                    "use only one of 'trajectory' and 'trajectory_file'");
+    return {};
+  }
+  if (!file.empty()) {
+    auto loaded = load_trajectory_csv(file);
+    if (!loaded) {
+      report_file_error(loaded.error(), node, "trajectory_file", diagnostics);
+      return {};
+    }
+    return std::move(*loaded);
+  }
+  Trajectory out;
+  const Node* list = node.find("trajectory");
+  if (list != nullptr && list->items.size() != drafts.size()) {
+    return {};  // reported while reading
+  }
+  for (std::size_t i = 0; i < drafts.size(); ++i) {
+    const Node& item = list->items[i];
+    Keyframe keyframe;
+    keyframe.sim_time_ns = drafts[i].time_ns;
+    keyframe.pose = resolve_pose(drafts[i].pose, item, diagnostics);
+    keyframe.on = drafts[i].on;
+    keyframe.teleport = drafts[i].teleport;
+    if (!out.empty() && item.has("time_s") && keyframe.sim_time_ns <= out.back().sim_time_ns) {
+      diagnostics.add(key_location(item, "time_s"),
+                      "'time_s' is not later than in the keyframe before");
+    }
+    out.push_back(keyframe);
+  }
+  return out;
+}
+
+void check_material_name(const std::string& name, const std::vector<Material>& materials,
+                         const Location& at, Diagnostics& diagnostics) {
+  std::vector<std::string_view> names;
+  for (const Material& material : materials) {
+    if (material.name == name) {
+      return;
+    }
+    names.push_back(material.name);
+  }
+  const std::string_view near = nearest_word(name, names);
+  diagnostics.add(
+      at, near.empty() ? fmt::format("there is no material '{}'", name)
+                       : fmt::format("there is no material '{}', did you mean '{}'?", name, near));
+}
+
+void resolve_placement(const ObjectDraft& draft, const Node& node, ObjectDesc& desc,
+                       Diagnostics& diagnostics) {
+  const Member* pose_key = first_pose_key(node);
+  const bool entity = desc.entity_id != 0;
+  if (const Node* list = node.find("instances")) {
+    if (pose_key != nullptr) {
+      diagnostics.add(pose_key->key_at,
+                      fmt::format("use only one of '{}' and 'instances'", pose_key->key));
+    } else if (entity) {
+      diagnostics.add(list->at,
+                      "an entity has exactly one placement: 'instances' is for static "
+                      "scenery");
+    } else if (list->items.empty()) {
+      diagnostics.add(list->at, "'instances' needs at least one placement");
+    }
+    for (std::size_t i = 0; i < draft.instances.size() && i < list->items.size(); ++i) {
+      desc.instances.push_back(resolve_pose(draft.instances[i].pose, list->items[i], diagnostics));
+    }
+    return;
+  }
+  // A trajectory alone places the entity; its first pose holds from the beginning anyway.
+  const bool from_trajectory = pose_key == nullptr && !desc.trajectory.empty();
+  desc.instances = {from_trajectory ? desc.trajectory.front().pose
+                                    : resolve_pose(draft.pose, node, diagnostics)};
+}
+
+std::string unique_name(const std::string& stem, const std::vector<ObjectDesc>& objects) {
+  std::string name = stem;
+  for (int i = 2; std::any_of(objects.begin(), objects.end(),
+                              [&name](const ObjectDesc& other) { return other.name == name; });
+       ++i) {
+    name = fmt::format("{}_{}", stem, i);
+  }
+  return name;
+}
+
+ObjectDesc resolve_object(const Node& node, const std::vector<ObjectDesc>& before,
+                          const std::vector<Material>& materials, bool require_files,
+                          Diagnostics& diagnostics) {
+  ObjectDraft draft;
+  read_table(node, object_keys(), draft, diagnostics);
+  ObjectDesc desc = draft.desc;
+  if (desc.name.empty()) {
+    desc.name = unique_name(desc.gltf.stem().string(), before);
+  }
+  for (const ObjectDesc& other : before) {
+    if (other.name == desc.name) {
+      diagnostics.add(key_location(node, "name"),
+                      fmt::format("object '{}' is defined twice", desc.name));
+    }
+    if (desc.entity_id != 0 && other.entity_id == desc.entity_id) {
+      diagnostics.add(
+          key_location(node, "entity_id"),
+          fmt::format("entity_id {} is already that of object '{}'", desc.entity_id, other.name));
+    }
+  }
+  if (node.has("gltf")) {
+    std::error_code code;
+    const std::string extension = desc.gltf.extension().string();
+    if (desc.gltf.empty() || (extension != ".glb" && extension != ".gltf")) {
+      diagnostics.add(key_location(node, "gltf"), "'gltf' must name a .glb or .gltf file");
+    } else if (require_files && !std::filesystem::is_regular_file(desc.gltf, code)) {
+      diagnostics.add(key_location(node, "gltf"),
+                      fmt::format("'gltf': {}: no such file", desc.gltf.string()));
+    }
+  }
+  if (!desc.material.empty()) {
+    check_material_name(desc.material, materials, key_location(node, "material"), diagnostics);
+  }
+  if (const Node* map = node.find("material_map");
+      map != nullptr && map->kind == Node::Kind::table) {
+    for (const Member& member : map->members) {
+      check_material_name(desc.material_map[member.key], materials, member.value.at, diagnostics);
+    }
+  }
+  desc.trajectory = resolve_trajectory(draft.trajectory, draft.trajectory_file, node, diagnostics);
+  if (desc.entity_id == 0) {
+    for (const std::string_view key : {"trajectory", "trajectory_file"}) {
+      if (node.has(key)) {
+        diagnostics.add(key_location(node, key),
+                        fmt::format("'{}' needs an entity_id: static scenery does not move", key));
+      }
+    }
+    if (!desc.on) {
+      diagnostics.add(key_location(node, "on"),
+                      "'on' needs an entity_id: static scenery is always on");
+    }
+  }
+  resolve_placement(draft, node, desc, diagnostics);
+  return desc;
+}
+
+}  // namespace
+
+std::vector<ObjectDesc> resolve_objects(const Node& root, const std::vector<Material>& materials,
+                                        bool require_files, Diagnostics& diagnostics) {
+  std::vector<ObjectDesc> objects;
+  for (const Node& node : section_array(root, "object", diagnostics)) {
+    objects.push_back(resolve_object(node, objects, materials, require_files, diagnostics));
+  }
+  return objects;
+}
+
+scene::SensorDesc resolve_sensor(const Node& root, Diagnostics& diagnostics) {
+  const Node& node = section(root, "sensor", diagnostics);
+  SensorDraft draft = default_sensor();
+  read_table(node, sensor_keys(), draft, diagnostics);
+  scene::SensorDesc desc = draft.desc;
+  if (desc.name.empty()) {
+    diagnostics.add(key_location(node, "name"), "'name' is empty");
+  }
+  desc.trajectory = resolve_trajectory(draft.trajectory, draft.trajectory_file, node, diagnostics);
+  for (std::size_t i = 0; i < desc.trajectory.size(); ++i) {
+    if (!desc.trajectory[i].on) {
+      diagnostics.add(key_location(node, node.has("trajectory") ? "trajectory" : "trajectory_file"),
+                      "a sensor is always on: its keyframes take no on = false");
+      break;
+    }
+  }
+  if (const Member* pose_key = first_pose_key(node)) {
+    if (node.has("trajectory") || node.has("trajectory_file")) {
+      diagnostics.add(pose_key->key_at,
+                      fmt::format("'{}' has no effect beside a trajectory", pose_key->key));
+    } else {
+      desc.trajectory.push_back({0, resolve_pose(draft.pose, node, diagnostics), true, false});
+    }
+  }
+  return desc;
+}
+
+}  // namespace emit::config

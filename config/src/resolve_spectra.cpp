@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "resolve.hpp"
+
+namespace emit::config {
+
+using scene::BandAtmosphere;
+using scene::ChannelDesc;
+using scene::SpectralBand;
+
+namespace {
+
+const std::vector<SpectralBand>& built_in_bands() {
+  static const std::vector<SpectralBand> bands = {{"3-5", 3.0, 5.0, {}},
+                                                  {"3.4-4.1", 3.4, 4.1, {}},
+                                                  {"8-12", 8.0, 12.0, {}},
+                                                  {"7.7-9.3", 7.7, 9.3, {}}};
+  return bands;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) {
+    out += (out.empty() ? "" : ", ") + name;
+  }
+  return out;
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+void check_response(const SpectralBand& band, const Location& at, Diagnostics& diagnostics) {
+  if (band.response.size() < 2) {
+    diagnostics.add(at, "a response needs at least two samples");
+    return;
+  }
+  double peak = 0.0;
+  for (std::size_t i = 0; i < band.response.size(); ++i) {
+    const scene::ResponseSample& sample = band.response[i];
+    if (!(sample.response_frac >= 0.0 && sample.response_frac <= 1.0)) {
+      diagnostics.add(at, fmt::format("the response at {} um is {}, must be 0 .. 1",
+                                      sample.wavelength_um, sample.response_frac));
+      return;
+    }
+    if (i > 0 && sample.wavelength_um <= band.response[i - 1].wavelength_um) {
+      diagnostics.add(at,
+                      fmt::format("the wavelengths of a response must ascend ({} um follows {})",
+                                  sample.wavelength_um, band.response[i - 1].wavelength_um));
+      return;
+    }
+    peak = std::max(peak, sample.response_frac);
+  }
+  if (peak <= 0.0) {
+    diagnostics.add(at, "the response is zero everywhere");
+  }
+}
+
+SpectralBand resolve_band(const Node& node, Diagnostics& diagnostics) {
+  BandDraft draft;
+  const std::size_t faults = diagnostics.size();
+  read_table(node, band_keys(), draft, diagnostics);
+  SpectralBand& band = draft.desc;
+  if (node.has("name") && band.name.empty()) {
+    diagnostics.add(key_location(node, "name"), "'name' is empty");
+  }
+  if (node.has("response") && node.has("response_file")) {
+    diagnostics.add(key_location(node, "response_file"),
+                    "use only one of 'response' and 'response_file'");
+    return band;
+  }
+  std::string_view response_key = "response";
+  if (!draft.response_file.empty()) {
+    response_key = "response_file";
+    auto loaded = load_response_csv(draft.response_file);
+    if (!loaded) {
+      report_file_error(loaded.error(), node, response_key, diagnostics);
+      return band;
+    }
+    band.response = std::move(*loaded);
+  }
+  if (diagnostics.size() != faults) {
+    return band;
+  }
+  if (node.has(response_key)) {
+    check_response(band, key_location(node, response_key), diagnostics);
+    if (diagnostics.size() != faults) {
+      return band;
+    }
+    const double first = band.response.front().wavelength_um;
+    const double last = band.response.back().wavelength_um;
+    band.lo_um = node.has("lo_um") ? band.lo_um : first;
+    band.hi_um = node.has("hi_um") ? band.hi_um : last;
+    if (band.lo_um > last || band.hi_um < first) {
+      diagnostics.add(node.at, fmt::format("band '{}' and its response do not overlap", band.name));
+      return band;
+    }
+  } else if (!node.has("lo_um") || !node.has("hi_um")) {
+    diagnostics.add(node.at,
+                    fmt::format("band '{}' needs 'lo_um' and 'hi_um', or a response", band.name));
+    return band;
+  }
+  if (band.lo_um >= band.hi_um) {
+    diagnostics.add(key_location(node, node.has("hi_um") ? "hi_um" : "lo_um"),
+                    fmt::format("'hi_um' ({}) must be above 'lo_um' ({})", band.hi_um, band.lo_um));
+  }
+  return band;
+}
+
+/// The [[band]] of that name, else `fallback`.
+const Location& band_location(const Node& root, const std::string& name, const Node& fallback) {
+  if (const Node* bands = root.find("band")) {
+    for (const Node& node : bands->items) {
+      const Node* band_name = node.find("name");
+      if (band_name != nullptr && band_name->text == name) {
+        return node.at;
+      }
+    }
+  }
+  return fallback.at;
+}
+
+}  // namespace
+
+std::vector<std::string> known_band_names(const std::vector<SpectralBand>& declared) {
+  std::vector<std::string> names;
+  for (const SpectralBand& band : built_in_bands()) {
+    names.push_back(band.name);
+  }
+  for (const SpectralBand& band : declared) {
+    if (!contains(names, band.name)) {
+      names.push_back(band.name);
+    }
+  }
+  return names;
+}
+
+std::vector<SpectralBand> resolve_declared_bands(const Node& root, Diagnostics& diagnostics) {
+  std::vector<SpectralBand> bands;
+  for (const Node& node : section_array(root, "band", diagnostics)) {
+    SpectralBand band = resolve_band(node, diagnostics);
+    for (const SpectralBand& other : bands) {
+      if (other.name == band.name) {
+        diagnostics.add(key_location(node, "name"),
+                        fmt::format("band '{}' is defined twice", band.name));
+      }
+    }
+    bands.push_back(std::move(band));
+  }
+  return bands;
+}
+
+std::vector<ChannelDesc> resolve_channels(const Node& root,
+                                          const std::vector<std::string>& known_bands,
+                                          Diagnostics& diagnostics) {
+  if (!root.has("channel")) {
+    return {{"lwir", scene::ChannelKind::injection, "8-12"},
+            {"mwir", scene::ChannelKind::injection, "3-5"}};
+  }
+  std::vector<ChannelDesc> channels;
+  for (const Node& node : section_array(root, "channel", diagnostics)) {
+    ChannelDesc channel;
+    read_table(node, channel_keys(), channel, diagnostics);
+    if (node.has("name") && channel.name.empty()) {
+      diagnostics.add(key_location(node, "name"), "'name' is empty");
+    }
+    if (node.has("band") && !contains(known_bands, channel.band)) {
+      diagnostics.add(key_location(node, "band"), fmt::format("there is no band '{}' (known: {})",
+                                                              channel.band, listed(known_bands)));
+    }
+    for (const ChannelDesc& other : channels) {
+      if (!channel.name.empty() && other.name == channel.name) {
+        diagnostics.add(key_location(node, "name"),
+                        fmt::format("channel '{}' is defined twice", channel.name));
+      }
+    }
+    channels.push_back(std::move(channel));
+  }
+  if (channels.empty() && diagnostics.empty()) {
+    diagnostics.add(key_location(root, "channel"), "at least one channel is needed");
+  }
+  return channels;
+}
+
+std::vector<SpectralBand> bands_in_use(const std::vector<ChannelDesc>& channels,
+                                       const std::vector<SpectralBand>& declared) {
+  std::vector<SpectralBand> out;
+  const auto add = [&out](const SpectralBand& band) {
+    if (std::none_of(out.begin(), out.end(),
+                     [&band](const SpectralBand& other) { return other.name == band.name; })) {
+      out.push_back(band);
+    }
+  };
+  for (const ChannelDesc& channel : channels) {
+    for (const std::vector<SpectralBand>* bands : {&declared, &built_in_bands()}) {
+      for (const SpectralBand& band : *bands) {
+        if (band.name == channel.band) {
+          add(band);
+        }
+      }
+    }
+  }
+  for (const SpectralBand& band : declared) {
+    add(band);
+  }
+  return out;
+}
+
+scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<SpectralBand>& bands,
+                                         Diagnostics& diagnostics) {
+  const Node& table = section(root, "atmosphere", diagnostics);
+  AtmosphereDraft draft;
+  const bool bands_are_sound = diagnostics.empty();
+  const std::size_t faults = diagnostics.size();
+  read_table(table, atmosphere_keys(), draft, diagnostics);
+  scene::AtmosphereDesc out;
+  out.enabled = draft.enabled;
+  std::vector<BandAtmosphere> from_file;
+  if (!draft.file.empty()) {
+    auto loaded = load_atmosphere_csv(draft.file);
+    if (!loaded) {
+      report_file_error(loaded.error(), table, "file", diagnostics);
+    } else {
+      from_file = std::move(*loaded);
+    }
+  }
+  const Node* inline_bands = table.find("band");
+  for (std::size_t i = 0; i < draft.bands.size() && diagnostics.size() == faults; ++i) {
+    const Node& node = inline_bands->items[i];
+    const std::string& name = draft.bands[i].band;
+    if (std::none_of(bands.begin(), bands.end(),
+                     [&name](const SpectralBand& band) { return band.name == name; }) &&
+        !contains(known_band_names(bands), name)) {
+      diagnostics.add(key_location(node, "band"), fmt::format("there is no band '{}'", name));
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      if (draft.bands[j].band == name) {
+        diagnostics.add(key_location(node, "band"),
+                        fmt::format("the atmosphere of band '{}' is given twice", name));
+      }
+    }
+  }
+  if (diagnostics.size() != faults) {
+    return out;
+  }
+  for (const SpectralBand& band : bands) {
+    const auto named = [&band](const BandAtmosphere& entry) { return entry.band == band.name; };
+    const auto inline_entry = std::find_if(draft.bands.begin(), draft.bands.end(), named);
+    const auto file_entry = std::find_if(from_file.begin(), from_file.end(), named);
+    if (inline_entry != draft.bands.end()) {
+      out.bands.push_back(*inline_entry);
+    } else if (file_entry != from_file.end()) {
+      out.bands.push_back(*file_entry);
+    } else if (std::optional<BandAtmosphere> model = model_atmosphere(draft.model, band.name)) {
+      out.bands.push_back(std::move(*model));
+    } else if (draft.enabled && bands_are_sound) {
+      diagnostics.add(
+          band_location(root, band.name, table),
+          fmt::format("band '{}' has no atmosphere: add an [[atmosphere.band]] for it or "
+                      "set atmosphere.enabled = false",
+                      band.name));
+    }
+  }
+  return out;
+}
+
+}  // namespace emit::config

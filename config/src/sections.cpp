@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/config/load.hpp"
+#include "keys.hpp"
+
+/// The sections in the order of the documentation, and the documentation itself.
+namespace emit::config {
+
+const std::vector<SectionDoc>& scenario_sections() {
+  static const std::vector<SectionDoc> sections = {
+      section_doc("", false, "Above the first section.", scenario_head_keys(),
+                  default_scenario_head()),
+      section_doc("place", false, "Where the world origin lies.", place_keys(),
+                  scene::Place{48.56 * 0.017453292519943295, 11.26 * 0.017453292519943295, 0.0}),
+      section_doc("weather", false, "Sun, sky and air over time.", weather_keys(), WeatherDraft{}),
+      section_doc("weather.sample", true,
+                  "Forcing at one instant: linear between samples, constant outside. The same "
+                  "names are the columns of the CSV.",
+                  weather_sample_keys(), scene::WeatherSample{}),
+      section_doc("atmosphere", false, "What the air does between surface and sensor.",
+                  atmosphere_keys(), AtmosphereDraft{}),
+      section_doc("atmosphere.band", true, "Transmittance of one band.", band_atmosphere_keys(),
+                  scene::BandAtmosphere{}),
+      section_doc("thermal", false, "The thermal simulation.", thermal_keys(),
+                  scene::ThermalOptions{}),
+      section_doc("sensor", false,
+                  "The camera: looks along the x axis of its body. Host frames override its poses.",
+                  sensor_keys(), default_sensor()),
+      section_doc("channel", true,
+                  "An output stream. Without any: `lwir` (8-12) and `mwir` (3-5), both injection.",
+                  channel_keys(), scene::ChannelDesc{}),
+      section_doc("band", true,
+                  "A spectral band beside the built-in ones. Each band in use costs one image per "
+                  "frame.",
+                  band_keys(), BandDraft{}),
+      section_doc("object", true, "A glTF file placed in the world.", object_keys(), ObjectDraft{}),
+      section_doc("object.instances", true, "One placement of static scenery.", instance_keys(),
+                  InstanceDraft{}),
+      section_doc("object.trajectory", true,
+                  "A keyframe; also of `[sensor]` (`[[sensor.trajectory]]`). Before the first its "
+                  "pose holds, likewise after the last.",
+                  keyframe_keys(), KeyframeDraft{}),
+      section_doc("material", true,
+                  "A material; the same in a library file, which holds nothing else.",
+                  material_keys(), scene::Material{}),
+      section_doc("material.layers", true, "A layer of a material, outermost first.", layer_keys(),
+                  scene::Layer{}),
+      section_doc("material.modes", true, "An exponential of a material's step response.",
+                  mode_keys(), scene::RelaxationMode{}),
+      section_doc("display", false, "Limits of the false-colour display.", display_keys(),
+                  scene::DisplayOptions{}),
+  };
+  return sections;
+}
+
+const std::vector<SectionDoc>& daemon_sections() {
+  static const std::vector<SectionDoc> sections = {
+      section_doc("", false, "Above the first section.", daemon_head_keys(), DaemonHead{}),
+      section_doc("source", false, "Where the frames come from.", source_keys(), SourceConfig{}),
+      section_doc("pacing", false, "When a frame is due.", pacing_keys(), PacingConfig{}),
+      section_doc("host", false, "Poses in.", host_keys(), HostConfig{}),
+      section_doc("control", false, "The TCP port for everything but datagrams.", control_keys(),
+                  ControlConfig{}),
+      section_doc("stream", false, "Frames out.", stream_keys(), StreamConfig{}),
+      section_doc("journal", false, "The record that makes replay exact.", journal_keys(),
+                  JournalConfig{}),
+      section_doc("device", false, "The graphics device.", device_keys(), DeviceConfig{}),
+      section_doc("log", false, "Messages.", log_keys(), LogConfig{}),
+  };
+  return sections;
+}
+
+namespace {
+
+/// `|` would end a table cell.
+std::string cell(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '|') {
+      out += '\\';
+    }
+    out += c;
+  }
+  return out;
+}
+
+void append_sections(const std::vector<SectionDoc>& sections, std::string& out) {
+  for (const SectionDoc& section : sections) {
+    std::string title = "Top level";
+    if (!section.path.empty()) {
+      title = section.array ? "`[[" + section.path + "]]`" : "`[" + section.path + "]`";
+    }
+    out += "### " + title + "\n\n" + section.summary + "\n\n";
+    out += "| key | type | unit | range | default | meaning |\n|---|---|---|---|---|---|\n";
+    for (const SectionDoc::Row& row : section.rows) {
+      const std::string shown = row.default_text.empty() ? ""
+                                : row.spec.required      ? "required"
+                                                         : "`" + row.default_text + "`";
+      out += "| `" + row.spec.name + "` | " + row.spec.type + " | " + row.spec.unit + " | " +
+             cell(row.spec.range) + " | " + cell(shown) + " | " + cell(row.spec.meaning) + " |\n";
+    }
+    out += "\n";
+  }
+}
+
+}  // namespace
+
+std::string key_reference_markdown() {
+  std::string out = "## Scenario keys\n\n";
+  append_sections(scenario_sections(), out);
+  out += "## Daemon keys\n\n";
+  append_sections(daemon_sections(), out);
+  out.pop_back();
+  return out;
+}
+
+}  // namespace emit::config

@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Installs the packages, builds the release preset and runs the demo; arguments go to `emit demo`.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+deploy/scripts/install_deps.sh
+cmake --preset release
+cmake --build --preset release
+build/release/bin/emit demo --out out/demo "$@"

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "emit/protocol/fragment.hpp"
+
+namespace emit::protocol {
+
+/// One bit per pixel, row-major: set = received.
+class PixelValidity {
+ public:
+  PixelValidity() = default;
+  PixelValidity(std::span<const std::uint64_t> words, std::size_t first_bit) noexcept
+      : words_(words), first_bit_(first_bit) {}
+  /// Precondition: index < width_px * height_px of the frame.
+  [[nodiscard]] bool pixel(std::size_t index) const noexcept;
+  /// True when every pixel of [begin, begin + count) arrived, for example of one row.
+  [[nodiscard]] bool all(std::size_t begin, std::size_t count) const noexcept;
+
+ private:
+  std::span<const std::uint64_t> words_;
+  std::size_t first_bit_ = 0;
+};
+
+/// A frame put together from fragments; valid until it is released.
+struct ReceivedFrame {
+  FrameHeader header;  ///< kFlagPartial set when pixels are missing
+  std::uint16_t stream_id = 0;
+  std::uint32_t frame_id = 0;
+  /// False: both copies of the header were lost. Size, format, band and channel are then those of
+  /// the stream's previous frame, sim_time_ns is the fragments', everything else is 0.
+  bool header_known = false;
+  bool complete = false;  ///< every pixel arrived
+  bool crc_ok = false;    ///< complete and the payload CRC matches (when it was checked)
+  std::uint64_t missing_px = 0;
+  std::uint32_t frames_lost_before = 0;  ///< frame ids between this and the one handed out before
+  std::span<const float> pixels;         ///< missing ones are 0; aligned to 64 bytes
+  PixelValidity validity;
+};
+
+/// Counts since construction; plain numbers for the owner's thread.
+struct ReassemblerCounters {
+  std::array<std::uint64_t, kFragmentStatusCount> fragments{};  ///< by FragmentStatus
+  std::uint64_t frames_complete = 0;
+  std::uint64_t frames_partial = 0;   ///< handed out with missing pixels
+  std::uint64_t frames_unusable = 0;  ///< dropped: no header copy and no earlier frame to go by, or
+                                      ///< a header that contradicts the fragments
+  std::uint64_t frames_lost = 0;      ///< frame ids of which no fragment arrived
+  std::uint64_t missing_px = 0;
+  std::uint64_t crc_mismatches = 0;
+  std::uint64_t resyncs = 0;  ///< a stream's frame ids started again
+};
+
+/// Puts frames together from fragments: lost, doubled, reordered, interleaved or corrupt ones.
+///
+/// Frames of one stream come out in order of frame id. A frame leaves as complete when its last
+/// byte arrives, as partial when a newer frame of its stream completes, when its buffer is needed,
+/// or on flush(). Trusts nothing: every offset and length is checked before a byte is copied.
+/// Thread: one owner.  Real time: the constructor allocates, everything else is RT-safe.
+/// @code
+///   reassembler.push(datagram);
+///   while (const ReceivedFrame* frame = reassembler.pop()) {
+///     use(*frame);
+///     reassembler.release(frame);
+///   }
+/// @endcode
+class Reassembler {
+ public:
+  struct Params {
+    std::uint32_t max_payload_bytes = 0;    ///< largest frame accepted, pixels only
+    std::uint32_t buffers = 4;              ///< frames held at once, in work and handed out; >= 2
+    std::uint32_t max_open_per_stream = 2;  ///< newer frames push the oldest out beyond this; >= 1
+    std::uint32_t max_streams = 8;
+    bool check_crc = true;  ///< of complete frames
+  };
+  explicit Reassembler(const Params& params);
+  ~Reassembler();
+  Reassembler(Reassembler&&) noexcept;
+  Reassembler& operator=(Reassembler&&) noexcept;
+
+  /// Takes one datagram; copies its payload.
+  FragmentStatus push(std::span<const std::byte> datagram) noexcept;
+
+  /// Hands out the next finished frame or nullptr. Keep it until release(); buffers held are
+  /// missing for new frames.
+  [[nodiscard]] const ReceivedFrame* pop() noexcept;
+  /// Precondition: `frame` came from pop() and was not released since.
+  void release(const ReceivedFrame* frame) noexcept;
+
+  /// Finishes every frame in work as partial: the stream ended or fell silent.
+  void flush() noexcept;
+
+  [[nodiscard]] const ReassemblerCounters& counters() const noexcept { return counters_; }
+
+ private:
+  struct Slot;
+  struct Stream;
+
+  [[nodiscard]] FragmentStatus take(const FragmentHeader& header,
+                                    std::span<const std::byte> payload) noexcept;
+  [[nodiscard]] Stream* stream_of(std::uint16_t stream_id) noexcept;
+  [[nodiscard]] Slot* open_slot(Stream& stream, const FragmentHeader& header,
+                                FragmentStatus& status) noexcept;
+  [[nodiscard]] Slot* oldest_open(const Stream* stream) noexcept;
+  void finish(Slot& slot) noexcept;
+  void finish_older(Stream& stream, std::uint32_t frame_id) noexcept;
+
+  Params params_;
+  std::vector<Slot> slots_;
+  std::vector<Stream> streams_;
+  std::vector<Slot*> ready_;  // ring of finished frames
+  std::size_t ready_begin_ = 0;
+  std::size_t ready_count_ = 0;
+  std::uint64_t arrivals_ = 0;
+  ReassemblerCounters counters_;
+};
+
+}  // namespace emit::protocol

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::protocol {
+
+struct McapWriterOptions {
+  std::string profile{};  ///< empty: none
+  std::string library = "emitd";
+  std::uint32_t chunk_bytes = 256u << 10;        ///< 0 = plain messages, each written at once
+  std::int64_t flush_interval_ns = 100'000'000;  ///< longest log time that a chunk is held back
+};
+
+/// Writes MCAP files (public specification): uncompressed chunks with CRC-32, message and chunk
+/// index, statistics, summary offsets, footer with CRC-32.
+///
+/// Every chunk goes to the file in one write, so a killed process leaves whole chunks and a file
+/// that scanning readers accept. Errors (io) name file and offset and are final: after the first
+/// one every call returns it again. Thread: one owner.  Not RT-safe.
+class McapWriter {
+ public:
+  [[nodiscard]] static physics::Result<McapWriter> create(const std::filesystem::path& path,
+                                                          const McapWriterOptions& options);
+  McapWriter(McapWriter&&) noexcept;
+  McapWriter& operator=(McapWriter&&) noexcept;
+  ~McapWriter();  ///< close(), errors are lost
+
+  /// Returns the id, from 1.
+  [[nodiscard]] physics::Result<std::uint16_t> add_schema(std::string_view name,
+                                                          std::string_view encoding,
+                                                          std::string_view data);
+  /// Returns the id, from 1. Errors (invalid_argument): unknown schema.
+  [[nodiscard]] physics::Result<std::uint16_t> add_channel(std::uint16_t schema_id,
+                                                           std::string_view topic,
+                                                           std::string_view message_encoding);
+  /// Errors (invalid_argument): unknown channel, closed writer, negative time.
+  [[nodiscard]] physics::Result<void> write(std::uint16_t channel_id, std::uint32_t sequence,
+                                            std::int64_t log_time_ns, std::int64_t publish_time_ns,
+                                            std::span<const std::byte> data);
+  /// Hands the open chunk to the kernel.
+  [[nodiscard]] physics::Result<void> flush();
+  /// Writes summary and footer. A second call does nothing.
+  [[nodiscard]] physics::Result<void> close();
+
+ private:
+  struct Impl;
+  explicit McapWriter(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace emit::protocol

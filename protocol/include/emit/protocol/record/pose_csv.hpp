@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "emit/physics/error.hpp"
+#include "emit/protocol/host_frame.hpp"
+
+namespace emit::protocol {
+
+/// Reads seeker poses from CSV, one host frame per row (columns: docs/wire.md, section 6).
+/// Thread: one owner.  Not RT-safe.
+class PoseCsvReader {
+ public:
+  /// Errors: not_found, io, parse (no header row, a mandatory column missing or twice).
+  [[nodiscard]] static physics::Result<PoseCsvReader> open(const std::filesystem::path& path);
+  PoseCsvReader(PoseCsvReader&&) noexcept;
+  PoseCsvReader& operator=(PoseCsvReader&&) noexcept;
+  ~PoseCsvReader();
+
+  /// Moves to the next row; false at the end. Errors (parse) name file, line and column: not a
+  /// number, missing value, invalid pose, time that goes back. An error is final.
+  [[nodiscard]] physics::Result<bool> next();
+  [[nodiscard]] const HostFrameData& host() const noexcept;
+
+ private:
+  struct Impl;
+  explicit PoseCsvReader(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace emit::protocol

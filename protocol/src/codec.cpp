@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/codec.hpp"
+
+#include <google/protobuf/arena.h>
+
+#include <array>
+#include <limits>
+
+#include "emit/protocol/convert.hpp"
+#include "emit/v1/host.pb.h"
+#include "wire_bytes.hpp"
+
+namespace emit::protocol {
+namespace {
+
+// Holds the largest host frame parsed: 128 entities of about 270 bytes each.
+constexpr std::size_t kArenaBytes = std::size_t{128} << 10;
+
+/// Arena that starts in memory of its own and goes back to it, so that it does not allocate.
+class FixedArena {
+ public:
+  FixedArena() : block_(std::make_unique<char[]>(kArenaBytes)), arena_(options(block_.get())) {}
+  [[nodiscard]] v1::HostFrame* fresh_host_frame() noexcept {
+    arena_.Reset();
+    return google::protobuf::Arena::CreateMessage<v1::HostFrame>(&arena_);
+  }
+
+ private:
+  static google::protobuf::ArenaOptions options(char* block) {
+    google::protobuf::ArenaOptions result;
+    result.initial_block = block;
+    result.initial_block_size = kArenaBytes;
+    return result;
+  }
+  std::unique_ptr<char[]> block_;
+  google::protobuf::Arena arena_;
+};
+
+/// Reads a varint at `at` and moves behind it; false when it is cut off or too long.
+bool read_varint(std::span<const std::byte> bytes, std::size_t& at, std::uint64_t& value) noexcept {
+  value = 0;
+  for (unsigned shift = 0; shift < 64; shift += 7) {
+    if (at == bytes.size()) return false;
+    const auto byte = std::to_integer<std::uint64_t>(bytes[at++]);
+    value |= (byte & 0x7Fu) << shift;
+    if ((byte & 0x80u) == 0) return true;
+  }
+  return false;
+}
+
+struct Outline {
+  std::uint64_t protocol_version = 0;
+  std::uint64_t entities = 0;
+};
+
+/// Walks the top-level fields before Protobuf gets to see the message: the version is known even
+/// where a newer layout would not parse, and the number of entities bounds the memory.
+bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameData& out) noexcept {
+  enum WireType : std::uint64_t { kVarint = 0, kFixed64 = 1, kDelimited = 2, kFixed32 = 5 };
+  std::size_t at = 0;
+  while (at < bytes.size()) {
+    std::uint64_t tag = 0;
+    std::uint64_t value = 0;
+    if (!read_varint(bytes, at, tag)) return false;
+    const std::uint64_t field = tag >> 3;
+    const std::size_t left = bytes.size() - at;
+    switch (tag & 7u) {
+      case kVarint:
+        if (!read_varint(bytes, at, value)) return false;
+        if (field == v1::HostFrame::kProtocolVersionFieldNumber) {
+          outline.protocol_version = value & 0xFFFFFFFFu;  // as Protobuf reads a uint32
+        } else if (field == v1::HostFrame::kFrameNumberFieldNumber) {
+          out.frame_number = value;
+        } else if (field == v1::HostFrame::kRunIdFieldNumber) {
+          out.run_id = value;
+        }
+        break;
+      case kFixed64:
+        if (left < 8) return false;
+        if (field == v1::HostFrame::kSimTimeNsFieldNumber) {
+          out.sim_time_ns = wire::get<std::int64_t>(bytes, at);
+        }
+        at += 8;
+        break;
+      case kDelimited:
+        if (!read_varint(bytes, at, value) || value > bytes.size() - at) return false;
+        at += static_cast<std::size_t>(value);
+        if (field == v1::HostFrame::kEntitiesFieldNumber) ++outline.entities;
+        break;
+      case kFixed32:
+        if (left < 4) return false;
+        at += 4;
+        break;
+      default:
+        return false;  // groups: proto3 has none
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string_view to_string(DecodeStatus status) noexcept {
+  switch (status) {
+    case DecodeStatus::ok:
+      return "ok";
+    case DecodeStatus::wrong_version:
+      return "wrong protocol version";
+    case DecodeStatus::oversize:
+      return "too large or too many entities";
+    case DecodeStatus::malformed:
+      return "malformed message";
+    case DecodeStatus::invalid_pose:
+      return "invalid pose";
+    case DecodeStatus::invalid_environment:
+      return "invalid environment";
+  }
+  return "unknown";
+}
+
+struct HostFrameDecoder::Impl {
+  FixedArena arena;
+};
+
+HostFrameDecoder::HostFrameDecoder() : impl_(std::make_unique<Impl>()) {}
+HostFrameDecoder::~HostFrameDecoder() = default;
+HostFrameDecoder::HostFrameDecoder(HostFrameDecoder&&) noexcept = default;
+HostFrameDecoder& HostFrameDecoder::operator=(HostFrameDecoder&&) noexcept = default;
+
+DecodeStatus decode_host_frame(std::span<const std::byte> bytes, HostFrameDecoder& decoder,
+                               HostFrameData& out) noexcept {
+  out.frame_number = 0;
+  out.sim_time_ns = 0;
+  out.run_id = 0;
+  out.entity_count = 0;
+  if (bytes.size() > kMaxHostFrameBytes) return DecodeStatus::oversize;
+  Outline outline;
+  if (!read_outline(bytes, outline, out)) return DecodeStatus::malformed;
+  if (outline.protocol_version != kProtocolVersion) return DecodeStatus::wrong_version;
+  if (outline.entities > kMaxEntitiesPerFrame) return DecodeStatus::oversize;
+  v1::HostFrame* message = decoder.impl_->arena.fresh_host_frame();
+  if (!message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    return DecodeStatus::malformed;
+  }
+  return from_proto(*message, out);
+}
+
+std::span<const std::byte> host_frame_in_control_record(std::span<const std::byte> body) noexcept {
+  constexpr std::uint64_t kHostFrameTag = (6u << 3) | 2u;  // ControlRecord.host_frame
+  std::size_t at = 0;
+  std::uint64_t tag = 0;
+  std::uint64_t length = 0;
+  if (!read_varint(body, at, tag) || tag != kHostFrameTag || !read_varint(body, at, length) ||
+      length != body.size() - at) {
+    return {};
+  }
+  return body.subspan(at);
+}
+
+struct HostFrameEncoder::Impl {
+  FixedArena arena;
+  // 128 entities with rates stay under 200 bytes each.
+  std::array<std::byte, kMaxHostFrameBytes> bytes;
+};
+
+HostFrameEncoder::HostFrameEncoder() : impl_(std::make_unique<Impl>()) {}
+HostFrameEncoder::~HostFrameEncoder() = default;
+HostFrameEncoder::HostFrameEncoder(HostFrameEncoder&&) noexcept = default;
+HostFrameEncoder& HostFrameEncoder::operator=(HostFrameEncoder&&) noexcept = default;
+
+std::span<const std::byte> HostFrameEncoder::encode(const HostFrameData& frame) noexcept {
+  v1::HostFrame* message = impl_->arena.fresh_host_frame();
+  to_proto(frame, *message);
+  const std::size_t size = message->ByteSizeLong();
+  if (size > impl_->bytes.size()) return {};
+  message->SerializeWithCachedSizesToArray(reinterpret_cast<std::uint8_t*>(impl_->bytes.data()));
+  return std::span(impl_->bytes).first(size);
+}
+
+}  // namespace emit::protocol

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/convert.hpp"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "emit/v1/control.pb.h"
+#include "emit/v1/host.pb.h"
+#include "emit/v1/status.pb.h"
+#include "quiet_protobuf.hpp"
+
+namespace emit::protocol {
+namespace {
+
+static_assert(static_cast<int>(DecodeStatus::ok) == v1::Status::CODE_OK);
+static_assert(static_cast<int>(DecodeStatus::wrong_version) == v1::Status::CODE_WRONG_VERSION);
+static_assert(static_cast<int>(DecodeStatus::oversize) == v1::Status::CODE_OVERSIZE);
+static_assert(static_cast<int>(DecodeStatus::malformed) == v1::Status::CODE_MALFORMED);
+static_assert(static_cast<int>(DecodeStatus::invalid_pose) == v1::Status::CODE_INVALID_POSE);
+static_assert(static_cast<int>(DecodeStatus::invalid_environment) ==
+              v1::Status::CODE_INVALID_ENVIRONMENT);
+
+// Ranges of docs/wire.md.
+constexpr double kMinNorm = 0.99;
+constexpr double kMaxNorm = 1.01;
+constexpr double kMaxSpeedMS = 1e6;
+constexpr double kMaxAngularRateRadS = 1e4;
+constexpr double kMaxFluxWM2 = 1e5;
+constexpr double kMaxAirK = 1000.0;
+constexpr double kMaxEnvironmentK = 5000.0;
+constexpr double kMaxWindMS = 1000.0;
+constexpr double kMaxFilmWM2K = 1e5;
+/// Squared norms nearer to 1 are left alone, so that decoding what was decoded changes no bit.
+constexpr double kNormTolerance = 1e-12;
+
+glm::dvec3 from(const v1::Vector3& in) noexcept {
+  return {in.x(), in.y(), in.z()};
+}
+
+void set(const glm::dvec3& in, v1::Vector3& out) {
+  out.set_x(in.x);
+  out.set_y(in.y);
+  out.set_z(in.z);
+}
+
+/// False for NaN too.
+bool within(const glm::dvec3& vector, double limit) noexcept {
+  return std::abs(vector.x) <= limit && std::abs(vector.y) <= limit && std::abs(vector.z) <= limit;
+}
+bool within(double value, double lowest, double highest) noexcept {
+  return value >= lowest && value <= highest;
+}
+
+bool read_attitude(const v1::Quaternion& in, glm::dquat& out) noexcept {
+  out = glm::dquat(in.w(), in.x(), in.y(), in.z());
+  const double squared = out.w * out.w + out.x * out.x + out.y * out.y + out.z * out.z;
+  const double norm = std::sqrt(squared);
+  if (!within(norm, kMinNorm, kMaxNorm)) return false;
+  if (std::abs(squared - 1.0) > kNormTolerance) {
+    out = glm::dquat(out.w / norm, out.x / norm, out.y / norm, out.z / norm);
+  }
+  return true;
+}
+
+bool repeats_an_id(const HostFrameData& frame, std::uint32_t checked) noexcept {
+  for (std::uint32_t i = 0; i < checked; ++i) {
+    if (frame.entities[i].entity_id == frame.entities[checked].entity_id) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void to_proto(const physics::Pose& pose, const std::optional<PoseRates>& rates, v1::Pose& out) {
+  set(pose.position_world_m, *out.mutable_position_m());
+  auto& attitude = *out.mutable_world_from_body();
+  attitude.set_w(pose.world_from_body.w);
+  attitude.set_x(pose.world_from_body.x);
+  attitude.set_y(pose.world_from_body.y);
+  attitude.set_z(pose.world_from_body.z);
+  if (rates) {
+    set(rates->velocity_world_m_s, *out.mutable_velocity_m_s());
+    set(rates->angular_rate_body_rad_s, *out.mutable_angular_rate_rad_s());
+  } else {
+    out.clear_velocity_m_s();
+    out.clear_angular_rate_rad_s();
+  }
+}
+
+void to_proto(const EntityStateData& entity, v1::EntityState& out) {
+  out.set_entity_id(entity.entity_id);
+  out.set_off(!entity.on);
+  out.set_teleport(entity.teleport);
+  if (entity.has_pose) {
+    to_proto(entity.pose, entity.rates, *out.mutable_pose());
+  } else {
+    out.clear_pose();
+  }
+}
+
+void to_proto(const EnvironmentData& environment, v1::Environment& out) {
+  out.set_direct_normal_w_m2(environment.direct_normal_w_m2);
+  out.set_diffuse_horizontal_w_m2(environment.diffuse_horizontal_w_m2);
+  out.set_longwave_down_w_m2(environment.longwave_down_w_m2);
+  out.set_air_k(environment.air_k);
+  out.set_wind_m_s(environment.wind_m_s);
+  out.set_cloud_frac(environment.cloud_frac);
+  out.clear_environment_k();
+  out.clear_film_w_m2_k();
+  if (environment.environment_k) out.set_environment_k(*environment.environment_k);
+  if (environment.film_w_m2_k) out.set_film_w_m2_k(*environment.film_w_m2_k);
+}
+
+void to_proto(const HostFrameData& frame, v1::HostFrame& out) {
+  out.Clear();
+  out.set_protocol_version(kProtocolVersion);
+  out.set_frame_number(frame.frame_number);
+  out.set_sim_time_ns(frame.sim_time_ns);
+  out.set_run_id(frame.run_id);
+  to_proto(frame.seeker, frame.seeker_rates, *out.mutable_seeker());
+  for (const EntityStateData& entity : frame.entity_span()) to_proto(entity, *out.add_entities());
+  if (frame.environment) to_proto(*frame.environment, *out.mutable_environment());
+}
+
+DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose,
+                        std::optional<PoseRates>& rates) noexcept {
+  if (!in.has_position_m() || !in.has_world_from_body()) return DecodeStatus::invalid_pose;
+  pose.position_world_m = from(in.position_m());
+  if (!within(pose.position_world_m, kMaxPositionM)) return DecodeStatus::invalid_pose;
+  if (!read_attitude(in.world_from_body(), pose.world_from_body)) {
+    return DecodeStatus::invalid_pose;
+  }
+  rates.reset();
+  if (in.has_velocity_m_s() != in.has_angular_rate_rad_s()) return DecodeStatus::invalid_pose;
+  if (in.has_velocity_m_s()) {
+    const PoseRates read{from(in.velocity_m_s()), from(in.angular_rate_rad_s())};
+    if (!within(read.velocity_world_m_s, kMaxSpeedMS) ||
+        !within(read.angular_rate_body_rad_s, kMaxAngularRateRadS)) {
+      return DecodeStatus::invalid_pose;
+    }
+    rates = read;
+  }
+  return DecodeStatus::ok;
+}
+
+DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out) noexcept {
+  out = EntityStateData{};
+  out.entity_id = in.entity_id();
+  out.on = !in.off();
+  out.teleport = in.teleport();
+  out.has_pose = in.has_pose();
+  return out.has_pose ? from_proto(in.pose(), out.pose, out.rates) : DecodeStatus::ok;
+}
+
+DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcept {
+  out = EnvironmentData{};
+  out.direct_normal_w_m2 = in.direct_normal_w_m2();
+  out.diffuse_horizontal_w_m2 = in.diffuse_horizontal_w_m2();
+  out.longwave_down_w_m2 = in.longwave_down_w_m2();
+  out.air_k = in.air_k();
+  out.wind_m_s = in.wind_m_s();
+  out.cloud_frac = in.cloud_frac();
+  if (in.has_environment_k()) out.environment_k = in.environment_k();
+  if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
+  constexpr double kAboveZero = std::numeric_limits<double>::min();
+  const bool valid =
+      within(out.direct_normal_w_m2, 0.0, kMaxFluxWM2) &&
+      within(out.diffuse_horizontal_w_m2, 0.0, kMaxFluxWM2) &&
+      within(out.longwave_down_w_m2, 0.0, kMaxFluxWM2) && within(out.air_k, kAboveZero, kMaxAirK) &&
+      within(out.wind_m_s, 0.0, kMaxWindMS) && within(out.cloud_frac, 0.0, 1.0) &&
+      (!out.environment_k || within(*out.environment_k, kAboveZero, kMaxEnvironmentK)) &&
+      (!out.film_w_m2_k || within(*out.film_w_m2_k, 0.0, kMaxFilmWM2K));
+  return valid ? DecodeStatus::ok : DecodeStatus::invalid_environment;
+}
+
+DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out) noexcept {
+  out.frame_number = in.frame_number();
+  out.sim_time_ns = in.sim_time_ns();
+  out.run_id = in.run_id();
+  out.received_ns = 0;
+  out.entity_count = 0;
+  out.environment.reset();
+  if (in.protocol_version() != kProtocolVersion) return DecodeStatus::wrong_version;
+  if (static_cast<std::size_t>(in.entities_size()) > kMaxEntitiesPerFrame) {
+    return DecodeStatus::oversize;
+  }
+  if (!in.has_seeker()) return DecodeStatus::invalid_pose;
+  if (auto status = from_proto(in.seeker(), out.seeker, out.seeker_rates);
+      status != DecodeStatus::ok) {
+    return status;
+  }
+  for (const v1::EntityState& entity : in.entities()) {
+    const std::uint32_t index = out.entity_count;
+    if (auto status = from_proto(entity, out.entities[index]); status != DecodeStatus::ok) {
+      return status;
+    }
+    if (repeats_an_id(out, index)) return DecodeStatus::malformed;
+    ++out.entity_count;
+  }
+  if (in.has_environment()) {
+    return from_proto(in.environment(), out.environment.emplace());
+  }
+  return DecodeStatus::ok;
+}
+
+void append_control_record(const v1::ControlRecord& message, std::vector<std::byte>& out) {
+  const std::size_t body_bytes = message.ByteSizeLong();
+  const std::size_t at = out.size();
+  out.resize(at + kRecordHeaderBytes + body_bytes);
+  encode_record_header(
+      RecordKind::control, static_cast<std::uint32_t>(body_bytes),
+      std::span<std::byte, kRecordHeaderBytes>(out.data() + at, kRecordHeaderBytes));
+  message.SerializeWithCachedSizesToArray(
+      reinterpret_cast<std::uint8_t*>(out.data() + at + kRecordHeaderBytes));
+}
+
+bool parse_control_record(std::span<const std::byte> body, v1::ControlRecord& out) {
+  quiet_protobuf();
+  return body.size() <= std::numeric_limits<int>::max() &&
+         out.ParseFromArray(body.data(), static_cast<int>(body.size())) &&
+         out.body_case() != v1::ControlRecord::BODY_NOT_SET;
+}
+
+}  // namespace emit::protocol

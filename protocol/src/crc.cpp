@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "crc.hpp"
+
+#include <array>
+#include <cstring>
+
+#include "emit/protocol/frame_header.hpp"
+#include "wire_bytes.hpp"
+
+#if defined(__x86_64__)
+#include <nmmintrin.h>
+#endif
+
+namespace emit::protocol {
+namespace {
+
+constexpr std::uint32_t kCastagnoliReflected = 0x82F63B78;
+constexpr std::uint32_t kIeeeReflected = 0xEDB88320;
+
+using SliceTable = std::array<std::array<std::uint32_t, 256>, 8>;
+
+/// Table k gives the effect of a byte that is followed by k zero bytes.
+constexpr SliceTable make_slices(std::uint32_t polynomial) {
+  SliceTable table{};
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    std::uint32_t crc = byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1u) != 0 ? polynomial : 0u);
+    table[0][byte] = crc;
+  }
+  for (std::size_t slice = 1; slice < 8; ++slice) {
+    for (std::size_t byte = 0; byte < 256; ++byte) {
+      const std::uint32_t before = table[slice - 1][byte];
+      table[slice][byte] = (before >> 8) ^ table[0][before & 0xFFu];
+    }
+  }
+  return table;
+}
+
+constexpr SliceTable kCastagnoliSlices = make_slices(kCastagnoliReflected);
+constexpr SliceTable kIeeeSlices = make_slices(kIeeeReflected);
+
+std::uint32_t crc_by_slices(const SliceTable& table, std::span<const std::byte> bytes,
+                            std::uint32_t crc) noexcept {
+  crc = ~crc;
+  std::size_t at = 0;
+  for (; at + 8 <= bytes.size(); at += 8) {
+    const std::uint64_t word = wire::get<std::uint64_t>(bytes, at) ^ crc;
+    crc = table[7][word & 0xFFu] ^ table[6][(word >> 8) & 0xFFu] ^ table[5][(word >> 16) & 0xFFu] ^
+          table[4][(word >> 24) & 0xFFu] ^ table[3][(word >> 32) & 0xFFu] ^
+          table[2][(word >> 40) & 0xFFu] ^ table[1][(word >> 48) & 0xFFu] ^ table[0][word >> 56];
+  }
+  for (; at < bytes.size(); ++at) {
+    crc = (crc >> 8) ^ table[0][(crc ^ std::to_integer<std::uint32_t>(bytes[at])) & 0xFFu];
+  }
+  return ~crc;
+}
+
+#if defined(__x86_64__)
+
+// The instruction takes three cycles but starts every cycle: three independent streams keep it
+// busy.
+constexpr std::size_t kStreamBytes = 4096;
+
+/// Moves a CRC register over kStreamBytes zero bytes: four table look-ups, one per register byte.
+using ShiftTable = std::array<std::array<std::uint32_t, 256>, 4>;
+
+constexpr ShiftTable make_shift(std::size_t zero_bytes) {
+  // The shift is linear, so the images of the 32 unit registers determine it.
+  std::array<std::uint32_t, 32> image{};
+  for (std::size_t bit = 0; bit < 32; ++bit) image[bit] = std::uint32_t{1} << bit;
+  // Doubling: image holds the shift by `step` bytes. Start with one byte.
+  for (auto& value : image) value = (value >> 8) ^ kCastagnoliSlices[0][value & 0xFFu];
+  auto apply = [](const std::array<std::uint32_t, 32>& matrix, std::uint32_t value) {
+    std::uint32_t sum = 0;
+    for (std::size_t bit = 0; bit < 32; ++bit) {
+      if (((value >> bit) & 1u) != 0) sum ^= matrix[bit];
+    }
+    return sum;
+  };
+  for (std::size_t step = 1; step < zero_bytes; step *= 2) {
+    std::array<std::uint32_t, 32> doubled{};
+    for (std::size_t bit = 0; bit < 32; ++bit) doubled[bit] = apply(image, image[bit]);
+    image = doubled;
+  }
+  ShiftTable table{};
+  for (std::size_t byte = 0; byte < 4; ++byte) {
+    for (std::uint32_t value = 0; value < 256; ++value) {
+      table[byte][value] = apply(image, value << (8 * byte));
+    }
+  }
+  return table;
+}
+static_assert((kStreamBytes & (kStreamBytes - 1)) == 0, "make_shift doubles");
+constexpr ShiftTable kShift = make_shift(kStreamBytes);
+
+std::uint32_t shift_stream(std::uint32_t crc) noexcept {
+  return kShift[0][crc & 0xFFu] ^ kShift[1][(crc >> 8) & 0xFFu] ^ kShift[2][(crc >> 16) & 0xFFu] ^
+         kShift[3][crc >> 24];
+}
+
+std::uint64_t load_u64(const std::byte* from) noexcept {
+  std::uint64_t word = 0;
+  std::memcpy(&word, from, sizeof word);
+  return word;
+}
+
+#endif
+
+}  // namespace
+
+std::uint32_t crc32c_portable(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  return crc_by_slices(kCastagnoliSlices, bytes, crc);
+}
+
+std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  return crc_by_slices(kIeeeSlices, bytes, crc);
+}
+
+#if defined(__x86_64__)
+
+bool has_crc32c_instruction() noexcept {
+  return __builtin_cpu_supports("sse4.2") != 0;
+}
+
+__attribute__((target("sse4.2"))) std::uint32_t crc32c_hardware(std::span<const std::byte> bytes,
+                                                                std::uint32_t crc) noexcept {
+  const std::byte* at = bytes.data();
+  std::size_t left = bytes.size();
+  std::uint64_t first = static_cast<std::uint32_t>(~crc);
+  while (left >= 3 * kStreamBytes) {
+    std::uint64_t second = 0;
+    std::uint64_t third = 0;
+    for (std::size_t i = 0; i < kStreamBytes; i += 8) {
+      first = _mm_crc32_u64(first, load_u64(at + i));
+      second = _mm_crc32_u64(second, load_u64(at + kStreamBytes + i));
+      third = _mm_crc32_u64(third, load_u64(at + 2 * kStreamBytes + i));
+    }
+    first = shift_stream(static_cast<std::uint32_t>(first)) ^ second;
+    first = shift_stream(static_cast<std::uint32_t>(first)) ^ third;
+    at += 3 * kStreamBytes;
+    left -= 3 * kStreamBytes;
+  }
+  for (; left >= 8; left -= 8, at += 8) first = _mm_crc32_u64(first, load_u64(at));
+  auto tail = static_cast<std::uint32_t>(first);
+  for (; left > 0; --left, ++at) tail = _mm_crc32_u8(tail, std::to_integer<std::uint8_t>(*at));
+  return ~tail;
+}
+
+#else
+
+bool has_crc32c_instruction() noexcept {
+  return false;
+}
+
+std::uint32_t crc32c_hardware(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  return crc32c_portable(bytes, crc);
+}
+
+#endif
+
+std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  static const bool hardware = has_crc32c_instruction();
+  return hardware ? crc32c_hardware(bytes, crc) : crc32c_portable(bytes, crc);
+}
+
+}  // namespace emit::protocol

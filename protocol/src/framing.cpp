@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/framing.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "wire_bytes.hpp"
+
+namespace emit::protocol {
+
+void encode_record_header(RecordKind kind, std::uint32_t body_bytes,
+                          std::span<std::byte, kRecordHeaderBytes> out) noexcept {
+  wire::put(out, 0, kRecordMagic);
+  wire::put(out, 4, kRecordVersion);
+  wire::put(out, 5, static_cast<std::uint8_t>(kind));
+  wire::put(out, 6, std::uint16_t{0});
+  wire::put(out, 8, body_bytes);
+}
+
+std::string_view to_string(ParseStatus status) noexcept {
+  switch (status) {
+    case ParseStatus::record:
+      return "record";
+    case ParseStatus::need_more:
+      return "need more bytes";
+    case ParseStatus::wrong_magic:
+      return "wrong record magic";
+    case ParseStatus::wrong_version:
+      return "wrong record version";
+    case ParseStatus::oversize:
+      return "record over the size limit";
+  }
+  return "unknown";
+}
+
+RecordParser::RecordParser(const RecordLimits& limits)
+    : limits_(limits),
+      capacity_(2 * (kRecordHeaderBytes +
+                     std::size_t{std::max(limits.max_control_bytes, limits.max_frame_bytes)})),
+      buffer_(std::make_unique<std::byte[]>(capacity_)) {}
+
+std::uint32_t RecordParser::limit_of(RecordKind kind) const noexcept {
+  return kind == RecordKind::frame ? limits_.max_frame_bytes : limits_.max_control_bytes;
+}
+
+std::span<std::byte> RecordParser::writable() noexcept {
+  if (error_ != ParseStatus::need_more) return {};
+  if (begin_ == end_) {
+    begin_ = end_ = 0;
+  } else if (begin_ >= capacity_ / 2) {
+    // Half the buffer holds any record, so what is kept always fits in front.
+    std::memmove(buffer_.get(), buffer_.get() + begin_, end_ - begin_);
+    end_ -= begin_;
+    begin_ = 0;
+  }
+  return {buffer_.get() + end_, capacity_ - end_};
+}
+
+void RecordParser::commit(std::size_t count) noexcept {
+  end_ += std::min(count, capacity_ - end_);
+}
+
+ParseStatus RecordParser::next(Record& record) noexcept {
+  if (error_ != ParseStatus::need_more) return error_;
+  if (end_ - begin_ < kRecordHeaderBytes) return ParseStatus::need_more;
+  const std::span<const std::byte> held{buffer_.get() + begin_, end_ - begin_};
+  offending_value_ = wire::get<std::uint32_t>(held, 0);
+  if (offending_value_ != kRecordMagic) return error_ = ParseStatus::wrong_magic;
+  offending_value_ = wire::get<std::uint8_t>(held, 4);
+  if (offending_value_ != kRecordVersion) return error_ = ParseStatus::wrong_version;
+  const auto kind = static_cast<RecordKind>(wire::get<std::uint8_t>(held, 5));
+  const auto length = wire::get<std::uint32_t>(held, 8);
+  offending_value_ = length;
+  if (length > limit_of(kind)) return error_ = ParseStatus::oversize;
+  offending_value_ = 0;
+  if (held.size() - kRecordHeaderBytes < length) return ParseStatus::need_more;
+  record.kind = kind;
+  record.body = held.subspan(kRecordHeaderBytes, length);
+  begin_ += kRecordHeaderBytes + length;
+  return ParseStatus::record;
+}
+
+void RecordParser::reset() noexcept {
+  begin_ = end_ = 0;
+  error_ = ParseStatus::need_more;
+  offending_value_ = 0;
+}
+
+physics::Result<FrameView> decode_frame_record(std::span<const std::byte> body) {
+  auto header = decode_frame_header(body);
+  if (!header) return tl::unexpected(std::move(header).error());
+  const auto pixels = body.subspan(kFrameHeaderBytes);
+  if (pixels.size() != header->payload_bytes) {
+    return physics::make_error(
+        physics::ErrorCode::protocol,
+        fmt::format("frame {}: {} bytes follow the header, {} announced", header->frame_number,
+                    pixels.size(), header->payload_bytes));
+  }
+  return FrameView{*header, pixels};
+}
+
+bool payload_crc_matches(const FrameView& frame) noexcept {
+  return crc32c(frame.pixels) == frame.header.payload_crc32c;
+}
+
+}  // namespace emit::protocol

@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/reassembler.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <new>
+
+#include "bit_range.hpp"
+#include "frame_header_parse.hpp"
+
+namespace emit::protocol {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "pixels are handed out as they arrive");
+
+constexpr std::size_t kWordBytes = sizeof(float);
+constexpr std::size_t kHeaderWords = kFrameHeaderBytes / kWordBytes;
+constexpr std::size_t kAlignment = 64;
+static_assert(kFrameHeaderBytes % kAlignment == 0, "pixels start aligned");
+
+/// Fragments this far behind are not reordered ones: after kResyncCount of them in a row the sender
+/// is taken to have started again.
+constexpr std::int32_t kReorderWindow = 64;
+constexpr std::uint32_t kResyncCount = 16;
+/// A wider gap in frame ids is a restart too, not a loss.
+constexpr std::uint32_t kMaxCountedGap = 65536;
+
+struct AlignedDelete {
+  void operator()(std::byte* bytes) const noexcept {
+    ::operator delete[](bytes, std::align_val_t{kAlignment});
+  }
+};
+using AlignedBytes = std::unique_ptr<std::byte[], AlignedDelete>;
+
+AlignedBytes allocate_aligned(std::size_t count) {
+  void* memory = ::operator new[](count, std::align_val_t{kAlignment});
+  std::memset(memory, 0, count);  // also touches the pages, before frames are due
+  return AlignedBytes(static_cast<std::byte*>(memory));
+}
+
+/// Frame ids wrap: positive when `a` comes after `b`.
+std::int32_t distance(std::uint32_t a, std::uint32_t b) noexcept {
+  return static_cast<std::int32_t>(a - b);
+}
+
+/// Bytes of zeros between pixels and second header are fewer than a header.
+bool fits(std::uint32_t total_bytes, std::uint64_t payload_bytes) noexcept {
+  const std::uint64_t least = payload_bytes + 2 * kFrameHeaderBytes;
+  return payload_bytes <= total_bytes && least <= total_bytes &&
+         total_bytes - least < kFrameHeaderBytes;
+}
+
+}  // namespace
+
+struct Reassembler::Slot {
+  enum class State : std::uint8_t { free, open, ready, held };
+  AlignedBytes bytes;
+  std::vector<std::uint64_t> received;  // one bit per four bytes
+  State state = State::free;
+  Stream* stream = nullptr;
+  std::uint32_t frame_id = 0;
+  std::uint32_t total_bytes = 0;
+  std::int64_t sim_time_ns = 0;
+  std::size_t received_words = 0;
+  std::uint64_t opened_at = 0;
+  ReceivedFrame frame;
+
+  [[nodiscard]] bool has_words(std::size_t begin, std::size_t count) const noexcept {
+    return bits::count_set(received, begin, count) == count;
+  }
+};
+
+struct Reassembler::Stream {
+  std::uint16_t id = 0;
+  bool has_finished = false;
+  std::uint32_t finished_id = 0;  // newest frame that left
+  std::uint32_t far_behind = 0;   // fragments in a row from far behind it
+  bool has_delivered = false;
+  std::uint32_t delivered_id = 0;  // newest frame that was handed out
+  bool has_geometry = false;
+  FrameHeader geometry;  // of the newest frame whose header was known
+};
+
+bool PixelValidity::pixel(std::size_t index) const noexcept {
+  const std::size_t bit = first_bit_ + index;
+  return ((words_[bit / 64] >> (bit % 64)) & 1u) != 0;
+}
+
+bool PixelValidity::all(std::size_t begin, std::size_t count) const noexcept {
+  return bits::count_set(words_, first_bit_ + begin, count) == count;
+}
+
+Reassembler::Reassembler(const Params& params) : params_(params) {
+  params_.max_open_per_stream = std::max(params_.max_open_per_stream, 1u);
+  params_.buffers = std::max({params_.buffers, 2u, params_.max_open_per_stream + 1});
+  params_.max_streams = std::max(params_.max_streams, 1u);
+  params_.max_payload_bytes &= ~std::uint32_t{3};
+  const std::size_t capacity = std::size_t{params_.max_payload_bytes} + 3 * kFrameHeaderBytes;
+  slots_.resize(params_.buffers);
+  for (Slot& slot : slots_) {
+    slot.bytes = allocate_aligned(capacity);
+    slot.received.resize(capacity / kWordBytes / 64 + 1);
+  }
+  streams_.reserve(params_.max_streams);
+  ready_.resize(params_.buffers);
+}
+
+Reassembler::~Reassembler() = default;
+Reassembler::Reassembler(Reassembler&&) noexcept = default;
+Reassembler& Reassembler::operator=(Reassembler&&) noexcept = default;
+
+FragmentStatus Reassembler::push(std::span<const std::byte> datagram) noexcept {
+  FragmentHeader header;
+  FragmentStatus status = decode_fragment_header(datagram, header);
+  if (status == FragmentStatus::accepted) {
+    status = take(header, datagram.subspan(kFragmentHeaderBytes));
+  }
+  ++counters_.fragments[static_cast<std::size_t>(status)];
+  return status;
+}
+
+FragmentStatus Reassembler::take(const FragmentHeader& header,
+                                 std::span<const std::byte> payload) noexcept {
+  // The padding is shorter than a header, so the constructor's three headers always suffice.
+  if (header.total_bytes - 2 * kFrameHeaderBytes >=
+      std::uint64_t{params_.max_payload_bytes} + kFrameHeaderBytes) {
+    return FragmentStatus::oversize;
+  }
+  Stream* stream = stream_of(header.stream_id);
+  if (stream == nullptr) return FragmentStatus::too_many_streams;
+
+  if (stream->has_finished && distance(header.frame_id, stream->finished_id) <= 0) {
+    if (distance(header.frame_id, stream->finished_id) > -kReorderWindow) {
+      return FragmentStatus::late;
+    }
+    if (++stream->far_behind < kResyncCount) return FragmentStatus::late;
+    while (Slot* slot = oldest_open(stream)) finish(*slot);
+    stream->has_finished = false;
+    stream->has_delivered = false;
+    ++counters_.resyncs;
+  }
+  stream->far_behind = 0;
+
+  auto status = FragmentStatus::accepted;
+  Slot* slot = open_slot(*stream, header, status);
+  if (slot == nullptr) return status;
+  if (slot->total_bytes != header.total_bytes || slot->sim_time_ns != header.sim_time_ns) {
+    return FragmentStatus::inconsistent;
+  }
+
+  const std::size_t first_word = header.byte_offset / kWordBytes;
+  const std::size_t words = payload.size() / kWordBytes;
+  const std::size_t present = bits::count_set(slot->received, first_word, words);
+  if (present == words) return FragmentStatus::duplicate;
+  if (present != 0) return FragmentStatus::overlap;
+  std::memcpy(slot->bytes.get() + header.byte_offset, payload.data(), payload.size());
+  bits::set_range(slot->received, first_word, words);
+  slot->received_words += words;
+  if (slot->received_words == slot->total_bytes / kWordBytes) {
+    finish_older(*stream, slot->frame_id);
+    finish(*slot);
+  }
+  return FragmentStatus::accepted;
+}
+
+Reassembler::Stream* Reassembler::stream_of(std::uint16_t stream_id) noexcept {
+  for (Stream& stream : streams_) {
+    if (stream.id == stream_id) return &stream;
+  }
+  if (streams_.size() == params_.max_streams) return nullptr;
+  Stream& stream = streams_.emplace_back();  // within the reserved capacity
+  stream.id = stream_id;
+  return &stream;
+}
+
+Reassembler::Slot* Reassembler::open_slot(Stream& stream, const FragmentHeader& header,
+                                          FragmentStatus& status) noexcept {
+  std::uint32_t open = 0;
+  Slot* vacant = nullptr;
+  for (Slot& slot : slots_) {
+    if (slot.state == Slot::State::free) vacant = &slot;
+    if (slot.state != Slot::State::open || slot.stream != &stream) continue;
+    if (slot.frame_id == header.frame_id) return &slot;
+    ++open;
+  }
+  if (open >= params_.max_open_per_stream) {
+    Slot* oldest = oldest_open(&stream);
+    if (oldest == nullptr || distance(header.frame_id, oldest->frame_id) < 0) {
+      status = FragmentStatus::late;
+      return nullptr;
+    }
+    finish(*oldest);
+    // Dropped as unusable, it is free again.
+    if (vacant == nullptr && oldest->state == Slot::State::free) vacant = oldest;
+  }
+  if (vacant == nullptr) {
+    // The next fragments find room once the consumer has taken this one.
+    if (Slot* oldest = oldest_open(nullptr)) {
+      finish_older(*oldest->stream, oldest->frame_id);
+      finish(*oldest);
+    }
+    status = FragmentStatus::no_buffer;
+    return nullptr;
+  }
+  vacant->state = Slot::State::open;
+  vacant->stream = &stream;
+  vacant->frame_id = header.frame_id;
+  vacant->total_bytes = header.total_bytes;
+  vacant->sim_time_ns = header.sim_time_ns;
+  vacant->received_words = 0;
+  vacant->opened_at = ++arrivals_;
+  std::ranges::fill(vacant->received, std::uint64_t{0});
+  return vacant;
+}
+
+Reassembler::Slot* Reassembler::oldest_open(const Stream* stream) noexcept {
+  Slot* oldest = nullptr;
+  for (Slot& slot : slots_) {
+    if (slot.state != Slot::State::open || (stream != nullptr && slot.stream != stream)) continue;
+    const bool older =
+        oldest == nullptr || (stream != nullptr ? distance(slot.frame_id, oldest->frame_id) < 0
+                                                : slot.opened_at < oldest->opened_at);
+    if (older) oldest = &slot;
+  }
+  return oldest;
+}
+
+void Reassembler::finish_older(Stream& stream, std::uint32_t frame_id) noexcept {
+  for (Slot* slot = oldest_open(&stream); slot != nullptr && distance(slot->frame_id, frame_id) < 0;
+       slot = oldest_open(&stream)) {
+    finish(*slot);
+  }
+}
+
+void Reassembler::finish(Slot& slot) noexcept {
+  Stream& stream = *slot.stream;
+  ReceivedFrame& frame = slot.frame;
+  frame = ReceivedFrame{};
+  frame.stream_id = stream.id;
+  frame.frame_id = slot.frame_id;
+
+  if (stream.has_finished) {
+    const std::uint32_t gap = slot.frame_id - stream.finished_id - 1;
+    if (gap <= kMaxCountedGap) {
+      counters_.frames_lost += gap;
+    } else {
+      ++counters_.resyncs;
+      stream.has_delivered = false;
+    }
+  }
+  stream.has_finished = true;
+  stream.finished_id = slot.frame_id;
+
+  const std::span<const std::byte> bytes{slot.bytes.get(), slot.total_bytes};
+  const std::size_t total_words = slot.total_bytes / kWordBytes;
+  FrameHeader header;
+  const bool has_first = slot.has_words(0, kHeaderWords);
+  const bool has_second = slot.has_words(total_words - kHeaderWords, kHeaderWords);
+  bool known = has_first && parse_frame_header(bytes, header) == HeaderFault::none;
+  known = known || (has_second &&
+                    parse_frame_header(bytes.last(kFrameHeaderBytes), header) == HeaderFault::none);
+  bool usable = false;
+  if (known) {
+    usable = fits(slot.total_bytes, header.payload_bytes) &&
+             header.payload_bytes <= params_.max_payload_bytes &&
+             header.sim_time_ns == slot.sim_time_ns;
+    if (usable) {
+      stream.has_geometry = true;
+      stream.geometry = header;
+    }
+  } else if (!has_first && !has_second && stream.has_geometry) {
+    usable = fits(slot.total_bytes, stream.geometry.payload_bytes);
+    header = FrameHeader{};
+    header.format = stream.geometry.format;
+    header.quantity = stream.geometry.quantity;
+    header.channel_kind = stream.geometry.channel_kind;
+    header.channel_index = stream.geometry.channel_index;
+    header.width_px = stream.geometry.width_px;
+    header.height_px = stream.geometry.height_px;
+    header.band_lo_um = stream.geometry.band_lo_um;
+    header.band_hi_um = stream.geometry.band_hi_um;
+    header.payload_bytes = stream.geometry.payload_bytes;
+    header.sim_time_ns = slot.sim_time_ns;
+  }
+  if (!usable) {
+    ++counters_.frames_unusable;
+    slot.state = Slot::State::free;
+    return;
+  }
+
+  const auto pixel_bytes = static_cast<std::size_t>(header.payload_bytes);
+  const std::size_t pixel_count = pixel_bytes / kWordBytes;
+  frame.header = header;
+  frame.header_known = known;
+  if (stream.has_delivered) frame.frames_lost_before = slot.frame_id - stream.delivered_id - 1;
+  stream.has_delivered = true;
+  stream.delivered_id = slot.frame_id;
+  frame.missing_px = pixel_count - bits::count_set(slot.received, kHeaderWords, pixel_count);
+  frame.complete = frame.missing_px == 0;
+  std::byte* pixel_memory = slot.bytes.get() + kFrameHeaderBytes;
+  if (frame.complete) {
+    ++counters_.frames_complete;
+    if (params_.check_crc && known) {
+      frame.crc_ok = crc32c({pixel_memory, pixel_bytes}) == header.payload_crc32c;
+      if (!frame.crc_ok) ++counters_.crc_mismatches;
+    }
+  } else {
+    ++counters_.frames_partial;
+    counters_.missing_px += frame.missing_px;
+    frame.header.flags |= kFlagPartial;
+    // The buffer still holds an earlier frame: nothing of it may show.
+    bits::for_each_word(kHeaderWords, pixel_count, [&](std::size_t index, std::uint64_t mask) {
+      std::uint64_t missing = ~slot.received[index] & mask;
+      for (; missing != 0; missing &= missing - 1) {
+        const auto bit = static_cast<std::size_t>(std::countr_zero(missing));
+        std::memset(slot.bytes.get() + (index * 64 + bit) * kWordBytes, 0, kWordBytes);
+      }
+    });
+  }
+  frame.pixels = {reinterpret_cast<const float*>(pixel_memory), pixel_count};
+  frame.validity = PixelValidity(slot.received, kHeaderWords);
+  slot.state = Slot::State::ready;
+  ready_[(ready_begin_ + ready_count_) % ready_.size()] = &slot;
+  ++ready_count_;
+}
+
+const ReceivedFrame* Reassembler::pop() noexcept {
+  if (ready_count_ == 0) return nullptr;
+  Slot* slot = ready_[ready_begin_];
+  ready_begin_ = (ready_begin_ + 1) % ready_.size();
+  --ready_count_;
+  slot->state = Slot::State::held;
+  return &slot->frame;
+}
+
+void Reassembler::release(const ReceivedFrame* frame) noexcept {
+  for (Slot& slot : slots_) {
+    if (&slot.frame == frame && slot.state == Slot::State::held) slot.state = Slot::State::free;
+  }
+}
+
+void Reassembler::flush() noexcept {
+  while (Slot* slot = oldest_open(nullptr)) {
+    finish_older(*slot->stream, slot->frame_id);
+    finish(*slot);
+  }
+}
+
+}  // namespace emit::protocol

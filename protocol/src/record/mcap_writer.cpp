@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/record/mcap_writer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <map>
+#include <optional>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "../crc.hpp"
+#include "mcap_format.hpp"
+
+namespace emit::protocol {
+namespace {
+
+using mcap::Opcode;
+using mcap::Output;
+using physics::Error;
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+struct IndexEntry {
+  std::uint64_t log_time_ns;
+  std::uint64_t offset;  // within the chunk's records
+};
+
+struct ChunkSummary {
+  std::uint64_t start_ns = 0;
+  std::uint64_t end_ns = 0;
+  std::uint64_t file_offset = 0;
+  std::uint64_t record_bytes = 0;  // of the chunk record with its prefix
+  std::uint64_t index_bytes = 0;   // of the message index records behind it
+  std::uint64_t data_bytes = 0;
+  std::map<std::uint16_t, std::uint64_t> index_offsets;
+};
+
+}  // namespace
+
+struct McapWriter::Impl {
+  std::filesystem::path path;
+  McapWriterOptions options;
+  int fd = -1;
+  std::uint64_t file_bytes = 0;
+  bool closed = false;
+  std::optional<Error> failure;
+
+  Output schemas;  // records as written, for the summary
+  Output channels;
+  std::uint16_t schema_count = 0;
+  std::uint16_t channel_count = 0;
+
+  Output chunk;  // records of the open chunk
+  std::map<std::uint16_t, std::vector<IndexEntry>> chunk_index;
+  std::uint64_t chunk_first_ns = 0;  // log time of its first message
+  std::uint64_t chunk_start_ns = 0;
+  std::uint64_t chunk_end_ns = 0;
+  std::vector<ChunkSummary> chunks;
+
+  std::uint64_t message_count = 0;
+  std::uint64_t start_ns = 0;
+  std::uint64_t end_ns = 0;
+  std::map<std::uint16_t, std::uint64_t> channel_messages;
+  Output scratch;
+
+  Impl(std::filesystem::path file, McapWriterOptions settings)
+      : path(std::move(file)), options(std::move(settings)) {}
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() {
+    if (fd >= 0) ::close(fd);
+  }
+
+  Result<void> put(std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) {
+        failure = Error{ErrorCode::io,
+                        fmt::format("{}: offset {}: cannot write: {}", path.string(), file_bytes,
+                                    std::generic_category().message(written < 0 ? errno : EIO))};
+        return tl::unexpected(*failure);
+      }
+      file_bytes += static_cast<std::uint64_t>(written);
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    }
+    return {};
+  }
+
+  Result<void> check_usable() const {
+    if (failure) return tl::unexpected(*failure);
+    if (closed) {
+      return make_error(ErrorCode::invalid_argument, path.string() + ": the log is closed");
+    }
+    return {};
+  }
+
+  static void append_message(Output& out, std::uint16_t channel_id, std::uint32_t sequence,
+                             std::uint64_t log_time_ns, std::uint64_t publish_time_ns,
+                             std::span<const std::byte> data) {
+    const auto record = out.begin_record(Opcode::message);
+    out.number(channel_id);
+    out.number(sequence);
+    out.number(log_time_ns);
+    out.number(publish_time_ns);
+    out.raw(data);
+    out.end_record(record);
+  }
+
+  Result<void> flush_chunk() {
+    if (chunk.size() == 0) return {};
+    ChunkSummary summary;
+    summary.start_ns = chunk_start_ns;
+    summary.end_ns = chunk_end_ns;
+    summary.file_offset = file_bytes;
+    summary.data_bytes = chunk.size();
+
+    scratch.clear();
+    const auto record = scratch.begin_record(Opcode::chunk);
+    scratch.number(chunk_start_ns);
+    scratch.number(chunk_end_ns);
+    scratch.number(std::uint64_t{chunk.size()});
+    scratch.number(crc32(chunk.bytes()));
+    scratch.string("");  // not compressed
+    scratch.number(std::uint64_t{chunk.size()});
+    scratch.raw(chunk.bytes());
+    scratch.end_record(record);
+    summary.record_bytes = scratch.size();
+
+    for (auto& [channel_id, entries] : chunk_index) {
+      std::ranges::stable_sort(entries, {}, &IndexEntry::log_time_ns);
+      summary.index_offsets[channel_id] = file_bytes + scratch.size();
+      const auto index = scratch.begin_record(Opcode::message_index);
+      scratch.number(channel_id);
+      const auto array = scratch.begin_block<std::uint32_t>();
+      for (const IndexEntry& entry : entries) {
+        scratch.number(entry.log_time_ns);
+        scratch.number(entry.offset);
+      }
+      scratch.end_block<std::uint32_t>(array);
+      scratch.end_record(index);
+    }
+    summary.index_bytes = scratch.size() - summary.record_bytes;
+    chunk.clear();
+    chunk_index.clear();
+    chunks.push_back(std::move(summary));
+    return put(scratch.bytes());
+  }
+
+  void append_statistics(Output& out) const {
+    const auto record = out.begin_record(Opcode::statistics);
+    out.number(message_count);
+    out.number(schema_count);
+    out.number(std::uint32_t{channel_count});
+    out.number(std::uint32_t{0});  // attachments
+    out.number(std::uint32_t{0});  // metadata
+    out.number(static_cast<std::uint32_t>(chunks.size()));
+    out.number(start_ns);
+    out.number(end_ns);
+    const auto map = out.begin_block<std::uint32_t>();
+    for (const auto& [channel_id, count] : channel_messages) {
+      out.number(channel_id);
+      out.number(count);
+    }
+    out.end_block<std::uint32_t>(map);
+    out.end_record(record);
+  }
+
+  void append_chunk_indexes(Output& out) const {
+    for (const ChunkSummary& summary : chunks) {
+      const auto record = out.begin_record(Opcode::chunk_index);
+      out.number(summary.start_ns);
+      out.number(summary.end_ns);
+      out.number(summary.file_offset);
+      out.number(summary.record_bytes);
+      const auto map = out.begin_block<std::uint32_t>();
+      for (const auto& [channel_id, offset] : summary.index_offsets) {
+        out.number(channel_id);
+        out.number(offset);
+      }
+      out.end_block<std::uint32_t>(map);
+      out.number(summary.index_bytes);
+      out.string("");
+      out.number(summary.data_bytes);
+      out.number(summary.data_bytes);
+      out.end_record(record);
+    }
+  }
+
+  Result<void> write_end() {
+    Output out;
+    const auto data_end = out.begin_record(Opcode::data_end);
+    out.number(std::uint32_t{0});  // chunks carry the CRCs
+    out.end_record(data_end);
+
+    const std::size_t summary_at = out.size();
+    struct Group {
+      Opcode opcode;
+      std::size_t begin;
+      std::size_t end;
+    };
+    std::vector<Group> groups;
+    auto group = [&](Opcode opcode, auto append) {
+      const std::size_t begin = out.size();
+      append();
+      if (out.size() != begin) groups.push_back({opcode, begin, out.size()});
+    };
+    group(Opcode::schema, [&] { out.raw(schemas.bytes()); });
+    group(Opcode::channel, [&] { out.raw(channels.bytes()); });
+    group(Opcode::statistics, [&] { append_statistics(out); });
+    group(Opcode::chunk_index, [&] { append_chunk_indexes(out); });
+
+    const std::size_t offsets_at = out.size();
+    for (const Group& entry : groups) {
+      const auto record = out.begin_record(Opcode::summary_offset);
+      out.number(static_cast<std::uint8_t>(entry.opcode));
+      out.number(file_bytes + entry.begin);
+      out.number(std::uint64_t{entry.end - entry.begin});
+      out.end_record(record);
+    }
+    // The length is fixed, so that the CRC can cover it.
+    out.number(static_cast<std::uint8_t>(Opcode::footer));
+    out.number(std::uint64_t{20});
+    out.number(file_bytes + summary_at);
+    out.number(file_bytes + offsets_at);
+    out.number(crc32(out.bytes().subspan(summary_at)));
+    out.raw(mcap::kMagic);
+    return put(out.bytes());
+  }
+};
+
+McapWriter::McapWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+McapWriter::McapWriter(McapWriter&&) noexcept = default;
+McapWriter& McapWriter::operator=(McapWriter&& other) noexcept {
+  std::swap(impl_, other.impl_);  // the old file is closed by the other's destructor
+  return *this;
+}
+McapWriter::~McapWriter() {
+  if (impl_ && !impl_->closed && !impl_->failure) static_cast<void>(close());
+}
+
+Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
+                                      const McapWriterOptions& options) {
+  auto impl = std::make_unique<Impl>(path, options);
+  impl->fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (impl->fd < 0) {
+    return make_error(ErrorCode::io, fmt::format("{}: cannot create: {}", path.string(),
+                                                 std::generic_category().message(errno)));
+  }
+  Output out;
+  out.raw(mcap::kMagic);
+  const auto record = out.begin_record(Opcode::header);
+  out.string(options.profile);
+  out.string(options.library);
+  out.end_record(record);
+  if (auto written = impl->put(out.bytes()); !written) return tl::unexpected(written.error());
+  return McapWriter(std::move(impl));
+}
+
+Result<std::uint16_t> McapWriter::add_schema(std::string_view name, std::string_view encoding,
+                                             std::string_view data) {
+  if (auto usable = impl_->check_usable(); !usable) return tl::unexpected(usable.error());
+  if (auto flushed = impl_->flush_chunk(); !flushed) return tl::unexpected(flushed.error());
+  const auto id = ++impl_->schema_count;
+  Output out;
+  const auto record = out.begin_record(Opcode::schema);
+  out.number(id);
+  out.string(name);
+  out.string(encoding);
+  out.string(data);
+  out.end_record(record);
+  impl_->schemas.raw(out.bytes());
+  if (auto written = impl_->put(out.bytes()); !written) return tl::unexpected(written.error());
+  return id;
+}
+
+Result<std::uint16_t> McapWriter::add_channel(std::uint16_t schema_id, std::string_view topic,
+                                              std::string_view message_encoding) {
+  if (auto usable = impl_->check_usable(); !usable) return tl::unexpected(usable.error());
+  if (schema_id > impl_->schema_count) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("{}: no schema {}", impl_->path.string(), schema_id));
+  }
+  if (auto flushed = impl_->flush_chunk(); !flushed) return tl::unexpected(flushed.error());
+  const auto id = ++impl_->channel_count;
+  Output out;
+  const auto record = out.begin_record(Opcode::channel);
+  out.number(id);
+  out.number(schema_id);
+  out.string(topic);
+  out.string(message_encoding);
+  out.number(std::uint32_t{0});  // no metadata
+  out.end_record(record);
+  impl_->channels.raw(out.bytes());
+  if (auto written = impl_->put(out.bytes()); !written) return tl::unexpected(written.error());
+  return id;
+}
+
+Result<void> McapWriter::write(std::uint16_t channel_id, std::uint32_t sequence,
+                               std::int64_t log_time_ns, std::int64_t publish_time_ns,
+                               std::span<const std::byte> data) {
+  Impl& self = *impl_;
+  if (auto usable = self.check_usable(); !usable) return usable;
+  if (channel_id == 0 || channel_id > self.channel_count) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("{}: no channel {}", self.path.string(), channel_id));
+  }
+  if (log_time_ns < 0 || publish_time_ns < 0) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("{}: channel {} message {}: negative time", self.path.string(),
+                                  channel_id, sequence));
+  }
+  const auto log_ns = static_cast<std::uint64_t>(log_time_ns);
+  const auto publish_ns = static_cast<std::uint64_t>(publish_time_ns);
+  const bool first_ever = self.message_count++ == 0;
+  self.start_ns = first_ever ? log_ns : std::min(self.start_ns, log_ns);
+  self.end_ns = std::max(self.end_ns, log_ns);
+  ++self.channel_messages[channel_id];
+
+  if (self.options.chunk_bytes == 0) {
+    self.scratch.clear();
+    Impl::append_message(self.scratch, channel_id, sequence, log_ns, publish_ns, data);
+    return self.put(self.scratch.bytes());
+  }
+  if (self.chunk.size() == 0) {
+    self.chunk_first_ns = self.chunk_start_ns = self.chunk_end_ns = log_ns;
+  }
+  self.chunk_index[channel_id].push_back({log_ns, self.chunk.size()});
+  Impl::append_message(self.chunk, channel_id, sequence, log_ns, publish_ns, data);
+  self.chunk_start_ns = std::min(self.chunk_start_ns, log_ns);
+  self.chunk_end_ns = std::max(self.chunk_end_ns, log_ns);
+  const bool full = self.chunk.size() >= self.options.chunk_bytes;
+  const bool due =
+      log_ns >= self.chunk_first_ns &&
+      log_ns - self.chunk_first_ns >=
+          static_cast<std::uint64_t>(std::max<std::int64_t>(self.options.flush_interval_ns, 0));
+  if (full || due) return self.flush_chunk();
+  return {};
+}
+
+Result<void> McapWriter::flush() {
+  if (auto usable = impl_->check_usable(); !usable) return usable;
+  return impl_->flush_chunk();
+}
+
+Result<void> McapWriter::close() {
+  if (impl_->closed) return {};
+  if (auto usable = impl_->check_usable(); !usable) return usable;
+  if (auto flushed = impl_->flush_chunk(); !flushed) return flushed;
+  if (auto ended = impl_->write_end(); !ended) return ended;
+  impl_->closed = true;
+  const int failed = ::close(std::exchange(impl_->fd, -1));
+  if (failed != 0) {
+    impl_->failure = Error{ErrorCode::io, fmt::format("{}: cannot close: {}", impl_->path.string(),
+                                                      std::generic_category().message(errno))};
+    return tl::unexpected(*impl_->failure);
+  }
+  return {};
+}
+
+}  // namespace emit::protocol

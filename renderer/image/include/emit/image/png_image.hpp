@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::image {
+
+using Rgb = std::array<std::uint8_t, 3>;
+
+/// 8-bit sRGB picture, row-major, rows down, three bytes a pixel.
+struct RgbImage {
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+  std::vector<std::uint8_t> rgb;
+};
+
+/// Errors: invalid_argument (size and data disagree), io (naming the file). Not for frame threads.
+[[nodiscard]] physics::Result<void> write_png(const std::filesystem::path& file,
+                                              const RgbImage& image);
+
+}  // namespace emit::image

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/physics/weather.hpp"
+
+#include <algorithm>
+
+namespace emit::physics {
+namespace {
+
+Forcing forcing_of(const WeatherRow& row) noexcept {
+  Forcing f;
+  f.direct_normal_w_m2 = row.direct_normal_w_m2;
+  f.diffuse_horizontal_w_m2 = row.diffuse_horizontal_w_m2;
+  f.longwave_down_w_m2 = row.longwave_down_w_m2;
+  f.air_k = row.air_k;
+  f.environment_k = row.environment_k.value_or(row.air_k);
+  f.film_w_m2_k = row.film_w_m2_k.value_or(film_coefficient_w_m2_k(row.wind_m_s));
+  f.wind_m_s = row.wind_m_s;
+  f.cloud_frac = row.cloud_frac;
+  return f;
+}
+
+}  // namespace
+
+Forcing forcing_from_rows(std::span<const WeatherRow> rows, std::int64_t time_ns) noexcept {
+  const auto after =
+      std::upper_bound(rows.begin(), rows.end(), time_ns,
+                       [](std::int64_t t, const WeatherRow& row) { return t < row.time_ns; });
+  if (after == rows.begin()) {
+    return forcing_of(rows.front());
+  }
+  const WeatherRow& before = *(after - 1);
+  if (after == rows.end()) {
+    return forcing_of(before);
+  }
+  const Forcing a = forcing_of(before);
+  const Forcing b = forcing_of(*after);
+  const double s = static_cast<double>(time_ns - before.time_ns) /
+                   static_cast<double>(after->time_ns - before.time_ns);
+  const auto mix = [s, &a, &b](double Forcing::*member) {
+    return a.*member + s * (b.*member - a.*member);
+  };
+  Forcing f;
+  f.direct_normal_w_m2 = mix(&Forcing::direct_normal_w_m2);
+  f.diffuse_horizontal_w_m2 = mix(&Forcing::diffuse_horizontal_w_m2);
+  f.longwave_down_w_m2 = mix(&Forcing::longwave_down_w_m2);
+  f.air_k = mix(&Forcing::air_k);
+  f.environment_k = mix(&Forcing::environment_k);
+  f.film_w_m2_k = mix(&Forcing::film_w_m2_k);
+  f.wind_m_s = mix(&Forcing::wind_m_s);
+  f.cloud_frac = mix(&Forcing::cloud_frac);
+  return f;
+}
+
+Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place, const SunPosition& sun,
+                               std::int64_t posix_utc_ns) noexcept {
+  const SolarIrradiance solar = clear_sky_irradiance(sun, place.height, model.linke_turbidity);
+  const Kelvin air = daily_air_temperature(mean_solar_hours(posix_utc_ns, place.longitude),
+                                           Kelvin(model.air_mean_k), Kelvin(model.air_amplitude_k));
+  Forcing f;
+  f.direct_normal_w_m2 = solar.direct_normal_w_m2;
+  f.diffuse_horizontal_w_m2 = solar.diffuse_horizontal_w_m2;
+  f.longwave_down_w_m2 = sky_longwave_w_m2(air, Kelvin(model.dew_point_k), model.cloud_frac);
+  f.air_k = air.value();
+  f.environment_k = air.value();
+  f.film_w_m2_k = film_coefficient_w_m2_k(model.wind_m_s);
+  f.wind_m_s = model.wind_m_s;
+  f.cloud_frac = model.cloud_frac;
+  return f;
+}
+
+}  // namespace emit::physics

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "emit/scenegen/generate.hpp"
+#include "mesh_builder.hpp"
+
+/// Plan of the airfield, metres, x east and y north of the reference point:
+///   runway     y -272.5 .. -227.5, x -480 .. 480      taxiway  y -110 .. -90, x -480 .. 480
+///   links      x -400, 0, 400 between them            apron    x -220 .. 220, y 20 .. 140
+///   hangars    y 146 .. 190, x -150, -50, 50, 150     tower    x 250, y 100
+///   car park   x 280 .. 360, y 150 .. 200             fuel farm x -300, y 90
+///   fence along x, y = +-490; trees in the north and along the fence; fields out to 3 km.
+namespace emit::scenegen {
+
+void add_ground(Scene& scene);
+void add_buildings(Scene& scene);
+void add_trees_and_fence(Scene& scene, std::uint32_t seed);
+
+/// File stem and scene of each vehicle, origin on the ground under its middle, +x forward.
+[[nodiscard]] std::vector<std::pair<std::string, Scene>> vehicle_scenes();
+
+}  // namespace emit::scenegen

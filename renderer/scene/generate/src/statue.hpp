@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "emit/physics/error.hpp"
+#include "emit/scenegen/generate.hpp"
+#include "mesh_builder.hpp"
+
+namespace emit::scenegen {
+
+/// Options are valid here. Error: internal, when the triangle count cannot be reached.
+[[nodiscard]] physics::Result<Scene> statue_scene(const StatueOptions& options);
+
+}  // namespace emit::scenegen

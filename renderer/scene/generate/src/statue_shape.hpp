@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+
+#include "polygonise.hpp"
+
+namespace emit::scenegen {
+
+/// A seated figure on a round pedestal, facing south (-y), z up, about 2.65 m high at scale 1; its
+/// foot reaches 2 cm below the ground.
+struct StatueShape {
+  std::unique_ptr<SignedDistance> distance;
+  glm::dvec3 min_m;
+  glm::dvec3 max_m;
+  double height_m;
+};
+[[nodiscard]] StatueShape statue_shape();
+
+}  // namespace emit::scenegen

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <glm/ext/matrix_double4x4.hpp>
+#include <glm/ext/vector_double3.hpp>
+#include <glm/ext/vector_float3.hpp>
+
+#include "emit/physics/error.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+/// Loaded geometry as plain arrays, ready to be copied to a device.
+///
+/// Frames. Vertices stay in the axes of the glTF file (x left, y up, z forward). Every object, be it
+/// a vehicle or a map, is turned into the body frame (x forward, y right, z down) by
+/// `body_from_gltf()`:
+///   body x = glTF z,   body y = -glTF x,   body z = -glTF y
+/// and placed by a pose `world_from_body`. With the default pose, level and heading north, a glTF
+/// file stands upright: glTF +z points north, +y up, +x west. A map drawn with north along glTF -z
+/// (the usual export of a plan with x east and y north) is placed with heading 180 degrees.
+namespace emit::scene {
+
+/// Axis-aligned box; empty (min > max) until something is added.
+struct Aabb {
+  glm::dvec3 min_m{std::numeric_limits<double>::infinity()};
+  glm::dvec3 max_m{-std::numeric_limits<double>::infinity()};
+
+  void add(const glm::dvec3& point_m) noexcept;
+  void add(const Aabb& other) noexcept;
+  [[nodiscard]] bool empty() const noexcept { return !(min_m.x <= max_m.x); }
+};
+/// Box around the eight transformed corners; an empty box stays empty.
+[[nodiscard]] Aabb transformed(const Aabb& box, const glm::dmat4& target_from_source) noexcept;
+
+/// A range of triangles of one material.
+struct Submesh {
+  std::uint32_t first_index = 0;
+  std::uint32_t index_count = 0;  ///< multiple of 3
+  std::uint32_t material = 0;     ///< index into SceneGeometry::materials
+  bool double_sided = false;      ///< a sheet: both sides are seen and lit
+};
+
+/// Indexed triangles, counter-clockwise seen from outside. positions_m and normals have equal size;
+/// every index is below it; normals are unit length.
+struct Mesh {
+  std::string name;
+  std::vector<glm::vec3> positions_m;
+  std::vector<glm::vec3> normals;
+  std::vector<std::uint32_t> indices;
+  std::vector<Submesh> submeshes;  ///< cover `indices` without gap or overlap
+  Aabb bounds;                     ///< of positions_m, in the mesh's own axes
+};
+
+/// One mesh drawn once. Transforms have a positive determinant: where a glTF node mirrors, a mirrored
+/// copy of the mesh is used, so front faces are always counter-clockwise. Scales need not be uniform:
+/// normals go with the inverse transpose.
+struct Instance {
+  std::uint32_t mesh = 0;
+  std::uint32_t object = 0;      ///< index into ScenarioDesc::objects
+  std::uint32_t placement = 0;   ///< index into that object's instances
+  std::uint32_t entity_id = 0;   ///< 0: static
+  glm::dmat4 body_from_mesh{1.0};   ///< node transform, scale and axis change; fixed for life
+  glm::dmat4 world_from_mesh{1.0};  ///< at the placement of the scenario
+  Aabb world_bounds;                ///< at that placement
+};
+
+/// How one glTF material of one object found its entry in SceneGeometry::materials.
+enum class MappedBy : std::uint8_t { material_map, object_material, name, fallback };
+struct MaterialMapping {
+  std::uint32_t object = 0;
+  std::string gltf_material;  ///< "" for primitives without material
+  std::string material;       ///< name of the entry used
+  std::uint32_t index = 0;
+  MappedBy by = MappedBy::fallback;
+};
+
+struct SceneGeometry {
+  std::vector<Mesh> meshes;
+  std::vector<Instance> instances;
+  /// Only those in use, in the order of the library. Entry 0 is the default material, always there.
+  std::vector<Material> materials;
+  std::vector<MaterialMapping> mappings;
+  std::vector<std::string> warnings;       ///< unmapped materials, skipped primitives, dropped triangles
+  std::uint64_t triangles = 0;             ///< instances counted
+  std::uint64_t dropped_triangles = 0;     ///< of zero area, counted once per file
+  Aabb static_bounds;                      ///< world, static instances
+  Aabb bounds;                             ///< world, all instances at their placements
+};
+
+/// body_from_gltf as above; the rotation has determinant +1.
+[[nodiscard]] glm::dmat4 body_from_gltf() noexcept;
+[[nodiscard]] glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept;
+
+/// Loads every glTF file of the scenario and resolves its materials. A glTF material is looked up in
+/// the object's material_map, then the object's `material`, then the library by name, then the
+/// scenario's default_material (with a warning that names it). Setup only; any thread.
+/// Errors: not_found, io, parse (naming file and element), config (unknown library material, naming
+/// object and material; an entity without exactly one placement).
+[[nodiscard]] physics::Result<SceneGeometry> load_scene(const ScenarioDesc& scenario);
+
+}  // namespace emit::scene

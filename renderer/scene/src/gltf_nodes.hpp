@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <glm/ext/matrix_double4x4.hpp>
+#include <string>
+#include <vector>
+
+#include "gltf_file.hpp"
+
+namespace emit::scene {
+
+/// A node of the scene shown with its transform, parents before children.
+struct PlacedNode {
+  int node = 0;
+  glm::dmat4 gltf_from_node{1.0};
+};
+
+/// Walks the default scene, else the first, else every node that is no child.
+/// Errors: parse (missing or cyclic nodes, two parents, transforms not finite or of a wrong size).
+[[nodiscard]] physics::Result<std::vector<PlacedNode>> place_nodes(const GltfFile& file);
+
+/// node_from_mesh for each instance of EXT_mesh_gpu_instancing; the identity alone without it.
+[[nodiscard]] physics::Result<std::vector<glm::dmat4>> node_instances(const GltfFile& file,
+                                                                      int node);
+
+}  // namespace emit::scene

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <cmath>
+#include <glm/ext/matrix_transform.hpp>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "emit/scene/gltf_import.hpp"
+#include "emit/scene/mesh.hpp"
+#include "material_lookup.hpp"
+
+namespace emit::scene {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+/// Meshes of one file under one assignment of materials; objects that agree in both share them.
+struct ModelUse {
+  std::filesystem::path file;
+  std::vector<std::size_t> materials;
+  bool operator<(const ModelUse& other) const {
+    return std::tie(file, materials) < std::tie(other.file, other.materials);
+  }
+};
+
+class SceneLoader {
+ public:
+  SceneLoader(const ScenarioDesc& scenario, MaterialLookup lookup)
+      : scenario_(scenario), lookup_(std::move(lookup)) {}
+
+  Result<SceneGeometry> load() {
+    for (std::uint32_t i = 0; i < scenario_.objects.size(); ++i) {
+      if (auto added = add_object(i); !added) {
+        return tl::unexpected(added.error());
+      }
+    }
+    const std::vector<std::uint32_t> index_of = lookup_.finish(geometry_);
+    for (Mesh& mesh : geometry_.meshes) {
+      for (Submesh& submesh : mesh.submeshes) {
+        submesh.material = index_of[submesh.material];
+      }
+    }
+    for (const Instance& instance : geometry_.instances) {
+      geometry_.bounds.add(instance.world_bounds);
+      if (instance.entity_id == 0) {
+        geometry_.static_bounds.add(instance.world_bounds);
+      }
+      geometry_.triangles += geometry_.meshes[instance.mesh].indices.size() / 3;
+    }
+    return std::move(geometry_);
+  }
+
+ private:
+  Result<void> check(const ObjectDesc& object) {
+    const std::string context = fmt::format("{}: object '{}'", scenario_.file.string(), object.name);
+    if (!(object.scale > 0.0) || !std::isfinite(object.scale)) {
+      return make_error(ErrorCode::config, fmt::format("{}: scale {} is not positive", context,
+                                                       object.scale));
+    }
+    for (const physics::Pose& pose : object.instances) {
+      if (!physics::is_valid(pose)) {
+        return make_error(ErrorCode::config, context + ": a placement is not a valid pose");
+      }
+    }
+    if (object.entity_id != 0) {
+      if (object.instances.size() != 1) {
+        return make_error(ErrorCode::config,
+                          fmt::format("{}: entity {} has {} placements instead of one", context,
+                                      object.entity_id, object.instances.size()));
+      }
+      if (!entities_.insert(object.entity_id).second) {
+        return make_error(ErrorCode::config,
+                          fmt::format("{}: entity id {} is used twice", context, object.entity_id));
+      }
+    }
+    return {};
+  }
+
+  Result<const GltfModel*> model_of(const std::filesystem::path& file) {
+    const std::filesystem::path key = file.lexically_normal();
+    if (const auto known = models_.find(key); known != models_.end()) {
+      return &known->second;
+    }
+    Result<GltfModel> model = import_gltf(key);
+    if (!model) {
+      return tl::unexpected(std::move(model.error()));
+    }
+    geometry_.dropped_triangles += model->dropped_triangles;
+    geometry_.warnings.insert(geometry_.warnings.end(), model->warnings.begin(),
+                              model->warnings.end());
+    return &models_.emplace(key, std::move(*model)).first->second;
+  }
+
+  /// First of the model's meshes in the scene; submesh materials are library positions for now.
+  std::uint32_t mesh_base(const GltfModel& model, const std::vector<std::size_t>& materials) {
+    const ModelUse use{model.file, materials};
+    const auto [entry, is_new] =
+        bases_.emplace(use, static_cast<std::uint32_t>(geometry_.meshes.size()));
+    if (is_new) {
+      for (const Mesh& mesh : model.meshes) {
+        geometry_.meshes.push_back(mesh);
+        for (Submesh& submesh : geometry_.meshes.back().submeshes) {
+          const std::size_t slot = std::min<std::size_t>(submesh.material, materials.size() - 1);
+          submesh.material = static_cast<std::uint32_t>(materials[slot]);
+        }
+      }
+    }
+    return entry->second;
+  }
+
+  Result<void> add_object(std::uint32_t object_index) {
+    const ObjectDesc& object = scenario_.objects[object_index];
+    if (auto checked = check(object); !checked) {
+      return checked;
+    }
+    const Result<const GltfModel*> model = model_of(object.gltf);
+    if (!model) {
+      return tl::unexpected(
+          physics::Error(model.error()).with_context(fmt::format("object '{}'", object.name)));
+    }
+    const Result<std::vector<std::size_t>> materials = lookup_.resolve(object_index, **model);
+    if (!materials) {
+      return tl::unexpected(materials.error());
+    }
+    const std::uint32_t base = mesh_base(**model, *materials);
+    const glm::dmat4 scaled_body_from_gltf =
+        glm::scale(glm::dmat4(1.0), glm::dvec3(object.scale)) * body_from_gltf();
+    for (std::uint32_t p = 0; p < object.instances.size(); ++p) {
+      const glm::dmat4 world_from_body = world_from_body_matrix(object.instances[p]);
+      for (const GltfPlacement& placement : (*model)->placements) {
+        Instance instance;
+        instance.mesh = base + placement.mesh;
+        instance.object = object_index;
+        instance.placement = p;
+        instance.entity_id = object.entity_id;
+        instance.body_from_mesh = scaled_body_from_gltf * placement.gltf_from_mesh;
+        instance.world_from_mesh = world_from_body * instance.body_from_mesh;
+        instance.world_bounds =
+            transformed(geometry_.meshes[instance.mesh].bounds, instance.world_from_mesh);
+        geometry_.instances.push_back(instance);
+      }
+    }
+    return {};
+  }
+
+  const ScenarioDesc& scenario_;
+  MaterialLookup lookup_;
+  SceneGeometry geometry_;
+  std::map<std::filesystem::path, GltfModel> models_;
+  std::map<ModelUse, std::uint32_t> bases_;
+  std::set<std::uint32_t> entities_;
+};
+
+}  // namespace
+
+Result<SceneGeometry> load_scene(const ScenarioDesc& scenario) {
+  Result<MaterialLookup> lookup = MaterialLookup::create(scenario);
+  if (!lookup) {
+    return tl::unexpected(std::move(lookup.error()));
+  }
+  return SceneLoader(scenario, std::move(*lookup)).load();
+}
+
+}  // namespace emit::scene

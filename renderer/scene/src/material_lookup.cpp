@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "material_lookup.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace emit::scene {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+Material builtin_default_material() {
+  Material material;
+  material.name = "default";
+  material.solar_absorptance_frac = 0.6;
+  material.emissivity_frac = 0.9;
+  material.layers = {{0.10, 1.28, 2200.0, 920.0}};
+  material.base_k = 290.0;
+  material.modes = {{141.0, 0.324}, {2634.0, 0.676}};
+  material.source = "built in: 10 cm of concrete";
+  material.uncertainty = "stands in for an unknown material";
+  return material;
+}
+
+bool MaterialLookup::find(std::string_view name, std::size_t& position) const noexcept {
+  const auto found = std::find_if(library_.begin(), library_.end(),
+                                  [&](const Material& m) { return m.name == name; });
+  position = static_cast<std::size_t>(found - library_.begin());
+  return found != library_.end();
+}
+
+Result<MaterialLookup> MaterialLookup::create(const ScenarioDesc& scenario) {
+  MaterialLookup lookup;
+  lookup.scenario_ = &scenario;
+  lookup.library_ = scenario.materials;
+  if (scenario.default_material.empty()) {
+    lookup.default_position_ = lookup.library_.size();
+    lookup.library_.push_back(builtin_default_material());
+  } else if (!lookup.find(scenario.default_material, lookup.default_position_)) {
+    return make_error(ErrorCode::config, fmt::format("{}: default_material '{}' is not in the "
+                                                     "material library",
+                                                     scenario.file.string(),
+                                                     scenario.default_material));
+  }
+  lookup.used_.assign(lookup.library_.size(), false);
+  return lookup;
+}
+
+Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_index,
+                                                         const GltfModel& model) {
+  const ObjectDesc& object = scenario_->objects[object_index];
+  std::vector<bool> in_use(model.materials.size() + 1, false);
+  for (const Mesh& mesh : model.meshes) {
+    for (const Submesh& submesh : mesh.submeshes) {
+      in_use[std::min<std::size_t>(submesh.material, model.materials.size())] = true;
+    }
+  }
+  std::vector<std::size_t> positions(in_use.size(), default_position_);
+  for (std::size_t i = 0; i < in_use.size(); ++i) {
+    const std::string name = i < model.materials.size() ? model.materials[i].name : "";
+    MappedBy by = MappedBy::fallback;
+    std::string wanted;
+    if (const auto mapped = object.material_map.find(name); mapped != object.material_map.end()) {
+      by = MappedBy::material_map;
+      wanted = mapped->second;
+    } else if (!object.material.empty()) {
+      by = MappedBy::object_material;
+      wanted = object.material;
+    } else if (std::size_t same = 0; !name.empty() && find(name, same)) {
+      by = MappedBy::name;
+      wanted = name;
+    }
+    if (by != MappedBy::fallback && !find(wanted, positions[i])) {
+      return make_error(ErrorCode::config,
+                        fmt::format("{}: object '{}': material '{}' is not in the material library",
+                                    scenario_->file.string(), object.name, wanted));
+    }
+    if (!in_use[i]) {
+      continue;
+    }
+    used_[positions[i]] = true;
+    if (by == MappedBy::fallback) {
+      warnings_.push_back(fmt::format(
+          "{}: {} maps to nothing in the library, '{}' is used", model.file.filename().string(),
+          name.empty() ? std::string("geometry without material")
+                       : fmt::format("material '{}'", name),
+          library_[positions[i]].name));
+    }
+    mappings_.push_back({object_index, name, library_[positions[i]].name, 0, by});
+    mapping_positions_.push_back(positions[i]);
+  }
+  return positions;
+}
+
+std::vector<std::uint32_t> MaterialLookup::finish(SceneGeometry& geometry) {
+  std::vector<std::uint32_t> index_of(library_.size(), 0);
+  geometry.materials.push_back(library_[default_position_]);
+  for (std::size_t i = 0; i < library_.size(); ++i) {
+    if (used_[i] && i != default_position_) {
+      index_of[i] = static_cast<std::uint32_t>(geometry.materials.size());
+      geometry.materials.push_back(library_[i]);
+    }
+  }
+  for (std::size_t i = 0; i < mappings_.size(); ++i) {
+    mappings_[i].index = index_of[mapping_positions_[i]];
+  }
+  geometry.mappings = std::move(mappings_);
+  // Several objects of one file say the same.
+  std::sort(warnings_.begin(), warnings_.end());
+  warnings_.erase(std::unique(warnings_.begin(), warnings_.end()), warnings_.end());
+  geometry.warnings.insert(geometry.warnings.end(), warnings_.begin(), warnings_.end());
+  return index_of;
+}
+
+}  // namespace emit::scene

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/scene/mesh.hpp"
+
+#include <glm/common.hpp>
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+namespace emit::scene {
+
+void Aabb::add(const glm::dvec3& point_m) noexcept {
+  min_m = glm::min(min_m, point_m);
+  max_m = glm::max(max_m, point_m);
+}
+
+void Aabb::add(const Aabb& other) noexcept {
+  if (!other.empty()) {
+    add(other.min_m);
+    add(other.max_m);
+  }
+}
+
+Aabb transformed(const Aabb& box, const glm::dmat4& target_from_source) noexcept {
+  Aabb result;
+  if (box.empty()) {
+    return result;
+  }
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 point((corner & 1) != 0 ? box.max_m.x : box.min_m.x,
+                           (corner & 2) != 0 ? box.max_m.y : box.min_m.y,
+                           (corner & 4) != 0 ? box.max_m.z : box.min_m.z);
+    result.add(glm::dvec3(target_from_source * glm::dvec4(point, 1.0)));
+  }
+  return result;
+}
+
+glm::dmat4 body_from_gltf() noexcept {
+  // Columns: where glTF x (left), y (up) and z (forward) go in forward, right, down.
+  return glm::dmat4(glm::dvec4(0.0, -1.0, 0.0, 0.0), glm::dvec4(0.0, 0.0, -1.0, 0.0),
+                    glm::dvec4(1.0, 0.0, 0.0, 0.0), glm::dvec4(0.0, 0.0, 0.0, 1.0));
+}
+
+glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept {
+  return glm::translate(glm::dmat4(1.0), pose.position_world_m) *
+         glm::mat4_cast(glm::normalize(pose.world_from_body));
+}
+
+}  // namespace emit::scene

@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/conductor.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace emit::server {
+
+using protocol::FrameHeader;
+
+Conductor::Conductor(Context& context, const ScenarioTracks& scenario, const Options& options)
+    : Agent(context.bells.conductor),
+      context_(context),
+      scenario_(scenario),
+      options_(options),
+      journal_(context.journal, context.journal_handed_over),
+      clock_(options.pacing.rate_hz),
+      issued_(kMaxIssued) {
+  entities_.reserve(kMaxTracked);
+  touched_.reserve(kMaxTracked);
+}
+
+bool Conductor::on_start() noexcept {
+  start_run(context_.clock.tai_ns());
+  return true;
+}
+
+std::int64_t Conductor::wake_at_ns() const noexcept {
+  return ig_clock() && clock_started_ && !draining_.load(std::memory_order_relaxed)
+             ? clock_.end_ns()
+             : kNeverNs;
+}
+
+int Conductor::do_work(std::int64_t now_ns) noexcept {
+  int work = take_images_and_slots(now_ns);
+  if (draining_.load(std::memory_order_acquire)) {
+    if (issued_count_ == 0) {
+      drained_.store(true, std::memory_order_release);
+    }
+    return work;
+  }
+  work += take_inputs(now_ns);
+  if (ig_clock() && !clock_started_) {
+    clock_.start(now_ns);
+    clock_started_ = true;
+    begin_slot();
+    ++work;
+  }
+  return work;
+}
+
+void Conductor::start_run(std::int64_t now_ns) noexcept {
+  run_id_ = std::max(run_id_ + 1, static_cast<std::uint64_t>(std::max<std::int64_t>(now_ns, 0)));
+  frame_number_ = 0;
+  render_number_ = 0;
+  gate_.reset();
+  seeker_.clear();
+  entities_.clear();
+  touched_.clear();
+  next_entity_ = 0;
+  have_host_frame_ = false;
+  host_frame_number_ = 0;
+  host_sim_time_ns_ = 0;
+  host_received_ns_ = 0;
+  last_sim_time_ns_ = 0;
+  issued_any_ = false;
+  shown_ = {};
+  slots_.reset();
+  context_.run_id.store(run_id_, std::memory_order_relaxed);
+
+  JournalRunStart line;
+  line.head = {0, now_ns, JournalKind::run_start};
+  line.run_id = run_id_;
+  if (!journal_.write(line)) {
+    count_lost_line();
+  }
+  context_.bells.recorder.ring();
+  context_.conductor_events.push(EventKind::run_started, run_id_);
+}
+
+bool Conductor::reset_run(std::int64_t now_ns) noexcept {
+  reset_pending_ = true;
+  RenderJob* job = context_.jobs.claim();
+  if (issued_count_ > 0 || job == nullptr) {
+    return false;
+  }
+  reset_pending_ = false;
+  job->kind = RenderJob::Kind::reset;
+  context_.jobs.commit();
+  context_.bells.render.ring();
+  start_run(now_ns);
+  return true;
+}
+
+// A frame, and in front of it perhaps one weather job, must find room.
+bool Conductor::can_issue() noexcept {
+  return issued_count_ < kMaxIssued && context_.jobs.free() >= 2 && !reset_pending_;
+}
+
+Conductor::Issued& Conductor::next_issued() noexcept {
+  Issued& issued = issued_[(issued_first_ + issued_count_) % kMaxIssued];
+  issued.header = {};
+  issued.entity_count = 0;
+  return issued;
+}
+
+void Conductor::add_update(RenderJob& job, Entity& entity, const physics::Pose& pose) noexcept {
+  renderer::EntityUpdate& update = job.entities[job.entity_count++];
+  update.entity_id = entity.id;
+  update.pose = pose;
+  update.on = entity.on;
+  update.teleport = entity.teleport_pending;
+  entity.teleport_pending = false;
+}
+
+void Conductor::issue_host_step(bool is_step) noexcept {
+  RenderJob& job = context_.jobs.claim_reserved();
+  Issued& issued = next_issued();
+  job.kind = RenderJob::Kind::frame;
+  job.entity_count = 0;
+  job.request.sim_time_ns = host_sim_time_ns_;
+  job.request.sensor_pose = seeker_.newest().pose;
+  std::size_t applied = 0;
+  for (; applied < touched_.size() && job.entity_count < job.entities.size(); ++applied) {
+    Entity* found = entity(touched_[applied]);
+    if (found == nullptr) {
+      continue;  // entities leave only with the whole list, in start_run()
+    }
+    Entity& body = *found;
+    body.touched = false;
+    add_update(job, body,
+               body.track.empty() ? scenario_.entity_at(body.id, host_sim_time_ns_).pose
+                                  : body.track.newest().pose);
+  }
+  touched_.erase(touched_.begin(), touched_.begin() + static_cast<std::ptrdiff_t>(applied));
+  issued.header.pose_sim_time_ns = host_sim_time_ns_;
+  if (options_.pacing.budget_ns > 0) {
+    issued.header.deadline_ns = host_received_ns_ + options_.pacing.budget_ns;
+  }
+  issue(job, issued, is_step);
+}
+
+void Conductor::issue_ig_clock() noexcept {
+  RenderJob& job = context_.jobs.claim_reserved();
+  Issued& issued = next_issued();
+  job.kind = RenderJob::Kind::frame;
+  job.entity_count = 0;
+  issued.header.deadline_ns = clock_.end_ns();
+  if (!have_host_frame_) {
+    // Until the host speaks: the scenario's own start, and the frame says that nobody steers it.
+    job.request.sim_time_ns = 0;
+    job.request.sensor_pose = scenario_.sensor_at(0);
+    issued.header.flags |= protocol::kFlagStale;
+  } else {
+    const std::int64_t display_ns = clock_.begin_ns() + options_.pacing.display_delay_ns;
+    std::int64_t wanted_ns = host_sim_time_ns_ + (display_ns - host_received_ns_);
+    if (issued_any_) {
+      // Jitter of the network must not turn into motion backwards.
+      wanted_ns = std::max(wanted_ns, last_sim_time_ns_);
+    }
+    const PoseSample sample = seeker_.sample(wanted_ns, options_.pacing.horizon_ns);
+    job.request.sim_time_ns = sample.shown_ns;
+    job.request.sensor_pose = sample.pose;
+    issued.header.pose_sim_time_ns = sample.newest_ns;
+    issued.header.flags |= (sample.extrapolated ? protocol::kFlagExtrapolated : 0U) |
+                           (sample.stale ? protocol::kFlagStale : 0U);
+    const std::size_t count = std::min(entities_.size(), job.entities.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      Entity& body = entities_[(next_entity_ + i) % entities_.size()];
+      add_update(job, body,
+                 body.track.empty()
+                     ? scenario_.entity_at(body.id, sample.shown_ns).pose
+                     : body.track.sample(sample.shown_ns, options_.pacing.horizon_ns).pose);
+    }
+    next_entity_ = count < entities_.size() ? (next_entity_ + count) % entities_.size() : 0;
+  }
+  slots_.issued();
+  issue(job, issued, control_.step_pending());
+}
+
+void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
+  job.request.frame_number = ++render_number_;
+  job.request.thermal_time_ns = control_.thermal_time_ns(job.request.sim_time_ns, is_step);
+  last_sim_time_ns_ = job.request.sim_time_ns;
+  issued_any_ = true;
+
+  FrameHeader& header = issued.header;
+  header.run_id = run_id_;
+  header.host_frame_number = host_frame_number_;
+  header.host_received_ns = host_received_ns_;
+  header.sim_time_ns = job.request.sim_time_ns;
+  header.pose = job.request.sensor_pose;
+  header.flags |= (control_.held() ? protocol::kFlagHold : 0U) |
+                  (options_.canned ? protocol::kFlagCanned : 0U) |
+                  (options_.tai_unset ? protocol::kFlagTimeUnset : 0U);
+  issued.thermal_time_ns = job.request.thermal_time_ns;
+  issued.entity_count = job.entity_count;
+  std::copy_n(job.entities.begin(), job.entity_count, issued.entities.begin());
+  ++issued_count_;
+  context_.jobs.commit();
+  context_.bells.render.ring();
+}
+
+void Conductor::begin_slot() noexcept {
+  slots_.begin(clock_.slot(), control_.running() || control_.step_pending());
+  if (slots_.may_issue() && can_issue()) {
+    issue_ig_clock();
+  }
+}
+
+int Conductor::take_images_and_slots(std::int64_t now_ns) noexcept {
+  int work = 0;
+  const bool slots_run =
+      ig_clock() && clock_started_ && !draining_.load(std::memory_order_acquire);
+  if (slots_run && clock_.must_restart(now_ns)) {
+    clock_.start(now_ns);
+    context_.conductor_events.push(EventKind::slots_missed, 0);
+  }
+  // In order of time: an image counts for the slot in which its pixels arrived.
+  constexpr int kMaxPerTurn = 32;
+  while (work < kMaxPerTurn) {
+    const RenderDone* done = context_.done.front();
+    const bool slot_ended = slots_run && now_ns >= clock_.end_ns();
+    if (slot_ended && (done == nullptr || done->readback_end_ns > clock_.end_ns())) {
+      if (!end_slot(now_ns)) {
+        break;
+      }
+    } else if (done != nullptr) {
+      if (!publish_image(*done, now_ns)) {
+        break;
+      }
+      context_.done.pop();
+    } else {
+      break;
+    }
+    ++work;
+  }
+  return work;
+}
+
+bool Conductor::end_slot(std::int64_t now_ns) noexcept {
+  if (context_.published.claim() == nullptr) {
+    return false;
+  }
+  switch (slots_.end()) {
+    case SlotPolicy::SlotEnd::nothing: break;
+    case SlotPolicy::SlotEnd::no_image:
+      context_.counters.add(Counter::slots_without_image);
+      break;
+    case SlotPolicy::SlotEnd::repeat:
+      if (!publish_repeat(now_ns)) {
+        return false;
+      }
+      break;
+  }
+  const std::uint64_t missed = clock_.advance(now_ns);
+  if (missed > 0) {
+    context_.counters.add(Counter::slots_missed, missed);
+    context_.conductor_events.push(EventKind::slots_missed, missed);
+  }
+  begin_slot();
+  return true;
+}
+
+bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexcept {
+  PublishFrame* frame = context_.published.claim();
+  if (frame == nullptr) {
+    return false;
+  }
+  const Issued& issued = issued_[issued_first_];
+  frame->repeat = false;
+  frame->image = done.image;
+  FrameHeader& header = frame->header;
+  header = issued.header;
+  header.frame_number = ++frame_number_;
+  header.render_start_ns = done.render_start_ns;
+  header.render_end_ns = done.render_end_ns;
+  header.readback_end_ns = done.readback_end_ns;
+  header.nonfinite_px = done.nonfinite_px;
+  header.clamped_px = done.clamped_px;
+  header.flags |= (done.nonfinite_px > 0 ? protocol::kFlagNonFinite : 0U) |
+                  (done.clamped_px > 0 ? protocol::kFlagClamped : 0U);
+  if (done.device_failed) {
+    header.flags |= protocol::kFlagDegraded;
+    header.estimated_error_k = std::numeric_limits<float>::infinity();
+  }
+  const bool late = ig_clock() ? slots_.finished()
+                               : host_step_is_late(header.deadline_ns, done.readback_end_ns);
+  if (late) {
+    header.flags |= protocol::kFlagLate;
+  }
+  shown_ = header;
+  shown_thermal_ns_ = issued.thermal_time_ns;
+  shown_crc_ = options_.first_plane < done.image.plane_count
+                   ? done.image.crc32c[options_.first_plane]
+                   : 0;
+  context_.published.commit();
+  context_.frames_handed_over.fetch_add(1, std::memory_order_release);
+  context_.bells.sender.ring();
+  count_flags(shown_.flags);
+  journal_frame(shown_, &issued, now_ns);
+  issued_first_ = (issued_first_ + 1) % kMaxIssued;
+  --issued_count_;
+  return true;
+}
+
+bool Conductor::publish_repeat(std::int64_t now_ns) noexcept {
+  PublishFrame* frame = context_.published.claim();
+  if (frame == nullptr) {
+    return false;
+  }
+  frame->repeat = true;
+  frame->image = {};
+  frame->header = shown_;
+  frame->header.frame_number = ++frame_number_;
+  frame->header.deadline_ns = clock_.end_ns();
+  frame->header.flags = (shown_.flags & ~std::uint32_t{protocol::kFlagLate}) |
+                        protocol::kFlagRepeated;
+  const FrameHeader header = frame->header;
+  context_.published.commit();
+  context_.frames_handed_over.fetch_add(1, std::memory_order_release);
+  context_.bells.sender.ring();
+  count_flags(header.flags);
+  journal_frame(header, nullptr, now_ns);
+  return true;
+}
+
+void Conductor::count_flags(std::uint32_t flags) noexcept {
+  context_.counters.add(Counter::frames_published);
+  const auto count = [&](std::uint32_t flag, Counter id) {
+    if ((flags & flag) != 0) {
+      context_.counters.add(id);
+    }
+  };
+  count(protocol::kFlagLate, Counter::frames_late);
+  count(protocol::kFlagRepeated, Counter::frames_repeated);
+  count(protocol::kFlagStale, Counter::frames_stale);
+  count(protocol::kFlagExtrapolated, Counter::frames_extrapolated);
+}
+
+void Conductor::journal_frame(const FrameHeader& header, const Issued* issued,
+                              std::int64_t now_ns) noexcept {
+  JournalFrame line;
+  line.head = {0, now_ns, JournalKind::frame};
+  line.frame_number = header.frame_number;
+  line.host_frame_number = header.host_frame_number;
+  line.sim_time_ns = header.sim_time_ns;
+  line.pose_sim_time_ns = header.pose_sim_time_ns;
+  line.thermal_time_ns = shown_thermal_ns_;
+  line.sensor_pose = header.pose;
+  line.flags = header.flags;
+  line.quality_rung = header.quality_rung;
+  line.radiance_crc32c = shown_crc_;
+  line.rendered = issued != nullptr;
+  line.entity_count = issued != nullptr ? issued->entity_count : 0;
+  const std::span<const renderer::EntityUpdate> entities =
+      issued != nullptr ? std::span<const renderer::EntityUpdate>(issued->entities.data(),
+                                                                  issued->entity_count)
+                        : std::span<const renderer::EntityUpdate>();
+  if (!journal_.write(line, entities)) {
+    count_lost_line();
+  }
+  context_.bells.recorder.ring();
+}
+
+void Conductor::count_lost_line() noexcept {
+  context_.counters.add(Counter::journal_dropped);
+  if (!journal_lossy_) {
+    // Once: from here on this run's journal cannot be replayed.
+    journal_lossy_ = true;
+    context_.conductor_events.push(EventKind::journal_overrun, journal_.sequence());
+  }
+}
+
+}  // namespace emit::server

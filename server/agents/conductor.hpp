@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <atomic>
+#include <vector>
+
+#include "agents/agent.hpp"
+#include "agents/journal_ring.hpp"
+#include "app/context.hpp"
+#include "emit/config/daemon_config.hpp"
+#include "pacing/deadline_policy.hpp"
+#include "pacing/ig_clock.hpp"
+#include "pacing/input_gate.hpp"
+#include "pacing/pose_track.hpp"
+#include "pacing/run_control.hpp"
+#include "pacing/scenario_track.hpp"
+
+namespace emit::server {
+
+/// Turns host inputs into render jobs and images into frames: pacing, control, deadlines, journal.
+/// What it decides follows from inputs and clock alone.
+class Conductor final : public Agent {
+ public:
+  /// `first_plane`: plane of the first channel, whose CRC goes into the journal.
+  /// `canned`: frames carry kFlagCanned.
+  struct Options {
+    config::PacingConfig pacing;
+    std::size_t first_plane = 0;
+    bool canned = false;
+    bool tai_unset = false;
+  };
+  Conductor(Context& context, const ScenarioTracks& scenario, const Options& options);
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "conductor"; }
+  [[nodiscard]] bool on_start() noexcept override;
+  int do_work(std::int64_t now_ns) noexcept override;
+  [[nodiscard]] std::int64_t wake_at_ns() const noexcept override;
+
+  /// Any thread: takes no further input, finishes what is in work; then drained() is true.
+  void drain() noexcept { draining_.store(true, std::memory_order_release); }
+  [[nodiscard]] bool drained() const noexcept { return drained_.load(std::memory_order_acquire); }
+
+ private:
+  /// What was decided when a frame was issued, until its image comes back.
+  struct Issued {
+    protocol::FrameHeader header;
+    std::int64_t thermal_time_ns = 0;
+    std::uint32_t entity_count = 0;
+    std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
+  };
+  struct Entity {
+    std::uint32_t id = 0;
+    PoseTrack track;
+    bool on = true;
+    bool teleport_pending = false;  // the next update applied is a jump
+    bool touched = false;           // listed in touched_
+  };
+  static constexpr std::size_t kMaxIssued = 8;
+  static constexpr std::size_t kMaxTracked = 1024;
+
+  [[nodiscard]] bool ig_clock() const noexcept {
+    return options_.pacing.mode == config::PacingMode::ig_clock;
+  }
+
+  // Inputs (conductor_input.cpp).
+  int take_inputs(std::int64_t now_ns) noexcept;
+  bool take_frame(HostInput& input, std::int64_t now_ns) noexcept;
+  bool take_command(const HostInput& input, std::int64_t now_ns) noexcept;
+  void remember(protocol::HostFrameData& frame) noexcept;
+  void drop_unknown_entities(HostInput& input) noexcept;
+  void refuse(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
+              std::uint64_t detail = 0) noexcept;
+  void reply(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
+             std::uint64_t count, std::uint64_t detail) noexcept;
+  [[nodiscard]] Entity* entity(std::uint32_t id) noexcept;
+  void journal_host_frame(const protocol::HostFrameData& frame, std::int64_t now_ns) noexcept;
+  void count_lost_line() noexcept;
+
+  // Frames (conductor.cpp).
+  void start_run(std::int64_t now_ns) noexcept;
+  /// Back to the start snapshot. False: frames are still in work, ask again.
+  [[nodiscard]] bool reset_run(std::int64_t now_ns) noexcept;
+  void issue_host_step(bool is_step) noexcept;
+  void issue_ig_clock() noexcept;
+  void issue(RenderJob& job, Issued& issued, bool is_step) noexcept;
+  [[nodiscard]] Issued& next_issued() noexcept;
+  void add_update(RenderJob& job, Entity& entity, const physics::Pose& pose) noexcept;
+  void begin_slot() noexcept;
+  [[nodiscard]] bool can_issue() noexcept;
+  int take_images_and_slots(std::int64_t now_ns) noexcept;
+  bool end_slot(std::int64_t now_ns) noexcept;
+  bool publish_image(const RenderDone& done, std::int64_t now_ns) noexcept;
+  bool publish_repeat(std::int64_t now_ns) noexcept;
+  void journal_frame(const protocol::FrameHeader& header, const Issued* issued,
+                     std::int64_t now_ns) noexcept;
+  void count_flags(std::uint32_t flags) noexcept;
+
+  Context& context_;
+  const ScenarioTracks& scenario_;
+  Options options_;
+  JournalWriter journal_;
+
+  RunControl control_;
+  InputGate gate_;
+  IgClock clock_;
+  SlotPolicy slots_;
+  bool clock_started_ = false;
+
+  PoseTrack seeker_;
+  std::vector<Entity> entities_;  // reserved at start, sorted by id
+  bool have_host_frame_ = false;
+  std::uint64_t host_frame_number_ = 0;
+  std::int64_t host_sim_time_ns_ = 0;
+  std::int64_t host_received_ns_ = 0;
+  std::int64_t last_sim_time_ns_ = 0;  // of the newest frame issued in this run
+  bool issued_any_ = false;
+  bool reset_pending_ = false;          // waits for the frames in work
+  std::vector<std::uint32_t> touched_;  // host-step: entities to apply with the next frames
+  std::size_t next_entity_ = 0;         // ig-clock: where the next frame goes on, if not all fit
+
+  std::uint64_t run_id_ = 0;
+  std::uint64_t frame_number_ = 0;   // of the newest frame published
+  std::uint64_t render_number_ = 0;  // of the newest frame issued
+  std::vector<Issued> issued_;       // ring of kMaxIssued
+  std::size_t issued_first_ = 0;
+  std::size_t issued_count_ = 0;
+  protocol::FrameHeader shown_;      // of the image published last
+  std::int64_t shown_thermal_ns_ = 0;
+  std::uint32_t shown_crc_ = 0;
+  bool journal_lossy_ = false;
+
+  std::atomic<bool> draining_{false};
+  std::atomic<bool> drained_{false};
+};
+
+}  // namespace emit::server

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "emit/config/daemon_config.hpp"
+#include "emit/physics/error.hpp"
+#include "emit/renderer/renderer.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+namespace emit::server {
+
+/// Sensor channels a source can fill, and what its images come from.
+struct SourceInfo {
+  std::string device;  ///< GL renderer, or where canned frames come from
+  bool canned = false; ///< pre-rendered pixels: frames carry kFlagCanned
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+  std::uint32_t slots = 0;
+  std::size_t planes = 0;  ///< FrameView::radiance_w_m2_sr.size() of every frame
+};
+
+/// Where frames come from. The same calls, in the same order, give the same pixels: the journal
+/// and its player rely on it.
+/// Thread: the render agent owns the source from its factory to destruction; release() and info()
+/// may be called by any thread. Real time: everything after construction is RT-safe.
+class FrameSource {
+ public:
+  FrameSource() = default;
+  FrameSource(const FrameSource&) = delete;
+  FrameSource& operator=(const FrameSource&) = delete;
+  virtual ~FrameSource() = default;
+
+  virtual std::size_t apply_entities(
+      std::int64_t sim_time_ns, std::span<const renderer::EntityUpdate> updates) noexcept = 0;
+  virtual bool apply_weather(const scene::WeatherSample& sample) noexcept = 0;
+  virtual void reset() noexcept = 0;
+
+  /// Issues a frame; -1 when every slot is in use.
+  [[nodiscard]] virtual int submit(const renderer::FrameRequest& request) noexcept = 0;
+  /// True when collect() would not wait.
+  [[nodiscard]] virtual bool poll(renderer::SlotIndex slot) noexcept = 0;
+  /// Waits for the device. The view and its memory live until release().
+  [[nodiscard]] virtual const renderer::FrameView& collect(renderer::SlotIndex slot) noexcept = 0;
+  virtual void release(renderer::SlotIndex slot) noexcept = 0;
+
+  [[nodiscard]] virtual const SourceInfo& info() const noexcept = 0;
+};
+
+/// Called once, on the thread that will own the source (a GL context is bound to its thread).
+using FrameSourceFactory = std::function<physics::Result<std::unique_ptr<FrameSource>>()>;
+
+/// Frames of emit::renderer.
+[[nodiscard]] physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
+    const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
+    const renderer::OutputOptions& output);
+
+/// Pre-rendered frames: a folder of frame_*.exr with a `radiance` channel in name order, or a moving
+/// test pattern; shown again and again. All memory is taken here.
+/// Errors: not_found (no frame in the folder), parse (file at fault, or frames of different size).
+[[nodiscard]] physics::Result<std::unique_ptr<FrameSource>> make_canned_source(
+    const config::SourceConfig& source, std::uint32_t slots, std::size_t planes);
+
+}  // namespace emit::server

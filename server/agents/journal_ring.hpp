@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <type_traits>
+
+#include "agents/messages.hpp"
+#include "rt/byte_ring.hpp"
+
+/// Journal lines on the way from conductor to recorder: a head, then the entities it counts, both
+/// copied byte by byte. The recorder turns them into emit.v1.JournalEntry.
+namespace emit::server {
+
+enum class JournalKind : std::uint32_t { run_start, host_frame, command, frame };
+
+struct JournalHead {
+  std::uint64_t sequence = 0;
+  std::int64_t wall_time_ns = 0;
+  JournalKind kind = JournalKind::run_start;
+};
+
+struct JournalRunStart {
+  JournalHead head;
+  std::uint64_t run_id = 0;
+};
+
+struct JournalCommand {
+  JournalHead head;
+  CommandKind command = CommandKind::start;
+};
+
+/// Followed by entity_count EntityStateData.
+struct JournalHostFrame {
+  JournalHead head;
+  std::uint64_t frame_number = 0;
+  std::int64_t sim_time_ns = 0;
+  std::uint64_t run_id = 0;
+  std::int64_t received_ns = 0;
+  physics::Pose seeker;
+  std::optional<protocol::PoseRates> seeker_rates;
+  std::optional<protocol::EnvironmentData> environment;
+  std::uint32_t entity_count = 0;
+};
+
+/// Followed by entity_count renderer::EntityUpdate.
+struct JournalFrame {
+  JournalHead head;
+  std::uint64_t frame_number = 0;
+  std::uint64_t host_frame_number = 0;
+  std::int64_t sim_time_ns = 0;
+  std::int64_t pose_sim_time_ns = 0;
+  std::int64_t thermal_time_ns = 0;
+  physics::Pose sensor_pose;
+  std::uint32_t flags = 0;
+  std::uint32_t quality_rung = 0;
+  std::uint32_t radiance_crc32c = 0;
+  bool rendered = false;
+  std::uint32_t entity_count = 0;
+};
+
+/// Conductor's end. A line that finds no room is lost and counted; its sequence number stays unused,
+/// so that a reader sees the gap. RT-safe.
+class JournalWriter {
+ public:
+  /// `written` counts the lines that found room.
+  JournalWriter(ByteRing& ring, std::atomic<std::uint64_t>& written)
+      : ring_(ring), written_(written) {}
+
+  /// Fills in the head's sequence. False when the line was lost.
+  template <class Line, class Element = std::byte>
+  bool write(Line& line, std::span<const Element> elements = {}) noexcept {
+    static_assert(std::is_trivially_copyable_v<Line> && std::is_trivially_copyable_v<Element>);
+    line.head.sequence = ++sequence_;
+    const std::span<std::byte> memory = ring_.claim(sizeof(Line) + elements.size_bytes());
+    if (memory.empty()) {
+      return false;
+    }
+    std::memcpy(memory.data(), &line, sizeof(Line));
+    if (!elements.empty()) {
+      std::memcpy(memory.data() + sizeof(Line), elements.data(), elements.size_bytes());
+    }
+    ring_.commit();
+    written_.fetch_add(1, std::memory_order_release);
+    return true;
+  }
+  [[nodiscard]] std::uint64_t sequence() const noexcept { return sequence_; }
+
+ private:
+  ByteRing& ring_;
+  std::atomic<std::uint64_t>& written_;
+  std::uint64_t sequence_ = 0;
+};
+
+}  // namespace emit::server

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "agents/frame_source.hpp"
+#include "emit/protocol/frame_header.hpp"
+#include "emit/protocol/host_frame.hpp"
+#include "pacing/run_control.hpp"
+
+/// Plain structs on the rings between agents; docs/threading.md shows who sends what to whom.
+namespace emit::server {
+
+inline constexpr std::size_t kMaxPlanes = 16;
+inline constexpr std::size_t kMaxSlots = 16;
+
+/// Connections are named by their place in the receiver's table and how often it was used.
+inline constexpr std::uint32_t kConnectionPlaceBits = 10;
+inline constexpr std::uint32_t kMaxConnections = 1u << kConnectionPlaceBits;
+[[nodiscard]] constexpr std::uint32_t connection_place(std::uint64_t key) noexcept {
+  return static_cast<std::uint32_t>(key) & (kMaxConnections - 1);
+}
+
+/// Values of emit.v1.Status.Code.
+enum class StatusCode : std::uint8_t {
+  ok = 1,
+  wrong_version = 2,
+  oversize = 3,
+  malformed = 4,
+  unknown_entity = 5,
+  invalid_pose = 6,
+  time_backwards = 7,
+  duplicate_frame = 8,
+  unknown_channel = 9,
+  not_allowed = 10,
+  overloaded = 11,
+  internal = 12,
+  invalid_environment = 13,
+};
+
+/// Whom an answer goes to.
+struct Origin {
+  enum class Kind : std::uint8_t { none, udp, tcp };
+  Kind kind = Kind::none;
+  std::uint32_t connection = 0;  ///< tcp: index and generation in the receiver's table
+  std::uint32_t generation = 0;
+  std::uint32_t address_bytes = 0;  ///< udp: sockaddr of the sender
+  alignas(8) std::array<std::byte, 32> address{};
+};
+
+/// receiver -> conductor, in order of arrival.
+struct HostInput {
+  enum class Kind : std::uint8_t { frame, command };
+  Kind kind = Kind::frame;
+  CommandKind command = CommandKind::start;
+  Origin origin;
+  protocol::HostFrameData frame;
+};
+
+/// conductor -> receiver: an answer to send.
+struct StatusReply {
+  Origin origin;
+  StatusCode code = StatusCode::ok;
+  std::uint64_t host_frame_number = 0;
+  std::uint64_t count = 0;
+  std::uint64_t detail = 0;  ///< unknown_entity: its id; ok: the command's kind
+};
+
+/// conductor -> render agent, in the order in which the source must see it.
+struct RenderJob {
+  enum class Kind : std::uint8_t { frame, weather, reset };
+  Kind kind = Kind::frame;
+  renderer::FrameRequest request;
+  scene::WeatherSample weather;
+  std::uint32_t entity_count = 0;
+  std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
+};
+
+/// Pixels of one image, in memory of the source.
+struct Image {
+  FrameSource* source = nullptr;
+  renderer::SlotIndex slot = 0;
+  std::uint32_t plane_count = 0;
+  std::array<std::span<const float>, kMaxPlanes> planes;
+  std::array<std::uint32_t, kMaxPlanes> crc32c{};
+};
+
+/// render agent -> conductor, in order of submission.
+struct RenderDone {
+  Image image;
+  std::uint32_t nonfinite_px = 0;
+  std::uint32_t clamped_px = 0;
+  bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
+  std::int64_t render_start_ns = 0;
+  std::int64_t render_end_ns = 0;
+  std::int64_t readback_end_ns = 0;
+};
+
+/// conductor -> sender. The header lacks what depends on channel and client.
+struct PublishFrame {
+  bool repeat = false;  ///< the image published last, again; `image` is not set
+  Image image;
+  protocol::FrameHeader header;
+};
+
+enum class EventKind : std::uint8_t {
+  run_started,       ///< a = run id
+  host_epoch,        ///< a = host's run id
+  command,           ///< a = CommandKind
+  refused,           ///< a = StatusCode, b = count
+  connected,         ///< a = connection, text = peer
+  disconnected,      ///< a = connection, text = why
+  hello,             ///< a = connection, b = role, text = software
+  subscribed,        ///< a = connection, b = channel, text = transport
+  client_failed,     ///< a = connection, text = why
+  client_slow,       ///< a = connection
+  no_gso,            ///< a = connection, text = why
+  source_failed,     ///< text = why
+  journal_failed,    ///< text = why
+  journal_overrun,   ///< a = first sequence lost
+  slots_missed,      ///< a = how many
+};
+
+/// any agent -> housekeeping: what happened, as numbers; the text is put together there.
+struct Event {
+  EventKind kind = EventKind::run_started;
+  std::uint64_t a = 0;
+  std::uint64_t b = 0;
+  std::array<char, 104> text{};
+};
+
+}  // namespace emit::server

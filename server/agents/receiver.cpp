@@ -1,0 +1,436 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/receiver.hpp"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/epoll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <exception>
+#include <new>
+
+#include "agents/receiver_connection.hpp"
+
+namespace emit::server {
+namespace {
+
+constexpr std::uint64_t kListenerKey = ~std::uint64_t{0};
+constexpr std::uint64_t kUdpKey = ~std::uint64_t{0} - 1;
+constexpr std::int64_t kHelloTimeoutNs = 5'000'000'000;
+/// What a peer may leave unread of our answers.
+constexpr std::size_t kMaxQueuedBytes = 256u << 10;
+constexpr std::uint32_t kMaxMisbehaved = 1000;
+
+}  // namespace
+
+Receiver::Receiver(Context& context, const config::DaemonConfig& config)
+    : Agent(context.bells.receiver),
+      context_(context),
+      config_(config),
+      epoll_(::epoll_create1(EPOLL_CLOEXEC)),
+      udp_memory_(std::make_unique<UdpMemory>()) {}
+
+Receiver::~Receiver() = default;
+
+physics::Result<void> Receiver::open() {
+  const auto where = parse_host_port(config_.control.tcp);
+  if (!where) {
+    return tl::unexpected<physics::Error>(
+        physics::Error(where.error()).with_context("control.tcp"));
+  }
+  const auto address = resolve(*where, SOCK_STREAM, true);
+  if (!address) {
+    return tl::unexpected<physics::Error>(
+        physics::Error(address.error()).with_context("control.tcp"));
+  }
+  auto listener = open_tcp_listener(*address);
+  if (!listener) {
+    return tl::unexpected<physics::Error>(std::move(listener.error()).with_context("control.tcp"));
+  }
+  listener_ = std::move(*listener);
+
+  if (!config_.host.udp.empty()) {
+    const auto udp_where = parse_host_port(config_.host.udp);
+    if (!udp_where) {
+      return tl::unexpected<physics::Error>(
+          physics::Error(udp_where.error()).with_context("host.udp"));
+    }
+    const auto udp_address = resolve(*udp_where, SOCK_DGRAM, true);
+    if (!udp_address) {
+      return tl::unexpected<physics::Error>(
+          physics::Error(udp_address.error()).with_context("host.udp"));
+    }
+    auto udp = open_udp_bound(*udp_address);
+    if (!udp) {
+      return tl::unexpected<physics::Error>(std::move(udp.error()).with_context("host.udp"));
+    }
+    udp_ = std::move(*udp);
+    set_option(udp_.get(), SOL_SOCKET, SO_TIMESTAMPNS, 1);
+    set_option(udp_.get(), SOL_SOCKET, SO_RXQ_OVFL, 1);
+    constexpr std::uint64_t kHostBufferBytes = 4u << 20;
+    set_receive_buffer(udp_.get(), kHostBufferBytes);
+  }
+
+  const std::uint32_t places = std::clamp(config_.control.max_clients, 1U, kMaxConnections);
+  for (std::uint32_t i = 0; i < places; ++i) {
+    connections_.push_back(std::make_unique<Connection>());
+    connections_.back()->index = i;
+    connections_.back()->out.reserve(4096);
+  }
+  return {};
+}
+
+SocketAddress Receiver::control_address() const noexcept { return local_address(listener_.get()); }
+
+SocketAddress Receiver::host_address() const noexcept {
+  return udp_ ? local_address(udp_.get()) : SocketAddress{};
+}
+
+bool Receiver::on_start() noexcept {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = kListenerKey;
+  if (!epoll_ || ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, listener_.get(), &event) != 0) {
+    return false;
+  }
+  if (udp_) {
+    event.data.u64 = kUdpKey;
+    udp_watched_ = ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, udp_.get(), &event) == 0;
+    return udp_watched_;
+  }
+  return true;
+}
+
+void Receiver::on_stop() noexcept {
+  for (auto& connection : connections_) {
+    if (connection->open()) {
+      // Sender and recorder have ended before; nothing is lent any more.
+      if (!connection->write_lent) {
+        flush(*connection);
+      }
+      finish_close(*connection);
+    }
+  }
+}
+
+int Receiver::do_work(std::int64_t now_ns) noexcept {
+  wake_at_ns_ = kNeverNs;
+  int work = 0;
+  // Connections come and go with allocations; without memory for one, it is the one that ends.
+  try {
+    work += take_released();
+    work += take_replies();
+    std::array<epoll_event, 32> events{};
+    const int count =
+        ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
+    for (int i = 0; i < count; ++i) {
+      const epoll_event& event = events[static_cast<std::size_t>(i)];
+      if (event.data.u64 == kListenerKey) {
+        work += accept_connections(now_ns);
+      } else if (event.data.u64 == kUdpKey) {
+        work += receive_datagrams(now_ns);
+      } else {
+        Connection& connection = *connections_[connection_place(event.data.u64)];
+        if (!connection.open() || connection.key() != event.data.u64) {
+          continue;
+        }
+        if ((event.events & EPOLLOUT) != 0) {
+          flush(connection);
+          ++work;
+        }
+        if ((event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0 && connection.open()) {
+          work += read(connection, now_ns);
+        }
+      }
+    }
+    for (auto& connection : connections_) {
+      if (connection->open() && connection->stuck && context_.host_inputs.claim() != nullptr) {
+        connection->stuck = false;
+        connection->dirty = true;
+        work += 1 + parse(*connection, now_ns);
+      }
+    }
+    if (udp_ && !udp_watched_ && !draining_.load(std::memory_order_acquire)) {
+      work += receive_datagrams(now_ns);
+    }
+    check_timeouts(now_ns);
+    for (auto& connection : connections_) {
+      if (connection->open() && connection->dirty) {
+        watch(*connection);
+      }
+    }
+  } catch (const std::exception& error) {
+    context_.receiver_events.push(EventKind::refused,
+                                  static_cast<std::uint64_t>(StatusCode::internal),
+                                  context_.counters.add(Counter::refused_internal), error.what());
+  }
+  return work;
+}
+
+int Receiver::accept_connections(std::int64_t now_ns) {
+  int work = 0;
+  constexpr int kMaxPerTurn = 8;
+  for (; work < kMaxPerTurn; ++work) {
+    SocketAddress peer;
+    peer.length = sizeof(peer.storage);
+    Fd fd(::accept4(listener_.get(), peer.get(), &peer.length, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (!fd) {
+      break;
+    }
+    set_option(fd.get(), IPPROTO_TCP, TCP_NODELAY, 1);
+    const auto place = std::find_if(connections_.begin(), connections_.end(),
+                                    [](const auto& connection) { return !connection->open(); });
+    if (place == connections_.end() || draining_.load(std::memory_order_acquire)) {
+      // One connection more than allowed gets an answer of its own, without a place in the table.
+      Connection guest;
+      guest.fd = std::move(fd);
+      refuse(guest, StatusCode::overloaded,
+             place == connections_.end() ? "as many connections as control.max_clients allows"
+                                         : "the daemon is stopping");
+      ::shutdown(guest.fd.get(), SHUT_WR);
+      continue;
+    }
+    Connection& connection = **place;
+    // First what may throw, so that a place is never half taken.
+    protocol::RecordLimits limits;
+    limits.max_control_bytes = config_.control.max_record_bytes;
+    connection.parser.emplace(limits);
+    connection.fd = std::move(fd);
+    connection.peer = peer;
+    connection.generation = (connection.generation + 1) & (~0U >> kConnectionPlaceBits);
+    connection.role = Role::none;
+    connection.welcomed = false;
+    connection.closing = false;
+    connection.flush_close = false;
+    connection.lent = false;
+    connection.write_lent = false;
+    connection.stuck = false;
+    connection.dirty = false;
+    connection.misbehaved = 0;
+    connection.since_ns = now_ns;
+    connection.out.clear();
+    connection.out_sent = 0;
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.u64 = connection.key();
+    if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, connection.fd.get(), &event) != 0) {
+      connection.fd.reset();
+      continue;
+    }
+    context_.counters.add(Counter::connections_accepted);
+    context_.receiver_events.push(EventKind::connected, connection.key(), 0, to_string(peer));
+  }
+  return work;
+}
+
+int Receiver::read(Connection& connection, std::int64_t now_ns) {
+  if (connection.stuck || connection.closing || connection.flush_close) {
+    // Only the end of the stream is of interest; anything else is thrown away or waits.
+    std::array<std::byte, 4096> trash;
+    const ssize_t got = ::recv(connection.fd.get(), trash.data(), trash.size(),
+                               MSG_DONTWAIT | (connection.stuck ? MSG_PEEK : 0));
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) {
+      close(connection, "closed by the peer");
+    }
+    return 1;
+  }
+  const std::span<std::byte> space = connection.parser->writable();
+  if (space.empty()) {
+    close(connection, "no room for a record");
+    return 1;
+  }
+  const ssize_t got = ::recv(connection.fd.get(), space.data(), space.size(), MSG_DONTWAIT);
+  if (got < 0) {
+    if (errno != EAGAIN && errno != EINTR) {
+      close(connection, error_text(errno));
+    }
+    return 1;
+  }
+  if (got == 0) {
+    close(connection, connection.parser->pending_bytes() != 0 ? "closed in the middle of a record"
+                                                             : "closed by the peer");
+    return 1;
+  }
+  connection.parser->commit(static_cast<std::size_t>(got));
+  return 1 + parse(connection, now_ns);
+}
+
+int Receiver::parse(Connection& connection, std::int64_t now_ns) {
+  int work = 0;
+  while (connection.open() && !connection.closing && !connection.flush_close) {
+    if (connection.role == Role::host && !draining_.load(std::memory_order_acquire) &&
+        context_.host_inputs.claim() == nullptr) {
+      connection.stuck = true;
+      connection.dirty = true;
+      break;
+    }
+    protocol::Record record;
+    const protocol::ParseStatus status = connection.parser->next(record);
+    if (status == protocol::ParseStatus::need_more) {
+      break;
+    }
+    ++work;
+    if (status == protocol::ParseStatus::record) {
+      take_record(connection, record, now_ns);
+      continue;
+    }
+    const auto code = status == protocol::ParseStatus::oversize ? StatusCode::oversize
+                      : status == protocol::ParseStatus::wrong_version
+                          ? StatusCode::wrong_version
+                          : StatusCode::malformed;
+    // The framing is lost: the connection ends after the answer.
+    refuse(connection, code, std::string("record: ") + std::string(protocol::to_string(status)));
+    connection.flush_close = true;
+    flush(connection);
+  }
+  return work;
+}
+
+void Receiver::flush(Connection& connection) noexcept {
+  if (connection.write_lent) {
+    return;
+  }
+  while (connection.out_sent < connection.out.size()) {
+    const ssize_t sent =
+        ::send(connection.fd.get(), connection.out.data() + connection.out_sent,
+               connection.out.size() - connection.out_sent, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (sent < 0) {
+      if (errno != EAGAIN && errno != EINTR) {
+        close(connection, "write failed");
+      }
+      connection.dirty = true;
+      return;
+    }
+    connection.out_sent += static_cast<std::size_t>(sent);
+  }
+  if (!connection.out.empty()) {
+    connection.out.clear();
+    connection.out_sent = 0;
+    connection.dirty = true;
+  }
+  if (connection.flush_close) {
+    ::shutdown(connection.fd.get(), SHUT_WR);
+    close(connection, "refused");
+  }
+}
+
+void Receiver::watch(Connection& connection) noexcept {
+  connection.dirty = false;
+  epoll_event event{};
+  const bool reading = !connection.stuck && !connection.closing;
+  const bool writing = !connection.write_lent && !connection.closing &&
+                       connection.out_sent < connection.out.size();
+  event.events = (reading ? std::uint32_t{EPOLLIN} : 0U) | (writing ? std::uint32_t{EPOLLOUT} : 0U);
+  event.data.u64 = connection.key();
+  if (connection.closing) {
+    // Waits for sender or recorder; a hang-up must not wake this agent over and over.
+    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.fd.get(), nullptr);
+    return;
+  }
+  ::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, connection.fd.get(), &event);
+}
+
+void Receiver::close(Connection& connection, std::string_view why) noexcept {
+  if (connection.closing || connection.index >= connections_.size() ||
+      connections_[connection.index].get() != &connection) {
+    return;
+  }
+  connection.closing = true;
+  context_.receiver_events.push(EventKind::disconnected, connection.key(), 0, why);
+  if (!connection.lent) {
+    finish_close(connection);
+    return;
+  }
+  connection.dirty = true;
+  if (connection.role == Role::recorder) {
+    static_cast<void>(context_.to_recorder.push(
+        {ClientCommand::Kind::remove, connection.key(), -1, 0}));
+    context_.bells.recorder.ring();
+  } else {
+    static_cast<void>(context_.to_sender.push(
+        {ClientCommand::Kind::remove, connection.key(), nullptr}));
+    context_.bells.sender.ring();
+  }
+}
+
+void Receiver::finish_close(Connection& connection) noexcept {
+  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.fd.get(), nullptr);
+  connection.fd.reset();
+  connection.client.reset();
+  connection.parser.reset();
+  connection.lent = false;
+  connection.write_lent = false;
+  context_.counters.add(Counter::connections_closed);
+}
+
+int Receiver::take_released() noexcept {
+  int work = 0;
+  const auto released = [&](std::uint32_t key) {
+    ++work;
+    Connection& connection = *connections_[connection_place(key)];
+    if (!connection.open() || connection.key() != key || !connection.lent) {
+      return;
+    }
+    connection.lent = false;
+    connection.write_lent = false;
+    connection.client.reset();
+    if (!connection.closing) {
+      // Ended by sender or recorder: too slow, or its socket failed.
+      context_.receiver_events.push(EventKind::disconnected, key, 0, "cannot keep up or failed");
+      connection.closing = true;
+    }
+    finish_close(connection);
+  };
+  while (const ClientReleased* client = context_.from_sender.front()) {
+    released(client->connection);
+    context_.from_sender.pop();
+  }
+  while (const RecorderReleased* recorder = context_.from_recorder.front()) {
+    released(recorder->connection);
+    context_.from_recorder.pop();
+  }
+  return work;
+}
+
+int Receiver::take_replies() {
+  int work = 0;
+  while (const StatusReply* reply = context_.replies.front()) {
+    ++work;
+    if (reply->origin.kind == Origin::Kind::udp) {
+      send_udp_status(reply->origin, reply->code, reply->host_frame_number, reply->count,
+                      status_text(reply->code, reply->detail));
+    } else if (reply->origin.kind == Origin::Kind::tcp) {
+      Connection& connection = *connections_[reply->origin.connection];
+      if (connection.open() && !connection.closing &&
+          connection.generation == reply->origin.generation) {
+        send_status(connection, reply->code, status_text(reply->code, reply->detail),
+                    reply->host_frame_number, reply->count);
+      }
+    }
+    context_.replies.pop();
+  }
+  return work;
+}
+
+void Receiver::check_timeouts(std::int64_t now_ns) noexcept {
+  for (auto& connection : connections_) {
+    if (!connection->open() || connection->closing) {
+      continue;
+    }
+    if (connection->misbehaved > kMaxMisbehaved) {
+      close(*connection, "too many refused messages");
+    } else if (connection->out.size() - connection->out_sent > kMaxQueuedBytes) {
+      close(*connection, "does not read its answers");
+    } else if (!connection->welcomed || connection->flush_close) {
+      const std::int64_t end_ns = connection->since_ns + kHelloTimeoutNs;
+      if (now_ns >= end_ns) {
+        close(*connection, "no hello within 5 s");
+      } else {
+        wake_at_ns_ = std::min(wake_at_ns_, end_ns);
+      }
+    }
+  }
+}
+
+}  // namespace emit::server

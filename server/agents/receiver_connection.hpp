@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <sys/uio.h>
+
+#include "agents/receiver.hpp"
+
+namespace emit::server {
+
+struct Receiver::Connection {
+  std::uint32_t index = 0;
+  std::uint32_t generation = 0;
+  Fd fd;
+  SocketAddress peer;
+  Role role = Role::none;
+  bool welcomed = false;
+  bool closing = false;      ///< to be closed as soon as nobody else uses the descriptor
+  bool flush_close = false;  ///< closes once what is queued went out
+  bool lent = false;         ///< sender or recorder hold it (or its client) and must give it back
+  bool write_lent = false;   ///< they write to the descriptor: nobody else may
+  bool stuck = false;        ///< the conductor's ring is full: records wait in the parser
+  bool dirty = false;        ///< watch() has to be called
+  std::uint32_t misbehaved = 0;
+  std::int64_t since_ns = 0;
+  std::optional<protocol::RecordParser> parser;  ///< taken on connecting: a large buffer
+  std::vector<std::byte> out;
+  std::size_t out_sent = 0;
+  std::unique_ptr<SenderClient> client;
+
+  [[nodiscard]] bool open() const noexcept { return static_cast<bool>(fd); }
+  /// Key of the connection on rings: the place in the table and how often it was used.
+  [[nodiscard]] std::uint32_t key() const noexcept { return generation << kConnectionPlaceBits | index; }
+};
+
+struct Receiver::UdpMemory {
+  static constexpr std::size_t kBatch = 16;
+  static constexpr std::size_t kDatagramBytes = 65536;
+  static constexpr std::size_t kControlBytes = 128;
+  std::vector<std::byte> data = std::vector<std::byte>(kBatch * kDatagramBytes);
+  struct alignas(cmsghdr) Control {
+    std::array<std::byte, kControlBytes> bytes;
+  };
+  std::array<Control, kBatch> control{};
+  std::array<sockaddr_storage, kBatch> peers{};
+  std::array<iovec, kBatch> iov{};
+  std::array<mmsghdr, kBatch> messages{};
+};
+
+/// Text of a Status for people. `detail` as in StatusReply.
+[[nodiscard]] std::string status_text(StatusCode code, std::uint64_t detail);
+
+}  // namespace emit::server

@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <netinet/in.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "agents/receiver_connection.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/protocol/version.hpp"
+#include "emit/v1/control.pb.h"
+
+namespace emit::server {
+
+using protocol::kProtocolVersion;
+
+std::string status_text(StatusCode code, std::uint64_t detail) {
+  switch (code) {
+    case StatusCode::ok: return "taken";
+    case StatusCode::wrong_version: return "wrong protocol version";
+    case StatusCode::oversize: return "message too large";
+    case StatusCode::malformed: return "malformed message";
+    case StatusCode::unknown_entity:
+      return fmt::format("unknown entity {}: not in the scenario, not applied", detail);
+    case StatusCode::invalid_pose: return "invalid pose";
+    case StatusCode::time_backwards: return "sim time goes backwards within a run";
+    case StatusCode::duplicate_frame: return "frame number already seen in this run";
+    case StatusCode::unknown_channel: return "unknown channel";
+    case StatusCode::not_allowed:
+      return detail == static_cast<std::uint64_t>(CommandKind::step)
+                 ? "step needs a pose, and hold or stop before it"
+                 : "not allowed now";
+    case StatusCode::overloaded:
+      return fmt::format("entity {}: more entities than emitd tracks", detail);
+    case StatusCode::internal: return "failure inside emitd";
+    case StatusCode::invalid_environment: return "environment outside its ranges";
+  }
+  return "unknown status";
+}
+
+void Receiver::take_record(Connection& connection, const protocol::Record& record,
+                           std::int64_t now_ns) {
+  switch (record.kind) {
+    case protocol::RecordKind::host_frame: take_host_frame(connection, record.body, now_ns); return;
+    case protocol::RecordKind::control: {
+      const auto frame = protocol::host_frame_in_control_record(record.body);
+      if (!frame.empty()) {
+        take_host_frame(connection, frame, now_ns);
+      } else {
+        take_control(connection, record.body);
+      }
+      return;
+    }
+    case protocol::RecordKind::frame:
+      refuse(connection, StatusCode::not_allowed, "frames go the other way");
+      return;
+  }
+  // A kind of a newer version: skipped.
+}
+
+void Receiver::take_host_frame(Connection& connection, std::span<const std::byte> bytes,
+                               std::int64_t now_ns) {
+  if (connection.role != Role::host) {
+    refuse(connection, StatusCode::not_allowed, "host frames need the role of a host");
+    return;
+  }
+  if (draining_.load(std::memory_order_acquire)) {
+    return;
+  }
+  // parse() looked for room before it took the record.
+  HostInput& input = context_.host_inputs.claim_reserved();
+  const protocol::DecodeStatus decoded = protocol::decode_host_frame(bytes, decoder_, input.frame);
+  if (decoded != protocol::DecodeStatus::ok) {
+    refuse(connection, static_cast<StatusCode>(decoded),
+           "host frame: " + std::string(protocol::to_string(decoded)), input.frame.frame_number);
+    return;
+  }
+  input.kind = HostInput::Kind::frame;
+  input.origin = {};
+  input.origin.kind = Origin::Kind::tcp;
+  input.origin.connection = connection.index;
+  input.origin.generation = connection.generation;
+  input.frame.received_ns = now_ns;
+  context_.host_inputs.commit();
+  context_.bells.conductor.ring();
+}
+
+void Receiver::take_control(Connection& connection, std::span<const std::byte> body) {
+  v1::ControlRecord record;
+  if (!protocol::parse_control_record(body, record)) {
+    refuse(connection, StatusCode::malformed, "not a control record");
+    if (!connection.welcomed) {
+      connection.flush_close = true;
+      flush(connection);
+    }
+    return;
+  }
+  if (record.has_hello()) {
+    take_hello(connection, record);
+    return;
+  }
+  if (!connection.welcomed) {
+    refuse(connection, StatusCode::not_allowed, "hello comes first");
+    connection.flush_close = true;
+    flush(connection);
+    return;
+  }
+  if (record.has_subscribe()) {
+    take_subscribe(connection, record);
+    return;
+  }
+  if (record.has_command()) {
+    const auto kind = static_cast<int>(record.command().kind());
+    if (connection.role != Role::host) {
+      refuse(connection, StatusCode::not_allowed, "commands need the role of a host");
+    } else if (kind < static_cast<int>(CommandKind::start) ||
+               kind > static_cast<int>(CommandKind::reset)) {
+      refuse(connection, StatusCode::malformed, "unknown command");
+    } else if (!draining_.load(std::memory_order_acquire)) {
+      HostInput& input = context_.host_inputs.claim_reserved();
+      input.kind = HostInput::Kind::command;
+      input.command = static_cast<CommandKind>(kind);
+      input.origin = {};
+      input.origin.kind = Origin::Kind::tcp;
+      input.origin.connection = connection.index;
+      input.origin.generation = connection.generation;
+      context_.host_inputs.commit();
+      context_.bells.conductor.ring();
+    }
+    return;
+  }
+  if (!record.has_status()) {
+    refuse(connection, StatusCode::not_allowed, "this record goes the other way");
+  }
+}
+
+namespace {
+
+void fill(const Channel& channel, v1::ChannelInfo& out) {
+  out.set_index(channel.index);
+  out.set_name(channel.name);
+  out.set_kind(std::string(to_string(channel.kind)));
+  out.set_sensor(channel.sensor);
+  out.set_band(channel.band);
+  out.set_band_lo_um(channel.band_lo_um);
+  out.set_band_hi_um(channel.band_hi_um);
+  out.set_width_px(channel.width_px);
+  out.set_height_px(channel.height_px);
+}
+
+}  // namespace
+
+void Receiver::take_hello(Connection& connection, const v1::ControlRecord& record) {
+  const v1::Hello& hello = record.hello();
+  const auto end = [&](StatusCode code, const std::string& text) {
+    refuse(connection, code, text);
+    connection.flush_close = true;
+    flush(connection);
+  };
+  if (connection.welcomed) {
+    refuse(connection, StatusCode::not_allowed, "hello comes once");
+    return;
+  }
+  if (hello.protocol_version() != kProtocolVersion) {
+    end(StatusCode::wrong_version, fmt::format("protocol version {}, this daemon speaks {}",
+                                               hello.protocol_version(), kProtocolVersion));
+    return;
+  }
+  switch (hello.role()) {
+    case v1::Hello::ROLE_HOST: connection.role = Role::host; break;
+    case v1::Hello::ROLE_CLIENT: connection.role = Role::client; break;
+    case v1::Hello::ROLE_RECORDER: connection.role = Role::recorder; break;
+    default: end(StatusCode::malformed, "hello without a role"); return;
+  }
+  connection.welcomed = true;
+  v1::ControlRecord answer;
+  v1::Welcome& welcome = *answer.mutable_welcome();
+  welcome.set_protocol_version(kProtocolVersion);
+  welcome.set_software(identity_.software);
+  welcome.set_scenario(identity_.scenario);
+  welcome.set_pacing(identity_.pacing);
+  welcome.set_run_id(context_.run_id.load(std::memory_order_relaxed));
+  welcome.set_tai_offset_unset(context_.clock.tai_offset_unset());
+  welcome.set_device(identity_.device);
+  for (const Channel& channel : context_.channels) {
+    fill(channel, *welcome.add_channels());
+  }
+  queue(connection, answer);
+  flush(connection);
+  context_.receiver_events.push(EventKind::hello, connection.key(),
+                                static_cast<std::uint64_t>(connection.role), hello.software());
+  if (connection.role == Role::recorder && connection.open() && !connection.closing) {
+    if (!connection.out.empty()) {
+      close(connection, "does not take the welcome");
+      return;
+    }
+    connection.lent = true;
+    connection.write_lent = true;
+    static_cast<void>(context_.to_recorder.push(
+        {ClientCommand::Kind::add, connection.key(), connection.fd.get(), connection.generation}));
+    context_.bells.recorder.ring();
+  }
+}
+
+void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& record) {
+  const v1::Subscribe& subscribe = record.subscribe();
+  if (connection.role != Role::client) {
+    refuse(connection, StatusCode::not_allowed, "subscribe needs the role of a client");
+    return;
+  }
+  if (connection.lent) {
+    refuse(connection, StatusCode::not_allowed, "one subscription per connection");
+    return;
+  }
+  const Channel* channel = find_channel(context_.channels, subscribe.channel_kind(),
+                                        subscribe.sensor(), subscribe.band());
+  if (channel == nullptr) {
+    std::string known;
+    for (const Channel& each : context_.channels) {
+      known += fmt::format("{}{}/{}/{}", known.empty() ? "" : ", ", to_string(each.kind),
+                           each.sensor, each.band);
+    }
+    refuse(connection, StatusCode::unknown_channel,
+           fmt::format("no channel kind '{}' sensor '{}' band '{}'; there are {}",
+                       subscribe.channel_kind(), subscribe.sensor(), subscribe.band(), known));
+    return;
+  }
+  SenderClient::Params params;
+  params.connection = connection.key();
+  params.channel = channel;
+  params.every_frame = subscribe.every_frame();
+  params.udp = subscribe.udp_port() != 0;
+  params.stream_id = next_stream_id_++;
+  if (params.udp) {
+    auto socket = open_stream_socket(connection, subscribe.udp_port(), subscribe.multicast_group());
+    if (!socket) {
+      refuse(connection, StatusCode::not_allowed, socket.error().text);
+      return;
+    }
+    params.udp_fd = std::move(*socket);
+    params.fragment_payload_bytes = std::clamp(
+        subscribe.fragment_payload_bytes() != 0 ? subscribe.fragment_payload_bytes()
+                                                : config_.stream.udp_fragment_payload_bytes,
+        protocol::kMinFragmentPayloadBytes, protocol::kMaxFragmentPayloadBytes);
+  } else {
+    params.tcp_fd = connection.fd.get();
+  }
+  v1::ControlRecord answer;
+  fill(*channel, *answer.mutable_subscribed()->mutable_channel());
+  answer.mutable_subscribed()->set_stream_id(params.stream_id);
+  const bool udp = params.udp;
+  if (udp) {
+    queue(connection, answer);
+    flush(connection);
+    if (!connection.open() || connection.closing) {
+      return;
+    }
+  } else {
+    // From here on the sender writes: what is still queued goes first.
+    params.first_bytes.assign(connection.out.begin() + static_cast<std::ptrdiff_t>(connection.out_sent),
+                              connection.out.end());
+    protocol::append_control_record(answer, params.first_bytes);
+    connection.out.clear();
+    connection.out_sent = 0;
+    connection.write_lent = true;
+    connection.dirty = true;
+  }
+  connection.lent = true;
+  connection.client = std::make_unique<SenderClient>(std::move(params));
+  static_cast<void>(context_.to_sender.push(
+      {ClientCommand::Kind::add, connection.key(), connection.client.get()}));
+  context_.bells.sender.ring();
+  context_.receiver_events.push(EventKind::subscribed, connection.key(), channel->index,
+                                udp ? "udp" : "tcp");
+}
+
+physics::Result<Fd> Receiver::open_stream_socket(const Connection& connection, std::uint32_t port,
+                                                 const std::string& group) const {
+  using physics::ErrorCode;
+  if (port > 65535) {
+    return physics::make_error(ErrorCode::protocol, fmt::format("udp port {} does not exist", port));
+  }
+  SocketAddress target = connection.peer;
+  if (!group.empty()) {
+    target = numeric_address(group, static_cast<std::uint16_t>(port));
+    bool multicast = false;
+    if (target.length == 0) {
+      // Not a number; names are not looked up on a client's behalf.
+    } else if (target.storage.ss_family == AF_INET) {
+      const auto* v4 = reinterpret_cast<const sockaddr_in*>(&target.storage);
+      multicast = IN_MULTICAST(ntohl(v4->sin_addr.s_addr));
+    } else {
+      const auto* v6 = reinterpret_cast<const sockaddr_in6*>(&target.storage);
+      multicast = v6->sin6_addr.s6_addr[0] == 0xFF;
+    }
+    if (!multicast) {
+      // Otherwise anybody could have frames sent to anybody.
+      return physics::make_error(ErrorCode::protocol, "'" + group + "' is not a multicast group");
+    }
+  }
+  target.set_port(static_cast<std::uint16_t>(port));
+  Fd fd(::socket(target.storage.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (!fd) {
+    return physics::make_error(ErrorCode::io, "udp socket: " + error_text(errno));
+  }
+  set_send_buffer(fd.get(), config_.stream.udp_send_buffer_bytes);
+  if (!group.empty()) {
+    if (target.storage.ss_family == AF_INET) {
+      set_option(fd.get(), IPPROTO_IP, IP_MULTICAST_TTL, config_.stream.multicast_ttl);
+    } else {
+      set_option(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_HOPS, config_.stream.multicast_ttl);
+    }
+  }
+  if (::connect(fd.get(), target.get(), target.length) != 0) {
+    return physics::make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(target),
+                                                          error_text(errno)));
+  }
+  return fd;
+}
+
+void Receiver::refuse(Connection& connection, StatusCode code, const std::string& text,
+                      std::uint64_t host_frame_number) {
+  const std::uint64_t count = context_.counters.add(counter_of(code));
+  ++connection.misbehaved;
+  context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count, text);
+  send_status(connection, code, text, host_frame_number, count);
+}
+
+void Receiver::send_status(Connection& connection, StatusCode code, const std::string& text,
+                           std::uint64_t host_frame_number, std::uint64_t count) {
+  if (connection.write_lent) {
+    context_.counters.add(Counter::statuses_suppressed);
+    return;
+  }
+  v1::ControlRecord answer;
+  v1::Status& status = *answer.mutable_status();
+  status.set_code(static_cast<v1::Status::Code>(code));
+  status.set_text(text);
+  status.set_host_frame_number(host_frame_number);
+  status.set_count(count);
+  queue(connection, answer);
+  flush(connection);
+}
+
+void Receiver::queue(Connection& connection, const v1::ControlRecord& record) {
+  protocol::append_control_record(record, connection.out);
+  connection.dirty = true;
+}
+
+}  // namespace emit::server

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/render_agent.hpp"
+
+#include <algorithm>
+#include <span>
+
+namespace emit::server {
+
+RenderAgent::~RenderAgent() = default;
+
+bool RenderAgent::on_start() noexcept {
+  auto source = factory_();
+  if (!source) {
+    info_ = tl::unexpected<physics::Error>(std::move(source.error()));
+    return false;
+  }
+  source_ = std::move(*source);
+  info_ = source_->info();
+  return true;
+}
+
+void RenderAgent::on_stop() noexcept {
+  while (count_ > 0) {
+    const auto slot = in_flight_[first_].slot;
+    static_cast<void>(source_->collect(slot));
+    source_->release(slot);
+    first_ = (first_ + 1) % kDepth;
+    --count_;
+  }
+  source_.reset();
+}
+
+int RenderAgent::do_work(std::int64_t now_ns) noexcept {
+  int work = 0;
+  wake_at_ns_ = kNeverNs;
+  if (finish_oldest()) {
+    ++work;
+  }
+  if (take_job(now_ns)) {
+    ++work;
+  }
+  if (work == 0 && count_ > 0) {
+    // The device does not ring; looking again after 50 us costs little beside a frame.
+    wake_at_ns_ = now_ns + 50'000;
+  }
+  return work;
+}
+
+bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
+  RenderJob* job = context_.jobs.front();
+  if (job == nullptr) {
+    return false;
+  }
+  switch (job->kind) {
+    case RenderJob::Kind::weather:
+      if (!source_->apply_weather(job->weather)) {
+        context_.counters.add(Counter::refused_overloaded);
+      }
+      break;
+    case RenderJob::Kind::reset:
+      source_->reset();
+      break;
+    case RenderJob::Kind::frame: {
+      if (count_ == kDepth) {
+        return false;
+      }
+      if (!job_prepared_) {
+        source_->apply_entities(job->request.sim_time_ns,
+                                std::span(job->entities.data(), job->entity_count));
+        job_prepared_ = true;
+      }
+      const int slot = source_->submit(job->request);
+      if (slot < 0) {
+        // A slot comes free when the sender or the conductor is done with one; both ring.
+        if (!starved_) {
+          context_.counters.add(Counter::no_free_slot);
+          starved_ = true;
+        }
+        return false;
+      }
+      starved_ = false;
+      job_prepared_ = false;
+      in_flight_[(first_ + count_) % kDepth] = {static_cast<renderer::SlotIndex>(slot), now_ns};
+      ++count_;
+      context_.counters.add(Counter::frames_submitted);
+      break;
+    }
+  }
+  context_.jobs.pop();
+  return true;
+}
+
+bool RenderAgent::finish_oldest() noexcept {
+  if (count_ == 0) {
+    return false;
+  }
+  const InFlight& oldest = in_flight_[first_];
+  if (!source_->poll(oldest.slot)) {
+    return false;
+  }
+  RenderDone* done = context_.done.claim();
+  if (done == nullptr) {
+    return false;
+  }
+  done->render_start_ns = oldest.render_start_ns;
+  done->render_end_ns = context_.clock.tai_ns();
+  const renderer::FrameView& view = source_->collect(oldest.slot);
+  done->readback_end_ns = context_.clock.tai_ns();
+  done->nonfinite_px = view.stats.nonfinite_px;
+  done->clamped_px = view.stats.clamped_px;
+  done->device_failed = view.device_failed;
+  if (view.device_failed) {
+    context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");
+  }
+  done->image.source = source_.get();
+  done->image.slot = oldest.slot;
+  done->image.plane_count =
+      static_cast<std::uint32_t>(std::min(view.radiance_w_m2_sr.size(), kMaxPlanes));
+  for (std::size_t i = 0; i < done->image.plane_count; ++i) {
+    done->image.planes[i] = view.radiance_w_m2_sr[i];
+    // Planes that share memory (canned frames) are summed once.
+    const bool same = i > 0 && view.radiance_w_m2_sr[i].data() == view.radiance_w_m2_sr[i - 1].data();
+    done->image.crc32c[i] = same ? done->image.crc32c[i - 1]
+                                 : protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[i]));
+  }
+  context_.done.commit();
+  context_.counters.add(Counter::frames_rendered);
+  first_ = (first_ + 1) % kDepth;
+  --count_;
+  context_.bells.conductor.ring();
+  return true;
+}
+
+}  // namespace emit::server

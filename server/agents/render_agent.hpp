@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <atomic>
+#include <memory>
+#include <optional>
+
+#include "agents/agent.hpp"
+#include "agents/frame_source.hpp"
+#include "app/context.hpp"
+
+namespace emit::server {
+
+/// Owns the frame source from its making to its end, carries out render jobs in order and hands
+/// finished images to the conductor. A frame is always collected before a later one.
+class RenderAgent final : public Agent {
+ public:
+  RenderAgent(Context& context, FrameSourceFactory factory)
+      : Agent(context.bells.render), context_(context), factory_(std::move(factory)) {}
+  ~RenderAgent() override;
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "render"; }
+  [[nodiscard]] bool on_start() noexcept override;
+  int do_work(std::int64_t now_ns) noexcept override;
+  void on_stop() noexcept override;
+  [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
+
+  /// After on_start: the source's description, or why there is none. Not while running.
+  [[nodiscard]] const physics::Result<SourceInfo>& source_info() const noexcept { return info_; }
+
+ private:
+  struct InFlight {
+    renderer::SlotIndex slot = 0;
+    std::int64_t render_start_ns = 0;
+  };
+  /// More than one in flight lets upload of the next overlap with read-back of the last.
+  static constexpr std::size_t kDepth = 2;
+
+  bool take_job(std::int64_t now_ns) noexcept;
+  bool finish_oldest() noexcept;
+
+  Context& context_;
+  FrameSourceFactory factory_;
+  std::unique_ptr<FrameSource> source_;
+  physics::Result<SourceInfo> info_ =
+      physics::make_error(physics::ErrorCode::internal, "the frame source was not started");
+  std::array<InFlight, kDepth> in_flight_{};
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+  std::int64_t wake_at_ns_ = kNeverNs;
+  bool starved_ = false;
+  bool job_prepared_ = false;  // entities of the job in front are applied; only submit is missing
+};
+
+}  // namespace emit::server

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/frame_source.hpp"
+
+namespace emit::server {
+namespace {
+
+class RendererSource final : public FrameSource {
+ public:
+  RendererSource(std::unique_ptr<renderer::Renderer> renderer, SourceInfo info)
+      : renderer_(std::move(renderer)), info_(std::move(info)) {}
+
+  std::size_t apply_entities(
+      std::int64_t sim_time_ns,
+      std::span<const renderer::EntityUpdate> updates) noexcept override {
+    return updates.empty() ? 0 : renderer_->apply_entities(sim_time_ns, updates);
+  }
+  bool apply_weather(const scene::WeatherSample& sample) noexcept override {
+    return renderer_->apply_weather(sample);
+  }
+  void reset() noexcept override { renderer_->reset(); }
+  int submit(const renderer::FrameRequest& request) noexcept override {
+    return renderer_->submit(request);
+  }
+  bool poll(renderer::SlotIndex slot) noexcept override { return renderer_->poll(slot); }
+  const renderer::FrameView& collect(renderer::SlotIndex slot) noexcept override {
+    return renderer_->collect(slot);
+  }
+  void release(renderer::SlotIndex slot) noexcept override { renderer_->release(slot); }
+  const SourceInfo& info() const noexcept override { return info_; }
+
+ private:
+  std::unique_ptr<renderer::Renderer> renderer_;
+  SourceInfo info_;
+};
+
+}  // namespace
+
+physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
+    const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
+    const renderer::OutputOptions& output) {
+  auto renderer = renderer::Renderer::create(scenario, device, output);
+  if (!renderer) {
+    return tl::unexpected<physics::Error>(std::move(renderer.error()));
+  }
+  SourceInfo info;
+  info.device = (*renderer)->device_name();
+  info.width_px = scenario.sensor.width_px;
+  info.height_px = scenario.sensor.height_px;
+  info.slots = output.slots;
+  info.planes = scenario.bands.size();
+  return std::make_unique<RendererSource>(std::move(*renderer), std::move(info));
+}
+
+}  // namespace emit::server

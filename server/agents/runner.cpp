@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/runner.hpp"
+
+#include <poll.h>
+#include <pthread.h>
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstring>
+#include <ctime>
+#include <system_error>
+
+namespace emit::server {
+
+bool AgentRunner::start_thread() {
+  state_.store(static_cast<int>(State::starting));
+  try {
+    thread_ = std::thread([this] { run(); });
+  } catch (const std::system_error&) {
+    state_.store(static_cast<int>(State::idle));
+    return false;
+  }
+  state_.wait(static_cast<int>(State::starting));
+  if (state_.load() == static_cast<int>(State::failed)) {
+    thread_.join();
+    return false;
+  }
+  return true;
+}
+
+bool AgentRunner::start_stepped() {
+  stepped_ = agent_.on_start();
+  return stepped_;
+}
+
+int AgentRunner::step() noexcept { return turn(); }
+
+void AgentRunner::stop() noexcept {
+  if (stepped_) {
+    agent_.on_stop();
+    stepped_ = false;
+  }
+  if (thread_.joinable()) {
+    stop_.store(true, std::memory_order_release);
+    agent_.doorbell().ring();
+    thread_.join();
+  }
+}
+
+int AgentRunner::turn() noexcept {
+  const std::int64_t begin_ns = clock_.monotonic_ns();
+  const int work = agent_.do_work(clock_.tai_ns());
+  if (work != 0) {
+    duty_.record(clock_.monotonic_ns() - begin_ns);
+  }
+  return work;
+}
+
+void AgentRunner::run() noexcept {
+  // Signals are the main thread's; a name helps in ps, perf and gdb.
+  sigset_t all{};
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  std::array<char, 16> thread_name{};
+  const auto name = agent_.name();
+  std::memcpy(thread_name.data(), name.data(), std::min(name.size(), thread_name.size() - 1));
+  pthread_setname_np(pthread_self(), thread_name.data());
+  prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
+
+  const bool started = agent_.on_start();
+  state_.store(static_cast<int>(started ? State::running : State::failed));
+  state_.notify_all();
+  if (!started) {
+    return;
+  }
+  while (!stop_.load(std::memory_order_acquire)) {
+    if (turn() == 0) {
+      sleep();
+    }
+  }
+  agent_.on_stop();
+}
+
+void AgentRunner::sleep() noexcept {
+  agent_.doorbell().arm();
+  if (turn() != 0 || stop_.load(std::memory_order_acquire)) {
+    agent_.doorbell().disarm();
+    return;
+  }
+  // Bounded, so that a step of the wall clock cannot leave an agent asleep.
+  constexpr std::int64_t kLongestNs = 100'000'000;
+  const std::int64_t wake_ns = agent_.wake_at_ns();
+  const std::int64_t now_ns = clock_.tai_ns();
+  const std::int64_t wait_ns =
+      wake_ns == kNeverNs ? kLongestNs
+                          : std::clamp(wake_ns - now_ns, std::int64_t{0}, kLongestNs);
+  std::array<pollfd, 2> fds{{{agent_.doorbell().fd(), POLLIN, 0}, {agent_.wait_fd(), POLLIN, 0}}};
+  const timespec timeout{static_cast<time_t>(wait_ns / 1'000'000'000),
+                         static_cast<long>(wait_ns % 1'000'000'000)};
+  ::ppoll(fds.data(), fds[1].fd >= 0 ? 2 : 1, &timeout, nullptr);
+  agent_.doorbell().disarm();
+}
+
+}  // namespace emit::server

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/sender.hpp"
+
+#include <sys/epoll.h>
+
+#include <algorithm>
+#include <cstring>
+
+namespace emit::server {
+
+Sender::Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients,
+               bool keep_last)
+    : Agent(context.bells.sender),
+      context_(context),
+      queue_frames_(std::max(queue_frames, 1U)),
+      keep_last_(keep_last),
+      epoll_(::epoll_create1(EPOLL_CLOEXEC)),
+      window_(queue_frames_ + 1) {
+  clients_.reserve(max_clients);
+}
+
+bool Sender::on_start() noexcept { return static_cast<bool>(epoll_); }
+
+int Sender::do_work(std::int64_t now_ns) noexcept {
+  static_cast<void>(now_ns);
+  wake_at_ns_ = kNeverNs;
+  int work = take_commands();
+  work += take_published();
+  work += take_writable();
+  work += send_all();
+  trim();
+  const bool nothing_left =
+      std::all_of(clients_.begin(), clients_.end(), [this](const SenderClient* client) {
+        return !client->busy() && client->next >= end_;
+      });
+  if (nothing_left) {
+    finished_.store(taken_, std::memory_order_release);
+  }
+  return work;
+}
+
+void Sender::on_stop() noexcept {
+  while (take_published() > 0) {
+    trim();
+  }
+  while (!clients_.empty()) {
+    remove(clients_.size() - 1, false);
+  }
+  trim();
+  if (have_last_) {
+    have_last_ = false;
+    let_go(last_);
+  }
+}
+
+int Sender::take_commands() noexcept {
+  int work = 0;
+  while (ClientCommand* command = context_.to_sender.front()) {
+    if (command->kind == ClientCommand::Kind::add) {
+      SenderClient* client = command->client;
+      client->next = end_;
+      clients_.push_back(client);
+    } else {
+      const auto found =
+          std::find_if(clients_.begin(), clients_.end(), [&](const SenderClient* client) {
+            return client->params().connection == command->connection;
+          });
+      if (found != clients_.end()) {
+        remove(static_cast<std::size_t>(found - clients_.begin()), false);
+      }
+    }
+    context_.to_sender.pop();
+    ++work;
+  }
+  return work;
+}
+
+int Sender::take_published() noexcept {
+  int work = 0;
+  while (PublishFrame* published = context_.published.front()) {
+    if (end_ - first_ >= queue_frames_) {
+      evict_oldest();
+    }
+    Entry& added = entry(end_);
+    added.header = published->header;
+    // Frames are repeated only after one was published, and only where the last one is kept.
+    added.image = published->repeat ? last_ : published->image;
+    hold(added.image);
+    if (keep_last_ && !published->repeat) {
+      hold(added.image);
+      if (have_last_) {
+        let_go(last_);
+      }
+      last_ = added.image;
+      have_last_ = true;
+    }
+    ++end_;
+    ++taken_;
+    context_.published.pop();
+    ++work;
+    // Between two publications clients get a chance, so that a burst does not skip frames.
+    if (work < 4) {
+      static_cast<void>(send_all());
+    } else {
+      break;
+    }
+  }
+  if (work > 0) {
+    // The conductor may wait for room.
+    context_.bells.conductor.ring();
+  }
+  return work;
+}
+
+void Sender::evict_oldest() noexcept {
+  for (std::size_t i = clients_.size(); i-- > 0;) {
+    SenderClient& client = *clients_[i];
+    if (client.busy() && !client.spilled() && client.in_transit == first_) {
+      client.spill();
+      context_.counters.add(Counter::frames_spilled);
+    }
+    if (client.next == first_) {
+      if (client.params().every_frame) {
+        context_.counters.add(Counter::clients_disconnected_slow);
+        context_.sender_events.push(EventKind::client_slow, client.params().connection);
+        remove(i, true);
+        continue;
+      }
+      ++client.next;
+      client.gap = true;
+      context_.counters.add(Counter::frames_skipped);
+    }
+  }
+  let_go(entry(first_).image);
+  ++first_;
+}
+
+void Sender::trim() noexcept {
+  while (first_ < end_) {
+    const bool needed =
+        std::any_of(clients_.begin(), clients_.end(), [this](const SenderClient* client) {
+          return client->next <= first_ ||
+                 (client->busy() && !client->spilled() && client->in_transit <= first_);
+        });
+    if (needed) {
+      return;
+    }
+    let_go(entry(first_).image);
+    ++first_;
+  }
+}
+
+void Sender::hold(const Image& image) noexcept { ++holds_[image.slot]; }
+
+void Sender::let_go(const Image& image) noexcept {
+  if (--holds_[image.slot] == 0) {
+    image.source->release(image.slot);
+    context_.bells.render.ring();
+  }
+}
+
+int Sender::take_writable() noexcept {
+  std::array<epoll_event, 16> events{};
+  const bool any_blocked = std::any_of(clients_.begin(), clients_.end(),
+                                       [](const SenderClient* client) { return client->blocked; });
+  if (!any_blocked) {
+    return 0;
+  }
+  const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
+  for (int i = 0; i < count; ++i) {
+    static_cast<SenderClient*>(events[static_cast<std::size_t>(i)].data.ptr)->blocked = false;
+  }
+  return std::max(count, 0);
+}
+
+int Sender::send_all() noexcept {
+  int work = 0;
+  for (std::size_t i = clients_.size(); i-- > 0;) {
+    SenderClient& client = *clients_[i];
+    if (client.closing) {
+      remove(i, true);
+      ++work;
+      continue;
+    }
+    if (!client.blocked && advance(client)) {
+      ++work;
+    }
+  }
+  return work;
+}
+
+bool Sender::advance(SenderClient& client) noexcept {
+  if (!client.busy() && client.next < end_) {
+    client.next = std::max(client.next, first_);
+    const Entry& next = entry(client.next);
+    const std::size_t plane = client.params().channel->plane;
+    client.in_transit = client.next++;
+    client.begin(next.header, next.image.planes[plane], next.image.crc32c[plane],
+                 context_.clock.tai_ns());
+  }
+  switch (client.send(batch_, context_)) {
+    case SenderClient::Progress::idle: return false;
+    case SenderClient::Progress::more: return true;
+    case SenderClient::Progress::finished:
+      client.complete(context_.clock.tai_ns());
+      context_.counters.add(Counter::frames_sent);
+      return true;
+    case SenderClient::Progress::blocked: block(client); return false;
+    case SenderClient::Progress::retry_soon:
+      // A full device queue does not turn the socket unwritable; it drains within this time.
+      wake_at_ns_ = context_.clock.tai_ns() + 100'000;
+      return false;
+    case SenderClient::Progress::failed: client.closing = true; return true;
+  }
+  return false;
+}
+
+void Sender::block(SenderClient& client) noexcept {
+  client.blocked = true;
+  epoll_event event{};
+  event.events = EPOLLOUT | EPOLLONESHOT;
+  event.data.ptr = &client;
+  // Not before the first block: epoll reports errors and hang-ups even of sockets nobody asks about.
+  ::epoll_ctl(epoll_.get(), client.registered ? EPOLL_CTL_MOD : EPOLL_CTL_ADD, client.fd(), &event);
+  client.registered = true;
+}
+
+void Sender::remove(std::size_t index, bool failed) noexcept {
+  SenderClient* client = clients_[index];
+  if (client->registered) {
+    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, client->fd(), nullptr);
+  }
+  clients_.erase(clients_.begin() + static_cast<std::ptrdiff_t>(index));
+  if (failed && client->error() != 0) {
+    context_.sender_events.push(EventKind::client_failed, client->params().connection,
+                                static_cast<std::uint64_t>(client->error()));
+  }
+  // Room is certain: the receiver has at most max_clients clients lent, the ring holds four times
+  // that.
+  static_cast<void>(context_.from_sender.push({client->params().connection, client}));
+  context_.bells.receiver.ring();
+}
+
+}  // namespace emit::server

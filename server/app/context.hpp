@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "agents/channel_table.hpp"
+#include "agents/messages.hpp"
+#include "rt/byte_ring.hpp"
+#include "rt/clock.hpp"
+#include "rt/counters.hpp"
+#include "rt/doorbell.hpp"
+#include "rt/spsc_ring.hpp"
+
+namespace emit::server {
+
+class SenderClient;
+class RecorderPeer;
+
+/// receiver -> sender.
+struct ClientCommand {
+  enum class Kind : std::uint8_t { add, remove };
+  Kind kind = Kind::add;
+  std::uint32_t connection = 0;
+  SenderClient* client = nullptr;  ///< add: lent until it comes back with ClientReleased
+};
+/// sender -> receiver: the client's socket and memory are the receiver's again.
+struct ClientReleased {
+  std::uint32_t connection = 0;
+  SenderClient* client = nullptr;
+};
+/// receiver -> recorder, and back, as above.
+struct RecorderCommand {
+  ClientCommand::Kind kind = ClientCommand::Kind::add;
+  std::uint32_t connection = 0;
+  int fd = -1;
+  std::uint64_t handle = 0;  ///< generation of the connection
+};
+struct RecorderReleased {
+  std::uint32_t connection = 0;
+};
+
+/// One agent's way to say what happened. Thread: that agent's. RT-safe.
+class EventLog {
+ public:
+  EventLog(std::size_t capacity, Counters& counters) : ring_(capacity), counters_(counters) {}
+
+  void push(EventKind kind, std::uint64_t a = 0, std::uint64_t b = 0,
+            std::string_view text = {}) noexcept {
+    Event* event = ring_.claim();
+    if (event == nullptr) {
+      counters_.add(Counter::events_dropped);
+      return;
+    }
+    event->kind = kind;
+    event->a = a;
+    event->b = b;
+    event->text.fill('\0');
+    std::copy_n(text.begin(), std::min(text.size(), event->text.size() - 1), event->text.begin());
+    ring_.commit();
+  }
+  /// Housekeeping's end.
+  [[nodiscard]] SpscRing<Event>& ring() noexcept { return ring_; }
+
+ private:
+  SpscRing<Event> ring_;
+  Counters& counters_;
+};
+
+/// One per agent: rung after something was put on one of its rings.
+struct Doorbells {
+  Doorbell conductor;
+  Doorbell receiver;
+  Doorbell render;
+  Doorbell sender;
+  Doorbell recorder;
+};
+
+/// Everything that more than one agent sees: rings, counters and what is fixed after start.
+struct Context {
+  Context(const Clock& injected_clock, std::size_t journal_bytes, std::size_t max_clients)
+      : clock(injected_clock),
+        journal(journal_bytes),
+        to_sender(4 * max_clients),
+        from_sender(4 * max_clients),
+        to_recorder(4 * max_clients),
+        from_recorder(4 * max_clients) {}
+
+  const Clock& clock;
+  Counters counters;
+  Doorbells bells;
+  std::vector<Channel> channels;       ///< fixed before the agents run
+  std::atomic<std::uint64_t> run_id{0};
+  std::atomic<std::uint64_t> frames_handed_over{0};   ///< put on `published` by the conductor
+  std::atomic<std::uint64_t> journal_handed_over{0};  ///< lines put on `journal`
+
+  SpscRing<HostInput> host_inputs{32};     // receiver -> conductor
+  SpscRing<StatusReply> replies{256};      // conductor -> receiver
+  SpscRing<RenderJob> jobs{16};            // conductor -> render
+  SpscRing<RenderDone> done{16};           // render -> conductor
+  SpscRing<PublishFrame> published{16};    // conductor -> sender
+  ByteRing journal;                        // conductor -> recorder
+  SpscRing<ClientCommand> to_sender;       // receiver -> sender
+  SpscRing<ClientReleased> from_sender;    // sender -> receiver
+  SpscRing<RecorderCommand> to_recorder;   // receiver -> recorder
+  SpscRing<RecorderReleased> from_recorder;// recorder -> receiver
+
+  EventLog conductor_events{256, counters};
+  EventLog receiver_events{256, counters};
+  EventLog render_events{64, counters};
+  EventLog sender_events{256, counters};
+  EventLog recorder_events{64, counters};
+};
+
+/// Counter of a refusal. Precondition: not ok.
+[[nodiscard]] constexpr Counter counter_of(StatusCode code) noexcept {
+  switch (code) {
+    case StatusCode::wrong_version: return Counter::refused_wrong_version;
+    case StatusCode::oversize: return Counter::refused_oversize;
+    case StatusCode::malformed: return Counter::refused_malformed;
+    case StatusCode::unknown_entity: return Counter::refused_unknown_entity;
+    case StatusCode::invalid_pose: return Counter::refused_invalid_pose;
+    case StatusCode::time_backwards: return Counter::refused_time_backwards;
+    case StatusCode::duplicate_frame: return Counter::refused_duplicate_frame;
+    case StatusCode::unknown_channel: return Counter::refused_unknown_channel;
+    case StatusCode::not_allowed: return Counter::refused_not_allowed;
+    case StatusCode::overloaded: return Counter::refused_overloaded;
+    case StatusCode::invalid_environment: return Counter::refused_invalid_environment;
+    case StatusCode::ok:
+    case StatusCode::internal: break;
+  }
+  return Counter::refused_internal;
+}
+
+}  // namespace emit::server

@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/daemon.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <ctime>
+
+#include "agents/conductor.hpp"
+#include "agents/receiver.hpp"
+#include "agents/recorder.hpp"
+#include "agents/render_agent.hpp"
+#include "agents/runner.hpp"
+#include "agents/sender.hpp"
+#include "app/context.hpp"
+#include "app/replay.hpp"
+#include "emit/version.hpp"
+#include "telemetry/log.hpp"
+
+namespace emit::server {
+namespace {
+
+using physics::Error;
+using physics::ErrorCode;
+
+/// A frame in work may be a slow one (a software renderer takes seconds); a client that does not
+/// read is given up soon.
+constexpr std::int64_t kFramesDrainNs = 60'000'000'000;
+constexpr std::int64_t kClientsDrainNs = 2'000'000'000;
+constexpr std::int64_t kJournalDrainNs = 5'000'000'000;
+
+std::uint32_t slot_count(const config::DaemonConfig& config) {
+  return std::clamp<std::uint32_t>(config.stream.queue_frames + 3, 4, kMaxSlots);
+}
+
+std::size_t journal_bytes(const config::JournalConfig& config) {
+  // A line is some hundred bytes; one with every entity of a frame about 20 KiB.
+  constexpr std::size_t kBytesPerEntry = 1024;
+  return std::max<std::size_t>(std::size_t{config.ring_entries} * kBytesPerEntry, 1u << 20);
+}
+
+std::string_view pacing_name(config::PacingMode mode) {
+  return mode == config::PacingMode::ig_clock ? "ig-clock" : "host-step";
+}
+
+class DaemonImpl final : public Daemon {
+ public:
+  DaemonImpl(const config::DaemonConfig& config, std::optional<scene::ScenarioDesc> scenario,
+             DaemonOptions options)
+      : config_(config),
+        scenario_(std::move(scenario)),
+        options_(std::move(options)),
+        clock_(options_.clock != nullptr ? *options_.clock : system_clock_),
+        tracks_(scenario_),
+        context_(clock_, journal_bytes(config_.journal),
+                 std::max<std::size_t>(config_.control.max_clients, 1)),
+        stop_event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+
+  ~DaemonImpl() override {
+    if (options_.stepped && conductor_runner_) {
+      drain_stepped();
+    }
+    stop_agents();
+    housekeep();
+  }
+
+  [[nodiscard]] physics::Result<void> setup();
+
+  int run() override;
+  void request_stop() noexcept override {
+    stop_.store(true, std::memory_order_release);
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = ::write(stop_event_.get(), &one, sizeof(one));
+  }
+  int step() override;
+
+  std::uint16_t control_port() const noexcept override {
+    return receiver_->control_address().port();
+  }
+  std::uint16_t host_udp_port() const noexcept override {
+    const SocketAddress address = receiver_->host_address();
+    return address.length != 0 ? address.port() : std::uint16_t{0};
+  }
+  std::uint64_t counter(Counter id) const noexcept override { return context_.counters.get(id); }
+  std::string ready_line() const override {
+    const SocketAddress host = receiver_->host_address();
+    return fmt::format("ready control={} host_udp={}", to_string(receiver_->control_address()),
+                       host.length != 0 ? to_string(host) : std::string("off"));
+  }
+
+ private:
+  [[nodiscard]] FrameSourceFactory source_factory() const;
+  [[nodiscard]] physics::Result<void> make_agents(const SourceInfo& source);
+  template <class Predicate>
+  bool wait_until(Predicate done, std::int64_t limit_ns);
+  void drain_stepped();
+  void stop_agents();
+  void housekeep();
+  void log_summary();
+
+  config::DaemonConfig config_;
+  std::optional<scene::ScenarioDesc> scenario_;
+  DaemonOptions options_;
+  SystemClock system_clock_;
+  const Clock& clock_;
+  ScenarioTracks tracks_;
+  Context context_;
+  std::unique_ptr<Log> log_;
+  DistinctTable distinct_;
+  Fd stop_event_;
+  std::atomic<bool> stop_{false};
+
+  std::unique_ptr<Receiver> receiver_;
+  std::unique_ptr<RenderAgent> render_;
+  std::unique_ptr<Recorder> recorder_;
+  std::unique_ptr<Sender> sender_;
+  std::unique_ptr<Conductor> conductor_;
+  std::unique_ptr<AgentRunner> receiver_runner_;
+  std::unique_ptr<AgentRunner> render_runner_;
+  std::unique_ptr<AgentRunner> recorder_runner_;
+  std::unique_ptr<AgentRunner> sender_runner_;
+  std::unique_ptr<AgentRunner> conductor_runner_;
+};
+
+FrameSourceFactory DaemonImpl::source_factory() const {
+  if (options_.source_factory) {
+    return options_.source_factory;
+  }
+  if (config_.source.kind == config::SourceKind::canned) {
+    return [this] {
+      return make_canned_source(config_.source, slot_count(config_),
+                                scenario_ ? scenario_->bands.size() : 1);
+    };
+  }
+  return [this] {
+    renderer::DeviceOptions device;
+    device.gpu_index = config_.device.gpu_index;
+    renderer::OutputOptions output;
+    output.slots = slot_count(config_);
+    return make_renderer_source(*scenario_, device, output);
+  };
+}
+
+physics::Result<void> DaemonImpl::setup() {
+  if (options_.on_log) {
+    log_ = make_log(options_.on_log);
+  } else {
+    auto log = make_log(config_.log);
+    if (!log) {
+      return tl::unexpected<Error>(std::move(log.error()));
+    }
+    log_ = std::move(*log);
+  }
+  if (!scenario_ && !options_.source_factory &&
+      config_.source.kind == config::SourceKind::renderer) {
+    return physics::make_error(ErrorCode::config,
+                               config_.file.string() + ": a renderer needs a scenario");
+  }
+  // Ports first: an address in use shows at once, not after a scene has been loaded.
+  receiver_ = std::make_unique<Receiver>(context_, config_);
+  if (auto opened = receiver_->open(); !opened) {
+    return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
+  }
+  render_ = std::make_unique<RenderAgent>(context_, source_factory());
+  render_runner_ = std::make_unique<AgentRunner>(*render_, clock_);
+  const bool started =
+      options_.stepped ? render_runner_->start_stepped() : render_runner_->start_thread();
+  if (!started) {
+    return render_->source_info()
+               ? physics::make_error(ErrorCode::internal, "the render thread did not start")
+               : tl::unexpected<Error>(Error(render_->source_info().error()));
+  }
+  return make_agents(*render_->source_info());
+}
+
+physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
+  auto channels = make_channels(scenario_, source);
+  if (!channels) {
+    return tl::unexpected<Error>(std::move(channels.error()));
+  }
+  context_.channels = std::move(*channels);
+
+  const std::string software = fmt::format("emitd {} ({})", kVersion, kCommit);
+  const std::string scenario_name = scenario_ ? scenario_->name : std::string();
+  const bool ig_clock = config_.pacing.mode == config::PacingMode::ig_clock;
+  Recorder::Identity identity;
+  identity.scenario_name = scenario_name;
+  identity.software = software;
+  identity.device = source.device;
+  identity.pacing = pacing_name(config_.pacing.mode);
+  if (scenario_) {
+    auto hash = scenario_sha256(*scenario_);
+    if (!hash) {
+      return tl::unexpected<Error>(std::move(hash.error()));
+    }
+    identity.scenario_sha256 = std::move(*hash);
+  }
+  recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
+  recorder_->set_identity(std::move(identity));
+  if (auto opened = recorder_->open(); !opened) {
+    return tl::unexpected<Error>(std::move(opened.error()).with_context("journal.file"));
+  }
+  receiver_->set_identity(
+      {software, scenario_name, std::string(pacing_name(config_.pacing.mode)), source.device});
+  // Three slots beside the window: one being rendered, one on its way here, one free.
+  const std::uint32_t window =
+      std::min(std::max(config_.stream.queue_frames, 1U), std::max(source.slots, 4U) - 3);
+  sender_ = std::make_unique<Sender>(context_, window, config_.control.max_clients, ig_clock);
+  Conductor::Options options;
+  options.pacing = config_.pacing;
+  options.first_plane = context_.channels.front().plane;
+  options.canned = source.canned;
+  options.tai_unset = clock_.tai_offset_unset();
+  conductor_ = std::make_unique<Conductor>(context_, tracks_, options);
+
+  log_->write(LogLevel::info,
+              fmt::format("software=\"{}\" commit={} device=\"{}\" scenario=\"{}\" pacing={} "
+                          "channels={} width_px={} height_px={}",
+                          software, kCommit, source.device,
+                          scenario_ ? scenario_->file.string() : "", pacing_name(config_.pacing.mode),
+                          context_.channels.size(), source.width_px, source.height_px));
+  if (clock_.tai_offset_unset()) {
+    log_->write(LogLevel::warn,
+                "event=tai_offset_unset effect=\"wall instants are UTC\" "
+                "remedy=\"let ntpd, chronyd or phc2sys set the kernel's TAI offset\"");
+  }
+  recorder_runner_ = std::make_unique<AgentRunner>(*recorder_, clock_);
+  sender_runner_ = std::make_unique<AgentRunner>(*sender_, clock_);
+  conductor_runner_ = std::make_unique<AgentRunner>(*conductor_, clock_);
+  receiver_runner_ = std::make_unique<AgentRunner>(*receiver_, clock_);
+  if (options_.stepped) {
+    for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(),
+                                conductor_runner_.get(), receiver_runner_.get()}) {
+      if (!runner->start_stepped()) {
+        return physics::make_error(ErrorCode::io,
+                                   fmt::format("the {} did not start", runner->agent().name()));
+      }
+    }
+  }
+  return {};
+}
+
+int DaemonImpl::run() {
+  for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(),
+                              conductor_runner_.get(), receiver_runner_.get()}) {
+    if (!runner->start_thread()) {
+      log_->write(LogLevel::error,
+                  fmt::format("event=agent_failed agent={}", runner->agent().name()));
+      stop_agents();
+      return 1;
+    }
+  }
+  log_->write(LogLevel::info, ready_line());
+  while (!stop_.load(std::memory_order_acquire)) {
+    pollfd wait{stop_event_.get(), POLLIN, 0};
+    constexpr int kHousekeepingMs = 100;
+    ::poll(&wait, 1, kHousekeepingMs);
+    housekeep();
+  }
+  log_->write(LogLevel::info, "event=stopping");
+  receiver_->drain();
+  context_.bells.receiver.ring();
+  conductor_->drain();
+  context_.bells.conductor.ring();
+  const bool frames = wait_until([this] { return conductor_->drained(); }, kFramesDrainNs);
+  const bool clients = wait_until([this] { return sender_->idle(); }, kClientsDrainNs);
+  const bool journal = wait_until([this] { return recorder_->idle(); }, kJournalDrainNs);
+  stop_agents();
+  housekeep();
+  log_summary();
+  log_->write(LogLevel::info, fmt::format("event=stopped frames={} clients={} journal={}",
+                                          frames ? "drained" : "given_up",
+                                          clients ? "drained" : "given_up",
+                                          journal ? "drained" : "given_up"));
+  log_->flush();
+  return 0;
+}
+
+template <class Predicate>
+bool DaemonImpl::wait_until(Predicate done, std::int64_t limit_ns) {
+  const std::int64_t end_ns = clock_.monotonic_ns() + limit_ns;
+  while (!done()) {
+    if (clock_.monotonic_ns() > end_ns) {
+      return false;
+    }
+    const timespec pause{0, 2'000'000};
+    ::nanosleep(&pause, nullptr);
+    housekeep();
+  }
+  return true;
+}
+
+int DaemonImpl::step() {
+  int work = 0;
+  for (AgentRunner* runner :
+       {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
+        conductor_runner_.get(), sender_runner_.get(), recorder_runner_.get()}) {
+    work += runner->step();
+  }
+  housekeep();
+  return work;
+}
+
+void DaemonImpl::drain_stepped() {
+  receiver_->drain();
+  conductor_->drain();
+  constexpr int kMaxSteps = 10'000;
+  for (int i = 0; i < kMaxSteps && (step() > 0 || !conductor_->drained()); ++i) {
+  }
+}
+
+void DaemonImpl::stop_agents() {
+  // Against the flow of lent things: slots go back to the source before it ends, descriptors to the
+  // receiver before it closes them.
+  for (AgentRunner* runner : {conductor_runner_.get(), sender_runner_.get(),
+                              recorder_runner_.get(), receiver_runner_.get(),
+                              render_runner_.get()}) {
+    if (runner != nullptr) {
+      runner->stop();
+    }
+  }
+}
+
+void DaemonImpl::housekeep() {
+  for (EventLog* events : {&context_.conductor_events, &context_.receiver_events,
+                           &context_.render_events, &context_.sender_events,
+                           &context_.recorder_events}) {
+    while (const Event* event = events->ring().front()) {
+      const EventText line = describe(*event);
+      events->ring().pop();
+      if (log_ && (!line.distinct || distinct_.note(line.text, clock_.tai_ns()))) {
+        const auto count = line.distinct ? distinct_.entries().find(line.text)
+                                         : distinct_.entries().end();
+        log_->write(line.level, count != distinct_.entries().end() && count->second.count > 1
+                                    ? fmt::format("{} repeats={}", line.text, count->second.count)
+                                    : line.text);
+      }
+    }
+  }
+}
+
+void DaemonImpl::log_summary() {
+  std::string counters = "event=counters";
+  for (std::size_t i = 0; i < kCounterCount; ++i) {
+    const std::uint64_t value = context_.counters.get(static_cast<Counter>(i));
+    if (value != 0) {
+      counters += fmt::format(" {}={}", kCounterLabels[i].name, value);
+    }
+  }
+  log_->write(LogLevel::info, counters);
+  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(),
+                              render_runner_.get(), sender_runner_.get(),
+                              recorder_runner_.get()}) {
+    const DutyCycle& duty = runner->duty_cycle();
+    log_->write(LogLevel::info,
+                fmt::format("event=duty_cycle agent={} turns={} busy_ms={:.1f} max_turn_us={} "
+                            "turns_over_1ms={}",
+                            runner->agent().name(), duty.cycles(),
+                            static_cast<double>(duty.busy_ns()) * 1e-6, duty.max_ns() / 1000,
+                            duty.over_threshold()));
+  }
+}
+
+}  // namespace
+
+physics::Result<std::unique_ptr<Daemon>> Daemon::create(const config::DaemonConfig& config,
+                                                        std::optional<scene::ScenarioDesc> scenario,
+                                                        DaemonOptions options) {
+  auto daemon = std::make_unique<DaemonImpl>(config, std::move(scenario), std::move(options));
+  if (auto ready = daemon->setup(); !ready) {
+    return tl::unexpected<Error>(std::move(ready.error()));
+  }
+  return daemon;
+}
+
+}  // namespace emit::server

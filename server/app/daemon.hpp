@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "agents/frame_source.hpp"
+#include "emit/config/daemon_config.hpp"
+#include "emit/physics/error.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "rt/clock.hpp"
+#include "rt/counters.hpp"
+
+namespace emit::server {
+
+/// What a caller may replace: tests give a fake clock and a null source.
+struct DaemonOptions {
+  Clock* clock = nullptr;              ///< null: SystemClock; must outlive the daemon
+  FrameSourceFactory source_factory;   ///< empty: what the configuration names
+  bool stepped = false;                ///< no threads: the caller turns the crank with step()
+  std::function<void(const std::string&)> on_log;  ///< null: spdlog as configured; set: log lines go here
+};
+
+/// The whole daemon: agents, sockets, journal and frame source behind one object.
+///
+///   auto daemon = Daemon::create(config, scenario, {});
+///   std::jthread thread([&] { exit_code = (*daemon)->run(); });
+///   connect(fmt::format("tcp://127.0.0.1:{}", (*daemon)->control_port()));
+///   (*daemon)->request_stop();   // also async-signal-safe
+///
+/// Several daemons may live in one process (ports 0). Nothing here installs signal handlers.
+class Daemon {
+ public:
+  /// Opens sockets and files and loads the source; nothing runs yet, but the kernel queues what
+  /// arrives. Port 0 in the configuration takes a free port. `scenario` may be absent only for a
+  /// canned source or with a source factory.
+  /// Errors: config, io (address in use, journal file), gpu, parse, not_found.
+  [[nodiscard]] static physics::Result<std::unique_ptr<Daemon>> create(
+      const config::DaemonConfig& config, std::optional<scene::ScenarioDesc> scenario,
+      DaemonOptions options);
+  virtual ~Daemon() = default;
+
+  /// Runs until request_stop(), then drains: frames in flight are sent, the journal is flushed and
+  /// closed. Returns what a process exits with: 0, or 1 when an agent failed. Once per daemon.
+  [[nodiscard]] virtual int run() = 0;
+  /// Any thread, and signal handlers.
+  virtual void request_stop() noexcept = 0;
+
+  /// Stepped mode: every agent once, in a fixed order. Returns the work done (0 = idle).
+  virtual int step() = 0;
+
+  [[nodiscard]] virtual std::uint16_t control_port() const noexcept = 0;
+  [[nodiscard]] virtual std::uint16_t host_udp_port() const noexcept = 0;  ///< 0 = off
+  [[nodiscard]] virtual std::uint64_t counter(Counter id) const noexcept = 0;
+  /// "ready control=HOST:PORT host_udp=HOST:PORT"
+  [[nodiscard]] virtual std::string ready_line() const = 0;
+};
+
+/// main() of emitd and of `emit serve`. Exit codes: 0 after SIGTERM or SIGINT, 2 usage, 78 bad
+/// configuration (file:line:column on standard error), 1 otherwise.
+/// @param program  name shown in messages, "emitd" or "emit serve"; argv[0] is skipped.
+[[nodiscard]] int emitd_main(int argc, char** argv, const char* program = "emitd");
+
+}  // namespace emit::server

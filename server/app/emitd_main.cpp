@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "app/daemon.hpp"
+#include "emit/config/load.hpp"
+#include "emit/version.hpp"
+
+namespace emit::server {
+namespace {
+
+constexpr int kExitFailure = 1;
+constexpr int kExitUsage = 2;
+constexpr int kExitConfig = 78;  // EX_CONFIG of sysexits.h
+
+std::atomic<Daemon*> g_daemon{nullptr};
+static_assert(std::atomic<Daemon*>::is_always_lock_free);
+
+extern "C" void emit_on_stop_signal(int /*signal*/) {
+  if (Daemon* daemon = g_daemon.load()) {
+    daemon->request_stop();
+  }
+}
+
+struct Arguments {
+  std::string config_file;
+  std::vector<std::string> overrides;
+  bool check = false;
+};
+
+void print_usage(std::FILE* out, const char* program) {
+  fmt::print(out,
+             "usage: {} --config FILE [--set key=value]... [--check]\n"
+             "       {} --version | --help\n"
+             "\n"
+             "  --config FILE    daemon configuration (TOML); config/README.md lists the keys\n"
+             "  --set key=value  overrides a key of the configuration or of the scenario\n"
+             "  --check          load configuration and scenario, say what is wrong, and exit\n"
+             "\n"
+             "exit: 0 after SIGTERM or SIGINT, 2 usage, 78 bad configuration, 1 otherwise\n",
+             program, program);
+}
+
+/// Returns an exit code, or -1 to go on.
+int parse_arguments(int argc, char** argv, const char* program, Arguments& out) {
+  const auto usage = [&](const std::string& why) {
+    fmt::print(stderr, "{}: {}\n", program, why);
+    print_usage(stderr, program);
+    return kExitUsage;
+  };
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view argument = argv[i];
+    const auto value_of = [&](std::string_view name, std::string& value) {
+      if (argument == name && i + 1 < argc) {
+        value = argv[++i];
+        return true;
+      }
+      if (argument.size() > name.size() + 1 && argument.starts_with(name) &&
+          argument[name.size()] == '=') {
+        value = argument.substr(name.size() + 1);
+        return true;
+      }
+      return false;
+    };
+    std::string value;
+    if (argument == "--help" || argument == "-h") {
+      print_usage(stdout, program);
+      return 0;
+    }
+    if (argument == "--version") {
+      fmt::print("emitd {} ({})\n", kVersion, kCommit);
+      return 0;
+    }
+    if (argument == "--check") {
+      out.check = true;
+    } else if (value_of("--config", value)) {
+      out.config_file = value;
+    } else if (value_of("--set", value)) {
+      if (value.find('=') == std::string::npos) {
+        return usage(fmt::format("--set {}: not key=value", value));
+      }
+      out.overrides.push_back(value);
+    } else {
+      return usage(fmt::format("unknown or incomplete argument '{}'", argument));
+    }
+  }
+  if (out.config_file.empty()) {
+    return usage("--config FILE is missing");
+  }
+  return -1;
+}
+
+int exit_code_of(const physics::Error& error) {
+  switch (error.code) {
+    case physics::ErrorCode::config:
+    case physics::ErrorCode::parse:
+    case physics::ErrorCode::not_found:
+    case physics::ErrorCode::unsupported: return kExitConfig;
+    default: return kExitFailure;
+  }
+}
+
+int fail(const char* program, const physics::Error& error) {
+  // Positions come first on the line, so that editors can jump to them.
+  fmt::print(stderr, "{}\n{}: {}\n", error.text, program, physics::to_string(error.code));
+  return exit_code_of(error);
+}
+
+int serve(const Arguments& arguments, const char* program) {
+  const config::SplitOverrides overrides = config::split_overrides(arguments.overrides);
+  const auto daemon_config = config::load_daemon(arguments.config_file, overrides.daemon);
+  if (!daemon_config) {
+    fail(program, daemon_config.error());
+    return kExitConfig;
+  }
+  std::optional<scene::ScenarioDesc> scenario;
+  if (!daemon_config->scenario.empty()) {
+    auto loaded = config::load_scenario(daemon_config->scenario, overrides.scenario);
+    if (!loaded) {
+      fail(program, loaded.error());
+      return kExitConfig;
+    }
+    scenario = std::move(*loaded);
+  } else if (!overrides.scenario.empty()) {
+    fmt::print(stderr, "{}: --set {}: there is no scenario to override\n", program,
+               overrides.scenario.front());
+    return kExitConfig;
+  }
+  if (arguments.check) {
+    fmt::print("{}: ok\n", arguments.config_file);
+    return 0;
+  }
+  auto daemon = Daemon::create(*daemon_config, std::move(scenario), {});
+  if (!daemon) {
+    return fail(program, daemon.error());
+  }
+
+  g_daemon.store(daemon->get());
+  struct sigaction action {};
+  action.sa_handler = emit_on_stop_signal;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+
+  fmt::print("{}\n", (*daemon)->ready_line());
+  std::fflush(stdout);
+  const int code = (*daemon)->run();
+  g_daemon.store(nullptr);
+  return code;
+}
+
+}  // namespace
+
+int emitd_main(int argc, char** argv, const char* program) {
+  Arguments arguments;
+  const int code = parse_arguments(argc, argv, program, arguments);
+  if (code >= 0) {
+    return code;
+  }
+  try {
+    return serve(arguments, program);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}: {}\n", program, error.what());
+    return kExitFailure;
+  }
+}
+
+}  // namespace emit::server

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/replay.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <vector>
+
+#include "app/sha256.hpp"
+#include "emit/config/load.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/protocol/frame_header.hpp"
+#include "emit/v1/control.pb.h"
+
+namespace emit::server {
+
+using physics::ErrorCode;
+using physics::make_error;
+
+namespace {
+
+/// The numbers as they were used. Inputs from a host are normalised on the way in; doing that again
+/// here could turn the last bit.
+physics::Pose exact_pose(const v1::Pose& pose) {
+  physics::Pose out;
+  out.position_world_m = {pose.position_m().x(), pose.position_m().y(), pose.position_m().z()};
+  out.world_from_body = glm::dquat{pose.world_from_body().w(), pose.world_from_body().x(),
+                                   pose.world_from_body().y(), pose.world_from_body().z()};
+  return out;
+}
+
+}  // namespace
+
+struct JournalPlayer::PendingWeather {
+  std::uint64_t host_frame_number = 0;
+  scene::WeatherSample sample;
+};
+
+JournalPlayer::JournalPlayer(FrameSource& source, std::size_t first_channel_plane)
+    : source_(source), plane_(first_channel_plane) {}
+
+JournalPlayer::~JournalPlayer() { release_shown(); }
+
+void JournalPlayer::release_shown() noexcept {
+  if (shown_) {
+    source_.release(*shown_);
+    shown_.reset();
+    view_ = nullptr;
+  }
+}
+
+physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::JournalEntry& entry) {
+  const auto fail = [&](const std::string& text) {
+    return make_error(ErrorCode::protocol,
+                      fmt::format("journal entry {}: {}", entry.sequence(), text));
+  };
+  if (last_sequence_ != 0 && entry.sequence() != last_sequence_ + 1) {
+    return fail(fmt::format("follows {}: entries in between were lost", last_sequence_));
+  }
+  last_sequence_ = entry.sequence();
+
+  if (entry.has_run_start()) {
+    release_shown();
+    source_.reset();
+    weather_.clear();
+    render_number_ = 0;
+    run_id_ = entry.run_start().run_id();
+    scenario_sha256_ = entry.run_start().scenario_sha256();
+    device_ = entry.run_start().device();
+    started_ = true;
+    return std::optional<ReplayedFrame>();
+  }
+  if (entry.has_command()) {
+    // What a command did shows in the frames and run starts behind it.
+    return std::optional<ReplayedFrame>();
+  }
+  if (entry.has_host_frame()) {
+    const v1::HostFrame& frame = entry.host_frame();
+    if (frame.has_environment()) {
+      protocol::EnvironmentData data;
+      if (protocol::from_proto(frame.environment(), data) != protocol::DecodeStatus::ok) {
+        return fail("environment out of range");
+      }
+      weather_.push_back({frame.frame_number(),
+                          {frame.sim_time_ns(), data.direct_normal_w_m2,
+                           data.diffuse_horizontal_w_m2, data.longwave_down_w_m2, data.air_k,
+                           data.wind_m_s, data.cloud_frac, data.environment_k, data.film_w_m2_k}});
+    }
+    return std::optional<ReplayedFrame>();
+  }
+  if (!entry.has_frame()) {
+    return fail("has no body");
+  }
+  if (!started_) {
+    return fail("a frame before any run start: the journal begins in the middle of a run");
+  }
+  return play(entry.frame(), entry.sequence());
+}
+
+physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::FrameDecision& decision,
+                                                                  std::uint64_t sequence) {
+  const auto fail = [&](ErrorCode code, const std::string& text) {
+    return make_error(code, fmt::format("journal entry {}: {}", sequence, text));
+  };
+  if (decision.rendered()) {
+    release_shown();
+    // Weather acts from the frame that first used its host frame, as in the live run, where host
+    // frames may have been accepted ahead of frames still in work.
+    const auto later = std::find_if(weather_.begin(), weather_.end(), [&](const auto& pending) {
+      return pending.host_frame_number > decision.host_frame_number();
+    });
+    std::for_each(weather_.begin(), later,
+                  [&](const auto& pending) { source_.apply_weather(pending.sample); });
+    weather_.erase(weather_.begin(), later);
+
+    std::vector<renderer::EntityUpdate> updates;
+    for (const v1::EntityState& state : decision.entities()) {
+      updates.push_back(
+          {state.entity_id(), exact_pose(state.pose()), !state.off(), state.teleport()});
+      if (!physics::is_valid(updates.back().pose)) {
+        return fail(ErrorCode::protocol, fmt::format("entity {}: bad pose", state.entity_id()));
+      }
+    }
+    source_.apply_entities(decision.sim_time_ns(), updates);
+
+    renderer::FrameRequest request;
+    request.frame_number = ++render_number_;
+    request.sim_time_ns = decision.sim_time_ns();
+    request.thermal_time_ns = decision.thermal_time_ns();
+    request.sensor_pose = exact_pose(decision.sensor_pose());
+    if (!physics::is_valid(request.sensor_pose)) {
+      return fail(ErrorCode::protocol, "bad sensor pose");
+    }
+    const int slot = source_.submit(request);
+    if (slot < 0) {
+      return fail(ErrorCode::internal, "the source has no free slot");
+    }
+    shown_ = static_cast<renderer::SlotIndex>(slot);
+    view_ = &source_.collect(*shown_);
+    if (plane_ >= view_->radiance_w_m2_sr.size()) {
+      return fail(ErrorCode::internal, fmt::format("the source has no plane {}", plane_));
+    }
+    view_crc_ = protocol::crc32c(std::as_bytes(view_->radiance_w_m2_sr[plane_]));
+  } else if (view_ == nullptr) {
+    return fail(ErrorCode::protocol, "repeats a frame, but none was rendered before");
+  }
+
+  ReplayedFrame frame;
+  frame.run_id = run_id_;
+  frame.frame_number = decision.frame_number();
+  frame.host_frame_number = decision.host_frame_number();
+  frame.sim_time_ns = decision.sim_time_ns();
+  frame.pose_sim_time_ns = decision.pose_sim_time_ns();
+  frame.flags = decision.flags();
+  frame.repeated = !decision.rendered();
+  frame.view = view_;
+  frame.crc32c = view_crc_;
+  frame.journal_crc32c = decision.radiance_crc32c();
+  frame.matches = frame.crc32c == frame.journal_crc32c;
+  ++frames_;
+  mismatches_ += frame.matches ? 0 : 1;
+  return std::optional<ReplayedFrame>(frame);
+}
+
+std::size_t first_channel_plane(const scene::ScenarioDesc& scenario) noexcept {
+  if (scenario.channels.empty()) {
+    return 0;
+  }
+  const auto band = std::find_if(
+      scenario.bands.begin(), scenario.bands.end(),
+      [&](const auto& each) { return each.name == scenario.channels.front().band; });
+  return band != scenario.bands.end() ? static_cast<std::size_t>(band - scenario.bands.begin()) : 0;
+}
+
+physics::Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
+  Sha256 hash;
+  // Folders differ from machine to machine, contents must not.
+  scene::ScenarioDesc plain = scenario;
+  plain.file.clear();
+  for (auto& object : plain.objects) {
+    object.gltf = object.gltf.filename();
+  }
+  const std::string text = config::print_scenario(plain);
+  hash.update(std::as_bytes(std::span(text)));
+  std::vector<char> buffer(1u << 20);
+  for (const auto& object : scenario.objects) {
+    std::ifstream file(object.gltf, std::ios::binary);
+    if (!file) {
+      return make_error(ErrorCode::io, object.gltf.string() + ": cannot be read");
+    }
+    while (file) {
+      file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+      hash.update(std::as_bytes(std::span(buffer.data(), static_cast<std::size_t>(file.gcount()))));
+    }
+    if (file.bad()) {
+      return make_error(ErrorCode::io, object.gltf.string() + ": reading failed");
+    }
+  }
+  return hash.finish();
+}
+
+}  // namespace emit::server

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "agents/frame_source.hpp"
+#include "emit/physics/error.hpp"
+
+namespace emit::v1 {
+class FrameDecision;
+class JournalEntry;
+}
+
+namespace emit::server {
+
+/// One frame of a replay.
+struct ReplayedFrame {
+  std::uint64_t run_id = 0;
+  std::uint64_t frame_number = 0;       ///< as in the live stream
+  std::uint64_t host_frame_number = 0;
+  std::int64_t sim_time_ns = 0;
+  std::int64_t pose_sim_time_ns = 0;
+  std::uint32_t flags = 0;              ///< protocol::FrameFlags of the live frame
+  bool repeated = false;                ///< the previous image again: nothing was rendered
+  /// Valid until the next apply(). Of a repeated frame: the image shown before it.
+  const renderer::FrameView* view = nullptr;
+  std::uint32_t crc32c = 0;             ///< of the first channel, computed here
+  std::uint32_t journal_crc32c = 0;     ///< what the live run sent
+  bool matches = false;                 ///< crc32c == journal_crc32c
+};
+
+/// Re-renders a journal: hands the inputs to a FrameSource as the live run did, in the same order.
+///
+///   auto player = JournalPlayer(*source, first_channel_plane);
+///   while (read(entry)) {
+///     auto frame = player.apply(entry);   // Result<optional<ReplayedFrame>>
+///     if (frame && *frame) use(**frame);
+///   }
+///
+/// Thread: the one that owns the source. Real time: no.
+class JournalPlayer {
+ public:
+  /// `first_channel_plane`: index into FrameView::radiance_w_m2_sr of the band of the scenario's
+  /// first channel, whose CRC the journal holds (see first_channel_plane()).
+  JournalPlayer(FrameSource& source, std::size_t first_channel_plane);
+  ~JournalPlayer();
+  JournalPlayer(const JournalPlayer&) = delete;
+  JournalPlayer& operator=(const JournalPlayer&) = delete;
+
+  /// Empty optional: the entry changed state but is no frame.
+  /// Errors (protocol): the sequence has a gap (the live journal lost entries), a frame before any
+  /// run start, a repeated frame before any image, an entry without a body; (internal): no free slot.
+  [[nodiscard]] physics::Result<std::optional<ReplayedFrame>> apply(const v1::JournalEntry& entry);
+
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+  [[nodiscard]] std::uint64_t mismatches() const noexcept { return mismatches_; }
+  /// Of the newest RunStart, for checks against the scenario at hand; empty before one.
+  [[nodiscard]] const std::string& scenario_sha256() const noexcept { return scenario_sha256_; }
+  [[nodiscard]] const std::string& device() const noexcept { return device_; }
+
+ private:
+  struct PendingWeather;
+  void release_shown() noexcept;
+  [[nodiscard]] physics::Result<std::optional<ReplayedFrame>> play(
+      const v1::FrameDecision& decision, std::uint64_t sequence);
+
+  FrameSource& source_;
+  std::size_t plane_;
+  std::uint64_t run_id_ = 0;
+  std::uint64_t last_sequence_ = 0;
+  bool started_ = false;
+  std::optional<renderer::SlotIndex> shown_;  ///< slot of the last image, kept for repeats
+  const renderer::FrameView* view_ = nullptr;
+  std::uint32_t view_crc_ = 0;
+  std::vector<PendingWeather> weather_;  ///< accepted, not yet used by a frame
+  std::uint64_t render_number_ = 0;
+  std::uint64_t frames_ = 0;
+  std::uint64_t mismatches_ = 0;
+  std::string scenario_sha256_;
+  std::string device_;
+};
+
+/// Plane of the scenario's first channel: index of its band. 0 for a scenario without channels.
+[[nodiscard]] std::size_t first_channel_plane(const scene::ScenarioDesc& scenario) noexcept;
+
+/// Identity of a resolved scenario as written into RunStart, hex SHA-256: over the scenario file
+/// and every file that it names (glTF, buffers beside it are not followed), in order.
+/// Errors (io): a file that cannot be read, by name.
+[[nodiscard]] physics::Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario);
+
+}  // namespace emit::server

@@ -1,0 +1,374 @@
+// SPDX-License-Identifier: Apache-2.0
+// The command line of `emit`: every option of every subcommand. The only file that includes CLI11.
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "emit/version.hpp"
+
+namespace emit::cli {
+namespace {
+
+using std::filesystem::path;
+
+CLI::Option* add_path(CLI::App& app, const std::string& name, path& target,
+                      const std::string& text) {
+  return app
+      .add_option_function<std::string>(
+          name, [&target](const std::string& value) { target = value; }, text)
+      ->type_name("FILE");
+}
+
+CLI::Option* add_path(CLI::App& app, const std::string& name, std::optional<path>& target,
+                      const std::string& text) {
+  return app
+      .add_option_function<std::string>(
+          name, [&target](const std::string& value) { target = path(value); }, text)
+      ->type_name("FILE");
+}
+
+void add_json(CLI::App& app, std::optional<path>& target) {
+  add_path(app, "--json", target, "Write the results as JSON (- for standard output)");
+}
+
+void add_set(CLI::App& app, std::vector<std::string>& target) {
+  app.add_option("--set", target, "Override a key of the file, e.g. --set thermal.steps=90")
+      ->allow_extra_args(false)
+      ->type_name("KEY=VALUE");
+}
+
+void add_scenario(CLI::App& app, ScenarioChoice& target, const std::string& name) {
+  app.add_option(name, target.scenario, "Shipped scenario (airfield, box, ...) or a .toml file")
+      ->required()
+      ->type_name("SCENARIO");
+  add_set(app, target.set);
+}
+
+void add_gpu(CLI::App& app, int& target) {
+  app.add_option("--gpu", target, "EGL device index; default: first hardware device, else Mesa")
+      ->type_name("N");
+}
+
+CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& target,
+                       const std::string& text) {
+  return app.add_option(name, target, text)->type_name("N");
+}
+
+CLI::Option* add_seconds(CLI::App& app, const std::string& name, double& target,
+                         const std::string& text) {
+  return app.add_option(name, target, text)->type_name("S");
+}
+
+/// A subcommand's options must outlive parsing: they live in the closure that runs it.
+class Tool {
+ public:
+  Tool()
+      : app_("emit: command-line tool of emitd, the real-time infrared image generator.", "emit") {
+    app_.set_version_flag("--version", std::string("emit ") + kVersion + " (" + kCommit + ")");
+    app_.require_subcommand(1);
+    app_.footer(
+        "Exit codes: 0 success, 2 bad usage, 78 bad configuration, 1 any other failure.\n"
+        "Example: emit demo --out frames");
+    add_scene_commands();
+    add_stream_commands();
+    add_log_commands();
+    add_model_commands();
+    add_bench_commands();
+  }
+
+  int run(int argc, char** argv) {
+    try {
+      app_.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      return app_.exit(error) == 0 ? kExitOk : kExitUsage;
+    }
+    for (const auto& [command, action] : actions_) {
+      if (command->parsed()) return action();
+    }
+    return kExitUsage;
+  }
+
+ private:
+  template <class Options>
+  struct Entry {
+    CLI::App& app;
+    Options& options;
+  };
+
+  template <class Options>
+  Entry<Options> add(CLI::App& parent, const std::string& name, const std::string& text,
+                     const std::string& example, int (*action)(const Options&)) {
+    CLI::App* command = parent.add_subcommand(name, text);
+    command->footer("Example: " + example);
+    auto options = std::make_shared<Options>();
+    actions_.emplace_back(command, [options, action] { return action(*options); });
+    return {*command, *options};
+  }
+
+  void add_scene_commands();
+  void add_stream_commands();
+  void add_log_commands();
+  void add_model_commands();
+  void add_bench_commands();
+
+  CLI::App app_;
+  std::vector<std::pair<CLI::App*, std::function<int()>>> actions_;
+};
+
+void Tool::add_scene_commands() {
+  {
+    auto [app, o] = add<RenderCommand>(
+        app_, "render", "Render one frame of a scenario offline",
+        "emit render block-on-road --time-s 41400 --out road.exr --png road.png", run_render);
+    add_scenario(app, o.input, "scenario");
+    add_seconds(app, "--time-s", o.time_s, "Simulated time since the scenario's epoch, s")
+        ->required();
+    add_path(app, "--out", o.out, "OpenEXR file to write")->required();
+    add_path(app, "--png", o.png, "False-colour temperature as PNG");
+    app.add_option("--channel", o.channels,
+                   "Channel beside radiance: temperature, depth, object; repeatable; default all")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"temperature", "depth", "object"}));
+    app.add_option("--band", o.band, "Band of the radiance channel; default: the first")
+        ->type_name("NAME");
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<InspectCommand>(app_, "inspect", "Show what the loader sees in a glTF file",
+                                        "emit inspect scene.glb", run_inspect);
+    add_path(app, "scene", o.file, "glTF 2.0 file (.glb or .gltf)")->required();
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] =
+        add<CompareCommand>(app_, "compare", "Difference of two frames, in kelvin and per cent",
+                            "emit compare a.exr b.exr --json diff.json", run_compare);
+    add_path(app, "a", o.a, "OpenEXR frame")->required();
+    add_path(app, "b", o.b, "OpenEXR frame, taken as the reference")->required();
+    app.add_option("--max-error-k", o.max_error_k,
+                   "Exit 1 when temperatures differ by more than this anywhere")
+        ->type_name("K");
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<GenerateCommand>(
+        app_, "generate", "Write one of the shipped scenes, or all, as glTF",
+        "emit generate block-on-road --out scenes --set block_size_m=2", run_generate);
+    app.add_option("scene", o.scene, "Scene name, or all")->required()->type_name("SCENE");
+    add_path(app, "--out", o.out, "Folder to write into")->required();
+    add_set(app, o.set);
+  }
+  {
+    auto [app, o] = add<ViewCommand>(
+        app_, "view", "Live window: a scenario, or the stream of a running daemon",
+        "emit view airfield    or    emit view tcp://127.0.0.1:7000\n"
+        "Keys: arrows or left mouse button turn, W/S and wheel move, A/D sideways, Q/E down/up,\n"
+        "  space pause, [ ] time slower/faster, - + lower limit, , . upper limit, R auto range,\n"
+        "  T radiance or temperature, Home back to the scenario's view, Esc close",
+        run_view);
+    app.add_option("source", o.source, "Scenario name, .toml file, tcp:// or udp:// URL")
+        ->required()
+        ->type_name("SCENARIO|URL");
+    add_set(app, o.set);
+    app.add_option("--time-s", o.time_s, "Scenario: simulated time to start from, s")
+        ->type_name("S");
+    app.add_option("--min", o.min_value, "Lower limit of the colours, K or W m-2 sr-1");
+    app.add_option("--max", o.max_value, "Upper limit of the colours, K or W m-2 sr-1");
+    app.add_option("--channel", o.channel_kind, "URL: channel kind")
+        ->check(CLI::IsMember({"injection", "projector"}));
+    app.add_option("--band", o.band, "Name of the band")->type_name("NAME");
+    add_count(app, "--frames", o.frames,
+              "Close after this many frames; 0: until the window closes");
+    add_path(app, "--screenshot", o.screenshot, "Write the window's last picture as PNG");
+    add_gpu(app, o.gpu_index);
+  }
+}
+
+void Tool::add_stream_commands() {
+  {
+    auto [app, o] = add<DemoCommand>(
+        app_, "demo",
+        "The main job end to end on loopback: daemon, pose log over UDP and TCP, two clients, "
+        "frames on disk, timing table, bit-exact replay",
+        "emit demo --out frames", run_demo);
+    add_path(app, "--out", o.out, "Folder for the frames")->capture_default_str();
+    app.add_option("--scenario", o.scenario, "Shipped scenario or .toml file")
+        ->capture_default_str();
+    add_path(app, "--log", o.log, "Host log to play; default: the scenario's shipped log");
+    add_count(app, "--frames", o.frames,
+              "Poses to play, evenly spaced over the log; 0: as many as fit");
+    app.add_flag("--all", o.all, "Play every pose of the log, however long it takes");
+    app.add_flag("--keep", o.keep, "Keep the recording, the daemon's configuration and its log");
+    add_seconds(app, "--budget-s", o.budget_s, "Time that the chosen poses may take")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    add_json(app, o.json);
+  }
+  // Listed here for --help alone: run_tool() hands `emit serve ...` to the daemon's own main.
+  app_.add_subcommand("serve", "Run the daemon (same as emitd)");
+  {
+    auto [app, o] = add<ReceiveCommand>(
+        app_, "receive",
+        "Receive frames, check sequence and CRC, print the latency histogram; exits 1 when frames "
+        "were lost or a gap was not flagged",
+        "emit receive tcp://127.0.0.1:7000 --frames 100 --out frames", run_receive);
+    app.add_option("url", o.url,
+                   "Control address of the daemon; the scheme chooses how frames travel: "
+                   "tcp://host:port or udp://host:port")
+        ->required()
+        ->type_name("URL");
+    add_count(app, "--frames", o.frames, "Stop after this many; 0: until interrupted");
+    add_path(app, "--out", o.out, "Folder for frame_NNNNNN.exr and .png");
+    app.add_option("--channel", o.channel_kind, "Channel kind; default: any")
+        ->check(CLI::IsMember({"injection", "projector"}));
+    app.add_option("--band", o.band, "Band; default: any")->type_name("NAME");
+    app.add_option("--sensor", o.sensor, "Sensor; default: any")->type_name("NAME");
+    app.add_option("--multicast", o.multicast_group, "UDP: group to join instead of unicast")
+        ->type_name("ADDRESS");
+    add_seconds(app, "--timeout-s", o.timeout_s, "Give up when no frame comes for this long")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_flag("--every-frame", o.every_frame,
+                 "TCP: ask the daemon to disconnect rather than to skip frames");
+    app.add_option("--min-k", o.min_k, "Lower limit of the PNG's colours")->capture_default_str();
+    app.add_option("--max-k", o.max_k, "Upper limit of the PNG's colours")->capture_default_str();
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] =
+        add<SendCommand>(app_, "send", "Host stand-in: plays the poses of a log to a daemon",
+                         "emit send airfield.mcap --to udp://127.0.0.1:7001 --rate 200", run_send);
+    add_path(app, "log", o.log, "MCAP log with host frames")->required();
+    app.add_option("--to", o.to, "udp://host:port (host port) or tcp://host:port (control port)")
+        ->required()
+        ->type_name("URL");
+    app.add_option("--rate", o.rate_hz, "Poses a second; default: as the log's sim times say")
+        ->type_name("HZ")
+        ->check(CLI::PositiveNumber);
+    app.add_flag("--step", o.step, "Wait until the daemon has sent the frame before the next pose");
+    add_count(app, "--frames", o.frames, "Send at most this many poses; 0: all");
+    add_count(app, "--every", o.every, "Send every Nth pose, numbered anew")
+        ->check(CLI::PositiveNumber);
+    app.add_option("--control", o.control,
+                   "With --step and udp: control port to watch the frames, tcp://host:port")
+        ->type_name("URL");
+    add_seconds(app, "--timeout-s", o.timeout_s, "With --step: longest wait for a frame")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    add_json(app, o.json);
+  }
+}
+
+void Tool::add_log_commands() {
+  {
+    auto [app, o] = add<RecordCommand>(
+        app_, "record", "Fetch the daemon's journal into a log that replay can apply",
+        "emit record --from tcp://127.0.0.1:7000 --out run.mcap", run_record);
+    app.add_option("--from", o.from, "Control address of the daemon, tcp://host:port")
+        ->required()
+        ->type_name("URL");
+    add_path(app, "--out", o.out, "MCAP log to write")->required();
+    add_count(app, "--frames", o.frames, "Stop after this many frames; 0: no limit");
+    add_seconds(app, "--duration-s", o.duration_s, "Stop after this long; 0: until interrupted");
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<ReplayCommand>(
+        app_, "replay",
+        "Apply a recorded journal and check every frame bit for bit; exits 1 on a difference",
+        "emit replay run.mcap --scenario airfield --out frames", run_replay);
+    add_path(app, "log", o.log, "MCAP log of emit record, or of the daemon's journal")->required();
+    add_scenario(app, o.input, "--scenario");
+    add_path(app, "--out", o.out, "Folder for frame_NNNNNN.exr and .png");
+    app.add_option("--speed", o.speed, "Multiple of the recorded pace, or max")
+        ->type_name("X")
+        ->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<MakeLogCommand>(
+        app_, "make-log", "Make a host log from a scenario's own trajectories",
+        "emit make-log airfield --rate-hz 200 --duration-s 20 --out airfield.mcap", run_make_log);
+    add_scenario(app, o.input, "scenario");
+    app.add_option("--rate-hz", o.rate_hz, "Poses a second")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--start-s", o.start_s,
+                   "Simulated time of the first pose; default: the sensor trajectory's first node");
+    add_seconds(app, "--duration-s", o.duration_s, "Length")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    add_path(app, "--out", o.out, "MCAP log to write")->required();
+  }
+}
+
+void Tool::add_model_commands() {
+  auto [app, o] = add<EvaluateCommand>(
+      app_, "evaluate", "Run one model on a table; CSV to standard output",
+      "emit evaluate equilibrium quartic_roots.csv --precision float32 --device gpu", run_evaluate);
+  app.footer(
+      "Models:\n" + evaluate_models_text() +
+      "Example: emit evaluate equilibrium quartic_roots.csv --precision float32 --device gpu");
+  app.add_option("model", o.model, "Name of the model, see below")->required()->type_name("MODEL");
+  add_path(app, "input", o.input, "CSV with a header row; columns in any order")->required();
+  app.add_option("--precision", o.precision, "float64 or float32")
+      ->check(CLI::IsMember({"float32", "float64"}))
+      ->capture_default_str();
+  app.add_option("--device", o.device, "cpu, or gpu: the shader code itself (float32)")
+      ->check(CLI::IsMember({"gpu", "cpu"}))
+      ->capture_default_str();
+  add_path(app, "--cases", o.cases, "relaxation: CSV of the cases");
+  add_path(app, "--nodes", o.nodes, "relaxation: CSV of the history's nodes");
+  add_gpu(app, o.gpu_index);
+}
+
+void Tool::add_bench_commands() {
+  CLI::App* bench = app_.add_subcommand("bench", "Benchmarks; results as JSON");
+  bench->require_subcommand(1);
+  bench->footer("Example: emit bench paper --json paper.json");
+  {
+    auto [app, o] = add<BenchPaperCommand>(
+        *bench, "paper", "Scenes and step counts of the published tables, 1024x768",
+        "emit bench paper --json paper.json --scene box --steps 27", run_bench_paper);
+    app.add_option("--scene", o.scenes, "box or statue; repeatable; default both")
+        ->allow_extra_args(false);
+    app.add_option("--steps", o.steps, "History steps; repeatable; default 27 and 90")
+        ->allow_extra_args(false)
+        ->check(CLI::PositiveNumber);
+    app.add_option("--frames", o.frames, "Frames per result, at least 5")
+        ->check(CLI::Range(5U, 100000U))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchStreamCommand>(
+        *bench, "stream", "Transport alone: canned frames over TCP and UDP loopback",
+        "emit bench stream --json stream.json --frames 1000 --rate 200", run_bench_stream);
+    add_count(app, "--frames", o.frames, "Frames per transport")->capture_default_str();
+    app.add_option("--rate", o.rate_hz, "Frames a second")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    app.add_option("--clients", o.clients, "Clients per transport")
+        ->check(CLI::Range(1U, 8U))
+        ->capture_default_str();
+    add_json(app, o.json);
+  }
+}
+
+}  // namespace
+
+int run_tool(int argc, char** argv) {
+  if (argc >= 2 && std::string_view(argv[1]) == "serve") return run_serve(argc - 1, argv + 1);
+  return Tool().run(argc, argv);
+}
+
+}  // namespace emit::cli

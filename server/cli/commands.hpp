@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+/// One options struct and one function per subcommand of `emit`. The functions return the exit
+/// code, print results to standard output and everything else to standard error.
+namespace emit::cli {
+
+/// A scenario by name or file, with `--set key=value` applied.
+struct ScenarioChoice {
+  std::string scenario;
+  std::vector<std::string> set;
+};
+
+struct RenderCommand {
+  ScenarioChoice input;
+  double time_s = 0.0;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> png;
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> channels;  ///< empty: all of temperature, depth, object
+  std::string band;                   ///< empty: the scenario's first
+  int gpu_index = -1;
+};
+int run_render(const RenderCommand& command);
+
+/// Takes its arguments as a main() does; argv[0] is "serve".
+int run_serve(int argc, char** argv);
+
+struct ReceiveCommand {
+  std::string url;
+  std::uint64_t frames = 0;  ///< 0: until interrupted or the daemon ends
+  std::optional<std::filesystem::path> out;
+  std::optional<std::filesystem::path> json;
+  std::string channel_kind;
+  std::string band;
+  std::string sensor;
+  std::string multicast_group;
+  double timeout_s = 10.0;
+  bool every_frame = false;
+  double min_k = 280.0;
+  double max_k = 330.0;
+};
+int run_receive(const ReceiveCommand& command);
+
+struct SendCommand {
+  std::filesystem::path log;
+  std::string to;
+  std::string control;   ///< with step over UDP: where frames can be watched
+  double rate_hz = 0.0;  ///< 0: as recorded
+  bool step = false;
+  std::uint64_t frames = 0;  ///< 0: all
+  std::uint64_t every = 1;
+  double timeout_s = 60.0;
+  std::optional<std::filesystem::path> json;
+};
+int run_send(const SendCommand& command);
+
+struct RecordCommand {
+  std::string from;
+  std::filesystem::path out;
+  std::uint64_t frames = 0;
+  double duration_s = 0.0;
+  std::optional<std::filesystem::path> json;
+};
+int run_record(const RecordCommand& command);
+
+struct ReplayCommand {
+  std::filesystem::path log;
+  ScenarioChoice input;
+  std::optional<std::filesystem::path> out;
+  std::string speed = "max";
+  int gpu_index = -1;
+  std::optional<std::filesystem::path> json;
+};
+int run_replay(const ReplayCommand& command);
+
+struct DemoCommand {
+  std::filesystem::path out = "emit-demo";
+  std::string scenario = "airfield";
+  std::optional<std::filesystem::path> log;
+  std::uint64_t frames = 0;  ///< 0: as many as fit the budget
+  bool all = false;
+  bool keep = false;
+  double budget_s = 45.0;
+  std::optional<std::filesystem::path> json;
+};
+int run_demo(const DemoCommand& command);
+
+struct ViewCommand {
+  std::string source;
+  std::vector<std::string> set;
+  std::optional<double> time_s;
+  std::optional<double> min_value;
+  std::optional<double> max_value;
+  std::string channel_kind;
+  std::string band;
+  std::uint64_t frames = 0;
+  std::optional<std::filesystem::path> screenshot;
+  int gpu_index = -1;
+};
+int run_view(const ViewCommand& command);
+
+struct CompareCommand {
+  std::filesystem::path a;
+  std::filesystem::path b;
+  std::optional<double> max_error_k;
+  std::optional<std::filesystem::path> json;
+};
+int run_compare(const CompareCommand& command);
+
+struct InspectCommand {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> json;
+};
+int run_inspect(const InspectCommand& command);
+
+struct EvaluateCommand {
+  std::string model;
+  std::filesystem::path input;
+  std::string precision = "float64";
+  std::string device = "cpu";
+  std::optional<std::filesystem::path> cases;
+  std::optional<std::filesystem::path> nodes;
+  int gpu_index = -1;
+};
+int run_evaluate(const EvaluateCommand& command);
+/// List of the models with their columns, for --help.
+[[nodiscard]] std::string evaluate_models_text();
+
+struct GenerateCommand {
+  std::string scene;
+  std::filesystem::path out = ".";
+  std::vector<std::string> set;
+};
+int run_generate(const GenerateCommand& command);
+
+struct MakeLogCommand {
+  ScenarioChoice input;
+  double rate_hz = 200.0;
+  std::optional<double> start_s;  ///< absent: first node of the sensor trajectory
+  double duration_s = 20.0;
+  std::filesystem::path out;
+};
+int run_make_log(const MakeLogCommand& command);
+
+struct BenchPaperCommand {
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> scenes;
+  std::vector<std::uint32_t> steps;
+  std::uint32_t frames = 5;
+  std::uint32_t width_px = 1024;
+  std::uint32_t height_px = 768;
+  int gpu_index = -1;
+};
+int run_bench_paper(const BenchPaperCommand& command);
+
+struct BenchStreamCommand {
+  std::optional<std::filesystem::path> json;
+  std::uint64_t frames = 1000;
+  double rate_hz = 200.0;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  std::uint32_t clients = 2;
+};
+int run_bench_stream(const BenchStreamCommand& command);
+
+/// Parses the command line and runs the chosen subcommand; returns the process's exit code.
+int run_tool(int argc, char** argv);
+
+}  // namespace emit::cli

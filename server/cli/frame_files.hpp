@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "emit/image/exr_image.hpp"
+#include "emit/image/false_color.hpp"
+#include "emit/physics/error.hpp"
+
+namespace emit::cli {
+
+/// In-band radiance to the temperature of a blackbody of the same radiance, by a table of 0.05 K
+/// over 150..1500 K; outside it the end of the table. Setup only to build; lookup any thread.
+class ApparentTemperature {
+ public:
+  /// Precondition: 0 < lo_um < hi_um.
+  ApparentTemperature(double lo_um, double hi_um);
+  [[nodiscard]] double kelvin(double radiance_w_m2_sr) const noexcept;
+  /// dT/dL there, K per W m-2 sr-1.
+  [[nodiscard]] double kelvin_per_radiance(double radiance_w_m2_sr) const noexcept;
+  [[nodiscard]] std::vector<float> kelvin(std::span<const float> radiance_w_m2_sr) const;
+
+ private:
+  [[nodiscard]] std::size_t interval(double radiance_w_m2_sr) const noexcept;
+  std::vector<double> radiance_;  ///< ascending
+};
+
+/// Planes of one frame on their way to disk; empty planes are left out.
+struct FramePlanes {
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+  std::span<const float> radiance_w_m2_sr;
+  std::span<const float> temperature_k;
+  std::span<const float> depth_m;
+  std::span<const float> object_id;
+  image::FrameMetadata metadata;
+};
+
+/// Limits of the false colours, with a colour bar beside the picture.
+struct ColorLimits {
+  double min_k = 280.0;
+  double max_k = 330.0;
+};
+
+[[nodiscard]] physics::Result<void> write_frame_exr(const std::filesystem::path& file,
+                                                    const FramePlanes& frame);
+/// Surface temperature where the frame has it, else the apparent temperature of the radiance; for a
+/// frame of no band, radiance between its 1st and 99th percentile.
+[[nodiscard]] physics::Result<void> write_frame_png(const std::filesystem::path& file,
+                                                    const FramePlanes& frame,
+                                                    const ColorLimits& limits);
+/// frame_NNNNNN.exr and .png in `directory`, numbered by the metadata's frame number.
+[[nodiscard]] physics::Result<void> write_frame_files(const std::filesystem::path& directory,
+                                                      const FramePlanes& frame,
+                                                      const ColorLimits& limits);
+
+/// Creates a folder and its parents. Errors: io.
+[[nodiscard]] physics::Result<void> make_directory(const std::filesystem::path& directory);
+
+}  // namespace emit::cli

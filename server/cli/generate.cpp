@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "commands.hpp"
+#include "console.hpp"
+#include "scene_options.hpp"
+
+namespace emit::cli {
+
+int run_generate(const GenerateCommand& command) {
+  const auto done = generate_scenes(command.scene, command.out, command.set);
+  if (done) return kExitOk;
+  const bool usage = done.error().code == physics::ErrorCode::invalid_argument;
+  return fail(usage ? kExitUsage : kExitFailure, done.error().text);
+}
+
+}  // namespace emit::cli

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "emit/protocol/record/log.hpp"
+#include "emit/v1/control.pb.h"
+#include "emit/version.hpp"
+#include "interrupt.hpp"
+#include "io/client.hpp"
+#include "json.hpp"
+
+namespace emit::cli {
+
+int run_record(const RecordCommand& command) {
+  const auto url = server::parse_url(command.from);
+  if (!url) return fail(kExitUsage, url.error().text);
+  auto connected = server::RecorderClient::connect(command.from);
+  if (!connected) return fail(connected.error());
+  server::RecorderClient& recorder = **connected;
+  protocol::LogWriterOptions options;
+  options.software = fmt::format("emit {} record", kVersion);
+  auto writer = protocol::LogWriter::create(command.out, options);
+  if (!writer) return fail(writer.error());
+
+  const InterruptGuard interrupt;
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  const auto end = command.duration_s > 0.0
+                       ? start + std::chrono::duration_cast<Clock::duration>(
+                                     std::chrono::duration<double>(command.duration_s))
+                       : Clock::time_point::max();
+  ProgressBar progress("frames", command.frames);
+  v1::JournalEntry entry;
+  std::uint64_t entries = 0;
+  std::uint64_t frames = 0;
+  std::uint64_t host_frames = 0;
+  std::uint64_t lost_entries = 0;
+  std::uint64_t last_sequence = 0;
+  std::string broken;
+  while (!InterruptGuard::interrupted() && Clock::now() < end &&
+         (command.frames == 0 || frames < command.frames)) {
+    const auto received = recorder.receive(entry, 100'000'000);
+    if (!received) {
+      if (!recorder.closed()) broken = received.error().text;
+      break;
+    }
+    if (!*received) {
+      if (recorder.closed()) break;
+      continue;
+    }
+    if (entries > 0 && entry.sequence() != last_sequence + 1) {
+      lost_entries += entry.sequence() - last_sequence - 1;
+    }
+    last_sequence = entry.sequence();
+    ++entries;
+    if (entry.has_frame()) ++frames;
+    if (entry.has_host_frame()) ++host_frames;
+    if (auto written = writer->write_journal(entry); !written) return fail(written.error());
+    if (command.frames != 0) progress.advance_to(frames);
+  }
+  progress.finish();
+  if (auto closed = writer->close(); !closed) return fail(closed.error());
+  fmt::print(text_stream(command.json), "{}: {} entries, {} host frames, {} frames\n",
+             command.out.string(), entries, host_frames, frames);
+  if (command.json) {
+    Json json = Json::object();
+    json.set("entries", entries).set("host_frames", host_frames).set("frames", frames);
+    json.set("lost_entries", lost_entries);
+    if (auto done = write_json(*command.json, json); !done) return fail(done.error());
+  }
+  if (!broken.empty()) return fail(kExitFailure, broken);
+  if (lost_entries > 0) {
+    return fail(kExitFailure,
+                fmt::format("{} journal entries were lost: the log does not replay", lost_entries));
+  }
+  return kExitOk;
+}
+
+}  // namespace emit::cli

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "statistics.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace emit::cli {
+namespace {
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+}
+
+double Samples::percentile(double frac) const {
+  if (values_.empty()) return kNan;
+  std::vector<double> sorted = values_;
+  const double count = static_cast<double>(sorted.size());
+  const auto rank = static_cast<std::size_t>(std::max(1.0, std::ceil(frac * count - 1e-9)));
+  const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(std::min(rank, sorted.size()) - 1);
+  std::nth_element(sorted.begin(), nth, sorted.end());
+  return *nth;
+}
+
+double Samples::median() const {
+  if (values_.empty()) return kNan;
+  std::vector<double> sorted = values_;
+  std::sort(sorted.begin(), sorted.end());
+  const std::size_t middle = sorted.size() / 2;
+  return sorted.size() % 2 == 1 ? sorted[middle] : 0.5 * (sorted[middle - 1] + sorted[middle]);
+}
+
+double Samples::mean() const {
+  return values_.empty() ? kNan : sum() / static_cast<double>(values_.size());
+}
+
+double Samples::max() const {
+  return values_.empty() ? kNan : *std::max_element(values_.begin(), values_.end());
+}
+
+double Samples::sum() const {
+  return std::accumulate(values_.begin(), values_.end(), 0.0);
+}
+
+std::string histogram_text(const Samples& samples, const std::string& unit) {
+  if (samples.empty()) return "";
+  constexpr std::array<double, 3> kSteps{1.0, 2.0, 5.0};
+  const auto& values = samples.values();
+  const double largest = samples.max();
+  double decade = 1.0;
+  const double smallest = std::max(1e-9, *std::min_element(values.begin(), values.end()));
+  while (decade > smallest) decade /= 10.0;
+  while (decade * 10.0 <= smallest) decade *= 10.0;
+
+  // At most 40 decades of doubles lie between the smallest and the largest sample.
+  std::vector<double> edges(1, 0.0);
+  for (int step = 0; step < 120 && edges.back() <= largest; ++step) {
+    edges.push_back(decade * kSteps[static_cast<std::size_t>(step % 3)]);
+    if (step % 3 == 2) decade *= 10.0;
+  }
+  std::vector<std::size_t> counts(edges.size(), 0);
+  for (const double value : values) {
+    const auto above = std::upper_bound(edges.begin(), edges.end(), value);
+    const std::ptrdiff_t bin = above - edges.begin() - 1;
+    ++counts[static_cast<std::size_t>(std::max<std::ptrdiff_t>(bin, 0))];
+  }
+  const std::size_t tallest = *std::max_element(counts.begin(), counts.end());
+  std::string out;
+  for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
+    if (counts[i] == 0) continue;
+    constexpr std::size_t kBarWidth = 40;
+    const std::size_t length = std::max<std::size_t>(1, kBarWidth * counts[i] / tallest);
+    out += fmt::format("  {:>8g} .. {:<8g} {} {:>7} {}\n", edges[i], edges[i + 1], unit, counts[i],
+                       std::string(length, '#'));
+  }
+  return out;
+}
+
+}  // namespace emit::cli

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace emit::cli {
+
+/// Samples of one quantity; percentiles by nearest rank on the sorted samples. Setup only.
+class Samples {
+ public:
+  void add(double value) { values_.push_back(value); }
+  void reserve(std::size_t count) { values_.reserve(count); }
+  [[nodiscard]] std::size_t count() const noexcept { return values_.size(); }
+  [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
+  /// `frac` in [0, 1]: the smallest sample that at least this share does not exceed. NaN when
+  /// empty.
+  [[nodiscard]] double percentile(double frac) const;
+  [[nodiscard]] double median() const;  ///< mean of the two middle samples for an even count
+  [[nodiscard]] double mean() const;
+  [[nodiscard]] double max() const;
+  [[nodiscard]] double sum() const;
+  [[nodiscard]] const std::vector<double>& values() const noexcept { return values_; }
+
+ private:
+  std::vector<double> values_;
+};
+
+/// Histogram as text, logarithmic bins of the 1-2-5 series; `unit` follows the bin limits.
+[[nodiscard]] std::string histogram_text(const Samples& samples, const std::string& unit);
+
+}  // namespace emit::cli

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stream_client.hpp"
+
+#include <span>
+
+namespace emit::cli {
+
+physics::Result<std::unique_ptr<StreamClient>> StreamClient::start(const Options& options) {
+  auto connected = server::FrameClient::connect(options.url);
+  if (!connected) return tl::unexpected(connected.error());
+  auto channel = (*connected)->subscribe(options.subscribe);
+  if (!channel) return tl::unexpected(channel.error());
+  std::unique_ptr<StreamClient> client(
+      new StreamClient(std::move(*connected), std::move(*channel), options.keep_pixels));
+  return client;
+}
+
+StreamClient::StreamClient(std::unique_ptr<server::FrameClient> client,
+                           server::ChannelDescription channel, bool keep_pixels)
+    : client_(std::move(client)), channel_(std::move(channel)), keep_pixels_(keep_pixels) {
+  thread_ = std::thread([this] { run(); });
+}
+
+StreamClient::~StreamClient() {
+  stop();
+}
+
+void StreamClient::stop() {
+  stop_.store(true);
+  if (thread_.joinable()) thread_.join();
+}
+
+void StreamClient::run() {
+  constexpr std::int64_t kPollNs = 50'000'000;
+  while (!stop_.load()) {
+    if (paused_.load()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      continue;
+    }
+    const auto received = client_->receive(kPollNs);
+    if (received && *received == nullptr) continue;
+    if (received) {
+      const server::ReceivedFrame& frame = **received;
+      report_.add(frame);
+      // The client has checked the header's CRC against the pixels; here they are few enough to
+      // trust nothing but the pixels.
+      crcs_[frame.header.frame_number] = keep_pixels_
+                                             ? protocol::crc32c(std::as_bytes(frame.pixels))
+                                             : frame.header.payload_crc32c;
+    }
+    const std::lock_guard lock(mutex_);
+    if (!received) {
+      ended_ = true;
+      error_ = received.error().text;
+      arrived_.notify_all();
+      return;
+    }
+    last_.header = (*received)->header;
+    if (keep_pixels_) last_.pixels.assign((*received)->pixels.begin(), (*received)->pixels.end());
+    ++count_;
+    arrived_.notify_all();
+  }
+}
+
+bool StreamClient::wait_for_host_frame(std::uint64_t host_frame_number,
+                                       std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  const auto here = [&] {
+    return count_ > 0 && last_.header.host_frame_number >= host_frame_number;
+  };
+  arrived_.wait_for(lock, timeout, [&] { return ended_ || here(); });
+  return here();
+}
+
+bool StreamClient::wait_for_frames(std::uint64_t frames, std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, timeout, [&] { return ended_ || count_ >= frames; });
+  return count_ >= frames;
+}
+
+StreamClient::Snapshot StreamClient::last_frame() {
+  const std::lock_guard lock(mutex_);
+  return last_;
+}
+
+std::string StreamClient::error() {
+  const std::lock_guard lock(mutex_);
+  return error_;
+}
+
+}  // namespace emit::cli

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/protocol/frame_header.hpp"
+#include "io/client.hpp"
+#include "stream_report.hpp"
+
+namespace emit::cli {
+
+/// A subscribed client that receives on a thread of its own, for `demo` and `bench stream`.
+/// The member functions are for the thread that made it.
+class StreamClient {
+ public:
+  struct Options {
+    std::string url;
+    server::SubscribeOptions subscribe;
+    bool keep_pixels = false;  ///< of the newest frame, for last_frame()
+  };
+  [[nodiscard]] static physics::Result<std::unique_ptr<StreamClient>> start(const Options& options);
+  ~StreamClient();
+  StreamClient(const StreamClient&) = delete;
+  StreamClient& operator=(const StreamClient&) = delete;
+
+  /// Waits for a frame made from this host frame or a later one. False: timeout or stream ended.
+  [[nodiscard]] bool wait_for_host_frame(std::uint64_t host_frame_number,
+                                         std::chrono::milliseconds timeout);
+  /// Waits until this many frames have come. False: timeout or stream ended.
+  [[nodiscard]] bool wait_for_frames(std::uint64_t frames, std::chrono::milliseconds timeout);
+
+  struct Snapshot {
+    protocol::FrameHeader header;
+    std::vector<float> pixels;
+  };
+  /// Newest frame; header.width_px is 0 before the first.
+  [[nodiscard]] Snapshot last_frame();
+
+  /// While set the thread does not read from its socket: a client that stands still.
+  void pause(bool paused) noexcept { paused_.store(paused); }
+  /// Ends the thread. The reports below are complete after it.
+  void stop();
+
+  [[nodiscard]] const server::ChannelDescription& channel() const noexcept { return channel_; }
+  [[nodiscard]] const server::ServerInfo& server() const noexcept { return client_->server(); }
+  [[nodiscard]] std::string advice() const { return client_->receive_buffer_advice(); }
+  [[nodiscard]] const StreamReport& report() const noexcept { return report_; }
+  [[nodiscard]] const server::ReceiveCounters& counters() const noexcept {
+    return client_->counters();
+  }
+  /// CRC of the pixels by frame number: computed here when pixels are kept, else the header's.
+  [[nodiscard]] const std::map<std::uint64_t, std::uint32_t>& crcs() const noexcept {
+    return crcs_;
+  }
+  /// Why the stream ended; empty while it did not.
+  [[nodiscard]] std::string error();
+
+ private:
+  StreamClient(std::unique_ptr<server::FrameClient> client, server::ChannelDescription channel,
+               bool keep_pixels);
+  void run();
+
+  std::unique_ptr<server::FrameClient> client_;
+  server::ChannelDescription channel_;
+  bool keep_pixels_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> paused_{false};
+
+  std::mutex mutex_;
+  std::condition_variable arrived_;
+  Snapshot last_;
+  std::uint64_t count_ = 0;
+  bool ended_ = false;
+  std::string error_;
+
+  // Owned by the thread until stop().
+  StreamReport report_;
+  std::map<std::uint64_t, std::uint32_t> crcs_;
+  std::thread thread_;
+};
+
+}  // namespace emit::cli

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "io/client.hpp"
+#include "json.hpp"
+#include "statistics.hpp"
+
+namespace emit::cli {
+
+/// What the headers of one client's frames say: stage times, total delays, flags. The header's
+/// instants and this machine's are both TAI; across machines the delays hold only as far as the
+/// clocks agree. One thread.
+class StreamReport {
+ public:
+  void add(const server::ReceivedFrame& frame);
+
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+  [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
+  /// Frames that came without the flag although the numbers before them are missing.
+  [[nodiscard]] std::uint64_t unflagged_gaps() const noexcept { return unflagged_gaps_; }
+
+  /// Pose received to last byte of the frame here, ms; frames without a pose are left out.
+  [[nodiscard]] const Samples& pose_to_received_ms() const noexcept { return stages_[kTotal]; }
+  /// First byte given to the kernel to last byte here, ms.
+  [[nodiscard]] const Samples& send_to_received_ms() const noexcept { return stages_[kTransport]; }
+  /// Pixels in CPU memory to last byte here, ms: what the daemon and the wire add to a render.
+  [[nodiscard]] const Samples& ready_to_received_ms() const noexcept { return ready_ms_; }
+
+  /// Table of stages: median, p99 and largest, ms.
+  [[nodiscard]] std::string stage_table() const;
+  [[nodiscard]] Json stages_json() const;
+  [[nodiscard]] Json flags_json() const;
+
+ private:
+  enum Stage : std::size_t { kQueue, kRender, kReadback, kHandOver, kTransport, kTotal, kStages };
+  static constexpr std::array<const char*, kStages> kNames{
+      "pose received -> render start", "render start -> render end", "render end -> read back",
+      "read back -> send start",       "send start -> received",     "pose received -> received"};
+  static constexpr std::array<const char*, kStages> kKeys{
+      "queue_ms", "render_ms", "readback_ms", "hand_over_ms", "transport_ms", "total_ms"};
+
+  std::array<Samples, kStages> stages_;
+  Samples ready_ms_;
+  std::array<std::uint64_t, 32> flag_counts_{};
+  std::uint64_t frames_ = 0;
+  std::uint64_t unflagged_gaps_ = 0;
+  std::uint64_t last_run_ = 0;
+  std::uint64_t last_number_ = 0;
+};
+
+[[nodiscard]] Json latency_json(const Samples& samples_ms);
+[[nodiscard]] std::string latency_line(const std::string& name, const Samples& samples_ms);
+[[nodiscard]] Json counters_json(const server::ReceiveCounters& counters);
+[[nodiscard]] std::string channel_text(const server::ChannelDescription& channel);
+
+}  // namespace emit::cli

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "commands.hpp"
+#include "emit/physics/error.hpp"
+
+namespace emit::cli::view {
+
+/// Picture handed from the thread that makes it to the window.
+struct ViewFrame {
+  std::uint64_t serial = 0;  ///< counts up; 0: none yet
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+  std::vector<float> radiance_w_m2_sr;
+  std::vector<float> temperature_k;  ///< of the surface, or apparent; see apparent_temperature
+  bool apparent_temperature = false;
+  std::uint64_t frame_number = 0;
+  std::int64_t sim_time_ns = 0;
+  std::uint32_t flags = 0;
+  double frame_ms = 0.0;  ///< time to make it, or pose to reception
+};
+
+/// What the user asks of the camera and the clock; streams ignore it.
+struct ViewControl {
+  double yaw_rad = 0.0;    ///< added to the scenario's heading, clockwise
+  double pitch_rad = 0.0;  ///< added to its elevation, up
+  double forward_m = 0.0;  ///< along the scenario's boresight
+  double right_m = 0.0;
+  double up_m = 0.0;  ///< world
+  bool paused = false;
+  double time_scale = 1.0;  ///< simulated seconds per second
+  double jump_s = 0.0;      ///< seconds to add to the simulated time, consumed by the provider
+};
+
+/// Newest-wins slot between a producer thread and the window's thread.
+class FrameSlot {
+ public:
+  /// Producer: swaps the frame in; `frame` gets an old buffer back for reuse.
+  void put(ViewFrame& frame);
+  /// Window: true when `frame` was exchanged for a newer one.
+  bool take(ViewFrame& frame);
+  /// Producer: ends the stream of frames with a reason.
+  void end(std::string reason);
+  [[nodiscard]] bool ended(std::string& reason);
+
+ private:
+  std::mutex mutex_;
+  ViewFrame slot_;
+  std::uint64_t serial_ = 0;
+  bool ended_ = false;
+  std::string reason_;
+};
+
+/// Source of pictures with a thread of its own. The window's thread calls everything.
+class FrameProvider {
+ public:
+  virtual ~FrameProvider() = default;
+  [[nodiscard]] virtual bool take(ViewFrame& frame) = 0;
+  virtual void control(const ViewControl& control) = 0;
+  [[nodiscard]] virtual bool ended(std::string& reason) = 0;
+  /// Name, channel or scenario, for the window's title.
+  [[nodiscard]] virtual std::string title() const = 0;
+  [[nodiscard]] virtual std::string band() const = 0;
+  /// Limits to begin with, K.
+  virtual void limits(double& min_k, double& max_k) const = 0;
+};
+
+/// Renders a scenario on a thread that owns the GL context of the renderer. Errors as
+/// load_scenario (code config) and Renderer::create.
+[[nodiscard]] physics::Result<std::unique_ptr<FrameProvider>> make_scenario_provider(
+    const ViewCommand& command);
+/// Receives a daemon's stream.
+[[nodiscard]] physics::Result<std::unique_ptr<FrameProvider>> make_stream_provider(
+    const ViewCommand& command);
+
+}  // namespace emit::cli::view

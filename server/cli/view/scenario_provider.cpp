@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <glm/gtc/quaternion.hpp>
+#include <thread>
+
+#include "emit/renderer/renderer.hpp"
+#include "scenario_input.hpp"
+#include "view/frame_provider.hpp"
+
+namespace emit::cli::view {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+physics::Pose moved(const physics::Pose& base, const ViewControl& control) {
+  physics::Pose pose = base;
+  // Yaw turns about the world's vertical (clockwise seen from above), pitch about the body's y
+  // axis.
+  const glm::dquat yaw = glm::angleAxis(-control.yaw_rad, glm::dvec3(0.0, 0.0, 1.0));
+  const glm::dquat pitch = glm::angleAxis(control.pitch_rad, glm::dvec3(0.0, 1.0, 0.0));
+  pose.world_from_body = glm::normalize(yaw * base.world_from_body * pitch);
+  pose.position_world_m +=
+      base.world_from_body * glm::dvec3(control.forward_m, control.right_m, 0.0) +
+      glm::dvec3(0.0, 0.0, control.up_m);
+  return pose;
+}
+
+class ScenarioProvider final : public FrameProvider {
+ public:
+  ScenarioProvider(scene::ScenarioDesc scenario, std::size_t band, double start_s, int gpu_index)
+      : scenario_(std::move(scenario)), band_(band), sim_time_s_(start_s), gpu_index_(gpu_index) {}
+
+  /// The renderer's context lives on the thread: it is made there, and its failure told here.
+  physics::Result<void> start() {
+    std::promise<physics::Result<void>> made;
+    auto result = made.get_future();
+    thread_ = std::thread([this, promise = std::move(made)]() mutable { run(promise); });
+    return result.get();
+  }
+  ~ScenarioProvider() override {
+    stop_.store(true);
+    if (thread_.joinable()) thread_.join();
+  }
+
+  bool take(ViewFrame& frame) override { return slot_.take(frame); }
+  void control(const ViewControl& control) override {
+    const std::lock_guard lock(control_mutex_);
+    const double pending_s = control_.jump_s;
+    control_ = control;
+    control_.jump_s += pending_s;
+  }
+  bool ended(std::string& reason) override { return slot_.ended(reason); }
+  std::string title() const override { return scenario_.name; }
+  std::string band() const override { return scenario_.bands[band_].name; }
+  void limits(double& min_k, double& max_k) const override {
+    min_k = scenario_.display.min_k;
+    max_k = scenario_.display.max_k;
+  }
+
+ private:
+  void run(std::promise<physics::Result<void>>& made) {
+    renderer::OutputOptions output;
+    output.temperature = true;
+    output.slots = 2;
+    auto created = renderer::Renderer::create(scenario_, {gpu_index_, false}, output);
+    if (!created) {
+      made.set_value(tl::unexpected(created.error()));
+      return;
+    }
+    made.set_value({});
+    loop(**created);
+  }
+
+  void loop(renderer::Renderer& renderer) {
+    ViewFrame frame;
+    std::uint64_t number = 0;
+    auto last = Clock::now();
+    while (!stop_.load()) {
+      ViewControl control;
+      {
+        const std::lock_guard lock(control_mutex_);
+        control = control_;
+        control_.jump_s = 0.0;
+      }
+      const auto now = Clock::now();
+      // A slow device skips simulated time rather than falling behind for ever.
+      const double wall_s = std::min(1.0, std::chrono::duration<double>(now - last).count());
+      last = now;
+      if (!control.paused && number > 0) sim_time_s_ += wall_s * control.time_scale;
+      sim_time_s_ += control.jump_s;
+
+      renderer::FrameRequest request;
+      request.frame_number = ++number;
+      request.sim_time_ns = std::llround(sim_time_s_ * 1e9);
+      request.thermal_time_ns = request.sim_time_ns;
+      request.sensor_pose = moved(renderer.scenario_sensor_pose_at(request.sim_time_ns), control);
+      const int slot = renderer.submit(request);
+      if (slot < 0) {
+        slot_.end("the renderer has no free slot");
+        return;
+      }
+      const auto& view = renderer.collect(static_cast<renderer::SlotIndex>(slot));
+      frame.width_px = view.width_px;
+      frame.height_px = view.height_px;
+      const auto radiance = view.radiance_w_m2_sr[band_];
+      frame.radiance_w_m2_sr.assign(radiance.begin(), radiance.end());
+      frame.temperature_k.assign(view.temperature_k.begin(), view.temperature_k.end());
+      frame.apparent_temperature = false;
+      frame.frame_number = number;
+      frame.sim_time_ns = request.sim_time_ns;
+      renderer.release(static_cast<renderer::SlotIndex>(slot));
+      frame.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - now).count();
+      slot_.put(frame);
+      constexpr auto kFramePeriod = std::chrono::milliseconds(10);
+      if (Clock::now() - now < kFramePeriod) std::this_thread::sleep_until(now + kFramePeriod);
+    }
+  }
+
+  scene::ScenarioDesc scenario_;
+  std::size_t band_;
+  double sim_time_s_;
+  int gpu_index_;
+  FrameSlot slot_;
+  std::mutex control_mutex_;
+  ViewControl control_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+physics::Result<std::unique_ptr<FrameProvider>> make_scenario_provider(const ViewCommand& command) {
+  auto scenario = load_scenario_choice({command.source, command.set});
+  if (!scenario) {
+    return physics::make_error(physics::ErrorCode::config, std::move(scenario.error().text));
+  }
+  const auto band = find_band(*scenario, command.band);
+  if (!band) return tl::unexpected(band.error());
+  const double start_s =
+      command.time_s.value_or(1e-9 * static_cast<double>(trajectory_start_ns(*scenario)));
+  auto provider =
+      std::make_unique<ScenarioProvider>(std::move(*scenario), *band, start_s, command.gpu_index);
+  if (auto started = provider->start(); !started) return tl::unexpected(started.error());
+  return std::unique_ptr<FrameProvider>(std::move(provider));
+}
+
+}  // namespace emit::cli::view

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/protocol/frame_header.hpp"
+#include "emit/protocol/host_frame.hpp"
+
+namespace emit::v1 {
+class JournalEntry;
+}
+
+/// Client side of the wire protocol, for the tool, for tests and for integrators' programs.
+/// Blocking with a timeout; one thread per object. Timeouts are in ns of the monotonic clock; 0 polls.
+namespace emit::server {
+
+/// scheme://host:port; schemes tcp and udp, IPv6 hosts in brackets.
+struct Url {
+  enum class Scheme : std::uint8_t { tcp, udp };
+  Scheme scheme = Scheme::tcp;
+  std::string host;
+  std::uint16_t port = 0;
+};
+/// Errors (invalid_argument): anything else, naming the text.
+[[nodiscard]] physics::Result<Url> parse_url(const std::string& text);
+
+/// emit.v1.Status as plain data; `code` has the values of Status::Code (1 = OK).
+struct ServerStatus {
+  std::uint32_t code = 0;
+  std::string text;
+  std::uint64_t host_frame_number = 0;
+  std::uint64_t count = 0;
+  [[nodiscard]] bool ok() const noexcept { return code == 1; }
+};
+
+struct ChannelDescription {
+  std::uint32_t index = 0;
+  std::string name;
+  std::string kind;  ///< "injection" or "projector"
+  std::string sensor;
+  std::string band;
+  double band_lo_um = 0.0;
+  double band_hi_um = 0.0;
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+};
+
+/// What the daemon says about itself on connecting.
+struct ServerInfo {
+  std::string software;
+  std::string scenario;
+  std::string pacing;
+  std::string device;
+  std::uint64_t run_id = 0;
+  bool tai_offset_unset = false;
+  std::vector<ChannelDescription> channels;
+};
+
+/// Names a channel by any of the three; empty matches anything, the first match is taken.
+struct SubscribeOptions {
+  std::string channel_kind;
+  std::string sensor;
+  std::string band;
+  bool every_frame = false;  ///< the daemon disconnects this client rather than skip a frame
+  std::uint32_t fragment_payload_bytes = 0;  ///< UDP; 0 = daemon's choice
+  std::string multicast_group;               ///< UDP; empty = unicast
+  std::uint16_t udp_port = 0;                ///< UDP; 0 = any free port
+};
+
+/// Pixels stay valid until the next receive().
+struct ReceivedFrame {
+  protocol::FrameHeader header;  ///< kFlagPartial is set here when fragments are missing
+  std::span<const float> pixels; ///< width_px * height_px; missing pixels are 0
+  std::uint64_t missing_px = 0;  ///< of a partial frame
+  std::int64_t first_byte_ns = 0;  ///< wall (TAI), when this client began to have it
+  std::int64_t last_byte_ns = 0;
+};
+
+struct ReceiveCounters {
+  std::uint64_t received = 0;    ///< complete frames
+  std::uint64_t partial = 0;     ///< delivered with missing pixels
+  std::uint64_t lost = 0;        ///< frame numbers never seen and not announced by kFlagGapBefore
+  std::uint64_t gaps = 0;        ///< announced skips (frames with kFlagGapBefore)
+  std::uint64_t skipped = 0;     ///< frame numbers missing at announced skips
+  std::uint64_t crc_errors = 0;
+  std::uint64_t os_drops = 0;    ///< datagrams the kernel dropped for want of buffer space
+  std::uint64_t bad_datagrams = 0;
+  std::uint64_t late = 0;        ///< frames with kFlagLate
+  std::uint64_t repeated = 0;    ///< frames with kFlagRepeated
+};
+
+/// Receives frames. tcp://host:port: frames on the control connection; udp://host:port: control
+/// over TCP to host:port, frames as UDP fragments.
+class FrameClient {
+ public:
+  /// Hello and Welcome. Errors: io (refused, timeout), protocol (version).
+  [[nodiscard]] static physics::Result<std::unique_ptr<FrameClient>> connect(
+      const std::string& url, std::int64_t timeout_ns = 5'000'000'000);
+  virtual ~FrameClient() = default;
+
+  [[nodiscard]] virtual const ServerInfo& server() const noexcept = 0;
+  /// Once. Errors: protocol with the daemon's status text (unknown channel, too many clients).
+  [[nodiscard]] virtual physics::Result<ChannelDescription> subscribe(
+      const SubscribeOptions& options) = 0;
+
+  /// Next frame in order; null when the timeout ran out first. Errors: io (connection closed),
+  /// protocol (stream broken). After an error the client is of no further use.
+  [[nodiscard]] virtual physics::Result<const ReceivedFrame*> receive(std::int64_t timeout_ns) = 0;
+
+  [[nodiscard]] virtual const ReceiveCounters& counters() const noexcept = 0;
+  /// Statuses the daemon sent in between, oldest first; clears the list.
+  [[nodiscard]] virtual std::vector<ServerStatus> take_statuses() = 0;
+
+  /// Bytes that the kernel granted for UDP, in the unit of net.core.rmem_max; 0 for TCP.
+  [[nodiscard]] virtual std::uint64_t receive_buffer_bytes() const noexcept = 0;
+  /// Empty when the buffer holds at least 4 frames; otherwise one line on how to raise the limit.
+  [[nodiscard]] virtual std::string receive_buffer_advice() const = 0;
+};
+
+enum class HostCommand : std::uint8_t { start = 1, stop = 2, hold = 3, step = 4, reset = 5 };
+
+/// Sends poses. udp://host:port is the daemon's host port (datagrams, frames only);
+/// tcp://host:port its control port (frames and commands).
+class HostClient {
+ public:
+  [[nodiscard]] static physics::Result<std::unique_ptr<HostClient>> connect(
+      const std::string& url, std::int64_t timeout_ns = 5'000'000'000);
+  virtual ~HostClient() = default;
+
+  /// TCP: waits up to `timeout_ns` for room. UDP: one datagram. Errors: io, timeout included.
+  [[nodiscard]] virtual physics::Result<void> send(const protocol::HostFrameData& frame,
+                                                   std::int64_t timeout_ns = 5'000'000'000) = 0;
+  /// TCP only. The answer comes through receive_status().
+  [[nodiscard]] virtual physics::Result<void> command(HostCommand command,
+                                                      std::int64_t timeout_ns = 5'000'000'000) = 0;
+  /// Empty when the timeout ran out. Errors: io (connection closed), protocol.
+  [[nodiscard]] virtual physics::Result<std::optional<ServerStatus>> receive_status(
+      std::int64_t timeout_ns) = 0;
+  /// TCP only: null over UDP.
+  [[nodiscard]] virtual const ServerInfo* server() const noexcept = 0;
+};
+
+/// Receives the journal over tcp://host:port, from the start of the current run as far as the
+/// daemon still holds it.
+class RecorderClient {
+ public:
+  [[nodiscard]] static physics::Result<std::unique_ptr<RecorderClient>> connect(
+      const std::string& url, std::int64_t timeout_ns = 5'000'000'000);
+  virtual ~RecorderClient() = default;
+
+  [[nodiscard]] virtual const ServerInfo& server() const noexcept = 0;
+  /// False when the timeout ran out. Errors: io (connection closed; `closed()` tells), protocol.
+  [[nodiscard]] virtual physics::Result<bool> receive(v1::JournalEntry& entry,
+                                                      std::int64_t timeout_ns) = 0;
+  /// True after the daemon closed the connection in order: the journal is complete.
+  [[nodiscard]] virtual bool closed() const noexcept = 0;
+};
+
+}  // namespace emit::server

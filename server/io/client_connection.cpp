@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/client_connection.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+#include "emit/protocol/convert.hpp"
+#include "emit/protocol/version.hpp"
+#include "emit/v1/control.pb.h"
+
+namespace emit::server {
+
+using physics::ErrorCode;
+using physics::make_error;
+
+std::int64_t monotonic_now_ns() noexcept {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+}
+
+bool wait_for(int fd, short events, std::int64_t end_ns) noexcept {
+  for (;;) {
+    const std::int64_t left_ns = std::max<std::int64_t>(end_ns - monotonic_now_ns(), 0);
+    pollfd wait{fd, events, 0};
+    const timespec timeout{static_cast<time_t>(left_ns / 1'000'000'000),
+                           static_cast<long>(left_ns % 1'000'000'000)};
+    const int ready = ::ppoll(&wait, 1, &timeout, nullptr);
+    if (ready > 0) {
+      return true;
+    }
+    if (ready == 0 || errno != EINTR) {
+      return false;
+    }
+  }
+}
+
+ServerStatus to_status(const v1::Status& status) {
+  return {static_cast<std::uint32_t>(status.code()), status.text(), status.host_frame_number(),
+          status.count()};
+}
+
+physics::Result<Url> parse_url(const std::string& text) {
+  Url url;
+  std::string rest;
+  if (text.starts_with("tcp://")) {
+    url.scheme = Url::Scheme::tcp;
+  } else if (text.starts_with("udp://")) {
+    url.scheme = Url::Scheme::udp;
+  } else {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("'{}': not tcp://host:port or udp://host:port", text));
+  }
+  const auto where = parse_host_port(std::string_view(text).substr(6));
+  if (!where || where->host.empty() || where->port == 0) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("'{}': not tcp://host:port or udp://host:port", text));
+  }
+  url.host = where->host;
+  url.port = where->port;
+  return url;
+}
+
+ClientConnection::ClientConnection(Fd fd, SocketAddress peer)
+    : fd_(std::move(fd)), peer_(peer), parser_(protocol::RecordLimits{}) {}
+
+physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientRole role,
+                                                         std::int64_t timeout_ns) {
+  const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
+  const auto address = resolve({url.host, url.port}, SOCK_STREAM, false);
+  if (!address) {
+    return tl::unexpected<physics::Error>(physics::Error(address.error()));
+  }
+  auto fd = connect_tcp(*address, timeout_ns);
+  if (!fd) {
+    return tl::unexpected<physics::Error>(std::move(fd.error()));
+  }
+  ClientConnection connection(std::move(*fd), *address);
+
+  v1::ControlRecord request;
+  v1::Hello& hello = *request.mutable_hello();
+  hello.set_protocol_version(protocol::kProtocolVersion);
+  hello.set_software("emit client");
+  hello.set_role(static_cast<v1::Hello::Role>(role));
+  if (auto sent = connection.send(request, end_ns); !sent) {
+    return tl::unexpected<physics::Error>(std::move(sent.error()));
+  }
+  protocol::Record record;
+  auto received = connection.receive(record, end_ns);
+  if (!received) {
+    return tl::unexpected<physics::Error>(std::move(received.error()));
+  }
+  const std::string where = to_string(*address);
+  if (!*received) {
+    return make_error(ErrorCode::io, where + ": no welcome within the timeout");
+  }
+  v1::ControlRecord answer;
+  if (record.kind != protocol::RecordKind::control ||
+      !protocol::parse_control_record(record.body, answer)) {
+    return make_error(ErrorCode::protocol, where + ": the first record is not a welcome");
+  }
+  if (answer.has_status()) {
+    return make_error(ErrorCode::protocol,
+                      fmt::format("{}: refused: {}", where, answer.status().text()));
+  }
+  if (!answer.has_welcome()) {
+    return make_error(ErrorCode::protocol, where + ": the first record is not a welcome");
+  }
+  const v1::Welcome& welcome = answer.welcome();
+  if (welcome.protocol_version() != protocol::kProtocolVersion) {
+    return make_error(ErrorCode::protocol,
+                      fmt::format("{}: speaks protocol version {}, this client {}", where,
+                                  welcome.protocol_version(), protocol::kProtocolVersion));
+  }
+  ServerInfo& info = connection.info_;
+  info.software = welcome.software();
+  info.scenario = welcome.scenario();
+  info.pacing = welcome.pacing();
+  info.device = welcome.device();
+  info.run_id = welcome.run_id();
+  info.tai_offset_unset = welcome.tai_offset_unset();
+  for (const v1::ChannelInfo& channel : welcome.channels()) {
+    info.channels.push_back({channel.index(), channel.name(), channel.kind(), channel.sensor(),
+                             channel.band(), channel.band_lo_um(), channel.band_hi_um(),
+                             channel.width_px(), channel.height_px()});
+  }
+  return connection;
+}
+
+void ClientConnection::allow_frames(std::uint32_t max_frame_bytes) {
+  protocol::RecordLimits limits;
+  limits.max_frame_bytes = max_frame_bytes;
+  parser_ = protocol::RecordParser(limits);
+}
+
+physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::int64_t end_ns) {
+  for (;;) {
+    const protocol::ParseStatus status = parser_.next(record);
+    if (status == protocol::ParseStatus::record) {
+      return true;
+    }
+    if (status != protocol::ParseStatus::need_more) {
+      return make_error(ErrorCode::protocol,
+                        fmt::format("{}: stream broken: {} ({})", to_string(peer_),
+                                    protocol::to_string(status), parser_.offending_value()));
+    }
+    const std::span<std::byte> space = parser_.writable();
+    const ssize_t got = ::recv(fd_.get(), space.data(), space.size(), MSG_DONTWAIT);
+    if (got > 0) {
+      parser_.commit(static_cast<std::size_t>(got));
+      continue;
+    }
+    if (got == 0) {
+      closed_ = parser_.pending_bytes() == 0;
+      return make_error(ErrorCode::io,
+                        to_string(peer_) + (closed_ ? ": connection closed"
+                                                    : ": connection closed within a record"));
+    }
+    if (errno != EAGAIN && errno != EINTR) {
+      return make_error(ErrorCode::io,
+                        fmt::format("{}: {}", to_string(peer_), error_text(errno)));
+    }
+    if (!wait_for(fd_.get(), POLLIN, end_ns)) {
+      return false;
+    }
+  }
+}
+
+physics::Result<void> ClientConnection::send(std::span<const std::byte> bytes,
+                                             std::int64_t end_ns) {
+  while (!bytes.empty()) {
+    const ssize_t sent =
+        ::send(fd_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (sent >= 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(sent));
+    } else if (errno != EAGAIN && errno != EINTR) {
+      return make_error(ErrorCode::io,
+                        fmt::format("{}: {}", to_string(peer_), error_text(errno)));
+    } else if (!wait_for(fd_.get(), POLLOUT, end_ns)) {
+      return make_error(ErrorCode::io, to_string(peer_) + ": takes nothing within the timeout");
+    }
+  }
+  return {};
+}
+
+physics::Result<void> ClientConnection::send(const v1::ControlRecord& record,
+                                             std::int64_t end_ns) {
+  out_.clear();
+  protocol::append_control_record(record, out_);
+  return send(out_, end_ns);
+}
+
+}  // namespace emit::server

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "emit/protocol/framing.hpp"
+#include "io/client.hpp"
+#include "io/socket.hpp"
+
+namespace emit::v1 {
+class ControlRecord;
+class Status;
+}
+
+namespace emit::server {
+
+[[nodiscard]] std::int64_t monotonic_now_ns() noexcept;
+/// Waits for `events` on a descriptor until `end_ns` (monotonic). False: the time is up.
+[[nodiscard]] bool wait_for(int fd, short events, std::int64_t end_ns) noexcept;
+[[nodiscard]] ServerStatus to_status(const v1::Status& status);
+
+enum class ClientRole : std::uint8_t { host = 1, client = 2, recorder = 3 };
+
+/// Control connection of a client: hello on opening, then records both ways.
+class ClientConnection {
+ public:
+  /// Hello and Welcome. Errors: io, protocol (what the daemon answered instead).
+  [[nodiscard]] static physics::Result<ClientConnection> open(const Url& url, ClientRole role,
+                                                              std::int64_t timeout_ns);
+
+  [[nodiscard]] int fd() const noexcept { return fd_.get(); }
+  [[nodiscard]] const ServerInfo& server() const noexcept { return info_; }
+  [[nodiscard]] const SocketAddress& peer() const noexcept { return peer_; }
+  /// True after the peer closed in order, between two records.
+  [[nodiscard]] bool closed() const noexcept { return closed_; }
+
+  /// Replaces the parser by one that takes records this large. Only between records.
+  void allow_frames(std::uint32_t max_frame_bytes);
+
+  /// Next record; false when the time is up. The body lives until the next call.
+  /// Errors: io (closed), protocol (framing).
+  [[nodiscard]] physics::Result<bool> receive(protocol::Record& record, std::int64_t end_ns);
+  [[nodiscard]] physics::Result<void> send(std::span<const std::byte> bytes, std::int64_t end_ns);
+  [[nodiscard]] physics::Result<void> send(const v1::ControlRecord& record, std::int64_t end_ns);
+
+ private:
+  ClientConnection(Fd fd, SocketAddress peer);
+
+  Fd fd_;
+  SocketAddress peer_;
+  protocol::RecordParser parser_;
+  ServerInfo info_;
+  std::vector<std::byte> out_;
+  bool closed_ = false;
+};
+
+}  // namespace emit::server

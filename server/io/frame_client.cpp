@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+
+#include "emit/protocol/convert.hpp"
+#include "emit/v1/control.pb.h"
+#include "io/client_connection.hpp"
+#include "io/udp_frame_receiver.hpp"
+#include "rt/clock.hpp"
+
+namespace emit::server {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+
+class FrameClientImpl final : public FrameClient {
+ public:
+  FrameClientImpl(ClientConnection connection, bool udp)
+      : connection_(std::move(connection)), udp_(udp) {}
+
+  const ServerInfo& server() const noexcept override { return connection_.server(); }
+  physics::Result<ChannelDescription> subscribe(const SubscribeOptions& options) override;
+  physics::Result<const ReceivedFrame*> receive(std::int64_t timeout_ns) override;
+  const ReceiveCounters& counters() const noexcept override { return counters_; }
+  std::vector<ServerStatus> take_statuses() override { return std::exchange(statuses_, {}); }
+  std::uint64_t receive_buffer_bytes() const noexcept override {
+    return receiver_ ? receiver_->buffer_bytes() : 0;
+  }
+  std::string receive_buffer_advice() const override;
+
+ private:
+  physics::Result<const ReceivedFrame*> receive_tcp(std::int64_t end_ns);
+  physics::Result<const ReceivedFrame*> receive_udp(std::int64_t end_ns);
+  const ReceivedFrame* pop_udp();
+  void take_control(std::span<const std::byte> body);
+  void account();
+
+  ClientConnection connection_;
+  bool udp_;
+  bool subscribed_ = false;
+  std::uint16_t stream_id_ = 0;
+  ChannelDescription channel_;
+  SystemClock clock_;
+  ReceiveCounters counters_;
+  std::vector<ServerStatus> statuses_;
+  ReceivedFrame frame_;
+  std::vector<float> pixels_;  // tcp: aligned copy of the record's pixels
+  std::optional<UdpFrameReceiver> receiver_;
+  std::optional<protocol::Reassembler> reassembler_;
+  const protocol::ReceivedFrame* held_ = nullptr;
+  std::int64_t burst_begin_ns_ = 0;
+  std::int64_t quiet_since_ns_ = 0;
+  std::uint64_t run_id_ = 0;
+  std::uint64_t last_frame_number_ = 0;
+  bool any_ = false;
+};
+
+physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOptions& options) {
+  constexpr std::int64_t kTimeoutNs = 5'000'000'000;
+  const std::int64_t end_ns = monotonic_now_ns() + kTimeoutNs;
+  if (subscribed_) {
+    return make_error(ErrorCode::invalid_argument, "already subscribed");
+  }
+  // Frames may follow the answer at once: the parser must take the largest channel's.
+  std::uint64_t largest = 0;
+  for (const auto& channel : connection_.server().channels) {
+    largest = std::max(largest, std::uint64_t{channel.width_px} * channel.height_px * sizeof(float));
+  }
+  constexpr std::uint64_t kMostBytes = 1u << 30;
+  if (largest > kMostBytes) {
+    return make_error(ErrorCode::protocol, fmt::format("frames of {} bytes are refused", largest));
+  }
+  v1::ControlRecord request;
+  v1::Subscribe& subscribe = *request.mutable_subscribe();
+  subscribe.set_channel_kind(options.channel_kind);
+  subscribe.set_sensor(options.sensor);
+  subscribe.set_band(options.band);
+  subscribe.set_every_frame(options.every_frame);
+  if (udp_) {
+    auto receiver = UdpFrameReceiver::open(connection_.peer(), options);
+    if (!receiver) {
+      return tl::unexpected<physics::Error>(std::move(receiver.error()));
+    }
+    receiver_ = std::move(*receiver);
+    receiver_->size_buffer(largest);
+    subscribe.set_udp_port(receiver_->port());
+    subscribe.set_fragment_payload_bytes(options.fragment_payload_bytes);
+    subscribe.set_multicast_group(options.multicast_group);
+    protocol::Reassembler::Params params;
+    params.max_payload_bytes = static_cast<std::uint32_t>(largest);
+    params.max_streams = 2;
+    reassembler_.emplace(params);
+  } else {
+    connection_.allow_frames(
+        static_cast<std::uint32_t>(largest + protocol::kFrameHeaderBytes));
+    pixels_.resize(static_cast<std::size_t>(largest / sizeof(float)));
+  }
+  if (auto sent = connection_.send(request, end_ns); !sent) {
+    return tl::unexpected<physics::Error>(std::move(sent.error()));
+  }
+  protocol::Record record;
+  for (;;) {
+    auto received = connection_.receive(record, end_ns);
+    if (!received) {
+      return tl::unexpected<physics::Error>(std::move(received.error()));
+    }
+    if (!*received) {
+      return make_error(ErrorCode::io, "no answer to the subscription within 5 s");
+    }
+    v1::ControlRecord answer;
+    if (record.kind != protocol::RecordKind::control ||
+        !protocol::parse_control_record(record.body, answer)) {
+      continue;
+    }
+    if (answer.has_status()) {
+      return make_error(ErrorCode::protocol, "subscription refused: " + answer.status().text());
+    }
+    if (answer.has_subscribed()) {
+      const v1::ChannelInfo& info = answer.subscribed().channel();
+      channel_ = {info.index(), info.name(), info.kind(), info.sensor(), info.band(),
+                  info.band_lo_um(), info.band_hi_um(), info.width_px(), info.height_px()};
+      stream_id_ = static_cast<std::uint16_t>(answer.subscribed().stream_id());
+      subscribed_ = true;
+      return channel_;
+    }
+  }
+}
+
+physics::Result<const ReceivedFrame*> FrameClientImpl::receive(std::int64_t timeout_ns) {
+  if (!subscribed_) {
+    return make_error(ErrorCode::invalid_argument, "subscribe comes before receive");
+  }
+  const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
+  return udp_ ? receive_udp(end_ns) : receive_tcp(end_ns);
+}
+
+physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t end_ns) {
+  protocol::Record record;
+  for (;;) {
+    if (!wait_for(connection_.fd(), POLLIN, monotonic_now_ns())) {
+      burst_begin_ns_ = 0;  // nothing of the next frame has arrived yet
+    } else if (burst_begin_ns_ == 0) {
+      burst_begin_ns_ = clock_.tai_ns();
+    }
+    auto received = connection_.receive(record, end_ns);
+    if (!received) {
+      return tl::unexpected<physics::Error>(std::move(received.error()));
+    }
+    if (!*received) {
+      return nullptr;
+    }
+    if (record.kind == protocol::RecordKind::control) {
+      take_control(record.body);
+      continue;
+    }
+    if (record.kind != protocol::RecordKind::frame) {
+      continue;
+    }
+    auto view = protocol::decode_frame_record(record.body);
+    if (!view) {
+      return tl::unexpected<physics::Error>(std::move(view.error()));
+    }
+    if (view->pixels.size() > pixels_.size() * sizeof(float)) {
+      return make_error(ErrorCode::protocol, "a frame larger than its channel");
+    }
+    frame_.header = view->header;
+    frame_.last_byte_ns = clock_.tai_ns();
+    frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
+    burst_begin_ns_ = 0;
+    frame_.missing_px = 0;
+    if (!protocol::payload_crc_matches(*view)) {
+      ++counters_.crc_errors;
+    }
+    std::memcpy(pixels_.data(), view->pixels.data(), view->pixels.size());
+    frame_.pixels = std::span<const float>(pixels_).first(view->pixels.size() / sizeof(float));
+    ++counters_.received;
+    account();
+    return &frame_;
+  }
+}
+
+physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t end_ns) {
+  // A frame whose last fragment was lost is handed out when nothing more comes for this long.
+  constexpr std::int64_t kQuietNs = 250'000'000;
+  if (held_ != nullptr) {
+    reassembler_->release(held_);
+    held_ = nullptr;
+  }
+  for (;;) {
+    if (const ReceivedFrame* frame = pop_udp()) {
+      return frame;
+    }
+    const int taken = receiver_->take(*reassembler_, counters_);
+    if (taken > 0) {
+      quiet_since_ns_ = 0;
+      if (burst_begin_ns_ == 0) {
+        burst_begin_ns_ = clock_.tai_ns();
+      }
+      continue;
+    }
+    const std::int64_t now_ns = monotonic_now_ns();
+    if (quiet_since_ns_ == 0) {
+      quiet_since_ns_ = now_ns;
+    } else if (now_ns - quiet_since_ns_ > kQuietNs) {
+      quiet_since_ns_ = now_ns;
+      reassembler_->flush();
+      if (const ReceivedFrame* frame = pop_udp()) {
+        return frame;
+      }
+    }
+    const std::int64_t wait_ns = std::min(end_ns, quiet_since_ns_ + kQuietNs + 1'000'000) - now_ns;
+    std::array<pollfd, 2> fds{{{receiver_->fd(), POLLIN, 0}, {connection_.fd(), POLLIN, 0}}};
+    const timespec timeout{static_cast<time_t>(std::max<std::int64_t>(wait_ns, 0) / 1'000'000'000),
+                           static_cast<long>(std::max<std::int64_t>(wait_ns, 0) % 1'000'000'000)};
+    ::ppoll(fds.data(), fds.size(), &timeout, nullptr);
+    if (fds[1].revents != 0) {
+      protocol::Record record;
+      auto received = connection_.receive(record, monotonic_now_ns());
+      if (!received) {
+        // The daemon went away: what is still in the socket comes first.
+        if (receiver_->take(*reassembler_, counters_) > 0) {
+          continue;
+        }
+        reassembler_->flush();
+        if (const ReceivedFrame* frame = pop_udp()) {
+          return frame;
+        }
+        return tl::unexpected<physics::Error>(std::move(received.error()));
+      }
+      if (*received && record.kind == protocol::RecordKind::control) {
+        take_control(record.body);
+      }
+    }
+    if (fds[0].revents == 0 && monotonic_now_ns() >= end_ns) {
+      return nullptr;
+    }
+  }
+}
+
+const ReceivedFrame* FrameClientImpl::pop_udp() {
+  for (;;) {
+    held_ = reassembler_->pop();
+    if (held_ == nullptr) {
+      return nullptr;
+    }
+    if (held_->stream_id == stream_id_) {
+      break;
+    }
+    // Somebody else's frames on this port.
+    ++counters_.bad_datagrams;
+    reassembler_->release(held_);
+  }
+  frame_.header = held_->header;
+  frame_.pixels = held_->pixels;
+  frame_.missing_px = held_->missing_px;
+  frame_.last_byte_ns = clock_.tai_ns();
+  frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
+  burst_begin_ns_ = 0;
+  counters_.received += held_->complete ? 1 : 0;
+  counters_.partial += held_->complete ? 0 : 1;
+  counters_.crc_errors += held_->complete && !held_->crc_ok ? 1 : 0;
+  if (held_->header_known) {
+    account();
+  } else {
+    // The frame number went with the header; the gap to the next one is this frame.
+    ++last_frame_number_;
+  }
+  return &frame_;
+}
+
+void FrameClientImpl::account() {
+  const protocol::FrameHeader& header = frame_.header;
+  counters_.late += (header.flags & protocol::kFlagLate) != 0 ? 1 : 0;
+  counters_.repeated += (header.flags & protocol::kFlagRepeated) != 0 ? 1 : 0;
+  const bool gap = (header.flags & protocol::kFlagGapBefore) != 0;
+  counters_.gaps += gap ? 1 : 0;
+  if (any_ && header.run_id == run_id_ && header.frame_number > last_frame_number_ + 1) {
+    (gap ? counters_.skipped : counters_.lost) += header.frame_number - last_frame_number_ - 1;
+  }
+  any_ = true;
+  run_id_ = header.run_id;
+  last_frame_number_ = header.frame_number;
+}
+
+void FrameClientImpl::take_control(std::span<const std::byte> body) {
+  v1::ControlRecord message;
+  if (protocol::parse_control_record(body, message) && message.has_status()) {
+    statuses_.push_back(to_status(message.status()));
+  }
+}
+
+std::string FrameClientImpl::receive_buffer_advice() const {
+  if (!receiver_ || !subscribed_) {
+    return {};
+  }
+  constexpr std::uint64_t kFrames = 4;
+  const std::uint64_t frame_bytes =
+      std::uint64_t{channel_.width_px} * channel_.height_px * sizeof(float);
+  if (receiver_->buffer_bytes() >= kFrames * frame_bytes) {
+    return {};
+  }
+  return fmt::format(
+      "the UDP receive buffer holds {} bytes, less than {} frames of {} bytes; allow more with: "
+      "sudo sysctl -w net.core.rmem_max={}",
+      receiver_->buffer_bytes(), kFrames, frame_bytes,
+      std::bit_ceil(2 * kFrames * frame_bytes));
+}
+
+}  // namespace
+
+physics::Result<std::unique_ptr<FrameClient>> FrameClient::connect(const std::string& url,
+                                                                   std::int64_t timeout_ns) {
+  const auto parsed = parse_url(url);
+  if (!parsed) {
+    return tl::unexpected<physics::Error>(physics::Error(parsed.error()));
+  }
+  auto connection = ClientConnection::open(*parsed, ClientRole::client, timeout_ns);
+  if (!connection) {
+    return tl::unexpected<physics::Error>(std::move(connection.error()));
+  }
+  return std::make_unique<FrameClientImpl>(std::move(*connection),
+                                           parsed->scheme == Url::Scheme::udp);
+}
+
+}  // namespace emit::server

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <array>
+#include <cerrno>
+
+#include "emit/protocol/codec.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/v1/control.pb.h"
+#include "io/client_connection.hpp"
+
+namespace emit::server {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+
+class TcpHost final : public HostClient {
+ public:
+  explicit TcpHost(ClientConnection connection) : connection_(std::move(connection)) {}
+
+  physics::Result<void> send(const protocol::HostFrameData& frame,
+                             std::int64_t timeout_ns) override {
+    const auto body = encoder_.encode(frame);
+    record_.resize(protocol::kRecordHeaderBytes + body.size());
+    protocol::encode_record_header(
+        protocol::RecordKind::host_frame, static_cast<std::uint32_t>(body.size()),
+        std::span(record_).first<protocol::kRecordHeaderBytes>());
+    std::copy(body.begin(), body.end(), record_.begin() + protocol::kRecordHeaderBytes);
+    return connection_.send(record_, monotonic_now_ns() + timeout_ns);
+  }
+  physics::Result<void> command(HostCommand command, std::int64_t timeout_ns) override {
+    v1::ControlRecord record;
+    record.mutable_command()->set_kind(static_cast<v1::Command::Kind>(command));
+    return connection_.send(record, monotonic_now_ns() + timeout_ns);
+  }
+  physics::Result<std::optional<ServerStatus>> receive_status(std::int64_t timeout_ns) override {
+    const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
+    protocol::Record record;
+    for (;;) {
+      auto received = connection_.receive(record, end_ns);
+      if (!received) {
+        return tl::unexpected<physics::Error>(std::move(received.error()));
+      }
+      if (!*received) {
+        return std::optional<ServerStatus>();
+      }
+      v1::ControlRecord message;
+      if (record.kind == protocol::RecordKind::control &&
+          protocol::parse_control_record(record.body, message) && message.has_status()) {
+        return std::optional<ServerStatus>(to_status(message.status()));
+      }
+    }
+  }
+  const ServerInfo* server() const noexcept override { return &connection_.server(); }
+
+ private:
+  ClientConnection connection_;
+  protocol::HostFrameEncoder encoder_;
+  std::vector<std::byte> record_;
+};
+
+class UdpHost final : public HostClient {
+ public:
+  UdpHost(Fd fd, SocketAddress peer) : fd_(std::move(fd)), peer_(peer) {}
+
+  physics::Result<void> send(const protocol::HostFrameData& frame,
+                             std::int64_t timeout_ns) override {
+    const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
+    const auto body = encoder_.encode(frame);
+    bool retried = false;
+    for (;;) {
+      if (::send(fd_.get(), body.data(), body.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) {
+        return {};
+      }
+      if (errno == ECONNREFUSED && !retried) {
+        // The report belongs to an earlier datagram and takes this call's place; if nobody listens,
+        // the next call tells again.
+        retried = true;
+        continue;
+      }
+      if ((errno != EAGAIN && errno != EINTR) || !wait_for(fd_.get(), POLLOUT, end_ns)) {
+        return make_error(ErrorCode::io,
+                          fmt::format("udp {}: {}", to_string(peer_), error_text(errno)));
+      }
+    }
+  }
+  physics::Result<void> command(HostCommand /*command*/, std::int64_t /*timeout_ns*/) override {
+    return make_error(ErrorCode::unsupported, "commands need a tcp:// connection");
+  }
+  physics::Result<std::optional<ServerStatus>> receive_status(std::int64_t timeout_ns) override {
+    const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
+    std::array<std::byte, 2048> bytes;
+    for (;;) {
+      const ssize_t got = ::recv(fd_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+      if (got < 0) {
+        if (errno != EAGAIN && errno != EINTR) {
+          return make_error(ErrorCode::io,
+                            fmt::format("udp {}: {}", to_string(peer_), error_text(errno)));
+        }
+        if (!wait_for(fd_.get(), POLLIN, end_ns)) {
+          return std::optional<ServerStatus>();
+        }
+        continue;
+      }
+      v1::Status status;
+      if (status.ParseFromArray(bytes.data(), static_cast<int>(got))) {
+        return std::optional<ServerStatus>(to_status(status));
+      }
+    }
+  }
+  const ServerInfo* server() const noexcept override { return nullptr; }
+
+ private:
+  Fd fd_;
+  SocketAddress peer_;
+  protocol::HostFrameEncoder encoder_;
+};
+
+}  // namespace
+
+physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::string& url,
+                                                                 std::int64_t timeout_ns) {
+  const auto parsed = parse_url(url);
+  if (!parsed) {
+    return tl::unexpected<physics::Error>(physics::Error(parsed.error()));
+  }
+  if (parsed->scheme == Url::Scheme::tcp) {
+    auto connection = ClientConnection::open(*parsed, ClientRole::host, timeout_ns);
+    if (!connection) {
+      return tl::unexpected<physics::Error>(std::move(connection.error()));
+    }
+    return std::make_unique<TcpHost>(std::move(*connection));
+  }
+  const auto address = resolve({parsed->host, parsed->port}, SOCK_DGRAM, false);
+  if (!address) {
+    return tl::unexpected<physics::Error>(physics::Error(address.error()));
+  }
+  Fd fd(::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (!fd || ::connect(fd.get(), address->get(), address->length) != 0) {
+    return make_error(ErrorCode::io,
+                      fmt::format("udp {}: {}", to_string(*address), error_text(errno)));
+  }
+  return std::make_unique<UdpHost>(std::move(fd), *address);
+}
+
+}  // namespace emit::server

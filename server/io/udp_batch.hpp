@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <sys/socket.h>
+#include <sys/uio.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "emit/protocol/fragment.hpp"
+
+namespace emit::server {
+
+/// Sends consecutive fragments of a frame from the caller's pixel memory: many per system call, by
+/// generic segmentation offload where the kernel and the path's MTU allow it, else sendmmsg.
+/// Thread: one owner; shared by all clients of it. Real time: RT-safe after construction.
+class UdpBatch {
+ public:
+  UdpBatch();
+
+  enum class Status : std::uint8_t { sent, would_block, no_buffers, no_segmentation, failed };
+  struct Result {
+    Status status = Status::sent;
+    std::uint32_t fragments = 0;  ///< handed to the kernel
+    std::uint64_t bytes = 0;
+    int error = 0;                ///< errno of failed and no_segmentation
+  };
+
+  /// One call's worth of fragments from `first` on, over a connected socket.
+  [[nodiscard]] Result send(int fd, const protocol::Fragmenter& fragments, std::uint32_t first,
+                            bool segmentation) noexcept;
+
+ private:
+  static constexpr std::size_t kMaxBatch = 64;  // limit of UDP_SEGMENT on older kernels
+  static constexpr std::size_t kPieces = 5;
+
+  [[nodiscard]] Result send_segmented(int fd, std::uint32_t count, std::size_t iov_count,
+                                      std::uint64_t bytes, std::uint32_t segment_bytes) noexcept;
+  [[nodiscard]] Result send_many(int fd, std::uint32_t count) noexcept;
+
+  struct Memory {
+    std::array<std::array<std::byte, protocol::kFragmentHeaderBytes>, kMaxBatch> headers;
+    std::array<iovec, kMaxBatch * kPieces> iov;
+    std::array<mmsghdr, kMaxBatch> messages;
+    std::array<std::uint32_t, kMaxBatch> sizes;
+  };
+  std::unique_ptr<Memory> memory_;
+};
+
+/// True when the kernel knows UDP_SEGMENT.
+[[nodiscard]] bool udp_segmentation_supported(int fd) noexcept;
+
+}  // namespace emit::server

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "emit/protocol/reassembler.hpp"
+#include "io/client.hpp"
+#include "io/socket.hpp"
+
+namespace emit::server {
+
+/// Fragments from a UDP socket into a reassembler; takes several datagrams per system call, joined by
+/// the kernel (UDP_GRO) where it can.
+class UdpFrameReceiver {
+ public:
+  /// Errors (io).
+  [[nodiscard]] static physics::Result<UdpFrameReceiver> open(const SocketAddress& peer,
+                                                              const SubscribeOptions& options);
+
+  [[nodiscard]] int fd() const noexcept { return fd_.get(); }
+  [[nodiscard]] std::uint16_t port() const noexcept { return local_address(fd_.get()).port(); }
+  [[nodiscard]] std::uint64_t buffer_bytes() const noexcept { return buffer_bytes_; }
+  /// Asks for room for `frames` frames of `frame_bytes`.
+  void size_buffer(std::uint64_t frame_bytes);
+
+  /// Takes what lies in the socket, at most one batch. Returns the datagrams taken.
+  int take(protocol::Reassembler& reassembler, ReceiveCounters& counters);
+
+ private:
+  static constexpr std::size_t kBatch = 16;
+  static constexpr std::size_t kDatagramBytes = 65536;
+  static constexpr std::size_t kControlBytes = 64;
+
+  explicit UdpFrameReceiver(Fd fd);
+
+  Fd fd_;
+  std::uint64_t buffer_bytes_ = 0;
+  std::uint32_t drops_seen_ = 0;
+  std::vector<std::byte> data_;
+  std::vector<std::byte> control_;
+};
+
+}  // namespace emit::server

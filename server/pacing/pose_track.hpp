@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "emit/physics/frames.hpp"
+#include "emit/protocol/host_frame.hpp"
+
+namespace emit::server {
+
+struct TimedPose {
+  std::int64_t sim_time_ns = 0;
+  physics::Pose pose;
+  std::optional<protocol::PoseRates> rates;
+  bool teleport = false;  ///< no motion between the pose before and this one
+};
+
+struct PoseSample {
+  physics::Pose pose;
+  std::int64_t newest_ns = 0;  ///< time stamp of the newest pose known
+  std::int64_t shown_ns = 0;   ///< instant the pose stands for: the one asked for, or the clamp
+  bool extrapolated = false;   ///< shown_ns lies beyond newest_ns
+  bool stale = false;          ///< asked for more than the horizon beyond newest_ns
+};
+
+/// Recent poses of one body, and where it is at an instant.
+///
+/// Between received poses: linear in position, shortest arc in attitude. Beyond the newest:
+/// p + v t + a t^2 / 2 and q exp(omega t / 2), the dead reckoning "RVW" of DIS; v and omega as given,
+/// else differenced, a always differenced. Before the oldest: the oldest.
+/// Thread: one owner. Real time: RT-safe.
+class PoseTrack {
+ public:
+  static constexpr std::size_t kHistory = 8;
+
+  void clear() noexcept { count_ = 0; }
+  [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
+  /// A pose of the newest instant replaces it; precondition: not older than the newest.
+  void push(const TimedPose& pose) noexcept;
+  /// Precondition: not empty.
+  [[nodiscard]] const TimedPose& newest() const noexcept { return at(count_ - 1); }
+  /// Precondition: not empty, horizon_ns >= 0.
+  [[nodiscard]] PoseSample sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) const noexcept;
+
+ private:
+  struct Motion {
+    glm::dvec3 velocity_m_s{0.0};
+    glm::dvec3 acceleration_m_s2{0.0};
+    glm::dvec3 angular_rate_body_rad_s{0.0};
+  };
+  /// index 0 = oldest.
+  [[nodiscard]] const TimedPose& at(std::size_t index) const noexcept {
+    return poses_[(first_ + index) % kHistory];
+  }
+  [[nodiscard]] Motion motion_at_newest() const noexcept;
+
+  std::array<TimedPose, kHistory> poses_;
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+};
+
+}  // namespace emit::server

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "telemetry/log.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/async.h>
+#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <array>
+
+#include "agents/receiver_connection.hpp"
+
+namespace emit::server {
+namespace {
+
+constexpr std::size_t kQueueLines = 8192;
+
+class SpdLog final : public Log {
+ public:
+  SpdLog(std::shared_ptr<spdlog::details::thread_pool> pool,
+         std::shared_ptr<spdlog::async_logger> logger)
+      : pool_(std::move(pool)), logger_(std::move(logger)) {}
+  ~SpdLog() override { flush(); }
+
+  void write(LogLevel level, const std::string& text) override {
+    static constexpr std::array kLevels{spdlog::level::err, spdlog::level::warn,
+                                        spdlog::level::info, spdlog::level::debug};
+    logger_->log(kLevels[static_cast<std::size_t>(level)], text);
+  }
+  // Lines are written by the pool's thread; ending it writes what is queued.
+  void flush() override { logger_->flush(); }
+
+ private:
+  // The logger only refers to the pool; the pool's thread ends, queue written, with this object.
+  std::shared_ptr<spdlog::details::thread_pool> pool_;
+  std::shared_ptr<spdlog::async_logger> logger_;
+};
+
+class FunctionLog final : public Log {
+ public:
+  explicit FunctionLog(std::function<void(const std::string&)> sink) : sink_(std::move(sink)) {}
+  void write(LogLevel /*level*/, const std::string& text) override { sink_(text); }
+  void flush() override {}
+
+ private:
+  std::function<void(const std::string&)> sink_;
+};
+
+}  // namespace
+
+physics::Result<std::unique_ptr<Log>> make_log(const config::LogConfig& config) {
+  try {
+    auto pool = std::make_shared<spdlog::details::thread_pool>(kQueueLines, 1);
+    spdlog::sink_ptr sink;
+    if (config.file.empty()) {
+      sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+    } else {
+      sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(config.file.string());
+    }
+    auto logger = std::make_shared<spdlog::async_logger>(
+        "emitd", std::move(sink), pool, spdlog::async_overflow_policy::overrun_oldest);
+    logger->set_level(spdlog::level::from_str(config.level));
+    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%f%z %l %v");
+    logger->flush_on(spdlog::level::info);
+    return std::make_unique<SpdLog>(std::move(pool), std::move(logger));
+  } catch (const std::exception& error) {
+    return physics::make_error(physics::ErrorCode::io,
+                               fmt::format("log {}: {}", config.file.string(), error.what()));
+  }
+}
+
+std::unique_ptr<Log> make_log(std::function<void(const std::string&)> sink) {
+  return std::make_unique<FunctionLog>(std::move(sink));
+}
+
+bool DistinctTable::note(const std::string& text, std::int64_t now_ns) {
+  if (entries_.size() >= kMaxEntries && entries_.find(text) == entries_.end()) {
+    return true;
+  }
+  Entry& entry = entries_[text];
+  if (entry.count == 0) {
+    entry.first_ns = now_ns;
+  }
+  entry.last_ns = now_ns;
+  ++entry.count;
+  std::uint64_t power = 1;
+  while (power < entry.count) {
+    power *= 10;
+  }
+  return power == entry.count;
+}
+
+namespace {
+
+/// Peers choose some of the text: it must not break lines or quotes of the log.
+std::string printable(const Event& event) {
+  std::string text(event.text.data());
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F || c == '"') {
+      c = '?';
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+EventText describe(const Event& event) {
+  const std::string text = printable(event);
+  const auto connection = [&] { return fmt::format("{}.{}", connection_place(event.a), event.a >> kConnectionPlaceBits); };
+  switch (event.kind) {
+    case EventKind::run_started:
+      return {LogLevel::info, fmt::format("event=run_started run_id={}", event.a), false};
+    case EventKind::host_epoch:
+      return {LogLevel::info, fmt::format("event=host_restarted host_run_id={}", event.a), false};
+    case EventKind::command: {
+      static constexpr std::array kNames{"unspecified", "start", "stop", "hold", "step", "reset"};
+      return {LogLevel::info,
+              fmt::format("event=command kind={}", event.a < kNames.size() ? kNames[event.a] : "?"),
+              false};
+    }
+    case EventKind::refused:
+      return {LogLevel::warn,
+              fmt::format("event=refused status={} text=\"{}\"", event.a,
+                          text.empty() ? status_text(static_cast<StatusCode>(event.a), 0) : text),
+              true};
+    case EventKind::connected:
+      return {LogLevel::info, fmt::format("event=connected connection={} peer={}", connection(), text),
+              false};
+    case EventKind::disconnected:
+      return {LogLevel::info,
+              fmt::format("event=disconnected connection={} why=\"{}\"", connection(), text), false};
+    case EventKind::hello: {
+      static constexpr std::array kRoles{"none", "host", "client", "recorder"};
+      return {LogLevel::info,
+              fmt::format("event=hello connection={} role={} software=\"{}\"", connection(),
+                          event.b < kRoles.size() ? kRoles[event.b] : "?", text),
+              false};
+    }
+    case EventKind::subscribed:
+      return {LogLevel::info,
+              fmt::format("event=subscribed connection={} channel={} transport={}", connection(),
+                          event.b, text),
+              false};
+    case EventKind::client_failed:
+      return {LogLevel::warn,
+              fmt::format("event=client_failed connection={} why=\"{}\"", connection(),
+                          error_text(static_cast<int>(event.b))),
+              false};
+    case EventKind::client_slow:
+      return {LogLevel::warn,
+              fmt::format("event=disconnected_slow connection={} why=\"fell behind\"", connection()),
+              false};
+    case EventKind::no_gso:
+      return {LogLevel::warn,
+              fmt::format("event=no_segmentation_offload connection={} why=\"{}\"", connection(),
+                          error_text(static_cast<int>(event.b))),
+              false};
+    case EventKind::source_failed:
+      return {LogLevel::error, fmt::format("event=source_failed why=\"{}\"", text), true};
+    case EventKind::journal_failed:
+      return {LogLevel::error,
+              fmt::format("event=journal_failed why=\"{}\" effect=\"journal file ends here\"", text),
+              true};
+    case EventKind::journal_overrun:
+      return {LogLevel::error,
+              fmt::format("event=journal_overrun sequence={} effect=\"journal cannot be replayed\"",
+                          event.a),
+              false};
+    case EventKind::slots_missed:
+      return {LogLevel::warn, fmt::format("event=slots_missed count={}", event.a), true};
+  }
+  return {LogLevel::error, "event=unknown", true};
+}
+
+}  // namespace emit::server

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "agents/messages.hpp"
+#include "emit/config/daemon_config.hpp"
+#include "emit/physics/error.hpp"
+
+namespace emit::server {
+
+enum class LogLevel : std::uint8_t {
+  error,  ///< the operator must act
+  warn,   ///< the result is degraded
+  info,   ///< a change of state
+  debug,  ///< for developers
+};
+
+/// Log lines as key=value text. Never blocks the writer: the queue is preallocated and drops its
+/// oldest line when the disk or terminal cannot keep up.
+/// Thread: any. Not for agents on the frame path, which push Events instead.
+class Log {
+ public:
+  Log(const Log&) = delete;
+  Log& operator=(const Log&) = delete;
+  virtual ~Log() = default;
+  virtual void write(LogLevel level, const std::string& text) = 0;
+  /// Hands over everything written so far; for the end of the program.
+  virtual void flush() = 0;
+
+ protected:
+  Log() = default;
+};
+
+/// spdlog, asynchronous. Errors (io): the log file.
+[[nodiscard]] physics::Result<std::unique_ptr<Log>> make_log(const config::LogConfig& config);
+/// Hands lines to a function.
+[[nodiscard]] std::unique_ptr<Log> make_log(std::function<void(const std::string&)> sink);
+
+/// Keeps each distinct warning once with a count, so that a storm of bad datagrams is two lines in
+/// the log and not a million: one is written when it first happens, again at 10, 100, 1000, ...
+class DistinctTable {
+ public:
+  struct Entry {
+    std::uint64_t count = 0;
+    std::int64_t first_ns = 0;
+    std::int64_t last_ns = 0;
+  };
+  /// True when this occurrence is to be written.
+  [[nodiscard]] bool note(const std::string& text, std::int64_t now_ns);
+  [[nodiscard]] const std::map<std::string, Entry>& entries() const noexcept { return entries_; }
+
+ private:
+  static constexpr std::size_t kMaxEntries = 256;
+  std::map<std::string, Entry> entries_;
+};
+
+struct EventText {
+  LogLevel level = LogLevel::info;
+  std::string text;
+  bool distinct = false;  ///< repeats collapse in the DistinctTable
+};
+[[nodiscard]] EventText describe(const Event& event);
+
+}  // namespace emit::server

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <glm/ext/vector_double3.hpp>
+#include <string>
+#include <vector>
+
+#include "emit/renderer/renderer.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+/// Small worlds for renderer tests, written as glTF and loaded like any other scene.
+namespace emit::test {
+
+/// Flat face of four corners, counter-clockwise seen from outside, world axes (east, north, up).
+struct Quad {
+  glm::dvec3 a, b, c, d;
+};
+
+/// Ground rectangle centred on the origin at height 0, facing up.
+[[nodiscard]] Quad ground(double half_east_m, double half_north_m, double up_m = 0.0);
+/// Five visible faces of an upright box between two corners (no bottom).
+[[nodiscard]] std::vector<Quad> box(const glm::dvec3& low, const glm::dvec3& high);
+
+/// Writes the quads as `name`.gltf into a fresh folder of the running test.
+[[nodiscard]] std::filesystem::path write_quads(const std::string& name,
+                                                const std::vector<Quad>& quads);
+
+/// A scenario around one static file: one material, no atmosphere, band 8-12, 21 June at 48.56 N.
+/// Sim time 0 is 06:00 UTC. The surface answers at once (time constants of a millisecond), so that
+/// temperature is the equilibrium of the last interval.
+[[nodiscard]] scene::ScenarioDesc instant_scenario(const std::filesystem::path& gltf);
+
+/// Constant weather from sim time 0.
+[[nodiscard]] scene::WeatherSample weather(double direct_w_m2, double diffuse_w_m2,
+                                           double longwave_w_m2, double environment_k);
+
+/// Pixel to world, from the depth plane.
+[[nodiscard]] glm::dvec3 world_point(const scene::SensorDesc& sensor, const physics::Pose& pose,
+                                     std::uint32_t x, std::uint32_t y, double depth_m);
+
+}  // namespace emit::test

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// The structs that C++ and GLSL share lie at the same offsets on both sides.
+#include <gtest/gtest.h>
+
+#include <cstddef>
+
+#include "gl/egl_context.hpp"
+#include "gl/program.hpp"
+#include "shared/frame_params.glsl.h"
+
+namespace emit::renderer {
+namespace {
+
+#define EXPECT_OFFSET(program, instance, type, member) \
+  EXPECT_EQ((program).uniform_offset(instance "." #member), static_cast<GLint>(offsetof(type, member)))
+
+TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
+  auto context = gl::EglContext::create(-1, false);
+  ASSERT_TRUE(context) << context.error().text;
+  const gl::Define taps[] = {{"EMIT_BLOCKER_TAPS", "8u"}, {"EMIT_FILTER_TAPS", "32u"}};
+  auto thermal = gl::Program::compute("passes/thermal.comp", taps);
+  ASSERT_TRUE(thermal) << thermal.error().text;
+  auto radiance = gl::Program::compute("passes/radiance.comp");
+  ASSERT_TRUE(radiance) << radiance.error().text;
+
+  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, relworld_from_sensor);
+  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, tan_half_fov);
+  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, format_px);
+  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, obscurance);
+  EXPECT_OFFSET(*radiance, "frame", gpu::FrameParams, bands);
+  EXPECT_OFFSET(*radiance, "frame", gpu::FrameParams, sun_now);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].light_row0);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].drift);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[3].scale);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, sun_start);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, flux_end);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, casters);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, info);
+  EXPECT_EQ(thermal->uniform_offset("taps.blocker[0]"), 0);
+  EXPECT_EQ(thermal->uniform_offset("taps.filter_[0]"),
+            static_cast<GLint>(offsetof(gpu::TapParams, filter_)));
+  EXPECT_EQ(radiance->uniform_offset("bands[1].sun_irradiance_w_m2"),
+            static_cast<GLint>(sizeof(gpu::BandParams) +
+                               offsetof(gpu::BandParams, sun_irradiance_w_m2)));
+  EXPECT_EQ(radiance->uniform_offset("bands[3].lut_last_node"),
+            static_cast<GLint>(3 * sizeof(gpu::BandParams) +
+                               offsetof(gpu::BandParams, lut_last_node)));
+  // Tables fetched as texels of four floats.
+  EXPECT_EQ(sizeof(gpu::InstanceParams), 4U * 16U);
+  EXPECT_EQ(sizeof(gpu::MaterialParams), 4U * 16U);
+  EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
+  EXPECT_EQ(offsetof(gpu::MaterialParams, band_emissivity_frac), 32U);
+  EXPECT_EQ(sizeof(gpu::RelaxationParams), 2U * 16U);
+}
+
+}  // namespace
+}  // namespace emit::renderer

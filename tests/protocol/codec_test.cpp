@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/codec.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "emit/protocol/convert.hpp"
+#include "emit/v1/control.pb.h"
+#include "protocol/allocation_counter.hpp"
+#include "protocol/hex.hpp"
+#include "protocol/host_frames.hpp"
+
+namespace emit::protocol {
+namespace {
+
+using Bytes = std::vector<std::byte>;
+
+Bytes encoded(const v1::HostFrame& message) {
+  Bytes bytes(message.ByteSizeLong());
+  message.SerializeToArray(bytes.data(), static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+v1::HostFrame valid_message(std::uint32_t entities = 3) {
+  v1::HostFrame message;
+  to_proto(*test::make_host_frame(entities), message);
+  return message;
+}
+
+DecodeStatus decode(const Bytes& bytes) {
+  HostFrameDecoder decoder;
+  const auto out = std::make_unique<HostFrameData>();
+  return decode_host_frame(bytes, decoder, *out);
+}
+
+void expect_equal(const std::optional<PoseRates>& a, const std::optional<PoseRates>& b) {
+  ASSERT_EQ(a.has_value(), b.has_value());
+  if (!a) return;
+  EXPECT_EQ(a->velocity_world_m_s, b->velocity_world_m_s);
+  EXPECT_EQ(a->angular_rate_body_rad_s, b->angular_rate_body_rad_s);
+}
+
+void expect_equal(const HostFrameData& a, const HostFrameData& b) {
+  EXPECT_EQ(a.frame_number, b.frame_number);
+  EXPECT_EQ(a.sim_time_ns, b.sim_time_ns);
+  EXPECT_EQ(a.run_id, b.run_id);
+  EXPECT_EQ(a.seeker.position_world_m, b.seeker.position_world_m);
+  EXPECT_EQ(a.seeker.world_from_body, b.seeker.world_from_body);
+  expect_equal(a.seeker_rates, b.seeker_rates);
+  ASSERT_EQ(a.entity_count, b.entity_count);
+  for (std::uint32_t i = 0; i < a.entity_count; ++i) {
+    EXPECT_EQ(a.entities[i].entity_id, b.entities[i].entity_id);
+    EXPECT_EQ(a.entities[i].on, b.entities[i].on);
+    EXPECT_EQ(a.entities[i].teleport, b.entities[i].teleport);
+    ASSERT_EQ(a.entities[i].has_pose, b.entities[i].has_pose);
+    if (!a.entities[i].has_pose) continue;
+    EXPECT_EQ(a.entities[i].pose.position_world_m, b.entities[i].pose.position_world_m);
+    EXPECT_EQ(a.entities[i].pose.world_from_body, b.entities[i].pose.world_from_body);
+    expect_equal(a.entities[i].rates, b.entities[i].rates);
+  }
+  ASSERT_EQ(a.environment.has_value(), b.environment.has_value());
+  if (!a.environment) return;
+  EXPECT_EQ(a.environment->direct_normal_w_m2, b.environment->direct_normal_w_m2);
+  EXPECT_EQ(a.environment->diffuse_horizontal_w_m2, b.environment->diffuse_horizontal_w_m2);
+  EXPECT_EQ(a.environment->longwave_down_w_m2, b.environment->longwave_down_w_m2);
+  EXPECT_EQ(a.environment->air_k, b.environment->air_k);
+  EXPECT_EQ(a.environment->wind_m_s, b.environment->wind_m_s);
+  EXPECT_EQ(a.environment->cloud_frac, b.environment->cloud_frac);
+  EXPECT_EQ(a.environment->environment_k, b.environment->environment_k);
+  EXPECT_EQ(a.environment->film_w_m2_k, b.environment->film_w_m2_k);
+}
+
+TEST(HostFrameCodec, RoundTripsBitForBit) {
+  for (const std::uint32_t entities : {0u, 1u, 9u, 128u}) {
+    const auto sent = test::make_host_frame(entities);
+    if (entities == 1) sent->environment.reset();
+    if (entities == 9) sent->seeker_rates.reset();
+    HostFrameEncoder encoder;
+    HostFrameDecoder decoder;
+    const auto received = std::make_unique<HostFrameData>();
+    received->received_ns = 5;
+    ASSERT_EQ(decode_host_frame(encoder.encode(*sent), decoder, *received), DecodeStatus::ok);
+    expect_equal(*received, *sent);
+    EXPECT_EQ(received->received_ns, 0);
+  }
+}
+
+TEST(HostFrameCodec, DecodesTheGoldenBytes) {
+  // protocol_version 1, frame_number 300, sim_time_ns 5, seeker at (1, 2, 0) heading north-up
+  // identity, run_id 7: written by hand after the Protobuf encoding rules.
+  const auto bytes = test::from_hex(
+      "0801"
+      "10ac02"
+      "190500000000000000"
+      "221f"
+      "0a12"
+      "09000000000000f03f"
+      "110000000000000040"
+      "1209"
+      "09000000000000f03f"
+      "3807");
+  HostFrameDecoder decoder;
+  const auto out = std::make_unique<HostFrameData>();
+  ASSERT_EQ(decode_host_frame(bytes, decoder, *out), DecodeStatus::ok);
+  EXPECT_EQ(out->frame_number, 300u);
+  EXPECT_EQ(out->sim_time_ns, 5);
+  EXPECT_EQ(out->run_id, 7u);
+  EXPECT_EQ(out->seeker.position_world_m, glm::dvec3(1.0, 2.0, 0.0));
+  EXPECT_EQ(out->seeker.world_from_body, glm::dquat(1.0, 0.0, 0.0, 0.0));
+  HostFrameEncoder encoder;
+  EXPECT_EQ(test::to_hex(encoder.encode(*out)), test::to_hex(bytes));
+}
+
+TEST(HostFrameCodec, DoesNotAllocateInSteadyState) {
+  const auto sent = test::make_host_frame(kMaxEntitiesPerFrame);
+  HostFrameEncoder encoder;
+  HostFrameDecoder decoder;
+  const auto out = std::make_unique<HostFrameData>();
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(decode_host_frame(encoder.encode(*sent), decoder, *out), DecodeStatus::ok);
+  }
+  const std::uint64_t before = test::allocation_count();
+  DecodeStatus status = DecodeStatus::malformed;
+  for (int i = 0; i < 100; ++i) status = decode_host_frame(encoder.encode(*sent), decoder, *out);
+  const std::uint64_t after = test::allocation_count();
+  EXPECT_EQ(status, DecodeStatus::ok);
+  EXPECT_EQ(after - before, 0u);
+}
+
+TEST(HostFrameCodec, AQuaternionSlightlyOffUnitLengthIsNormalisedOnce) {
+  auto message = valid_message(0);
+  message.mutable_seeker()->mutable_world_from_body()->set_w(0.505);
+  HostFrameDecoder decoder;
+  const auto first = std::make_unique<HostFrameData>();
+  ASSERT_EQ(decode_host_frame(encoded(message), decoder, *first), DecodeStatus::ok);
+  const auto& q = first->seeker.world_from_body;
+  EXPECT_NEAR(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z, 1.0, 1e-15);
+  // What was decoded decodes to the same bits: a journal replays exactly.
+  HostFrameEncoder encoder;
+  const auto second = std::make_unique<HostFrameData>();
+  ASSERT_EQ(decode_host_frame(encoder.encode(*first), decoder, *second), DecodeStatus::ok);
+  EXPECT_EQ(second->seeker.world_from_body, q);
+}
+
+TEST(HostFrameCodec, RefusesPosesThatAreNoPoses) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  using Change = void (*)(v1::Pose&);
+  const Change changes[] = {
+      [](v1::Pose& p) { p.mutable_position_m()->set_x(kNan); },
+      [](v1::Pose& p) { p.mutable_position_m()->set_z(-kInf); },
+      [](v1::Pose& p) { p.mutable_position_m()->set_y(1e9); },
+      [](v1::Pose& p) { p.mutable_world_from_body()->set_x(kNan); },
+      [](v1::Pose& p) { p.mutable_world_from_body()->set_w(kInf); },
+      [](v1::Pose& p) { p.mutable_world_from_body()->set_w(2.0); },
+      [](v1::Pose& p) { p.mutable_world_from_body()->Clear(); },
+      [](v1::Pose& p) { p.clear_position_m(); },
+      [](v1::Pose& p) { p.clear_world_from_body(); },
+      [](v1::Pose& p) { p.mutable_velocity_m_s()->set_x(kNan); },
+      [](v1::Pose& p) { p.mutable_angular_rate_rad_s()->set_x(kInf); },
+      [](v1::Pose& p) {
+        p.mutable_velocity_m_s();
+        p.clear_angular_rate_rad_s();
+      },
+  };
+  for (const Change change : changes) {
+    auto seeker = valid_message();
+    change(*seeker.mutable_seeker());
+    EXPECT_EQ(decode(encoded(seeker)), DecodeStatus::invalid_pose) << seeker.ShortDebugString();
+    auto entity = valid_message();
+    change(*entity.mutable_entities(0)->mutable_pose());
+    EXPECT_EQ(decode(encoded(entity)), DecodeStatus::invalid_pose) << entity.ShortDebugString();
+  }
+  auto none = valid_message();
+  none.clear_seeker();
+  EXPECT_EQ(decode(encoded(none)), DecodeStatus::invalid_pose);
+}
+
+TEST(HostFrameCodec, RefusesEnvironmentsOutsideTheirRanges) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  using Change = void (*)(v1::Environment&);
+  const Change changes[] = {
+      [](v1::Environment& e) { e.set_direct_normal_w_m2(-1.0); },
+      [](v1::Environment& e) { e.set_diffuse_horizontal_w_m2(kNan); },
+      [](v1::Environment& e) { e.set_longwave_down_w_m2(1e6); },
+      [](v1::Environment& e) { e.set_air_k(0.0); },
+      [](v1::Environment& e) { e.set_wind_m_s(-0.1); },
+      [](v1::Environment& e) { e.set_cloud_frac(1.01); },
+      [](v1::Environment& e) { e.set_environment_k(0.0); },
+      [](v1::Environment& e) { e.set_film_w_m2_k(kNan); },
+  };
+  for (const Change change : changes) {
+    auto message = valid_message();
+    change(*message.mutable_environment());
+    EXPECT_EQ(decode(encoded(message)), DecodeStatus::invalid_environment);
+  }
+}
+
+TEST(HostFrameCodec, RefusesOtherVersionsEvenWhereTheRestCannotBeParsed) {
+  auto message = valid_message();
+  message.set_protocol_version(2);
+  EXPECT_EQ(decode(encoded(message)), DecodeStatus::wrong_version);
+  message.clear_protocol_version();
+  EXPECT_EQ(decode(encoded(message)), DecodeStatus::wrong_version);
+  // Version 2 with a seeker whose content is no Pose.
+  EXPECT_EQ(decode(test::from_hex("08022202ffff")), DecodeStatus::wrong_version);
+  EXPECT_EQ(decode(test::from_hex("08012202ffff")), DecodeStatus::malformed);
+}
+
+TEST(HostFrameCodec, RefusesTooManyEntitiesTooManyBytesAndIdsTwice) {
+  auto message = valid_message(128);
+  EXPECT_EQ(decode(encoded(message)), DecodeStatus::ok);
+  message.add_entities()->set_entity_id(9999);
+  EXPECT_EQ(decode(encoded(message)), DecodeStatus::oversize);
+  EXPECT_EQ(decode(Bytes(kMaxHostFrameBytes + 1)), DecodeStatus::oversize);
+  auto twice = valid_message(3);
+  twice.mutable_entities(2)->set_entity_id(twice.entities(0).entity_id());
+  EXPECT_EQ(decode(encoded(twice)), DecodeStatus::malformed);
+}
+
+TEST(HostFrameCodec, NamesTheFrameThatItRefuses) {
+  auto message = valid_message();
+  message.mutable_seeker()->mutable_position_m()->set_x(std::numeric_limits<double>::infinity());
+  HostFrameDecoder decoder;
+  const auto out = std::make_unique<HostFrameData>();
+  ASSERT_EQ(decode_host_frame(encoded(message), decoder, *out), DecodeStatus::invalid_pose);
+  EXPECT_EQ(out->frame_number, 42u);
+  EXPECT_EQ(out->run_id, 0xABCDEFu);
+  EXPECT_EQ(out->sim_time_ns, -1'500'000'000);
+}
+
+TEST(HostFrameCodec, IgnoresFieldsOfLaterVersionsThatOnlyAdd) {
+  auto bytes = encoded(valid_message());
+  for (const std::byte byte : test::from_hex("fa06036162637d010203048107aabbccddeeff0011")) {
+    bytes.push_back(byte);
+  }
+  EXPECT_EQ(decode(bytes), DecodeStatus::ok);
+}
+
+TEST(ControlRecord, AHostFrameWithinIsFoundWithoutParsing) {
+  v1::ControlRecord record;
+  *record.mutable_host_frame() = valid_message();
+  std::vector<std::byte> wire;
+  append_control_record(record, wire);
+  const auto body = std::span<const std::byte>(wire).subspan(kRecordHeaderBytes);
+  const auto inner = host_frame_in_control_record(body);
+  EXPECT_TRUE(std::ranges::equal(inner, encoded(record.host_frame())));
+  EXPECT_TRUE(host_frame_in_control_record(body.first(body.size() - 1)).empty());
+
+  v1::ControlRecord other;
+  other.mutable_command()->set_kind(v1::Command::KIND_STEP);
+  std::vector<std::byte> command;
+  append_control_record(other, command);
+  const auto command_body = std::span<const std::byte>(command).subspan(kRecordHeaderBytes);
+  EXPECT_TRUE(host_frame_in_control_record(command_body).empty());
+  v1::ControlRecord parsed;
+  ASSERT_TRUE(parse_control_record(command_body, parsed));
+  EXPECT_EQ(parsed.command().kind(), v1::Command::KIND_STEP);
+  EXPECT_FALSE(parse_control_record({}, parsed));
+}
+
+TEST(DecodeStatus, HasTheNumbersOfStatusCode) {
+  for (const auto status :
+       {DecodeStatus::ok, DecodeStatus::wrong_version, DecodeStatus::oversize,
+        DecodeStatus::malformed, DecodeStatus::invalid_pose, DecodeStatus::invalid_environment}) {
+    EXPECT_TRUE(v1::Status::Code_IsValid(static_cast<int>(status)));
+    EXPECT_NE(to_string(status), "unknown");
+  }
+}
+
+}  // namespace
+}  // namespace emit::protocol

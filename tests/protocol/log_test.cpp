@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/record/log.hpp"
+
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
+#include <google/protobuf/dynamic_message.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "emit/protocol/record/mcap_reader.hpp"
+#include "emit/protocol/record/mcap_writer.hpp"
+#include "emit/v1/control.pb.h"
+#include "protocol/host_frames.hpp"
+
+namespace emit::protocol {
+namespace {
+
+using ::testing::HasSubstr;
+
+class LogFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    path_ = std::filesystem::path(EMIT_TEST_BINARY_DIR) /
+            (std::string("log_test_") + info->name() + ".mcap");
+    std::filesystem::remove(path_);
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+
+  [[nodiscard]] std::string content() const {
+    std::ifstream file(path_, std::ios::binary);
+    std::string bytes(std::filesystem::file_size(path_), '\0');
+    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return bytes;
+  }
+  void set_content(std::string_view bytes) const {
+    std::ofstream file(path_, std::ios::binary | std::ios::trunc);
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  }
+
+  /// Host frames 1..count, 5 ms apart, each followed by a journal entry.
+  static void write_messages(LogWriter& writer, std::uint64_t count) {
+    auto frame = test::make_host_frame(2);
+    for (std::uint64_t i = 1; i <= count; ++i) {
+      frame->frame_number = i;
+      frame->sim_time_ns = static_cast<std::int64_t>(i) * 5'000'000;
+      ASSERT_TRUE(writer.write_host(*frame, frame->sim_time_ns));
+      v1::JournalEntry entry;
+      entry.set_sequence(i);
+      entry.set_wall_time_ns(frame->sim_time_ns);
+      entry.mutable_frame()->set_frame_number(i);
+      entry.mutable_frame()->set_radiance_crc32c(static_cast<std::uint32_t>(i * 77));
+      ASSERT_TRUE(writer.write_journal(entry));
+    }
+  }
+
+  struct Counts {
+    std::uint64_t host = 0;
+    std::uint64_t journal = 0;
+    std::string error;
+    std::string truncation;
+  };
+  /// Reads everything and checks order and values on the way.
+  [[nodiscard]] Counts read_all() const {
+    Counts counts;
+    auto reader = LogReader::open(path_);
+    if (!reader) {
+      counts.error = reader.error().text;
+      return counts;
+    }
+    while (true) {
+      const auto more = reader->next();
+      if (!more) {
+        counts.error = more.error().text;
+        break;
+      }
+      if (!*more) break;
+      if (reader->topic() == LogTopic::host) {
+        EXPECT_EQ(reader->host().frame_number, ++counts.host);
+        EXPECT_EQ(reader->host().entity_count, 2u);
+        EXPECT_EQ(reader->log_time_ns(), reader->host().sim_time_ns);
+      } else {
+        EXPECT_EQ(reader->journal().sequence(), ++counts.journal);
+        EXPECT_EQ(reader->journal().frame().radiance_crc32c(), counts.journal * 77);
+      }
+    }
+    counts.truncation = reader->truncation().value_or("");
+    return counts;
+  }
+
+  std::filesystem::path path_;
+};
+
+TEST_F(LogFile, RoundTripsBothTopicsChunkedAndPlain) {
+  for (const std::uint32_t chunk_bytes : {0u, 1u, 5000u, 1u << 20}) {
+    auto writer = LogWriter::create(path_, {.chunk_bytes = chunk_bytes, .software = "test 1"});
+    ASSERT_TRUE(writer) << writer.error().text;
+    write_messages(*writer, 100);
+    ASSERT_TRUE(writer->close());
+    EXPECT_TRUE(writer->close());
+    EXPECT_FALSE(writer->flush());
+    const Counts counts = read_all();
+    EXPECT_EQ(counts.error, "");
+    EXPECT_EQ(counts.truncation, "");
+    EXPECT_EQ(counts.host, 100u);
+    EXPECT_EQ(counts.journal, 100u);
+  }
+}
+
+TEST_F(LogFile, AKilledWriterLeavesAllButTheLastFlushInterval) {
+  auto writer = LogWriter::create(path_, {.flush_interval_ns = 100'000'000});
+  ASSERT_TRUE(writer);
+  write_messages(*writer, 110);
+  // The file as a killed process leaves it: the writer is still open.
+  const Counts counts = read_all();
+  EXPECT_EQ(counts.error, "");
+  EXPECT_THAT(counts.truncation, HasSubstr("ends without a footer"));
+  EXPECT_GE(counts.host, 90u);
+  EXPECT_LT(counts.host, 110u);
+  ASSERT_TRUE(writer->flush());
+  EXPECT_EQ(read_all().journal, 110u);
+}
+
+TEST_F(LogFile, EveryCutOffTailIsReadableUpToTheCut) {
+  {
+    auto writer = LogWriter::create(path_, {.chunk_bytes = 900});
+    ASSERT_TRUE(writer);
+    write_messages(*writer, 6);
+  }
+  const std::string whole = content();
+  EXPECT_EQ(read_all().truncation, "");
+  std::uint64_t before = 0;
+  std::mt19937 random(2);
+  for (std::size_t size = 8; size < whole.size(); size += 1 + random() % 41) {
+    set_content(std::string_view(whole).substr(0, size));
+    const Counts counts = read_all();
+    ASSERT_EQ(counts.error, "") << size;
+    ASSERT_THAT(counts.truncation, HasSubstr("offset ")) << size;
+    ASSERT_GE(counts.host + counts.journal, before) << size;
+    before = counts.host + counts.journal;
+  }
+  EXPECT_EQ(before, 12u);
+}
+
+TEST_F(LogFile, ADamagedByteIsAnErrorOrChangesNothingThatIsRead) {
+  {
+    auto writer = LogWriter::create(path_, {.chunk_bytes = 900});
+    ASSERT_TRUE(writer);
+    write_messages(*writer, 4);
+  }
+  const std::string whole = content();
+  std::mt19937 random(3);
+  int errors = 0;
+  for (int i = 0; i < 400; ++i) {
+    std::string bytes = whole;
+    bytes[random() % bytes.size()] ^= static_cast<char>(1 + random() % 255);
+    set_content(bytes);
+    auto reader = LogReader::open(path_);
+    if (!reader) {
+      ++errors;
+      continue;
+    }
+    while (true) {
+      const auto more = reader->next();
+      if (!more) {
+        EXPECT_THAT(more.error().text, HasSubstr(path_.string() + ": offset "));
+        ++errors;
+        break;
+      }
+      if (!*more) break;
+    }
+  }
+  EXPECT_GT(errors, 40);
+}
+
+TEST_F(LogFile, AFlippedBitInAChunkIsFoundByItsCrc) {
+  {
+    auto writer = LogWriter::create(path_);
+    ASSERT_TRUE(writer);
+    write_messages(*writer, 4);
+  }
+  std::string bytes = content();
+  std::size_t offset = 8;  // walk the records to the chunk
+  auto length_at = [&](std::size_t at) {
+    std::uint64_t length = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+      length |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[at + 1 + i]))
+                << (8 * i);
+    }
+    return length;
+  };
+  while (bytes[offset] != 6) offset += 9 + length_at(offset);
+  bytes[offset + 300] ^= 1;
+  set_content(bytes);
+  const Counts counts = read_all();
+  EXPECT_THAT(counts.error, HasSubstr("offset " + std::to_string(offset) + ": chunk CRC"));
+  EXPECT_EQ(counts.host, 0u);
+}
+
+TEST_F(LogFile, OtherFilesAreRefusedByName) {
+  EXPECT_THAT(read_all().error, HasSubstr("no such file"));
+  set_content("t_sim,x,y,z\n");
+  EXPECT_THAT(read_all().error, HasSubstr(path_.string() + ": offset 0: not an MCAP file"));
+  set_content("");
+  EXPECT_THAT(read_all().error, HasSubstr("not an MCAP file"));
+  const auto directory = LogReader::open(path_.parent_path());
+  ASSERT_FALSE(directory);
+  EXPECT_THAT(directory.error().text, HasSubstr("is a directory"));
+  const auto writer = LogWriter::create(path_ / "missing" / "a.mcap");
+  ASSERT_FALSE(writer);
+  EXPECT_EQ(writer.error().code, physics::ErrorCode::io);
+}
+
+TEST_F(LogFile, ATopicOfAnotherTypeIsRefusedAndOtherTopicsAreSkipped) {
+  {
+    auto mcap = McapWriter::create(path_, {});
+    ASSERT_TRUE(mcap);
+    const auto schema = mcap->add_schema("pkg.Other", "protobuf", "");
+    const auto other = mcap->add_channel(*schema, "camera", "protobuf");
+    const auto host = mcap->add_channel(*schema, "host", "protobuf");
+    ASSERT_TRUE(host);
+    ASSERT_TRUE(mcap->write(*other, 1, 0, 0, {}));
+    ASSERT_TRUE(mcap->write(*host, 1, 0, 0, {}));
+    EXPECT_FALSE(mcap->write(77, 1, 0, 0, {}));
+    EXPECT_FALSE(mcap->write(*host, 1, -1, 0, {}));
+  }
+  EXPECT_THAT(read_all().error, HasSubstr("topic 'host' holds protobuf 'pkg.Other'"));
+}
+
+TEST_F(LogFile, InvalidHostFramesAreErrorsThatNameTheFrame) {
+  {
+    auto writer = LogWriter::create(path_);
+    ASSERT_TRUE(writer);
+    auto frame = test::make_host_frame(0);
+    frame->seeker.world_from_body = {2.0, 0.0, 0.0, 0.0};
+    ASSERT_TRUE(writer->write_host(*frame, 1));
+  }
+  EXPECT_THAT(read_all().error, HasSubstr("(frame 42): invalid pose"));
+}
+
+TEST_F(LogFile, WriteErrorsAreReportedAndFinal) {
+  auto writer = LogWriter::create("/dev/full");
+  ASSERT_FALSE(writer);
+  EXPECT_THAT(writer.error().text, HasSubstr("/dev/full: offset 0: cannot write"));
+}
+
+/// Decodes the messages with nothing but what the file says about them.
+TEST_F(LogFile, DescribesItselfWithoutTheProtoFiles) {
+  {
+    auto writer = LogWriter::create(path_);
+    ASSERT_TRUE(writer);
+    write_messages(*writer, 3);
+  }
+  auto reader = McapReader::open(path_);
+  ASSERT_TRUE(reader);
+  int decoded = 0;
+  while (true) {
+    const auto more = reader->next();
+    ASSERT_TRUE(more) << more.error().text;
+    if (!*more) break;
+    const McapMessage& message = reader->message();
+    const McapChannel* channel = reader->channel(message.channel_id);
+    ASSERT_NE(channel, nullptr);
+    const McapSchema* schema = reader->schema(channel->schema_id);
+    ASSERT_NE(schema, nullptr);
+    EXPECT_EQ(schema->encoding, "protobuf");
+
+    google::protobuf::FileDescriptorSet files;
+    ASSERT_TRUE(files.ParseFromString(schema->data));
+    google::protobuf::DescriptorPool pool;
+    for (const auto& file : files.file()) ASSERT_NE(pool.BuildFile(file), nullptr) << file.name();
+    const auto* type = pool.FindMessageTypeByName(schema->name);
+    ASSERT_NE(type, nullptr);
+    google::protobuf::DynamicMessageFactory factory(&pool);
+    const std::unique_ptr<google::protobuf::Message> dynamic(factory.GetPrototype(type)->New());
+    ASSERT_TRUE(
+        dynamic->ParseFromArray(message.data.data(), static_cast<int>(message.data.size())));
+    const bool is_host = channel->topic == kHostTopic;
+    const auto* field = type->FindFieldByName(is_host ? "frame_number" : "sequence");
+    ASSERT_NE(field, nullptr);
+    EXPECT_EQ(dynamic->GetReflection()->GetUInt64(*dynamic, field), message.sequence);
+    ++decoded;
+  }
+  EXPECT_EQ(decoded, 6);
+}
+
+}  // namespace
+}  // namespace emit::protocol

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace emit::test {
+
+/// Folder of its own for each test, removed at the end.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "emitd_test_XXXXXX").string();
+    if (::mkdtemp(name.data()) != nullptr) {
+      path_ = name;
+    }
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(file(name)) << text;
+    return file(name);
+  }
+  [[nodiscard]] std::string read(const std::string& name) const {
+    std::ifstream in(file(name));
+    std::ostringstream out;
+    out << in.rdbuf();
+    return out.str();
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A real emitd. Standard output and error go to files of `folder`; killed at the end if need be.
+class DaemonProcess {
+ public:
+  DaemonProcess(const ScratchFolder& folder, std::vector<std::string> arguments)
+      : folder_(folder) {
+    std::string program = std::string(EMIT_TEST_BIN_DIR) + "/emitd";
+    std::vector<char*> argv{program.data()};
+    for (auto& argument : arguments) {
+      argv.push_back(argument.data());
+    }
+    argv.push_back(nullptr);
+    const std::string out = folder.file("stdout");
+    const std::string err = folder.file("stderr");
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      const int out_fd = ::open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
+      const int err_fd = ::open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
+      ::dup2(out_fd, 1);
+      ::dup2(err_fd, 2);
+      ::execv(argv[0], argv.data());
+      ::_exit(127);
+    }
+  }
+  ~DaemonProcess() {
+    if (pid_ > 0) {
+      ::kill(pid_, SIGKILL);
+      ::waitpid(pid_, nullptr, 0);
+    }
+  }
+  DaemonProcess(const DaemonProcess&) = delete;
+  DaemonProcess& operator=(const DaemonProcess&) = delete;
+
+  /// Waits for the ready line. False when the process ended first.
+  [[nodiscard]] bool wait_ready(std::chrono::seconds limit = std::chrono::seconds(60)) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    while (std::chrono::steady_clock::now() < end) {
+      const std::string out = folder_.read("stdout");
+      const std::size_t line = out.find("ready control=");
+      if (line != std::string::npos && out.find('\n', line) != std::string::npos) {
+        std::istringstream words(out.substr(line));
+        std::string word;
+        words >> word >> word;
+        control_ = word.substr(word.find('=') + 1);
+        words >> word;
+        host_udp_ = word.substr(word.find('=') + 1);
+        return true;
+      }
+      if (ended()) {
+        return false;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  }
+  [[nodiscard]] const std::string& control() const { return control_; }
+  [[nodiscard]] const std::string& host_udp() const { return host_udp_; }
+  void signal(int number) const { ::kill(pid_, number); }
+  /// Exit code, 128 + signal, or -1 when it does not end within the limit.
+  [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    while (!ended()) {
+      if (std::chrono::steady_clock::now() > end) {
+        return -1;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return exit_code_;
+  }
+  [[nodiscard]] bool ended() {
+    int status = 0;
+    if (pid_ > 0 && ::waitpid(pid_, &status, WNOHANG) == pid_) {
+      pid_ = -1;
+      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    }
+    return pid_ <= 0;
+  }
+
+ private:
+  const ScratchFolder& folder_;
+  pid_t pid_ = -1;
+  int exit_code_ = -1;
+  std::string control_;
+  std::string host_udp_;
+};
+
+/// Configuration of a daemon with canned frames on free ports; `more` is appended.
+inline std::string canned_config(std::uint32_t width_px, std::uint32_t height_px,
+                                 const std::string& pacing, const std::string& more = {}) {
+  std::ostringstream out;
+  out << "[source]\nkind = \"canned\"\ncanned_width_px = " << width_px
+      << "\ncanned_height_px = " << height_px << "\ncanned_frames = 8\n"
+      << "[pacing]\n" << pacing << "\n[host]\nudp = \"127.0.0.1:0\"\n"
+      << "[control]\ntcp = \"127.0.0.1:0\"\n" << more;
+  return out.str();
+}
+
+}  // namespace emit::test

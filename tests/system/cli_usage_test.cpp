@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "system/cli_process.hpp"
+
+namespace emit::test {
+namespace {
+
+class CliHelp : public testing::TestWithParam<const char*> {};
+
+TEST_P(CliHelp, every_command_explains_itself_with_an_example) {
+  const ProcessResult result = run_emit({GetParam(), "--help"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("--help"), std::string::npos);
+  EXPECT_NE(result.out.find("Example: emit "), std::string::npos) << result.out;
+}
+INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
+                         testing::Values("render", "receive", "send", "record", "replay", "demo",
+                                         "view", "compare", "inspect", "evaluate", "generate",
+                                         "make-log", "bench"));
+
+TEST(CliUsage, version_names_tool_and_number) {
+  const ProcessResult result = run_emit({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out.rfind("emit ", 0), 0U) << result.out;
+}
+
+TEST(CliUsage, help_lists_the_exit_codes) {
+  const ProcessResult result = run_emit({"--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.out.find("78 bad configuration"), std::string::npos);
+  EXPECT_NE(result.out.find("serve"), std::string::npos);
+}
+
+TEST(CliUsage, serve_help_is_the_daemons_own) {
+  const ProcessResult result = run_emit({"serve", "--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.out.find("--config"), std::string::npos) << result.out;
+}
+
+class CliBadUsage : public testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(CliBadUsage, exits_with_2) {
+  const ProcessResult result = run_emit(GetParam());
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_FALSE(result.err.empty());
+  EXPECT_TRUE(result.out.empty()) << result.out;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Cases, CliBadUsage,
+    testing::Values(
+        std::vector<std::string>{}, std::vector<std::string>{"no-such-command"},
+        std::vector<std::string>{"render", "box"},
+        std::vector<std::string>{"render", "box", "--time-s", "noon", "--out", "x.exr"},
+        std::vector<std::string>{"render", "box", "--time-s", "1", "--out", "x.exr", "--channel",
+                                 "colour"},
+        std::vector<std::string>{"compare", "a.exr"},
+        std::vector<std::string>{"receive", "http://localhost:1"},
+        std::vector<std::string>{"receive", "tcp://localhost"},
+        std::vector<std::string>{"send", "x.mcap", "--to", "nowhere"},
+        std::vector<std::string>{"send", "x.mcap", "--to", "udp://127.0.0.1:1", "--step"},
+        std::vector<std::string>{"replay", "x.mcap", "--scenario", "box", "--speed", "0"},
+        std::vector<std::string>{"evaluate", "equilibrium"},
+        std::vector<std::string>{"evaluate", "equilibrium", "x.csv", "--precision", "half"},
+        std::vector<std::string>{"generate", "castle", "--out", "."},
+        std::vector<std::string>{"bench"}, std::vector<std::string>{"bench", "speed"},
+        std::vector<std::string>{"bench", "paper", "--frames", "1"}));
+
+TEST(CliBadConfiguration, an_unknown_scenario_exits_with_78) {
+  const ProcessResult result =
+      run_emit({"render", "no-such-scenario", "--time-s", "0", "--out", "x.exr"});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("no-such-scenario"), std::string::npos);
+}
+
+TEST(CliBadConfiguration, an_unknown_key_exits_with_78_and_says_where) {
+  const TemporaryFolder folder;
+  write_text(folder.file("bad.toml"), "name = \"bad\"\nnot_a_key = 1\n");
+  const ProcessResult result =
+      run_emit({"render", folder.file("bad.toml"), "--time-s", "0", "--out", folder.file("x.exr")});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("bad.toml:2:"), std::string::npos) << result.err;
+}
+
+TEST(CliBadConfiguration, malformed_toml_exits_with_78) {
+  const TemporaryFolder folder;
+  write_text(folder.file("bad.toml"), "[place\nlat_deg = 1\n");
+  const ProcessResult result =
+      run_emit({"make-log", folder.file("bad.toml"), "--out", folder.file("x.mcap")});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("bad.toml:1:"), std::string::npos) << result.err;
+}
+
+TEST(CliBadConfiguration, an_unknown_override_exits_with_78) {
+  const ProcessResult result =
+      run_emit({"render", "box", "--time-s", "0", "--out", "x.exr", "--set", "thermal.stepz=9"});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("stepz"), std::string::npos);
+}
+
+TEST(CliFailure, a_refused_connection_exits_with_1) {
+  const ProcessResult result = run_emit({"receive", "tcp://127.0.0.1:1", "--frames", "1"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+}
+
+TEST(CliFailure, a_missing_log_exits_with_1_and_is_named) {
+  const ProcessResult result = run_emit({"send", "/no/such/log.mcap", "--to", "udp://127.0.0.1:9"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_NE(result.err.find("/no/such/log.mcap"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace emit::test

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "statistics.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "console.hpp"
+
+namespace emit::cli {
+namespace {
+
+TEST(CliStatistics, percentiles_are_nearest_rank) {
+  Samples samples;
+  for (int i = 100; i >= 1; --i) samples.add(i);
+  EXPECT_EQ(samples.percentile(0.0), 1.0);
+  EXPECT_EQ(samples.percentile(0.5), 50.0);
+  EXPECT_EQ(samples.percentile(0.99), 99.0);
+  EXPECT_EQ(samples.percentile(0.999), 100.0);
+  EXPECT_EQ(samples.percentile(1.0), 100.0);
+}
+
+TEST(CliStatistics, the_median_of_an_even_count_is_the_mean_of_the_middle_two) {
+  Samples samples;
+  for (const double value : {4.0, 1.0, 3.0, 2.0}) samples.add(value);
+  EXPECT_EQ(samples.median(), 2.5);
+  EXPECT_EQ(samples.mean(), 2.5);
+  EXPECT_EQ(samples.max(), 4.0);
+  EXPECT_EQ(samples.sum(), 10.0);
+}
+
+TEST(CliStatistics, no_samples_give_nan_rather_than_a_number) {
+  const Samples samples;
+  EXPECT_TRUE(std::isnan(samples.median()));
+  EXPECT_TRUE(std::isnan(samples.percentile(0.99)));
+  EXPECT_TRUE(std::isnan(samples.max()));
+  EXPECT_EQ(histogram_text(samples, "ms"), "");
+}
+
+TEST(CliStatistics, the_histogram_counts_every_sample_once) {
+  Samples samples;
+  for (int i = 0; i < 7; ++i) samples.add(0.3);
+  for (int i = 0; i < 5; ++i) samples.add(40.0);
+  const std::string text = histogram_text(samples, "ms");
+  EXPECT_NE(text.find("0.2 .. 0.5"), std::string::npos) << text;
+  EXPECT_NE(text.find("20 .. 50"), std::string::npos) << text;
+  EXPECT_NE(text.find(" 7 ####"), std::string::npos) << text;
+  EXPECT_NE(text.find(" 5 ####"), std::string::npos) << text;
+}
+
+TEST(CliStatistics, samples_of_zero_and_below_stay_in_the_first_bin) {
+  Samples samples;
+  samples.add(0.0);
+  samples.add(-1.0);
+  const std::string text = histogram_text(samples, "ms");
+  EXPECT_NE(text.find(" 2 ####"), std::string::npos) << text;
+}
+
+TEST(CliTable, columns_are_as_wide_as_their_widest_cell) {
+  TextTable table({"name", "n"});
+  table.add({"a", "100"});
+  EXPECT_EQ(table.to_string(), "name    n\na     100\n");
+}
+
+}  // namespace
+}  // namespace emit::cli

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include "emit/image/exr_image.hpp"
+#include "emit/image/false_color.hpp"
+#include "emit/image/image_diff.hpp"
+#include "emit/image/png_image.hpp"
+
+namespace emit::image {
+namespace {
+
+using physics::ErrorCode;
+using testing::HasSubstr;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+std::filesystem::path scratch(const std::string& name) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "emit_image";
+  std::filesystem::create_directories(folder);
+  return folder / name;
+}
+
+ExrImage sample_image() {
+  ExrImage image;
+  image.width_px = 5;
+  image.height_px = 3;
+  std::vector<float> radiance(15);
+  std::vector<float> depth(15, kInf);
+  for (std::size_t i = 0; i < radiance.size(); ++i) {
+    radiance[i] = 1.0F / (static_cast<float>(i) + 3.0F);
+  }
+  depth[7] = 2512.062F;
+  std::vector<float> temperature(15, kNan);
+  temperature[4] = 301.25F;
+  image.add(kRadianceChannel, radiance);
+  image.add(kDepthChannel, depth);
+  image.add(kTemperatureChannel, temperature);
+  return image;
+}
+
+TEST(ExrImage, every_bit_survives_writing_and_reading) {
+  const ExrImage image = sample_image();
+  const auto file = scratch("round_trip.exr");
+  ASSERT_TRUE(write_exr(file, image));
+  const physics::Result<ExrImage> back = read_exr(file);
+  ASSERT_TRUE(back) << back.error().text;
+  EXPECT_EQ(back->width_px, 5U);
+  EXPECT_EQ(back->height_px, 3U);
+  ASSERT_EQ(back->channels.size(), 3U);
+  for (const ExrChannel& channel : image.channels) {
+    const ExrChannel* read = back->find(channel.name);
+    ASSERT_NE(read, nullptr) << channel.name;
+    for (std::size_t i = 0; i < channel.pixels.size(); ++i) {
+      const bool both_nan = std::isnan(channel.pixels[i]) && std::isnan(read->pixels[i]);
+      EXPECT_TRUE(both_nan || channel.pixels[i] == read->pixels[i]) << channel.name << " " << i;
+    }
+  }
+}
+
+TEST(ExrImage, frame_metadata_survives_exactly) {
+  ExrImage image = sample_image();
+  FrameMetadata metadata;
+  metadata.sim_time_ns = -9'007'199'254'740'993;  // needs more than the 53 bits of a double
+  metadata.frame_number = 18'446'744'073'709'551'615U;
+  metadata.sensor_pose.position_world_m = {1.0 / 3.0, -2.5e6, 17.0};
+  metadata.sensor_pose.world_from_body = {0.5, -0.5, 0.5, 0.5};
+  metadata.band_name = "8-12";
+  metadata.band_lo_um = 8.0;
+  metadata.band_hi_um = 12.0;
+  set_frame_metadata(image, metadata);
+  const auto file = scratch("metadata.exr");
+  ASSERT_TRUE(write_exr(file, image));
+  const physics::Result<ExrImage> back = read_exr(file);
+  ASSERT_TRUE(back);
+  const physics::Result<FrameMetadata> read = frame_metadata(*back);
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_EQ(read->sim_time_ns, metadata.sim_time_ns);
+  EXPECT_EQ(read->frame_number, metadata.frame_number);
+  EXPECT_EQ(read->sensor_pose.position_world_m, metadata.sensor_pose.position_world_m);
+  EXPECT_EQ(read->sensor_pose.world_from_body, metadata.sensor_pose.world_from_body);
+  EXPECT_EQ(read->band_name, "8-12");
+  EXPECT_EQ(read->band_hi_um, 12.0);
+  EXPECT_EQ(read->units, "W m-2 sr-1");
+}
+
+TEST(ExrImage, missing_metadata_is_named) {
+  const physics::Result<FrameMetadata> metadata = frame_metadata(sample_image());
+  ASSERT_FALSE(metadata);
+  EXPECT_THAT(metadata.error().text, HasSubstr("simTimeNs"));
+}
+
+TEST(ExrImage, wrong_plane_sizes_and_double_names_are_refused) {
+  ExrImage image = sample_image();
+  image.channels[1].pixels.pop_back();
+  EXPECT_THAT(write_exr(scratch("bad.exr"), image).error().text, HasSubstr("'depth'"));
+  image = sample_image();
+  image.channels[1].name = "radiance";
+  EXPECT_THAT(write_exr(scratch("bad.exr"), image).error().text, HasSubstr("used twice"));
+}
+
+TEST(ExrImage, unreadable_files_are_errors_that_name_them) {
+  EXPECT_EQ(read_exr("/nowhere/ghost.exr").error().code, ErrorCode::not_found);
+  const auto file = scratch("garbage.exr");
+  std::ofstream(file) << "not an image at all, just some text";
+  const physics::Result<ExrImage> image = read_exr(file);
+  ASSERT_FALSE(image);
+  EXPECT_EQ(image.error().code, ErrorCode::parse);
+  EXPECT_THAT(image.error().text, HasSubstr("garbage.exr"));
+  const auto whole = scratch("whole.exr");
+  ASSERT_TRUE(write_exr(whole, sample_image()));
+  std::filesystem::resize_file(whole, std::filesystem::file_size(whole) - 40);
+  EXPECT_FALSE(read_exr(whole));
+  EXPECT_EQ(write_exr("/nowhere/at/all.exr", sample_image()).error().code, ErrorCode::io);
+}
+
+TEST(PngImage, file_carries_signature_and_size) {
+  RgbImage image{3, 2, std::vector<std::uint8_t>(18, 200)};
+  const auto file = scratch("small.png");
+  ASSERT_TRUE(write_png(file, image));
+  std::ifstream stream(file, std::ios::binary);
+  std::array<unsigned char, 24> head{};
+  stream.read(reinterpret_cast<char*>(head.data()), head.size());
+  EXPECT_EQ(head[0], 0x89);
+  EXPECT_EQ(head[1], 'P');
+  EXPECT_EQ(head[19], 3);
+  EXPECT_EQ(head[23], 2);
+  image.rgb.pop_back();
+  EXPECT_EQ(write_png(file, image).error().code, ErrorCode::invalid_argument);
+  image.rgb.push_back(0);
+  EXPECT_EQ(write_png("/nowhere/at/all.png", image).error().code, ErrorCode::io);
+}
+
+double luma(const Rgb& c) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; }
+
+TEST(FalseColor, lightness_never_falls_along_a_map) {
+  for (const ColorMap map : {ColorMap::thermal, ColorMap::grey}) {
+    const auto& table = color_table(map);
+    for (std::size_t i = 1; i < table.size(); ++i) {
+      // One count of rounding per component; two entries apart it must rise.
+      EXPECT_GE(luma(table[i]) + 1.0, luma(table[i - 1])) << i;
+      if (i >= 8) {
+        EXPECT_GT(luma(table[i]), luma(table[i - 8])) << i;
+      }
+    }
+    EXPECT_LT(luma(table.front()), 10.0);
+    EXPECT_GT(luma(table.back()), 245.0);
+  }
+}
+
+TEST(FalseColor, values_map_to_their_place_and_nan_to_its_own_colour) {
+  const std::vector<float> values{280.0F, 330.0F, 305.125F, 100.0F, kInf, kNan};
+  const physics::Result<RgbImage> image = false_color(values, 6, 1, {});
+  ASSERT_TRUE(image);
+  const auto& table = color_table(ColorMap::thermal);
+  const auto pixel = [&](std::size_t i) {
+    return Rgb{image->rgb[3 * i], image->rgb[3 * i + 1], image->rgb[3 * i + 2]};
+  };
+  EXPECT_EQ(pixel(0), table[0]);
+  EXPECT_EQ(pixel(1), table[255]);
+  EXPECT_EQ(pixel(2), table[128]);
+  EXPECT_EQ(pixel(3), table[0]);
+  EXPECT_EQ(pixel(4), table[255]);
+  EXPECT_EQ(pixel(5), kNanColor);
+  for (const Rgb& color : table) {
+    EXPECT_NE(color, kNanColor);
+  }
+}
+
+TEST(FalseColor, colour_bar_widens_the_picture_and_prints_the_limits) {
+  const std::vector<float> values(64 * 100, 300.0F);
+  FalseColorOptions options;
+  options.color_bar = true;
+  const physics::Result<RgbImage> image = false_color(values, 64, 100, options);
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->width_px, 64U + kColorBarWidthPx);
+  int text_pixels = 0;
+  for (std::size_t i = 0; i < image->rgb.size(); i += 3) {
+    text_pixels += image->rgb[i] == 235 && image->rgb[i + 1] == 235 ? 1 : 0;
+  }
+  EXPECT_GT(text_pixels, 100);
+}
+
+TEST(FalseColor, limits_that_do_not_ascend_are_refused) {
+  const std::vector<float> values(4, 300.0F);
+  FalseColorOptions options;
+  options.min_value = 330.0;
+  EXPECT_FALSE(false_color(values, 2, 2, options));
+  options.min_value = std::nan("");
+  EXPECT_FALSE(false_color(values, 2, 2, options));
+  EXPECT_FALSE(false_color(values, 3, 2, {}));
+}
+
+TEST(FalseColor, percentiles_leave_out_what_is_not_finite) {
+  std::vector<float> values{kNan, kInf};
+  EXPECT_FALSE(percentile_range(values, 0, 100));
+  for (int i = 0; i <= 100; ++i) {
+    values.push_back(static_cast<float>(i));
+  }
+  const auto range = percentile_range(values, 1, 99);
+  ASSERT_TRUE(range);
+  EXPECT_EQ(range->min_value, 1.0);
+  EXPECT_EQ(range->max_value, 99.0);
+}
+
+TEST(ImageDiff, statistics_of_a_known_difference) {
+  std::vector<float> a(1000);
+  std::vector<float> b(1000, 0.0F);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    a[i] = (i % 2 == 0 ? 1.0F : -1.0F) * static_cast<float>(i + 1);
+  }
+  const DiffStats stats = diff_values(a, b, 100);
+  EXPECT_EQ(stats.pixels_compared, 1000U);
+  EXPECT_EQ(stats.max_abs, 1000.0);
+  EXPECT_EQ(stats.max_x_px, 99U);
+  EXPECT_EQ(stats.max_y_px, 9U);
+  EXPECT_DOUBLE_EQ(stats.mean, -0.5);
+  EXPECT_DOUBLE_EQ(stats.mean_abs, 500.5);
+  EXPECT_NEAR(stats.rms, std::sqrt(1001.0 * 2001.0 / 6.0), 1e-9);
+  EXPECT_EQ(stats.p50, 500.0);
+  EXPECT_EQ(stats.p95, 950.0);
+  EXPECT_EQ(stats.p99, 990.0);
+  EXPECT_EQ(stats.p999, 999.0);
+}
+
+TEST(ImageDiff, pixels_not_finite_on_one_side_are_counted) {
+  const std::vector<float> a{kNan, kNan, 1.0F, kInf, kInf, -kInf};
+  const std::vector<float> b{kNan, 2.0F, kNan, kInf, 3.0F, kInf};
+  const DiffStats stats = diff_values(a, b, 6);
+  EXPECT_EQ(stats.one_sided_nan, 4U);
+  EXPECT_EQ(stats.pixels_compared, 0U);
+}
+
+TEST(ImageDiff, radiance_is_reported_in_per_cent_and_kelvin) {
+  ExrImage a = sample_image();
+  ExrImage b = sample_image();
+  a.channels[0].pixels.assign(15, 2.0F);
+  b.channels[0].pixels.assign(15, 2.0F);
+  a.channels[0].pixels[6] = 2.5F;
+  a.channels[2].pixels[4] = 303.25F;
+  const auto diff = compare_images(a, b, [](double radiance) { return 10.0 * radiance; });
+  ASSERT_TRUE(diff);
+  EXPECT_FALSE(diff->identical());
+  for (const ChannelDiff& channel : diff->channels) {
+    if (channel.channel == "radiance") {
+      EXPECT_DOUBLE_EQ(channel.absolute.max_abs, 0.5);
+      EXPECT_DOUBLE_EQ(channel.percent.max_abs, 25.0);
+      EXPECT_DOUBLE_EQ(channel.kelvin_equivalent.max_abs, 10.0);
+      EXPECT_EQ(channel.absolute.max_x_px, 1U);
+      EXPECT_EQ(channel.absolute.max_y_px, 1U);
+    } else if (channel.channel == "temperature") {
+      EXPECT_EQ(channel.unit, "K");
+      EXPECT_DOUBLE_EQ(channel.absolute.max_abs, 2.0);
+      EXPECT_EQ(channel.absolute.pixels_compared, 1U);
+    }
+  }
+}
+
+TEST(ImageDiff, equal_images_are_identical_and_missing_channels_are_listed) {
+  const ExrImage a = sample_image();
+  ExrImage b = sample_image();
+  EXPECT_TRUE(compare_images(a, b)->identical());
+  b.channels.pop_back();
+  b.add("object", std::vector<float>(15, 0.0F));
+  const auto diff = compare_images(a, b);
+  ASSERT_TRUE(diff);
+  EXPECT_THAT(diff->only_in_a, testing::ElementsAre("temperature"));
+  EXPECT_THAT(diff->only_in_b, testing::ElementsAre("object"));
+  EXPECT_FALSE(diff->identical());
+  b.width_px = 3;
+  b.height_px = 5;
+  EXPECT_FALSE(compare_images(a, b));
+}
+
+}  // namespace
+}  // namespace emit::image

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "emit/physics/clear_sky.hpp"
+#include "emit/physics/sun.hpp"
+#include "emit/physics/weather.hpp"
+
+namespace emit::physics {
+namespace {
+
+constexpr std::int64_t kSecond = 1000000000LL;
+constexpr std::int64_t kDay = 86400 * kSecond;
+
+SunPosition sun_at_zenith_angle(double zenith_deg) {
+  SunPosition sun;
+  sun.elevation = degrees(90.0 - zenith_deg);
+  sun.direction_enu = {std::sin(zenith_deg * kDegree), 0.0, std::cos(zenith_deg * kDegree)};
+  return sun;
+}
+
+TEST(Sun, JulianDaysOfKnownDates) {
+  EXPECT_EQ(julian_day_0h(2000, 1, 1), 2451544.5);
+  EXPECT_EQ(julian_day_0h(1970, 1, 1), 2440587.5);
+  EXPECT_EQ(julian_day_0h(2024, 2, 29) + 1.0, julian_day_0h(2024, 3, 1));
+  EXPECT_EQ(julian_day_0h(1900, 2, 28) + 1.0, julian_day_0h(1900, 3, 1));
+  EXPECT_EQ(julian_day_0h(1600, 2, 29) + 1.0, julian_day_0h(1600, 3, 1));
+}
+
+TEST(Sun, PosixTimeAgreesWithTheJulianDate) {
+  const GeoPlace place{48.56_deg, 11.26_deg, 400_m};
+  // 2003-10-17 19:30:30 UTC and 1955-06-05 12:00 UTC, before the POSIX epoch.
+  const SunPosition a = sun_position(1066419030 * kSecond, place);
+  const SunPosition b = sun_position_ut1(julian_day_0h(2003, 10, 17), (19.5 * 3600 + 30) / 86400,
+                                         delta_t_s(2003.8), place);
+  EXPECT_LT(glm::distance(a.direction_enu, b.direction_enu), 1e-8);
+  const auto days = static_cast<std::int64_t>(julian_day_0h(1955, 6, 5) - 2440587.5);
+  const SunPosition c = sun_position(days * kDay + kDay / 2, place);
+  const SunPosition d = sun_position_ut1(julian_day_0h(1955, 6, 5), 0.5, delta_t_s(1955.4), place);
+  EXPECT_LT(glm::distance(c.direction_enu, d.direction_enu), 1e-8);
+}
+
+TEST(Sun, DirectionIsAUnitVectorOfAzimuthAndElevation) {
+  const GeoPlace place{Radians(-0.6), Radians(2.4), 30_m};
+  for (int hour = 0; hour < 24; ++hour) {
+    const SunPosition sun = sun_position(1750000000 * kSecond + hour * 3600 * kSecond, place);
+    EXPECT_NEAR(glm::length(sun.direction_enu), 1.0, 1e-14);
+    const double ce = std::cos(sun.elevation.value());
+    EXPECT_NEAR(sun.direction_enu.x, ce * std::sin(sun.azimuth.value()), 1e-12);
+    EXPECT_NEAR(sun.direction_enu.y, ce * std::cos(sun.azimuth.value()), 1e-12);
+    EXPECT_NEAR(sun.direction_enu.z, std::sin(sun.elevation.value()), 1e-12);
+    EXPECT_GE(sun.azimuth.value(), 0.0);
+    EXPECT_LT(sun.azimuth.value(), 2.0 * kPi);
+  }
+}
+
+TEST(Sun, CulminatesInTheSouthOfTheNorthernTemperateZone) {
+  const GeoPlace place{48.56_deg, 11.26_deg, 400_m};
+  double highest = -1.0;
+  double azimuth_deg = 0.0;
+  // 2026-06-21: the solstice sun stands at 90 - 48.56 + 23.44 deg.
+  for (std::int64_t minute = 0; minute < 1440; ++minute) {
+    const SunPosition sun = sun_position(1781999999LL * kSecond + minute * 60 * kSecond, place);
+    if (sun.elevation.value() > highest) {
+      highest = sun.elevation.value();
+      azimuth_deg = to_degrees(sun.azimuth);
+    }
+  }
+  EXPECT_NEAR(highest / kDegree, 64.88, 0.02);
+  EXPECT_NEAR(azimuth_deg, 180.0, 0.5);
+}
+
+TEST(Sun, DeltaTIsContinuousAndNearTheObservedValues) {
+  for (const double year : {1941.0, 1961.0, 1986.0, 2005.0, 2020.0, 2030.0}) {
+    EXPECT_NEAR(delta_t_s(year - 1e-9), delta_t_s(year), 0.5) << year;
+  }
+  EXPECT_NEAR(delta_t_s(1972.0), 42.23, 0.5);
+  EXPECT_NEAR(delta_t_s(2000.0), 63.83, 0.2);
+  EXPECT_NEAR(delta_t_s(2017.0), 68.6, 1.0);
+}
+
+TEST(Sun, MeanSolarTimeFollowsTheLongitude) {
+  EXPECT_NEAR(mean_solar_hours(0, Radians(0.0)), 0.0, 1e-12);
+  EXPECT_NEAR(mean_solar_hours(6 * 3600 * kSecond, 90_deg), 12.0, 1e-9);
+  EXPECT_NEAR(mean_solar_hours(6 * 3600 * kSecond, degrees(-120.0)), 22.0, 1e-9);
+  EXPECT_NEAR(mean_solar_hours(-6 * 3600 * kSecond, Radians(0.0)), 18.0, 1e-9);
+}
+
+TEST(ClearSky, IrradianceMatchesPublishedValuesAtThreeZenithAngles) {
+  // Ineichen with TL 3.5, 400 m above the sea at midsummer (sun at 1.0163 au), by an independent
+  // implementation that rounds to 1 W/m2: DNI/DHI at z = 25, 60, 75 deg.
+  struct Row {
+    double zenith_deg, direct, diffuse;
+  };
+  for (const Row& row : {Row{25, 868, 118}, Row{60, 717, 81}, Row{75, 485, 50}}) {
+    SunPosition sun = sun_at_zenith_angle(row.zenith_deg);
+    sun.distance_au = 1.0163;
+    const auto got = clear_sky_irradiance(sun, 400_m, 3.5);
+    EXPECT_NEAR(got.direct_normal_w_m2, row.direct, 2.0) << row.zenith_deg;
+    EXPECT_NEAR(got.diffuse_horizontal_w_m2, row.diffuse, 1.0) << row.zenith_deg;
+  }
+}
+
+TEST(ClearSky, HazeMovesSunlightFromDirectToDiffuseAndNightHasNone) {
+  const SunPosition sun = sun_at_zenith_angle(45.0);
+  double direct = 2000.0;
+  double diffuse = 0.0;
+  for (const double turbidity : {2.0, 3.0, 5.0, 7.0}) {
+    const auto got = clear_sky_irradiance(sun, 400_m, turbidity);
+    EXPECT_LT(got.direct_normal_w_m2, direct);
+    EXPECT_GT(got.diffuse_horizontal_w_m2, diffuse);
+    direct = got.direct_normal_w_m2;
+    diffuse = got.diffuse_horizontal_w_m2;
+  }
+  const auto night = clear_sky_irradiance(sun_at_zenith_angle(90.5), 0_m, 3.5);
+  EXPECT_EQ(night.direct_normal_w_m2, 0.0);
+  EXPECT_EQ(night.diffuse_horizontal_w_m2, 0.0);
+  const auto horizon = clear_sky_irradiance(sun_at_zenith_angle(89.9), 0_m, 3.5);
+  EXPECT_GE(horizon.direct_normal_w_m2, 0.0);
+  EXPECT_GE(horizon.diffuse_horizontal_w_m2, 0.0);
+}
+
+TEST(ClearSky, AirMassIsOneOverheadAnd38AtTheHorizon) {
+  EXPECT_NEAR(relative_air_mass(90_deg), 1.0, 1e-3);
+  EXPECT_NEAR(relative_air_mass(30_deg), 1.994, 1e-3);
+  EXPECT_NEAR(relative_air_mass(0_deg), 37.92, 0.1);
+  EXPECT_EQ(relative_air_mass(degrees(-10.0)), 0.0);
+  EXPECT_NEAR(pressure_ratio(0_m), 1.0, 1e-15);
+  EXPECT_NEAR(pressure_ratio(5500_m), 0.498, 2e-3);
+}
+
+TEST(ClearSky, LongwaveMatchesTheRecalibratedFormAndCloudsCloseTheWindow) {
+  // T 293.15 K, dew point 285.15 K: 347.4 W/m2.
+  EXPECT_NEAR(sky_longwave_w_m2(Kelvin(293.15), Kelvin(285.15), 0.0), 347.4, 0.2);
+  const double clear = sky_emissivity_frac(Kelvin(280.0), 0.0);
+  EXPECT_NEAR(sky_emissivity_frac(Kelvin(280.0), 1.0), clear + 0.784 * (1.0 - clear), 1e-14);
+  EXPECT_LE(sky_emissivity_frac(Kelvin(330.0), 1.0), 1.0);
+}
+
+TEST(ClearSky, AirIsWarmestAtThreeInTheAfternoon) {
+  EXPECT_NEAR(daily_air_temperature(15.0, 290_K, 6_K).value(), 296.0, 1e-12);
+  EXPECT_NEAR(daily_air_temperature(3.0, 290_K, 6_K).value(), 284.0, 1e-12);
+  EXPECT_NEAR(film_coefficient_w_m2_k(2.0), 13.3, 1e-12);
+  EXPECT_EQ(film_coefficient_w_m2_k(-1.0), 5.7);
+}
+
+TEST(Weather, RowsAreLinearBetweenAndConstantOutside) {
+  const std::array<WeatherRow, 3> rows = {
+      WeatherRow{100, 0.0, 10.0, 300.0, 280.0, 1.0, 0.0, 285.0, 7.0},
+      WeatherRow{200, 800.0, 110.0, 340.0, 290.0, 3.0, 0.5, std::nullopt, std::nullopt},
+      WeatherRow{300, 400.0, 60.0, 320.0, 288.0, 2.0, 0.0, std::nullopt, std::nullopt}};
+  const Forcing middle = forcing_from_rows(rows, 150);
+  EXPECT_DOUBLE_EQ(middle.direct_normal_w_m2, 400.0);
+  EXPECT_DOUBLE_EQ(middle.diffuse_horizontal_w_m2, 60.0);
+  EXPECT_DOUBLE_EQ(middle.longwave_down_w_m2, 320.0);
+  EXPECT_DOUBLE_EQ(middle.air_k, 285.0);
+  EXPECT_DOUBLE_EQ(middle.cloud_frac, 0.25);
+  // The row without its own values uses the models: air temperature and the wind.
+  EXPECT_DOUBLE_EQ(middle.environment_k, 0.5 * (285.0 + 290.0));
+  EXPECT_DOUBLE_EQ(middle.film_w_m2_k, 0.5 * (7.0 + film_coefficient_w_m2_k(3.0)));
+  EXPECT_DOUBLE_EQ(forcing_from_rows(rows, -5).air_k, 280.0);
+  EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 200).air_k, 290.0);
+  EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 999).air_k, 288.0);
+}
+
+TEST(Weather, TwoRowsAtOneInstantAreAJump) {
+  std::array<WeatherRow, 3> rows;
+  rows[0].air_k = rows[1].air_k = 280.0;
+  rows[1].time_ns = rows[2].time_ns = 10;
+  rows[2].air_k = 300.0;
+  EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 9).air_k, 280.0);
+  EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 10).air_k, 300.0);
+}
+
+TEST(Weather, ClearSkyJoinsTheModels) {
+  const GeoPlace place{48.56_deg, 11.26_deg, 400_m};
+  const std::int64_t noon = 1782040440LL * kSecond;  // 2026-06-21 11:14 UTC
+  const SunPosition sun = sun_position(noon, place);
+  ClearSky model;
+  model.cloud_frac = 0.3;
+  const Forcing f = forcing_from_clear_sky(model, place, sun, noon);
+  const auto solar = clear_sky_irradiance(sun, place.height, model.linke_turbidity);
+  EXPECT_EQ(f.direct_normal_w_m2, solar.direct_normal_w_m2);
+  EXPECT_GT(f.direct_normal_w_m2, 800.0);
+  EXPECT_EQ(f.cloud_frac, 0.3);
+  EXPECT_EQ(f.environment_k, f.air_k);
+  EXPECT_NEAR(f.air_k, 290.0 + 6.0 * std::cos(2.0 * kPi * 3.0 / 24.0), 0.05);
+  EXPECT_DOUBLE_EQ(f.longwave_down_w_m2, sky_longwave_w_m2(Kelvin(f.air_k), 282_K, 0.3));
+}
+
+}  // namespace
+}  // namespace emit::physics

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "emit/physics/constants.hpp"
+#include "history/pose_history.hpp"
+#include "history/step_plan.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+physics::Pose at_east(double east_m) {
+  return {{east_m, 0.0, 0.0}, physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0)};
+}
+
+scene::ObjectDesc scripted() {
+  scene::ObjectDesc object;
+  object.entity_id = 1;
+  object.trajectory = {{0, at_east(0.0), true, false},
+                       {100 * kSecondNs, at_east(0.0), true, false},
+                       {110 * kSecondNs, at_east(100.0), true, false},
+                       {200 * kSecondNs, at_east(0.0), true, true}};
+  return object;
+}
+
+TEST(PoseHistory, interpolates_holds_and_jumps_as_scripted) {
+  const PoseHistory history(scripted(), at_east(5.0));
+  EXPECT_EQ(history.at(-kSecondNs).pose.position_world_m.x, 0.0);
+  EXPECT_NEAR(history.at(105 * kSecondNs).pose.position_world_m.x, 50.0, 1e-9);
+  EXPECT_EQ(history.at(199 * kSecondNs).pose.position_world_m.x, 100.0);  // no drift to the jump
+  EXPECT_EQ(history.at(200 * kSecondNs).pose.position_world_m.x, 0.0);
+  EXPECT_EQ(history.at(999 * kSecondNs).pose.position_world_m.x, 0.0);
+}
+
+TEST(PoseHistory, an_entity_without_trajectory_stays_at_its_placement) {
+  scene::ObjectDesc object;
+  object.entity_id = 1;
+  object.on = false;
+  const PoseHistory history(object, at_east(5.0));
+  EXPECT_EQ(history.at(7).pose.position_world_m.x, 5.0);
+  EXPECT_FALSE(history.at(7).on);
+}
+
+TEST(PoseHistory, finds_starts_stops_and_jumps) {
+  const PoseHistory history(scripted(), at_east(0.0));
+  const std::vector<std::int64_t> expected = {100 * kSecondNs, 110 * kSecondNs, 200 * kSecondNs};
+  EXPECT_EQ(std::vector(history.events_ns().begin(), history.events_ns().end()), expected);
+}
+
+TEST(PoseHistory, live_poses_override_the_script_from_their_time_on_and_reset_brings_it_back) {
+  PoseHistory history(scripted(), at_east(0.0));
+  ASSERT_TRUE(history.append(50 * kSecondNs, at_east(-7.0), true, true));
+  EXPECT_EQ(history.at(49 * kSecondNs).pose.position_world_m.x, 0.0);
+  EXPECT_EQ(history.at(50 * kSecondNs).pose.position_world_m.x, -7.0);
+  EXPECT_EQ(history.at(105 * kSecondNs).pose.position_world_m.x, -7.0);
+  const std::vector<std::int64_t> jump = {50 * kSecondNs};
+  EXPECT_EQ(std::vector(history.events_ns().begin(), history.events_ns().end()), jump);
+  history.reset();
+  EXPECT_NEAR(history.at(105 * kSecondNs).pose.position_world_m.x, 50.0, 1e-9);
+  EXPECT_EQ(history.events_ns().size(), 3U);
+}
+
+TEST(PoseHistory, refuses_time_going_back) {
+  PoseHistory history(scripted(), at_east(0.0));
+  EXPECT_TRUE(history.append(50 * kSecondNs, at_east(0.0), true, false));
+  EXPECT_FALSE(history.append(49 * kSecondNs, at_east(0.0), true, false));
+}
+
+TEST(PoseHistory, thinning_keeps_a_curved_drive_to_two_centimetres) {
+  PoseHistory history(scripted(), at_east(0.0));
+  const auto pose_at = [](double t_s) {
+    physics::Pose pose;
+    pose.position_world_m = {50.0 * std::sin(0.2 * t_s), 50.0 * std::cos(0.2 * t_s), 0.0};
+    pose.world_from_body =
+        physics::world_from_body_heading_pitch_roll(physics::kPi / 2.0 + 0.2 * t_s, 0.0, 0.0);
+    return pose;
+  };
+  for (int i = 0; i <= 20000; ++i) {
+    ASSERT_TRUE(history.append(i * 5'000'000LL, pose_at(i * 5e-3), true, false));
+  }
+  double worst_m = 0.0;
+  for (int i = 0; i <= 100000; ++i) {
+    const double t_s = i * 1e-3;
+    const auto state = history.at(static_cast<std::int64_t>(t_s * 1e9));
+    worst_m = std::max(worst_m, glm::distance(state.pose.position_world_m,
+                                              pose_at(t_s).position_world_m));
+  }
+  EXPECT_LT(worst_m, 0.02);
+  EXPECT_EQ(history.dropped(), 0U);
+}
+
+TEST(PoseHistory, a_full_store_thins_the_oldest_poses_and_counts_them) {
+  PoseHistory history(scripted(), at_east(0.0));
+  std::int64_t t_ns = 0;
+  for (std::size_t i = 0; i < PoseHistory::kMaxLivePoses + 100; ++i) {
+    t_ns += 2 * kSecondNs;  // too far apart to thin
+    ASSERT_TRUE(history.append(t_ns, at_east(static_cast<double>(i % 2)), true, false));
+  }
+  EXPECT_GT(history.dropped(), 0U);
+  EXPECT_NEAR(history.at(t_ns).pose.position_world_m.x,
+              static_cast<double>((PoseHistory::kMaxLivePoses + 99) % 2), 1e-9);
+}
+
+TEST(PoseHistory, path_counts_motion_but_no_jumps) {
+  const PoseHistory history(scripted(), at_east(0.0));
+  EXPECT_NEAR(history.path_m(100 * kSecondNs, 110 * kSecondNs), 100.0, 1e-6);
+  EXPECT_EQ(history.path_m(0, 90 * kSecondNs), 0.0);
+}
+
+scene::ScenarioDesc clear_day() {
+  scene::ScenarioDesc scenario;
+  scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
+  scenario.epoch_utc_ns = 1403330400LL * kSecondNs;
+  scenario.thermal.steps = 27;
+  return scenario;
+}
+
+TEST(StepPlan, covers_the_history_without_gap) {
+  const auto scenario = clear_day();
+  StepPlan plan(scenario.thermal);
+  const Environment environment(scenario);
+  plan.update(12600 * kSecondNs, environment, {});
+  const auto intervals = plan.intervals();
+  ASSERT_EQ(intervals.size(), 27U);
+  EXPECT_EQ(intervals.front().begin_ns, 0);
+  EXPECT_EQ(intervals.back().end_ns, 12600 * kSecondNs);
+  for (std::size_t i = 1; i < intervals.size(); ++i) {
+    EXPECT_EQ(intervals[i].begin_ns, intervals[i - 1].end_ns);
+    EXPECT_TRUE(intervals[i].sun_up);
+  }
+}
+
+TEST(StepPlan, puts_nodes_on_the_events_of_entities) {
+  const auto scenario = clear_day();
+  StepPlan plan(scenario.thermal);
+  const Environment environment(scenario);
+  std::vector<PoseHistory> entities;
+  entities.emplace_back(scripted(), at_east(0.0));
+  plan.update(12600 * kSecondNs, environment, entities);
+  std::vector<std::int64_t> nodes;
+  for (const auto& interval : plan.intervals()) {
+    nodes.push_back(interval.begin_ns);
+    EXPECT_GE(interval.end_ns, interval.begin_ns);
+  }
+  // Three events fall into the first, long interval: each takes one of the nodes nearby, in order.
+  EXPECT_TRUE(std::find(nodes.begin(), nodes.end(), 200 * kSecondNs) != nodes.end());
+  // A few seconds after a stop all its events have nodes of their own.
+  plan.update(130 * kSecondNs, environment, entities);
+  nodes.clear();
+  for (const auto& interval : plan.intervals()) nodes.push_back(interval.begin_ns);
+  EXPECT_TRUE(std::find(nodes.begin(), nodes.end(), 100 * kSecondNs) != nodes.end());
+  EXPECT_TRUE(std::find(nodes.begin(), nodes.end(), 110 * kSecondNs) != nodes.end());
+}
+
+TEST(StepPlan, needs_no_shadow_map_at_night) {
+  auto scenario = clear_day();
+  scenario.thermal.history_start_ns = 14 * 3600 * kSecondNs;  // 20:00 UTC, the sun has set
+  StepPlan plan(scenario.thermal);
+  const Environment environment(scenario);
+  plan.update(18 * 3600 * kSecondNs, environment, {});
+  for (const auto& interval : plan.intervals()) EXPECT_FALSE(interval.sun_up);
+}
+
+TEST(Environment, weather_from_the_host_holds_from_its_time_on) {
+  const auto scenario = clear_day();
+  Environment environment(scenario);
+  const auto sun = environment.sun_at(3600 * kSecondNs);
+  const double before = environment.forcing_at(3600 * kSecondNs, sun).direct_normal_w_m2;
+  scene::WeatherSample overcast;
+  overcast.sim_time_ns = 7200 * kSecondNs;
+  overcast.longwave_down_w_m2 = 390.0;
+  overcast.air_k = 285.0;
+  ASSERT_TRUE(environment.append(overcast));
+  EXPECT_EQ(environment.forcing_at(3600 * kSecondNs, sun).direct_normal_w_m2, before);
+  EXPECT_EQ(environment.forcing_at(7200 * kSecondNs, sun).direct_normal_w_m2, 0.0);
+  overcast.sim_time_ns = 7100 * kSecondNs;
+  EXPECT_FALSE(environment.append(overcast));
+  environment.reset();
+  EXPECT_GT(environment.forcing_at(7200 * kSecondNs, sun).direct_normal_w_m2, 0.0);
+}
+
+}  // namespace
+}  // namespace emit::renderer

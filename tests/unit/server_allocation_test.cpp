@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <memory>
+
+#include "agents/conductor.hpp"
+#include "agents/render_agent.hpp"
+#include "agents/sender.hpp"
+#include "io/socket.hpp"
+#include "protocol/allocation_counter.hpp"
+#include "support/fake_clock.hpp"
+
+namespace emit::server {
+namespace {
+
+// The agents on the way of a frame, from the host's input to the last byte sent.
+TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
+  const test::FakeClock clock;
+  Context context(clock, 1u << 20, 4);
+  const std::optional<scene::ScenarioDesc> no_scenario;
+  const ScenarioTracks tracks(no_scenario);
+  config::SourceConfig source;
+  source.canned_width_px = 64;
+  source.canned_height_px = 48;
+  source.canned_frames = 4;
+  RenderAgent render(context, [&] { return make_canned_source(source, 7, 1); });
+  Conductor conductor(context, tracks, {});
+  Sender sender(context, 4, 4, false);
+  ASSERT_TRUE(render.on_start() && conductor.on_start() && sender.on_start());
+  context.channels = *make_channels(no_scenario, *render.source_info());
+
+  int pair[2] = {-1, -1};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
+  const Fd near(pair[0]);
+  const Fd far(pair[1]);
+  SenderClient::Params params;
+  params.channel = &context.channels.front();
+  params.tcp_fd = near.get();
+  SenderClient client(std::move(params));
+  ASSERT_TRUE(context.to_sender.push({ClientCommand::Kind::add, 0, &client}));
+
+  std::array<std::byte, 65536> sink;
+  const auto frame = [&](std::uint64_t number) {
+    HostInput& input = context.host_inputs.claim_reserved();
+    input.kind = HostInput::Kind::frame;
+    input.frame.frame_number = number;
+    input.frame.sim_time_ns = static_cast<std::int64_t>(number);
+    input.frame.entity_count = 8;
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      input.frame.entities[i].entity_id = i;
+      input.frame.entities[i].has_pose = true;
+    }
+    context.host_inputs.commit();
+    for (int turn = 0; turn < 4; ++turn) {
+      conductor.do_work(clock.tai_ns());
+      render.do_work(clock.tai_ns());
+      conductor.do_work(clock.tai_ns());
+      sender.do_work(clock.tai_ns());
+      while (::recv(far.get(), sink.data(), sink.size(), MSG_DONTWAIT) > 0) {
+      }
+    }
+    while (!context.journal.front().empty()) {
+      context.journal.pop();
+    }
+  };
+  for (std::uint64_t number = 1; number <= 20; ++number) {
+    frame(number);
+  }
+  const std::uint64_t before = test::allocation_count();
+  for (std::uint64_t number = 21; number <= 520; ++number) {
+    frame(number);
+  }
+  EXPECT_EQ(test::allocation_count() - before, 0U);
+  EXPECT_EQ(context.counters.get(Counter::frames_sent), 520U);
+  sender.on_stop();
+  render.on_stop();
+}
+
+}  // namespace
+}  // namespace emit::server

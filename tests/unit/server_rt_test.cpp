@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstring>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "app/sha256.hpp"
+#include "rt/byte_ring.hpp"
+#include "rt/clock.hpp"
+#include "rt/counters.hpp"
+#include "rt/spsc_ring.hpp"
+#include "telemetry/log.hpp"
+
+namespace emit::server {
+namespace {
+
+TEST(SpscRing, RefusesWhenFullAndKeepsOrder) {
+  SpscRing<int> ring(3);
+  ASSERT_EQ(ring.capacity(), 4U);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_TRUE(ring.push(i));
+  }
+  EXPECT_FALSE(ring.push(99));
+  EXPECT_EQ(ring.free(), 0U);
+  for (int i = 0; i < 4; ++i) {
+    const int* value = ring.front();
+    ASSERT_NE(value, nullptr);
+    EXPECT_EQ(*value, i);
+    ring.pop();
+  }
+  EXPECT_EQ(ring.front(), nullptr);
+}
+
+TEST(SpscRing, CarriesEveryElementBetweenTwoThreads) {
+  SpscRing<std::uint64_t> ring(16);
+  constexpr std::uint64_t kCount = 200'000;
+  std::thread producer([&] {
+    for (std::uint64_t i = 0; i < kCount;) {
+      if (ring.push(i)) {
+        ++i;
+      } else {
+        std::this_thread::yield();
+      }
+    }
+  });
+  std::uint64_t expected = 0;
+  while (expected < kCount) {
+    if (const auto* value = ring.front()) {
+      ASSERT_EQ(*value, expected);
+      ++expected;
+      ring.pop();
+    } else {
+      std::this_thread::yield();
+    }
+  }
+  producer.join();
+}
+
+TEST(ByteRing, CarriesRecordsOfAnyLengthBetweenTwoThreads) {
+  ByteRing ring(4096);
+  constexpr std::uint32_t kCount = 50'000;
+  const auto length_of = [](std::uint32_t i) { return 4 + (i * 2654435761U >> 8) % 1500; };
+  std::thread producer([&] {
+    for (std::uint32_t i = 0; i < kCount;) {
+      const auto memory = ring.claim(length_of(i));
+      if (memory.empty()) {
+        std::this_thread::yield();
+        continue;
+      }
+      std::memset(memory.data(), static_cast<int>(i & 0xFF), memory.size());
+      std::memcpy(memory.data(), &i, sizeof(i));
+      ring.commit();
+      ++i;
+    }
+  });
+  for (std::uint32_t i = 0; i < kCount;) {
+    const auto record = ring.front();
+    if (record.empty()) {
+      std::this_thread::yield();
+      continue;
+    }
+    std::uint32_t number = 0;
+    std::memcpy(&number, record.data(), sizeof(number));
+    ASSERT_EQ(number, i);
+    ASSERT_EQ(record.size(), length_of(i));
+    ASSERT_EQ(record.back(), record.size() > 4 ? static_cast<std::byte>(i & 0xFF) : record.back());
+    ring.pop();
+    ++i;
+  }
+  producer.join();
+}
+
+TEST(ByteRing, RefusesARecordLargerThanItself) {
+  ByteRing ring(4096);
+  EXPECT_TRUE(ring.claim(5000).empty());
+  EXPECT_FALSE(ring.claim(3000).empty());
+}
+
+TEST(Counters, HaveDistinctNames) {
+  std::set<std::string_view> names;
+  for (const auto& label : kCounterLabels) {
+    EXPECT_TRUE(names.insert(label.name).second) << label.name;
+    EXPECT_FALSE(label.label.empty());
+  }
+}
+
+TEST(SystemClock, PutsKernelStampsOnTheClockOfTai) {
+  const SystemClock clock;
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  const std::int64_t utc_ns = std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+  const std::int64_t tai_ns = clock.tai_ns();
+  const std::int64_t difference_ns = tai_ns - clock.tai_from_kernel_stamp_ns(utc_ns);
+  EXPECT_GE(difference_ns, 0);
+  EXPECT_LT(difference_ns, 500'000'000) << "only the time between the two reads";
+}
+
+TEST(DistinctTable, WritesARepeatedLineAtPowersOfTen) {
+  DistinctTable table;
+  std::vector<int> written;
+  for (int i = 1; i <= 1000; ++i) {
+    if (table.note("same", i)) {
+      written.push_back(i);
+    }
+  }
+  EXPECT_EQ(written, (std::vector<int>{1, 10, 100, 1000}));
+  EXPECT_EQ(table.entries().at("same").count, 1000U);
+  EXPECT_EQ(table.entries().at("same").first_ns, 1);
+  EXPECT_EQ(table.entries().at("same").last_ns, 1000);
+}
+
+TEST(Log, KeepsWhatPeersSayOnOneLine) {
+  Event event;
+  event.kind = EventKind::hello;
+  const std::string evil = "x\"\nlevel=error fake";
+  std::memcpy(event.text.data(), evil.data(), evil.size());
+  const EventText line = describe(event);
+  EXPECT_EQ(line.text.find('\n'), std::string::npos);
+  EXPECT_NE(line.text.find("x??level"), std::string::npos);
+}
+
+// FIPS 180-4 examples.
+TEST(Sha256, MatchesPublishedDigests) {
+  const auto digest = [](const std::string& text, std::size_t times = 1) {
+    Sha256 hash;
+    for (std::size_t i = 0; i < times; ++i) {
+      hash.update(std::as_bytes(std::span(text)));
+    }
+    return hash.finish();
+  };
+  EXPECT_EQ(digest(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(digest("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(digest("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  EXPECT_EQ(digest("aaaaaaaaaa", 100'000),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+}  // namespace
+}  // namespace emit::server
