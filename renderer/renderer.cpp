@@ -151,6 +151,7 @@ class GlRenderer final : public Renderer {
   gl::Buffer frame_buffer_;
   gl::Buffer instance_buffer_;
   gl::Buffer record_buffer_;
+  gl::Buffer light_record_buffer_;
   gl::Buffer step_buffer_;
   gl::Buffer relaxation_buffer_;
   gl::Buffer band_buffer_;
@@ -163,7 +164,7 @@ class GlRenderer final : public Renderer {
   gl::BufferTexture band_table_;
   gl::Buffer output_buffer_;  ///< planes, then counters
   std::size_t stats_offset_ = 0;
-  SceneVertexArray vertices_;
+  SceneVertexArrays vertices_;
   ReadbackRing readback_;
   std::vector<FrameView> views_;
   TimePoint last_mark_;
@@ -210,7 +211,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       plan_(scenario.thermal),
       bands_(std::move(bands)),
       scene_(std::move(geometry)),
-      lists_(scene_, histories_of_objects(scenario), scenario.thermal.steps + 1,
+      lists_(scene_, histories_of_objects(scenario),
              (scenario.thermal.steps + 1) * scenario.thermal.max_cascades),
       geometry_pass_(std::move(geometry_pass)),
       occlusion_pass_(std::move(occlusion_pass)),
@@ -223,6 +224,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       frame_buffer_(make_dynamic(sizeof(gpu::FrameParams))),
       instance_buffer_(make_dynamic(lists_.max_instance_params() * sizeof(gpu::InstanceParams))),
       record_buffer_(make_dynamic(lists_.max_records() * sizeof(DrawRecord))),
+      light_record_buffer_(make_dynamic(lists_.max_light_records() * sizeof(LightRecord))),
       step_buffer_(make_dynamic(step_params_.size() * sizeof(StepSlot))),
       relaxation_buffer_(make_dynamic(relaxation_params_.size() * sizeof(gpu::RelaxationParams))),
       band_buffer_(make_dynamic(EMIT_MAX_BANDS * sizeof(gpu::BandParams))),
@@ -236,7 +238,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       band_table_(GL_R32F, table_buffer_),
       output_buffer_(planes_bytes(scenario, output) + sizeof(gpu::FrameStatsGpu), nullptr, 0),
       stats_offset_(planes_bytes(scenario, output)),
-      vertices_(scene_, record_buffer_),
+      vertices_(scene_, record_buffer_, light_record_buffer_),
       readback_(output.slots, output_buffer_.bytes()),
       views_(output.slots) {
   for (const scene::ObjectDesc& object : scenario_.objects) {
@@ -383,6 +385,7 @@ void GlRenderer::upload_frame() noexcept {
   upload(frame_buffer_, std::span<const gpu::FrameParams>(&frame_params_, 1));
   upload(instance_buffer_, lists_.instance_params());
   upload(record_buffer_, lists_.records());
+  upload(light_record_buffer_, lists_.light_records());
   upload(step_buffer_, std::span<const StepSlot>(step_params_));
   upload(relaxation_buffer_, std::span<const gpu::RelaxationParams>(relaxation_params_));
   upload(band_buffer_, bands_.params());

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/daemon.hpp"
 
-int main(int argc, char** argv) { return emit::server::emitd_main(argc, argv); }
+int main(int argc, char** argv) {
+  return emit::server::emitd_main(argc, argv);
+}

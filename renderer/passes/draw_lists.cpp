@@ -52,7 +52,7 @@ bool outside(const LightFrustum& frustum, const scene::Aabb& box) noexcept {
 }  // namespace
 
 DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-                     std::uint32_t max_steps, std::uint32_t max_passes)
+                     std::uint32_t max_passes)
     : scene_(scene) {
   const auto instances = scene.instances();
   std::size_t submeshes = 0;
@@ -73,20 +73,19 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
   }
   view_placed_.resize(instances.size());
   light_placed_.resize(instances.size());
-  params_.reserve(std::max<std::size_t>(1, instances.size() + moving_.size() * max_steps));
-  records_.reserve(std::max<std::size_t>(1, submesh_instances + instances.size() * max_passes));
+  params_.reserve(std::max<std::size_t>(1, instances.size()));
+  records_.reserve(std::max<std::size_t>(1, submesh_instances));
+  light_records_.reserve(std::max<std::size_t>(1, instances.size() * max_passes));
   commands_.reserve(submeshes + scene.meshes().size() * max_passes);
 }
 
-void DrawLists::place(std::uint32_t instance, std::uint32_t slot,
-                      const glm::dmat4& world_from_mesh, bool on) noexcept {
+DrawLists::Placed DrawLists::place(std::uint32_t instance, const glm::dmat4& world_from_mesh,
+                                   bool on) const noexcept {
   glm::dmat4 relworld_from_mesh = world_from_mesh;
   relworld_from_mesh[3] -= glm::dvec4(camera_world_m_, 0.0);
-  const scene::Instance& source = scene_.instances()[instance];
-  if (slot == params_.size()) params_.emplace_back();
-  params_[slot] = params_from(relworld_from_mesh, source.object);
-  light_placed_[instance] = {
-      scene::transformed(scene_.mesh_bounds(source.mesh), relworld_from_mesh), slot, on};
+  const std::uint32_t mesh = scene_.instances()[instance].mesh;
+  return {relworld_from_mesh, scene::transformed(scene_.mesh_bounds(mesh), relworld_from_mesh),
+          on};
 }
 
 void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
@@ -94,21 +93,24 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
   camera_world_m_ = camera_world_m;
   params_.clear();
   records_.clear();
+  light_records_.clear();
   commands_.clear();
   bounds_ = {};
   const auto instances = scene_.instances();
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
     const std::int32_t history = history_of_instance_[i];
     if (history < 0) {
-      place(i, i, instances[i].world_from_mesh, true);
+      view_placed_[i] = place(i, instances[i].world_from_mesh, true);
     } else {
       const TrajectoryState state = entities[static_cast<std::size_t>(history)].at(sim_time_ns);
-      place(i, i, scene::world_from_body_matrix(state.pose) * instances[i].body_from_mesh,
-            state.on);
+      view_placed_[i] =
+          place(i, scene::world_from_body_matrix(state.pose) * instances[i].body_from_mesh,
+                state.on);
     }
-    if (light_placed_[i].on) bounds_.add(light_placed_[i].box);
+    params_.push_back(params_from(view_placed_[i].relworld_from_mesh, instances[i].object));
+    if (view_placed_[i].on) bounds_.add(view_placed_[i].box);
   }
-  view_placed_ = light_placed_;
+  light_placed_ = view_placed_;
 }
 
 void DrawLists::cull_view(const ViewVolume& view, CommandRange& single_sided,
@@ -123,7 +125,7 @@ void DrawLists::cull_view(const ViewVolume& view, CommandRange& single_sided,
         for (std::uint32_t i = 0; i < mesh.instance_count; ++i) {
           const Placed& placed = view_placed_[mesh.first_instance + i];
           if (placed.on && !outside(view, placed.box)) {
-            records_.push_back({placed.slot, submesh.material});
+            records_.push_back({mesh.first_instance + i, submesh.material});
           }
         }
         const auto count = static_cast<std::uint32_t>(records_.size()) - first;
@@ -140,21 +142,32 @@ void DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_ns, std:
     const PoseHistory& entity = entities[static_cast<std::size_t>(history_of_instance_[i])];
     const TrajectoryState state = entity.at(sample_ns);
     const bool passing = entity.path_m(begin_ns, end_ns) > size_of_instance_m_[i];
-    place(i, static_cast<std::uint32_t>(params_.size()),
-          scene::world_from_body_matrix(state.pose) * scene_.instances()[i].body_from_mesh,
-          state.on && !passing);
+    light_placed_[i] =
+        place(i, scene::world_from_body_matrix(state.pose) * scene_.instances()[i].body_from_mesh,
+              state.on && !passing);
   }
 }
 
 CommandRange DrawLists::cull_light(const LightFrustum& frustum) noexcept {
+  // Rows of clip_from_relworld: light metres scaled to -1..1 across the map and 0..1 in depth.
+  glm::dvec4 clip_rows[3];
+  for (glm::length_t axis = 0; axis < 3; ++axis) {
+    const double scale = (axis < 2 ? 2.0 : 1.0) / frustum.extent_m[axis];
+    clip_rows[axis] = glm::dvec4(frustum.axes[static_cast<std::size_t>(axis)] * scale,
+                                 frustum.offset_m[axis] * scale - (axis < 2 ? 1.0 : 0.0));
+  }
   CommandRange range{static_cast<std::uint32_t>(commands_.size()), 0};
   for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
-    const auto first = static_cast<std::uint32_t>(records_.size());
+    const auto first = static_cast<std::uint32_t>(light_records_.size());
     for (std::uint32_t i = 0; i < mesh.instance_count; ++i) {
       const Placed& placed = light_placed_[mesh.first_instance + i];
-      if (placed.on && !outside(frustum, placed.box)) records_.push_back({placed.slot, 0});
+      if (!placed.on || outside(frustum, placed.box)) continue;
+      LightRecord& record = light_records_.emplace_back();
+      for (int row = 0; row < 3; ++row) {
+        record.clip_from_mesh_row[row] = glm::vec4(clip_rows[row] * placed.relworld_from_mesh);
+      }
     }
-    const auto count = static_cast<std::uint32_t>(records_.size()) - first;
+    const auto count = static_cast<std::uint32_t>(light_records_.size()) - first;
     if (count > 0) commands_.push_back({mesh.whole, mesh.base_vertex, first, count});
   }
   range.count = static_cast<std::uint32_t>(commands_.size()) - range.first;

@@ -29,7 +29,7 @@ class DrawLists {
  public:
   /// `max_passes`: most shadow passes (steps x cascades) of a frame.
   DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-            std::uint32_t max_steps, std::uint32_t max_passes);
+            std::uint32_t max_passes);
 
   /// Starts a frame: all instances at `sim_time_ns` around a camera at `camera_world_m`.
   void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
@@ -48,22 +48,28 @@ class DrawLists {
     return params_;
   }
   [[nodiscard]] std::span<const DrawRecord> records() const noexcept { return records_; }
+  [[nodiscard]] std::span<const LightRecord> light_records() const noexcept {
+    return light_records_;
+  }
   [[nodiscard]] std::span<const DrawCommand> commands(CommandRange range) const noexcept {
     return std::span(commands_).subspan(range.first, range.count);
   }
   [[nodiscard]] std::size_t max_instance_params() const noexcept { return params_.capacity(); }
   [[nodiscard]] std::size_t max_records() const noexcept { return records_.capacity(); }
+  [[nodiscard]] std::size_t max_light_records() const noexcept {
+    return light_records_.capacity();
+  }
   /// Box around everything, relative to the camera, at the frame's instant.
   [[nodiscard]] const scene::Aabb& bounds() const noexcept { return bounds_; }
 
  private:
   struct Placed {
-    scene::Aabb box;         ///< relative to the camera
-    std::uint32_t slot = 0;  ///< in params_
+    glm::dmat4 relworld_from_mesh{1.0};
+    scene::Aabb box;  ///< relative to the camera
     bool on = true;
   };
-  void place(std::uint32_t instance, std::uint32_t slot, const glm::dmat4& world_from_mesh,
-             bool on) noexcept;
+  [[nodiscard]] Placed place(std::uint32_t instance, const glm::dmat4& world_from_mesh,
+                             bool on) const noexcept;
 
   const SceneBuffers& scene_;
   std::vector<std::int32_t> history_of_instance_;  ///< -1: static
@@ -73,6 +79,7 @@ class DrawLists {
   std::vector<Placed> light_placed_;
   std::vector<gpu::InstanceParams> params_;
   std::vector<DrawRecord> records_;
+  std::vector<LightRecord> light_records_;
   std::vector<DrawCommand> commands_;
   glm::dvec3 camera_world_m_{0.0};
   scene::Aabb bounds_;

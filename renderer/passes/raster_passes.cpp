@@ -2,7 +2,6 @@
 #include "passes/raster_passes.hpp"
 
 #include <cstdint>
-#include <initializer_list>
 
 namespace emit::renderer {
 namespace {
@@ -28,24 +27,36 @@ physics::Result<void> check_complete(const gl::Framebuffer& framebuffer, const c
 
 }  // namespace
 
-SceneVertexArray::SceneVertexArray(const SceneBuffers& scene, const gl::Buffer& records)
-    : array_(gl::VertexArray::make()) {
-  const GLuint id = array_.id();
-  glVertexArrayElementBuffer(id, scene.indices());
-  glVertexArrayVertexBuffer(id, 0, scene.positions(), 0, 3 * sizeof(float));
-  glVertexArrayAttribFormat(id, EMIT_ATTR_POSITION, 3, GL_FLOAT, GL_FALSE, 0);
-  glVertexArrayAttribBinding(id, EMIT_ATTR_POSITION, 0);
-  glVertexArrayVertexBuffer(id, 1, scene.normals(), 0, 4 * sizeof(std::int16_t));
-  glVertexArrayAttribFormat(id, EMIT_ATTR_NORMAL, 4, GL_SHORT, GL_TRUE, 0);
-  glVertexArrayAttribBinding(id, EMIT_ATTR_NORMAL, 1);
-  glVertexArrayVertexBuffer(id, 2, records.id(), 0, sizeof(DrawRecord));
-  glVertexArrayAttribIFormat(id, EMIT_ATTR_DRAW, 2, GL_UNSIGNED_INT, 0);
-  glVertexArrayAttribBinding(id, EMIT_ATTR_DRAW, 2);
-  glVertexArrayBindingDivisor(id, 2, 1);
-  for (const GLuint attribute :
-       std::initializer_list<GLuint>{EMIT_ATTR_POSITION, EMIT_ATTR_NORMAL, EMIT_ATTR_DRAW}) {
-    glEnableVertexArrayAttrib(id, attribute);
+SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& draw_records,
+                                     const gl::Buffer& light_records)
+    : view_(gl::VertexArray::make()), light_(gl::VertexArray::make()) {
+  for (const GLuint id : {view_.id(), light_.id()}) {
+    glVertexArrayElementBuffer(id, scene.indices());
+    glVertexArrayVertexBuffer(id, 0, scene.positions(), 0, 3 * sizeof(float));
+    glVertexArrayAttribFormat(id, EMIT_ATTR_POSITION, 3, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(id, EMIT_ATTR_POSITION, 0);
+    glEnableVertexArrayAttrib(id, EMIT_ATTR_POSITION);
   }
+  const GLuint view = view_.id();
+  glVertexArrayVertexBuffer(view, 1, scene.normals(), 0, 4 * sizeof(std::int16_t));
+  glVertexArrayAttribFormat(view, EMIT_ATTR_NORMAL, 4, GL_SHORT, GL_TRUE, 0);
+  glVertexArrayAttribBinding(view, EMIT_ATTR_NORMAL, 1);
+  glEnableVertexArrayAttrib(view, EMIT_ATTR_NORMAL);
+  glVertexArrayVertexBuffer(view, 2, draw_records.id(), 0, sizeof(DrawRecord));
+  glVertexArrayAttribIFormat(view, EMIT_ATTR_DRAW, 2, GL_UNSIGNED_INT, 0);
+  glVertexArrayAttribBinding(view, EMIT_ATTR_DRAW, 2);
+  glVertexArrayBindingDivisor(view, 2, 1);
+  glEnableVertexArrayAttrib(view, EMIT_ATTR_DRAW);
+
+  const GLuint light = light_.id();
+  glVertexArrayVertexBuffer(light, 1, light_records.id(), 0, sizeof(LightRecord));
+  for (GLuint row = 0; row < 3; ++row) {
+    const GLuint attribute = EMIT_ATTR_LIGHT_ROW + row;
+    glVertexArrayAttribFormat(light, attribute, 4, GL_FLOAT, GL_FALSE, row * 4 * sizeof(float));
+    glVertexArrayAttribBinding(light, attribute, 1);
+    glEnableVertexArrayAttrib(light, attribute);
+  }
+  glVertexArrayBindingDivisor(light, 1, 1);
 }
 
 physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px,
@@ -74,7 +85,7 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px,
   return pass;
 }
 
-void GeometryPass::draw(const SceneVertexArray& vertices,
+void GeometryPass::draw(const SceneVertexArrays& vertices,
                         std::span<const DrawCommand> single_sided,
                         std::span<const DrawCommand> double_sided) const noexcept {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
@@ -92,7 +103,7 @@ void GeometryPass::draw(const SceneVertexArray& vertices,
   glFrontFace(GL_CW);  // image row 0 is at the bottom of GL's window: the view is mirrored
   glCullFace(GL_BACK);
   program_.use();
-  vertices.bind();
+  vertices.bind_view();
   glEnable(GL_CULL_FACE);
   issue(single_sided);
   glDisable(GL_CULL_FACE);
@@ -126,7 +137,7 @@ physics::Result<ShadowPass> ShadowPass::create(std::uint32_t size_px, std::uint3
   return pass;
 }
 
-void ShadowPass::draw(const SceneVertexArray& vertices, std::uint32_t cascade,
+void ShadowPass::draw(const SceneVertexArrays& vertices, std::uint32_t cascade,
                       std::span<const DrawCommand> commands) const noexcept {
   const gl::Framebuffer& framebuffer = framebuffers_[cascade];
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.id());
@@ -137,8 +148,7 @@ void ShadowPass::draw(const SceneVertexArray& vertices, std::uint32_t cascade,
   glDepthFunc(GL_LESS);
   glDisable(GL_CULL_FACE);
   program_.use();
-  glUniform1ui(0, cascade);
-  vertices.bind();
+  vertices.bind_light();
   issue(commands);
 }
 

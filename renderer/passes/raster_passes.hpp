@@ -10,14 +10,18 @@
 
 namespace emit::renderer {
 
-/// Vertex array that reads SceneBuffers and one draw record per instance.
-class SceneVertexArray {
+/// Vertex arrays that read SceneBuffers and one record per instance: a DrawRecord for the camera, a
+/// LightRecord (positions only) for shadow maps.
+class SceneVertexArrays {
  public:
-  SceneVertexArray(const SceneBuffers& scene, const gl::Buffer& records);
-  void bind() const noexcept { glBindVertexArray(array_.id()); }
+  SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& draw_records,
+                    const gl::Buffer& light_records);
+  void bind_view() const noexcept { glBindVertexArray(view_.id()); }
+  void bind_light() const noexcept { glBindVertexArray(light_.id()); }
 
  private:
-  gl::VertexArray array_;
+  gl::VertexArray view_;
+  gl::VertexArray light_;
 };
 
 /// Paper part 1: linear depth, normal, material index and object id of the visible surface.
@@ -25,7 +29,7 @@ class GeometryPass {
  public:
   [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
                                                             std::uint32_t height_px);
-  void draw(const SceneVertexArray& vertices, std::span<const DrawCommand> single_sided,
+  void draw(const SceneVertexArrays& vertices, std::span<const DrawCommand> single_sided,
             std::span<const DrawCommand> double_sided) const noexcept;
   /// Binds depth, normal and ids to their texture units.
   void bind_textures() const noexcept;
@@ -46,8 +50,8 @@ class ShadowPass {
  public:
   [[nodiscard]] static physics::Result<ShadowPass> create(std::uint32_t size_px,
                                                           std::uint32_t layers);
-  /// Draws into the layer of `cascade`, with the interval bound as EMIT_BIND_STEP.
-  void draw(const SceneVertexArray& vertices, std::uint32_t cascade,
+  /// Draws into the layer of `cascade`.
+  void draw(const SceneVertexArrays& vertices, std::uint32_t cascade,
             std::span<const DrawCommand> commands) const noexcept;
   void bind_texture() const noexcept;
 

@@ -55,4 +55,9 @@ struct DrawRecord {
   std::uint32_t material = 0;
 };
 
+/// One instance drawn into a shadow map: rows of the affine clip_from_mesh, depth in 0..1.
+struct LightRecord {
+  glm::vec4 clip_from_mesh_row[3];
+};
+
 }  // namespace emit::renderer

@@ -32,9 +32,8 @@ class CannedSource final : public FrameSource {
     }
   }
 
-  std::size_t apply_entities(
-      std::int64_t /*sim_time_ns*/,
-      std::span<const renderer::EntityUpdate> updates) noexcept override {
+  std::size_t apply_entities(std::int64_t /*sim_time_ns*/,
+                             std::span<const renderer::EntityUpdate> updates) noexcept override {
     return updates.size();
   }
   bool apply_weather(const scene::WeatherSample& /*sample*/) noexcept override { return true; }
@@ -130,10 +129,10 @@ physics::Result<std::vector<std::vector<float>>> load_folder(const std::filesyst
       info.width_px = image->width_px;
       info.height_px = image->height_px;
     } else if (image->width_px != info.width_px || image->height_px != info.height_px) {
-      return make_error(ErrorCode::parse,
-                        fmt::format("{}: {} x {}, but the first frame is {} x {}", file.string(),
-                                    image->width_px, image->height_px, info.width_px,
-                                    info.height_px));
+      return make_error(
+          ErrorCode::parse,
+          fmt::format("{}: {} x {}, but the first frame is {} x {}", file.string(), image->width_px,
+                      image->height_px, info.width_px, info.height_px));
     }
     images.push_back(radiance->pixels);
   }
@@ -142,8 +141,9 @@ physics::Result<std::vector<std::vector<float>>> load_folder(const std::filesyst
 
 }  // namespace
 
-physics::Result<std::unique_ptr<FrameSource>> make_canned_source(
-    const config::SourceConfig& source, std::uint32_t slots, std::size_t planes) {
+physics::Result<std::unique_ptr<FrameSource>> make_canned_source(const config::SourceConfig& source,
+                                                                 std::uint32_t slots,
+                                                                 std::size_t planes) {
   SourceInfo info;
   info.canned = true;
   info.slots = std::clamp<std::uint32_t>(slots, 2, kMaxSlots);

@@ -41,10 +41,9 @@ physics::Result<std::vector<Channel>> make_channels(
   }
   const auto& bands = scenario->bands;
   if (bands.size() > kMaxPlanes || bands.size() > source.planes) {
-    return make_error(ErrorCode::config,
-                      fmt::format("{}: {} bands, at most {} can be streamed",
-                                  scenario->file.string(), bands.size(),
-                                  std::min(kMaxPlanes, source.planes)));
+    return make_error(ErrorCode::config, fmt::format("{}: {} bands, at most {} can be streamed",
+                                                     scenario->file.string(), bands.size(),
+                                                     std::min(kMaxPlanes, source.planes)));
   }
   if (scenario->channels.empty()) {
     for (std::size_t i = 0; i < bands.size(); ++i) {

@@ -210,8 +210,7 @@ void Conductor::begin_slot() noexcept {
 
 int Conductor::take_images_and_slots(std::int64_t now_ns) noexcept {
   int work = 0;
-  const bool slots_run =
-      ig_clock() && clock_started_ && !draining_.load(std::memory_order_acquire);
+  const bool slots_run = ig_clock() && clock_started_ && !draining_.load(std::memory_order_acquire);
   if (slots_run && clock_.must_restart(now_ns)) {
     clock_.start(now_ns);
     context_.conductor_events.push(EventKind::slots_missed, 0);
@@ -243,7 +242,8 @@ bool Conductor::end_slot(std::int64_t now_ns) noexcept {
     return false;
   }
   switch (slots_.end()) {
-    case SlotPolicy::SlotEnd::nothing: break;
+    case SlotPolicy::SlotEnd::nothing:
+      break;
     case SlotPolicy::SlotEnd::no_image:
       context_.counters.add(Counter::slots_without_image);
       break;
@@ -284,16 +284,15 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
     header.flags |= protocol::kFlagDegraded;
     header.estimated_error_k = std::numeric_limits<float>::infinity();
   }
-  const bool late = ig_clock() ? slots_.finished()
-                               : host_step_is_late(header.deadline_ns, done.readback_end_ns);
+  const bool late =
+      ig_clock() ? slots_.finished() : host_step_is_late(header.deadline_ns, done.readback_end_ns);
   if (late) {
     header.flags |= protocol::kFlagLate;
   }
   shown_ = header;
   shown_thermal_ns_ = issued.thermal_time_ns;
-  shown_crc_ = options_.first_plane < done.image.plane_count
-                   ? done.image.crc32c[options_.first_plane]
-                   : 0;
+  shown_crc_ =
+      options_.first_plane < done.image.plane_count ? done.image.crc32c[options_.first_plane] : 0;
   context_.published.commit();
   context_.frames_handed_over.fetch_add(1, std::memory_order_release);
   context_.bells.sender.ring();
@@ -314,8 +313,8 @@ bool Conductor::publish_repeat(std::int64_t now_ns) noexcept {
   frame->header = shown_;
   frame->header.frame_number = ++frame_number_;
   frame->header.deadline_ns = clock_.end_ns();
-  frame->header.flags = (shown_.flags & ~std::uint32_t{protocol::kFlagLate}) |
-                        protocol::kFlagRepeated;
+  frame->header.flags =
+      (shown_.flags & ~std::uint32_t{protocol::kFlagLate}) | protocol::kFlagRepeated;
   const FrameHeader header = frame->header;
   context_.published.commit();
   context_.frames_handed_over.fetch_add(1, std::memory_order_release);
@@ -354,9 +353,9 @@ void Conductor::journal_frame(const FrameHeader& header, const Issued* issued,
   line.rendered = issued != nullptr;
   line.entity_count = issued != nullptr ? issued->entity_count : 0;
   const std::span<const renderer::EntityUpdate> entities =
-      issued != nullptr ? std::span<const renderer::EntityUpdate>(issued->entities.data(),
-                                                                  issued->entity_count)
-                        : std::span<const renderer::EntityUpdate>();
+      issued != nullptr
+          ? std::span<const renderer::EntityUpdate>(issued->entities.data(), issued->entity_count)
+          : std::span<const renderer::EntityUpdate>();
   if (!journal_.write(line, entities)) {
     count_lost_line();
   }

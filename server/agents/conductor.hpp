@@ -124,7 +124,7 @@ class Conductor final : public Agent {
   std::vector<Issued> issued_;       // ring of kMaxIssued
   std::size_t issued_first_ = 0;
   std::size_t issued_count_ = 0;
-  protocol::FrameHeader shown_;      // of the image published last
+  protocol::FrameHeader shown_;  // of the image published last
   std::int64_t shown_thermal_ns_ = 0;
   std::uint32_t shown_crc_ = 0;
   bool journal_lossy_ = false;

@@ -151,8 +151,7 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
   if (immediate_step && have_host_frame_ && !can_issue()) {
     return false;
   }
-  if (command == CommandKind::reset &&
-      (issued_count_ > 0 || context_.jobs.claim() == nullptr)) {
+  if (command == CommandKind::reset && (issued_count_ > 0 || context_.jobs.claim() == nullptr)) {
     reset_pending_ = true;  // no further frames until those in work are done
     return false;
   }

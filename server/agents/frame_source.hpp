@@ -16,8 +16,8 @@ namespace emit::server {
 
 /// Sensor channels a source can fill, and what its images come from.
 struct SourceInfo {
-  std::string device;  ///< GL renderer, or where canned frames come from
-  bool canned = false; ///< pre-rendered pixels: frames carry kFlagCanned
+  std::string device;   ///< GL renderer, or where canned frames come from
+  bool canned = false;  ///< pre-rendered pixels: frames carry kFlagCanned
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::uint32_t slots = 0;
@@ -35,8 +35,8 @@ class FrameSource {
   FrameSource& operator=(const FrameSource&) = delete;
   virtual ~FrameSource() = default;
 
-  virtual std::size_t apply_entities(
-      std::int64_t sim_time_ns, std::span<const renderer::EntityUpdate> updates) noexcept = 0;
+  virtual std::size_t apply_entities(std::int64_t sim_time_ns,
+                                     std::span<const renderer::EntityUpdate> updates) noexcept = 0;
   virtual bool apply_weather(const scene::WeatherSample& sample) noexcept = 0;
   virtual void reset() noexcept = 0;
 
@@ -59,9 +59,9 @@ using FrameSourceFactory = std::function<physics::Result<std::unique_ptr<FrameSo
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
     const renderer::OutputOptions& output);
 
-/// Pre-rendered frames: a folder of frame_*.exr with a `radiance` channel in name order, or a moving
-/// test pattern; shown again and again. All memory is taken here.
-/// Errors: not_found (no frame in the folder), parse (file at fault, or frames of different size).
+/// Pre-rendered frames: a folder of frame_*.exr with a `radiance` channel in name order, or a
+/// moving test pattern; shown again and again. All memory is taken here. Errors: not_found (no
+/// frame in the folder), parse (file at fault, or frames of different size).
 [[nodiscard]] physics::Result<std::unique_ptr<FrameSource>> make_canned_source(
     const config::SourceConfig& source, std::uint32_t slots, std::size_t planes);
 

@@ -37,8 +37,8 @@ bool read_elements(std::span<const std::byte> bytes, std::uint32_t count, Elemen
 bool host_frame(std::span<const std::byte> bytes, v1::HostFrame& out) {
   JournalHostFrame line;
   protocol::HostFrameData frame;
-  if (!read(bytes, line) || !read_elements<JournalHostFrame>(bytes, line.entity_count,
-                                                             frame.entities.data())) {
+  if (!read(bytes, line) ||
+      !read_elements<JournalHostFrame>(bytes, line.entity_count, frame.entities.data())) {
     return false;
   }
   frame.frame_number = line.frame_number;
@@ -108,7 +108,8 @@ bool to_journal_entry(std::span<const std::byte> line, const Recorder::Identity&
       message.set_pacing(identity.pacing);
       return true;
     }
-    case JournalKind::host_frame: return host_frame(line, *out.mutable_host_frame());
+    case JournalKind::host_frame:
+      return host_frame(line, *out.mutable_host_frame());
     case JournalKind::command: {
       JournalCommand command;
       if (!read(line, command)) {
@@ -117,7 +118,8 @@ bool to_journal_entry(std::span<const std::byte> line, const Recorder::Identity&
       out.mutable_command()->set_kind(static_cast<v1::Command::Kind>(command.command));
       return true;
     }
-    case JournalKind::frame: return decision(line, *out.mutable_frame());
+    case JournalKind::frame:
+      return decision(line, *out.mutable_frame());
   }
   return false;
 }

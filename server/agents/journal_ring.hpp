@@ -61,8 +61,8 @@ struct JournalFrame {
   std::uint32_t entity_count = 0;
 };
 
-/// Conductor's end. A line that finds no room is lost and counted; its sequence number stays unused,
-/// so that a reader sees the gap. RT-safe.
+/// Conductor's end. A line that finds no room is lost and counted; its sequence number stays
+/// unused, so that a reader sees the gap. RT-safe.
 class JournalWriter {
  public:
   /// `written` counts the lines that found room.

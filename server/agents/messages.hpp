@@ -106,21 +106,21 @@ struct PublishFrame {
 };
 
 enum class EventKind : std::uint8_t {
-  run_started,       ///< a = run id
-  host_epoch,        ///< a = host's run id
-  command,           ///< a = CommandKind
-  refused,           ///< a = StatusCode, b = count
-  connected,         ///< a = connection, text = peer
-  disconnected,      ///< a = connection, text = why
-  hello,             ///< a = connection, b = role, text = software
-  subscribed,        ///< a = connection, b = channel, text = transport
-  client_failed,     ///< a = connection, text = why
-  client_slow,       ///< a = connection
-  no_gso,            ///< a = connection, text = why
-  source_failed,     ///< text = why
-  journal_failed,    ///< text = why
-  journal_overrun,   ///< a = first sequence lost
-  slots_missed,      ///< a = how many
+  run_started,      ///< a = run id
+  host_epoch,       ///< a = host's run id
+  command,          ///< a = CommandKind
+  refused,          ///< a = StatusCode, b = count
+  connected,        ///< a = connection, text = peer
+  disconnected,     ///< a = connection, text = why
+  hello,            ///< a = connection, b = role, text = software
+  subscribed,       ///< a = connection, b = channel, text = transport
+  client_failed,    ///< a = connection, text = why
+  client_slow,      ///< a = connection
+  no_gso,           ///< a = connection, text = why
+  source_failed,    ///< text = why
+  journal_failed,   ///< text = why
+  journal_overrun,  ///< a = first sequence lost
+  slots_missed,     ///< a = how many
 };
 
 /// any agent -> housekeeping: what happened, as numbers; the text is put together there.

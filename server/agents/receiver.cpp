@@ -81,7 +81,9 @@ physics::Result<void> Receiver::open() {
   return {};
 }
 
-SocketAddress Receiver::control_address() const noexcept { return local_address(listener_.get()); }
+SocketAddress Receiver::control_address() const noexcept {
+  return local_address(listener_.get());
+}
 
 SocketAddress Receiver::host_address() const noexcept {
   return udp_ ? local_address(udp_.get()) : SocketAddress{};
@@ -122,8 +124,7 @@ int Receiver::do_work(std::int64_t now_ns) noexcept {
     work += take_released();
     work += take_replies();
     std::array<epoll_event, 32> events{};
-    const int count =
-        ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
+    const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
     for (int i = 0; i < count; ++i) {
       const epoll_event& event = events[static_cast<std::size_t>(i)];
       if (event.data.u64 == kListenerKey) {
@@ -249,7 +250,7 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
   }
   if (got == 0) {
     close(connection, connection.parser->pending_bytes() != 0 ? "closed in the middle of a record"
-                                                             : "closed by the peer");
+                                                              : "closed by the peer");
     return 1;
   }
   connection.parser->commit(static_cast<std::size_t>(got));
@@ -275,10 +276,9 @@ int Receiver::parse(Connection& connection, std::int64_t now_ns) {
       take_record(connection, record, now_ns);
       continue;
     }
-    const auto code = status == protocol::ParseStatus::oversize ? StatusCode::oversize
-                      : status == protocol::ParseStatus::wrong_version
-                          ? StatusCode::wrong_version
-                          : StatusCode::malformed;
+    const auto code = status == protocol::ParseStatus::oversize        ? StatusCode::oversize
+                      : status == protocol::ParseStatus::wrong_version ? StatusCode::wrong_version
+                                                                       : StatusCode::malformed;
     // The framing is lost: the connection ends after the answer.
     refuse(connection, code, std::string("record: ") + std::string(protocol::to_string(status)));
     connection.flush_close = true;
@@ -319,8 +319,8 @@ void Receiver::watch(Connection& connection) noexcept {
   connection.dirty = false;
   epoll_event event{};
   const bool reading = !connection.stuck && !connection.closing;
-  const bool writing = !connection.write_lent && !connection.closing &&
-                       connection.out_sent < connection.out.size();
+  const bool writing =
+      !connection.write_lent && !connection.closing && connection.out_sent < connection.out.size();
   event.events = (reading ? std::uint32_t{EPOLLIN} : 0U) | (writing ? std::uint32_t{EPOLLOUT} : 0U);
   event.data.u64 = connection.key();
   if (connection.closing) {
@@ -344,12 +344,12 @@ void Receiver::close(Connection& connection, std::string_view why) noexcept {
   }
   connection.dirty = true;
   if (connection.role == Role::recorder) {
-    static_cast<void>(context_.to_recorder.push(
-        {ClientCommand::Kind::remove, connection.key(), -1, 0}));
+    static_cast<void>(
+        context_.to_recorder.push({ClientCommand::Kind::remove, connection.key(), -1, 0}));
     context_.bells.recorder.ring();
   } else {
-    static_cast<void>(context_.to_sender.push(
-        {ClientCommand::Kind::remove, connection.key(), nullptr}));
+    static_cast<void>(
+        context_.to_sender.push({ClientCommand::Kind::remove, connection.key(), nullptr}));
     context_.bells.sender.ring();
   }
 }

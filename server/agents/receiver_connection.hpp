@@ -28,7 +28,9 @@ struct Receiver::Connection {
 
   [[nodiscard]] bool open() const noexcept { return static_cast<bool>(fd); }
   /// Key of the connection on rings: the place in the table and how often it was used.
-  [[nodiscard]] std::uint32_t key() const noexcept { return generation << kConnectionPlaceBits | index; }
+  [[nodiscard]] std::uint32_t key() const noexcept {
+    return generation << kConnectionPlaceBits | index;
+  }
 };
 
 struct Receiver::UdpMemory {

@@ -16,24 +16,34 @@ using protocol::kProtocolVersion;
 
 std::string status_text(StatusCode code, std::uint64_t detail) {
   switch (code) {
-    case StatusCode::ok: return "taken";
-    case StatusCode::wrong_version: return "wrong protocol version";
-    case StatusCode::oversize: return "message too large";
-    case StatusCode::malformed: return "malformed message";
+    case StatusCode::ok:
+      return "taken";
+    case StatusCode::wrong_version:
+      return "wrong protocol version";
+    case StatusCode::oversize:
+      return "message too large";
+    case StatusCode::malformed:
+      return "malformed message";
     case StatusCode::unknown_entity:
       return fmt::format("unknown entity {}: not in the scenario, not applied", detail);
-    case StatusCode::invalid_pose: return "invalid pose";
-    case StatusCode::time_backwards: return "sim time goes backwards within a run";
-    case StatusCode::duplicate_frame: return "frame number already seen in this run";
-    case StatusCode::unknown_channel: return "unknown channel";
+    case StatusCode::invalid_pose:
+      return "invalid pose";
+    case StatusCode::time_backwards:
+      return "sim time goes backwards within a run";
+    case StatusCode::duplicate_frame:
+      return "frame number already seen in this run";
+    case StatusCode::unknown_channel:
+      return "unknown channel";
     case StatusCode::not_allowed:
       return detail == static_cast<std::uint64_t>(CommandKind::step)
                  ? "step needs a pose, and hold or stop before it"
                  : "not allowed now";
     case StatusCode::overloaded:
       return fmt::format("entity {}: more entities than emitd tracks", detail);
-    case StatusCode::internal: return "failure inside emitd";
-    case StatusCode::invalid_environment: return "environment outside its ranges";
+    case StatusCode::internal:
+      return "failure inside emitd";
+    case StatusCode::invalid_environment:
+      return "environment outside its ranges";
   }
   return "unknown status";
 }
@@ -41,7 +51,9 @@ std::string status_text(StatusCode code, std::uint64_t detail) {
 void Receiver::take_record(Connection& connection, const protocol::Record& record,
                            std::int64_t now_ns) {
   switch (record.kind) {
-    case protocol::RecordKind::host_frame: take_host_frame(connection, record.body, now_ns); return;
+    case protocol::RecordKind::host_frame:
+      take_host_frame(connection, record.body, now_ns);
+      return;
     case protocol::RecordKind::control: {
       const auto frame = protocol::host_frame_in_control_record(record.body);
       if (!frame.empty()) {
@@ -167,10 +179,18 @@ void Receiver::take_hello(Connection& connection, const v1::ControlRecord& recor
     return;
   }
   switch (hello.role()) {
-    case v1::Hello::ROLE_HOST: connection.role = Role::host; break;
-    case v1::Hello::ROLE_CLIENT: connection.role = Role::client; break;
-    case v1::Hello::ROLE_RECORDER: connection.role = Role::recorder; break;
-    default: end(StatusCode::malformed, "hello without a role"); return;
+    case v1::Hello::ROLE_HOST:
+      connection.role = Role::host;
+      break;
+    case v1::Hello::ROLE_CLIENT:
+      connection.role = Role::client;
+      break;
+    case v1::Hello::ROLE_RECORDER:
+      connection.role = Role::recorder;
+      break;
+    default:
+      end(StatusCode::malformed, "hello without a role");
+      return;
   }
   connection.welcomed = true;
   v1::ControlRecord answer;
@@ -257,8 +277,9 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
     }
   } else {
     // From here on the sender writes: what is still queued goes first.
-    params.first_bytes.assign(connection.out.begin() + static_cast<std::ptrdiff_t>(connection.out_sent),
-                              connection.out.end());
+    params.first_bytes.assign(
+        connection.out.begin() + static_cast<std::ptrdiff_t>(connection.out_sent),
+        connection.out.end());
     protocol::append_control_record(answer, params.first_bytes);
     connection.out.clear();
     connection.out_sent = 0;
@@ -278,7 +299,8 @@ physics::Result<Fd> Receiver::open_stream_socket(const Connection& connection, s
                                                  const std::string& group) const {
   using physics::ErrorCode;
   if (port > 65535) {
-    return physics::make_error(ErrorCode::protocol, fmt::format("udp port {} does not exist", port));
+    return physics::make_error(ErrorCode::protocol,
+                               fmt::format("udp port {} does not exist", port));
   }
   SocketAddress target = connection.peer;
   if (!group.empty()) {
@@ -312,8 +334,8 @@ physics::Result<Fd> Receiver::open_stream_socket(const Connection& connection, s
     }
   }
   if (::connect(fd.get(), target.get(), target.length) != 0) {
-    return physics::make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(target),
-                                                          error_text(errno)));
+    return physics::make_error(ErrorCode::io,
+                               fmt::format("udp {}: {}", to_string(target), error_text(errno)));
   }
   return fd;
 }

@@ -35,8 +35,7 @@ int Receiver::receive_datagrams(std::int64_t now_ns) noexcept {
   }
   const std::size_t batch = std::min(room, UdpMemory::kBatch);
   for (std::size_t i = 0; i < batch; ++i) {
-    memory.iov[i] = {memory.data.data() + i * UdpMemory::kDatagramBytes,
-                     UdpMemory::kDatagramBytes};
+    memory.iov[i] = {memory.data.data() + i * UdpMemory::kDatagramBytes, UdpMemory::kDatagramBytes};
     msghdr& message = memory.messages[i].msg_hdr;
     message = {};
     message.msg_name = &memory.peers[i];
@@ -46,8 +45,8 @@ int Receiver::receive_datagrams(std::int64_t now_ns) noexcept {
     message.msg_control = memory.control[i].bytes.data();
     message.msg_controllen = UdpMemory::kControlBytes;
   }
-  const int count = ::recvmmsg(udp_.get(), memory.messages.data(),
-                               static_cast<unsigned>(batch), MSG_DONTWAIT, nullptr);
+  const int count = ::recvmmsg(udp_.get(), memory.messages.data(), static_cast<unsigned>(batch),
+                               MSG_DONTWAIT, nullptr);
   for (int i = 0; i < count; ++i) {
     const auto index = static_cast<std::size_t>(i);
     take_datagram(index, memory.messages[index].msg_len, now_ns);
@@ -80,16 +79,16 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
 
   Origin origin;
   origin.kind = Origin::Kind::udp;
-  origin.address_bytes =
-      std::min<std::uint32_t>(message.msg_namelen, static_cast<std::uint32_t>(origin.address.size()));
+  origin.address_bytes = std::min<std::uint32_t>(message.msg_namelen,
+                                                 static_cast<std::uint32_t>(origin.address.size()));
   std::memcpy(origin.address.data(), &memory.peers[index], origin.address_bytes);
 
   HostInput* input = context_.host_inputs.claim();
   if (input == nullptr) {
     return;  // room for the batch was looked up before it was read
   }
-  const std::span<const std::byte> datagram(
-      memory.data.data() + index * UdpMemory::kDatagramBytes, bytes);
+  const std::span<const std::byte> datagram(memory.data.data() + index * UdpMemory::kDatagramBytes,
+                                            bytes);
   const protocol::DecodeStatus decoded =
       protocol::decode_host_frame(datagram, decoder_, input->frame);
   if (decoded != protocol::DecodeStatus::ok) {

@@ -38,7 +38,9 @@ physics::Result<void> Recorder::open() {
   return {};
 }
 
-bool Recorder::on_start() noexcept { return static_cast<bool>(epoll_); }
+bool Recorder::on_start() noexcept {
+  return static_cast<bool>(epoll_);
+}
 
 int Recorder::do_work(std::int64_t now_ns) noexcept {
   static_cast<void>(now_ns);

@@ -119,7 +119,8 @@ bool RenderAgent::finish_oldest() noexcept {
   for (std::size_t i = 0; i < done->image.plane_count; ++i) {
     done->image.planes[i] = view.radiance_w_m2_sr[i];
     // Planes that share memory (canned frames) are summed once.
-    const bool same = i > 0 && view.radiance_w_m2_sr[i].data() == view.radiance_w_m2_sr[i - 1].data();
+    const bool same =
+        i > 0 && view.radiance_w_m2_sr[i].data() == view.radiance_w_m2_sr[i - 1].data();
     done->image.crc32c[i] = same ? done->image.crc32c[i - 1]
                                  : protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[i]));
   }

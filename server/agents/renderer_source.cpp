@@ -9,9 +9,8 @@ class RendererSource final : public FrameSource {
   RendererSource(std::unique_ptr<renderer::Renderer> renderer, SourceInfo info)
       : renderer_(std::move(renderer)), info_(std::move(info)) {}
 
-  std::size_t apply_entities(
-      std::int64_t sim_time_ns,
-      std::span<const renderer::EntityUpdate> updates) noexcept override {
+  std::size_t apply_entities(std::int64_t sim_time_ns,
+                             std::span<const renderer::EntityUpdate> updates) noexcept override {
     return updates.empty() ? 0 : renderer_->apply_entities(sim_time_ns, updates);
   }
   bool apply_weather(const scene::WeatherSample& sample) noexcept override {

@@ -35,7 +35,9 @@ bool AgentRunner::start_stepped() {
   return stepped_;
 }
 
-int AgentRunner::step() noexcept { return turn(); }
+int AgentRunner::step() noexcept {
+  return turn();
+}
 
 void AgentRunner::stop() noexcept {
   if (stepped_) {
@@ -94,8 +96,7 @@ void AgentRunner::sleep() noexcept {
   const std::int64_t wake_ns = agent_.wake_at_ns();
   const std::int64_t now_ns = clock_.tai_ns();
   const std::int64_t wait_ns =
-      wake_ns == kNeverNs ? kLongestNs
-                          : std::clamp(wake_ns - now_ns, std::int64_t{0}, kLongestNs);
+      wake_ns == kNeverNs ? kLongestNs : std::clamp(wake_ns - now_ns, std::int64_t{0}, kLongestNs);
   std::array<pollfd, 2> fds{{{agent_.doorbell().fd(), POLLIN, 0}, {agent_.wait_fd(), POLLIN, 0}}};
   const timespec timeout{static_cast<time_t>(wait_ns / 1'000'000'000),
                          static_cast<long>(wait_ns % 1'000'000'000)};

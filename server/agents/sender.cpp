@@ -19,7 +19,9 @@ Sender::Sender(Context& context, std::uint32_t queue_frames, std::size_t max_cli
   clients_.reserve(max_clients);
 }
 
-bool Sender::on_start() noexcept { return static_cast<bool>(epoll_); }
+bool Sender::on_start() noexcept {
+  return static_cast<bool>(epoll_);
+}
 
 int Sender::do_work(std::int64_t now_ns) noexcept {
   static_cast<void>(now_ns);
@@ -29,10 +31,9 @@ int Sender::do_work(std::int64_t now_ns) noexcept {
   work += take_writable();
   work += send_all();
   trim();
-  const bool nothing_left =
-      std::all_of(clients_.begin(), clients_.end(), [this](const SenderClient* client) {
-        return !client->busy() && client->next >= end_;
-      });
+  const bool nothing_left = std::all_of(
+      clients_.begin(), clients_.end(),
+      [this](const SenderClient* client) { return !client->busy() && client->next >= end_; });
   if (nothing_left) {
     finished_.store(taken_, std::memory_order_release);
   }
@@ -150,7 +151,9 @@ void Sender::trim() noexcept {
   }
 }
 
-void Sender::hold(const Image& image) noexcept { ++holds_[image.slot]; }
+void Sender::hold(const Image& image) noexcept {
+  ++holds_[image.slot];
+}
 
 void Sender::let_go(const Image& image) noexcept {
   if (--holds_[image.slot] == 0) {
@@ -199,18 +202,24 @@ bool Sender::advance(SenderClient& client) noexcept {
                  context_.clock.tai_ns());
   }
   switch (client.send(batch_, context_)) {
-    case SenderClient::Progress::idle: return false;
-    case SenderClient::Progress::more: return true;
+    case SenderClient::Progress::idle:
+      return false;
+    case SenderClient::Progress::more:
+      return true;
     case SenderClient::Progress::finished:
       client.complete(context_.clock.tai_ns());
       context_.counters.add(Counter::frames_sent);
       return true;
-    case SenderClient::Progress::blocked: block(client); return false;
+    case SenderClient::Progress::blocked:
+      block(client);
+      return false;
     case SenderClient::Progress::retry_soon:
       // A full device queue does not turn the socket unwritable; it drains within this time.
       wake_at_ns_ = context_.clock.tai_ns() + 100'000;
       return false;
-    case SenderClient::Progress::failed: client.closing = true; return true;
+    case SenderClient::Progress::failed:
+      client.closing = true;
+      return true;
   }
   return false;
 }
@@ -220,7 +229,8 @@ void Sender::block(SenderClient& client) noexcept {
   epoll_event event{};
   event.events = EPOLLOUT | EPOLLONESHOT;
   event.data.ptr = &client;
-  // Not before the first block: epoll reports errors and hang-ups even of sockets nobody asks about.
+  // Not before the first block: epoll reports errors and hang-ups even of sockets nobody asks
+  // about.
   ::epoll_ctl(epoll_.get(), client.registered ? EPOLL_CTL_MOD : EPOLL_CTL_ADD, client.fd(), &event);
   client.registered = true;
 }

@@ -16,8 +16,8 @@ namespace emit::server {
 ///
 /// The newest `queue_frames` publications form the window. A client is a position in it. When a
 /// publication leaves the window although a client has not had it yet, that client skips it: the
-/// next frame it gets carries kFlagGapBefore (newest-wins), or it is disconnected (every_frame). What
-/// such a client has half sent moves to its own memory. So the sender holds at most
+/// next frame it gets carries kFlagGapBefore (newest-wins), or it is disconnected (every_frame).
+/// What such a client has half sent moves to its own memory. So the sender holds at most
 /// queue_frames + 1 images, whatever clients do, and a source with queue_frames + 3 slots always
 /// has one to render into.
 class Sender final : public Agent {
@@ -72,8 +72,9 @@ class Sender final : public Agent {
   bool have_last_ = false;
   Image last_;
   std::int64_t wake_at_ns_ = kNeverNs;
-  std::uint64_t taken_ = 0;                 // publications taken so far
-  std::atomic<std::uint64_t> finished_{0};  // taken_ when nothing was left to send; else the last such
+  std::uint64_t taken_ = 0;  // publications taken so far
+  std::atomic<std::uint64_t> finished_{
+      0};  // taken_ when nothing was left to send; else the last such
 };
 
 }  // namespace emit::server

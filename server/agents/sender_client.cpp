@@ -84,8 +84,8 @@ SenderClient::Progress SenderClient::send_tcp(Context& context) noexcept {
   add(params_.first_bytes, first_sent_);
   if (busy_) {
     add(head_, static_cast<std::size_t>(offset_));
-    add(pixels_, static_cast<std::size_t>(
-                     offset_ > head_.size() ? offset_ - head_.size() : std::uint64_t{0}));
+    add(pixels_, static_cast<std::size_t>(offset_ > head_.size() ? offset_ - head_.size()
+                                                                 : std::uint64_t{0}));
   }
   if (count == 0) {
     return Progress::idle;
@@ -115,8 +115,7 @@ SenderClient::Progress SenderClient::send_udp(UdpBatch& batch, Context& context)
     return Progress::idle;
   }
   for (int call = 0; call < kUdpTurnCalls; ++call) {
-    const auto result =
-        batch.send(params_.udp_fd.get(), *fragments_, fragment_, segmentation_);
+    const auto result = batch.send(params_.udp_fd.get(), *fragments_, fragment_, segmentation_);
     switch (result.status) {
       case UdpBatch::Status::sent:
         fragment_ += result.fragments;
@@ -125,8 +124,10 @@ SenderClient::Progress SenderClient::send_udp(UdpBatch& batch, Context& context)
           return Progress::finished;
         }
         break;
-      case UdpBatch::Status::would_block: return Progress::blocked;
-      case UdpBatch::Status::no_buffers: return Progress::retry_soon;
+      case UdpBatch::Status::would_block:
+        return Progress::blocked;
+      case UdpBatch::Status::no_buffers:
+        return Progress::retry_soon;
       case UdpBatch::Status::no_segmentation:
         segmentation_ = false;
         context.sender_events.push(EventKind::no_gso, params_.connection,

@@ -91,21 +91,21 @@ struct Context {
   const Clock& clock;
   Counters counters;
   Doorbells bells;
-  std::vector<Channel> channels;       ///< fixed before the agents run
+  std::vector<Channel> channels;  ///< fixed before the agents run
   std::atomic<std::uint64_t> run_id{0};
   std::atomic<std::uint64_t> frames_handed_over{0};   ///< put on `published` by the conductor
   std::atomic<std::uint64_t> journal_handed_over{0};  ///< lines put on `journal`
 
-  SpscRing<HostInput> host_inputs{32};     // receiver -> conductor
-  SpscRing<StatusReply> replies{256};      // conductor -> receiver
-  SpscRing<RenderJob> jobs{16};            // conductor -> render
-  SpscRing<RenderDone> done{16};           // render -> conductor
-  SpscRing<PublishFrame> published{16};    // conductor -> sender
-  ByteRing journal;                        // conductor -> recorder
-  SpscRing<ClientCommand> to_sender;       // receiver -> sender
-  SpscRing<ClientReleased> from_sender;    // sender -> receiver
-  SpscRing<RecorderCommand> to_recorder;   // receiver -> recorder
-  SpscRing<RecorderReleased> from_recorder;// recorder -> receiver
+  SpscRing<HostInput> host_inputs{32};       // receiver -> conductor
+  SpscRing<StatusReply> replies{256};        // conductor -> receiver
+  SpscRing<RenderJob> jobs{16};              // conductor -> render
+  SpscRing<RenderDone> done{16};             // render -> conductor
+  SpscRing<PublishFrame> published{16};      // conductor -> sender
+  ByteRing journal;                          // conductor -> recorder
+  SpscRing<ClientCommand> to_sender;         // receiver -> sender
+  SpscRing<ClientReleased> from_sender;      // sender -> receiver
+  SpscRing<RecorderCommand> to_recorder;     // receiver -> recorder
+  SpscRing<RecorderReleased> from_recorder;  // recorder -> receiver
 
   EventLog conductor_events{256, counters};
   EventLog receiver_events{256, counters};
@@ -117,19 +117,31 @@ struct Context {
 /// Counter of a refusal. Precondition: not ok.
 [[nodiscard]] constexpr Counter counter_of(StatusCode code) noexcept {
   switch (code) {
-    case StatusCode::wrong_version: return Counter::refused_wrong_version;
-    case StatusCode::oversize: return Counter::refused_oversize;
-    case StatusCode::malformed: return Counter::refused_malformed;
-    case StatusCode::unknown_entity: return Counter::refused_unknown_entity;
-    case StatusCode::invalid_pose: return Counter::refused_invalid_pose;
-    case StatusCode::time_backwards: return Counter::refused_time_backwards;
-    case StatusCode::duplicate_frame: return Counter::refused_duplicate_frame;
-    case StatusCode::unknown_channel: return Counter::refused_unknown_channel;
-    case StatusCode::not_allowed: return Counter::refused_not_allowed;
-    case StatusCode::overloaded: return Counter::refused_overloaded;
-    case StatusCode::invalid_environment: return Counter::refused_invalid_environment;
+    case StatusCode::wrong_version:
+      return Counter::refused_wrong_version;
+    case StatusCode::oversize:
+      return Counter::refused_oversize;
+    case StatusCode::malformed:
+      return Counter::refused_malformed;
+    case StatusCode::unknown_entity:
+      return Counter::refused_unknown_entity;
+    case StatusCode::invalid_pose:
+      return Counter::refused_invalid_pose;
+    case StatusCode::time_backwards:
+      return Counter::refused_time_backwards;
+    case StatusCode::duplicate_frame:
+      return Counter::refused_duplicate_frame;
+    case StatusCode::unknown_channel:
+      return Counter::refused_unknown_channel;
+    case StatusCode::not_allowed:
+      return Counter::refused_not_allowed;
+    case StatusCode::overloaded:
+      return Counter::refused_overloaded;
+    case StatusCode::invalid_environment:
+      return Counter::refused_invalid_environment;
     case StatusCode::ok:
-    case StatusCode::internal: break;
+    case StatusCode::internal:
+      break;
   }
   return Counter::refused_internal;
 }

@@ -217,12 +217,13 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   options.tai_unset = clock_.tai_offset_unset();
   conductor_ = std::make_unique<Conductor>(context_, tracks_, options);
 
-  log_->write(LogLevel::info,
-              fmt::format("software=\"{}\" commit={} device=\"{}\" scenario=\"{}\" pacing={} "
-                          "channels={} width_px={} height_px={}",
-                          software, kCommit, source.device,
-                          scenario_ ? scenario_->file.string() : "", pacing_name(config_.pacing.mode),
-                          context_.channels.size(), source.width_px, source.height_px));
+  log_->write(
+      LogLevel::info,
+      fmt::format("software=\"{}\" commit={} device=\"{}\" scenario=\"{}\" pacing={} "
+                  "channels={} width_px={} height_px={}",
+                  software, kCommit, source.device, scenario_ ? scenario_->file.string() : "",
+                  pacing_name(config_.pacing.mode), context_.channels.size(), source.width_px,
+                  source.height_px));
   if (clock_.tai_offset_unset()) {
     log_->write(LogLevel::warn,
                 "event=tai_offset_unset effect=\"wall instants are UTC\" "
@@ -245,8 +246,8 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
 }
 
 int DaemonImpl::run() {
-  for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(),
-                              conductor_runner_.get(), receiver_runner_.get()}) {
+  for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(), conductor_runner_.get(),
+                              receiver_runner_.get()}) {
     if (!runner->start_thread()) {
       log_->write(LogLevel::error,
                   fmt::format("event=agent_failed agent={}", runner->agent().name()));
@@ -272,10 +273,10 @@ int DaemonImpl::run() {
   stop_agents();
   housekeep();
   log_summary();
-  log_->write(LogLevel::info, fmt::format("event=stopped frames={} clients={} journal={}",
-                                          frames ? "drained" : "given_up",
-                                          clients ? "drained" : "given_up",
-                                          journal ? "drained" : "given_up"));
+  log_->write(
+      LogLevel::info,
+      fmt::format("event=stopped frames={} clients={} journal={}", frames ? "drained" : "given_up",
+                  clients ? "drained" : "given_up", journal ? "drained" : "given_up"));
   log_->flush();
   return 0;
 }
@@ -316,9 +317,8 @@ void DaemonImpl::drain_stepped() {
 void DaemonImpl::stop_agents() {
   // Against the flow of lent things: slots go back to the source before it ends, descriptors to the
   // receiver before it closes them.
-  for (AgentRunner* runner : {conductor_runner_.get(), sender_runner_.get(),
-                              recorder_runner_.get(), receiver_runner_.get(),
-                              render_runner_.get()}) {
+  for (AgentRunner* runner : {conductor_runner_.get(), sender_runner_.get(), recorder_runner_.get(),
+                              receiver_runner_.get(), render_runner_.get()}) {
     if (runner != nullptr) {
       runner->stop();
     }
@@ -326,15 +326,15 @@ void DaemonImpl::stop_agents() {
 }
 
 void DaemonImpl::housekeep() {
-  for (EventLog* events : {&context_.conductor_events, &context_.receiver_events,
-                           &context_.render_events, &context_.sender_events,
-                           &context_.recorder_events}) {
+  for (EventLog* events :
+       {&context_.conductor_events, &context_.receiver_events, &context_.render_events,
+        &context_.sender_events, &context_.recorder_events}) {
     while (const Event* event = events->ring().front()) {
       const EventText line = describe(*event);
       events->ring().pop();
       if (log_ && (!line.distinct || distinct_.note(line.text, clock_.tai_ns()))) {
-        const auto count = line.distinct ? distinct_.entries().find(line.text)
-                                         : distinct_.entries().end();
+        const auto count =
+            line.distinct ? distinct_.entries().find(line.text) : distinct_.entries().end();
         log_->write(line.level, count != distinct_.entries().end() && count->second.count > 1
                                     ? fmt::format("{} repeats={}", line.text, count->second.count)
                                     : line.text);
@@ -352,9 +352,8 @@ void DaemonImpl::log_summary() {
     }
   }
   log_->write(LogLevel::info, counters);
-  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(),
-                              render_runner_.get(), sender_runner_.get(),
-                              recorder_runner_.get()}) {
+  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
+                              sender_runner_.get(), recorder_runner_.get()}) {
     const DutyCycle& duty = runner->duty_cycle();
     log_->write(LogLevel::info,
                 fmt::format("event=duty_cycle agent={} turns={} busy_ms={:.1f} max_turn_us={} "

@@ -17,10 +17,11 @@ namespace emit::server {
 
 /// What a caller may replace: tests give a fake clock and a null source.
 struct DaemonOptions {
-  Clock* clock = nullptr;              ///< null: SystemClock; must outlive the daemon
-  FrameSourceFactory source_factory;   ///< empty: what the configuration names
-  bool stepped = false;                ///< no threads: the caller turns the crank with step()
-  std::function<void(const std::string&)> on_log;  ///< null: spdlog as configured; set: log lines go here
+  Clock* clock = nullptr;             ///< null: SystemClock; must outlive the daemon
+  FrameSourceFactory source_factory;  ///< empty: what the configuration names
+  bool stepped = false;               ///< no threads: the caller turns the crank with step()
+  std::function<void(const std::string&)>
+      on_log;  ///< null: spdlog as configured; set: log lines go here
 };
 
 /// The whole daemon: agents, sockets, journal and frame source behind one object.

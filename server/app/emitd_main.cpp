@@ -102,8 +102,10 @@ int exit_code_of(const physics::Error& error) {
     case physics::ErrorCode::config:
     case physics::ErrorCode::parse:
     case physics::ErrorCode::not_found:
-    case physics::ErrorCode::unsupported: return kExitConfig;
-    default: return kExitFailure;
+    case physics::ErrorCode::unsupported:
+      return kExitConfig;
+    default:
+      return kExitFailure;
   }
 }
 

@@ -40,7 +40,9 @@ struct JournalPlayer::PendingWeather {
 JournalPlayer::JournalPlayer(FrameSource& source, std::size_t first_channel_plane)
     : source_(source), plane_(first_channel_plane) {}
 
-JournalPlayer::~JournalPlayer() { release_shown(); }
+JournalPlayer::~JournalPlayer() {
+  release_shown();
+}
 
 void JournalPlayer::release_shown() noexcept {
   if (shown_) {
@@ -167,9 +169,9 @@ std::size_t first_channel_plane(const scene::ScenarioDesc& scenario) noexcept {
   if (scenario.channels.empty()) {
     return 0;
   }
-  const auto band = std::find_if(
-      scenario.bands.begin(), scenario.bands.end(),
-      [&](const auto& each) { return each.name == scenario.channels.front().band; });
+  const auto band =
+      std::find_if(scenario.bands.begin(), scenario.bands.end(),
+                   [&](const auto& each) { return each.name == scenario.channels.front().band; });
   return band != scenario.bands.end() ? static_cast<std::size_t>(band - scenario.bands.begin()) : 0;
 }
 

@@ -12,24 +12,24 @@
 namespace emit::v1 {
 class FrameDecision;
 class JournalEntry;
-}
+}  // namespace emit::v1
 
 namespace emit::server {
 
 /// One frame of a replay.
 struct ReplayedFrame {
   std::uint64_t run_id = 0;
-  std::uint64_t frame_number = 0;       ///< as in the live stream
+  std::uint64_t frame_number = 0;  ///< as in the live stream
   std::uint64_t host_frame_number = 0;
   std::int64_t sim_time_ns = 0;
   std::int64_t pose_sim_time_ns = 0;
-  std::uint32_t flags = 0;              ///< protocol::FrameFlags of the live frame
-  bool repeated = false;                ///< the previous image again: nothing was rendered
+  std::uint32_t flags = 0;  ///< protocol::FrameFlags of the live frame
+  bool repeated = false;    ///< the previous image again: nothing was rendered
   /// Valid until the next apply(). Of a repeated frame: the image shown before it.
   const renderer::FrameView* view = nullptr;
-  std::uint32_t crc32c = 0;             ///< of the first channel, computed here
-  std::uint32_t journal_crc32c = 0;     ///< what the live run sent
-  bool matches = false;                 ///< crc32c == journal_crc32c
+  std::uint32_t crc32c = 0;          ///< of the first channel, computed here
+  std::uint32_t journal_crc32c = 0;  ///< what the live run sent
+  bool matches = false;              ///< crc32c == journal_crc32c
 };
 
 /// Re-renders a journal: hands the inputs to a FrameSource as the live run did, in the same order.
@@ -52,7 +52,8 @@ class JournalPlayer {
 
   /// Empty optional: the entry changed state but is no frame.
   /// Errors (protocol): the sequence has a gap (the live journal lost entries), a frame before any
-  /// run start, a repeated frame before any image, an entry without a body; (internal): no free slot.
+  /// run start, a repeated frame before any image, an entry without a body; (internal): no free
+  /// slot.
   [[nodiscard]] physics::Result<std::optional<ReplayedFrame>> apply(const v1::JournalEntry& entry);
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }

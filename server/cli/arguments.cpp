@@ -195,8 +195,9 @@ void Tool::add_stream_commands() {
         "frames on disk, timing table, bit-exact replay",
         "emit demo --out frames", run_demo);
     add_path(app, "--out", o.out, "Folder for the frames")->capture_default_str();
-    app.add_option("--scenario", o.scenario, "Shipped scenario or .toml file")
+    app.add_option("--scenario", o.input.scenario, "Shipped scenario or .toml file")
         ->capture_default_str();
+    add_set(app, o.input.set);
     add_path(app, "--log", o.log, "Host log to play; default: the scenario's shipped log");
     add_count(app, "--frames", o.frames,
               "Poses to play, evenly spaced over the log; 0: as many as fit");

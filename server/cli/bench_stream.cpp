@@ -48,7 +48,7 @@ config::DaemonConfig canned_config(const BenchStreamCommand& command) {
 
 Result<StreamResult> run_transport(const BenchStreamCommand& command, const std::string& scheme,
                                    const std::filesystem::path& work) {
-  auto daemon = DaemonProcess::start(canned_config(command), work, std::chrono::seconds(60));
+  auto daemon = DaemonProcess::start(canned_config(command), {}, work, std::chrono::seconds(60));
   if (!daemon) return tl::unexpected(daemon.error());
   std::vector<std::unique_ptr<StreamClient>> clients;
   for (std::uint32_t i = 0; i < command.clients; ++i) {

@@ -81,7 +81,7 @@ int run_replay(const ReplayCommand& command);
 
 struct DemoCommand {
   std::filesystem::path out = "emit-demo";
-  std::string scenario = "airfield";
+  ScenarioChoice input{"airfield", {}};
   std::optional<std::filesystem::path> log;
   std::uint64_t frames = 0;  ///< 0: as many as fit the budget
   bool all = false;

@@ -41,6 +41,7 @@ std::optional<std::string> ready_line(const std::filesystem::path& log) {
 }  // namespace
 
 physics::Result<DaemonProcess> DaemonProcess::start(const config::DaemonConfig& config,
+                                                    const std::vector<std::string>& set,
                                                     const std::filesystem::path& directory,
                                                     std::chrono::milliseconds timeout) {
   const auto bin = executable_dir();
@@ -53,8 +54,12 @@ physics::Result<DaemonProcess> DaemonProcess::start(const config::DaemonConfig& 
     return make_error(ErrorCode::io, fmt::format("{}: cannot write", config_file.string()));
   }
   const auto log = directory / "emitd.log";
-  auto process =
-      Subprocess::start({(*bin / "emitd").string(), "--config", config_file.string()}, log);
+  std::vector<std::string> arguments{(*bin / "emitd").string(), "--config", config_file.string()};
+  for (const std::string& entry : set) {
+    arguments.emplace_back("--set");
+    arguments.push_back(entry);
+  }
+  auto process = Subprocess::start(arguments, log);
   if (!process) return tl::unexpected(process.error());
 
   DaemonProcess daemon(std::move(*process), log);

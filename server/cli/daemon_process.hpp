@@ -15,11 +15,12 @@ namespace emit::cli {
 /// The real emitd as a child process, found beside this executable. Single thread, setup only.
 class DaemonProcess {
  public:
-  /// Writes `config` to directory/emitd.toml, starts emitd with it and waits until it says that it
-  /// is ready. What it prints goes to directory/emitd.log.
+  /// Writes `config` to directory/emitd.toml, starts emitd with it and the overrides `set`, and
+  /// waits until it says that it is ready. What it prints goes to directory/emitd.log.
   /// Errors: not_found (no emitd), config (it refused the configuration), io (ended or not ready in
   /// time); the text carries the last lines of its log.
   [[nodiscard]] static physics::Result<DaemonProcess> start(const config::DaemonConfig& config,
+                                                            const std::vector<std::string>& set,
                                                             const std::filesystem::path& directory,
                                                             std::chrono::milliseconds timeout);
 

@@ -176,8 +176,8 @@ Result<void> Demo::start() {
   fmt::print(text_stream(command_.json), "starting emitd on scenario {} ({})\n", scenario_.name,
              scenario_.file.string());
   const auto started = Clock::now();
-  auto daemon = DaemonProcess::start(daemon_config(scenario_, work_.path()), work_.path(),
-                                     std::chrono::seconds(120));
+  auto daemon = DaemonProcess::start(daemon_config(scenario_, work_.path()), command_.input.set,
+                                     work_.path(), std::chrono::seconds(120));
   if (!daemon) return tl::unexpected(daemon.error());
   daemon_.emplace(std::move(*daemon));
   setup_s_ = seconds_since(started);
@@ -429,7 +429,7 @@ int Demo::run() {
 }  // namespace
 
 int run_demo(const DemoCommand& command) {
-  const auto scenario = load_scenario_choice({command.scenario, {}});
+  const auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
   WorkFolder work(command.out / "run", command.keep);
   const InterruptGuard interrupt;

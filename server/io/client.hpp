@@ -16,7 +16,8 @@ class JournalEntry;
 }
 
 /// Client side of the wire protocol, for the tool, for tests and for integrators' programs.
-/// Blocking with a timeout; one thread per object. Timeouts are in ns of the monotonic clock; 0 polls.
+/// Blocking with a timeout; one thread per object. Timeouts are in ns of the monotonic clock; 0
+/// polls.
 namespace emit::server {
 
 /// scheme://host:port; schemes tcp and udp, IPv6 hosts in brackets.
@@ -74,24 +75,24 @@ struct SubscribeOptions {
 
 /// Pixels stay valid until the next receive().
 struct ReceivedFrame {
-  protocol::FrameHeader header;  ///< kFlagPartial is set here when fragments are missing
-  std::span<const float> pixels; ///< width_px * height_px; missing pixels are 0
-  std::uint64_t missing_px = 0;  ///< of a partial frame
+  protocol::FrameHeader header;    ///< kFlagPartial is set here when fragments are missing
+  std::span<const float> pixels;   ///< width_px * height_px; missing pixels are 0
+  std::uint64_t missing_px = 0;    ///< of a partial frame
   std::int64_t first_byte_ns = 0;  ///< wall (TAI), when this client began to have it
   std::int64_t last_byte_ns = 0;
 };
 
 struct ReceiveCounters {
-  std::uint64_t received = 0;    ///< complete frames
-  std::uint64_t partial = 0;     ///< delivered with missing pixels
-  std::uint64_t lost = 0;        ///< frame numbers never seen and not announced by kFlagGapBefore
-  std::uint64_t gaps = 0;        ///< announced skips (frames with kFlagGapBefore)
-  std::uint64_t skipped = 0;     ///< frame numbers missing at announced skips
+  std::uint64_t received = 0;  ///< complete frames
+  std::uint64_t partial = 0;   ///< delivered with missing pixels
+  std::uint64_t lost = 0;      ///< frame numbers never seen and not announced by kFlagGapBefore
+  std::uint64_t gaps = 0;      ///< announced skips (frames with kFlagGapBefore)
+  std::uint64_t skipped = 0;   ///< frame numbers missing at announced skips
   std::uint64_t crc_errors = 0;
-  std::uint64_t os_drops = 0;    ///< datagrams the kernel dropped for want of buffer space
+  std::uint64_t os_drops = 0;  ///< datagrams the kernel dropped for want of buffer space
   std::uint64_t bad_datagrams = 0;
-  std::uint64_t late = 0;        ///< frames with kFlagLate
-  std::uint64_t repeated = 0;    ///< frames with kFlagRepeated
+  std::uint64_t late = 0;      ///< frames with kFlagLate
+  std::uint64_t repeated = 0;  ///< frames with kFlagRepeated
 };
 
 /// Receives frames. tcp://host:port: frames on the control connection; udp://host:port: control

@@ -162,8 +162,7 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
                                                     : ": connection closed within a record"));
     }
     if (errno != EAGAIN && errno != EINTR) {
-      return make_error(ErrorCode::io,
-                        fmt::format("{}: {}", to_string(peer_), error_text(errno)));
+      return make_error(ErrorCode::io, fmt::format("{}: {}", to_string(peer_), error_text(errno)));
     }
     if (!wait_for(fd_.get(), POLLIN, end_ns)) {
       return false;
@@ -174,13 +173,11 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
 physics::Result<void> ClientConnection::send(std::span<const std::byte> bytes,
                                              std::int64_t end_ns) {
   while (!bytes.empty()) {
-    const ssize_t sent =
-        ::send(fd_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+    const ssize_t sent = ::send(fd_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
     if (sent >= 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(sent));
     } else if (errno != EAGAIN && errno != EINTR) {
-      return make_error(ErrorCode::io,
-                        fmt::format("{}: {}", to_string(peer_), error_text(errno)));
+      return make_error(ErrorCode::io, fmt::format("{}: {}", to_string(peer_), error_text(errno)));
     } else if (!wait_for(fd_.get(), POLLOUT, end_ns)) {
       return make_error(ErrorCode::io, to_string(peer_) + ": takes nothing within the timeout");
     }
@@ -188,8 +185,7 @@ physics::Result<void> ClientConnection::send(std::span<const std::byte> bytes,
   return {};
 }
 
-physics::Result<void> ClientConnection::send(const v1::ControlRecord& record,
-                                             std::int64_t end_ns) {
+physics::Result<void> ClientConnection::send(const v1::ControlRecord& record, std::int64_t end_ns) {
   out_.clear();
   protocol::append_control_record(record, out_);
   return send(out_, end_ns);

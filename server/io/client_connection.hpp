@@ -14,7 +14,7 @@
 namespace emit::v1 {
 class ControlRecord;
 class Status;
-}
+}  // namespace emit::v1
 
 namespace emit::server {
 

@@ -71,7 +71,8 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   // Frames may follow the answer at once: the parser must take the largest channel's.
   std::uint64_t largest = 0;
   for (const auto& channel : connection_.server().channels) {
-    largest = std::max(largest, std::uint64_t{channel.width_px} * channel.height_px * sizeof(float));
+    largest =
+        std::max(largest, std::uint64_t{channel.width_px} * channel.height_px * sizeof(float));
   }
   constexpr std::uint64_t kMostBytes = 1u << 30;
   if (largest > kMostBytes) {
@@ -98,8 +99,7 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
     params.max_streams = 2;
     reassembler_.emplace(params);
   } else {
-    connection_.allow_frames(
-        static_cast<std::uint32_t>(largest + protocol::kFrameHeaderBytes));
+    connection_.allow_frames(static_cast<std::uint32_t>(largest + protocol::kFrameHeaderBytes));
     pixels_.resize(static_cast<std::size_t>(largest / sizeof(float)));
   }
   if (auto sent = connection_.send(request, end_ns); !sent) {
@@ -124,8 +124,9 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
     }
     if (answer.has_subscribed()) {
       const v1::ChannelInfo& info = answer.subscribed().channel();
-      channel_ = {info.index(), info.name(), info.kind(), info.sensor(), info.band(),
-                  info.band_lo_um(), info.band_hi_um(), info.width_px(), info.height_px()};
+      channel_ = {info.index(),      info.name(),     info.kind(),
+                  info.sensor(),     info.band(),     info.band_lo_um(),
+                  info.band_hi_um(), info.width_px(), info.height_px()};
       stream_id_ = static_cast<std::uint16_t>(answer.subscribed().stream_id());
       subscribed_ = true;
       return channel_;
@@ -309,8 +310,7 @@ std::string FrameClientImpl::receive_buffer_advice() const {
   return fmt::format(
       "the UDP receive buffer holds {} bytes, less than {} frames of {} bytes; allow more with: "
       "sudo sysctl -w net.core.rmem_max={}",
-      receiver_->buffer_bytes(), kFrames, frame_bytes,
-      std::bit_ceil(2 * kFrames * frame_bytes));
+      receiver_->buffer_bytes(), kFrames, frame_bytes, std::bit_ceil(2 * kFrames * frame_bytes));
 }
 
 }  // namespace

@@ -24,9 +24,9 @@ class TcpHost final : public HostClient {
                              std::int64_t timeout_ns) override {
     const auto body = encoder_.encode(frame);
     record_.resize(protocol::kRecordHeaderBytes + body.size());
-    protocol::encode_record_header(
-        protocol::RecordKind::host_frame, static_cast<std::uint32_t>(body.size()),
-        std::span(record_).first<protocol::kRecordHeaderBytes>());
+    protocol::encode_record_header(protocol::RecordKind::host_frame,
+                                   static_cast<std::uint32_t>(body.size()),
+                                   std::span(record_).first<protocol::kRecordHeaderBytes>());
     std::copy(body.begin(), body.end(), record_.begin() + protocol::kRecordHeaderBytes);
     return connection_.send(record_, monotonic_now_ns() + timeout_ns);
   }

@@ -48,9 +48,9 @@ void SocketAddress::set_port(std::uint16_t port) noexcept {
 
 physics::Result<HostPort> parse_host_port(std::string_view text) {
   const auto bad = [&] {
-    return make_error(ErrorCode::config,
-                      fmt::format("'{}' is not host:port (such as 127.0.0.1:7000 or [::1]:7000)",
-                                  text));
+    return make_error(
+        ErrorCode::config,
+        fmt::format("'{}' is not host:port (such as 127.0.0.1:7000 or [::1]:7000)", text));
   };
   const std::size_t colon = text.rfind(':');
   if (colon == std::string_view::npos) {
@@ -159,8 +159,8 @@ physics::Result<Fd> connect_tcp(const SocketAddress& address, std::int64_t timeo
       return fail(error_text(errno));
     }
     pollfd wait{fd->get(), POLLOUT, 0};
-    const int ready = ::poll(&wait, 1, static_cast<int>(std::min<std::int64_t>(
-                                           timeout_ns / 1'000'000, INT_MAX)));
+    const int ready =
+        ::poll(&wait, 1, static_cast<int>(std::min<std::int64_t>(timeout_ns / 1'000'000, INT_MAX)));
     if (ready <= 0) {
       return fail("no answer within the timeout");
     }
@@ -194,7 +194,9 @@ std::string to_string(const SocketAddress& address) {
   return fmt::format("{}{}{}:{}", v6 ? "[" : "", host.data(), v6 ? "]" : "", address.port());
 }
 
-std::string error_text(int error) { return std::generic_category().message(error); }
+std::string error_text(int error) {
+  return std::generic_category().message(error);
+}
 
 std::uint64_t set_receive_buffer(int fd, std::uint64_t bytes) noexcept {
   const int wanted = static_cast<int>(std::min<std::uint64_t>(bytes, INT_MAX / 2));

@@ -18,10 +18,13 @@ constexpr std::uint64_t kMaxDatagramBytes = 65507;
 
 UdpBatch::Result failure(int error) noexcept {
   switch (error) {
-    case EAGAIN: return {UdpBatch::Status::would_block, 0, 0, error};
+    case EAGAIN:
+      return {UdpBatch::Status::would_block, 0, 0, error};
     case ENOBUFS:
-    case ENOMEM: return {UdpBatch::Status::no_buffers, 0, 0, error};
-    default: return {UdpBatch::Status::failed, 0, 0, error};
+    case ENOMEM:
+      return {UdpBatch::Status::no_buffers, 0, 0, error};
+    default:
+      return {UdpBatch::Status::failed, 0, 0, error};
   }
 }
 

@@ -24,7 +24,7 @@ class UdpBatch {
     Status status = Status::sent;
     std::uint32_t fragments = 0;  ///< handed to the kernel
     std::uint64_t bytes = 0;
-    int error = 0;                ///< errno of failed and no_segmentation
+    int error = 0;  ///< errno of failed and no_segmentation
   };
 
   /// One call's worth of fragments from `first` on, over a connected socket.

@@ -74,7 +74,8 @@ physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketAddress& pe
 
 void UdpFrameReceiver::size_buffer(std::uint64_t frame_bytes) {
   constexpr std::uint64_t kFrames = 8;  // at least 4 are needed; the rest is headroom
-  buffer_bytes_ = set_receive_buffer(fd_.get(), std::max<std::uint64_t>(kFrames * frame_bytes, 1u << 20));
+  buffer_bytes_ =
+      set_receive_buffer(fd_.get(), std::max<std::uint64_t>(kFrames * frame_bytes, 1u << 20));
 }
 
 int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& counters) {
@@ -112,8 +113,11 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
       switch (reassembler.push(datagram)) {
         case protocol::FragmentStatus::accepted:
         case protocol::FragmentStatus::duplicate:
-        case protocol::FragmentStatus::late: break;
-        default: ++counters.bad_datagrams; break;
+        case protocol::FragmentStatus::late:
+          break;
+        default:
+          ++counters.bad_datagrams;
+          break;
       }
     } while (!rest.empty());
   }

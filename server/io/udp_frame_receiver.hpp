@@ -10,8 +10,8 @@
 
 namespace emit::server {
 
-/// Fragments from a UDP socket into a reassembler; takes several datagrams per system call, joined by
-/// the kernel (UDP_GRO) where it can.
+/// Fragments from a UDP socket into a reassembler; takes several datagrams per system call, joined
+/// by the kernel (UDP_GRO) where it can.
 class UdpFrameReceiver {
  public:
   /// Errors (io).

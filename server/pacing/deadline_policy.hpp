@@ -5,7 +5,8 @@
 namespace emit::server {
 
 /// host-step: frame k is always sent for pose k; late when its pixels came after the deadline.
-[[nodiscard]] inline bool host_step_is_late(std::int64_t deadline_ns, std::int64_t done_ns) noexcept {
+[[nodiscard]] inline bool host_step_is_late(std::int64_t deadline_ns,
+                                            std::int64_t done_ns) noexcept {
   return deadline_ns != 0 && done_ns > deadline_ns;
 }
 

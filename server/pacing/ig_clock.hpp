@@ -30,8 +30,8 @@ class IgClock {
     ++slot_;
     constexpr std::int64_t kSkipAfterSlots = 4;
     if (now_ns - end_ns() > kSkipAfterSlots * period_ns()) {
-      const auto target = static_cast<std::uint64_t>(static_cast<double>(now_ns - origin_ns_) *
-                                                     1e-9 * rate_hz_);
+      const auto target =
+          static_cast<std::uint64_t>(static_cast<double>(now_ns - origin_ns_) * 1e-9 * rate_hz_);
       if (target > slot_) {
         const std::uint64_t skipped = target - slot_;
         slot_ = target;

@@ -8,7 +8,7 @@ namespace emit::server {
 
 enum class GateVerdict : std::uint8_t {
   accept,
-  new_epoch,        ///< the host restarted: accept after a reset of the run
+  new_epoch,  ///< the host restarted: accept after a reset of the run
   time_backwards,
   duplicate_frame,
 };

@@ -34,8 +34,8 @@ glm::dquat turned(const glm::dquat& attitude, const glm::dvec3& rate_body_rad_s,
   const glm::dvec3 half = rate_body_rad_s * (0.5 * dt_s);
   const double angle = glm::length(half);
   const double sinc = angle < 1e-9 ? 1.0 - angle * angle / 6.0 : std::sin(angle) / angle;
-  return glm::normalize(attitude * glm::dquat{std::cos(angle), half.x * sinc, half.y * sinc,
-                                              half.z * sinc});
+  return glm::normalize(attitude *
+                        glm::dquat{std::cos(angle), half.x * sinc, half.y * sinc, half.z * sinc});
 }
 
 }  // namespace
@@ -79,8 +79,7 @@ PoseTrack::Motion PoseTrack::motion_at_newest() const noexcept {
     motion.velocity_m_s = last.rates->velocity_world_m_s;
     motion.angular_rate_body_rad_s = last.rates->angular_rate_body_rad_s;
     if (before != nullptr && before->rates) {
-      motion.acceleration_m_s2 =
-          (motion.velocity_m_s - before->rates->velocity_world_m_s) / dt_s;
+      motion.acceleration_m_s2 = (motion.velocity_m_s - before->rates->velocity_world_m_s) / dt_s;
     }
     return motion;
   }
@@ -117,7 +116,8 @@ PoseSample PoseTrack::sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) 
     const double dt_s = seconds(last.sim_time_ns, out.shown_ns);
     const Motion motion = motion_at_newest();
     out.pose.position_world_m =
-        last.pose.position_world_m + (motion.velocity_m_s + motion.acceleration_m_s2 * (0.5 * dt_s)) * dt_s;
+        last.pose.position_world_m +
+        (motion.velocity_m_s + motion.acceleration_m_s2 * (0.5 * dt_s)) * dt_s;
     out.pose.world_from_body =
         turned(last.pose.world_from_body, motion.angular_rate_body_rad_s, dt_s);
     return out;
@@ -130,11 +130,10 @@ PoseSample PoseTrack::sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) 
     }
     const TimedPose& from = at(i - 1);
     if (from.sim_time_ns <= sim_time_ns) {
-      out.pose = to.teleport
-                     ? from.pose
-                     : physics::interpolate(from.pose, to.pose,
-                                            seconds(from.sim_time_ns, sim_time_ns) /
-                                                seconds(from.sim_time_ns, to.sim_time_ns));
+      out.pose = to.teleport ? from.pose
+                             : physics::interpolate(from.pose, to.pose,
+                                                    seconds(from.sim_time_ns, sim_time_ns) /
+                                                        seconds(from.sim_time_ns, to.sim_time_ns));
       return out;
     }
   }

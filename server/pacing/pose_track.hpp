@@ -28,9 +28,9 @@ struct PoseSample {
 /// Recent poses of one body, and where it is at an instant.
 ///
 /// Between received poses: linear in position, shortest arc in attitude. Beyond the newest:
-/// p + v t + a t^2 / 2 and q exp(omega t / 2), the dead reckoning "RVW" of DIS; v and omega as given,
-/// else differenced, a always differenced. Before the oldest: the oldest.
-/// Thread: one owner. Real time: RT-safe.
+/// p + v t + a t^2 / 2 and q exp(omega t / 2), the dead reckoning "RVW" of DIS; v and omega as
+/// given, else differenced, a always differenced. Before the oldest: the oldest. Thread: one owner.
+/// Real time: RT-safe.
 class PoseTrack {
  public:
   static constexpr std::size_t kHistory = 8;

@@ -13,8 +13,8 @@ struct ScenarioPose {
   bool on = true;
 };
 
-/// State of a trajectory at an instant: before the first keyframe that one, after the last that one;
-/// `on` holds until the next keyframe, and a teleport keyframe is not interpolated towards.
+/// State of a trajectory at an instant: before the first keyframe that one, after the last that
+/// one; `on` holds until the next keyframe, and a teleport keyframe is not interpolated towards.
 /// Precondition: not empty. RT-safe.
 [[nodiscard]] ScenarioPose pose_on(const scene::Trajectory& trajectory,
                                    std::int64_t sim_time_ns) noexcept;

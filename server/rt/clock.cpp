@@ -14,9 +14,13 @@ std::int64_t read_ns(clockid_t id) noexcept {
 
 }  // namespace
 
-std::int64_t SystemClock::tai_ns() const noexcept { return read_ns(CLOCK_TAI); }
+std::int64_t SystemClock::tai_ns() const noexcept {
+  return read_ns(CLOCK_TAI);
+}
 
-std::int64_t SystemClock::monotonic_ns() const noexcept { return read_ns(CLOCK_MONOTONIC); }
+std::int64_t SystemClock::monotonic_ns() const noexcept {
+  return read_ns(CLOCK_MONOTONIC);
+}
 
 std::int64_t SystemClock::tai_from_utc_offset_ns() const noexcept {
   // Whole seconds; the two reads are far less than half a second apart unless the thread was

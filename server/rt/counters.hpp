@@ -9,49 +9,49 @@
 namespace emit::server {
 
 /// One list gives enum and label, so that neither can go without the other.
-#define EMIT_COUNTERS(X)                                                            \
-  X(host_datagrams, "UDP datagrams received on the host port")                      \
-  X(host_frames_accepted, "host frames accepted")                                   \
-  X(host_frames_missing, "host frame numbers that never arrived")                   \
-  X(host_frames_unused, "host frames accepted while stopped")                       \
-  X(host_os_drops, "host datagrams dropped by the kernel for want of buffer space") \
-  X(host_epochs, "restarts of the host seen by a new run id")                       \
-  X(commands, "control commands taken")                                             \
-  X(refused_wrong_version, "messages refused: wrong version")                       \
-  X(refused_oversize, "messages refused: too large")                                \
-  X(refused_malformed, "messages refused: malformed")                               \
-  X(refused_unknown_entity, "entity updates refused: unknown entity")               \
-  X(refused_invalid_pose, "host frames refused: invalid pose")                      \
-  X(refused_time_backwards, "host frames refused: time going backwards")            \
-  X(refused_duplicate_frame, "host frames refused: number already seen")            \
-  X(refused_unknown_channel, "subscriptions refused: unknown channel")              \
-  X(refused_not_allowed, "messages refused: not allowed in this role or state")     \
-  X(refused_overloaded, "connections or updates refused: limit reached")            \
-  X(refused_internal, "messages refused: failure inside emitd")                     \
-  X(refused_invalid_environment, "host frames refused: invalid environment")        \
-  X(statuses_suppressed, "answers not sent: rate limit or no room")                 \
-  X(connections_accepted, "TCP connections accepted")                               \
-  X(connections_closed, "TCP connections closed")                                   \
-  X(clients_disconnected_slow, "clients disconnected: fell behind with every_frame")\
-  X(recorders_disconnected_slow, "recorders disconnected: fell behind")             \
-  X(frames_submitted, "frames issued to the source")                                \
-  X(frames_rendered, "frames finished by the source")                               \
-  X(frames_published, "frames handed to the sender, repeated ones included")        \
-  X(frames_late, "frames flagged late")                                             \
-  X(frames_repeated, "frames flagged repeated")                                     \
-  X(frames_stale, "frames flagged stale")                                           \
-  X(frames_extrapolated, "frames flagged extrapolated")                             \
-  X(slots_without_image, "clock slots before the first image")                      \
-  X(slots_missed, "clock slots skipped because the conductor was not running")      \
-  X(no_free_slot, "attempts to render while every slot was in use")                 \
-  X(frames_sent, "frames sent completely, all clients")                             \
-  X(frames_skipped, "frames skipped for slow clients, flagged gap-before")          \
-  X(frames_spilled, "partly sent frames moved to a client's own buffer")            \
-  X(bytes_sent, "bytes handed to the kernel, all clients")                          \
-  X(send_errors, "datagrams the kernel refused")                                    \
-  X(journal_entries, "journal entries recorded")                                    \
-  X(journal_dropped, "journal entries lost: recorder too slow")                     \
-  X(journal_errors, "failures writing the journal file")                            \
+#define EMIT_COUNTERS(X)                                                             \
+  X(host_datagrams, "UDP datagrams received on the host port")                       \
+  X(host_frames_accepted, "host frames accepted")                                    \
+  X(host_frames_missing, "host frame numbers that never arrived")                    \
+  X(host_frames_unused, "host frames accepted while stopped")                        \
+  X(host_os_drops, "host datagrams dropped by the kernel for want of buffer space")  \
+  X(host_epochs, "restarts of the host seen by a new run id")                        \
+  X(commands, "control commands taken")                                              \
+  X(refused_wrong_version, "messages refused: wrong version")                        \
+  X(refused_oversize, "messages refused: too large")                                 \
+  X(refused_malformed, "messages refused: malformed")                                \
+  X(refused_unknown_entity, "entity updates refused: unknown entity")                \
+  X(refused_invalid_pose, "host frames refused: invalid pose")                       \
+  X(refused_time_backwards, "host frames refused: time going backwards")             \
+  X(refused_duplicate_frame, "host frames refused: number already seen")             \
+  X(refused_unknown_channel, "subscriptions refused: unknown channel")               \
+  X(refused_not_allowed, "messages refused: not allowed in this role or state")      \
+  X(refused_overloaded, "connections or updates refused: limit reached")             \
+  X(refused_internal, "messages refused: failure inside emitd")                      \
+  X(refused_invalid_environment, "host frames refused: invalid environment")         \
+  X(statuses_suppressed, "answers not sent: rate limit or no room")                  \
+  X(connections_accepted, "TCP connections accepted")                                \
+  X(connections_closed, "TCP connections closed")                                    \
+  X(clients_disconnected_slow, "clients disconnected: fell behind with every_frame") \
+  X(recorders_disconnected_slow, "recorders disconnected: fell behind")              \
+  X(frames_submitted, "frames issued to the source")                                 \
+  X(frames_rendered, "frames finished by the source")                                \
+  X(frames_published, "frames handed to the sender, repeated ones included")         \
+  X(frames_late, "frames flagged late")                                              \
+  X(frames_repeated, "frames flagged repeated")                                      \
+  X(frames_stale, "frames flagged stale")                                            \
+  X(frames_extrapolated, "frames flagged extrapolated")                              \
+  X(slots_without_image, "clock slots before the first image")                       \
+  X(slots_missed, "clock slots skipped because the conductor was not running")       \
+  X(no_free_slot, "attempts to render while every slot was in use")                  \
+  X(frames_sent, "frames sent completely, all clients")                              \
+  X(frames_skipped, "frames skipped for slow clients, flagged gap-before")           \
+  X(frames_spilled, "partly sent frames moved to a client's own buffer")             \
+  X(bytes_sent, "bytes handed to the kernel, all clients")                           \
+  X(send_errors, "datagrams the kernel refused")                                     \
+  X(journal_entries, "journal entries recorded")                                     \
+  X(journal_dropped, "journal entries lost: recorder too slow")                      \
+  X(journal_errors, "failures writing the journal file")                             \
   X(events_dropped, "log events lost: log queue full")
 
 enum class Counter : std::uint8_t {

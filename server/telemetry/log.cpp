@@ -108,7 +108,9 @@ std::string printable(const Event& event) {
 
 EventText describe(const Event& event) {
   const std::string text = printable(event);
-  const auto connection = [&] { return fmt::format("{}.{}", connection_place(event.a), event.a >> kConnectionPlaceBits); };
+  const auto connection = [&] {
+    return fmt::format("{}.{}", connection_place(event.a), event.a >> kConnectionPlaceBits);
+  };
   switch (event.kind) {
     case EventKind::run_started:
       return {LogLevel::info, fmt::format("event=run_started run_id={}", event.a), false};
@@ -126,11 +128,12 @@ EventText describe(const Event& event) {
                           text.empty() ? status_text(static_cast<StatusCode>(event.a), 0) : text),
               true};
     case EventKind::connected:
-      return {LogLevel::info, fmt::format("event=connected connection={} peer={}", connection(), text),
-              false};
+      return {LogLevel::info,
+              fmt::format("event=connected connection={} peer={}", connection(), text), false};
     case EventKind::disconnected:
       return {LogLevel::info,
-              fmt::format("event=disconnected connection={} why=\"{}\"", connection(), text), false};
+              fmt::format("event=disconnected connection={} why=\"{}\"", connection(), text),
+              false};
     case EventKind::hello: {
       static constexpr std::array kRoles{"none", "host", "client", "recorder"};
       return {LogLevel::info,
@@ -149,9 +152,10 @@ EventText describe(const Event& event) {
                           error_text(static_cast<int>(event.b))),
               false};
     case EventKind::client_slow:
-      return {LogLevel::warn,
-              fmt::format("event=disconnected_slow connection={} why=\"fell behind\"", connection()),
-              false};
+      return {
+          LogLevel::warn,
+          fmt::format("event=disconnected_slow connection={} why=\"fell behind\"", connection()),
+          false};
     case EventKind::no_gso:
       return {LogLevel::warn,
               fmt::format("event=no_segmentation_offload connection={} why=\"{}\"", connection(),
@@ -160,9 +164,10 @@ EventText describe(const Event& event) {
     case EventKind::source_failed:
       return {LogLevel::error, fmt::format("event=source_failed why=\"{}\"", text), true};
     case EventKind::journal_failed:
-      return {LogLevel::error,
-              fmt::format("event=journal_failed why=\"{}\" effect=\"journal file ends here\"", text),
-              true};
+      return {
+          LogLevel::error,
+          fmt::format("event=journal_failed why=\"{}\" effect=\"journal file ends here\"", text),
+          true};
     case EventKind::journal_overrun:
       return {LogLevel::error,
               fmt::format("event=journal_overrun sequence={} effect=\"journal cannot be replayed\"",

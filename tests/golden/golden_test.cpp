@@ -106,8 +106,8 @@ TEST_P(Golden, matches_the_stored_image) {
 INSTANTIATE_TEST_SUITE_P(Scenarios, Golden,
                          testing::Values(Case{"box", 12600.0}, Case{"block-on-road", 12600.0},
                                          Case{"ribbed", 7200.0}),
-                         [](const auto& info) {
-                           std::string name = info.param.scenario;
+                         [](const auto& case_info) {
+                           std::string name = case_info.param.scenario;
                            for (char& c : name) c = c == '-' ? '_' : c;
                            return name;
                          });

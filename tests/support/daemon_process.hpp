@@ -51,8 +51,7 @@ class ScratchFolder {
 /// A real emitd. Standard output and error go to files of `folder`; killed at the end if need be.
 class DaemonProcess {
  public:
-  DaemonProcess(const ScratchFolder& folder, std::vector<std::string> arguments)
-      : folder_(folder) {
+  DaemonProcess(const ScratchFolder& folder, std::vector<std::string> arguments) : folder_(folder) {
     std::string program = std::string(EMIT_TEST_BIN_DIR) + "/emitd";
     std::vector<char*> argv{program.data()};
     for (auto& argument : arguments) {
@@ -139,8 +138,10 @@ inline std::string canned_config(std::uint32_t width_px, std::uint32_t height_px
   std::ostringstream out;
   out << "[source]\nkind = \"canned\"\ncanned_width_px = " << width_px
       << "\ncanned_height_px = " << height_px << "\ncanned_frames = 8\n"
-      << "[pacing]\n" << pacing << "\n[host]\nudp = \"127.0.0.1:0\"\n"
-      << "[control]\ntcp = \"127.0.0.1:0\"\n" << more;
+      << "[pacing]\n"
+      << pacing << "\n[host]\nudp = \"127.0.0.1:0\"\n"
+      << "[control]\ntcp = \"127.0.0.1:0\"\n"
+      << more;
   return out.str();
 }
 

@@ -17,11 +17,21 @@ std::size_t count_files(const std::filesystem::path& folder, const std::string& 
   return count;
 }
 
+/// A small picture keeps llvmpipe quick.
+const std::vector<std::string> kSmall{
+    "--set", "sensor.width_px=320", "--set", "sensor.height_px=256", "--set", "thermal.steps=9"};
+
+std::vector<std::string> with_small(std::vector<std::string> arguments) {
+  for (const std::string& argument : kSmall) arguments.push_back(argument);
+  return arguments;
+}
+
 TEST(CliDemo, plays_poses_through_the_daemon_and_replays_bit_for_bit) {
   const TemporaryFolder folder;
-  const ProcessResult result = run_emit({"demo", "--scenario", "box", "--frames", "6", "--out",
-                                         folder.file("out"), "--json", folder.file("demo.json")},
-                                        std::chrono::seconds(280));
+  const ProcessResult result =
+      run_emit(with_small({"demo", "--scenario", "box", "--frames", "6", "--out",
+                           folder.file("out"), "--json", folder.file("demo.json")}),
+               std::chrono::seconds(280));
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
   const std::string json = read_text(folder.file("demo.json"));
   EXPECT_EQ(json_value(json, "poses_played"), "6");
@@ -37,16 +47,24 @@ TEST(CliDemo, plays_poses_through_the_daemon_and_replays_bit_for_bit) {
 
 TEST(CliDemo, what_it_recorded_replays_as_a_command) {
   const TemporaryFolder folder;
-  const ProcessResult demo = run_emit(
-      {"demo", "--scenario", "box", "--frames", "4", "--keep", "--out", folder.file("out")},
-      std::chrono::seconds(280));
+  const ProcessResult demo = run_emit(with_small({"demo", "--scenario", "box", "--frames", "4",
+                                                  "--keep", "--out", folder.file("out")}),
+                                      std::chrono::seconds(280));
   ASSERT_EQ(demo.exit_code, 0) << demo.out << demo.err;
-  const ProcessResult replay = run_emit({"replay", folder.file("out/run/journal.mcap"),
-                                         "--scenario", "box", "--out", folder.file("again")},
-                                        std::chrono::seconds(280));
+  const ProcessResult replay =
+      run_emit(with_small({"replay", folder.file("out/run/journal.mcap"), "--scenario", "box",
+                           "--out", folder.file("again")}),
+               std::chrono::seconds(280));
   EXPECT_EQ(replay.exit_code, 0) << replay.out << replay.err;
   EXPECT_NE(replay.out.find("bit-identical"), std::string::npos) << replay.out;
   EXPECT_EQ(count_files(folder.file("again"), ".exr"), 4U);
+
+  auto other_steps =
+      with_small({"replay", folder.file("out/run/journal.mcap"), "--scenario", "box"});
+  other_steps.back() = "thermal.steps=5";
+  const ProcessResult other = run_emit(other_steps, std::chrono::seconds(280));
+  EXPECT_EQ(other.exit_code, 1) << other.out;
+  EXPECT_NE(other.out.find("NOT identical"), std::string::npos) << other.out;
 }
 
 TEST(CliView, shows_a_scenario_in_a_window) {

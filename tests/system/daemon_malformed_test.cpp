@@ -27,7 +27,8 @@ class MalformedTraffic : public ::testing::Test {
   void SetUp() override {
     const std::string config =
         folder_.write("emitd.toml", canned_config(64, 48, "mode = \"host-step\""));
-    daemon_ = std::make_unique<DaemonProcess>(folder_, std::vector<std::string>{"--config", config});
+    daemon_ =
+        std::make_unique<DaemonProcess>(folder_, std::vector<std::string>{"--config", config});
     ASSERT_TRUE(daemon_->wait_ready()) << folder_.read("stderr");
   }
   void TearDown() override {

@@ -28,8 +28,8 @@ protocol::HostFrameData host_frame(std::uint64_t number) {
 TEST(DaemonProcess, SigtermSendsWhatIsInWorkClosesTheJournalAndExitsZero) {
   ScratchFolder folder;
   const std::string config = folder.write(
-      "emitd.toml", canned_config(64, 48, "mode = \"host-step\"",
-                                  "[journal]\nfile = \"run.mcap\"\n"));
+      "emitd.toml",
+      canned_config(64, 48, "mode = \"host-step\"", "[journal]\nfile = \"run.mcap\"\n"));
   DaemonProcess daemon(folder, {"--config", config});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
   auto client = FrameClient::connect("tcp://" + daemon.control());
@@ -106,7 +106,9 @@ TEST(DaemonProcess, UsageErrorsExitTwo) {
   const std::string config =
       folder.write("emitd.toml", canned_config(64, 48, "mode = \"host-step\""));
   for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{}, {"--nonsense"}, {"--config"},
+       {std::vector<std::string>{},
+        {"--nonsense"},
+        {"--config"},
         {"--config", config, "--set", "no_equals_sign"}}) {
     DaemonProcess daemon(folder, arguments);
     EXPECT_EQ(daemon.wait(), 2);

@@ -137,8 +137,8 @@ struct Replay {
     if (*frame) {
       ++frames;
       rendered += (*frame)->repeated ? 0U : 1U;
-      EXPECT_TRUE((*frame)->matches) << "frame " << (*frame)->frame_number << " of run "
-                                     << (*frame)->run_id;
+      EXPECT_TRUE((*frame)->matches)
+          << "frame " << (*frame)->frame_number << " of run " << (*frame)->run_id;
     }
   }
 };
@@ -207,7 +207,7 @@ INSTANTIATE_TEST_SUITE_P(Pacing, DaemonReplay,
                                            config::PacingMode::ig_clock),
                          [](const auto& parameter) {
                            return parameter.param == config::PacingMode::host_step ? "HostStep"
-                                                                              : "IgClock";
+                                                                                   : "IgClock";
                          });
 
 TEST(JournalPlayer, RefusesAJournalWithAHole) {

@@ -117,8 +117,8 @@ TEST(DaemonStream, AStoppedClientCostsTheOthersNothingOverTcpAndUdp) {
 
 TEST(DaemonStream, AtItsOwn200HzNothingIsLostUnflagged) {
   ScratchFolder folder;
-  const std::string config = folder.write(
-      "emitd.toml", canned_config(640, 512, "mode = \"ig-clock\"\nrate_hz = 200.0"));
+  const std::string config =
+      folder.write("emitd.toml", canned_config(640, 512, "mode = \"ig-clock\"\nrate_hz = 200.0"));
   DaemonProcess daemon(folder, {"--config", config});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
   const auto watch = [&](bool stops) {

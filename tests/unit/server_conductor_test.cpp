@@ -26,10 +26,11 @@ class Rig {
       : scenario_(std::move(scenario)),
         tracks_(scenario_),
         context_(clock, 1u << 20, 4),
-        render_(context_, [this] {
-          return physics::Result<std::unique_ptr<FrameSource>>(
-              std::make_unique<ScriptedSource>(script, 8, 4, 7));
-        }),
+        render_(context_,
+                [this] {
+                  return physics::Result<std::unique_ptr<FrameSource>>(
+                      std::make_unique<ScriptedSource>(script, 8, 4, 7));
+                }),
         conductor_(context_, tracks_, options(pacing)) {
     EXPECT_TRUE(render_.on_start());
     EXPECT_TRUE(conductor_.on_start());

@@ -23,8 +23,10 @@ constexpr std::uint32_t kQueue = 4;
 /// The sender with clients over socket pairs; the test plays conductor, source and clients.
 class Rig {
  public:
-  Rig() : context_(clock_, 1u << 20, 8), source_(script_, kWidthPx, kHeightPx, kQueue + 3),
-          sender_(context_, kQueue, 8, false) {
+  Rig()
+      : context_(clock_, 1u << 20, 8),
+        source_(script_, kWidthPx, kHeightPx, kQueue + 3),
+        sender_(context_, kQueue, 8, false) {
     Channel channel;
     channel.width_px = kWidthPx;
     channel.height_px = kHeightPx;
@@ -38,8 +40,8 @@ class Rig {
     Fd far;
     std::unique_ptr<SenderClient> client;
     protocol::RecordParser parser{
-        {1u << 16, static_cast<std::uint32_t>(protocol::kFrameHeaderBytes) +
-                       kWidthPx * kHeightPx * 4}};
+        {1u << 16,
+         static_cast<std::uint32_t>(protocol::kFrameHeaderBytes) + kWidthPx* kHeightPx * 4}};
     std::vector<protocol::FrameHeader> frames;
     std::uint64_t bad_crc = 0;
     std::uint64_t bytes = 0;
@@ -223,7 +225,8 @@ TEST(UdpBatch, DeliversEveryFragmentWithAndWithoutSegmentation) {
   header.height_px = kHeightPx;
   header.payload_bytes = pixels.size() * sizeof(float);
   header.payload_crc32c = protocol::crc32c(std::as_bytes(std::span<const float>(pixels)));
-  protocol::Reassembler reassembler({static_cast<std::uint32_t>(header.payload_bytes), 4, 2, 2, true});
+  protocol::Reassembler reassembler(
+      {static_cast<std::uint32_t>(header.payload_bytes), 4, 2, 2, true});
   UdpBatch batch;
   std::uint32_t id = 0;
   for (const bool segmentation : {true, false}) {

@@ -35,6 +35,7 @@
 #define EMIT_ATTR_POSITION 0
 #define EMIT_ATTR_NORMAL 1
 #define EMIT_ATTR_DRAW 2
+#define EMIT_ATTR_LIGHT_ROW 3  // three of them
 
 #define EMIT_MAX_CASCADES 4
 #define EMIT_MAX_BANDS 4
