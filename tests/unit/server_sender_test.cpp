@@ -69,8 +69,8 @@ class Rig {
     }
   };
 
-  std::unique_ptr<Peer> connect(bool every_frame = false) {
-    auto peer = std::make_unique<Peer>();
+  Peer* connect(bool every_frame = false) {
+    Peer* peer = peers_.emplace_back(std::make_unique<Peer>()).get();
     int pair[2] = {-1, -1};
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
     peer->near = Fd(pair[0]);
@@ -131,6 +131,7 @@ class Rig {
  private:
   test::FakeClock clock_;
   test::SourceScript script_;
+  std::vector<std::unique_ptr<Peer>> peers_;
   Context context_;
   test::ScriptedSource source_;
   Sender sender_;
@@ -140,11 +141,11 @@ class Rig {
 
 TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
   Rig rig;
-  auto good = rig.connect();
-  auto stopped = rig.connect();
+  Rig::Peer* good = rig.connect();
+  Rig::Peer* stopped = rig.connect();
   for (int i = 0; i < 40; ++i) {
     ASSERT_TRUE(rig.publish()) << "a stopped client must not hold every slot, frame " << i;
-    rig.settle({good.get()});
+    rig.settle({good});
   }
   ASSERT_EQ(good->frames.size(), 40U);
   EXPECT_EQ(good->bad_crc, 0U);
@@ -153,7 +154,7 @@ TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
     EXPECT_EQ(good->frames[i].flags, 0U);
   }
 
-  rig.settle({good.get(), stopped.get()});
+  rig.settle({good, stopped});
   ASSERT_GE(stopped->frames.size(), 2U);
   EXPECT_EQ(stopped->bad_crc, 0U) << "the frame that was half sent is finished from its own copy";
   EXPECT_EQ(stopped->frames.back().frame_number, 40U) << "the newest frames win";
@@ -174,7 +175,7 @@ TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
 
 TEST(Sender, DisconnectsAnEveryFrameClientThatFallsBehind) {
   Rig rig;
-  auto client = rig.connect(true);
+  Rig::Peer* client = rig.connect(true);
   for (int i = 0; i < 10; ++i) {
     ASSERT_TRUE(rig.publish());
     rig.settle({});
@@ -188,11 +189,11 @@ TEST(Sender, DisconnectsAnEveryFrameClientThatFallsBehind) {
 
 TEST(Sender, GivesAClientBackWhenItsSocketFailsOrItIsAskedTo) {
   Rig rig;
-  auto gone = rig.connect();
-  auto left = rig.connect();
+  Rig::Peer* gone = rig.connect();
+  Rig::Peer* left = rig.connect();
   gone->far.reset();
   ASSERT_TRUE(rig.publish());
-  rig.settle({left.get()});
+  rig.settle({left});
   const auto* released = rig.context().from_sender.front();
   ASSERT_NE(released, nullptr);
   EXPECT_EQ(released->client, gone->client.get());
