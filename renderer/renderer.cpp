@@ -354,12 +354,21 @@ void GlRenderer::prepare_steps(const FrameRequest& request) noexcept {
   const auto steps = static_cast<std::uint32_t>(intervals.size());
   const auto material_count = static_cast<std::uint32_t>(materials_.size());
   const auto add_step = [&](const HistoryInterval& interval, std::uint32_t step, bool last) {
+    // Casters of the past may stand where, and as high as, nothing does now.
+    scene::Aabb casters = bounds;
+    if (interval.sun_up) {
+      casters.add(lists_.pose_casters(interval.sample_ns, interval.begin_ns, interval.end_ns,
+                                      histories_));
+    }
+    if (!casters.empty()) {
+      camera.view.casters_min_m = casters.min_m;
+      camera.view.casters_max_m = casters.max_m;
+    }
     const LightFrusta frusta =
         set_step(interval, camera, scenario_.thermal, step == 0, last,
                  std::min(step, steps - 1) * material_count, step_params_[step].params);
     shadow_commands_[step] = {};
     if (frusta.count == 0) return;
-    lists_.pose_casters(interval.sample_ns, interval.begin_ns, interval.end_ns, histories_);
     for (std::uint32_t c = 0; c < frusta.count; ++c) {
       shadow_commands_[step][c] = lists_.cull_light(frusta.cascades[c]);
     }
@@ -374,9 +383,13 @@ void GlRenderer::prepare_steps(const FrameRequest& request) noexcept {
   const HistoryInterval& newest = intervals.back();
   extra_sun_pass_ = sun_up && newest.end_ns - newest.begin_ns > kFreshShadeNs;
   for (const PoseHistory& history : histories_) {
+    const auto events = history.events_ns();
+    const bool changed = std::any_of(events.begin(), events.end(), [&](std::int64_t event_ns) {
+      return event_ns > newest.begin_ns && event_ns <= request.sim_time_ns;
+    });
     extra_sun_pass_ =
         extra_sun_pass_ ||
-        (sun_up && history.path_m(newest.begin_ns, request.sim_time_ns) > kFreshCasterM);
+        (sun_up && (changed || history.path_m(newest.begin_ns, request.sim_time_ns) > kFreshCasterM));
   }
   if (extra_sun_pass_) add_step(instant_interval(plan_, request.sim_time_ns), steps, true);
 }

@@ -18,6 +18,14 @@ physics::WeatherRow row_from(const scene::WeatherSample& sample) noexcept {
           .film_w_m2_k = sample.film_w_m2_k};
 }
 
+bool same_weather(const physics::WeatherRow& a, const physics::WeatherRow& b) noexcept {
+  return a.direct_normal_w_m2 == b.direct_normal_w_m2 &&
+         a.diffuse_horizontal_w_m2 == b.diffuse_horizontal_w_m2 &&
+         a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
+         a.wind_m_s == b.wind_m_s && a.cloud_frac == b.cloud_frac &&
+         a.environment_k == b.environment_k && a.film_w_m2_k == b.film_w_m2_k;
+}
+
 }  // namespace
 
 Environment::Environment(const scene::ScenarioDesc& scenario)
@@ -32,13 +40,37 @@ Environment::Environment(const scene::ScenarioDesc& scenario)
                  .cloud_frac = scenario.clear_sky.cloud_frac} {
   for (const scene::WeatherSample& sample : scenario.weather) table_.push_back(row_from(sample));
   live_.reserve(kMaxLiveSamples);
+  changes_ns_.reserve(kMaxLiveSamples);
 }
 
 bool Environment::append(const scene::WeatherSample& sample) noexcept {
-  if (live_.size() == kMaxLiveSamples) return false;
-  if (!live_.empty() && sample.sim_time_ns < live_.back().time_ns) return false;
-  live_.push_back(row_from(sample));
+  physics::WeatherRow row = row_from(sample);
+  if (!live_.empty()) {
+    if (row.time_ns < live_.back().time_ns) return false;
+    if (same_weather(row, live_.back())) return true;
+    if (row.time_ns == live_.back().time_ns) {
+      live_.back() = row;
+      return true;
+    }
+  }
+  if (live_.size() == kMaxLiveSamples) {
+    const auto thin = [](auto& values) {
+      const auto half = values.begin() + kMaxLiveSamples / 2;
+      auto write = values.begin() + 1;
+      for (auto read = values.begin() + 2; read < half; read += 2) *write++ = *read;
+      values.erase(write, half);
+    };
+    thin(live_);
+    thin(changes_ns_);
+  }
+  live_.push_back(row);
+  changes_ns_.push_back(row.time_ns);
   return true;
+}
+
+void Environment::reset() noexcept {
+  live_.clear();
+  changes_ns_.clear();
 }
 
 physics::SunPosition Environment::sun_at(std::int64_t sim_time_ns) const noexcept {

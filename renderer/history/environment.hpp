@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "emit/physics/sun.hpp"
@@ -17,9 +18,13 @@ class Environment {
 
   explicit Environment(const scene::ScenarioDesc& scenario);
 
-  /// Holds from its time on until the next one. False when the store is full or time goes back.
+  /// Holds from its time on until the next one; false when time goes back. A sample equal to the
+  /// newest changes nothing. When the store is full, its oldest half is thinned to every other one.
   bool append(const scene::WeatherSample& sample) noexcept;
-  void reset() noexcept { live_.clear(); }
+  void reset() noexcept;
+
+  /// Instants at which live weather changes, ascending.
+  [[nodiscard]] std::span<const std::int64_t> changes_ns() const noexcept { return changes_ns_; }
 
   [[nodiscard]] physics::SunPosition sun_at(std::int64_t sim_time_ns) const noexcept;
   [[nodiscard]] physics::Forcing forcing_at(std::int64_t sim_time_ns,
@@ -31,6 +36,7 @@ class Environment {
   physics::ClearSky clear_sky_;
   std::vector<physics::WeatherRow> table_;
   std::vector<physics::WeatherRow> live_;
+  std::vector<std::int64_t> changes_ns_;  ///< times of live_
 };
 
 }  // namespace emit::renderer

@@ -14,6 +14,8 @@ constexpr double kThinPositionM = 0.01;
 constexpr double kThinAngleRad = 1e-3;
 constexpr std::int64_t kThinSpanNs = 1'000'000'000;
 constexpr double kMovingMPerS = 0.05;
+constexpr double kSpotM = 0.02;
+constexpr std::int64_t kRestNs = 500'000'000;
 
 double angle_between_rad(const glm::dquat& a, const glm::dquat& b) noexcept {
   return 2.0 * std::acos(std::min(1.0, std::abs(glm::dot(a, b))));
@@ -35,6 +37,27 @@ bool moves(const scene::Keyframe& from, const scene::Keyframe& to) noexcept {
   return !to.teleport && seconds > 0.0 &&
          glm::distance(from.pose.position_world_m, to.pose.position_world_m) >
              kMovingMPerS * seconds;
+}
+
+/// Way along the keyframes between two instants.
+double path_in(const scene::Trajectory& keys, std::int64_t begin_ns,
+               std::int64_t end_ns) noexcept {
+  double path_m = 0.0;
+  auto next = std::upper_bound(
+      keys.begin(), keys.end(), begin_ns,
+      [](std::int64_t t, const scene::Keyframe& key) { return t < key.sim_time_ns; });
+  if (next == keys.begin() && next != keys.end()) ++next;
+  for (; next != keys.end() && (next - 1)->sim_time_ns < end_ns; ++next) {
+    const scene::Keyframe& from = *(next - 1);
+    if (next->teleport || !from.on) continue;
+    const std::int64_t clipped_begin_ns = std::max(begin_ns, from.sim_time_ns);
+    const std::int64_t clipped_end_ns = std::min(end_ns, next->sim_time_ns);
+    if (clipped_end_ns <= clipped_begin_ns) continue;
+    path_m += glm::distance(from.pose.position_world_m, next->pose.position_world_m) *
+              (fraction(from.sim_time_ns, next->sim_time_ns, clipped_end_ns) -
+               fraction(from.sim_time_ns, next->sim_time_ns, clipped_begin_ns));
+  }
+  return path_m;
 }
 
 }  // namespace
@@ -63,9 +86,32 @@ void PoseHistory::note_scripted_events() noexcept {
 }
 
 void PoseHistory::note_event(std::int64_t sim_time_ns) noexcept {
-  if (!events_ns_.empty() && events_ns_.back() >= sim_time_ns) return;
-  if (events_ns_.size() == kMaxEvents) events_ns_.erase(events_ns_.begin());
-  events_ns_.push_back(sim_time_ns);
+  const auto place = std::lower_bound(events_ns_.begin(), events_ns_.end(), sim_time_ns);
+  if (place != events_ns_.end() && *place == sim_time_ns) return;
+  if (events_ns_.size() < kMaxEvents) {
+    events_ns_.insert(place, sim_time_ns);
+  } else if (place != events_ns_.begin()) {
+    std::move(events_ns_.begin() + 1, place, events_ns_.begin());  // the oldest makes room
+    *(place - 1) = sim_time_ns;
+  }
+}
+
+void PoseHistory::note_motion(const scene::Keyframe& last, const scene::Keyframe& next) noexcept {
+  const bool on_spot =
+      glm::distance(spot_.pose.position_world_m, next.pose.position_world_m) < kSpotM;
+  if (next.teleport) {
+    note_event(next.sim_time_ns);
+    if (moving_) note_event(last.sim_time_ns);
+    moving_ = false;
+    spot_ = next;
+  } else if (!on_spot) {
+    if (!moving_) note_event(last.sim_time_ns);
+    moving_ = true;
+    spot_ = next;
+  } else if (moving_ && next.sim_time_ns - spot_.sim_time_ns >= kRestNs) {
+    note_event(spot_.sim_time_ns);
+    moving_ = false;
+  }
 }
 
 bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on,
@@ -80,6 +126,7 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
     if (planned.on != on || !close(planned.pose, pose)) note_event(sim_time_ns);
     live_.push_back(next);
     moving_ = false;
+    spot_ = next;
     return true;
   }
   const scene::Keyframe& last = live_.back();
@@ -87,10 +134,8 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
     live_.back() = next;
     return true;
   }
-  const bool moving_now = moves(last, next);
-  if (moving_now != moving_) note_event(last.sim_time_ns);
-  moving_ = moving_now;
-  if (last.on != on || teleport) note_event(sim_time_ns);
+  note_motion(last, next);
+  if (last.on != on) note_event(sim_time_ns);
 
   if (replaces_last(next)) {
     live_.back() = next;
@@ -163,17 +208,11 @@ TrajectoryState PoseHistory::at(std::int64_t sim_time_ns) const noexcept {
 }
 
 double PoseHistory::path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {
-  constexpr int kSamples = 8;
-  double path_m = 0.0;
-  TrajectoryState from = at(begin_ns);
-  for (int i = 1; i <= kSamples; ++i) {
-    const TrajectoryState to = at(begin_ns + (end_ns - begin_ns) * i / kSamples);
-    if (from.on && to.on) {
-      path_m += glm::distance(from.pose.position_world_m, to.pose.position_world_m);
-    }
-    from = to;
-  }
-  return path_m;
+  if (live_.empty()) return path_in(scripted_, begin_ns, end_ns);
+  // Where live poses take over from the script the entity may jump.
+  const std::int64_t seam_ns = live_.front().sim_time_ns;
+  return path_in(scripted_, begin_ns, std::min(end_ns, seam_ns)) +
+         path_in(live_, std::max(begin_ns, seam_ns), end_ns);
 }
 
 }  // namespace emit::renderer

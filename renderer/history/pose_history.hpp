@@ -32,7 +32,7 @@ class PoseHistory {
 
   [[nodiscard]] TrajectoryState at(std::int64_t sim_time_ns) const noexcept;
 
-  /// Length of the way between two instants, sampled at eight points; jumps do not count.
+  /// Length of the way between two instants while switched on; jumps do not count.
   [[nodiscard]] double path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept;
 
   /// Instants at which the entity appears, vanishes, starts or stops, ascending.
@@ -45,12 +45,16 @@ class PoseHistory {
   void note_event(std::int64_t sim_time_ns) noexcept;
   [[nodiscard]] bool replaces_last(const scene::Keyframe& next) noexcept;
   void make_room() noexcept;
+  void note_motion(const scene::Keyframe& last, const scene::Keyframe& next) noexcept;
   void note_scripted_events() noexcept;
 
   scene::Trajectory scripted_;
   scene::Trajectory live_;
   std::vector<std::int64_t> events_ns_;
+  // A live entity starts when it leaves the spot it rested on, and stops when it has stayed on one
+  // for a while: jitter of the host is neither.
   bool moving_ = false;
+  scene::Keyframe spot_;
   // Thinned-out poses since the last kept one, a sample of them: what the next pose must fit.
   std::array<scene::Keyframe, 16> skipped_;
   std::size_t skipped_count_ = 0;

@@ -14,29 +14,25 @@ StepPlan::StepPlan(const scene::ThermalOptions& options)
       snapped_(options.steps + 1),
       intervals_(options.steps) {}
 
-void StepPlan::snap_to_events(std::span<const PoseHistory> entities) noexcept {
-  std::fill(snapped_.begin(), snapped_.end(), false);
+void StepPlan::snap_to(std::span<const std::int64_t> events_ns) noexcept {
   const std::size_t last = nodes_ns_.size() - 1;
   // The newest events matter most, so they choose first.
-  for (const PoseHistory& entity : entities) {
-    const auto events = entity.events_ns();
-    for (auto event = events.rbegin(); event != events.rend(); ++event) {
-      if (*event <= nodes_ns_.front() || *event >= nodes_ns_.back()) continue;
-      const auto above = std::lower_bound(nodes_ns_.begin(), nodes_ns_.end(), *event);
-      if (*above == *event) continue;
-      std::size_t best = 0;
-      for (const auto candidate : {above - 1, above}) {
-        const auto i = static_cast<std::size_t>(candidate - nodes_ns_.begin());
-        if (i == 0 || i == last || snapped_[i]) continue;
-        if (best == 0 ||
-            std::abs(nodes_ns_[i] - *event) < std::abs(nodes_ns_[best] - *event)) {
-          best = i;
-        }
+  for (auto event = events_ns.rbegin(); event != events_ns.rend(); ++event) {
+    if (*event >= nodes_ns_.back()) continue;
+    if (*event <= nodes_ns_.front()) break;
+    const auto above = std::lower_bound(nodes_ns_.begin(), nodes_ns_.end(), *event);
+    if (*above == *event) continue;
+    std::size_t best = 0;
+    for (const auto candidate : {above - 1, above}) {
+      const auto i = static_cast<std::size_t>(candidate - nodes_ns_.begin());
+      if (i == 0 || i == last || snapped_[i]) continue;
+      if (best == 0 || std::abs(nodes_ns_[i] - *event) < std::abs(nodes_ns_[best] - *event)) {
+        best = i;
       }
-      if (best == 0) continue;
-      nodes_ns_[best] = *event;
-      snapped_[best] = true;
     }
+    if (best == 0) continue;
+    nodes_ns_[best] = *event;
+    snapped_[best] = true;
   }
 }
 
@@ -48,7 +44,9 @@ void StepPlan::update(std::int64_t now_ns, const Environment& environment,
     physics::geometric_step_nodes(options_.history_start_ns, now_ns, options_.first_step_s,
                                   nodes_ns_);
   }
-  snap_to_events(entities);
+  std::fill(snapped_.begin(), snapped_.end(), false);
+  for (const PoseHistory& entity : entities) snap_to(entity.events_ns());
+  snap_to(environment.changes_ns());
 
   physics::SunPosition sun = environment.sun_at(nodes_ns_.front());
   physics::Forcing forcing = environment.forcing_at(nodes_ns_.front(), sun);
@@ -61,7 +59,10 @@ void StepPlan::update(std::int64_t now_ns, const Environment& environment,
     sun = environment.sun_at(interval.end_ns);
     forcing = environment.forcing_at(interval.end_ns, sun);
     interval.sun_end = sun;
-    interval.forcing_end = forcing;
+    // Weather that changes at the end of the interval has not acted in it.
+    interval.forcing_end = interval.end_ns > interval.begin_ns
+                               ? environment.forcing_at(interval.end_ns - 1, sun)
+                               : forcing;
 
     interval.sample_ns = interval.begin_ns + (interval.end_ns - interval.begin_ns) / 2;
     interval.sun_sample = environment.sun_at(interval.sample_ns);

@@ -25,7 +25,8 @@ struct HistoryInterval {
 
 /// The intervals from history start to a frame's instant, in order of time. Their number is fixed
 /// (thermal.steps); near every event of an entity (appears, vanishes, starts, stops) the closest
-/// inner node is moved onto it, so that a parked vehicle's shade begins and ends on time.
+/// inner node is moved onto it, so that a parked vehicle's shade begins and ends on time; likewise
+/// near every change of the weather by the host.
 /// Owner: Renderer. Real time: update is RT-safe.
 class StepPlan {
  public:
@@ -43,7 +44,7 @@ class StepPlan {
   static constexpr double kMinSunElevationRad = 0.5 * physics::kDegree;
 
  private:
-  void snap_to_events(std::span<const PoseHistory> entities) noexcept;
+  void snap_to(std::span<const std::int64_t> events_ns) noexcept;
 
   scene::ThermalOptions options_;
   std::vector<std::int64_t> nodes_ns_;

@@ -136,8 +136,10 @@ void DrawLists::cull_view(const ViewVolume& view, CommandRange& single_sided,
   }
 }
 
-void DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_ns, std::int64_t end_ns,
-                             std::span<const PoseHistory> entities) noexcept {
+scene::Aabb DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_ns,
+                                    std::int64_t end_ns,
+                                    std::span<const PoseHistory> entities) noexcept {
+  scene::Aabb box;
   for (const std::uint32_t i : moving_) {
     const PoseHistory& entity = entities[static_cast<std::size_t>(history_of_instance_[i])];
     const TrajectoryState state = entity.at(sample_ns);
@@ -145,7 +147,9 @@ void DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_ns, std:
     light_placed_[i] =
         place(i, scene::world_from_body_matrix(state.pose) * scene_.instances()[i].body_from_mesh,
               state.on && !passing);
+    if (light_placed_[i].on) box.add(light_placed_[i].box);
   }
+  return box;
 }
 
 CommandRange DrawLists::cull_light(const LightFrustum& frustum) noexcept {

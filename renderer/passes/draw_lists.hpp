@@ -40,8 +40,9 @@ class DrawLists {
   /// Moves entities to their poses at `sample_ns` for the shadow passes that follow. Casters that
   /// travel farther than their own size between the two instants are left out: what shade they cast
   /// lasts a smaller share of the interval than size / way, and one pose would paint all of it.
-  void pose_casters(std::int64_t sample_ns, std::int64_t begin_ns, std::int64_t end_ns,
-                    std::span<const PoseHistory> entities) noexcept;
+  /// Returns the box around the moved casters that are left, relative to the camera.
+  scene::Aabb pose_casters(std::int64_t sample_ns, std::int64_t begin_ns, std::int64_t end_ns,
+                           std::span<const PoseHistory> entities) noexcept;
   [[nodiscard]] CommandRange cull_light(const LightFrustum& frustum) noexcept;
 
   [[nodiscard]] std::span<const gpu::InstanceParams> instance_params() const noexcept {

@@ -83,11 +83,13 @@ LightFrusta set_step(const HistoryInterval& interval, const CameraSetup& camera,
   const glm::dvec3 to_sun = interval.sun_sample.direction_enu;
   const glm::dvec3 drift =
       interval.sun_end.direction_enu - interval.sun_begin.direction_enu;
-  const double top_m = camera.view.scene_max_m.z;
+  const double top_m = std::max(camera.view.scene_max_m.z, camera.view.casters_max_m.z);
   const double height_m = top_m - camera.view.scene_min_m.z;
   const double margin_m =
       std::min(kMaxMarginM, height_m / to_sun.z *
                                 (std::tan(physics::kSunSemiAngleRad) + 0.5 * glm::length(drift)));
+  // Without frusta (nothing in view) the sun shines unobstructed.
+  params.info.z |= EMIT_STEP_SUN_UP;
   frusta = fit_light(camera.view, to_sun, options.shadow_map_px, options.max_cascades, margin_m,
                      camera.pixel_rad);
   if (frusta.count == 0) return frusta;
@@ -103,8 +105,7 @@ LightFrusta set_step(const HistoryInterval& interval, const CameraSetup& camera,
                               static_cast<float>(glm::dot(drift, frustum.axes[1])), 0.0F, 0.0F);
   }
   params.casters = glm::vec4(static_cast<float>(top_m), static_cast<float>(to_sun.z), 0.0F, 0.0F);
-  flags |= EMIT_STEP_SUN_UP;
-  params.info = glm::uvec4(frusta.count, relaxation_offset, flags, 0);
+  params.info.x = frusta.count;
   return frusta;
 }
 

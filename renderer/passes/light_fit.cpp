@@ -151,7 +151,9 @@ bool visible_depth_range_m(const ViewVolume& view, double& near_m, double& far_m
     near_m = std::min(near_m, depth_m);
     far_m = std::max(far_m, depth_m);
   }
-  near_m = std::max(near_m, view.near_m);
+  // A plane seen head-on has no depth of its own: a little room keeps it inside the slab.
+  near_m = std::max(near_m * (1.0 - 1e-6), view.near_m);
+  far_m = far_m * (1.0 + 1e-6);
   return far_m > near_m;
 }
 
@@ -162,13 +164,14 @@ LightFrusta fit_light(const ViewVolume& view, const glm::dvec3& to_sun, std::uin
   double far_m = 0.0;
   if (!visible_depth_range_m(view, near_m, far_m)) return best;
 
-  // Depth of the whole box along the light: every caster lies behind the near plane.
+  // Depth of receivers and casters along the light: nothing is cut off by the near plane.
+  const glm::dvec3 low_m = glm::min(view.scene_min_m, view.casters_min_m);
+  const glm::dvec3 high_m = glm::max(view.scene_max_m, view.casters_max_m);
   double depth_low_m = std::numeric_limits<double>::infinity();
   double depth_high_m = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 8; ++i) {
-    const glm::dvec3 corner{(i & 1U) != 0 ? view.scene_max_m.x : view.scene_min_m.x,
-                            (i & 2U) != 0 ? view.scene_max_m.y : view.scene_min_m.y,
-                            (i & 4U) != 0 ? view.scene_max_m.z : view.scene_min_m.z};
+    const glm::dvec3 corner{(i & 1U) != 0 ? high_m.x : low_m.x, (i & 2U) != 0 ? high_m.y : low_m.y,
+                            (i & 4U) != 0 ? high_m.z : low_m.z};
     const double depth_m = glm::dot(-to_sun, corner);
     depth_low_m = std::min(depth_low_m, depth_m);
     depth_high_m = std::max(depth_high_m, depth_m);

@@ -16,8 +16,10 @@ struct ViewVolume {
   double tan_half_v = 0.1;
   double near_m = 0.1;
   double far_m = 1e5;
-  glm::dvec3 scene_min_m{0.0};  ///< box around receivers and casters, relative to the camera
+  glm::dvec3 scene_min_m{0.0};  ///< box around all receivers, relative to the camera
   glm::dvec3 scene_max_m{0.0};
+  glm::dvec3 casters_min_m{0.0};  ///< box around all casters at the light's instant
+  glm::dvec3 casters_max_m{0.0};
 };
 
 /// One orthographic light frustum: rows of light_from_relworld (right, down, away from the sun) with
@@ -37,7 +39,7 @@ struct LightFrusta {
 /// Fits the smallest rectangle (in any orientation about the sun's direction) around the visible
 /// part of the scene's box, and splits it along the boresight until a texel at the near end is at
 /// most a pixel there, or `max_cascades` is reached. `margin_m` widens every side for filter taps.
-/// The near plane clears the whole box, so that every caster is in front of its receivers.
+/// The depth range covers both boxes, so that no caster is cut off.
 /// RT-safe: fixed memory.
 [[nodiscard]] LightFrusta fit_light(const ViewVolume& view, const glm::dvec3& to_sun,
                                     std::uint32_t map_px, std::uint32_t max_cascades,

@@ -55,13 +55,15 @@ bool ReadbackRing::ready(std::uint32_t slot) noexcept {
 bool ReadbackRing::wait(std::uint32_t slot) noexcept {
   if (slots_[slot].fence == nullptr) return false;
   constexpr GLuint64 kSecondNs = 1'000'000'000;
+  // A software rasteriser may need minutes for a huge frame; a device that is silent longer hangs.
+  constexpr int kMaxSeconds = 600;
   GLenum state = GL_TIMEOUT_EXPIRED;
-  while (state == GL_TIMEOUT_EXPIRED) {
+  for (int i = 0; i < kMaxSeconds && state == GL_TIMEOUT_EXPIRED; ++i) {
     state = glClientWaitSync(slots_[slot].fence, GL_SYNC_FLUSH_COMMANDS_BIT, kSecondNs);
   }
   glDeleteSync(slots_[slot].fence);
   slots_[slot].fence = nullptr;
-  return state != GL_WAIT_FAILED;
+  return state != GL_WAIT_FAILED && state != GL_TIMEOUT_EXPIRED;
 }
 
 void ReadbackRing::release(std::uint32_t slot) noexcept {

@@ -27,7 +27,7 @@ class ReadbackRing {
   /// Issues the copy of `source` into the slot, and a fence behind it.
   void copy_from(const gl::Buffer& source, std::uint32_t slot) noexcept;
   [[nodiscard]] bool ready(std::uint32_t slot) noexcept;
-  /// Waits for the fence; false when the driver failed.
+  /// Waits for the fence; false when the driver failed or hangs for ten minutes.
   [[nodiscard]] bool wait(std::uint32_t slot) noexcept;
   void release(std::uint32_t slot) noexcept;
 

@@ -236,6 +236,71 @@ TEST(RendererShadow, a_parked_caster_that_left_leaves_a_cool_print) {
   EXPECT_LT(under, open - 10.0F);
 }
 
+/// Share of pixels whose temperatures differ by more than a limit. Maps of other extents put the
+/// sharp edges along a caster's foot on other texels: a few pixels always do.
+double share_apart(const Rendered& a, const Rendered& b, double limit_k) {
+  std::size_t apart = 0;
+  for (std::size_t i = 0; i < a.temperature_k.size(); ++i) {
+    if (!(std::abs(a.temperature_k[i] - b.temperature_k[i]) <= limit_k)) ++apart;
+  }
+  return static_cast<double>(apart) / static_cast<double>(a.temperature_k.size());
+}
+
+scene::ObjectDesc parked_truck(scene::Trajectory trajectory) {
+  scene::ObjectDesc truck;
+  truck.name = "truck";
+  truck.entity_id = 7;
+  truck.gltf = write_quads("truck", box({-1.0, -2.0, 0.0}, {1.0, 2.0, 2.5}));
+  truck.instances = {trajectory.front().pose};
+  truck.trajectory = std::move(trajectory);
+  return truck;
+}
+physics::Pose north_at(double east_m, double north_m) {
+  return {{east_m, north_m, 0.0}, physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0)};
+}
+
+TEST(RendererShadow, casters_of_the_past_count_in_full_though_nothing_as_high_is_there_now) {
+  auto scenario = instant_scenario(write_quads("plane", {ground(30.0, 30.0)}));
+  scenario.materials[0].modes = {{609.0, 0.547}, {7259.0, 0.453}};
+  scenario.thermal.steps = 13;
+  scenario.thermal.spacing = scene::StepSpacing::geometric;
+  const std::int64_t off_ns = 3 * kHourNs - 300'000'000'000;
+  scenario.objects.push_back(parked_truck(
+      {{0, north_at(0.0, 0.0), true, false}, {off_ns, north_at(0.0, 0.0), false, false}}));
+  const auto pose = looking({0.0, 0.0, 20.0}, {0.0, 0.0, 0.0});
+  const auto alone = Scene(scenario).render(pose, 3 * kHourNs);
+  // A mast out of sight is as high as the truck was; its own shadow stays out of sight too.
+  scene::ObjectDesc mast;
+  mast.name = "mast";
+  mast.gltf = write_quads("mast", box({28.0, 28.0, 0.0}, {28.2, 28.2, 4.0}));
+  mast.instances = {north_at(0.0, 0.0)};
+  scenario.objects.push_back(mast);
+  const auto beside_mast = Scene(scenario).render(pose, 3 * kHourNs);
+  double coldest_k = 1e9;
+  for (std::size_t i = 0; i < alone.temperature_k.size(); ++i) {
+    coldest_k = std::min<double>(coldest_k, alone.temperature_k[i]);
+  }
+  EXPECT_LT(coldest_k, alone.temperature_k[128 * 320 + 310] - 10.0);
+  EXPECT_LT(share_apart(alone, beside_mast, 1.0), 0.003);
+}
+
+TEST(RendererShadow, a_teleport_leaves_the_shade_before_it) {
+  auto scenario = instant_scenario(write_quads("plane", {ground(60.0, 60.0)}));
+  scenario.materials[0].modes = {{609.0, 0.547}, {7259.0, 0.453}};
+  scenario.thermal.steps = 13;
+  const std::int64_t jump_ns = 3 * kHourNs - 300'000'000'000;
+  const auto pose = looking({0.0, 0.0, 20.0}, {0.0, 0.0, 0.0});
+  const auto at_origin_until = [&](scene::Keyframe then) {
+    auto with_truck = scenario;
+    with_truck.objects.push_back(
+        parked_truck({{0, north_at(0.0, 0.0), true, false}, std::move(then)}));
+    return Scene(with_truck).render(pose, 3 * kHourNs);
+  };
+  const auto switched_off = at_origin_until({jump_ns, north_at(0.0, 0.0), false, false});
+  const auto teleported = at_origin_until({jump_ns, north_at(50.0, 50.0), true, true});
+  EXPECT_LT(share_apart(teleported, switched_off, 1.0), 0.003);
+}
+
 TEST(RendererShadow, a_live_pose_moves_the_caster_from_then_on) {
   auto scenario = instant_scenario(write_quads("plane", {ground(30.0, 30.0)}));
   scene::ObjectDesc crate;

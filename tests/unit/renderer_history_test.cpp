@@ -110,6 +110,34 @@ TEST(PoseHistory, path_counts_motion_but_no_jumps) {
   const PoseHistory history(scripted(), at_east(0.0));
   EXPECT_NEAR(history.path_m(100 * kSecondNs, 110 * kSecondNs), 100.0, 1e-6);
   EXPECT_EQ(history.path_m(0, 90 * kSecondNs), 0.0);
+  EXPECT_NEAR(history.path_m(105 * kSecondNs, 300 * kSecondNs), 50.0, 1e-6);  // over the jump
+  EXPECT_EQ(history.path_m(150 * kSecondNs, 200 * kSecondNs), 0.0);
+}
+
+TEST(PoseHistory, path_does_not_count_the_way_from_the_script_to_the_first_live_pose) {
+  PoseHistory history(scripted(), at_east(0.0));
+  ASSERT_TRUE(history.append(50 * kSecondNs, at_east(-70.0), true, false));
+  ASSERT_TRUE(history.append(52 * kSecondNs, at_east(-73.0), true, false));
+  EXPECT_NEAR(history.path_m(40 * kSecondNs, 60 * kSecondNs), 3.0, 1e-9);
+}
+
+TEST(PoseHistory, jitter_of_the_host_is_neither_start_nor_stop) {
+  PoseHistory history(scripted(), at_east(0.0));
+  for (int i = 0; i < 4000; ++i) {
+    ASSERT_TRUE(history.append(i * 5'000'000LL, at_east(i % 2 == 0 ? 0.0 : 0.001), true, false));
+  }
+  EXPECT_TRUE(history.events_ns().empty());
+}
+
+TEST(PoseHistory, finds_start_and_stop_of_a_live_drive) {
+  PoseHistory history(scripted(), at_east(0.0));
+  const auto east_m = [](double t_s) { return 5.0 * std::clamp(t_s - 10.0, 0.0, 10.0); };
+  for (int i = 0; i <= 6000; ++i) {
+    ASSERT_TRUE(history.append(i * 5'000'000LL, at_east(east_m(i * 5e-3)), true, false));
+  }
+  ASSERT_EQ(history.events_ns().size(), 2U);
+  EXPECT_NEAR(static_cast<double>(history.events_ns()[0]) * 1e-9, 10.0, 0.02);
+  EXPECT_NEAR(static_cast<double>(history.events_ns()[1]) * 1e-9, 20.0, 0.02);
 }
 
 scene::ScenarioDesc clear_day() {
@@ -166,6 +194,25 @@ TEST(StepPlan, needs_no_shadow_map_at_night) {
   for (const auto& interval : plan.intervals()) EXPECT_FALSE(interval.sun_up);
 }
 
+TEST(Environment, takes_weather_with_every_pose_for_hours) {
+  const auto scenario = clear_day();
+  Environment environment(scenario);
+  scene::WeatherSample sample;
+  sample.air_k = 290.0;
+  for (int i = 0; i < 100'000; ++i) {
+    sample.sim_time_ns = i * 5'000'000LL;
+    ASSERT_TRUE(environment.append(sample));  // unchanged
+  }
+  EXPECT_EQ(environment.changes_ns().size(), 1U);
+  for (int i = 100'000; i < 200'000; ++i) {
+    sample.sim_time_ns = i * 5'000'000LL;
+    sample.air_k = 290.0 + 1e-5 * i;
+    ASSERT_TRUE(environment.append(sample));
+  }
+  const auto sun = environment.sun_at(sample.sim_time_ns);
+  EXPECT_NEAR(environment.forcing_at(sample.sim_time_ns, sun).air_k, 292.0, 1e-4);
+}
+
 TEST(Environment, weather_from_the_host_holds_from_its_time_on) {
   const auto scenario = clear_day();
   Environment environment(scenario);
@@ -180,6 +227,17 @@ TEST(Environment, weather_from_the_host_holds_from_its_time_on) {
   EXPECT_EQ(environment.forcing_at(7200 * kSecondNs, sun).direct_normal_w_m2, 0.0);
   overcast.sim_time_ns = 7100 * kSecondNs;
   EXPECT_FALSE(environment.append(overcast));
+  // A step ends and begins exactly there, and the step before it still has the old weather.
+  StepPlan plan(scenario.thermal);
+  plan.update(12600 * kSecondNs, environment, {});
+  bool found = false;
+  for (const auto& interval : plan.intervals()) {
+    found = found || interval.begin_ns == 7200 * kSecondNs;
+    if (interval.end_ns == 7200 * kSecondNs) {
+      EXPECT_GT(interval.forcing_end.direct_normal_w_m2, 0.0);
+    }
+  }
+  EXPECT_TRUE(found);
   environment.reset();
   EXPECT_GT(environment.forcing_at(7200 * kSecondNs, sun).direct_normal_w_m2, 0.0);
 }

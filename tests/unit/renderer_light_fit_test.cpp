@@ -22,6 +22,9 @@ ViewVolume view_at_ground() {
   view.far_m = 2000.0;
   view.scene_min_m = {-500.0, -500.0, -60.0};
   view.scene_max_m = {500.0, 500.0, -40.0};
+  // A caster may stand higher than anything that is there now.
+  view.casters_min_m = {-5.0, -5.0, -60.0};
+  view.casters_max_m = {5.0, 5.0, -20.0};
   return view;
 }
 
@@ -54,7 +57,7 @@ TEST(LightFit, holds_every_visible_point_and_every_caster_in_front_of_it) {
         ASSERT_LE(at[axis], frusta.cascades[c].extent_m[axis] + 1e-6);
       }
       // A caster anywhere in the box towards the sun is nearer to the light, not cut off.
-      const glm::dvec3 caster = p + to_sun * ((-40.0 - p.z) / to_sun.z);
+      const glm::dvec3 caster = p + to_sun * ((-20.0 - p.z) / to_sun.z);
       ASSERT_GE(light_coordinates(frusta.cascades[c], caster).z, -1e-6);
     }
     EXPECT_GT(inside_box, 1000);
@@ -77,10 +80,22 @@ TEST(LightFit, splits_only_when_texels_would_be_coarser_than_pixels) {
   EXPECT_EQ(fit_light(view, to_sun, 64, 4, 0.5, 6e-4).count, 4U);
 }
 
+TEST(LightFit, fits_a_plane_seen_head_on) {
+  ViewVolume view = view_at_ground();
+  view.relworld_from_sensor = glm::dmat3({1.0, 0.0, 0.0}, {0.0, -1.0, 0.0}, {0.0, 0.0, -1.0});
+  view.scene_min_m = {-500.0, -500.0, -40.0};
+  view.scene_max_m = {500.0, 500.0, -40.0};
+  const LightFrusta frusta = fit_light(view, {0.0, 0.6, 0.8}, 1024, 1, 0.0, 6e-4);
+  ASSERT_EQ(frusta.count, 1U);
+  EXPECT_GT(frusta.cascades[0].extent_m.x, 15.0);
+}
+
 TEST(LightFit, sees_nothing_when_the_scene_is_behind_the_camera) {
   ViewVolume view = view_at_ground();
   view.scene_min_m = {-500.0, -500.0, 40.0};
   view.scene_max_m = {500.0, 500.0, 60.0};
+  view.casters_min_m = view.scene_min_m;
+  view.casters_max_m = view.scene_max_m;
   EXPECT_EQ(fit_light(view, {0.0, 0.0, 1.0}, 1024, 1, 0.5, 6e-4).count, 0U);
 }
 

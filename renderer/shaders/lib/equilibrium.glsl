@@ -7,7 +7,7 @@
 // where an input lies below its guard and the result is that of the guard.
 float equilibrium_k(float emission_w_m2_k4, float conductance_w_m2_k, float source_w_m2,
                     inout bool clamped) {
-  const float min_emission_w_m2_k4 = 1e-12;
+  const float min_emission_w_m2_k4 = 1e-20;
   const float min_source_w_m2 = 1e-9;
   // Written so that NaN counts too.
   clamped = clamped || !(emission_w_m2_k4 >= min_emission_w_m2_k4) ||

@@ -11,6 +11,7 @@ layout(std140, binding = EMIT_BIND_TAPS) uniform Taps { TapParams taps; };
 
 // Share of the sun's disc seen from a point, 0..1.
 float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
+  if (step_params.info.x == 0u) return 1.0;
   uint cascade = 0u;
   while (cascade + 1u < step_params.info.x && boresight_m > step_params.cascades[cascade].scale.w) ++cascade;
   vec4 row0 = step_params.cascades[cascade].light_row0;

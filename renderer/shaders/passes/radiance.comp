@@ -24,7 +24,7 @@ float air_mass(float sin_elevation) {
 }
 
 float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
-  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log(bands[band].vertical_transmittance_frac) * air_mass(sin_elevation)));
+  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log(max(bands[band].vertical_transmittance_frac, 1e-30)) * air_mass(sin_elevation)));
 }
 
 float transmittance(uint band, float range_m) {

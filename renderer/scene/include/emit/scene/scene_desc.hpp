@@ -150,7 +150,7 @@ struct ThermalOptions {
   double initial_k = 290.0;             ///< surface temperature at history start
   std::int64_t history_start_ns = 0;    ///< sim time; the thermal simulation runs from here to now
   std::uint32_t steps = 27;
-  StepSpacing spacing = StepSpacing::geometric;
+  StepSpacing spacing = StepSpacing::uniform;
   double first_step_s = 20.0;           ///< newest interval of geometric spacing
   std::uint32_t shadow_map_px = 1024;
   std::uint32_t max_cascades = 1;       ///< 1..4
