@@ -64,17 +64,17 @@ Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptio
     return fail(fmt::format("thermal steps {}: 1 to 4096 are possible", thermal.steps));
   }
   if (thermal.max_cascades < 1 || thermal.max_cascades > EMIT_MAX_CASCADES) {
-    return fail(fmt::format("{} cascades: 1 to {} are possible", thermal.max_cascades,
-                            EMIT_MAX_CASCADES));
+    return fail(
+        fmt::format("{} cascades: 1 to {} are possible", thermal.max_cascades, EMIT_MAX_CASCADES));
   }
   if (thermal.shadow_map_px < 16 || thermal.shadow_map_px > 16384) {
-    return fail(fmt::format("shadow map of {} px: 16 to 16384 are possible",
-                            thermal.shadow_map_px));
+    return fail(
+        fmt::format("shadow map of {} px: 16 to 16384 are possible", thermal.shadow_map_px));
   }
-  if (thermal.blocker_taps < 1 || thermal.blocker_taps > EMIT_MAX_TAPS ||
-      thermal.filter_taps < 1 || thermal.filter_taps > EMIT_MAX_TAPS) {
-    return fail(fmt::format("shadow taps {} + {}: 1 to {} each are possible",
-                            thermal.blocker_taps, thermal.filter_taps, EMIT_MAX_TAPS));
+  if (thermal.blocker_taps < 1 || thermal.blocker_taps > EMIT_MAX_TAPS || thermal.filter_taps < 1 ||
+      thermal.filter_taps > EMIT_MAX_TAPS) {
+    return fail(fmt::format("shadow taps {} + {}: 1 to {} each are possible", thermal.blocker_taps,
+                            thermal.filter_taps, EMIT_MAX_TAPS));
   }
   if (output.slots < 2 || output.slots > ReadbackRing::kMaxSlots) {
     return fail(fmt::format("{} read-back slots: 2 to {} are possible", output.slots,
@@ -196,10 +196,9 @@ std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOption
 }
 
 GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
-                       scene::SceneGeometry geometry, const OutputOptions& output,
-                       BandModel bands, GeometryPass geometry_pass, OcclusionPass occlusion_pass,
-                       ShadowPass shadow_pass, ThermalPass thermal_pass,
-                       RadiancePass radiance_pass)
+                       scene::SceneGeometry geometry, const OutputOptions& output, BandModel bands,
+                       GeometryPass geometry_pass, OcclusionPass occlusion_pass,
+                       ShadowPass shadow_pass, ThermalPass thermal_pass, RadiancePass radiance_pass)
     : scenario_(scenario),
       output_(output),
       context_(std::move(context)),
@@ -246,17 +245,13 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     entity_ids_.push_back(object.entity_id);
     histories_.emplace_back(object, object.instances.front());
   }
-  const std::size_t plane_px =
-      std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
-  frame_params_.format_px =
-      glm::uvec4(scenario_.sensor.width_px, scenario_.sensor.height_px,
-                 static_cast<std::uint32_t>(plane_px),
-                 (output_.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
-                     (output_.depth ? EMIT_OUTPUT_DEPTH : 0U) |
-                     (output_.object ? EMIT_OUTPUT_OBJECT : 0U));
-  frame_params_.obscurance =
-      glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
-                static_cast<float>(kReferenceK), 0.0F, 0.0F);
+  const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
+  frame_params_.format_px = glm::uvec4(
+      scenario_.sensor.width_px, scenario_.sensor.height_px, static_cast<std::uint32_t>(plane_px),
+      (output_.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
+          (output_.depth ? EMIT_OUTPUT_DEPTH : 0U) | (output_.object ? EMIT_OUTPUT_OBJECT : 0U));
+  frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
+                                       static_cast<float>(kReferenceK), 0.0F, 0.0F);
   frame_params_.bands = glm::uvec4(static_cast<std::uint32_t>(scenario_.bands.size()),
                                    bands_.nodes_per_band(), 0U, 0U);
   for (std::uint32_t slot = 0; slot < output_.slots; ++slot) {
@@ -357,8 +352,8 @@ void GlRenderer::prepare_steps(const FrameRequest& request) noexcept {
     // Casters of the past may stand where, and as high as, nothing does now.
     scene::Aabb casters = bounds;
     if (interval.sun_up) {
-      casters.add(lists_.pose_casters(interval.sample_ns, interval.begin_ns, interval.end_ns,
-                                      histories_));
+      casters.add(
+          lists_.pose_casters(interval.sample_ns, interval.begin_ns, interval.end_ns, histories_));
     }
     if (!casters.empty()) {
       camera.view.casters_min_m = casters.min_m;
@@ -387,9 +382,9 @@ void GlRenderer::prepare_steps(const FrameRequest& request) noexcept {
     const bool changed = std::any_of(events.begin(), events.end(), [&](std::int64_t event_ns) {
       return event_ns > newest.begin_ns && event_ns <= request.sim_time_ns;
     });
-    extra_sun_pass_ =
-        extra_sun_pass_ ||
-        (sun_up && (changed || history.path_m(newest.begin_ns, request.sim_time_ns) > kFreshCasterM));
+    extra_sun_pass_ = extra_sun_pass_ ||
+                      (sun_up && (changed || history.path_m(newest.begin_ns, request.sim_time_ns) >
+                                                 kFreshCasterM));
   }
   if (extra_sun_pass_) add_step(instant_interval(plan_, request.sim_time_ns), steps, true);
 }
@@ -509,10 +504,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto radiance_pass = RadiancePass::create(width_px, height_px);
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
 
-  auto renderer = std::make_unique<GlRenderer>(
-      scenario, std::move(*context), std::move(*geometry), output, std::move(*bands),
-      std::move(*geometry_pass), std::move(*occlusion_pass), std::move(*shadow_pass),
-      std::move(*thermal_pass), std::move(*radiance_pass));
+  auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), std::move(*geometry),
+                                               output, std::move(*bands), std::move(*geometry_pass),
+                                               std::move(*occlusion_pass), std::move(*shadow_pass),
+                                               std::move(*thermal_pass), std::move(*radiance_pass));
   if (glGetError() != GL_NO_ERROR || !renderer->memory_mapped()) {
     return make_error(ErrorCode::gpu, "the device cannot provide the buffers of this scenario");
   }

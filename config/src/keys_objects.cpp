@@ -200,8 +200,8 @@ const KeyTable<SensorDraft>& sensor_keys() {
   static const KeyTable<SensorDraft> keys = [] {
     KeyTable<SensorDraft> table = {
         text<SensorDraft>("name", EMIT_FIELD(desc.name), "Name in the frames' attributes."),
-        integer<SensorDraft>("width_px", "px", 1, 16384, EMIT_FIELD(desc.width_px), "Columns."),
-        integer<SensorDraft>("height_px", "px", 1, 16384, EMIT_FIELD(desc.height_px), "Rows."),
+        integer<SensorDraft>("width_px", "px", 1, 8192, EMIT_FIELD(desc.width_px), "Columns."),
+        integer<SensorDraft>("height_px", "px", 1, 8192, EMIT_FIELD(desc.height_px), "Rows."),
         number<SensorDraft>("fov_h_deg", "deg", between(0.01, 170), EMIT_FIELD(desc.fov_h_rad),
                             "Horizontal field of view; pixels are square.", kDegree),
         number<SensorDraft>("near_m", "m", between(1e-4, 1e4), EMIT_FIELD(desc.near_m),

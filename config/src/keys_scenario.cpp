@@ -147,13 +147,13 @@ const KeyTable<BandAtmosphere>& band_atmosphere_keys() {
   static const KeyTable<BandAtmosphere> keys = {
       required(text<BandAtmosphere>("band", EMIT_FIELD(band), "Name of a band.")),
       required(custom<BandAtmosphere>(
-          {"terms", "array of [a, k]", "1, km-1", "1 .. 8 terms, sum of a = 1, k >= 0",
+          {"terms", "array of [a, k]", "1, km-1", "1 .. 4 terms, sum of a = 1, k >= 0",
            "Transmittance over a range R: sum of a exp(-k R). Path radiance is (1 - tau) times "
            "that of a blackbody at air temperature.",
            false},
           [](BandAtmosphere& out, const Node& node, Diagnostics& diagnostics) {
-            if (node.kind != Node::Kind::array || node.items.empty() || node.items.size() > 8) {
-              diagnostics.add(node.at, "'terms' must be an array of 1 to 8 pairs [a, k]");
+            if (node.kind != Node::Kind::array || node.items.empty() || node.items.size() > 4) {
+              diagnostics.add(node.at, "'terms' must be an array of 1 to 4 pairs [a, k]");
               return;
             }
             out.terms.clear();

@@ -197,6 +197,16 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.atmosphere = resolve_atmosphere(root, scenario.bands, diagnostics);
 
   scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
+  // A [[band]] that no channel shows is not handed over, so neither are emissivities in it.
+  std::vector<std::string> handed_over = known_band_names({});
+  for (const scene::SpectralBand& band : scenario.bands) {
+    handed_over.push_back(band.name);
+  }
+  for (scene::Material& material : scenario.materials) {
+    std::erase_if(material.band_emissivity, [&handed_over](const scene::BandEmissivity& entry) {
+      return std::find(handed_over.begin(), handed_over.end(), entry.band) == handed_over.end();
+    });
+  }
   resolve_default_material(root, head, scenario, diagnostics);
   scenario.sensor = resolve_sensor(root, diagnostics);
   scenario.objects =

@@ -144,11 +144,11 @@ Result<std::vector<scene::BandAtmosphere>> load_atmosphere_csv(const std::filesy
     for (const scene::AtmosphereTerm& term : out[i].terms) {
       sum += term.amplitude_frac;
     }
-    if (std::abs(sum - 1.0) > 1e-3 || out[i].terms.size() > 8) {
+    if (std::abs(sum - 1.0) > 1e-3 || out[i].terms.size() > 4) {
       return make_error(
           ErrorCode::config,
           fmt::format("{}:{}: the amplitudes of band '{}' add up to {} over {} rows, "
-                      "must be 1 over at most 8",
+                      "must be 1 over at most 4",
                       file.string(), first_line[i], out[i].band, sum, out[i].terms.size()));
     }
   }

@@ -179,6 +179,19 @@ std::vector<ChannelDesc> resolve_channels(const Node& root,
     }
     channels.push_back(std::move(channel));
   }
+  // What a frame's metadata and the renderer hold.
+  constexpr std::size_t kMaxBands = 4;
+  std::vector<std::string> used;
+  for (std::size_t i = 0; i < channels.size() && diagnostics.empty(); ++i) {
+    if (contains(used, channels[i].band)) {
+      continue;
+    }
+    used.push_back(channels[i].band);
+    if (used.size() == kMaxBands + 1) {
+      diagnostics.add(key_location(root.find("channel")->items[i], "band"),
+                      fmt::format("channels use more than {} bands", kMaxBands));
+    }
+  }
   if (channels.empty() && diagnostics.empty()) {
     diagnostics.add(key_location(root, "channel"), "at least one channel is needed");
   }
@@ -202,9 +215,6 @@ std::vector<SpectralBand> bands_in_use(const std::vector<ChannelDesc>& channels,
         }
       }
     }
-  }
-  for (const SpectralBand& band : declared) {
-    add(band);
   }
   return out;
 }

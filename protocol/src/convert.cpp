@@ -26,11 +26,17 @@ constexpr double kMinNorm = 0.99;
 constexpr double kMaxNorm = 1.01;
 constexpr double kMaxSpeedMS = 1e6;
 constexpr double kMaxAngularRateRadS = 1e4;
-constexpr double kMaxFluxWM2 = 1e5;
-constexpr double kMaxAirK = 1000.0;
-constexpr double kMaxEnvironmentK = 5000.0;
-constexpr double kMaxWindMS = 1000.0;
-constexpr double kMaxFilmWM2K = 1e5;
+// Weather: those of a scenario's [[weather.sample]], so that live weather can do nothing that a
+// scenario cannot.
+constexpr double kMaxDirectNormalWM2 = 2000.0;
+constexpr double kMaxDiffuseHorizontalWM2 = 1500.0;
+constexpr double kMaxLongwaveDownWM2 = 1000.0;
+constexpr double kMinAirK = 180.0;
+constexpr double kMaxAirK = 340.0;
+constexpr double kMinEnvironmentK = 100.0;
+constexpr double kMaxEnvironmentK = 400.0;
+constexpr double kMaxWindMS = 100.0;
+constexpr double kMaxFilmWM2K = 1000.0;
 /// Squared norms nearer to 1 are left alone, so that decoding what was decoded changes no bit.
 constexpr double kNormTolerance = 1e-12;
 
@@ -163,13 +169,13 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcep
   out.cloud_frac = in.cloud_frac();
   if (in.has_environment_k()) out.environment_k = in.environment_k();
   if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
-  constexpr double kAboveZero = std::numeric_limits<double>::min();
   const bool valid =
-      within(out.direct_normal_w_m2, 0.0, kMaxFluxWM2) &&
-      within(out.diffuse_horizontal_w_m2, 0.0, kMaxFluxWM2) &&
-      within(out.longwave_down_w_m2, 0.0, kMaxFluxWM2) && within(out.air_k, kAboveZero, kMaxAirK) &&
-      within(out.wind_m_s, 0.0, kMaxWindMS) && within(out.cloud_frac, 0.0, 1.0) &&
-      (!out.environment_k || within(*out.environment_k, kAboveZero, kMaxEnvironmentK)) &&
+      within(out.direct_normal_w_m2, 0.0, kMaxDirectNormalWM2) &&
+      within(out.diffuse_horizontal_w_m2, 0.0, kMaxDiffuseHorizontalWM2) &&
+      within(out.longwave_down_w_m2, 0.0, kMaxLongwaveDownWM2) &&
+      within(out.air_k, kMinAirK, kMaxAirK) && within(out.wind_m_s, 0.0, kMaxWindMS) &&
+      within(out.cloud_frac, 0.0, 1.0) &&
+      (!out.environment_k || within(*out.environment_k, kMinEnvironmentK, kMaxEnvironmentK)) &&
       (!out.film_w_m2_k || within(*out.film_w_m2_k, 0.0, kMaxFilmWM2K));
   return valid ? DecodeStatus::ok : DecodeStatus::invalid_environment;
 }
@@ -184,6 +190,9 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out) noexcept {
   if (in.protocol_version() != kProtocolVersion) return DecodeStatus::wrong_version;
   if (static_cast<std::size_t>(in.entities_size()) > kMaxEntitiesPerFrame) {
     return DecodeStatus::oversize;
+  }
+  if (out.sim_time_ns > kMaxSimTimeNs || out.sim_time_ns < -kMaxSimTimeNs) {
+    return DecodeStatus::malformed;
   }
   if (!in.has_seeker()) return DecodeStatus::invalid_pose;
   if (auto status = from_proto(in.seeker(), out.seeker, out.seeker_rates);

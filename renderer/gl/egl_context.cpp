@@ -67,8 +67,7 @@ std::vector<Candidate> list_candidates(int gpu_index, std::string& tried) {
     return {candidates[static_cast<std::size_t>(gpu_index)]};
   }
   if (has_extension(client, "EGL_MESA_platform_surfaceless")) {
-    candidates.push_back({eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA,
-                                                   nullptr, nullptr),
+    candidates.push_back({eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, nullptr, nullptr),
                           "Mesa surfaceless"});
   }
   if (candidates.empty()) tried = "EGL offers neither device nor surfaceless platform";
@@ -103,8 +102,7 @@ EGLContext make_context(EGLDisplay display, bool debug, std::string& why) {
                                        EGL_CONTEXT_OPENGL_DEBUG,
                                        debug ? EGL_TRUE : EGL_FALSE,
                                        EGL_NONE};
-  const EGLContext context =
-      eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes);
+  const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes);
   if (context == EGL_NO_CONTEXT) {
     why = fmt::format("no OpenGL 4.5 core context (EGL error 0x{:x})", eglGetError());
     return EGL_NO_CONTEXT;
@@ -163,6 +161,8 @@ physics::Result<EglContext> EglContext::create(int gpu_index, bool debug) {
                                 tried));
 }
 
-const std::string& EglContext::device_name() const noexcept { return impl_->device_name; }
+const std::string& EglContext::device_name() const noexcept {
+  return impl_->device_name;
+}
 
 }  // namespace emit::gl

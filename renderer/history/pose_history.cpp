@@ -40,8 +40,7 @@ bool moves(const scene::Keyframe& from, const scene::Keyframe& to) noexcept {
 }
 
 /// Way along the keyframes between two instants.
-double path_in(const scene::Trajectory& keys, std::int64_t begin_ns,
-               std::int64_t end_ns) noexcept {
+double path_in(const scene::Trajectory& keys, std::int64_t begin_ns, std::int64_t end_ns) noexcept {
   double path_m = 0.0;
   auto next = std::upper_bound(
       keys.begin(), keys.end(), begin_ns,
@@ -117,8 +116,8 @@ void PoseHistory::note_motion(const scene::Keyframe& last, const scene::Keyframe
 bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on,
                          bool teleport) noexcept {
   if (!live_.empty() && sim_time_ns < live_.back().sim_time_ns) return false;
-  const scene::Keyframe next{.sim_time_ns = sim_time_ns, .pose = pose, .on = on,
-                             .teleport = teleport};
+  const scene::Keyframe next{
+      .sim_time_ns = sim_time_ns, .pose = pose, .on = on, .teleport = teleport};
   if (live_.empty()) {
     // What the script planned after this instant will not happen.
     const TrajectoryState planned = trajectory_at(scripted_, sim_time_ns);
@@ -159,10 +158,10 @@ bool PoseHistory::replaces_last(const scene::Keyframe& next) noexcept {
   const bool at_rest = close(before.pose, last.pose) && close(before.pose, next.pose);
   if (!at_rest && next.sim_time_ns - before.sim_time_ns > kThinSpanNs) return false;
   const auto fits = [&](const scene::Keyframe& key) {
-    return close(physics::interpolate(
-                     before.pose, next.pose,
-                     fraction(before.sim_time_ns, next.sim_time_ns, key.sim_time_ns)),
-                 key.pose);
+    return close(
+        physics::interpolate(before.pose, next.pose,
+                             fraction(before.sim_time_ns, next.sim_time_ns, key.sim_time_ns)),
+        key.pose);
   };
   if (!fits(last)) return false;
   for (std::size_t i = 0; i < skipped_count_; ++i) {

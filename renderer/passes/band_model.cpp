@@ -29,8 +29,7 @@ double sky_hemisphere_frac(double vertical_transmittance_frac) {
   double sum = 0.0;
   for (int i = 0; i < kRings; ++i) {
     const double sin_elevation = std::sqrt((i + 0.5) / kRings);
-    const double mass =
-        physics::relative_air_mass(physics::Radians(std::asin(sin_elevation)));
+    const double mass = physics::relative_air_mass(physics::Radians(std::asin(sin_elevation)));
     sum += 1.0 - std::pow(vertical_transmittance_frac, mass);
   }
   return sum / kRings;
@@ -70,16 +69,15 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
     params.vertical_transmittance_frac = 1.0F;
     if (const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name)) {
       if (atmosphere->terms.size() > EMIT_MAX_ATMOSPHERE_TERMS) {
-        return make_error(ErrorCode::config,
-                          fmt::format("atmosphere of band '{}': {} terms, {} are possible",
-                                      desc.name, atmosphere->terms.size(),
-                                      EMIT_MAX_ATMOSPHERE_TERMS));
+        return make_error(
+            ErrorCode::config,
+            fmt::format("atmosphere of band '{}': {} terms, {} are possible", desc.name,
+                        atmosphere->terms.size(), EMIT_MAX_ATMOSPHERE_TERMS));
       }
       params.terms_amplitude_frac = glm::vec4(0.0F);
       for (std::size_t i = 0; i < atmosphere->terms.size(); ++i) {
         const auto k = static_cast<glm::length_t>(i);
-        params.terms_amplitude_frac[k] =
-            static_cast<float>(atmosphere->terms[i].amplitude_frac);
+        params.terms_amplitude_frac[k] = static_cast<float>(atmosphere->terms[i].amplitude_frac);
         params.terms_extinction_per_m[k] =
             static_cast<float>(atmosphere->terms[i].extinction_per_km * 1e-3);
       }
@@ -100,8 +98,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
 }
 
 void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept {
-  const double disc_sr_projected =
-      physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+  const double disc_sr_projected = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
   const double air_mass = physics::relative_air_mass(sun.elevation);
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
@@ -138,8 +135,8 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
                                                      material.layers[0].thickness_m);
     }
     params.base_k = static_cast<float>(material.base_k);
-    params.initial_offset_k = static_cast<float>(
-        material.initial_k.value_or(scenario.thermal.initial_k) - reference_k);
+    params.initial_offset_k =
+        static_cast<float>(material.initial_k.value_or(scenario.thermal.initial_k) - reference_k);
     if (material.prescribed_k) {
       params.prescribed = 1.0F;
       params.prescribed_offset_k = static_cast<float>(*material.prescribed_k - reference_k);

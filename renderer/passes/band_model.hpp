@@ -29,8 +29,8 @@ class BandModel {
  private:
   struct Entry {
     physics::Band band;
-    double sun_radiance_w_m2_sr = 0.0;      ///< photosphere, in band
-    double sky_hemisphere_frac = 0.0;       ///< hemisphere mean over blackbody at air temperature
+    double sun_radiance_w_m2_sr = 0.0;  ///< photosphere, in band
+    double sky_hemisphere_frac = 0.0;   ///< hemisphere mean over blackbody at air temperature
     double vertical_transmittance_frac = 1.0;
   };
   std::vector<Entry> entries_;

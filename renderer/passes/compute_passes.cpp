@@ -39,7 +39,9 @@ void OcclusionPass::dispatch() const noexcept {
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
 }
 
-void OcclusionPass::bind_texture() const noexcept { sky_frac_.bind(EMIT_TEX_OCCLUSION); }
+void OcclusionPass::bind_texture() const noexcept {
+  sky_frac_.bind(EMIT_TEX_OCCLUSION);
+}
 
 physics::Result<ThermalPass> ThermalPass::create(std::uint32_t width_px, std::uint32_t height_px,
                                                  const scene::ThermalOptions& options) {

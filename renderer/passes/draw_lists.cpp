@@ -11,12 +11,11 @@ namespace emit::renderer {
 namespace {
 
 gpu::InstanceParams params_from(const glm::dmat4& relworld_from_mesh,
-                                 std::uint32_t object) noexcept {
+                                std::uint32_t object) noexcept {
   const auto row = [&relworld_from_mesh](glm::length_t r) {
-    return glm::vec4(static_cast<float>(relworld_from_mesh[0][r]),
-                     static_cast<float>(relworld_from_mesh[1][r]),
-                     static_cast<float>(relworld_from_mesh[2][r]),
-                     static_cast<float>(relworld_from_mesh[3][r]));
+    return glm::vec4(
+        static_cast<float>(relworld_from_mesh[0][r]), static_cast<float>(relworld_from_mesh[1][r]),
+        static_cast<float>(relworld_from_mesh[2][r]), static_cast<float>(relworld_from_mesh[3][r]));
   };
   return {row(0), row(1), row(2), glm::vec4(static_cast<float>(object + 1), 0.0F, 0.0F, 0.0F)};
 }
@@ -24,11 +23,10 @@ gpu::InstanceParams params_from(const glm::dmat4& relworld_from_mesh,
 /// True when the box lies outside one plane of the pyramid.
 bool outside(const ViewVolume& view, const scene::Aabb& box) noexcept {
   const glm::dmat3& m = view.relworld_from_sensor;
-  const glm::dvec3 normals[] = {m * glm::dvec3(1.0, 0.0, view.tan_half_h),
-                                m * glm::dvec3(-1.0, 0.0, view.tan_half_h),
-                                m * glm::dvec3(0.0, 1.0, view.tan_half_v),
-                                m * glm::dvec3(0.0, -1.0, view.tan_half_v),
-                                m * glm::dvec3(0.0, 0.0, 1.0)};
+  const glm::dvec3 normals[] = {
+      m * glm::dvec3(1.0, 0.0, view.tan_half_h), m * glm::dvec3(-1.0, 0.0, view.tan_half_h),
+      m * glm::dvec3(0.0, 1.0, view.tan_half_v), m * glm::dvec3(0.0, -1.0, view.tan_half_v),
+      m * glm::dvec3(0.0, 0.0, 1.0)};
   const glm::dvec3 centre = 0.5 * (box.min_m + box.max_m);
   const glm::dvec3 half = 0.5 * (box.max_m - box.min_m);
   for (const glm::dvec3& n : normals) {
@@ -65,10 +63,9 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
     const std::int32_t history = history_of_object[instances[i].object];
     history_of_instance_.push_back(history);
     if (history >= 0) moving_.push_back(i);
-    const glm::dvec3 size =
-        instances[i].world_bounds.empty()
-            ? glm::dvec3(0.0)
-            : instances[i].world_bounds.max_m - instances[i].world_bounds.min_m;
+    const glm::dvec3 size = instances[i].world_bounds.empty()
+                                ? glm::dvec3(0.0)
+                                : instances[i].world_bounds.max_m - instances[i].world_bounds.min_m;
     size_of_instance_m_.push_back(std::max({size.x, size.y, size.z}));
   }
   view_placed_.resize(instances.size());
@@ -84,8 +81,7 @@ DrawLists::Placed DrawLists::place(std::uint32_t instance, const glm::dmat4& wor
   glm::dmat4 relworld_from_mesh = world_from_mesh;
   relworld_from_mesh[3] -= glm::dvec4(camera_world_m_, 0.0);
   const std::uint32_t mesh = scene_.instances()[instance].mesh;
-  return {relworld_from_mesh, scene::transformed(scene_.mesh_bounds(mesh), relworld_from_mesh),
-          on};
+  return {relworld_from_mesh, scene::transformed(scene_.mesh_bounds(mesh), relworld_from_mesh), on};
 }
 
 void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
@@ -103,9 +99,8 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
       view_placed_[i] = place(i, instances[i].world_from_mesh, true);
     } else {
       const TrajectoryState state = entities[static_cast<std::size_t>(history)].at(sim_time_ns);
-      view_placed_[i] =
-          place(i, scene::world_from_body_matrix(state.pose) * instances[i].body_from_mesh,
-                state.on);
+      view_placed_[i] = place(
+          i, scene::world_from_body_matrix(state.pose) * instances[i].body_from_mesh, state.on);
     }
     params_.push_back(params_from(view_placed_[i].relworld_from_mesh, instances[i].object));
     if (view_placed_[i].on) bounds_.add(view_placed_[i].box);

@@ -57,9 +57,7 @@ class DrawLists {
   }
   [[nodiscard]] std::size_t max_instance_params() const noexcept { return params_.capacity(); }
   [[nodiscard]] std::size_t max_records() const noexcept { return records_.capacity(); }
-  [[nodiscard]] std::size_t max_light_records() const noexcept {
-    return light_records_.capacity();
-  }
+  [[nodiscard]] std::size_t max_light_records() const noexcept { return light_records_.capacity(); }
   /// Box around everything, relative to the camera, at the frame's instant.
   [[nodiscard]] const scene::Aabb& bounds() const noexcept { return bounds_; }
 

@@ -24,18 +24,17 @@ glm::vec4 vec4_from(const glm::dvec3& v, double w) noexcept {
 }
 
 glm::vec4 sun_vector(const physics::SunPosition& sun, const physics::Forcing& forcing) noexcept {
-  const double flux_w_m2 = sun.elevation.value() > 0.0
-                               ? forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac)
-                               : 0.0;
+  const double flux_w_m2 =
+      sun.elevation.value() > 0.0 ? forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) : 0.0;
   return vec4_from(sun.direction_enu, flux_w_m2);
 }
 
 glm::vec4 flux_vector(const physics::Forcing& forcing) noexcept {
-  return glm::vec4(
-      static_cast<float>(physics::diffuse_input_w_m2(forcing.diffuse_horizontal_w_m2)),
-      static_cast<float>(
-          physics::longwave_input_w_m2(forcing.longwave_down_w_m2, forcing.environment_k)),
-      static_cast<float>(physics::environment_input_w_m2(1.0, forcing.environment_k)), 0.0F);
+  return glm::vec4(static_cast<float>(physics::diffuse_input_w_m2(forcing.diffuse_horizontal_w_m2)),
+                   static_cast<float>(physics::longwave_input_w_m2(forcing.longwave_down_w_m2,
+                                                                   forcing.environment_k)),
+                   static_cast<float>(physics::environment_input_w_m2(1.0, forcing.environment_k)),
+                   0.0F);
 }
 
 }  // namespace
@@ -59,9 +58,9 @@ CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pos
                                     {0.0, 0.0, sensor.near_m, 0.0}};
   params.clip_from_relworld = glm::mat4(clip_from_sensor * glm::dmat4(sensor_from_world));
   params.relworld_from_sensor = glm::mat4(glm::dmat4(view.relworld_from_sensor));
-  params.tan_half_fov = glm::vec4(
-      static_cast<float>(view.tan_half_h), static_cast<float>(view.tan_half_v),
-      static_cast<float>(sensor.near_m), static_cast<float>(1.0 / camera.pixel_rad));
+  params.tan_half_fov =
+      glm::vec4(static_cast<float>(view.tan_half_h), static_cast<float>(view.tan_half_v),
+                static_cast<float>(sensor.near_m), static_cast<float>(1.0 / camera.pixel_rad));
   return camera;
 }
 
@@ -81,8 +80,7 @@ LightFrusta set_step(const HistoryInterval& interval, const CameraSetup& camera,
   LightFrusta frusta;
   if (!interval.sun_up) return frusta;
   const glm::dvec3 to_sun = interval.sun_sample.direction_enu;
-  const glm::dvec3 drift =
-      interval.sun_end.direction_enu - interval.sun_begin.direction_enu;
+  const glm::dvec3 drift = interval.sun_end.direction_enu - interval.sun_begin.direction_enu;
   const double top_m = std::max(camera.view.scene_max_m.z, camera.view.casters_max_m.z);
   const double height_m = top_m - camera.view.scene_min_m.z;
   const double margin_m =
@@ -145,8 +143,7 @@ void set_relaxation(const HistoryInterval& interval, std::span<const scene::Mate
     const auto& source = materials[m].modes;
     for (std::size_t i = 0; i < source.size() && i < EMIT_MAX_MODES; ++i) {
       const auto gains = physics::relaxation_gains(dt_s, source[i].tau_s);
-      modes[i] = glm::vec4(static_cast<float>(gains.start_frac),
-                           static_cast<float>(gains.end_frac),
+      modes[i] = glm::vec4(static_cast<float>(gains.start_frac), static_cast<float>(gains.end_frac),
                            static_cast<float>(source[i].weight_frac), 0.0F);
     }
     params[m] = {modes[0], modes[1]};

@@ -34,7 +34,8 @@ struct CameraSetup {
 
 /// Disc samples of the soft shadows: equal areas, golden angle, places along the drift stratified
 /// independently of the radius.
-[[nodiscard]] gpu::TapParams shadow_taps(std::uint32_t blocker_taps, std::uint32_t filter_taps) noexcept;
+[[nodiscard]] gpu::TapParams shadow_taps(std::uint32_t blocker_taps,
+                                         std::uint32_t filter_taps) noexcept;
 
 /// Exact gains of every material over an interval.
 void set_relaxation(const HistoryInterval& interval, std::span<const scene::Material> materials,

@@ -93,12 +93,10 @@ void visible_points(const ViewVolume& view, double near_m, double far_m, Points&
               (i & 2U) != 0 ? view.scene_max_m.y : view.scene_min_m.y,
               (i & 4U) != 0 ? view.scene_max_m.z : view.scene_min_m.z};
   }
-  const std::array<Plane, 6> box_planes = {Plane{{1, 0, 0}, -view.scene_min_m.x},
-                                           Plane{{-1, 0, 0}, view.scene_max_m.x},
-                                           Plane{{0, 1, 0}, -view.scene_min_m.y},
-                                           Plane{{0, -1, 0}, view.scene_max_m.y},
-                                           Plane{{0, 0, 1}, -view.scene_min_m.z},
-                                           Plane{{0, 0, -1}, view.scene_max_m.z}};
+  const std::array<Plane, 6> box_planes = {
+      Plane{{1, 0, 0}, -view.scene_min_m.x}, Plane{{-1, 0, 0}, view.scene_max_m.x},
+      Plane{{0, 1, 0}, -view.scene_min_m.y}, Plane{{0, -1, 0}, view.scene_max_m.y},
+      Plane{{0, 0, 1}, -view.scene_min_m.z}, Plane{{0, 0, -1}, view.scene_max_m.z}};
   const auto pyramid = pyramid_planes(view, near_m, far_m);
   out.count = 0;
   add_clipped_faces(box, pyramid, out);

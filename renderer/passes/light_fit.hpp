@@ -22,8 +22,8 @@ struct ViewVolume {
   glm::dvec3 casters_max_m{0.0};
 };
 
-/// One orthographic light frustum: rows of light_from_relworld (right, down, away from the sun) with
-/// the offsets that put the origin at the map's first corner on the near plane.
+/// One orthographic light frustum: rows of light_from_relworld (right, down, away from the sun)
+/// with the offsets that put the origin at the map's first corner on the near plane.
 struct LightFrustum {
   std::array<glm::dvec3, 3> axes;
   glm::dvec3 offset_m{0.0};

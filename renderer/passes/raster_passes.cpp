@@ -152,6 +152,8 @@ void ShadowPass::draw(const SceneVertexArrays& vertices, std::uint32_t cascade,
   issue(commands);
 }
 
-void ShadowPass::bind_texture() const noexcept { maps_.bind(EMIT_TEX_SHADOW); }
+void ShadowPass::bind_texture() const noexcept {
+  maps_.bind(EMIT_TEX_SHADOW);
+}
 
 }  // namespace emit::renderer

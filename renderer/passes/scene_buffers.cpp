@@ -40,8 +40,8 @@ SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
     range.base_vertex = static_cast<std::int32_t>(positions.size());
     const auto first = static_cast<std::uint32_t>(indices.size());
     for (const scene::Submesh& submesh : mesh.submeshes) {
-      range.submeshes.push_back({first + submesh.first_index, submesh.index_count,
-                                 submesh.material, submesh.double_sided});
+      range.submeshes.push_back({first + submesh.first_index, submesh.index_count, submesh.material,
+                                 submesh.double_sided});
     }
     range.whole = {first, static_cast<std::uint32_t>(mesh.indices.size()), 0, true};
     range.first_instance = next_instance;

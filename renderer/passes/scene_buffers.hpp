@@ -21,10 +21,10 @@ class SceneBuffers {
     bool double_sided = false;
   };
   struct MeshRange {
-    DrawRange whole;                  ///< all submeshes, for depth-only passes
+    DrawRange whole;  ///< all submeshes, for depth-only passes
     std::vector<DrawRange> submeshes;
     std::int32_t base_vertex = 0;
-    std::uint32_t first_instance = 0; ///< instances() are grouped by mesh
+    std::uint32_t first_instance = 0;  ///< instances() are grouped by mesh
     std::uint32_t instance_count = 0;
   };
 

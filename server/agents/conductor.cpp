@@ -53,7 +53,8 @@ void Conductor::start_run(std::int64_t now_ns) noexcept {
   run_id_ = std::max(run_id_ + 1, static_cast<std::uint64_t>(std::max<std::int64_t>(now_ns, 0)));
   frame_number_ = 0;
   render_number_ = 0;
-  gate_.reset();
+  control_.new_run();
+  weather_count_ = 0;
   seeker_.clear();
   entities_.clear();
   touched_.clear();
@@ -92,9 +93,8 @@ bool Conductor::reset_run(std::int64_t now_ns) noexcept {
   return true;
 }
 
-// A frame, and in front of it perhaps one weather job, must find room.
 bool Conductor::can_issue() noexcept {
-  return issued_count_ < kMaxIssued && context_.jobs.free() >= 2 && !reset_pending_;
+  return issued_count_ < kMaxIssued && context_.jobs.claim() != nullptr && !reset_pending_;
 }
 
 Conductor::Issued& Conductor::next_issued() noexcept {
@@ -104,16 +104,21 @@ Conductor::Issued& Conductor::next_issued() noexcept {
   return issued;
 }
 
-void Conductor::add_update(RenderJob& job, Entity& entity, const physics::Pose& pose) noexcept {
+void Conductor::add_update(RenderJob& job, Entity& entity, const physics::Pose& pose,
+                           std::int64_t base_ns) noexcept {
   renderer::EntityUpdate& update = job.entities[job.entity_count++];
   update.entity_id = entity.id;
   update.pose = pose;
   update.on = entity.on;
-  update.teleport = entity.teleport_pending;
-  entity.teleport_pending = false;
+  // While the instant shown is still before the jump, so is the pose.
+  update.teleport = entity.teleport_pending && base_ns >= entity.first_teleport_ns;
+  if (update.teleport) {
+    entity.teleport_pending = base_ns < entity.last_teleport_ns;
+    entity.first_teleport_ns = entity.last_teleport_ns;
+  }
 }
 
-void Conductor::issue_host_step(bool is_step) noexcept {
+void Conductor::issue_host_step(bool is_step, std::int64_t received_ns) noexcept {
   RenderJob& job = context_.jobs.claim_reserved();
   Issued& issued = next_issued();
   job.kind = RenderJob::Kind::frame;
@@ -126,16 +131,15 @@ void Conductor::issue_host_step(bool is_step) noexcept {
     if (found == nullptr) {
       continue;  // entities leave only with the whole list, in start_run()
     }
-    Entity& body = *found;
-    body.touched = false;
-    add_update(job, body,
-               body.track.empty() ? scenario_.entity_at(body.id, host_sim_time_ns_).pose
-                                  : body.track.newest().pose);
+    found->touched = false;
+    const TimedPose& newest = found->track.newest();
+    add_update(job, *found, newest.pose, newest.sim_time_ns);
   }
   touched_.erase(touched_.begin(), touched_.begin() + static_cast<std::ptrdiff_t>(applied));
   issued.header.pose_sim_time_ns = host_sim_time_ns_;
+  issued.header.host_received_ns = received_ns;
   if (options_.pacing.budget_ns > 0) {
-    issued.header.deadline_ns = host_received_ns_ + options_.pacing.budget_ns;
+    issued.header.deadline_ns = received_ns + options_.pacing.budget_ns;
   }
   issue(job, issued, is_step);
 }
@@ -146,6 +150,7 @@ void Conductor::issue_ig_clock() noexcept {
   job.kind = RenderJob::Kind::frame;
   job.entity_count = 0;
   issued.header.deadline_ns = clock_.end_ns();
+  issued.header.host_received_ns = host_received_ns_;
   if (!have_host_frame_) {
     // Until the host speaks: the scenario's own start, and the frame says that nobody steers it.
     job.request.sim_time_ns = 0;
@@ -153,6 +158,8 @@ void Conductor::issue_ig_clock() noexcept {
     issued.header.flags |= protocol::kFlagStale;
   } else {
     const std::int64_t display_ns = clock_.begin_ns() + options_.pacing.display_delay_ns;
+    // No overflow: host times stay within protocol::kMaxSimTimeNs, 1e18, and the instant between
+    // two wall clocks that both count from 1970 below 8e18 until the year 2220.
     std::int64_t wanted_ns = host_sim_time_ns_ + (display_ns - host_received_ns_);
     if (issued_any_) {
       // Jitter of the network must not turn into motion backwards.
@@ -167,10 +174,8 @@ void Conductor::issue_ig_clock() noexcept {
     const std::size_t count = std::min(entities_.size(), job.entities.size());
     for (std::size_t i = 0; i < count; ++i) {
       Entity& body = entities_[(next_entity_ + i) % entities_.size()];
-      add_update(job, body,
-                 body.track.empty()
-                     ? scenario_.entity_at(body.id, sample.shown_ns).pose
-                     : body.track.sample(sample.shown_ns, options_.pacing.horizon_ns).pose);
+      const PoseSample placed = body.track.sample(sample.shown_ns, options_.pacing.horizon_ns);
+      add_update(job, body, placed.pose, placed.base_ns);
     }
     next_entity_ = count < entities_.size() ? (next_entity_ + count) % entities_.size() : 0;
   }
@@ -187,7 +192,6 @@ void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
   FrameHeader& header = issued.header;
   header.run_id = run_id_;
   header.host_frame_number = host_frame_number_;
-  header.host_received_ns = host_received_ns_;
   header.sim_time_ns = job.request.sim_time_ns;
   header.pose = job.request.sensor_pose;
   header.flags |= (control_.held() ? protocol::kFlagHold : 0U) |
@@ -196,6 +200,9 @@ void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
   issued.thermal_time_ns = job.request.thermal_time_ns;
   issued.entity_count = job.entity_count;
   std::copy_n(job.entities.begin(), job.entity_count, issued.entities.begin());
+  std::copy_n(weather_.begin(), weather_count_, job.weather.begin());
+  job.weather_count = static_cast<std::uint32_t>(weather_count_);
+  weather_count_ = 0;
   ++issued_count_;
   context_.jobs.commit();
   context_.bells.render.ring();

@@ -52,8 +52,10 @@ class Conductor final : public Agent {
     std::uint32_t id = 0;
     PoseTrack track;
     bool on = true;
-    bool teleport_pending = false;  // the next update applied is a jump
     bool touched = false;           // listed in touched_
+    bool teleport_pending = false;  // jumps, these two and any between, that no update has shown
+    std::int64_t first_teleport_ns = 0;
+    std::int64_t last_teleport_ns = 0;
   };
   static constexpr std::size_t kMaxIssued = 8;
   static constexpr std::size_t kMaxTracked = 1024;
@@ -66,7 +68,10 @@ class Conductor final : public Agent {
   int take_inputs(std::int64_t now_ns) noexcept;
   bool take_frame(HostInput& input, std::int64_t now_ns) noexcept;
   bool take_command(const HostInput& input, std::int64_t now_ns) noexcept;
-  void remember(protocol::HostFrameData& frame) noexcept;
+  void remember(const protocol::HostFrameData& frame) noexcept;
+  void remember_entity(const protocol::EntityStateData& state, std::int64_t sim_time_ns) noexcept;
+  void remember_weather(const protocol::EnvironmentData& environment,
+                        std::int64_t sim_time_ns) noexcept;
   void drop_unknown_entities(HostInput& input) noexcept;
   void refuse(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
               std::uint64_t detail = 0) noexcept;
@@ -80,11 +85,14 @@ class Conductor final : public Agent {
   void start_run(std::int64_t now_ns) noexcept;
   /// Back to the start snapshot. False: frames are still in work, ask again.
   [[nodiscard]] bool reset_run(std::int64_t now_ns) noexcept;
-  void issue_host_step(bool is_step) noexcept;
+  /// `received_ns`: when what asked for the frame came; its deadline counts from there.
+  void issue_host_step(bool is_step, std::int64_t received_ns) noexcept;
   void issue_ig_clock() noexcept;
   void issue(RenderJob& job, Issued& issued, bool is_step) noexcept;
   [[nodiscard]] Issued& next_issued() noexcept;
-  void add_update(RenderJob& job, Entity& entity, const physics::Pose& pose) noexcept;
+  /// `base_ns`: time stamp of the received pose that `pose` starts from (PoseSample).
+  void add_update(RenderJob& job, Entity& entity, const physics::Pose& pose,
+                  std::int64_t base_ns) noexcept;
   void begin_slot() noexcept;
   [[nodiscard]] bool can_issue() noexcept;
   int take_images_and_slots(std::int64_t now_ns) noexcept;
@@ -117,6 +125,8 @@ class Conductor final : public Agent {
   bool reset_pending_ = false;          // waits for the frames in work
   std::vector<std::uint32_t> touched_;  // host-step: entities to apply with the next frames
   std::size_t next_entity_ = 0;         // ig-clock: where the next frame goes on, if not all fit
+  std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather_;  // goes with the next frame
+  std::size_t weather_count_ = 0;
 
   std::uint64_t run_id_ = 0;
   std::uint64_t frame_number_ = 0;   // of the newest frame published

@@ -42,7 +42,14 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
     refuse(input.origin, StatusCode::duplicate_frame, frame.frame_number);
     return true;
   }
-  if (!can_issue() && !reset_pending_) {
+  if (gate.verdict == GateVerdict::old_run) {
+    context_.counters.add(Counter::host_frames_old_run);
+    refuse(input.origin, StatusCode::not_allowed, frame.frame_number);
+    return true;
+  }
+  // In lock step each input becomes a frame. On a clock of its own emitd takes inputs at any time,
+  // so that the newest pose known is the newest that came.
+  if (!ig_clock() && !can_issue() && !reset_pending_) {
     return false;
   }
   if (gate.verdict == GateVerdict::new_epoch) {
@@ -62,7 +69,7 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   journal_host_frame(frame, now_ns);
   if (!ig_clock()) {
     if (control_.running()) {
-      issue_host_step(false);
+      issue_host_step(false, frame.received_ns);
     } else {
       context_.counters.add(Counter::host_frames_unused);
     }
@@ -70,44 +77,66 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   return true;
 }
 
-void Conductor::remember(HostFrameData& frame) noexcept {
+void Conductor::remember(const HostFrameData& frame) noexcept {
   have_host_frame_ = true;
   host_frame_number_ = frame.frame_number;
   host_sim_time_ns_ = frame.sim_time_ns;
   host_received_ns_ = frame.received_ns;
   seeker_.push({frame.sim_time_ns, frame.seeker, frame.seeker_rates, false});
   for (const EntityStateData& state : frame.entity_span()) {
-    Entity* found = entity(state.entity_id);
-    if (found == nullptr) {
-      continue;  // drop_unknown_entities() made room for each that is left
-    }
-    Entity& body = *found;
-    body.on = state.on;
-    if (state.has_pose) {
-      body.track.push({frame.sim_time_ns, state.pose, state.rates, state.teleport});
-      body.teleport_pending = body.teleport_pending || state.teleport;
-    }
-    if (!body.touched && !ig_clock()) {
-      body.touched = true;
-      touched_.push_back(body.id);
-    }
+    remember_entity(state, frame.sim_time_ns);
   }
   if (frame.environment) {
-    const auto& environment = *frame.environment;
-    RenderJob& job = context_.jobs.claim_reserved();
-    job.kind = RenderJob::Kind::weather;
-    job.weather = {frame.sim_time_ns,
-                   environment.direct_normal_w_m2,
-                   environment.diffuse_horizontal_w_m2,
-                   environment.longwave_down_w_m2,
-                   environment.air_k,
-                   environment.wind_m_s,
-                   environment.cloud_frac,
-                   environment.environment_k,
-                   environment.film_w_m2_k};
-    context_.jobs.commit();
-    context_.bells.render.ring();
+    remember_weather(*frame.environment, frame.sim_time_ns);
   }
+}
+
+void Conductor::remember_entity(const EntityStateData& state, std::int64_t sim_time_ns) noexcept {
+  Entity* found = entity(state.entity_id);
+  if (found == nullptr) {
+    return;  // drop_unknown_entities() made room for each that is left
+  }
+  Entity& body = *found;
+  body.on = state.on;
+  if (state.has_pose) {
+    body.track.push({sim_time_ns, state.pose, state.rates, state.teleport});
+    if (state.teleport) {
+      if (!body.teleport_pending) {
+        body.first_teleport_ns = sim_time_ns;
+      }
+      body.last_teleport_ns = sim_time_ns;
+      body.teleport_pending = true;
+    }
+  } else {
+    // It stays where it is: where a host put it last, else where the scenario has it at this
+    // instant. For the track that ends any motion; it is no jump of the entity.
+    const physics::Pose pose = body.track.empty() ? scenario_.entity_at(body.id, sim_time_ns).pose
+                                                  : body.track.newest().pose;
+    constexpr bool kNoMotionBefore = true;
+    body.track.push({sim_time_ns, pose, std::nullopt, kNoMotionBefore});
+  }
+  if (!body.touched && !ig_clock()) {
+    body.touched = true;
+    touched_.push_back(body.id);
+  }
+}
+
+void Conductor::remember_weather(const protocol::EnvironmentData& environment,
+                                 std::int64_t sim_time_ns) noexcept {
+  if (weather_count_ == weather_.size()) {
+    // Replay leaves out the same ones (JournalPlayer).
+    --weather_count_;
+    context_.counters.add(Counter::weather_coalesced);
+  }
+  weather_[weather_count_++] = {sim_time_ns,
+                                environment.direct_normal_w_m2,
+                                environment.diffuse_horizontal_w_m2,
+                                environment.longwave_down_w_m2,
+                                environment.air_k,
+                                environment.wind_m_s,
+                                environment.cloud_frac,
+                                environment.environment_k,
+                                environment.film_w_m2_k};
 }
 
 void Conductor::drop_unknown_entities(HostInput& input) noexcept {
@@ -168,9 +197,11 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
   }
   context_.bells.recorder.ring();
   if (command == CommandKind::reset) {
+    gate_.reset();
     static_cast<void>(reset_run(now_ns));  // room and idleness were checked above
   } else if (immediate_step) {
-    issue_host_step(true);
+    // The pose may be old; the frame was asked for now.
+    issue_host_step(true, now_ns);
   }
   context_.counters.add(Counter::commands);
   context_.conductor_events.push(EventKind::command, static_cast<std::uint64_t>(command));

@@ -68,12 +68,17 @@ struct StatusReply {
   std::uint64_t detail = 0;  ///< unknown_entity: its id; ok: the command's kind
 };
 
-/// conductor -> render agent, in the order in which the source must see it.
+/// Weather changes that come with one frame; further ones replace the newest.
+inline constexpr std::size_t kMaxWeatherPerFrame = 32;
+
+/// conductor -> render agent, in the order in which the source must see it. Of a frame, weather is
+/// applied first, then entities.
 struct RenderJob {
-  enum class Kind : std::uint8_t { frame, weather, reset };
+  enum class Kind : std::uint8_t { frame, reset };
   Kind kind = Kind::frame;
   renderer::FrameRequest request;
-  scene::WeatherSample weather;
+  std::uint32_t weather_count = 0;
+  std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather;
   std::uint32_t entity_count = 0;
   std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
 };
@@ -121,6 +126,7 @@ enum class EventKind : std::uint8_t {
   journal_failed,   ///< text = why
   journal_overrun,  ///< a = first sequence lost
   slots_missed,     ///< a = how many
+  weather_lost,     ///< a = sim time of the sample, ns
 };
 
 /// any agent -> housekeeping: what happened, as numbers; the text is put together there.

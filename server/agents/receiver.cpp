@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/receiver.hpp"
 
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <sys/epoll.h>
+#include <sys/socket.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <exception>
 #include <new>
 
@@ -39,12 +37,12 @@ physics::Result<void> Receiver::open() {
     return tl::unexpected<physics::Error>(
         physics::Error(where.error()).with_context("control.tcp"));
   }
-  const auto address = resolve(*where, SOCK_STREAM, true);
+  const auto address = resolve(*where, Transport::tcp, true);
   if (!address) {
     return tl::unexpected<physics::Error>(
         physics::Error(address.error()).with_context("control.tcp"));
   }
-  auto listener = open_tcp_listener(*address);
+  auto listener = TcpListener::open(sockets_, *address);
   if (!listener) {
     return tl::unexpected<physics::Error>(std::move(listener.error()).with_context("control.tcp"));
   }
@@ -56,20 +54,20 @@ physics::Result<void> Receiver::open() {
       return tl::unexpected<physics::Error>(
           physics::Error(udp_where.error()).with_context("host.udp"));
     }
-    const auto udp_address = resolve(*udp_where, SOCK_DGRAM, true);
+    const auto udp_address = resolve(*udp_where, Transport::udp, true);
     if (!udp_address) {
       return tl::unexpected<physics::Error>(
           physics::Error(udp_address.error()).with_context("host.udp"));
     }
-    auto udp = open_udp_bound(*udp_address);
+    auto udp = UdpSocket::open_bound(sockets_, *udp_address);
     if (!udp) {
       return tl::unexpected<physics::Error>(std::move(udp.error()).with_context("host.udp"));
     }
     udp_ = std::move(*udp);
-    set_option(udp_.get(), SOL_SOCKET, SO_TIMESTAMPNS, 1);
-    set_option(udp_.get(), SOL_SOCKET, SO_RXQ_OVFL, 1);
+    udp_.set_option(SOL_SOCKET, SO_TIMESTAMPNS, 1);
+    udp_.set_option(SOL_SOCKET, SO_RXQ_OVFL, 1);
     constexpr std::uint64_t kHostBufferBytes = 4u << 20;
-    set_receive_buffer(udp_.get(), kHostBufferBytes);
+    udp_.set_receive_buffer(kHostBufferBytes);
   }
 
   const std::uint32_t places = std::clamp(config_.control.max_clients, 1U, kMaxConnections);
@@ -82,23 +80,23 @@ physics::Result<void> Receiver::open() {
 }
 
 SocketAddress Receiver::control_address() const noexcept {
-  return local_address(listener_.get());
+  return listener_.local_address();
 }
 
 SocketAddress Receiver::host_address() const noexcept {
-  return udp_ ? local_address(udp_.get()) : SocketAddress{};
+  return udp_.local_address();
 }
 
 bool Receiver::on_start() noexcept {
   epoll_event event{};
   event.events = EPOLLIN;
   event.data.u64 = kListenerKey;
-  if (!epoll_ || ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, listener_.get(), &event) != 0) {
+  if (!epoll_ || ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, listener_.fd(), &event) != 0) {
     return false;
   }
   if (udp_) {
     event.data.u64 = kUdpKey;
-    udp_watched_ = ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, udp_.get(), &event) == 0;
+    udp_watched_ = ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, udp_.fd(), &event) == 0;
     return udp_watched_;
   }
   return true;
@@ -174,22 +172,20 @@ int Receiver::accept_connections(std::int64_t now_ns) {
   constexpr int kMaxPerTurn = 8;
   for (; work < kMaxPerTurn; ++work) {
     SocketAddress peer;
-    peer.length = sizeof(peer.storage);
-    Fd fd(::accept4(listener_.get(), peer.get(), &peer.length, SOCK_NONBLOCK | SOCK_CLOEXEC));
-    if (!fd) {
+    TcpSocket socket = listener_.accept(peer);
+    if (!socket) {
       break;
     }
-    set_option(fd.get(), IPPROTO_TCP, TCP_NODELAY, 1);
     const auto place = std::find_if(connections_.begin(), connections_.end(),
                                     [](const auto& connection) { return !connection->open(); });
     if (place == connections_.end() || draining_.load(std::memory_order_acquire)) {
       // One connection more than allowed gets an answer of its own, without a place in the table.
       Connection guest;
-      guest.fd = std::move(fd);
+      guest.socket = std::move(socket);
       refuse(guest, StatusCode::overloaded,
              place == connections_.end() ? "as many connections as control.max_clients allows"
                                          : "the daemon is stopping");
-      ::shutdown(guest.fd.get(), SHUT_WR);
+      guest.socket.shutdown_send();
       continue;
     }
     Connection& connection = **place;
@@ -197,7 +193,7 @@ int Receiver::accept_connections(std::int64_t now_ns) {
     protocol::RecordLimits limits;
     limits.max_control_bytes = config_.control.max_record_bytes;
     connection.parser.emplace(limits);
-    connection.fd = std::move(fd);
+    connection.socket = std::move(socket);
     connection.peer = peer;
     connection.generation = (connection.generation + 1) & (~0U >> kConnectionPlaceBits);
     connection.role = Role::none;
@@ -215,8 +211,8 @@ int Receiver::accept_connections(std::int64_t now_ns) {
     epoll_event event{};
     event.events = EPOLLIN;
     event.data.u64 = connection.key();
-    if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, connection.fd.get(), &event) != 0) {
-      connection.fd.reset();
+    if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, connection.socket.fd(), &event) != 0) {
+      connection.socket.close();
       continue;
     }
     context_.counters.add(Counter::connections_accepted);
@@ -229,9 +225,9 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
   if (connection.stuck || connection.closing || connection.flush_close) {
     // Only the end of the stream is of interest; anything else is thrown away or waits.
     std::array<std::byte, 4096> trash;
-    const ssize_t got = ::recv(connection.fd.get(), trash.data(), trash.size(),
-                               MSG_DONTWAIT | (connection.stuck ? MSG_PEEK : 0));
-    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) {
+    const IoResult got =
+        connection.stuck ? connection.socket.peek(trash) : connection.socket.read_some(trash);
+    if (got.status == IoStatus::closed || got.status == IoStatus::failed) {
       close(connection, "closed by the peer");
     }
     return 1;
@@ -241,20 +237,22 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
     close(connection, "no room for a record");
     return 1;
   }
-  const ssize_t got = ::recv(connection.fd.get(), space.data(), space.size(), MSG_DONTWAIT);
-  if (got < 0) {
-    if (errno != EAGAIN && errno != EINTR) {
-      close(connection, error_text(errno));
-    }
-    return 1;
+  const IoResult got = connection.socket.read_some(space);
+  switch (got.status) {
+    case IoStatus::done:
+      connection.parser->commit(got.bytes);
+      return 1 + parse(connection, now_ns);
+    case IoStatus::closed:
+      close(connection, connection.parser->pending_bytes() != 0 ? "closed in the middle of a record"
+                                                                : "closed by the peer");
+      break;
+    case IoStatus::failed:
+      close(connection, error_text(got.error));
+      break;
+    case IoStatus::would_block:
+      break;
   }
-  if (got == 0) {
-    close(connection, connection.parser->pending_bytes() != 0 ? "closed in the middle of a record"
-                                                              : "closed by the peer");
-    return 1;
-  }
-  connection.parser->commit(static_cast<std::size_t>(got));
-  return 1 + parse(connection, now_ns);
+  return 1;
 }
 
 int Receiver::parse(Connection& connection, std::int64_t now_ns) {
@@ -292,17 +290,16 @@ void Receiver::flush(Connection& connection) noexcept {
     return;
   }
   while (connection.out_sent < connection.out.size()) {
-    const ssize_t sent =
-        ::send(connection.fd.get(), connection.out.data() + connection.out_sent,
-               connection.out.size() - connection.out_sent, MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (sent < 0) {
-      if (errno != EAGAIN && errno != EINTR) {
+    const IoResult sent = connection.socket.write_some(
+        std::span<const std::byte>(connection.out).subspan(connection.out_sent));
+    if (sent.status != IoStatus::done) {
+      if (sent.status != IoStatus::would_block) {
         close(connection, "write failed");
       }
       connection.dirty = true;
       return;
     }
-    connection.out_sent += static_cast<std::size_t>(sent);
+    connection.out_sent += sent.bytes;
   }
   if (!connection.out.empty()) {
     connection.out.clear();
@@ -310,7 +307,7 @@ void Receiver::flush(Connection& connection) noexcept {
     connection.dirty = true;
   }
   if (connection.flush_close) {
-    ::shutdown(connection.fd.get(), SHUT_WR);
+    connection.socket.shutdown_send();
     close(connection, "refused");
   }
 }
@@ -325,10 +322,10 @@ void Receiver::watch(Connection& connection) noexcept {
   event.data.u64 = connection.key();
   if (connection.closing) {
     // Waits for sender or recorder; a hang-up must not wake this agent over and over.
-    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.fd.get(), nullptr);
+    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.socket.fd(), nullptr);
     return;
   }
-  ::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, connection.fd.get(), &event);
+  ::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, connection.socket.fd(), &event);
 }
 
 void Receiver::close(Connection& connection, std::string_view why) noexcept {
@@ -355,8 +352,8 @@ void Receiver::close(Connection& connection, std::string_view why) noexcept {
 }
 
 void Receiver::finish_close(Connection& connection) noexcept {
-  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.fd.get(), nullptr);
-  connection.fd.reset();
+  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.socket.fd(), nullptr);
+  connection.socket.close();
   connection.client.reset();
   connection.parser.reset();
   connection.lent = false;

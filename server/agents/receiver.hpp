@@ -80,9 +80,9 @@ class Receiver final : public Agent {
   void take_control(Connection& connection, std::span<const std::byte> body);
   void take_hello(Connection& connection, const v1::ControlRecord& record);
   void take_subscribe(Connection& connection, const v1::ControlRecord& record);
-  [[nodiscard]] physics::Result<Fd> open_stream_socket(const Connection& connection,
-                                                       std::uint32_t port,
-                                                       const std::string& group) const;
+  [[nodiscard]] physics::Result<UdpSocket> open_stream_socket(const Connection& connection,
+                                                              std::uint32_t port,
+                                                              const std::string& group) const;
   void refuse(Connection& connection, StatusCode code, const std::string& text,
               std::uint64_t host_frame_number = 0);
   void send_status(Connection& connection, StatusCode code, const std::string& text,
@@ -100,8 +100,9 @@ class Receiver final : public Agent {
   const config::DaemonConfig& config_;
   Identity identity_;
   Fd epoll_;
-  Fd listener_;
-  Fd udp_;
+  SocketContext sockets_;
+  TcpListener listener_;
+  UdpSocket udp_;
   std::unique_ptr<UdpMemory> udp_memory_;
   bool udp_watched_ = false;
   std::uint32_t os_drops_seen_ = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <sys/socket.h>
 #include <sys/uio.h>
 
 #include "agents/receiver.hpp"
@@ -9,7 +10,7 @@ namespace emit::server {
 struct Receiver::Connection {
   std::uint32_t index = 0;
   std::uint32_t generation = 0;
-  Fd fd;
+  TcpSocket socket;
   SocketAddress peer;
   Role role = Role::none;
   bool welcomed = false;
@@ -26,7 +27,7 @@ struct Receiver::Connection {
   std::size_t out_sent = 0;
   std::unique_ptr<SenderClient> client;
 
-  [[nodiscard]] bool open() const noexcept { return static_cast<bool>(fd); }
+  [[nodiscard]] bool open() const noexcept { return static_cast<bool>(socket); }
   /// Key of the connection on rings: the place in the table and how often it was used.
   [[nodiscard]] std::uint32_t key() const noexcept {
     return generation << kConnectionPlaceBits | index;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <netinet/in.h>
 
 #include <algorithm>
-#include <cerrno>
 
 #include "agents/receiver_connection.hpp"
 #include "emit/protocol/convert.hpp"
@@ -216,8 +214,8 @@ void Receiver::take_hello(Connection& connection, const v1::ControlRecord& recor
     }
     connection.lent = true;
     connection.write_lent = true;
-    static_cast<void>(context_.to_recorder.push(
-        {ClientCommand::Kind::add, connection.key(), connection.fd.get(), connection.generation}));
+    static_cast<void>(context_.to_recorder.push({ClientCommand::Kind::add, connection.key(),
+                                                 connection.socket.fd(), connection.generation}));
     context_.bells.recorder.ring();
   }
 }
@@ -257,13 +255,13 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
       refuse(connection, StatusCode::not_allowed, socket.error().text);
       return;
     }
-    params.udp_fd = std::move(*socket);
+    params.udp_socket = std::move(*socket);
     params.fragment_payload_bytes = std::clamp(
         subscribe.fragment_payload_bytes() != 0 ? subscribe.fragment_payload_bytes()
                                                 : config_.stream.udp_fragment_payload_bytes,
         protocol::kMinFragmentPayloadBytes, protocol::kMaxFragmentPayloadBytes);
   } else {
-    params.tcp_fd = connection.fd.get();
+    params.tcp_socket = &connection.socket;
   }
   v1::ControlRecord answer;
   fill(*channel, *answer.mutable_subscribed()->mutable_channel());
@@ -295,8 +293,9 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
                                 udp ? "udp" : "tcp");
 }
 
-physics::Result<Fd> Receiver::open_stream_socket(const Connection& connection, std::uint32_t port,
-                                                 const std::string& group) const {
+physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connection,
+                                                        std::uint32_t port,
+                                                        const std::string& group) const {
   using physics::ErrorCode;
   if (port > 65535) {
     return physics::make_error(ErrorCode::protocol,
@@ -304,40 +303,26 @@ physics::Result<Fd> Receiver::open_stream_socket(const Connection& connection, s
   }
   SocketAddress target = connection.peer;
   if (!group.empty()) {
+    // Names are not looked up on a client's behalf.
     target = numeric_address(group, static_cast<std::uint16_t>(port));
-    bool multicast = false;
-    if (target.length == 0) {
-      // Not a number; names are not looked up on a client's behalf.
-    } else if (target.storage.ss_family == AF_INET) {
-      const auto* v4 = reinterpret_cast<const sockaddr_in*>(&target.storage);
-      multicast = IN_MULTICAST(ntohl(v4->sin_addr.s_addr));
-    } else {
-      const auto* v6 = reinterpret_cast<const sockaddr_in6*>(&target.storage);
-      multicast = v6->sin6_addr.s6_addr[0] == 0xFF;
-    }
-    if (!multicast) {
+    if (!target.is_multicast()) {
       // Otherwise anybody could have frames sent to anybody.
       return physics::make_error(ErrorCode::protocol, "'" + group + "' is not a multicast group");
     }
   }
   target.set_port(static_cast<std::uint16_t>(port));
-  Fd fd(::socket(target.storage.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (!fd) {
-    return physics::make_error(ErrorCode::io, "udp socket: " + error_text(errno));
+  auto socket = UdpSocket::open(sockets_, target);
+  if (!socket) {
+    return socket;
   }
-  set_send_buffer(fd.get(), config_.stream.udp_send_buffer_bytes);
+  socket->set_send_buffer(config_.stream.udp_send_buffer_bytes);
   if (!group.empty()) {
-    if (target.storage.ss_family == AF_INET) {
-      set_option(fd.get(), IPPROTO_IP, IP_MULTICAST_TTL, config_.stream.multicast_ttl);
-    } else {
-      set_option(fd.get(), IPPROTO_IPV6, IPV6_MULTICAST_HOPS, config_.stream.multicast_ttl);
-    }
+    socket->set_multicast_hops(static_cast<int>(config_.stream.multicast_ttl));
   }
-  if (::connect(fd.get(), target.get(), target.length) != 0) {
-    return physics::make_error(ErrorCode::io,
-                               fmt::format("udp {}: {}", to_string(target), error_text(errno)));
+  if (auto connected = socket->connect(target); !connected) {
+    return tl::unexpected<physics::Error>(std::move(connected.error()));
   }
-  return fd;
+  return socket;
 }
 
 void Receiver::refuse(Connection& connection, StatusCode code, const std::string& text,

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <netinet/in.h>
 #include <sys/epoll.h>
+#include <sys/socket.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <ctime>
 
@@ -27,7 +26,7 @@ int Receiver::receive_datagrams(std::int64_t now_ns) noexcept {
     epoll_event event{};
     event.events = reading ? std::uint32_t{EPOLLIN} : 0U;
     event.data.u64 = ~std::uint64_t{0} - 1;
-    ::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, udp_.get(), &event);
+    ::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, udp_.fd(), &event);
     udp_watched_ = reading;
   }
   if (!reading) {
@@ -45,7 +44,8 @@ int Receiver::receive_datagrams(std::int64_t now_ns) noexcept {
     message.msg_control = memory.control[i].bytes.data();
     message.msg_controllen = UdpMemory::kControlBytes;
   }
-  const int count = ::recvmmsg(udp_.get(), memory.messages.data(), static_cast<unsigned>(batch),
+  // Natively: Asio knows neither many messages per call nor control messages (time stamps, drops).
+  const int count = ::recvmmsg(udp_.fd(), memory.messages.data(), static_cast<unsigned>(batch),
                                MSG_DONTWAIT, nullptr);
   for (int i = 0; i < count; ++i) {
     const auto index = static_cast<std::size_t>(i);
@@ -129,10 +129,10 @@ void Receiver::send_udp_status(const Origin& origin, StatusCode code,
   if (length > bytes.size() || !status.SerializeToArray(bytes.data(), static_cast<int>(length))) {
     return;
   }
-  sockaddr_storage address{};
-  std::memcpy(&address, origin.address.data(), origin.address_bytes);
-  if (::sendto(udp_.get(), bytes.data(), length, MSG_DONTWAIT | MSG_NOSIGNAL,
-               reinterpret_cast<const sockaddr*>(&address), origin.address_bytes) < 0) {
+  SocketAddress target;
+  target.length = origin.address_bytes;
+  std::memcpy(&target.storage, origin.address.data(), origin.address_bytes);
+  if (udp_.send_to(std::span(bytes).first(length), target).status != IoStatus::done) {
     context_.counters.add(Counter::statuses_suppressed);
   }
 }

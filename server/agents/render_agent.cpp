@@ -52,19 +52,16 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
     return false;
   }
   switch (job->kind) {
-    case RenderJob::Kind::weather:
-      if (!source_->apply_weather(job->weather)) {
-        context_.counters.add(Counter::refused_overloaded);
-      }
-      break;
     case RenderJob::Kind::reset:
       source_->reset();
+      weather_lost_ = false;
       break;
     case RenderJob::Kind::frame: {
       if (count_ == kDepth) {
         return false;
       }
       if (!job_prepared_) {
+        apply_weather(*job);
         source_->apply_entities(job->request.sim_time_ns,
                                 std::span(job->entities.data(), job->entity_count));
         job_prepared_ = true;
@@ -88,6 +85,21 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
   }
   context_.jobs.pop();
   return true;
+}
+
+void RenderAgent::apply_weather(const RenderJob& job) noexcept {
+  for (std::uint32_t i = 0; i < job.weather_count; ++i) {
+    if (source_->apply_weather(job.weather[i])) {
+      continue;
+    }
+    context_.counters.add(Counter::weather_lost);
+    if (!weather_lost_) {
+      // Once per run: from here on its weather stands still.
+      weather_lost_ = true;
+      context_.render_events.push(EventKind::weather_lost,
+                                  static_cast<std::uint64_t>(job.weather[i].sim_time_ns));
+    }
+  }
 }
 
 bool RenderAgent::finish_oldest() noexcept {

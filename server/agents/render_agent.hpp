@@ -38,6 +38,7 @@ class RenderAgent final : public Agent {
 
   bool take_job(std::int64_t now_ns) noexcept;
   bool finish_oldest() noexcept;
+  void apply_weather(const RenderJob& job) noexcept;
 
   Context& context_;
   FrameSourceFactory factory_;
@@ -49,6 +50,7 @@ class RenderAgent final : public Agent {
   std::size_t count_ = 0;
   std::int64_t wake_at_ns_ = kNeverNs;
   bool starved_ = false;
+  bool weather_lost_ = false;  // said so for this run
   bool job_prepared_ = false;  // entities of the job in front are applied; only submit is missing
 };
 

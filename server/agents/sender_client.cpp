@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/sender_client.hpp"
 
-#include <sys/socket.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 
 namespace emit::server {
@@ -19,7 +16,7 @@ constexpr int kUdpTurnCalls = 6;
 SenderClient::SenderClient(Params params) : params_(std::move(params)) {
   const auto& channel = *params_.channel;
   spill_.resize(std::size_t{channel.width_px} * channel.height_px * sizeof(float));
-  segmentation_ = params_.udp && udp_segmentation_supported(params_.udp_fd.get());
+  segmentation_ = params_.udp && udp_segmentation_supported(params_.udp_socket.fd());
 }
 
 void SenderClient::begin(const protocol::FrameHeader& header, std::span<const float> pixels,
@@ -71,13 +68,13 @@ SenderClient::Progress SenderClient::send(UdpBatch& batch, Context& context) noe
 }
 
 SenderClient::Progress SenderClient::send_tcp(Context& context) noexcept {
-  std::array<iovec, 3> iov{};
+  std::array<std::span<const std::byte>, 3> pieces;
   std::size_t count = 0;
   std::size_t budget = kTcpTurnBytes;
   const auto add = [&](std::span<const std::byte> bytes, std::size_t from) {
     if (from < bytes.size() && budget > 0) {
       const std::size_t length = std::min(bytes.size() - from, budget);
-      iov[count++] = {const_cast<std::byte*>(bytes.data()) + from, length};
+      pieces[count++] = bytes.subspan(from, length);
       budget -= length;
     }
   };
@@ -90,15 +87,15 @@ SenderClient::Progress SenderClient::send_tcp(Context& context) noexcept {
   if (count == 0) {
     return Progress::idle;
   }
-  msghdr message{};
-  message.msg_iov = iov.data();
-  message.msg_iovlen = count;
-  const ssize_t sent = ::sendmsg(params_.tcp_fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
-  if (sent < 0) {
-    error_ = errno;
-    return error_ == EAGAIN || error_ == EINTR ? Progress::blocked : Progress::failed;
+  const IoResult sent = params_.tcp_socket->write_some(std::span(pieces).first(count));
+  if (sent.status == IoStatus::would_block) {
+    return Progress::blocked;
   }
-  auto rest = static_cast<std::size_t>(sent);
+  if (sent.status != IoStatus::done) {
+    error_ = sent.error;
+    return Progress::failed;
+  }
+  std::size_t rest = sent.bytes;
   context.counters.add(Counter::bytes_sent, rest);
   const std::size_t first = std::min(rest, params_.first_bytes.size() - first_sent_);
   first_sent_ += first;
@@ -115,7 +112,7 @@ SenderClient::Progress SenderClient::send_udp(UdpBatch& batch, Context& context)
     return Progress::idle;
   }
   for (int call = 0; call < kUdpTurnCalls; ++call) {
-    const auto result = batch.send(params_.udp_fd.get(), *fragments_, fragment_, segmentation_);
+    const auto result = batch.send(params_.udp_socket.fd(), *fragments_, fragment_, segmentation_);
     switch (result.status) {
       case UdpBatch::Status::sent:
         fragment_ += result.fragments;

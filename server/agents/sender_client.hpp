@@ -11,8 +11,8 @@
 #include "emit/protocol/fragment.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/framing.hpp"
+#include "io/socket.hpp"
 #include "io/udp_batch.hpp"
-#include "rt/fd.hpp"
 
 namespace emit::server {
 
@@ -27,8 +27,8 @@ class SenderClient {
     const Channel* channel = nullptr;
     bool every_frame = false;
     bool udp = false;
-    int tcp_fd = -1;  ///< of the control connection; stays the receiver's
-    Fd udp_fd;        ///< connected to the client's port or group
+    TcpSocket* tcp_socket = nullptr;  ///< of the control connection; stays the receiver's
+    UdpSocket udp_socket;             ///< connected to the client's port or group
     std::uint16_t stream_id = 0;
     std::uint32_t fragment_payload_bytes = 0;
     std::vector<std::byte> first_bytes;  ///< tcp: goes out before any frame
@@ -51,7 +51,7 @@ class SenderClient {
   [[nodiscard]] bool busy() const noexcept { return busy_; }
   [[nodiscard]] bool spilled() const noexcept { return spilled_; }
   [[nodiscard]] int fd() const noexcept {
-    return params_.udp ? params_.udp_fd.get() : params_.tcp_fd;
+    return params_.udp ? params_.udp_socket.fd() : params_.tcp_socket->fd();
   }
   [[nodiscard]] const Params& params() const noexcept { return params_; }
   /// Why send() failed; for the log.

@@ -111,6 +111,7 @@ class DaemonImpl final : public Daemon {
   Context context_;
   std::unique_ptr<Log> log_;
   DistinctTable distinct_;
+  DistinctTable errors_;
   Fd stop_event_;
   std::atomic<bool> stop_{false};
 
@@ -332,12 +333,14 @@ void DaemonImpl::housekeep() {
     while (const Event* event = events->ring().front()) {
       const EventText line = describe(*event);
       events->ring().pop();
-      if (log_ && (!line.distinct || distinct_.note(line.text, clock_.tai_ns()))) {
-        const auto count =
-            line.distinct ? distinct_.entries().find(line.text) : distinct_.entries().end();
-        log_->write(line.level, count != distinct_.entries().end() && count->second.count > 1
-                                    ? fmt::format("{} repeats={}", line.text, count->second.count)
-                                    : line.text);
+      if (!log_) {
+        continue;
+      }
+      // Errors have a table of their own, which peers cannot fill.
+      DistinctTable& table = line.level == LogLevel::error ? errors_ : distinct_;
+      const std::string text = line.distinct ? table.note(line.text, clock_.tai_ns()) : line.text;
+      if (!text.empty()) {
+        log_->write(line.level, text);
       }
     }
   }

@@ -7,8 +7,7 @@
 #include <fstream>
 #include <vector>
 
-#include "app/sha256.hpp"
-#include "emit/config/load.hpp"
+#include "agents/messages.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/v1/control.pb.h"
@@ -112,8 +111,13 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
     const auto later = std::find_if(weather_.begin(), weather_.end(), [&](const auto& pending) {
       return pending.host_frame_number > decision.host_frame_number();
     });
-    std::for_each(weather_.begin(), later,
-                  [&](const auto& pending) { source_.apply_weather(pending.sample); });
+    // Of more than fit into one frame the live run kept the first ones and the newest.
+    const auto count = static_cast<std::size_t>(later - weather_.begin());
+    for (std::size_t i = 0; i < count; ++i) {
+      if (i + 1 < kMaxWeatherPerFrame || i + 1 == count) {
+        source_.apply_weather(weather_[i].sample);
+      }
+    }
     weather_.erase(weather_.begin(), later);
 
     std::vector<renderer::EntityUpdate> updates;
@@ -173,33 +177,6 @@ std::size_t first_channel_plane(const scene::ScenarioDesc& scenario) noexcept {
       std::find_if(scenario.bands.begin(), scenario.bands.end(),
                    [&](const auto& each) { return each.name == scenario.channels.front().band; });
   return band != scenario.bands.end() ? static_cast<std::size_t>(band - scenario.bands.begin()) : 0;
-}
-
-physics::Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
-  Sha256 hash;
-  // Folders differ from machine to machine, contents must not.
-  scene::ScenarioDesc plain = scenario;
-  plain.file.clear();
-  for (auto& object : plain.objects) {
-    object.gltf = object.gltf.filename();
-  }
-  const std::string text = config::print_scenario(plain);
-  hash.update(std::as_bytes(std::span(text)));
-  std::vector<char> buffer(1u << 20);
-  for (const auto& object : scenario.objects) {
-    std::ifstream file(object.gltf, std::ios::binary);
-    if (!file) {
-      return make_error(ErrorCode::io, object.gltf.string() + ": cannot be read");
-    }
-    while (file) {
-      file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-      hash.update(std::as_bytes(std::span(buffer.data(), static_cast<std::size_t>(file.gcount()))));
-    }
-    if (file.bad()) {
-      return make_error(ErrorCode::io, object.gltf.string() + ": reading failed");
-    }
-  }
-  return hash.finish();
 }
 
 }  // namespace emit::server

@@ -87,9 +87,10 @@ class JournalPlayer {
 /// Plane of the scenario's first channel: index of its band. 0 for a scenario without channels.
 [[nodiscard]] std::size_t first_channel_plane(const scene::ScenarioDesc& scenario) noexcept;
 
-/// Identity of a resolved scenario as written into RunStart, hex SHA-256: over the scenario file
-/// and every file that it names (glTF, buffers beside it are not followed), in order.
-/// Errors (io): a file that cannot be read, by name.
+/// Identity of a resolved scenario as written into RunStart, hex SHA-256: over its resolved values
+/// (tables that it names are among them) and, by path relative to the scenario file, over its glTF
+/// files and the buffers that these name. The same in every folder on every machine.
+/// Errors (io): a file that cannot be read, by name; (parse): a glTF file whose JSON is none.
 [[nodiscard]] physics::Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario);
 
 }  // namespace emit::server

@@ -156,7 +156,7 @@ void Tool::add_scene_commands() {
   {
     auto [app, o] = add<GenerateCommand>(
         app_, "generate", "Write one of the shipped scenes, or all, as glTF",
-        "emit generate block-on-road --out scenes --set block_size_m=2", run_generate);
+        "emit generate block-on-road --out scenes --set block_size_m=1.5", run_generate);
     app.add_option("scene", o.scene, "Scene name, or all")->required()->type_name("SCENE");
     add_path(app, "--out", o.out, "Folder to write into")->required();
     add_set(app, o.set);
@@ -165,9 +165,13 @@ void Tool::add_scene_commands() {
     auto [app, o] = add<ViewCommand>(
         app_, "view", "Live window: a scenario, or the stream of a running daemon",
         "emit view airfield    or    emit view tcp://127.0.0.1:7000\n"
-        "Keys: arrows or left mouse button turn, W/S and wheel move, A/D sideways, Q/E down/up,\n"
-        "  space pause, [ ] time slower/faster, - + lower limit, , . upper limit, R auto range,\n"
-        "  T radiance or temperature, Home back to the scenario's view, Esc close",
+        "Keys, scenario only: arrows or dragging with the left button turn; W/S or the wheel move\n"
+        "  forward/back along the view, A/D left/right, E/Q up/down; space pauses;\n"
+        "  ] or PgUp jumps 60 s ahead, [ or PgDn 60 s back; Home or H back to the scenario's view\n"
+        "Keys, always: - = lower limit of the colours down/up, comma and period upper limit "
+        "down/up\n"
+        "  (number pad: - + and / *), R limits from the picture, T radiance or temperature, Esc "
+        "closes",
         run_view);
     app.add_option("source", o.source, "Scenario name, .toml file, tcp:// or udp:// URL")
         ->required()
@@ -242,7 +246,7 @@ void Tool::add_stream_commands() {
     auto [app, o] =
         add<SendCommand>(app_, "send", "Host stand-in: plays the poses of a log to a daemon",
                          "emit send airfield.mcap --to udp://127.0.0.1:7001 --rate 200", run_send);
-    add_path(app, "log", o.log, "MCAP log with host frames")->required();
+    add_path(app, "log", o.log, "MCAP log with host frames, or CSV with poses (*.csv)")->required();
     app.add_option("--to", o.to, "udp://host:port (host port) or tcp://host:port (control port)")
         ->required()
         ->type_name("URL");

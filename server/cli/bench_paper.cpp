@@ -6,7 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
+#include <optional>
 
+#include "bench_rules.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 #include "emit/renderer/renderer.hpp"
@@ -84,6 +86,42 @@ Run make_run(scene::ScenarioDesc scenario, std::uint32_t steps, const BenchPaper
   return run;
 }
 
+Result<void> device_error(std::uint64_t frame) {
+  return physics::make_error(physics::ErrorCode::gpu,
+                             fmt::format("frame {}: the device reported an error", frame));
+}
+
+/// Shares of the picture over the run's first frame and the one after half a pan: not timed, so
+/// that the planes it needs cost the measured frames nothing.
+Result<SceneFill> check_fill(const Run& run) {
+  renderer::OutputOptions output;
+  output.slots = 2;
+  output.temperature = output.depth = true;
+  const auto created = renderer::Renderer::create(run.scenario, {run.gpu_index, false}, output);
+  if (!created) return tl::unexpected(created.error());
+  renderer::Renderer& renderer = **created;
+  const physics::Pose base = renderer.scenario_sensor_pose_at(run.start_ns);
+  std::optional<SceneFill> least;
+  for (const std::uint32_t frame : {0U, std::min(run.frames - 1, kPanPeriodFrames / 2)}) {
+    renderer::FrameRequest request;
+    request.frame_number = frame + 1;
+    request.sim_time_ns = run.start_ns + run.advance_ns * frame;
+    request.thermal_time_ns = request.sim_time_ns;
+    request.sensor_pose = panned(base, pan_rad(run.scenario.sensor, frame));
+    const int slot = renderer.submit(request);
+    if (slot < 0) {
+      return physics::make_error(physics::ErrorCode::internal, "the renderer has no free slot");
+    }
+    const auto& view = renderer.collect(static_cast<renderer::SlotIndex>(slot));
+    if (view.device_failed) return tl::unexpected(device_error(frame).error());
+    const SceneFill fill =
+        measure_fill(run.scenario.sensor, request.sensor_pose, view.depth_m, view.temperature_k);
+    least = least ? least_of(*least, fill) : fill;
+    renderer.release(static_cast<renderer::SlotIndex>(slot));
+  }
+  return *least;
+}
+
 /// One pass over the frames of a run after a warm-up frame. With `stages` the device is waited for
 /// after each stage, so that the stages can be told apart.
 Result<void> measure(const Run& run, bool stages, ProgressBar& progress, std::uint64_t& done,
@@ -117,6 +155,7 @@ Result<void> measure(const Run& run, bool stages, ProgressBar& progress, std::ui
     }
     const auto& view = renderer.collect(static_cast<renderer::SlotIndex>(slot));
     const double frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    if (view.device_failed) return device_error(i);
     if (!warm_up) {
       out.frame_ms.add(frame_ms);
       out.fill_frac.add(view.stats.surface_px / pixels);
@@ -132,7 +171,7 @@ Result<void> measure(const Run& run, bool stages, ProgressBar& progress, std::ui
 }
 
 Json result_json(const std::string& scene, std::uint32_t steps, const Run& run,
-                 const Measured& free_run, const Measured& serial) {
+                 const Measured& free_run, const Measured& serial, const SceneFill& fill) {
   static constexpr std::array<const char*, 6> kStages{"geometry", "occlusion", "shadow",
                                                       "thermal",  "radiance",  "readback"};
   Json stages = Json::object();
@@ -158,7 +197,11 @@ Json result_json(const std::string& scene, std::uint32_t steps, const Run& run,
   json.set("spacing", "uniform").set("camera_px_per_frame", kPanPx);
   json.set("nominal_rate_hz", kNominalRateHz).set("sim_advance_s_per_frame", advance_s);
   json.set("newest_interval_closings", kClosings);
+  const bool statue = scene == "statue";
   json.set("surface_fill_frac", free_run.fill_frac.mean());
+  json.set("statue_fill_frac", statue ? Json(fill.figure_frac) : Json(nullptr));
+  json.set("swept_ground_frac", fill.swept_ground_frac);
+  json.set("rules_met", broken_rules(fill, statue).empty());
   return json;
 }
 
@@ -180,6 +223,13 @@ int run_bench_paper(const BenchPaperCommand& command) {
   for (const std::string& scene : scenes) {
     const auto scenario = load_scenario_choice({scene, {}});
     if (!scenario) return fail_config(scenario.error());
+    // The shares hang on camera and sun, not on the number of steps: the cheapest tells.
+    const auto fill =
+        check_fill(make_run(*scenario, *std::min_element(steps.begin(), steps.end()), command));
+    if (!fill) return fail(fill.error());
+    for (const std::string& text : broken_rules(*fill, scene == "statue")) {
+      warn(fmt::format("{}: {}", scene, text));
+    }
     for (const std::uint32_t count : steps) {
       const Run run = make_run(*scenario, count, command);
       Measured free_run;
@@ -190,7 +240,7 @@ int run_bench_paper(const BenchPaperCommand& command) {
         }
       }
       device = free_run.device;
-      results.push(result_json(scene, count, run, free_run, serial));
+      results.push(result_json(scene, count, run, free_run, serial, *fill));
       const auto ms = [](double value) { return fmt::format("{:.1f}", value); };
       double serial_ms = 0.0;
       std::vector<std::string> row{scene, fmt::format("{}", count), ms(free_run.frame_ms.median()),

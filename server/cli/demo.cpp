@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <stdlib.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -16,6 +18,7 @@
 #include "emit/protocol/record/log.hpp"
 #include "frame_files.hpp"
 #include "interrupt.hpp"
+#include "pose_log.hpp"
 #include "pose_plan.hpp"
 #include "scenario_input.hpp"
 
@@ -31,17 +34,30 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Work folder for configuration, journal and log; removed at the end unless it is to be kept.
+/// Work folder for configuration, journal and log, under a name that nothing had before; removed at
+/// the end unless it is to be kept.
 class WorkFolder {
  public:
-  WorkFolder(std::filesystem::path path, bool keep) : path_(std::move(path)), keep_(keep) {}
+  explicit WorkFolder(bool keep) : keep_(keep) {}
   ~WorkFolder() {
     std::error_code ignored;
-    if (!keep_) std::filesystem::remove_all(path_, ignored);
+    if (!keep_ && !path_.empty()) std::filesystem::remove_all(path_, ignored);
   }
   WorkFolder(const WorkFolder&) = delete;
   WorkFolder& operator=(const WorkFolder&) = delete;
+  /// Makes `parent`/run-XXXXXX. Errors: io.
+  Result<void> create(const std::filesystem::path& parent) {
+    std::string name = (parent / "run-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) {
+      return make_error(ErrorCode::io,
+                        fmt::format("{}: cannot create the work folder: {}", parent.string(),
+                                    std::generic_category().message(errno)));
+    }
+    path_ = name;
+    return {};
+  }
   void keep() noexcept { keep_ = true; }
+  [[nodiscard]] bool kept() const noexcept { return keep_ && !path_.empty(); }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
  private:
@@ -77,14 +93,14 @@ Result<std::filesystem::path> find_or_make_log(const DemoCommand& command,
 }
 
 Result<std::uint64_t> count_host_frames(const std::filesystem::path& path) {
-  auto log = protocol::LogReader::open(path);
+  auto log = PoseLog::open(path);
   if (!log) return tl::unexpected(log.error());
   std::uint64_t count = 0;
   while (true) {
     const auto more = log->next();
     if (!more) return tl::unexpected(more.error());
     if (!*more) break;
-    if (log->topic() == protocol::LogTopic::host) ++count;
+    ++count;
   }
   if (count == 0) {
     return make_error(ErrorCode::parse, fmt::format("{}: no host frame in the log", path.string()));
@@ -95,20 +111,19 @@ Result<std::uint64_t> count_host_frames(const std::filesystem::path& path) {
 /// Sequential reader of host frames by index.
 class HostFrameReader {
  public:
-  explicit HostFrameReader(protocol::LogReader log) : log_(std::move(log)) {}
+  explicit HostFrameReader(PoseLog log) : log_(std::move(log)) {}
   /// `index` must ascend from call to call and lie within the log.
   Result<const protocol::HostFrameData*> at(std::uint64_t index) {
-    while (next_ <= index) {
+    for (; next_ <= index; ++next_) {
       const auto more = log_.next();
       if (!more) return tl::unexpected(more.error());
       if (!*more) return make_error(ErrorCode::io, "the host log changed while it was read");
-      if (log_.topic() == protocol::LogTopic::host) ++next_;
     }
     return &log_.host();
   }
 
  private:
-  protocol::LogReader log_;
+  PoseLog log_;
   std::uint64_t next_ = 0;
 };
 
@@ -155,12 +170,13 @@ class Demo {
   std::unique_ptr<server::HostClient> udp_host_;
   std::unique_ptr<server::HostClient> tcp_host_;
   std::unique_ptr<protocol::HostFrameData> frame_ = std::make_unique<protocol::HostFrameData>();
+  std::optional<ApparentTemperature> apparent_;
   DemoResults results_;
 };
 
 Result<void> Demo::prepare() {
   if (auto made = make_directory(command_.out); !made) return made;
-  if (auto made = make_directory(work_.path()); !made) return made;
+  if (auto made = work_.create(command_.out); !made) return made;
   const auto log = find_or_make_log(command_, scenario_, work_.path());
   if (!log) return tl::unexpected(log.error());
   log_ = *log;
@@ -262,6 +278,12 @@ Result<void> Demo::save_frame() {
   planes.width_px = snapshot.header.width_px;
   planes.height_px = snapshot.header.height_px;
   planes.radiance_w_m2_sr = snapshot.pixels;
+  const std::size_t band = band_of_channel(scenario_, scene::ChannelKind::injection);
+  if (!apparent_ && band < scenario_.bands.size() &&
+      scenario_.bands[band].name == tcp_client_->channel().band) {
+    apparent_.emplace(spectral_band(scenario_.bands[band]));
+  }
+  planes.apparent = apparent_ ? &*apparent_ : nullptr;
   planes.metadata = {snapshot.header.sim_time_ns,
                      snapshot.header.frame_number,
                      snapshot.header.pose,
@@ -297,7 +319,7 @@ Result<void> Demo::play() {
   if (command_.all) count = results_.poses_in_log;
   if (command_.frames > 0) count = command_.frames;
   PosePlan plan(results_.poses_in_log, count);
-  auto log = protocol::LogReader::open(log_);
+  auto log = PoseLog::open(log_);
   if (!log) return tl::unexpected(log.error());
   HostFrameReader reader(std::move(*log));
 
@@ -405,9 +427,16 @@ int Demo::report() {
         fmt::format("{} poses made {} frames at the tcp client and {} in the journal", played,
                     tcp_client_->report().frames(), results_.replay.frames));
   }
+  for (std::string& text : demo_shortfalls(results_, departures_)) {
+    failures.push_back(std::move(text));
+  }
   for (const std::string& text : warnings) warn(text);
   for (const std::string& text : failures) fail(kExitFailure, text);
   if (!failures.empty()) work_.keep();
+  if (work_.kept()) {
+    fmt::print(text_stream(command_.json), "recording, configuration and log are kept in {}\n",
+               work_.path().string());
+  }
   return failures.empty() ? kExitOk : kExitFailure;
 }
 
@@ -418,8 +447,10 @@ int Demo::run() {
     if (auto done = (this->*step)(); !done) {
       work_.keep();
       const int code = fail(done.error());
-      fmt::print(stderr, "emit: configuration and log of the daemon are kept in {}\n",
-                 work_.path().string());
+      if (work_.kept()) {
+        fmt::print(stderr, "emit: configuration and log of the daemon are kept in {}\n",
+                   work_.path().string());
+      }
       return code;
     }
   }
@@ -431,7 +462,7 @@ int Demo::run() {
 int run_demo(const DemoCommand& command) {
   const auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
-  WorkFolder work(command.out / "run", command.keep);
+  WorkFolder work(command.keep);
   const InterruptGuard interrupt;
   return Demo(command, *scenario, work).run();
 }

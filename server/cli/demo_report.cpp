@@ -86,4 +86,20 @@ std::vector<std::string> demo_losses(const std::vector<DemoClientView>& clients,
   return failures;
 }
 
+std::vector<std::string> demo_shortfalls(const DemoResults& results,
+                                         const std::vector<Departure>& departures) {
+  constexpr std::uint64_t kLeastFrames = 3;
+  std::vector<std::string> failures;
+  if (results.frames_written < kLeastFrames) {
+    failures.push_back(fmt::format("{} frames were written, the demo shows at least {}",
+                                   results.frames_written, kLeastFrames));
+  }
+  if (!departures.empty() && results.frames_after_departure == 0) {
+    failures.push_back(fmt::format(
+        "no written frame shows the scene after {} left at sim time {:.1f} s",
+        departures.front().object, 1e-9 * static_cast<double>(departures.front().left_ns)));
+  }
+  return failures;
+}
+
 }  // namespace emit::cli

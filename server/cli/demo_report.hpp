@@ -6,6 +6,7 @@
 
 #include "journal_replay.hpp"
 #include "json.hpp"
+#include "pose_plan.hpp"
 #include "stream_client.hpp"
 
 namespace emit::cli {
@@ -39,5 +40,10 @@ struct DemoClientView {
 /// excuse, where `warnings` gets a line instead.
 [[nodiscard]] std::vector<std::string> demo_losses(const std::vector<DemoClientView>& clients,
                                                    std::vector<std::string>& warnings);
+
+/// What the demo promises to show and did not: at least three frames, one of them after an entity
+/// has left where the scenario has a departure. One line each; empty when all was shown.
+[[nodiscard]] std::vector<std::string> demo_shortfalls(const DemoResults& results,
+                                                       const std::vector<Departure>& departures);
 
 }  // namespace emit::cli

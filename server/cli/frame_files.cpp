@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include "emit/image/png_image.hpp"
-#include "emit/physics/planck.hpp"
 
 namespace emit::cli {
 namespace {
@@ -23,8 +22,18 @@ constexpr double kTableStepK = 0.05;
 
 }  // namespace
 
-ApparentTemperature::ApparentTemperature(double lo_um, double hi_um) {
-  const physics::Band band{lo_um, hi_um, {}};
+physics::Band spectral_band(const scene::SpectralBand& band) {
+  physics::Band out{band.lo_um, band.hi_um, {}};
+  for (const scene::ResponseSample& sample : band.response) {
+    out.response.push_back({sample.wavelength_um, sample.response_frac});
+  }
+  return out;
+}
+
+ApparentTemperature::ApparentTemperature(double lo_um, double hi_um)
+    : ApparentTemperature(physics::Band{lo_um, hi_um, {}}) {}
+
+ApparentTemperature::ApparentTemperature(const physics::Band& band) {
   // Every 2 K exactly, ln L between them linear in 1/T: below 1 mK in the thermal bands.
   constexpr double kAnchorK = 2.0;
   const auto count = static_cast<std::size_t>((kTableToK - kTableFromK) / kTableStepK) + 1;
@@ -99,7 +108,10 @@ physics::Result<void> write_frame_png(const std::filesystem::path& file, const F
   if (values.empty()) {
     const double lo_um = frame.metadata.band_lo_um;
     const double hi_um = frame.metadata.band_hi_um;
-    if (lo_um > 0.0 && hi_um > lo_um) {
+    if (frame.apparent != nullptr) {
+      apparent = frame.apparent->kelvin(frame.radiance_w_m2_sr);
+      values = apparent;
+    } else if (lo_um > 0.0 && hi_um > lo_um) {
       apparent = ApparentTemperature(lo_um, hi_um).kelvin(frame.radiance_w_m2_sr);
       values = apparent;
     } else {

@@ -8,6 +8,8 @@
 #include "emit/image/exr_image.hpp"
 #include "emit/image/false_color.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/planck.hpp"
+#include "emit/scene/scene_desc.hpp"
 
 namespace emit::cli {
 
@@ -15,7 +17,9 @@ namespace emit::cli {
 /// over 150..1500 K; outside it the end of the table. Setup only to build; lookup any thread.
 class ApparentTemperature {
  public:
-  /// Precondition: 0 < lo_um < hi_um.
+  /// Of a band with its response. Precondition: physics::validate().
+  explicit ApparentTemperature(const physics::Band& band);
+  /// Of a rectangular band, where no response is known. Precondition: 0 < lo_um < hi_um.
   ApparentTemperature(double lo_um, double hi_um);
   [[nodiscard]] double kelvin(double radiance_w_m2_sr) const noexcept;
   /// dT/dL there, K per W m-2 sr-1.
@@ -27,6 +31,9 @@ class ApparentTemperature {
   std::vector<double> radiance_;  ///< ascending
 };
 
+/// The scenario's band as the radiometry takes it, response included.
+[[nodiscard]] physics::Band spectral_band(const scene::SpectralBand& band);
+
 /// Planes of one frame on their way to disk; empty planes are left out.
 struct FramePlanes {
   std::uint32_t width_px = 0;
@@ -35,6 +42,9 @@ struct FramePlanes {
   std::span<const float> temperature_k;
   std::span<const float> depth_m;
   std::span<const float> object_id;
+  /// For pictures of frames without temperature; absent: built from the metadata's band limits,
+  /// which costs a second or so, and knows of no response. Callers of many frames set it.
+  const ApparentTemperature* apparent = nullptr;
   image::FrameMetadata metadata;
 };
 

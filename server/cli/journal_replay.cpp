@@ -79,6 +79,11 @@ physics::Result<JournalReplaySummary> replay_journal(
     }
     if (!*applied) continue;
     const server::ReplayedFrame& frame = **applied;
+    if (frame.view != nullptr && frame.view->device_failed) {
+      return physics::make_error(
+          physics::ErrorCode::gpu,
+          fmt::format("frame {}: the device reported an error", frame.frame_number));
+    }
     if (!frame.repeated) ++summary.rendered;
     if (!frame.matches && summary.first_mismatch == 0) summary.first_mismatch = frame.frame_number;
     if (on_frame) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -20,18 +21,24 @@ using Clock = std::chrono::steady_clock;
 
 physics::Result<void> save(const std::filesystem::path& directory,
                            const server::ReceivedFrame& frame,
-                           const server::ChannelDescription& channel, const ColorLimits& limits) {
+                           const server::ChannelDescription& channel, const ColorLimits& limits,
+                           std::optional<ApparentTemperature>& apparent) {
   FramePlanes planes;
   planes.width_px = frame.header.width_px;
   planes.height_px = frame.header.height_px;
   const bool temperature = frame.header.quantity == protocol::PixelQuantity::temperature_k;
   (temperature ? planes.temperature_k : planes.radiance_w_m2_sr) = frame.pixels;
+  const double lo_um = static_cast<double>(frame.header.band_lo_um);
+  const double hi_um = static_cast<double>(frame.header.band_hi_um);
+  // The band of a channel does not change: one table serves every frame.
+  if (!temperature && !apparent && lo_um > 0.0 && hi_um > lo_um) apparent.emplace(lo_um, hi_um);
+  planes.apparent = apparent ? &*apparent : nullptr;
   planes.metadata = {frame.header.sim_time_ns,
                      frame.header.frame_number,
                      frame.header.pose,
                      channel.band,
-                     static_cast<double>(frame.header.band_lo_um),
-                     static_cast<double>(frame.header.band_hi_um),
+                     lo_um,
+                     hi_um,
                      temperature ? "K" : "W m-2 sr-1"};
   return write_frame_files(directory, planes, limits);
 }
@@ -80,6 +87,7 @@ int run_receive(const ReceiveCommand& command) {
   }
   if (const std::string advice = client.receive_buffer_advice(); !advice.empty()) warn(advice);
 
+  std::optional<ApparentTemperature> apparent;
   const InterruptGuard interrupt;
   StreamReport report;
   ProgressBar progress("frames", command.frames == 0 ? 1 : command.frames);
@@ -110,7 +118,8 @@ int run_receive(const ReceiveCommand& command) {
     last_frame = Clock::now();
     report.add(**received);
     if (command.out) {
-      const auto saved = save(*command.out, **received, *channel, {command.min_k, command.max_k});
+      const auto saved =
+          save(*command.out, **received, *channel, {command.min_k, command.max_k}, apparent);
       if (!saved) return fail(saved.error());
     }
     if (command.frames != 0) progress.advance_to(report.frames());

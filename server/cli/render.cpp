@@ -77,6 +77,9 @@ int run_render(const RenderCommand& command) {
   if (slot < 0) return fail(kExitFailure, "the renderer has no free slot");
   const renderer::FrameView& view = renderer.collect(static_cast<renderer::SlotIndex>(slot));
   const double frame_ms = ms_since(start);
+  if (view.device_failed) {
+    return fail(kExitFailure, "the device reported an error: the frame is not written");
+  }
 
   const scene::SpectralBand& shown = scenario->bands[*band];
   FramePlanes planes;

@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "emit/config/load.hpp"
+#include "emit/scene/trajectory.hpp"
 
 namespace emit::cli {
 namespace {
@@ -16,38 +17,24 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-/// Half width of the central difference that gives a trajectory's rates.
+/// Largest half width of the central difference that gives a trajectory's rates.
 constexpr std::int64_t kRateStepNs = 500'000;
 
-struct Segment {
-  const scene::Keyframe* before;
-  const scene::Keyframe* after;
-};
-
-Segment segment_at(const scene::Trajectory& trajectory, std::int64_t sim_time_ns) noexcept {
-  const auto next = std::upper_bound(
+/// Rates inside a segment: constant velocity and constant rotation axis, so the chord is exact.
+protocol::PoseRates rates_at(const scene::Trajectory& trajectory,
+                             std::int64_t sim_time_ns) noexcept {
+  const auto after = std::upper_bound(
       trajectory.begin(), trajectory.end(), sim_time_ns,
       [](std::int64_t time, const scene::Keyframe& key) { return time < key.sim_time_ns; });
-  if (next == trajectory.begin()) return {&trajectory.front(), &trajectory.front()};
-  if (next == trajectory.end()) return {&trajectory.back(), &trajectory.back()};
-  return {&*(next - 1), &*next};
-}
-
-physics::Pose pose_in(const Segment& segment, std::int64_t sim_time_ns) noexcept {
-  const std::int64_t span_ns = segment.after->sim_time_ns - segment.before->sim_time_ns;
-  if (span_ns <= 0 || segment.after->teleport) return segment.before->pose;
-  const double fraction =
-      static_cast<double>(sim_time_ns - segment.before->sim_time_ns) / static_cast<double>(span_ns);
-  return physics::interpolate(segment.before->pose, segment.after->pose, fraction);
-}
-
-/// Rates inside one segment: constant velocity and constant rotation axis, so the chord is exact.
-protocol::PoseRates rates_in(const Segment& segment, std::int64_t sim_time_ns) noexcept {
+  if (after == trajectory.begin() || after == trajectory.end() || after->teleport) return {};
+  // The chord stays inside the segment: a neighbour moves otherwise.
+  const std::int64_t from_ns = std::max(sim_time_ns - kRateStepNs, (after - 1)->sim_time_ns);
+  const std::int64_t to_ns = std::min(sim_time_ns + kRateStepNs, after->sim_time_ns - 1);
+  if (to_ns <= from_ns) return {};
+  const physics::Pose a = scene::trajectory_at(trajectory, from_ns).pose;
+  const physics::Pose b = scene::trajectory_at(trajectory, to_ns).pose;
+  const double span_s = 1e-9 * static_cast<double>(to_ns - from_ns);
   protocol::PoseRates rates;
-  if (segment.before == segment.after || segment.after->teleport) return rates;
-  const physics::Pose a = pose_in(segment, sim_time_ns - kRateStepNs);
-  const physics::Pose b = pose_in(segment, sim_time_ns + kRateStepNs);
-  const double span_s = 2e-9 * static_cast<double>(kRateStepNs);
   rates.velocity_world_m_s = (b.position_world_m - a.position_world_m) / span_s;
   glm::dquat turn = glm::conjugate(a.world_from_body) * b.world_from_body;
   if (turn.w < 0.0) turn = -turn;
@@ -110,11 +97,11 @@ std::size_t band_of_channel(const scene::ScenarioDesc& scenario, scene::ChannelK
 
 TrajectorySample sample_trajectory(const scene::Trajectory& trajectory, std::int64_t sim_time_ns,
                                    std::int64_t previous_ns) noexcept {
-  const Segment segment = segment_at(trajectory, sim_time_ns);
+  const scene::TrajectoryState state = scene::trajectory_at(trajectory, sim_time_ns);
   TrajectorySample sample;
-  sample.pose = pose_in(segment, sim_time_ns);
-  sample.rates = rates_in(segment, sim_time_ns);
-  sample.on = segment.before->on;
+  sample.pose = state.pose;
+  sample.rates = rates_at(trajectory, sim_time_ns);
+  sample.on = state.on;
   sample.teleport = std::any_of(trajectory.begin(), trajectory.end(), [&](const auto& key) {
     return key.teleport && key.sim_time_ns > previous_ns && key.sim_time_ns <= sim_time_ns;
   });

@@ -35,7 +35,13 @@ std::map<std::string, Setter, std::less<>> setters(scenegen::GenerateOptions& op
               {"height_m", number(options.statue.height_m)},
               {"plane_m", number(options.statue.plane_m)}};
     case SceneKind::block_on_road:
-      return {{"block_east_m", number(options.block_on_road.block_east_m)},
+      return {{"block_size_m",
+               [&block = options.block_on_road](std::string_view text) {
+                 if (!number(block.block_east_m)(text)) return false;
+                 block.block_north_m = block.block_up_m = block.block_east_m;
+                 return true;
+               }},
+              {"block_east_m", number(options.block_on_road.block_east_m)},
               {"block_north_m", number(options.block_on_road.block_north_m)},
               {"block_up_m", number(options.block_on_road.block_up_m)},
               {"wall_thickness_m", number(options.block_on_road.wall_thickness_m)},

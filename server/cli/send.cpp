@@ -9,10 +9,10 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "emit/protocol/record/log.hpp"
 #include "interrupt.hpp"
 #include "io/client.hpp"
 #include "json.hpp"
+#include "pose_log.hpp"
 
 namespace emit::cli {
 namespace {
@@ -73,7 +73,7 @@ int run_send(const SendCommand& command) {
   if (command.step && udp && command.control.empty()) {
     return fail(kExitUsage, "--step over udp needs --control tcp://host:port to watch the frames");
   }
-  auto log = protocol::LogReader::open(command.log);
+  auto log = PoseLog::open(command.log);
   if (!log) return fail(log.error());
 
   std::unique_ptr<server::FrameClient> watcher;
@@ -99,7 +99,6 @@ int run_send(const SendCommand& command) {
     const auto more = log->next();
     if (!more) return fail(more.error());
     if (!*more) break;
-    if (log->topic() != protocol::LogTopic::host) continue;
     if (seen++ % command.every != 0) continue;
     *frame = log->host();
     if (command.every > 1) frame->frame_number = sent + 1;
@@ -129,7 +128,7 @@ int run_send(const SendCommand& command) {
   if (auto drained = drain_statuses(host, refusals, 200'000'000); !drained) {
     warn(drained.error().text);
   }
-  if (log->truncation()) warn(*log->truncation());
+  if (const auto truncation = log->truncation()) warn(*truncation);
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   fmt::print(text_stream(command.json), "{} poses sent in {:.3f} s, {} refused\n", sent, seconds,
              refusals.total);

@@ -102,10 +102,10 @@ void Viewer::handle(Key key) {
     case Key::pause:
       control_.paused = !control_.paused;
       break;
-    case Key::slower:
+    case Key::earlier:
       control_.jump_s -= 60.0;
       break;
-    case Key::faster:
+    case Key::later:
       control_.jump_s += 60.0;
       break;
     case Key::min_down:
@@ -129,7 +129,7 @@ void Viewer::handle(Key key) {
       if (show_radiance_ && !radiance_ranged_) auto_range();
       break;
     case Key::home:
-      control_ = ViewControl{};
+      control_ = ViewControl{.paused = control_.paused, .jump_s = control_.jump_s, .home = true};
       break;
     case Key::close:
       close_ = true;
@@ -145,7 +145,8 @@ void Viewer::handle(const view::WindowInput& input) {
   control_.pitch_rad -= kDragRadPerPx * input.drag_y_px;
   control_.forward_m += 2.0 * input.wheel;
   provider_.control(control_);
-  control_.jump_s = 0.0;
+  control_.jump_s = control_.forward_m = control_.right_m = control_.up_m = 0.0;
+  control_.home = false;
 }
 
 void Viewer::auto_range() {
@@ -204,10 +205,9 @@ int Viewer::run() {
   while (!close_ && !InterruptGuard::interrupted()) {
     handle(window_.poll());
     const bool fresh = provider_.take(frame_);
-    std::string reason;
-    if (!fresh && provider_.ended(reason)) {
-      if (have_frame && command_.frames == 0) break;
-      return fail(kExitFailure, reason);
+    if (const auto end = provider_.ended(); !fresh && end) {
+      if (!end->failure && have_frame && command_.frames == 0) break;
+      return fail(kExitFailure, end->reason);
     }
     have_frame = have_frame || fresh;
     if (!have_frame) {

@@ -66,21 +66,25 @@ physics::Result<Url> parse_url(const std::string& text) {
   return url;
 }
 
-ClientConnection::ClientConnection(Fd fd, SocketAddress peer)
-    : fd_(std::move(fd)), peer_(peer), parser_(protocol::RecordLimits{}) {}
+ClientConnection::ClientConnection(SocketContext context, TcpSocket socket, SocketAddress peer)
+    : context_(std::move(context)),
+      socket_(std::move(socket)),
+      peer_(peer),
+      parser_(protocol::RecordLimits{}) {}
 
 physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientRole role,
                                                          std::int64_t timeout_ns) {
   const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
-  const auto address = resolve({url.host, url.port}, SOCK_STREAM, false);
+  const auto address = resolve({url.host, url.port}, Transport::tcp, false);
   if (!address) {
     return tl::unexpected<physics::Error>(physics::Error(address.error()));
   }
-  auto fd = connect_tcp(*address, timeout_ns);
-  if (!fd) {
-    return tl::unexpected<physics::Error>(std::move(fd.error()));
+  SocketContext context;
+  auto socket = TcpSocket::connect(context, *address, timeout_ns);
+  if (!socket) {
+    return tl::unexpected<physics::Error>(std::move(socket.error()));
   }
-  ClientConnection connection(std::move(*fd), *address);
+  ClientConnection connection(std::move(context), std::move(*socket), *address);
 
   v1::ControlRecord request;
   v1::Hello& hello = *request.mutable_hello();
@@ -150,22 +154,24 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
                                     protocol::to_string(status), parser_.offending_value()));
     }
     const std::span<std::byte> space = parser_.writable();
-    const ssize_t got = ::recv(fd_.get(), space.data(), space.size(), MSG_DONTWAIT);
-    if (got > 0) {
-      parser_.commit(static_cast<std::size_t>(got));
-      continue;
-    }
-    if (got == 0) {
-      closed_ = parser_.pending_bytes() == 0;
-      return make_error(ErrorCode::io,
-                        to_string(peer_) + (closed_ ? ": connection closed"
-                                                    : ": connection closed within a record"));
-    }
-    if (errno != EAGAIN && errno != EINTR) {
-      return make_error(ErrorCode::io, fmt::format("{}: {}", to_string(peer_), error_text(errno)));
-    }
-    if (!wait_for(fd_.get(), POLLIN, end_ns)) {
-      return false;
+    const IoResult got = socket_.read_some(space);
+    switch (got.status) {
+      case IoStatus::done:
+        parser_.commit(got.bytes);
+        break;
+      case IoStatus::closed:
+        closed_ = parser_.pending_bytes() == 0;
+        return make_error(ErrorCode::io,
+                          to_string(peer_) + (closed_ ? ": connection closed"
+                                                      : ": connection closed within a record"));
+      case IoStatus::failed:
+        return make_error(ErrorCode::io,
+                          fmt::format("{}: {}", to_string(peer_), error_text(got.error)));
+      case IoStatus::would_block:
+        if (!wait_for(socket_.fd(), POLLIN, end_ns)) {
+          return false;
+        }
+        break;
     }
   }
 }
@@ -173,12 +179,13 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
 physics::Result<void> ClientConnection::send(std::span<const std::byte> bytes,
                                              std::int64_t end_ns) {
   while (!bytes.empty()) {
-    const ssize_t sent = ::send(fd_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
-    if (sent >= 0) {
-      bytes = bytes.subspan(static_cast<std::size_t>(sent));
-    } else if (errno != EAGAIN && errno != EINTR) {
-      return make_error(ErrorCode::io, fmt::format("{}: {}", to_string(peer_), error_text(errno)));
-    } else if (!wait_for(fd_.get(), POLLOUT, end_ns)) {
+    const IoResult sent = socket_.write_some(bytes);
+    if (sent.status == IoStatus::done) {
+      bytes = bytes.subspan(sent.bytes);
+    } else if (sent.status != IoStatus::would_block) {
+      return make_error(ErrorCode::io,
+                        fmt::format("{}: {}", to_string(peer_), error_text(sent.error)));
+    } else if (!wait_for(socket_.fd(), POLLOUT, end_ns)) {
       return make_error(ErrorCode::io, to_string(peer_) + ": takes nothing within the timeout");
     }
   }

@@ -32,7 +32,8 @@ class ClientConnection {
   [[nodiscard]] static physics::Result<ClientConnection> open(const Url& url, ClientRole role,
                                                               std::int64_t timeout_ns);
 
-  [[nodiscard]] int fd() const noexcept { return fd_.get(); }
+  [[nodiscard]] int fd() const noexcept { return socket_.fd(); }
+  [[nodiscard]] const SocketContext& context() const noexcept { return context_; }
   [[nodiscard]] const ServerInfo& server() const noexcept { return info_; }
   [[nodiscard]] const SocketAddress& peer() const noexcept { return peer_; }
   /// True after the peer closed in order, between two records.
@@ -48,9 +49,10 @@ class ClientConnection {
   [[nodiscard]] physics::Result<void> send(const v1::ControlRecord& record, std::int64_t end_ns);
 
  private:
-  ClientConnection(Fd fd, SocketAddress peer);
+  ClientConnection(SocketContext context, TcpSocket socket, SocketAddress peer);
 
-  Fd fd_;
+  SocketContext context_;
+  TcpSocket socket_;
   SocketAddress peer_;
   protocol::RecordParser parser_;
   ServerInfo info_;

@@ -85,7 +85,7 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   subscribe.set_band(options.band);
   subscribe.set_every_frame(options.every_frame);
   if (udp_) {
-    auto receiver = UdpFrameReceiver::open(connection_.peer(), options);
+    auto receiver = UdpFrameReceiver::open(connection_.context(), connection_.peer(), options);
     if (!receiver) {
       return tl::unexpected<physics::Error>(std::move(receiver.error()));
     }

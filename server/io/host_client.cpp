@@ -63,7 +63,7 @@ class TcpHost final : public HostClient {
 
 class UdpHost final : public HostClient {
  public:
-  UdpHost(Fd fd, SocketAddress peer) : fd_(std::move(fd)), peer_(peer) {}
+  UdpHost(UdpSocket socket, SocketAddress peer) : socket_(std::move(socket)), peer_(peer) {}
 
   physics::Result<void> send(const protocol::HostFrameData& frame,
                              std::int64_t timeout_ns) override {
@@ -71,18 +71,20 @@ class UdpHost final : public HostClient {
     const auto body = encoder_.encode(frame);
     bool retried = false;
     for (;;) {
-      if (::send(fd_.get(), body.data(), body.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) {
+      const IoResult sent = socket_.send(body);
+      if (sent.status == IoStatus::done) {
         return {};
       }
-      if (errno == ECONNREFUSED && !retried) {
+      if (sent.error == ECONNREFUSED && !retried) {
         // The report belongs to an earlier datagram and takes this call's place; if nobody listens,
         // the next call tells again.
         retried = true;
         continue;
       }
-      if ((errno != EAGAIN && errno != EINTR) || !wait_for(fd_.get(), POLLOUT, end_ns)) {
-        return make_error(ErrorCode::io,
-                          fmt::format("udp {}: {}", to_string(peer_), error_text(errno)));
+      const bool full = sent.status == IoStatus::would_block;
+      if (!full || !wait_for(socket_.fd(), POLLOUT, end_ns)) {
+        return make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(peer_),
+                                                     error_text(full ? EAGAIN : sent.error)));
       }
     }
   }
@@ -93,19 +95,19 @@ class UdpHost final : public HostClient {
     const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
     std::array<std::byte, 2048> bytes;
     for (;;) {
-      const ssize_t got = ::recv(fd_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
-      if (got < 0) {
-        if (errno != EAGAIN && errno != EINTR) {
-          return make_error(ErrorCode::io,
-                            fmt::format("udp {}: {}", to_string(peer_), error_text(errno)));
-        }
-        if (!wait_for(fd_.get(), POLLIN, end_ns)) {
+      const IoResult got = socket_.receive(bytes);
+      if (got.status == IoStatus::would_block) {
+        if (!wait_for(socket_.fd(), POLLIN, end_ns)) {
           return std::optional<ServerStatus>();
         }
         continue;
       }
+      if (got.status != IoStatus::done) {
+        return make_error(ErrorCode::io,
+                          fmt::format("udp {}: {}", to_string(peer_), error_text(got.error)));
+      }
       v1::Status status;
-      if (status.ParseFromArray(bytes.data(), static_cast<int>(got))) {
+      if (status.ParseFromArray(bytes.data(), static_cast<int>(got.bytes))) {
         return std::optional<ServerStatus>(to_status(status));
       }
     }
@@ -113,7 +115,7 @@ class UdpHost final : public HostClient {
   const ServerInfo* server() const noexcept override { return nullptr; }
 
  private:
-  Fd fd_;
+  UdpSocket socket_;
   SocketAddress peer_;
   protocol::HostFrameEncoder encoder_;
 };
@@ -133,16 +135,18 @@ physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::stri
     }
     return std::make_unique<TcpHost>(std::move(*connection));
   }
-  const auto address = resolve({parsed->host, parsed->port}, SOCK_DGRAM, false);
+  const auto address = resolve({parsed->host, parsed->port}, Transport::udp, false);
   if (!address) {
     return tl::unexpected<physics::Error>(physics::Error(address.error()));
   }
-  Fd fd(::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (!fd || ::connect(fd.get(), address->get(), address->length) != 0) {
-    return make_error(ErrorCode::io,
-                      fmt::format("udp {}: {}", to_string(*address), error_text(errno)));
+  auto socket = UdpSocket::open(SocketContext(), *address);
+  if (!socket) {
+    return tl::unexpected<physics::Error>(std::move(socket.error()));
   }
-  return std::make_unique<UdpHost>(std::move(fd), *address);
+  if (auto connected = socket->connect(*address); !connected) {
+    return tl::unexpected<physics::Error>(std::move(connected.error()));
+  }
+  return std::make_unique<UdpHost>(std::move(*socket), *address);
 }
 
 }  // namespace emit::server

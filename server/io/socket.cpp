@@ -1,224 +1,432 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/socket.hpp"
 
-#include <arpa/inet.h>
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <netdb.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
-#include <poll.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/multicast.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/udp.hpp>
 #include <cerrno>
-#include <charconv>
+#include <chrono>
 #include <climits>
-#include <cstring>
-#include <system_error>
+#include <exception>
+
+#include "io/asio_endpoint.hpp"
 
 namespace emit::server {
+namespace {
 
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using asio::ip::udp;
+using boost::system::error_code;
 using physics::ErrorCode;
 using physics::make_error;
 
-std::uint16_t SocketAddress::port() const noexcept {
-  if (storage.ss_family == AF_INET6) {
-    sockaddr_in6 v6{};
-    std::memcpy(&v6, &storage, sizeof(v6));
-    return ntohs(v6.sin6_port);
+constexpr int kBacklog = 32;
+
+/// Any option with an int value, in the form that Asio's set_option() takes.
+class IntOption {
+ public:
+  IntOption(int level, int name, int value) noexcept : level_(level), name_(name), value_(value) {}
+  template <typename Protocol>
+  [[nodiscard]] int level(const Protocol& /*protocol*/) const noexcept {
+    return level_;
   }
-  sockaddr_in v4{};
-  std::memcpy(&v4, &storage, sizeof(v4));
-  return ntohs(v4.sin_port);
+  template <typename Protocol>
+  [[nodiscard]] int name(const Protocol& /*protocol*/) const noexcept {
+    return name_;
+  }
+  template <typename Protocol>
+  [[nodiscard]] const void* data(const Protocol& /*protocol*/) const noexcept {
+    return &value_;
+  }
+  template <typename Protocol>
+  [[nodiscard]] std::size_t size(const Protocol& /*protocol*/) const noexcept {
+    return sizeof(value_);
+  }
+
+ private:
+  int level_;
+  int name_;
+  int value_;
+};
+
+/// Errors are dropped: options are wishes.
+template <typename Socket, typename Option>
+void wish(Socket& socket, const Option& option) noexcept {
+  error_code ignored;
+  socket.set_option(option, ignored);
 }
 
-void SocketAddress::set_port(std::uint16_t port) noexcept {
-  if (storage.ss_family == AF_INET6) {
-    sockaddr_in6 v6{};
-    std::memcpy(&v6, &storage, sizeof(v6));
-    v6.sin6_port = htons(port);
-    std::memcpy(&storage, &v6, sizeof(v6));
+int buffer_size(std::uint64_t bytes) noexcept {
+  return static_cast<int>(std::min<std::uint64_t>(bytes, INT_MAX / 2));
+}
+
+/// Asio opens blocking sockets that child processes inherit.
+template <typename Socket>
+void make_ours(Socket& socket, error_code& error) noexcept {
+  if (::fcntl(socket.native_handle(), F_SETFD, FD_CLOEXEC) != 0) {
+    error.assign(errno, asio::error::get_system_category());
     return;
   }
-  sockaddr_in v4{};
-  std::memcpy(&v4, &storage, sizeof(v4));
-  v4.sin_port = htons(port);
-  std::memcpy(&storage, &v4, sizeof(v4));
+  socket.non_blocking(true, error);
 }
 
-physics::Result<HostPort> parse_host_port(std::string_view text) {
-  const auto bad = [&] {
-    return make_error(
-        ErrorCode::config,
-        fmt::format("'{}' is not host:port (such as 127.0.0.1:7000 or [::1]:7000)", text));
-  };
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string_view::npos) {
-    return bad();
+template <typename Socket, typename Protocol>
+void open_ours(Socket& socket, const Protocol& protocol, error_code& error) noexcept {
+  socket.open(protocol, error);
+  if (!error) {
+    make_ours(socket, error);
   }
-  HostPort out;
-  std::string_view host = text.substr(0, colon);
-  const std::string_view port = text.substr(colon + 1);
-  if (host.size() >= 2 && host.front() == '[' && host.back() == ']') {
-    host = host.substr(1, host.size() - 2);
-  } else if (host.find(':') != std::string_view::npos) {
-    return bad();
-  }
-  out.host = host;
-  const auto parsed = std::from_chars(port.data(), port.data() + port.size(), out.port);
-  if (parsed.ec != std::errc{} || parsed.ptr != port.data() + port.size()) {
-    return bad();
-  }
-  return out;
 }
 
-physics::Result<SocketAddress> resolve(const HostPort& where, int socket_type, bool passive) {
-  addrinfo hints{};
-  hints.ai_family = AF_UNSPEC;
-  hints.ai_socktype = socket_type;
-  hints.ai_flags = AI_NUMERICSERV | (passive ? AI_PASSIVE : 0);
-  addrinfo* found = nullptr;
-  const std::string port = std::to_string(where.port);
-  const int code = ::getaddrinfo(where.host.empty() ? nullptr : where.host.c_str(), port.c_str(),
-                                 &hints, &found);
-  if (code != 0 || found == nullptr) {
-    return make_error(ErrorCode::io,
-                      fmt::format("{}:{}: {}", where.host, where.port, ::gai_strerror(code)));
+IoResult to_result(const error_code& error, std::size_t bytes) noexcept {
+  if (!error) {
+    return {IoStatus::done, bytes, 0};
   }
-  SocketAddress address;
-  std::memcpy(&address.storage, found->ai_addr, found->ai_addrlen);
-  address.length = found->ai_addrlen;
-  ::freeaddrinfo(found);
-  return address;
+  if (error == asio::error::would_block || error == asio::error::try_again ||
+      error == asio::error::interrupted) {
+    return {IoStatus::would_block, 0, 0};
+  }
+  if (error == asio::error::eof) {
+    return {IoStatus::closed, 0, 0};
+  }
+  return {IoStatus::failed, 0, error.value()};
 }
 
-SocketAddress numeric_address(const std::string& host, std::uint16_t port) noexcept {
-  SocketAddress address;
-  sockaddr_in v4{};
-  sockaddr_in6 v6{};
-  if (::inet_pton(AF_INET, host.c_str(), &v4.sin_addr) == 1) {
-    v4.sin_family = AF_INET;
-    std::memcpy(&address.storage, &v4, sizeof(v4));
-    address.length = sizeof(v4);
-  } else if (::inet_pton(AF_INET6, host.c_str(), &v6.sin6_addr) == 1) {
-    v6.sin6_family = AF_INET6;
-    std::memcpy(&address.storage, &v6, sizeof(v6));
-    address.length = sizeof(v6);
-  } else {
-    return address;
-  }
-  address.set_port(port);
-  return address;
+auto failure(std::string_view transport, const SocketAddress& address, const std::string& why) {
+  return make_error(ErrorCode::io, fmt::format("{}{}: {}", transport, to_string(address), why));
 }
 
-namespace {
-
-physics::Result<Fd> open_socket(const SocketAddress& address, int type) {
-  Fd fd(::socket(address.storage.ss_family, type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (!fd) {
-    return make_error(ErrorCode::io,
-                      fmt::format("{}: socket: {}", to_string(address), error_text(errno)));
+/// Runs what may throw: allocation, and the first socket of a context, which opens Asio's epoll.
+template <typename Work>
+auto guarded(std::string_view what, const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    return make_error(ErrorCode::io, fmt::format("{}: {}", what, error.what()));
   }
-  return fd;
+}
+
+template <typename Socket>
+SocketAddress local_address_of(const Socket& socket) noexcept {
+  error_code error;
+  const auto endpoint = socket.local_endpoint(error);
+  return error ? SocketAddress{} : from_endpoint(endpoint);
 }
 
 }  // namespace
 
-physics::Result<Fd> open_udp_bound(const SocketAddress& address) {
-  auto fd = open_socket(address, SOCK_DGRAM);
-  if (fd && ::bind(fd->get(), address.get(), address.length) != 0) {
-    return make_error(ErrorCode::io,
-                      fmt::format("udp {}: {}", to_string(address), error_text(errno)));
-  }
-  return fd;
-}
+SocketContext::SocketContext() : context_(std::make_shared<asio::io_context>()) {}
 
-physics::Result<Fd> open_tcp_listener(const SocketAddress& address) {
-  auto fd = open_socket(address, SOCK_STREAM);
-  if (!fd) {
-    return fd;
-  }
-  set_option(fd->get(), SOL_SOCKET, SO_REUSEADDR, 1);
-  if (::bind(fd->get(), address.get(), address.length) != 0 || ::listen(fd->get(), 32) != 0) {
-    return make_error(ErrorCode::io,
-                      fmt::format("tcp {}: {}", to_string(address), error_text(errno)));
-  }
-  return fd;
-}
+// TcpSocket
 
-physics::Result<Fd> connect_tcp(const SocketAddress& address, std::int64_t timeout_ns) {
-  auto fd = open_socket(address, SOCK_STREAM);
-  if (!fd) {
-    return fd;
-  }
-  const auto fail = [&](const std::string& why) {
-    return make_error(ErrorCode::io, fmt::format("tcp {}: {}", to_string(address), why));
-  };
-  if (::connect(fd->get(), address.get(), address.length) != 0) {
-    if (errno != EINPROGRESS) {
-      return fail(error_text(errno));
+struct TcpSocket::Impl {
+  explicit Impl(std::shared_ptr<asio::io_context> shared)
+      : context(std::move(shared)), socket(*context) {}
+  std::shared_ptr<asio::io_context> context;  // outlives the socket
+  tcp::socket socket;
+};
+
+TcpSocket::TcpSocket() noexcept = default;
+TcpSocket::TcpSocket(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
+TcpSocket::TcpSocket(TcpSocket&& other) noexcept = default;
+TcpSocket& TcpSocket::operator=(TcpSocket&& other) noexcept = default;
+TcpSocket::~TcpSocket() = default;
+
+physics::Result<TcpSocket> TcpSocket::connect(const SocketContext& context,
+                                              const SocketAddress& address,
+                                              std::int64_t timeout_ns) {
+  return guarded("tcp", [&]() -> physics::Result<TcpSocket> {
+    auto impl = std::make_unique<Impl>(context.get());
+    const auto endpoint = to_endpoint<tcp::endpoint>(address);
+    error_code error;
+    open_ours(impl->socket, endpoint.protocol(), error);
+    if (error) {
+      return failure("", address, "socket: " + error_text(error.value()));
     }
-    pollfd wait{fd->get(), POLLOUT, 0};
-    const int ready =
-        ::poll(&wait, 1, static_cast<int>(std::min<std::int64_t>(timeout_ns / 1'000'000, INT_MAX)));
-    if (ready <= 0) {
-      return fail("no answer within the timeout");
+    bool ended = false;
+    impl->socket.async_connect(endpoint, [&](const error_code& result) {
+      ended = true;
+      error = result;
+    });
+    asio::io_context& reactor = *context.get();
+    reactor.restart();
+    reactor.run_for(std::chrono::nanoseconds(std::max<std::int64_t>(timeout_ns, 0)));
+    reactor.poll();  // looks once however short the time
+    if (!ended) {
+      // The handler holds references to this frame: it has to have run before we leave.
+      error_code ignored;
+      impl->socket.close(ignored);
+      reactor.restart();
+      reactor.run();
+      return failure("tcp ", address, "no answer within the timeout");
     }
-    int error = 0;
-    socklen_t length = sizeof(error);
-    ::getsockopt(fd->get(), SOL_SOCKET, SO_ERROR, &error, &length);
-    if (error != 0) {
-      return fail(error_text(error));
+    if (error) {
+      return failure("tcp ", address, error_text(error.value()));
+    }
+    wish(impl->socket, tcp::no_delay(true));
+    return TcpSocket(std::move(impl));
+  });
+}
+
+physics::Result<TcpSocket> TcpSocket::adopt(const SocketContext& context, int fd) {
+  return guarded("tcp", [&]() -> physics::Result<TcpSocket> {
+    auto impl = std::make_unique<Impl>(context.get());
+    error_code error;
+    impl->socket.assign(tcp::v4(), fd, error);
+    if (!error) {
+      make_ours(impl->socket, error);
+    }
+    if (error) {
+      error_code ignored;
+      impl->socket.release(ignored);
+      return make_error(ErrorCode::io, "tcp: " + error_text(error.value()));
+    }
+    return TcpSocket(std::move(impl));
+  });
+}
+
+int TcpSocket::fd() const noexcept {
+  return impl_ ? impl_->socket.native_handle() : -1;
+}
+
+void TcpSocket::close() noexcept {
+  impl_.reset();
+}
+
+void TcpSocket::shutdown_send() noexcept {
+  error_code ignored;
+  impl_->socket.shutdown(tcp::socket::shutdown_send, ignored);
+}
+
+IoResult TcpSocket::read_some(std::span<std::byte> space) noexcept {
+  if (space.empty()) {
+    return {IoStatus::failed, 0, ENOBUFS};  // Asio would report success without reading
+  }
+  error_code error;
+  const std::size_t bytes =
+      impl_->socket.read_some(asio::buffer(space.data(), space.size()), error);
+  return to_result(error, bytes);
+}
+
+IoResult TcpSocket::peek(std::span<std::byte> space) noexcept {
+  error_code error;
+  const std::size_t bytes = impl_->socket.receive(asio::buffer(space.data(), space.size()),
+                                                  tcp::socket::message_peek, error);
+  return to_result(error, bytes);
+}
+
+IoResult TcpSocket::write_some(std::span<const std::byte> bytes) noexcept {
+  error_code error;
+  const std::size_t sent =
+      impl_->socket.write_some(asio::buffer(bytes.data(), bytes.size()), error);
+  return to_result(error, sent);
+}
+
+IoResult TcpSocket::write_some(std::span<const std::span<const std::byte>> pieces) noexcept {
+  std::array<asio::const_buffer, kMaxPieces> buffers;
+  const std::size_t count = std::min(pieces.size(), buffers.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    buffers[i] = asio::const_buffer(pieces[i].data(), pieces[i].size());
+  }
+  error_code error;
+  const std::size_t sent =
+      impl_->socket.write_some(std::span<const asio::const_buffer>(buffers.data(), count), error);
+  return to_result(error, sent);
+}
+
+// TcpListener
+
+struct TcpListener::Impl {
+  explicit Impl(std::shared_ptr<asio::io_context> shared)
+      : context(std::move(shared)), acceptor(*context) {}
+  std::shared_ptr<asio::io_context> context;  // outlives the acceptor
+  tcp::acceptor acceptor;
+};
+
+TcpListener::TcpListener() noexcept = default;
+TcpListener::TcpListener(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
+TcpListener::TcpListener(TcpListener&& other) noexcept = default;
+TcpListener& TcpListener::operator=(TcpListener&& other) noexcept = default;
+TcpListener::~TcpListener() = default;
+
+physics::Result<TcpListener> TcpListener::open(const SocketContext& context,
+                                               const SocketAddress& address) {
+  return guarded("tcp", [&]() -> physics::Result<TcpListener> {
+    auto impl = std::make_unique<Impl>(context.get());
+    const auto endpoint = to_endpoint<tcp::endpoint>(address);
+    error_code error;
+    open_ours(impl->acceptor, endpoint.protocol(), error);
+    if (error) {
+      return failure("", address, "socket: " + error_text(error.value()));
+    }
+    wish(impl->acceptor, tcp::acceptor::reuse_address(true));
+    impl->acceptor.bind(endpoint, error);
+    if (!error) {
+      impl->acceptor.listen(kBacklog, error);
+    }
+    if (error) {
+      return failure("tcp ", address, error_text(error.value()));
+    }
+    return TcpListener(std::move(impl));
+  });
+}
+
+int TcpListener::fd() const noexcept {
+  return impl_ ? impl_->acceptor.native_handle() : -1;
+}
+
+SocketAddress TcpListener::local_address() const noexcept {
+  return impl_ ? local_address_of(impl_->acceptor) : SocketAddress{};
+}
+
+TcpSocket TcpListener::accept(SocketAddress& peer) {
+  auto accepted = std::make_unique<TcpSocket::Impl>(impl_->context);
+  tcp::endpoint endpoint;
+  error_code error;
+  impl_->acceptor.accept(accepted->socket, endpoint, error);
+  if (!error) {
+    make_ours(accepted->socket, error);
+  }
+  if (error) {
+    return {};
+  }
+  wish(accepted->socket, tcp::no_delay(true));
+  peer = from_endpoint(endpoint);
+  return TcpSocket(std::move(accepted));
+}
+
+// UdpSocket
+
+struct UdpSocket::Impl {
+  explicit Impl(std::shared_ptr<asio::io_context> shared)
+      : context(std::move(shared)), socket(*context) {}
+  std::shared_ptr<asio::io_context> context;  // outlives the socket
+  udp::socket socket;
+};
+
+UdpSocket::UdpSocket() noexcept = default;
+UdpSocket::UdpSocket(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
+UdpSocket::UdpSocket(UdpSocket&& other) noexcept = default;
+UdpSocket& UdpSocket::operator=(UdpSocket&& other) noexcept = default;
+UdpSocket::~UdpSocket() = default;
+
+physics::Result<UdpSocket> UdpSocket::open(const SocketContext& context,
+                                           const SocketAddress& address) {
+  return guarded("udp socket", [&]() -> physics::Result<UdpSocket> {
+    auto impl = std::make_unique<Impl>(context.get());
+    error_code error;
+    open_ours(impl->socket, to_endpoint<udp::endpoint>(address).protocol(), error);
+    if (error) {
+      return make_error(ErrorCode::io, "udp socket: " + error_text(error.value()));
+    }
+    return UdpSocket(std::move(impl));
+  });
+}
+
+physics::Result<UdpSocket> UdpSocket::open_bound(const SocketContext& context,
+                                                 const SocketAddress& address) {
+  auto socket = open(context, address);
+  if (socket) {
+    if (auto bound = socket->bind(address); !bound) {
+      return tl::unexpected<physics::Error>(std::move(bound.error()));
     }
   }
-  set_option(fd->get(), IPPROTO_TCP, TCP_NODELAY, 1);
-  return fd;
+  return socket;
 }
 
-SocketAddress local_address(int fd) noexcept {
-  SocketAddress address;
-  address.length = sizeof(address.storage);
-  if (::getsockname(fd, address.get(), &address.length) != 0) {
-    address.length = 0;
+physics::Result<void> UdpSocket::bind(const SocketAddress& address) {
+  error_code error;
+  impl_->socket.bind(to_endpoint<udp::endpoint>(address), error);
+  if (error) {
+    return failure("udp ", address, error_text(error.value()));
   }
-  return address;
+  return {};
 }
 
-std::string to_string(const SocketAddress& address) {
-  std::array<char, NI_MAXHOST> host{};
-  if (::getnameinfo(address.get(), address.length, host.data(), host.size(), nullptr, 0,
-                    NI_NUMERICHOST) != 0) {
-    return "unknown address";
+physics::Result<void> UdpSocket::connect(const SocketAddress& address) {
+  error_code error;
+  impl_->socket.connect(to_endpoint<udp::endpoint>(address), error);
+  if (error) {
+    return failure("udp ", address, error_text(error.value()));
   }
-  const bool v6 = address.storage.ss_family == AF_INET6;
-  return fmt::format("{}{}{}:{}", v6 ? "[" : "", host.data(), v6 ? "]" : "", address.port());
+  return {};
 }
 
-std::string error_text(int error) {
-  return std::generic_category().message(error);
+int UdpSocket::fd() const noexcept {
+  return impl_ ? impl_->socket.native_handle() : -1;
 }
 
-std::uint64_t set_receive_buffer(int fd, std::uint64_t bytes) noexcept {
-  const int wanted = static_cast<int>(std::min<std::uint64_t>(bytes, INT_MAX / 2));
-  if (::setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof(wanted)) != 0) {
-    set_option(fd, SOL_SOCKET, SO_RCVBUF, wanted);
+SocketAddress UdpSocket::local_address() const noexcept {
+  return impl_ ? local_address_of(impl_->socket) : SocketAddress{};
+}
+
+IoResult UdpSocket::receive(std::span<std::byte> space) noexcept {
+  error_code error;
+  const std::size_t bytes =
+      impl_->socket.receive(asio::buffer(space.data(), space.size()), 0, error);
+  return to_result(error, bytes);
+}
+
+IoResult UdpSocket::send(std::span<const std::byte> bytes) noexcept {
+  error_code error;
+  const std::size_t sent = impl_->socket.send(asio::buffer(bytes.data(), bytes.size()), 0, error);
+  return to_result(error, sent);
+}
+
+IoResult UdpSocket::send_to(std::span<const std::byte> bytes,
+                            const SocketAddress& target) noexcept {
+  error_code error;
+  const std::size_t sent = impl_->socket.send_to(asio::buffer(bytes.data(), bytes.size()),
+                                                 to_endpoint<udp::endpoint>(target), 0, error);
+  return to_result(error, sent);
+}
+
+void UdpSocket::allow_shared_port() noexcept {
+  wish(impl_->socket, udp::socket::reuse_address(true));
+}
+
+int UdpSocket::join_group(const SocketAddress& group) noexcept {
+  error_code error;
+  impl_->socket.set_option(
+      asio::ip::multicast::join_group(to_endpoint<udp::endpoint>(group).address()), error);
+  return error.value();
+}
+
+void UdpSocket::set_multicast_hops(int hops) noexcept {
+  wish(impl_->socket, asio::ip::multicast::hops(std::clamp(hops, 0, 255)));
+}
+
+std::uint64_t UdpSocket::set_receive_buffer(std::uint64_t bytes) noexcept {
+  error_code error;
+  impl_->socket.set_option(IntOption(SOL_SOCKET, SO_RCVBUFFORCE, buffer_size(bytes)), error);
+  if (error) {
+    wish(impl_->socket, udp::socket::receive_buffer_size(buffer_size(bytes)));
   }
-  int granted = 0;
-  socklen_t length = sizeof(granted);
-  ::getsockopt(fd, SOL_SOCKET, SO_RCVBUF, &granted, &length);
-  return static_cast<std::uint64_t>(granted) / 2;
+  // Asio halves what the kernel reports.
+  udp::socket::receive_buffer_size granted;
+  impl_->socket.get_option(granted, error);
+  return error ? 0 : static_cast<std::uint64_t>(granted.value());
 }
 
-void set_send_buffer(int fd, std::uint64_t bytes) noexcept {
-  const int wanted = static_cast<int>(std::min<std::uint64_t>(bytes, INT_MAX / 2));
-  if (::setsockopt(fd, SOL_SOCKET, SO_SNDBUFFORCE, &wanted, sizeof(wanted)) != 0) {
-    set_option(fd, SOL_SOCKET, SO_SNDBUF, wanted);
+void UdpSocket::set_send_buffer(std::uint64_t bytes) noexcept {
+  error_code error;
+  impl_->socket.set_option(IntOption(SOL_SOCKET, SO_SNDBUFFORCE, buffer_size(bytes)), error);
+  if (error) {
+    wish(impl_->socket, udp::socket::send_buffer_size(buffer_size(bytes)));
   }
 }
 
-void set_option(int fd, int level, int name, int value) noexcept {
-  // Options are wishes: what the kernel refuses shows in what the caller reads back.
-  static_cast<void>(::setsockopt(fd, level, name, &value, sizeof(value)));
+void UdpSocket::set_option(int level, int name, int value) noexcept {
+  wish(impl_->socket, IntOption(level, name, value));
 }
 
 }  // namespace emit::server

@@ -1,61 +1,152 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <sys/socket.h>
-
+#include <cstddef>
 #include <cstdint>
-#include <string>
-#include <string_view>
+#include <memory>
+#include <span>
 
 #include "emit/physics/error.hpp"
-#include "rt/fd.hpp"
+#include "io/socket_address.hpp"
 
-/// Sockets as emitd uses them: non-blocking, close-on-exec. Setup only unless noted.
+namespace boost::asio {
+class io_context;
+}
+
+/// Sockets as emitd uses them: Boost.Asio's, non-blocking and close-on-exec, used synchronously.
+/// Nothing here starts a thread or throws. Who has to wait does so with poll or epoll on fd(), so
+/// that one wait covers sockets and doorbells alike and allocates nothing.
+///
+/// Boost's headers stay in the .cpp files. Opening, accepting and closing allocate; reading,
+/// writing and the options are RT-safe.
 namespace emit::server {
 
-struct SocketAddress {
-  sockaddr_storage storage{};
-  socklen_t length = 0;
-
-  [[nodiscard]] const sockaddr* get() const noexcept {
-    return reinterpret_cast<const sockaddr*>(&storage);
+/// What Asio keeps beside the sockets; each socket keeps it alive. Thread: any.
+class SocketContext {
+ public:
+  SocketContext();
+  [[nodiscard]] const std::shared_ptr<boost::asio::io_context>& get() const noexcept {
+    return context_;
   }
-  [[nodiscard]] sockaddr* get() noexcept { return reinterpret_cast<sockaddr*>(&storage); }
-  [[nodiscard]] std::uint16_t port() const noexcept;
-  void set_port(std::uint16_t port) noexcept;
+
+ private:
+  std::shared_ptr<boost::asio::io_context> context_;
 };
 
-struct HostPort {
-  std::string host;
-  std::uint16_t port = 0;
+enum class IoStatus : std::uint8_t { done, would_block, closed, failed };
+struct IoResult {
+  IoStatus status = IoStatus::done;
+  std::size_t bytes = 0;
+  int error = 0;  ///< errno of failed
 };
-/// "host:port", IPv6 hosts in brackets; an empty host is every address of this machine.
-/// Errors (config), naming the text.
-[[nodiscard]] physics::Result<HostPort> parse_host_port(std::string_view text);
 
-/// First address of a name. Errors (io), naming host and reason.
-[[nodiscard]] physics::Result<SocketAddress> resolve(const HostPort& where, int socket_type,
-                                                     bool passive);
+/// Connected stream. Thread: one owner; in addition, another thread may write while the owner
+/// reads: Asio's synchronous send and receive only read what the object holds.
+class TcpSocket {
+ public:
+  TcpSocket() noexcept;  ///< closed
+  TcpSocket(TcpSocket&& other) noexcept;
+  TcpSocket& operator=(TcpSocket&& other) noexcept;
+  ~TcpSocket();
 
-/// An address in numbers, without asking a name service; length 0 when it is none.
-[[nodiscard]] SocketAddress numeric_address(const std::string& host, std::uint16_t port) noexcept;
+  /// Waits up to `timeout_ns` for the connection. Errors: io, naming the address. No other socket
+  /// of `context` may be connecting.
+  [[nodiscard]] static physics::Result<TcpSocket> connect(const SocketContext& context,
+                                                          const SocketAddress& address,
+                                                          std::int64_t timeout_ns);
+  /// Takes over a connected stream descriptor. Errors: io; the descriptor stays the
+  /// caller's then.
+  [[nodiscard]] static physics::Result<TcpSocket> adopt(const SocketContext& context, int fd);
 
-/// Errors (io): address in use and so on, naming the address.
-[[nodiscard]] physics::Result<Fd> open_udp_bound(const SocketAddress& address);
-[[nodiscard]] physics::Result<Fd> open_tcp_listener(const SocketAddress& address);
-/// Waits up to `timeout_ns` for the connection.
-[[nodiscard]] physics::Result<Fd> connect_tcp(const SocketAddress& address,
-                                              std::int64_t timeout_ns);
+  [[nodiscard]] explicit operator bool() const noexcept { return impl_ != nullptr; }
+  /// -1 when closed.
+  [[nodiscard]] int fd() const noexcept;
+  void close() noexcept;
+  void shutdown_send() noexcept;
 
-[[nodiscard]] SocketAddress local_address(int fd) noexcept;
-/// "host:port", numeric.
-[[nodiscard]] std::string to_string(const SocketAddress& address);
-/// Text of an errno. Thread: any.
-[[nodiscard]] std::string error_text(int error);
+  [[nodiscard]] IoResult read_some(std::span<std::byte> space) noexcept;
+  /// Like read_some, but what is read stays in the socket.
+  [[nodiscard]] IoResult peek(std::span<std::byte> space) noexcept;
+  [[nodiscard]] IoResult write_some(std::span<const std::byte> bytes) noexcept;
+  /// Up to kMaxPieces pieces in one system call.
+  [[nodiscard]] IoResult write_some(std::span<const std::span<const std::byte>> pieces) noexcept;
+  static constexpr std::size_t kMaxPieces = 4;
 
-/// Asks for a receive buffer; past the system's limit where privileges allow. Returns the bytes
-/// granted, in the unit of net.core.rmem_max (the kernel books twice that).
-std::uint64_t set_receive_buffer(int fd, std::uint64_t bytes) noexcept;
-void set_send_buffer(int fd, std::uint64_t bytes) noexcept;
-void set_option(int fd, int level, int name, int value) noexcept;
+ private:
+  friend class TcpListener;
+  struct Impl;
+  explicit TcpSocket(std::unique_ptr<Impl> impl) noexcept;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Thread: one owner.
+class TcpListener {
+ public:
+  TcpListener() noexcept;  ///< closed
+  TcpListener(TcpListener&& other) noexcept;
+  TcpListener& operator=(TcpListener&& other) noexcept;
+  ~TcpListener();
+
+  /// Errors (io): address in use and so on, naming the address.
+  [[nodiscard]] static physics::Result<TcpListener> open(const SocketContext& context,
+                                                         const SocketAddress& address);
+  [[nodiscard]] int fd() const noexcept;
+  [[nodiscard]] SocketAddress local_address() const noexcept;
+  /// Next connection; closed when there is none now. Throws std::bad_alloc.
+  [[nodiscard]] TcpSocket accept(SocketAddress& peer);
+
+ private:
+  struct Impl;
+  explicit TcpListener(std::unique_ptr<Impl> impl) noexcept;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Thread: one owner.
+class UdpSocket {
+ public:
+  UdpSocket() noexcept;  ///< closed
+  UdpSocket(UdpSocket&& other) noexcept;
+  UdpSocket& operator=(UdpSocket&& other) noexcept;
+  ~UdpSocket();
+
+  /// Of the family of `address`. Errors: io.
+  [[nodiscard]] static physics::Result<UdpSocket> open(const SocketContext& context,
+                                                       const SocketAddress& address);
+  /// open() and bind().
+  [[nodiscard]] static physics::Result<UdpSocket> open_bound(const SocketContext& context,
+                                                             const SocketAddress& address);
+  /// Errors (io), naming the address.
+  [[nodiscard]] physics::Result<void> bind(const SocketAddress& address);
+  /// Fixes the peer. Errors (io), naming the address.
+  [[nodiscard]] physics::Result<void> connect(const SocketAddress& address);
+
+  [[nodiscard]] explicit operator bool() const noexcept { return impl_ != nullptr; }
+  /// For the calls with control messages that Asio has no functions for. -1 when closed.
+  [[nodiscard]] int fd() const noexcept;
+  [[nodiscard]] SocketAddress local_address() const noexcept;
+
+  [[nodiscard]] IoResult receive(std::span<std::byte> space) noexcept;
+  [[nodiscard]] IoResult send(std::span<const std::byte> bytes) noexcept;
+  [[nodiscard]] IoResult send_to(std::span<const std::byte> bytes,
+                                 const SocketAddress& target) noexcept;
+
+  /// Several sockets may bind the port: wanted for multicast.
+  void allow_shared_port() noexcept;
+  /// Joins on the default interface. Returns 0 or an errno.
+  [[nodiscard]] int join_group(const SocketAddress& group) noexcept;
+  /// 0 to 255.
+  void set_multicast_hops(int hops) noexcept;
+  /// Asks for a receive buffer; past the system's limit where privileges allow. Returns the bytes
+  /// granted, in the unit of net.core.rmem_max (the kernel books twice that).
+  std::uint64_t set_receive_buffer(std::uint64_t bytes) noexcept;
+  void set_send_buffer(std::uint64_t bytes) noexcept;
+  /// An option of the system that Asio has no name for. A wish: what the kernel refuses shows in
+  /// what the caller reads back.
+  void set_option(int level, int name, int value) noexcept;
+
+ private:
+  struct Impl;
+  explicit UdpSocket(std::unique_ptr<Impl> impl) noexcept;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace emit::server

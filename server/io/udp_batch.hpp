@@ -13,7 +13,8 @@
 namespace emit::server {
 
 /// Sends consecutive fragments of a frame from the caller's pixel memory: many per system call, by
-/// generic segmentation offload where the kernel and the path's MTU allow it, else sendmmsg.
+/// generic segmentation offload where the kernel and the path's MTU allow it, else sendmmsg. Works
+/// on the native descriptor of a UdpSocket: Asio knows neither control messages nor sendmmsg.
 /// Thread: one owner; shared by all clients of it. Real time: RT-safe after construction.
 class UdpBatch {
  public:

@@ -7,7 +7,6 @@
 #include <sys/uio.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 
 namespace emit::server {
@@ -20,27 +19,15 @@ constexpr int UDP_GRO = 104;
 using physics::ErrorCode;
 using physics::make_error;
 
-bool join_group(int fd, const SocketAddress& group) noexcept {
-  if (group.storage.ss_family == AF_INET) {
-    sockaddr_in v4{};
-    std::memcpy(&v4, &group.storage, sizeof(v4));
-    ip_mreq request{};
-    request.imr_multiaddr = v4.sin_addr;
-    return ::setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &request, sizeof(request)) == 0;
-  }
-  sockaddr_in6 v6{};
-  std::memcpy(&v6, &group.storage, sizeof(v6));
-  ipv6_mreq request{};
-  request.ipv6mr_multiaddr = v6.sin6_addr;
-  return ::setsockopt(fd, IPPROTO_IPV6, IPV6_ADD_MEMBERSHIP, &request, sizeof(request)) == 0;
-}
-
 }  // namespace
 
-UdpFrameReceiver::UdpFrameReceiver(Fd fd)
-    : fd_(std::move(fd)), data_(kBatch * kDatagramBytes), control_(kBatch * kControlBytes) {}
+UdpFrameReceiver::UdpFrameReceiver(UdpSocket socket)
+    : socket_(std::move(socket)),
+      data_(kBatch * kDatagramBytes),
+      control_(kBatch * kControlBytes) {}
 
-physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketAddress& peer,
+physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketContext& context,
+                                                         const SocketAddress& peer,
                                                          const SubscribeOptions& options) {
   const bool multicast = !options.multicast_group.empty();
   SocketAddress any;
@@ -53,29 +40,31 @@ physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketAddress& pe
   } else {
     any = numeric_address(peer.storage.ss_family == AF_INET6 ? "::" : "0.0.0.0", options.udp_port);
   }
-  Fd fd(::socket(any.storage.ss_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (!fd) {
-    return make_error(ErrorCode::io, "udp socket: " + error_text(errno));
+  auto socket = UdpSocket::open(context, any);
+  if (!socket) {
+    return tl::unexpected<physics::Error>(std::move(socket.error()));
   }
   if (multicast) {
-    set_option(fd.get(), SOL_SOCKET, SO_REUSEADDR, 1);
+    socket->allow_shared_port();
   }
-  if (::bind(fd.get(), any.get(), any.length) != 0) {
-    return make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(any), error_text(errno)));
+  if (auto bound = socket->bind(any); !bound) {
+    return tl::unexpected<physics::Error>(std::move(bound.error()));
   }
-  if (multicast && !join_group(fd.get(), any)) {
-    return make_error(ErrorCode::io,
-                      fmt::format("joining {}: {}", options.multicast_group, error_text(errno)));
+  if (multicast) {
+    if (const int error = socket->join_group(any); error != 0) {
+      return make_error(ErrorCode::io,
+                        fmt::format("joining {}: {}", options.multicast_group, error_text(error)));
+    }
   }
-  set_option(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, 1);
-  set_option(fd.get(), SOL_UDP, UDP_GRO, 1);
-  return UdpFrameReceiver(std::move(fd));
+  socket->set_option(SOL_SOCKET, SO_RXQ_OVFL, 1);
+  socket->set_option(SOL_UDP, UDP_GRO, 1);
+  return UdpFrameReceiver(std::move(*socket));
 }
 
 void UdpFrameReceiver::size_buffer(std::uint64_t frame_bytes) {
   constexpr std::uint64_t kFrames = 8;  // at least 4 are needed; the rest is headroom
   buffer_bytes_ =
-      set_receive_buffer(fd_.get(), std::max<std::uint64_t>(kFrames * frame_bytes, 1u << 20));
+      socket_.set_receive_buffer(std::max<std::uint64_t>(kFrames * frame_bytes, 1u << 20));
 }
 
 int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& counters) {
@@ -88,7 +77,8 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
     messages[i].msg_hdr.msg_control = control_.data() + i * kControlBytes;
     messages[i].msg_hdr.msg_controllen = kControlBytes;
   }
-  const int count = ::recvmmsg(fd_.get(), messages.data(), kBatch, MSG_DONTWAIT, nullptr);
+  // Natively: Asio knows neither many messages per call nor control messages (drops, UDP_GRO).
+  const int count = ::recvmmsg(socket_.fd(), messages.data(), kBatch, MSG_DONTWAIT, nullptr);
   for (int i = 0; i < count; ++i) {
     const auto index = static_cast<std::size_t>(i);
     msghdr& message = messages[index].msg_hdr;

@@ -15,11 +15,12 @@ namespace emit::server {
 class UdpFrameReceiver {
  public:
   /// Errors (io).
-  [[nodiscard]] static physics::Result<UdpFrameReceiver> open(const SocketAddress& peer,
+  [[nodiscard]] static physics::Result<UdpFrameReceiver> open(const SocketContext& context,
+                                                              const SocketAddress& peer,
                                                               const SubscribeOptions& options);
 
-  [[nodiscard]] int fd() const noexcept { return fd_.get(); }
-  [[nodiscard]] std::uint16_t port() const noexcept { return local_address(fd_.get()).port(); }
+  [[nodiscard]] int fd() const noexcept { return socket_.fd(); }
+  [[nodiscard]] std::uint16_t port() const noexcept { return socket_.local_address().port(); }
   [[nodiscard]] std::uint64_t buffer_bytes() const noexcept { return buffer_bytes_; }
   /// Asks for room for `frames` frames of `frame_bytes`.
   void size_buffer(std::uint64_t frame_bytes);
@@ -32,9 +33,9 @@ class UdpFrameReceiver {
   static constexpr std::size_t kDatagramBytes = 65536;
   static constexpr std::size_t kControlBytes = 64;
 
-  explicit UdpFrameReceiver(Fd fd);
+  explicit UdpFrameReceiver(UdpSocket socket);
 
-  Fd fd_;
+  UdpSocket socket_;
   std::uint64_t buffer_bytes_ = 0;
   std::uint32_t drops_seen_ = 0;
   std::vector<std::byte> data_;

@@ -47,7 +47,6 @@ class SlotPolicy {
     filled_ = true;
     return has_image_ ? SlotEnd::repeat : SlotEnd::no_image;
   }
-  [[nodiscard]] bool in_work() const noexcept { return in_work_; }
 
   /// A new run: images of the old one are never repeated.
   void reset() noexcept {

@@ -113,6 +113,7 @@ PoseSample PoseTrack::sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) 
       out.shown_ns = last.sim_time_ns + horizon_ns;
     }
     out.extrapolated = out.shown_ns > last.sim_time_ns;
+    out.base_ns = last.sim_time_ns;
     const double dt_s = seconds(last.sim_time_ns, out.shown_ns);
     const Motion motion = motion_at_newest();
     out.pose.position_world_m =
@@ -126,10 +127,12 @@ PoseSample PoseTrack::sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) 
     const TimedPose& to = at(i);
     if (to.sim_time_ns == sim_time_ns || i == 0) {
       out.pose = to.pose;
+      out.base_ns = to.sim_time_ns;
       return out;
     }
     const TimedPose& from = at(i - 1);
     if (from.sim_time_ns <= sim_time_ns) {
+      out.base_ns = from.sim_time_ns;
       out.pose = to.teleport ? from.pose
                              : physics::interpolate(from.pose, to.pose,
                                                     seconds(from.sim_time_ns, sim_time_ns) /

@@ -21,8 +21,11 @@ struct PoseSample {
   physics::Pose pose;
   std::int64_t newest_ns = 0;  ///< time stamp of the newest pose known
   std::int64_t shown_ns = 0;   ///< instant the pose stands for: the one asked for, or the clamp
-  bool extrapolated = false;   ///< shown_ns lies beyond newest_ns
-  bool stale = false;          ///< asked for more than the horizon beyond newest_ns
+  /// Time stamp of the received pose that this one starts from: the last one at or before shown_ns,
+  /// before all of them the oldest. What jumped no later than this has jumped in `pose`.
+  std::int64_t base_ns = 0;
+  bool extrapolated = false;  ///< shown_ns lies beyond newest_ns
+  bool stale = false;         ///< asked for more than the horizon beyond newest_ns
 };
 
 /// Recent poses of one body, and where it is at an instant.

@@ -44,6 +44,12 @@ class RunControl {
     return false;
   }
 
+  /// A new run of the host: stop and hold stay, instants of the old run mean nothing any more.
+  void new_run() noexcept {
+    held_thermal_ns_.reset();
+    last_thermal_ns_.reset();
+  }
+
   [[nodiscard]] bool running() const noexcept { return running_; }
   [[nodiscard]] bool held() const noexcept { return held_; }
   [[nodiscard]] bool step_pending() const noexcept { return steps_ > 0; }

@@ -15,7 +15,10 @@ namespace emit::server {
   X(host_frames_missing, "host frame numbers that never arrived")                    \
   X(host_frames_unused, "host frames accepted while stopped")                        \
   X(host_os_drops, "host datagrams dropped by the kernel for want of buffer space")  \
+  X(host_frames_old_run, "host frames refused: of a run that was replaced")          \
   X(host_epochs, "restarts of the host seen by a new run id")                        \
+  X(weather_coalesced, "weather changes replaced by a newer one before any frame")   \
+  X(weather_lost, "weather changes the source had no room for")                      \
   X(commands, "control commands taken")                                              \
   X(refused_wrong_version, "messages refused: wrong version")                        \
   X(refused_oversize, "messages refused: too large")                                 \

@@ -74,11 +74,11 @@ std::unique_ptr<Log> make_log(std::function<void(const std::string&)> sink) {
   return std::make_unique<FunctionLog>(std::move(sink));
 }
 
-bool DistinctTable::note(const std::string& text, std::int64_t now_ns) {
-  if (entries_.size() >= kMaxEntries && entries_.find(text) == entries_.end()) {
-    return true;
-  }
-  Entry& entry = entries_[text];
+std::string DistinctTable::note(const std::string& text, std::int64_t now_ns) {
+  // Peers choose part of the text: once the table is full, what is new shares one entry.
+  const bool fits = entries_.size() < kMaxEntries || entries_.find(text) != entries_.end();
+  const std::string line = fits ? text : std::string(kOverflowText);
+  Entry& entry = entries_[line];
   if (entry.count == 0) {
     entry.first_ns = now_ns;
   }
@@ -88,7 +88,10 @@ bool DistinctTable::note(const std::string& text, std::int64_t now_ns) {
   while (power < entry.count) {
     power *= 10;
   }
-  return power == entry.count;
+  if (power != entry.count) {
+    return {};
+  }
+  return entry.count > 1 ? fmt::format("{} repeats={}", line, entry.count) : line;
 }
 
 namespace {
@@ -175,6 +178,13 @@ EventText describe(const Event& event) {
               false};
     case EventKind::slots_missed:
       return {LogLevel::warn, fmt::format("event=slots_missed count={}", event.a), true};
+    case EventKind::weather_lost:
+      return {LogLevel::error,
+              fmt::format("event=weather_lost sim_time_ns={} effect=\"the host's weather no longer "
+                          "changes in this run\" remedy=\"reset the run, or send weather less "
+                          "often\"",
+                          static_cast<std::int64_t>(event.a)),
+              false};
   }
   return {LogLevel::error, "event=unknown", true};
 }

@@ -43,6 +43,7 @@ class Log {
 
 /// Keeps each distinct warning once with a count, so that a storm of bad datagrams is two lines in
 /// the log and not a million: one is written when it first happens, again at 10, 100, 1000, ...
+/// Holds kMaxEntries; further ones count as one warning, kOverflowText.
 class DistinctTable {
  public:
   struct Entry {
@@ -50,12 +51,15 @@ class DistinctTable {
     std::int64_t first_ns = 0;
     std::int64_t last_ns = 0;
   };
-  /// True when this occurrence is to be written.
-  [[nodiscard]] bool note(const std::string& text, std::int64_t now_ns);
+  static constexpr std::size_t kMaxEntries = 256;
+  static constexpr std::string_view kOverflowText =
+      "event=warnings_not_written effect=\"too many distinct ones; see the counters\"";
+
+  /// The line to write for this occurrence; empty: none.
+  [[nodiscard]] std::string note(const std::string& text, std::int64_t now_ns);
   [[nodiscard]] const std::map<std::string, Entry>& entries() const noexcept { return entries_; }
 
  private:
-  static constexpr std::size_t kMaxEntries = 256;
   std::map<std::string, Entry> entries_;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shipped scenarios against stored images. The references belong to Mesa llvmpipe: on another device
-// the comparison is skipped. EMIT_UPDATE_GOLDENS=1 rewrites them (deploy/scripts/update_goldens.sh).
+// Shipped scenarios against stored images. The references belong to Mesa llvmpipe: on another
+// device the comparison is skipped. EMIT_UPDATE_GOLDENS=1 rewrites them
+// (deploy/scripts/update_goldens.sh).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,8 +18,8 @@ namespace emit::test {
 namespace {
 
 /// Tolerances: a pixel counts as off beyond abs + rel |reference|. Temperatures repeat to float32
-/// rounding on one machine; 10 mK leaves room for another vector width. `allowed_frac` pixels may be
-/// off because an edge fell on the other side of a pixel or a shadow texel.
+/// rounding on one machine; 10 mK leaves room for another vector width. `allowed_frac` pixels may
+/// be off because an edge fell on the other side of a pixel or a shadow texel.
 struct Tolerance {
   double abs;
   double rel;
@@ -31,7 +32,9 @@ struct Case {
   const char* scenario;
   double time_s;
 };
-void PrintTo(const Case& c, std::ostream* out) { *out << c.scenario; }
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.scenario;
+}
 
 class Golden : public testing::TestWithParam<Case> {};
 
@@ -60,9 +63,9 @@ TEST_P(Golden, matches_the_stored_image) {
   const auto [name, time_s] = GetParam();
   const std::vector<std::string> overrides = {"sensor.width_px=320", "sensor.height_px=256",
                                               "thermal.steps=13"};
-  auto scenario = config::load_scenario(std::filesystem::path(EMIT_TEST_SHARE_DIR) / "scenarios" /
-                                            (std::string(name) + ".toml"),
-                                        overrides);
+  auto scenario = config::load_scenario(
+      std::filesystem::path(EMIT_TEST_SHARE_DIR) / "scenarios" / (std::string(name) + ".toml"),
+      overrides);
   ASSERT_TRUE(scenario) << scenario.error().text;
   renderer::OutputOptions output;
   output.temperature = true;
@@ -83,8 +86,8 @@ TEST_P(Golden, matches_the_stored_image) {
   image.height_px = frame.height_px;
   image.add("radiance", frame.radiance_w_m2_sr[0]);
   image.add("temperature", frame.temperature_k);
-  const std::filesystem::path file =
-      std::filesystem::path(EMIT_TEST_SOURCE_DIR) / "golden" / "refs" / (std::string(name) + ".exr");
+  const std::filesystem::path file = std::filesystem::path(EMIT_TEST_SOURCE_DIR) / "golden" /
+                                     "refs" / (std::string(name) + ".exr");
   if (std::getenv("EMIT_UPDATE_GOLDENS") != nullptr) {
     const auto written = image::write_exr(file, image);
     ASSERT_TRUE(written) << written.error().text;
@@ -98,7 +101,8 @@ TEST_P(Golden, matches_the_stored_image) {
   compare(image, *reference, "temperature", kTemperatureK);
   compare(image, *reference, "radiance", kRadianceWPerM2Sr);
   if (HasFailure()) {
-    const auto failed = std::filesystem::path(testing::TempDir()) / (std::string(name) + "_failed.exr");
+    const auto failed =
+        std::filesystem::path(testing::TempDir()) / (std::string(name) + "_failed.exr");
     if (image::write_exr(failed, image)) std::printf("wrote %s\n", failed.c_str());
   }
 }

@@ -30,9 +30,8 @@ std::vector<Quad> box(const glm::dvec3& l, const glm::dvec3& h) {
 
 std::filesystem::path write_quads(const std::string& name, const std::vector<Quad>& quads) {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / "emit_renderer" /
-      (std::string(info->test_suite_name()) + "." + info->name());
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "emit_renderer" /
+                                       (std::string(info->test_suite_name()) + "." + info->name());
   std::filesystem::create_directories(folder);
 
   std::vector<float> positions;
@@ -49,11 +48,12 @@ std::filesystem::path write_quads(const std::string& name, const std::vector<Qua
   binary.write(reinterpret_cast<const char*>(positions.data()),
                static_cast<std::streamsize>(bytes));
   std::ofstream json(folder / (name + ".gltf"));
-  json << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-       << R"("materials":[{"name":"surface"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},)"
-       << R"("material":0}]}],"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":)"
-       << positions.size() / 3 << R"(}],"bufferViews":[{"buffer":0,"byteLength":)" << bytes
-       << R"(}],"buffers":[{"byteLength":)" << bytes << R"(,"uri":")" << name << R"(.bin"}]})";
+  json
+      << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      << R"("materials":[{"name":"surface"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},)"
+      << R"("material":0}]}],"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":)"
+      << positions.size() / 3 << R"(}],"bufferViews":[{"buffer":0,"byteLength":)" << bytes
+      << R"(}],"buffers":[{"byteLength":)" << bytes << R"(,"uri":")" << name << R"(.bin"}]})";
   return folder / (name + ".gltf");
 }
 

@@ -50,7 +50,9 @@ class Scene {
     EXPECT_GE(slot, 0);
     const auto& view = renderer_->collect(static_cast<renderer::SlotIndex>(slot));
     EXPECT_FALSE(view.device_failed);
-    const auto copy = [](std::span<const float> s) { return std::vector<float>(s.begin(), s.end()); };
+    const auto copy = [](std::span<const float> s) {
+      return std::vector<float>(s.begin(), s.end());
+    };
     Rendered out{copy(view.radiance_w_m2_sr[0]), copy(view.temperature_k), copy(view.depth_m),
                  copy(view.object_id), view.stats};
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
@@ -68,10 +70,9 @@ physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
 }
 
 glm::dvec3 sun_at(const scene::ScenarioDesc& s, std::int64_t sim_time_ns) {
-  return physics::sun_position(s.epoch_utc_ns + sim_time_ns,
-                               {physics::Radians(s.place.lat_rad),
-                                physics::Radians(s.place.lon_rad),
-                                physics::Metres(s.place.height_m)})
+  return physics::sun_position(s.epoch_utc_ns + sim_time_ns, {physics::Radians(s.place.lat_rad),
+                                                              physics::Radians(s.place.lon_rad),
+                                                              physics::Metres(s.place.height_m)})
       .direction_enu;
 }
 
@@ -112,8 +113,8 @@ TEST(RendererGeometry, the_first_row_is_the_top_of_the_image) {
   auto scenario = instant_scenario(write_quads("plane", {ground(500.0, 500.0)}));
   Scene scene(scenario);
   const auto frame = scene.render(looking({0.0, 0.0, 2.0}, {0.0, 100.0, 2.0}), kHourNs);
-  EXPECT_TRUE(std::isinf(frame.depth_m[10 * 320 + 160]));   // sky above
-  EXPECT_LT(frame.depth_m[250 * 320 + 160], 10.0F);         // ground below
+  EXPECT_TRUE(std::isinf(frame.depth_m[10 * 320 + 160]));  // sky above
+  EXPECT_LT(frame.depth_m[250 * 320 + 160], 10.0F);        // ground below
   EXPECT_TRUE(std::isnan(frame.temperature_k[10 * 320 + 160]));
 }
 
@@ -223,9 +224,10 @@ TEST(RendererShadow, a_parked_caster_that_left_leaves_a_cool_print) {
   const glm::dquat north = physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0);
   truck.instances = {{glm::dvec3(0.0), north}};
   const std::int64_t left_ns = 3 * kHourNs - 60'000'000'000;
-  truck.trajectory = {{0, {glm::dvec3(0.0), north}, true, false},
-                      {left_ns, {glm::dvec3(0.0), north}, true, false},
-                      {left_ns + 10'000'000'000, {glm::dvec3(0.0, 100.0, 0.0), north}, true, false}};
+  truck.trajectory = {
+      {0, {glm::dvec3(0.0), north}, true, false},
+      {left_ns, {glm::dvec3(0.0), north}, true, false},
+      {left_ns + 10'000'000'000, {glm::dvec3(0.0, 100.0, 0.0), north}, true, false}};
   scenario.objects.push_back(truck);
   Scene scene(scenario);
   const auto pose = looking({0.0, 0.0, 20.0}, {0.0, 0.0, 0.0});
@@ -346,9 +348,9 @@ double sky_frac(double temperature_k) {
 TEST(RendererObscurance, concave_is_below_flat_is_below_convex) {
   // A step up at x = 0 and a drop at x = 2, seen from above.
   std::vector<Quad> quads = {
-      {{-10, -10, 1}, {0, -10, 1}, {0, 10, 1}, {-10, 10, 1}},   // upper floor
-      {{0, -10, 0}, {0, 10, 0}, {0, 10, 1}, {0, -10, 1}},       // its wall, facing east
-      {{0, -10, 0}, {10, -10, 0}, {10, 10, 0}, {0, 10, 0}}};    // lower floor
+      {{-10, -10, 1}, {0, -10, 1}, {0, 10, 1}, {-10, 10, 1}},  // upper floor
+      {{0, -10, 0}, {0, 10, 0}, {0, 10, 1}, {0, -10, 1}},      // its wall, facing east
+      {{0, -10, 0}, {10, -10, 0}, {10, 10, 0}, {0, 10, 0}}};   // lower floor
   auto scenario = obscurance_scenario(quads, 0.5);
   Scene scene(scenario);
   const auto pose = looking({0.0, 0.0, 9.0}, {0.0, 0.0, 0.0});
@@ -382,14 +384,14 @@ TEST(RendererObscurance, a_tilted_plane_is_flat) {
 }
 
 TEST(RendererObscurance, follows_the_open_volume_of_a_ball_beside_a_wall_and_a_drop) {
-  // Open share of a ball whose centre lies on flat ground at s = u R from an infinite wall (concave)
-  // or a drop (convex): the wall takes half of the spherical cap beyond it, the drop opens it. The
-  // wall is taller than the ball, but not so tall that its top counts as something else in front.
+  // Open share of a ball whose centre lies on flat ground at s = u R from an infinite wall
+  // (concave) or a drop (convex): the wall takes half of the spherical cap beyond it, the drop
+  // opens it. The wall is taller than the ball, but not so tall that its top counts as something
+  // else in front.
   const double radius_m = 1.0;
-  std::vector<Quad> quads = {
-      {{-10, -10, 1.5}, {0, -10, 1.5}, {0, 10, 1.5}, {-10, 10, 1.5}},
-      {{0, -10, 0}, {0, 10, 0}, {0, 10, 1.5}, {0, -10, 1.5}},
-      {{0, -10, 0}, {10, -10, 0}, {10, 10, 0}, {0, 10, 0}}};
+  std::vector<Quad> quads = {{{-10, -10, 1.5}, {0, -10, 1.5}, {0, 10, 1.5}, {-10, 10, 1.5}},
+                             {{0, -10, 0}, {0, 10, 0}, {0, 10, 1.5}, {0, -10, 1.5}},
+                             {{0, -10, 0}, {10, -10, 0}, {10, 10, 0}, {0, 10, 0}}};
   auto scenario = obscurance_scenario(quads, radius_m);
   scenario.sensor.fov_h_rad = 8.0 * physics::kDegree;
   Scene scene(scenario);
@@ -426,7 +428,8 @@ TEST(RendererRadiance, a_black_surface_without_air_radiates_planck_in_band) {
 TEST(RendererRadiance, an_isothermal_world_looks_like_a_blackbody) {
   // Surface, surroundings, air and sky at one temperature: emissivity and range cannot matter.
   auto scenario = instant_scenario(write_quads("plane", {ground(500.0, 500.0)}));
-  scenario.weather = {weather(0.0, 0.0, physics::kStefanBoltzmannWPerM2K4 * std::pow(300.0, 4), 300.0)};
+  scenario.weather = {
+      weather(0.0, 0.0, physics::kStefanBoltzmannWPerM2K4 * std::pow(300.0, 4), 300.0)};
   scenario.materials[0].prescribed_k = 300.0;
   scenario.materials[0].band_emissivity = {{"8-12", 0.6}};
   scenario.atmosphere.enabled = true;

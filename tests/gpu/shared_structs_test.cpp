@@ -11,8 +11,9 @@
 namespace emit::renderer {
 namespace {
 
-#define EXPECT_OFFSET(program, instance, type, member) \
-  EXPECT_EQ((program).uniform_offset(instance "." #member), static_cast<GLint>(offsetof(type, member)))
+#define EXPECT_OFFSET(program, instance, type, member)      \
+  EXPECT_EQ((program).uniform_offset(instance "." #member), \
+            static_cast<GLint>(offsetof(type, member)))
 
 TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto context = gl::EglContext::create(-1, false);
@@ -39,12 +40,12 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_EQ(thermal->uniform_offset("taps.blocker[0]"), 0);
   EXPECT_EQ(thermal->uniform_offset("taps.filter_[0]"),
             static_cast<GLint>(offsetof(gpu::TapParams, filter_)));
-  EXPECT_EQ(radiance->uniform_offset("bands[1].sun_irradiance_w_m2"),
-            static_cast<GLint>(sizeof(gpu::BandParams) +
-                               offsetof(gpu::BandParams, sun_irradiance_w_m2)));
-  EXPECT_EQ(radiance->uniform_offset("bands[3].lut_last_node"),
-            static_cast<GLint>(3 * sizeof(gpu::BandParams) +
-                               offsetof(gpu::BandParams, lut_last_node)));
+  EXPECT_EQ(
+      radiance->uniform_offset("bands[1].sun_irradiance_w_m2"),
+      static_cast<GLint>(sizeof(gpu::BandParams) + offsetof(gpu::BandParams, sun_irradiance_w_m2)));
+  EXPECT_EQ(
+      radiance->uniform_offset("bands[3].lut_last_node"),
+      static_cast<GLint>(3 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, lut_last_node)));
   // Tables fetched as texels of four floats.
   EXPECT_EQ(sizeof(gpu::InstanceParams), 4U * 16U);
   EXPECT_EQ(sizeof(gpu::MaterialParams), 4U * 16U);

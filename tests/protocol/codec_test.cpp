@@ -180,6 +180,53 @@ TEST(HostFrameCodec, RefusesPosesThatAreNoPoses) {
   EXPECT_EQ(decode(encoded(none)), DecodeStatus::invalid_pose);
 }
 
+TEST(HostFrameCodec, RefusesSimulationTimesThatNoScenarioReaches) {
+  constexpr std::int64_t kLargest = 1'000'000'000'000'000'000;
+  constexpr auto kAny = std::numeric_limits<std::int64_t>::max();
+  const auto with_time = [](std::int64_t time_ns) {
+    auto message = valid_message();
+    message.set_sim_time_ns(time_ns);
+    return decode(encoded(message));
+  };
+  for (const std::int64_t time_ns : {kLargest, -kLargest, std::int64_t{0}}) {
+    EXPECT_EQ(with_time(time_ns), DecodeStatus::ok) << time_ns;
+  }
+  for (const std::int64_t time_ns : {kLargest + 1, -kLargest - 1, kAny, -kAny - 1}) {
+    EXPECT_EQ(with_time(time_ns), DecodeStatus::malformed) << time_ns;
+  }
+}
+
+TEST(HostFrameCodec, TakesTheWeatherThatScenariosTakeAndNoOther) {
+  using Set = void (*)(v1::Environment&, double);
+  struct Range {
+    Set set;
+    double lowest;
+    double highest;
+  };
+  // As [[weather.sample]].
+  const Range ranges[] = {
+      {[](v1::Environment& e, double v) { e.set_direct_normal_w_m2(v); }, 0.0, 2000.0},
+      {[](v1::Environment& e, double v) { e.set_diffuse_horizontal_w_m2(v); }, 0.0, 1500.0},
+      {[](v1::Environment& e, double v) { e.set_longwave_down_w_m2(v); }, 0.0, 1000.0},
+      {[](v1::Environment& e, double v) { e.set_air_k(v); }, 180.0, 340.0},
+      {[](v1::Environment& e, double v) { e.set_wind_m_s(v); }, 0.0, 100.0},
+      {[](v1::Environment& e, double v) { e.set_cloud_frac(v); }, 0.0, 1.0},
+      {[](v1::Environment& e, double v) { e.set_environment_k(v); }, 100.0, 400.0},
+      {[](v1::Environment& e, double v) { e.set_film_w_m2_k(v); }, 0.0, 1000.0},
+  };
+  for (const Range& range : ranges) {
+    const auto with_value = [&](double value) {
+      auto message = valid_message();
+      range.set(*message.mutable_environment(), value);
+      return decode(encoded(message));
+    };
+    EXPECT_EQ(with_value(range.lowest), DecodeStatus::ok) << range.lowest;
+    EXPECT_EQ(with_value(range.highest), DecodeStatus::ok) << range.highest;
+    EXPECT_EQ(with_value(range.lowest - 1e-3), DecodeStatus::invalid_environment) << range.lowest;
+    EXPECT_EQ(with_value(range.highest + 1e-3), DecodeStatus::invalid_environment) << range.highest;
+  }
+}
+
 TEST(HostFrameCodec, RefusesEnvironmentsOutsideTheirRanges) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   using Change = void (*)(v1::Environment&);

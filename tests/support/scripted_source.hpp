@@ -14,7 +14,8 @@ namespace emit::test {
 
 /// What a source was asked to do, kept by the test so that it outlives the source.
 struct SourceScript {
-  bool ready = true;  ///< poll(): false holds frames back
+  bool ready = true;         ///< poll(): false holds frames back
+  bool weather_full = false;  ///< apply_weather(): no room
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
   std::vector<scene::WeatherSample> weather;
@@ -57,6 +58,9 @@ class ScriptedSource final : public server::FrameSource {
     return updates.size();
   }
   bool apply_weather(const scene::WeatherSample& sample) noexcept override {
+    if (script_.weather_full) {
+      return false;
+    }
     script_.weather.push_back(sample);
     script_.order.emplace_back("weather");
     mix(sample.air_k);

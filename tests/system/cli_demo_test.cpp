@@ -17,6 +17,14 @@ std::size_t count_files(const std::filesystem::path& folder, const std::string& 
   return count;
 }
 
+/// The demo's work folder below `out`; "" when there is none.
+std::string work_folder(const std::filesystem::path& out) {
+  for (const auto& entry : std::filesystem::directory_iterator(out)) {
+    if (entry.path().filename().string().starts_with("run-")) return entry.path().string();
+  }
+  return "";
+}
+
 /// A small picture keeps llvmpipe quick.
 const std::vector<std::string> kSmall{
     "--set", "sensor.width_px=320", "--set", "sensor.height_px=256", "--set", "thermal.steps=9"};
@@ -28,6 +36,8 @@ std::vector<std::string> with_small(std::vector<std::string> arguments) {
 
 TEST(CliDemo, plays_poses_through_the_daemon_and_replays_bit_for_bit) {
   const TemporaryFolder folder;
+  std::filesystem::create_directories(folder.file("out/run"));
+  write_text(folder.file("out/run/mine.txt"), "precious");
   const ProcessResult result =
       run_emit(with_small({"demo", "--scenario", "box", "--frames", "6", "--out",
                            folder.file("out"), "--json", folder.file("demo.json")}),
@@ -42,7 +52,9 @@ TEST(CliDemo, plays_poses_through_the_daemon_and_replays_bit_for_bit) {
   EXPECT_GE(count_files(folder.file("out"), ".exr"), 3U);
   EXPECT_GE(count_files(folder.file("out"), ".png"), 3U);
   EXPECT_NE(result.out.find("pose received -> render start"), std::string::npos) << result.out;
-  EXPECT_FALSE(std::filesystem::exists(folder.file("out/run")));
+  EXPECT_EQ(work_folder(folder.file("out")), "");
+  // A folder of the user's own beside the frames stays.
+  EXPECT_TRUE(std::filesystem::exists(folder.file("out/run/mine.txt")));
 }
 
 TEST(CliDemo, what_it_recorded_replays_as_a_command) {
@@ -51,16 +63,15 @@ TEST(CliDemo, what_it_recorded_replays_as_a_command) {
                                                   "--keep", "--out", folder.file("out")}),
                                       std::chrono::seconds(280));
   ASSERT_EQ(demo.exit_code, 0) << demo.out << demo.err;
+  const std::string journal = work_folder(folder.file("out")) + "/journal.mcap";
   const ProcessResult replay =
-      run_emit(with_small({"replay", folder.file("out/run/journal.mcap"), "--scenario", "box",
-                           "--out", folder.file("again")}),
+      run_emit(with_small({"replay", journal, "--scenario", "box", "--out", folder.file("again")}),
                std::chrono::seconds(280));
   EXPECT_EQ(replay.exit_code, 0) << replay.out << replay.err;
   EXPECT_NE(replay.out.find("bit-identical"), std::string::npos) << replay.out;
   EXPECT_EQ(count_files(folder.file("again"), ".exr"), 4U);
 
-  auto other_steps =
-      with_small({"replay", folder.file("out/run/journal.mcap"), "--scenario", "box"});
+  auto other_steps = with_small({"replay", journal, "--scenario", "box"});
   other_steps.back() = "thermal.steps=5";
   const ProcessResult other = run_emit(other_steps, std::chrono::seconds(280));
   EXPECT_EQ(other.exit_code, 1) << other.out;

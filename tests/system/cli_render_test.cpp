@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <sstream>
 
 #include "system/cli_process.hpp"
 
@@ -106,6 +107,22 @@ TEST(CliGenerate, the_same_options_give_the_same_bytes) {
   EXPECT_FALSE(read_text(folder.file("a/block-on-road.glb")).empty());
 }
 
+TEST(CliGenerate, the_example_of_its_help_works) {
+  const std::string help = run_emit({"generate", "--help"}).out;
+  const std::string lead = "Example: emit ";
+  const std::size_t at = help.find(lead);
+  ASSERT_NE(at, std::string::npos) << help;
+  std::istringstream words(help.substr(at + lead.size(), help.find('\n', at) - at - lead.size()));
+  const TemporaryFolder folder;
+  std::vector<std::string> arguments;
+  for (std::string word; words >> word;) {
+    arguments.push_back(!arguments.empty() && arguments.back() == "--out" ? folder.file("scenes")
+                                                                          : word);
+  }
+  const ProcessResult result = run_emit(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
 TEST(CliBench, paper_fills_every_key) {
   const TemporaryFolder folder;
   const ProcessResult result =
@@ -114,12 +131,34 @@ TEST(CliBench, paper_fills_every_key) {
                std::chrono::seconds(280));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string json = read_text(folder.file("paper.json"));
-  for (const char* key :
-       {"device",      "commit",          "suite",           "scene",        "steps",
-        "method",      "frame_ms_median", "frame_ms_mean",   "frame_ms_p99", "frame_ms_max",
-        "geometry",    "occlusion",       "shadow",          "thermal",      "radiance",
-        "readback",    "frame_serial_ms", "time_scale",      "max_error_k",  "rms_error_k",
-        "p99_error_k", "edge_p99_k",      "pixels_compared", "reference"}) {
+  for (const char* key : {"device",
+                          "commit",
+                          "suite",
+                          "scene",
+                          "steps",
+                          "method",
+                          "frame_ms_median",
+                          "frame_ms_mean",
+                          "frame_ms_p99",
+                          "frame_ms_max",
+                          "geometry",
+                          "occlusion",
+                          "shadow",
+                          "thermal",
+                          "radiance",
+                          "readback",
+                          "frame_serial_ms",
+                          "time_scale",
+                          "max_error_k",
+                          "rms_error_k",
+                          "p99_error_k",
+                          "edge_p99_k",
+                          "pixels_compared",
+                          "reference",
+                          "surface_fill_frac",
+                          "statue_fill_frac",
+                          "swept_ground_frac",
+                          "rules_met"}) {
     EXPECT_FALSE(json_value(json, key).empty()) << key << "\n" << json;
   }
   double sum = 0.0;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +13,7 @@
 #include "emit/protocol/framing.hpp"
 #include "io/client.hpp"
 #include "io/socket.hpp"
+#include "rt/fd.hpp"
 #include "support/daemon_process.hpp"
 
 namespace emit::server {
@@ -59,10 +62,10 @@ class MalformedTraffic : public ::testing::Test {
     const auto where = parse_host_port(text);
     return numeric_address(where->host, where->port);
   }
-  [[nodiscard]] Fd raw_tcp() const {
-    auto fd = connect_tcp(address(daemon_->control()), kLongNs);
-    EXPECT_TRUE(fd.has_value()) << fd.error().text;
-    return fd ? std::move(*fd) : Fd();
+  [[nodiscard]] TcpSocket raw_tcp() const {
+    auto socket = TcpSocket::connect(SocketContext(), address(daemon_->control()), kLongNs);
+    EXPECT_TRUE(socket.has_value()) << socket.error().text;
+    return socket ? std::move(*socket) : TcpSocket();
   }
 
   ScratchFolder folder_;
@@ -122,7 +125,7 @@ TEST_F(MalformedTraffic, ANanPoseIsRefusedWithItsStatus) {
 TEST_F(MalformedTraffic, RandomBytesOnTheControlPortEndOnlyTheirConnection) {
   std::mt19937 random(2);
   for (int i = 0; i < 60; ++i) {
-    Fd fd = raw_tcp();
+    const TcpSocket socket = raw_tcp();
     auto bytes = random_bytes(random, 4000);
     if (i % 3 == 0 && bytes.size() >= protocol::kRecordHeaderBytes) {
       // Right framing, random body: reaches the parser of control records.
@@ -131,21 +134,21 @@ TEST_F(MalformedTraffic, RandomBytesOnTheControlPortEndOnlyTheirConnection) {
           static_cast<std::uint32_t>(bytes.size() - protocol::kRecordHeaderBytes),
           std::span(bytes).first<protocol::kRecordHeaderBytes>());
     }
-    static_cast<void>(::send(fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL));
+    static_cast<void>(::send(socket.fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL));
   }
 }
 
 TEST_F(MalformedTraffic, AnOversizeRecordIsAnsweredAndClosed) {
-  Fd fd = raw_tcp();
+  const TcpSocket socket = raw_tcp();
   std::array<std::byte, protocol::kRecordHeaderBytes> header{};
   protocol::encode_record_header(protocol::RecordKind::control, 0xFFFFFFF0U, header);
-  ASSERT_GT(::send(fd.get(), header.data(), header.size(), MSG_NOSIGNAL), 0);
+  ASSERT_GT(::send(socket.fd(), header.data(), header.size(), MSG_NOSIGNAL), 0);
   std::string answer;
   std::array<char, 1024> buffer;
   for (;;) {
-    pollfd wait{fd.get(), POLLIN, 0};
+    pollfd wait{socket.fd(), POLLIN, 0};
     ASSERT_GT(::poll(&wait, 1, 20'000), 0) << "no answer and no end of the connection";
-    const ssize_t got = ::recv(fd.get(), buffer.data(), buffer.size(), 0);
+    const ssize_t got = ::recv(socket.fd(), buffer.data(), buffer.size(), 0);
     if (got <= 0) {
       break;
     }

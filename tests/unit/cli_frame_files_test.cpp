@@ -51,6 +51,15 @@ TEST(CliApparentTemperature, slope_is_the_inverse_of_the_derivative) {
               1e-3);
 }
 
+TEST(CliApparentTemperature, takes_the_response_into_account) {
+  const scene::SpectralBand band{"det", 8.0, 12.0, {{8.0, 0.0}, {10.0, 1.0}, {12.0, 0.0}}};
+  const ApparentTemperature table(spectral_band(band));
+  const double radiance =
+      physics::band_radiance(spectral_band(band), physics::Kelvin{305.0}).radiance_w_m2_sr;
+  EXPECT_NEAR(table.kelvin(radiance), 305.0, 1e-3);
+  EXPECT_LT(ApparentTemperature(8.0, 12.0).kelvin(radiance), 280.0);
+}
+
 TEST(CliApparentTemperature, radiances_outside_the_table_end_at_its_limits) {
   const ApparentTemperature table(8.0, 12.0);
   EXPECT_DOUBLE_EQ(table.kelvin(0.0), 150.0);
@@ -82,6 +91,16 @@ TEST(CliFrameFiles, a_frame_comes_back_from_disk_bit_for_bit) {
   EXPECT_EQ(metadata->sim_time_ns, planes.metadata.sim_time_ns);
   EXPECT_EQ(metadata->frame_number, 42U);
   EXPECT_TRUE(std::filesystem::exists(folder.path() / "frame_000042.png"));
+}
+
+TEST(CliSceneOptions, block_size_sets_all_three_edges_and_single_ones_override_it) {
+  scenegen::GenerateOptions options;
+  options.kind = scenegen::SceneKind::block_on_road;
+  const std::vector<std::string> set{"block_size_m=1.5", "block_up_m=0.5"};
+  ASSERT_TRUE(apply_scene_options(options, set).has_value());
+  EXPECT_EQ(options.block_on_road.block_east_m, 1.5);
+  EXPECT_EQ(options.block_on_road.block_north_m, 1.5);
+  EXPECT_EQ(options.block_on_road.block_up_m, 0.5);
 }
 
 TEST(CliSceneOptions, are_applied_by_name) {

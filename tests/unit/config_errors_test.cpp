@@ -113,6 +113,18 @@ const std::vector<Case>& cases() {
       {"channel_twice",
        "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[[channel]]\nname = \"a\"\nband = \"8-12\"\n",
        "s.toml:6:8: channel 'a' is defined twice"},
+      {"too_many_bands",
+       "[[band]]\nname = \"w\"\nlo_um = 4\nhi_um = 5\n"
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[[channel]]\nname = \"b\"\nband = "
+       "\"8-12\"\n[[channel]]\nname = \"c\"\nband = \"7.7-9.3\"\n[[channel]]\nname = "
+       "\"d\"\nband = \"3.4-4.1\"\n[[channel]]\nname = \"e\"\nband = \"w\"\n",
+       "s.toml:20:8: channels use more than 4 bands"},
+      {"too_many_atmosphere_terms",
+       "[[atmosphere.band]]\nband = \"8-12\"\nterms = [[0.2, 1], [0.2, 2], [0.2, 3], [0.2, 4], "
+       "[0.2, 5]]\n",
+       "s.toml:4:9: 'terms' must be an array of 1 to 4 pairs [a, k]"},
+      {"too_wide", "[sensor]\nwidth_px = 8193\n",
+       "s.toml:3:12: 'width_px' is 8193, must be 1 .. 8192"},
       {"no_channel", "channel = []\n", "s.toml:2:11: at least one channel is needed"},
       {"band_upside_down", "[[band]]\nname = \"w\"\nlo_um = 5\nhi_um = 4\n",
        "s.toml:5:9: 'hi_um' (4) must be above 'lo_um' (5)"},
@@ -122,7 +134,8 @@ const std::vector<Case>& cases() {
        "s.toml:4:12: the wavelengths of a response must ascend (2 um follows 3)"},
       {"response_above_one", "[[band]]\nname = \"w\"\nresponse = [[3, 1], [4, 1.5]]\n",
        "s.toml:4:12: the response at 4 um is 1.5, must be 0 .. 1"},
-      {"band_without_atmosphere", "[[band]]\nname = \"w\"\nlo_um = 4\nhi_um = 5\n",
+      {"band_without_atmosphere",
+       "[[band]]\nname = \"w\"\nlo_um = 4\nhi_um = 5\n[[channel]]\nname = \"c\"\nband = \"w\"\n",
        "s.toml:2:1: band 'w' has no atmosphere: add an [[atmosphere.band]] for it or set "
        "atmosphere.enabled = false"},
       {"atmosphere_sum", "[[atmosphere.band]]\nband = \"3-5\"\nterms = [[0.5, 0.1], [0.4, 1]]\n",

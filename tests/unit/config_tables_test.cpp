@@ -126,6 +126,15 @@ TEST_F(ConfigTest, responses_come_from_csv) {
   EXPECT_EQ(loaded->atmosphere.bands[0].terms[0].extinction_per_km, 0.2);
 }
 
+TEST_F(ConfigTest, a_band_that_no_channel_shows_is_not_handed_over) {
+  const auto loaded = scenario(
+      "[[band]]\nname = \"spare\"\nlo_um = 4\nhi_um = 5\n"
+      "[[channel]]\nname = \"c\"\nband = \"3-5\"\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_EQ(loaded->bands.size(), 1U);
+  EXPECT_EQ(loaded->bands[0].name, "3-5");
+}
+
 TEST_F(ConfigTest, atmosphere_terms_come_from_csv_for_its_bands_only) {
   write("a.csv",
         "band,amplitude_frac,extinction_per_km,vertical_transmittance_frac\n"
@@ -146,7 +155,7 @@ TEST_F(ConfigTest, atmosphere_csv_amplitudes_must_add_up) {
   EXPECT_EQ(
       scenario_error("[atmosphere]\nfile = \"a.csv\"\n"),
       "s.toml:3:8: 'file': a.csv:2: the amplitudes of band '8-12' add up to 0.75 over 1 rows, "
-      "must be 1 over at most 8");
+      "must be 1 over at most 4");
 }
 
 /// LOWTRAN7 horizontal transmittances of the mid-latitude summer, 23 km; tolerance: the fit's

@@ -87,8 +87,8 @@ TEST(PoseHistory, thinning_keeps_a_curved_drive_to_two_centimetres) {
   for (int i = 0; i <= 100000; ++i) {
     const double t_s = i * 1e-3;
     const auto state = history.at(static_cast<std::int64_t>(t_s * 1e9));
-    worst_m = std::max(worst_m, glm::distance(state.pose.position_world_m,
-                                              pose_at(t_s).position_world_m));
+    worst_m = std::max(worst_m,
+                       glm::distance(state.pose.position_world_m, pose_at(t_s).position_world_m));
   }
   EXPECT_LT(worst_m, 0.02);
   EXPECT_EQ(history.dropped(), 0U);

@@ -10,6 +10,7 @@
 #include "agents/sender.hpp"
 #include "io/socket.hpp"
 #include "protocol/allocation_counter.hpp"
+#include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
 
 namespace emit::server {
@@ -33,11 +34,12 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
 
   int pair[2] = {-1, -1};
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
-  const Fd near(pair[0]);
+  auto near = TcpSocket::adopt(SocketContext(), pair[0]);
+  ASSERT_TRUE(near.has_value());
   const Fd far(pair[1]);
   SenderClient::Params params;
   params.channel = &context.channels.front();
-  params.tcp_fd = near.get();
+  params.tcp_socket = &*near;
   SenderClient client(std::move(params));
   ASSERT_TRUE(context.to_sender.push({ClientCommand::Kind::add, 0, &client}));
 

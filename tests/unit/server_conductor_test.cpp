@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "agents/conductor.hpp"
 #include "agents/render_agent.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"
+#include "telemetry/log.hpp"
 
 namespace emit::server {
 namespace {
@@ -59,6 +62,12 @@ class Rig {
       }
     }
     FAIL() << "never idle";
+  }
+
+  /// As settle(), with a render thread that does not come to its turn.
+  void settle_without_render() {
+    while (conductor_.do_work(clock.tai_ns()) > 0) {
+    }
   }
 
   HostInput& next_input() { return context_.host_inputs.claim_reserved(); }
@@ -192,6 +201,60 @@ TEST(HostStep, FlagsALateFrameAndSendsItAllTheSame) {
   EXPECT_FALSE(rig.frames[0].repeat);
   EXPECT_EQ(rig.frames[1].header.flags, 0U);
   EXPECT_EQ(rig.count(Counter::frames_late), 1U);
+}
+
+TEST(HostStep, AStepHasItsBudgetFromTheCommandOn) {
+  config::PacingConfig pacing;
+  pacing.budget_ns = 3 * kMs;
+  Rig rig(pacing);
+  rig.send(1, 0);
+  rig.settle();
+  rig.command(CommandKind::stop);
+  rig.settle();
+  rig.clock.advance(5000 * kMs);
+  rig.command(CommandKind::step);
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 2U);
+  const auto& header = rig.frames[1].header;
+  EXPECT_EQ(header.host_frame_number, 1U);
+  EXPECT_EQ(header.flags & protocol::kFlagLate, 0U);
+  EXPECT_EQ(header.host_received_ns, rig.clock.tai_ns());
+  EXPECT_EQ(header.deadline_ns, rig.clock.tai_ns() + 3 * kMs);
+}
+
+TEST(HostStep, ADelayedPacketOfTheReplacedRunResetsNothing) {
+  Rig rig;
+  rig.send(100, 1000, 0.0, 1);
+  rig.send(1, 0, 0.0, 2);
+  rig.send(101, 1010, 0.0, 1);
+  rig.send(2, 10, 0.0, 2);
+  rig.settle();
+  EXPECT_EQ(rig.script.resets, 1);
+  ASSERT_EQ(rig.frames.size(), 3U);
+  EXPECT_EQ(rig.frames[1].header.run_id, rig.frames[2].header.run_id);
+  ASSERT_EQ(rig.replies.size(), 1U);
+  EXPECT_EQ(rig.replies[0].code, StatusCode::not_allowed);
+  EXPECT_EQ(rig.replies[0].host_frame_number, 101U);
+  EXPECT_EQ(rig.count(Counter::host_frames_old_run), 1U);
+  EXPECT_EQ(rig.count(Counter::refused_not_allowed), 1U);
+  rig.command(CommandKind::reset);
+  rig.send(1, 0, 0.0, 1);
+  rig.settle();
+  EXPECT_EQ(rig.frames.size(), 4U) << "after a reset any run is welcome";
+}
+
+TEST(HostStep, AHeldRunOfARestartedHostStartsAtItsOwnInstant) {
+  Rig rig;
+  rig.send(1, 1000 * kMs, 0.0, 1);
+  rig.command(CommandKind::hold);
+  rig.send(2, 1010 * kMs, 0.0, 1);
+  rig.send(1, 20 * kMs, 0.0, 2);
+  rig.send(2, 30 * kMs, 0.0, 2);
+  rig.settle();
+  ASSERT_EQ(rig.script.submitted.size(), 4U);
+  EXPECT_EQ(rig.script.submitted[1].thermal_time_ns, 1000 * kMs);
+  EXPECT_EQ(rig.script.submitted[2].thermal_time_ns, 20 * kMs);
+  EXPECT_EQ(rig.script.submitted[3].thermal_time_ns, 20 * kMs);
 }
 
 TEST(HostStep, AnswersRefusedFramesAndGoesOn) {
@@ -390,6 +453,101 @@ TEST(IgClockPacing, RepeatsThePreviousFrameThenShowsTheLateOne) {
   EXPECT_EQ(rig.frames[5].header.flags & (protocol::kFlagLate | protocol::kFlagRepeated), 0U);
 }
 
+TEST(IgClockPacing, FlagsATeleportWithTheFirstPoseBehindIt) {
+  Rig rig(ig_clock());
+  rig.settle();
+  const auto entity_at = [](double x_m, bool teleport, std::int64_t early_ns) {
+    return [=](protocol::HostFrameData& frame) {
+      // A stamp ahead of the slot: its display time lies before this frame's simulation time.
+      frame.received_ns += early_ns;
+      frame.entity_count = 1;
+      frame.entities[0].entity_id = 3;
+      frame.entities[0].has_pose = true;
+      frame.entities[0].pose.position_world_m.x = x_m;
+      frame.entities[0].teleport = teleport;
+    };
+  };
+  rig.with(entity_at(1.0, false, 0)).send(1, 100 * kMs);
+  rig.settle();
+  rig.next_slot();
+  rig.with(entity_at(500.0, true, 25 * kMs)).send(2, 200 * kMs);
+  rig.settle();
+  for (int slot = 0; slot < 4; ++slot) {
+    rig.next_slot();
+  }
+  ASSERT_EQ(rig.script.entities.size(), 5U);
+  const auto times_ns = std::array{185 * kMs, 195 * kMs, 205 * kMs, 215 * kMs};
+  for (std::size_t i = 0; i < times_ns.size(); ++i) {
+    const auto& [time_ns, updates] = rig.script.entities[i + 1];
+    EXPECT_EQ(time_ns, times_ns[i]);
+    ASSERT_EQ(updates.size(), 1U);
+    EXPECT_EQ(updates[0].pose.position_world_m.x, i < 2 ? 1.0 : 500.0) << i;
+    EXPECT_EQ(updates[0].teleport, i == 2) << i;
+  }
+}
+
+TEST(IgClockPacing, TakesInputsWithWeatherWhileARenderIsSlow) {
+  Rig rig(ig_clock());
+  rig.settle();
+  constexpr std::uint64_t kFrames = kMaxWeatherPerFrame + 10;
+  for (std::uint64_t k = 1; k <= kFrames; ++k) {
+    rig.with([&](protocol::HostFrameData& frame) {
+         frame.environment.emplace();
+         frame.environment->air_k = 200.0 + static_cast<double>(k);
+       })
+        .send(k, static_cast<std::int64_t>(k) * kMs, static_cast<double>(k));
+    rig.settle_without_render();
+    ASSERT_EQ(rig.context().host_inputs.front(), nullptr) << "input " << k << " waits";
+  }
+  rig.next_slot();
+  EXPECT_EQ(rig.frames.back().header.host_frame_number, kFrames);
+  ASSERT_EQ(rig.script.weather.size(), kMaxWeatherPerFrame);
+  EXPECT_EQ(rig.script.weather.front().air_k, 201.0);
+  EXPECT_EQ(rig.script.weather.back().air_k, 200.0 + static_cast<double>(kFrames));
+  EXPECT_EQ(rig.count(Counter::weather_coalesced), 10U);
+}
+
+TEST(IgClockPacing, AnEntityWithoutAPoseStaysWhereItIs) {
+  auto scenario = scenario_with_entity(3);
+  auto& trajectory = scenario.objects[0].trajectory;
+  trajectory.resize(2);
+  trajectory[1].sim_time_ns = 1000 * kMs;
+  trajectory[1].pose.position_world_m.x = 1000.0;
+  Rig rig(ig_clock(), scenario);
+  rig.settle();
+  const auto state = [](std::optional<double> x_m) {
+    return [=](protocol::HostFrameData& frame) {
+      frame.entity_count = 1;
+      frame.entities[0].entity_id = 3;
+      frame.entities[0].has_pose = x_m.has_value();
+      frame.entities[0].pose.position_world_m.x = x_m.value_or(0.0);
+    };
+  };
+  const auto shown_x_m = [&] {
+    return rig.script.entities.back().second[0].pose.position_world_m.x;
+  };
+  rig.with(state(std::nullopt)).send(1, 100 * kMs);
+  rig.settle();
+  for (int slot = 0; slot < 3; ++slot) {
+    rig.next_slot();
+    EXPECT_NEAR(shown_x_m(), 100.0, 1e-9) << "where the scenario had it when the host spoke";
+  }
+  rig.with(state(150.0)).send(2, 150 * kMs);
+  rig.settle();
+  rig.next_slot();
+  rig.with(state(160.0)).send(3, 160 * kMs);
+  rig.settle();
+  rig.next_slot();
+  EXPECT_GT(shown_x_m(), 160.0) << "predicted";
+  rig.with(state(std::nullopt)).send(4, 170 * kMs);
+  rig.settle();
+  for (int slot = 0; slot < 3; ++slot) {
+    rig.next_slot();
+    EXPECT_EQ(shown_x_m(), 160.0) << "no motion any more";
+    EXPECT_FALSE(rig.script.entities.back().second[0].teleport);
+  }
+}
+
 TEST(IgClockPacing, SimTimeNeverGoesBackwardsUnderJitter) {
   Rig rig(ig_clock());
   rig.settle();
@@ -418,6 +576,25 @@ TEST(Conductor, DrainsWhatIsInWork) {
   rig.settle();
   EXPECT_TRUE(rig.conductor().drained());
   EXPECT_EQ(rig.frames.size(), 1U);
+}
+
+TEST(RenderAgent, SaysOnceWhenTheSourceHasNoRoomForWeather) {
+  Rig rig;
+  rig.script.weather_full = true;
+  for (std::uint64_t k = 1; k <= 5; ++k) {
+    rig.with([](protocol::HostFrameData& frame) { frame.environment.emplace(); })
+        .send(k, static_cast<std::int64_t>(k));
+    rig.settle();
+  }
+  EXPECT_EQ(rig.count(Counter::weather_lost), 5U);
+  EXPECT_EQ(rig.frames.size(), 5U);
+  auto& events = rig.context().render_events.ring();
+  ASSERT_NE(events.front(), nullptr);
+  EXPECT_EQ(events.front()->kind, EventKind::weather_lost);
+  EXPECT_EQ(events.front()->a, 1U);
+  EXPECT_NE(describe(*events.front()).text.find("event=weather_lost"), std::string::npos);
+  events.pop();
+  EXPECT_EQ(events.front(), nullptr);
 }
 
 TEST(Conductor, CountsJournalLinesThatFindNoRoomAndKeepsOnSendingFrames) {

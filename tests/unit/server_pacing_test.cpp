@@ -98,6 +98,21 @@ TEST(PoseTrack, DoesNotMoveThroughATeleport) {
   EXPECT_EQ(track.sample(40 * kMs, 50 * kMs).pose.position_world_m.x, 500.0);
 }
 
+TEST(PoseTrack, SaysFromWhichReceivedPoseItStarts) {
+  PoseTrack track;
+  track.push(at(10 * kMs, 1.0));
+  TimedPose jump = at(20 * kMs, 500.0);
+  jump.teleport = true;
+  track.push(jump);
+  track.push(at(30 * kMs, 501.0));
+  EXPECT_EQ(track.sample(5 * kMs, 0).base_ns, 10 * kMs);
+  EXPECT_EQ(track.sample(19 * kMs, 0).base_ns, 10 * kMs);
+  EXPECT_EQ(track.sample(20 * kMs, 0).base_ns, 20 * kMs);
+  EXPECT_EQ(track.sample(25 * kMs, 0).base_ns, 20 * kMs);
+  EXPECT_EQ(track.sample(30 * kMs, 0).base_ns, 30 * kMs);
+  EXPECT_EQ(track.sample(35 * kMs, 50 * kMs).base_ns, 30 * kMs);
+}
+
 TEST(PoseTrack, ReplacesThePoseOfTheSameInstant) {
   PoseTrack track;
   track.push(at(0, 0.0));
@@ -152,6 +167,23 @@ TEST(InputGate, TellsDuplicatesFromTimeGoingBackwardsAndFromARestart) {
   EXPECT_EQ(gate.check(host(1, 0, 9)).verdict, GateVerdict::accept);
 }
 
+TEST(InputGate, RefusesRunsThatWereReplacedUntilAReset) {
+  InputGate gate;
+  for (std::uint64_t run = 100; run < 100 + 3 * InputGate::kReplacedRuns; ++run) {
+    EXPECT_EQ(gate.check(host(1, 0, run)).verdict,
+              run == 100 ? GateVerdict::accept : GateVerdict::new_epoch);
+    gate.accept(host(1, 0, run));
+    gate.accept(host(2, 10, run));
+    for (std::uint64_t old = 1; old <= InputGate::kReplacedRuns && run - old >= 100; ++old) {
+      EXPECT_EQ(gate.check(host(3, 20, run - old)).verdict, GateVerdict::old_run);
+    }
+    EXPECT_EQ(gate.check(host(3, 20, run)).verdict, GateVerdict::accept);
+  }
+  gate.reset();
+  gate.accept(host(1, 0, 7));
+  EXPECT_EQ(gate.check(host(3, 20, 122)).verdict, GateVerdict::new_epoch);
+}
+
 TEST(RunControl, HoldFreezesTheThermalClockAtTheLastFrame) {
   RunControl control;
   EXPECT_EQ(control.thermal_time_ns(100, false), 100);
@@ -160,6 +192,17 @@ TEST(RunControl, HoldFreezesTheThermalClockAtTheLastFrame) {
   EXPECT_EQ(control.thermal_time_ns(300, false), 100);
   ASSERT_TRUE(control.apply(CommandKind::start));
   EXPECT_EQ(control.thermal_time_ns(400, false), 400);
+}
+
+TEST(RunControl, ANewRunKeepsTheHoldButNotItsInstant) {
+  RunControl control;
+  EXPECT_EQ(control.thermal_time_ns(1000, false), 1000);
+  ASSERT_TRUE(control.apply(CommandKind::hold));
+  EXPECT_EQ(control.thermal_time_ns(1100, false), 1000);
+  control.new_run();
+  EXPECT_TRUE(control.held());
+  EXPECT_EQ(control.thermal_time_ns(5, false), 5);
+  EXPECT_EQ(control.thermal_time_ns(15, false), 5);
 }
 
 TEST(RunControl, StepWhileHeldBringsTheThermalClockUpOnce) {

@@ -123,7 +123,9 @@ TEST(DistinctTable, WritesARepeatedLineAtPowersOfTen) {
   DistinctTable table;
   std::vector<int> written;
   for (int i = 1; i <= 1000; ++i) {
-    if (table.note("same", i)) {
+    const std::string line = table.note("same", i);
+    if (!line.empty()) {
+      EXPECT_EQ(line, i == 1 ? "same" : "same repeats=" + std::to_string(i));
       written.push_back(i);
     }
   }
@@ -131,6 +133,29 @@ TEST(DistinctTable, WritesARepeatedLineAtPowersOfTen) {
   EXPECT_EQ(table.entries().at("same").count, 1000U);
   EXPECT_EQ(table.entries().at("same").first_ns, 1);
   EXPECT_EQ(table.entries().at("same").last_ns, 1000);
+}
+
+TEST(DistinctTable, WritesOneLineForEverythingThatNoLongerFits) {
+  DistinctTable table;
+  for (std::size_t i = 0; i < DistinctTable::kMaxEntries; ++i) {
+    EXPECT_FALSE(table.note("line " + std::to_string(i), 1).empty());
+  }
+  std::vector<std::string> written;
+  for (int i = 0; i < 5000; ++i) {
+    std::string line = table.note("chosen by a peer " + std::to_string(i), 2);
+    if (!line.empty()) {
+      written.push_back(std::move(line));
+    }
+  }
+  const std::string overflow(DistinctTable::kOverflowText);
+  EXPECT_EQ(written,
+            (std::vector<std::string>{overflow, overflow + " repeats=10", overflow + " repeats=100",
+                                      overflow + " repeats=1000"}));
+  EXPECT_LE(table.entries().size(), DistinctTable::kMaxEntries + 1);
+  for (int i = 0; i < 9; ++i) {
+    const bool last = !table.note("line 7", 3).empty();
+    EXPECT_EQ(last, i == 8) << "what is in the table goes on being counted for itself";
+  }
 }
 
 TEST(Log, KeepsWhatPeersSayOnOneLine) {

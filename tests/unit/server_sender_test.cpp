@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <memory>
@@ -10,6 +9,7 @@
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/reassembler.hpp"
 #include "io/socket.hpp"
+#include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"
 
@@ -36,7 +36,7 @@ class Rig {
   ~Rig() { sender_.on_stop(); }
 
   struct Peer {
-    Fd near;
+    TcpSocket near;
     Fd far;
     std::unique_ptr<SenderClient> client;
     protocol::RecordParser parser{
@@ -73,15 +73,18 @@ class Rig {
     Peer* peer = peers_.emplace_back(std::make_unique<Peer>()).get();
     int pair[2] = {-1, -1};
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
-    peer->near = Fd(pair[0]);
     peer->far = Fd(pair[1]);
+    auto near = TcpSocket::adopt(sockets_, pair[0]);
+    EXPECT_TRUE(near.has_value());
+    peer->near = std::move(*near);
     // Less than a frame, so that a client that does not read stops in the middle of one.
-    set_option(peer->near.get(), SOL_SOCKET, SO_SNDBUF, 32 << 10);
+    const int send_bytes = 32 << 10;
+    EXPECT_EQ(::setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &send_bytes, sizeof(send_bytes)), 0);
     SenderClient::Params params;
     params.connection = next_connection_++;
     params.channel = &context_.channels.front();
     params.every_frame = every_frame;
-    params.tcp_fd = peer->near.get();
+    params.tcp_socket = &peer->near;
     peer->client = std::make_unique<SenderClient>(std::move(params));
     EXPECT_TRUE(context_.to_sender.push(
         {ClientCommand::Kind::add, peer->client->params().connection, peer->client.get()}));
@@ -131,6 +134,7 @@ class Rig {
  private:
   test::FakeClock clock_;
   test::SourceScript script_;
+  SocketContext sockets_;
   std::vector<std::unique_ptr<Peer>> peers_;
   Context context_;
   test::ScriptedSource source_;
@@ -210,12 +214,13 @@ TEST(Sender, GivesAClientBackWhenItsSocketFailsOrItIsAskedTo) {
 
 TEST(UdpBatch, DeliversEveryFragmentWithAndWithoutSegmentation) {
   const auto address = numeric_address("127.0.0.1", 0);
-  auto receiver = open_udp_bound(address);
+  const SocketContext sockets;
+  auto receiver = UdpSocket::open_bound(sockets, address);
   ASSERT_TRUE(receiver.has_value());
-  set_receive_buffer(receiver->get(), 4u << 20);
-  const auto target = local_address(receiver->get());
-  Fd sender(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK, 0));
-  ASSERT_EQ(::connect(sender.get(), target.get(), target.length), 0);
+  EXPECT_GT(receiver->set_receive_buffer(4u << 20), 0U);
+  auto sender = UdpSocket::open(sockets, address);
+  ASSERT_TRUE(sender.has_value());
+  ASSERT_TRUE(sender->connect(receiver->local_address()).has_value());
 
   std::vector<float> pixels(kWidthPx * kHeightPx);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -236,19 +241,18 @@ TEST(UdpBatch, DeliversEveryFragmentWithAndWithoutSegmentation) {
     protocol::encode(header, head);
     const protocol::Fragmenter fragments({1, id, 0, kWidthPx * 4, 1440}, head,
                                          std::as_bytes(std::span<const float>(pixels)));
-    bool use_segmentation = segmentation && udp_segmentation_supported(sender.get());
+    bool use_segmentation = segmentation && udp_segmentation_supported(sender->fd());
     std::array<std::byte, 65536> datagram;
     for (std::uint32_t next = 0; next < fragments.fragment_count();) {
-      const auto result = batch.send(sender.get(), fragments, next, use_segmentation);
+      const auto result = batch.send(sender->fd(), fragments, next, use_segmentation);
       if (result.status == UdpBatch::Status::no_segmentation) {
         use_segmentation = false;
         continue;
       }
       ASSERT_EQ(result.status, UdpBatch::Status::sent) << result.error;
       next += result.fragments;
-      for (ssize_t got = 0;
-           (got = ::recv(receiver->get(), datagram.data(), datagram.size(), MSG_DONTWAIT)) > 0;) {
-        EXPECT_EQ(reassembler.push(std::span(datagram).first(static_cast<std::size_t>(got))),
+      for (IoResult got; (got = receiver->receive(datagram)).status == IoStatus::done;) {
+        EXPECT_EQ(reassembler.push(std::span(datagram).first(got.bytes)),
                   protocol::FragmentStatus::accepted);
       }
     }

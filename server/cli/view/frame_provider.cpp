@@ -18,16 +18,14 @@ bool FrameSlot::take(ViewFrame& frame) {
   return true;
 }
 
-void FrameSlot::end(std::string reason) {
+void FrameSlot::end(std::string reason, bool failure) {
   const std::lock_guard lock(mutex_);
-  ended_ = true;
-  reason_ = std::move(reason);
+  end_ = ViewEnd{std::move(reason), failure};
 }
 
-bool FrameSlot::ended(std::string& reason) {
+std::optional<ViewEnd> FrameSlot::ended() {
   const std::lock_guard lock(mutex_);
-  if (ended_) reason = reason_;
-  return ended_;
+  return end_;
 }
 
 }  // namespace emit::cli::view

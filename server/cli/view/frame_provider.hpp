@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "commands.hpp"
 #include "emit/physics/error.hpp"
+#include "view/view_control.hpp"
 
 namespace emit::cli::view {
 
@@ -26,16 +28,10 @@ struct ViewFrame {
   double frame_ms = 0.0;  ///< time to make it, or pose to reception
 };
 
-/// What the user asks of the camera and the clock; streams ignore it.
-struct ViewControl {
-  double yaw_rad = 0.0;    ///< added to the scenario's heading, clockwise
-  double pitch_rad = 0.0;  ///< added to its elevation, up
-  double forward_m = 0.0;  ///< along the scenario's boresight
-  double right_m = 0.0;
-  double up_m = 0.0;  ///< world
-  bool paused = false;
-  double time_scale = 1.0;  ///< simulated seconds per second
-  double jump_s = 0.0;      ///< seconds to add to the simulated time, consumed by the provider
+/// Why no more frames come.
+struct ViewEnd {
+  std::string reason;
+  bool failure = false;  ///< an error of ours; else the other side ended a stream
 };
 
 /// Newest-wins slot between a producer thread and the window's thread.
@@ -46,15 +42,14 @@ class FrameSlot {
   /// Window: true when `frame` was exchanged for a newer one.
   bool take(ViewFrame& frame);
   /// Producer: ends the stream of frames with a reason.
-  void end(std::string reason);
-  [[nodiscard]] bool ended(std::string& reason);
+  void end(std::string reason, bool failure);
+  [[nodiscard]] std::optional<ViewEnd> ended();
 
  private:
   std::mutex mutex_;
   ViewFrame slot_;
   std::uint64_t serial_ = 0;
-  bool ended_ = false;
-  std::string reason_;
+  std::optional<ViewEnd> end_;
 };
 
 /// Source of pictures with a thread of its own. The window's thread calls everything.
@@ -63,7 +58,7 @@ class FrameProvider {
   virtual ~FrameProvider() = default;
   [[nodiscard]] virtual bool take(ViewFrame& frame) = 0;
   virtual void control(const ViewControl& control) = 0;
-  [[nodiscard]] virtual bool ended(std::string& reason) = 0;
+  [[nodiscard]] virtual std::optional<ViewEnd> ended() = 0;
   /// Name, channel or scenario, for the window's title.
   [[nodiscard]] virtual std::string title() const = 0;
   [[nodiscard]] virtual std::string band() const = 0;

@@ -6,30 +6,18 @@
 #include <chrono>
 #include <cmath>
 #include <future>
-#include <glm/gtc/quaternion.hpp>
+#include <optional>
 #include <thread>
 
 #include "emit/renderer/renderer.hpp"
 #include "scenario_input.hpp"
 #include "view/frame_provider.hpp"
+#include "view/view_control.hpp"
 
 namespace emit::cli::view {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-physics::Pose moved(const physics::Pose& base, const ViewControl& control) {
-  physics::Pose pose = base;
-  // Yaw turns about the world's vertical (clockwise seen from above), pitch about the body's y
-  // axis.
-  const glm::dquat yaw = glm::angleAxis(-control.yaw_rad, glm::dvec3(0.0, 0.0, 1.0));
-  const glm::dquat pitch = glm::angleAxis(control.pitch_rad, glm::dvec3(0.0, 1.0, 0.0));
-  pose.world_from_body = glm::normalize(yaw * base.world_from_body * pitch);
-  pose.position_world_m +=
-      base.world_from_body * glm::dvec3(control.forward_m, control.right_m, 0.0) +
-      glm::dvec3(0.0, 0.0, control.up_m);
-  return pose;
-}
 
 class ScenarioProvider final : public FrameProvider {
  public:
@@ -51,11 +39,18 @@ class ScenarioProvider final : public FrameProvider {
   bool take(ViewFrame& frame) override { return slot_.take(frame); }
   void control(const ViewControl& control) override {
     const std::lock_guard lock(control_mutex_);
-    const double pending_s = control_.jump_s;
+    // Steps and jumps that the loop has not seen yet stay; going home cancels the steps before it.
+    const ViewControl pending = control_;
     control_ = control;
-    control_.jump_s += pending_s;
+    control_.jump_s += pending.jump_s;
+    control_.home = control.home || pending.home;
+    if (!control.home) {
+      control_.forward_m += pending.forward_m;
+      control_.right_m += pending.right_m;
+      control_.up_m += pending.up_m;
+    }
   }
-  bool ended(std::string& reason) override { return slot_.ended(reason); }
+  std::optional<ViewEnd> ended() override { return slot_.ended(); }
   std::string title() const override { return scenario_.name; }
   std::string band() const override { return scenario_.bands[band_].name; }
   void limits(double& min_k, double& max_k) const override {
@@ -86,26 +81,36 @@ class ScenarioProvider final : public FrameProvider {
       {
         const std::lock_guard lock(control_mutex_);
         control = control_;
-        control_.jump_s = 0.0;
+        control_.jump_s = control_.forward_m = control_.right_m = control_.up_m = 0.0;
+        control_.home = false;
       }
       const auto now = Clock::now();
       // A slow device skips simulated time rather than falling behind for ever.
       const double wall_s = std::min(1.0, std::chrono::duration<double>(now - last).count());
       last = now;
-      if (!control.paused && number > 0) sim_time_s_ += wall_s * control.time_scale;
+      if (!control.paused && number > 0) sim_time_s_ += wall_s;
       sim_time_s_ += control.jump_s;
 
       renderer::FrameRequest request;
       request.frame_number = ++number;
       request.sim_time_ns = std::llround(sim_time_s_ * 1e9);
       request.thermal_time_ns = request.sim_time_ns;
-      request.sensor_pose = moved(renderer.scenario_sensor_pose_at(request.sim_time_ns), control);
+      const physics::Pose base = renderer.scenario_sensor_pose_at(request.sim_time_ns);
+      if (control.home) shift_world_m_ = glm::dvec3(0.0);
+      shift_world_m_ += step_world_m(base, control);
+      request.sensor_pose = turned_pose(base, control);
+      request.sensor_pose.position_world_m += shift_world_m_;
       const int slot = renderer.submit(request);
       if (slot < 0) {
-        slot_.end("the renderer has no free slot");
+        slot_.end("the renderer has no free slot", true);
         return;
       }
       const auto& view = renderer.collect(static_cast<renderer::SlotIndex>(slot));
+      if (view.device_failed) {
+        renderer.release(static_cast<renderer::SlotIndex>(slot));
+        slot_.end("the device reported an error", true);
+        return;
+      }
       frame.width_px = view.width_px;
       frame.height_px = view.height_px;
       const auto radiance = view.radiance_w_m2_sr[band_];
@@ -125,6 +130,7 @@ class ScenarioProvider final : public FrameProvider {
   scene::ScenarioDesc scenario_;
   std::size_t band_;
   double sim_time_s_;
+  glm::dvec3 shift_world_m_{0.0};  ///< where the user moved the camera
   int gpu_index_;
   FrameSlot slot_;
   std::mutex control_mutex_;

@@ -30,7 +30,7 @@ class StreamProvider final : public FrameProvider {
 
   bool take(ViewFrame& frame) override { return slot_.take(frame); }
   void control(const ViewControl&) override {}
-  bool ended(std::string& reason) override { return slot_.ended(reason); }
+  std::optional<ViewEnd> ended() override { return slot_.ended(); }
   std::string title() const override {
     return fmt::format("{} {} {}", client_->server().scenario, channel_.kind, channel_.sensor);
   }
@@ -46,7 +46,7 @@ class StreamProvider final : public FrameProvider {
     while (!stop_.load()) {
       const auto received = client_->receive(100'000'000);
       if (!received) {
-        slot_.end(received.error().text);
+        slot_.end(received.error().text, false);
         return;
       }
       if (*received == nullptr) continue;

@@ -16,13 +16,15 @@ namespace emit::protocol {
 inline constexpr std::size_t kMaxHostFrameBytes = 65507;
 /// Positions farther from the origin are refused, m.
 inline constexpr double kMaxPositionM = 1e8;
+/// Simulation times farther from the scenario's epoch are refused, ns: 1e9 s, as in scenarios.
+inline constexpr std::int64_t kMaxSimTimeNs = 1'000'000'000'000'000'000;
 
 /// Values are those of emit.v1.Status.Code.
 enum class DecodeStatus : std::uint8_t {
   ok = 1,
   wrong_version = 2,         ///< protocol_version is not kProtocolVersion
   oversize = 3,              ///< over kMaxHostFrameBytes or kMaxEntitiesPerFrame
-  malformed = 4,             ///< not a HostFrame, or an entity id twice
+  malformed = 4,             ///< not a HostFrame, an entity id twice, or beyond kMaxSimTimeNs
   invalid_pose = 6,          ///< missing part, NaN, infinite, not a unit quaternion, too far away,
                              ///< or only one of the two rates
   invalid_environment = 13,  ///< NaN, infinite or outside the ranges of docs/wire.md

@@ -28,10 +28,10 @@ struct DeviceOptions {
 };
 
 struct OutputOptions {
-  bool temperature = false;   ///< surface temperature, K; NaN where there is only sky
-  bool depth = false;         ///< distance along the boresight, m; +Inf where there is only sky
-  bool object = false;        ///< 1 + index of the scenario's object, as float; 0 where there is only sky
-  std::uint32_t slots = 3;    ///< read-back ring, 2..16: frames in flight plus frames being streamed
+  bool temperature = false;  ///< surface temperature, K; NaN where there is only sky
+  bool depth = false;        ///< distance along the boresight, m; +Inf where there is only sky
+  bool object = false;  ///< 1 + index of the scenario's object, as float; 0 where there is only sky
+  std::uint32_t slots = 3;  ///< read-back ring, 2..16: frames in flight plus frames being streamed
   bool stage_timing = false;  ///< waits for the device after each stage: fills stages_ms, slower
 };
 
@@ -61,9 +61,9 @@ struct StageTimes {
 
 /// Counted on the device for every frame: nothing is silently repaired.
 struct FrameStats {
-  std::uint32_t nonfinite_px = 0;   ///< NaN or Inf pixels, written as 0
-  std::uint32_t clamped_px = 0;     ///< model evaluations with an input outside the valid range
-  std::uint32_t surface_px = 0;     ///< pixels that show geometry
+  std::uint32_t nonfinite_px = 0;  ///< NaN or Inf pixels, written as 0
+  std::uint32_t clamped_px = 0;    ///< model evaluations with an input outside the valid range
+  std::uint32_t surface_px = 0;    ///< pixels that show geometry
 };
 
 /// One rendered frame. Rows go down, row-major, float32, no padding.

@@ -63,6 +63,5 @@ inline constexpr char kRadianceChannel[] = "radiance";        ///< W m-2 sr-1 in
 inline constexpr char kTemperatureChannel[] = "temperature";  ///< K; NaN: sky
 inline constexpr char kDepthChannel[] = "depth";              ///< m along the boresight; +Inf: sky
 inline constexpr char kObjectChannel[] = "object";            ///< id; 0: sky
-inline constexpr char kRangeRateChannel[] = "range_rate";     ///< m/s
 
 }  // namespace emit::image

@@ -9,15 +9,15 @@
 namespace emit::physics {
 
 /// One list gives the enum, the text and the row of the documentation.
-#define EMIT_ERROR_CODES(X)                                                       \
+#define EMIT_ERROR_CODES(X)                                                        \
   X(invalid_argument, "a value handed to the function is outside its valid range") \
-  X(not_found, "a file, name or device does not exist")                           \
-  X(io, "reading or writing failed")                                              \
-  X(parse, "the content of a file or message is malformed")                       \
-  X(config, "the configuration or scenario is not valid")                         \
-  X(unsupported, "valid, but not handled by this build or device")                \
-  X(gpu, "the graphics device or driver refused")                                 \
-  X(protocol, "a peer broke the wire protocol")                                   \
+  X(not_found, "a file, name or device does not exist")                            \
+  X(io, "reading or writing failed")                                               \
+  X(parse, "the content of a file or message is malformed")                        \
+  X(config, "the configuration or scenario is not valid")                          \
+  X(unsupported, "valid, but not handled by this build or device")                 \
+  X(gpu, "the graphics device or driver refused")                                  \
+  X(protocol, "a peer broke the wire protocol")                                    \
   X(internal, "a defect of emitd itself")
 
 enum class ErrorCode : std::uint8_t {

@@ -7,7 +7,8 @@
 
 /// Frames (conventions.md): world = local east-north-up metres around the scenario origin;
 /// body = x forward, y right, z down; sensor = x right, y down, z along the boresight.
-/// Transforms read target_from_source. Quaternions are (w, x, y, z), unit length, `world_from_body`.
+/// Transforms read target_from_source. Quaternions are (w, x, y, z), unit length,
+/// `world_from_body`.
 namespace emit::physics {
 
 /// Position and attitude of a body in the world frame.

@@ -6,10 +6,10 @@
 ///
 ///   T(t) = sum w_i x_i(t),   tau_i x_i' = u(t) - x_i,   sum w_i = 1        (physics.md eq. 5)
 ///
-/// One step of length dt (eq. 6) is exact for a drive u that is constant or linear over it, whatever dt.
-/// The gains are computed here in double once per (mode, step); the state itself may be float32 if
-/// it is stored as an offset from a reference temperature (a kelvin state stalls in float32).
-/// shaders/lib/relaxation.glsl is the float32 twin. Any thread. RT-safe.
+/// One step of length dt (eq. 6) is exact for a drive u that is constant or linear over it,
+/// whatever dt. The gains are computed here in double once per (mode, step); the state itself may
+/// be float32 if it is stored as an offset from a reference temperature (a kelvin state stalls in
+/// float32). shaders/lib/relaxation.glsl is the float32 twin. Any thread. RT-safe.
 namespace emit::physics {
 
 /// x_new = x + (u0 - x) start + (u1 - x) end, with z = dt/tau, E = exp(-z), phi = (1-E)/z:

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/property_tree/json_parser.hpp>
+#include <boost/property_tree/ptree.hpp>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <vector>
+
+#include "app/replay.hpp"
+#include "app/sha256.hpp"
+#include "emit/config/load.hpp"
+
+namespace emit::server {
+namespace {
+
+namespace fs = std::filesystem;
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+/// Name of a file that is the same wherever the scenario's folder lies. What lies elsewhere (data
+/// that came with the program) goes by its file name.
+std::string label_of(const fs::path& file, const fs::path& folder) {
+  std::error_code code;
+  const fs::path relative =
+      fs::absolute(file, code).lexically_normal().lexically_relative(folder).lexically_normal();
+  const bool beneath = !relative.empty() && *relative.begin() != "..";
+  return (beneath ? relative : file.filename()).generic_string();
+}
+
+/// Label, content and length: neither moving bytes from one file to the next nor a new name goes
+/// unseen.
+Result<void> hash_file(const fs::path& file, const std::string& label, Sha256& hash) {
+  std::error_code code;
+  std::ifstream in(file, std::ios::binary);
+  if (!in || fs::is_directory(file, code)) {
+    return make_error(ErrorCode::io, file.string() + ": cannot be read");
+  }
+  hash.update(std::as_bytes(std::span(label.c_str(), label.size() + 1)));
+  std::vector<char> buffer(1u << 20);
+  std::uint64_t bytes = 0;
+  while (in) {
+    in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    const auto count = static_cast<std::size_t>(in.gcount());
+    hash.update(std::as_bytes(std::span(buffer.data(), count)));
+    bytes += count;
+  }
+  if (in.bad()) {
+    return make_error(ErrorCode::io, file.string() + ": reading failed");
+  }
+  hash.update(std::as_bytes(std::span(&bytes, 1)));
+  return {};
+}
+
+/// The JSON of a .gltf file, or the first chunk of a .glb file (glTF 2.0, section 4.4).
+std::string json_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::array<char, 20> head{};
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  if (in.gcount() == static_cast<std::streamsize>(head.size()) &&
+      std::memcmp(head.data(), "glTF", 4) == 0) {
+    std::uint32_t json_bytes = 0;
+    std::memcpy(&json_bytes, head.data() + 12, sizeof(json_bytes));
+    std::error_code code;
+    const std::uintmax_t limit = fs::file_size(file, code);
+    std::string json(code ? 0 : std::min<std::uintmax_t>(json_bytes, limit), '\0');
+    in.read(json.data(), static_cast<std::streamsize>(json.size()));
+    return json;
+  }
+  in.clear();
+  in.seekg(0);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+std::string percent_decoded(const std::string& uri) {
+  std::string out;
+  for (std::size_t i = 0; i < uri.size(); ++i) {
+    unsigned value = 0;
+    const char* first = uri.data() + i + 1;
+    if (uri[i] == '%' && i + 2 < uri.size() &&
+        std::from_chars(first, first + 2, value, 16).ptr == first + 2) {
+      out += static_cast<char>(value);
+      i += 2;
+    } else {
+      out += uri[i];
+    }
+  }
+  return out;
+}
+
+/// Files with the geometry of a glTF file that are not part of it. Images are not followed: nothing
+/// is rendered from them.
+Result<std::vector<fs::path>> buffer_files(const fs::path& gltf) {
+  std::vector<fs::path> out;
+  try {
+    std::istringstream text(json_of(gltf));
+    boost::property_tree::ptree root;
+    boost::property_tree::read_json(text, root);
+    const auto buffers = root.get_child_optional("buffers");
+    if (!buffers) {
+      return out;
+    }
+    for (const auto& [key, buffer] : *buffers) {
+      const auto uri = buffer.get_optional<std::string>("uri");
+      if (uri && !uri->starts_with("data:")) {
+        out.push_back((gltf.parent_path() / percent_decoded(*uri)).lexically_normal());
+      }
+    }
+  } catch (const std::exception& error) {
+    return make_error(ErrorCode::parse, fmt::format("{}: {}", gltf.string(), error.what()));
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
+  Sha256 hash;
+  std::error_code code;
+  const fs::path folder = fs::absolute(scenario.file, code).lexically_normal().parent_path();
+  // Folders differ from machine to machine, contents must not.
+  scene::ScenarioDesc plain = scenario;
+  plain.file.clear();
+  for (auto& object : plain.objects) {
+    object.gltf = label_of(object.gltf, folder);
+  }
+  const std::string text = config::print_scenario(plain);
+  hash.update(std::as_bytes(std::span(text)));
+  for (const auto& object : scenario.objects) {
+    if (auto done = hash_file(object.gltf, label_of(object.gltf, folder), hash); !done) {
+      return tl::unexpected<physics::Error>(std::move(done.error()));
+    }
+    auto buffers = buffer_files(object.gltf);
+    if (!buffers) {
+      return tl::unexpected<physics::Error>(std::move(buffers.error()));
+    }
+    for (const fs::path& buffer : *buffers) {
+      if (auto done = hash_file(buffer, label_of(buffer, folder), hash); !done) {
+        return tl::unexpected<physics::Error>(
+            std::move(done.error()).with_context(object.gltf.string()));
+      }
+    }
+  }
+  return hash.finish();
+}
+
+}  // namespace emit::server

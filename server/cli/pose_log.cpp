@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pose_log.hpp"
+
+#include <algorithm>
+#include <cctype>
+
+namespace emit::cli {
+namespace {
+
+bool is_csv(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".csv";
+}
+
+}  // namespace
+
+physics::Result<PoseLog> PoseLog::open(const std::filesystem::path& file) {
+  if (is_csv(file)) {
+    auto reader = protocol::PoseCsvReader::open(file);
+    if (!reader) return tl::unexpected(reader.error());
+    return PoseLog(std::move(*reader));
+  }
+  auto reader = protocol::LogReader::open(file);
+  if (!reader) return tl::unexpected(reader.error());
+  return PoseLog(std::move(*reader));
+}
+
+physics::Result<bool> PoseLog::next() {
+  if (auto* csv = std::get_if<protocol::PoseCsvReader>(&reader_)) return csv->next();
+  auto& log = std::get<protocol::LogReader>(reader_);
+  while (true) {
+    auto more = log.next();
+    if (!more || !*more || log.topic() == protocol::LogTopic::host) return more;
+  }
+}
+
+const protocol::HostFrameData& PoseLog::host() const noexcept {
+  if (const auto* csv = std::get_if<protocol::PoseCsvReader>(&reader_)) return csv->host();
+  return std::get_if<protocol::LogReader>(&reader_)->host();
+}
+
+std::optional<std::string> PoseLog::truncation() const {
+  const auto* log = std::get_if<protocol::LogReader>(&reader_);
+  if (log == nullptr || !log->truncation()) return std::nullopt;
+  return std::string(*log->truncation());
+}
+
+}  // namespace emit::cli

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/socket.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <string>
+#include <vector>
+
+namespace emit::server {
+namespace {
+
+constexpr std::int64_t kLongNs = 20'000'000'000;
+
+bool readable(int fd) {
+  pollfd wait{fd, POLLIN, 0};
+  return ::poll(&wait, 1, 20'000) == 1;
+}
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+/// A listener on the loopback interface with one connection.
+class TcpPair : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto listener = TcpListener::open(context_, numeric_address("127.0.0.1", 0));
+    ASSERT_TRUE(listener.has_value()) << listener.error().text;
+    listener_ = std::move(*listener);
+    auto client = TcpSocket::connect(SocketContext(), listener_.local_address(), kLongNs);
+    ASSERT_TRUE(client.has_value()) << client.error().text;
+    client_ = std::move(*client);
+    ASSERT_TRUE(readable(listener_.fd()));
+    server_ = listener_.accept(peer_);
+    ASSERT_TRUE(static_cast<bool>(server_));
+  }
+
+  SocketContext context_;
+  TcpListener listener_;
+  TcpSocket client_;
+  TcpSocket server_;
+  SocketAddress peer_;
+};
+
+TEST_F(TcpPair, AcceptedAndConnectedSocketsNeitherBlockNorReachChildProcesses) {
+  for (const int fd : {listener_.fd(), client_.fd(), server_.fd()}) {
+    EXPECT_NE(::fcntl(fd, F_GETFL) & O_NONBLOCK, 0);
+    EXPECT_NE(::fcntl(fd, F_GETFD) & FD_CLOEXEC, 0);
+  }
+  SocketAddress nobody;
+  EXPECT_FALSE(static_cast<bool>(listener_.accept(nobody)));
+  EXPECT_EQ(to_string(peer_).substr(0, 10), "127.0.0.1:");
+}
+
+TEST_F(TcpPair, PiecesArriveInOrderAndPeekingTakesNothing) {
+  const std::string one = "one ";
+  const std::string two = "two ";
+  const std::string three = "three";
+  const std::array<std::span<const std::byte>, 3> pieces{bytes_of(one), bytes_of(two),
+                                                         bytes_of(three)};
+  const IoResult sent = client_.write_some(pieces);
+  ASSERT_EQ(sent.status, IoStatus::done);
+  EXPECT_EQ(sent.bytes, 13U);
+  ASSERT_TRUE(readable(server_.fd()));
+  std::array<std::byte, 64> space{};
+  EXPECT_EQ(server_.peek(space).bytes, 13U);
+  const IoResult got = server_.read_some(space);
+  ASSERT_EQ(got.bytes, 13U);
+  EXPECT_TRUE(std::ranges::equal(std::span(space).first(13), bytes_of("one two three")));
+  EXPECT_EQ(server_.read_some(space).status, IoStatus::would_block);
+}
+
+TEST_F(TcpPair, TheEndOfAStreamIsToldApartFromFailures) {
+  client_.shutdown_send();
+  ASSERT_TRUE(readable(server_.fd()));
+  std::array<std::byte, 8> space{};
+  EXPECT_EQ(server_.read_some(space).status, IoStatus::closed);
+  EXPECT_EQ(server_.peek(space).status, IoStatus::closed);
+  EXPECT_EQ(server_.read_some({}).status, IoStatus::failed) << "no space is no end";
+  const IoResult sent = client_.write_some(bytes_of("late"));
+  EXPECT_EQ(sent.status, IoStatus::failed);
+  EXPECT_EQ(sent.error, EPIPE) << "and no signal";
+}
+
+TEST_F(TcpPair, AFullSocketTakesPartThenNothing) {
+  const std::vector<std::byte> much(64u << 20);
+  std::size_t sent = 0;
+  IoResult result;
+  while ((result = client_.write_some(std::span<const std::byte>(much))).status == IoStatus::done) {
+    sent += result.bytes;
+  }
+  EXPECT_EQ(result.status, IoStatus::would_block);
+  EXPECT_GT(sent, 0U);
+  EXPECT_LT(sent, much.size());
+}
+
+TEST(TcpSocket, NamesAddressAndReasonWhenNobodyListens) {
+  SocketContext context;
+  SocketAddress address;
+  {
+    auto listener = TcpListener::open(context, numeric_address("127.0.0.1", 0));
+    ASSERT_TRUE(listener.has_value());
+    address = listener->local_address();
+    const auto taken = TcpListener::open(context, address);
+    ASSERT_FALSE(taken.has_value());
+    EXPECT_EQ(taken.error().text, "tcp " + to_string(address) + ": Address already in use");
+  }
+  const auto refused = TcpSocket::connect(context, address, kLongNs);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().text, "tcp " + to_string(address) + ": Connection refused");
+}
+
+TEST(TcpSocket, GivesUpOnAConnectionThatNobodyAnswersInTime) {
+  SocketContext context;
+  auto listener = TcpListener::open(context, numeric_address("127.0.0.1", 0));
+  ASSERT_TRUE(listener.has_value());
+  // The queue of connections nobody accepts fills up; then the kernel leaves new ones unanswered.
+  std::vector<TcpSocket> waiting;
+  for (int i = 0; i < 200; ++i) {
+    auto socket = TcpSocket::connect(context, listener->local_address(), 50'000'000);
+    if (!socket) {
+      EXPECT_EQ(socket.error().text,
+                "tcp " + to_string(listener->local_address()) + ": no answer within the timeout");
+      return;
+    }
+    waiting.push_back(std::move(*socket));
+  }
+  FAIL() << "200 connections in a queue of 32";
+}
+
+TEST(UdpSocket, SendsToAddressesAndHearsThatNobodyListens) {
+  SocketContext context;
+  auto here = UdpSocket::open_bound(context, numeric_address("127.0.0.1", 0));
+  auto there = UdpSocket::open_bound(context, numeric_address("127.0.0.1", 0));
+  ASSERT_TRUE(here.has_value() && there.has_value());
+  EXPECT_EQ(here->send_to(bytes_of("hello"), there->local_address()).bytes, 5U);
+  ASSERT_TRUE(readable(there->fd()));
+  std::array<std::byte, 64> space{};
+  EXPECT_EQ(there->receive(space).bytes, 5U);
+  EXPECT_EQ(there->receive(space).status, IoStatus::would_block);
+
+  const SocketAddress gone = there->local_address();
+  *there = UdpSocket();
+  ASSERT_TRUE(here->connect(gone).has_value());
+  ASSERT_EQ(here->send(bytes_of("anybody?")).status, IoStatus::done);
+  ASSERT_TRUE(readable(here->fd()));
+  const IoResult got = here->receive(space);
+  EXPECT_EQ(got.status, IoStatus::failed);
+  EXPECT_EQ(got.error, ECONNREFUSED);
+}
+
+TEST(UdpSocket, SharesThePortOfAGroupOnlyWhenAllowed) {
+  SocketContext context;
+  const SocketAddress any = numeric_address("239.255.12.34", 0);
+  auto first = UdpSocket::open(context, any);
+  ASSERT_TRUE(first.has_value());
+  first->allow_shared_port();
+  ASSERT_TRUE(first->bind(any).has_value());
+  const SocketAddress taken = first->local_address();
+  auto second = UdpSocket::open(context, taken);
+  ASSERT_TRUE(second.has_value());
+  const auto refused = second->bind(taken);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().text.find("Address already in use"), std::string::npos);
+  second->allow_shared_port();
+  EXPECT_TRUE(second->bind(taken).has_value());
+  EXPECT_EQ(first->join_group(numeric_address("10.0.0.1", 0)), EINVAL);
+}
+
+TEST(SocketAddress, ReadsNumbersOnlyAndKnowsGroups) {
+  EXPECT_EQ(numeric_address("localhost", 1).length, 0U);
+  EXPECT_EQ(numeric_address("", 1).length, 0U);
+  EXPECT_EQ(to_string(SocketAddress{}), "unknown address");
+  SocketAddress v6 = numeric_address("::1", 7000);
+  EXPECT_EQ(to_string(v6), "[::1]:7000");
+  v6.set_port(7001);
+  EXPECT_EQ(v6.port(), 7001);
+  EXPECT_FALSE(v6.is_multicast());
+  EXPECT_TRUE(numeric_address("ff02::1", 1).is_multicast());
+  EXPECT_TRUE(numeric_address("239.1.2.3", 1).is_multicast());
+  EXPECT_FALSE(numeric_address("127.0.0.1", 1).is_multicast());
+  EXPECT_FALSE(SocketAddress{}.is_multicast());
+}
+
+TEST(Resolve, TakesNumbersAndNamesWhatItCannotFind) {
+  const auto number = resolve({"127.0.0.1", 7000}, Transport::tcp, false);
+  ASSERT_TRUE(number.has_value()) << number.error().text;
+  EXPECT_EQ(to_string(*number), "127.0.0.1:7000");
+  const auto every = resolve({"", 7000}, Transport::udp, true);
+  ASSERT_TRUE(every.has_value());
+  EXPECT_EQ(every->port(), 7000);
+  // Reserved: never exists (RFC 6761). Without a name service the reason is another.
+  const auto nowhere = resolve({"host.invalid", 7000}, Transport::tcp, false);
+  ASSERT_FALSE(nowhere.has_value());
+  EXPECT_EQ(nowhere.error().text.substr(0, 19), "host.invalid:7000: ");
+}
+
+}  // namespace
+}  // namespace emit::server
