@@ -14,7 +14,7 @@ namespace emit::test {
 
 /// What a source was asked to do, kept by the test so that it outlives the source.
 struct SourceScript {
-  bool ready = true;         ///< poll(): false holds frames back
+  bool ready = true;          ///< poll(): false holds frames back
   bool weather_full = false;  ///< apply_weather(): no room
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;

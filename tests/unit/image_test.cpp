@@ -138,7 +138,9 @@ TEST(PngImage, file_carries_signature_and_size) {
   EXPECT_EQ(write_png("/nowhere/at/all.png", image).error().code, ErrorCode::io);
 }
 
-double luma(const Rgb& c) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; }
+double luma(const Rgb& c) {
+  return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+}
 
 TEST(FalseColor, lightness_never_falls_along_a_map) {
   for (const ColorMap map : {ColorMap::thermal, ColorMap::grey}) {

@@ -44,13 +44,11 @@ void put(std::string& text, const std::string& from, const std::string& to) {
 }
 
 const Broken kBroken[] = {
-    {"index_out_of_range",
-     [](GltfText& t) { t.buffer.replace(40, 2, packed<std::uint16_t>({7})); },
+    {"index_out_of_range", [](GltfText& t) { t.buffer.replace(40, 2, packed<std::uint16_t>({7})); },
      "mesh 0 'part' primitive 0: accessor 1: index 7 >= 3 vertices"},
     {"accessor_beyond_view", [](GltfText& t) { put(t.accessors, R"("count":3)", R"("count":4)"); },
      "accessor 0: 4 elements of 12 bytes from byte 0 exceed bufferView 0 of 36 bytes"},
-    {"huge_count",
-     [](GltfText& t) { put(t.accessors, R"("count":3)", R"("count":4000000000)"); },
+    {"huge_count", [](GltfText& t) { put(t.accessors, R"("count":3)", R"("count":4000000000)"); },
      "accessor 0: 4000000000 elements"},
     {"huge_count_without_view",
      [](GltfText& t) {
@@ -79,8 +77,7 @@ const Broken kBroken[] = {
      "node 0 'lost': mesh 4 does not exist"},
     {"missing_child", [](GltfText& t) { t.nodes = R"({"mesh":0,"children":[8]})"; },
      "node 0: child 8 does not exist"},
-    {"node_cycle",
-     [](GltfText& t) { t.nodes = R"({"children":[1]},{"children":[0],"mesh":0})"; },
+    {"node_cycle", [](GltfText& t) { t.nodes = R"({"children":[1]},{"children":[0],"mesh":0})"; },
      "node 0: reached twice"},
     {"two_parents",
      [](GltfText& t) { t.nodes = R"({"children":[1,2]},{"children":[2]},{"name":"c","mesh":0})"; },

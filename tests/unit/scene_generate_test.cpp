@@ -136,7 +136,9 @@ TEST(GenerateBox, plane_covers_its_square_once) {
   const Mesh& plane = mesh_named(model, "plane");
   double area = 0.0;
   for (std::size_t i = 0; i < plane.indices.size(); i += 3) {
-    const auto p = [&](std::size_t k) { return glm::dvec3(plane.positions_m[plane.indices[i + k]]); };
+    const auto p = [&](std::size_t k) {
+      return glm::dvec3(plane.positions_m[plane.indices[i + k]]);
+    };
     const glm::dvec3 cross = glm::cross(p(1) - p(0), p(2) - p(0));
     EXPECT_GT(cross.y, 0.0) << "faces down";
     area += 0.5 * cross.y;
@@ -244,7 +246,9 @@ TEST(GenerateAirfield, ground_is_covered_exactly_once) {
   const Mesh& ground = mesh_named(model, "ground");
   double area = 0.0;
   for (std::size_t i = 0; i < ground.indices.size(); i += 3) {
-    const auto p = [&](std::size_t k) { return glm::dvec3(ground.positions_m[ground.indices[i + k]]); };
+    const auto p = [&](std::size_t k) {
+      return glm::dvec3(ground.positions_m[ground.indices[i + k]]);
+    };
     EXPECT_EQ(p(0).y, 0.0);
     area += 0.5 * glm::cross(p(1) - p(0), p(2) - p(0)).y;
   }

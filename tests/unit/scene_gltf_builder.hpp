@@ -22,7 +22,8 @@ inline std::filesystem::path test_folder() {
   return folder;
 }
 
-inline std::filesystem::path write_file(const std::filesystem::path& file, const std::string& data) {
+inline std::filesystem::path write_file(const std::filesystem::path& file,
+                                        const std::string& data) {
   std::ofstream(file, std::ios::binary) << data;
   return file;
 }
@@ -68,9 +69,8 @@ struct GltfText {
   std::string extra;  ///< further members of the root, each followed by a comma
 
   [[nodiscard]] std::string json() const {
-    const std::string uri = buffer_uri.empty()
-                                ? "data:application/octet-stream;base64," + base64(buffer)
-                                : buffer_uri;
+    const std::string uri =
+        buffer_uri.empty() ? "data:application/octet-stream;base64," + base64(buffer) : buffer_uri;
     const std::string mesh_list =
         meshes.empty() ? R"({"name":"part","primitives":[)" + primitive + "]}" : meshes;
     return R"({"asset":{"version":"2.0"},)" + extra + R"("scenes":[)" + scenes + R"(],"nodes":[)" +
@@ -85,7 +85,9 @@ struct GltfText {
 inline std::string glb(std::string json, std::string binary) {
   json.resize((json.size() + 3) / 4 * 4, ' ');
   binary.resize((binary.size() + 3) / 4 * 4, '\0');
-  const auto word = [](std::size_t value) { return packed<std::uint32_t>({static_cast<std::uint32_t>(value)}); };
+  const auto word = [](std::size_t value) {
+    return packed<std::uint32_t>({static_cast<std::uint32_t>(value)});
+  };
   return "glTF" + word(2) + word(28 + json.size() + binary.size()) + word(json.size()) + "JSON" +
          json + word(binary.size()) + std::string("BIN\0", 4) + binary;
 }

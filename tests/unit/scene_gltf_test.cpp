@@ -143,7 +143,8 @@ TEST(GltfImport, node_hierarchies_multiply_from_the_root_down) {
          {"name":"c","matrix":[2,0,0,0, 0,2,0,0, 0,0,2,0, 0,0,5,1],"mesh":0})";
   const GltfModel model = load(text);
   EXPECT_EQ(model.nodes, 3U);
-  // Corner (1,0,0): doubled and lifted, shifted by (1,0,0), turned by 90 degrees, shifted by (10,0,0).
+  // Corner (1,0,0): doubled and lifted, shifted by (1,0,0), turned by 90 degrees, shifted by
+  // (10,0,0).
   expect_near(corner(model, 0, 1), {10, 3, 5});
 }
 
@@ -263,7 +264,8 @@ TEST(GltfImport, missing_pictures_do_not_matter) {
 }
 
 TEST(GltfImport, shipped_example_files_load) {
-  const std::filesystem::path folder = std::filesystem::path(EMIT_TEST_SOURCE_DIR) / "data" / "gltf";
+  const std::filesystem::path folder =
+      std::filesystem::path(EMIT_TEST_SOURCE_DIR) / "data" / "gltf";
   const GltfModel external = load_file(folder / "wedge.gltf");
   EXPECT_EQ(external.meshes.at(0).indices.size(), 24U);
   EXPECT_EQ(external.materials.at(0).name, "concrete");

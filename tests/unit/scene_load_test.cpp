@@ -44,7 +44,8 @@ ScenarioDesc scenario_of(const std::filesystem::path& gltf) {
   return scenario;
 }
 
-ScenarioDesc one_triangle(const std::string& materials = "", const std::string& primitive_end = "") {
+ScenarioDesc one_triangle(const std::string& materials = "",
+                          const std::string& primitive_end = "") {
   GltfText text;
   text.materials = materials;
   text.primitive = R"({"attributes":{"POSITION":0},"indices":1)" + primitive_end + "}";
@@ -100,8 +101,7 @@ TEST(SceneOrientation, scale_applies_to_the_geometry_not_to_the_place) {
 }
 
 TEST(LoadScene, materials_map_by_table_then_object_then_name_then_default) {
-  const std::string materials =
-      R"({"name":"paint"},{"name":"steel"},{"name":"unknown"})";
+  const std::string materials = R"({"name":"paint"},{"name":"steel"},{"name":"unknown"})";
   const auto material_of = [&](int gltf, auto change) {
     ScenarioDesc scenario = one_triangle(materials, R"(,"material":)" + std::to_string(gltf));
     change(scenario.objects[0]);
@@ -114,10 +114,11 @@ TEST(LoadScene, materials_map_by_table_then_object_then_name_then_default) {
   EXPECT_EQ(material_of(2, nothing), "concrete");
   EXPECT_EQ(material_of(0, [](ObjectDesc& o) { o.material_map["paint"] = "asphalt"; }), "asphalt");
   EXPECT_EQ(material_of(1, [](ObjectDesc& o) { o.material = "asphalt"; }), "asphalt");
-  EXPECT_EQ(material_of(1, [](ObjectDesc& o) {
-              o.material = "asphalt";
-              o.material_map["steel"] = "steel";
-            }),
+  EXPECT_EQ(material_of(1,
+                        [](ObjectDesc& o) {
+                          o.material = "asphalt";
+                          o.material_map["steel"] = "steel";
+                        }),
             "steel");
 }
 
@@ -126,7 +127,8 @@ TEST(LoadScene, default_material_is_entry_zero_and_its_use_is_warned_of) {
   ASSERT_TRUE(scene);
   EXPECT_EQ(scene->materials.at(0).name, "concrete");
   EXPECT_EQ(scene->meshes.at(0).submeshes.at(0).material, 0U);
-  EXPECT_THAT(scene->warnings, Contains(AllOf(HasSubstr("thing.gltf"), HasSubstr("'unobtainium'"))));
+  EXPECT_THAT(scene->warnings,
+              Contains(AllOf(HasSubstr("thing.gltf"), HasSubstr("'unobtainium'"))));
   EXPECT_EQ(scene->mappings.at(0).by, MappedBy::fallback);
 }
 

@@ -126,7 +126,8 @@ physics::Result<double> number_attribute(const ExrImage& image, const char* name
       return *value;
     }
   }
-  return make_error(ErrorCode::parse, fmt::format("attribute '{}' is missing or not a number", name));
+  return make_error(ErrorCode::parse,
+                    fmt::format("attribute '{}' is missing or not a number", name));
 }
 
 physics::Result<std::string> text_attribute(const ExrImage& image, const char* name) {
@@ -240,12 +241,15 @@ physics::Result<FrameMetadata> frame_metadata(const ExrImage& image) {
   metadata.band_name = *band;
   metadata.units = *units;
   physics::Pose& pose = metadata.sensor_pose;
-  const std::pair<const char*, double*> numbers[] = {
-      {"posePositionXM", &pose.position_world_m.x}, {"posePositionYM", &pose.position_world_m.y},
-      {"posePositionZM", &pose.position_world_m.z}, {"poseQuatW", &pose.world_from_body.w},
-      {"poseQuatX", &pose.world_from_body.x},       {"poseQuatY", &pose.world_from_body.y},
-      {"poseQuatZ", &pose.world_from_body.z},       {"bandLoUm", &metadata.band_lo_um},
-      {"bandHiUm", &metadata.band_hi_um}};
+  const std::pair<const char*, double*> numbers[] = {{"posePositionXM", &pose.position_world_m.x},
+                                                     {"posePositionYM", &pose.position_world_m.y},
+                                                     {"posePositionZM", &pose.position_world_m.z},
+                                                     {"poseQuatW", &pose.world_from_body.w},
+                                                     {"poseQuatX", &pose.world_from_body.x},
+                                                     {"poseQuatY", &pose.world_from_body.y},
+                                                     {"poseQuatZ", &pose.world_from_body.z},
+                                                     {"bandLoUm", &metadata.band_lo_um},
+                                                     {"bandHiUm", &metadata.band_hi_um}};
   for (const auto& [name, target] : numbers) {
     const physics::Result<double> value = number_attribute(image, name);
     if (!value) return tl::unexpected(value.error());

@@ -44,7 +44,7 @@ struct Knot {
   double chroma;
   double hue_deg;
 };
-constexpr Knot kThermalPath[] = {{0.0, 0.02, 275.0}, {0.22, 0.16, 290.0}, {0.42, 0.22, 340.0},
+constexpr Knot kThermalPath[] = {{0.0, 0.02, 275.0},  {0.22, 0.16, 290.0}, {0.42, 0.22, 340.0},
                                  {0.60, 0.22, 395.0}, {0.78, 0.19, 430.0}, {0.92, 0.13, 455.0},
                                  {1.0, 0.02, 465.0}};
 constexpr double kDarkest = 0.06;
@@ -124,8 +124,8 @@ void draw_color_bar(RgbImage& image, std::uint32_t left_px, const FalseColorOpti
   const auto text_left = static_cast<std::int32_t>(left_px + kBarLeftPx + kBarWidthPx + 4);
   for (std::uint32_t tick = 0; tick < kBarTicks; ++tick) {
     const double frac = static_cast<double>(tick) / (kBarTicks - 1);
-    const auto y = static_cast<std::int32_t>(rows) -
-                   static_cast<std::int32_t>(std::lround(frac * span));
+    const auto y =
+        static_cast<std::int32_t>(rows) - static_cast<std::int32_t>(std::lround(frac * span));
     const double value = options.min_value + frac * range;
     std::string text = fmt::format("{:.{}f}", value, decimals);
     if (text.size() > 6) {
@@ -153,9 +153,9 @@ const std::array<Rgb, 256>& color_table(ColorMap map) noexcept {
 physics::Result<RgbImage> false_color(std::span<const float> values, std::uint32_t width_px,
                                       std::uint32_t height_px, const FalseColorOptions& options) {
   if (width_px == 0 || height_px == 0 || values.size() != std::size_t{width_px} * height_px) {
-    return physics::make_error(
-        physics::ErrorCode::invalid_argument,
-        fmt::format("false colour: {} values for {}x{} pixels", values.size(), width_px, height_px));
+    return physics::make_error(physics::ErrorCode::invalid_argument,
+                               fmt::format("false colour: {} values for {}x{} pixels",
+                                           values.size(), width_px, height_px));
   }
   if (!std::isfinite(options.min_value) || !std::isfinite(options.max_value) ||
       !(options.min_value < options.max_value)) {

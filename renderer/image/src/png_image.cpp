@@ -54,8 +54,8 @@ physics::Result<void> write_png(const std::filesystem::path& file, const RgbImag
                                fmt::format("{}: {}", file.string(), std::strerror(errno)));
   }
   const int width = static_cast<int>(image.width_px);
-  const int written = stbi_write_png_to_func(append, &sink, width, static_cast<int>(image.height_px),
-                                             3, image.rgb.data(), width * 3);
+  const int written = stbi_write_png_to_func(
+      append, &sink, width, static_cast<int>(image.height_px), 3, image.rgb.data(), width * 3);
   const bool closed = std::fclose(sink.file) == 0;
   if (written == 0 || sink.failed || !closed) {
     return physics::make_error(physics::ErrorCode::io,

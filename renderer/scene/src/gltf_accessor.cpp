@@ -59,12 +59,13 @@ Result<View> view_of(const tinygltf::Model& model, int view_index, std::size_t o
     return make_error(ErrorCode::parse, fmt::format("bufferView {}: buffer {} does not exist",
                                                     view_index, view.buffer));
   }
-  const std::vector<unsigned char>& data = model.buffers[static_cast<std::size_t>(view.buffer)].data;
+  const std::vector<unsigned char>& data =
+      model.buffers[static_cast<std::size_t>(view.buffer)].data;
   if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset) {
-    return make_error(ErrorCode::parse,
-                      fmt::format("bufferView {}: bytes {} + {} exceed buffer {} of {} bytes",
-                                  view_index, view.byteOffset, view.byteLength, view.buffer,
-                                  data.size()));
+    return make_error(
+        ErrorCode::parse,
+        fmt::format("bufferView {}: bytes {} + {} exceed buffer {} of {} bytes", view_index,
+                    view.byteOffset, view.byteLength, view.buffer, data.size()));
   }
   const std::size_t stride = strided && view.byteStride != 0 ? view.byteStride : element_bytes;
   if (stride < element_bytes) {
@@ -72,14 +73,15 @@ Result<View> view_of(const tinygltf::Model& model, int view_index, std::size_t o
                       fmt::format("bufferView {}: byteStride {} is below the element's {} bytes",
                                   view_index, stride, element_bytes));
   }
-  const bool fits = offset <= view.byteLength &&
-                    (count == 0 || (element_bytes <= view.byteLength - offset &&
-                                    count - 1 <= (view.byteLength - offset - element_bytes) / stride));
+  const bool fits =
+      offset <= view.byteLength &&
+      (count == 0 || (element_bytes <= view.byteLength - offset &&
+                      count - 1 <= (view.byteLength - offset - element_bytes) / stride));
   if (!fits) {
     return make_error(ErrorCode::parse,
                       fmt::format("{} elements of {} bytes from byte {} exceed bufferView {} of {} "
-                                  "bytes", count, element_bytes, offset, view_index,
-                                  view.byteLength));
+                                  "bytes",
+                                  count, element_bytes, offset, view_index, view.byteLength));
   }
   return View{data.data() + view.byteOffset + offset, stride};
 }
@@ -150,8 +152,8 @@ Result<void> apply_sparse(const tinygltf::Model& model, const tinygltf::Accessor
     const std::uint32_t target =
         unsigned_integer(indices->data + i * indices->stride, sparse.indices.componentType);
     if (target >= accessor.count) {
-      return make_error(ErrorCode::parse, fmt::format("sparse index {} >= {} elements", target,
-                                                      accessor.count));
+      return make_error(ErrorCode::parse,
+                        fmt::format("sparse index {} >= {} elements", target, accessor.count));
     }
     for (std::size_t c = 0; c < components; ++c) {
       values[target * components + c] =
@@ -168,8 +170,9 @@ Result<std::vector<float>> read_checked(const tinygltf::Model& model,
   const int found = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type));
   const std::size_t bytes = component_bytes(accessor.componentType);
   if (found < 0 || static_cast<std::size_t>(found) != components || bytes == 0) {
-    return make_error(ErrorCode::parse, fmt::format("{} components of type {} instead of {} numbers",
-                                                    found, accessor.componentType, components));
+    return make_error(ErrorCode::parse,
+                      fmt::format("{} components of type {} instead of {} numbers", found,
+                                  accessor.componentType, components));
   }
   if (accessor.count > kMaxElements) {
     return make_error(ErrorCode::unsupported, fmt::format("{} elements", accessor.count));
@@ -223,7 +226,8 @@ Result<std::vector<float>> read_floats(const tinygltf::Model& model, int index, 
   Result<std::vector<float>> values =
       read_checked(model, *accessor, static_cast<std::size_t>(components));
   if (!values) {
-    return tl::unexpected(std::move(values.error()).with_context(fmt::format("accessor {}", index)));
+    return tl::unexpected(
+        std::move(values.error()).with_context(fmt::format("accessor {}", index)));
   }
   return values;
 }
@@ -254,8 +258,8 @@ Result<std::vector<std::uint32_t>> read_indices(const tinygltf::Model& model, in
   for (std::size_t i = 0; i < indices.size(); ++i) {
     indices[i] = unsigned_integer(view->data + i * view->stride, accessor->componentType);
     if (indices[i] >= vertices) {
-      return make_error(ErrorCode::parse, fmt::format("{}: index {} >= {} vertices", context,
-                                                      indices[i], vertices));
+      return make_error(ErrorCode::parse,
+                        fmt::format("{}: index {} >= {} vertices", context, indices[i], vertices));
     }
   }
   return indices;

@@ -71,12 +71,14 @@ Result<std::span<const unsigned char>> check_container(std::span<const unsigned 
   }
   const std::uint32_t version = read_u32(bytes, 4);
   if (version != 2) {
-    return make_error(ErrorCode::unsupported, fmt::format("GLB header: version {}, not 2", version));
+    return make_error(ErrorCode::unsupported,
+                      fmt::format("GLB header: version {}, not 2", version));
   }
   const std::uint32_t length = read_u32(bytes, 8);
   if (length > bytes.size()) {
     return make_error(ErrorCode::parse, fmt::format("GLB header: length {}, but the file has {} "
-                                                    "bytes: truncated?", length, bytes.size()));
+                                                    "bytes: truncated?",
+                                                    length, bytes.size()));
   }
   std::span<const unsigned char> json;
   std::size_t offset = kHeaderBytes;
@@ -86,7 +88,8 @@ Result<std::span<const unsigned char>> check_container(std::span<const unsigned 
     offset += kChunkHeaderBytes;
     if (size > length - offset) {
       return make_error(ErrorCode::parse, fmt::format("GLB chunk {}: {} bytes, but {} are left: "
-                                                      "truncated?", chunk, size, length - offset));
+                                                      "truncated?",
+                                                      chunk, size, length - offset));
     }
     if (chunk == 0) {
       if (kind != kJsonChunk) {
@@ -172,11 +175,11 @@ Result<void> parse_bytes(const std::vector<unsigned char>& bytes, GltfFile& file
   const auto size = static_cast<unsigned int>(bytes.size());
   bool parsed = false;
   try {
-    parsed = binary ? parser.LoadBinaryFromMemory(&file.model, &error, &warning, bytes.data(), size,
-                                                  folder)
-                    : parser.LoadASCIIFromString(&file.model, &error, &warning,
-                                                 reinterpret_cast<const char*>(bytes.data()), size,
-                                                 folder);
+    parsed =
+        binary
+            ? parser.LoadBinaryFromMemory(&file.model, &error, &warning, bytes.data(), size, folder)
+            : parser.LoadASCIIFromString(&file.model, &error, &warning,
+                                         reinterpret_cast<const char*>(bytes.data()), size, folder);
   } catch (const std::exception& thrown) {
     return make_error(ErrorCode::parse, one_line(error + thrown.what()));
   }

@@ -72,14 +72,15 @@ bool is_finite(const glm::dmat4& matrix) {
   return true;
 }
 
-/// A mirroring node gets a mirrored copy of the mesh, so that its matrix no longer mirrors and front
-/// faces come out counter-clockwise.
+/// A mirroring node gets a mirrored copy of the mesh, so that its matrix no longer mirrors and
+/// front faces come out counter-clockwise.
 Result<void> place_mesh(const GltfFile& file, const PlacedNode& placed, MeshStore& store,
                         GltfModel& model) {
   const tinygltf::Node& node = file.model.nodes[static_cast<std::size_t>(placed.node)];
   const std::string context = element("node", placed.node, node.name);
   if (static_cast<std::size_t>(node.mesh) >= file.model.meshes.size()) {
-    return make_error(ErrorCode::parse, fmt::format("{}: mesh {} does not exist", context, node.mesh));
+    return make_error(ErrorCode::parse,
+                      fmt::format("{}: mesh {} does not exist", context, node.mesh));
   }
   if (node.skin >= 0) {
     model.warnings.push_back(
@@ -112,8 +113,8 @@ Result<void> place_mesh(const GltfFile& file, const PlacedNode& placed, MeshStor
     }
   }
   if (collapsed > 0) {
-    model.warnings.push_back(fmt::format("{}: {}: {} placements of zero volume skipped", file.name,
-                                         context, collapsed));
+    model.warnings.push_back(
+        fmt::format("{}: {}: {} placements of zero volume skipped", file.name, context, collapsed));
   }
   return {};
 }

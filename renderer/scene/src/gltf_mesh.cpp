@@ -53,7 +53,8 @@ std::vector<glm::vec3> to_vectors(const std::vector<float>& values) {
 }
 
 /// Triangle lists out of strips and fans; the winding of odd strip triangles is turned back.
-Result<std::vector<std::uint32_t>> to_triangle_list(const std::vector<std::uint32_t>& in, int mode) {
+Result<std::vector<std::uint32_t>> to_triangle_list(const std::vector<std::uint32_t>& in,
+                                                    int mode) {
   if (mode == TINYGLTF_MODE_TRIANGLES) {
     if (in.size() % 3 != 0) {
       return make_error(ErrorCode::parse,
@@ -186,9 +187,9 @@ Result<Soup> read_geometry(const tinygltf::Model& model, const tinygltf::Primiti
     }
     soup.normals = to_vectors(*normals);
     if (soup.normals.size() != soup.positions_m.size()) {
-      return make_error(ErrorCode::parse, fmt::format("NORMAL: {} elements for {} vertices",
-                                                      soup.normals.size(),
-                                                      soup.positions_m.size()));
+      return make_error(ErrorCode::parse,
+                        fmt::format("NORMAL: {} elements for {} vertices", soup.normals.size(),
+                                    soup.positions_m.size()));
     }
   }
   const Result<std::vector<std::uint32_t>> raw =
@@ -272,7 +273,8 @@ Result<std::uint64_t> add_primitive(const GltfFile& file, const tinygltf::Primit
     return make_error(ErrorCode::unsupported, "more than 2^31 indices in one mesh");
   }
   const bool has_material = primitive.material >= 0;
-  append(mesh, *soup, has_material ? static_cast<std::uint32_t>(primitive.material) : kNoGltfMaterial,
+  append(mesh, *soup,
+         has_material ? static_cast<std::uint32_t>(primitive.material) : kNoGltfMaterial,
          has_material && model.materials[static_cast<std::size_t>(primitive.material)].doubleSided);
   return dropped;
 }

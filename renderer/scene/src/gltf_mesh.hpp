@@ -19,8 +19,8 @@ struct ConvertedMesh {
 [[nodiscard]] physics::Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index,
                                                           std::vector<std::string>& warnings);
 
-/// The mesh mirrored in x, with its winding turned so that fronts stay fronts: what a mirroring node
-/// shows when its matrix is multiplied by mesh_from_mirrored().
+/// The mesh mirrored in x, with its winding turned so that fronts stay fronts: what a mirroring
+/// node shows when its matrix is multiplied by mesh_from_mirrored().
 [[nodiscard]] Mesh mirrored_copy(const Mesh& mesh);
 [[nodiscard]] glm::dmat4 mesh_from_mirrored() noexcept;
 

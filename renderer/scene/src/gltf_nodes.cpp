@@ -32,8 +32,8 @@ bool all_finite(const std::vector<double>& values) {
 /// `values` is empty where the file leaves the property out.
 Result<void> check_property(const char* name, const std::vector<double>& values, std::size_t size) {
   if (!values.empty() && (values.size() != size || !all_finite(values))) {
-    return make_error(ErrorCode::parse, fmt::format("{}: {} numbers instead of {} finite ones", name,
-                                                    values.size(), size));
+    return make_error(ErrorCode::parse, fmt::format("{}: {} numbers instead of {} finite ones",
+                                                    name, values.size(), size));
   }
   return {};
 }
@@ -121,8 +121,7 @@ Result<std::vector<float>> instance_attribute(const GltfFile& file, const tinygl
   if (!index.IsInt()) {
     return make_error(ErrorCode::parse, fmt::format("{}: not an accessor", name));
   }
-  Result<std::vector<float>> values =
-      read_floats(file.model, index.GetNumberAsInt(), components);
+  Result<std::vector<float>> values = read_floats(file.model, index.GetNumberAsInt(), components);
   if (!values) {
     return tl::unexpected(std::move(values.error()).with_context(name));
   }
@@ -153,8 +152,9 @@ Result<std::vector<glm::dmat4>> read_instances(const GltfFile& file,
   std::vector<glm::dmat4> transforms;
   transforms.reserve(count);
   const auto vector_at = [](const std::vector<float>& values, std::size_t i, double fallback) {
-    return values.empty() ? glm::dvec3(fallback)
-                          : glm::dvec3(glm::vec3(values[3 * i], values[3 * i + 1], values[3 * i + 2]));
+    return values.empty()
+               ? glm::dvec3(fallback)
+               : glm::dvec3(glm::vec3(values[3 * i], values[3 * i + 1], values[3 * i + 2]));
   };
   for (std::size_t i = 0; i < count; ++i) {
     glm::dquat rotation(1.0, 0.0, 0.0, 0.0);
@@ -227,9 +227,9 @@ Result<std::vector<glm::dmat4>> node_instances(const GltfFile& file, int node_in
   }
   Result<std::vector<glm::dmat4>> transforms = read_instances(file, extension->second);
   if (!transforms) {
-    return tl::unexpected(std::move(transforms.error())
-                              .with_context(element("node", node_index, node.name) +
-                                            ": EXT_mesh_gpu_instancing"));
+    return tl::unexpected(
+        std::move(transforms.error())
+            .with_context(element("node", node_index, node.name) + ": EXT_mesh_gpu_instancing"));
   }
   return transforms;
 }

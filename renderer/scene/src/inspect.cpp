@@ -16,9 +16,11 @@ namespace {
 double area_m2(const Mesh& mesh, const Submesh& submesh, const glm::dmat4& target_from_mesh) {
   double area = 0.0;
   const auto point = [&](std::uint32_t i) {
-    return glm::dvec3(target_from_mesh * glm::dvec4(glm::dvec3(mesh.positions_m[mesh.indices[i]]), 1.0));
+    return glm::dvec3(target_from_mesh *
+                      glm::dvec4(glm::dvec3(mesh.positions_m[mesh.indices[i]]), 1.0));
   };
-  for (std::uint32_t i = submesh.first_index; i < submesh.first_index + submesh.index_count; i += 3) {
+  for (std::uint32_t i = submesh.first_index; i < submesh.first_index + submesh.index_count;
+       i += 3) {
     const glm::dvec3 a = point(i);
     area += 0.5 * glm::length(glm::cross(point(i + 1) - a, point(i + 2) - a));
   }
@@ -96,11 +98,10 @@ physics::Result<SceneSummary> inspect_gltf(const std::filesystem::path& file,
   if (!library.empty()) {
     for (const SceneSummary::MaterialRow& row : rows) {
       if (row.triangles > 0 && row.library_material.empty()) {
-        summary.warnings.push_back(
-            row.gltf_material.empty()
-                ? file.filename().string() + ": geometry without material"
-                : fmt::format("{}: material '{}' is not in the library", file.filename().string(),
-                              row.gltf_material));
+        summary.warnings.push_back(row.gltf_material.empty()
+                                       ? file.filename().string() + ": geometry without material"
+                                       : fmt::format("{}: material '{}' is not in the library",
+                                                     file.filename().string(), row.gltf_material));
       }
     }
   }
@@ -126,7 +127,8 @@ std::string to_text(const SceneSummary& summary) {
   }
   fmt::format_to(put, "meshes\n");
   for (const SceneSummary::MeshRow& row : summary.meshes) {
-    fmt::format_to(put, "  {:<32} {:>9} triangles {:>9} vertices {:>3} submeshes {:>5} placements\n",
+    fmt::format_to(put,
+                   "  {:<32} {:>9} triangles {:>9} vertices {:>3} submeshes {:>5} placements\n",
                    row.name, row.triangles, row.vertices, row.submeshes, row.placements);
   }
   fmt::format_to(put, "materials\n");
@@ -163,9 +165,9 @@ std::string to_json(const SceneSummary& summary) {
                  quoted);
   std::string bounds = "null";
   if (const Aabb& box = summary.bounds_body; !box.empty()) {
-    bounds = fmt::format(R"({{"min_m": [{:.9g}, {:.9g}, {:.9g}], "max_m": [{:.9g}, {:.9g}, {:.9g}]}})",
-                         box.min_m.x, box.min_m.y, box.min_m.z, box.max_m.x, box.max_m.y,
-                         box.max_m.z);
+    bounds =
+        fmt::format(R"({{"min_m": [{:.9g}, {:.9g}, {:.9g}], "max_m": [{:.9g}, {:.9g}, {:.9g}]}})",
+                    box.min_m.x, box.min_m.y, box.min_m.z, box.max_m.x, box.max_m.y, box.max_m.z);
   }
   return fmt::format(
       R"({{"file": {}, "nodes": {}, "placements": {}, "triangles": {}, "vertices": {}, )"

@@ -56,10 +56,11 @@ class SceneLoader {
 
  private:
   Result<void> check(const ObjectDesc& object) {
-    const std::string context = fmt::format("{}: object '{}'", scenario_.file.string(), object.name);
+    const std::string context =
+        fmt::format("{}: object '{}'", scenario_.file.string(), object.name);
     if (!(object.scale > 0.0) || !std::isfinite(object.scale)) {
-      return make_error(ErrorCode::config, fmt::format("{}: scale {} is not positive", context,
-                                                       object.scale));
+      return make_error(ErrorCode::config,
+                        fmt::format("{}: scale {} is not positive", context, object.scale));
     }
     for (const physics::Pose& pose : object.instances) {
       if (!physics::is_valid(pose)) {

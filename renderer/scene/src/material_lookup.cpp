@@ -40,10 +40,10 @@ Result<MaterialLookup> MaterialLookup::create(const ScenarioDesc& scenario) {
     lookup.default_position_ = lookup.library_.size();
     lookup.library_.push_back(builtin_default_material());
   } else if (!lookup.find(scenario.default_material, lookup.default_position_)) {
-    return make_error(ErrorCode::config, fmt::format("{}: default_material '{}' is not in the "
-                                                     "material library",
-                                                     scenario.file.string(),
-                                                     scenario.default_material));
+    return make_error(ErrorCode::config,
+                      fmt::format("{}: default_material '{}' is not in the "
+                                  "material library",
+                                  scenario.file.string(), scenario.default_material));
   }
   lookup.used_.assign(lookup.library_.size(), false);
   return lookup;
@@ -83,11 +83,11 @@ Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_in
     }
     used_[positions[i]] = true;
     if (by == MappedBy::fallback) {
-      warnings_.push_back(fmt::format(
-          "{}: {} maps to nothing in the library, '{}' is used", model.file.filename().string(),
-          name.empty() ? std::string("geometry without material")
-                       : fmt::format("material '{}'", name),
-          library_[positions[i]].name));
+      warnings_.push_back(fmt::format("{}: {} maps to nothing in the library, '{}' is used",
+                                      model.file.filename().string(),
+                                      name.empty() ? std::string("geometry without material")
+                                                   : fmt::format("material '{}'", name),
+                                      library_[positions[i]].name));
     }
     mappings_.push_back({object_index, name, library_[positions[i]].name, 0, by});
     mapping_positions_.push_back(positions[i]);

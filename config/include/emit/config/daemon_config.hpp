@@ -22,10 +22,11 @@ struct SourceConfig {
 
 struct PacingConfig {
   PacingMode mode = PacingMode::host_step;
-  double rate_hz = 200.0;              ///< ig_clock: own period
-  std::int64_t budget_ns = 0;          ///< host_step: deadline after the pose arrived; 0 = none
-  std::int64_t horizon_ns = 50'000'000;///< extrapolation is clamped here and the frame flagged stale
-  std::int64_t display_delay_ns = 0;   ///< ig_clock: pose is predicted to slot start + this
+  double rate_hz = 200.0;      ///< ig_clock: own period
+  std::int64_t budget_ns = 0;  ///< host_step: deadline after the pose arrived; 0 = none
+  std::int64_t horizon_ns =
+      50'000'000;                     ///< extrapolation is clamped here and the frame flagged stale
+  std::int64_t display_delay_ns = 0;  ///< ig_clock: pose is predicted to slot start + this
 };
 
 struct HostConfig {
@@ -40,7 +41,7 @@ struct ControlConfig {
 };
 
 struct StreamConfig {
-  std::uint32_t queue_frames = 4;      ///< per client, bounded; slots = queue + 3
+  std::uint32_t queue_frames = 4;  ///< per client, bounded; slots = queue + 3
   std::uint32_t udp_fragment_payload_bytes = 8900;
   std::uint32_t udp_send_buffer_bytes = 8u << 20;
   std::uint8_t multicast_ttl = 1;
@@ -56,8 +57,8 @@ struct DeviceConfig {
 };
 
 struct LogConfig {
-  std::string level = "info";   ///< error, warn, info, debug
-  std::filesystem::path file;   ///< empty = standard error
+  std::string level = "info";  ///< error, warn, info, debug
+  std::filesystem::path file;  ///< empty = standard error
 };
 
 struct DaemonConfig {

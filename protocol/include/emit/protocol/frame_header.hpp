@@ -20,18 +20,18 @@ enum class PixelQuantity : std::uint8_t { radiance_w_m2_sr = 1, temperature_k = 
 
 /// Set on a frame whenever it is not simply right and on time. Names are part of the contract.
 enum FrameFlags : std::uint32_t {
-  kFlagLate = 1u << 0,        ///< finished after its deadline
-  kFlagRepeated = 1u << 1,    ///< the previous frame's pixels sent again at this slot
-  kFlagStale = 1u << 2,       ///< rendered on a pose older than the extrapolation horizon
-  kFlagDegraded = 1u << 3,    ///< quality ladder shed work; see quality_rung, estimated_error_k
-  kFlagPartial = 1u << 4,     ///< set by a receiver: pixels are missing
-  kFlagHold = 1u << 5,        ///< thermal clock frozen by the host
-  kFlagNonFinite = 1u << 6,   ///< nonfinite_px > 0: those pixels are written as 0
-  kFlagClamped = 1u << 7,     ///< clamped_px > 0
-  kFlagExtrapolated = 1u << 8,///< pose predicted beyond the newest one received
-  kFlagGapBefore = 1u << 9,   ///< frames in front of this one were not sent to this client
-  kFlagCanned = 1u << 10,     ///< pre-rendered pixels
-  kFlagTimeUnset = 1u << 11,  ///< kernel TAI offset unknown: wall instants are UTC
+  kFlagLate = 1u << 0,          ///< finished after its deadline
+  kFlagRepeated = 1u << 1,      ///< the previous frame's pixels sent again at this slot
+  kFlagStale = 1u << 2,         ///< rendered on a pose older than the extrapolation horizon
+  kFlagDegraded = 1u << 3,      ///< quality ladder shed work; see quality_rung, estimated_error_k
+  kFlagPartial = 1u << 4,       ///< set by a receiver: pixels are missing
+  kFlagHold = 1u << 5,          ///< thermal clock frozen by the host
+  kFlagNonFinite = 1u << 6,     ///< nonfinite_px > 0: those pixels are written as 0
+  kFlagClamped = 1u << 7,       ///< clamped_px > 0
+  kFlagExtrapolated = 1u << 8,  ///< pose predicted beyond the newest one received
+  kFlagGapBefore = 1u << 9,     ///< frames in front of this one were not sent to this client
+  kFlagCanned = 1u << 10,       ///< pre-rendered pixels
+  kFlagTimeUnset = 1u << 11,    ///< kernel TAI offset unknown: wall instants are UTC
 };
 
 struct FrameHeader {
@@ -54,16 +54,16 @@ struct FrameHeader {
   std::int64_t sim_time_ns = 0;         ///< instant that the image shows
   std::int64_t pose_sim_time_ns = 0;    ///< time stamp of the newest pose used
   // Wall instants, int64 ns TAI; 0 = did not happen.
-  std::int64_t host_received_ns = 0;    ///< kernel receive stamp of that host frame
-  std::int64_t deadline_ns = 0;         ///< 0 in host-step without a budget
+  std::int64_t host_received_ns = 0;  ///< kernel receive stamp of that host frame
+  std::int64_t deadline_ns = 0;       ///< 0 in host-step without a budget
   std::int64_t render_start_ns = 0;
-  std::int64_t render_end_ns = 0;       ///< device finished
-  std::int64_t readback_end_ns = 0;     ///< pixels visible to the CPU
-  std::int64_t send_start_ns = 0;       ///< first byte handed to the kernel
-  std::int64_t previous_age_ns = 0;     ///< last completed frame: sim-time age at its last byte
-  std::int64_t previous_delay_ns = 0;   ///< last completed frame: pose received to last byte sent
+  std::int64_t render_end_ns = 0;      ///< device finished
+  std::int64_t readback_end_ns = 0;    ///< pixels visible to the CPU
+  std::int64_t send_start_ns = 0;      ///< first byte handed to the kernel
+  std::int64_t previous_age_ns = 0;    ///< last completed frame: sim-time age at its last byte
+  std::int64_t previous_delay_ns = 0;  ///< last completed frame: pose received to last byte sent
   std::uint64_t previous_frame_number = 0;
-  physics::Pose pose;                   ///< of the sensor, as used
+  physics::Pose pose;  ///< of the sensor, as used
   std::uint64_t payload_bytes = 0;
   std::uint32_t payload_crc32c = 0;
 };
@@ -76,6 +76,7 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
 [[nodiscard]] physics::Result<FrameHeader> decode_frame_header(std::span<const std::byte> bytes);
 
 /// CRC-32C (Castagnoli), as in iSCSI; `crc` continues an earlier call. RT-safe.
-[[nodiscard]] std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t crc = 0) noexcept;
+[[nodiscard]] std::uint32_t crc32c(std::span<const std::byte> bytes,
+                                   std::uint32_t crc = 0) noexcept;
 
 }  // namespace emit::protocol

@@ -50,8 +50,8 @@ void add_fence(MeshBuilder& builder) {
     post(-kHalfM, -along);
   }
   for (const double z : {0.3, 1.3, 2.3}) {
-    const glm::dvec3 corners[] = {{-kHalfM, -kHalfM, z}, {kHalfM, -kHalfM, z}, {kHalfM, kHalfM, z},
-                                  {-kHalfM, kHalfM, z}};
+    const glm::dvec3 corners[] = {
+        {-kHalfM, -kHalfM, z}, {kHalfM, -kHalfM, z}, {kHalfM, kHalfM, z}, {-kHalfM, kHalfM, z}};
     for (int side = 0; side < 4; ++side) {
       builder.tube(corners[side], corners[(side + 1) % 4], 0.03, 0.03, 4, false, false);
     }

@@ -7,7 +7,8 @@
 namespace emit::scenegen {
 namespace {
 
-/// Open towards -y with two leaves pushed aside; origin in the middle of the doorway, on the ground.
+/// Open towards -y with two leaves pushed aside; origin in the middle of the doorway, on the
+/// ground.
 SceneMesh hangar() {
   constexpr double kHalfWidthM = 21.0;
   constexpr double kDepthM = 42.0;

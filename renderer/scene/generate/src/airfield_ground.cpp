@@ -126,7 +126,8 @@ void add_apron(PatchPlan& plan) {
     plan.add(x - 22.0, 144.0, x + 22.0, 190.0, "concrete");  // hangar floors
   }
   plan.add(-220.0, 40.0, 220.0, 40.3, kPaint);  // edge of the manoeuvring area
-  for (const double x : {-180.0, -140.0, -60.0, 60.0, 140.0, 180.0}) {  // lead-in lines of the stands
+  for (const double x :
+       {-180.0, -140.0, -60.0, 60.0, 140.0, 180.0}) {  // lead-in lines of the stands
     plan.add(x - 0.15, 40.0, x + 0.15, 110.0, kPaint);
     plan.add(x - 3.0, 109.7, x + 3.0, 110.0, kPaint);
   }

@@ -46,24 +46,26 @@ Result<void> first_error(std::initializer_list<Result<void>> checks) {
   return {};
 }
 
-bool in_range(double value, double lo, double hi) { return value >= lo && value <= hi; }
+bool in_range(double value, double lo, double hi) {
+  return value >= lo && value <= hi;
+}
 
 constexpr double kMaxLengthM = 1e5;
 
 Result<void> check(const BoxOptions& o) {
-  return first_error(
-      {require(in_range(o.size_m, 1e-3, kMaxLengthM), "size_m", o.size_m, "must be in [0.001, 1e5]"),
-       require(o.plane_m > 1.2 * o.size_m && o.plane_m <= kMaxLengthM, "plane_m", o.plane_m,
-               "must exceed 1.2 size_m and be at most 1e5")});
+  return first_error({require(in_range(o.size_m, 1e-3, kMaxLengthM), "size_m", o.size_m,
+                              "must be in [0.001, 1e5]"),
+                      require(o.plane_m > 1.2 * o.size_m && o.plane_m <= kMaxLengthM, "plane_m",
+                              o.plane_m, "must exceed 1.2 size_m and be at most 1e5")});
 }
 
 Result<void> check(const StatueOptions& o) {
-  return first_error({require(o.min_triangles >= 2000 && o.min_triangles <= 20'000'000,
-                              "min_triangles", o.min_triangles, "must be in [2000, 2e7]"),
-                      require(in_range(o.height_m, 0.1, 100.0), "height_m", o.height_m,
-                              "must be in [0.1, 100]"),
-                      require(o.plane_m > 2.0 * o.height_m && o.plane_m <= kMaxLengthM, "plane_m",
-                              o.plane_m, "must exceed 2 height_m and be at most 1e5")});
+  return first_error(
+      {require(o.min_triangles >= 2000 && o.min_triangles <= 20'000'000, "min_triangles",
+               o.min_triangles, "must be in [2000, 2e7]"),
+       require(in_range(o.height_m, 0.1, 100.0), "height_m", o.height_m, "must be in [0.1, 100]"),
+       require(o.plane_m > 2.0 * o.height_m && o.plane_m <= kMaxLengthM, "plane_m", o.plane_m,
+               "must exceed 2 height_m and be at most 1e5")});
 }
 
 Result<void> check(const BlockOnRoadOptions& o) {
@@ -175,8 +177,8 @@ Result<GeneratedFiles> generate(const GenerateOptions& options) {
   std::error_code status;
   std::filesystem::create_directories(options.directory, status);
   if (status) {
-    return make_error(ErrorCode::io, fmt::format("{}: {}", options.directory.string(),
-                                                 status.message()));
+    return make_error(ErrorCode::io,
+                      fmt::format("{}: {}", options.directory.string(), status.message()));
   }
   const Result<NamedScenes> scenes = build(options);
   if (!scenes) {

@@ -109,7 +109,8 @@ std::size_t material_index(std::vector<MaterialKey>& materials, const Part& part
   return index;
 }
 
-std::string meshes_json(const Scene& scene, GlbBuffer& buffer, std::vector<MaterialKey>& materials) {
+std::string meshes_json(const Scene& scene, GlbBuffer& buffer,
+                        std::vector<MaterialKey>& materials) {
   std::string meshes;
   for (const SceneMesh& mesh : scene.meshes) {
     std::string primitives;
@@ -135,8 +136,8 @@ std::string nodes_json(const Scene& scene) {
   std::string nodes;
   for (const SceneNode& node : scene.nodes) {
     const glm::dvec3 t = gltf_from(scene.axes, node.position_m) + glm::dvec3(0.0);
-    nodes += fmt::format(R"({}{{"name":"{}","mesh":{})", nodes.empty() ? "" : ",", node.name,
-                         node.mesh);
+    nodes +=
+        fmt::format(R"({}{{"name":"{}","mesh":{})", nodes.empty() ? "" : ",", node.name, node.mesh);
     if (t != glm::dvec3(0.0)) {
       nodes += fmt::format(R"(,"translation":[{:.9g},{:.9g},{:.9g}])", t.x, t.y, t.z);
     }
@@ -164,19 +165,20 @@ physics::Result<GeneratedFile> write_glb(const std::filesystem::path& file, cons
   const std::string meshes = meshes_json(scene, buffer, materials);
   std::string material_list;
   for (const MaterialKey& material : materials) {
-    material_list += fmt::format(R"({}{{"name":"{}"{}}})", material_list.empty() ? "" : ",",
-                                 material.name, material.double_sided ? R"(,"doubleSided":true)" : "");
+    material_list +=
+        fmt::format(R"({}{{"name":"{}"{}}})", material_list.empty() ? "" : ",", material.name,
+                    material.double_sided ? R"(,"doubleSided":true)" : "");
   }
   std::string node_list;
   for (std::size_t i = 0; i < scene.nodes.size(); ++i) {
     node_list += fmt::format("{}{}", i == 0 ? "" : ",", i);
   }
-  std::string json = fmt::format(
-      R"({{"asset":{{"version":"2.0","generator":"emit generate"}},"scene":0,)"
-      R"("scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}],"materials":[{}],)"
-      R"("accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}})",
-      node_list, nodes_json(scene), meshes, material_list, buffer.accessors(), buffer.views(),
-      buffer.bytes().size());
+  std::string json =
+      fmt::format(R"({{"asset":{{"version":"2.0","generator":"emit generate"}},"scene":0,)"
+                  R"("scenes":[{{"nodes":[{}]}}],"nodes":[{}],"meshes":[{}],"materials":[{}],)"
+                  R"("accessors":[{}],"bufferViews":[{}],"buffers":[{{"byteLength":{}}}]}})",
+                  node_list, nodes_json(scene), meshes, material_list, buffer.accessors(),
+                  buffer.views(), buffer.bytes().size());
   json.resize((json.size() + 3) / 4 * 4, ' ');
 
   std::string head = "glTF";

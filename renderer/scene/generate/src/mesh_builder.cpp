@@ -38,7 +38,9 @@ MeshBuilder& MeshBuilder::origin(const glm::dvec3& offset_m, double yaw_rad) {
   return *this;
 }
 
-Part& MeshBuilder::part() { return mesh_.parts[current_]; }
+Part& MeshBuilder::part() {
+  return mesh_.parts[current_];
+}
 
 std::uint32_t MeshBuilder::vertex(const glm::dvec3& p, const glm::dvec3& n) {
   const auto turned = [this](const glm::dvec3& v) {
@@ -198,11 +200,10 @@ void MeshBuilder::lathe_x(const std::vector<glm::dvec2>& rings, const glm::dvec3
       const double angle = 2.0 * physics::kPi * i / sides;
       const double c = std::cos(angle);
       const double s = std::sin(angle);
-      const glm::dvec3 normal = glm::normalize(
-          glm::dvec3(-along.y, along.x * c, along.x * s / scale_z));
-      ring.push_back(vertex(axis_point_m + glm::dvec3(rings[r].x, rings[r].y * c,
-                                                      rings[r].y * s * scale_z),
-                            normal));
+      const glm::dvec3 normal =
+          glm::normalize(glm::dvec3(-along.y, along.x * c, along.x * s / scale_z));
+      ring.push_back(vertex(
+          axis_point_m + glm::dvec3(rings[r].x, rings[r].y * c, rings[r].y * s * scale_z), normal));
     }
     lattice.push_back(std::move(ring));
   }

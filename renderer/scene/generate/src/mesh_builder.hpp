@@ -57,8 +57,8 @@ class MeshBuilder {
   void polygon(const std::vector<glm::dvec3>& corners);
   void quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d);
   /// Quad cut into `columns` x `rows` equal cells.
-  void grid_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
-                 const glm::dvec3& d, std::uint32_t columns, std::uint32_t rows);
+  void grid_quad(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d,
+                 std::uint32_t columns, std::uint32_t rows);
 
   enum Faces : std::uint32_t { kTop = 1, kBottom = 2, kSides = 4, kAll = 7 };
   /// Axis-parallel box.

@@ -32,12 +32,18 @@ constexpr std::array<std::array<int, 4>, 4> kOneFirst{
     {{0, 1, 2, 3}, {1, 0, 3, 2}, {2, 0, 1, 3}, {3, 0, 2, 1}}};
 constexpr std::array<int, 4> pair_first(unsigned mask) {
   switch (mask) {
-    case 0b0011U: return {0, 1, 2, 3};
-    case 0b1100U: return {2, 3, 0, 1};
-    case 0b0101U: return {0, 2, 3, 1};
-    case 0b1010U: return {3, 1, 0, 2};
-    case 0b1001U: return {0, 3, 1, 2};
-    default: return {1, 2, 0, 3};
+    case 0b0011U:
+      return {0, 1, 2, 3};
+    case 0b1100U:
+      return {2, 3, 0, 1};
+    case 0b0101U:
+      return {0, 2, 3, 1};
+    case 0b1010U:
+      return {3, 1, 0, 2};
+    case 0b1001U:
+      return {0, 3, 1, 2};
+    default:
+      return {1, 2, 0, 3};
   }
 }
 
@@ -176,8 +182,8 @@ class Polygoniser {
     const auto [entry, is_new] =
         vertex_of_edge_.emplace(key, static_cast<std::uint32_t>(surface_.positions_m.size()));
     if (is_new) {
-      const double t = std::clamp(low.value / (low.value - high.value), kMinCutFrac,
-                                  1.0 - kMinCutFrac);
+      const double t =
+          std::clamp(low.value / (low.value - high.value), kMinCutFrac, 1.0 - kMinCutFrac);
       surface_.positions_m.push_back(glm::mix(position(low.at), position(high.at), t));
     }
     return entry->second;
@@ -199,8 +205,7 @@ Surface polygonise(const SignedDistance& shape, const glm::dvec3& min_m, const g
   Polygoniser polygoniser(shape, min_m, cell_m);
   // Lattice coordinates are sums of two world coordinates over the cell edge, all from 0 upwards.
   const glm::dvec3 extent = (max_m - min_m) / cell_m;
-  const double farthest =
-      std::max({extent.y + extent.z, extent.x + extent.z, extent.x + extent.y});
+  const double farthest = std::max({extent.y + extent.z, extent.x + extent.z, extent.x + extent.y});
   int size = kLeafCells;
   while (size < static_cast<int>(std::ceil(farthest)) + 1) {
     size *= 2;

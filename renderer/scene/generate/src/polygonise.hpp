@@ -19,9 +19,10 @@ struct Surface {
   std::vector<std::uint32_t> indices;  ///< counter-clockwise from outside
 };
 
-/// Marching tetrahedra on a body-centred cubic lattice of the given cell edge. The result is closed,
-/// manifold and without zero-area triangles as long as the surface lies inside the box. Cells are
-/// visited along a space-filling curve, so that triangles near each other are near in the list.
+/// Marching tetrahedra on a body-centred cubic lattice of the given cell edge. The result is
+/// closed, manifold and without zero-area triangles as long as the surface lies inside the box.
+/// Cells are visited along a space-filling curve, so that triangles near each other are near in the
+/// list.
 [[nodiscard]] Surface polygonise(const SignedDistance& shape, const glm::dvec3& min_m,
                                  const glm::dvec3& max_m, double cell_m);
 

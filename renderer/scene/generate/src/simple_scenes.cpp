@@ -38,9 +38,10 @@ Scene box_scene(const BoxOptions& options) {
   const double m = 0.5 * (h + p);
   for (const glm::dvec2 corner : {glm::dvec2(-m, -m), glm::dvec2(m, -m), glm::dvec2(m, m)}) {
     const double r = 0.5 * (p - h);  // 4 each: 12
-    const std::array<glm::dvec3, 4> ring{
-        glm::dvec3(corner.x - r, corner.y - r, 0.0), {corner.x + r, corner.y - r, 0.0},
-        {corner.x + r, corner.y + r, 0.0}, {corner.x - r, corner.y + r, 0.0}};
+    const std::array<glm::dvec3, 4> ring{glm::dvec3(corner.x - r, corner.y - r, 0.0),
+                                         {corner.x + r, corner.y - r, 0.0},
+                                         {corner.x + r, corner.y + r, 0.0},
+                                         {corner.x - r, corner.y + r, 0.0}};
     for (std::size_t i = 0; i < 4; ++i) {
       plane.polygon({ring[i], ring[(i + 1) % 4], {corner, 0.0}});
     }
@@ -113,8 +114,8 @@ Scene block_on_road_scene(const BlockOnRoadOptions& options) {
   const double ceiling = height - wall;
   inner.quad({-inner_x, -inner_y, ceiling}, {-inner_x, inner_y, ceiling},
              {inner_x, inner_y, ceiling}, {inner_x, -inner_y, ceiling});
-  const std::array<glm::dvec2, 4> ring{glm::dvec2(-inner_x, -inner_y), {inner_x, -inner_y},
-                                       {inner_x, inner_y}, {-inner_x, inner_y}};
+  const std::array<glm::dvec2, 4> ring{
+      glm::dvec2(-inner_x, -inner_y), {inner_x, -inner_y}, {inner_x, inner_y}, {-inner_x, inner_y}};
   for (std::size_t side = 0; side < 4; ++side) {
     const glm::dvec2 a = ring[side];
     const glm::dvec2 b = ring[(side + 1) % 4];

@@ -115,11 +115,13 @@ class SeatedFigure final : public SignedDistance {
     double d = ellipsoid(p, {0.0, 0.0, 2.20}, {0.22, 0.25, 0.29});
     d = blend(d, limb(p, {0.0, -0.24, 2.24}, {0.0, -0.275, 2.15}, 0.018, 0.032), 0.02);  // nose
     for (const double side : {-1.0, 1.0}) {
-      d = blend(d, limb(p, {side * 0.225, 0.02, 2.26}, {side * 0.235, 0.02, 2.07}, 0.04, 0.03), 0.02);
+      d = blend(d, limb(p, {side * 0.225, 0.02, 2.26}, {side * 0.235, 0.02, 2.07}, 0.04, 0.03),
+                0.02);
       // Eye sockets: a smooth maximum with the outside of a sphere.
       d = -blend(-d, glm::length(p - dvec3(side * 0.085, -0.245, 2.245)) - 0.045, 0.03);
     }
-    d = -blend(-d, limb(p, {-0.05, -0.245, 2.06}, {0.05, -0.245, 2.06}, 0.012, 0.012), 0.02);  // mouth
+    d = -blend(-d, limb(p, {-0.05, -0.245, 2.06}, {0.05, -0.245, 2.06}, 0.012, 0.012),
+               0.02);  // mouth
     const double hair = blend(ellipsoid(p, {0.0, 0.04, 2.27}, {0.235, 0.25, 0.25}),
                               glm::length(p - dvec3(0.0, 0.05, 2.53)) - 0.12, 0.06);
     const double curls = 0.012 * std::sin(70.0 * p.x) * std::sin(70.0 * p.y) * std::sin(70.0 * p.z);

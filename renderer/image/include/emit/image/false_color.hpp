@@ -11,8 +11,8 @@
 
 namespace emit::image {
 
-/// `thermal`: black, violet, red, orange, white; lightness rises evenly, so equal steps of the value
-/// look equal, and it reads in grey as well. `grey`: even lightness.
+/// `thermal`: black, violet, red, orange, white; lightness rises evenly, so equal steps of the
+/// value look equal, and it reads in grey as well. `grey`: even lightness.
 enum class ColorMap : std::uint8_t { thermal, grey };
 [[nodiscard]] std::optional<ColorMap> color_map_from(std::string_view name) noexcept;
 
@@ -33,8 +33,7 @@ inline constexpr std::uint32_t kColorBarWidthPx = 64;
 
 /// Errors: invalid_argument (sizes, limits not finite or not ascending).
 [[nodiscard]] physics::Result<RgbImage> false_color(std::span<const float> values,
-                                                    std::uint32_t width_px,
-                                                    std::uint32_t height_px,
+                                                    std::uint32_t width_px, std::uint32_t height_px,
                                                     const FalseColorOptions& options);
 
 /// Smallest and largest finite value between two percentiles (0..100), for display limits;

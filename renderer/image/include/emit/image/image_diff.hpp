@@ -33,8 +33,8 @@ struct DiffStats {
 
 struct ChannelDiff {
   std::string channel;
-  std::string unit;     ///< "K" for temperature, else "" (the channel's own)
-  DiffStats absolute;   ///< in `unit`
+  std::string unit;    ///< "K" for temperature, else "" (the channel's own)
+  DiffStats absolute;  ///< in `unit`
   /// Per cent of |b|; radiance channels only, pixels_compared 0 otherwise and where b is 0.
   DiffStats percent;
   /// Radiance turned into kelvin; filled when a conversion was given.

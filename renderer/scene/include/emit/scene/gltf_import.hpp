@@ -10,9 +10,9 @@
 
 /// glTF 2.0 files (.glb, .gltf with embedded or external buffers) to plain meshes.
 ///
-/// Handled: node hierarchies (TRS and matrix, mirrored ones too), the default scene (else the first,
-/// else all root nodes), any number of primitives and materials, triangle lists, strips and fans,
-/// 8/16/32-bit and no indices, interleaved, strided, normalised and sparse accessors,
+/// Handled: node hierarchies (TRS and matrix, mirrored ones too), the default scene (else the
+/// first, else all root nodes), any number of primitives and materials, triangle lists, strips and
+/// fans, 8/16/32-bit and no indices, interleaved, strided, normalised and sparse accessors,
 /// EXT_mesh_gpu_instancing, KHR_mesh_quantization, doubleSided. Images are not read. Points, lines,
 /// skins and morph targets are skipped with a warning; an unknown required extension is an error.
 /// Missing normals are computed flat, as the glTF specification asks.
@@ -27,9 +27,9 @@ struct GltfMaterial {
 
 /// One mesh under one node.
 struct GltfPlacement {
-  std::uint32_t mesh = 0;         ///< index into GltfModel::meshes
+  std::uint32_t mesh = 0;          ///< index into GltfModel::meshes
   glm::dmat4 gltf_from_mesh{1.0};  ///< determinant > 0
-  std::string node;               ///< name of the node, "node N" where the file gives none
+  std::string node;                ///< name of the node, "node N" where the file gives none
 };
 
 struct GltfModel {

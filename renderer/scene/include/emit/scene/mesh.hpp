@@ -15,8 +15,8 @@
 
 /// Loaded geometry as plain arrays, ready to be copied to a device.
 ///
-/// Frames. Vertices stay in the axes of the glTF file (x left, y up, z forward). Every object, be it
-/// a vehicle or a map, is turned into the body frame (x forward, y right, z down) by
+/// Frames. Vertices stay in the axes of the glTF file (x left, y up, z forward). Every object, be
+/// it a vehicle or a map, is turned into the body frame (x forward, y right, z down) by
 /// `body_from_gltf()`:
 ///   body x = glTF z,   body y = -glTF x,   body z = -glTF y
 /// and placed by a pose `world_from_body`. With the default pose, level and heading north, a glTF
@@ -55,14 +55,14 @@ struct Mesh {
   Aabb bounds;                     ///< of positions_m, in the mesh's own axes
 };
 
-/// One mesh drawn once. Transforms have a positive determinant: where a glTF node mirrors, a mirrored
-/// copy of the mesh is used, so front faces are always counter-clockwise. Scales need not be uniform:
-/// normals go with the inverse transpose.
+/// One mesh drawn once. Transforms have a positive determinant: where a glTF node mirrors, a
+/// mirrored copy of the mesh is used, so front faces are always counter-clockwise. Scales need not
+/// be uniform: normals go with the inverse transpose.
 struct Instance {
   std::uint32_t mesh = 0;
-  std::uint32_t object = 0;      ///< index into ScenarioDesc::objects
-  std::uint32_t placement = 0;   ///< index into that object's instances
-  std::uint32_t entity_id = 0;   ///< 0: static
+  std::uint32_t object = 0;         ///< index into ScenarioDesc::objects
+  std::uint32_t placement = 0;      ///< index into that object's instances
+  std::uint32_t entity_id = 0;      ///< 0: static
   glm::dmat4 body_from_mesh{1.0};   ///< node transform, scale and axis change; fixed for life
   glm::dmat4 world_from_mesh{1.0};  ///< at the placement of the scenario
   Aabb world_bounds;                ///< at that placement
@@ -84,19 +84,19 @@ struct SceneGeometry {
   /// Only those in use, in the order of the library. Entry 0 is the default material, always there.
   std::vector<Material> materials;
   std::vector<MaterialMapping> mappings;
-  std::vector<std::string> warnings;       ///< unmapped materials, skipped primitives, dropped triangles
-  std::uint64_t triangles = 0;             ///< instances counted
-  std::uint64_t dropped_triangles = 0;     ///< of zero area, counted once per file
-  Aabb static_bounds;                      ///< world, static instances
-  Aabb bounds;                             ///< world, all instances at their placements
+  std::vector<std::string> warnings;  ///< unmapped materials, skipped primitives, dropped triangles
+  std::uint64_t triangles = 0;        ///< instances counted
+  std::uint64_t dropped_triangles = 0;  ///< of zero area, counted once per file
+  Aabb static_bounds;                   ///< world, static instances
+  Aabb bounds;                          ///< world, all instances at their placements
 };
 
 /// body_from_gltf as above; the rotation has determinant +1.
 [[nodiscard]] glm::dmat4 body_from_gltf() noexcept;
 [[nodiscard]] glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept;
 
-/// Loads every glTF file of the scenario and resolves its materials. A glTF material is looked up in
-/// the object's material_map, then the object's `material`, then the library by name, then the
+/// Loads every glTF file of the scenario and resolves its materials. A glTF material is looked up
+/// in the object's material_map, then the object's `material`, then the library by name, then the
 /// scenario's default_material (with a warning that names it). Setup only; any thread.
 /// Errors: not_found, io, parse (naming file and element), config (unknown library material, naming
 /// object and material; an entity without exactly one placement).

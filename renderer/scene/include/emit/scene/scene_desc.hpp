@@ -45,13 +45,13 @@ struct BandEmissivity {
 
 struct Material {
   std::string name;
-  double solar_absorptance_frac = 0.0;  ///< absorbed share of sunlight: 1 - albedo
-  double emissivity_frac = 0.0;         ///< total hemispherical, long-wave
+  double solar_absorptance_frac = 0.0;          ///< absorbed share of sunlight: 1 - albedo
+  double emissivity_frac = 0.0;                 ///< total hemispherical, long-wave
   std::vector<BandEmissivity> band_emissivity;  ///< bands not listed use emissivity_frac
   std::vector<Layer> layers;                    ///< outermost first; emit2014 uses the first only
   double base_k = 0.0;                          ///< core temperature under the last layer
-  std::optional<double> initial_k;              ///< surface at history start; else thermal.initial_k
-  std::vector<RelaxationMode> modes;            ///< weights sum to 1
+  std::optional<double> initial_k;    ///< surface at history start; else thermal.initial_k
+  std::vector<RelaxationMode> modes;  ///< weights sum to 1
   /// A hot part or another emitter of given temperature: takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
   std::string source;       ///< where the numbers come from
@@ -66,7 +66,8 @@ struct Keyframe {
   bool teleport = false;  ///< no interpolation from the previous keyframe: a jump
 };
 
-/// Keyframes in ascending time; before the first its pose and on state hold, likewise after the last.
+/// Keyframes in ascending time; before the first its pose and on state hold, likewise after the
+/// last.
 using Trajectory = std::vector<Keyframe>;
 
 /// A glTF file placed in the world, once or many times.
@@ -74,10 +75,11 @@ struct ObjectDesc {
   std::string name;
   std::uint32_t entity_id = 0;  ///< 0: static scenery; otherwise addressed by host frames, unique
   std::filesystem::path gltf;
-  /// Library material for glTF materials not listed in material_map ("" = map by name, then default).
+  /// Library material for glTF materials not listed in material_map ("" = map by name, then
+  /// default).
   std::string material;
   std::map<std::string, std::string> material_map;  ///< glTF material name -> library material
-  std::vector<physics::Pose> instances;             ///< static placements; an entity has exactly one
+  std::vector<physics::Pose> instances;  ///< static placements; an entity has exactly one
   double scale = 1.0;
   Trajectory trajectory;  ///< entities only; empty: stays at its placement until the host moves it
   bool on = true;         ///< entities only: state without trajectory
@@ -108,16 +110,16 @@ struct WeatherSample {
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
   double wind_m_s = 0.0;
-  double cloud_frac = 0.0;                ///< beta of Eq. 1 for clear-sky models; 0 for measured sun
-  std::optional<double> environment_k;    ///< surroundings; absent: air temperature
-  std::optional<double> film_w_m2_k;      ///< convection coefficient; not used by emit2014
+  double cloud_frac = 0.0;              ///< beta of Eq. 1 for clear-sky models; 0 for measured sun
+  std::optional<double> environment_k;  ///< surroundings; absent: air temperature
+  std::optional<double> film_w_m2_k;    ///< convection coefficient; not used by emit2014
 };
 
 /// Clear-sky models used when no weather table is given (PHYSICS 9).
 struct ClearSkyDesc {
   double linke_turbidity = 3.5;
   double air_mean_k = 290.0;
-  double air_amplitude_k = 6.0;   ///< daily, maximum at 15:00 local solar time
+  double air_amplitude_k = 6.0;  ///< daily, maximum at 15:00 local solar time
   double dew_point_k = 282.0;
   double wind_m_s = 2.0;
   double cloud_frac = 0.0;
@@ -147,13 +149,13 @@ struct ThermalOptions {
   ThermalMethod method = ThermalMethod::per_frame;
   ThermalModel model = ThermalModel::emit2014;
   double tolerance_k = 0.1;
-  double initial_k = 290.0;             ///< surface temperature at history start
-  std::int64_t history_start_ns = 0;    ///< sim time; the thermal simulation runs from here to now
+  double initial_k = 290.0;           ///< surface temperature at history start
+  std::int64_t history_start_ns = 0;  ///< sim time; the thermal simulation runs from here to now
   std::uint32_t steps = 27;
   StepSpacing spacing = StepSpacing::uniform;
-  double first_step_s = 20.0;           ///< newest interval of geometric spacing
+  double first_step_s = 20.0;  ///< newest interval of geometric spacing
   std::uint32_t shadow_map_px = 1024;
-  std::uint32_t max_cascades = 1;       ///< 1..4
+  std::uint32_t max_cascades = 1;  ///< 1..4
   std::uint32_t blocker_taps = 8;
   std::uint32_t filter_taps = 32;
   double obscurance_radius_m = 0.5;
@@ -173,15 +175,15 @@ struct DisplayOptions {
 
 struct ScenarioDesc {
   std::string name;
-  std::filesystem::path file;     ///< where it came from, for messages
+  std::filesystem::path file;  ///< where it came from, for messages
   Place place;
-  std::int64_t epoch_utc_ns = 0;  ///< POSIX ns (UTC) of sim time 0
+  std::int64_t epoch_utc_ns = 0;       ///< POSIX ns (UTC) of sim time 0
   std::vector<WeatherSample> weather;  ///< empty: clear_sky
   ClearSkyDesc clear_sky;
   AtmosphereDesc atmosphere;
   std::vector<SpectralBand> bands;
-  std::vector<Material> materials;     ///< library plus the scenario's own
-  std::string default_material;        ///< for glTF materials nothing maps
+  std::vector<Material> materials;  ///< library plus the scenario's own
+  std::string default_material;     ///< for glTF materials nothing maps
   std::vector<ObjectDesc> objects;
   SensorDesc sensor;
   std::vector<ChannelDesc> channels;

@@ -34,8 +34,9 @@ struct StatueOptions {
   double plane_m = 40.0;                    ///< edge of the plane, > 2 height_m
 };
 
-/// Concrete block on an asphalt road. Road in x = east, y = north, centred on the block. Nodes: road,
-/// block, block_inner (hollow only: the faces towards the cavity, held at base_k by the solver).
+/// Concrete block on an asphalt road. Road in x = east, y = north, centred on the block. Nodes:
+/// road, block, block_inner (hollow only: the faces towards the cavity, held at base_k by the
+/// solver).
 struct BlockOnRoadOptions {
   double block_east_m = 2.0;
   double block_north_m = 1.0;
@@ -47,11 +48,11 @@ struct BlockOnRoadOptions {
 
 /// Ribs with square corners along north on a base plate. Material: concrete.
 struct RibbedOptions {
-  std::uint32_t ribs = 8;        ///< 1 .. 1000
-  double pitch_m = 0.5;          ///< rib to rib
-  double rib_width_m = 0.25;     ///< in (0, pitch_m)
-  double rib_height_m = 0.25;    ///< > 0
-  double length_m = 4.0;         ///< > 0
+  std::uint32_t ribs = 8;      ///< 1 .. 1000
+  double pitch_m = 0.5;        ///< rib to rib
+  double rib_width_m = 0.25;   ///< in (0, pitch_m)
+  double rib_height_m = 0.25;  ///< > 0
+  double length_m = 4.0;       ///< > 0
 };
 
 /// About a square kilometre of airfield, see airfield.cpp for the plan.
