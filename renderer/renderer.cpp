@@ -101,8 +101,6 @@ class GlRenderer final : public Renderer {
   bool poll(SlotIndex slot) noexcept override { return readback_.ready(slot); }
   const FrameView& collect(SlotIndex slot) noexcept override;
   void release(SlotIndex slot) noexcept override { readback_.release(slot); }
-  bool entity_pose_at(std::uint32_t entity_id, std::int64_t sim_time_ns, physics::Pose& pose,
-                      bool& on) const noexcept override;
   physics::Pose scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept override;
   const SceneStats& scene_stats() const noexcept override { return scene_stats_; }
   const std::string& device_name() const noexcept override { return context_.device_name(); }
@@ -295,16 +293,6 @@ std::size_t GlRenderer::apply_entities(std::int64_t sim_time_ns,
 void GlRenderer::reset() noexcept {
   for (PoseHistory& history : histories_) history.reset();
   environment_.reset();
-}
-
-bool GlRenderer::entity_pose_at(std::uint32_t entity_id, std::int64_t sim_time_ns,
-                                physics::Pose& pose, bool& on) const noexcept {
-  const int index = find_entity(entity_id);
-  if (index < 0) return false;
-  const TrajectoryState state = histories_[static_cast<std::size_t>(index)].at(sim_time_ns);
-  pose = state.pose;
-  on = state.on;
-  return true;
 }
 
 physics::Pose GlRenderer::scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept {

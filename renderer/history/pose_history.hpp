@@ -7,9 +7,12 @@
 
 #include "emit/physics/frames.hpp"
 #include "emit/scene/scene_desc.hpp"
-#include "history/trajectory.hpp"
+#include "emit/scene/trajectory.hpp"
 
 namespace emit::renderer {
+
+using scene::trajectory_at;
+using scene::TrajectoryState;
 
 /// Where an entity was and whether it was there, at any instant of the thermal history: the
 /// scenario's trajectory, overridden from the first live pose on by what the host sent.

@@ -119,9 +119,6 @@ class Renderer {
   /// Gives the slot back. Any thread.
   virtual void release(SlotIndex slot) noexcept = 0;
 
-  /// World pose and on state of an entity at an instant, as the shadow history sees it.
-  [[nodiscard]] virtual bool entity_pose_at(std::uint32_t entity_id, std::int64_t sim_time_ns,
-                                            physics::Pose& pose, bool& on) const noexcept = 0;
   /// Sensor pose of the scenario's own trajectory.
   [[nodiscard]] virtual physics::Pose scenario_sensor_pose_at(
       std::int64_t sim_time_ns) const noexcept = 0;
