@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Shows that the include arrows of the architecture hold: folder = layer, arrows point down.
 #   physics -> nothing; image, protocol, config -> physics; scene -> physics;
-#   renderer -> physics, scene, image; server -> all. Besides, config may read the plain header
+#   reference -> physics and the plain scene description; renderer -> physics, scene, image;
+#   server -> all. Besides, config may read the plain header
 #   emit/scene/scene_desc.hpp, because it fills those structs.
 # Third-party libraries stay in the one folder that wraps them.
 set -euo pipefail
@@ -45,7 +46,8 @@ check scene    renderer/scene    "emit/scene/|emit/scenegen/|emit/physics/|$besi
 check gl       renderer/gl       "gl/|emit/physics/"
 check renderer "renderer/passes renderer/history renderer/include renderer/renderer.cpp" \
       "emit/(renderer|physics|scene|image)/|gl/|passes/|history/|shared/"
-check evaluate renderer/evaluate "emit/(evaluate|physics)/|gl/|$beside"
+check reference renderer/reference "emit/(reference|physics)/|emit/scene/(scene_desc|mesh|trajectory)\.hpp|$beside"
+check evaluate renderer/evaluate "emit/(evaluate|physics|reference|renderer|scene)/|gl/|$beside"
 check protocol protocol          "emit/(protocol|physics)/|emit/v1/|record/|$beside"
 check config   config            "emit/(config|physics)/|emit/scene/scene_desc\.hpp|$beside"
 
@@ -57,6 +59,9 @@ only toml++   'toml\+\+|toml\.hpp' 'config/'
 only Boost    'boost/'            'server/'
 only Protobuf 'google/protobuf/'  'protocol/|server/'
 only spdlog   'spdlog/'           'server/'
+only Embree   'embree3/'          'renderer/reference/'
+only Eigen    'Eigen/'            'renderer/reference/'
+only Ceres    'ceres/'            'renderer/reference/'
 only CLI11    'CLI/'              'server/'
 only "the renderer's insides" 'gl/|passes/|history/' 'renderer/'
 
