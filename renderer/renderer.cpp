@@ -5,15 +5,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "emit/scene/mesh.hpp"
 #include "gl/egl_context.hpp"
 #include "history/environment.hpp"
+#include "history/foster_history.hpp"
 #include "history/pose_history.hpp"
 #include "history/step_plan.hpp"
 #include "passes/band_model.hpp"
 #include "passes/compute_passes.hpp"
 #include "passes/draw_lists.hpp"
+#include "passes/foster_setup.hpp"
 #include "passes/frame_setup.hpp"
 #include "passes/raster_passes.hpp"
 #include "passes/readback_ring.hpp"
@@ -88,8 +91,9 @@ class GlRenderer final : public Renderer {
  public:
   GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
              scene::SceneGeometry geometry, const OutputOptions& output, BandModel bands,
-             GeometryPass geometry_pass, OcclusionPass occlusion_pass, ShadowPass shadow_pass,
-             ThermalPass thermal_pass, RadiancePass radiance_pass);
+             std::vector<FosterMaterial> foster_materials, GeometryPass geometry_pass,
+             OcclusionPass occlusion_pass, ShadowPass shadow_pass, ThermalPass thermal_pass,
+             RadiancePass radiance_pass);
 
   std::size_t apply_entities(std::int64_t sim_time_ns,
                              std::span<const EntityUpdate> updates) noexcept override;
@@ -112,8 +116,11 @@ class GlRenderer final : public Renderer {
 
   void prepare(const FrameRequest& request) noexcept;
   void prepare_steps(const FrameRequest& request) noexcept;
+  /// Extended model: fluxes, surroundings and gains of all intervals, spin-up tail included.
+  void prepare_foster(bool table_changed) noexcept;
   void upload_frame() noexcept;
   void bind_frame() const noexcept;
+  void bind_step(std::uint32_t step) const noexcept;
   void draw_shadow(std::uint32_t step) noexcept;
   /// With stage timing: waits for the device and adds the time since the last call to `stage_ms`.
   void mark(double& stage_ms) noexcept;
@@ -128,6 +135,8 @@ class GlRenderer final : public Renderer {
   std::vector<std::uint32_t> entity_ids_;
   std::vector<PoseHistory> histories_;
   StepPlan plan_;
+  std::optional<FosterHistory> foster_;  ///< extended model only
+  std::uint32_t tail_steps_ = 0;
   BandModel bands_;
   SceneBuffers scene_;
   DrawLists lists_;
@@ -156,10 +165,12 @@ class GlRenderer final : public Renderer {
   gl::Buffer tap_buffer_;
   gl::Buffer material_buffer_;
   gl::Buffer table_buffer_;
+  gl::Buffer spin_up_buffer_;
   gl::BufferTexture instance_table_;
   gl::BufferTexture relaxation_table_;
   gl::BufferTexture material_table_;
   gl::BufferTexture band_table_;
+  gl::BufferTexture spin_up_table_;
   gl::Buffer output_buffer_;  ///< planes, then counters
   std::size_t stats_offset_ = 0;
   SceneVertexArrays vertices_;
@@ -193,10 +204,19 @@ std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOption
   return (bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
 }
 
+std::vector<gpu::MaterialParams> make_material_params(const scene::ScenarioDesc& scenario,
+                                                      std::span<const scene::Material> materials,
+                                                      const std::optional<FosterHistory>& foster) {
+  std::vector<gpu::MaterialParams> params = material_params(materials, scenario, kReferenceK);
+  add_resistances(foster, params);
+  return params;
+}
+
 GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
                        scene::SceneGeometry geometry, const OutputOptions& output, BandModel bands,
-                       GeometryPass geometry_pass, OcclusionPass occlusion_pass,
-                       ShadowPass shadow_pass, ThermalPass thermal_pass, RadiancePass radiance_pass)
+                       std::vector<FosterMaterial> foster_materials, GeometryPass geometry_pass,
+                       OcclusionPass occlusion_pass, ShadowPass shadow_pass,
+                       ThermalPass thermal_pass, RadiancePass radiance_pass)
     : scenario_(scenario),
       output_(output),
       context_(std::move(context)),
@@ -206,6 +226,8 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
                    .warnings = geometry.warnings},
       environment_(scenario),
       plan_(scenario.thermal),
+      foster_(make_foster(scenario, std::move(foster_materials), environment_, kReferenceK)),
+      tail_steps_(foster_ ? static_cast<std::uint32_t>(foster_->tail().size()) : 0),
       bands_(std::move(bands)),
       scene_(std::move(geometry)),
       lists_(scene_, histories_of_objects(scenario),
@@ -215,8 +237,9 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       shadow_pass_(std::move(shadow_pass)),
       thermal_pass_(std::move(thermal_pass)),
       radiance_pass_(std::move(radiance_pass)),
-      step_params_(scenario.thermal.steps + 1),
-      relaxation_params_(materials_.size() * scenario.thermal.steps),
+      step_params_(scenario.thermal.steps + 1 + tail_steps_),
+      relaxation_params_(materials_.size() * (scenario.thermal.steps + tail_steps_) *
+                         (foster_ ? EMIT_FOSTER_LEVELS + 1 : 1)),
       shadow_commands_(scenario.thermal.steps + 1),
       frame_buffer_(make_dynamic(sizeof(gpu::FrameParams))),
       instance_buffer_(make_dynamic(lists_.max_instance_params() * sizeof(gpu::InstanceParams))),
@@ -227,12 +250,14 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       band_buffer_(make_dynamic(EMIT_MAX_BANDS * sizeof(gpu::BandParams))),
       tap_buffer_(make_tap_buffer(scenario.thermal)),
       material_buffer_(gl::Buffer::from(std::span<const gpu::MaterialParams>(
-          material_params(materials_, scenario, kReferenceK)))),
+          make_material_params(scenario, materials_, foster_)))),
       table_buffer_(gl::Buffer::from(bands_.tables())),
+      spin_up_buffer_(make_spin_up_buffer(foster_)),
       instance_table_(GL_RGBA32F, instance_buffer_),
       relaxation_table_(GL_RGBA32F, relaxation_buffer_),
       material_table_(GL_RGBA32F, material_buffer_),
       band_table_(GL_R32F, table_buffer_),
+      spin_up_table_(GL_RGBA32F, spin_up_buffer_),
       output_buffer_(planes_bytes(scenario, output) + sizeof(gpu::FrameStatsGpu), nullptr, 0),
       stats_offset_(planes_bytes(scenario, output)),
       vertices_(scene_, record_buffer_, light_record_buffer_),
@@ -248,8 +273,10 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       scenario_.sensor.width_px, scenario_.sensor.height_px, static_cast<std::uint32_t>(plane_px),
       (output_.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
           (output_.depth ? EMIT_OUTPUT_DEPTH : 0U) | (output_.object ? EMIT_OUTPUT_OBJECT : 0U));
-  frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
-                                       static_cast<float>(kReferenceK), 0.0F, 0.0F);
+  frame_params_.obscurance =
+      glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
+                static_cast<float>(kReferenceK), static_cast<float>(scenario_.thermal.tolerance_k),
+                foster_ ? static_cast<float>(foster_->grid_nodes()) : 0.0F);
   frame_params_.bands = glm::uvec4(static_cast<std::uint32_t>(scenario_.bands.size()),
                                    bands_.nodes_per_band(), 0U, 0U);
   for (std::uint32_t slot = 0; slot < output_.slots; ++slot) {
@@ -310,10 +337,40 @@ void GlRenderer::mark(double& stage_ms) noexcept {
 
 void GlRenderer::prepare(const FrameRequest& request) noexcept {
   plan_.update(request.thermal_time_ns, environment_, histories_);
-  bands_.update(plan_.forcing_now(), plan_.sun_now());
+  physics::Forcing now = plan_.forcing_now();
+  bool table_changed = false;
+  if (foster_) {
+    table_changed = foster_->update(plan_, environment_);
+    now.environment_k = foster_->surroundings_now_k();
+  }
+  bands_.update(now, plan_.sun_now());
   lists_.begin(request.sensor_pose.position_world_m, request.sim_time_ns, histories_);
   prepare_steps(request);
+  if (foster_) prepare_foster(table_changed);
   upload_frame();
+}
+
+void GlRenderer::prepare_foster(bool table_changed) noexcept {
+  const auto materials = foster_->materials();
+  const std::size_t stride = materials.size() * (EMIT_FOSTER_LEVELS + 1);
+  const auto set = [&](const IntervalForcing& forcing, std::size_t entry, gpu::StepParams& params) {
+    set_foster_forcing(forcing, kReferenceK, params);
+    set_foster_gains(forcing.dt_s, materials,
+                     std::span(relaxation_params_).subspan(entry * stride, stride));
+    params.info.y = static_cast<std::uint32_t>(entry * stride);
+  };
+  const auto intervals = foster_->intervals();
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    set(intervals[i], i, step_params_[i].params);
+  }
+  const auto tail = foster_->tail();
+  for (std::size_t i = 0; i < tail.size(); ++i) {
+    gpu::StepParams& params = step_params_[intervals.size() + 1 + i].params;
+    params.info = glm::uvec4(0, 0, EMIT_STEP_UNSHADED | (i == 0 ? EMIT_STEP_FIRST : 0U), 0);
+    set(tail[i], intervals.size() + i, params);
+  }
+  if (!tail.empty()) step_params_[0].params.info.z &= ~EMIT_STEP_FIRST;
+  if (table_changed) upload(spin_up_buffer_, foster_->table());
 }
 
 void GlRenderer::prepare_steps(const FrameRequest& request) noexcept {
@@ -358,6 +415,7 @@ void GlRenderer::prepare_steps(const FrameRequest& request) noexcept {
   };
   for (std::uint32_t step = 0; step < steps; ++step) {
     add_step(intervals[step], step, step + 1 == steps);
+    if (foster_) continue;
     set_relaxation(intervals[step], materials_,
                    std::span(relaxation_params_).subspan(step * material_count, material_count));
   }
@@ -395,6 +453,7 @@ void GlRenderer::bind_frame() const noexcept {
   material_table_.bind(EMIT_TEX_MATERIALS);
   relaxation_table_.bind(EMIT_TEX_RELAXATION);
   band_table_.bind(EMIT_TEX_BAND_LUT);
+  spin_up_table_.bind(EMIT_TEX_SPIN_UP);
   output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
   output_buffer_.bind_storage(EMIT_BIND_STATS, stats_offset_, sizeof(gpu::FrameStatsGpu));
   geometry_pass_.bind_textures();
@@ -403,8 +462,12 @@ void GlRenderer::bind_frame() const noexcept {
   thermal_pass_.bind_textures();
 }
 
-void GlRenderer::draw_shadow(std::uint32_t step) noexcept {
+void GlRenderer::bind_step(std::uint32_t step) const noexcept {
   step_buffer_.bind_uniform(EMIT_BIND_STEP, step * sizeof(StepSlot), sizeof(gpu::StepParams));
+}
+
+void GlRenderer::draw_shadow(std::uint32_t step) noexcept {
+  bind_step(step);
   for (std::uint32_t c = 0; c < step_params_[step].params.info.x; ++c) {
     shadow_pass_.draw(vertices_, c, lists_.commands(shadow_commands_[step][c]));
   }
@@ -417,6 +480,8 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   view.frame_number = request.frame_number;
   view.sim_time_ns = request.sim_time_ns;
   view.sensor_pose = request.sensor_pose;
+  view.stats.dropped_poses = 0;
+  for (const PoseHistory& history : histories_) view.stats.dropped_poses += history.dropped();
   view.stages_ms = {};
   StageTimes& stages = view.stages_ms;
   if (output_.stage_timing) {
@@ -436,6 +501,11 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   occlusion_pass_.dispatch();
   mark(stages.occlusion_ms);
   const auto steps = static_cast<std::uint32_t>(plan_.intervals().size());
+  for (std::uint32_t i = 0; i < tail_steps_; ++i) {
+    bind_step(steps + 1 + i);
+    thermal_pass_.dispatch_step();
+    mark(stages.thermal_ms);
+  }
   for (std::uint32_t step = 0; step < steps; ++step) {
     draw_shadow(step);
     mark(stages.shadow_ms);
@@ -461,7 +531,7 @@ const FrameView& GlRenderer::collect(SlotIndex slot) noexcept {
   gpu::FrameStatsGpu stats{};
   std::copy_n(readback_.data(slot) + stats_offset_, sizeof(stats),
               reinterpret_cast<std::byte*>(&stats));
-  view.stats = {stats.nonfinite_px, stats.clamped_px, stats.surface_px};
+  view.stats = {stats.nonfinite_px, stats.clamped_px, stats.surface_px, view.stats.dropped_poses};
   return view;
 }
 
@@ -478,6 +548,9 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
   if (!context) return tl::unexpected(std::move(context.error()));
 
+  auto foster = build_foster_materials(scenario, geometry->materials);
+  if (!foster) return tl::unexpected(std::move(foster.error()));
+
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   auto geometry_pass = GeometryPass::create(width_px, height_px);
@@ -489,13 +562,13 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   if (!shadow_pass) return tl::unexpected(std::move(shadow_pass.error()));
   auto thermal_pass = ThermalPass::create(width_px, height_px, scenario.thermal);
   if (!thermal_pass) return tl::unexpected(std::move(thermal_pass.error()));
-  auto radiance_pass = RadiancePass::create(width_px, height_px);
+  auto radiance_pass = RadiancePass::create(width_px, height_px, scenario.thermal.model);
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
 
-  auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), std::move(*geometry),
-                                               output, std::move(*bands), std::move(*geometry_pass),
-                                               std::move(*occlusion_pass), std::move(*shadow_pass),
-                                               std::move(*thermal_pass), std::move(*radiance_pass));
+  auto renderer = std::make_unique<GlRenderer>(
+      scenario, std::move(*context), std::move(*geometry), output, std::move(*bands),
+      std::move(*foster), std::move(*geometry_pass), std::move(*occlusion_pass),
+      std::move(*shadow_pass), std::move(*thermal_pass), std::move(*radiance_pass));
   if (glGetError() != GL_NO_ERROR || !renderer->memory_mapped()) {
     return make_error(ErrorCode::gpu, "the device cannot provide the buffers of this scenario");
   }

@@ -89,6 +89,8 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<scene::Material>& material_keys();
 [[nodiscard]] const KeyTable<scene::Layer>& layer_keys();
 [[nodiscard]] const KeyTable<scene::RelaxationMode>& mode_keys();
+[[nodiscard]] const KeyTable<scene::FosterMode>& foster_mode_keys();
+[[nodiscard]] const KeyTable<scene::FosterFit>& foster_fit_keys();
 
 [[nodiscard]] const KeyTable<DaemonHead>& daemon_head_keys();
 [[nodiscard]] const KeyTable<SourceConfig>& source_keys();
@@ -103,6 +105,8 @@ struct DaemonHead {
 inline constexpr std::string_view kShippedLibrary = "share:materials/library.toml";
 /// Most relaxation modes a material may have: the emit2014 model keeps two states per sample.
 inline constexpr std::size_t kMaxModes = 2;
+/// Most states of the extended model.
+inline constexpr std::size_t kMaxFosterModes = 4;
 
 /// A section as documentation, override routing and the environment see it.
 struct SectionDoc {

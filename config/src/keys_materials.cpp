@@ -4,6 +4,8 @@
 /// Keys of materials, in a scenario and in library files alike.
 namespace emit::config {
 
+using scene::FosterFit;
+using scene::FosterMode;
 using scene::Layer;
 using scene::Material;
 using scene::RelaxationMode;
@@ -28,6 +30,29 @@ const KeyTable<RelaxationMode>& mode_keys() {
                                       "Time constant.")),
       required(number<RelaxationMode>("weight_frac", "", between(0, 1), EMIT_FIELD(weight_frac),
                                       "Share of the step response; all add up to 1.")),
+  };
+  return keys;
+}
+
+const KeyTable<FosterMode>& foster_mode_keys() {
+  static const KeyTable<FosterMode> keys = {
+      required(
+          number<FosterMode>("tau_s", "s", above_to(0, 1e9), EMIT_FIELD(tau_s), "Time constant.")),
+      required(number<FosterMode>("resistance_m2k_w", "m2 K W-1", above_to(0, 1e4),
+                                  EMIT_FIELD(resistance_m2k_w),
+                                  "Thermal resistance; all add up to that of the layers.")),
+  };
+  return keys;
+}
+
+const KeyTable<FosterFit>& foster_fit_keys() {
+  static const KeyTable<FosterFit> keys = {
+      required(number<FosterFit>("horizon_s", "s", above_to(0, 1e8), EMIT_FIELD(horizon_s),
+                                 "Length of the histories the modes were fitted over.")),
+      required(number<FosterFit>("rms_k", "K", between(0, 1000), EMIT_FIELD(rms_k),
+                                 "Root mean square of the residual in the worst history.")),
+      required(number<FosterFit>("max_k", "K", between(0, 1000), EMIT_FIELD(max_k),
+                                 "Largest residual of all.")),
   };
   return keys;
 }
@@ -67,7 +92,8 @@ const KeyTable<Material>& material_keys() {
           }),
       custom<Material>(
           {"layers", "array of tables", "", "1 .. 16",
-           "Outermost first; emit2014 uses the first. Required without prescribed_k. See `layers` "
+           "Outermost first, down to where the temperature is base_k; emit2014 uses the first. "
+           "Required without prescribed_k. See `layers` "
            "below.",
            false},
           [](Material& out, const Node& node, Diagnostics& diagnostics) {
@@ -82,12 +108,17 @@ const KeyTable<Material>& material_keys() {
                  number<Material>("base_k", "K", between(150, 2000), EMIT_FIELD(base_k),
                                   "Core temperature under the last layer. Required without "
                                   "prescribed_k.")),
+      number<Material>("core_conductance_w_m2_k", "W m-2 K-1", above_to(0, 1e7),
+                       EMIT_FIELD(core_conductance_w_m2_k),
+                       "emit2014: conductance between surface and core, for sheets; that of the "
+                       "first layer if absent. Give `modes` with it."),
       number<Material>("initial_k", "K", between(150, 2000), EMIT_FIELD(initial_k),
                        "Surface temperature at the start of the history; thermal.initial_k if "
                        "absent."),
       custom<Material>(
           {"modes", "array of tables", "", "1 .. 2, weights add up to 1",
-           "Relaxation modes. If absent: derived from the first layer by the slab formula "
+           "emit2014: relaxation modes. If absent: derived from the first layer by the slab "
+           "formula "
            "(slab_modes.hpp). See `modes` below.",
            false},
           [](Material& out, const Node& node, Diagnostics& diagnostics) {
@@ -111,6 +142,56 @@ const KeyTable<Material>& material_keys() {
             }
           },
           [](const Material& in) { return write_array(in.modes, mode_keys()); }),
+      custom<Material>(
+          {"foster_modes", "array of tables", "",
+           "1 .. 4, resistances add up to that of the layers",
+           "foster: modes, fastest first, such as `emit fit` writes. If absent: derived from the "
+           "layers (foster.hpp). See `foster_modes` below.",
+           false},
+          [](Material& out, const Node& node, Diagnostics& diagnostics) {
+            const std::size_t faults = diagnostics.size();
+            read_array(node, "foster_modes", foster_mode_keys(), FosterMode{}, out.foster_modes,
+                       diagnostics);
+            if (diagnostics.size() != faults) {
+              return;
+            }
+            if (out.foster_modes.empty() || out.foster_modes.size() > kMaxFosterModes) {
+              diagnostics.add(node.at, "'foster_modes' has " +
+                                           std::to_string(out.foster_modes.size()) +
+                                           " entries, must have 1 to 4");
+              return;
+            }
+            for (std::size_t i = 1; i < out.foster_modes.size(); ++i) {
+              if (out.foster_modes[i].tau_s <= out.foster_modes[i - 1].tau_s) {
+                diagnostics.add(node.items[i].at, "time constants of 'foster_modes' must increase");
+              }
+            }
+          },
+          [](const Material& in) -> std::optional<std::string> {
+            if (in.foster_modes.empty()) {
+              return std::nullopt;
+            }
+            return write_array(in.foster_modes, foster_mode_keys());
+          }),
+      custom<Material>(
+          {"foster_fit", "table", "", "",
+           "What `emit fit` found for foster_modes against the reference solver: `horizon_s`, "
+           "`rms_k`, `max_k`. Absent: they come from the layers alone.",
+           false},
+          [](Material& out, const Node& node, Diagnostics& diagnostics) {
+            if (expect_table(node, "foster_fit", diagnostics)) {
+              read_table(node, foster_fit_keys(), out.foster_fit.emplace(), diagnostics);
+            }
+          },
+          [](const Material& in) -> std::optional<std::string> {
+            if (!in.foster_fit) {
+              return std::nullopt;
+            }
+            return inline_table(*in.foster_fit, foster_fit_keys());
+          }),
+      boolean<Material>("dry_layers_valid", EMIT_FIELD(dry_layers_valid),
+                        "False where heat moves otherwise than through dry layers: evaporation, "
+                        "melting, stirring. Its temperatures are then a guide only."),
       number<Material>("prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
                        "A part of given temperature (hot parts): no thermal simulation."),
       text<Material>("source", EMIT_FIELD(source), "Where the numbers come from."),

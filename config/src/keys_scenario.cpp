@@ -143,10 +143,90 @@ const KeyTable<WeatherDraft>& weather_keys() {
   return keys;
 }
 
+namespace {
+
+bool read_numbers(const Node& node, const std::string& name, const Range& range, double scale,
+                  std::vector<double>& out, Diagnostics& diagnostics) {
+  if (node.kind != Node::Kind::array || node.items.empty()) {
+    diagnostics.add(node.at, "'" + name + "' must be an array of numbers");
+    return false;
+  }
+  const std::size_t faults = diagnostics.size();
+  for (const Node& item : node.items) {
+    double value = 0.0;
+    read_number(item, name, range, value, diagnostics);
+    out.push_back(value * scale);
+  }
+  return diagnostics.size() == faults;
+}
+
+/// Axis of an inline atmosphere table.
+template <class Field>
+Key<BandAtmosphere> axis_key(std::string name, std::string unit, Range range, Field field,
+                             double scale, std::string meaning) {
+  return custom<BandAtmosphere>(
+      {name, "array of floats", std::move(unit), range.to_string() + ", ascending",
+       std::move(meaning), false},
+      [name, range, field, scale](BandAtmosphere& out, const Node& node, Diagnostics& diagnostics) {
+        field(out).clear();
+        read_numbers(node, name, range, scale, field(out), diagnostics);
+      },
+      [field, scale](const BandAtmosphere& in) -> std::optional<std::string> {
+        if (in.table.empty()) {
+          return std::nullopt;
+        }
+        std::string out = "[";
+        for (const double value : field(in)) {
+          out += (out.size() > 1 ? ", " : "") + unscaled_number(value, scale);
+        }
+        return out + "]";
+      });
+}
+
+/// Values of an inline atmosphere table: an array per elevation.
+template <class Field>
+Key<BandAtmosphere> plane_key(std::string name, std::string unit, Range range, Field field,
+                              std::string meaning) {
+  return custom<BandAtmosphere>(
+      {name, "array of arrays of floats", std::move(unit), range.to_string(), std::move(meaning),
+       false},
+      [name, range, field](BandAtmosphere& out, const Node& node, Diagnostics& diagnostics) {
+        field(out).clear();
+        if (node.kind != Node::Kind::array || node.items.empty()) {
+          diagnostics.add(node.at, "'" + name + "' must be an array of arrays of numbers");
+          return;
+        }
+        for (const Node& item : node.items) {
+          if (item.kind == Node::Kind::array &&
+              item.items.size() != node.items.front().items.size()) {
+            diagnostics.add(item.at, "'" + name + "' has rows of different length");
+            return;
+          }
+          if (!read_numbers(item, name, range, 1.0, field(out), diagnostics)) {
+            return;
+          }
+        }
+      },
+      [field](const BandAtmosphere& in) -> std::optional<std::string> {
+        if (in.table.empty()) {
+          return std::nullopt;
+        }
+        const std::vector<double>& values = field(in);
+        const std::size_t ranges = in.table.range_m.size();
+        std::string out = "[";
+        for (std::size_t i = 0; i + ranges <= values.size(); i += ranges) {
+          out += (i > 0 ? ", " : "") + toml_vector(values.data() + i, ranges);
+        }
+        return out + "]";
+      });
+}
+
+}  // namespace
+
 const KeyTable<BandAtmosphere>& band_atmosphere_keys() {
   static const KeyTable<BandAtmosphere> keys = {
       required(text<BandAtmosphere>("band", EMIT_FIELD(band), "Name of a band.")),
-      required(custom<BandAtmosphere>(
+      custom<BandAtmosphere>(
           {"terms", "array of [a, k]", "1, km-1", "1 .. 4 terms, sum of a = 1, k >= 0",
            "Transmittance over a range R: sum of a exp(-k R). Path radiance is (1 - tau) times "
            "that of a blackbody at air temperature.",
@@ -173,18 +253,35 @@ const KeyTable<BandAtmosphere>& band_atmosphere_keys() {
                                            ", must be 1");
             }
           },
-          [](const BandAtmosphere& in) {
+          [](const BandAtmosphere& in) -> std::optional<std::string> {
+            if (in.terms.empty()) {
+              return std::nullopt;
+            }
             std::string out = "[";
             for (const scene::AtmosphereTerm& term : in.terms) {
               const double pair[2] = {term.amplitude_frac, term.extinction_per_km};
               out += (out.size() > 1 ? ", " : "") + toml_vector(pair, 2);
             }
             return out + "]";
-          })),
-      number<BandAtmosphere>("vertical_transmittance_frac", "", between(0, 1),
-                             EMIT_FIELD(vertical_transmittance_frac),
-                             "Ground to space at the zenith; the sky radiates (1 - tau^airmass) "
-                             "times a blackbody at air temperature."),
+          }),
+      written_if<BandAtmosphere>(
+          [](const BandAtmosphere& in) { return in.table.empty(); },
+          number<BandAtmosphere>(
+              "vertical_transmittance_frac", "", between(0, 1),
+              EMIT_FIELD(vertical_transmittance_frac),
+              "Ground to space at the zenith; the sky radiates (1 - tau^airmass) "
+              "times a blackbody at air temperature.")),
+      axis_key("range_m", "m", between(0, 1e7), EMIT_FIELD(table.range_m), 1.0,
+               "In place of terms, a table (the CSV of `atmosphere.file` inline): ranges, the last "
+               "one standing for the way out of the atmosphere."),
+      axis_key("elevation_deg", "deg", between(-90, 90), EMIT_FIELD(table.elevation_rad), kDegree,
+               "Table: elevations of the line of sight, negative looking down; a single one holds "
+               "for all."),
+      plane_key("transmittance_frac", "", between(0, 1), EMIT_FIELD(table.transmittance_frac),
+                "Table: one row of values per elevation, one value per range."),
+      plane_key("path_radiance_w_m2_sr", "W m-2 sr-1", between(0, 1e6),
+                EMIT_FIELD(table.path_radiance_w_m2_sr),
+                "Table: in-band radiance of the air itself, likewise."),
   };
   return keys;
 }
@@ -206,12 +303,17 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
           "Built-in terms of the built-in bands: fits to LOWTRAN7, rural haze, visibility 23 km "
           "(hazy: 5 km). `none`: only what file and `[[atmosphere.band]]` give."),
       path<AtmosphereDraft>("file", EMIT_FIELD(file),
-                            "CSV `band,amplitude_frac,extinction_per_km,"
-                            "vertical_transmittance_frac`, one row per term; replaces the model's "
-                            "terms for its bands."),
+                            "CSV `band,range_m,elevation_deg,transmittance_frac,"
+                            "path_radiance_w_m2_sr`: a grid of ranges and elevations per band, as "
+                            "seen from the sensor; the last range stands for the way out (sky, "
+                            "sun). Or `band,amplitude_frac,extinction_per_km,"
+                            "vertical_transmittance_frac`, one row per exponential term. Comes "
+                            "before the model; with a grid, bands it lacks need `model` written "
+                            "out."),
       custom<AtmosphereDraft>(
           {"band", "array of tables", "", "",
-           "Terms inline; see `[[atmosphere.band]]`. Replaces file and model for its bands.",
+           "Terms or a table inline; see `[[atmosphere.band]]`. Replaces file and model for its "
+           "bands.",
            false},
           [](AtmosphereDraft& out, const Node& node, Diagnostics& diagnostics) {
             read_array(node, "band", band_atmosphere_keys(), BandAtmosphere{}, out.bands,
@@ -226,10 +328,11 @@ const KeyTable<ThermalOptions>& thermal_keys() {
   static const KeyTable<ThermalOptions> keys = {
       choice<ThermalOptions>(
           "model",
-          std::vector<std::pair<std::string, ThermalModel>>{{"emit2014", ThermalModel::emit2014}},
+          std::vector<std::pair<std::string, ThermalModel>>{{"emit2014", ThermalModel::emit2014},
+                                                            {"foster", ThermalModel::foster}},
           EMIT_FIELD(model),
-          "Surface model: equilibrium of Eq. 1-6, relaxed by the modes of the "
-          "material."),
+          "Surface model. emit2014: equilibrium of Eq. 1-6, relaxed by the modes of the material. "
+          "foster: convection, sky and surroundings, and all layers as 2 to 4 flux-driven states."),
       choice<ThermalOptions>("method",
                              std::vector<std::pair<std::string, ThermalMethod>>{
                                  {"per-frame", ThermalMethod::per_frame}},
@@ -237,12 +340,27 @@ const KeyTable<ThermalOptions>& thermal_keys() {
                              "How the history is evaluated. per-frame: all steps again for every "
                              "pixel of every frame."),
       number<ThermalOptions>("tolerance_k", "K", above_to(0, 50), EMIT_FIELD(tolerance_k),
-                             "Aimed-at error of surface temperatures. Not used by per-frame."),
+                             "Aimed-at error of surface temperatures. foster: history steps are "
+                             "split until halving them changes less. Not used by emit2014."),
       number<ThermalOptions>("initial_k", "K", between(150, 1000), EMIT_FIELD(initial_k),
                              "Surface temperature at the start of the history."),
       nanoseconds<ThermalOptions>("history_start_s", "s", 1e9, between(-1e9, 1e9),
                                   EMIT_FIELD(history_start_ns),
                                   "Sim time from which the thermal simulation runs."),
+      nanoseconds<ThermalOptions>(
+          "spin_up_s", "s", 1e9, between(0, 3.2e7), EMIT_FIELD(spin_up_ns),
+          "foster: unshadowed weather before the history, from a steady profile between initial_k "
+          "and the base; 172800 (two days) if absent. A weather table has to reach back as far: "
+          "its "
+          "first row holds before. emit2014: not used."),
+      text<ThermalOptions>(
+          "surroundings_material", EMIT_FIELD(surroundings_material),
+          "foster: what lies around where weather states no environment_k; its "
+          "open, level surface sets the temperature, its reflectance the reflected "
+          "sun. default_material if absent."),
+      integer<ThermalOptions>("foster_modes", "", 0, 4, EMIT_FIELD(foster_modes),
+                              "foster: states per material, derived from its layers. 0: its fitted "
+                              "modes."),
       integer<ThermalOptions>("steps", "", 1, 4096, EMIT_FIELD(steps),
                               "History steps; one shadow map each."),
       choice<ThermalOptions>(
@@ -255,7 +373,8 @@ const KeyTable<ThermalOptions>& thermal_keys() {
       integer<ThermalOptions>("shadow_map_px", "px", 16, 8192, EMIT_FIELD(shadow_map_px),
                               "Width and height of a shadow map."),
       integer<ThermalOptions>(
-          "max_cascades", "", 1, 4, EMIT_FIELD(max_cascades),
+          "max_cascades", "",
+          1, 4, EMIT_FIELD(max_cascades),
           "Most shadow maps per step, for scenes larger than one map resolves."),
       integer<ThermalOptions>("blocker_taps", "", 1, 64, EMIT_FIELD(blocker_taps),
                               "Samples of the search for what casts the shadow."),

@@ -130,6 +130,19 @@ void resolve_head(const Node& root, ScenarioDesc& scenario, ScenarioHead& head,
   scenario.epoch_utc_ns = head.epoch_utc_ns;
 }
 
+constexpr std::int64_t kFosterSpinUpNs = 172'800'000'000'000;  // two days
+
+void check_surroundings(const Node& thermal, const ScenarioDesc& scenario,
+                        Diagnostics& diagnostics) {
+  const std::string& name = scenario.thermal.surroundings_material;
+  if (!name.empty() &&
+      std::none_of(scenario.materials.begin(), scenario.materials.end(),
+                   [&name](const scene::Material& material) { return material.name == name; })) {
+    diagnostics.add(key_location(thermal, "surroundings_material"),
+                    fmt::format("there is no material '{}'", name));
+  }
+}
+
 void resolve_default_material(const Node& root, const ScenarioHead& head, ScenarioDesc& scenario,
                               Diagnostics& diagnostics) {
   const auto exists = [&scenario](const std::string& name) {
@@ -187,7 +200,11 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 0.0};
   read_table(section(root, "place", diagnostics), place_keys(), scenario.place, diagnostics);
   resolve_weather(root, scenario, diagnostics);
-  read_table(section(root, "thermal", diagnostics), thermal_keys(), scenario.thermal, diagnostics);
+  const Node& thermal = section(root, "thermal", diagnostics);
+  read_table(thermal, thermal_keys(), scenario.thermal, diagnostics);
+  if (scenario.thermal.model == scene::ThermalModel::foster && !thermal.has("spin_up_s")) {
+    scenario.thermal.spin_up_ns = kFosterSpinUpNs;
+  }
   resolve_display(root, scenario, diagnostics);
 
   const std::vector<scene::SpectralBand> declared = resolve_declared_bands(root, diagnostics);
@@ -208,6 +225,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
     });
   }
   resolve_default_material(root, head, scenario, diagnostics);
+  check_surroundings(thermal, scenario, diagnostics);
   scenario.sensor = resolve_sensor(root, diagnostics);
   scenario.objects =
       resolve_objects(root, scenario.materials, options.require_scene_files, diagnostics);

@@ -112,47 +112,4 @@ Result<std::vector<scene::ResponseSample>> load_response_csv(const std::filesyst
   return out;
 }
 
-Result<std::vector<scene::BandAtmosphere>> load_atmosphere_csv(const std::filesystem::path& file) {
-  const Result<std::vector<CsvRow>> rows =
-      read_csv(file, {{"band", true, any_number(), true},
-                      {"amplitude_frac", true, between(0, 1)},
-                      {"extinction_per_km", true, at_least(0)},
-                      {"vertical_transmittance_frac", true, between(0, 1)}});
-  if (!rows) {
-    return tl::unexpected<physics::Error>(rows.error());
-  }
-  std::vector<scene::BandAtmosphere> out;
-  std::vector<std::uint32_t> first_line;
-  for (const CsvRow& row : *rows) {
-    std::size_t index = 0;
-    while (index < out.size() && out[index].band != row.texts[0]) {
-      ++index;
-    }
-    if (index == out.size()) {
-      out.push_back({row.texts[0], {}, *row.numbers[3]});
-      first_line.push_back(row.line);
-    }
-    if (out[index].vertical_transmittance_frac != *row.numbers[3]) {
-      return make_error(
-          ErrorCode::config,
-          at_line(file, row, "'vertical_transmittance_frac' differs within one band"));
-    }
-    out[index].terms.push_back({*row.numbers[1], *row.numbers[2]});
-  }
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    double sum = 0.0;
-    for (const scene::AtmosphereTerm& term : out[i].terms) {
-      sum += term.amplitude_frac;
-    }
-    if (std::abs(sum - 1.0) > 1e-3 || out[i].terms.size() > 4) {
-      return make_error(
-          ErrorCode::config,
-          fmt::format("{}:{}: the amplitudes of band '{}' add up to {} over {} rows, "
-                      "must be 1 over at most 4",
-                      file.string(), first_line[i], out[i].band, sum, out[i].terms.size()));
-    }
-  }
-  return out;
-}
-
 }  // namespace emit::config

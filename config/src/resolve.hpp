@@ -18,8 +18,10 @@ namespace emit::config {
     const std::filesystem::path& file);
 [[nodiscard]] physics::Result<std::vector<scene::ResponseSample>> load_response_csv(
     const std::filesystem::path& file);
+
+// load_atmosphere.cpp: tables or terms, told apart by the header row.
 [[nodiscard]] physics::Result<std::vector<scene::BandAtmosphere>> load_atmosphere_csv(
-    const std::filesystem::path& file);
+    const std::filesystem::path& file, const std::vector<std::string>& known_bands);
 
 /// The material tables of the scenario and its libraries as one list of nodes, libraries first.
 [[nodiscard]] std::vector<Node> collect_material_nodes(

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "emit/config/slab_modes.hpp"
 #include "resolve.hpp"
@@ -55,6 +56,20 @@ void check_material(const Material& material, const Node& node,
     if (const Node* layers = node.find("layers");
         layers != nullptr && layers->kind == Node::Kind::array && layers->items.empty()) {
       diagnostics.add(layers->at, "'layers' needs at least one layer");
+    }
+  }
+  if (!material.foster_modes.empty() && !material.layers.empty()) {
+    double of_modes = 0.0;
+    double of_layers = 0.0;
+    for (const scene::FosterMode& mode : material.foster_modes) of_modes += mode.resistance_m2k_w;
+    for (const scene::Layer& layer : material.layers) {
+      of_layers += layer.thickness_m / layer.conductivity_w_m_k;
+    }
+    if (std::abs(of_modes - of_layers) > 1e-3 * of_layers) {
+      diagnostics.add(key_location(node, "foster_modes"),
+                      fmt::format("the resistances of 'foster_modes' add up to {:.6g}, those of "
+                                  "'layers' to {:.6g}: fit again",
+                                  of_modes, of_layers));
     }
   }
   if (const Node* bands = node.find("band_emissivity_frac");

@@ -219,6 +219,57 @@ std::vector<SpectralBand> bands_in_use(const std::vector<ChannelDesc>& channels,
   return out;
 }
 
+namespace {
+
+/// Names of every band a scenario may speak of, shown or not.
+std::vector<std::string> speakable_band_names(const Node& root,
+                                              const std::vector<SpectralBand>& bands) {
+  std::vector<std::string> names = known_band_names(bands);
+  if (const Node* declared = root.find("band")) {
+    for (const Node& node : declared->items) {
+      const Node* name = node.find("name");
+      if (name != nullptr && !contains(names, name->text)) {
+        names.push_back(name->text);
+      }
+    }
+  }
+  return names;
+}
+
+/// `[[atmosphere.band]]`: terms or a table, and the table must hold together.
+void check_inline_atmosphere(const Node& node, const BandAtmosphere& entry,
+                             Diagnostics& diagnostics) {
+  constexpr const char* kTableKeys[] = {"range_m", "elevation_deg", "transmittance_frac",
+                                        "path_radiance_w_m2_sr"};
+  const bool table = std::any_of(std::begin(kTableKeys), std::end(kTableKeys),
+                                 [&node](const char* key) { return node.has(key); });
+  if (!table) {
+    if (!node.has("terms")) {
+      diagnostics.add(node.at,
+                      "key 'terms' is missing (or a table: 'range_m', 'elevation_deg', "
+                      "'transmittance_frac', 'path_radiance_w_m2_sr')");
+    }
+    return;
+  }
+  for (const char* key : {"terms", "vertical_transmittance_frac"}) {
+    if (node.has(key)) {
+      diagnostics.add(key_location(node, key),
+                      fmt::format("'{}' and a table exclude each other", key));
+    }
+  }
+  for (const char* key : kTableKeys) {
+    if (!node.has(key)) {
+      diagnostics.add(node.at, fmt::format("key '{}' is missing", key));
+      return;
+    }
+  }
+  if (auto valid = physics::validate(entry.table); !valid) {
+    diagnostics.add(node.at, valid.error().text);
+  }
+}
+
+}  // namespace
+
 scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<SpectralBand>& bands,
                                          Diagnostics& diagnostics) {
   const Node& table = section(root, "atmosphere", diagnostics);
@@ -230,7 +281,7 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<Spe
   out.enabled = draft.enabled;
   std::vector<BandAtmosphere> from_file;
   if (!draft.file.empty()) {
-    auto loaded = load_atmosphere_csv(draft.file);
+    auto loaded = load_atmosphere_csv(draft.file, speakable_band_names(root, bands));
     if (!loaded) {
       report_file_error(loaded.error(), table, "file", diagnostics);
     } else {
@@ -241,9 +292,8 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<Spe
   for (std::size_t i = 0; i < draft.bands.size() && diagnostics.size() == faults; ++i) {
     const Node& node = inline_bands->items[i];
     const std::string& name = draft.bands[i].band;
-    if (std::none_of(bands.begin(), bands.end(),
-                     [&name](const SpectralBand& band) { return band.name == name; }) &&
-        !contains(known_band_names(bands), name)) {
+    check_inline_atmosphere(node, draft.bands[i], diagnostics);
+    if (!contains(speakable_band_names(root, bands), name)) {
       diagnostics.add(key_location(node, "band"), fmt::format("there is no band '{}'", name));
     }
     for (std::size_t j = 0; j < i; ++j) {
@@ -264,6 +314,12 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<Spe
       out.bands.push_back(*inline_entry);
     } else if (file_entry != from_file.end()) {
       out.bands.push_back(*file_entry);
+    } else if (draft.enabled && !from_file.empty() && !from_file.front().table.empty() &&
+               !table.has("model")) {
+      diagnostics.add(key_location(table, "file"),
+                      fmt::format("'file': {} has no rows of band '{}': add them, or name the "
+                                  "'model' that stands in for it",
+                                  draft.file.string(), band.name));
     } else if (std::optional<BandAtmosphere> model = model_atmosphere(draft.model, band.name)) {
       out.bands.push_back(std::move(*model));
     } else if (draft.enabled && bands_are_sound) {

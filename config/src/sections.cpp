@@ -18,8 +18,8 @@ const std::vector<SectionDoc>& scenario_sections() {
                   weather_sample_keys(), scene::WeatherSample{}),
       section_doc("atmosphere", false, "What the air does between surface and sensor.",
                   atmosphere_keys(), AtmosphereDraft{}),
-      section_doc("atmosphere.band", true, "Transmittance of one band.", band_atmosphere_keys(),
-                  scene::BandAtmosphere{}),
+      section_doc("atmosphere.band", true, "Transmittance of one band: terms or a table.",
+                  band_atmosphere_keys(), scene::BandAtmosphere{}),
       section_doc("thermal", false, "The thermal simulation.", thermal_keys(),
                   scene::ThermalOptions{}),
       section_doc("sensor", false,
@@ -46,6 +46,11 @@ const std::vector<SectionDoc>& scenario_sections() {
                   scene::Layer{}),
       section_doc("material.modes", true, "An exponential of a material's step response.",
                   mode_keys(), scene::RelaxationMode{}),
+      section_doc(
+          "material.foster_modes", true,
+          "A flux-driven state of a material: tau x' = resistance q - x, q the net flux into "
+          "the surface, which is base_k plus the sum of the states.",
+          foster_mode_keys(), scene::FosterMode{}),
       section_doc("display", false, "Limits of the false-colour display.", display_keys(),
                   scene::DisplayOptions{}),
   };

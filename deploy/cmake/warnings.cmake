@@ -12,7 +12,7 @@ if(EMIT_WARNINGS_AS_ERRORS)
 endif()
 if(EMIT_SANITIZE)
   target_compile_options(emit_options INTERFACE -fsanitize=${EMIT_SANITIZE} -fno-omit-frame-pointer
-    -fno-sanitize-recover=all -g)
+    -fno-sanitize-recover=all)
   target_link_options(emit_options INTERFACE -fsanitize=${EMIT_SANITIZE})
   # g++ 12 reports false null dereferences and maybe-uninitialised reads in instrumented code.
   target_compile_options(emit_options INTERFACE -Wno-null-dereference -Wno-maybe-uninitialized)

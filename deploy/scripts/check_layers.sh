@@ -47,7 +47,7 @@ check gl       renderer/gl       "gl/|emit/physics/"
 check renderer "renderer/passes renderer/history renderer/include renderer/renderer.cpp" \
       "emit/(renderer|physics|scene|image)/|gl/|passes/|history/|shared/"
 check reference renderer/reference "emit/(reference|physics)/|emit/scene/(scene_desc|mesh|trajectory)\.hpp|$beside"
-check evaluate renderer/evaluate "emit/(evaluate|physics|reference|renderer|scene)/|gl/|$beside"
+check evaluate renderer/evaluate "emit/(evaluate|physics|reference|renderer|scene)/|gl/|shared/|$beside"
 check protocol protocol          "emit/(protocol|physics)/|emit/v1/|record/|$beside"
 check config   config            "emit/(config|physics)/|emit/scene/scene_desc\.hpp|$beside"
 

@@ -50,6 +50,7 @@ bool Environment::append(const scene::WeatherSample& sample) noexcept {
     if (same_weather(row, live_.back())) return true;
     if (row.time_ns == live_.back().time_ns) {
       live_.back() = row;
+      ++revision_;
       return true;
     }
   }
@@ -64,11 +65,13 @@ bool Environment::append(const scene::WeatherSample& sample) noexcept {
     thin(changes_ns_);
   }
   live_.push_back(row);
+  ++revision_;
   changes_ns_.push_back(row.time_ns);
   return true;
 }
 
 void Environment::reset() noexcept {
+  if (!live_.empty()) ++revision_;
   live_.clear();
   changes_ns_.clear();
 }

@@ -26,6 +26,9 @@ class Environment {
   /// Instants at which live weather changes, ascending.
   [[nodiscard]] std::span<const std::int64_t> changes_ns() const noexcept { return changes_ns_; }
 
+  /// Goes up with every change by the host.
+  [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
+
   [[nodiscard]] physics::SunPosition sun_at(std::int64_t sim_time_ns) const noexcept;
   [[nodiscard]] physics::Forcing forcing_at(std::int64_t sim_time_ns,
                                             const physics::SunPosition& sun) const noexcept;
@@ -37,6 +40,7 @@ class Environment {
   std::vector<physics::WeatherRow> table_;
   std::vector<physics::WeatherRow> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of live_
+  std::uint64_t revision_ = 0;
 };
 
 }  // namespace emit::renderer

@@ -190,6 +190,7 @@ void PoseHistory::make_room() noexcept {
 
 void PoseHistory::reset() noexcept {
   live_.clear();
+  dropped_ = 0;
   skipped_count_ = 0;
   skipped_stride_ = 1;
   skipped_phase_ = 0;

@@ -15,6 +15,9 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
+// Least texels of a buffer texture that OpenGL 4.5 allows (GL_MAX_TEXTURE_BUFFER_SIZE).
+constexpr std::size_t kMaxTableFloats = 65536;
+
 physics::Band band_from(const scene::SpectralBand& desc) {
   physics::Band band{desc.lo_um, desc.hi_um, {}};
   for (const scene::ResponseSample& sample : desc.response) {
@@ -67,7 +70,16 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
     params.terms_amplitude_frac = glm::vec4(1.0F, 0.0F, 0.0F, 0.0F);
     params.terms_extinction_per_m = glm::vec4(0.0F);
     params.vertical_transmittance_frac = 1.0F;
-    if (const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name)) {
+    const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name);
+    if (atmosphere != nullptr && !atmosphere->table.empty()) {
+      auto air = physics::AtmosphereTable::build(atmosphere->table);
+      if (!air) {
+        return make_error(ErrorCode::config,
+                          fmt::format("band '{}': {}", desc.name, air.error().text));
+      }
+      entry.air_hemisphere_w_m2_sr = air->sky_hemisphere_w_m2_sr();
+      entry.air = std::move(*air);
+    } else if (atmosphere != nullptr) {
       if (atmosphere->terms.size() > EMIT_MAX_ATMOSPHERE_TERMS) {
         return make_error(
             ErrorCode::config,
@@ -94,6 +106,21 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
     model.params_.push_back(params);
     model.entries_.push_back(std::move(entry));
   }
+  for (std::size_t i = 0; i < model.entries_.size(); ++i) {
+    if (!model.entries_[i].air) continue;
+    const physics::AtmosphereTable& air = *model.entries_[i].air;
+    model.params_[i].atmosphere_table = glm::uvec4(
+        static_cast<std::uint32_t>(model.tables_.size()), static_cast<std::uint32_t>(air.ranges()),
+        static_cast<std::uint32_t>(air.elevations()), 0U);
+    const std::vector<float> nodes = air.shader_nodes();
+    model.tables_.insert(model.tables_.end(), nodes.begin(), nodes.end());
+    if (model.tables_.size() > kMaxTableFloats) {
+      return make_error(ErrorCode::config,
+                        fmt::format("band '{}': the atmosphere tables have more points than a "
+                                    "device is sure to take ({} numbers, {} are possible)",
+                                    scenario.bands[i].name, model.tables_.size(), kMaxTableFloats));
+    }
+  }
   return model;
 }
 
@@ -109,14 +136,17 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
     params.surroundings_radiance_w_m2_sr = static_cast<float>(
         physics::band_radiance(entry.band, physics::Kelvin(forcing.environment_k))
             .radiance_w_m2_sr);
-    params.sky_hemisphere_w_m2_sr = static_cast<float>(air_w_m2_sr * entry.sky_hemisphere_frac);
+    params.sky_hemisphere_w_m2_sr = static_cast<float>(
+        entry.air ? entry.air_hemisphere_w_m2_sr : air_w_m2_sr * entry.sky_hemisphere_frac);
     // Without direct sun in the forcing (overcast) none is reflected either.
     const bool sun_shines =
         forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) > 0.0 && air_mass > 0.0;
+    const double sun_transmittance_frac =
+        entry.air ? entry.air->out(std::sin(sun.elevation.value())).transmittance_frac
+                  : std::pow(entry.vertical_transmittance_frac, air_mass);
     params.sun_irradiance_w_m2 =
         sun_shines ? static_cast<float>(entry.sun_radiance_w_m2_sr * disc_sr_projected *
-                                        (1.0 - forcing.cloud_frac) *
-                                        std::pow(entry.vertical_transmittance_frac, air_mass))
+                                        (1.0 - forcing.cloud_frac) * sun_transmittance_frac)
                    : 0.0F;
   }
 }
@@ -130,11 +160,14 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
     gpu::MaterialParams params{};
     params.solar_absorptance_frac = static_cast<float>(material.solar_absorptance_frac);
     params.emissivity_frac = static_cast<float>(material.emissivity_frac);
-    if (!material.layers.empty()) {
+    if (material.core_conductance_w_m2_k) {
+      params.conductance_w_m2_k = static_cast<float>(*material.core_conductance_w_m2_k);
+    } else if (!material.layers.empty()) {
       params.conductance_w_m2_k = static_cast<float>(material.layers[0].conductivity_w_m_k /
                                                      material.layers[0].thickness_m);
     }
     params.base_k = static_cast<float>(material.base_k);
+    params.base_offset_k = static_cast<float>(material.base_k - reference_k);
     params.initial_offset_k =
         static_cast<float>(material.initial_k.value_or(scenario.thermal.initial_k) - reference_k);
     if (material.prescribed_k) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
 #include "emit/physics/weather.hpp"
@@ -15,14 +17,14 @@ namespace emit::renderer {
 /// Owner: Renderer. Real time: update is RT-safe, build is setup only.
 class BandModel {
  public:
-  /// Errors (config): more than EMIT_MAX_BANDS bands, or a band that is not valid.
+  /// Errors (config): more than EMIT_MAX_BANDS bands, a band or an atmosphere that is not valid.
   [[nodiscard]] static physics::Result<BandModel> build(const scene::ScenarioDesc& scenario);
 
   /// Air, surroundings and sun at the frame's instant.
   void update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept;
 
   [[nodiscard]] std::span<const gpu::BandParams> params() const noexcept { return params_; }
-  /// T ln L tables, one band after the other.
+  /// T ln L tables, one band after the other, then the tables of the air.
   [[nodiscard]] std::span<const float> tables() const noexcept { return tables_; }
   [[nodiscard]] std::uint32_t nodes_per_band() const noexcept { return nodes_per_band_; }
 
@@ -32,6 +34,8 @@ class BandModel {
     double sun_radiance_w_m2_sr = 0.0;  ///< photosphere, in band
     double sky_hemisphere_frac = 0.0;   ///< hemisphere mean over blackbody at air temperature
     double vertical_transmittance_frac = 1.0;
+    std::optional<physics::AtmosphereTable> air = std::nullopt;  ///< in place of the terms
+    double air_hemisphere_w_m2_sr = 0.0;                         ///< sky of that table
   };
   std::vector<Entry> entries_;
   std::vector<gpu::BandParams> params_;

@@ -49,14 +49,17 @@ physics::Result<ThermalPass> ThermalPass::create(std::uint32_t width_px, std::ui
   std::vector<gl::Define> defines = {
       {"EMIT_BLOCKER_TAPS", fmt::format("{}u", options.blocker_taps)},
       {"EMIT_FILTER_TAPS", fmt::format("{}u", options.filter_taps)}};
-  auto step_program = gl::Program::compute("passes/thermal.comp", defines);
+  const bool foster = options.model == scene::ThermalModel::foster;
+  auto step_program =
+      gl::Program::compute(foster ? "passes/thermal_foster.comp" : "passes/thermal.comp", defines);
   if (!step_program) return tl::unexpected(std::move(step_program.error()));
   defines.push_back({"EMIT_SUN_ONLY", "1"});
   auto sun_program = gl::Program::compute("passes/thermal.comp", defines);
   if (!sun_program) return tl::unexpected(std::move(sun_program.error()));
   pass.step_program_ = std::move(*step_program);
   pass.sun_program_ = std::move(*sun_program);
-  pass.state_ = make_texture(GL_RG32F, width_px, height_px);
+  if (foster) pass.state_format_ = GL_RGBA32F;
+  pass.state_ = make_texture(pass.state_format_, width_px, height_px);
   pass.sun_now_ = make_texture(GL_R32F, width_px, height_px);
   pass.width_px_ = width_px;
   pass.height_px_ = height_px;
@@ -65,7 +68,7 @@ physics::Result<ThermalPass> ThermalPass::create(std::uint32_t width_px, std::ui
 
 void ThermalPass::dispatch(const gl::Program& program) const noexcept {
   program.use();
-  glBindImageTexture(EMIT_IMG_STATE, state_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32F);
+  glBindImageTexture(EMIT_IMG_STATE, state_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, state_format_);
   glBindImageTexture(EMIT_IMG_SUN_NOW, sun_now_.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
   dispatch_pixels(width_px_, height_px_);
   glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
@@ -84,10 +87,12 @@ void ThermalPass::bind_textures() const noexcept {
   sun_now_.bind(EMIT_TEX_SUN_NOW);
 }
 
-physics::Result<RadiancePass> RadiancePass::create(std::uint32_t width_px,
-                                                   std::uint32_t height_px) {
+physics::Result<RadiancePass> RadiancePass::create(std::uint32_t width_px, std::uint32_t height_px,
+                                                   scene::ThermalModel model) {
   RadiancePass pass;
-  auto program = gl::Program::compute("passes/radiance.comp");
+  std::vector<gl::Define> defines;
+  if (model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});
+  auto program = gl::Program::compute("passes/radiance.comp", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
   pass.width_px_ = width_px;

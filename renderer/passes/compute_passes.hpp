@@ -40,7 +40,8 @@ class ThermalPass {
 
   gl::Program step_program_;
   gl::Program sun_program_;
-  gl::Texture state_;    ///< two modes, offsets in K
+  gl::Texture state_;  ///< two modes (foster: four), offsets in K
+  GLenum state_format_ = GL_RG32F;
   gl::Texture sun_now_;  ///< visible share of the sun's disc at the frame's instant
   std::uint32_t width_px_ = 0;
   std::uint32_t height_px_ = 0;
@@ -49,7 +50,8 @@ class ThermalPass {
 class RadiancePass {
  public:
   [[nodiscard]] static physics::Result<RadiancePass> create(std::uint32_t width_px,
-                                                            std::uint32_t height_px);
+                                                            std::uint32_t height_px,
+                                                            scene::ThermalModel model);
   void dispatch() const noexcept;
 
  private:

@@ -135,6 +135,43 @@ gpu::TapParams shadow_taps(std::uint32_t blocker_taps, std::uint32_t filter_taps
   return params;
 }
 
+void set_foster_forcing(const IntervalForcing& forcing, double reference_k,
+                        gpu::StepParams& params) noexcept {
+  const auto sun = [](const SurfaceForcing& f) {
+    const double flux_w_m2 = glm::length(f.sun_w_m2);
+    const glm::dvec3 up(0.0, 0.0, 1.0);
+    return vec4_from(flux_w_m2 > 0.0 ? f.sun_w_m2 / flux_w_m2 : up, flux_w_m2);
+  };
+  const auto flux = [](const SurfaceForcing& f) {
+    return glm::vec4(static_cast<float>(f.diffuse_w_m2), static_cast<float>(f.longwave_w_m2),
+                     static_cast<float>(f.reflected_w_m2), static_cast<float>(f.environment_w_m2));
+  };
+  params.sun_start = sun(forcing.begin);
+  params.sun_end = sun(forcing.end);
+  params.flux_start = flux(forcing.begin);
+  params.flux_end = flux(forcing.end);
+  params.film_air = glm::vec4(static_cast<float>(forcing.begin.film_w_m2_k),
+                              static_cast<float>(forcing.begin.air_k - reference_k),
+                              static_cast<float>(forcing.end.film_w_m2_k),
+                              static_cast<float>(forcing.end.air_k - reference_k));
+}
+
+void set_foster_gains(double dt_s, std::span<const FosterMaterial> materials,
+                      std::span<gpu::RelaxationParams> params) noexcept {
+  static_assert(EMIT_FOSTER_LEVELS == physics::kMaxFosterLevel);
+  const auto narrow = [](const physics::FosterState<double>& x) {
+    return glm::vec4(static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
+                     static_cast<float>(x[3]));
+  };
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    const physics::FosterLadder ladder = physics::foster_ladder(dt_s, materials[m].network);
+    for (std::size_t level = 0; level < ladder.level.size(); ++level) {
+      params[m * ladder.level.size() + level] = {narrow(ladder.level[level].start_frac),
+                                                 narrow(ladder.level[level].end_frac)};
+    }
+  }
+}
+
 void set_relaxation(const HistoryInterval& interval, std::span<const scene::Material> materials,
                     std::span<gpu::RelaxationParams> params) noexcept {
   const double dt_s = static_cast<double>(interval.end_ns - interval.begin_ns) * 1e-9;

@@ -5,6 +5,7 @@
 
 #include "emit/physics/frames.hpp"
 #include "emit/scene/scene_desc.hpp"
+#include "history/foster_history.hpp"
 #include "history/step_plan.hpp"
 #include "passes/light_fit.hpp"
 #include "shared/frame_params.glsl.h"
@@ -36,6 +37,14 @@ struct CameraSetup {
 /// independently of the radius.
 [[nodiscard]] gpu::TapParams shadow_taps(std::uint32_t blocker_taps,
                                          std::uint32_t filter_taps) noexcept;
+
+/// The extended model in place of what set_step() filled for emit2014: fluxes, film and air at the
+/// two ends of the interval.
+void set_foster_forcing(const IntervalForcing& forcing, double reference_k,
+                        gpu::StepParams& params) noexcept;
+/// Gains of every material over an interval and its splits; EMIT_FOSTER_LEVELS + 1 entries each.
+void set_foster_gains(double dt_s, std::span<const FosterMaterial> materials,
+                      std::span<gpu::RelaxationParams> params) noexcept;
 
 /// Exact gains of every material over an interval.
 void set_relaxation(const HistoryInterval& interval, std::span<const scene::Material> materials,

@@ -43,7 +43,7 @@ SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
       range.submeshes.push_back({first + submesh.first_index, submesh.index_count, submesh.material,
                                  submesh.double_sided});
     }
-    range.whole = {first, static_cast<std::uint32_t>(mesh.indices.size()), 0, true};
+    range.whole = {first, static_cast<std::uint32_t>(mesh.indices.size()), 0, !mesh.closed};
     range.first_instance = next_instance;
     while (next_instance < instances_.size() && instances_[next_instance].mesh == m) {
       ++next_instance;

@@ -21,7 +21,7 @@ class SceneBuffers {
     bool double_sided = false;
   };
   struct MeshRange {
-    DrawRange whole;  ///< all submeshes, for depth-only passes
+    DrawRange whole;  ///< all submeshes, for depth-only passes; one-sided if closed
     std::vector<DrawRange> submeshes;
     std::int32_t base_vertex = 0;
     std::uint32_t first_instance = 0;  ///< instances() are grouped by mesh

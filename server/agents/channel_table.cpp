@@ -29,6 +29,7 @@ physics::Result<std::vector<Channel>> make_channels(
     channel.band = band.name;
     channel.band_lo_um = band.lo_um;
     channel.band_hi_um = band.hi_um;
+    channel.response = band.response;
     channel.width_px = source.width_px;
     channel.height_px = source.height_px;
     channel.plane = plane;

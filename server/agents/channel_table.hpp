@@ -20,6 +20,7 @@ struct Channel {
   std::string band;
   double band_lo_um = 0.0;
   double band_hi_um = 0.0;
+  std::vector<scene::ResponseSample> response;  ///< of the band; empty: a rectangle
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::size_t plane = 0;  ///< index into FrameView::radiance_w_m2_sr

@@ -44,7 +44,7 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   }
   if (gate.verdict == GateVerdict::old_run) {
     context_.counters.add(Counter::host_frames_old_run);
-    refuse(input.origin, StatusCode::not_allowed, frame.frame_number);
+    refuse(input.origin, StatusCode::not_allowed, frame.frame_number, kDetailOldRun);
     return true;
   }
   // In lock step each input becomes a frame. On a clock of its own emitd takes inputs at any time,
@@ -213,7 +213,8 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
 void Conductor::refuse(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
                        std::uint64_t detail) noexcept {
   const std::uint64_t count = context_.counters.add(counter_of(code));
-  context_.conductor_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count);
+  context_.conductor_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
+                                 detail == kDetailOldRun ? "a host frame of a replaced run" : "");
   reply(origin, code, host_frame_number, count, detail);
 }
 

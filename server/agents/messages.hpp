@@ -59,13 +59,16 @@ struct HostInput {
   protocol::HostFrameData frame;
 };
 
+/// StatusReply::detail of not_allowed: a host frame of a run that another one has replaced.
+inline constexpr std::uint64_t kDetailOldRun = 1u << 16;
+
 /// conductor -> receiver: an answer to send.
 struct StatusReply {
   Origin origin;
   StatusCode code = StatusCode::ok;
   std::uint64_t host_frame_number = 0;
   std::uint64_t count = 0;
-  std::uint64_t detail = 0;  ///< unknown_entity: its id; ok: the command's kind
+  std::uint64_t detail = 0;  ///< unknown_entity: its id; ok: the command's kind; kDetailOldRun
 };
 
 /// Weather changes that come with one frame; further ones replace the newest.
@@ -97,6 +100,7 @@ struct RenderDone {
   Image image;
   std::uint32_t nonfinite_px = 0;
   std::uint32_t clamped_px = 0;
+  std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
   std::int64_t render_start_ns = 0;
   std::int64_t render_end_ns = 0;
@@ -127,6 +131,7 @@ enum class EventKind : std::uint8_t {
   journal_overrun,  ///< a = first sequence lost
   slots_missed,     ///< a = how many
   weather_lost,     ///< a = sim time of the sample, ns
+  poses_dropped,    ///< a = how many
 };
 
 /// any agent -> housekeeping: what happened, as numbers; the text is put together there.

@@ -33,6 +33,10 @@ std::string status_text(StatusCode code, std::uint64_t detail) {
     case StatusCode::unknown_channel:
       return "unknown channel";
     case StatusCode::not_allowed:
+      if (detail == kDetailOldRun) {
+        return "this host's run id belongs to a run that another host has replaced: send under a "
+               "new run id, or RESET on the control port";
+      }
       return detail == static_cast<std::uint64_t>(CommandKind::step)
                  ? "step needs a pose, and hold or stop before it"
                  : "not allowed now";
@@ -154,6 +158,11 @@ void fill(const Channel& channel, v1::ChannelInfo& out) {
   out.set_band(channel.band);
   out.set_band_lo_um(channel.band_lo_um);
   out.set_band_hi_um(channel.band_hi_um);
+  for (const scene::ResponseSample& sample : channel.response) {
+    out.add_response_um(sample.wavelength_um);
+    out.add_response_frac(sample.response_frac);
+  }
+  out.set_band_is_rectangle(channel.response.empty() && channel.band_hi_um > channel.band_lo_um);
   out.set_width_px(channel.width_px);
   out.set_height_px(channel.height_px);
 }
@@ -318,6 +327,12 @@ physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connec
   socket->set_send_buffer(config_.stream.udp_send_buffer_bytes);
   if (!group.empty()) {
     socket->set_multicast_hops(static_cast<int>(config_.stream.multicast_ttl));
+    // Out to where the client is, not to where the default route leads.
+    const unsigned interface = interface_of(connection.socket.local_address());
+    if (const int error = socket->set_multicast_interface(target, interface); error != 0) {
+      return physics::make_error(ErrorCode::protocol,
+                                 fmt::format("group {}: {}", group, error_text(error)));
+    }
   }
   if (auto connected = socket->connect(target); !connected) {
     return tl::unexpected<physics::Error>(std::move(connected.error()));

@@ -2,17 +2,16 @@
 #include "agents/recorder.hpp"
 
 #include <sys/epoll.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <exception>
 
 #include "agents/journal_encode.hpp"
 #include "agents/journal_ring.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
+#include "io/socket.hpp"
 
 namespace emit::server {
 
@@ -207,27 +206,22 @@ int Recorder::send_all() noexcept {
 }
 
 bool Recorder::send_some(Peer& peer, bool& failed) noexcept {
-  constexpr std::size_t kMaxRecords = 64;
-  std::array<iovec, kMaxRecords> iov{};
+  std::array<std::span<const std::byte>, kMaxLentPieces> pieces;
   std::size_t count = 0;
   const std::uint64_t end = kept_first_ + kept_.size();
-  for (std::uint64_t index = peer.next; index < end && count < kMaxRecords; ++index) {
-    auto& bytes = kept_[static_cast<std::size_t>(index - kept_first_)];
-    const std::size_t from = index == peer.next ? peer.offset : 0;
-    iov[count++] = {bytes.data() + from, bytes.size() - from};
+  for (std::uint64_t index = peer.next; index < end && count < pieces.size(); ++index) {
+    const std::span<const std::byte> bytes(kept_[static_cast<std::size_t>(index - kept_first_)]);
+    pieces[count++] = bytes.subspan(index == peer.next ? peer.offset : 0);
   }
   if (count == 0) {
     return false;
   }
-  msghdr message{};
-  message.msg_iov = iov.data();
-  message.msg_iovlen = count;
-  const ssize_t sent = ::sendmsg(peer.fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
-  if (sent < 0) {
-    if (errno != EAGAIN && errno != EINTR) {
-      failed = true;
-      return false;
-    }
+  const IoResult sent = write_lent(peer.fd, std::span(pieces).first(count));
+  if (sent.status == IoStatus::failed) {
+    failed = true;
+    return false;
+  }
+  if (sent.status == IoStatus::would_block) {
     peer.blocked = true;
     epoll_event event{};
     event.events = EPOLLOUT | EPOLLONESHOT;
@@ -236,13 +230,13 @@ bool Recorder::send_some(Peer& peer, bool& failed) noexcept {
     peer.registered = true;
     return false;
   }
-  auto left = static_cast<std::size_t>(sent);
+  std::size_t left = sent.bytes;
   for (std::size_t i = 0; i < count && left > 0; ++i) {
-    if (left < iov[i].iov_len) {
+    if (left < pieces[i].size()) {
       peer.offset += left;
       return true;
     }
-    left -= iov[i].iov_len;
+    left -= pieces[i].size();
     ++peer.next;
     peer.offset = 0;
   }

@@ -55,6 +55,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
     case RenderJob::Kind::reset:
       source_->reset();
       weather_lost_ = false;
+      dropped_poses_ = 0;
       break;
     case RenderJob::Kind::frame: {
       if (count_ == kDepth) {
@@ -102,6 +103,17 @@ void RenderAgent::apply_weather(const RenderJob& job) noexcept {
   }
 }
 
+void RenderAgent::note_dropped_poses(std::uint64_t in_run) noexcept {
+  if (in_run <= dropped_poses_) {
+    return;
+  }
+  context_.counters.add(Counter::poses_dropped, in_run - dropped_poses_);
+  if (dropped_poses_ == 0) {
+    context_.render_events.push(EventKind::poses_dropped, in_run);
+  }
+  dropped_poses_ = in_run;
+}
+
 bool RenderAgent::finish_oldest() noexcept {
   if (count_ == 0) {
     return false;
@@ -120,6 +132,8 @@ bool RenderAgent::finish_oldest() noexcept {
   done->readback_end_ns = context_.clock.tai_ns();
   done->nonfinite_px = view.stats.nonfinite_px;
   done->clamped_px = view.stats.clamped_px;
+  done->dropped_poses = view.stats.dropped_poses;
+  note_dropped_poses(view.stats.dropped_poses);
   done->device_failed = view.device_failed;
   if (view.device_failed) {
     context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");

@@ -39,6 +39,7 @@ class RenderAgent final : public Agent {
   bool take_job(std::int64_t now_ns) noexcept;
   bool finish_oldest() noexcept;
   void apply_weather(const RenderJob& job) noexcept;
+  void note_dropped_poses(std::uint64_t in_run) noexcept;
 
   Context& context_;
   FrameSourceFactory factory_;
@@ -50,7 +51,8 @@ class RenderAgent final : public Agent {
   std::size_t count_ = 0;
   std::int64_t wake_at_ns_ = kNeverNs;
   bool starved_ = false;
-  bool weather_lost_ = false;  // said so for this run
+  bool weather_lost_ = false;        // said so for this run
+  std::uint64_t dropped_poses_ = 0;  // counted in this run
   bool job_prepared_ = false;  // entities of the job in front are applied; only submit is missing
 };
 

@@ -137,6 +137,40 @@ void Tool::add_scene_commands() {
     add_json(app, o.json);
   }
   {
+    auto [app, o] = add<SolveCommand>(
+        app_, "solve",
+        "Reference solution: the picture of render by transient conduction and rays, in double",
+        "emit solve block-on-road --time-s 12600 --out truth.exr --checkpoint runs", run_solve);
+    add_scenario(app, o.input, "scenario");
+    add_seconds(app, "--time-s", o.time_s, "Simulated time since the scenario's epoch, s")
+        ->required();
+    add_path(app, "--out", o.out, "OpenEXR file to write")->required();
+    add_path(app, "--png", o.png, "False-colour temperature as PNG");
+    app.add_option("--dimension", o.dimension,
+                   "Conduction: 3 (solids of axis-aligned faces, nothing moving), 1 (behind every "
+                   "pixel), auto (3 where it fits)")
+        ->check(CLI::IsMember({"auto", "1", "3"}))
+        ->capture_default_str();
+    app.add_option("--rays", o.rays, "Rays per face or pixel for sky and surroundings")
+        ->check(CLI::Range(1U, 1U << 20U))
+        ->capture_default_str();
+    app.add_option("--refine", o.refine, "Three dimensions: multiplies cells per axis and steps")
+        ->check(CLI::Range(0.1, 8.0))
+        ->capture_default_str();
+    app.add_option("--tolerance-k", o.tolerance_k,
+                   "Three dimensions: error of a step at refine 1, K")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    add_count(app, "--pixels", o.pixels,
+              "Only so many surface pixels, always the same ones, the rest NaN; 0: all");
+    add_path(app, "--checkpoint", o.checkpoint,
+             "Folder to save the three-dimensional history in, and to go on from");
+    app.add_option("--threads", o.threads, "Threads; 0: one per core")->capture_default_str();
+    app.add_option("--band", o.band, "Band of the radiance channel; default: the first")
+        ->type_name("NAME");
+    add_json(app, o.json);
+  }
+  {
     auto [app, o] = add<InspectCommand>(app_, "inspect", "Show what the loader sees in a glTF file",
                                         "emit inspect scene.glb", run_inspect);
     add_path(app, "scene", o.file, "glTF 2.0 file (.glb or .gltf)")->required();
@@ -148,8 +182,10 @@ void Tool::add_scene_commands() {
                             "emit compare a.exr b.exr --json diff.json", run_compare);
     add_path(app, "a", o.a, "OpenEXR frame")->required();
     add_path(app, "b", o.b, "OpenEXR frame, taken as the reference")->required();
-    app.add_option("--max-error-k", o.max_error_k,
-                   "Exit 1 when temperatures differ by more than this anywhere")
+    app.add_option(
+           "--max-error-k", o.max_error_k,
+           "Exit 1 when temperatures differ by more than this anywhere (radiance by the band "
+           "and response in b's attributes; without a response as of a rectangular band)")
         ->type_name("K");
     add_json(app, o.json);
   }
@@ -226,7 +262,10 @@ void Tool::add_stream_commands() {
         ->required()
         ->type_name("URL");
     add_count(app, "--frames", o.frames, "Stop after this many; 0: until interrupted");
-    add_path(app, "--out", o.out, "Folder for frame_NNNNNN.exr and .png");
+    add_path(
+        app, "--out", o.out,
+        "Folder for frame_NNNNNN.exr and .png (apparent temperature, by the band's response where "
+        "the daemon tells it, else as of a rectangular band)");
     app.add_option("--channel", o.channel_kind, "Channel kind; default: any")
         ->check(CLI::IsMember({"injection", "projector"}));
     app.add_option("--band", o.band, "Band; default: any")->type_name("NAME");
@@ -246,7 +285,10 @@ void Tool::add_stream_commands() {
     auto [app, o] =
         add<SendCommand>(app_, "send", "Host stand-in: plays the poses of a log to a daemon",
                          "emit send airfield.mcap --to udp://127.0.0.1:7001 --rate 200", run_send);
-    add_path(app, "log", o.log, "MCAP log with host frames, or CSV with poses (*.csv)")->required();
+    add_path(app, "log", o.log,
+             "MCAP log with host frames, CSV with poses (*.csv), or a pcap/pcapng capture of a "
+             "host's datagrams")
+        ->required();
     app.add_option("--to", o.to, "udp://host:port (host port) or tcp://host:port (control port)")
         ->required()
         ->type_name("URL");
@@ -260,6 +302,15 @@ void Tool::add_stream_commands() {
     app.add_option("--control", o.control,
                    "With --step and udp: control port to watch the frames, tcp://host:port")
         ->type_name("URL");
+    app.add_option("--host-port", o.host_port, "Capture: UDP port the host sent to")
+        ->type_name("PORT")
+        ->check(CLI::Range(1, 65535))
+        ->capture_default_str();
+    app.add_option("--run-id", o.run_id,
+                   "Host run id, not 0; another run in the log counts up. Default: from the clock, "
+                   "so that a run that follows another needs no reset")
+        ->type_name("N")
+        ->check(CLI::PositiveNumber);
     add_seconds(app, "--timeout-s", o.timeout_s, "With --step: longest wait for a frame")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
@@ -328,7 +379,65 @@ void Tool::add_model_commands() {
       ->capture_default_str();
   add_path(app, "--cases", o.cases, "relaxation: CSV of the cases");
   add_path(app, "--nodes", o.nodes, "relaxation: CSV of the history's nodes");
+  app.add_option("--refine", o.refine, "conduction-*, surface-history: scales cells and steps")
+      ->check(CLI::IsMember({1, 2, 4}))
+      ->capture_default_str();
+  app.add_option("--layers", o.layers,
+                 "surface-history: layers from the surface, thickness m : conductivity W/m/K : "
+                 "heat capacity J/m3/K")
+      ->type_name("D:K:RC,...");
+  app.add_option("--initial", o.initial,
+                 "surface-history: profile at the first row, depth m : temperature K, linear")
+      ->type_name("Z:T,...");
+  app.add_option("--base-k", o.base_k, "surface-history: temperature below the last layer")
+      ->type_name("K");
+  app.add_option("--emissivity", o.emissivity_frac, "surface-history: long-wave emissivity, 0..1")
+      ->type_name("E");
+  app.add_option("--film-w-m2-k", o.film_w_m2_k, "surface-history: convection coefficient")
+      ->type_name("H");
+  app.add_option("--model", o.history_model,
+                 "surface-history: reference, emit2014 (first layer, no convection) or foster")
+      ->check(CLI::IsMember({"reference", "emit2014", "foster"}))
+      ->capture_default_str();
+  app.add_option("--rays", o.rays,
+                 "sun-disc, wall-shadow, sky-view on the cpu: rays per row and measure")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--method", o.method, "wall-shadow, sky-view on the gpu: method of the frame")
+      ->check(CLI::IsMember({"per-frame"}));
   add_gpu(app, o.gpu_index);
+  {
+    auto [fit, f] = add<FitCommand>(
+        app_, "fit", "Fit a material's modes to the reference solver, or to a curve",
+        "emit fit block-on-road --material asphalt --modes 4 --json fit.json --out library.toml",
+        run_fit);
+    fit.add_option(
+           "input", f.input.scenario,
+           "Scenario: its place, date, weather and materials, over five histories of sun and "
+           "shade. Or a curve, CSV with time_s, absorbed_w_m2, film_w_m2_k, air_k, "
+           "temperature_k")
+        ->required()
+        ->type_name("SCENARIO|CURVE.csv");
+    add_set(fit, f.input.set);
+    fit.add_option("--material", f.materials, "Material; repeatable; default: all of the scenario")
+        ->allow_extra_args(false)
+        ->type_name("NAME");
+    fit.add_option("--modes", f.modes, "foster: 2 to 4, default 4; emit2014: 1 or 2, default 2")
+        ->type_name("N")
+        ->check(CLI::Range(1, 4));
+    fit.add_option("--model", f.model, "Model whose modes are fitted")
+        ->check(CLI::IsMember({"foster", "emit2014"}))
+        ->capture_default_str();
+    add_seconds(fit, "--spin-up-s", f.spin_up_s, "Unshadowed time before the histories")
+        ->check(CLI::Range(0.0, 3.2e7))
+        ->capture_default_str();
+    add_seconds(fit, "--history-s", f.history_s, "Length of a history")
+        ->check(CLI::Range(600.0, 864'000.0))
+        ->capture_default_str();
+    add_path(fit, "--library", f.library, "Library to start from; default: the shipped one");
+    add_path(fit, "--out", f.out, "Library to write: the same with the fitted modes");
+    add_json(fit, f.json);
+  }
 }
 
 void Tool::add_bench_commands() {
@@ -353,6 +462,37 @@ void Tool::add_bench_commands() {
     add_json(app, o.json);
   }
   {
+    auto [app, o] = add<BenchErrorCommand>(
+        *bench, "error-vs-time",
+        "What every setting costs in time and in error against the reference solver",
+        "emit bench error-vs-time --json error.json --csv error.csv --plot error.svg",
+        run_bench_error);
+    app.add_option("--scene", o.scenes,
+                   "Scenario; repeatable; default block-on-road, ribbed, statue, airfield")
+        ->allow_extra_args(false);
+    app.add_flag("--quick", o.quick, "Models, spacings and two step counts only");
+    app.add_option("--csv", o.csv, "Write the results as CSV");
+    app.add_option("--plot", o.plot, "Write the diagrams as SVG");
+    app.add_option("--figures", o.figures,
+                   "Folder for pictures and profiles of reference and models");
+    app.add_option("--frames", o.frames, "Frames timed per setting")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    app.add_option("--rays", o.rays, "Rays per face or pixel of the reference")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--refine", o.refine, "Refinement of the three-dimensional reference")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--pixels", o.pixels,
+                   "Surface pixels the reference solves, at least 20000; 0: all")
+        ->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
     auto [app, o] = add<BenchStreamCommand>(
         *bench, "stream", "Transport alone: canned frames over TCP and UDP loopback",
         "emit bench stream --json stream.json --frames 1000 --rate 200", run_bench_stream);
@@ -365,6 +505,47 @@ void Tool::add_bench_commands() {
     app.add_option("--clients", o.clients, "Clients per transport")
         ->check(CLI::Range(1U, 8U))
         ->capture_default_str();
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchStabilityCommand>(*bench, "stability",
+                                               "Shader functions and whole frames under random and "
+                                               "hostile input, against double: NaN, Inf "
+                                               "and errors in kelvin",
+                                               "emit bench stability --json stability.json",
+                                               run_bench_stability);
+    add_count(app, "--cases", o.cases,
+              "Random surfaces of the equilibrium sweep; the other sweeps follow in proportion")
+        ->check(CLI::Range(std::uint64_t{1000}, std::uint64_t{4'000'000'000}))
+        ->capture_default_str();
+    app.add_option("--seed", o.seed, "Draws other cases")->type_name("N")->capture_default_str();
+    app.add_option("--part", o.parts, "Part of the suite; repeatable; default all")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember(stability_parts()));
+    app.add_option("--frame", o.frames, "Test of part frames, e.g. frame-zero-area; repeatable")
+        ->allow_extra_args(false);
+    add_path(app, "--pictures", o.pictures, "Existing folder for the hostile frames as PNG")
+        ->type_name("DIR");
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchThermalTruthCommand>(
+        *bench, "thermal-truth",
+        "Split steps, a moved camera, a parked vehicle's print and a restart: what the thermal "
+        "history must not depend on, and what it must show",
+        "emit bench thermal-truth --json truth.json", run_bench_thermal_truth);
+    app.add_option("--method", o.method, "thermal.method to judge")
+        ->check(CLI::IsMember({"per-frame"}))
+        ->capture_default_str();
+    app.add_option("--steps", o.steps, "History steps")
+        ->check(CLI::Range(1U, 4096U))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    add_path(app, "--pictures", o.pictures, "Existing folder for the judged frames as PNG")
+        ->type_name("DIR");
+    add_gpu(app, o.gpu_index);
     add_json(app, o.json);
   }
 }

@@ -32,8 +32,6 @@ constexpr std::uint32_t kPanPeriodFrames = 40;
 constexpr double kClosings = 3.2;
 /// Frame rate that `time_scale` refers to.
 constexpr double kNominalRateHz = 200.0;
-/// 08:00 to 11:30, for scenarios that leave the moment open.
-constexpr double kHistoryS = 3.5 * 3600.0;
 
 struct Run {
   scene::ScenarioDesc scenario;
@@ -74,10 +72,8 @@ Run make_run(scene::ScenarioDesc scenario, std::uint32_t steps, const BenchPaper
   scenario.thermal.method = scene::ThermalMethod::per_frame;
   scenario.thermal.steps = steps;
   scenario.thermal.spacing = scene::StepSpacing::uniform;  // as published
-  const auto history_ns = static_cast<std::int64_t>(kHistoryS * 1e9);
   const std::int64_t from_ns = scenario.thermal.history_start_ns;
-  run.start_ns = trajectory_start_ns(scenario);
-  if (run.start_ns < from_ns + history_ns / 4) run.start_ns = from_ns + history_ns;
+  run.start_ns = observation_ns(scenario);
   const double interval_s = 1e-9 * static_cast<double>(run.start_ns - from_ns) / steps;
   run.frames = command.frames;
   run.advance_ns = std::llround(1e9 * kClosings * interval_s / (command.frames - 1));

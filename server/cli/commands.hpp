@@ -28,6 +28,23 @@ struct RenderCommand {
 };
 int run_render(const RenderCommand& command);
 
+struct SolveCommand {
+  ScenarioChoice input;
+  double time_s = 0.0;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> png;
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> checkpoint;
+  std::string dimension = "auto";  ///< "auto", "1" or "3"
+  std::string band;                ///< empty: the scenario's first
+  std::uint32_t rays = 256;
+  std::uint32_t threads = 0;  ///< 0: all
+  std::uint64_t pixels = 0;   ///< 0: all
+  double refine = 1.0;
+  double tolerance_k = 0.02;
+};
+int run_solve(const SolveCommand& command);
+
 /// Takes its arguments as a main() does; argv[0] is "serve".
 int run_serve(int argc, char** argv);
 
@@ -56,6 +73,8 @@ struct SendCommand {
   std::uint64_t frames = 0;  ///< 0: all
   std::uint64_t every = 1;
   double timeout_s = 60.0;
+  std::optional<std::uint64_t> run_id;  ///< absent: from the wall clock
+  std::uint16_t host_port = 7001;       ///< of captures: where the host's datagrams went
   std::optional<std::filesystem::path> json;
 };
 int run_send(const SendCommand& command);
@@ -126,11 +145,33 @@ struct EvaluateCommand {
   std::string device = "cpu";
   std::optional<std::filesystem::path> cases;
   std::optional<std::filesystem::path> nodes;
+  std::optional<std::uint32_t> rays;
+  std::string method;  ///< empty: the default method
   int gpu_index = -1;
+  std::uint32_t refine = 1;
+  std::string layers;   ///< surface-history: d:k:rc,...
+  std::string initial;  ///< surface-history: z:T,...
+  std::optional<double> base_k;
+  std::optional<double> emissivity_frac;
+  std::optional<double> film_w_m2_k;
+  std::string history_model = "reference";
 };
 int run_evaluate(const EvaluateCommand& command);
 /// List of the models with their columns, for --help.
 [[nodiscard]] std::string evaluate_models_text();
+
+struct FitCommand {
+  ScenarioChoice input;  ///< a scenario, or a curve (*.csv)
+  std::vector<std::string> materials;
+  std::optional<std::size_t> modes;
+  std::string model = "foster";
+  double spin_up_s = 172'800.0;
+  double history_s = 12'600.0;
+  std::filesystem::path library;  ///< empty: the shipped one
+  std::optional<std::filesystem::path> out;
+  std::optional<std::filesystem::path> json;
+};
+int run_fit(const FitCommand& command);
 
 struct GenerateCommand {
   std::string scene;
@@ -159,6 +200,23 @@ struct BenchPaperCommand {
 };
 int run_bench_paper(const BenchPaperCommand& command);
 
+struct BenchErrorCommand {
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> csv;
+  std::optional<std::filesystem::path> plot;
+  std::optional<std::filesystem::path> figures;
+  std::vector<std::string> scenes;
+  bool quick = false;
+  std::uint32_t frames = 3;
+  std::uint32_t width_px = 320;
+  std::uint32_t height_px = 256;
+  std::uint32_t rays = 256;
+  double refine = 1.0;
+  std::uint64_t pixels = 0;
+  int gpu_index = -1;
+};
+int run_bench_error(const BenchErrorCommand& command);
+
 struct BenchStreamCommand {
   std::optional<std::filesystem::path> json;
   std::uint64_t frames = 1000;
@@ -168,6 +226,29 @@ struct BenchStreamCommand {
   std::uint32_t clients = 2;
 };
 int run_bench_stream(const BenchStreamCommand& command);
+
+struct BenchStabilityCommand {
+  std::optional<std::filesystem::path> json;
+  std::uint64_t cases = 100'000'000;  ///< of the equilibrium sweep; the others follow
+  std::uint32_t seed = 20140621;
+  std::vector<std::string> parts;   ///< of stability_parts(); empty: all
+  std::vector<std::string> frames;  ///< names of hostile frame tests; empty: all
+  std::optional<std::filesystem::path> pictures;
+  int gpu_index = -1;
+};
+int run_bench_stability(const BenchStabilityCommand& command);
+[[nodiscard]] std::vector<std::string> stability_parts();
+
+struct BenchThermalTruthCommand {
+  std::optional<std::filesystem::path> json;
+  std::string method = "per-frame";
+  std::uint32_t steps = 90;
+  std::uint32_t width_px = 320;
+  std::uint32_t height_px = 256;
+  std::optional<std::filesystem::path> pictures;
+  int gpu_index = -1;
+};
+int run_bench_thermal_truth(const BenchThermalTruthCommand& command);
 
 /// Parses the command line and runs the chosen subcommand; returns the process's exit code.
 int run_tool(int argc, char** argv);

@@ -53,10 +53,14 @@ int run_compare(const CompareCommand& command) {
 
   // Radiance in kelvin needs the band, which the reference names in its attributes.
   image::KelvinPerRadiance conversion;
-  if (const auto metadata = image::frame_metadata(*b);
-      metadata && metadata->band_lo_um > 0.0 && metadata->band_hi_um > metadata->band_lo_um) {
-    conversion = [table = ApparentTemperature(metadata->band_lo_um, metadata->band_hi_um)](
-                     double radiance) { return table.kelvin_per_radiance(radiance); };
+  std::string conversion_note;
+  if (const auto metadata = image::frame_metadata(*b)) {
+    if (const auto band = spectral_band(*metadata)) {
+      conversion = [table = ApparentTemperature(*band)](double radiance) {
+        return table.kelvin_per_radiance(radiance);
+      };
+      conversion_note = conversion_text(*band, metadata->band_response.has_value());
+    }
   }
   const auto diff = image::compare_images(*a, *b, conversion);
   if (!diff) return fail(diff.error());
@@ -86,6 +90,7 @@ int run_compare(const CompareCommand& command) {
   const bool quiet = command.json == std::filesystem::path("-");
   if (!quiet) {
     fmt::print("{}", table.to_string());
+    if (!conversion_note.empty()) fmt::print("K equivalent: {}\n", conversion_note);
     if (!diff->only_in_a.empty()) fmt::print("only in a: {}\n", list(diff->only_in_a));
     if (!diff->only_in_b.empty()) fmt::print("only in b: {}\n", list(diff->only_in_b));
     fmt::print("{}\n", diff->identical() ? "identical" : "different");
@@ -94,6 +99,7 @@ int run_compare(const CompareCommand& command) {
     Json json = Json::object();
     json.set("a", command.a.string()).set("b", command.b.string());
     json.set("identical", diff->identical()).set("max_error_k", worst_k);
+    json.set("kelvin_conversion", conversion_note);
     json.set("channels", std::move(channels));
     json.set("only_in_a", names_json(diff->only_in_a));
     json.set("only_in_b", names_json(diff->only_in_b));

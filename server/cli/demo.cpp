@@ -288,9 +288,10 @@ Result<void> Demo::save_frame() {
                      snapshot.header.frame_number,
                      snapshot.header.pose,
                      tcp_client_->channel().band,
-                     static_cast<double>(snapshot.header.band_lo_um),
-                     static_cast<double>(snapshot.header.band_hi_um),
-                     "W m-2 sr-1"};
+                     tcp_client_->channel().band_lo_um,
+                     tcp_client_->channel().band_hi_um,
+                     "W m-2 sr-1",
+                     tcp_client_->channel().response};
   if (auto written = write_frame_files(command_.out, planes,
                                        {scenario_.display.min_k, scenario_.display.max_k});
       !written) {

@@ -23,11 +23,30 @@ constexpr double kTableStepK = 0.05;
 }  // namespace
 
 physics::Band spectral_band(const scene::SpectralBand& band) {
-  physics::Band out{band.lo_um, band.hi_um, {}};
+  return {band.lo_um, band.hi_um, response_of(band)};
+}
+
+std::vector<physics::ResponsePoint> response_of(const scene::SpectralBand& band) {
+  std::vector<physics::ResponsePoint> out;
   for (const scene::ResponseSample& sample : band.response) {
-    out.response.push_back({sample.wavelength_um, sample.response_frac});
+    out.push_back({sample.wavelength_um, sample.response_frac});
   }
   return out;
+}
+
+std::optional<physics::Band> spectral_band(const image::FrameMetadata& metadata) {
+  physics::Band band{metadata.band_lo_um, metadata.band_hi_um,
+                     metadata.band_response.value_or(std::vector<physics::ResponsePoint>())};
+  if (!physics::validate(band)) return std::nullopt;
+  return band;
+}
+
+std::string conversion_text(const physics::Band& band, bool response_known) {
+  const std::string limits = fmt::format("band {:g}-{:g} um", band.lo_um, band.hi_um);
+  if (!band.response.empty()) {
+    return fmt::format("{} by its response of {} points", limits, band.response.size());
+  }
+  return limits + (response_known ? ", a rectangle" : ", response not known: a rectangle assumed");
 }
 
 ApparentTemperature::ApparentTemperature(double lo_um, double hi_um)
@@ -106,18 +125,16 @@ physics::Result<void> write_frame_png(const std::filesystem::path& file, const F
   std::vector<float> apparent;
   std::span<const float> values = frame.temperature_k;
   if (values.empty()) {
-    const double lo_um = frame.metadata.band_lo_um;
-    const double hi_um = frame.metadata.band_hi_um;
     if (frame.apparent != nullptr) {
       apparent = frame.apparent->kelvin(frame.radiance_w_m2_sr);
       values = apparent;
-    } else if (lo_um > 0.0 && hi_um > lo_um) {
-      apparent = ApparentTemperature(lo_um, hi_um).kelvin(frame.radiance_w_m2_sr);
+    } else if (const auto band = spectral_band(frame.metadata)) {
+      apparent = ApparentTemperature(*band).kelvin(frame.radiance_w_m2_sr);
       values = apparent;
     } else {
       // A canned picture of no band: its own range of radiance.
       values = frame.radiance_w_m2_sr;
-      options.unit = "W";
+      options.unit.assign(1, 'W');
       const auto range = image::percentile_range(values, 1.0, 99.0);
       options.min_value = range ? range->min_value : 0.0;
       options.max_value =

@@ -2,7 +2,9 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "emit/image/exr_image.hpp"
@@ -19,7 +21,7 @@ class ApparentTemperature {
  public:
   /// Of a band with its response. Precondition: physics::validate().
   explicit ApparentTemperature(const physics::Band& band);
-  /// Of a rectangular band, where no response is known. Precondition: 0 < lo_um < hi_um.
+  /// Of a rectangular band. Precondition: 0 < lo_um < hi_um.
   ApparentTemperature(double lo_um, double hi_um);
   [[nodiscard]] double kelvin(double radiance_w_m2_sr) const noexcept;
   /// dT/dL there, K per W m-2 sr-1.
@@ -34,6 +36,14 @@ class ApparentTemperature {
 /// The scenario's band as the radiometry takes it, response included.
 [[nodiscard]] physics::Band spectral_band(const scene::SpectralBand& band);
 
+/// The band of a frame's attributes; where they do not give the response, a rectangle. Absent for a
+/// frame of no band, or of one that fails physics::validate().
+[[nodiscard]] std::optional<physics::Band> spectral_band(const image::FrameMetadata& metadata);
+/// The response for a frame's attributes.
+[[nodiscard]] std::vector<physics::ResponsePoint> response_of(const scene::SpectralBand& band);
+/// How radiances become kelvins, for the user: "band 3-5 um by its response of 12 points".
+[[nodiscard]] std::string conversion_text(const physics::Band& band, bool response_known);
+
 /// Planes of one frame on their way to disk; empty planes are left out.
 struct FramePlanes {
   std::uint32_t width_px = 0;
@@ -42,8 +52,8 @@ struct FramePlanes {
   std::span<const float> temperature_k;
   std::span<const float> depth_m;
   std::span<const float> object_id;
-  /// For pictures of frames without temperature; absent: built from the metadata's band limits,
-  /// which costs a second or so, and knows of no response. Callers of many frames set it.
+  /// For pictures of frames without temperature; absent: built from the metadata's band, which
+  /// costs a second or so. Callers of many frames set it.
   const ApparentTemperature* apparent = nullptr;
   image::FrameMetadata metadata;
 };

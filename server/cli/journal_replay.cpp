@@ -8,6 +8,7 @@
 
 #include "console.hpp"
 #include "emit/protocol/record/log.hpp"
+#include "emit/protocol/record/pose_pcap.hpp"
 #include "emit/v1/control.pb.h"
 #include "interrupt.hpp"
 
@@ -36,6 +37,14 @@ void warn_of_differences(const server::JournalPlayer& player, const std::string&
 physics::Result<JournalReplaySummary> replay_journal(
     const scene::ScenarioDesc& scenario, const JournalReplayOptions& options,
     const std::function<physics::Result<void>(const server::ReplayedFrame&)>& on_frame) {
+  if (protocol::PosePcapReader::is_capture(options.log)) {
+    return physics::make_error(
+        physics::ErrorCode::unsupported,
+        fmt::format(
+            "{}: a network capture holds the host's poses, not the daemon's decisions: play "
+            "it with emit send and record the journal",
+            options.log.string()));
+  }
   auto log = protocol::LogReader::open(options.log);
   if (!log) return tl::unexpected(log.error());
   const auto scenario_hash = server::scenario_sha256(scenario);

@@ -28,18 +28,19 @@ physics::Result<void> save(const std::filesystem::path& directory,
   planes.height_px = frame.header.height_px;
   const bool temperature = frame.header.quantity == protocol::PixelQuantity::temperature_k;
   (temperature ? planes.temperature_k : planes.radiance_w_m2_sr) = frame.pixels;
-  const double lo_um = static_cast<double>(frame.header.band_lo_um);
-  const double hi_um = static_cast<double>(frame.header.band_hi_um);
   // The band of a channel does not change: one table serves every frame.
-  if (!temperature && !apparent && lo_um > 0.0 && hi_um > lo_um) apparent.emplace(lo_um, hi_um);
+  if (!temperature && !apparent) {
+    if (const auto band = channel.spectral_band()) apparent.emplace(*band);
+  }
   planes.apparent = apparent ? &*apparent : nullptr;
   planes.metadata = {frame.header.sim_time_ns,
                      frame.header.frame_number,
                      frame.header.pose,
                      channel.band,
-                     lo_um,
-                     hi_um,
-                     temperature ? "K" : "W m-2 sr-1"};
+                     channel.band_lo_um,
+                     channel.band_hi_um,
+                     temperature ? "K" : "W m-2 sr-1",
+                     channel.response};
   return write_frame_files(directory, planes, limits);
 }
 
@@ -82,6 +83,10 @@ int run_receive(const ReceiveCommand& command) {
   if (!channel) return fail(channel.error());
   fmt::print(stderr, "emit: {} ({}), scenario {}, {}\n", client.server().software,
              client.server().device, client.server().scenario, channel_text(*channel));
+  if (const auto band = channel->spectral_band(); band && command.out) {
+    fmt::print(stderr, "emit: colours show apparent temperature, {}\n",
+               conversion_text(*band, channel->response.has_value()));
+  }
   if (client.server().tai_offset_unset) {
     warn("the daemon's kernel has no TAI offset: its instants are UTC");
   }

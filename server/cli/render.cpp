@@ -89,8 +89,9 @@ int run_render(const RenderCommand& command) {
   planes.temperature_k = view.temperature_k;
   planes.depth_m = view.depth_m;
   planes.object_id = view.object_id;
-  planes.metadata = {request.sim_time_ns, request.frame_number, view.sensor_pose, shown.name,
-                     shown.lo_um,         shown.hi_um,          "W m-2 sr-1"};
+  planes.metadata = {request.sim_time_ns, request.frame_number, view.sensor_pose,
+                     shown.name,          shown.lo_um,          shown.hi_um,
+                     "W m-2 sr-1",        response_of(shown)};
   if (command.png) {
     const ColorLimits limits{scenario->display.min_k, scenario->display.max_k};
     if (auto done = write_frame_png(*command.png, planes, limits); !done) return fail(done.error());

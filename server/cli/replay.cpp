@@ -63,7 +63,7 @@ int run_replay(const ReplayCommand& command) {
         planes.object_id = frame.view->object_id;
         planes.metadata = {frame.sim_time_ns, frame.frame_number, frame.view->sensor_pose,
                            band.name,         band.lo_um,         band.hi_um,
-                           "W m-2 sr-1"};
+                           "W m-2 sr-1",      response_of(band)};
         return write_frame_files(*command.out, planes, limits);
       });
   if (!summary) return fail(summary.error());

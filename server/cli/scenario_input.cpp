@@ -113,6 +113,13 @@ std::int64_t trajectory_start_ns(const scene::ScenarioDesc& scenario) noexcept {
                                             : scenario.sensor.trajectory.front().sim_time_ns;
 }
 
+std::int64_t observation_ns(const scene::ScenarioDesc& scenario) noexcept {
+  constexpr std::int64_t kHistoryNs = 12'600'000'000'000;
+  const std::int64_t start_ns = trajectory_start_ns(scenario);
+  const std::int64_t from_ns = scenario.thermal.history_start_ns;
+  return start_ns < from_ns + kHistoryNs / 4 ? from_ns + kHistoryNs : start_ns;
+}
+
 physics::Result<void> check_entities_fit(const scene::ScenarioDesc& scenario) {
   const auto moving = std::count_if(
       scenario.objects.begin(), scenario.objects.end(),

@@ -42,6 +42,10 @@ struct TrajectorySample {
 /// First instant of the sensor's trajectory; the history start when it has none.
 [[nodiscard]] std::int64_t trajectory_start_ns(const scene::ScenarioDesc& scenario) noexcept;
 
+/// The instant at which benchmarks look at a scenario: where its camera's trajectory starts, or,
+/// where that is (nearly) the start of the history, three and a half hours later.
+[[nodiscard]] std::int64_t observation_ns(const scene::ScenarioDesc& scenario) noexcept;
+
 /// Host frame as a simulation host would send it for the scenario's own trajectories, with rates.
 /// `index` counts from 0, frame numbers from 1. Precondition: check_entities_fit().
 void make_host_frame(const scene::ScenarioDesc& scenario, std::int64_t start_ns, double rate_hz,

@@ -44,6 +44,34 @@ physics::Result<void> drain_statuses(server::HostClient& host, Refusals& refusal
   }
 }
 
+/// Run ids of this sending: the log's own would meet those of an earlier sending, which emitd takes
+/// for the same run, or refuses once another has replaced it (wire.md section 5).
+class RunIds {
+ public:
+  explicit RunIds(std::optional<std::uint64_t> first)
+      : next_(first.value_or(
+            static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                           std::chrono::system_clock::now().time_since_epoch())
+                                           .count()))) {}
+
+  /// The id to send under: a new one whenever the log's changes.
+  std::uint64_t of(std::uint64_t in_log) {
+    if (!started_ || in_log_ != in_log) {
+      started_ = true;
+      in_log_ = in_log;
+      current_ = next_++;
+    }
+    return current_;
+  }
+  [[nodiscard]] std::uint64_t current() const noexcept { return current_; }
+
+ private:
+  std::uint64_t next_;
+  std::uint64_t current_ = 0;
+  bool started_ = false;
+  std::uint64_t in_log_ = 0;
+};
+
 /// Waits until a frame made from this pose, or a newer one, has arrived; false on timeout.
 physics::Result<bool> wait_for_frame(server::FrameClient& watcher, server::HostClient& host,
                                      Refusals& refusals, std::uint64_t host_frame_number,
@@ -73,7 +101,7 @@ int run_send(const SendCommand& command) {
   if (command.step && udp && command.control.empty()) {
     return fail(kExitUsage, "--step over udp needs --control tcp://host:port to watch the frames");
   }
-  auto log = PoseLog::open(command.log);
+  auto log = PoseLog::open(command.log, command.host_port);
   if (!log) return fail(log.error());
 
   std::unique_ptr<server::FrameClient> watcher;
@@ -90,6 +118,7 @@ int run_send(const SendCommand& command) {
 
   const InterruptGuard interrupt;
   Refusals refusals;
+  RunIds run_ids(command.run_id);
   std::uint64_t seen = 0;
   std::uint64_t sent = 0;
   std::int64_t first_sim_ns = 0;
@@ -101,6 +130,7 @@ int run_send(const SendCommand& command) {
     if (!*more) break;
     if (seen++ % command.every != 0) continue;
     *frame = log->host();
+    frame->run_id = run_ids.of(frame->run_id);
     if (command.every > 1) frame->frame_number = sent + 1;
     if (sent == 0) first_sim_ns = frame->sim_time_ns;
     if (!command.step) {
@@ -128,7 +158,7 @@ int run_send(const SendCommand& command) {
   if (auto drained = drain_statuses(host, refusals, 200'000'000); !drained) {
     warn(drained.error().text);
   }
-  if (const auto truncation = log->truncation()) warn(*truncation);
+  if (const auto notes = log->notes()) warn(*notes);
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
   fmt::print(text_stream(command.json), "{} poses sent in {:.3f} s, {} refused\n", sent, seconds,
              refusals.total);
@@ -136,7 +166,10 @@ int run_send(const SendCommand& command) {
     Json codes = Json::object();
     for (const auto& [code, count] : refusals.by_code) codes.set(fmt::format("{}", code), count);
     Json json = Json::object();
-    json.set("sent", sent).set("seconds", seconds).set("refused", refusals.total);
+    json.set("sent", sent)
+        .set("run_id", run_ids.current())
+        .set("seconds", seconds)
+        .set("refused", refusals.total);
     json.set("refused_by_code", std::move(codes));
     if (auto done = write_json(*command.json, json); !done) return fail(done.error());
   }

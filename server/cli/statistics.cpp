@@ -66,7 +66,8 @@ std::string histogram_text(const Samples& samples, const std::string& unit) {
     const std::ptrdiff_t bin = above - edges.begin() - 1;
     ++counts[static_cast<std::size_t>(std::max<std::ptrdiff_t>(bin, 0))];
   }
-  const std::size_t tallest = *std::max_element(counts.begin(), counts.end());
+  std::size_t tallest = 1;
+  for (const std::size_t count : counts) tallest = std::max(tallest, count);
   std::string out;
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) {
     if (counts[i] == 0) continue;

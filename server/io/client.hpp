@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "emit/physics/error.hpp"
+#include "emit/physics/planck.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/host_frame.hpp"
 
@@ -49,6 +50,12 @@ struct ChannelDescription {
   double band_hi_um = 0.0;
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
+  /// Spectral response of the band; empty: a perfect rectangle; absent: the daemon does not say.
+  std::optional<std::vector<physics::ResponsePoint>> response = std::nullopt;
+
+  /// What radiances are converted with: where the response is not known, a rectangle. Absent for a
+  /// channel of no band, or one that makes no sense.
+  [[nodiscard]] std::optional<physics::Band> spectral_band() const;
 };
 
 /// What the daemon says about itself on connecting.

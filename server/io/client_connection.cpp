@@ -40,6 +40,30 @@ bool wait_for(int fd, short events, std::int64_t end_ns) noexcept {
   }
 }
 
+std::optional<physics::Band> ChannelDescription::spectral_band() const {
+  physics::Band out{band_lo_um, band_hi_um,
+                    response.value_or(std::vector<physics::ResponsePoint>())};
+  if (!physics::validate(out)) {
+    return std::nullopt;
+  }
+  return out;
+}
+
+ChannelDescription describe_channel(const v1::ChannelInfo& info) {
+  ChannelDescription out{info.index(),      info.name(),     info.kind(),
+                         info.sensor(),     info.band(),     info.band_lo_um(),
+                         info.band_hi_um(), info.width_px(), info.height_px()};
+  if (info.band_is_rectangle()) {
+    out.response.emplace();
+  } else if (info.response_um_size() > 0 && info.response_um_size() == info.response_frac_size()) {
+    out.response.emplace();
+    for (int i = 0; i < info.response_um_size(); ++i) {
+      out.response->push_back({info.response_um(i), info.response_frac(i)});
+    }
+  }
+  return out;
+}
+
 ServerStatus to_status(const v1::Status& status) {
   return {static_cast<std::uint32_t>(status.code()), status.text(), status.host_frame_number(),
           status.count()};
@@ -129,9 +153,7 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
   info.run_id = welcome.run_id();
   info.tai_offset_unset = welcome.tai_offset_unset();
   for (const v1::ChannelInfo& channel : welcome.channels()) {
-    info.channels.push_back({channel.index(), channel.name(), channel.kind(), channel.sensor(),
-                             channel.band(), channel.band_lo_um(), channel.band_hi_um(),
-                             channel.width_px(), channel.height_px()});
+    info.channels.push_back(describe_channel(channel));
   }
   return connection;
 }

@@ -12,6 +12,7 @@
 #include "io/socket.hpp"
 
 namespace emit::v1 {
+class ChannelInfo;
 class ControlRecord;
 class Status;
 }  // namespace emit::v1
@@ -22,6 +23,7 @@ namespace emit::server {
 /// Waits for `events` on a descriptor until `end_ns` (monotonic). False: the time is up.
 [[nodiscard]] bool wait_for(int fd, short events, std::int64_t end_ns) noexcept;
 [[nodiscard]] ServerStatus to_status(const v1::Status& status);
+[[nodiscard]] ChannelDescription describe_channel(const v1::ChannelInfo& info);
 
 enum class ClientRole : std::uint8_t { host = 1, client = 2, recorder = 3 };
 
@@ -36,6 +38,7 @@ class ClientConnection {
   [[nodiscard]] const SocketContext& context() const noexcept { return context_; }
   [[nodiscard]] const ServerInfo& server() const noexcept { return info_; }
   [[nodiscard]] const SocketAddress& peer() const noexcept { return peer_; }
+  [[nodiscard]] SocketAddress local_address() const noexcept { return socket_.local_address(); }
   /// True after the peer closed in order, between two records.
   [[nodiscard]] bool closed() const noexcept { return closed_; }
 

@@ -85,7 +85,8 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   subscribe.set_band(options.band);
   subscribe.set_every_frame(options.every_frame);
   if (udp_) {
-    auto receiver = UdpFrameReceiver::open(connection_.context(), connection_.peer(), options);
+    auto receiver = UdpFrameReceiver::open(connection_.context(), connection_.peer(),
+                                           connection_.local_address(), options);
     if (!receiver) {
       return tl::unexpected<physics::Error>(std::move(receiver.error()));
     }
@@ -123,10 +124,7 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
       return make_error(ErrorCode::protocol, "subscription refused: " + answer.status().text());
     }
     if (answer.has_subscribed()) {
-      const v1::ChannelInfo& info = answer.subscribed().channel();
-      channel_ = {info.index(),      info.name(),     info.kind(),
-                  info.sensor(),     info.band(),     info.band_lo_um(),
-                  info.band_hi_um(), info.width_px(), info.height_px()};
+      channel_ = describe_channel(answer.subscribed().channel());
       stream_id_ = static_cast<std::uint16_t>(answer.subscribed().stream_id());
       subscribed_ = true;
       return channel_;

@@ -3,7 +3,9 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/uio.h>
 
 #include <algorithm>
 #include <array>
@@ -198,6 +200,10 @@ int TcpSocket::fd() const noexcept {
   return impl_ ? impl_->socket.native_handle() : -1;
 }
 
+SocketAddress TcpSocket::local_address() const noexcept {
+  return impl_ ? local_address_of(impl_->socket) : SocketAddress{};
+}
+
 void TcpSocket::close() noexcept {
   impl_.reset();
 }
@@ -241,6 +247,24 @@ IoResult TcpSocket::write_some(std::span<const std::span<const std::byte>> piece
   const std::size_t sent =
       impl_->socket.write_some(std::span<const asio::const_buffer>(buffers.data(), count), error);
   return to_result(error, sent);
+}
+
+IoResult write_lent(int fd, std::span<const std::span<const std::byte>> pieces) noexcept {
+  std::array<iovec, kMaxLentPieces> iov{};
+  const std::size_t count = std::min(pieces.size(), iov.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    // The kernel only reads what is sent.
+    iov[i] = {const_cast<std::byte*>(pieces[i].data()), pieces[i].size()};
+  }
+  msghdr message{};
+  message.msg_iov = iov.data();
+  message.msg_iovlen = count;
+  const ssize_t sent = ::sendmsg(fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent >= 0) {
+    return {IoStatus::done, static_cast<std::size_t>(sent), 0};
+  }
+  const bool again = errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
+  return {again ? IoStatus::would_block : IoStatus::failed, 0, errno};
 }
 
 // TcpListener
@@ -394,11 +418,33 @@ void UdpSocket::allow_shared_port() noexcept {
   wish(impl_->socket, udp::socket::reuse_address(true));
 }
 
-int UdpSocket::join_group(const SocketAddress& group) noexcept {
-  error_code error;
-  impl_->socket.set_option(
-      asio::ip::multicast::join_group(to_endpoint<udp::endpoint>(group).address()), error);
-  return error.value();
+int UdpSocket::join_group(const SocketAddress& group, unsigned interface) noexcept {
+  // Natively: Asio names the interface by an address for one family and by its index for the other.
+  if (group.storage.ss_family == AF_INET6) {
+    ipv6_mreq request{};
+    request.ipv6mr_multiaddr = reinterpret_cast<const sockaddr_in6*>(group.get())->sin6_addr;
+    request.ipv6mr_interface = interface;
+    return ::setsockopt(fd(), IPPROTO_IPV6, IPV6_JOIN_GROUP, &request, sizeof(request)) == 0
+               ? 0
+               : errno;
+  }
+  ip_mreqn request{};
+  request.imr_multiaddr = reinterpret_cast<const sockaddr_in*>(group.get())->sin_addr;
+  request.imr_ifindex = static_cast<int>(interface);
+  return ::setsockopt(fd(), IPPROTO_IP, IP_ADD_MEMBERSHIP, &request, sizeof(request)) == 0 ? 0
+                                                                                           : errno;
+}
+
+int UdpSocket::set_multicast_interface(const SocketAddress& group, unsigned interface) noexcept {
+  if (group.storage.ss_family == AF_INET6) {
+    return ::setsockopt(fd(), IPPROTO_IPV6, IPV6_MULTICAST_IF, &interface, sizeof(interface)) == 0
+               ? 0
+               : errno;
+  }
+  ip_mreqn request{};
+  request.imr_ifindex = static_cast<int>(interface);
+  return ::setsockopt(fd(), IPPROTO_IP, IP_MULTICAST_IF, &request, sizeof(request)) == 0 ? 0
+                                                                                         : errno;
 }
 
 void UdpSocket::set_multicast_hops(int hops) noexcept {

@@ -60,6 +60,7 @@ class TcpSocket {
   [[nodiscard]] explicit operator bool() const noexcept { return impl_ != nullptr; }
   /// -1 when closed.
   [[nodiscard]] int fd() const noexcept;
+  [[nodiscard]] SocketAddress local_address() const noexcept;
   void close() noexcept;
   void shutdown_send() noexcept;
 
@@ -77,6 +78,12 @@ class TcpSocket {
   explicit TcpSocket(std::unique_ptr<Impl> impl) noexcept;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Up to kMaxLentPieces pieces in one system call to a stream that another agent owns and has lent
+/// by its descriptor. RT-safe.
+[[nodiscard]] IoResult write_lent(int fd,
+                                  std::span<const std::span<const std::byte>> pieces) noexcept;
+inline constexpr std::size_t kMaxLentPieces = 64;
 
 /// Thread: one owner.
 class TcpListener {
@@ -131,8 +138,11 @@ class UdpSocket {
 
   /// Several sockets may bind the port: wanted for multicast.
   void allow_shared_port() noexcept;
-  /// Joins on the default interface. Returns 0 or an errno.
-  [[nodiscard]] int join_group(const SocketAddress& group) noexcept;
+  /// Joins on an interface (interface_of(); 0: the system's choice). Returns 0 or an errno.
+  [[nodiscard]] int join_group(const SocketAddress& group, unsigned interface) noexcept;
+  /// Where multicast of this socket goes out. Returns 0 or an errno.
+  [[nodiscard]] int set_multicast_interface(const SocketAddress& group,
+                                            unsigned interface) noexcept;
   /// 0 to 255.
   void set_multicast_hops(int hops) noexcept;
   /// Asks for a receive buffer; past the system's limit where privileges allow. Returns the bytes

@@ -2,12 +2,16 @@
 #include "io/socket_address.hpp"
 
 #include <fmt/format.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 #include <netdb.h>
+#include <netinet/in.h>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <charconv>
+#include <cstring>
 #include <exception>
 #include <system_error>
 
@@ -123,6 +127,34 @@ SocketAddress numeric_address(const std::string& host, std::uint16_t port) noexc
   error_code error;
   const auto address = asio::ip::make_address(host.c_str(), error);
   return error ? SocketAddress{} : from_endpoint(AnyEndpoint(address, port));
+}
+
+unsigned interface_of(const SocketAddress& local) noexcept {
+  ifaddrs* all = nullptr;
+  if (local.length == 0 || ::getifaddrs(&all) != 0) {
+    return 0;
+  }
+  const auto wanted = to_endpoint<AnyEndpoint>(local).address();
+  unsigned index = 0;
+  for (const ifaddrs* each = all; each != nullptr && index == 0; each = each->ifa_next) {
+    const int family = each->ifa_addr != nullptr ? each->ifa_addr->sa_family : AF_UNSPEC;
+    if (family != AF_INET && family != AF_INET6) {
+      continue;
+    }
+    SocketAddress candidate;
+    candidate.length = family == AF_INET ? sizeof(sockaddr_in) : sizeof(sockaddr_in6);
+    std::memcpy(&candidate.storage, each->ifa_addr, candidate.length);
+    auto address = to_endpoint<AnyEndpoint>(candidate).address();
+    // An IPv4 peer of a socket for both families.
+    const bool mapped = wanted.is_v6() && wanted.to_v6().is_v4_mapped() && address.is_v4();
+    if (address == wanted ||
+        (mapped &&
+         asio::ip::make_address_v4(asio::ip::v4_mapped, wanted.to_v6()) == address.to_v4())) {
+      index = ::if_nametoindex(each->ifa_name);
+    }
+  }
+  ::freeifaddrs(all);
+  return index;
 }
 
 std::string to_string(const SocketAddress& address) {

@@ -44,6 +44,9 @@ enum class Transport : std::uint8_t { tcp, udp };
 /// An address in numbers, without asking a name service; length 0 when it is none.
 [[nodiscard]] SocketAddress numeric_address(const std::string& host, std::uint16_t port) noexcept;
 
+/// Index of the network interface that has this address; 0: none has. Not RT-safe.
+[[nodiscard]] unsigned interface_of(const SocketAddress& local) noexcept;
+
 /// "host:port", numeric.
 [[nodiscard]] std::string to_string(const SocketAddress& address);
 /// Text of an errno. Thread: any.

@@ -28,12 +28,13 @@ UdpFrameReceiver::UdpFrameReceiver(UdpSocket socket)
 
 physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketContext& context,
                                                          const SocketAddress& peer,
+                                                         const SocketAddress& local,
                                                          const SubscribeOptions& options) {
   const bool multicast = !options.multicast_group.empty();
   SocketAddress any;
   if (multicast) {
     any = numeric_address(options.multicast_group, options.udp_port);
-    if (any.length == 0) {
+    if (!any.is_multicast()) {
       return make_error(ErrorCode::invalid_argument,
                         fmt::format("'{}' is not a multicast group", options.multicast_group));
     }
@@ -51,7 +52,7 @@ physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketContext& co
     return tl::unexpected<physics::Error>(std::move(bound.error()));
   }
   if (multicast) {
-    if (const int error = socket->join_group(any); error != 0) {
+    if (const int error = socket->join_group(any, interface_of(local)); error != 0) {
       return make_error(ErrorCode::io,
                         fmt::format("joining {}: {}", options.multicast_group, error_text(error)));
     }

@@ -14,9 +14,11 @@ namespace emit::server {
 /// by the kernel (UDP_GRO) where it can.
 class UdpFrameReceiver {
  public:
-  /// Errors (io).
+  /// `local`: this side's address of the control connection; a group is joined on its interface.
+  /// Errors (io, invalid_argument).
   [[nodiscard]] static physics::Result<UdpFrameReceiver> open(const SocketContext& context,
                                                               const SocketAddress& peer,
+                                                              const SocketAddress& local,
                                                               const SubscribeOptions& options);
 
   [[nodiscard]] int fd() const noexcept { return socket_.fd(); }

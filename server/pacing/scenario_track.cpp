@@ -5,22 +5,6 @@
 
 namespace emit::server {
 
-ScenarioPose pose_on(const scene::Trajectory& trajectory, std::int64_t sim_time_ns) noexcept {
-  const auto after = std::upper_bound(
-      trajectory.begin(), trajectory.end(), sim_time_ns,
-      [](std::int64_t time_ns, const scene::Keyframe& key) { return time_ns < key.sim_time_ns; });
-  if (after == trajectory.begin()) {
-    return {after->pose, after->on};
-  }
-  const scene::Keyframe& from = *(after - 1);
-  if (after == trajectory.end() || after->teleport) {
-    return {from.pose, from.on};
-  }
-  const double fraction = static_cast<double>(sim_time_ns - from.sim_time_ns) /
-                          static_cast<double>(after->sim_time_ns - from.sim_time_ns);
-  return {physics::interpolate(from.pose, after->pose, fraction), from.on};
-}
-
 ScenarioTracks::ScenarioTracks(const std::optional<scene::ScenarioDesc>& scenario)
     : any_entity_(!scenario) {
   if (!scenario) {
@@ -55,17 +39,18 @@ bool ScenarioTracks::knows(std::uint32_t entity_id) const noexcept {
   return any_entity_ || find(entity_id) != nullptr;
 }
 
-ScenarioPose ScenarioTracks::entity_at(std::uint32_t entity_id,
-                                       std::int64_t sim_time_ns) const noexcept {
+scene::TrajectoryState ScenarioTracks::entity_at(std::uint32_t entity_id,
+                                                 std::int64_t sim_time_ns) const noexcept {
   const Entity* entity = find(entity_id);
   if (entity == nullptr) {
     return {};
   }
-  return entity->trajectory.empty() ? entity->start : pose_on(entity->trajectory, sim_time_ns);
+  return entity->trajectory.empty() ? entity->start
+                                    : scene::trajectory_at(entity->trajectory, sim_time_ns);
 }
 
 physics::Pose ScenarioTracks::sensor_at(std::int64_t sim_time_ns) const noexcept {
-  return sensor_.empty() ? physics::Pose{} : pose_on(sensor_, sim_time_ns).pose;
+  return sensor_.empty() ? physics::Pose{} : scene::trajectory_at(sensor_, sim_time_ns).pose;
 }
 
 }  // namespace emit::server

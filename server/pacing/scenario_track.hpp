@@ -5,19 +5,9 @@
 #include <vector>
 
 #include "emit/scene/scene_desc.hpp"
+#include "emit/scene/trajectory.hpp"
 
 namespace emit::server {
-
-struct ScenarioPose {
-  physics::Pose pose;
-  bool on = true;
-};
-
-/// State of a trajectory at an instant: before the first keyframe that one, after the last that
-/// one; `on` holds until the next keyframe, and a teleport keyframe is not interpolated towards.
-/// Precondition: not empty. RT-safe.
-[[nodiscard]] ScenarioPose pose_on(const scene::Trajectory& trajectory,
-                                   std::int64_t sim_time_ns) noexcept;
 
 /// What the scenario itself says about the sensor and the entities that hosts may address.
 /// Thread: any (read only). Real time: const functions RT-safe.
@@ -27,14 +17,14 @@ class ScenarioTracks {
   explicit ScenarioTracks(const std::optional<scene::ScenarioDesc>& scenario);
 
   [[nodiscard]] bool knows(std::uint32_t entity_id) const noexcept;
-  [[nodiscard]] ScenarioPose entity_at(std::uint32_t entity_id,
-                                       std::int64_t sim_time_ns) const noexcept;
+  [[nodiscard]] scene::TrajectoryState entity_at(std::uint32_t entity_id,
+                                                 std::int64_t sim_time_ns) const noexcept;
   [[nodiscard]] physics::Pose sensor_at(std::int64_t sim_time_ns) const noexcept;
 
  private:
   struct Entity {
     std::uint32_t id = 0;
-    ScenarioPose start;
+    scene::TrajectoryState start;
     scene::Trajectory trajectory;
   };
   [[nodiscard]] const Entity* find(std::uint32_t entity_id) const noexcept;

@@ -185,6 +185,12 @@ EventText describe(const Event& event) {
                           "often\"",
                           static_cast<std::int64_t>(event.a)),
               false};
+    case EventKind::poses_dropped:
+      return {LogLevel::warn,
+              fmt::format("event=poses_dropped count={} effect=\"oldest motion of this run is kept "
+                          "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
+                          event.a),
+              false};
   }
   return {LogLevel::error, "event=unknown", true};
 }

@@ -21,6 +21,8 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   const gl::Define taps[] = {{"EMIT_BLOCKER_TAPS", "8u"}, {"EMIT_FILTER_TAPS", "32u"}};
   auto thermal = gl::Program::compute("passes/thermal.comp", taps);
   ASSERT_TRUE(thermal) << thermal.error().text;
+  auto foster = gl::Program::compute("passes/thermal_foster.comp", taps);
+  ASSERT_TRUE(foster) << foster.error().text;
   auto radiance = gl::Program::compute("passes/radiance.comp");
   ASSERT_TRUE(radiance) << radiance.error().text;
 
@@ -37,6 +39,9 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, flux_end);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, casters);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, info);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_air);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, flux_end);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, info);
   EXPECT_EQ(thermal->uniform_offset("taps.blocker[0]"), 0);
   EXPECT_EQ(thermal->uniform_offset("taps.filter_[0]"),
             static_cast<GLint>(offsetof(gpu::TapParams, filter_)));
@@ -46,11 +51,16 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_EQ(
       radiance->uniform_offset("bands[3].lut_last_node"),
       static_cast<GLint>(3 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, lut_last_node)));
+  EXPECT_EQ(radiance->uniform_offset("bands[2].atmosphere_table"),
+            static_cast<GLint>(2 * sizeof(gpu::BandParams) +
+                               offsetof(gpu::BandParams, atmosphere_table)));
   // Tables fetched as texels of four floats.
   EXPECT_EQ(sizeof(gpu::InstanceParams), 4U * 16U);
   EXPECT_EQ(sizeof(gpu::MaterialParams), 4U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, band_emissivity_frac), 32U);
+  EXPECT_EQ(offsetof(gpu::MaterialParams, base_offset_k), 28U);
+  EXPECT_EQ(offsetof(gpu::MaterialParams, resistance_m2k_w), 48U);
   EXPECT_EQ(sizeof(gpu::RelaxationParams), 2U * 16U);
 }
 

@@ -14,8 +14,9 @@ namespace emit::test {
 
 /// What a source was asked to do, kept by the test so that it outlives the source.
 struct SourceScript {
-  bool ready = true;          ///< poll(): false holds frames back
-  bool weather_full = false;  ///< apply_weather(): no room
+  bool ready = true;                ///< poll(): false holds frames back
+  bool weather_full = false;        ///< apply_weather(): no room
+  std::uint64_t dropped_poses = 0;  ///< of every frame's statistics
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
   std::vector<scene::WeatherSample> weather;
@@ -93,6 +94,7 @@ class ScriptedSource final : public server::FrameSource {
       view.frame_number = request.frame_number;
       view.sim_time_ns = request.sim_time_ns;
       view.sensor_pose = request.sensor_pose;
+      view.stats.dropped_poses = script_.dropped_poses;
       view.width_px = info_.width_px;
       view.height_px = info_.height_px;
       view.radiance_w_m2_sr = {std::span<const float>(pixels)};

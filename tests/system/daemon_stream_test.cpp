@@ -115,6 +115,44 @@ TEST(DaemonStream, AStoppedClientCostsTheOthersNothingOverTcpAndUdp) {
   EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
 }
 
+TEST(DaemonStream, AClientLearnsTheSpectralResponseOfItsBand) {
+  ScratchFolder folder;
+  folder.write("world.toml",
+               "[atmosphere]\nenabled = false\n"
+               "[[material]]\nname = \"concrete\"\nsolar_absorptance_frac = 0.6\n"
+               "emissivity_frac = 0.9\nprescribed_k = 300.0\n"
+               "[[band]]\nname = \"det\"\nresponse = [[3.0, 0.0], [4.1, 1.0], [5.5, 0.25]]\n"
+               "[[channel]]\nname = \"a\"\nband = \"det\"\n"
+               "[[channel]]\nname = \"b\"\nband = \"8-12\"\n");
+  const std::string config = folder.write(
+      "emitd.toml", "scenario = \"world.toml\"\n" + canned_config(64, 48, "mode = \"host-step\""));
+  DaemonProcess daemon(folder, {"--config", config});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  for (const bool det : {true, false}) {
+    auto client = FrameClient::connect("tcp://" + daemon.control());
+    ASSERT_TRUE(client.has_value()) << client.error().text;
+    SubscribeOptions options;
+    options.band = det ? "det" : "8-12";
+    const auto channel = (*client)->subscribe(options);
+    ASSERT_TRUE(channel.has_value()) << channel.error().text;
+    ASSERT_TRUE(channel->response.has_value()) << "known, a rectangle included";
+    const auto band = channel->spectral_band();
+    ASSERT_TRUE(band.has_value());
+    if (det) {
+      ASSERT_EQ(band->response.size(), 3U);
+      EXPECT_EQ(band->response[1].wavelength_um, 4.1);
+      EXPECT_EQ(band->response[2].response_frac, 0.25);
+      EXPECT_EQ(band->hi_um, 5.5);
+    } else {
+      EXPECT_TRUE(band->response.empty());
+      EXPECT_EQ(band->lo_um, 8.0);
+    }
+    EXPECT_EQ((*client)->server().channels[0].response->size(), 3U);
+  }
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
+}
+
 TEST(DaemonStream, AtItsOwn200HzNothingIsLostUnflagged) {
   ScratchFolder folder;
   const std::string config =

@@ -84,7 +84,7 @@ TEST(CliPoseLog, csv_files_give_host_frames) {
   ASSERT_TRUE(*log->next());
   EXPECT_EQ(log->host().frame_number, 2U);
   EXPECT_FALSE(*log->next());
-  EXPECT_FALSE(log->truncation().has_value());
+  EXPECT_FALSE(log->notes().has_value());
   std::filesystem::remove(file);
   EXPECT_FALSE(PoseLog::open(file).has_value());
 }

@@ -52,7 +52,7 @@ const std::vector<Case>& cases() {
       {"open_range", "[thermal]\ntolerance_k = 0\n",
        "s.toml:3:15: 'tolerance_k' is 0, must be > 0, <= 50"},
       {"word_not_offered", "[thermal]\nmodel = \"emit2015\"\n",
-       "s.toml:3:9: 'model' is 'emit2015', must be one of: emit2014"},
+       "s.toml:3:9: 'model' is 'emit2015', must be one of: emit2014, foster"},
       {"instant_without_offset", "epoch_utc = 2014-06-21T06:00:00\n",
        "s.toml:2:13: 'epoch_utc' must be an instant with offset between the years 1900 and 2199, "
        "such as 2014-06-21T06:00:00Z"},
@@ -147,6 +147,19 @@ const std::vector<Case>& cases() {
                 "modes = [{ tau_s = 10, weight_frac = 0.5 }, { tau_s = 20, weight_frac "
                 "= 0.4 }]\n"),
        "s.toml:8:9: the weights of 'modes' add up to 0.9, must be 1"},
+      {"foster_sum",
+       material("base_k = 290\n" + kLayer +
+                "foster_modes = [{ tau_s = 10, resistance_m2k_w = 0.5 }]\n"),
+       "s.toml:8:16: the resistances of 'foster_modes' add up to 0.5, those of 'layers' to 0.1: "
+       "fit "
+       "again"},
+      {"foster_order",
+       material("base_k = 290\n" + kLayer +
+                "foster_modes = [{ tau_s = 10, resistance_m2k_w = 0.05 }, { tau_s = 9, "
+                "resistance_m2k_w = 0.05 }]\n"),
+       "s.toml:8:58: time constants of 'foster_modes' must increase"},
+      {"surroundings", "[thermal]\nsurroundings_material = \"gras\"\n",
+       "s.toml:3:25: there is no material 'gras'"},
       {"three_modes",
        material("base_k = 290\n" + kLayer +
                 "modes = [{ tau_s = 1, weight_frac = 0.5 }, { tau_s = 2, "

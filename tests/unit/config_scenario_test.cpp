@@ -39,11 +39,14 @@ terms = [[0.25, 0.5], [0.75, 0.0625]]
 vertical_transmittance_frac = 0.55
 
 [thermal]
-model = "emit2014"
+model = "foster"
 method = "per-frame"
 tolerance_k = 0.25
 initial_k = 288.5
 history_start_s = -1800.5
+spin_up_s = 90000.5
+surroundings_material = "deep"
+foster_modes = 3
 steps = 90
 spacing = "uniform"
 first_step_s = 12.5
@@ -132,7 +135,11 @@ solar_absorptance_frac = 0.3
 emissivity_frac = 0.95
 base_k = 285.5
 initial_k = 287.25
+core_conductance_w_m2_k = 7.5
 modes = [{ tau_s = 100.5, weight_frac = 0.375 }, { tau_s = 2000.0, weight_frac = 0.625 }]
+foster_modes = [{ tau_s = 50.5, resistance_m2k_w = 0.0714 }, { tau_s = 9000.0, resistance_m2k_w = 0.25 }]
+foster_fit = { horizon_s = 99000.0, rms_k = 0.125, max_k = 0.75 }
+dry_layers_valid = false
 layers = [
   { thickness_m = 0.05, conductivity_w_m_k = 0.7, density_kg_m3 = 2120.0, specific_heat_j_kg_k = 920.0 },
   { thickness_m = 0.5, conductivity_w_m_k = 2.0, density_kg_m3 = 1900.0, specific_heat_j_kg_k = 850.0 },
@@ -165,6 +172,10 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.thermal.tolerance_k, 0.25);
   EXPECT_EQ(s.thermal.initial_k, 288.5);
   EXPECT_EQ(s.thermal.history_start_ns, -1'800'500'000'000);
+  EXPECT_EQ(s.thermal.model, scene::ThermalModel::foster);
+  EXPECT_EQ(s.thermal.spin_up_ns, 90'000'500'000'000);
+  EXPECT_EQ(s.thermal.surroundings_material, "deep");
+  EXPECT_EQ(s.thermal.foster_modes, 3U);
   EXPECT_EQ(s.thermal.steps, 90U);
   EXPECT_EQ(s.thermal.spacing, scene::StepSpacing::uniform);
   EXPECT_EQ(s.thermal.first_step_s, 12.5);
@@ -214,6 +225,22 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.materials[2].base_k, 285.5);
   EXPECT_EQ(s.materials[2].layers[1].density_kg_m3, 1900.0);
   EXPECT_EQ(s.materials[2].modes[1].weight_frac, 0.625);
+  EXPECT_EQ(s.materials[2].core_conductance_w_m2_k, 7.5);
+  ASSERT_EQ(s.materials[2].foster_modes.size(), 2U);
+  EXPECT_EQ(s.materials[2].foster_modes[1].tau_s, 9000.0);
+  EXPECT_EQ(s.materials[2].foster_modes[1].resistance_m2k_w, 0.25);
+  ASSERT_TRUE(s.materials[2].foster_fit.has_value());
+  EXPECT_EQ(s.materials[2].foster_fit->max_k, 0.75);
+  EXPECT_FALSE(s.materials[2].dry_layers_valid);
+  EXPECT_TRUE(s.materials[1].dry_layers_valid);
+}
+
+TEST_F(ConfigTest, the_extended_model_spins_up_for_two_days_unless_told_otherwise) {
+  const std::string object = "[[object]]\ngltf = \"a.glb\"\n";
+  EXPECT_EQ(scenario(object)->thermal.spin_up_ns, 0);
+  EXPECT_EQ(scenario(object, {"thermal.model=foster"})->thermal.spin_up_ns, 172'800'000'000'000);
+  const auto none = scenario(object, {"thermal.model=foster", "thermal.spin_up_s=0"});
+  EXPECT_EQ(none->thermal.spin_up_ns, 0);
 }
 
 TEST_F(ConfigTest, attitudes_point_where_the_keys_say) {

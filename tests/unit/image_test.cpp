@@ -91,6 +91,43 @@ TEST(ExrImage, frame_metadata_survives_exactly) {
   EXPECT_EQ(read->units, "W m-2 sr-1");
 }
 
+TEST(ExrImage, the_band_response_survives_exactly_or_is_known_to_be_unknown) {
+  FrameMetadata metadata;
+  metadata.band_name = "det";
+  metadata.band_lo_um = 3.0;
+  metadata.band_hi_um = 5.5;
+  const auto through_file = [&] {
+    ExrImage image = sample_image();
+    set_frame_metadata(image, metadata);
+    const auto file = scratch("response.exr");
+    EXPECT_TRUE(write_exr(file, image));
+    const auto back = read_exr(file);
+    EXPECT_TRUE(back);
+    const auto read = frame_metadata(*back);
+    EXPECT_TRUE(read) << read.error().text;
+    return read->band_response;
+  };
+  EXPECT_FALSE(through_file().has_value());
+  metadata.band_response.emplace();
+  ASSERT_TRUE(through_file().has_value());
+  EXPECT_TRUE(through_file()->empty()) << "a rectangle";
+  metadata.band_response = {{3.0, 0.0}, {4.1, 1.0 / 3.0}, {5.5, 1e-7}};
+  const auto response = through_file();
+  ASSERT_TRUE(response.has_value());
+  ASSERT_EQ(response->size(), 3U);
+  EXPECT_EQ((*response)[1].wavelength_um, 4.1);
+  EXPECT_EQ((*response)[1].response_frac, 1.0 / 3.0);
+  EXPECT_EQ((*response)[2].response_frac, 1e-7);
+  ExrImage image = sample_image();
+  for (const char* text : {"", "3:0,4:1", "3", "3:", "3:0 ", "x"}) {
+    set_frame_metadata(image, metadata);
+    image.attributes["bandResponse"] = std::string(text);
+    const auto read = frame_metadata(image);
+    ASSERT_FALSE(read) << text;
+    EXPECT_THAT(read.error().text, HasSubstr("bandResponse"));
+  }
+}
+
 TEST(ExrImage, missing_metadata_is_named) {
   const physics::Result<FrameMetadata> metadata = frame_metadata(sample_image());
   ASSERT_FALSE(metadata);

@@ -104,6 +104,8 @@ TEST(PoseHistory, a_full_store_thins_the_oldest_poses_and_counts_them) {
   EXPECT_GT(history.dropped(), 0U);
   EXPECT_NEAR(history.at(t_ns).pose.position_world_m.x,
               static_cast<double>((PoseHistory::kMaxLivePoses + 99) % 2), 1e-9);
+  history.reset();
+  EXPECT_EQ(history.dropped(), 0U) << "a new run has lost nothing yet";
 }
 
 TEST(PoseHistory, path_counts_motion_but_no_jumps) {

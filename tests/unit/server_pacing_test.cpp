@@ -129,13 +129,18 @@ TEST(ScenarioTrack, HoldsOnStateUntilTheNextKeyframeAndJumpsAtTeleports) {
   trajectory[1].pose.position_world_m.x = 10.0;
   trajectory[2] = {200, {}, true, true};
   trajectory[2].pose.position_world_m.x = 99.0;
-  EXPECT_EQ(pose_on(trajectory, -5).pose.position_world_m.x, 0.0);
-  EXPECT_NEAR(pose_on(trajectory, 50).pose.position_world_m.x, 5.0, 1e-12);
-  EXPECT_TRUE(pose_on(trajectory, 50).on);
-  EXPECT_FALSE(pose_on(trajectory, 150).on);
-  EXPECT_EQ(pose_on(trajectory, 199).pose.position_world_m.x, 10.0);
-  EXPECT_EQ(pose_on(trajectory, 200).pose.position_world_m.x, 99.0);
-  EXPECT_TRUE(pose_on(trajectory, 900).on);
+  scene::ScenarioDesc scenario;
+  scenario.objects.resize(1);
+  scenario.objects[0].entity_id = 5;
+  scenario.objects[0].trajectory = trajectory;
+  const ScenarioTracks tracks(scenario);
+  EXPECT_EQ(tracks.entity_at(5, -5).pose.position_world_m.x, 0.0);
+  EXPECT_NEAR(tracks.entity_at(5, 50).pose.position_world_m.x, 5.0, 1e-12);
+  EXPECT_TRUE(tracks.entity_at(5, 50).on);
+  EXPECT_FALSE(tracks.entity_at(5, 150).on);
+  EXPECT_EQ(tracks.entity_at(5, 199).pose.position_world_m.x, 10.0);
+  EXPECT_EQ(tracks.entity_at(5, 200).pose.position_world_m.x, 99.0);
+  EXPECT_TRUE(tracks.entity_at(5, 900).on);
 }
 
 protocol::HostFrameData host(std::uint64_t number, std::int64_t time_ns, std::uint64_t run = 7) {

@@ -169,7 +169,7 @@ TEST(UdpSocket, SharesThePortOfAGroupOnlyWhenAllowed) {
   EXPECT_NE(refused.error().text.find("Address already in use"), std::string::npos);
   second->allow_shared_port();
   EXPECT_TRUE(second->bind(taken).has_value());
-  EXPECT_EQ(first->join_group(numeric_address("10.0.0.1", 0)), EINVAL);
+  EXPECT_EQ(first->join_group(numeric_address("10.0.0.1", 0), 0), EINVAL);
 }
 
 TEST(SocketAddress, ReadsNumbersOnlyAndKnowsGroups) {

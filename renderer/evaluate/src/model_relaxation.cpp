@@ -20,6 +20,8 @@ using physics::make_error;
 using physics::Result;
 
 constexpr std::size_t kModes = 3;
+/// Mesa's software rasteriser leaves the loops of an invocation after 65535 turns without a word.
+constexpr std::size_t kMostGpuIntervals = 65'536;
 
 struct Node {
   double time_s = 0.0;
@@ -233,6 +235,13 @@ Result<std::vector<float>> on_gpu(const std::vector<Query>& queries, int gpu_ind
         intervals.push_back(static_cast<float>(gains.end_frac));
       }
     }
+  }
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    if (queries[i].intervals.size() < kMostGpuIntervals) continue;
+    return make_error(ErrorCode::unsupported,
+                      fmt::format("relaxation on the GPU: query {} spans {} intervals, {} are "
+                                  "possible: use --device cpu",
+                                  i + 1, queries[i].intervals.size(), kMostGpuIntervals - 1));
   }
   if (intervals.size() / kIntervalStride >= (1U << 24)) {
     return make_error(ErrorCode::unsupported,

@@ -25,6 +25,24 @@ inline constexpr std::string_view kRelaxationOutputs = "T_K";
 inline constexpr std::string_view kSunPositionInputs = "year,month,day,hours_ut,lat,lon,height,dT";
 inline constexpr std::string_view kSunPositionOutputs = "azimuth,elevation";
 
+inline constexpr std::string_view kSunDiscInputs = "delta_deg";
+inline constexpr std::string_view kSunDiscOutputs = "f";
+inline constexpr std::string_view kWallShadowInputs = "H,e_deg,x";
+inline constexpr std::string_view kWallShadowOutputs = "f";
+inline constexpr std::string_view kSkyViewInputs = "kind,p1,p2,p3,p4,p5,p6,p7";
+inline constexpr std::string_view kSkyViewOutputs = "svf,f_uni";
+inline constexpr std::string_view kConductionSlabInputs = "kind,k,rc,d,q,h,Tinf,Td,Ti,x,t";
+inline constexpr std::string_view kConductionSemiInfiniteInputs =
+    "kind,k,rc,q_or_amp,h,Tinf_or_Ts,Ti,period_s,x,t";
+inline constexpr std::string_view kConductionOutputs = "T";
+inline constexpr std::string_view kConductionLayeredInputs =
+    "n,base,d1,k1,rc1,d2,k2,rc2,d3,k3,rc3,period_s";
+inline constexpr std::string_view kConductionLayeredOutputs = "absZ,argZ";
+inline constexpr std::string_view kConductionLateralInputs = "kind,k,rc,q,lx,ly,v,x,y,z,t";
+inline constexpr std::string_view kConductionLateralOutputs = "dT";
+inline constexpr std::string_view kSurfaceHistoryInputs = "t_s,Tair,E0,E1,E2,E3";
+inline constexpr std::string_view kSurfaceHistoryOutputs = "Ts0,Ts1,Ts2,Ts3";
+
 [[nodiscard]] physics::Result<std::string> run_equilibrium(const EvaluateRequest& request,
                                                            const CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_band_radiance(const EvaluateRequest& request,
@@ -35,6 +53,22 @@ inline constexpr std::string_view kSunPositionOutputs = "azimuth,elevation";
                                                           const CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sun_position(const EvaluateRequest& request,
                                                             const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_sun_disc(const EvaluateRequest& request,
+                                                        const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_wall_shadow(const EvaluateRequest& request,
+                                                           const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_sky_view(const EvaluateRequest& request,
+                                                        const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_conduction_slab(const EvaluateRequest& request,
+                                                               const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_conduction_semi_infinite(
+    const EvaluateRequest& request, const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_conduction_layered(const EvaluateRequest& request,
+                                                                  const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_conduction_lateral(const EvaluateRequest& request,
+                                                                  const CsvTable& table);
+[[nodiscard]] physics::Result<std::string> run_surface_history(const EvaluateRequest& request,
+                                                               const CsvTable& table);
 
 /// Values of several columns, each as long as the table.
 template <std::size_t N>

@@ -155,6 +155,40 @@ physics::Result<Integer> integer_attribute(const ExrImage& image, const char* na
   return value;
 }
 
+constexpr std::string_view kRectangle = "rectangle";
+
+std::string response_text(const std::vector<physics::ResponsePoint>& response) {
+  if (response.empty()) return std::string(kRectangle);
+  std::string out;
+  for (const physics::ResponsePoint& point : response) {
+    // The shortest digits that read back as the same numbers.
+    out += fmt::format("{}{}:{}", out.empty() ? "" : " ", point.wavelength_um, point.response_frac);
+  }
+  return out;
+}
+
+physics::Result<std::vector<physics::ResponsePoint>> response_attribute(const ExrImage& image) {
+  const physics::Result<std::string> text = text_attribute(image, "bandResponse");
+  if (!text) return tl::unexpected(text.error());
+  std::vector<physics::ResponsePoint> out;
+  if (*text == kRectangle) return out;
+  const char* at = text->data();
+  const char* const end = at + text->size();
+  for (;;) {
+    physics::ResponsePoint point;
+    const auto wavelength = std::from_chars(at, end, point.wavelength_um);
+    if (wavelength.ec != std::errc{} || wavelength.ptr == end || *wavelength.ptr != ':') break;
+    const auto response = std::from_chars(wavelength.ptr + 1, end, point.response_frac);
+    if (response.ec != std::errc{}) break;
+    out.push_back(point);
+    if (response.ptr == end) return out;
+    if (*response.ptr != ' ') break;
+    at = response.ptr + 1;
+  }
+  return make_error(ErrorCode::parse,
+                    "attribute 'bandResponse' is not made of pairs wavelength:response");
+}
+
 }  // namespace
 
 const ExrChannel* ExrImage::find(std::string_view channel) const noexcept {
@@ -224,6 +258,7 @@ void set_frame_metadata(ExrImage& image, const FrameMetadata& metadata) {
   attributes["bandLoUm"] = metadata.band_lo_um;
   attributes["bandHiUm"] = metadata.band_hi_um;
   attributes["units"] = metadata.units;
+  if (metadata.band_response) attributes["bandResponse"] = response_text(*metadata.band_response);
 }
 
 physics::Result<FrameMetadata> frame_metadata(const ExrImage& image) {
@@ -240,6 +275,11 @@ physics::Result<FrameMetadata> frame_metadata(const ExrImage& image) {
   metadata.frame_number = *frame_number;
   metadata.band_name = *band;
   metadata.units = *units;
+  if (image.attributes.contains("bandResponse")) {
+    auto response = response_attribute(image);
+    if (!response) return tl::unexpected(response.error());
+    metadata.band_response = std::move(*response);
+  }
   physics::Pose& pose = metadata.sensor_pose;
   const std::pair<const char*, double*> numbers[] = {{"posePositionXM", &pose.position_world_m.x},
                                                      {"posePositionYM", &pose.position_world_m.y},

@@ -13,6 +13,7 @@ Forcing forcing_of(const WeatherRow& row) noexcept {
   f.longwave_down_w_m2 = row.longwave_down_w_m2;
   f.air_k = row.air_k;
   f.environment_k = row.environment_k.value_or(row.air_k);
+  f.environment_stated = row.environment_k.has_value();
   f.film_w_m2_k = row.film_w_m2_k.value_or(film_coefficient_w_m2_k(row.wind_m_s));
   f.wind_m_s = row.wind_m_s;
   f.cloud_frac = row.cloud_frac;
@@ -45,6 +46,7 @@ Forcing forcing_from_rows(std::span<const WeatherRow> rows, std::int64_t time_ns
   f.longwave_down_w_m2 = mix(&Forcing::longwave_down_w_m2);
   f.air_k = mix(&Forcing::air_k);
   f.environment_k = mix(&Forcing::environment_k);
+  f.environment_stated = a.environment_stated || b.environment_stated;
   f.film_w_m2_k = mix(&Forcing::film_w_m2_k);
   f.wind_m_s = mix(&Forcing::wind_m_s);
   f.cloud_frac = mix(&Forcing::cloud_frac);

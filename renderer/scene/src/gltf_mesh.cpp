@@ -299,6 +299,7 @@ Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index,
   for (const std::uint32_t index : converted.mesh.indices) {
     converted.mesh.bounds.add(glm::dvec3(converted.mesh.positions_m[index]));
   }
+  converted.mesh.closed = is_closed_surface(converted.mesh);
   return converted;
 }
 

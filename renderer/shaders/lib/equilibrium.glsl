@@ -2,19 +2,24 @@
 #ifndef EMIT_LIB_EQUILIBRIUM
 #define EMIT_LIB_EQUILIBRIUM
 
+// `value` held in [low, high]; NaN goes to `low`. Sets `clamped` where it had to. NaN is told by its
+// bits: compilers may assume that there is none and turn !(x >= y) into x < y.
+float held_in_range(float value, float low, float high, inout bool clamped) {
+  bool is_number = (floatBitsToUint(value) & 0x7fffffffu) <= 0x7f800000u;
+  float held = is_number ? clamp(value, low, high) : low;
+  clamped = clamped || !is_number || held != value;
+  return held;
+}
+
 // Positive root of  emission T^4 + conductance T = source  (physics.md eq. 4), in kelvin.
-// Twin of emit/physics/equilibrium.hpp; see there for accuracy. Sets `clamped` (never clears it)
-// where an input lies below its guard and the result is that of the guard.
+// Twin of emit/physics/equilibrium.hpp; see there for accuracy. Finite whatever is handed over:
+// inputs are held in their ranges, which sets `clamped` (never clears it). The ranges leave every
+// intermediate result within float32.
 float equilibrium_k(float emission_w_m2_k4, float conductance_w_m2_k, float source_w_m2,
                     inout bool clamped) {
-  const float min_emission_w_m2_k4 = 1e-20;
-  const float min_source_w_m2 = 1e-9;
-  // Written so that NaN counts too.
-  clamped = clamped || !(emission_w_m2_k4 >= min_emission_w_m2_k4) ||
-            !(source_w_m2 >= min_source_w_m2);
-  float e = max(emission_w_m2_k4, min_emission_w_m2_k4);
-  float a = max(source_w_m2, min_source_w_m2);
-  float g = conductance_w_m2_k;
+  float e = held_in_range(emission_w_m2_k4, 1e-20, 1.0, clamped);
+  float a = held_in_range(source_w_m2, 1e-9, 1e18, clamped);
+  float g = held_in_range(conductance_w_m2_k, 0.0, 1e16, clamped);
 
   float r = sqrt(sqrt(a / e));
   float k = g * r / a;

@@ -17,16 +17,19 @@ void main() {
   uint first = uint(in_row[i]);
   uint count = uint(in_row[i + 1u]);
   bool is_linear = in_row[i + 2u] != 0.0;
-  float sum_k = 0.0;
-  for (uint mode = 0u; mode < 3u; ++mode) {
-    float x = in_row[i + 4u + 2u * mode];
-    for (uint step = 0u; step < count; ++step) {
-      uint at = (first + step) * 8u;
-      vec2 gains_frac = vec2(interval[at + 2u + 2u * mode], interval[at + 3u + 2u * mode]);
-      x = is_linear ? relax_linear(x, interval[at], interval[at + 1u], gains_frac)
-                    : relax_constant(x, interval[at], gains_frac);
-    }
-    sum_k += in_row[i + 3u + 2u * mode] * x;
+  // All modes in one loop: software rasterisers leave the loops of an invocation after 65535 turns.
+  vec3 x = vec3(in_row[i + 4u], in_row[i + 6u], in_row[i + 8u]);
+  for (uint step = 0u; step < count; ++step) {
+    uint at = (first + step) * 8u;
+    float u0 = interval[at];
+    float u1 = interval[at + 1u];
+    vec2 gains0 = vec2(interval[at + 2u], interval[at + 3u]);
+    vec2 gains1 = vec2(interval[at + 4u], interval[at + 5u]);
+    vec2 gains2 = vec2(interval[at + 6u], interval[at + 7u]);
+    x = is_linear ? vec3(relax_linear(x.x, u0, u1, gains0), relax_linear(x.y, u0, u1, gains1),
+                         relax_linear(x.z, u0, u1, gains2))
+                  : vec3(relax_constant(x.x, u0, gains0), relax_constant(x.y, u0, gains1),
+                         relax_constant(x.z, u0, gains2));
   }
-  out_row[row] = sum_k;
+  out_row[row] = in_row[i + 3u] * x.x + in_row[i + 5u] * x.y + in_row[i + 7u] * x.z;
 }

@@ -9,6 +9,9 @@ layout(binding = EMIT_TEX_SHADOW) uniform sampler2DArray shadow_maps;
 layout(std140, binding = EMIT_BIND_STEP) uniform Step { StepParams step_params; };
 layout(std140, binding = EMIT_BIND_TAPS) uniform Taps { TapParams taps; };
 
+// Radius in texels beyond which the search for blockers is too sparse to be trusted alone.
+const float kWideSearchPx = 16.0;
+
 // Share of the sun's disc seen from a point, 0..1.
 float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
   if (step_params.info.x == 0u) return 1.0;
@@ -55,6 +58,18 @@ float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
     if (depth < limit + dot(slope_px, texel + 0.5 - at_px)) {
       blocker_sum += depth;
       blockers += 1.0;
+    }
+  }
+  // With something very tall in the scene (a mast, a mountain) the search is so wide that its taps
+  // step over what stands near: then the receiver's own line to the sun is looked along as well.
+  if (blockers == 0.0 && max(search_px.x, search_px.y) > kWideSearchPx) {
+    vec2 texel = floor(at_px);
+    if (all(greaterThanEqual(texel, vec2(0.0))) && all(lessThan(texel, map_px))) {
+      float depth = texelFetch(shadow_maps, ivec3(ivec2(texel), int(cascade)), 0).r;
+      if (depth < limit + dot(slope_px, texel + 0.5 - at_px)) {
+        blocker_sum = depth;
+        blockers = 1.0;
+      }
     }
   }
   if (blockers == 0.0) return 1.0;

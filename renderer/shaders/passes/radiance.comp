@@ -16,6 +16,9 @@ layout(binding = EMIT_TEX_SUN_NOW) uniform sampler2D sun_now_texture;
 
 #define EMIT_PLANCK_LUT(index) texelFetch(band_lut, index).r
 #include "lib/planck_lut.glsl"
+// Tables of the air lie behind those of the bands.
+#define EMIT_ATMOSPHERE_TABLE(index) texelFetch(band_lut, index).r
+#include "lib/atmosphere_table.glsl"
 
 // Relative air mass after Kasten and Young (1989), 1 at the zenith, 38 at the horizon.
 float air_mass(float sin_elevation) {
@@ -59,11 +62,16 @@ void main() {
     if (start.z > 0.5) {
       temperature_k = frame.obscurance.y + start.y;
     } else {
+#ifdef EMIT_FOSTER
+      vec4 x = texelFetch(state_texture, px, 0);
+      temperature_k = frame.obscurance.y + (start.w + ((x.x + x.y) + (x.z + x.w)));
+#else
       vec2 x = texelFetch(state_texture, px, 0).rg;
       // Weights are the same in every interval: those of the first are read.
       float weight0_frac = relaxation_mode(int(ids.x), 0).z;
       float weight1_frac = relaxation_mode(int(ids.x), 1).z;
       temperature_k = frame.obscurance.y + (weight0_frac * x.x + weight1_frac * x.y);
+#endif
     }
     atomicAdd(stats.surface_px, 1u);
   }
@@ -78,8 +86,16 @@ void main() {
       float open_frac = min(2.0 * sky_frac, 1.0) * 0.5 * (1.0 + n.z);
       float incoming = mix(bands[i].surroundings_radiance_w_m2_sr, bands[i].sky_hemisphere_w_m2_sr, open_frac);
       incoming += bands[i].sun_irradiance_w_m2 / EMIT_PI * sun_frac * max(dot(n, frame.sun_now.xyz), 0.0);
-      float tau = transmittance(i, boresight_m * ray_length);
-      radiance_w_m2_sr = tau * (emitted + (1.0 - emissivity_frac) * incoming) + (1.0 - tau) * bands[i].air_radiance_w_m2_sr;
+      float leaving = emitted + (1.0 - emissivity_frac) * incoming;
+      if (bands[i].atmosphere_table.z > 0u) {
+        vec2 air = atmosphere_table_air(bands[i].atmosphere_table, boresight_m * ray_length, ray.z / ray_length, clamped);
+        radiance_w_m2_sr = air.x * leaving + air.y;
+      } else {
+        float tau = transmittance(i, boresight_m * ray_length);
+        radiance_w_m2_sr = tau * leaving + (1.0 - tau) * bands[i].air_radiance_w_m2_sr;
+      }
+    } else if (bands[i].atmosphere_table.z > 0u) {
+      radiance_w_m2_sr = atmosphere_table_out(bands[i].atmosphere_table, ray.z / ray_length, clamped).y;
     } else {
       radiance_w_m2_sr = sky_radiance_w_m2_sr(i, ray.z / ray_length);
     }

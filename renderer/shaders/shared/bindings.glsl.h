@@ -25,6 +25,7 @@
 #define EMIT_TEX_RELAXATION 8
 #define EMIT_TEX_BAND_LUT 9
 #define EMIT_TEX_INSTANCES 10
+#define EMIT_TEX_SPIN_UP 11
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -55,3 +56,7 @@
 #define EMIT_STEP_FIRST 1u
 #define EMIT_STEP_SUN_UP 2u
 #define EMIT_STEP_SUN_NOW 4u
+#define EMIT_STEP_UNSHADED 8u  // foster: before the history, nothing stands in the way
+
+// foster: finest split of an interval is 2 to this power
+#define EMIT_FOSTER_LEVELS 6

@@ -10,7 +10,8 @@ struct FrameParams {
   mat4 relworld_from_sensor;  // rotation
   vec4 tan_half_fov;          // x, y; z = near plane in m; w = pixels per unit tangent
   uvec4 format_px;            // width, height, pixels per plane, EMIT_OUTPUT_* flags
-  vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K
+  vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K;
+                              // foster: z = tolerance of a step in K, w = nodes per axis of the spin-up table
   uvec4 bands;                // x = number of bands, y = nodes of a band's table
   vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
 };
@@ -32,9 +33,9 @@ struct MaterialParams {
   float initial_offset_k;     // surface at history start, minus the reference temperature
   float prescribed_offset_k;  // if prescribed
   float prescribed;           // 1: temperature is given; 0: simulated
-  float pad;
+  float base_offset_k;        // foster: base minus the reference temperature
   vec4 band_emissivity_frac;  // by scenario band
-  vec4 spare;
+  vec4 resistance_m2k_w;      // foster: of the modes
 };
 
 // One light frustum of a history step: light coordinates in metres.
@@ -59,12 +60,15 @@ struct StepParams {
   vec4 sun_start;   // xyz = unit vector towards the sun, w = direct normal flux after clouds, W m-2
   vec4 sun_end;
   vec4 flux_start;  // x = S_i, y = R_LW, z = exitance of the surroundings (R_e / emissivity), W m-2
-  vec4 flux_end;
+  vec4 flux_end;    // foster: x = diffuse, y = sky long-wave, both horizontal; z, w = reflected sun and
+                    // exitance of the surroundings
+  vec4 film_air;    // foster: film coefficient in W m-2 K-1 and air offset in K at the start, at the end
   vec4 casters;     // x = height of the highest caster above the camera, m; y = sine of the sun's elevation
   uvec4 info;       // x = number of cascades; y = offset into relaxation table; z = EMIT_STEP_* flags
 };
 
 // Two texels of the relaxation table: exact exponential step of one material over one interval (lib/relaxation.glsl).
+// foster: one entry per split of the interval; gains of four modes at the start, at the end (lib/foster.glsl).
 struct RelaxationParams {
   vec4 mode0;  // gain of the drive at the start, at the end, weight of the mode, 0
   vec4 mode1;
@@ -81,6 +85,7 @@ struct BandParams {
   float lut_first_k;                   // layout of the band's T ln L table
   float lut_nodes_per_k;
   float lut_last_node;
+  uvec4 atmosphere_table;              // lib/atmosphere_table.glsl: first float, ranges, elevations; z = 0: none
 };
 
 

@@ -18,8 +18,10 @@ class StreamProvider final : public FrameProvider {
   StreamProvider(std::unique_ptr<server::FrameClient> client, server::ChannelDescription channel)
       : client_(std::move(client)), channel_(std::move(channel)) {
     // Canned streams may name no band: they have a radiance alone.
-    if (channel_.band_lo_um > 0.0 && channel_.band_hi_um > channel_.band_lo_um) {
-      apparent_.emplace(channel_.band_lo_um, channel_.band_hi_um);
+    if (const auto band = channel_.spectral_band()) {
+      apparent_.emplace(*band);
+      fmt::print(stderr, "emit: apparent temperature, {}\n",
+                 conversion_text(*band, channel_.response.has_value()));
     }
     thread_ = std::thread([this] { run(); });
   }

@@ -23,7 +23,7 @@ enum FrameFlags : std::uint32_t {
   kFlagLate = 1u << 0,          ///< finished after its deadline
   kFlagRepeated = 1u << 1,      ///< the previous frame's pixels sent again at this slot
   kFlagStale = 1u << 2,         ///< rendered on a pose older than the extrapolation horizon
-  kFlagDegraded = 1u << 3,      ///< quality ladder shed work; see quality_rung, estimated_error_k
+  kFlagDegraded = 1u << 3,      ///< less than full quality; see quality_rung, estimated_error_k
   kFlagPartial = 1u << 4,       ///< set by a receiver: pixels are missing
   kFlagHold = 1u << 5,          ///< thermal clock frozen by the host
   kFlagNonFinite = 1u << 6,     ///< nonfinite_px > 0: those pixels are written as 0
@@ -44,8 +44,8 @@ struct FrameHeader {
   std::uint32_t height_px = 0;
   float band_lo_um = 0.0F;
   float band_hi_um = 0.0F;
-  std::uint32_t flags = 0;  ///< FrameFlags
-  float estimated_error_k = 0.0F;
+  std::uint32_t flags = 0;         ///< FrameFlags
+  float estimated_error_k = 0.0F;  ///< NaN: not known; Inf: not to be trusted
   std::uint32_t nonfinite_px = 0;
   std::uint32_t clamped_px = 0;
   std::uint64_t run_id = 0;             ///< changes at every start and reset of the daemon

@@ -2,9 +2,11 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "emit/physics/error.hpp"
 
@@ -16,6 +18,31 @@ namespace emit::evaluate {
 enum class Precision : std::uint8_t { float32, float64 };
 enum class Device : std::uint8_t { cpu, gpu };
 
+/// Options of `surface-history`; all required but the model and the modes.
+struct HistoryLayer {
+  double thickness_m = 0.0;
+  double conductivity_w_m_k = 0.0;
+  double heat_capacity_j_m3_k = 0.0;
+};
+struct HistoryPoint {
+  double depth_m = 0.0;
+  double temperature_k = 0.0;
+};
+struct HistoryMode {
+  double tau_s = 0.0;
+  double weight_frac = 0.0;
+};
+enum class HistoryModel : std::uint8_t { reference, emit2014, foster };
+struct HistoryOptions {
+  std::vector<HistoryLayer> layers;  ///< outermost first
+  std::optional<double> base_k;
+  std::optional<double> emissivity_frac;
+  std::optional<double> film_w_m2_k;
+  std::vector<HistoryPoint> initial;  ///< profile at the first row, linear in between
+  HistoryModel model = HistoryModel::reference;
+  std::vector<HistoryMode> modes;  ///< emit2014 only: relaxation modes of the first layer
+};
+
 struct EvaluateRequest {
   std::string model;
   std::filesystem::path table;
@@ -23,7 +50,12 @@ struct EvaluateRequest {
   std::filesystem::path nodes;  ///< relaxation only: the drive, t_s and u_K per case
   Precision precision = Precision::float64;
   Device device = Device::cpu;
+  /// Visibility models on the CPU: rays per row and measure; the error falls with their number.
+  std::optional<std::uint32_t> rays;
+  std::string method;  ///< visibility models on the GPU: "per-frame"; empty: the default method
   int gpu_index = -1;  ///< as gl::EglContext::create()
+  std::uint32_t refine = 1;  ///< conduction and surface-history: 1, 2 or 4 scales cells and steps
+  HistoryOptions history;
 };
 
 /// A model as `--help` and the documentation list it.

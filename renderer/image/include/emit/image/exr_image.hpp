@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,6 +12,7 @@
 
 #include "emit/physics/error.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/physics/planck.hpp"
 
 namespace emit::image {
 
@@ -44,7 +46,7 @@ struct ExrImage {
 
 /// What a frame says about itself. Attribute names: simTimeNs and frameNumber (decimal strings,
 /// exact), posePositionX/Y/ZM and poseQuatW/X/Y/Z (world_from_body), bandName, bandLoUm, bandHiUm,
-/// units.
+/// units, bandResponse ("rectangle", or "um:frac" pairs separated by blanks).
 struct FrameMetadata {
   std::int64_t sim_time_ns = 0;
   std::uint64_t frame_number = 0;
@@ -53,6 +55,9 @@ struct FrameMetadata {
   double band_lo_um = 0.0;  ///< 0 with band_hi_um 0: no single band
   double band_hi_um = 0.0;
   std::string units = "W m-2 sr-1";
+  /// Spectral response between the limits; empty: a perfect rectangle; absent: not known (files
+  /// that do not say).
+  std::optional<std::vector<physics::ResponsePoint>> band_response = std::nullopt;
 };
 void set_frame_metadata(ExrImage& image, const FrameMetadata& metadata);
 /// Error: parse, naming the attribute that is missing or malformed.

@@ -41,6 +41,7 @@ struct Forcing {
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
   double environment_k = 0.0;
+  bool environment_stated = false;  ///< by the weather; otherwise environment_k is that of the air
   double film_w_m2_k = 0.0;
   double wind_m_s = 0.0;
   double cloud_frac = 0.0;

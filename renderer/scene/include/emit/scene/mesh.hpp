@@ -53,6 +53,9 @@ struct Mesh {
   std::vector<std::uint32_t> indices;
   std::vector<Submesh> submeshes;  ///< cover `indices` without gap or overlap
   Aabb bounds;                     ///< of positions_m, in the mesh's own axes
+  /// The surface of a body, see is_closed_surface(): seen from outside, its nearest face along any
+  /// ray is a front face.
+  bool closed = false;
 };
 
 /// One mesh drawn once. Transforms have a positive determinant: where a glTF node mirrors, a
@@ -90,6 +93,11 @@ struct SceneGeometry {
   Aabb static_bounds;                   ///< world, static instances
   Aabb bounds;                          ///< world, all instances at their placements
 };
+
+/// True when the triangles bound a body: every directed edge is met by exactly one opposite one
+/// (vertices at equal positions count as one), no submesh is a sheet, and the enclosed volume is
+/// positive, i.e. front faces look outwards. Setup only: O(n log n) in time, 24 bytes a triangle.
+[[nodiscard]] bool is_closed_surface(const Mesh& mesh);
 
 /// body_from_gltf as above; the rotation has determinant +1.
 [[nodiscard]] glm::dmat4 body_from_gltf() noexcept;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/frames.hpp"
 
 /// Plain description of a scenario. `config` fills it from files, `renderer` and `reference` read
@@ -38,6 +39,20 @@ struct RelaxationMode {
   double weight_frac = 0.0;
 };
 
+/// One state of a thermal network between the surface and the base (physics.md eq. 17):
+/// T = base_k + sum x_i, tau_i x_i' = r_i q - x_i, q = net flux into the solid.
+struct FosterMode {
+  double tau_s = 0.0;
+  double resistance_m2k_w = 0.0;  ///< r_i; the sum over the modes is that of the layers
+};
+
+/// What is known about the fitted modes of a material against the reference solver.
+struct FosterFit {
+  double horizon_s = 0.0;  ///< length of the histories they were fitted over
+  double rms_k = 0.0;      ///< largest of the scenarios' root mean squares
+  double max_k = 0.0;      ///< over all scenarios
+};
+
 struct BandEmissivity {
   std::string band;  ///< name of a SpectralBand
   double emissivity_frac = 0.0;
@@ -50,8 +65,15 @@ struct Material {
   std::vector<BandEmissivity> band_emissivity;  ///< bands not listed use emissivity_frac
   std::vector<Layer> layers;                    ///< outermost first; emit2014 uses the first only
   double base_k = 0.0;                          ///< core temperature under the last layer
+  /// emit2014: conductance between surface and core; absent: that of the first layer.
+  std::optional<double> core_conductance_w_m2_k;
   std::optional<double> initial_k;    ///< surface at history start; else thermal.initial_k
-  std::vector<RelaxationMode> modes;  ///< weights sum to 1
+  std::vector<RelaxationMode> modes;  ///< emit2014; weights sum to 1
+  /// foster: 1 to 4 modes, fastest first, of all layers together; empty: derived from them.
+  std::vector<FosterMode> foster_modes;
+  std::optional<FosterFit> foster_fit;  ///< absent: modes come from the layers alone
+  /// False where heat moves otherwise than through dry layers: evaporation, melting, stirring.
+  bool dry_layers_valid = true;
   /// A hot part or another emitter of given temperature: takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
   std::string source;       ///< where the numbers come from
@@ -135,6 +157,7 @@ struct BandAtmosphere {
   std::string band;
   std::vector<AtmosphereTerm> terms;
   double vertical_transmittance_frac = 0.7;  ///< ground to space, zenith; sky = (1-tau^m) L(air)
+  physics::AtmosphereGrid table = {};        ///< not empty: in place of terms and vertical
 };
 struct AtmosphereDesc {
   bool enabled = true;
@@ -142,7 +165,7 @@ struct AtmosphereDesc {
 };
 
 enum class ThermalMethod : std::uint8_t { per_frame };
-enum class ThermalModel : std::uint8_t { emit2014 };
+enum class ThermalModel : std::uint8_t { emit2014, foster };
 enum class StepSpacing : std::uint8_t { uniform, geometric };
 
 struct ThermalOptions {
@@ -151,6 +174,14 @@ struct ThermalOptions {
   double tolerance_k = 0.1;
   double initial_k = 290.0;           ///< surface temperature at history start
   std::int64_t history_start_ns = 0;  ///< sim time; the thermal simulation runs from here to now
+  /// Unshadowed forcing before history start, from a steady profile; emit2014 ignores it. Scenario
+  /// files default to two days for foster.
+  std::int64_t spin_up_ns = 0;
+  /// foster: what the surroundings consist of, where the weather does not state environment_k;
+  /// empty: default_material.
+  std::string surroundings_material;
+  /// foster: number of modes derived from the layers, 2..4; 0: the modes of the material.
+  std::uint32_t foster_modes = 0;
   std::uint32_t steps = 27;
   StepSpacing spacing = StepSpacing::uniform;
   double first_step_s = 20.0;  ///< newest interval of geometric spacing

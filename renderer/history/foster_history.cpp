@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "history/foster_history.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "emit/physics/step_nodes.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using physics::ErrorCode;
+using physics::FosterDrive;
+using physics::FosterState;
+
+// Steps of the spin-up, a quarter of an hour at most: the sun goes straight between their ends. The
+// same holds for the tail, which also makes the fast modes.
+constexpr std::size_t kSpinUpSteps = 288;
+constexpr double kFirstSpinUpStepS = 300.0;
+constexpr double kFirstTailStepS = 300.0;
+// How well the surroundings are followed.
+constexpr double kSurroundingsToleranceK = 0.01;
+
+double seconds(std::int64_t begin_ns, std::int64_t end_ns) noexcept {
+  return static_cast<double>(end_ns - begin_ns) * 1e-9;
+}
+
+glm::dvec3 unit_from_octahedral(double u, double v) noexcept {
+  glm::dvec3 n(u, v, 1.0 - std::abs(u) - std::abs(v));
+  const double t = std::max(-n.z, 0.0);
+  n.x += n.x >= 0.0 ? -t : t;
+  n.y += n.y >= 0.0 ? -t : t;
+  return glm::normalize(n);
+}
+
+/// Steady profile between the initial surface temperature and the base.
+FosterState<double> initial_states(const FosterMaterial& material) noexcept {
+  FosterState<double> x{};
+  const double flux_w_m2 =
+      (material.initial_k - material.base_k) / material.network.resistance_m2k_w();
+  for (std::size_t i = 0; i < material.network.count; ++i) {
+    x[i] = material.network.modes[i].resistance_m2k_w * flux_w_m2;
+  }
+  return x;
+}
+
+physics::FosterSurface<double> surface_of(const FosterMaterial& material,
+                                          double reference_k) noexcept {
+  return physics::foster_surface(material.network, material.emissivity_frac, material.base_k,
+                                 reference_k);
+}
+
+HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
+                                 const Environment& environment) noexcept {
+  HistoryInterval interval;
+  interval.begin_ns = begin_ns;
+  interval.end_ns = end_ns;
+  interval.sun_begin = environment.sun_at(begin_ns);
+  interval.sun_end = environment.sun_at(end_ns);
+  interval.forcing_begin = environment.forcing_at(begin_ns, interval.sun_begin);
+  // Weather that changes at the end of the interval has not acted in it.
+  interval.forcing_end =
+      environment.forcing_at(end_ns > begin_ns ? end_ns - 1 : end_ns, interval.sun_end);
+  return interval;
+}
+
+}  // namespace
+
+FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMaterial& material,
+                                     const glm::dvec3& normal, double reference_k) noexcept {
+  const double sky_frac = 0.5 * (1.0 + normal.z);
+  const double short_wave_w_m2 = std::max(0.0, glm::dot(normal, f.sun_w_m2)) +
+                                 sky_frac * f.diffuse_w_m2 + (1.0 - sky_frac) * f.reflected_w_m2;
+  const double long_wave_w_m2 = sky_frac * f.longwave_w_m2 + (1.0 - sky_frac) * f.environment_w_m2;
+  return {.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
+                           material.emissivity_frac * long_wave_w_m2,
+          .film_w_m2_k = f.film_w_m2_k,
+          .air_offset_k = f.air_k - reference_k};
+}
+
+physics::Result<std::vector<FosterMaterial>> foster_materials(
+    std::span<const scene::Material> materials, const scene::ThermalOptions& options) {
+  std::vector<FosterMaterial> out;
+  for (const scene::Material& material : materials) {
+    FosterMaterial entry;
+    entry.solar_absorptance_frac = material.solar_absorptance_frac;
+    entry.emissivity_frac = material.emissivity_frac;
+    entry.base_k = material.base_k;
+    entry.initial_k = material.initial_k.value_or(options.initial_k);
+    if (material.prescribed_k) {
+      entry.prescribed_k = *material.prescribed_k;
+      out.push_back(entry);
+      continue;
+    }
+    if (options.foster_modes == 0 && !material.foster_modes.empty()) {
+      for (const scene::FosterMode& mode : material.foster_modes) {
+        if (entry.network.count == physics::kMaxFosterModes) break;
+        entry.network.modes[entry.network.count++] = {mode.tau_s, mode.resistance_m2k_w};
+      }
+      out.push_back(entry);
+      continue;
+    }
+    std::vector<physics::StackLayer> layers;
+    for (const scene::Layer& layer : material.layers) {
+      layers.push_back({layer.thickness_m, layer.conductivity_w_m_k,
+                        layer.density_kg_m3 * layer.specific_heat_j_kg_k});
+    }
+    const std::size_t modes =
+        options.foster_modes == 0 ? physics::kMaxFosterModes : std::size_t{options.foster_modes};
+    auto network = physics::network_of_stack(layers, {.modes = modes});
+    if (!network) {
+      return physics::make_error(
+          ErrorCode::config, fmt::format("material '{}': {}", material.name, network.error().text));
+    }
+    entry.network = *network;
+    out.push_back(entry);
+  }
+  return out;
+}
+
+FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
+                             std::vector<FosterMaterial> materials, FosterMaterial surroundings,
+                             const Environment& environment, double reference_k)
+    : materials_(std::move(materials)),
+      surroundings_(surroundings),
+      reference_k_(reference_k),
+      tolerance_k_(std::min(scenario.thermal.tolerance_k, kSurroundingsToleranceK)),
+      history_start_ns_(scenario.thermal.history_start_ns),
+      spin_up_ns_(std::max<std::int64_t>(scenario.thermal.spin_up_ns, 0)),
+      surroundings_surface_(surface_of(surroundings_, reference_k)),
+      intervals_(scenario.thermal.steps) {
+  if (spin_up_ns_ > 0) tail_.resize(kTailSteps);
+  if (spin_up_ns_ > kTailNs) {
+    grid_nodes_ = kGridNodes;
+    spin_up_.resize(kSpinUpSteps);
+  }
+  nodes_ns_.resize(kSpinUpSteps + 1);
+  table_.resize(materials_.size() * grid_nodes_ * grid_nodes_);
+  spin_up_gains_.resize(materials_.size());
+  spin_up(environment);
+}
+
+SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
+                                      const physics::Forcing& weather) const noexcept {
+  SurfaceForcing out;
+  const double sine = std::sin(sun.elevation.value());
+  const double direct_w_m2 =
+      sine > 0.0 ? weather.direct_normal_w_m2 * (1.0 - weather.cloud_frac) : 0.0;
+  out.sun_w_m2 = direct_w_m2 * sun.direction_enu;
+  out.diffuse_w_m2 = weather.diffuse_horizontal_w_m2;
+  out.longwave_w_m2 = weather.longwave_down_w_m2;
+  out.reflected_w_m2 = (1.0 - surroundings_.solar_absorptance_frac) *
+                       (direct_w_m2 * std::max(sine, 0.0) + weather.diffuse_horizontal_w_m2);
+  out.film_w_m2_k = weather.film_w_m2_k;
+  out.air_k = weather.air_k;
+  return out;
+}
+
+void FosterHistory::carry(const HistoryInterval& interval, double tolerance_k,
+                          IntervalForcing& out) noexcept {
+  out.begin = forcing(interval.sun_begin, interval.forcing_begin);
+  out.end = forcing(interval.sun_end, interval.forcing_end);
+  out.dt_s = seconds(interval.begin_ns, interval.end_ns);
+  const glm::dvec3 up(0.0, 0.0, 1.0);
+  double begin_k = surroundings_.prescribed_k;
+  double end_k = surroundings_.prescribed_k;
+  if (!surroundings_.prescribed()) {
+    begin_k = reference_k_ + physics::foster_offset_k(surroundings_state_, surroundings_surface_);
+    const auto ladder = physics::foster_ladder(out.dt_s, surroundings_.network);
+    physics::foster_advance(surroundings_state_,
+                            unshadowed_drive(out.begin, surroundings_, up, reference_k_),
+                            unshadowed_drive(out.end, surroundings_, up, reference_k_), ladder,
+                            surroundings_surface_, tolerance_k);
+    end_k = reference_k_ + physics::foster_offset_k(surroundings_state_, surroundings_surface_);
+  }
+  const auto exitance_w_m2 = [](double t_k) {
+    const double t2 = t_k * t_k;
+    return physics::kStefanBoltzmannWPerM2K4 * t2 * t2;
+  };
+  const auto environment_k = [](const physics::Forcing& weather, double model_k) {
+    return weather.environment_stated ? weather.environment_k : model_k;
+  };
+  out.begin.environment_w_m2 = exitance_w_m2(environment_k(interval.forcing_begin, begin_k));
+  out.end.environment_w_m2 = exitance_w_m2(environment_k(interval.forcing_end, end_k));
+  surroundings_now_k_ = environment_k(interval.forcing_end, end_k);
+}
+
+void FosterHistory::spin_up_surroundings(const Environment& environment) noexcept {
+  surroundings_state_ =
+      surroundings_.prescribed() ? FosterState<double>{} : initial_states(surroundings_);
+  const std::int64_t table_ns =
+      history_start_ns_ - std::min(spin_up_ns_, tail_.empty() ? 0 : kTailNs);
+  if (!spin_up_.empty()) {
+    physics::geometric_step_nodes(history_start_ns_ - spin_up_ns_, table_ns, kFirstSpinUpStepS,
+                                  std::span(nodes_ns_).first(kSpinUpSteps + 1));
+    for (std::size_t i = 0; i < kSpinUpSteps; ++i) {
+      carry(interval_between(nodes_ns_[i], nodes_ns_[i + 1], environment), tolerance_k_,
+            spin_up_[i]);
+    }
+  }
+  if (!tail_.empty()) {
+    physics::geometric_step_nodes(table_ns, history_start_ns_, kFirstTailStepS,
+                                  std::span(nodes_ns_).first(kTailSteps + 1));
+    for (std::size_t i = 0; i < kTailSteps; ++i) {
+      carry(interval_between(nodes_ns_[i], nodes_ns_[i + 1], environment), tolerance_k_, tail_[i]);
+    }
+  }
+  surroundings_at_start_ = surroundings_state_;
+}
+
+FosterState<double> FosterHistory::spun_up(std::size_t index,
+                                           const glm::dvec3& normal) const noexcept {
+  const FosterMaterial& material = materials_[index];
+  FosterState<double> x = initial_states(material);
+  if (spin_up_.empty()) return x;
+  const auto surface = surface_of(material, reference_k_);
+  FosterDrive<double> from =
+      unshadowed_drive(spin_up_.front().begin, material, normal, reference_k_);
+  for (std::size_t i = 0; i < spin_up_.size(); ++i) {
+    const FosterDrive<double> to =
+        unshadowed_drive(spin_up_[i].end, material, normal, reference_k_);
+    physics::foster_step(x, from, to, spin_up_gains_[index][i], surface);
+    // A jump of the weather at the node acts from there on.
+    from = i + 1 < spin_up_.size()
+               ? unshadowed_drive(spin_up_[i + 1].begin, material, normal, reference_k_)
+               : to;
+  }
+  return x;
+}
+
+void FosterHistory::spin_up(const Environment& environment) noexcept {
+  spin_up_surroundings(environment);
+  for (std::size_t m = 0; m < materials_.size(); ++m) {
+    const FosterMaterial& material = materials_[m];
+    if (material.prescribed()) continue;
+    std::vector<physics::FosterGains<double>>& gains = spin_up_gains_[m];
+    gains.resize(spin_up_.size());
+    for (std::size_t i = 0; i < spin_up_.size(); ++i) {
+      gains[i] = physics::foster_gains(spin_up_[i].dt_s, material.network);
+    }
+    for (std::uint32_t j = 0; j < grid_nodes_; ++j) {
+      for (std::uint32_t i = 0; i < grid_nodes_; ++i) {
+        const double scale = 2.0 / (grid_nodes_ - 1);
+        const FosterState<double> x =
+            spun_up(m, unit_from_octahedral(scale * i - 1.0, scale * j - 1.0));
+        table_[(m * grid_nodes_ + j) * grid_nodes_ + i] =
+            glm::vec4(static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
+                      static_cast<float>(x[3]));
+      }
+    }
+  }
+  revision_ = environment.revision();
+  const auto changes_ns = environment.changes_ns();
+  weather_before_start_ = !changes_ns.empty() && changes_ns.front() < history_start_ns_;
+}
+
+bool FosterHistory::update(const StepPlan& plan, const Environment& environment) noexcept {
+  bool changed = false;
+  if (revision_ != environment.revision()) {
+    revision_ = environment.revision();
+    const auto changes_ns = environment.changes_ns();
+    const bool before_start = !changes_ns.empty() && changes_ns.front() < history_start_ns_;
+    if (before_start != weather_before_start_ ||
+        (before_start && changes_ns.back() < history_start_ns_)) {
+      spin_up(environment);
+      changed = true;
+    }
+  }
+  surroundings_state_ = surroundings_at_start_;
+  const auto intervals = plan.intervals();
+  for (std::size_t i = 0; i < intervals.size() && i < intervals_.size(); ++i) {
+    carry(intervals[i], tolerance_k_, intervals_[i]);
+  }
+  return changed;
+}
+
+}  // namespace emit::renderer

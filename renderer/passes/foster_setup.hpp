@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "gl/objects.hpp"
+#include "history/foster_history.hpp"
+#include "shared/frame_params.glsl.h"
+
+/// What the extended thermal model needs once, at set-up. Nothing of it costs emit2014 a byte but
+/// an empty table.
+namespace emit::renderer {
+
+/// The networks of all simulated materials and, last, of the surroundings; empty for emit2014.
+/// Errors (config) name the material.
+[[nodiscard]] physics::Result<std::vector<FosterMaterial>> build_foster_materials(
+    const scene::ScenarioDesc& scenario, std::span<const scene::Material> materials);
+
+/// Runs the spin-up; nothing for emit2014. `materials` as build_foster_materials() made them.
+[[nodiscard]] std::optional<FosterHistory> make_foster(const scene::ScenarioDesc& scenario,
+                                                       std::vector<FosterMaterial> materials,
+                                                       const Environment& environment,
+                                                       double reference_k);
+
+/// Adds the resistances of the modes to the material table.
+void add_resistances(const std::optional<FosterHistory>& foster,
+                     std::span<gpu::MaterialParams> params) noexcept;
+
+[[nodiscard]] gl::Buffer make_spin_up_buffer(const std::optional<FosterHistory>& foster);
+
+}  // namespace emit::renderer

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <glm/ext/vector_double3.hpp>
+#include <span>
+#include <vector>
+
+#include "emit/reference/solid_solver.hpp"
+#include "emit/reference/visibility.hpp"
+#include "emit/reference/voxel_model.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+/// Radiation between the faces of a voxel model, sky and surroundings. Faces are gathered into
+/// patches of about 20 cm that radiate evenly; every face sees them by rays of its own. Short-wave
+/// and long-wave are diffuse; reflections between patches are followed until they fade.
+namespace emit::reference {
+
+struct ExchangeFace {
+  glm::dvec3 centre_m{0.0};
+  glm::dvec3 normal{0.0};
+  double area_m2 = 0.0;
+  double solar_absorptance_frac = 0.0;
+  double emissivity_frac = 0.0;
+  bool enclosed = false;  ///< looks into a closed cavity: no rays, no sky
+};
+
+/// What falls on a face besides direct sun, W/m2.
+struct Incoming {
+  double shortwave_w_m2 = 0.0;
+  double longwave_w_m2 = 0.0;
+};
+
+/// Sky and surroundings as the exchange needs them.
+struct ExchangeSky {
+  double diffuse_w_m2 = 0.0;       ///< short-wave irradiance of the open sky on level ground
+  double longwave_w_m2 = 0.0;      ///< the same, long-wave
+  double ground_short_w_m2 = 0.0;  ///< radiosity of what lies beyond the scene below the horizon
+  double ground_long_w_m2 = 0.0;
+};
+
+/// Immutable after creation; any number of threads may ask.
+class SceneExchange {
+ public:
+  /// `rays` per face.
+  SceneExchange(std::span<const SolidFace> faces, std::span<const ExchangeFace> surfaces,
+                const FaceFinder& finder, const SceneInstant& scene, std::uint32_t rays);
+
+  /// `direct_w_m2`: sunlight that falls on each face. `face_k`: temperatures.
+  void incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
+                const ExchangeSky& sky, std::span<Incoming> out) const;
+
+  [[nodiscard]] double sky_frac(std::size_t face) const noexcept { return sky_frac_[face]; }
+  /// Share of the hemisphere that leaves the scene below the horizon.
+  [[nodiscard]] double ground_frac(std::size_t face) const noexcept { return ground_frac_[face]; }
+  [[nodiscard]] std::size_t patches() const noexcept { return patch_area_m2_.size(); }
+
+  struct Link {
+    std::uint32_t patch = 0;
+    float share_frac = 0.0F;
+  };
+  [[nodiscard]] std::span<const Link> links(std::size_t face) const noexcept {
+    return {links_.data() + link_start_[face], link_start_[face + 1] - link_start_[face]};
+  }
+  /// Area-weighted means over the patches of values per face.
+  [[nodiscard]] std::vector<double> patch_means(std::span<const double> per_face) const;
+  [[nodiscard]] std::uint32_t patch_of(std::size_t face) const noexcept { return patch_[face]; }
+
+ private:
+  void gather_patches(std::span<const SolidFace> faces);
+  void trace(std::span<const ExchangeFace> surfaces, const FaceFinder& finder,
+             const SceneInstant& scene, std::uint32_t rays);
+  void link_patches();
+
+  std::vector<double> absorptance_, emissivity_, area_m2_, sky_frac_, ground_frac_;
+  std::vector<std::uint32_t> patch_;
+  std::vector<std::size_t> link_start_;
+  std::vector<Link> links_;
+  std::vector<double> patch_area_m2_, patch_reflect_, patch_emissivity_, patch_sky_, patch_ground_;
+  std::vector<std::size_t> patch_link_start_;
+  std::vector<Link> patch_links_;
+};
+
+/// Share of the sun's disc that every face sees, averaged over the face where a shadow's edge
+/// crosses it.
+class SunOnFaces {
+ public:
+  SunOnFaces(std::span<const SolidFace> faces, std::span<const ExchangeFace> surfaces);
+  /// @pre out as long as the faces
+  void visible_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
+                    std::span<double> out) const;
+
+ private:
+  [[nodiscard]] double mean_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
+                                 std::size_t face) const;
+
+  std::span<const SolidFace> faces_;
+  std::vector<ExchangeFace> surfaces_;
+  std::vector<std::uint32_t> node_start_;  ///< faces around every node
+  std::vector<std::uint32_t> node_faces_;
+};
+
+}  // namespace emit::reference

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/reference/radiosity.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <map>
+#include <tuple>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::reference {
+namespace {
+
+constexpr double kPatchM = 0.2;
+/// Reflections: each round is weaker by reflectance times view factor, below a fifth in any scene
+/// of common materials.
+constexpr int kBounces = 8;
+
+template <class Body>
+void for_range(std::size_t n, std::size_t grain, const Body& body) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
+  });
+}
+
+double fourth(double t) {
+  const double t2 = t * t;
+  return t2 * t2;
+}
+
+}  // namespace
+
+SceneExchange::SceneExchange(std::span<const SolidFace> faces,
+                             std::span<const ExchangeFace> surfaces, const FaceFinder& finder,
+                             const SceneInstant& scene, std::uint32_t rays) {
+  for (const ExchangeFace& surface : surfaces) {
+    absorptance_.push_back(surface.solar_absorptance_frac);
+    emissivity_.push_back(surface.emissivity_frac);
+    area_m2_.push_back(surface.area_m2);
+  }
+  sky_frac_.resize(faces.size());
+  ground_frac_.resize(faces.size());
+  gather_patches(faces);
+  trace(surfaces, finder, scene, rays);
+  link_patches();
+}
+
+void SceneExchange::gather_patches(std::span<const SolidFace> faces) {
+  using Key = std::tuple<std::uint8_t, std::int8_t, std::uint16_t, std::int64_t, std::int64_t,
+                         std::int64_t>;
+  std::map<Key, std::uint32_t> known;
+  patch_.resize(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    const SolidFace& face = faces[f];
+    const glm::dvec3 centre = face.centre_m();
+    std::array<std::int64_t, 3> tile{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double x = centre[static_cast<glm::dvec3::length_type>(axis)];
+      // The plane itself keeps parallel faces apart.
+      tile[axis] = axis == face.axis ? std::llround(x * 1e5)
+                                     : static_cast<std::int64_t>(std::floor(x / kPatchM));
+    }
+    const auto [found, added] =
+        known.try_emplace(Key{face.axis, face.sign, face.material, tile[0], tile[1], tile[2]},
+                          static_cast<std::uint32_t>(known.size()));
+    patch_[f] = found->second;
+  }
+  patch_area_m2_.assign(known.size(), 0.0);
+  for (std::size_t f = 0; f < faces.size(); ++f) patch_area_m2_[patch_[f]] += area_m2_[f];
+  std::vector<double> reflect(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f) reflect[f] = 1.0 - absorptance_[f];
+  patch_reflect_ = patch_means(reflect);
+  patch_emissivity_ = patch_means(emissivity_);
+}
+
+std::vector<double> SceneExchange::patch_means(std::span<const double> per_face) const {
+  std::vector<double> means(patch_area_m2_.size(), 0.0);
+  for (std::size_t f = 0; f < per_face.size(); ++f) means[patch_[f]] += area_m2_[f] * per_face[f];
+  for (std::size_t p = 0; p < means.size(); ++p) means[p] /= patch_area_m2_[p];
+  return means;
+}
+
+void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFinder& finder,
+                          const SceneInstant& scene, std::uint32_t rays) {
+  const std::size_t n = surfaces.size();
+  std::vector<std::vector<Link>> found(n);
+  tbb::enumerable_thread_specific<std::vector<HemisphereRay>> buffers(
+      [&] { return std::vector<HemisphereRay>(rays); });
+  for_range(n, 64, [&](std::size_t f) {
+    const ExchangeFace& surface = surfaces[f];
+    if (surface.enclosed) return;
+    std::vector<HemisphereRay>& buffer = buffers.local();
+    scene.hemisphere({surface.centre_m, surface.normal, 0.0}, buffer,
+                     static_cast<std::uint32_t>(f));
+    std::uint32_t sky = 0;
+    std::uint32_t ground = 0;
+    std::vector<std::uint32_t> hits;
+    for (const HemisphereRay& ray : buffer) {
+      if (!ray.hit_surface) {
+        ++(ray.direction.z > 0.0 ? sky : ground);
+        continue;
+      }
+      const auto face = ray.hit.front
+                            ? finder.find(ray.hit.position_world_m, ray.hit.geometric_normal)
+                            : std::nullopt;
+      // A face that is not part of the model counts as surroundings.
+      if (face) {
+        hits.push_back(patch_[*face]);
+      } else {
+        ++ground;
+      }
+    }
+    const double share = 1.0 / static_cast<double>(rays);
+    sky_frac_[f] = sky * share;
+    ground_frac_[f] = ground * share;
+    std::sort(hits.begin(), hits.end());
+    for (std::size_t i = 0; i < hits.size();) {
+      std::size_t end = i;
+      while (end < hits.size() && hits[end] == hits[i]) ++end;
+      found[f].push_back({hits[i], static_cast<float>(static_cast<double>(end - i) * share)});
+      i = end;
+    }
+  });
+  link_start_.assign(n + 1, 0);
+  for (std::size_t f = 0; f < n; ++f) link_start_[f + 1] = link_start_[f] + found[f].size();
+  links_.reserve(link_start_[n]);
+  for (const auto& list : found) links_.insert(links_.end(), list.begin(), list.end());
+}
+
+/// View factors between patches: the means of those of their faces.
+void SceneExchange::link_patches() {
+  patch_sky_ = patch_means(sky_frac_);
+  patch_ground_ = patch_means(ground_frac_);
+  std::vector<std::map<std::uint32_t, double>> sums(patches());
+  for (std::size_t f = 0; f < patch_.size(); ++f) {
+    for (const Link& link : links(f)) {
+      sums[patch_[f]][link.patch] += area_m2_[f] * static_cast<double>(link.share_frac);
+    }
+  }
+  patch_link_start_.push_back(0);
+  for (std::size_t p = 0; p < sums.size(); ++p) {
+    for (const auto& [other, sum] : sums[p]) {
+      patch_links_.push_back({other, static_cast<float>(sum / patch_area_m2_[p])});
+    }
+    patch_link_start_.push_back(patch_links_.size());
+  }
+}
+
+void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
+                             const ExchangeSky& sky, std::span<Incoming> out) const {
+  const std::size_t n = patches();
+  const std::vector<double> direct = patch_means(direct_w_m2);
+  std::vector<double> emitted(face_k.size());
+  for_range(face_k.size(), 8192, [&](std::size_t f) {
+    emitted[f] = emissivity_[f] * physics::kStefanBoltzmannWPerM2K4 * fourth(face_k[f]);
+  });
+  const std::vector<double> own_long = patch_means(emitted);
+  std::vector<double> short_w(n, 0.0), long_w(n, 0.0), next_short(n), next_long(n);
+  for (int bounce = 0; bounce < kBounces; ++bounce) {
+    for_range(n, 256, [&](std::size_t p) {
+      double in_short =
+          direct[p] + patch_sky_[p] * sky.diffuse_w_m2 + patch_ground_[p] * sky.ground_short_w_m2;
+      double in_long = patch_sky_[p] * sky.longwave_w_m2 + patch_ground_[p] * sky.ground_long_w_m2;
+      for (std::size_t at = patch_link_start_[p]; at < patch_link_start_[p + 1]; ++at) {
+        const Link& link = patch_links_[at];
+        in_short += static_cast<double>(link.share_frac) * short_w[link.patch];
+        in_long += static_cast<double>(link.share_frac) * long_w[link.patch];
+      }
+      next_short[p] = patch_reflect_[p] * in_short;
+      next_long[p] = own_long[p] + (1.0 - patch_emissivity_[p]) * in_long;
+    });
+    short_w.swap(next_short);
+    long_w.swap(next_long);
+  }
+  for_range(out.size(), 4096, [&](std::size_t f) {
+    Incoming in{sky_frac_[f] * sky.diffuse_w_m2 + ground_frac_[f] * sky.ground_short_w_m2,
+                sky_frac_[f] * sky.longwave_w_m2 + ground_frac_[f] * sky.ground_long_w_m2};
+    for (const Link& link : links(f)) {
+      in.shortwave_w_m2 += static_cast<double>(link.share_frac) * short_w[link.patch];
+      in.longwave_w_m2 += static_cast<double>(link.share_frac) * long_w[link.patch];
+    }
+    out[f] = in;
+  });
+}
+
+SunOnFaces::SunOnFaces(std::span<const SolidFace> faces, std::span<const ExchangeFace> surfaces)
+    : faces_(faces), surfaces_(surfaces.begin(), surfaces.end()) {
+  std::uint32_t nodes = 0;
+  for (const SolidFace& face : faces) {
+    for (const std::uint32_t node : face.nodes) nodes = std::max(nodes, node + 1);
+  }
+  node_start_.assign(nodes + 1, 0);
+  for (const SolidFace& face : faces) {
+    for (const std::uint32_t node : face.nodes) ++node_start_[node + 1];
+  }
+  for (std::size_t i = 0; i < nodes; ++i) node_start_[i + 1] += node_start_[i];
+  node_faces_.resize(node_start_[nodes]);
+  std::vector<std::uint32_t> at(node_start_.begin(), node_start_.end() - 1);
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    for (const std::uint32_t node : faces[f].nodes) {
+      node_faces_[at[node]++] = static_cast<std::uint32_t>(f);
+    }
+  }
+}
+
+/// Mean over a face, at Gauss points of order three each way.
+double SunOnFaces::mean_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
+                             std::size_t f) const {
+  static constexpr std::array<double, 3> kPlace{0.1127016653792583, 0.5, 0.8872983346207417};
+  static constexpr std::array<double, 3> kWeight{5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
+  const SolidFace& face = faces_[f];
+  const auto u = static_cast<glm::dvec3::length_type>(face.axis == 0 ? 1 : 0);
+  const auto v = static_cast<glm::dvec3::length_type>(face.axis == 2 ? 1 : 2);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      glm::dvec3 p = face.low_m;
+      p[u] += kPlace[i] * (face.high_m[u] - face.low_m[u]);
+      p[v] += kPlace[j] * (face.high_m[v] - face.low_m[v]);
+      sum += kWeight[i] * kWeight[j] *
+             scene.sun_visible_frac_clipped({p, surfaces_[f].normal, 0.0}, to_sun).value_frac;
+    }
+  }
+  return sum;
+}
+
+void SunOnFaces::visible_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
+                              std::span<double> out) const {
+  // One ray per face tells sun from shade. Faces beside a change are integrated, and from them on
+  // their neighbours as long as the disc is partly covered: that walks through every penumbra.
+  const std::size_t n = faces_.size();
+  const auto towards = [&](std::size_t f) {
+    return !surfaces_[f].enclosed && glm::dot(surfaces_[f].normal, to_sun) > 0.0;
+  };
+  std::vector<double> ray(n);
+  for_range(n, 256, [&](std::size_t f) {
+    const bool lit = towards(f) && !scene.occluded({surfaces_[f].centre_m, to_sun, 0.0});
+    ray[f] = lit ? 1.0 : 0.0;
+    out[f] = ray[f];
+  });
+  const auto same_side = [&](std::size_t a, std::size_t b) {
+    return faces_[a].axis == faces_[b].axis && faces_[a].sign == faces_[b].sign;
+  };
+  std::vector<char> taken(n, 0);
+  for_range(n, 256, [&](std::size_t f) {
+    if (!towards(f)) return;
+    for (const std::uint32_t node : faces_[f].nodes) {
+      for (std::uint32_t at = node_start_[node]; at < node_start_[node + 1]; ++at) {
+        const std::uint32_t other = node_faces_[at];
+        // At the foot or edge of a solid a shadow narrower than a face may begin.
+        if (same_side(f, other) ? ray[other] != ray[f] : !towards(other)) taken[f] = 1;
+      }
+    }
+  });
+  std::vector<std::uint32_t> front;
+  for (std::size_t f = 0; f < n; ++f) {
+    if (taken[f] != 0) front.push_back(static_cast<std::uint32_t>(f));
+  }
+  while (!front.empty()) {
+    for_range(front.size(), 8,
+              [&](std::size_t i) { out[front[i]] = mean_frac(scene, to_sun, front[i]); });
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t f : front) {
+      if (!(out[f] > 0.0 && out[f] < 1.0)) continue;
+      for (const std::uint32_t node : faces_[f].nodes) {
+        for (std::uint32_t at = node_start_[node]; at < node_start_[node + 1]; ++at) {
+          const std::uint32_t other = node_faces_[at];
+          if (taken[other] != 0 || !same_side(f, other) || !towards(other)) continue;
+          taken[other] = 1;
+          next.push_back(other);
+        }
+      }
+    }
+    front.swap(next);
+  }
+}
+
+}  // namespace emit::reference

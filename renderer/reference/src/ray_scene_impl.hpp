@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <glm/ext/matrix_double3x3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "emit/reference/visibility.hpp"
+#include "ray_set.hpp"
+
+namespace emit::reference {
+
+struct RayScene::Impl {
+  EmbreeDevice device;  // before the sets: released after them
+  RaySceneDesc desc;
+  RayArithmetic arithmetic = RayArithmetic::exact;
+  std::unique_ptr<RaySet> fixed;
+  std::vector<std::unique_ptr<RaySet>> movers;
+  std::size_t triangles = 0;
+  std::size_t dropped = 0;
+};
+
+struct PlacedMover {
+  const RaySet* set = nullptr;
+  physics::Pose pose;
+  bool on = true;
+  glm::dmat3 world_from_body{1.0};
+  glm::dvec3 centre_world_m{0.0};
+};
+
+struct SceneInstant::Impl {
+  const RayScene::Impl* scene = nullptr;
+  std::vector<PlacedMover> movers;
+
+  /// Distance to a plane that rounding alone may cause for a point with these world coordinates.
+  [[nodiscard]] double plane_m(const glm::dvec3& point_world_m, double tolerance_m) const noexcept;
+  [[nodiscard]] PreparedRay in_fixed(const Ray& ray) const noexcept;
+  [[nodiscard]] PreparedRay in_mover(const PlacedMover& mover, const Ray& ray) const noexcept;
+  [[nodiscard]] bool near(const PlacedMover& mover, const Ray& ray) const noexcept;
+
+  /// Bit i is set where rays[i] is blocked. @pre at most 16 rays
+  [[nodiscard]] std::uint32_t blocked_16(std::span<const Ray> rays) const;
+
+  /// Triangles that may stand before a disc, relative to the point; those whose plane holds the
+  /// point are left out.
+  void gather(const SurfacePoint& point, const glm::dvec3& axis, double semi_angle_rad,
+              std::vector<std::array<glm::dvec3, 3>>& out) const;
+
+  [[nodiscard]] RayHit complete(const Ray& ray, const RaySet& set, const SetHit& hit,
+                                const PlacedMover* mover) const;
+
+  /// In fast arithmetic the start is moved off the surface by the float32 error.
+  [[nodiscard]] glm::dvec3 start_m(const SurfacePoint& point) const noexcept;
+};
+
+}  // namespace emit::reference

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <glm/ext/vector_double3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/reference/visibility.hpp"
+#include "ray_cone_tree.hpp"
+#include "ray_triangle.hpp"
+
+struct RTCDeviceTy;
+struct RTCSceneTy;
+
+namespace emit::reference {
+
+struct EmbreeRelease {
+  void operator()(RTCDeviceTy* device) const noexcept;
+  void operator()(RTCSceneTy* scene) const noexcept;
+};
+using EmbreeDevice = std::unique_ptr<RTCDeviceTy, EmbreeRelease>;
+using EmbreeScene = std::unique_ptr<RTCSceneTy, EmbreeRelease>;
+
+[[nodiscard]] physics::Result<EmbreeDevice> make_embree_device();
+
+/// Where a triangle of a set comes from.
+struct TriangleSource {
+  std::uint32_t mesh = 0;
+  std::uint32_t primitive = 0;
+};
+
+/// A ray in the frame of a set (world axes minus the set's origin).
+struct SetHit {
+  TriangleHit triangle;
+  std::uint32_t index = 0;  ///< of the set's triangles
+};
+
+/// Triangles of one rigid frame, relative to an origin in their middle, under one hierarchy.
+class RaySet {
+ public:
+  struct Builder {
+    std::vector<std::array<glm::dvec3, 3>> triangles;  ///< in the frame's own coordinates
+    std::vector<TriangleSource> sources;
+  };
+  [[nodiscard]] static physics::Result<std::unique_ptr<RaySet>> create(RTCDeviceTy* device,
+                                                                       Builder builder,
+                                                                       RayArithmetic arithmetic);
+
+  [[nodiscard]] bool empty() const noexcept { return triangles_.empty(); }
+  [[nodiscard]] const glm::dvec3& origin_m() const noexcept { return origin_m_; }
+  /// Of a ball around the origin that holds every triangle.
+  [[nodiscard]] double radius_m() const noexcept { return radius_m_; }
+  [[nodiscard]] std::span<const std::array<glm::dvec3, 3>> triangles() const noexcept {
+    return triangles_;  // relative to origin_m()
+  }
+  [[nodiscard]] TriangleSource source(std::uint32_t index) const { return sources_[index]; }
+
+  /// Nearest hit closer than `limit_m`; ties go to the first triangle. The ray is relative to
+  /// origin_m().
+  [[nodiscard]] bool first_hit(const PreparedRay& ray, double limit_m, SetHit& hit) const;
+  [[nodiscard]] bool occluded(const PreparedRay& ray) const;
+  /// Up to 16 rays at once, all of the same direction. `blocked` bits are or-ed.
+  void occluded_16(std::span<const PreparedRay> rays, std::uint32_t& blocked) const;
+
+  /// Triangles that may lie within a cone, ascending.
+  void in_cone(const glm::dvec3& apex_m, const glm::dvec3& axis, double semi_angle_rad,
+               std::vector<std::uint32_t>& out) const;
+
+ private:
+  friend struct SetCallbacks;
+  RaySet() = default;
+  [[nodiscard]] bool enter(const PreparedRay& ray, glm::dvec3& start_m,
+                           double& skipped_m) const noexcept;
+
+  std::vector<std::array<glm::dvec3, 3>> triangles_;
+  std::vector<TriangleSource> sources_;
+  glm::dvec3 origin_m_{0.0};
+  double radius_m_ = 0.0;
+  double pad_m_ = 0.0;
+  RayArithmetic arithmetic_ = RayArithmetic::exact;
+  EmbreeScene scene_;
+  ConeTree cone_tree_;
+};
+
+}  // namespace emit::reference

@@ -1,0 +1,431 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/reference/solve.hpp"
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "emit/reference/surface_forcing.hpp"
+#include "emit/reference/visibility.hpp"
+#include "solve_checkpoint.hpp"
+#include "solve_points.hpp"
+#include "solve_radiance.hpp"
+#include "solve_solid.hpp"
+
+namespace emit::reference {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+/// What a pixel's ray meets.
+struct PixelHit {
+  std::uint32_t pixel = 0;
+  SolvePoint point;
+  glm::dvec3 direction{0.0};
+  double range_m = 0.0;
+  double sky_frac = 0.0;
+  double ground_frac = 0.0;
+  double sun_frac = 0.0;
+  std::uint32_t face = 0;  ///< three dimensions
+};
+
+std::uint64_t mix(std::uint64_t x) {
+  x += 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31U);
+}
+
+/// Share of the direct sun that clouds take: the weather table's, linear, or the model's.
+double cloud_frac_at(const scene::ScenarioDesc& scenario, std::int64_t sim_time_ns) {
+  const auto& rows = scenario.weather;
+  if (rows.empty()) return scenario.clear_sky.cloud_frac;
+  const auto after =
+      std::upper_bound(rows.begin(), rows.end(), sim_time_ns,
+                       [](std::int64_t t, const auto& row) { return t < row.sim_time_ns; });
+  if (after == rows.begin()) return rows.front().cloud_frac;
+  if (after == rows.end()) return rows.back().cloud_frac;
+  const auto& before = *(after - 1);
+  const double share = static_cast<double>(sim_time_ns - before.sim_time_ns) /
+                       static_cast<double>(after->sim_time_ns - before.sim_time_ns);
+  return before.cloud_frac + share * (after->cloud_frac - before.cloud_frac);
+}
+
+/// The pixels with the smallest hashes: a random-looking choice, the same every time.
+void choose(std::vector<PixelHit>& hits, std::uint64_t wanted) {
+  if (wanted == 0 || wanted >= hits.size()) return;
+  std::sort(hits.begin(), hits.end(),
+            [](const PixelHit& a, const PixelHit& b) { return mix(a.pixel) < mix(b.pixel); });
+  hits.resize(wanted);
+  std::sort(hits.begin(), hits.end(),
+            [](const PixelHit& a, const PixelHit& b) { return a.pixel < b.pixel; });
+}
+
+}  // namespace
+
+struct SceneSolver::Data {
+  scene::ScenarioDesc scenario;
+  scene::SceneGeometry geometry;
+  SolveOptions options;
+  std::int64_t end_ns = 0;
+  std::optional<RayScene> rays;
+  std::optional<SceneInstant> start;
+  std::optional<SurfaceClimate> climate;
+  std::unique_ptr<SolidHistory> solid;
+  std::vector<BandRadiance> bands;
+  SolveFingerprint print;
+  bool started = false;
+  bool resumed = false;
+  bool stopped = false;
+  std::vector<std::string> notes;
+
+  Result<void> start_solid();
+  Result<std::vector<PixelHit>> see(const SolveView& view, SolvedImage& image,
+                                    std::vector<glm::dvec3>& sky_rays) const;
+  void radiate(const SolveView& view, std::span<const PixelHit> hits,
+               std::span<const double> kelvin, std::span<const glm::dvec3> sky_rays,
+               SolvedImage& image);
+};
+
+Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
+                                        const scene::SceneGeometry& geometry,
+                                        const SolveOptions& options, std::int64_t end_ns) {
+  if (options.rays == 0 || !(options.refine > 0.0) || !(options.tolerance_k > 0.0)) {
+    return make_error(ErrorCode::invalid_argument,
+                      "solve: rays, refinement and tolerance must be positive");
+  }
+  if (end_ns < scenario.thermal.history_start_ns) {
+    return make_error(ErrorCode::invalid_argument,
+                      "solve: the time asked for lies before the start of the thermal history");
+  }
+  auto data = std::make_unique<Data>();
+  data->scenario = scenario;
+  data->geometry = geometry;
+  data->options = options;
+  data->end_ns = end_ns;
+  auto rays = RayScene::create(ray_scene_desc(scenario, geometry));
+  if (!rays) return tl::unexpected(std::move(rays.error()));
+  data->rays.emplace(std::move(*rays));
+  ClimateOptions climate_options;
+  climate_options.end_ns = std::max(end_ns, scenario.thermal.history_start_ns + 1);
+  auto climate = SurfaceClimate::create(scenario, climate_options);
+  if (!climate) return tl::unexpected(std::move(climate.error()));
+  data->climate.emplace(std::move(*climate));
+  for (std::size_t band = 0; band < scenario.bands.size(); ++band) {
+    auto made = BandRadiance::create(scenario, band);
+    if (!made) return tl::unexpected(std::move(made.error()));
+    data->bands.push_back(std::move(*made));
+  }
+  bool three = options.dimension == SolveDimension::three;
+  if (options.dimension == SolveDimension::automatic) {
+    three = VoxelModel::fits(scenario, geometry);
+  }
+  if (three) {
+    data->start.emplace(data->rays->at(scenario.thermal.history_start_ns));
+    auto solid = SolidHistory::create(data->scenario, data->geometry, *data->start, *data->climate,
+                                      data->options, static_cast<double>(end_ns) * 1e-9);
+    if (!solid) return tl::unexpected(std::move(solid.error()));
+    data->solid = std::move(*solid);
+    data->print = fingerprint(scenario, geometry, options);
+    // The grid is fine where shadows fall until the end, so the end belongs to the run.
+    data->print.options ^= static_cast<std::uint64_t>(end_ns) * 0x9e3779b97f4a7c15ULL;
+  }
+  return SceneSolver(std::move(data));
+}
+
+SceneSolver::SceneSolver(std::unique_ptr<Data> data) : data_(std::move(data)) {}
+SceneSolver::~SceneSolver() = default;
+SceneSolver::SceneSolver(SceneSolver&&) noexcept = default;
+SceneSolver& SceneSolver::operator=(SceneSolver&&) noexcept = default;
+
+/// From the checkpoint, else through the spin-up.
+Result<void> SceneSolver::Data::start_solid() {
+  if (started) return {};
+  if (!options.checkpoint.empty()) {
+    auto saved = load_checkpoint(checkpoint_file(scenario, options), print);
+    if (!saved) return tl::unexpected(std::move(saved.error()));
+    if (*saved) {
+      auto restored = solid->restore((*saved)->state, (*saved)->spin_up);
+      if (!restored) return restored;
+      resumed = true;
+      started = true;
+      return {};
+    }
+  }
+  auto done = solid->spin_up();
+  started = done.has_value();
+  return done;
+}
+
+Result<void> SceneSolver::advance_to(std::int64_t sim_time_ns) {
+  Data& d = *data_;
+  if (sim_time_ns > d.end_ns) {
+    return make_error(ErrorCode::invalid_argument, "solve: later than the end that was announced");
+  }
+  if (!d.solid || d.stopped) return {};
+  if (auto ready = d.start_solid(); !ready) return ready;
+  const double to_s = static_cast<double>(sim_time_ns) * 1e-9;
+  const double start_s = static_cast<double>(d.climate->history_start_ns()) * 1e-9;
+  const double whole_s = std::max(1e-9, static_cast<double>(d.end_ns) * 1e-9 - start_s);
+  if (d.solid->solver().time_s() > to_s) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("solve: the run has reached {} s, {} s is in its past{}",
+                                  d.solid->solver().time_s(), to_s,
+                                  d.resumed ? " (remove the checkpoint to start anew)" : ""));
+  }
+  Result<void> saved;
+  const auto save = [&] {
+    if (d.options.checkpoint.empty()) return;
+    saved = save_checkpoint(checkpoint_file(d.scenario, d.options), d.print,
+                            d.solid->solver().state(), d.solid->spin_up_stats());
+  };
+  const auto done = d.solid->advance(to_s, [&](double time_s) {
+    const std::uint64_t steps = d.solid->solver().stats().steps;
+    if (d.options.checkpoint_steps > 0 && steps % d.options.checkpoint_steps == 0) save();
+    d.stopped = d.options.progress && !d.options.progress((time_s - start_s) / whole_s);
+    return !d.stopped && saved.has_value();
+  });
+  if (!done) return done;
+  save();
+  return saved;
+}
+
+Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, SolvedImage& image,
+                                                     std::vector<glm::dvec3>& sky_rays) const {
+  if (view.width_px == 0 || view.height_px == 0 || !(view.fov_h_rad > 0.0)) {
+    return make_error(ErrorCode::invalid_argument, "solve: the camera has no pixels or no view");
+  }
+  const std::size_t pixels = std::size_t{view.width_px} * view.height_px;
+  image.width_px = view.width_px;
+  image.height_px = view.height_px;
+  image.temperature_k.assign(pixels, kNan);
+  image.depth_m.assign(pixels, std::numeric_limits<float>::infinity());
+  image.object_id.assign(pixels, 0.0F);
+  image.radiance_w_m2_sr.assign(bands.size(), std::vector<float>(pixels, kNan));
+  sky_rays.assign(pixels, glm::dvec3(0.0));
+  const double focal_px = 0.5 * view.width_px / std::tan(0.5 * view.fov_h_rad);
+  const glm::dmat3 world_from_sensor = glm::mat3_cast(view.sensor_pose.world_from_body) *
+                                       glm::transpose(physics::sensor_from_body());
+  const SceneInstant instant = rays->at(view.sim_time_ns);
+  std::vector<std::optional<PixelHit>> found(pixels);
+  tbb::parallel_for(std::uint32_t{0}, view.height_px, [&](std::uint32_t y) {
+    for (std::uint32_t x = 0; x < view.width_px; ++x) {
+      const glm::dvec3 sensor_ray((x + 0.5 - 0.5 * view.width_px) / focal_px,
+                                  (y + 0.5 - 0.5 * view.height_px) / focal_px, 1.0);
+      const glm::dvec3 direction = world_from_sensor * glm::normalize(sensor_ray);
+      const std::uint32_t pixel = y * view.width_px + x;
+      const auto hit = instant.first_hit({view.sensor_pose.position_world_m, direction, 0.0});
+      if (!hit) {
+        sky_rays[pixel] = direction;
+        continue;
+      }
+      PixelHit p;
+      p.pixel = pixel;
+      p.direction = direction;
+      p.range_m = hit->distance_m;
+      glm::dvec3 normal = solid ? hit->geometric_normal : hit->shading_normal;
+      // Interpolated normals may turn away from the side that is seen; the face's own does not.
+      if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
+      if (!hit->front) normal = -normal;
+      p.point = {hit->position_world_m, normal, hit->material, hit->mover};
+      found[pixel] = p;
+      image.depth_m[pixel] = static_cast<float>(hit->distance_m / glm::length(sensor_ray));
+      image.object_id[pixel] = static_cast<float>(hit->object + 1);
+    }
+  });
+  std::vector<PixelHit> hits;
+  for (auto& hit : found) {
+    if (hit) hits.push_back(*hit);
+  }
+  image.surface_px = hits.size();
+  choose(hits, options.pixels);
+  return hits;
+}
+
+/// Radiance at the aperture of the solved pixels and of the sky.
+void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit> hits,
+                                std::span<const double> kelvin,
+                                std::span<const glm::dvec3> sky_rays, SolvedImage& image) {
+  const ClimateNode now = climate->at(view.sim_time_ns);
+  const glm::dvec3 to_sun = glm::normalize(now.to_sun);
+  std::vector<double> face_k;
+  if (solid) {
+    face_k.resize(solid->solver().faces().size());
+    for (std::size_t f = 0; f < face_k.size(); ++f) face_k[f] = solid->solver().face_k(f);
+  }
+  for (std::size_t b = 0; b < bands.size(); ++b) {
+    BandRadiance& band = bands[b];
+    band.set_air(now.air_k, to_sun.z, cloud_frac_at(scenario, view.sim_time_ns),
+                 now.direct_normal_w_m2 > 0.0);
+    const double around = band.black(now.surroundings_k);
+    std::vector<double> patch;
+    if (solid) {
+      // What a patch sends to others: its emission, and the surroundings mirrored once.
+      std::vector<double> leaving(face_k.size());
+      tbb::parallel_for(std::size_t{0}, face_k.size(), [&](std::size_t f) {
+        const double e = band.emissivity(geometry.materials[solid->material_of(f)]);
+        const double sky = solid->exchange().sky_frac(f);
+        leaving[f] =
+            e * band.black(face_k[f]) + (1.0 - e) * (sky * band.sky_mean() + (1.0 - sky) * around);
+      });
+      patch = solid->exchange().patch_means(leaving);
+    }
+    std::vector<float>& plane = image.radiance_w_m2_sr[b];
+    tbb::parallel_for(std::size_t{0}, hits.size(), [&](std::size_t i) {
+      const PixelHit& hit = hits[i];
+      const double e = band.emissivity(geometry.materials[hit.point.material]);
+      double incoming = hit.sky_frac * band.sky_mean() + hit.ground_frac * around +
+                        band.sun_w_m2() / physics::kPi * hit.sun_frac *
+                            std::max(0.0, glm::dot(hit.point.normal, to_sun));
+      if (solid) {
+        for (const SceneExchange::Link& link : solid->exchange().links(hit.face)) {
+          incoming += static_cast<double>(link.share_frac) * patch[link.patch];
+        }
+      }
+      const double leaving = e * band.black(kelvin[i]) + (1.0 - e) * incoming;
+      plane[hit.pixel] =
+          static_cast<float>(band.at_aperture(leaving, hit.range_m, hit.direction.z));
+    });
+    for (std::size_t p = 0; p < sky_rays.size(); ++p) {
+      if (sky_rays[p] == glm::dvec3(0.0)) continue;
+      plane[p] = static_cast<float>(band.sky(sky_rays[p].z));
+    }
+  }
+}
+
+Result<SolvedImage> SceneSolver::image(const SolveView& view) {
+  Data& d = *data_;
+  SolvedImage image;
+  if (view.sim_time_ns > d.end_ns || view.sim_time_ns < d.climate->history_start_ns()) {
+    return make_error(ErrorCode::invalid_argument, "solve: the picture lies outside the history");
+  }
+  if (d.solid &&
+      std::abs(d.solid->solver().time_s() - static_cast<double>(view.sim_time_ns) * 1e-9) > 1e-6) {
+    return make_error(ErrorCode::invalid_argument,
+                      "solve: the history does not stand at the picture's instant");
+  }
+  std::vector<glm::dvec3> sky_rays;
+  auto seen = d.see(view, image, sky_rays);
+  if (!seen) return tl::unexpected(std::move(seen.error()));
+  std::vector<PixelHit>& hits = *seen;
+  const SceneInstant instant = d.rays->at(view.sim_time_ns);
+  const ClimateNode now = d.climate->at(view.sim_time_ns);
+  const glm::dvec3 to_sun = glm::normalize(now.to_sun);
+
+  std::vector<double> kelvin(hits.size(), std::numeric_limits<double>::quiet_NaN());
+  if (d.solid) {
+    std::vector<std::optional<std::uint32_t>> faces(hits.size());
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      faces[i] = d.solid->finder().find(hits[i].point.position_world_m, hits[i].point.normal);
+    }
+    std::vector<PixelHit> on_model;
+    std::vector<double> their_k;
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      if (!faces[i]) continue;
+      hits[i].face = *faces[i];
+      hits[i].sky_frac = d.solid->exchange().sky_frac(*faces[i]);
+      hits[i].ground_frac = d.solid->exchange().ground_frac(*faces[i]);
+      on_model.push_back(hits[i]);
+      their_k.push_back(d.solid->solver().face_k_at(*faces[i], hits[i].point.position_world_m));
+    }
+    hits.swap(on_model);
+    kelvin.swap(their_k);
+  } else {
+    const PointHistories histories(d.scenario, d.geometry, *d.rays, *d.climate, d.options.rays);
+    std::vector<SolvePoint> points;
+    for (const PixelHit& hit : hits) points.push_back(hit.point);
+    auto solved = histories.temperatures(points, view.sim_time_ns, [&](double share) {
+      d.stopped = d.options.progress && !d.options.progress(share);
+      return !d.stopped;
+    });
+    if (!solved) return tl::unexpected(std::move(solved.error()));
+    kelvin = std::move(*solved);
+    tbb::parallel_for(std::size_t{0}, hits.size(), [&](std::size_t i) {
+      hits[i].sky_frac = instant
+                             .sky_view({hits[i].point.position_world_m, hits[i].point.normal, 1e-9},
+                                       d.options.rays)
+                             .sky_cosine.value_frac;
+      hits[i].ground_frac = 1.0 - hits[i].sky_frac;
+    });
+  }
+  if (now.direct_normal_w_m2 > 0.0) {
+    tbb::parallel_for(std::size_t{0}, hits.size(), [&](std::size_t i) {
+      hits[i].sun_frac =
+          instant
+              .sun_visible_frac_clipped(
+                  {hits[i].point.position_world_m, hits[i].point.normal, 1e-9}, to_sun)
+              .value_frac;
+    });
+  }
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    image.temperature_k[hits[i].pixel] = static_cast<float>(kelvin[i]);
+    if (std::isfinite(kelvin[i])) ++image.solved_px;
+  }
+  d.radiate(view, hits, kelvin, sky_rays, image);
+  return image;
+}
+
+SolveReport SceneSolver::report() const {
+  const Data& d = *data_;
+  SolveReport report;
+  report.notes = d.notes;
+  report.resumed = d.resumed;
+  if (d.solid) {
+    report.dimension = 3;
+    report.nodes = d.solid->solver().free_nodes();
+    report.faces = d.solid->solver().faces().size();
+    report.patches = d.solid->exchange().patches();
+    report.stats = d.solid->solver().stats();
+    report.spin_up = d.solid->spin_up_stats();
+  }
+  return report;
+}
+
+std::span<const double> SceneSolver::node_k() const noexcept {
+  return data_->solid ? data_->solid->solver().node_k() : std::span<const double>();
+}
+
+bool SceneSolver::stopped() const noexcept {
+  return data_->stopped;
+}
+
+Result<std::vector<SolvedImage>> solve(const scene::ScenarioDesc& scenario,
+                                       const scene::SceneGeometry& geometry,
+                                       std::span<const SolveView> views,
+                                       const SolveOptions& options, SolveReport* report) {
+  std::vector<std::size_t> order(views.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return views[a].sim_time_ns < views[b].sim_time_ns;
+  });
+  std::vector<SolvedImage> images(views.size());
+  if (views.empty()) return images;
+  auto solver = SceneSolver::create(scenario, geometry, options, views[order.back()].sim_time_ns);
+  if (!solver) return tl::unexpected(std::move(solver.error()));
+  for (const std::size_t i : order) {
+    if (auto reached = solver->advance_to(views[i].sim_time_ns); !reached) {
+      return tl::unexpected(std::move(reached.error()));
+    }
+    if (solver->stopped()) break;
+    auto image = solver->image(views[i]);
+    if (!image) return tl::unexpected(std::move(image.error()));
+    images[i] = std::move(*image);
+  }
+  if (report != nullptr) *report = solver->report();
+  return images;
+}
+
+}  // namespace emit::reference

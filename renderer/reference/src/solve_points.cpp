@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "solve_points.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
+#include <map>
+
+namespace emit::reference {
+namespace {
+
+using physics::Result;
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+/// Between these visibility is taken as linear, unless it changes: then the interval is halved down
+/// to the shortest.
+constexpr std::int64_t kStaticStepNs = 60 * kSecondNs;
+constexpr std::int64_t kMovingStepNs = 4 * kSecondNs;
+constexpr std::int64_t kShortestStaticNs = 4 * kSecondNs;
+constexpr std::int64_t kShortestMovingNs = kSecondNs / 2;
+constexpr double kEvenFrac = 0.02;
+/// A mover further away than this leaves a point's view of the sky as it was.
+constexpr double kMoverReachM = 25.0;
+
+}  // namespace
+
+PointHistories::PointHistories(const scene::ScenarioDesc& scenario,
+                               const scene::SceneGeometry& geometry, const RayScene& scene,
+                               const SurfaceClimate& climate, std::uint32_t rays)
+    : scenario_(scenario), geometry_(geometry), scene_(scene), climate_(climate), rays_(rays) {}
+
+bool PointHistories::moves(const SceneInstant& a, const SceneInstant& b) const {
+  for (std::uint32_t m = 0; m < scene_.desc().movers.size(); ++m) {
+    if (a.mover_on(m) != b.mover_on(m)) return true;
+    const physics::Pose& pa = a.mover_pose(m);
+    const physics::Pose& pb = b.mover_pose(m);
+    if (glm::distance(pa.position_world_m, pb.position_world_m) > 1e-3 ||
+        std::abs(glm::dot(pa.world_from_body, pb.world_from_body)) < 1.0 - 1e-9) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Instants at which every point is looked at: fine while anything moves.
+void PointHistories::choose_nodes(std::int64_t until_ns,
+                                  std::vector<std::int64_t>& nodes_ns) const {
+  std::int64_t t = climate_.history_start_ns();
+  nodes_ns = {t};
+  while (t < until_ns) {
+    const std::int64_t next = std::min(until_ns, t + kStaticStepNs);
+    // A keyframe between the ends moves too: look in the middle as well.
+    const SceneInstant here = scene_.at(t);
+    bool moving = false;
+    for (int part = 1; part <= 4 && !moving; ++part) {
+      moving = moves(here, scene_.at(t + (next - t) * part / 4));
+    }
+    t = moving ? std::min(next, t + kMovingStepNs) : next;
+    nodes_ns.push_back(t);
+  }
+}
+
+std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
+                                              std::span<const std::int64_t> nodes_ns,
+                                              std::span<const SceneInstant> instants,
+                                              std::int64_t sim_time_ns) const {
+  // A point of a mover is carried back with it.
+  glm::dvec3 body_m(0.0);
+  glm::dvec3 body_normal(0.0);
+  if (point.mover != kNoMover) {
+    const SceneInstant now = scene_.at(sim_time_ns);
+    const physics::Pose& pose = now.mover_pose(point.mover);
+    const glm::dquat back = glm::conjugate(pose.world_from_body);
+    body_m = back * (point.position_world_m - pose.position_world_m);
+    body_normal = back * point.normal;
+  }
+  const auto place = [&](const SceneInstant& instant) {
+    SurfacePoint p{point.position_world_m, point.normal, 0.0};
+    if (point.mover != kNoMover) {
+      const physics::Pose& pose = instant.mover_pose(point.mover);
+      p.position_world_m = pose.position_world_m + pose.world_from_body * body_m;
+      p.normal = pose.world_from_body * body_normal;
+      p.tolerance_m = 1e-9;
+    }
+    return p;
+  };
+  double last_sky = -1.0;
+  std::vector<physics::Pose> last_poses(scene_.desc().movers.size());
+  std::vector<char> last_on(last_poses.size(), 0);
+  const auto sky_of = [&](const SceneInstant& instant, const SurfacePoint& p) {
+    bool same = last_sky >= 0.0;
+    for (std::uint32_t m = 0; m < last_poses.size(); ++m) {
+      const physics::Pose& pose = instant.mover_pose(m);
+      const bool near =
+          m == point.mover || std::min(glm::distance(pose.position_world_m, p.position_world_m),
+                                       glm::distance(last_poses[m].position_world_m,
+                                                     p.position_world_m)) < kMoverReachM;
+      if (!near) continue;
+      same = same && last_on[m] == (instant.mover_on(m) ? 1 : 0) &&
+             glm::distance(pose.position_world_m, last_poses[m].position_world_m) < 0.5 &&
+             std::abs(glm::dot(pose.world_from_body, last_poses[m].world_from_body)) > 0.9998;
+    }
+    if (!same) {
+      last_sky = instant.sky_view(p, rays_).sky_cosine.value_frac;
+      for (std::uint32_t m = 0; m < last_poses.size(); ++m) {
+        last_poses[m] = instant.mover_pose(m);
+        last_on[m] = instant.mover_on(m) ? 1 : 0;
+      }
+    }
+    return last_sky;
+  };
+
+  std::vector<ViewSample> out;
+  const auto look = [&](std::int64_t t, const SceneInstant& instant) {
+    ViewSample sample;
+    sample.time_ns = t;
+    const ClimateNode now = climate_.at(t);
+    const glm::dvec3 to_sun = glm::normalize(now.to_sun);
+    const SurfacePoint p = place(instant);
+    const bool absent = point.mover != kNoMover && !instant.mover_on(point.mover);
+    const double cosine = glm::dot(p.normal, to_sun);
+    double sun = 0.0;
+    if (cosine > 0.0 && now.direct_normal_w_m2 > 0.0) {
+      sun = absent ? 1.0 : instant.sun_visible_frac_clipped(p, to_sun).value_frac;
+    }
+    sample.sky_frac = absent ? 0.5 * (1.0 + p.normal.z) : sky_of(instant, p);
+    if (point.mover == kNoMover) {
+      sample.sun_frac = sun;
+    } else {
+      // The solver knows one direction of the face; a mover turns. Its sunlight goes in as a flux.
+      sample.sun_frac = 0.0;
+      sample.scene_shortwave_w_m2 = now.direct_normal_w_m2 * sun * std::max(0.0, cosine);
+    }
+    return std::pair(sample, sun);
+  };
+  double last_sun = 0.0;
+  std::function<void(std::int64_t, double, std::int64_t, double, std::int64_t)> between =
+      [&](std::int64_t from, double sun_from, std::int64_t to, double sun_to,
+          std::int64_t shortest) {
+        if (to - from <= shortest || std::abs(sun_to - sun_from) <= kEvenFrac) return;
+        const std::int64_t middle = from + (to - from) / 2;
+        const auto [sample, sun] = look(middle, scene_.at(middle));
+        between(from, sun_from, middle, sun, shortest);
+        out.push_back(sample);
+        between(middle, sun, to, sun_to, shortest);
+      };
+  for (std::size_t i = 0; i < nodes_ns.size(); ++i) {
+    const auto [sample, sun] = look(nodes_ns[i], instants[i]);
+    if (i > 0) {
+      const bool moving = nodes_ns[i] - nodes_ns[i - 1] < kStaticStepNs;
+      between(nodes_ns[i - 1], last_sun, nodes_ns[i], sun,
+              moving ? kShortestMovingNs : kShortestStaticNs);
+    }
+    out.push_back(sample);
+    last_sun = sun;
+  }
+  return out;
+}
+
+Result<std::vector<double>> PointHistories::temperatures(
+    std::span<const SolvePoint> points, std::int64_t sim_time_ns,
+    const std::function<bool(double)>& done) const {
+  std::vector<std::int64_t> nodes_ns;
+  choose_nodes(sim_time_ns, nodes_ns);
+  std::vector<SceneInstant> instants;
+  instants.reserve(nodes_ns.size());
+  for (const std::int64_t t : nodes_ns) instants.push_back(scene_.at(t));
+
+  std::map<std::uint32_t, LayerMesh> meshes;
+  for (const SolvePoint& point : points) {
+    const scene::Material& material = geometry_.materials[point.material];
+    if (material.prescribed_k || meshes.contains(point.material)) continue;
+    auto mesh = material_mesh(material);
+    if (!mesh) return tl::unexpected(std::move(mesh.error()));
+    meshes.emplace(point.material, std::move(*mesh));
+  }
+
+  std::vector<double> kelvin(points.size(), std::numeric_limits<double>::quiet_NaN());
+  tbb::enumerable_thread_specific<std::map<std::uint32_t, PointSolver>> solvers;
+  const std::size_t portion = std::max<std::size_t>(64, points.size() / 100);
+  for (std::size_t begin = 0; begin < points.size(); begin += portion) {
+    const std::size_t end = std::min(points.size(), begin + portion);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i != range.end(); ++i) {
+        const SolvePoint& point = points[i];
+        const scene::Material& material = geometry_.materials[point.material];
+        if (material.prescribed_k) {
+          kelvin[i] = *material.prescribed_k;
+          continue;
+        }
+        auto& mine = solvers.local();
+        const auto solver = mine.try_emplace(point.material, climate_, meshes.at(point.material),
+                                             material, scenario_.thermal.initial_k)
+                                .first;
+        const std::vector<ViewSample> view = views(point, nodes_ns, instants, sim_time_ns);
+        solver->second.run(point.normal, view, std::span(&sim_time_ns, 1),
+                           std::span(&kelvin[i], 1));
+      }
+    });
+    if (done && !done(static_cast<double>(end) / static_cast<double>(points.size()))) break;
+  }
+  return kelvin;
+}
+
+}  // namespace emit::reference

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/reference/surface_forcing.hpp"
+#include "emit/reference/visibility.hpp"
+
+namespace emit::reference {
+
+/// A point of the surface at the instant of the picture.
+struct SolvePoint {
+  glm::dvec3 position_world_m{0.0};
+  glm::dvec3 normal{0.0};  ///< unit, towards the side that is seen
+  std::uint32_t material = 0;
+  std::uint32_t mover = kNoMover;
+};
+
+/// One-dimensional histories behind points, with the visibility of sun and sky at their own past
+/// places. Owner: caller.
+class PointHistories {
+ public:
+  PointHistories(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
+                 const RayScene& scene, const SurfaceClimate& climate, std::uint32_t rays);
+
+  /// Temperature of every point at `sim_time_ns`; spread over the cores. `done` is called from the
+  /// calling thread between portions with the share done; false stops (the rest is NaN).
+  /// Errors: those of material_mesh().
+  [[nodiscard]] physics::Result<std::vector<double>> temperatures(
+      std::span<const SolvePoint> points, std::int64_t sim_time_ns,
+      const std::function<bool(double)>& done) const;
+
+ private:
+  void choose_nodes(std::int64_t until_ns, std::vector<std::int64_t>& nodes_ns) const;
+  [[nodiscard]] bool moves(const SceneInstant& a, const SceneInstant& b) const;
+  [[nodiscard]] std::vector<ViewSample> views(const SolvePoint& point,
+                                              std::span<const std::int64_t> nodes_ns,
+                                              std::span<const SceneInstant> instants,
+                                              std::int64_t sim_time_ns) const;
+
+  const scene::ScenarioDesc& scenario_;
+  const scene::SceneGeometry& geometry_;
+  const RayScene& scene_;
+  const SurfaceClimate& climate_;
+  std::uint32_t rays_;
+};
+
+}  // namespace emit::reference

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "solve_radiance.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "emit/physics/clear_sky.hpp"
+#include "emit/physics/constants.hpp"
+
+namespace emit::reference {
+namespace {
+
+// Gauss-Legendre of order 10 on (0, 1): five points, mirrored.
+constexpr std::array<double, 5> kAbscissa{0.0130467357414141, 0.0674683166555077,
+                                          0.1602952158504878, 0.2833023029353764,
+                                          0.4255628305091844};
+constexpr std::array<double, 5> kWeight{0.0333356721543441, 0.0747256745752903, 0.1095431812579910,
+                                        0.1346333596549982, 0.1477621123573765};
+constexpr double kWidestPanelUm = 1.0;
+
+double air_mass(double sin_elevation) {
+  return physics::relative_air_mass(
+      physics::Radians(std::asin(std::clamp(sin_elevation, 0.0, 1.0))));
+}
+
+}  // namespace
+
+BandIntegral::BandIntegral(const scene::SpectralBand& band) {
+  std::vector<scene::ResponseSample> curve = band.response;
+  if (curve.empty()) curve = {{band.lo_um, 1.0}, {band.hi_um, 1.0}};
+  for (std::size_t i = 0; i + 1 < curve.size(); ++i) {
+    const double low = curve[i].wavelength_um;
+    const double width = curve[i + 1].wavelength_um - low;
+    const double panels = std::max(1.0, std::ceil(width / kWidestPanelUm));
+    const auto add = [&](double share, double weight) {
+      const double um = low + share * width;
+      const double response =
+          curve[i].response_frac + share * (curve[i + 1].response_frac - curve[i].response_frac);
+      points_.push_back(
+          {physics::kC2UmK / um,
+           weight * width * response * physics::kRadianceC1WUm4PerM2Sr / std::pow(um, 5)});
+    };
+    for (double panel = 0.0; panel < panels; panel += 1.0) {
+      for (std::size_t g = 0; g < kAbscissa.size(); ++g) {
+        add((panel + kAbscissa[g]) / panels, kWeight[g] / panels);
+        add((panel + 1.0 - kAbscissa[g]) / panels, kWeight[g] / panels);
+      }
+    }
+  }
+}
+
+double BandIntegral::radiance_w_m2_sr(double kelvin) const {
+  if (!(kelvin > 0.0)) return kelvin == 0.0 ? 0.0 : std::nan("");
+  double sum = 0.0;
+  for (const Point& p : points_)
+    sum += p.weight / std::expm1(std::min(700.0, p.exponent_k / kelvin));
+  return sum;
+}
+
+physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& scenario,
+                                                   std::size_t band) {
+  BandRadiance out(scenario.bands[band]);
+  if (scenario.atmosphere.enabled) {
+    for (const scene::BandAtmosphere& entry : scenario.atmosphere.bands) {
+      if (entry.band != out.name_) continue;
+      if (entry.table.empty()) {
+        out.terms_ = entry.terms;
+        out.vertical_frac_ = entry.vertical_transmittance_frac;
+      } else {
+        auto table = physics::AtmosphereTable::build(entry.table);
+        if (!table) {
+          return physics::make_error(physics::ErrorCode::config,
+                                     fmt::format("band '{}': {}", out.name_, table.error().text));
+        }
+        out.table_ = std::move(*table);
+      }
+      break;
+    }
+  }
+  // Midpoint rule over elevation, weight 2 sin cos.
+  constexpr int kRings = 2000;
+  for (int i = 0; i < kRings; ++i) {
+    const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
+    out.sky_share_ += (1.0 - std::pow(out.vertical_frac_, air_mass(std::sin(elevation)))) *
+                      std::sin(2.0 * elevation) * physics::kPi / 2.0 / kRings;
+  }
+  out.sun_black_ = out.black(physics::kSunTemperatureK);
+  return out;
+}
+
+void BandRadiance::set_air(double air_k, double sin_sun, double cloud_frac, bool sun_shines) {
+  air_ = black(air_k);
+  sky_mean_ = table_ ? table_->sky_hemisphere_w_m2_sr() : air_ * sky_share_;
+  const double disc_sr = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+  const double through = table_ ? table_->out(sin_sun).transmittance_frac
+                                : std::pow(vertical_frac_, air_mass(sin_sun));
+  sun_w_m2_ = sun_shines ? sun_black_ * disc_sr * (1.0 - cloud_frac) * through : 0.0;
+}
+
+double BandRadiance::emissivity(const scene::Material& material) const {
+  for (const scene::BandEmissivity& e : material.band_emissivity) {
+    if (e.band == name_) return e.emissivity_frac;
+  }
+  return material.emissivity_frac;
+}
+
+double BandRadiance::at_aperture(double leaving, double range_m, double sin_elevation) const {
+  if (table_) {
+    const auto air = table_->along(range_m, sin_elevation);
+    return air.transmittance_frac * leaving + air.path_radiance_w_m2_sr;
+  }
+  double tau = terms_.empty() ? 1.0 : 0.0;
+  for (const scene::AtmosphereTerm& term : terms_) {
+    tau += term.amplitude_frac * std::exp(-term.extinction_per_km * range_m * 1e-3);
+  }
+  return tau * leaving + (1.0 - tau) * air_;
+}
+
+double BandRadiance::sky(double sin_elevation) const {
+  if (table_) return table_->out(sin_elevation).path_radiance_w_m2_sr;
+  return air_ * (1.0 - std::pow(vertical_frac_, air_mass(sin_elevation)));
+}
+
+}  // namespace emit::reference

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "solve_solid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::reference {
+namespace {
+
+using physics::Result;
+
+/// Sun directions for the choice of cells: shadows move slowly against this.
+constexpr double kSunSampleS = 600.0;
+constexpr double kMaxSpinUpStepS = 3600.0;
+/// Moving shadows are sampled at least this often.
+constexpr double kMaxHistoryStepS = 120.0;
+
+std::int64_t ns(double time_s) {
+  return std::llround(time_s * 1e9);
+}
+
+ExchangeFace surface_of(const VoxelModel& model, const SolidFace& face,
+                        const scene::SceneGeometry& geometry) {
+  const VoxelFace info = model.face(face);
+  const scene::Material& material = geometry.materials[info.material];
+  return {face.centre_m(),          face.normal(), face.area_m2, material.solar_absorptance_frac,
+          material.emissivity_frac, info.in_cavity};
+}
+
+/// Trilinear in the node temperatures of another solver's grid.
+class NodeField {
+ public:
+  NodeField(const SolidGrid& grid, const SolidSolver& solver) : lines_m_(grid.lines_m) {
+    const std::size_t nodes = lines_m_[0].size() * lines_m_[1].size() * lines_m_[2].size();
+    kelvin_.assign(nodes, std::numeric_limits<double>::quiet_NaN());
+    const auto places = solver.nodes_m();
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      kelvin_[index(line(0, places[i].x), line(1, places[i].y), line(2, places[i].z))] =
+          solver.node_k()[i];
+    }
+  }
+
+  [[nodiscard]] double at(const glm::dvec3& p) const {
+    std::array<std::size_t, 3> cell{};
+    std::array<double, 3> share{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double x = p[static_cast<glm::dvec3::length_type>(axis)];
+      const std::size_t above = line(axis, x);
+      cell[axis] = std::min(above, lines_m_[axis].size() - 2);
+      share[axis] = std::clamp((x - lines_m_[axis][cell[axis]]) /
+                                   (lines_m_[axis][cell[axis] + 1] - lines_m_[axis][cell[axis]]),
+                               0.0, 1.0);
+    }
+    double sum = 0.0;
+    double weights = 0.0;
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      double weight = 1.0;
+      std::array<std::size_t, 3> node = cell;
+      for (unsigned axis = 0; axis < 3; ++axis) {
+        const bool up = (corner >> axis & 1U) != 0;
+        weight *= up ? share[axis] : 1.0 - share[axis];
+        node[axis] += up ? 1 : 0;
+      }
+      const double value = kelvin_[index(node[0], node[1], node[2])];
+      // Places without a node are air; a point on a face has no weight there.
+      if (!(weight > 0.0) || std::isnan(value)) continue;
+      sum += weight * value;
+      weights += weight;
+    }
+    return weights > 0.0 ? sum / weights : std::numeric_limits<double>::quiet_NaN();
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(std::size_t i, std::size_t j, std::size_t k) const {
+    return i + lines_m_[0].size() * (j + lines_m_[1].size() * k);
+  }
+  /// Last line at or below x, to rounding.
+  [[nodiscard]] std::size_t line(std::size_t axis, double x) const {
+    const auto after = std::upper_bound(lines_m_[axis].begin(), lines_m_[axis].end(), x + 1e-9);
+    return static_cast<std::size_t>(
+        std::max<std::ptrdiff_t>(after - lines_m_[axis].begin() - 1, 0));
+  }
+  std::array<std::vector<double>, 3> lines_m_;
+  std::vector<double> kelvin_;
+};
+
+}  // namespace
+
+ExchangeSky exchange_sky(const ClimateNode& now, double surroundings_reflectance_frac) {
+  const double t2 = now.surroundings_k * now.surroundings_k;
+  const double global =
+      now.diffuse_horizontal_w_m2 + now.direct_normal_w_m2 * std::max(0.0, now.to_sun.z);
+  return {now.diffuse_horizontal_w_m2, now.longwave_down_w_m2,
+          surroundings_reflectance_frac * global, physics::kStefanBoltzmannWPerM2K4 * t2 * t2};
+}
+
+Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::ScenarioDesc& scenario,
+                                                           const scene::SceneGeometry& geometry,
+                                                           const SceneInstant& instant,
+                                                           const SurfaceClimate& climate,
+                                                           const SolveOptions& options,
+                                                           double end_s) {
+  auto history = std::unique_ptr<SolidHistory>(
+      new SolidHistory(scenario, geometry, instant, climate, options));
+  VoxelOptions voxels;
+  voxels.refine = options.refine;
+  const double start_s = static_cast<double>(climate.history_start_ns()) * 1e-9;
+  for (double t = start_s; t < end_s + kSunSampleS; t += kSunSampleS) {
+    const ClimateNode now = climate.at(ns(std::min(t, end_s)));
+    if (now.direct_normal_w_m2 > 0.0) voxels.suns.push_back(glm::normalize(now.to_sun));
+  }
+  auto model = VoxelModel::build(scenario, geometry, voxels);
+  if (!model) return tl::unexpected(std::move(model.error()));
+  history->model_ = std::make_unique<VoxelModel>(std::move(*model));
+  const VoxelModel& voxel = *history->model_;
+  auto solver = SolidSolver::create(
+      voxel.grid(), [&](const SolidFace& face) { return voxel.condition(face); },
+      history->solid_options());
+  if (!solver) return tl::unexpected(std::move(solver.error()));
+  history->solver_ = std::make_unique<SolidSolver>(std::move(*solver));
+  const auto faces = history->solver_->faces();
+  for (const SolidFace& face : faces) {
+    history->surfaces_.push_back(surface_of(voxel, face, geometry));
+    history->face_material_.push_back(voxel.face(face).material);
+  }
+  history->finder_ = std::make_unique<FaceFinder>(voxel.grid(), faces);
+  history->exchange_ = std::make_unique<SceneExchange>(faces, history->surfaces_, *history->finder_,
+                                                       instant, options.rays);
+  history->sun_ = std::make_unique<SunOnFaces>(faces, history->surfaces_);
+  history->sun_frac_.resize(faces.size());
+  history->direct_w_m2_.resize(faces.size());
+  history->incoming_.resize(faces.size());
+  return history;
+}
+
+SolidOptions SolidHistory::solid_options() const {
+  SolidOptions solid;
+  solid.tolerance_k = options_.tolerance_k / (options_.refine * options_.refine);
+  solid.first_step_s = 1.0;
+  solid.max_step_s = kMaxHistoryStepS / options_.refine;
+  return solid;
+}
+
+Result<void> SolidHistory::spin_up() {
+  const double start_s = static_cast<double>(climate_.start_ns()) * 1e-9;
+  const double history_s = static_cast<double>(climate_.history_start_ns()) * 1e-9;
+  const double initial_k = scenario_.thermal.initial_k;
+  const auto steady = [&](const glm::dvec3& p) { return model_->steady_k(p, initial_k); };
+  if (!(history_s > start_s)) {
+    solver_->set_temperature(history_s, steady);
+    return {};
+  }
+  // Nothing is shadowed yet, so no shadow's edge needs small cells.
+  VoxelOptions voxels;
+  voxels.refine = options_.refine;
+  auto coarse = VoxelModel::build(scenario_, geometry_, voxels);
+  if (!coarse) return tl::unexpected(std::move(coarse.error()));
+  SolidOptions solid = solid_options();
+  solid.max_step_s = kMaxSpinUpStepS / options_.refine;
+  auto solver = SolidSolver::create(
+      coarse->grid(), [&](const SolidFace& face) { return coarse->condition(face); }, solid);
+  if (!solver) return tl::unexpected(std::move(solver.error()));
+  std::vector<ExchangeFace> surfaces;
+  for (const SolidFace& face : solver->faces()) {
+    surfaces.push_back(surface_of(*coarse, face, geometry_));
+  }
+  const double cavity4 = std::pow(coarse->cavity_k(), 4);
+  const DriveFunction drive_open = [&](double time_s, std::span<const double>,
+                                       const FaceDrive& out) {
+    const ClimateNode now = climate_.at(ns(time_s));
+    for (std::size_t f = 0; f < surfaces.size(); ++f) {
+      const ExchangeFace& s = surfaces[f];
+      if (s.enclosed) {
+        out.absorbed_w_m2[f] = s.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * cavity4;
+        out.film_w_m2_k[f] = 0.0;
+        out.air_k[f] = 0.0;
+        continue;
+      }
+      const FaceState face =
+          face_state(now, {s.normal, s.solar_absorptance_frac, s.emissivity_frac},
+                     open_view(s.normal), climate_.surroundings_reflectance_frac());
+      out.absorbed_w_m2[f] = face.absorbed_w_m2;
+      out.film_w_m2_k[f] = face.film_w_m2_k;
+      out.air_k[f] = face.air_k;
+    }
+  };
+  solver->set_temperature(start_s, steady);
+  const auto reached = solver->advance(
+      history_s, drive_open, [&](double) { return !options_.progress || options_.progress(0.0); });
+  if (!reached) return tl::unexpected(reached.error());
+  const NodeField field(coarse->grid(), *solver);
+  solver_->set_temperature(history_s, [&](const glm::dvec3& p) { return field.at(p); });
+  spin_up_stats_ = solver->stats();
+  return {};
+}
+
+void SolidHistory::drive(double time_s, std::span<const double> face_k, const FaceDrive& out) {
+  const ClimateNode now = climate_.at(ns(time_s));
+  const glm::dvec3 to_sun = glm::normalize(now.to_sun);
+  const std::size_t n = surfaces_.size();
+  if (now.direct_normal_w_m2 > 0.0) {
+    sun_->visible_frac(instant_, to_sun, sun_frac_);
+  } else {
+    std::fill(sun_frac_.begin(), sun_frac_.end(), 0.0);
+  }
+  for (std::size_t f = 0; f < n; ++f) {
+    direct_w_m2_[f] = now.direct_normal_w_m2 * sun_frac_[f] *
+                      std::max(0.0, glm::dot(surfaces_[f].normal, to_sun));
+  }
+  exchange_->incoming(direct_w_m2_, face_k,
+                      exchange_sky(now, climate_.surroundings_reflectance_frac()), incoming_);
+  const double cavity4 = std::pow(model_->cavity_k(), 4);
+  for (std::size_t f = 0; f < n; ++f) {
+    const ExchangeFace& s = surfaces_[f];
+    out.film_w_m2_k[f] = s.enclosed ? 0.0 : now.film_w_m2_k;
+    out.air_k[f] = now.air_k;
+    out.absorbed_w_m2[f] =
+        s.enclosed ? s.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * cavity4
+                   : s.solar_absorptance_frac * (direct_w_m2_[f] + incoming_[f].shortwave_w_m2) +
+                         s.emissivity_frac * incoming_[f].longwave_w_m2;
+  }
+}
+
+Result<void> SolidHistory::advance(double to_s, const std::function<bool(double)>& after_step) {
+  return solver_->advance(
+      to_s,
+      [this](double time_s, std::span<const double> face_k, const FaceDrive& out) {
+        drive(time_s, face_k, out);
+      },
+      after_step);
+}
+
+Result<void> SolidHistory::restore(const SolidState& state, const SolidStats& spin_up) {
+  spin_up_stats_ = spin_up;
+  return solver_->restore(state);
+}
+
+}  // namespace emit::reference

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/reference/radiosity.hpp"
+#include "emit/reference/solid_solver.hpp"
+#include "emit/reference/solve.hpp"
+#include "emit/reference/surface_forcing.hpp"
+#include "emit/reference/visibility.hpp"
+#include "emit/reference/voxel_model.hpp"
+
+namespace emit::reference {
+
+/// History of a voxel model under a scenario's forcing: unshadowed spin-up on a coarse grid, then
+/// true visibility and exchange. Times are s of simulated time.
+class SolidHistory {
+ public:
+  /// `instant` and `climate` must outlive it. Errors: those of VoxelModel and SolidSolver.
+  [[nodiscard]] static physics::Result<std::unique_ptr<SolidHistory>> create(
+      const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
+      const SceneInstant& instant, const SurfaceClimate& climate, const SolveOptions& options,
+      double end_s);
+
+  /// Runs the spin-up and takes its temperatures over. Errors: internal.
+  [[nodiscard]] physics::Result<void> spin_up();
+  [[nodiscard]] physics::Result<void> advance(double to_s,
+                                              const std::function<bool(double)>& after_step);
+  [[nodiscard]] physics::Result<void> restore(const SolidState& state, const SolidStats& spin_up);
+
+  [[nodiscard]] const SolidSolver& solver() const noexcept { return *solver_; }
+  [[nodiscard]] const SceneExchange& exchange() const noexcept { return *exchange_; }
+  [[nodiscard]] const FaceFinder& finder() const noexcept { return *finder_; }
+  [[nodiscard]] const SolidStats& spin_up_stats() const noexcept { return spin_up_stats_; }
+  [[nodiscard]] std::span<const ExchangeFace> surfaces() const noexcept { return surfaces_; }
+  [[nodiscard]] std::uint32_t material_of(std::size_t face) const noexcept {
+    return face_material_[face];
+  }
+
+ private:
+  SolidHistory(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
+               const SceneInstant& instant, const SurfaceClimate& climate,
+               const SolveOptions& options)
+      : scenario_(scenario),
+        geometry_(geometry),
+        instant_(instant),
+        climate_(climate),
+        options_(options) {}
+  [[nodiscard]] SolidOptions solid_options() const;
+  void drive(double time_s, std::span<const double> face_k, const FaceDrive& out);
+
+  const scene::ScenarioDesc& scenario_;
+  const scene::SceneGeometry& geometry_;
+  const SceneInstant& instant_;
+  const SurfaceClimate& climate_;
+  const SolveOptions& options_;
+  std::unique_ptr<VoxelModel> model_;
+  std::unique_ptr<SolidSolver> solver_;
+  std::vector<ExchangeFace> surfaces_;
+  std::vector<std::uint32_t> face_material_;
+  std::unique_ptr<FaceFinder> finder_;
+  std::unique_ptr<SceneExchange> exchange_;
+  std::unique_ptr<SunOnFaces> sun_;
+  std::vector<double> sun_frac_, direct_w_m2_;
+  std::vector<Incoming> incoming_;
+  SolidStats spin_up_stats_;
+};
+
+/// What of sky and surroundings falls on faces at an instant.
+[[nodiscard]] ExchangeSky exchange_sky(const ClimateNode& now,
+                                       double surroundings_reflectance_frac);
+
+}  // namespace emit::reference

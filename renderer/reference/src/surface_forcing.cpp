@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/reference/surface_forcing.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <string>
+
+#include "emit/physics/constants.hpp"
+#include "emit/physics/sun.hpp"
+#include "emit/physics/weather.hpp"
+
+namespace emit::reference {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+constexpr std::int64_t kNsPerS = 1'000'000'000;
+
+/// The scenario's weather as the shared input models take it.
+struct Weather {
+  physics::GeoPlace place;
+  std::int64_t epoch_utc_ns = 0;
+  physics::ClearSky clear_sky;
+  std::vector<physics::WeatherRow> rows;
+
+  explicit Weather(const scene::ScenarioDesc& scenario)
+      : place{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
+              physics::Metres(scenario.place.height_m)},
+        epoch_utc_ns(scenario.epoch_utc_ns),
+        clear_sky{.linke_turbidity = scenario.clear_sky.linke_turbidity,
+                  .air_mean_k = scenario.clear_sky.air_mean_k,
+                  .air_amplitude_k = scenario.clear_sky.air_amplitude_k,
+                  .dew_point_k = scenario.clear_sky.dew_point_k,
+                  .wind_m_s = scenario.clear_sky.wind_m_s,
+                  .cloud_frac = scenario.clear_sky.cloud_frac} {
+    for (const scene::WeatherSample& sample : scenario.weather) {
+      rows.push_back({.time_ns = sample.sim_time_ns,
+                      .direct_normal_w_m2 = sample.direct_normal_w_m2,
+                      .diffuse_horizontal_w_m2 = sample.diffuse_horizontal_w_m2,
+                      .longwave_down_w_m2 = sample.longwave_down_w_m2,
+                      .air_k = sample.air_k,
+                      .wind_m_s = sample.wind_m_s,
+                      .cloud_frac = sample.cloud_frac,
+                      .environment_k = sample.environment_k,
+                      .film_w_m2_k = sample.film_w_m2_k});
+    }
+  }
+
+  /// `before`: the limit from earlier times where the table jumps. Sets `stated` to whether the
+  /// weather gives the temperature of the surroundings.
+  [[nodiscard]] ClimateNode at(std::int64_t time_ns, bool before, bool& stated) const {
+    const physics::SunPosition sun = physics::sun_position(epoch_utc_ns + time_ns, place);
+    const physics::Forcing forcing =
+        rows.empty()
+            ? physics::forcing_from_clear_sky(clear_sky, place, sun, epoch_utc_ns + time_ns)
+            : physics::forcing_from_rows(rows, before ? time_ns - 1 : time_ns);
+    ClimateNode node;
+    node.time_ns = time_ns;
+    node.to_sun = sun.direction_enu;
+    node.direct_normal_w_m2 =
+        node.to_sun.z > 0.0 ? forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) : 0.0;
+    node.diffuse_horizontal_w_m2 = forcing.diffuse_horizontal_w_m2;
+    node.longwave_down_w_m2 = forcing.longwave_down_w_m2;
+    node.air_k = forcing.air_k;
+    node.film_w_m2_k = forcing.film_w_m2_k;
+    node.surroundings_k = forcing.environment_k;
+    stated = forcing.environment_stated;
+    return node;
+  }
+};
+
+/// Where forcing bends or jumps within the run, and at most `step` apart in between.
+std::vector<std::int64_t> node_times(const Weather& weather, std::int64_t start_ns,
+                                     std::int64_t history_ns, std::int64_t end_ns,
+                                     std::int64_t step_ns) {
+  std::vector<std::int64_t> marks{start_ns, history_ns, end_ns};
+  for (const physics::WeatherRow& row : weather.rows) {
+    if (row.time_ns > start_ns && row.time_ns < end_ns) marks.push_back(row.time_ns);
+  }
+  std::sort(marks.begin(), marks.end());
+  marks.erase(std::unique(marks.begin(), marks.end()), marks.end());
+  std::vector<std::int64_t> times;
+  for (std::size_t i = 0; i + 1 < marks.size(); ++i) {
+    const std::int64_t length_ns = marks[i + 1] - marks[i];
+    const std::int64_t parts = std::max<std::int64_t>(1, (length_ns + step_ns - 1) / step_ns);
+    for (std::int64_t part = 0; part < parts; ++part) {
+      // Whole steps first: equal lengths let the solver meet its matrices again.
+      times.push_back(marks[i] + part * step_ns);
+    }
+  }
+  times.push_back(marks.back());
+  return times;
+}
+
+const scene::Material* find_material(const scene::ScenarioDesc& scenario, const std::string& name) {
+  const auto found = std::find_if(scenario.materials.begin(), scenario.materials.end(),
+                                  [&](const scene::Material& m) { return m.name == name; });
+  return found == scenario.materials.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
+                     const ViewSample& view, double surroundings_reflectance_frac) noexcept {
+  const double facing = std::max(0.0, glm::dot(surface.normal, climate.to_sun));
+  const double direct = climate.direct_normal_w_m2;
+  const double global = direct * std::max(0.0, climate.to_sun.z) + climate.diffuse_horizontal_w_m2;
+  const double ground_frac = std::max(0.0, 1.0 - view.sky_frac - view.scene_frac);
+  const double env2 = climate.surroundings_k * climate.surroundings_k;
+  const double shortwave =
+      direct * view.sun_frac * facing + view.sky_frac * climate.diffuse_horizontal_w_m2 +
+      view.scene_shortwave_w_m2 + ground_frac * surroundings_reflectance_frac * global;
+  const double longwave = view.sky_frac * climate.longwave_down_w_m2 + view.scene_longwave_w_m2 +
+                          ground_frac * physics::kStefanBoltzmannWPerM2K4 * env2 * env2;
+  return {surface.solar_absorptance_frac * shortwave + surface.emissivity_frac * longwave,
+          climate.film_w_m2_k, climate.air_k};
+}
+
+ViewSample open_view(const glm::dvec3& normal) noexcept {
+  ViewSample view;
+  view.sun_frac = 1.0;
+  view.sky_frac = 0.5 * (1.0 + std::clamp(normal.z, -1.0, 1.0));
+  return view;
+}
+
+Result<LayerMesh> material_mesh(const scene::Material& material, const MeshOptions& options) {
+  const auto layers = solid_layers(material.layers);
+  auto mesh = LayerMesh::build(layers, {BaseKind::fixed_temperature, material.base_k}, options);
+  if (!mesh) {
+    return tl::unexpected(physics::Error{
+        ErrorCode::config, fmt::format("material '{}': {}", material.name, mesh.error().text)});
+  }
+  return mesh;
+}
+
+ClimateNode SurfaceClimate::at(std::int64_t time_ns) const noexcept {
+  const auto after =
+      std::upper_bound(nodes_.begin(), nodes_.end(), time_ns,
+                       [](std::int64_t t, const ClimateNode& node) { return t < node.time_ns; });
+  if (after == nodes_.begin()) return nodes_.front();
+  if (after == nodes_.end()) return nodes_.back();
+  const ClimateNode& a = *(after - 1);
+  const ClimateNode& b = *after;
+  const double f =
+      static_cast<double>(time_ns - a.time_ns) / static_cast<double>(b.time_ns - a.time_ns);
+  const auto mix = [f](double x, double y) { return x + f * (y - x); };
+  return {time_ns,
+          a.to_sun + f * (b.to_sun - a.to_sun),
+          mix(a.direct_normal_w_m2, b.direct_normal_w_m2),
+          mix(a.diffuse_horizontal_w_m2, b.diffuse_horizontal_w_m2),
+          mix(a.longwave_down_w_m2, b.longwave_down_w_m2),
+          mix(a.air_k, b.air_k),
+          mix(a.film_w_m2_k, b.film_w_m2_k),
+          mix(a.surroundings_k, b.surroundings_k)};
+}
+
+Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenario,
+                                              const ClimateOptions& options) {
+  SurfaceClimate climate;
+  climate.history_start_ns_ = scenario.thermal.history_start_ns;
+  const std::int64_t spin_up_ns = options.spin_up_ns.value_or(scenario.thermal.spin_up_ns);
+  const std::int64_t start_ns = climate.history_start_ns_ - std::max<std::int64_t>(0, spin_up_ns);
+  const std::int64_t end_ns = std::max(options.end_ns, climate.history_start_ns_);
+  const double step_ns = options.step_s * static_cast<double>(kNsPerS);
+  if (!(step_ns >= 1.0) || !(static_cast<double>(end_ns - start_ns) / step_ns < 1e7)) {
+    return make_error(ErrorCode::invalid_argument,
+                      "the climate's step must be positive and give less than 10 million nodes");
+  }
+
+  const Weather weather(scenario);
+  bool all_stated = true;
+  std::vector<bool> node_stated;
+  const auto add = [&](std::int64_t time_ns, bool before) {
+    bool stated = false;
+    climate.nodes_.push_back(weather.at(time_ns, before, stated));
+    node_stated.push_back(stated);
+    all_stated = all_stated && stated;
+  };
+  for (const std::int64_t time_ns :
+       node_times(weather, start_ns, climate.history_start_ns_, end_ns,
+                  static_cast<std::int64_t>(std::min(step_ns, 9e18)))) {
+    const auto rows_here =
+        std::count_if(weather.rows.begin(), weather.rows.end(),
+                      [time_ns](const physics::WeatherRow& row) { return row.time_ns == time_ns; });
+    if (rows_here > 1 && time_ns > start_ns) add(time_ns, true);
+    add(time_ns, false);
+  }
+
+  const std::string& name = scenario.thermal.surroundings_material.empty()
+                                ? scenario.default_material
+                                : scenario.thermal.surroundings_material;
+  const scene::Material* ground = find_material(scenario, name);
+  if (ground == nullptr) {
+    return make_error(ErrorCode::config,
+                      fmt::format("thermal.surroundings_material: no material '{}'", name));
+  }
+  climate.reflectance_frac_ = 1.0 - ground->solar_absorptance_frac;
+  if (all_stated) return climate;
+
+  // A level open surface sees no surroundings, so its history needs none.
+  auto mesh =
+      ground->prescribed_k ? Result<LayerMesh>(LayerMesh()) : material_mesh(*ground, options.mesh);
+  if (!mesh) return tl::unexpected(std::move(mesh.error()));
+  std::vector<double> ground_k(climate.nodes_.size(), ground->prescribed_k.value_or(0.0));
+  if (!ground->prescribed_k) {
+    const SurfaceOptics surface{
+        {0.0, 0.0, 1.0}, ground->solar_absorptance_frac, ground->emissivity_frac};
+    std::vector<ForcingRow> rows;
+    std::vector<double> times_s;
+    for (const ClimateNode& node : climate.nodes_) {
+      times_s.push_back(static_cast<double>(node.time_ns - start_ns) * 1e-9);
+      rows.push_back({times_s.back(), face_state(node, surface, open_view(surface.normal),
+                                                 climate.reflectance_frac_)});
+    }
+    LayerSolver solver(*mesh, options.steps);
+    const auto profile =
+        steady_profile(solid_layers(ground->layers),
+                       ground->initial_k.value_or(scenario.thermal.initial_k), ground->base_k);
+    face_history(solver, profile, rows, surface.emissivity_frac, times_s, ground_k);
+  }
+  for (std::size_t i = 0; i < climate.nodes_.size(); ++i) {
+    if (!node_stated[i]) climate.nodes_[i].surroundings_k = ground_k[i];
+  }
+  return climate;
+}
+
+}  // namespace emit::reference

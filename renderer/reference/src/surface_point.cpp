@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <limits>
+
+#include "emit/reference/surface_forcing.hpp"
+
+namespace emit::reference {
+namespace {
+
+ClimateNode mix(const ClimateNode& a, const ClimateNode& b, double f) noexcept {
+  const auto at = [f](double x, double y) { return x + f * (y - x); };
+  return {a.time_ns,
+          a.to_sun + f * (b.to_sun - a.to_sun),
+          at(a.direct_normal_w_m2, b.direct_normal_w_m2),
+          at(a.diffuse_horizontal_w_m2, b.diffuse_horizontal_w_m2),
+          at(a.longwave_down_w_m2, b.longwave_down_w_m2),
+          at(a.air_k, b.air_k),
+          at(a.film_w_m2_k, b.film_w_m2_k),
+          at(a.surroundings_k, b.surroundings_k)};
+}
+
+ViewSample mix(const ViewSample& a, const ViewSample& b, double f) noexcept {
+  const auto at = [f](double x, double y) { return x + f * (y - x); };
+  return {a.time_ns,
+          at(a.sun_frac, b.sun_frac),
+          at(a.sky_frac, b.sky_frac),
+          at(a.scene_frac, b.scene_frac),
+          at(a.scene_shortwave_w_m2, b.scene_shortwave_w_m2),
+          at(a.scene_longwave_w_m2, b.scene_longwave_w_m2)};
+}
+
+/// The last row at or before `now` (the later one of a jump), moving on from `row`.
+template <class Rows>
+void seek(const Rows& rows, std::int64_t now_ns, std::size_t& row) noexcept {
+  while (row + 1 < rows.size() && rows[row + 1].time_ns <= now_ns) ++row;
+}
+
+/// Next time at which the rows bend, after `row`.
+template <class Rows>
+std::int64_t next_time(const Rows& rows, std::int64_t now_ns, std::size_t row) noexcept {
+  if (!rows.empty() && rows[row].time_ns > now_ns) return rows[row].time_ns;
+  return row + 1 < rows.size() ? rows[row + 1].time_ns : std::numeric_limits<std::int64_t>::max();
+}
+
+/// Value at `time` of the stretch that starts with `row`; held outside the rows.
+template <class Rows>
+auto value_at(const Rows& rows, std::int64_t time_ns, std::size_t row) noexcept {
+  if (row + 1 >= rows.size() || time_ns <= rows[row].time_ns) return mix(rows[row], rows[row], 0.0);
+  const std::int64_t length_ns = rows[row + 1].time_ns - rows[row].time_ns;
+  return mix(rows[row], rows[row + 1],
+             static_cast<double>(time_ns - rows[row].time_ns) / static_cast<double>(length_ns));
+}
+
+}  // namespace
+
+PointSolver::PointSolver(const SurfaceClimate& climate, const LayerMesh& mesh,
+                         const scene::Material& material, double initial_k,
+                         const StepOptions& steps)
+    : climate_(&climate),
+      material_(&material),
+      initial_k_(material.initial_k.value_or(initial_k)),
+      solver_(mesh, steps),
+      spin_up_k_(mesh.nodes()) {
+  start_profile_ = steady_profile(solid_layers(material.layers), initial_k_, material.base_k);
+}
+
+double PointSolver::seconds(std::int64_t time_ns) const noexcept {
+  return static_cast<double>(time_ns - climate_->start_ns()) * 1e-9;
+}
+
+void PointSolver::advance(const SurfaceOptics& surface, std::span<const ViewSample> view,
+                          std::int64_t until_ns) noexcept {
+  const auto nodes = climate_->nodes();
+  while (now_ns_ < until_ns) {
+    seek(nodes, now_ns_, climate_row_);
+    seek(view, now_ns_, view_row_);
+    const std::int64_t end_ns = std::min(
+        {until_ns, next_time(nodes, now_ns_, climate_row_), next_time(view, now_ns_, view_row_)});
+    const auto state = [&](std::int64_t time_ns) {
+      return face_state(value_at(nodes, time_ns, climate_row_), surface,
+                        value_at(view, time_ns, view_row_),
+                        climate_->surroundings_reflectance_frac());
+    };
+    solver_.advance({solver_.time_s(), seconds(end_ns), state(now_ns_), state(end_ns)},
+                    surface.emissivity_frac);
+    now_ns_ = end_ns;
+  }
+}
+
+void PointSolver::spin_up(const SurfaceOptics& surface) {
+  now_ns_ = climate_->start_ns();
+  climate_row_ = 0;
+  view_row_ = 0;
+  solver_.start(start_profile_, 0.0);
+  const ViewSample open = open_view(surface.normal);
+  advance(surface, std::span(&open, 1), climate_->history_start_ns());
+  solver_.copy_nodes_k(spin_up_k_);
+  spin_up_normal_ = surface.normal;
+  has_spin_up_ = true;
+}
+
+void PointSolver::run(const glm::dvec3& normal, std::span<const ViewSample> view,
+                      std::span<const std::int64_t> times_ns, std::span<double> out_k) {
+  if (material_->prescribed_k) {
+    std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
+    return;
+  }
+  const SurfaceOptics surface{normal, material_->solar_absorptance_frac,
+                              material_->emissivity_frac};
+  if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);
+  const std::int64_t start_ns = climate_->history_start_ns();
+  solver_.start_nodes(spin_up_k_, seconds(start_ns));
+  now_ns_ = start_ns;
+  climate_row_ = 0;
+  view_row_ = 0;
+  const ViewSample open = open_view(normal);
+  if (view.empty()) view = std::span(&open, 1);
+  for (std::size_t i = 0; i < times_ns.size(); ++i) {
+    advance(surface, view, times_ns[i]);
+    out_k[i] = solver_.face_k();
+  }
+}
+
+physics::Result<std::vector<double>> point_history(const SurfaceClimate& climate,
+                                                   const scene::Material& material,
+                                                   double initial_k, const glm::dvec3& normal,
+                                                   std::span<const ViewSample> view,
+                                                   std::span<const std::int64_t> times_ns,
+                                                   const MeshOptions& mesh_options,
+                                                   const StepOptions& steps) {
+  std::vector<double> out_k(times_ns.size());
+  if (material.prescribed_k) {
+    std::fill(out_k.begin(), out_k.end(), *material.prescribed_k);
+    return out_k;
+  }
+  const auto mesh = material_mesh(material, mesh_options);
+  if (!mesh) return tl::unexpected(mesh.error());
+  PointSolver solver(climate, *mesh, material, initial_k, steps);
+  solver.run(normal, view, times_ns, out_k);
+  return out_k;
+}
+
+}  // namespace emit::reference

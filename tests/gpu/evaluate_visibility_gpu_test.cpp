@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// The frame's soft shadow and obscurance by themselves, on geometry built from rows. The bounds are
+// those of the method as published, a little above what was measured over the whole tables.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "csv_table.hpp"
+#include "emit/evaluate/evaluate.hpp"
+
+namespace emit {
+namespace {
+
+std::vector<double> on_gpu(const std::string& model, const std::string& text,
+                           const std::string& column) {
+  const auto file = std::filesystem::path(testing::TempDir()) / (model + "_gpu.csv");
+  std::ofstream(file) << text;
+  evaluate::EvaluateRequest request;
+  request.model = model;
+  request.table = file;
+  request.device = evaluate::Device::gpu;
+  request.precision = evaluate::Precision::float32;
+  request.method = "per-frame";
+  const auto result = evaluate::evaluate(request);
+  if (!result) {
+    ADD_FAILURE() << result.error().text;
+    return {};
+  }
+  const auto table = evaluate::CsvTable::parse(*result, "result");
+  return table ? table->numbers(column).value_or(std::vector<double>{}) : std::vector<double>{};
+}
+
+TEST(EvaluateVisibilityGpu, ShadowEdgeFollowsTheDisc) {
+  const auto f = on_gpu("sun-disc", "delta_deg\n-0.4\n-0.15\n0\n0.15\n0.4\n", "f");
+  ASSERT_EQ(f.size(), 5U);
+  EXPECT_EQ(f[0], 0.0);
+  EXPECT_EQ(f[4], 1.0);
+  const auto exact = [](double delta_deg) {
+    const double v = delta_deg / 0.2666;
+    return 0.5 + (std::asin(v) + v * std::sqrt(1.0 - v * v)) / 3.14159265358979323846;
+  };
+  EXPECT_NEAR(f[1], exact(-0.15), 0.08);
+  EXPECT_NEAR(f[2], 0.5, 0.08);
+  EXPECT_NEAR(f[3], exact(0.15), 0.08);
+}
+
+TEST(EvaluateVisibilityGpu, WallShadowIsNearTheExactShare) {
+  // Core shadow, a penumbra, full sun.
+  const auto f = on_gpu("wall-shadow",
+                        "H,e_deg,x\n1,45,0.8\n0.48371750116348267,31.859729766845703,"
+                        "0.7844818234443665\n1,45,1.2\n",
+                        "f");
+  ASSERT_EQ(f.size(), 3U);
+  EXPECT_EQ(f[0], 0.0);
+  EXPECT_NEAR(f[1], 0.93018, 0.1);
+  EXPECT_EQ(f[2], 1.0);
+}
+
+TEST(EvaluateVisibilityGpu, ObscuranceKnowsFlatConcaveAndConvex) {
+  const auto f = on_gpu("sky-view",
+                        "kind,p1,p2,p3,p4,p5,p6,p7\nflat,0,0,0,0,0,0,0\nwall,1,0.2,0,0,0,0,0\n"
+                        "edge,90,0,0,0,0,0,0\ncube_corner,0,0,0,0,0,0,0\n",
+                        "f_uni");
+  ASSERT_EQ(f.size(), 4U);
+  EXPECT_NEAR(f[0], 0.5, 1e-3);
+  EXPECT_LT(f[1], 0.42);
+  EXPECT_NEAR(f[2], 0.75, 0.05);
+  EXPECT_NEAR(f[3], 0.875, 0.05);
+}
+
+}  // namespace
+}  // namespace emit

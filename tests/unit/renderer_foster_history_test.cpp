@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "history/foster_history.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <random>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr double kReferenceK = 295.0;
+
+scene::Material material(const std::string& name, std::vector<scene::Layer> layers) {
+  scene::Material out;
+  out.name = name;
+  out.solar_absorptance_frac = 0.8;
+  out.emissivity_frac = 0.92;
+  out.layers = std::move(layers);
+  out.base_k = 288.15;
+  return out;
+}
+
+/// 21 June at 48.56 N under a clear sky; history starts at `start_s` after 06:00 UTC.
+scene::ScenarioDesc scenario(double start_s) {
+  scene::ScenarioDesc s;
+  s.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
+  s.epoch_utc_ns = 1403330400LL * kSecondNs;
+  s.clear_sky.wind_m_s = 2.0;
+  s.materials = {
+      material("road", {{0.15, 0.7, 2120, 920}, {0.3, 1.5, 2000, 950}, {1.55, 1.2, 1900, 1158}}),
+      material("concrete", {{0.1, 1.7, 2300, 878}, {0.9, 1.7, 2300, 878}}),
+      material("sheet", {{0.001, 45.0, 7850, 470}, {0.02, 0.16, 1.2, 1005}}),
+      material("wood", {{0.03, 0.15, 550, 1700}})};
+  s.default_material = "road";
+  s.thermal.model = scene::ThermalModel::foster;
+  s.thermal.spin_up_ns = 172'800 * kSecondNs;
+  s.thermal.history_start_ns = static_cast<std::int64_t>(start_s) * kSecondNs;
+  s.thermal.steps = 13;
+  return s;
+}
+
+FosterHistory history_of(const scene::ScenarioDesc& s, const Environment& environment) {
+  auto materials = foster_materials(s.materials, s.thermal);
+  EXPECT_TRUE(materials.has_value());
+  const FosterMaterial surroundings = materials->front();
+  return FosterHistory(s, *materials, surroundings, environment, kReferenceK);
+}
+
+/// What the shader does at the start of a frame: table, then the tail.
+double looked_up_k(const FosterHistory& history, std::size_t m, glm::dvec3 n) {
+  const FosterMaterial& material = history.materials()[m];
+  const auto nodes = static_cast<int>(history.grid_nodes());
+  const glm::dvec3 unit = n;
+  n /= std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+  double u = n.x;
+  double v = n.y;
+  if (n.z < 0.0) {
+    u = (1.0 - std::abs(n.y)) * (n.x >= 0.0 ? 1.0 : -1.0);
+    v = (1.0 - std::abs(n.x)) * (n.y >= 0.0 ? 1.0 : -1.0);
+  }
+  const double x = (u * 0.5 + 0.5) * (nodes - 1);
+  const double y = (v * 0.5 + 0.5) * (nodes - 1);
+  const int i = std::min(static_cast<int>(x), nodes - 2);
+  const int j = std::min(static_cast<int>(y), nodes - 2);
+  const auto at = [&](int column, int row) {
+    return glm::dvec4(history.table()[(m * history.grid_nodes() + static_cast<std::size_t>(row)) *
+                                          history.grid_nodes() +
+                                      static_cast<std::size_t>(column)]);
+  };
+  const glm::dvec4 states =
+      (1.0 - (y - j)) * ((1.0 - (x - i)) * at(i, j) + (x - i) * at(i + 1, j)) +
+      (y - j) * ((1.0 - (x - i)) * at(i, j + 1) + (x - i) * at(i + 1, j + 1));
+  physics::FosterState<double> state{states.x, states.y, states.z, states.w};
+  const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
+                                               material.base_k, kReferenceK);
+  for (const IntervalForcing& interval : history.tail()) {
+    physics::foster_advance(state, unshadowed_drive(interval.begin, material, unit, kReferenceK),
+                            unshadowed_drive(interval.end, material, unit, kReferenceK),
+                            physics::foster_ladder(interval.dt_s, material.network), surface, 0.01);
+  }
+  return physics::foster_offset_k(state, surface);
+}
+
+/// The same from the definition: two days in steps of 20 s.
+double spun_up_k(const scene::ScenarioDesc& s, const Environment& environment,
+                 const FosterMaterial& material, const FosterMaterial& surroundings,
+                 const glm::dvec3& n) {
+  const auto surface_of = [](const FosterMaterial& m) {
+    return physics::foster_surface(m.network, m.emissivity_frac, m.base_k, kReferenceK);
+  };
+  const auto steady = [](const FosterMaterial& m) {
+    physics::FosterState<double> x{};
+    for (std::size_t i = 0; i < m.network.count; ++i) {
+      x[i] = m.network.modes[i].resistance_m2k_w * (m.initial_k - m.base_k) /
+             m.network.resistance_m2k_w();
+    }
+    return x;
+  };
+  physics::FosterState<double> x = steady(material);
+  physics::FosterState<double> ground = steady(surroundings);
+  const auto forcing_at = [&](std::int64_t t_ns) {
+    const auto sun = environment.sun_at(t_ns);
+    const auto weather = environment.forcing_at(t_ns, sun);
+    SurfaceForcing f;
+    const double direct = sun.elevation.value() > 0.0 ? weather.direct_normal_w_m2 : 0.0;
+    f.sun_w_m2 = direct * sun.direction_enu;
+    f.diffuse_w_m2 = weather.diffuse_horizontal_w_m2;
+    f.longwave_w_m2 = weather.longwave_down_w_m2;
+    f.reflected_w_m2 =
+        (1.0 - surroundings.solar_absorptance_frac) *
+        (direct * std::max(0.0, sun.direction_enu.z) + weather.diffuse_horizontal_w_m2);
+    f.environment_w_m2 =
+        physics::kStefanBoltzmannWPerM2K4 *
+        std::pow(kReferenceK + physics::foster_offset_k(ground, surface_of(surroundings)), 4);
+    f.film_w_m2_k = weather.film_w_m2_k;
+    f.air_k = weather.air_k;
+    return f;
+  };
+  constexpr std::int64_t kStepNs = 20 * kSecondNs;
+  const auto gains = physics::foster_gains(20.0, material.network);
+  const auto ground_gains = physics::foster_gains(20.0, surroundings.network);
+  SurfaceForcing from = forcing_at(s.thermal.history_start_ns - s.thermal.spin_up_ns);
+  for (std::int64_t t_ns = s.thermal.history_start_ns - s.thermal.spin_up_ns;
+       t_ns < s.thermal.history_start_ns; t_ns += kStepNs) {
+    SurfaceForcing to = forcing_at(t_ns + kStepNs);
+    const glm::dvec3 up(0.0, 0.0, 1.0);
+    physics::foster_step(ground, unshadowed_drive(from, surroundings, up, kReferenceK),
+                         unshadowed_drive(to, surroundings, up, kReferenceK), ground_gains,
+                         surface_of(surroundings));
+    physics::foster_step(x, unshadowed_drive(from, material, n, kReferenceK),
+                         unshadowed_drive(to, material, n, kReferenceK), gains,
+                         surface_of(material));
+    from = to;
+  }
+  return physics::foster_offset_k(x, surface_of(material));
+}
+
+TEST(FosterHistory, SpinUpOfAnyDirectionIsWithinFiftyMillikelvinOfItsDefinition) {
+  std::mt19937 rng(3);
+  std::normal_distribution<double> normal;
+  double worst_k = 0.0;
+  double sum = 0.0;
+  int count = 0;
+  for (const double start_s : {0.0, 21600.0, 46800.0}) {  // morning, noon, after sunset
+    const scene::ScenarioDesc s = scenario(start_s);
+    const Environment environment(s);
+    const FosterHistory history = history_of(s, environment);
+    for (std::size_t m = 0; m < history.materials().size(); ++m) {
+      for (int i = 0; i < 8; ++i) {
+        const glm::dvec3 n =
+            glm::normalize(glm::dvec3(normal(rng), normal(rng), 0.6 * normal(rng) + 0.3));
+        const double error_k =
+            looked_up_k(history, m, n) -
+            spun_up_k(s, environment, history.materials()[m], history.materials()[0], n);
+        EXPECT_LT(std::abs(error_k), 0.05)
+            << start_s << " " << s.materials[m].name << " " << n.x << " " << n.y << " " << n.z;
+        worst_k = std::max(worst_k, std::abs(error_k));
+        sum += error_k * error_k;
+        ++count;
+      }
+    }
+  }
+  RecordProperty("worst_k", std::to_string(worst_k));
+  RecordProperty("rms_k", std::to_string(std::sqrt(sum / count)));
+}
+
+TEST(FosterHistory, WithoutSpinUpTheStatesAreTheSteadyProfile) {
+  scene::ScenarioDesc s = scenario(0.0);
+  s.thermal.spin_up_ns = 0;
+  s.thermal.initial_k = 301.0;
+  const Environment environment(s);
+  const FosterHistory history = history_of(s, environment);
+  EXPECT_TRUE(history.tail().empty());
+  for (std::size_t m = 0; m < 4; ++m) {
+    EXPECT_NEAR(kReferenceK + looked_up_k(history, m, glm::normalize(glm::dvec3(1, 2, 3))), 301.0,
+                1e-4);
+  }
+}
+
+TEST(FosterHistory, SurroundingsFollowTheWeatherWhereItStatesTheirTemperature) {
+  scene::ScenarioDesc s = scenario(0.0);
+  scene::WeatherSample sample;
+  sample.direct_normal_w_m2 = 500.0;
+  sample.longwave_down_w_m2 = 330.0;
+  sample.air_k = 293.0;
+  sample.environment_k = 281.0;
+  s.weather = {sample};
+  Environment environment(s);
+  FosterHistory history = history_of(s, environment);
+  StepPlan plan(s.thermal);
+  plan.update(3600 * kSecondNs, environment, {});
+  EXPECT_FALSE(history.update(plan, environment));
+  EXPECT_DOUBLE_EQ(history.surroundings_now_k(), 281.0);
+  EXPECT_NEAR(history.intervals().back().end.environment_w_m2,
+              physics::kStefanBoltzmannWPerM2K4 * std::pow(281.0, 4), 1e-9);
+  // Reflected sunlight of the ground: 1 - 0.8 of what falls on it.
+  const double sine = plan.sun_now().direction_enu.z;
+  EXPECT_NEAR(history.intervals().back().end.reflected_w_m2, 0.2 * 500.0 * sine, 1e-3);
+}
+
+TEST(FosterHistory, SurroundingsWarmThroughTheMorningWhateverTheNumberOfSteps) {
+  std::vector<double> found_k;
+  for (const std::uint32_t steps : {9U, 27U, 180U}) {
+    scene::ScenarioDesc s = scenario(0.0);
+    s.thermal.steps = steps;
+    const Environment environment(s);
+    FosterHistory history = history_of(s, environment);
+    StepPlan plan(s.thermal);
+    plan.update(12600 * kSecondNs, environment, {});
+    history.update(plan, environment);
+    found_k.push_back(history.surroundings_now_k());
+    EXPECT_GT(history.intervals().back().end.environment_w_m2,
+              history.intervals().front().begin.environment_w_m2 + 40.0);
+  }
+  EXPECT_NEAR(found_k[0], found_k[2], 0.1);
+  EXPECT_NEAR(found_k[1], found_k[2], 0.02);
+}
+
+TEST(FosterHistory, WeatherBeforeTheStartRunsTheSpinUpAgain) {
+  const scene::ScenarioDesc s = scenario(0.0);
+  Environment environment(s);
+  FosterHistory history = history_of(s, environment);
+  StepPlan plan(s.thermal);
+  plan.update(3600 * kSecondNs, environment, {});
+  EXPECT_FALSE(history.update(plan, environment));
+  const glm::vec4 before = history.table()[7];
+
+  scene::WeatherSample sample;
+  sample.sim_time_ns = 1800 * kSecondNs;
+  sample.air_k = 290.0;
+  sample.longwave_down_w_m2 = 320.0;
+  ASSERT_TRUE(environment.append(sample));
+  EXPECT_FALSE(history.update(plan, environment));  // after the start: the table stands
+
+  environment.reset();
+  sample.sim_time_ns = -100'000 * kSecondNs;
+  ASSERT_TRUE(environment.append(sample));
+  EXPECT_TRUE(history.update(plan, environment));
+  EXPECT_NE(history.table()[7].x, before.x);
+  EXPECT_FALSE(history.update(plan, environment));
+  environment.reset();
+  EXPECT_TRUE(history.update(plan, environment));
+  EXPECT_EQ(history.table()[7], before);
+}
+
+TEST(FosterMaterials, NameTheMaterialWithoutLayers) {
+  scene::ScenarioDesc s = scenario(0.0);
+  s.materials[1].layers.clear();
+  const auto materials = foster_materials(s.materials, s.thermal);
+  ASSERT_FALSE(materials);
+  EXPECT_NE(materials.error().text.find("'concrete'"), std::string::npos);
+}
+
+TEST(FosterMaterials, TakeFittedModesUnlessAnotherNumberIsAskedFor) {
+  scene::ScenarioDesc s = scenario(0.0);
+  s.materials[0].foster_modes = {{23, 0.01}, {897, 0.02}, {7510, 0.05}};
+  auto materials = foster_materials(s.materials, s.thermal);
+  ASSERT_TRUE(materials);
+  EXPECT_EQ((*materials)[0].network.count, 3U);
+  EXPECT_EQ((*materials)[0].network.modes[1].tau_s, 897.0);
+  s.thermal.foster_modes = 2;
+  materials = foster_materials(s.materials, s.thermal);
+  ASSERT_TRUE(materials);
+  EXPECT_EQ((*materials)[0].network.count, 2U);
+}
+
+}  // namespace
+}  // namespace emit::renderer

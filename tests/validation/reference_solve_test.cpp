@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+// The solution of a whole scene: a block on the ground, made here.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/geometric.hpp>
+
+#include "emit/physics/constants.hpp"
+#include "emit/reference/solve.hpp"
+#include "emit/reference/voxel_model.hpp"
+
+namespace emit::reference {
+namespace {
+
+/// Adds a rectangle a, b, c, d seen counter-clockwise from outside.
+void add_quad(scene::Mesh& mesh, const std::array<glm::dvec3, 4>& corners) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions_m.size());
+  const glm::dvec3 normal =
+      glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
+  for (const glm::dvec3& p : corners) {
+    mesh.positions_m.emplace_back(p);
+    mesh.normals.emplace_back(normal);
+  }
+  for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, 3U}) mesh.indices.push_back(first + i);
+}
+
+void add_box(scene::Mesh& mesh, const glm::dvec3& a, const glm::dvec3& b) {
+  add_quad(mesh, {{{a.x, a.y, a.z}, {a.x, b.y, a.z}, {b.x, b.y, a.z}, {b.x, a.y, a.z}}});
+  add_quad(mesh, {{{a.x, a.y, b.z}, {b.x, a.y, b.z}, {b.x, b.y, b.z}, {a.x, b.y, b.z}}});
+  add_quad(mesh, {{{a.x, a.y, a.z}, {b.x, a.y, a.z}, {b.x, a.y, b.z}, {a.x, a.y, b.z}}});
+  add_quad(mesh, {{{b.x, b.y, a.z}, {a.x, b.y, a.z}, {a.x, b.y, b.z}, {b.x, b.y, b.z}}});
+  add_quad(mesh, {{{a.x, b.y, a.z}, {a.x, a.y, a.z}, {a.x, a.y, b.z}, {a.x, b.y, b.z}}});
+  add_quad(mesh, {{{b.x, a.y, a.z}, {b.x, b.y, a.z}, {b.x, b.y, b.z}, {b.x, a.y, b.z}}});
+}
+
+struct TestScene {
+  scene::ScenarioDesc scenario;
+  scene::SceneGeometry geometry;
+};
+
+void finish_mesh(TestScene& t, scene::Mesh mesh, std::uint32_t material) {
+  mesh.submeshes = {{0, static_cast<std::uint32_t>(mesh.indices.size()), material, false}};
+  for (const glm::vec3& p : mesh.positions_m) mesh.bounds.add(glm::dvec3(p));
+  scene::Instance instance;
+  instance.mesh = static_cast<std::uint32_t>(t.geometry.meshes.size());
+  instance.world_bounds = mesh.bounds;
+  t.geometry.meshes.push_back(std::move(mesh));
+  t.geometry.instances.push_back(instance);
+}
+
+/// A solid cube of 0.4 m on 6 m of asphalt, a summer's forenoon.
+TestScene block_scene() {
+  TestScene t;
+  scene::Material asphalt;
+  asphalt.name = "asphalt";
+  asphalt.solar_absorptance_frac = 0.75;
+  asphalt.emissivity_frac = 0.93;
+  asphalt.layers = {{0.15, 0.7, 2120.0, 920.0}};
+  asphalt.base_k = 293.15;
+  scene::Material concrete = asphalt;
+  concrete.name = "concrete";
+  concrete.solar_absorptance_frac = 0.6;
+  concrete.emissivity_frac = 0.88;
+  concrete.layers = {{0.10, 1.28, 2300.0, 878.0}};
+  t.geometry.materials = {asphalt, concrete};
+  scene::Mesh ground;
+  add_quad(ground, {{{-3, -3, 0}, {3, -3, 0}, {3, 3, 0}, {-3, 3, 0}}});
+  finish_mesh(t, std::move(ground), 0);
+  scene::Mesh block;
+  add_box(block, {-0.2, -0.2, 0.0}, {0.2, 0.2, 0.4});
+  finish_mesh(t, std::move(block), 1);
+
+  t.scenario.name = "test-block";
+  t.scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
+  t.scenario.epoch_utc_ns = 1403330400LL * 1'000'000'000LL;  // 2014-06-21T06:00:00Z
+  t.scenario.materials = t.geometry.materials;
+  t.scenario.default_material = "asphalt";
+  t.scenario.bands = {{"8-12", 8.0, 12.0, {}}};
+  t.scenario.objects.resize(1);
+  t.scenario.objects[0].name = "scene";
+  t.scenario.thermal.initial_k = 293.15;
+  t.scenario.atmosphere.enabled = false;
+  return t;
+}
+
+SolveOptions quick() {
+  SolveOptions options;
+  options.refine = 0.3;
+  options.tolerance_k = 0.003;
+  options.rays = 64;
+  return options;
+}
+
+SolveView view_at(double time_s, const glm::dvec3& eye, const glm::dvec3& target) {
+  SolveView view;
+  view.sim_time_ns = std::llround(time_s * 1e9);
+  view.sensor_pose = {eye, physics::world_from_body_look_at(eye, target)};
+  view.width_px = 64;
+  view.height_px = 48;
+  view.fov_h_rad = 0.6;
+  return view;
+}
+
+TEST(ReferenceSolve, VoxelModelFindsCoreGroundAndOpenFaces) {
+  const TestScene t = block_scene();
+  const auto model = VoxelModel::build(t.scenario, t.geometry, {});
+  ASSERT_TRUE(model.has_value()) << model.error().text;
+  EXPECT_NEAR(model->steady_k({2.0, 2.0, -0.15}, 303.15), 293.15, 1e-9);
+  EXPECT_NEAR(model->steady_k({2.0, 2.0, 0.0}, 303.15), 303.15, 1e-9);
+  EXPECT_NEAR(model->steady_k({0.0, 0.0, 0.35}, 303.15), 298.15, 1e-9);
+  EXPECT_NEAR(model->steady_k({0.0, 0.0, 0.2}, 303.15), 293.15, 1e-9);
+  // The core takes what lies more than the layers' thickness inside.
+  const SolidGrid& grid = model->grid();
+  double core_m3 = 0.0;
+  for (std::size_t k = 0; k < grid.count(2); ++k) {
+    if (grid.lines_m[2][k] < -1e-9) continue;
+    for (std::size_t j = 0; j < grid.count(1); ++j) {
+      for (std::size_t i = 0; i < grid.count(0); ++i) {
+        if (grid.cells[grid.index(i, j, k)] != kFixedCell) continue;
+        core_m3 += (grid.lines_m[0][i + 1] - grid.lines_m[0][i]) *
+                   (grid.lines_m[1][j + 1] - grid.lines_m[1][j]) *
+                   (grid.lines_m[2][k + 1] - grid.lines_m[2][k]);
+      }
+    }
+  }
+  EXPECT_NEAR(core_m3, 0.2 * 0.2 * 0.3, 1e-6);
+}
+
+TEST(ReferenceSolve, ShapesThatAreNotSolidsAreRefusedByName) {
+  TestScene t = block_scene();
+  t.geometry.meshes[1].submeshes[0].index_count -= 6;  // one side is missing
+  const auto open = VoxelModel::build(t.scenario, t.geometry, {});
+  ASSERT_FALSE(open.has_value());
+  EXPECT_NE(open.error().text.find("object 'scene'"), std::string::npos);
+  EXPECT_FALSE(VoxelModel::fits(t.scenario, t.geometry));
+  t = block_scene();
+  t.geometry.instances[1].world_from_mesh =
+      glm::rotate(glm::dmat4(1.0), 0.3, glm::dvec3(0.0, 0.0, 1.0));
+  EXPECT_FALSE(VoxelModel::fits(t.scenario, t.geometry));
+}
+
+TEST(ReferenceSolve, FarFromTheBlockThreeDimensionsAgreeWithOne) {
+  const TestScene t = block_scene();
+  SolveOptions options = quick();
+  options.refine = 0.7;
+  const SolveView view = view_at(1800.0, {2.0, 2.0, 1.0}, {2.6, 2.6, 0.0});
+  options.dimension = SolveDimension::three;
+  const auto three = solve(t.scenario, t.geometry, std::span(&view, 1), options);
+  ASSERT_TRUE(three.has_value()) << three.error().text;
+  options.dimension = SolveDimension::one;
+  options.pixels = 40;
+  const auto one = solve(t.scenario, t.geometry, std::span(&view, 1), options);
+  ASSERT_TRUE(one.has_value()) << one.error().text;
+  EXPECT_EQ((*one)[0].solved_px, 40U);
+  std::size_t compared = 0;
+  double worst = 0.0;
+  for (std::size_t p = 0; p < (*one)[0].temperature_k.size(); ++p) {
+    const float a = (*one)[0].temperature_k[p];
+    const float b = (*three)[0].temperature_k[p];
+    if (std::isnan(a) || std::isnan(b)) continue;
+    EXPECT_NEAR(a, b, 0.02) << "pixel " << p;
+    worst = std::max(worst, std::abs(static_cast<double>(a - b)));
+    ++compared;
+  }
+  EXPECT_EQ(compared, 40U);
+  RecordProperty("worst_k", std::to_string(worst));
+}
+
+TEST(ReferenceSolve, ShadowLiesAwayFromTheSun) {
+  const TestScene t = block_scene();
+  // Straight down on the block; north is at the top of the picture.
+  SolveView view = view_at(3600.0, {0.0, 0.0, 6.0}, {0.0, 0.0, 0.0});
+  const auto images = solve(t.scenario, t.geometry, std::span(&view, 1), quick());
+  ASSERT_TRUE(images.has_value()) << images.error().text;
+  const SolvedImage& image = (*images)[0];
+  EXPECT_EQ(image.solved_px, image.surface_px);
+  const double metre_px = 32.0 / std::tan(0.3) / 6.0;
+  const auto at = [&](double east_m, double north_m) {
+    const auto x = static_cast<std::size_t>(32.0 + metre_px * east_m);
+    const auto y = static_cast<std::size_t>(24.0 - metre_px * north_m);
+    return image.temperature_k[y * view.width_px + x];
+  };
+  // The morning sun stands in the east.
+  EXPECT_GT(at(0.5, 0.0), at(-0.4, 0.0) + 5.0F);
+  EXPECT_NEAR(image.depth_m[24 * 64 + 2], 6.0F, 0.01F);
+  for (const float value : image.radiance_w_m2_sr[0]) EXPECT_TRUE(std::isfinite(value));
+}
+
+TEST(ReferenceSolve, ResumedRunGivesTheSameBitsAndAMisfitIsRefused) {
+  TestScene t = block_scene();
+  SolveOptions options = quick();
+  options.refine = 0.2;
+  const SolveView view = view_at(900.0, {2.0, 2.0, 1.5}, {0.0, 0.0, 0.0});
+  auto whole = SceneSolver::create(t.scenario, t.geometry, options, view.sim_time_ns);
+  ASSERT_TRUE(whole.has_value()) << whole.error().text;
+  ASSERT_TRUE(whole->advance_to(view.sim_time_ns).has_value());
+
+  options.checkpoint =
+      std::filesystem::path(EMIT_TEST_BINARY_DIR) / "tests" / "reference_solve_checkpoint";
+  std::filesystem::remove_all(options.checkpoint);
+  options.checkpoint_steps = 3;
+  int calls = 0;
+  options.progress = [&](double done_frac) { return done_frac <= 0.0 || ++calls < 7; };
+  auto broken = SceneSolver::create(t.scenario, t.geometry, options, view.sim_time_ns);
+  ASSERT_TRUE(broken.has_value()) << broken.error().text;
+  ASSERT_TRUE(broken->advance_to(view.sim_time_ns).has_value());
+  ASSERT_TRUE(broken->stopped());
+
+  options.progress = {};
+  auto resumed = SceneSolver::create(t.scenario, t.geometry, options, view.sim_time_ns);
+  ASSERT_TRUE(resumed.has_value()) << resumed.error().text;
+  ASSERT_TRUE(resumed->advance_to(view.sim_time_ns).has_value());
+  EXPECT_TRUE(resumed->report().resumed);
+  ASSERT_LT(broken->report().stats.steps, resumed->report().stats.steps);
+  const auto a = whole->node_k();
+  const auto b = resumed->node_k();
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_GT(a.size(), 3000U);
+  for (std::size_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i], b[i]) << "node " << i;
+
+  t.scenario.clear_sky.wind_m_s += 1.0;
+  const auto misfit = solve(t.scenario, t.geometry, std::span(&view, 1), options);
+  ASSERT_FALSE(misfit.has_value());
+  EXPECT_EQ(misfit.error().code, physics::ErrorCode::config);
+  EXPECT_NE(misfit.error().text.find("weather"), std::string::npos) << misfit.error().text;
+}
+
+}  // namespace
+}  // namespace emit::reference
