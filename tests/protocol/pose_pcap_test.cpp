@@ -22,7 +22,9 @@ using Octets = std::string;
 
 Octets big(std::uint64_t value, int bytes) {
   Octets out;
-  for (int i = bytes - 1; i >= 0; --i) out += static_cast<char>(value >> (8 * i) & 0xFF);
+  for (int i = bytes - 1; i >= 0; --i) {
+    out += static_cast<char>(i < 8 ? value >> (8 * i) & 0xFF : 0);
+  }
   return out;
 }
 Octets little(std::uint64_t value, int bytes) {
