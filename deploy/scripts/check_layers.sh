@@ -47,6 +47,15 @@ check gl       renderer/gl       "gl/|emit/physics/"
 check renderer "renderer/passes renderer/history renderer/include renderer/renderer.cpp" \
       "emit/(renderer|physics|scene|image)/|gl/|passes/|history/|shared/"
 check reference renderer/reference "emit/(reference|physics)/|emit/scene/(scene_desc|mesh|trajectory)\.hpp|$beside"
+# The truth does not use the formulas that it judges (fitting compares the two, so it has both).
+formulas='equilibrium|surface_balance|relaxation|planck|band_radiance_lut|foster'
+judged=$(grep -rnE "^#include \"emit/physics/($formulas)\.hpp\"" renderer/reference \
+  --include='*.hpp' --include='*.cpp' | grep -vE '/fit[a-z_]*\.(hpp|cpp):' || true)
+if [[ -n $judged ]]; then
+  echo "the reference includes formulas of the real-time path:"
+  echo "$judged" | sed 's/^/  /'
+  violations=$((violations + $(echo "$judged" | wc -l)))
+fi
 check evaluate renderer/evaluate "emit/(evaluate|physics|reference|renderer|scene)/|gl/|shared/|$beside"
 check protocol protocol          "emit/(protocol|physics)/|emit/v1/|record/|$beside"
 check config   config            "emit/(config|physics)/|emit/scene/scene_desc\.hpp|$beside"
