@@ -100,11 +100,11 @@ class Evaluate : public testing::Test {
 TEST_F(Evaluate, ListsItsModels) {
   std::vector<std::string_view> names;
   for (const ModelInfo& model : models()) names.push_back(model.name);
-  EXPECT_THAT(names, testing::UnorderedElementsAre(
-                         "equilibrium", "balance", "band-radiance", "relaxation", "sun-position",
-                         "sun-disc", "wall-shadow", "sky-view", "conduction-slab",
-                         "conduction-semi-infinite", "conduction-layered", "conduction-lateral",
-                         "surface-history"));
+  EXPECT_THAT(names, testing::UnorderedElementsAre("equilibrium", "balance", "band-radiance",
+                                                   "relaxation", "sun-position", "sun-disc",
+                                                   "wall-shadow", "sky-view", "conduction-slab",
+                                                   "conduction-semi-infinite", "conduction-layered",
+                                                   "conduction-lateral", "surface-history"));
 }
 
 TEST_F(Evaluate, RowsKeepTheirOrderAndExtraColumnsAreIgnored) {
