@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visibility_cpu.hpp"
+#include "emit/reference/parallel.hpp"
 
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <optional>
 #include <vector>
@@ -19,23 +19,24 @@ Result<void> for_each_row(const CsvTable& table,
                           const std::function<void(std::size_t, const VisibilityRow&,
                                                    const reference::SceneInstant&)>& ask) {
   std::vector<std::optional<physics::Error>> errors(table.rows());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, table.rows(), 1), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      auto row = make(i);
-      if (!row) {
-        errors[i] = std::move(row.error());
-        continue;
-      }
-      reference::RaySceneDesc desc;
-      desc.meshes.push_back({.positions_m = row->positions_m, .indices = row->indices});
-      auto scene = reference::RayScene::create(std::move(desc));
-      if (!scene) {
-        errors[i] = std::move(scene.error());
-        continue;
-      }
-      ask(i, *row, scene->at(0));
-    }
-  });
+  reference::run_parallel(
+      tbb::blocked_range<std::size_t>(0, table.rows(), 1), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+          auto row = make(i);
+          if (!row) {
+            errors[i] = std::move(row.error());
+            continue;
+          }
+          reference::RaySceneDesc desc;
+          desc.meshes.push_back({.positions_m = row->positions_m, .indices = row->indices});
+          auto scene = reference::RayScene::create(std::move(desc));
+          if (!scene) {
+            errors[i] = std::move(scene.error());
+            continue;
+          }
+          ask(i, *row, scene->at(0));
+        }
+      });
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (errors[i]) {
       return tl::unexpected(

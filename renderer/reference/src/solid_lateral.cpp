@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/reference/solid_lateral.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "emit/physics/constants.hpp"
+#include "emit/reference/parallel.hpp"
 #include "emit/reference/solid_grid.hpp"
 #include "emit/reference/solid_solver.hpp"
 
@@ -184,7 +183,7 @@ Result<double> lateral_rise_k(const LateralCase& c, double refine) {
 
 std::vector<double> lateral_rises_k(std::span<const LateralCase> cases, double refine) {
   std::vector<double> rises(cases.size(), std::numeric_limits<double>::quiet_NaN());
-  tbb::parallel_for(std::size_t{0}, cases.size(), [&](std::size_t i) {
+  run_parallel(std::size_t{0}, cases.size(), [&](std::size_t i) {
     if (const auto rise = lateral_rise_k(cases[i], refine)) rises[i] = *rise;
   });
   return rises;

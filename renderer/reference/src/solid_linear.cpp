@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "solid_linear.hpp"
+#include "emit/reference/parallel.hpp"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
@@ -24,7 +24,7 @@ constexpr std::size_t kDirectSolid = 3000;
 
 template <class Body>
 void for_blocks(std::size_t blocks, const Body& body) {
-  tbb::parallel_for(
+  run_parallel(
       tbb::blocked_range<std::size_t>(0, blocks, 1),
       [&](const auto& range) {
         for (std::size_t block = range.begin(); block != range.end(); ++block) body(block);

@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "emit/physics/constants.hpp"
+#include "emit/reference/parallel.hpp"
 
 namespace emit::reference {
 namespace {
@@ -297,7 +297,7 @@ class MeshBuilder {
     mesh_.row_start.assign(n + 1, 0);
     mesh_.upper_start.assign(n, 0);
     std::vector<Links> links(n);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 4096), [&](const auto& range) {
+    run_parallel(tbb::blocked_range<std::size_t>(0, n, 4096), [&](const auto& range) {
       for (std::size_t row = range.begin(); row != range.end(); ++row) {
         links[row] = links_of(lattice_node_[row]);
         std::uint32_t used = 0;
@@ -308,7 +308,7 @@ class MeshBuilder {
     for (std::size_t row = 0; row < n; ++row) mesh_.row_start[row + 1] += mesh_.row_start[row];
     mesh_.columns.resize(mesh_.row_start[n]);
     mesh_.conductance_w_k.resize(mesh_.row_start[n]);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 4096), [&](const auto& range) {
+    run_parallel(tbb::blocked_range<std::size_t>(0, n, 4096), [&](const auto& range) {
       for (std::size_t row = range.begin(); row != range.end(); ++row) fill_row(row, links[row]);
     });
   }

@@ -3,11 +3,11 @@
 
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "emit/reference/parallel.hpp"
 #include "solid_linear.hpp"
 #include "solid_mesh.hpp"
 
@@ -35,7 +35,7 @@ constexpr std::size_t kGrain = 8192;
 
 template <class Body>
 void for_range(std::size_t n, const Body& body) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kGrain), [&](const auto& range) {
+  run_parallel(tbb::blocked_range<std::size_t>(0, n, kGrain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
   });
 }
@@ -45,7 +45,7 @@ template <class Term>
 double sum_of(std::size_t n, const Term& term) {
   const std::size_t chunks = (n + kGrain - 1) / kGrain;
   std::vector<double> partial(chunks, 0.0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chunks, 1), [&](const auto& range) {
+  run_parallel(tbb::blocked_range<std::size_t>(0, chunks, 1), [&](const auto& range) {
     for (std::size_t chunk = range.begin(); chunk != range.end(); ++chunk) {
       double sum = 0.0;
       const std::size_t end = std::min(n, (chunk + 1) * kGrain);

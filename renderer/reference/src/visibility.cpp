@@ -2,7 +2,6 @@
 #include "emit/reference/visibility.hpp"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <glm/geometric.hpp>
 
@@ -10,6 +9,7 @@
 #include <array>
 #include <cmath>
 
+#include "emit/reference/parallel.hpp"
 #include "emit/reference/sampling.hpp"
 #include "emit/reference/sun_disc.hpp"
 #include "ray_scene_impl.hpp"
@@ -88,7 +88,7 @@ void trace(const SceneInstant::Impl& instant, const SurfacePoint& point, std::ui
 void SceneInstant::occluded(std::span<const SurfacePoint> points, const glm::dvec3& direction,
                             std::span<std::uint8_t> out) const {
   const std::size_t packets = (points.size() + kPacket - 1) / kPacket;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, packets, 64), [&](const auto& range) {
+  run_parallel(tbb::blocked_range<std::size_t>(0, packets, 64), [&](const auto& range) {
     std::array<Ray, kPacket> packet;
     for (std::size_t p = range.begin(); p < range.end(); ++p) {
       const std::size_t first = p * kPacket;
@@ -150,7 +150,7 @@ Share SceneInstant::sun_visible_frac_clipped(const SurfacePoint& point, const gl
 void SceneInstant::sun_visible_frac(std::span<const SurfacePoint> points, const glm::dvec3& to_sun,
                                     const SunQuery& query, bool clipped,
                                     std::span<double> out_frac) const {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 32), [&](const auto& range) {
+  run_parallel(tbb::blocked_range<std::size_t>(0, points.size(), 32), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       out_frac[i] = (clipped ? sun_visible_frac_clipped(points[i], to_sun, query)
                              : sun_visible_frac(points[i], to_sun, query))
