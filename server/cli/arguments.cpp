@@ -487,7 +487,7 @@ void Tool::add_bench_commands() {
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--pixels", o.pixels,
-                   "Surface pixels the reference solves, at least 20000; 0: all")
+                   "Surface pixels the reference solves (published figures: 20000 or more); 0: all")
         ->capture_default_str();
     add_gpu(app, o.gpu_index);
     add_json(app, o.json);
