@@ -5,5 +5,5 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 deploy/scripts/install_deps.sh
 cmake --preset release
-cmake --build --preset release
+cmake --build --preset release --target emit emitd config_data emit_scenes emit_logs
 build/release/bin/emit demo --out out/demo "$@"

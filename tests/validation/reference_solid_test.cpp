@@ -14,6 +14,7 @@
 #include "emit/reference/solid_grid.hpp"
 #include "emit/reference/solid_lateral.hpp"
 #include "emit/reference/solid_solver.hpp"
+#include "support/sanitizer.hpp"
 
 namespace emit::reference {
 namespace {
@@ -303,8 +304,13 @@ double full_sun_k(const LateralCase& c) {
 }
 
 TEST(ReferenceSolidLateral, EveryRowWithinOnePerCentOfTheFullSunRise) {
-  const auto rows = lateral_rows();
+  auto rows = lateral_rows();
   ASSERT_EQ(rows.size(), 72U);
+  if (test::kThreadSanitizer) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < rows.size(); i += 12) rows[kept++] = rows[i];
+    rows.resize(kept);
+  }
   std::vector<LateralCase> cases;
   for (const LateralRow& row : rows) cases.push_back(row.c);
   const auto rises = lateral_rises_k(cases, 1.0);
@@ -314,6 +320,7 @@ TEST(ReferenceSolidLateral, EveryRowWithinOnePerCentOfTheFullSunRise) {
 }
 
 TEST(ReferenceSolidLateral, ErrorFallsWithRefinement) {
+  if (test::kThreadSanitizer) GTEST_SKIP() << "convergence is judged without the sanitizer";
   std::vector<LateralCase> cases;
   std::vector<LateralRow> plane;
   for (const LateralRow& row : lateral_rows()) {
