@@ -458,6 +458,16 @@ void Tool::add_bench_commands() {
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    app.add_option("--method", o.methods, "Thermal method; repeatable; cached needs --model foster")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"per-frame", "cached"}))
+        ->capture_default_str();
+    app.add_option("--model", o.model, "Thermal model; default that of the scene")
+        ->check(CLI::IsMember({"emit2014", "foster"}));
+    app.add_option("--pixels", o.pixels, "Surface pixels per picture whose error is computed")
+        ->check(CLI::Range(1U, 100'000'000U))
+        ->capture_default_str();
+    app.add_flag("--no-errors", o.no_errors, "Times only: spares the reference");
     add_gpu(app, o.gpu_index);
     add_json(app, o.json);
   }

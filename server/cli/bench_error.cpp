@@ -37,6 +37,7 @@ constexpr std::int64_t kSpinUpNs = 172'800'000'000'000;
 
 /// One point of the sweep.
 struct Setting {
+  scene::ThermalMethod method = scene::ThermalMethod::per_frame;
   scene::ThermalModel model = scene::ThermalModel::foster;
   scene::StepSpacing spacing = scene::StepSpacing::geometric;
   std::uint32_t steps = 27;
@@ -44,10 +45,15 @@ struct Setting {
   std::uint32_t blocker_taps = 8;
   std::uint32_t filter_taps = 32;
   std::uint32_t modes = 0;  ///< foster: 0 = those of the material
+  double tolerance_k = 0.1;
+  bool lateral = true;  ///< cached: conduction along the surface and across edges
 };
 
 std::string_view name_of(scene::ThermalModel model) {
   return model == scene::ThermalModel::foster ? "foster" : "emit2014";
+}
+std::string_view name_of(scene::ThermalMethod method) {
+  return method == scene::ThermalMethod::cached ? "cached" : "per-frame";
 }
 std::string_view name_of(scene::StepSpacing spacing) {
   return spacing == scene::StepSpacing::uniform ? "uniform" : "geometric";
@@ -55,14 +61,28 @@ std::string_view name_of(scene::StepSpacing spacing) {
 
 std::vector<Setting> sweep(bool quick) {
   std::vector<Setting> settings;
+  const auto cached = [&settings]() -> Setting& {
+    Setting& setting = settings.emplace_back();
+    setting.method = scene::ThermalMethod::cached;
+    return setting;
+  };
   const std::vector<std::uint32_t> steps =
       quick ? std::vector<std::uint32_t>{9, 27} : std::vector<std::uint32_t>{9, 13, 27, 54, 90};
   for (const auto model : {scene::ThermalModel::emit2014, scene::ThermalModel::foster}) {
     for (const auto spacing : {scene::StepSpacing::uniform, scene::StepSpacing::geometric}) {
-      for (const std::uint32_t count : steps) settings.push_back({model, spacing, count});
+      for (const std::uint32_t count : steps) {
+        Setting& setting = settings.emplace_back();
+        setting.model = model;
+        setting.spacing = spacing;
+        setting.steps = count;
+      }
     }
   }
+  cached();
+  cached().lateral = false;
   if (quick) return settings;
+  for (const std::uint32_t count : {13U, 54U, 90U}) cached().steps = count;
+  for (const double tolerance_k : {1.0, 0.3, 0.03}) cached().tolerance_k = tolerance_k;
   // One thing at a time around foster, geometric, 27.
   for (const std::uint32_t map_px : {256U, 512U, 2048U, 4096U}) {
     settings.emplace_back().shadow_map_px = map_px;
@@ -80,13 +100,17 @@ struct Shot {
   std::vector<float> temperature_k;
   std::vector<float> radiance_w_m2_sr;
   double frame_ms = 0.0;
+  double warm_up_ms = 0.0;
   std::string device;
 };
 
 Result<Shot> shoot(scene::ScenarioDesc scenario, const Setting& setting,
                    const reference::SolveView& view, const BenchErrorCommand& command) {
   scene::ThermalOptions& thermal = scenario.thermal;
+  thermal.method = setting.method;
   thermal.model = setting.model;
+  thermal.tolerance_k = setting.tolerance_k;
+  thermal.lateral = setting.lateral;
   thermal.spacing = setting.spacing;
   thermal.steps = setting.steps;
   thermal.shadow_map_px = setting.shadow_map_px;
@@ -111,6 +135,13 @@ Result<Shot> shoot(scene::ScenarioDesc scenario, const Setting& setting,
     request.sim_time_ns = view.sim_time_ns;
     request.thermal_time_ns = view.sim_time_ns;
     request.sensor_pose = view.sensor_pose;
+    if (i == 0) {
+      const auto start = Clock::now();
+      const auto warm =
+          renderer.warm_up(request, [](double) { return !InterruptGuard::interrupted(); });
+      if (!warm) return tl::unexpected(warm.error());
+      shot.warm_up_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    }
     const auto start = Clock::now();
     const int slot = renderer.submit(request);
     if (slot < 0) {
@@ -192,6 +223,7 @@ struct Row {
   Region region = Region::all;
   Setting setting;
   double frame_ms = 0.0;
+  double warm_up_ms = 0.0;
   ErrorSummary kelvin;
   ErrorSummary fraction;
   bool pareto = false;
@@ -220,12 +252,16 @@ std::uint32_t modes_of(const Setting& setting) {
 Json row_json(const Row& row, const BenchErrorCommand& command, const std::string& reference) {
   const Setting& s = row.setting;
   Json json = Json::object();
-  json.set("scene", row.scene).set("region", name_of(row.region)).set("method", "per-frame");
+  json.set("scene", row.scene).set("region", name_of(row.region)).set("method", name_of(s.method));
   json.set("model", name_of(s.model)).set("steps", s.steps).set("spacing", name_of(s.spacing));
   json.set("map_size", s.shadow_map_px).set("taps", taps_text(s));
-  json.set("occlusion", "screen-space");
+  const bool cached = s.method == scene::ThermalMethod::cached;
+  json.set("occlusion", cached ? "rays" : "screen-space").set("lateral", cached && s.lateral);
+  json.set("warm_up_ms", row.warm_up_ms);
   const std::uint32_t modes = modes_of(s);
-  json.set("modes", modes == 0 ? Json("material") : Json(modes)).set("tolerance_k", nullptr);
+  json.set("modes", modes == 0 ? Json("material") : Json(modes));
+  json.set("tolerance_k",
+           s.model == scene::ThermalModel::emit2014 ? Json(nullptr) : Json(s.tolerance_k));
   json.set("frame_ms_median", row.frame_ms);
   const bool known = row.kelvin.pixels > 0;
   const auto number = [known](double value) { return known ? Json(value) : Json(nullptr); };
@@ -242,16 +278,18 @@ Json row_json(const Row& row, const BenchErrorCommand& command, const std::strin
 
 Result<void> write_csv(const std::filesystem::path& file, const std::vector<Row>& rows) {
   std::ofstream out(file, std::ios::binary);
-  out << "scene,region,method,model,steps,spacing,map_size,taps,modes,frame_ms_median,max_error_k,"
+  out << "scene,region,method,model,steps,spacing,map_size,taps,modes,tolerance_k,lateral,frame_ms_"
+         "median,max_error_k,"
          "rms_error_k,p99_error_k,max_error_frac,rms_error_frac,p99_error_frac,pareto,pixels\n";
   for (const Row& row : rows) {
     const Setting& s = row.setting;
     out << fmt::format(
-        "{},{},per-frame,{},{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
+        "{},{},{},{},{},{},{},{},{},{:g},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
         "{:.4g},{},{}\n",
-        row.scene, name_of(row.region), name_of(s.model), s.steps, name_of(s.spacing),
-        s.shadow_map_px, taps_text(s), modes_of(s), row.frame_ms, row.kelvin.max, row.kelvin.rms,
-        row.kelvin.p99, row.fraction.max, row.fraction.rms, row.fraction.p99, row.pareto ? 1 : 0,
+        row.scene, name_of(row.region), name_of(s.method), name_of(s.model), s.steps,
+        name_of(s.spacing), s.shadow_map_px, taps_text(s), modes_of(s), s.tolerance_k,
+        s.lateral ? 1 : 0, row.frame_ms, row.kelvin.max, row.kelvin.rms, row.kelvin.p99,
+        row.fraction.max, row.fraction.rms, row.fraction.p99, row.pareto ? 1 : 0,
         row.kelvin.pixels);
   }
   out.flush();
@@ -271,10 +309,11 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
     const Setting& s = row.setting;
     return PlotPoint{
         row.frame_ms, row.kelvin.rms,
-        fmt::format("{} {} steps {}, map {}, taps {}: RMS {:.3f} K, p99 {:.3f} K, "
-                    "max {:.3f} K, {:.1f} ms",
-                    name_of(s.model), s.steps, name_of(s.spacing), s.shadow_map_px, taps_text(s),
-                    row.kelvin.rms, row.kelvin.p99, row.kelvin.max, row.frame_ms)};
+        fmt::format("{} {} {} steps {}, map {}, taps {}, tolerance {:g} K: RMS {:.3f} K, p99 "
+                    "{:.3f} K, max {:.3f} K, {:.1f} ms",
+                    name_of(s.method), name_of(s.model), s.steps, name_of(s.spacing),
+                    s.shadow_map_px, taps_text(s), s.tolerance_k, row.kelvin.rms, row.kelvin.p99,
+                    row.kelvin.max, row.frame_ms)};
   };
   std::map<std::string, PlotSeries> curves;
   PlotSeries variations{"one option changed", {}, false, true, false};
@@ -285,11 +324,14 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
     const Setting& s = row.setting;
     if (row.pareto) front.points.push_back(point(row));
     if (s.shadow_map_px != standard.shadow_map_px || s.filter_taps != standard.filter_taps ||
-        s.modes != standard.modes) {
+        s.modes != standard.modes || !s.lateral) {
       variations.points.push_back(point(row));
       continue;
     }
-    const std::string label = fmt::format("{}, {}", name_of(s.model), name_of(s.spacing));
+    const std::string label =
+        s.method == scene::ThermalMethod::cached
+            ? std::string("cached foster")
+            : fmt::format("per-frame {}, {}", name_of(s.model), name_of(s.spacing));
     PlotSeries& curve = curves[label];
     curve.label = label;
     curve.line = true;
@@ -343,8 +385,12 @@ int run_bench_error(const BenchErrorCommand& command) {
       if (!shot) return fail(shot.error());
       device = shot->device;
       if (setting.steps == 27 && setting.spacing == scene::StepSpacing::geometric &&
-          setting.shadow_map_px == 1024 && setting.filter_taps == 32 && setting.modes == 0) {
-        figures.add(std::string(name_of(setting.model)), shot->temperature_k);
+          setting.shadow_map_px == 1024 && setting.filter_taps == 32 && setting.modes == 0 &&
+          setting.tolerance_k == 0.1 && setting.lateral) {
+        figures.add(setting.method == scene::ThermalMethod::cached
+                        ? std::string(name_of(setting.method))
+                        : std::string(name_of(setting.model)),
+                    shot->temperature_k);
       }
       for (std::size_t r = 0; r < kRegions.size(); ++r) {
         Row row;
@@ -352,6 +398,7 @@ int run_bench_error(const BenchErrorCommand& command) {
         row.region = kRegions[r];
         row.setting = setting;
         row.frame_ms = shot->frame_ms;
+        row.warm_up_ms = shot->warm_up_ms;
         row.kelvin = summarize_error(shot->temperature_k, truth->image.temperature_k,
                                      truth->masks[r], false);
         row.fraction = summarize_error(shot->radiance_w_m2_sr, truth->image.radiance_w_m2_sr[0],
@@ -368,14 +415,18 @@ int run_bench_error(const BenchErrorCommand& command) {
   }
   mark_pareto(rows);
 
-  TextTable table({"scene", "model", "spacing", "steps", "map", "taps", "ms", "rms K", "p99 K",
-                   "max K", "sunlit max", "core max", "penumbra p99", "edges p99"});
+  TextTable table({"scene", "method", "model", "spacing", "steps", "map", "taps", "tol K",
+                   "lateral", "ms", "rms K", "p99 K", "max K", "sunlit max", "core max",
+                   "penumbra p99", "edges p99"});
   for (std::size_t i = 0; i + kRegions.size() <= rows.size(); i += kRegions.size()) {
     const Row& all = rows[i];
     const auto k = [](double value) { return fmt::format("{:.3f}", value); };
-    table.add({all.scene, std::string(name_of(all.setting.model)),
-               std::string(name_of(all.setting.spacing)), fmt::format("{}", all.setting.steps),
-               fmt::format("{}", all.setting.shadow_map_px), taps_text(all.setting),
+    const bool cached = all.setting.method == scene::ThermalMethod::cached;
+    table.add({all.scene, std::string(name_of(all.setting.method)),
+               std::string(name_of(all.setting.model)), std::string(name_of(all.setting.spacing)),
+               fmt::format("{}", all.setting.steps), fmt::format("{}", all.setting.shadow_map_px),
+               taps_text(all.setting), fmt::format("{:g}", all.setting.tolerance_k),
+               cached && all.setting.lateral ? "yes" : "no",
                fmt::format("{:.1f}{}", all.frame_ms, all.pareto ? " *" : "  "), k(all.kelvin.rms),
                k(all.kelvin.p99), k(all.kelvin.max), k(rows[i + 1].kelvin.max),
                k(rows[i + 2].kelvin.max), k(rows[i + 3].kelvin.p99), k(rows[i + 4].kelvin.p99)});

@@ -23,6 +23,8 @@ struct SceneFill {
 inline constexpr double kLeastSurfaceFrac = 0.80;
 inline constexpr double kLeastFigureFrac = 0.25;
 inline constexpr double kLeastSweptFrac = 0.15;
+/// A per-frame picture may take this many times what Embree takes to trace its history's steps.
+inline constexpr double kMostEmbreeRatio = 6.0;
 
 /// Shares in one picture. `depth_m` along the boresight, +Inf in the sky; `temperature_k` as
 /// rendered. Precondition: both have width_px * height_px values.

@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <unordered_map>
 
+#include "pixel_surface.hpp"
+
 namespace emit::cli {
 namespace {
 
@@ -13,16 +15,6 @@ constexpr double kLitFrac = 0.999;
 constexpr double kShadedFrac = 0.001;
 /// Neighbouring normals farther apart than 30 degrees are a crease.
 constexpr double kCreaseCos = 0.866;
-/// A step in depth beyond the tangent plane, in footprints of a pixel.
-constexpr double kStepPx = 3.0;
-
-struct PixelSurface {
-  bool surface = false;
-  std::uint32_t object = 0;
-  double distance_m = 0.0;
-  glm::dvec3 position_m{0.0};
-  glm::dvec3 normal{0.0};  ///< towards the camera
-};
 
 /// Points gathered in cells as wide as the search radius: neighbours lie in 27 cells.
 class NearPoints {
@@ -64,33 +56,19 @@ class NearPoints {
 std::vector<PixelSurface> trace(const reference::SceneInstant& scene,
                                 const reference::SolveView& view) {
   std::vector<PixelSurface> pixels(static_cast<std::size_t>(view.width_px) * view.height_px);
-  const double scale = 2.0 * std::tan(0.5 * view.fov_h_rad) / view.width_px;
   for (std::uint32_t row = 0; row < view.height_px; ++row) {
     for (std::uint32_t column = 0; column < view.width_px; ++column) {
-      const glm::dvec3 body(1.0, scale * (column + 0.5 - 0.5 * view.width_px),
-                            scale * (row + 0.5 - 0.5 * view.height_px));
-      const glm::dvec3 direction =
-          glm::normalize(view.sensor_pose.world_from_body * glm::normalize(body));
-      const auto hit = scene.first_hit({view.sensor_pose.position_world_m, direction, 0.0});
-      if (!hit) continue;
-      PixelSurface& pixel = pixels[static_cast<std::size_t>(row) * view.width_px + column];
-      pixel.surface = true;
-      pixel.object = hit->object;
-      pixel.distance_m = hit->distance_m;
-      pixel.position_m = hit->position_world_m;
-      pixel.normal = hit->front ? hit->geometric_normal : -hit->geometric_normal;
+      pixels[static_cast<std::size_t>(row) * view.width_px + column] =
+          trace_pixel(scene, view, column, row);
     }
   }
   return pixels;
 }
 
 /// Whether an edge of a body, a foot or an outline runs between two neighbouring pixels.
-bool is_edge(const PixelSurface& a, const PixelSurface& b, double pixel_rad) {
-  if (a.surface != b.surface) return true;
-  if (!a.surface) return false;
-  if (a.object != b.object || glm::dot(a.normal, b.normal) < kCreaseCos) return true;
-  const double step_m = std::abs(glm::dot(b.position_m - a.position_m, a.normal));
-  return step_m > kStepPx * pixel_rad * std::min(a.distance_m, b.distance_m);
+bool is_edge(const PixelSurface& a, const PixelSurface& b, double width_rad) {
+  if (is_outline(a, b, width_rad)) return true;
+  return a.surface && glm::dot(a.normal, b.normal) < kCreaseCos;
 }
 
 }  // namespace
@@ -115,7 +93,7 @@ std::array<std::vector<std::uint8_t>, kRegions.size()> classify_pixels(
     const reference::SceneInstant& scene, const reference::SolveView& view,
     const glm::dvec3& to_sun, const RegionOptions& options) {
   const std::vector<PixelSurface> pixels = trace(scene, view);
-  const double pixel_rad = 2.0 * std::tan(0.5 * view.fov_h_rad) / view.width_px;
+  const double width_rad = pixel_rad(view);
 
   std::vector<reference::SurfacePoint> points;
   std::vector<std::size_t> pixel_of_point;
@@ -138,7 +116,7 @@ std::array<std::vector<std::uint8_t>, kRegions.size()> classify_pixels(
       const std::size_t i = static_cast<std::size_t>(row) * view.width_px + column;
       for (const std::size_t step : {std::size_t{1}, std::size_t{view.width_px}}) {
         if (step == 1 ? column + 1 == view.width_px : row + 1 == view.height_px) continue;
-        if (is_edge(pixels[i], pixels[i + step], pixel_rad)) {
+        if (is_edge(pixels[i], pixels[i + step], width_rad)) {
           touches_edge[i] = touches_edge[i + step] = 1;
         }
       }

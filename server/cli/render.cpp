@@ -9,6 +9,7 @@
 #include "console.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "frame_files.hpp"
+#include "interrupt.hpp"
 #include "json.hpp"
 #include "scenario_input.hpp"
 
@@ -73,6 +74,17 @@ int run_render(const RenderCommand& command) {
   request.sim_time_ns = std::llround(command.time_s * 1e9);
   request.thermal_time_ns = request.sim_time_ns;
   request.sensor_pose = renderer.scenario_sensor_pose_at(request.sim_time_ns);
+  {
+    ProgressBar progress("warm-up", 1000);
+    const InterruptGuard interrupt;
+    const auto warm = renderer.warm_up(request, [&progress](double done_frac) {
+      progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
+      return !InterruptGuard::interrupted();
+    });
+    if (!warm) return fail(warm.error());
+  }
+  const double warm_up_ms = ms_since(start);
+  start = std::chrono::steady_clock::now();
   const int slot = renderer.submit(request);
   if (slot < 0) return fail(kExitFailure, "the renderer has no free slot");
   const renderer::FrameView& view = renderer.collect(static_cast<renderer::SlotIndex>(slot));
@@ -101,9 +113,17 @@ int run_render(const RenderCommand& command) {
 
   fmt::print(
       text_stream(command.json),
-      "{}: {}x{}, sim time {:.3f} s, band {}, {} triangles, setup {:.0f} ms, frame {:.1f} ms, {}\n",
+      "{}: {}x{}, sim time {:.3f} s, band {}, {} triangles, setup {:.0f} ms, warm-up {:.0f} ms{}, "
+      "frame {:.1f} ms, {}\n",
       command.out.string(), view.width_px, view.height_px, command.time_s, shown.name,
-      renderer.scene_stats().triangles, setup_ms, frame_ms, renderer.device_name());
+      renderer.scene_stats().triangles, setup_ms, warm_up_ms,
+      renderer.scene_stats().samples > 0
+          ? fmt::format(" ({} thermal samples)", renderer.scene_stats().samples)
+          : std::string(),
+      frame_ms, renderer.device_name());
+  if (renderer.scene_stats().samples_full) {
+    warn("thermal.max_samples stopped the refinement: shadows are coarser than tolerance_k asks");
+  }
   if (view.stats.nonfinite_px > 0) {
     warn(fmt::format("{} pixels were not finite and are written as 0", view.stats.nonfinite_px));
   }
@@ -116,7 +136,8 @@ int run_render(const RenderCommand& command) {
     json.set("sim_time_s", command.time_s).set("band", shown.name);
     json.set("width", view.width_px).set("height", view.height_px);
     json.set("triangles", renderer.scene_stats().triangles);
-    json.set("setup_ms", setup_ms).set("frame_ms", frame_ms);
+    json.set("setup_ms", setup_ms).set("warm_up_ms", warm_up_ms).set("frame_ms", frame_ms);
+    json.set("samples", renderer.scene_stats().samples);
     json.set("surface_px", view.stats.surface_px).set("nonfinite_px", view.stats.nonfinite_px);
     json.set("clamped_px", view.stats.clamped_px);
     json.set("radiance", plane_json(planes.radiance_w_m2_sr));

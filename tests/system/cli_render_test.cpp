@@ -127,7 +127,7 @@ TEST(CliBench, paper_fills_every_key) {
   const TemporaryFolder folder;
   const ProcessResult result =
       run_emit({"bench", "paper", "--scene", "box", "--steps", "5", "--width", "160", "--height",
-                "120", "--json", folder.file("paper.json")},
+                "120", "--pixels", "2000", "--json", folder.file("paper.json")},
                std::chrono::seconds(280));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const std::string json = read_text(folder.file("paper.json"));
@@ -158,6 +158,12 @@ TEST(CliBench, paper_fills_every_key) {
                           "surface_fill_frac",
                           "statue_fill_frac",
                           "swept_ground_frac",
+                          "model",
+                          "mean_error_k",
+                          "edge_pixels",
+                          "not_finite_px",
+                          "embree_step_ms_median",
+                          "embree_ratio",
                           "rules_met"}) {
     EXPECT_FALSE(json_value(json, key).empty()) << key << "\n" << json;
   }
@@ -165,9 +171,31 @@ TEST(CliBench, paper_fills_every_key) {
   for (const char* stage : {"geometry", "occlusion", "shadow", "thermal", "radiance", "readback"}) {
     sum += std::stod(json_value(json, stage));
   }
+  EXPECT_EQ(json_value(json, "pixels_compared"), "4000");  // two pictures
+  EXPECT_EQ(json_value(json, "not_finite_px"), "0");
+  const double rms_k = std::stod(json_value(json, "rms_error_k"));
+  EXPECT_GT(rms_k, 0.01);  // five steps are not enough
+  EXPECT_LT(rms_k, 5.0);
+  EXPECT_GE(std::stod(json_value(json, "max_error_k")), std::stod(json_value(json, "p99_error_k")));
+  EXPECT_NE(json_value(json, "reference").find("1440 uniform history steps"), std::string::npos);
+  EXPECT_GT(std::stod(json_value(json, "embree_ratio")), 0.0);
   const double serial_ms = std::stod(json_value(json, "frame_serial_ms"));
   EXPECT_GT(serial_ms, 0.0);
   EXPECT_NEAR(sum, serial_ms, 1e-9 * serial_ms);  // the same numbers in another order of rounding
+}
+
+TEST(CliBench, paper_without_errors_leaves_them_null) {
+  const TemporaryFolder folder;
+  const ProcessResult result =
+      run_emit({"bench", "paper", "--scene", "box", "--steps", "3", "--width", "80", "--height",
+                "60", "--model", "foster", "--no-errors", "--json", folder.file("paper.json")},
+               std::chrono::seconds(280));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string json = read_text(folder.file("paper.json"));
+  EXPECT_EQ(json_value(json, "model"), "\"foster\"");
+  for (const char* key : {"max_error_k", "p99_error_k", "edge_p99_k", "reference"}) {
+    EXPECT_EQ(json_value(json, key), "null") << key;
+  }
 }
 
 }  // namespace

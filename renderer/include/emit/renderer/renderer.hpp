@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -88,10 +89,17 @@ struct FrameView {
 struct SceneStats {
   std::uint64_t triangles = 0;  ///< drawn when everything is in view, instances counted
   std::uint32_t instances = 0;
+  /// thermal.method "cached", after warm_up(): thermal samples, and whether thermal.max_samples
+  /// stopped their refinement.
+  std::uint64_t samples = 0;
+  bool samples_full = false;
   std::vector<std::string> warnings;  ///< unmapped materials and what else the loader could not map
 };
 
 using SlotIndex = std::uint32_t;
+
+/// Share done; false asks to stop.
+using WarmUpProgress = std::function<bool(double done_frac)>;
 
 class Renderer {
  public:
@@ -113,7 +121,14 @@ class Renderer {
   /// Forgets live poses and weather: the state of create(). RT-safe.
   virtual void reset() noexcept = 0;
 
-  /// Records and issues a frame; -1 when every slot is in use. RT-safe.
+  /// Does what frames from `first` on need once: thermal.method "cached" samples the surface and
+  /// integrates its history, seconds to minutes on all cores. Call it before the first frame;
+  /// submit() does it otherwise, and again where sim time goes back behind it.
+  /// Errors: internal (stopped by `progress`), gpu (no memory for the samples).
+  [[nodiscard]] virtual physics::Result<void> warm_up(const FrameRequest& first,
+                                                      const WarmUpProgress& progress = {}) = 0;
+
+  /// Records and issues a frame; -1 when every slot is in use. RT-safe after warm_up().
   [[nodiscard]] virtual int submit(const FrameRequest& request) noexcept = 0;
   /// True when collect() would not wait.
   [[nodiscard]] virtual bool poll(SlotIndex slot) noexcept = 0;

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/renderer/surface_forcing.hpp"
+
+#include <algorithm>
+
+#include "emit/physics/surface_balance.hpp"
+#include "history/environment.hpp"
+#include "history/foster_history.hpp"
+#include "passes/foster_setup.hpp"
+
+namespace emit::renderer {
+namespace {
+
+// Offsets of the surroundings' temperature are from here: their float64 does not care.
+constexpr double kReferenceK = 295.0;
+
+SurfaceForcing with_environment(const physics::SunPosition& sun, const physics::Forcing& weather) {
+  SurfaceForcing forcing = open_forcing(sun, weather);
+  forcing.environment_w_m2 = physics::environment_input_w_m2(1.0, weather.environment_k);
+  return forcing;
+}
+
+}  // namespace
+
+physics::Result<std::vector<IntervalForcing>> surface_forcing(
+    const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns) {
+  if (nodes_ns.size() < 2 || !std::is_sorted(nodes_ns.begin(), nodes_ns.end())) {
+    return physics::make_error(physics::ErrorCode::invalid_argument,
+                               "forcing needs at least two instants, in order of time");
+  }
+  const Environment environment(scenario);
+  std::vector<IntervalForcing> out(nodes_ns.size() - 1);
+  if (scenario.thermal.model == scene::ThermalModel::foster) {
+    scene::ScenarioDesc start = scenario;
+    start.thermal.history_start_ns = nodes_ns.front();
+    start.thermal.spin_up_ns = 0;
+    // Only the surroundings are carried.
+    auto materials = build_foster_materials(start, {});
+    if (!materials) return tl::unexpected(std::move(materials.error()));
+    FosterHistory history(start, {}, materials->back(), environment, kReferenceK);
+    history.forcing_over(nodes_ns, environment, out);
+    return out;
+  }
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const HistoryInterval interval = interval_between(nodes_ns[i], nodes_ns[i + 1], environment);
+    out[i] = {with_environment(interval.sun_begin, interval.forcing_begin),
+              with_environment(interval.sun_end, interval.forcing_end),
+              static_cast<double>(interval.end_ns - interval.begin_ns) * 1e-9};
+  }
+  return out;
+}
+
+}  // namespace emit::renderer
