@@ -76,7 +76,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
                                                    double obscurance_radius_m) {
   const SceneBuffers scene(std::move(geometry));
   const std::array<std::int32_t, 1> no_history{-1};
-  DrawLists lists(scene, no_history, thermal_.max_cascades);
+  DrawLists lists(scene, no_history, thermal_.max_cascades, {});
   lists.begin(sensor_pose.position_world_m, 0, {});
 
   sensor_.near_m = near_m;
@@ -149,7 +149,7 @@ Result<std::unique_ptr<VisibilityProbe>> VisibilityProbe::create(
     const DeviceOptions& device) {
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
   if (!context) return tl::unexpected(std::move(context.error()));
-  auto geometry = GeometryPass::create(sensor.width_px, sensor.height_px);
+  auto geometry = GeometryPass::create(sensor.width_px, sensor.height_px, false);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
   auto occlusion = OcclusionPass::create(sensor.width_px, sensor.height_px);
   if (!occlusion) return tl::unexpected(std::move(occlusion.error()));

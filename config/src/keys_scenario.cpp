@@ -333,12 +333,14 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           EMIT_FIELD(model),
           "Surface model. emit2014: equilibrium of Eq. 1-6, relaxed by the modes of the material. "
           "foster: convection, sky and surroundings, and all layers as 2 to 4 flux-driven states."),
-      choice<ThermalOptions>("method",
-                             std::vector<std::pair<std::string, ThermalMethod>>{
-                                 {"per-frame", ThermalMethod::per_frame}},
-                             EMIT_FIELD(method),
-                             "How the history is evaluated. per-frame: all steps again for every "
-                             "pixel of every frame."),
+      choice<ThermalOptions>(
+          "method",
+          std::vector<std::pair<std::string, ThermalMethod>>{
+              {"per-frame", ThermalMethod::per_frame}, {"cached", ThermalMethod::cached}},
+          EMIT_FIELD(method),
+          "How the history is evaluated. per-frame: all steps again for every "
+          "pixel of every frame. cached: once, on samples of the surface that "
+          "are carried on from interval to interval (foster only)."),
       number<ThermalOptions>("tolerance_k", "K", above_to(0, 50), EMIT_FIELD(tolerance_k),
                              "Aimed-at error of surface temperatures. foster: history steps are "
                              "split until halving them changes less. Not used by emit2014."),
@@ -368,8 +370,10 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           std::vector<std::pair<std::string, StepSpacing>>{{"geometric", StepSpacing::geometric},
                                                            {"uniform", StepSpacing::uniform}},
           EMIT_FIELD(spacing), "geometric: steps grow into the past. uniform: all alike."),
-      number<ThermalOptions>("first_step_s", "s", above_to(0, 86400), EMIT_FIELD(first_step_s),
-                             "Length of the newest step of geometric spacing."),
+      number<ThermalOptions>(
+          "first_step_s", "s", above_to(0, 86400), EMIT_FIELD(first_step_s),
+          "Length of the newest step of geometric spacing; cached: of the intervals "
+          "it goes on in."),
       integer<ThermalOptions>("shadow_map_px", "px", 16, 8192, EMIT_FIELD(shadow_map_px),
                               "Width and height of a shadow map."),
       integer<ThermalOptions>(
@@ -382,7 +386,13 @@ const KeyTable<ThermalOptions>& thermal_keys() {
                               "Samples of the soft-shadow filter."),
       number<ThermalOptions>("obscurance_radius_m", "m", above_to(0, 100),
                              EMIT_FIELD(obscurance_radius_m),
-                             "Radius within which surfaces hide the sky from each other."),
+                             "per-frame: radius within which surfaces hide the sky from each "
+                             "other."),
+      integer<ThermalOptions>("max_samples", "", 1000, 100000000, EMIT_FIELD(max_samples),
+                              "cached: most thermal samples, about 600 bytes each."),
+      boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
+                              "cached: heat is also conducted along the surface and across convex "
+                              "edges."),
   };
   return keys;
 }

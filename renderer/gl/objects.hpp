@@ -33,6 +33,18 @@ class Buffer {
     return Buffer(data.size_bytes(), data.data(), flags);
   }
 
+  /// Storage that upload() refills; at least 16 bytes.
+  [[nodiscard]] static Buffer dynamic(std::size_t bytes) {
+    return Buffer(bytes < 16 ? 16 : bytes, nullptr, GL_DYNAMIC_STORAGE_BIT);
+  }
+  /// Copies to the device, from element `first` on. @pre made by dynamic(), and it fits
+  template <class T>
+  void upload(std::span<const T> data, std::size_t first = 0) const noexcept {
+    if (data.empty()) return;
+    glNamedBufferSubData(id_, static_cast<GLintptr>(first * sizeof(T)),
+                         static_cast<GLsizeiptr>(data.size_bytes()), data.data());
+  }
+
   /// Persistent, coherent mapping for life; the buffer must have been created with the same flags.
   [[nodiscard]] std::byte* map_persistent(GLbitfield access) const {
     return static_cast<std::byte*>(

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/ext/vector_double2.hpp>
+#include <glm/ext/vector_double4.hpp>
 #include <glm/geometric.hpp>
 
 #include "emit/physics/step_nodes.hpp"
@@ -36,6 +39,16 @@ glm::dvec3 unit_from_octahedral(double u, double v) noexcept {
   return glm::normalize(n);
 }
 
+glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
+  const double scale = 1.0 / (std::abs(n.x) + std::abs(n.y) + std::abs(n.z));
+  glm::dvec2 p(n.x * scale, n.y * scale);
+  if (n.z < 0.0) {
+    p = {(1.0 - std::abs(p.y)) * (p.x >= 0.0 ? 1.0 : -1.0),
+         (1.0 - std::abs(p.x)) * (p.y >= 0.0 ? 1.0 : -1.0)};
+  }
+  return p;
+}
+
 /// Steady profile between the initial surface temperature and the base.
 FosterState<double> initial_states(const FosterMaterial& material) noexcept {
   FosterState<double> x{};
@@ -53,6 +66,8 @@ physics::FosterSurface<double> surface_of(const FosterMaterial& material,
                                  reference_k);
 }
 
+}  // namespace
+
 HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
                                  const Environment& environment) noexcept {
   HistoryInterval interval;
@@ -67,7 +82,19 @@ HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
   return interval;
 }
 
-}  // namespace
+SurfaceForcing open_forcing(const physics::SunPosition& sun,
+                            const physics::Forcing& weather) noexcept {
+  SurfaceForcing out;
+  const double direct_w_m2 = std::sin(sun.elevation.value()) > 0.0
+                                 ? weather.direct_normal_w_m2 * (1.0 - weather.cloud_frac)
+                                 : 0.0;
+  out.sun_w_m2 = direct_w_m2 * sun.direction_enu;
+  out.diffuse_w_m2 = weather.diffuse_horizontal_w_m2;
+  out.longwave_w_m2 = weather.longwave_down_w_m2;
+  out.film_w_m2_k = weather.film_w_m2_k;
+  out.air_k = weather.air_k;
+  return out;
+}
 
 FosterDrive<double> unshadowed_drive(const SurfaceForcing& f, const FosterMaterial& material,
                                      const glm::dvec3& normal, double reference_k) noexcept {
@@ -145,17 +172,11 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
 
 SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
                                       const physics::Forcing& weather) const noexcept {
-  SurfaceForcing out;
-  const double sine = std::sin(sun.elevation.value());
-  const double direct_w_m2 =
-      sine > 0.0 ? weather.direct_normal_w_m2 * (1.0 - weather.cloud_frac) : 0.0;
-  out.sun_w_m2 = direct_w_m2 * sun.direction_enu;
-  out.diffuse_w_m2 = weather.diffuse_horizontal_w_m2;
-  out.longwave_w_m2 = weather.longwave_down_w_m2;
-  out.reflected_w_m2 = (1.0 - surroundings_.solar_absorptance_frac) *
-                       (direct_w_m2 * std::max(sine, 0.0) + weather.diffuse_horizontal_w_m2);
-  out.film_w_m2_k = weather.film_w_m2_k;
-  out.air_k = weather.air_k;
+  SurfaceForcing out = open_forcing(sun, weather);
+  const double level_w_m2 =
+      glm::length(out.sun_w_m2) * std::max(std::sin(sun.elevation.value()), 0.0);
+  out.reflected_w_m2 =
+      (1.0 - surroundings_.solar_absorptance_frac) * (level_w_m2 + weather.diffuse_horizontal_w_m2);
   return out;
 }
 
@@ -188,6 +209,15 @@ void FosterHistory::carry(const HistoryInterval& interval, double tolerance_k,
   surroundings_now_k_ = environment_k(interval.forcing_end, end_k);
 }
 
+void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
+                                 const Environment& environment,
+                                 std::span<IntervalForcing> out) noexcept {
+  surroundings_state_ = surroundings_at_start_;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    carry(interval_between(nodes_ns[i], nodes_ns[i + 1], environment), tolerance_k_, out[i]);
+  }
+}
+
 void FosterHistory::spin_up_surroundings(const Environment& environment) noexcept {
   surroundings_state_ =
       surroundings_.prescribed() ? FosterState<double>{} : initial_states(surroundings_);
@@ -209,6 +239,29 @@ void FosterHistory::spin_up_surroundings(const Environment& environment) noexcep
     }
   }
   surroundings_at_start_ = surroundings_state_;
+}
+
+FosterState<double> FosterHistory::start_states(std::size_t material,
+                                                const glm::dvec3& normal) const noexcept {
+  const glm::dvec2 place =
+      (octahedral_from_unit(normal) * 0.5 + 0.5) * static_cast<double>(grid_nodes_ - 1);
+  const glm::dvec2 low = glm::clamp(glm::floor(place), glm::dvec2(0.0),
+                                    glm::dvec2(static_cast<double>(grid_nodes_ - 2)));
+  const glm::dvec2 weight = place - low;
+  const std::size_t at = (material * grid_nodes_ + static_cast<std::size_t>(low.y)) * grid_nodes_ +
+                         static_cast<std::size_t>(low.x);
+  const glm::dvec4 south = glm::mix(glm::dvec4(table_[at]), glm::dvec4(table_[at + 1]), weight.x);
+  const glm::dvec4 north = glm::mix(glm::dvec4(table_[at + grid_nodes_]),
+                                    glm::dvec4(table_[at + grid_nodes_ + 1]), weight.x);
+  const glm::dvec4 x = glm::mix(south, north, weight.y);
+  return {x.x, x.y, x.z, x.w};
+}
+
+IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns,
+                                      const Environment& environment) noexcept {
+  IntervalForcing out;
+  carry(interval_between(begin_ns, end_ns, environment), tolerance_k_, out);
+  return out;
 }
 
 FosterState<double> FosterHistory::spun_up(std::size_t index,

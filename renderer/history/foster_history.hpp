@@ -9,6 +9,7 @@
 
 #include "emit/physics/error.hpp"
 #include "emit/physics/foster.hpp"
+#include "emit/renderer/surface_forcing.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "history/environment.hpp"
 #include "history/step_plan.hpp"
@@ -17,46 +18,18 @@
 /// of the surroundings, and the states of unshadowed surfaces before the history begins.
 namespace emit::renderer {
 
-/// Everything that drives surfaces at an instant, whatever their material and direction
-/// (physics.md eq. 16).
-struct SurfaceForcing {
-  glm::dvec3 sun_w_m2{0.0};     ///< towards the sun, as long as the direct normal flux after clouds
-  double diffuse_w_m2 = 0.0;    ///< horizontal
-  double longwave_w_m2 = 0.0;   ///< of the sky, horizontal
-  double reflected_w_m2 = 0.0;  ///< sunlight from the surroundings
-  double environment_w_m2 = 0.0;  ///< long-wave exitance of the surroundings
-  double film_w_m2_k = 0.0;
-  double air_k = 0.0;
-};
-struct IntervalForcing {
-  SurfaceForcing begin;
-  SurfaceForcing end;
-  double dt_s = 0.0;
-};
-
-/// A surface that drives its states.
-struct FosterMaterial {
-  physics::FosterNetwork network;  ///< no modes: its temperature is prescribed
-  double solar_absorptance_frac = 0.0;
-  double emissivity_frac = 1.0;
-  double base_k = 0.0;
-  double initial_k = 0.0;
-  double prescribed_k = 0.0;
-
-  [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }
-};
+/// Forcing at an instant but for what the surroundings send.
+[[nodiscard]] SurfaceForcing open_forcing(const physics::SunPosition& sun,
+                                          const physics::Forcing& weather) noexcept;
+/// Sun and weather at both ends; weather that changes at the end has not acted. No sample instant.
+[[nodiscard]] HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
+                                               const Environment& environment) noexcept;
 
 /// Drive of an unshadowed face of that direction.
 [[nodiscard]] physics::FosterDrive<double> unshadowed_drive(const SurfaceForcing& forcing,
                                                             const FosterMaterial& material,
                                                             const glm::dvec3& normal,
                                                             double reference_k) noexcept;
-
-/// Networks and constants of materials: their own modes, or derived from their layers where they
-/// have none or the scenario asks for another number. Setup only. Errors (config) name the
-/// material.
-[[nodiscard]] physics::Result<std::vector<FosterMaterial>> foster_materials(
-    std::span<const scene::Material> materials, const scene::ThermalOptions& options);
 
 /// Owner: Renderer. Real time: update is RT-safe, and takes microseconds unless the host has
 /// changed the weather before the history's start; then the spin-up runs again (tens of
@@ -78,6 +51,11 @@ class FosterHistory {
   /// Brings everything to the plan's intervals. True when the table has changed.
   bool update(const StepPlan& plan, const Environment& environment) noexcept;
 
+  /// Forcing between nodes of the caller's own from the history's start on; entry i from node i to
+  /// node i + 1. @pre out has one entry less than nodes_ns, which ascends
+  void forcing_over(std::span<const std::int64_t> nodes_ns, const Environment& environment,
+                    std::span<IntervalForcing> out) noexcept;
+
   [[nodiscard]] std::span<const FosterMaterial> materials() const noexcept { return materials_; }
   [[nodiscard]] std::span<const IntervalForcing> intervals() const noexcept { return intervals_; }
   /// Last intervals of the spin-up; none without spin-up.
@@ -88,6 +66,22 @@ class FosterHistory {
   /// direction of octahedral coordinates (2 i / (m - 1) - 1, 2 j / (m - 1) - 1).
   [[nodiscard]] std::span<const glm::vec4> table() const noexcept { return table_; }
   [[nodiscard]] std::uint32_t grid_nodes() const noexcept { return grid_nodes_; }
+
+  /// States from the table, bilinear. @pre material < materials().size(). Any thread; RT-safe.
+  [[nodiscard]] physics::FosterState<double> start_states(std::size_t material,
+                                                          const glm::dvec3& normal) const noexcept;
+
+  /// Carries the surroundings on over an interval that follows the last one. RT-safe.
+  [[nodiscard]] IntervalForcing extend(std::int64_t begin_ns, std::int64_t end_ns,
+                                       const Environment& environment) noexcept;
+
+  /// States of the surroundings where update() or extend() left them, and going back to such.
+  [[nodiscard]] const physics::FosterState<double>& surroundings() const noexcept {
+    return surroundings_state_;
+  }
+  void restore_surroundings(const physics::FosterState<double>& state) noexcept {
+    surroundings_state_ = state;
+  }
 
   /// States of an unshadowed face of materials()[material] of any direction at the instant where
   /// the table stands, from the full spin-up rather than the table.

@@ -88,10 +88,11 @@ void ThermalPass::bind_textures() const noexcept {
 }
 
 physics::Result<RadiancePass> RadiancePass::create(std::uint32_t width_px, std::uint32_t height_px,
-                                                   scene::ThermalModel model) {
+                                                   const scene::ThermalOptions& options) {
   RadiancePass pass;
   std::vector<gl::Define> defines;
-  if (model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});
+  if (options.model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});
+  if (options.method == scene::ThermalMethod::cached) defines.push_back({"EMIT_CACHED", "1"});
   auto program = gl::Program::compute("passes/radiance.comp", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);

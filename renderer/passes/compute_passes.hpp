@@ -51,7 +51,7 @@ class RadiancePass {
  public:
   [[nodiscard]] static physics::Result<RadiancePass> create(std::uint32_t width_px,
                                                             std::uint32_t height_px,
-                                                            scene::ThermalModel model);
+                                                            const scene::ThermalOptions& options);
   void dispatch() const noexcept;
 
  private:

@@ -10,14 +10,20 @@
 namespace emit::renderer {
 namespace {
 
-gpu::InstanceParams params_from(const glm::dmat4& relworld_from_mesh,
-                                std::uint32_t object) noexcept {
+/// A float holds whole numbers up to 2^24 only: large ones go in two parts.
+constexpr std::int64_t kSampleUnit = 4096;
+
+gpu::InstanceParams params_from(const glm::dmat4& relworld_from_mesh, std::uint32_t object,
+                                std::int64_t sample_offset) noexcept {
+  const std::int64_t units = sample_offset / kSampleUnit;
   const auto row = [&relworld_from_mesh](glm::length_t r) {
     return glm::vec4(
         static_cast<float>(relworld_from_mesh[0][r]), static_cast<float>(relworld_from_mesh[1][r]),
         static_cast<float>(relworld_from_mesh[2][r]), static_cast<float>(relworld_from_mesh[3][r]));
   };
-  return {row(0), row(1), row(2), glm::vec4(static_cast<float>(object + 1), 0.0F, 0.0F, 0.0F)};
+  return {row(0), row(1), row(2),
+          glm::vec4(static_cast<float>(object + 1), static_cast<float>(units),
+                    static_cast<float>(sample_offset - units * kSampleUnit), 0.0F)};
 }
 
 /// True when the box lies outside one plane of the pyramid.
@@ -50,8 +56,12 @@ bool outside(const LightFrustum& frustum, const scene::Aabb& box) noexcept {
 }  // namespace
 
 DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-                     std::uint32_t max_passes)
-    : scene_(scene) {
+                     std::uint32_t max_passes, std::vector<std::uint32_t> first_sample)
+    : scene_(scene), sample_offset_(scene.instances().size(), 0) {
+  for (std::size_t i = 0; i < first_sample.size(); ++i) {
+    sample_offset_[i] = static_cast<std::int64_t>(first_sample[i]) -
+                        scene.meshes()[scene.instances()[i].mesh].base_vertex;
+  }
   const auto instances = scene.instances();
   std::size_t submeshes = 0;
   std::size_t submesh_instances = 0;
@@ -102,7 +112,8 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
       view_placed_[i] = place(
           i, scene::world_from_body_matrix(state.pose) * instances[i].body_from_mesh, state.on);
     }
-    params_.push_back(params_from(view_placed_[i].relworld_from_mesh, instances[i].object));
+    params_.push_back(
+        params_from(view_placed_[i].relworld_from_mesh, instances[i].object, sample_offset_[i]));
     if (view_placed_[i].on) bounds_.add(view_placed_[i].box);
   }
   light_placed_ = view_placed_;

@@ -27,9 +27,10 @@ struct CommandRange {
 /// (capacity for the worst case is taken there).
 class DrawLists {
  public:
-  /// `max_passes`: most shadow passes (steps x cascades) of a frame.
+  /// `max_passes`: most shadow passes (steps x cascades) of a frame. `first_sample`: by instance,
+  /// the thermal sample of its mesh's first vertex; empty where the state is not on samples.
   DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-            std::uint32_t max_passes);
+            std::uint32_t max_passes, std::vector<std::uint32_t> first_sample);
 
   /// Starts a frame: all instances at `sim_time_ns` around a camera at `camera_world_m`.
   void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
@@ -74,6 +75,8 @@ class DrawLists {
   std::vector<std::int32_t> history_of_instance_;  ///< -1: static
   std::vector<std::uint32_t> moving_;              ///< instances of entities
   std::vector<double> size_of_instance_m_;
+  /// By instance: sample of a vertex minus its gl_VertexID.
+  std::vector<std::int64_t> sample_offset_;
   std::vector<Placed> view_placed_;
   std::vector<Placed> light_placed_;
   std::vector<gpu::InstanceParams> params_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 namespace emit::renderer {
 namespace {
@@ -60,10 +61,12 @@ SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer
   glVertexArrayBindingDivisor(light, 1, 1);
 }
 
-physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px,
-                                                   std::uint32_t height_px) {
+physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::uint32_t height_px,
+                                                   bool sampled) {
   GeometryPass pass;
-  auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag");
+  std::vector<gl::Define> defines;
+  if (sampled) defines.push_back({"EMIT_CACHED", "1"});
+  auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
   pass.width_px_ = static_cast<GLsizei>(width_px);
@@ -78,8 +81,14 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px,
   glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.normal_.id(), 0);
   glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
   glNamedFramebufferTexture(id, GL_DEPTH_ATTACHMENT, pass.depth_buffer_.id(), 0);
-  const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
-  glNamedFramebufferDrawBuffers(id, 3, targets);
+  pass.sampled_ = sampled;
+  if (sampled) {
+    pass.state_ = gl::Texture(GL_RGBA32F, pass.width_px_, pass.height_px_);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT3, pass.state_.id(), 0);
+  }
+  const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
+                            GL_COLOR_ATTACHMENT3};
+  glNamedFramebufferDrawBuffers(id, sampled ? 4 : 3, targets);
   if (auto ok = check_complete(pass.framebuffer_, "geometry buffer"); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
@@ -115,6 +124,7 @@ void GeometryPass::bind_textures() const noexcept {
   depth_m_.bind(EMIT_TEX_DEPTH);
   normal_.bind(EMIT_TEX_NORMAL);
   ids_.bind(EMIT_TEX_IDS);
+  if (sampled_) state_.bind(EMIT_TEX_STATE);
 }
 
 physics::Result<ShadowPass> ShadowPass::create(std::uint32_t size_px, std::uint32_t layers) {

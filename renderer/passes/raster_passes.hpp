@@ -27,11 +27,12 @@ class SceneVertexArrays {
 /// Paper part 1: linear depth, normal, material index and object id of the visible surface.
 class GeometryPass {
  public:
+  /// `sampled`: also the thermal state of the surface, from its samples.
   [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
-                                                            std::uint32_t height_px);
+                                                            std::uint32_t height_px, bool sampled);
   void draw(const SceneVertexArrays& vertices, std::span<const DrawCommand> single_sided,
             std::span<const DrawCommand> double_sided) const noexcept;
-  /// Binds depth, normal and ids to their texture units.
+  /// Binds depth, normal and ids, and the state if sampled, to their texture units.
   void bind_textures() const noexcept;
 
  private:
@@ -39,10 +40,12 @@ class GeometryPass {
   gl::Texture depth_m_;
   gl::Texture normal_;
   gl::Texture ids_;
+  gl::Texture state_;
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
   GLsizei width_px_ = 0;
   GLsizei height_px_ = 0;
+  bool sampled_ = false;
 };
 
 /// Paper part 3: depth seen from the sun, one layer per cascade, drawn anew for every step.

@@ -50,19 +50,27 @@ void main() {
   uvec2 ids = uvec2(0u);
   vec4 emissivity = vec4(1.0);
   vec3 n = vec3(0.0);
-  float sky_frac = 0.5;
+  float open_frac = 0.5;  // share of the hemisphere that shows sky, cosine-weighted
   float sun_frac = 0.0;
   if (surface) {
     ids = gbuffer_ids(px);
     n = gbuffer_normal(px);
-    sky_frac = texelFetch(occlusion_texture, px, 0).r;
+#ifdef EMIT_CACHED
+    vec3 sampled = texelFetch(state_texture, px, 0).rgb;
+    open_frac = sampled.z;
+    if (frame.sun_now.w > 0.0) sun_frac = sampled.y;
+#else
+    open_frac = min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0) * 0.5 * (1.0 + n.z);
     if (frame.sun_now.w > 0.0) sun_frac = texelFetch(sun_now_texture, px, 0).r;
+#endif
     vec4 start = material_start(int(ids.x));
     emissivity = material_band_emissivity(int(ids.x));
     if (start.z > 0.5) {
       temperature_k = frame.obscurance.y + start.y;
     } else {
-#ifdef EMIT_FOSTER
+#if defined(EMIT_CACHED)
+      temperature_k = frame.obscurance.y + sampled.x;
+#elif defined(EMIT_FOSTER)
       vec4 x = texelFetch(state_texture, px, 0);
       temperature_k = frame.obscurance.y + (start.w + ((x.x + x.y) + (x.z + x.w)));
 #else
@@ -83,7 +91,6 @@ void main() {
       float emissivity_frac = emissivity[i];
       float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(temperature_k, lut, clamped);
       // Diffuse reflection: the open part of the hemisphere shows sky, the rest the surroundings.
-      float open_frac = min(2.0 * sky_frac, 1.0) * 0.5 * (1.0 + n.z);
       float incoming = mix(bands[i].surroundings_radiance_w_m2_sr, bands[i].sky_hemisphere_w_m2_sr, open_frac);
       incoming += bands[i].sun_irradiance_w_m2 / EMIT_PI * sun_frac * max(dot(n, frame.sun_now.xyz), 0.0);
       float leaving = emitted + (1.0 - emissivity_frac) * incoming;

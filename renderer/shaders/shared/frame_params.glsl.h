@@ -13,6 +13,7 @@ struct FrameParams {
   vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K;
                               // foster: z = tolerance of a step in K, w = nodes per axis of the spin-up table
   uvec4 bands;                // x = number of bands, y = nodes of a band's table
+  vec4 samples;               // cached: x = way of now between the two nodes of the samples, 0..1
   vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
 };
 
@@ -21,7 +22,7 @@ struct InstanceParams {
   vec4 relworld_from_mesh_row0;
   vec4 relworld_from_mesh_row1;
   vec4 relworld_from_mesh_row2;
-  vec4 ids;  // x = object id (1 + index of the scenario's object), exact in float32
+  vec4 ids;  // x = object id (1 + index of the scenario's object); cached: 4096 y + z = sample - gl_VertexID. Exact in float32
 };
 
 // Four texels of the material table.

@@ -164,7 +164,7 @@ struct AtmosphereDesc {
   std::vector<BandAtmosphere> bands;
 };
 
-enum class ThermalMethod : std::uint8_t { per_frame };
+enum class ThermalMethod : std::uint8_t { per_frame, cached };
 enum class ThermalModel : std::uint8_t { emit2014, foster };
 enum class StepSpacing : std::uint8_t { uniform, geometric };
 
@@ -190,6 +190,8 @@ struct ThermalOptions {
   std::uint32_t blocker_taps = 8;
   std::uint32_t filter_taps = 32;
   double obscurance_radius_m = 0.5;
+  std::uint32_t max_samples = 4'000'000;  ///< cached: thermal samples, about 600 bytes each
+  bool lateral = true;  ///< cached: conduction along the surface and across convex edges
 };
 
 struct Place {

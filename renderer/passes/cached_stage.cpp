@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/cached_stage.hpp"
+
+#include <cmath>
+
+#include "passes/band_model.hpp"
+#include "passes/foster_setup.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// Places along a known trajectory of the camera that the refinement looks from.
+constexpr std::size_t kEyes = 64;
+
+FosterHistory foster_of(const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
+                        const Environment& environment) {
+  const FosterMaterial surroundings = materials[materials.size() - 1];
+  materials.pop_back();
+  return FosterHistory(scenario, std::move(materials), surroundings, environment, kReferenceK);
+}
+
+RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& request) {
+  RefineView view;
+  view.pixel_rad = 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
+  view.eyes_world_m.push_back(request.sensor_pose.position_world_m);
+  const scene::Trajectory& keys = sensor.trajectory;
+  if (keys.size() < 2) return view;
+  const std::int64_t end_ns = keys[keys.size() - 1].sim_time_ns;
+  for (std::size_t i = 1; i <= kEyes && request.sim_time_ns < end_ns; ++i) {
+    const auto way = static_cast<double>(end_ns - request.sim_time_ns) * static_cast<double>(i);
+    const std::int64_t at_ns = request.sim_time_ns + std::llround(way / kEyes);
+    view.eyes_world_m.push_back(trajectory_at(keys, at_ns).pose.position_world_m);
+  }
+  return view;
+}
+
+}  // namespace
+
+physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
+    const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+    std::vector<FosterMaterial> foster_materials, const SceneHistory& history) {
+  std::vector<scene::Material> materials = geometry.materials;
+  const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
+  auto surface =
+      CachedSurface::create(scenario, std::move(geometry), histories_of_objects(scenario),
+                            std::span(foster_materials).first(simulated), kReferenceK);
+  if (!surface) return tl::unexpected(std::move(surface.error()));
+  return std::unique_ptr<ThermalStage>(new CachedStage(
+      scenario, std::move(materials), std::move(*surface), std::move(foster_materials), history));
+}
+
+CachedStage::CachedStage(const scene::ScenarioDesc& scenario,
+                         std::vector<scene::Material> materials,
+                         std::unique_ptr<CachedSurface> surface,
+                         std::vector<FosterMaterial> foster_materials, const SceneHistory& history)
+    : sensor_(scenario.sensor),
+      history_of_object_(histories_of_objects(scenario)),
+      history_(history),
+      plan_(scenario.thermal),
+      foster_(foster_of(scenario, std::move(foster_materials), history.environment)),
+      surface_(std::move(surface)),
+      material_buffer_(gl::Buffer::from(
+          std::span<const gpu::MaterialParams>(material_params(materials, scenario, kReferenceK)))),
+      material_table_(GL_RGBA32F, material_buffer_) {}
+
+physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
+                                           const WarmUpProgress& progress) {
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities};
+  auto ready = surface_->prepare(request.thermal_time_ns, refine_view(sensor_, request), inputs,
+                                 plan_, foster_, progress);
+  if (!ready) return ready;
+  std::vector<std::uint32_t> first_sample;
+  scene::SceneGeometry geometry = surface_->drawn_geometry(first_sample);
+  drawn_.reset();  // its device memory goes before that of the next one is taken
+  drawn_ = std::make_unique<DrawnScene>(std::move(geometry), history_of_object_, 0,
+                                        std::move(first_sample));
+  make_sample_buffers();
+  if (glGetError() != GL_NO_ERROR) {
+    return physics::make_error(physics::ErrorCode::gpu,
+                               "the device cannot hold the samples of this scenario");
+  }
+  return {};
+}
+
+void CachedStage::describe(SceneStats& stats) const noexcept {
+  stats.samples = surface_->model().samples.samples.size();
+  stats.samples_full = surface_->model().full;
+}
+
+void CachedStage::make_sample_buffers() {
+  const SurfaceModel& model = surface_->model();
+  std::vector<float> sky_frac;
+  for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
+    sky_frac.push_back(model.samples.samples[i].sky_frac);
+  }
+  sky_buffer_ = gl::Buffer::dynamic(sky_frac.size() * sizeof(float));
+  sky_buffer_.upload(std::span<const float>(sky_frac));
+  sky_table_ = gl::BufferTexture(GL_R32F, sky_buffer_);
+  for (std::size_t i = 0; i < node_buffers_.size(); ++i) {
+    node_buffers_[i] = gl::Buffer::dynamic(model.drawn_samples * sizeof(SampleVertex));
+    node_tables_[i] = gl::BufferTexture(GL_RG32F, node_buffers_[i]);
+  }
+}
+
+void CachedStage::prepare(const FrameRequest& request, CameraSetup&,
+                          gpu::FrameParams& frame) noexcept {
+  surface_->advance(request.thermal_time_ns, {history_.environment, history_.entities}, foster_);
+  frame.samples.x = surface_->fraction();
+  sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
+  forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);
+  forcing_now_.environment_k = foster_.surroundings_now_k();
+}
+
+void CachedStage::upload() noexcept {
+  drawn_->upload();
+  for (std::size_t node = 0; node < node_buffers_.size(); ++node) {
+    const std::size_t storage = surface_->storage(node);
+    const CachedSurface::Range range = surface_->take_changes(storage);
+    node_buffers_[storage].upload(surface_->vertices(node).subspan(range.first, range.count),
+                                  range.first);
+  }
+}
+
+void CachedStage::bind() const noexcept {
+  node_tables_[surface_->storage(0)].bind(EMIT_TEX_NODE_BEFORE);
+  node_tables_[surface_->storage(1)].bind(EMIT_TEX_NODE_AFTER);
+  sky_table_.bind(EMIT_TEX_SAMPLE_SKY);
+}
+
+}  // namespace emit::renderer

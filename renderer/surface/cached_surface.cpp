@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/cached_surface.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <utility>
+
+#include "surface/parallel.hpp"
+#include "surface/surface_patch.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kGrain = 32;
+/// Intervals that are made up for one by one after a jump of sim time.
+constexpr std::int64_t kMostIntervals = 16;
+
+std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size_t movers,
+                                 std::span<const std::int32_t> mover_of_object) {
+  std::vector<float> radius_m(movers, 0.0F);
+  for (const scene::Instance& instance : geometry.instances) {
+    const std::int32_t mover = mover_of_object[instance.object];
+    if (mover < 0) continue;
+    const scene::Aabb box =
+        scene::transformed(geometry.meshes[instance.mesh].bounds, instance.body_from_mesh);
+    if (box.empty()) continue;
+    const glm::dvec3 farthest = glm::max(glm::abs(box.min_m), glm::abs(box.max_m));
+    float& radius = radius_m[static_cast<std::size_t>(mover)];
+    radius = std::max(radius, static_cast<float>(glm::length(farthest)));
+  }
+  return radius_m;
+}
+
+}  // namespace
+
+CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+                             std::vector<std::int32_t> mover_of_object,
+                             std::span<const FosterMaterial> materials, CasterRays rays,
+                             double reference_k)
+    : geometry_(std::move(geometry)),
+      materials_(geometry_.materials),
+      options_(scenario.thermal),
+      mover_of_object_(std::move(mover_of_object)),
+      rays_(std::move(rays)),
+      heat_(materials, reference_k, std::min(0.02, 0.2 * scenario.thermal.tolerance_k)),
+      interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
+  const auto movers = static_cast<std::size_t>(
+      std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
+  interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_));
+  interval_.ladders.resize(materials.size());
+}
+
+physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
+    const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+    std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> materials,
+    double reference_k) {
+  if (scenario.thermal.model != scene::ThermalModel::foster) {
+    return physics::make_error(physics::ErrorCode::config,
+                               "thermal.method \"cached\" needs thermal.model \"foster\"");
+  }
+  auto rays = CasterRays::create(geometry);
+  if (!rays) return tl::unexpected(std::move(rays.error()));
+  // Entities and what shades must be numbered alike.
+  std::size_t mover = 0;
+  for (std::size_t object = 0; object < scenario.objects.size(); ++object) {
+    if (scenario.objects[object].entity_id == 0) continue;
+    if (mover >= rays->movers() || rays->object_of_mover(mover) != object) {
+      return physics::make_error(
+          physics::ErrorCode::config,
+          fmt::format("entity object '{}' has no triangles", scenario.objects[object].name));
+    }
+    ++mover;
+  }
+  return std::unique_ptr<CachedSurface>(new CachedSurface(scenario, std::move(geometry),
+                                                          std::move(mover_of_object), materials,
+                                                          std::move(*rays), reference_k));
+}
+
+void CachedSurface::place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities) {
+  movers_now_.resize(entities.size());
+  for (std::size_t m = 0; m < entities.size(); ++m) {
+    const TrajectoryState state = entities[m].at(now_ns);
+    movers_now_[m] = {glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
+                      glm::vec3(state.pose.position_world_m - rays_.origin_world_m()), state.on};
+  }
+}
+
+bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
+  if (!model_) return true;
+  // Before the history starts nothing changes: its first interval stands for it.
+  const std::int64_t begin_ns = nodes_[storage(0)].at_ns;
+  return (now_ns < begin_ns && begin_ns > options_.history_start_ns) ||
+         now_ns > nodes_[storage(1)].at_ns + kMostIntervals * interval_ns_;
+}
+
+std::uint64_t CachedSurface::revision(const Inputs& inputs) const noexcept {
+  std::uint64_t revision = inputs.environment.revision();
+  for (const PoseHistory& entity : inputs.entities) revision += entity.events_ns().size();
+  return revision;
+}
+
+physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineView& view,
+                                             const Inputs& inputs, StepPlan& plan,
+                                             FosterHistory& foster,
+                                             const SurfaceProgress& progress) {
+  const std::int64_t start_ns =
+      options_.history_start_ns +
+      std::max<std::int64_t>(0, now_ns - options_.history_start_ns) / interval_ns_ * interval_ns_;
+  place_movers(start_ns, inputs.entities);
+  plan.update(start_ns, inputs.environment, inputs.entities);
+  foster.update(plan, inputs.environment);
+  const HistoryRecord record =
+      make_history_record(plan, foster, heat_, inputs.environment, inputs.entities, *interval_rays_,
+                          rays_.origin_world_m());
+  const SurfaceInputs surface{geometry_, materials_, mover_of_object_, rays_,
+                              heat_,     foster,     record,           movers_now_};
+  SurfaceModelOptions options;
+  options.tolerance_k = options_.tolerance_k;
+  options.max_samples = options_.max_samples;
+  options.lateral = options_.lateral;
+  auto model = build_surface_model(surface, view, options, progress);
+  if (!model) return tl::unexpected(std::move(model.error()));
+  offset_m_ = PatchSampler(surface, options).offset_m();
+  model_ = std::move(*model);
+
+  const std::size_t count = model_->samples.samples.size();
+  for (Node& node : nodes_) {
+    node.states.assign(count, {});
+    node.outputs.assign(count, {});
+    node.vertices.assign(model_->drawn_samples, {});
+  }
+  // One interval before the first is shown: nodes 0 and 1 are complete, 2 is begun.
+  ring_ = 0;
+  Node& first = node(0);
+  first.states = std::move(model_->states);
+  first.outputs = std::move(model_->outputs);
+  first.at_ns = start_ns;
+  first.surroundings = foster.surroundings();
+  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
+    first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
+  }
+  revision_ = revision(inputs);
+  turn_ = static_cast<std::uint32_t>(record.size());
+  node(1).at_ns = start_ns + interval_ns_;
+  begin_interval(0, inputs, foster);
+  compute(0, static_cast<std::uint32_t>(count));
+  node(2).at_ns = node(1).at_ns + interval_ns_;
+  begin_interval(1, inputs, foster);
+  for (Node& node : nodes_) node.changes = {0, model_->drawn_samples};
+  return {};
+}
+
+void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
+                                   FosterHistory& foster) noexcept {
+  const Node& from = node(index);
+  Node& to = node(index + 1);
+  foster.restore_surroundings(from.surroundings);
+  interval_.forcing = foster.extend(from.at_ns, to.at_ns, inputs.environment);
+  to.surroundings = foster.surroundings();
+  heat_.prepare(interval_);
+  interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment, inputs.entities,
+                         rays_.origin_world_m());
+  done_ = 0;
+}
+
+void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
+  const Node& from = node(index);
+  Node& to = node(index + 1);
+  const SurfaceSamples& all = model_->samples;
+  const std::uint32_t first = done_;
+  if (last <= first) return;
+  run_parallel(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = first + begin; i < first + end; ++i) {
+      const SurfaceSample& sample = all.samples[i];
+      SampleDrive drive;
+      drive.sun_frac = interval_rays_->sun_frac(rays_, sample, offset_m_, 0.0F);
+      drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays_, sample, offset_m_);
+      for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
+        const SeenSample& seen = all.seen[sample.first_seen + k];
+        const SampleOutput& other = from.outputs[seen.sample];
+        drive.longwave_begin_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
+        drive.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
+      }
+      // Neighbours change by hundredths of a kelvin in an interval: their start stands for it.
+      drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
+      for (std::size_t p = 0; p < kMaxPartners; ++p) {
+        const std::uint32_t partner = sample.partners[p].sample;
+        if (partner == kNoSample) continue;
+        drive.partner_begin_w_m2[p] = from.outputs[partner].flux_w_m2;
+        drive.partner_end_w_m2[p] = drive.partner_begin_w_m2[p];
+      }
+      SampleState state = from.states[i];
+      const SampleOutput output =
+          heat_.advance(sample, interval_rays_->normal(sample), interval_, drive, state);
+      to.states[i] = state;
+      to.outputs[i] = output;
+      if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
+    }
+  });
+  done_ = last;
+  const auto drawn = static_cast<std::uint32_t>(to.vertices.size());
+  const std::uint32_t low = to.changes.count > 0 ? std::min(to.changes.first, first) : first;
+  const std::uint32_t high = std::max(to.changes.first + to.changes.count, std::min(last, drawn));
+  to.changes = {std::min(low, high), high - std::min(low, high)};
+}
+
+void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
+                            FosterHistory& foster) noexcept {
+  const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
+  if (const std::uint64_t revision_now = revision(inputs); revision_now != revision_) {
+    // The host has changed the weather, or an entity came, went, stopped or left: the interval of
+    // now was computed without that.
+    revision_ = revision_now;
+    begin_interval(0, inputs, foster);
+    compute(0, count);
+    begin_interval(1, inputs, foster);
+  }
+  while (now_ns > node(1).at_ns) {
+    compute(1, count);
+    rotate();
+    node(2).at_ns = node(1).at_ns + interval_ns_;
+    node(2).changes = {};
+    begin_interval(1, inputs, foster);
+  }
+  const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
+                          static_cast<double>(node(1).at_ns - node(0).at_ns);
+  fraction_ = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
+  // As much of the next interval as has gone by of this one.
+  compute(1, std::min(count, static_cast<std::uint32_t>(std::ceil(fraction * count))));
+}
+
+CachedSurface::Range CachedSurface::take_changes(std::size_t storage) noexcept {
+  return std::exchange(nodes_[storage].changes, {});
+}
+
+scene::SceneGeometry CachedSurface::drawn_geometry(std::vector<std::uint32_t>& first_sample) const {
+  scene::SceneGeometry out = geometry_;
+  std::vector<std::uint32_t> order(out.instances.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return out.instances[i].mesh; });
+  first_sample.clear();
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    out.instances[i] = geometry_.instances[order[i]];
+    first_sample.push_back(model_->first_sample[order[i]]);
+  }
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges;
+  for (std::size_t m = 0; m < out.meshes.size(); ++m) {
+    scene::Mesh& mesh = out.meshes[m];
+    const RefinedMesh& refined = model_->meshes[m];
+    refined.write_indices(mesh.indices, ranges);
+    for (std::size_t k = 0; k < mesh.submeshes.size(); ++k) {
+      mesh.submeshes[k].first_index = ranges[k].first;
+      mesh.submeshes[k].index_count = ranges[k].second;
+    }
+    mesh.positions_m.clear();
+    mesh.normals.clear();
+    for (const RefinedMesh::Vertex& vertex : refined.vertices()) {
+      mesh.positions_m.push_back(vertex.position_m);
+      mesh.normals.push_back(vertex.normal);
+    }
+  }
+  return out;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "emit/scene/scene_desc.hpp"
+#include "history/environment.hpp"
+#include "history/foster_history.hpp"
+#include "history/pose_history.hpp"
+#include "history/step_plan.hpp"
+#include "surface/surface_model.hpp"
+
+namespace emit::renderer {
+
+/// What the device interpolates between, by sample and node of time.
+struct SampleVertex {
+  float offset_k = 0.0F;
+  float sun_frac = 0.0F;
+};
+
+/// The thermal method `cached`: temperatures live on samples of the surface. Time goes in intervals
+/// of thermal.first_step_s. While frames interpolate between the two ends of the current one, the
+/// next is computed, as much per frame as sim time has moved: no frame does more than its share,
+/// and the result depends on the inputs alone.
+///
+/// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
+/// nothing of its own; everything else is setup.
+class CachedSurface {
+ public:
+  struct Inputs {
+    const Environment& environment;
+    std::span<const PoseHistory> entities;
+  };
+  /// Part of the samples whose values at a node have changed.
+  struct Range {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+  };
+
+  /// `mover_of_object`: index of an object's PoseHistory, -1: static. Errors: config (thermal.model
+  /// other than foster, an entity without triangles), those of CasterRays.
+  [[nodiscard]] static physics::Result<std::unique_ptr<CachedSurface>> create(
+      const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+      std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> materials,
+      double reference_k);
+
+  /// Samples the surface as it is to be seen at `now_ns` and computes the interval that holds it.
+  /// `plan` and `foster` are brought there. Setup: seconds.
+  [[nodiscard]] physics::Result<void> prepare(std::int64_t now_ns, const RefineView& view,
+                                              const Inputs& inputs, StepPlan& plan,
+                                              FosterHistory& foster,
+                                              const SurfaceProgress& progress);
+
+  /// True when frames at `now_ns` need prepare() first: sim time went back behind the current
+  /// interval or jumped far ahead of it.
+  [[nodiscard]] bool stale(std::int64_t now_ns) const noexcept;
+
+  /// Brings the samples to `now_ns`. @pre !stale(now_ns)
+  void advance(std::int64_t now_ns, const Inputs& inputs, FosterHistory& foster) noexcept;
+
+  /// Way of `now_ns` of the last advance() between the two nodes.
+  [[nodiscard]] float fraction() const noexcept { return fraction_; }
+  /// Values at the nodes before (0) and after (1) now, and at the one that is being computed (2).
+  [[nodiscard]] std::span<const SampleVertex> vertices(std::size_t node) const noexcept {
+    return nodes_[storage(node)].vertices;
+  }
+  /// Index of the storage that node (0..2) has: rotates when an interval ends.
+  [[nodiscard]] std::size_t storage(std::size_t node) const noexcept { return (ring_ + node) % 3; }
+  /// What has changed in that storage since the last call.
+  [[nodiscard]] Range take_changes(std::size_t storage) noexcept;
+
+  [[nodiscard]] const SurfaceModel& model() const noexcept { return *model_; }
+  /// The refined meshes as a scene whose instances are grouped by mesh, and for each instance the
+  /// number of its first sample.
+  [[nodiscard]] scene::SceneGeometry drawn_geometry(std::vector<std::uint32_t>& first_sample) const;
+
+ private:
+  CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+                std::vector<std::int32_t> mover_of_object,
+                std::span<const FosterMaterial> materials, CasterRays rays, double reference_k);
+
+  /// What one node of time needs to go on from.
+  struct Node {
+    std::vector<SampleState> states;
+    std::vector<SampleOutput> outputs;
+    std::vector<SampleVertex> vertices;
+    Range changes;
+    std::int64_t at_ns = 0;
+    physics::FosterState<double> surroundings{};
+  };
+
+  void place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities);
+  /// Forcing, gains and rays from `node` to the next one, which nothing has been computed of yet.
+  void begin_interval(std::size_t node, const Inputs& inputs, FosterHistory& foster) noexcept;
+  /// Advances the samples up to `last` from `node` to the next one.
+  void compute(std::size_t node, std::uint32_t last) noexcept;
+  void rotate() noexcept { ring_ = (ring_ + 1) % 3; }
+  [[nodiscard]] std::uint64_t revision(const Inputs& inputs) const noexcept;
+  [[nodiscard]] Node& node(std::size_t index) noexcept { return nodes_[storage(index)]; }
+
+  scene::SceneGeometry geometry_;
+  std::vector<scene::Material> materials_;
+  scene::ThermalOptions options_;
+  std::vector<std::int32_t> mover_of_object_;
+  CasterRays rays_;
+  SampleHeat heat_;
+  std::optional<IntervalRays> interval_rays_;
+  HeatInterval interval_;
+  float offset_m_ = 0.0F;
+  std::vector<MoverPlacement> movers_now_;
+  std::optional<SurfaceModel> model_;
+
+  std::array<Node, 3> nodes_;
+  std::size_t ring_ = 0;
+  std::uint32_t done_ = 0;  ///< samples of the newest node that are computed
+  std::uint32_t turn_ = 0;
+  std::int64_t interval_ns_ = 0;
+  std::uint64_t revision_ = 0;
+  float fraction_ = 0.0F;
+};
+
+}  // namespace emit::renderer

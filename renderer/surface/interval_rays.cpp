@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/interval_rays.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "emit/physics/constants.hpp"
+#include "history/step_plan.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr double kGolden = 0.6180339887498949;
+/// Entities farther than this many of their radii hide too little sky to matter (1/400).
+constexpr float kNearRadii = 10.0F;
+constexpr std::size_t kSkyRays = 16;
+
+double fraction_of(double x) noexcept {
+  return x - std::floor(x);
+}
+
+struct Tangents {
+  glm::vec3 u, v;
+};
+/// Duff et al. (2017), "Building an orthonormal basis, revisited".
+Tangents tangents_of(const glm::vec3& n) noexcept {
+  const float sign = std::copysign(1.0F, n.z);
+  const float a = -1.0F / (sign + n.z);
+  const float b = n.x * n.y * a;
+  return {{1.0F + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}};
+}
+
+/// Inverse of the normal distribution.
+double normal_deviate(double u) noexcept {
+  // Bisection on erf: exact to double, set-up cost only.
+  double low = -6.0;
+  double high = 6.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (0.5 * (1.0 + std::erf(middle / std::sqrt(2.0))) < u ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+std::array<double, kSunRays> normal_deviates() noexcept {
+  std::array<double, kSunRays> out{};
+  for (std::size_t i = 0; i < kSunRays; ++i)
+    out[i] = normal_deviate((static_cast<double>(i) + 0.5) / kSunRays);
+  return out;
+}
+
+}  // namespace
+
+void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
+                          const Environment& environment, std::span<const PoseHistory> entities,
+                          const glm::dvec3& origin_world_m) noexcept {
+  static const std::array<double, kSunRays> deviates = normal_deviates();
+  const std::size_t movers = mover_radius_m_.size();
+  any_mover_on_ = false;
+  sun_up_ = false;
+  for (std::size_t i = 0; i < kSunRays; ++i) {
+    // From the disc's rim inwards: if the first packet agrees, so does next to all of the disc. Odd
+    // multipliers permute the strata; the golden ratio moves the pattern from turn to turn.
+    const std::size_t place_in_disc = kSunRays - 1 - i;
+    const std::size_t stratum = (place_in_disc * 27 + turn * 5) % kSunRays;
+    if (stratum == kSunRays / 2) middle_ray_ = i;
+    const double t = (static_cast<double>(stratum) + 0.5) / kSunRays;
+    const auto at_ns = begin_ns + std::llround(t * static_cast<double>(end_ns - begin_ns));
+    const physics::SunPosition sun = environment.sun_at(at_ns);
+    sun_up_ = sun_up_ || sun.elevation.value() > StepPlan::kMinSunElevationRad;
+    const glm::dvec3 to_sun = sun.direction_enu;
+    const double radius = std::tan(physics::kSunSemiAngleRad) *
+                          std::sqrt((static_cast<double>(place_in_disc) + 0.5) / kSunRays);
+    const double angle =
+        2.0 * physics::kPi *
+        fraction_of(kGolden * (static_cast<double>(place_in_disc) + 0.5) + 0.37 * turn);
+    const glm::dvec3 u = glm::normalize(glm::cross(
+        std::abs(to_sun.z) < 0.9 ? glm::dvec3(0.0, 0.0, 1.0) : glm::dvec3(1.0, 0.0, 0.0), to_sun));
+    const glm::dvec3 v = glm::cross(to_sun, u);
+    direction_[i] =
+        glm::vec3(glm::normalize(to_sun + radius * (std::cos(angle) * u + std::sin(angle) * v)));
+    spread_[i] =
+        glm::vec2(static_cast<float>(deviates[(place_in_disc * 23 + turn * 3) % kSunRays]),
+                  static_cast<float>(deviates[(place_in_disc * 45 + 5 + turn * 9) % kSunRays]));
+    for (std::size_t m = 0; m < movers; ++m) {
+      const TrajectoryState state = entities[m].at(at_ns);
+      MoverPlacement& place = placements_[i * movers + m];
+      place.rel_from_body = glm::mat3(glm::mat3_cast(state.pose.world_from_body));
+      place.position_m = glm::vec3(state.pose.position_world_m - origin_world_m);
+      place.on = state.on;
+      any_mover_on_ = any_mover_on_ || state.on;
+    }
+  }
+}
+
+glm::vec3 IntervalRays::normal(const SurfaceSample& sample) const noexcept {
+  if (sample.mover < 0) return sample.normal;
+  return placed(static_cast<std::size_t>(sample.mover), middle_ray_).rel_from_body * sample.normal;
+}
+
+IntervalRays::Seen IntervalRays::packet(const CasterRays& rays, const SurfaceSample& sample,
+                                        const Start& start, std::size_t first) const noexcept {
+  std::array<CasterRay, kPacketRays> sent;
+  std::array<std::uint8_t, kPacketRays> index{};
+  std::uint32_t count = 0;
+  for (std::size_t i = first; i < first + kPacketRays; ++i) {
+    glm::vec3 n = sample.normal;
+    glm::vec3 start_m = start.position_m + spread_[i].x * start.u_m + spread_[i].y * start.v_m;
+    if (sample.mover >= 0) {
+      const MoverPlacement& place = placed(static_cast<std::size_t>(sample.mover), i);
+      n = place.rel_from_body * n;
+      start_m = place.rel_from_body * start_m + place.position_m;
+    }
+    if (!(glm::dot(n, direction_[i]) > 0.0F)) continue;
+    index[count] = static_cast<std::uint8_t>(i);
+    sent[count++] = {start_m, direction_[i]};
+  }
+  if (count == 0) return {};
+  std::uint32_t blocked = rays.blocked_static({sent.data(), count});
+  if (any_mover_on_) {
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t m = 0; m < mover_radius_m_.size() && ((blocked >> k) & 1U) == 0U; ++m) {
+        const MoverPlacement& place = placed(m, index[k]);
+        if (place.on && rays.blocked_mover(m, place, {&sent[k], 1}) != 0U) blocked |= 1U << k;
+      }
+    }
+  }
+  return {count, count - static_cast<std::uint32_t>(std::popcount(blocked))};
+}
+
+float IntervalRays::sun_frac(const CasterRays& rays, const SurfaceSample& sample,
+                             float start_offset_m, float blur_m) const noexcept {
+  if (!sun_up_) return 0.0F;
+  const Tangents tangents = tangents_of(sample.normal);
+  const Start start{sample.position_m + start_offset_m * sample.normal, blur_m * tangents.u,
+                    blur_m * tangents.v};
+  Seen seen = packet(rays, sample, start, 0);
+  if (seen.rays == 0) return 0.0F;
+  for (std::size_t first = kPacketRays; first < kSunRays; first += kPacketRays) {
+    if (first == kPacketRays && (seen.lit == 0 || seen.lit == seen.rays)) break;
+    const Seen more = packet(rays, sample, start, first);
+    seen.rays += more.rays;
+    seen.lit += more.lit;
+  }
+  return static_cast<float>(seen.lit) / static_cast<float>(seen.rays);
+}
+
+float IntervalRays::hidden_sky_frac(const CasterRays& rays, const SurfaceSample& sample,
+                                    float start_offset_m) const noexcept {
+  // An entity's own surfaces carry its hull in sky_frac, seen where it stood when they were made.
+  if (!any_mover_on_ || sample.mover >= 0) return 0.0F;
+  const Tangents tangents = tangents_of(sample.normal);
+  const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
+  std::uint32_t hidden = 0;
+  for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
+    for (std::size_t i = 0; i < kSkyRays; ++i) {
+      const MoverPlacement& place = placed(m, i);
+      const glm::vec3 way = place.position_m - start_m;
+      const float reach_m = kNearRadii * mover_radius_m_[m];
+      if (!place.on || glm::dot(way, way) > reach_m * reach_m) continue;
+      const double r = std::sqrt((static_cast<double>(i) + 0.5) / kSkyRays);
+      const double angle =
+          2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(i) + 0.5));
+      const glm::vec3 direction = static_cast<float>(r * std::cos(angle)) * tangents.u +
+                                  static_cast<float>(r * std::sin(angle)) * tangents.v +
+                                  static_cast<float>(std::sqrt(1.0 - r * r)) * sample.normal;
+      const CasterRay ray{start_m, direction};
+      if (((hidden >> i) & 1U) == 0U && direction.z > 0.0F &&
+          rays.blocked_mover(m, place, {&ray, 1}) != 0U) {
+        hidden |= 1U << i;
+      }
+    }
+  }
+  return static_cast<float>(std::popcount(hidden)) / kSkyRays;
+}
+
+}  // namespace emit::renderer

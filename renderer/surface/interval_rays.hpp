@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <glm/ext/vector_float2.hpp>
+#include <glm/ext/vector_float3.hpp>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "history/environment.hpp"
+#include "history/pose_history.hpp"
+#include "surface/caster_rays.hpp"
+#include "surface/surface_samples.hpp"
+
+namespace emit::renderer {
+
+/// Rays of a sample towards the sun over an interval: one packet, and all of them where its rays
+/// disagree.
+inline constexpr std::size_t kPacketRays = CasterRays::kMaxRays;
+inline constexpr std::size_t kSunRays = 4 * kPacketRays;
+
+/// Where the sun and the entities stand when each ray of an interval is sent: instants, places in
+/// the sun's disc and lateral shifts are stratified together, the same for all samples, so that a
+/// penumbra comes out as a fine staircase and not as noise.
+class IntervalRays {
+ public:
+  /// By entity: the radius of its geometry around the body's origin, in m.
+  explicit IntervalRays(std::vector<float> mover_radius_m)
+      : mover_radius_m_(std::move(mover_radius_m)),
+        placements_(mover_radius_m_.size() * kSunRays) {}
+
+  /// Directions and places for [begin_ns, end_ns]; `turn` varies the pattern between intervals.
+  /// `entities` in the order of the radii. RT-safe.
+  void update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
+              const Environment& environment, std::span<const PoseHistory> entities,
+              const glm::dvec3& origin_world_m) noexcept;
+
+  /// Mean share of the sun's disc that the sample sees while the sun stands before its face; 0 if
+  /// it never does. `blur_m`: standard deviation of the origin along the surface, which stands for
+  /// the lateral conduction since then. Any thread; RT-safe.
+  [[nodiscard]] float sun_frac(const CasterRays& rays, const SurfaceSample& sample,
+                               float start_offset_m, float blur_m) const noexcept;
+
+  /// Share of the sample's sky that entities hide, mean over the interval: rays of a fixed
+  /// cosine-weighted set. Zero where none is near. Any thread; RT-safe.
+  [[nodiscard]] float hidden_sky_frac(const CasterRays& rays, const SurfaceSample& sample,
+                                      float start_offset_m) const noexcept;
+
+  [[nodiscard]] bool sun_up() const noexcept { return sun_up_; }
+  /// Unit vector to the sun, of the first ray.
+  [[nodiscard]] const glm::vec3& to_sun() const noexcept { return direction_[0]; }
+  /// Where an entity stands in the middle of the interval.
+  [[nodiscard]] const MoverPlacement& placement(std::size_t mover) const noexcept {
+    return placed(mover, middle_ray_);
+  }
+  /// Outward normal of the sample in the middle of the interval, axes of the rays.
+  [[nodiscard]] glm::vec3 normal(const SurfaceSample& sample) const noexcept;
+
+ private:
+  [[nodiscard]] const MoverPlacement& placed(std::size_t mover, std::size_t ray) const noexcept {
+    return placements_[ray * mover_radius_m_.size() + mover];
+  }
+
+  /// Rays that left a sample's face, and those of them that met nothing.
+  struct Seen {
+    std::uint32_t rays = 0;
+    std::uint32_t lit = 0;
+  };
+  /// Start of a sample's rays, and how far a unit deviate moves it.
+  struct Start {
+    glm::vec3 position_m{0.0F};
+    glm::vec3 u_m{0.0F};
+    glm::vec3 v_m{0.0F};
+  };
+  [[nodiscard]] Seen packet(const CasterRays& rays, const SurfaceSample& sample, const Start& start,
+                            std::size_t first) const noexcept;
+
+  std::vector<float> mover_radius_m_;
+  std::vector<MoverPlacement> placements_;  ///< by ray, then entity
+  std::array<glm::vec3, kSunRays> direction_{};
+  std::array<glm::vec2, kSunRays> spread_{};  ///< unit normal deviates
+  std::size_t middle_ray_ = 0;
+  bool any_mover_on_ = false;
+  bool sun_up_ = false;
+};
+
+}  // namespace emit::renderer

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/refined_mesh_edges.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <limits>
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+/// Bits of a position; adding zero turns -0 into +0.
+std::array<std::uint32_t, 3> position_bits(const glm::vec3& p_m) noexcept {
+  return {std::bit_cast<std::uint32_t>(p_m.x + 0.0F), std::bit_cast<std::uint32_t>(p_m.y + 0.0F),
+          std::bit_cast<std::uint32_t>(p_m.z + 0.0F)};
+}
+
+/// Multiply and fold, twice: coordinates of drawn scenes differ in few, high bits.
+std::size_t hash(const std::array<std::uint32_t, 3>& bits) noexcept {
+  std::uint64_t h = (static_cast<std::uint64_t>(bits[1]) << 32U | bits[0]) * 0x9E3779B97F4A7C15ULL;
+  h ^= h >> 32U;
+  h = (h ^ bits[2]) * 0xD6E8FEB86659FD93ULL;
+  return static_cast<std::size_t>(h ^ h >> 32U);
+}
+
+struct HalfEdge {
+  std::uint32_t to;  ///< position at the end with the larger index
+  std::uint32_t index;
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> weld_positions(std::span<const RefinedMesh::Vertex> vertices) {
+  std::vector<std::uint32_t> first(vertices.size());
+  // Open addressing, at most half full.
+  std::vector<std::uint32_t> table(std::bit_ceil(2 * vertices.size() + 1), kNone);
+  const std::size_t mask = table.size() - 1;
+  for (std::uint32_t v = 0; v < vertices.size(); ++v) {
+    const auto bits = position_bits(vertices[v].position_m);
+    std::size_t at = hash(bits) & mask;
+    while (table[at] != kNone && position_bits(vertices[table[at]].position_m) != bits) {
+      at = (at + 1) & mask;
+    }
+    if (table[at] == kNone) table[at] = v;
+    first[v] = table[at];
+  }
+  return first;
+}
+
+std::vector<std::uint32_t> link_edges(std::span<const std::array<std::uint32_t, 3>> triangles,
+                                      std::span<const std::uint32_t> position_id) {
+  std::vector<std::uint32_t> ring(3 * triangles.size());
+  for (std::uint32_t h = 0; h < ring.size(); ++h) ring[h] = h;
+
+  // Bucket by the lower position (counting sort), then sort each short bucket by the upper one.
+  const auto each_half_edge = [&](const auto& visit) {
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      const std::array<std::uint32_t, 3> p{
+          position_id[triangles[t][0]], position_id[triangles[t][1]], position_id[triangles[t][2]]};
+      if (p[0] == p[1] || p[1] == p[2] || p[2] == p[0]) continue;
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const std::uint32_t next = p[(k + 1) % 3];
+        visit(std::min(p[k], next), std::max(p[k], next), 3 * t + k);
+      }
+    }
+  };
+  std::vector<std::uint32_t> end(position_id.size() + 1, 0);
+  each_half_edge([&](std::uint32_t from, std::uint32_t, std::uint32_t) { ++end[from + 1]; });
+  for (std::size_t p = 1; p < end.size(); ++p) end[p] += end[p - 1];
+  std::vector<HalfEdge> sorted(end.back());
+  each_half_edge([&](std::uint32_t from, std::uint32_t to, std::uint32_t index) {
+    sorted[end[from]++] = {to, index};  // end[from] turns from the bucket's start into its end
+  });
+
+  std::size_t begin = 0;
+  for (std::size_t p = 0; p < position_id.size(); ++p) {
+    const std::span bucket = std::span(sorted).subspan(begin, end[p] - begin);
+    begin = end[p];
+    std::ranges::sort(bucket, [](const HalfEdge& a, const HalfEdge& b) {
+      return a.to != b.to ? a.to < b.to : a.index < b.index;
+    });
+    std::size_t first = 0;
+    for (std::size_t i = 1; i <= bucket.size(); ++i) {
+      if (i < bucket.size() && bucket[i].to == bucket[first].to) {
+        ring[bucket[i - 1].index] = bucket[i].index;
+      } else {
+        ring[bucket[i - 1].index] = bucket[first].index;
+        first = i;
+      }
+    }
+  }
+  return ring;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "surface/parallel.hpp"
+#include "surface/surface_exchange.hpp"
+#include "surface/surface_model.hpp"
+#include "surface/surface_patch.hpp"
+#include "surface/surface_refinement.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::uint32_t kMaxRounds = 48;
+constexpr std::size_t kGrain = 64;
+
+/// A sample to be evaluated.
+struct Job {
+  std::uint32_t patch = 0;
+  std::uint32_t index = 0;
+};
+
+class Builder {
+ public:
+  Builder(const SurfaceInputs& inputs, const RefineView& view, const SurfaceModelOptions& options,
+          const SurfaceProgress& progress)
+      : in_(inputs),
+        options_(options),
+        progress_(progress),
+        sampler_(inputs, options),
+        refinement_(inputs, view, options) {}
+
+  physics::Result<SurfaceModel> run();
+
+ private:
+  void make_patches();
+  /// Gives every vertex that has no sample yet one; false when stopped.
+  bool sample_new_vertices(double begin_frac, double end_frac);
+  void find_inward(std::uint32_t mesh);
+  [[nodiscard]] std::size_t sample_count() const noexcept;
+  bool report(double frac) const { return !progress_ || progress_(frac); }
+
+  const SurfaceInputs& in_;
+  SurfaceModelOptions options_;
+  const SurfaceProgress& progress_;
+  PatchSampler sampler_;
+  SurfaceRefinement refinement_;
+  SurfaceModel model_;
+  std::vector<SurfacePatch> patches_;
+  std::vector<glm::vec3> inward_;  ///< by vertex of the mesh at hand
+  std::vector<Job> jobs_;
+  std::vector<glm::vec3> job_inward_;
+};
+
+void Builder::make_patches() {
+  for (const scene::Instance& instance : in_.geometry.instances) {
+    SurfacePatch patch;
+    patch.mesh = instance.mesh;
+    patch.object = instance.object;
+    patch.mover = in_.mover_of_object[instance.object];
+    glm::dmat4 rel_from_mesh = instance.body_from_mesh;
+    if (patch.mover < 0) {
+      rel_from_mesh = instance.world_from_mesh;
+      rel_from_mesh[3] -= glm::dvec4(in_.rays.origin_world_m(), 0.0);
+    }
+    patch.rel_from_mesh = glm::mat4(rel_from_mesh);
+    patch.normal_from_mesh = glm::mat3(glm::transpose(glm::inverse(glm::dmat3(rel_from_mesh))));
+    patches_.push_back(std::move(patch));
+  }
+}
+
+/// Mean direction from each vertex into its leaves; zero inside a smooth surface.
+void Builder::find_inward(std::uint32_t mesh) {
+  const RefinedMesh& refined = model_.meshes[mesh];
+  const auto vertices = refined.vertices();
+  inward_.assign(vertices.size(), glm::vec3(0.0F));
+  std::vector<float> leaves(vertices.size(), 0.0F);
+  for (std::uint32_t slot = 0; slot < refined.leaf_count(); ++slot) {
+    const auto& leaf = refined.leaf(slot);
+    glm::vec3 centre_m(0.0F);
+    for (const std::uint32_t v : leaf) centre_m += vertices[v].position_m / 3.0F;
+    for (const std::uint32_t v : leaf) {
+      const glm::vec3 way = centre_m - vertices[v].position_m;
+      const float length = glm::length(way);
+      if (length > 0.0F) inward_[v] += way / length;
+      leaves[v] += 1.0F;
+    }
+  }
+  for (std::size_t v = 0; v < inward_.size(); ++v) {
+    // Opposite leaves cancel: what is left tells a border from the inside.
+    inward_[v] = leaves[v] > 0.0F && glm::length(inward_[v]) > 0.3F * leaves[v]
+                     ? glm::normalize(inward_[v])
+                     : glm::vec3(0.0F);
+  }
+}
+
+bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
+  jobs_.clear();
+  job_inward_.clear();
+  const std::size_t intervals = in_.record.size();
+  const bool movers = !in_.movers_now.empty();
+  for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
+    const auto vertices = model_.meshes[mesh].vertices();
+    bool looked = false;
+    for (std::uint32_t p = 0; p < patches_.size(); ++p) {
+      SurfacePatch& patch = patches_[p];
+      if (patch.mesh != mesh || patch.samples.size() == vertices.size()) continue;
+      if (!looked) find_inward(mesh);
+      looked = true;
+      const auto first = static_cast<std::uint32_t>(patch.samples.size());
+      patch.samples.resize(vertices.size());
+      patch.seen.resize(vertices.size());
+      patch.states.resize(vertices.size());
+      patch.outputs.resize(vertices.size());
+      patch.surplus_k.resize(vertices.size(), -1.0F);
+      patch.sun_frac.resize(vertices.size() * intervals);
+      if (movers) patch.hidden_sky_frac.resize(vertices.size() * intervals);
+      for (std::uint32_t v = first; v < vertices.size(); ++v) {
+        SurfaceSample& sample = patch.samples[v];
+        const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
+        const float length = glm::length(inward);
+        const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
+        sample.position_m =
+            glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F)) +
+            sampler_.offset_m() * unit_inward;
+        sample.normal = glm::normalize(patch.normal_from_mesh * vertices[v].normal);
+        sample.mover = patch.mover;
+        sample.material = vertices[v].material;
+        jobs_.push_back({p, v});
+        job_inward_.push_back(unit_inward);
+      }
+    }
+  }
+  // In slices, so that the progress moves and a stop is heard.
+  constexpr std::size_t kSlice = 16384;
+  for (std::size_t begin = 0; begin < jobs_.size(); begin += kSlice) {
+    const std::size_t end = std::min(jobs_.size(), begin + kSlice);
+    run_parallel(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
+      for (std::size_t j = begin + from; j < begin + to; ++j) {
+        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_inward_[j]);
+      }
+    });
+    const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());
+    if (!report(begin_frac + (end_frac - begin_frac) * done)) return false;
+  }
+  for (const Job& job : jobs_) {
+    SurfacePatch& patch = patches_[job.patch];
+    const RefinedMesh::Vertex& vertex = model_.meshes[patch.mesh].vertices()[job.index];
+    if (vertex.parent[0] == job.index) continue;
+    const float mean_k = 0.5F * (patch.outputs[vertex.parent[0]].offset_k +
+                                 patch.outputs[vertex.parent[1]].offset_k);
+    patch.surplus_k[job.index] = std::abs(patch.outputs[job.index].offset_k - mean_k);
+  }
+  return true;
+}
+
+std::size_t Builder::sample_count() const noexcept {
+  std::size_t count = 0;
+  for (const SurfacePatch& patch : patches_) {
+    count += model_.meshes[patch.mesh].vertices().size();
+  }
+  return count;
+}
+
+physics::Result<SurfaceModel> Builder::run() {
+  const auto stopped = [] {
+    return physics::make_error(physics::ErrorCode::internal, "stopped while sampling the surface");
+  };
+  for (const scene::Mesh& mesh : in_.geometry.meshes) {
+    model_.meshes.emplace_back(mesh, options_.max_samples);
+  }
+  make_patches();
+  // How far refinement will go is not known: each round takes a share of what is left.
+  double done_frac = 0.0;
+  const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
+  double to_frac = next_frac();
+  if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+  std::vector<std::uint32_t> slots;
+  for (std::uint32_t round = 0; round < kMaxRounds; ++round) {
+    bool cut = false;
+    for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
+      refinement_.flag(mesh, model_.meshes[mesh], patches_, slots);
+      if (slots.empty()) continue;
+      if (sample_count() + slots.size() > options_.max_samples) {
+        model_.full = true;
+        continue;
+      }
+      if (!model_.meshes[mesh].split(slots)) model_.full = true;
+      cut = true;
+    }
+    if (!cut) break;
+    done_frac = to_frac;
+    to_frac = next_frac();
+    if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+  }
+  number_samples(in_, sampler_, options_, patches_, model_);
+  exchange(in_, sampler_, patches_, model_);
+  if (!report(1.0)) return stopped();
+  return std::move(model_);
+}
+
+}  // namespace
+
+double diffusivity_m2_s(const scene::Material& material) noexcept {
+  if (material.layers.empty() || material.prescribed_k) return 0.0;
+  const scene::Layer& layer = material.layers.front();
+  return layer.conductivity_w_m_k / (layer.density_kg_m3 * layer.specific_heat_j_kg_k);
+}
+
+physics::Result<SurfaceModel> build_surface_model(const SurfaceInputs& inputs,
+                                                  const RefineView& view,
+                                                  const SurfaceModelOptions& options,
+                                                  const SurfaceProgress& progress) {
+  return Builder(inputs, view, options, progress).run();
+}
+
+}  // namespace emit::renderer

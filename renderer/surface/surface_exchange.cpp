@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/surface_exchange.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "surface/parallel.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kGrain = 64;
+/// Sweeps after the one that takes the surroundings for whatever is seen: each passes heat on by
+/// one more bounce, of which a third at most is reflected or re-emitted within minutes.
+constexpr std::uint32_t kSweeps = 3;
+/// A partner that drives no mode by more is left out.
+constexpr double kLeastWeightFrac = 0.03;
+constexpr float kMaxReachM = 1.0F;
+/// How far beside a body, and how near to the plane of its face, ground counts as touching it.
+constexpr float kBesideOffsets = 6.0F;
+
+/// Whole histories of what samples send out, by sample, then node or interval.
+struct Columns {
+  std::vector<float> longwave_out_w_m2;   ///< nodes
+  std::vector<float> flux_w_m2;           ///< nodes, just before what changes there
+  std::vector<float> shortwave_out_w_m2;  ///< intervals
+
+  Columns(std::size_t samples, std::size_t intervals)
+      : longwave_out_w_m2(samples * (intervals + 1)),
+        flux_w_m2(samples * (intervals + 1)),
+        shortwave_out_w_m2(samples * intervals) {}
+};
+
+class Partners {
+ public:
+  Partners(const SurfaceInputs& inputs, const PatchSampler& sampler,
+           std::vector<SurfacePatch>& patches)
+      : in_(inputs), sampler_(sampler), patches_(patches) {}
+
+  /// Appends one patch with all partners. Entries of Partner::sample are indices into it.
+  void add();
+
+ private:
+  void find(SurfacePatch& patch, std::uint32_t index);
+  [[nodiscard]] std::array<float, physics::kMaxFosterModes> weights(std::uint32_t material,
+                                                                    float distance_m) const;
+
+  const SurfaceInputs& in_;
+  const PatchSampler& sampler_;
+  std::vector<SurfacePatch>& patches_;
+  struct Found {
+    SurfaceSample sample;
+    float distance_m = 0.0F;
+  };
+  std::vector<std::vector<Found>> found_;  ///< by vertex of the patch at hand
+};
+
+std::array<float, physics::kMaxFosterModes> Partners::weights(std::uint32_t material,
+                                                              float distance_m) const {
+  std::array<float, physics::kMaxFosterModes> out{};
+  const double a = diffusivity_m2_s(in_.materials[material]);
+  const physics::FosterNetwork& network = in_.foster.materials()[material].network;
+  for (std::size_t i = 0; i < network.count; ++i) {
+    const double z = static_cast<double>(distance_m) / std::sqrt(a * network.modes[i].tau_s);
+    out[i] = static_cast<float>(std::exp(-0.5 * z * z));
+  }
+  return out;
+}
+
+void Partners::find(SurfacePatch& patch, std::uint32_t index) {
+  const SurfaceSample& own = patch.samples[index];
+  const scene::Material& material = in_.materials[own.material];
+  const double a = diffusivity_m2_s(material);
+  const physics::FosterNetwork& network = in_.foster.materials()[own.material].network;
+  if (!(a > 0.0) || network.count == 0) return;
+  const double slowest_s = network.modes[network.count - 1].tau_s;
+  const float reach_m = std::min(kMaxReachM, 5.0F * static_cast<float>(std::sqrt(a * slowest_s)));
+  // The body alone, in its own axes.
+  std::vector<MoverPlacement> alone(in_.movers_now.size());
+  for (MoverPlacement& place : alone) place.on = false;
+  CasterSelection selection{own.mover < 0, {}};
+  if (own.mover >= 0) {
+    alone[static_cast<std::size_t>(own.mover)] = {};
+    selection.movers = alone;
+  }
+  const ViewPoint point{own.position_m, own.normal, glm::vec3(0.0F), sampler_.offset_m()};
+  const AdjacentFaces adjacent = adjacent_faces(in_.rays, point, reach_m, selection);
+  for (std::uint32_t k = 0; k < adjacent.count && found_[index].size() < kMaxPartners; ++k) {
+    const glm::vec3 m = adjacent.faces[k].normal;
+    const float x_m = std::max(adjacent.faces[k].distance_m, 0.0F);
+    // As far from the edge as the own point, on the other face.
+    const float into = glm::dot(m, own.normal);
+    const glm::vec3 along = own.normal - into * m;
+    if (glm::length(along) < 0.2F) continue;
+    const glm::vec3 at_m =
+        own.position_m + x_m * m - (x_m + sampler_.offset_m()) * glm::normalize(along);
+    const float lift_m = 20.0F * sampler_.offset_m();
+    const CasterRay probe{at_m + lift_m * m, -m};
+    std::array<CasterHit, 1> hit;
+    if (in_.rays.first_hits({&probe, 1}, selection, hit) == 0U ||
+        std::abs(hit[0].distance_m - lift_m) > 0.5F * lift_m || glm::dot(hit[0].normal, m) < 0.9F) {
+      continue;
+    }
+    const scene::Instance& instance = in_.geometry.instances[hit[0].instance];
+    const scene::Mesh& mesh = in_.geometry.meshes[instance.mesh];
+    Found found;
+    found.sample.position_m = at_m;
+    found.sample.normal = m;
+    found.sample.mover = own.mover;
+    found.sample.material = own.material;
+    for (const scene::Submesh& submesh : mesh.submeshes) {
+      if (3 * hit[0].triangle >= submesh.first_index &&
+          3 * hit[0].triangle < submesh.first_index + submesh.index_count) {
+        found.sample.material = submesh.material;
+      }
+    }
+    found.distance_m = x_m;
+    // A body that stands on something: beside it, that something lies in the face's plane.
+    const CasterRay beside{own.position_m + kBesideOffsets * sampler_.offset_m() * own.normal, m};
+    found.sample.covered =
+        in_.rays.first_hits({&beside, 1}, selection, hit) != 0U &&
+        std::abs(hit[0].distance_m - x_m) < kBesideOffsets * sampler_.offset_m() &&
+        glm::dot(hit[0].normal, m) < -0.9F;
+    const auto weight = weights(own.material, x_m);
+    if (*std::ranges::max_element(weight) < kLeastWeightFrac) continue;
+    found_[index].push_back(found);
+  }
+}
+
+void Partners::add() {
+  SurfacePatch partners;
+  const std::size_t own_patches = patches_.size();
+  for (std::size_t p = 0; p < own_patches; ++p) {
+    SurfacePatch& patch = patches_[p];
+    found_.assign(patch.samples.size(), {});
+    run_parallel(patch.samples.size(), kGrain, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) find(patch, static_cast<std::uint32_t>(i));
+    });
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+      for (std::size_t k = 0; k < found_[i].size(); ++k) {
+        Partner& own = patch.samples[i].partners[k];
+        own.sample = static_cast<std::uint32_t>(partners.samples.size());
+        own.distance_m = found_[i][k].distance_m;
+        own.weight_frac = weights(patch.samples[i].material, own.distance_m);
+        SurfaceSample sample = found_[i][k].sample;
+        // Until samples are numbered: who the partner belongs to.
+        sample.partners[0] = {static_cast<std::uint32_t>(i), own.distance_m,
+                              weights(sample.material, own.distance_m)};
+        sample.first_seen = static_cast<std::uint32_t>(p);
+        partners.samples.push_back(sample);
+      }
+    }
+  }
+  const std::size_t count = partners.samples.size();
+  const std::size_t intervals = in_.record.size();
+  partners.seen.resize(count);
+  partners.states.resize(count);
+  partners.outputs.resize(count);
+  partners.sun_frac.resize(count * intervals);
+  if (!in_.movers_now.empty()) partners.hidden_sky_frac.resize(count * intervals);
+  run_parallel(count, kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      sampler_.evaluate(partners, static_cast<std::uint32_t>(i), glm::vec3(0.0F));
+    }
+  });
+  patches_.push_back(std::move(partners));
+}
+
+/// What is seen of one sample counts once.
+void add_seen(std::uint32_t sample, float weight_frac, std::size_t first,
+              std::vector<SeenSample>& seen) {
+  const auto known =
+      std::find_if(seen.begin() + static_cast<std::ptrdiff_t>(first), seen.end(),
+                   [sample](const SeenSample& other) { return other.sample == sample; });
+  if (known != seen.end()) {
+    known->weight_frac += weight_frac;
+  } else {
+    seen.push_back({sample, weight_frac});
+  }
+}
+
+}  // namespace
+
+void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
+                    const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
+                    SurfaceModel& model) {
+  if (options.lateral) Partners(inputs, sampler, patches).add();
+  std::vector<std::uint32_t> first;
+  std::uint32_t next = 0;
+  for (const SurfacePatch& patch : patches) {
+    first.push_back(next);
+    next += static_cast<std::uint32_t>(patch.samples.size());
+  }
+  const std::size_t instances = inputs.geometry.instances.size();
+  model.first_sample.assign(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(instances));
+  model.drawn_samples = first.size() > instances ? first[instances] : next;
+  model.samples.samples.reserve(next);
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    const bool partners = p >= instances;
+    for (std::size_t i = 0; i < patches[p].samples.size(); ++i) {
+      SurfaceSample sample = patches[p].samples[i];
+      if (partners) {
+        sample.partners[0].sample += first[sample.first_seen];
+      } else {
+        for (Partner& partner : sample.partners) {
+          if (partner.sample != kNoSample) partner.sample += first[instances];
+        }
+      }
+      sample.first_seen = static_cast<std::uint32_t>(model.samples.seen.size());
+      for (const SeenPlace& place : patches[p].seen[i]) {
+        const RefinedMesh& mesh = model.meshes[inputs.geometry.instances[place.instance].mesh];
+        const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
+        for (glm::length_t k = 0; k < 3; ++k) {
+          const float weight = place.weight_frac * at.weight[k];
+          if (weight > 0.0F) {
+            add_seen(first[place.instance] + at.vertex[static_cast<std::size_t>(k)], weight,
+                     sample.first_seen, model.samples.seen);
+          }
+        }
+      }
+      sample.seen_count = static_cast<std::uint32_t>(model.samples.seen.size()) - sample.first_seen;
+      model.samples.samples.push_back(sample);
+    }
+  }
+}
+
+void exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
+              std::vector<SurfacePatch>& patches, SurfaceModel& model) {
+  const HistoryRecord& record = inputs.record;
+  const std::size_t intervals = record.size();
+  const std::size_t nodes = intervals + 1;
+  const SurfaceSamples& all = model.samples;
+  const std::size_t count = all.samples.size();
+  std::vector<SampleState> start(count);
+  model.states.resize(count);
+  model.outputs.resize(count);
+  Columns before(count, intervals);
+  Columns after(count, intervals);
+  const auto sweep = [&](bool first) {
+    std::size_t offset = 0;
+    for (const SurfacePatch& patch : patches) {
+      run_parallel(patch.samples.size(), kGrain, [&, offset](std::size_t from, std::size_t to) {
+        std::vector<double> longwave(nodes);
+        std::vector<double> shortwave(intervals);
+        for (std::size_t i = from; i < to; ++i) {
+          const std::size_t s = offset + i;
+          SurfaceSample sample = all.samples[s];
+          std::ranges::fill(longwave, 0.0);
+          std::ranges::fill(shortwave, 0.0);
+          if (first) {
+            start[s] = sampler.start_state(sample);
+            sample.far_frac = 1.0F - sample.sky_frac;
+          }
+          for (std::uint32_t k = 0; !first && k < sample.seen_count; ++k) {
+            const SeenSample& seen = all.seen[sample.first_seen + k];
+            const double weight = seen.weight_frac;
+            for (std::size_t j = 0; j < nodes; ++j) {
+              longwave[j] += weight * before.longwave_out_w_m2[seen.sample * nodes + j];
+            }
+            for (std::size_t j = 0; j < intervals; ++j) {
+              shortwave[j] += weight * before.shortwave_out_w_m2[seen.sample * intervals + j];
+            }
+          }
+          SampleState state = start[s];
+          // A partner's modes drive the same states here, scaled: so do those at the start.
+          for (std::size_t p = 0; !first && p < kMaxPartners; ++p) {
+            const Partner& partner = sample.partners[p];
+            if (partner.sample == kNoSample) continue;
+            for (std::size_t m = 0; m < physics::kMaxFosterModes; ++m) {
+              state.partner_k[p][m] = partner.weight_frac[m] * start[partner.sample].modes_k[m];
+            }
+          }
+          SampleOutput output;
+          for (std::size_t j = 0; j < intervals; ++j) {
+            SampleDrive drive;
+            drive.sun_frac = patch.sun_frac[i * intervals + j];
+            if (!patch.hidden_sky_frac.empty()) {
+              drive.hidden_sky_frac = patch.hidden_sky_frac[i * intervals + j];
+            }
+            drive.longwave_begin_w_m2 = longwave[j];
+            drive.longwave_end_w_m2 = longwave[j + 1];
+            drive.shortwave_w_m2 = shortwave[j];
+            for (std::size_t p = 0; !first && p < kMaxPartners; ++p) {
+              const std::uint32_t partner = sample.partners[p].sample;
+              if (partner == kNoSample) continue;
+              drive.partner_begin_w_m2[p] = before.flux_w_m2[partner * nodes + j];
+              drive.partner_end_w_m2[p] = before.flux_w_m2[partner * nodes + j + 1];
+            }
+            const glm::vec3 normal = record.rays[j].normal(sample);
+            if (j == 0) {
+              output = inputs.heat.output(sample, normal, record.intervals[0].forcing.begin, drive,
+                                          state);
+              after.longwave_out_w_m2[s * nodes] = output.longwave_out_w_m2;
+              after.flux_w_m2[s * nodes] = output.flux_w_m2;
+            }
+            output = inputs.heat.advance(sample, normal, record.intervals[j], drive, state);
+            after.longwave_out_w_m2[s * nodes + j + 1] = output.longwave_out_w_m2;
+            after.flux_w_m2[s * nodes + j + 1] = output.flux_w_m2;
+            after.shortwave_out_w_m2[s * intervals + j] = output.shortwave_out_w_m2;
+          }
+          model.states[s] = state;
+          model.outputs[s] = output;
+        }
+      });
+      offset += patch.samples.size();
+    }
+    std::swap(before, after);
+  };
+  for (std::uint32_t i = 0; i <= kSweeps; ++i) sweep(i == 0);
+}
+
+}  // namespace emit::renderer

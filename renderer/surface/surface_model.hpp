@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <glm/ext/vector_double3.hpp>
+#include <span>
+#include <vector>
+
+#include "emit/scene/mesh.hpp"
+#include "surface/caster_rays.hpp"
+#include "surface/history_record.hpp"
+#include "surface/refined_mesh.hpp"
+#include "surface/sample_heat.hpp"
+#include "surface/surface_samples.hpp"
+#include "surface/surface_view.hpp"
+
+namespace emit::renderer {
+
+/// From where, and how finely, the surface will be looked at.
+struct RefineView {
+  std::vector<glm::dvec3> eyes_world_m;  ///< places of the camera
+  double pixel_rad = 1e-3;
+};
+
+struct SurfaceModelOptions {
+  double tolerance_k = 0.1;
+  std::size_t max_samples = 4'000'000;
+  double max_blur_m = 0.5;
+  bool lateral = true;  ///< heat moves along the surface and across convex edges
+};
+
+/// Everything a sample carries after the history.
+struct SurfaceModel {
+  std::vector<RefinedMesh> meshes;          ///< as SceneGeometry::meshes
+  std::vector<std::uint32_t> first_sample;  ///< by instance; its samples are the mesh's vertices
+  SurfaceSamples samples;                   ///< drawn ones first, then partners across edges
+  std::uint32_t drawn_samples = 0;
+  std::vector<SampleState> states;    ///< at the end of the record
+  std::vector<SampleOutput> outputs;  ///< at the end of the record
+  bool full = false;                  ///< max_samples stopped the refinement
+};
+
+/// Fraction done; false stops.
+using SurfaceProgress = std::function<bool(double done_frac)>;
+
+/// What the builder works with; all outlive it.
+struct SurfaceInputs {
+  const scene::SceneGeometry& geometry;
+  std::span<const scene::Material> materials;
+  std::span<const std::int32_t> mover_of_object;  ///< -1: static
+  const CasterRays& rays;
+  const SampleHeat& heat;
+  const FosterHistory& foster;
+  const HistoryRecord& record;
+  std::span<const MoverPlacement> movers_now;
+};
+
+/// Of the outermost layer; 0 for a prescribed material.
+[[nodiscard]] double diffusivity_m2_s(const scene::Material& material) noexcept;
+
+/// Places samples on every surface, integrates their history, and adds samples until linear
+/// interpolation between them is good to the tolerance or the triangles are as small as a pixel.
+/// Deterministic. Setup only: uses all cores. Errors: `internal` when stopped by `progress`.
+[[nodiscard]] physics::Result<SurfaceModel> build_surface_model(const SurfaceInputs& inputs,
+                                                                const RefineView& view,
+                                                                const SurfaceModelOptions& options,
+                                                                const SurfaceProgress& progress);
+
+}  // namespace emit::renderer

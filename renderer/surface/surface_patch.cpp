@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/surface_patch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::uint32_t kViewRays = 128;
+/// Ray starts lie this far off the surface, more where float32 resolves less.
+constexpr float kLeastOffsetM = 5e-4F;
+constexpr float kOffsetFrac = 1e-6F;
+constexpr std::size_t kTangents = CasterRays::kMaxRays;
+/// A face stands upright on another when the cosine between their normals is smaller.
+constexpr float kWallCos = 0.3F;
+constexpr float kMaxFootM = 3.0F;
+constexpr float kUnderOffsets = 8.0F;
+
+}  // namespace
+
+PatchSampler::PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
+    : in_(inputs), options_(options), view_(kViewRays) {
+  const scene::Aabb& bounds = inputs.geometry.bounds;
+  if (!bounds.empty()) {
+    const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);
+    offset_m_ = std::max(kLeastOffsetM, kOffsetFrac * static_cast<float>(radius_m));
+  }
+  history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
+  for (const scene::Material& material : inputs.materials) {
+    diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+  }
+}
+
+SampleState PatchSampler::start_state(const SurfaceSample& sample) const noexcept {
+  SampleState state;
+  const glm::vec3 normal = in_.record.rays.front().normal(sample);
+  state.modes_k = in_.foster.start_states(sample.material, glm::dvec3(normal));
+  for (const HeatInterval& interval : in_.record.tail) {
+    in_.heat.advance_unshadowed(sample.material, normal, interval, state.modes_k);
+  }
+  // What covers part of the ground did so before the history as well.
+  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+    state.modes_k[i] *= sample.open_before_frac[i];
+  }
+  return state;
+}
+
+void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
+                               const glm::vec3& inward) const {
+  SurfaceSample& sample = patch.samples[index];
+  ViewPoint point{sample.position_m, sample.normal, inward, offset_m_};
+  std::array<MoverPlacement, 1> self;
+  CasterSelection selection{true, {}};
+  std::vector<MoverPlacement> placed;
+  if (sample.mover >= 0) {
+    // An entity sees the world from where it stands now, and its own hull always.
+    placed.assign(in_.movers_now.begin(), in_.movers_now.end());
+    MoverPlacement& own = placed[static_cast<std::size_t>(sample.mover)];
+    own.on = true;
+    point.position_m = own.rel_from_body * point.position_m + own.position_m;
+    point.normal = own.rel_from_body * point.normal;
+    point.inward = own.rel_from_body * point.inward;
+    selection.movers = placed;
+  }
+  const SurfaceView view = view_.view(in_.rays, point, selection);
+  sample.sky_frac = view.sky_frac;
+  sample.far_frac = view.far_frac;
+  std::vector<SeenPlace>& seen = patch.seen[index];
+  seen.clear();
+  bool inside_a_body = view.sky_frac + view.far_frac == 0.0F;
+  for (std::uint32_t i = 0; i < view.seen_count; ++i) {
+    const SeenFace& face = view.seen[i];
+    seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac});
+    inside_a_body = inside_a_body && !face.front;
+  }
+  sample.covered = sample.covered || inside_a_body;
+
+  feel_along(patch, index, point, selection);
+}
+
+void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                              const CasterSelection& selection) const {
+  SurfaceSample& sample = patch.samples[index];
+  const glm::vec3& n = point.normal;
+  const glm::vec3 u = glm::normalize(glm::cross(
+      std::abs(n.z) < 0.9F ? glm::vec3(0.0F, 0.0F, 1.0F) : glm::vec3(1.0F, 0.0F, 0.0F), n));
+  const glm::vec3 v = glm::cross(n, u);
+  const glm::vec3 base_m = point.position_m + offset_m_ * point.inward;
+  std::array<CasterRay, kTangents> rays;
+  std::array<CasterHit, kTangents> above;
+  std::array<CasterHit, kTangents> below;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    const auto angle =
+        static_cast<float>(2.0 * physics::kPi * (static_cast<double>(k) + 0.5) / kTangents);
+    rays[k] = {base_m + 2.0F * offset_m_ * n, std::cos(angle) * u + std::sin(angle) * v};
+  }
+  const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above);
+  for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offset_m_ * n;
+  const std::uint32_t met_below = in_.rays.first_hits(rays, selection, below);
+  sample.flat_m = 1e6F;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    if (((met_above >> k) & 1U) != 0U) sample.flat_m = std::min(sample.flat_m, above[k].distance_m);
+    if (((met_below >> k) & 1U) != 0U) sample.flat_m = std::min(sample.flat_m, below[k].distance_m);
+  }
+  if (!options_.lateral) return;
+
+  // Walls that stand on the surface: where it goes on under them, nothing reaches it.
+  std::array<float, kTangents> wall_m;
+  wall_m.fill(-1.0F);
+  bool any = false;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    if (((met_above >> k) & 1U) == 0U || above[k].distance_m > kMaxFootM || !above[k].front ||
+        std::abs(glm::dot(above[k].normal, n)) > kWallCos) {
+      continue;
+    }
+    const CasterRay down{rays[k].origin_m + 4.0F * offset_m_ * n +
+                             (above[k].distance_m + kUnderOffsets * offset_m_) * rays[k].direction,
+                         -n};
+    std::array<CasterHit, 1> under;
+    if (in_.rays.first_hits({&down, 1}, selection, under) != 0U &&
+        under[0].distance_m < kUnderOffsets * offset_m_) {
+      wall_m[k] = above[k].distance_m;
+      any = true;
+    }
+  }
+  if (!any) return;
+  const physics::FosterNetwork& network = in_.foster.materials()[sample.material].network;
+  const auto open = [&](double memory_s) {
+    const double depth_m =
+        std::sqrt(static_cast<double>(diffusivity_m2_s_[sample.material]) * memory_s);
+    double covered = 0.0;
+    for (const float distance_m : wall_m) {
+      if (distance_m < 0.0F) continue;
+      covered += std::exp(-static_cast<double>(distance_m) / std::max(depth_m, 1e-6)) / kTangents;
+    }
+    return static_cast<float>(1.0 - covered);
+  };
+  for (std::size_t i = 0; i < network.count; ++i) {
+    sample.open_frac[i] = open(std::min(network.modes[i].tau_s, history_s_));
+    sample.open_before_frac[i] = open(network.modes[i].tau_s);
+  }
+}
+
+void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
+                            const glm::vec3& inward) const {
+  look_around(patch, index, inward);
+  SurfaceSample& sample = patch.samples[index];
+  const HistoryRecord& record = in_.record;
+  const std::size_t count = record.size();
+  const float max_blur_m =
+      options_.lateral ? std::min(static_cast<float>(options_.max_blur_m), 0.5F * sample.flat_m)
+                       : 0.0F;
+  // Before samples are numbered, what is seen counts as the surroundings.
+  SurfaceSample alone = sample;
+  alone.far_frac = 1.0F - sample.sky_frac;
+  SampleState state = start_state(sample);
+  SampleOutput output;
+  for (std::size_t i = 0; i < count; ++i) {
+    const IntervalRays& rays = record.rays[i];
+    const float blur_m = std::min(
+        max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
+    SampleDrive drive;
+    drive.sun_frac = rays.sun_frac(in_.rays, sample, offset_m_, blur_m);
+    drive.hidden_sky_frac = rays.hidden_sky_frac(in_.rays, sample, offset_m_);
+    patch.sun_frac[index * count + i] = drive.sun_frac;
+    if (!patch.hidden_sky_frac.empty()) {
+      patch.hidden_sky_frac[index * count + i] = drive.hidden_sky_frac;
+    }
+    output = in_.heat.advance(alone, rays.normal(sample), record.intervals[i], drive, state);
+  }
+  patch.states[index] = state;
+  patch.outputs[index] = output;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <glm/ext/matrix_float3x3.hpp>
+#include <glm/ext/matrix_float4x4.hpp>
+#include <vector>
+
+#include "surface/surface_model.hpp"
+
+namespace emit::renderer {
+
+/// A seen face until samples are numbered.
+struct SeenPlace {
+  std::uint32_t instance = 0;
+  std::uint32_t triangle = 0;
+  glm::vec2 barycentric{0.0F};
+  float weight_frac = 0.0F;
+};
+
+/// The samples of one instance while its mesh is being refined; arrays by vertex of the mesh.
+struct SurfacePatch {
+  std::uint32_t mesh = 0;
+  std::uint32_t object = 0;
+  std::int32_t mover = -1;
+  glm::mat4 rel_from_mesh{1.0F};  ///< body_from_mesh for entities
+  glm::mat3 normal_from_mesh{1.0F};
+
+  std::vector<SurfaceSample> samples;
+  std::vector<std::vector<SeenPlace>> seen;
+  std::vector<SampleState> states;
+  std::vector<SampleOutput> outputs;
+  /// Difference from the mean of the vertex's parents, K; negative where it has none.
+  std::vector<float> surplus_k;
+  std::vector<float> sun_frac;         ///< by vertex, then interval
+  std::vector<float> hidden_sky_frac;  ///< likewise; empty without entities
+};
+
+/// Evaluates single samples of patches: view, visibility and history. Owner: the builder. Any
+/// thread.
+class PatchSampler {
+ public:
+  PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOptions& options);
+
+  /// Distance of ray starts from the surface.
+  [[nodiscard]] float offset_m() const noexcept { return offset_m_; }
+
+  /// Fills everything of sample `index`, whose position, normal, material and mover stand in
+  /// patch.samples already. What it sees counts as the surroundings here.
+  void evaluate(SurfacePatch& patch, std::uint32_t index, const glm::vec3& inward) const;
+
+  /// States at the start of the record: spin-up and tail, unshadowed.
+  [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
+
+ private:
+  void look_around(SurfacePatch& patch, std::uint32_t index, const glm::vec3& inward) const;
+
+  /// Rays along the surface, a little above and a little below: how far it is a plane, and which
+  /// walls stand on it.
+  void feel_along(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                  const CasterSelection& selection) const;
+
+  const SurfaceInputs& in_;
+  SurfaceModelOptions options_;
+  ViewSampler view_;
+  float offset_m_ = 1e-3F;
+  double history_s_ = 0.0;
+  std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
+};
+
+}  // namespace emit::renderer

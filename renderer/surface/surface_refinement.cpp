@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/surface_refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "surface/parallel.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// Share of a caster's width that a triangle in its shade may have.
+constexpr float kSeedFrac = 0.25F;
+/// Edges of shadows this young are still sharp.
+constexpr float kRecentS = 900.0F;
+/// Corners whose suns differ by more see the edge of a shadow between them.
+constexpr float kEdgeSunFrac = 0.1F;
+/// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
+constexpr float kCreaseS = 1000.0F;
+constexpr float kCreaseDepths = 3.0F;
+/// The shortest edge that is halved, in pixels.
+constexpr float kLeastEdgePx = 0.75F;
+
+}  // namespace
+
+SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const RefineView& view,
+                                     const SurfaceModelOptions& options)
+    : in_(inputs),
+      pixel_rad_(static_cast<float>(view.pixel_rad)),
+      tolerance_k_(static_cast<float>(options.tolerance_k)),
+      lateral_(options.lateral) {
+  for (const scene::Material& material : inputs.materials) {
+    diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+  }
+  for (const glm::dvec3& eye : view.eyes_world_m) {
+    eyes_rel_m_.emplace_back(eye - inputs.rays.origin_world_m());
+  }
+  const HistoryRecord& record = inputs.record;
+  recent_ = record.size() - 1;
+  while (recent_ > 0 && record.lag_s[recent_ - 1] < kRecentS) --recent_;
+  for (const scene::Instance& instance : inputs.geometry.instances) {
+    if (instance.world_bounds.empty()) continue;
+    glm::dvec3 size_m = instance.world_bounds.max_m - instance.world_bounds.min_m;
+    std::array<double, 3> sorted = {size_m.x, size_m.y, size_m.z};
+    std::ranges::sort(sorted);
+    const glm::dvec3 centre_m = 0.5 * (instance.world_bounds.max_m + instance.world_bounds.min_m);
+    Caster caster;
+    caster.radius_m = static_cast<float>(0.5 * glm::length(size_m));
+    caster.width_m = static_cast<float>(sorted[1]);
+    const std::int32_t mover = inputs.mover_of_object[instance.object];
+    if (mover < 0) {
+      caster.centre_m = glm::vec3(centre_m - inputs.rays.origin_world_m());
+      for (std::size_t i = 0; i < record.size(); ++i) {
+        if (!record.rays[i].sun_up()) continue;
+        caster.to_sun = record.rays[i].to_sun();
+        casters_.push_back(caster);
+      }
+      continue;
+    }
+    for (std::size_t i = 0; i < record.size(); ++i) {
+      const MoverPlacement& place = record.rays[i].placement(static_cast<std::size_t>(mover));
+      if (!record.rays[i].sun_up() || !place.on) continue;
+      caster.centre_m = place.position_m;
+      caster.to_sun = record.rays[i].to_sun();
+      casters_.push_back(caster);
+    }
+  }
+}
+
+float SurfaceRefinement::least_edge_m(const glm::vec3& centre_m) const noexcept {
+  float distance_m = 1e30F;
+  for (const glm::vec3& eye : eyes_rel_m_) {
+    distance_m = std::min(distance_m, glm::distance(eye, centre_m));
+  }
+  return eyes_rel_m_.empty() ? 0.0F : kLeastEdgePx * pixel_rad_ * distance_m;
+}
+
+float SurfaceRefinement::seed_edge_m(const glm::vec3& centre_m, float longest_m) const noexcept {
+  float seed_m = 1e30F;
+  for (const Caster& caster : casters_) {
+    const float edge_m = kSeedFrac * caster.width_m;
+    if (edge_m >= std::min(seed_m, longest_m)) continue;  // changes nothing
+    const glm::vec3 way = centre_m - caster.centre_m;
+    const float along_m = std::max(0.0F, -glm::dot(way, caster.to_sun));
+    const float beside_m = glm::length(way + along_m * caster.to_sun);
+    if (beside_m < caster.radius_m + longest_m) seed_m = edge_m;
+  }
+  return seed_m;
+}
+
+bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slot,
+                                   const SurfacePatch& patch) const {
+  const auto& leaf = refined.leaf(slot);
+  const auto vertices = refined.vertices();
+  std::array<glm::vec3, 3> corners_m;
+  glm::vec3 centre_m(0.0F);
+  for (std::size_t i = 0; i < 3; ++i) {
+    // Not the samples' own places: those are moved off edges.
+    corners_m[i] = glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[leaf[i]].position_m, 1.0F));
+    if (patch.mover >= 0) {
+      const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(patch.mover)];
+      corners_m[i] = place.rel_from_body * corners_m[i] + place.position_m;
+    }
+    centre_m += corners_m[i] / 3.0F;
+  }
+  const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
+                                    glm::distance(corners_m[1], corners_m[2]),
+                                    glm::distance(corners_m[2], corners_m[0])});
+  if (longest_m <= least_edge_m(centre_m)) return false;
+  if (in_.materials[vertices[leaf[0]].material].prescribed_k) return false;
+  if (longest_m > seed_edge_m(centre_m, longest_m)) return true;
+
+  // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
+  const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
+  const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
+  if (lateral_ && longest_m > depth_m &&
+      std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
+    return true;
+  }
+
+  const auto offset_k = [&](std::size_t i) { return patch.outputs[leaf[i]].offset_k; };
+  const float range_k = std::max({offset_k(0), offset_k(1), offset_k(2)}) -
+                        std::min({offset_k(0), offset_k(1), offset_k(2)});
+  const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
+  if (patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
+  if (range_k < tolerance_k_) return false;
+  const std::size_t count = in_.record.size();
+  for (std::size_t i = recent_; i < count; ++i) {
+    const auto sun = [&](std::size_t corner) { return patch.sun_frac[leaf[corner] * count + i]; };
+    const float high = std::max({sun(0), sun(1), sun(2)});
+    const float low = std::min({sun(0), sun(1), sun(2)});
+    if (high - low > kEdgeSunFrac) return true;
+  }
+  return false;
+}
+
+void SurfaceRefinement::flag(std::uint32_t mesh, const RefinedMesh& refined,
+                             std::span<const SurfacePatch> patches,
+                             std::vector<std::uint32_t>& slots) const {
+  std::vector<std::uint8_t> flagged(refined.leaf_count(), 0);
+  for (const SurfacePatch& patch : patches) {
+    if (patch.mesh != mesh) continue;
+    run_parallel(flagged.size(), 256, [&](std::size_t from, std::size_t to) {
+      for (std::size_t slot = from; slot < to; ++slot) {
+        if (flagged[slot] == 0 && too_coarse(refined, static_cast<std::uint32_t>(slot), patch)) {
+          flagged[slot] = 1;
+        }
+      }
+    });
+  }
+  slots.clear();
+  for (std::uint32_t slot = 0; slot < flagged.size(); ++slot) {
+    if (flagged[slot] != 0) slots.push_back(slot);
+  }
+}
+
+}  // namespace emit::renderer

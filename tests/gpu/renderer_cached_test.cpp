@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: Apache-2.0
+// The thermal method "cached" against the model in double precision, against "per-frame", and
+// against itself: nothing it shows may depend on where the camera was.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "emit/physics/foster.hpp"
+#include "gpu/renderer_scene.hpp"
+#include "history/foster_history.hpp"
+
+namespace emit::test {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr std::int64_t kHourNs = 3600 * kSecondNs;
+constexpr double kReferenceK = 295.0;
+constexpr std::uint32_t kWidth = 96;
+constexpr std::uint32_t kHeight = 80;
+
+physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
+  return {from, physics::world_from_body_look_at(from, at)};
+}
+
+scene::ScenarioDesc cached_scenario(const std::filesystem::path& gltf) {
+  scene::ScenarioDesc s = instant_scenario(gltf);
+  s.weather.clear();
+  s.materials[0].layers = {{0.15, 0.7, 2120, 920}, {0.3, 1.5, 2000, 950}, {1.55, 1.2, 1900, 1158}};
+  s.materials[0].base_k = 286.15;
+  s.sensor.width_px = kWidth;
+  s.sensor.height_px = kHeight;
+  s.thermal.method = scene::ThermalMethod::cached;
+  s.thermal.model = scene::ThermalModel::foster;
+  s.thermal.spin_up_ns = 48 * kHourNs;
+  s.thermal.steps = 27;
+  s.thermal.spacing = scene::StepSpacing::geometric;
+  s.thermal.lateral = false;
+  return s;
+}
+
+/// One renderer at a time: each has its own context, current in this thread.
+class Session {
+ public:
+  explicit Session(const scene::ScenarioDesc& scenario) {
+    renderer::OutputOptions output;
+    output.temperature = true;
+    auto made = renderer::Renderer::create(scenario, {}, output);
+    if (made) {
+      renderer_ = std::move(*made);
+    } else {
+      ADD_FAILURE() << made.error().text;
+    }
+  }
+  [[nodiscard]] std::vector<float> frame_k(std::int64_t sim_time_ns, const physics::Pose& pose) {
+    renderer::FrameRequest request;
+    request.sim_time_ns = request.thermal_time_ns = sim_time_ns;
+    request.sensor_pose = pose;
+    const int slot = renderer_->submit(request);
+    const auto& view = renderer_->collect(static_cast<renderer::SlotIndex>(slot));
+    EXPECT_FALSE(view.device_failed);
+    EXPECT_EQ(view.stats.nonfinite_px, 0U);
+    std::vector<float> out(view.temperature_k.begin(), view.temperature_k.end());
+    renderer_->release(static_cast<renderer::SlotIndex>(slot));
+    return out;
+  }
+  [[nodiscard]] renderer::Renderer& renderer() { return *renderer_; }
+
+ private:
+  std::unique_ptr<renderer::Renderer> renderer_;
+};
+
+/// The same model in double on open, level ground.
+double open_ground_k(scene::ScenarioDesc s, std::int64_t now_ns) {
+  s.thermal.tolerance_k = 1e-3;
+  s.thermal.steps = 512;
+  const renderer::Environment environment(s);
+  const auto materials = renderer::foster_materials(s.materials, s.thermal);
+  const renderer::FosterMaterial material = materials->front();
+  renderer::FosterHistory history(s, *materials, material, environment, kReferenceK);
+  renderer::StepPlan plan(s.thermal);
+  plan.update(now_ns, environment, {});
+  history.update(plan, environment);
+  const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
+                                               material.base_k, kReferenceK);
+  const glm::dvec3 up(0.0, 0.0, 1.0);
+  physics::FosterState<double> x = history.spun_up(0, up);
+  for (const auto& intervals : {history.tail(), history.intervals()}) {
+    for (const renderer::IntervalForcing& interval : intervals) {
+      physics::foster_advance(x, unshadowed_drive(interval.begin, material, up, kReferenceK),
+                              unshadowed_drive(interval.end, material, up, kReferenceK),
+                              physics::foster_ladder(interval.dt_s, material.network), surface,
+                              1e-3);
+    }
+  }
+  return kReferenceK + physics::foster_offset_k(x, surface);
+}
+
+struct Difference {
+  double max_k = 0.0;
+  double p99_k = 0.0;
+};
+Difference difference(const std::vector<float>& a, const std::vector<float>& b) {
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (std::isnan(a[i]) != std::isnan(b[i])) {
+      errors.push_back(1e9);
+    } else if (!std::isnan(a[i])) {
+      errors.push_back(std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
+    }
+  }
+  std::ranges::sort(errors);
+  if (errors.empty()) return {1e9, 1e9};
+  return {errors[errors.size() - 1], errors[errors.size() * 99 / 100]};
+}
+
+std::filesystem::path box_on_ground() {
+  auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
+  quads.push_back(ground(12.0, 12.0));
+  return write_quads("box", quads);
+}
+
+TEST(RendererCached, OpenGroundFollowsTheModelInDoubleAlsoBetweenTheNodes) {
+  const auto scenario = cached_scenario(write_quads("plane", {ground(50.0, 50.0)}));
+  Session run(scenario);
+  const auto pose = looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0});
+  for (const double seconds : {7200.0, 7203.0, 7211.0, 7239.5, 7300.0}) {
+    const auto now_ns = static_cast<std::int64_t>(seconds * 1e9);
+    const double expected = open_ground_k(scenario, now_ns);
+    for (const float t : run.frame_k(now_ns, pose)) ASSERT_NEAR(t, expected, 0.02) << seconds;
+  }
+}
+
+TEST(RendererCached, ShadowLiesWhereThePerFrameMethodPutsIt) {
+  auto scenario = cached_scenario(box_on_ground());
+  const auto pose = looking({0.0, 0.1, 18.0}, {0.0, 0.0, 0.0});
+  const auto cached = Session(scenario).frame_k(3 * kHourNs, pose);
+  scenario.thermal.method = scene::ThermalMethod::per_frame;
+  scenario.thermal.obscurance_radius_m = 1e-6;
+  const auto per_frame = Session(scenario).frame_k(3 * kHourNs, pose);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < cached.size(); ++i) {
+    errors.push_back(std::abs(static_cast<double>(cached[i]) - static_cast<double>(per_frame[i])));
+  }
+  std::ranges::sort(errors);
+  // The box itself, what it hides of the sky and edges differ; shadow and open ground do not.
+  EXPECT_LT(errors[errors.size() / 2], 0.05);
+  EXPECT_LT(errors[errors.size() * 80 / 100], 0.4);
+  const auto [low, high] = std::ranges::minmax(cached);
+  EXPECT_GT(high - low, 8.0F);
+}
+
+TEST(RendererCached, ACameraThatTurnedAwayFindsWhatOneThatStayedSees) {
+  const auto scenario = cached_scenario(box_on_ground());
+  const auto pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+  const auto away = looking({3.0, -9.0, 6.0}, {3.0, -30.0, 6.0});
+  const auto last = [&](bool turns) {
+    Session session(scenario);
+    std::vector<float> frame;
+    for (std::int64_t i = 0; i <= 30; ++i) {
+      const std::int64_t now_ns = 2 * kHourNs + i * 4 * kSecondNs;
+      frame = session.frame_k(now_ns, turns && i > 3 && i < 30 ? away : pose);
+    }
+    return frame;
+  };
+  const auto stayed = last(false);
+  EXPECT_LT(difference(stayed, last(true)).max_k, 1e-3);
+}
+
+TEST(RendererCached, RunningOnEndsWhereAFreshStartBegins) {
+  const auto scenario = cached_scenario(box_on_ground());
+  const auto pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+  const std::int64_t end_ns = 2 * kHourNs + 300 * kSecondNs;
+  std::vector<float> last;
+  {
+    Session running(scenario);
+    for (std::int64_t t = 2 * kHourNs; t <= end_ns; t += 3 * kSecondNs) {
+      last = running.frame_k(t, pose);
+    }
+  }
+  const Difference d = difference(last, Session(scenario).frame_k(end_ns, pose));
+  EXPECT_LT(d.p99_k, 0.5);  // samples stay where they were refined for the start
+  EXPECT_LT(d.max_k, 4.0);
+}
+
+TEST(RendererCached, TheSameFramesInLargerStepsGiveTheSameTemperatures) {
+  const auto scenario = cached_scenario(box_on_ground());
+  const auto pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+  const auto last = [&](std::int64_t frames) {
+    Session session(scenario);
+    std::vector<float> frame;
+    for (std::int64_t i = 0; i <= frames; ++i) {
+      frame = session.frame_k(2 * kHourNs + 200 * kSecondNs * i / frames, pose);
+    }
+    return frame;
+  };
+  const auto fine = last(40);
+  EXPECT_EQ(difference(fine, last(1)).max_k, 0.0);
+}
+
+/// Ground and a box that stands on it until `leaves_ns`.
+scene::ScenarioDesc parking_lot(std::int64_t leaves_ns) {
+  scene::ScenarioDesc s = cached_scenario(write_quads("lot", {ground(14.0, 14.0)}));
+  scene::ObjectDesc vehicle = s.objects.front();
+  vehicle.name = "vehicle";
+  vehicle.gltf = write_quads("vehicle", box({-1.5, -1.0, 0.3}, {1.5, 1.0, 2.0}));
+  vehicle.entity_id = 7;
+  const physics::Pose parked = vehicle.instances.front();
+  physics::Pose away = parked;
+  away.position_world_m += glm::dvec3(300.0, 0.0, 0.0);
+  vehicle.trajectory = {{0, parked, true, false},
+                        {leaves_ns, parked, true, false},
+                        {leaves_ns + kSecondNs, away, true, true}};
+  s.objects.push_back(vehicle);
+  return s;
+}
+
+TEST(RendererCached, AVehicleThatLeftLeavesItsPrint) {
+  const auto scenario = parking_lot(3 * kHourNs);
+  Session run(scenario);
+  const auto pose = looking({0.0, 0.1, 16.0}, {0.0, 0.0, 0.0});
+  const std::int64_t shown_ns = 3 * kHourNs + 60 * kSecondNs;
+  const auto frame = run.frame_k(shown_ns, pose);
+  const double open_k = open_ground_k(scenario, shown_ns);
+  const float middle_k = frame[kHeight / 2 * kWidth + kWidth / 2];
+  EXPECT_LT(middle_k, open_k - 5.0);
+  EXPECT_NEAR(frame[2 * kWidth + 2], open_k, 0.3);
+}
+
+TEST(RendererCached, AVehicleThatTheHostDrivesOffIsNotForgotten) {
+  // Scripted and live departures at the same time give the same print.
+  const auto scripted = parking_lot(2 * kHourNs + 30 * kSecondNs);
+  auto live = scripted;
+  live.objects[1].trajectory.resize(1);
+  const auto pose = looking({0.0, 0.1, 16.0}, {0.0, 0.0, 0.0});
+  const auto last = [&](const scene::ScenarioDesc& scenario, bool tell) {
+    Session session(scenario);
+    std::vector<float> frame;
+    for (std::int64_t i = 0; i <= 30; ++i) {
+      if (tell && (i == 6 || i == 7)) {
+        const scene::Keyframe& key = scripted.objects[1].trajectory[i == 6 ? 1U : 2U];
+        const renderer::EntityUpdate update{7, key.pose, true, key.teleport};
+        EXPECT_EQ(session.renderer().apply_entities(key.sim_time_ns, {&update, 1}), 1U);
+      }
+      frame = session.frame_k(2 * kHourNs + i * 5 * kSecondNs, pose);
+    }
+    return frame;
+  };
+  const auto reference = last(scripted, false);
+  EXPECT_LT(difference(reference, last(live, true)).p99_k, 0.5);
+}
+
+TEST(RendererCached, GoingBackStartsAfresh) {
+  const auto scenario = cached_scenario(box_on_ground());
+  const auto pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+  Session run(scenario);
+  const auto first = run.frame_k(2 * kHourNs, pose);
+  (void)run.frame_k(2 * kHourNs + 90 * kSecondNs, pose);
+  run.renderer().reset();
+  const auto before = run.frame_k(kHourNs, pose);
+  EXPECT_GT(difference(first, before).p99_k, 1.0);
+}
+
+TEST(RendererCached, WarmUpReportsAndStops) {
+  const auto scenario = cached_scenario(box_on_ground());
+  Session run(scenario);
+  renderer::FrameRequest request;
+  request.sim_time_ns = request.thermal_time_ns = kHourNs;
+  request.sensor_pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+  EXPECT_FALSE(run.renderer().warm_up(request, [](double) { return false; }));
+  double last_frac = 0.0;
+  ASSERT_TRUE(run.renderer().warm_up(request, [&](double frac) {
+    EXPECT_GE(frac, last_frac);
+    last_frac = frac;
+    return true;
+  }));
+  EXPECT_EQ(last_frac, 1.0);
+  EXPECT_GT(run.renderer().scene_stats().samples, 100U);
+  EXPECT_FALSE(run.renderer().scene_stats().samples_full);
+}
+
+TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
+  auto scenario = cached_scenario(box_on_ground());
+  scenario.thermal.max_samples = 300;
+  Session run(scenario);
+  (void)run.frame_k(kHourNs, looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0}));
+  EXPECT_LE(run.renderer().scene_stats().samples, 300U);
+  EXPECT_TRUE(run.renderer().scene_stats().samples_full);
+}
+
+TEST(RendererCached, TheLiteralModelOfThePaperIsRefused) {
+  auto scenario = cached_scenario(box_on_ground());
+  scenario.thermal.model = scene::ThermalModel::emit2014;
+  auto made = renderer::Renderer::create(scenario, {}, {});
+  ASSERT_FALSE(made);
+  EXPECT_NE(made.error().text.find("foster"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace emit::test
