@@ -10,7 +10,7 @@ namespace emit::renderer {
 namespace {
 
 /// Places along a known trajectory of the camera that the refinement looks from.
-constexpr std::size_t kEyes = 64;
+constexpr std::size_t kEyes = 16;
 
 FosterHistory foster_of(const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
                         const Environment& environment) {

@@ -196,8 +196,8 @@ physics::Result<SurfaceModel> Builder::run() {
     if (!sample_new_vertices(done_frac, to_frac)) return stopped();
   }
   number_samples(in_, sampler_, options_, patches_, model_);
-  exchange(in_, sampler_, patches_, model_);
-  if (!report(1.0)) return stopped();
+  const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
+  if (!exchange(in_, sampler_, patches_, model_, exchanged)) return stopped();
   return std::move(model_);
 }
 

@@ -225,8 +225,9 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
   }
 }
 
-void exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
-              std::vector<SurfacePatch>& patches, SurfaceModel& model) {
+bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
+              std::vector<SurfacePatch>& patches, SurfaceModel& model,
+              const SurfaceProgress& report) {
   const HistoryRecord& record = inputs.record;
   const std::size_t intervals = record.size();
   const std::size_t nodes = intervals + 1;
@@ -307,7 +308,11 @@ void exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
     }
     std::swap(before, after);
   };
-  for (std::uint32_t i = 0; i <= kSweeps; ++i) sweep(i == 0);
+  for (std::uint32_t i = 0; i <= kSweeps; ++i) {
+    sweep(i == 0);
+    if (report && !report((i + 1.0) / (kSweeps + 1.0))) return false;
+  }
+  return true;
 }
 
 }  // namespace emit::renderer

@@ -24,7 +24,7 @@ struct RefineView {
 
 struct SurfaceModelOptions {
   double tolerance_k = 0.1;
-  std::size_t max_samples = 4'000'000;
+  std::size_t max_samples = 1'000'000;
   double max_blur_m = 0.5;
   bool lateral = true;  ///< heat moves along the surface and across convex edges
 };
