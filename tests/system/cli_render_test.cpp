@@ -60,6 +60,35 @@ TEST(CliRender, only_the_channels_asked_for_are_written) {
   EXPECT_NE(diff.out.find("only in b: depth"), std::string::npos) << diff.out;
 }
 
+TEST(CliRender, the_cached_method_says_how_many_samples_it_has) {
+  const TemporaryFolder folder;
+  const ProcessResult result = run_emit(
+      render(folder.file("a.exr"), {"--set", "thermal.method=cached", "--set",
+                                    "thermal.model=foster", "--json", folder.file("a.json")}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("thermal samples"), std::string::npos) << result.out;
+  const std::string json = read_text(folder.file("a.json"));
+  EXPECT_GT(std::stod(json_value(json, "samples")), 45.0);
+  EXPECT_EQ(json_value(json, "nonfinite_px"), "0");
+}
+
+TEST(CliSolve, a_few_pixels_by_layers_alone) {
+  const TemporaryFolder folder;
+  const ProcessResult result = run_emit({"solve",       "box",
+                                         "--time-s",    "3600",
+                                         "--dimension", "1",
+                                         "--pixels",    "40",
+                                         "--rays",      "64",
+                                         "--set",       "sensor.width_px=160",
+                                         "--set",       "sensor.height_px=120",
+                                         "--set",       "thermal.model=foster",
+                                         "--out",       folder.file("truth.exr"),
+                                         "--json",      folder.file("truth.json")});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(std::filesystem::exists(folder.file("truth.exr")));
+  EXPECT_NE(result.out.find("40 of"), std::string::npos) << result.out;
+}
+
 TEST(CliRender, an_unknown_band_exits_with_2_and_lists_the_bands) {
   const TemporaryFolder folder;
   const ProcessResult result = run_emit(render(folder.file("a.exr"), {"--band", "ultraviolet"}));
