@@ -388,9 +388,10 @@ const KeyTable<ThermalOptions>& thermal_keys() {
                              EMIT_FIELD(obscurance_radius_m),
                              "per-frame: radius within which surfaces hide the sky from each "
                              "other."),
-      integer<ThermalOptions>("max_samples", "", 1000, 100000000, EMIT_FIELD(max_samples),
-                              "cached: most thermal samples, about 1.5 kB each; those of the meshes' own "
-                              "vertices are always taken."),
+      integer<ThermalOptions>(
+          "max_samples", "", 1000, 100000000, EMIT_FIELD(max_samples),
+          "cached: most thermal samples, about 1.5 kB each; those of the meshes' own "
+          "vertices are always taken."),
       boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
                               "cached: heat is also conducted along the surface and across convex "
                               "edges."),

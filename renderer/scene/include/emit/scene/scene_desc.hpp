@@ -190,7 +190,8 @@ struct ThermalOptions {
   std::uint32_t blocker_taps = 8;
   std::uint32_t filter_taps = 32;
   double obscurance_radius_m = 0.5;
-  std::uint32_t max_samples = 1'000'000;  ///< cached: thermal samples, about 1.5 kB each at 27 steps
+  std::uint32_t max_samples =
+      1'000'000;        ///< cached: thermal samples, about 1.5 kB each at 27 steps
   bool lateral = true;  ///< cached: conduction along the surface and across convex edges
 };
 
