@@ -21,7 +21,11 @@ class SpdLog final : public Log {
   SpdLog(std::shared_ptr<spdlog::details::thread_pool> pool,
          std::shared_ptr<spdlog::async_logger> logger)
       : pool_(std::move(pool)), logger_(std::move(logger)) {}
-  ~SpdLog() override { flush(); }
+  ~SpdLog() override {
+    flush();
+    // The pool's thread ends here, its queue written; only then does the logger its lines refer to.
+    pool_.reset();
+  }
 
   void write(LogLevel level, const std::string& text) override {
     static constexpr std::array kLevels{spdlog::level::err, spdlog::level::warn,
@@ -32,8 +36,7 @@ class SpdLog final : public Log {
   void flush() override { logger_->flush(); }
 
  private:
-  // The logger only refers to the pool; the pool's thread ends, queue written, with this object.
-  std::shared_ptr<spdlog::details::thread_pool> pool_;
+  std::shared_ptr<spdlog::details::thread_pool> pool_;  ///< the logger refers to it weakly
   std::shared_ptr<spdlog::async_logger> logger_;
 };
 
