@@ -129,6 +129,16 @@ class GlRenderer final : public Renderer {
   StageClock clock_;
 };
 
+RadianceContent radiance_content(const BandModel& bands, const OutputOptions& output) {
+  return {.bands = static_cast<std::uint32_t>(bands.params().size()),
+          .air_terms = bands.air_terms(),
+          .air_table = bands.air_table(),
+          .terms = bands.max_terms(),
+          .outputs = (output.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
+                     (output.depth ? EMIT_OUTPUT_DEPTH : 0U) |
+                     (output.object ? EMIT_OUTPUT_OBJECT : 0U)};
+}
+
 std::size_t plane_count(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U);
@@ -167,15 +177,12 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     history_.entities.emplace_back(object, object.instances.front());
   }
   const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
-  frame_params_.format_px = glm::uvec4(
-      scenario_.sensor.width_px, scenario_.sensor.height_px, static_cast<std::uint32_t>(plane_px),
-      (output_.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
-          (output_.depth ? EMIT_OUTPUT_DEPTH : 0U) | (output_.object ? EMIT_OUTPUT_OBJECT : 0U));
+  frame_params_.format_px = glm::uvec4(scenario_.sensor.width_px, scenario_.sensor.height_px,
+                                       static_cast<std::uint32_t>(plane_px), 0U);
   frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
                                        static_cast<float>(kReferenceK),
                                        static_cast<float>(scenario_.thermal.tolerance_k), 0.0F);
-  frame_params_.bands = glm::uvec4(static_cast<std::uint32_t>(scenario_.bands.size()),
-                                   bands_.nodes_per_band(), 0U, 0U);
+  frame_params_.bands = glm::uvec4(bands_.nodes_per_band(), bands_.first_emissivity(), 0U, 0U);
   for (std::uint32_t slot = 0; slot < output_.slots; ++slot) {
     FrameView& view = views_[slot];
     view.width_px = scenario_.sensor.width_px;
@@ -256,7 +263,6 @@ void GlRenderer::bind_frame() const noexcept {
   frame_buffer_.bind_uniform(EMIT_BIND_FRAME);
   band_buffer_.bind_uniform(EMIT_BIND_BANDS);
   stage_->drawn().instance_table.bind(EMIT_TEX_INSTANCES);
-  stage_->material_table().bind(EMIT_TEX_MATERIALS);
   band_table_.bind(EMIT_TEX_BAND_LUT);
   output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
   output_buffer_.bind_storage(EMIT_BIND_STATS, stats_offset_, sizeof(gpu::FrameStatsGpu));
@@ -282,6 +288,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
     readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot));
     return slot;
   }
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose.position_world_m);
   clock_.start();
 
   prepare(request);
@@ -308,7 +315,11 @@ const FrameView& GlRenderer::collect(SlotIndex slot) noexcept {
   gpu::FrameStatsGpu stats{};
   std::copy_n(readback_.data(slot) + stats_offset_, sizeof(stats),
               reinterpret_cast<std::byte*>(&stats));
-  view.stats = {stats.nonfinite_px, stats.clamped_px, stats.surface_px, view.stats.dropped_poses};
+  const auto* flagged_px = stats.flagged_px;
+  view.stats.nonfinite_px =
+      flagged_px[EMIT_FLAG_NONFINITE] + flagged_px[EMIT_FLAG_NONFINITE + EMIT_FLAG_CLAMPED];
+  view.stats.clamped_px =
+      flagged_px[EMIT_FLAG_CLAMPED] + flagged_px[EMIT_FLAG_NONFINITE + EMIT_FLAG_CLAMPED];
   return view;
 }
 
@@ -318,10 +329,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
                                                    const DeviceOptions& device,
                                                    const OutputOptions& output) {
   if (auto ok = check_limits(scenario, output); !ok) return tl::unexpected(ok.error());
-  auto bands = BandModel::build(scenario);
-  if (!bands) return tl::unexpected(std::move(bands.error()));
   auto geometry = scene::load_scene(scenario);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
+  auto bands = BandModel::build(scenario, geometry->materials);
+  if (!bands) return tl::unexpected(std::move(bands.error()));
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
   if (!context) return tl::unexpected(std::move(context.error()));
 
@@ -333,7 +344,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   const bool cached = scenario.thermal.method == scene::ThermalMethod::cached;
   auto geometry_pass = GeometryPass::create(width_px, height_px, cached);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
-  auto radiance_pass = RadiancePass::create(width_px, height_px, scenario.thermal);
+  auto radiance_pass =
+      RadiancePass::create(width_px, height_px, scenario.thermal, radiance_content(*bands, output));
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
 
   auto renderer = std::make_unique<GlRenderer>(

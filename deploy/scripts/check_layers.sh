@@ -64,6 +64,7 @@ only OpenGL   'epoxy/|GL/'        'renderer/gl/|renderer/passes/|renderer/evalua
 only GLFW     'GLFW/'             'server/cli/view'
 only OpenEXR  'Imf|OpenEXR/'      'renderer/image/'
 only tinygltf 'tiny_gltf'         'renderer/scene/'
+only meshoptimizer 'meshoptimizer' 'renderer/scene/'
 only toml++   'toml\+\+|toml\.hpp' 'config/'
 only Boost    'boost/'            'server/'
 only Protobuf 'google/protobuf/'  'protocol/|server/'

@@ -47,9 +47,17 @@ const scene::BandAtmosphere* atmosphere_of(const scene::ScenarioDesc& scenario,
   return nullptr;
 }
 
+double band_emissivity_frac(const scene::Material& material, const std::string& band) {
+  for (const scene::BandEmissivity& entry : material.band_emissivity) {
+    if (entry.band == band) return entry.emissivity_frac;
+  }
+  return material.emissivity_frac;
+}
+
 }  // namespace
 
-physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario) {
+physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
+                                            std::span<const scene::Material> materials) {
   if (scenario.bands.empty() || scenario.bands.size() > EMIT_MAX_BANDS) {
     return make_error(ErrorCode::config, fmt::format("{} bands: 1 to {} are possible",
                                                      scenario.bands.size(), EMIT_MAX_BANDS));
@@ -67,8 +75,6 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
     params.lut_first_k = layout[0];
     params.lut_nodes_per_k = layout[1];
     params.lut_last_node = layout[2];
-    params.terms_amplitude_frac = glm::vec4(1.0F, 0.0F, 0.0F, 0.0F);
-    params.terms_extinction_per_m = glm::vec4(0.0F);
     params.vertical_transmittance_frac = 1.0F;
     const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name);
     if (atmosphere != nullptr && !atmosphere->table.empty()) {
@@ -77,6 +83,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
         return make_error(ErrorCode::config,
                           fmt::format("band '{}': {}", desc.name, air.error().text));
       }
+      model.air_table_ |= 1U << model.params_.size();
       entry.air_hemisphere_w_m2_sr = air->sky_hemisphere_w_m2_sr();
       entry.air = std::move(*air);
     } else if (atmosphere != nullptr) {
@@ -86,6 +93,9 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
             fmt::format("atmosphere of band '{}': {} terms, {} are possible", desc.name,
                         atmosphere->terms.size(), EMIT_MAX_ATMOSPHERE_TERMS));
       }
+      model.max_terms_ =
+          std::max(model.max_terms_, static_cast<std::uint32_t>(atmosphere->terms.size()));
+      model.air_terms_ |= 1U << model.params_.size();
       params.terms_amplitude_frac = glm::vec4(0.0F);
       for (std::size_t i = 0; i < atmosphere->terms.size(); ++i) {
         const auto k = static_cast<glm::length_t>(i);
@@ -120,6 +130,18 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario)
                                     "device is sure to take ({} numbers, {} are possible)",
                                     scenario.bands[i].name, model.tables_.size(), kMaxTableFloats));
     }
+  }
+  model.first_emissivity_ = static_cast<std::uint32_t>(model.tables_.size());
+  for (const scene::Material& material : materials) {
+    for (const scene::SpectralBand& band : scenario.bands) {
+      model.tables_.push_back(static_cast<float>(band_emissivity_frac(material, band.name)));
+    }
+  }
+  if (model.tables_.size() > kMaxTableFloats) {
+    return make_error(ErrorCode::config,
+                      fmt::format("{} materials in {} bands: their emissivities are more than a "
+                                  "device is sure to take",
+                                  materials.size(), scenario.bands.size()));
   }
   return model;
 }
@@ -173,14 +195,6 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
     if (material.prescribed_k) {
       params.prescribed = 1.0F;
       params.prescribed_offset_k = static_cast<float>(*material.prescribed_k - reference_k);
-    }
-    for (std::size_t b = 0; b < scenario.bands.size() && b < EMIT_MAX_BANDS; ++b) {
-      const auto known = std::find_if(
-          material.band_emissivity.begin(), material.band_emissivity.end(),
-          [&](const scene::BandEmissivity& e) { return e.band == scenario.bands[b].name; });
-      params.band_emissivity_frac[static_cast<glm::length_t>(b)] =
-          static_cast<float>(known != material.band_emissivity.end() ? known->emissivity_frac
-                                                                     : material.emissivity_frac);
     }
     out.push_back(params);
   }

@@ -18,15 +18,23 @@ namespace emit::renderer {
 class BandModel {
  public:
   /// Errors (config): more than EMIT_MAX_BANDS bands, a band or an atmosphere that is not valid.
-  [[nodiscard]] static physics::Result<BandModel> build(const scene::ScenarioDesc& scenario);
+  [[nodiscard]] static physics::Result<BandModel> build(const scene::ScenarioDesc& scenario,
+                                                        std::span<const scene::Material> materials);
 
   /// Air, surroundings and sun at the frame's instant.
   void update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept;
 
   [[nodiscard]] std::span<const gpu::BandParams> params() const noexcept { return params_; }
-  /// T ln L tables, one band after the other, then the tables of the air.
+  /// T ln L tables, one band after the other, then the tables of the air, then emissivities.
   [[nodiscard]] std::span<const float> tables() const noexcept { return tables_; }
   [[nodiscard]] std::uint32_t nodes_per_band() const noexcept { return nodes_per_band_; }
+  /// Bit per band whose air is a sum of exponential terms; a table.
+  [[nodiscard]] std::uint32_t air_terms() const noexcept { return air_terms_; }
+  [[nodiscard]] std::uint32_t air_table() const noexcept { return air_table_; }
+  /// Most exponential terms of a band.
+  [[nodiscard]] std::uint32_t max_terms() const noexcept { return max_terms_; }
+  /// Place in tables() of the emissivities: by material, then by band.
+  [[nodiscard]] std::uint32_t first_emissivity() const noexcept { return first_emissivity_; }
 
  private:
   struct Entry {
@@ -41,6 +49,10 @@ class BandModel {
   std::vector<gpu::BandParams> params_;
   std::vector<float> tables_;
   std::uint32_t nodes_per_band_ = 0;
+  std::uint32_t air_terms_ = 0;
+  std::uint32_t air_table_ = 0;
+  std::uint32_t max_terms_ = 0;
+  std::uint32_t first_emissivity_ = 0;
 };
 
 /// Materials as the shaders read them. `reference_k` is what temperature offsets count from.

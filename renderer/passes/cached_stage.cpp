@@ -1,16 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/cached_stage.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
-#include "passes/band_model.hpp"
+#include "emit/scene/simplify.hpp"
 #include "passes/foster_setup.hpp"
 
 namespace emit::renderer {
 namespace {
 
+/// A place stands for those around it, up to this share of its distance from the scene.
+constexpr double kReachFrac = 0.05;
 /// Places along a known trajectory of the camera that the refinement looks from.
 constexpr std::size_t kEyes = 16;
+
+double pixel_rad(const scene::SensorDesc& sensor) {
+  return 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
+}
+
+/// Every place of the camera that the scenario tells.
+std::vector<glm::dvec3> all_eyes(const scene::Trajectory& keys) {
+  std::vector<glm::dvec3> eyes_world_m;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    eyes_world_m.push_back(keys[i].pose.position_world_m);
+    if (i + 1 == keys.size()) break;
+    const std::int64_t length_ns = keys[i + 1].sim_time_ns - keys[i].sim_time_ns;
+    for (std::size_t part = 1; part < kEyes; ++part) {
+      const auto way = static_cast<double>(length_ns) * static_cast<double>(part) / kEyes;
+      eyes_world_m.push_back(
+          trajectory_at(keys, keys[i].sim_time_ns + std::llround(way)).pose.position_world_m);
+    }
+  }
+  return eyes_world_m;
+}
 
 FosterHistory foster_of(const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
                         const Environment& environment) {
@@ -19,9 +44,15 @@ FosterHistory foster_of(const scene::ScenarioDesc& scenario, std::vector<FosterM
   return FosterHistory(scenario, std::move(materials), surroundings, environment, kReferenceK);
 }
 
+double distance_m(const scene::Aabb& box, const glm::dvec3& point_m) {
+  return box.empty() ? 0.0
+                     : glm::length(glm::max(glm::max(box.min_m - point_m, point_m - box.max_m),
+                                            glm::dvec3(0.0)));
+}
+
 RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& request) {
   RefineView view;
-  view.pixel_rad = 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
+  view.pixel_rad = pixel_rad(sensor);
   view.eyes_world_m.push_back(request.sensor_pose.position_world_m);
   const scene::Trajectory& keys = sensor.trajectory;
   if (keys.size() < 2) return view;
@@ -36,39 +67,54 @@ RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& requ
 
 }  // namespace
 
+std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const glm::dvec3> eyes_world_m,
+                                                       const scene::Aabb& static_bounds) {
+  std::vector<Eye> eyes;
+  for (std::size_t i = 0; i < eyes_world_m.size(); ++i) {
+    // On the way to the next place, too.
+    const double way_m =
+        i + 1 < eyes_world_m.size() ? glm::distance(eyes_world_m[i], eyes_world_m[i + 1]) : 0.0;
+    const double around_m = kReachFrac * distance_m(static_bounds, eyes_world_m[i]);
+    eyes.push_back({eyes_world_m[i], std::max(way_m, around_m)});
+  }
+  return eyes;
+}
+
 physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
     std::vector<FosterMaterial> foster_materials, const SceneHistory& history) {
-  std::vector<scene::Material> materials = geometry.materials;
+  const std::vector<glm::dvec3> eyes_world_m = all_eyes(scenario.sensor.trajectory);
+  const scene::Aabb bounds = geometry.static_bounds;
+  geometry = scene::simplified(std::move(geometry), {eyes_world_m, pixel_rad(scenario.sensor)});
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
   auto surface =
       CachedSurface::create(scenario, std::move(geometry), histories_of_objects(scenario),
                             std::span(foster_materials).first(simulated), kReferenceK);
   if (!surface) return tl::unexpected(std::move(surface.error()));
-  return std::unique_ptr<ThermalStage>(new CachedStage(
-      scenario, std::move(materials), std::move(*surface), std::move(foster_materials), history));
+  return std::unique_ptr<ThermalStage>(
+      new CachedStage(scenario, bounds, eyes_around(eyes_world_m, bounds), std::move(*surface),
+                      std::move(foster_materials), history));
 }
 
-CachedStage::CachedStage(const scene::ScenarioDesc& scenario,
-                         std::vector<scene::Material> materials,
-                         std::unique_ptr<CachedSurface> surface,
+CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
+                         std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
                          std::vector<FosterMaterial> foster_materials, const SceneHistory& history)
     : sensor_(scenario.sensor),
+      static_bounds_(static_bounds),
+      detail_eyes_(std::move(detail_eyes)),
       history_of_object_(histories_of_objects(scenario)),
       history_(history),
       plan_(scenario.thermal),
       foster_(foster_of(scenario, std::move(foster_materials), history.environment)),
-      surface_(std::move(surface)),
-      material_buffer_(gl::Buffer::from(
-          std::span<const gpu::MaterialParams>(material_params(materials, scenario, kReferenceK)))),
-      material_table_(GL_RGBA32F, material_buffer_) {}
+      surface_(std::move(surface)) {}
 
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
-  auto ready = surface_->prepare(request.thermal_time_ns, refine_view(sensor_, request), inputs,
-                                 plan_, foster_, progress);
+  const RefineView view = refine_view(sensor_, request);
+  auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, foster_, progress);
   if (!ready) return ready;
+  refined_eyes_ = eyes_around(view.eyes_world_m, static_bounds_);
   std::vector<std::uint32_t> first_sample;
   scene::SceneGeometry geometry = surface_->drawn_geometry(first_sample);
   drawn_.reset();  // its device memory goes before that of the next one is taken
@@ -80,6 +126,16 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                "the device cannot hold the samples of this scenario");
   }
   return {};
+}
+
+bool CachedStage::coarse_from(const glm::dvec3& eye_world_m) const noexcept {
+  const auto stands_near = [&](const std::vector<Eye>& eyes) {
+    return std::ranges::any_of(eyes, [&](const Eye& eye) {
+      return glm::distance(eye.world_m, eye_world_m) <= eye.reach_m;
+    });
+  };
+  // Without known eyes no mesh was simplified.
+  return !stands_near(refined_eyes_) || (!detail_eyes_.empty() && !stands_near(detail_eyes_));
 }
 
 void CachedStage::describe(SceneStats& stats) const noexcept {

@@ -28,6 +28,7 @@ class CachedStage final : public ThermalStage {
   }
   DrawnScene& drawn() noexcept override { return *drawn_; }
   void describe(SceneStats& stats) const noexcept override;
+  bool coarse_from(const glm::dvec3& eye_world_m) const noexcept override;
   void prepare(const FrameRequest& request, CameraSetup& camera,
                gpu::FrameParams& frame) noexcept override;
   const physics::SunPosition& sun_now() const noexcept override { return sun_now_; }
@@ -35,15 +36,25 @@ class CachedStage final : public ThermalStage {
   void upload() noexcept override;
   void bind() const noexcept override;
   void draw(StageTimes&, StageClock&) noexcept override {}
-  const gl::BufferTexture& material_table() const noexcept override { return material_table_; }
 
  private:
-  CachedStage(const scene::ScenarioDesc& scenario, std::vector<scene::Material> materials,
-              std::unique_ptr<CachedSurface> surface, std::vector<FosterMaterial> foster_materials,
-              const SceneHistory& history);
+  /// A place the surface was prepared for, and how far around it that holds.
+  struct Eye {
+    glm::dvec3 world_m{0.0};
+    double reach_m = 0.0;
+  };
+  static std::vector<Eye> eyes_around(std::span<const glm::dvec3> eyes_world_m,
+                                      const scene::Aabb& static_bounds);
+
+  CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
+              std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
+              std::vector<FosterMaterial> foster_materials, const SceneHistory& history);
   void make_sample_buffers();
 
   scene::SensorDesc sensor_;
+  scene::Aabb static_bounds_;
+  std::vector<Eye> detail_eyes_;   ///< meshes were simplified for these
+  std::vector<Eye> refined_eyes_;  ///< triangles were cut for these
   std::vector<std::int32_t> history_of_object_;
   const SceneHistory& history_;
   StepPlan plan_;
@@ -53,8 +64,6 @@ class CachedStage final : public ThermalStage {
   physics::SunPosition sun_now_;
   physics::Forcing forcing_now_;
 
-  gl::Buffer material_buffer_;
-  gl::BufferTexture material_table_;
   std::array<gl::Buffer, 3> node_buffers_;  ///< by storage of CachedSurface
   std::array<gl::BufferTexture, 3> node_tables_;
   gl::Buffer sky_buffer_;

@@ -88,9 +88,14 @@ void ThermalPass::bind_textures() const noexcept {
 }
 
 physics::Result<RadiancePass> RadiancePass::create(std::uint32_t width_px, std::uint32_t height_px,
-                                                   const scene::ThermalOptions& options) {
+                                                   const scene::ThermalOptions& options,
+                                                   const RadianceContent& content) {
   RadiancePass pass;
-  std::vector<gl::Define> defines;
+  std::vector<gl::Define> defines{{"EMIT_BANDS", fmt::format("{}u", content.bands)},
+                                  {"EMIT_AIR_TERMS", fmt::format("{}u", content.air_terms)},
+                                  {"EMIT_AIR_TABLE", fmt::format("{}u", content.air_table)},
+                                  {"EMIT_TERMS", fmt::format("{}", content.terms)},
+                                  {"EMIT_OUTPUTS", fmt::format("{}u", content.outputs)}};
   if (options.model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});
   if (options.method == scene::ThermalMethod::cached) defines.push_back({"EMIT_CACHED", "1"});
   auto program = gl::Program::compute("passes/radiance.comp", defines);

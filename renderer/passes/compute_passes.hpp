@@ -47,11 +47,21 @@ class ThermalPass {
   std::uint32_t height_px_ = 0;
 };
 
+/// What a scenario asks of the radiance pass; it is compiled for nothing else.
+struct RadianceContent {
+  std::uint32_t bands = 0;
+  std::uint32_t air_terms = 0;  ///< bit per band: its air is a sum of exponential terms
+  std::uint32_t air_table = 0;  ///< bit per band: its air is a table
+  std::uint32_t terms = 0;      ///< most terms of a band
+  std::uint32_t outputs = 0;    ///< EMIT_OUTPUT_* planes after those of the bands
+};
+
 class RadiancePass {
  public:
   [[nodiscard]] static physics::Result<RadiancePass> create(std::uint32_t width_px,
                                                             std::uint32_t height_px,
-                                                            const scene::ThermalOptions& options);
+                                                            const scene::ThermalOptions& options,
+                                                            const RadianceContent& content);
   void dispatch() const noexcept;
 
  private:

@@ -58,9 +58,9 @@ CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pos
                                     {0.0, 0.0, sensor.near_m, 0.0}};
   params.clip_from_relworld = glm::mat4(clip_from_sensor * glm::dmat4(sensor_from_world));
   params.relworld_from_sensor = glm::mat4(glm::dmat4(view.relworld_from_sensor));
-  params.tan_half_fov =
-      glm::vec4(static_cast<float>(view.tan_half_h), static_cast<float>(view.tan_half_v),
-                static_cast<float>(sensor.near_m), static_cast<float>(1.0 / camera.pixel_rad));
+  params.ray =
+      glm::vec4(static_cast<float>(camera.pixel_rad), 0.0F, static_cast<float>(-view.tan_half_h),
+                static_cast<float>(-view.tan_half_v));
   return camera;
 }
 

@@ -165,6 +165,7 @@ void PerFrameStage::upload() noexcept {
 
 void PerFrameStage::bind() const noexcept {
   tap_buffer_.bind_uniform(EMIT_BIND_TAPS);
+  material_table_.bind(EMIT_TEX_MATERIALS);
   relaxation_table_.bind(EMIT_TEX_RELAXATION);
   spin_up_table_.bind(EMIT_TEX_SPIN_UP);
   passes_.occlusion.bind_texture();

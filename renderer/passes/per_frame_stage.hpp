@@ -33,7 +33,6 @@ class PerFrameStage final : public ThermalStage {
   void upload() noexcept override;
   void bind() const noexcept override;
   void draw(StageTimes& stages, StageClock& clock) noexcept override;
-  const gl::BufferTexture& material_table() const noexcept override { return material_table_; }
 
  private:
   static constexpr std::size_t kBlockAlignment = 256;  // GL guarantees that no driver asks for more

@@ -2,6 +2,7 @@
 #include "passes/raster_passes.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -71,24 +72,25 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::
   pass.program_ = std::move(*program);
   pass.width_px_ = static_cast<GLsizei>(width_px);
   pass.height_px_ = static_cast<GLsizei>(height_px);
-  pass.depth_m_ = gl::Texture(GL_R32F, pass.width_px_, pass.height_px_);
-  pass.normal_ = gl::Texture(GL_RG16_SNORM, pass.width_px_, pass.height_px_);
-  pass.ids_ = gl::Texture(GL_RG16UI, pass.width_px_, pass.height_px_);
+  pass.sampled_ = sampled;
   pass.depth_buffer_ = gl::Texture(GL_DEPTH_COMPONENT32F, pass.width_px_, pass.height_px_);
   pass.framebuffer_ = gl::Framebuffer::make();
   const GLuint id = pass.framebuffer_.id();
-  glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.depth_m_.id(), 0);
-  glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.normal_.id(), 0);
-  glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
   glNamedFramebufferTexture(id, GL_DEPTH_ATTACHMENT, pass.depth_buffer_.id(), 0);
-  pass.sampled_ = sampled;
   if (sampled) {
-    pass.state_ = gl::Texture(GL_RGBA32F, pass.width_px_, pass.height_px_);
-    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT3, pass.state_.id(), 0);
+    pass.surface_ = gl::Texture(GL_RGBA32UI, pass.width_px_, pass.height_px_);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.surface_.id(), 0);
+    glNamedFramebufferDrawBuffer(id, GL_COLOR_ATTACHMENT0);
+  } else {
+    pass.depth_m_ = gl::Texture(GL_R32F, pass.width_px_, pass.height_px_);
+    pass.normal_ = gl::Texture(GL_RG16_SNORM, pass.width_px_, pass.height_px_);
+    pass.ids_ = gl::Texture(GL_RG16UI, pass.width_px_, pass.height_px_);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.depth_m_.id(), 0);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.normal_.id(), 0);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
+    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+    glNamedFramebufferDrawBuffers(id, 3, targets);
   }
-  const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2,
-                            GL_COLOR_ATTACHMENT3};
-  glNamedFramebufferDrawBuffers(id, sampled ? 4 : 3, targets);
   if (auto ok = check_complete(pass.framebuffer_, "geometry buffer"); !ok) {
     return tl::unexpected(std::move(ok.error()));
   }
@@ -100,13 +102,18 @@ void GeometryPass::draw(const SceneVertexArrays& vertices,
                         std::span<const DrawCommand> double_sided) const noexcept {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
   glViewport(0, 0, width_px_, height_px_);
-  const GLfloat sky[4] = {EMIT_SKY_DEPTH_M, 0.0F, 0.0F, 0.0F};
-  const GLfloat zero[4] = {0.0F, 0.0F, 0.0F, 0.0F};
-  const GLuint none[4] = {0, 0, 0, 0};
   const GLfloat far_away = 0.0F;  // reversed z
-  glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 0, sky);
-  glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 1, zero);
-  glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 2, none);
+  if (sampled_) {
+    const GLuint sky[4] = {std::bit_cast<GLuint>(EMIT_SKY_DEPTH_M), 0, 0, 0};
+    glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 0, sky);
+  } else {
+    const GLfloat sky[4] = {EMIT_SKY_DEPTH_M, 0.0F, 0.0F, 0.0F};
+    const GLfloat zero[4] = {0.0F, 0.0F, 0.0F, 0.0F};
+    const GLuint none[4] = {0, 0, 0, 0};
+    glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 0, sky);
+    glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 1, zero);
+    glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 2, none);
+  }
   glClearNamedFramebufferfv(framebuffer_.id(), GL_DEPTH, 0, &far_away);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
@@ -121,10 +128,13 @@ void GeometryPass::draw(const SceneVertexArrays& vertices,
 }
 
 void GeometryPass::bind_textures() const noexcept {
+  if (sampled_) {
+    surface_.bind(EMIT_TEX_SURFACE);
+    return;
+  }
   depth_m_.bind(EMIT_TEX_DEPTH);
   normal_.bind(EMIT_TEX_NORMAL);
   ids_.bind(EMIT_TEX_IDS);
-  if (sampled_) state_.bind(EMIT_TEX_STATE);
 }
 
 physics::Result<ShadowPass> ShadowPass::create(std::uint32_t size_px, std::uint32_t layers) {

@@ -24,15 +24,16 @@ class SceneVertexArrays {
   gl::VertexArray light_;
 };
 
-/// Paper part 1: linear depth, normal, material index and object id of the visible surface.
+/// Paper part 1: linear depth, normal, material index and object id of the visible surface, in
+/// three textures; or, `sampled`, all that the radiance pass needs of it in one.
 class GeometryPass {
  public:
-  /// `sampled`: also the thermal state of the surface, from its samples.
+  /// `sampled`: the thermal state of the surface comes from its samples.
   [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
                                                             std::uint32_t height_px, bool sampled);
   void draw(const SceneVertexArrays& vertices, std::span<const DrawCommand> single_sided,
             std::span<const DrawCommand> double_sided) const noexcept;
-  /// Binds depth, normal and ids, and the state if sampled, to their texture units.
+  /// Binds what it drew to the texture units.
   void bind_textures() const noexcept;
 
  private:
@@ -40,7 +41,7 @@ class GeometryPass {
   gl::Texture depth_m_;
   gl::Texture normal_;
   gl::Texture ids_;
-  gl::Texture state_;
+  gl::Texture surface_;  ///< instead of the three: passes/geometry.frag
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
   GLsizei width_px_ = 0;

@@ -59,6 +59,11 @@ class ThermalStage {
   /// Adds what the method knows about the scene.
   virtual void describe(SceneStats&) const noexcept {}
 
+  /// True when the surface was not prepared for a camera at that place.
+  [[nodiscard]] virtual bool coarse_from(const glm::dvec3& /*eye_world_m*/) const noexcept {
+    return false;
+  }
+
   /// CPU side of a frame; the lists have begun and the camera's draws are culled. Fills its part of
   /// `frame`.
   virtual void prepare(const FrameRequest& request, CameraSetup& camera,
@@ -71,8 +76,6 @@ class ThermalStage {
   virtual void bind() const noexcept = 0;
   /// Everything between geometry and radiance.
   virtual void draw(StageTimes& stages, StageClock& clock) noexcept = 0;
-  /// Device memory of the constants of materials.
-  [[nodiscard]] virtual const gl::BufferTexture& material_table() const noexcept = 0;
 };
 
 /// Entries of SceneHistory::entities by object; -1: static.

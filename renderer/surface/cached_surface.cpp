@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <utility>
 
+#include "emit/scene/simplify.hpp"
 #include "surface/parallel.hpp"
 #include "surface/surface_patch.hpp"
 
@@ -262,6 +263,7 @@ scene::SceneGeometry CachedSurface::drawn_geometry(std::vector<std::uint32_t>& f
       mesh.positions_m.push_back(vertex.position_m);
       mesh.normals.push_back(vertex.normal);
     }
+    scene::order_for_drawing(mesh);
   }
   return out;
 }

@@ -14,13 +14,25 @@ namespace {
 constexpr float kSeedFrac = 0.25F;
 /// Edges of shadows this young are still sharp.
 constexpr float kRecentS = 900.0F;
-/// Corners whose suns differ by more see the edge of a shadow between them.
-constexpr float kEdgeSunFrac = 0.1F;
+/// Corners on which that much more of the sun's flux falls than on others have the edge of a shadow
+/// between them.
+constexpr float kEdgeSunFrac = 0.2F;
+/// Triangles of up to so many pixels are tested for being seen at all: by their corners and centre,
+/// which is too little for larger ones.
+constexpr float kTestedPx = 8.0F;
+/// A triangle that turns its back to an eye by more than this sine is not seen from there, whatever
+/// curvature its vertices' normals stand for.
+constexpr float kBackSine = 0.2F;
+/// Share of the way to a point that must be free.
+constexpr float kSeenFrac = 0.999F;
 /// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
 constexpr float kCreaseS = 1000.0F;
 constexpr float kCreaseDepths = 3.0F;
-/// The shortest edge that is halved, in pixels.
-constexpr float kLeastEdgePx = 0.75F;
+/// The shortest edges that are halved, in pixels: where temperature is smooth, and where the edge
+/// of a shadow runs (finer ones change no pixel by more than a tenth of a kelvin, emit bench
+/// error-vs-time).
+constexpr float kLeastEdgePx = 2.5F;
+constexpr float kLeastShadowEdgePx = 0.9F;
 
 }  // namespace
 
@@ -68,12 +80,12 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const RefineVi
   }
 }
 
-float SurfaceRefinement::least_edge_m(const glm::vec3& centre_m) const noexcept {
+float SurfaceRefinement::pixel_m(const glm::vec3& centre_m) const noexcept {
   float distance_m = 1e30F;
   for (const glm::vec3& eye : eyes_rel_m_) {
     distance_m = std::min(distance_m, glm::distance(eye, centre_m));
   }
-  return eyes_rel_m_.empty() ? 0.0F : kLeastEdgePx * pixel_rad_ * distance_m;
+  return eyes_rel_m_.empty() ? 0.0F : pixel_rad_ * distance_m;
 }
 
 float SurfaceRefinement::seed_edge_m(const glm::vec3& centre_m, float longest_m) const noexcept {
@@ -87,6 +99,36 @@ float SurfaceRefinement::seed_edge_m(const glm::vec3& centre_m, float longest_m)
     if (beside_m < caster.radius_m + longest_m) seed_m = edge_m;
   }
   return seed_m;
+}
+
+bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
+                             std::uint32_t slot, const SurfacePatch& patch) const {
+  if (eyes_rel_m_.empty() || patch.mover >= 0) return true;
+  const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
+  const glm::vec3 across = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
+  const float area = glm::length(across);
+  if (!(area > 0.0F)) return false;
+  const glm::vec3 normal = across / area;
+  const bool sheet = refined.vertices()[refined.leaf(slot)[0]].sheet;
+  for (const glm::vec3& eye_m : eyes_rel_m_) {
+    const glm::vec3 to_eye = eye_m - centre_m;
+    const float sine = glm::dot(normal, to_eye) / std::max(glm::length(to_eye), 1e-6F);
+    if (!sheet && sine < -kBackSine) continue;
+    std::array<CasterRay, 4> rays;
+    std::array<float, 4> distance_m{};
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      // Corners a little towards the middle, lest a neighbour across an edge hides them.
+      const glm::vec3 point_m = i < 3 ? glm::mix(corners_m[i], centre_m, 0.1F) : centre_m;
+      distance_m[i] = glm::distance(eye_m, point_m);
+      rays[i] = {eye_m, (point_m - eye_m) / std::max(distance_m[i], 1e-6F)};
+    }
+    std::array<CasterHit, 4> hits;
+    const std::uint32_t hit = in_.rays.first_hits(rays, {true, {}}, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if ((hit >> i & 1U) == 0 || hits[i].distance_m > kSeenFrac * distance_m[i]) return true;
+    }
+  }
+  return false;
 }
 
 bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slot,
@@ -107,14 +149,19 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
   const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
                                     glm::distance(corners_m[1], corners_m[2]),
                                     glm::distance(corners_m[2], corners_m[0])});
-  if (longest_m <= least_edge_m(centre_m)) return false;
+  const float pixel_m = this->pixel_m(centre_m);
+  if (longest_m <= kLeastShadowEdgePx * pixel_m) return false;
   if (in_.materials[vertices[leaf[0]].material].prescribed_k) return false;
   if (longest_m > seed_edge_m(centre_m, longest_m)) return true;
+  if (longest_m < kTestedPx * pixel_m && !seen(corners_m, refined, slot, patch)) {
+    return false;
+  }
 
   // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
   const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
   const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
-  if (lateral_ && longest_m > depth_m &&
+  const bool smooth = longest_m > kLeastEdgePx * pixel_m;
+  if (smooth && lateral_ && longest_m > depth_m &&
       std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
     return true;
   }
@@ -123,11 +170,15 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
   const float range_k = std::max({offset_k(0), offset_k(1), offset_k(2)}) -
                         std::min({offset_k(0), offset_k(1), offset_k(2)});
   const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
-  if (patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
+  if (smooth && patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
   if (range_k < tolerance_k_) return false;
   const std::size_t count = in_.record.size();
   for (std::size_t i = recent_; i < count; ++i) {
-    const auto sun = [&](std::size_t corner) { return patch.sun_frac[leaf[corner] * count + i]; };
+    const auto sun = [&](std::size_t corner) {
+      const glm::vec3 normal = in_.record.rays[i].normal(patch.samples[leaf[corner]]);
+      return patch.sun_frac[leaf[corner] * count + i] *
+             std::max(0.0F, glm::dot(normal, in_.record.rays[i].to_sun()));
+    };
     const float high = std::max({sun(0), sun(1), sun(2)});
     const float low = std::min({sun(0), sun(1), sun(2)});
     if (high - low > kEdgeSunFrac) return true;

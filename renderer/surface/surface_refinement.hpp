@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/ext/vector_float3.hpp>
@@ -16,7 +17,8 @@ namespace emit::renderer {
 /// - where its newest vertex is not what its parents interpolate to: the error of a linear
 ///   triangle is a quarter of its parent's;
 /// - where corners saw a different sun lately: an edge of a shadow runs through.
-/// It is never halved below the size of a pixel at the nearest place of the camera.
+/// It is never halved below some pixels (the last reason: one pixel) at the nearest place of the
+/// camera, and only for the first reason where no place of the camera sees it.
 class SurfaceRefinement {
  public:
   SurfaceRefinement(const SurfaceInputs& inputs, const RefineView& view,
@@ -36,7 +38,9 @@ class SurfaceRefinement {
   };
   [[nodiscard]] bool too_coarse(const RefinedMesh& refined, std::uint32_t slot,
                                 const SurfacePatch& patch) const;
-  [[nodiscard]] float least_edge_m(const glm::vec3& centre_m) const noexcept;
+  [[nodiscard]] bool seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
+                          std::uint32_t slot, const SurfacePatch& patch) const;
+  [[nodiscard]] float pixel_m(const glm::vec3& centre_m) const noexcept;
   /// Size a triangle may have there without missing a caster's shade.
   [[nodiscard]] float seed_edge_m(const glm::vec3& centre_m, float longest_m) const noexcept;
 

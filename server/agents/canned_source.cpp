@@ -28,7 +28,6 @@ class CannedSource final : public FrameSource {
       view.radiance_w_m2_sr.resize(info_.planes);
       view.width_px = info_.width_px;
       view.height_px = info_.height_px;
-      view.stats.surface_px = info_.width_px * info_.height_px;
     }
   }
 

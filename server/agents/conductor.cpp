@@ -287,8 +287,8 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   header.clamped_px = done.clamped_px;
   header.flags |= (done.nonfinite_px > 0 ? protocol::kFlagNonFinite : 0U) |
                   (done.clamped_px > 0 ? protocol::kFlagClamped : 0U);
-  if (done.dropped_poses > 0) {
-    // How much the coarser past matters depends on what it shaded: nobody knows.
+  if (done.dropped_poses > 0 || done.coarse) {
+    // How much the coarser past, or surface, matters depends on what it shaded: nobody knows.
     header.flags |= protocol::kFlagDegraded;
     header.estimated_error_k = std::numeric_limits<float>::quiet_NaN();
   }

@@ -101,6 +101,7 @@ struct RenderDone {
   std::uint32_t nonfinite_px = 0;
   std::uint32_t clamped_px = 0;
   std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
+  bool coarse = false;              ///< the surface was not prepared for this camera
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
   std::int64_t render_start_ns = 0;
   std::int64_t render_end_ns = 0;

@@ -134,6 +134,10 @@ bool RenderAgent::finish_oldest() noexcept {
   done->clamped_px = view.stats.clamped_px;
   done->dropped_poses = view.stats.dropped_poses;
   note_dropped_poses(view.stats.dropped_poses);
+  done->coarse = view.stats.coarse;
+  if (view.stats.coarse) {
+    context_.counters.add(Counter::frames_coarse);
+  }
   done->device_failed = view.device_failed;
   if (view.device_failed) {
     context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");

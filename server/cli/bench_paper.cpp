@@ -106,7 +106,7 @@ Json row_json(const Row& row) {
   json.set("nominal_rate_hz", kNominalRateHz).set("sim_advance_s_per_frame", advance_s);
   json.set("newest_interval_closings", kPaperClosings);
   const bool statue = row.scene == "statue";
-  json.set("surface_fill_frac", row.free_run.fill_frac.mean());
+  json.set("surface_fill_frac", row.fill.surface_frac);
   json.set("statue_fill_frac", statue ? Json(row.fill.figure_frac) : Json(nullptr));
   json.set("swept_ground_frac", row.fill.swept_ground_frac);
   json.set("rules_met", broken_rules(row.fill, statue).empty() && !baseline_is_slow(row));
@@ -123,7 +123,7 @@ std::vector<std::string> table_line(const Row& row) {
                                 ms(row.free_run.frame_ms.max())};
   for (const Samples& stage : row.serial.stages_ms) line.push_back(ms(stage.mean()));
   line.push_back(ms(row.serial_ms()));
-  line.push_back(fmt::format("{:.0f} %", 100.0 * row.free_run.fill_frac.mean()));
+  line.push_back(fmt::format("{:.0f} %", 100.0 * row.fill.surface_frac));
   const PaperErrors errors = row.errors.value_or(PaperErrors{});
   line.push_back(kelvin(errors.surface, errors.surface.rms));
   line.push_back(kelvin(errors.surface, errors.surface.p99));

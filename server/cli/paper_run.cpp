@@ -133,15 +133,12 @@ Result<PaperTimes> time_frames(const PaperRun& run, bool stages, const PaperProg
   PaperTimes out;
   out.device = camera->renderer().device_name();
   out.triangles = camera->renderer().scene_stats().triangles;
-  const double pixels =
-      static_cast<double>(run.scenario.sensor.width_px) * run.scenario.sensor.height_px;
   for (std::uint32_t i = 0; i <= run.frames; ++i) {
     const bool warm_up = i == 0;
     const auto done =
         camera->render(warm_up ? 0 : i - 1, [&](const renderer::FrameView& view, double frame_ms) {
           if (warm_up) return;
           out.frame_ms.add(frame_ms);
-          out.fill_frac.add(view.stats.surface_px / pixels);
           const renderer::StageTimes& t = view.stages_ms;
           const std::array<double, 6> values{t.geometry_ms, t.occlusion_ms, t.shadow_ms,
                                              t.thermal_ms,  t.radiance_ms,  t.readback_ms};

@@ -48,7 +48,6 @@ struct PaperRun {
 struct PaperTimes {
   Samples frame_ms;
   std::array<Samples, 6> stages_ms;
-  Samples fill_frac;
   std::string device;
   std::uint64_t triangles = 0;
 };

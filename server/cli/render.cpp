@@ -138,10 +138,15 @@ int run_render(const RenderCommand& command) {
     json.set("triangles", renderer.scene_stats().triangles);
     json.set("setup_ms", setup_ms).set("warm_up_ms", warm_up_ms).set("frame_ms", frame_ms);
     json.set("samples", renderer.scene_stats().samples);
-    json.set("surface_px", view.stats.surface_px).set("nonfinite_px", view.stats.nonfinite_px);
+    json.set("nonfinite_px", view.stats.nonfinite_px);
     json.set("clamped_px", view.stats.clamped_px);
     json.set("radiance", plane_json(planes.radiance_w_m2_sr));
-    if (!view.temperature_k.empty()) json.set("temperature", plane_json(view.temperature_k));
+    if (!view.temperature_k.empty()) {
+      const auto sky =
+          std::ranges::count_if(view.temperature_k, [](float t) { return std::isnan(t); });
+      json.set("surface_px", static_cast<std::int64_t>(view.temperature_k.size()) - sky);
+      json.set("temperature", plane_json(view.temperature_k));
+    }
     if (auto done = write_json(*command.json, json); !done) return fail(done.error());
   }
   renderer.release(static_cast<renderer::SlotIndex>(slot));

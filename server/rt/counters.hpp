@@ -19,6 +19,7 @@ namespace emit::server {
   X(host_epochs, "restarts of the host seen by a new run id")                        \
   X(weather_coalesced, "weather changes replaced by a newer one before any frame")   \
   X(weather_lost, "weather changes the source had no room for")                      \
+  X(frames_coarse, "frames whose camera stood where the surface was not prepared")   \
   X(poses_dropped, "poses the histories forgot for want of room")                    \
   X(commands, "control commands taken")                                              \
   X(refused_wrong_version, "messages refused: wrong version")                        \

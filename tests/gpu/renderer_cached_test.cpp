@@ -290,6 +290,78 @@ TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
   EXPECT_TRUE(run.renderer().scene_stats().samples_full);
 }
 
+TEST(RendererCached, AMeshFinerThanThePixelsIsSampledAsTheCameraNeedsIt) {
+  // Ground of 6 cm squares; a pixel is as wide as two or three of them.
+  std::vector<Quad> quads = box({-2.0, -2.0, 0.0}, {2.0, 2.0, 3.0});
+  constexpr double kSquareM = 0.0625;  // exact in float32: neighbours meet
+  for (int i = 0; i < 200; ++i) {
+    for (int j = 0; j < 200; ++j) {
+      const glm::dvec3 low(kSquareM * (i - 100), kSquareM * (j - 100), 0.0);
+      const glm::dvec3 x(kSquareM, 0.0, 0.0);
+      const glm::dvec3 y(0.0, kSquareM, 0.0);
+      quads.push_back({low, low + x, low + x + y, low + y});
+    }
+  }
+  auto scenario = cached_scenario(write_quads("fine", quads));
+  const auto pose = looking({0.0, -8.0, 24.0}, {0.0, 0.0, 0.0});
+  const auto shot = [&](bool announced) {
+    scenario.sensor.trajectory = announced ? scene::Trajectory{{0, pose}} : scene::Trajectory{};
+    Session run(scenario);
+    auto picture = run.frame_k(3 * kHourNs, pose);
+    return std::pair(std::move(picture), run.renderer().scene_stats().samples);
+  };
+  const auto [whole, all_samples] = shot(false);
+  const auto [reduced, few_samples] = shot(true);
+  EXPECT_GT(all_samples, 40000U);
+  EXPECT_LT(few_samples, 15000U);
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    if (std::isnan(whole[i])) continue;
+    errors.push_back(std::abs(static_cast<double>(whole[i]) - static_cast<double>(reduced[i])));
+  }
+  std::ranges::sort(errors);
+  ASSERT_GT(errors.size(), 2500U);
+  // All but the shadow's edge, less than a pixel wide here.
+  EXPECT_LT(errors[errors.size() / 2], 0.02);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.2);
+}
+
+TEST(RendererCached, WhatNoEyeSeesIsNotRefined) {
+  // A wall that runs north; in the morning its shade lies west of it.
+  std::vector<Quad> quads = box({-0.2, -6.0, 0.0}, {0.2, 6.0, 4.0});
+  quads.push_back(ground(12.0, 12.0));
+  const auto scenario = cached_scenario(write_quads("wall", quads));
+  const auto samples_from = [&](double east_m) {
+    Session run(scenario);
+    (void)run.frame_k(2 * kHourNs, looking({east_m, 0.0, 1.5}, {0.0, 0.0, 0.5}));
+    return run.renderer().scene_stats().samples;
+  };
+  EXPECT_GT(2 * samples_from(-5.0), 3 * samples_from(5.0));
+}
+
+TEST(RendererCached, FramesFromWhereNoOneSaidTheCameraWouldBeAreFlagged) {
+  auto scenario = cached_scenario(box_on_ground());
+  const glm::dvec3 eye(3.0, -9.0, 6.0);
+  const auto pose = looking(eye, {0.0, 0.0, 0.0});
+  scenario.sensor.trajectory = {{0, pose}};
+  Session run(scenario);
+  const auto coarse_at = [&](const glm::dvec3& from) {
+    renderer::FrameRequest request;
+    request.sim_time_ns = request.thermal_time_ns = kHourNs;
+    request.sensor_pose = looking(from, {0.0, 0.0, 0.0});
+    const int slot = run.renderer().submit(request);
+    const auto& view = run.renderer().collect(static_cast<renderer::SlotIndex>(slot));
+    const bool coarse = view.stats.coarse;
+    run.renderer().release(static_cast<renderer::SlotIndex>(slot));
+    return coarse;
+  };
+  EXPECT_FALSE(coarse_at(eye));
+  EXPECT_FALSE(coarse_at(eye + glm::dvec3(0.02, 0.0, 0.0)));
+  EXPECT_TRUE(coarse_at({1.0, -4.0, 3.0}));
+  EXPECT_TRUE(coarse_at({-3.0, 9.0, 6.0}));
+  EXPECT_FALSE(coarse_at(eye));
+}
+
 TEST(RendererCached, TheLiteralModelOfThePaperIsRefused) {
   auto scenario = cached_scenario(box_on_ground());
   scenario.thermal.model = scene::ThermalModel::emit2014;

@@ -17,6 +17,7 @@ struct SourceScript {
   bool ready = true;                ///< poll(): false holds frames back
   bool weather_full = false;        ///< apply_weather(): no room
   std::uint64_t dropped_poses = 0;  ///< of every frame's statistics
+  bool coarse = false;              ///< likewise
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
   std::vector<scene::WeatherSample> weather;
@@ -95,6 +96,7 @@ class ScriptedSource final : public server::FrameSource {
       view.sim_time_ns = request.sim_time_ns;
       view.sensor_pose = request.sensor_pose;
       view.stats.dropped_poses = script_.dropped_poses;
+      view.stats.coarse = script_.coarse;
       view.width_px = info_.width_px;
       view.height_px = info_.height_px;
       view.radiance_w_m2_sr = {std::span<const float>(pixels)};

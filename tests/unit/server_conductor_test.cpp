@@ -56,6 +56,25 @@ TEST(Conductor, CountsJournalLinesThatFindNoRoomAndKeepsOnSendingFrames) {
   EXPECT_GT(rig.count(Counter::journal_dropped), 0U);
 }
 
+TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCounted) {
+  Rig rig;
+  rig.send(1, 1);
+  rig.settle();
+  rig.script.coarse = true;
+  rig.send(2, 2);
+  rig.settle();
+  rig.script.coarse = false;
+  rig.send(3, 3);
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 3U);
+  for (const std::size_t i : {0U, 1U, 2U}) {
+    const bool degraded = (rig.frames[i].header.flags & protocol::kFlagDegraded) != 0U;
+    EXPECT_EQ(degraded, i == 1U);
+    EXPECT_EQ(std::isnan(rig.frames[i].header.estimated_error_k), i == 1U);
+  }
+  EXPECT_EQ(rig.count(Counter::frames_coarse), 1U);
+}
+
 TEST(RenderAgent, CountsForgottenPosesAndTheirFramesAreDegraded) {
   Rig rig;
   rig.send(1, 1);

@@ -130,6 +130,39 @@ TEST(ReferenceSolve, VoxelModelFindsCoreGroundAndOpenFaces) {
   EXPECT_NEAR(core_m3, 0.2 * 0.2 * 0.3, 1e-6);
 }
 
+/// Largest cell along an axis that reaches into [low, high].
+double widest_m(const SolidGrid& grid, std::size_t axis, double low, double high) {
+  const std::vector<double>& lines = grid.lines_m[axis];
+  double widest = 0.0;
+  for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
+    if (lines[i + 1] > low && lines[i] < high) widest = std::max(widest, lines[i + 1] - lines[i]);
+  }
+  return widest;
+}
+
+TEST(ReferenceSolve, CellsAreSmallWhereAShadowEdgeIsStillSharp) {
+  const TestScene t = block_scene();
+  const glm::dvec3 to_sun = glm::normalize(glm::dvec3(1.0, 0.2, 1.0));
+  // The block, 0.4 m high, shades x from -0.2 to -0.6; the edge of its top's shadow lies at -0.6.
+  VoxelOptions late;
+  late.suns = {{to_sun, 0.0}};
+  VoxelOptions old;
+  old.suns = {{to_sun, 7200.0}};
+  const auto sharp = VoxelModel::build(t.scenario, t.geometry, late);
+  const auto soft = VoxelModel::build(t.scenario, t.geometry, old);
+  ASSERT_TRUE(sharp.has_value() && soft.has_value());
+  EXPECT_LT(widest_m(sharp->grid(), 0, -0.605, -0.595), 1.2 * late.shadow_cell_m);
+  EXPECT_GT(widest_m(soft->grid(), 0, -0.605, -0.595), 2.0 * late.shadow_cell_m);
+  EXPECT_LT(widest_m(soft->grid(), 0, -0.605, -0.595), 1.2 * late.swept_cell_m);
+  // Along y: the edge of the top at -0.28, and the uprights' shadows from the foot to it.
+  EXPECT_LT(widest_m(sharp->grid(), 1, -0.285, -0.275), 1.2 * late.shadow_cell_m);
+  // The sides' shadows run nearly along x: their width is across y, x need not be fine.
+  EXPECT_GT(widest_m(sharp->grid(), 0, -0.45, -0.35), 2.0 * late.shadow_cell_m);
+  // Where no edge lies, nothing changes.
+  EXPECT_NEAR(widest_m(sharp->grid(), 0, 2.0, 2.5), widest_m(soft->grid(), 0, 2.0, 2.5), 0.05);
+  EXPECT_GT(sharp->grid().cells.size(), soft->grid().cells.size());
+}
+
 TEST(ReferenceSolve, ShapesThatAreNotSolidsAreRefusedByName) {
   TestScene t = block_scene();
   t.geometry.meshes[1].submeshes[0].index_count -= 6;  // one side is missing

@@ -15,6 +15,9 @@ using physics::Result;
 
 /// Sun directions for the choice of cells: shadows move slowly against this.
 constexpr double kSunSampleS = 600.0;
+/// Lately they are followed closely.
+constexpr double kLateSunSampleS = 60.0;
+constexpr double kLateS = 1200.0;
 constexpr double kMaxSpinUpStepS = 3600.0;
 /// Moving shadows are sampled at least this often.
 constexpr double kMaxHistoryStepS = 120.0;
@@ -108,11 +111,18 @@ Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::Scenario
       new SolidHistory(scenario, geometry, instant, climate, options));
   VoxelOptions voxels;
   voxels.refine = options.refine;
+  const auto past_sun = [&](double t) {
+    const ClimateNode now = climate.at(ns(t));
+    if (now.direct_normal_w_m2 > 0.0) {
+      voxels.suns.push_back({glm::normalize(now.to_sun), end_s - t});
+    }
+  };
   const double start_s = static_cast<double>(climate.history_start_ns()) * 1e-9;
-  for (double t = start_s; t < end_s + kSunSampleS; t += kSunSampleS) {
-    const ClimateNode now = climate.at(ns(std::min(t, end_s)));
-    if (now.direct_normal_w_m2 > 0.0) voxels.suns.push_back(glm::normalize(now.to_sun));
+  for (double t = start_s; t < end_s;
+       t += t < end_s - kLateS - kSunSampleS ? kSunSampleS : kLateSunSampleS) {
+    past_sun(t);
   }
+  past_sun(end_s);
   auto model = VoxelModel::build(scenario, geometry, voxels);
   if (!model) return tl::unexpected(std::move(model.error()));
   history->model_ = std::make_unique<VoxelModel>(std::move(*model));

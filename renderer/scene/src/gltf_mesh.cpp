@@ -116,13 +116,16 @@ Soup deduplicated(const Soup& soup) {
   seen.reserve(soup.positions_m.size());
   for (const std::uint32_t index : soup.indices) {
     VertexKey key{};
-    std::memcpy(key.bits.data(), &soup.positions_m[index], sizeof(glm::vec3));
-    std::memcpy(key.bits.data() + 3, &soup.normals[index], sizeof(glm::vec3));
+    // -0 and 0 are one place, and one normal.
+    const glm::vec3 position_m = soup.positions_m[index] + glm::vec3(0.0F);
+    const glm::vec3 normal = soup.normals[index] + glm::vec3(0.0F);
+    std::memcpy(key.bits.data(), &position_m, sizeof(glm::vec3));
+    std::memcpy(key.bits.data() + 3, &normal, sizeof(glm::vec3));
     const auto [entry, is_new] =
         seen.emplace(key, static_cast<std::uint32_t>(out.positions_m.size()));
     if (is_new) {
-      out.positions_m.push_back(soup.positions_m[index]);
-      out.normals.push_back(soup.normals[index]);
+      out.positions_m.push_back(position_m);
+      out.normals.push_back(normal);
     }
     out.indices.push_back(entry->second);
   }

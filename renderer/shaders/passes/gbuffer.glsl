@@ -15,8 +15,10 @@ vec3 gbuffer_normal(ivec2 px) { return unit_from_octahedral(texelFetch(normal_te
 // x = material, y = object id
 uvec2 gbuffer_ids(ivec2 px) { return texelFetch(ids_texture, px, 0).rg; }
 
-// Unnormalised direction through a pixel's centre, relworld axes, unit length along the boresight.
-vec3 view_ray(ivec2 px) {
-  vec2 ndc = (vec2(px) + 0.5) / vec2(frame.format_px.xy) * 2.0 - 1.0;
-  return mat3(frame.relworld_from_sensor) * vec3(ndc * frame.tan_half_fov.xy, 1.0);
+// In the sensor's axes, through a pixel's centre, unit length along the boresight.
+vec3 sensor_ray(ivec2 px) {
+  return vec3((vec2(px) + 0.5) * frame.ray.x + frame.ray.zw, 1.0);
 }
+
+// The same in relworld axes.
+vec3 view_ray(ivec2 px) { return mat3(frame.relworld_from_sensor) * sensor_ray(px); }

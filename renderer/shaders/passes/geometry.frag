@@ -1,24 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "shared/frame_params.glsl.h"
 #include "passes/octahedral.glsl"
 
 in vec3 normal_relworld;
 flat in uvec2 ids;
 
+#ifdef EMIT_CACHED
+layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
+in vec3 sample_state;
+// All that the radiance pass needs, so that it reads one texel (gbuffer.glsl unpacks it).
+layout(location = 0) out uvec4 surface;
+
+void main() {
+  float boresight_m = 1.0 / gl_FragCoord.w;  // clip w is the distance along the boresight
+  vec3 n = normalize(normal_relworld);
+  float cosine = dot(gl_FrontFacing ? n : -n, frame.sun_now.xyz) * frame.sun_now.w;
+  surface = uvec4(floatBitsToUint(boresight_m), floatBitsToUint(sample_state.x),
+                  packUnorm2x16(vec2(sample_state.y * max(cosine, 0.0), sample_state.z)),
+                  ids.y << 16 | ids.x);
+}
+#else
 layout(location = 0) out float depth_m;
 layout(location = 1) out vec2 normal_octahedral;
 layout(location = 2) out uvec2 material_and_object;
-
-#ifdef EMIT_CACHED
-in vec3 sample_state;
-layout(location = 3) out vec4 state;
-#endif
 
 void main() {
   depth_m = 1.0 / gl_FragCoord.w;  // clip w is the distance along the boresight
   vec3 n = normalize(normal_relworld);
   normal_octahedral = octahedral_from_unit(gl_FrontFacing ? n : -n);
   material_and_object = ids;
-#ifdef EMIT_CACHED
-  state = vec4(sample_state, 0.0);
-#endif
 }
+#endif

@@ -28,7 +28,7 @@ void main() {
   if (centre_m >= EMIT_SKY_DEPTH_M) return;
 
   float radius_m = frame.obscurance.x;
-  float radius_px = radius_m / centre_m * frame.tan_half_fov.w;
+  float radius_px = radius_m / (centre_m * frame.ray.x);
   float open_m = 0.0;
   float full_m = 0.0;
   if (radius_px >= kMinRadiusPx) {

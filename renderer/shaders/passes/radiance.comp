@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // In-band radiance at the aperture: emission and reflection of the surface, through the atmosphere;
 // sky where there is no surface. Writes the planes that are read back, NaN and Inf counted and
-// replaced by zero.
+// replaced by zero. Compiled for what the scenario has:
+//   EMIT_BANDS      number of bands
+//   EMIT_AIR_TERMS  bit per band: exponential terms of the atmosphere, at most EMIT_TERMS of them
+//   EMIT_AIR_TABLE  bit per band: a table of the atmosphere in their place
+//   EMIT_OUTPUTS    EMIT_OUTPUT_* planes
 #include "passes/gbuffer.glsl"
 #include "passes/tables.glsl"
 
@@ -10,15 +14,61 @@ layout(std140, binding = EMIT_BIND_BANDS) uniform Bands { BandParams bands[EMIT_
 layout(binding = EMIT_TEX_BAND_LUT) uniform samplerBuffer band_lut;
 layout(std430, binding = EMIT_BIND_OUTPUT) writeonly buffer Planes { float planes[]; };
 layout(std430, binding = EMIT_BIND_STATS) buffer Stats { FrameStatsGpu stats; };
-layout(binding = EMIT_TEX_OCCLUSION) uniform sampler2D occlusion_texture;
-layout(binding = EMIT_TEX_STATE) uniform sampler2D state_texture;
-layout(binding = EMIT_TEX_SUN_NOW) uniform sampler2D sun_now_texture;
 
 #define EMIT_PLANCK_LUT(index) texelFetch(band_lut, index).r
 #include "lib/planck_lut.glsl"
 // Tables of the air lie behind those of the bands.
 #define EMIT_ATMOSPHERE_TABLE(index) texelFetch(band_lut, index).r
 #include "lib/atmosphere_table.glsl"
+
+// What a pixel shows; where that is sky only `boresight_m` counts.
+struct Seen {
+  float boresight_m;
+  float temperature_k;
+  float open_frac;   // share of the hemisphere that shows sky, cosine-weighted
+  float sun_cosine;  // of the sun's incidence times its visible share
+  uint material;
+  uint object;
+};
+
+#ifdef EMIT_CACHED
+layout(binding = EMIT_TEX_SURFACE) uniform usampler2D surface_texture;
+
+Seen seen_at(ivec2 px) {
+  uvec4 texel = texelFetch(surface_texture, px, 0);  // as passes/geometry.frag packs it
+  vec2 shares = unpackUnorm2x16(texel.z);
+  return Seen(uintBitsToFloat(texel.x), frame.obscurance.y + uintBitsToFloat(texel.y), shares.y,
+              shares.x, texel.w & 0xffffu, texel.w >> 16);
+}
+#else
+layout(binding = EMIT_TEX_OCCLUSION) uniform sampler2D occlusion_texture;
+layout(binding = EMIT_TEX_STATE) uniform sampler2D state_texture;
+layout(binding = EMIT_TEX_SUN_NOW) uniform sampler2D sun_now_texture;
+
+float temperature_at(ivec2 px, int material) {
+  vec4 start = material_start(material);
+  if (start.z > 0.5) return frame.obscurance.y + start.y;
+#ifdef EMIT_FOSTER
+  vec4 x = texelFetch(state_texture, px, 0);
+  return frame.obscurance.y + (start.w + ((x.x + x.y) + (x.z + x.w)));
+#else
+  vec2 x = texelFetch(state_texture, px, 0).rg;
+  // Weights are the same in every interval: those of the first are read.
+  float weight0_frac = relaxation_mode(material, 0).z;
+  float weight1_frac = relaxation_mode(material, 1).z;
+  return frame.obscurance.y + (weight0_frac * x.x + weight1_frac * x.y);
+#endif
+}
+
+Seen seen_at(ivec2 px) {
+  uvec2 ids = gbuffer_ids(px);
+  vec3 n = gbuffer_normal(px);
+  float open_frac = min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0) * 0.5 * (1.0 + n.z);
+  float sun_frac = frame.sun_now.w > 0.0 ? texelFetch(sun_now_texture, px, 0).r : 0.0;
+  return Seen(gbuffer_depth_m(px), temperature_at(px, int(ids.x)), open_frac,
+              sun_frac * max(dot(n, frame.sun_now.xyz), 0.0), ids.x, ids.y);
+}
+#endif
 
 // Relative air mass after Kasten and Young (1989), 1 at the zenith, 38 at the horizon.
 float air_mass(float sin_elevation) {
@@ -31,7 +81,22 @@ float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
 }
 
 float transmittance(uint band, float range_m) {
-  return dot(bands[band].terms_amplitude_frac, exp(-bands[band].terms_extinction_per_m * range_m));
+  float sum = 0.0;
+  for (int term = 0; term < EMIT_TERMS; ++term) {
+    sum += bands[band].terms_amplitude_frac[term] * exp(-bands[band].terms_extinction_per_m[term] * range_m);
+  }
+  return sum;
+}
+
+// Leaves the surface in the band, W m-2 sr-1.
+float leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
+  vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node, float(band * frame.bands.x));
+  float emissivity_frac = texelFetch(band_lut, int(frame.bands.y + seen.material * EMIT_BANDS + band)).r;
+  float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(seen.temperature_k, lut, clamped);
+  // Diffuse reflection: the open part of the hemisphere shows sky, the rest the surroundings.
+  float incoming = mix(bands[band].surroundings_radiance_w_m2_sr, bands[band].sky_hemisphere_w_m2_sr, seen.open_frac);
+  incoming += bands[band].sun_irradiance_w_m2 / EMIT_PI * seen.sun_cosine;
+  return emitted + (1.0 - emissivity_frac) * incoming;
 }
 
 void main() {
@@ -39,72 +104,29 @@ void main() {
   if (any(greaterThanEqual(px, ivec2(frame.format_px.xy)))) return;
   uint pixel = uint(px.y) * frame.format_px.x + uint(px.x);
   uint plane_px = frame.format_px.z;
-  float boresight_m = gbuffer_depth_m(px);
-  vec3 ray = view_ray(px);
+  Seen seen = seen_at(px);
+  vec3 ray = sensor_ray(px);
   float ray_length = length(ray);
-  bool surface = boresight_m < EMIT_SKY_DEPTH_M;
+  float sin_elevation = dot(vec3(frame.relworld_from_sensor[0].z, frame.relworld_from_sensor[1].z, frame.relworld_from_sensor[2].z), ray) / ray_length;
+  bool surface = seen.boresight_m < EMIT_SKY_DEPTH_M;
   bool clamped = false;
   bool nonfinite = false;
 
-  float temperature_k = uintBitsToFloat(0x7fc00000u);
-  uvec2 ids = uvec2(0u);
-  vec4 emissivity = vec4(1.0);
-  vec3 n = vec3(0.0);
-  float open_frac = 0.5;  // share of the hemisphere that shows sky, cosine-weighted
-  float sun_frac = 0.0;
-  if (surface) {
-    ids = gbuffer_ids(px);
-    n = gbuffer_normal(px);
-#ifdef EMIT_CACHED
-    vec3 sampled = texelFetch(state_texture, px, 0).rgb;
-    open_frac = sampled.z;
-    if (frame.sun_now.w > 0.0) sun_frac = sampled.y;
-#else
-    open_frac = min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0) * 0.5 * (1.0 + n.z);
-    if (frame.sun_now.w > 0.0) sun_frac = texelFetch(sun_now_texture, px, 0).r;
-#endif
-    vec4 start = material_start(int(ids.x));
-    emissivity = material_band_emissivity(int(ids.x));
-    if (start.z > 0.5) {
-      temperature_k = frame.obscurance.y + start.y;
-    } else {
-#if defined(EMIT_CACHED)
-      temperature_k = frame.obscurance.y + sampled.x;
-#elif defined(EMIT_FOSTER)
-      vec4 x = texelFetch(state_texture, px, 0);
-      temperature_k = frame.obscurance.y + (start.w + ((x.x + x.y) + (x.z + x.w)));
-#else
-      vec2 x = texelFetch(state_texture, px, 0).rg;
-      // Weights are the same in every interval: those of the first are read.
-      float weight0_frac = relaxation_mode(int(ids.x), 0).z;
-      float weight1_frac = relaxation_mode(int(ids.x), 1).z;
-      temperature_k = frame.obscurance.y + (weight0_frac * x.x + weight1_frac * x.y);
-#endif
-    }
-    atomicAdd(stats.surface_px, 1u);
-  }
-
-  for (uint i = 0u; i < frame.bands.x; ++i) {
-    float radiance_w_m2_sr;
+  for (uint i = 0u; i < EMIT_BANDS; ++i) {
+    float radiance_w_m2_sr = 0.0;
     if (surface) {
-      vec4 lut = vec4(bands[i].lut_first_k, bands[i].lut_nodes_per_k, bands[i].lut_last_node, float(i * frame.bands.y));
-      float emissivity_frac = emissivity[i];
-      float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(temperature_k, lut, clamped);
-      // Diffuse reflection: the open part of the hemisphere shows sky, the rest the surroundings.
-      float incoming = mix(bands[i].surroundings_radiance_w_m2_sr, bands[i].sky_hemisphere_w_m2_sr, open_frac);
-      incoming += bands[i].sun_irradiance_w_m2 / EMIT_PI * sun_frac * max(dot(n, frame.sun_now.xyz), 0.0);
-      float leaving = emitted + (1.0 - emissivity_frac) * incoming;
-      if (bands[i].atmosphere_table.z > 0u) {
-        vec2 air = atmosphere_table_air(bands[i].atmosphere_table, boresight_m * ray_length, ray.z / ray_length, clamped);
-        radiance_w_m2_sr = air.x * leaving + air.y;
-      } else {
-        float tau = transmittance(i, boresight_m * ray_length);
-        radiance_w_m2_sr = tau * leaving + (1.0 - tau) * bands[i].air_radiance_w_m2_sr;
+      radiance_w_m2_sr = leaving_w_m2_sr(i, seen, clamped);
+      if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
+        vec2 air = atmosphere_table_air(bands[i].atmosphere_table, seen.boresight_m * ray_length, sin_elevation, clamped);
+        radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
+      } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
+        float tau = transmittance(i, seen.boresight_m * ray_length);
+        radiance_w_m2_sr = tau * radiance_w_m2_sr + (1.0 - tau) * bands[i].air_radiance_w_m2_sr;
       }
-    } else if (bands[i].atmosphere_table.z > 0u) {
-      radiance_w_m2_sr = atmosphere_table_out(bands[i].atmosphere_table, ray.z / ray_length, clamped).y;
-    } else {
-      radiance_w_m2_sr = sky_radiance_w_m2_sr(i, ray.z / ray_length);
+    } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
+      radiance_w_m2_sr = atmosphere_table_out(bands[i].atmosphere_table, sin_elevation, clamped).y;
+    } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
+      radiance_w_m2_sr = sky_radiance_w_m2_sr(i, sin_elevation);
     }
     if (isnan(radiance_w_m2_sr) || isinf(radiance_w_m2_sr)) {
       nonfinite = true;
@@ -113,12 +135,13 @@ void main() {
     planes[i * plane_px + pixel] = radiance_w_m2_sr;
   }
 
-  uint plane = frame.bands.x;
-  if ((frame.format_px.w & EMIT_OUTPUT_TEMPERATURE) != 0u) planes[plane++ * plane_px + pixel] = temperature_k;
-  if ((frame.format_px.w & EMIT_OUTPUT_DEPTH) != 0u) {
-    planes[plane++ * plane_px + pixel] = surface ? boresight_m : uintBitsToFloat(0x7f800000u);
+  uint plane = EMIT_BANDS;
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_TEMPERATURE) != 0u) {
+    planes[plane++ * plane_px + pixel] = surface ? seen.temperature_k : uintBitsToFloat(0x7fc00000u);
   }
-  if ((frame.format_px.w & EMIT_OUTPUT_OBJECT) != 0u) planes[plane++ * plane_px + pixel] = float(ids.y);
-  if (nonfinite) atomicAdd(stats.nonfinite_px, 1u);
-  if (clamped) atomicAdd(stats.clamped_px, 1u);
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_DEPTH) != 0u) {
+    planes[plane++ * plane_px + pixel] = surface ? seen.boresight_m : uintBitsToFloat(0x7f800000u);
+  }
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
+  if (nonfinite || clamped) atomicAdd(stats.flagged_px[(nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0)], 1u);
 }

@@ -57,7 +57,7 @@ void main() {
   bool clamped = false;
   float u0 = equilibrium_offset_k(surface, n, sun_start, step_params.flux_start, sun_frac, sky_frac, clamped);
   float u1 = equilibrium_offset_k(surface, n, sun_end, step_params.flux_end, sun_frac, sky_frac, clamped);
-  if (clamped) atomicAdd(stats.clamped_px, 1u);
+  if (clamped) atomicAdd(stats.flagged_px[EMIT_FLAG_CLAMPED], 1u);
 
   vec2 x = (flags & EMIT_STEP_FIRST) != 0u ? vec2(start.x) : imageLoad(state_image, px).rg;
   int entry = int(step_params.info.y) + material;

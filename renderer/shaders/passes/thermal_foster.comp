@@ -96,6 +96,6 @@ void main() {
     float worst_k = max(max(max(change_k.x, change_k.y), max(change_k.z, change_k.w)), total_k);
     if (!(worst_k > frame.obscurance.z)) break;
   }
-  if (clamped) atomicAdd(stats.clamped_px, 1u);
+  if (clamped) atomicAdd(stats.flagged_px[EMIT_FLAG_CLAMPED], 1u);
   imageStore(state_image, px, x);
 }

@@ -29,6 +29,7 @@
 #define EMIT_TEX_NODE_BEFORE 12
 #define EMIT_TEX_NODE_AFTER 13
 #define EMIT_TEX_SAMPLE_SKY 14
+#define EMIT_TEX_SURFACE 15
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -50,10 +51,14 @@
 // Boresight distance in the geometry buffer where no surface is seen.
 #define EMIT_SKY_DEPTH_M 1e30f
 
-// FrameParams.format_px.w
+// EMIT_OUTPUTS of passes/radiance.comp
 #define EMIT_OUTPUT_TEMPERATURE 1u
 #define EMIT_OUTPUT_DEPTH 2u
 #define EMIT_OUTPUT_OBJECT 4u
+
+// FrameStatsGpu.flagged_px
+#define EMIT_FLAG_NONFINITE 1
+#define EMIT_FLAG_CLAMPED 2
 
 // StepParams.info.z
 #define EMIT_STEP_FIRST 1u

@@ -8,11 +8,11 @@ EMIT_SHARED_BEGIN
 struct FrameParams {
   mat4 clip_from_relworld;    // reversed z, infinite far plane; image row 0 at NDC y = -1
   mat4 relworld_from_sensor;  // rotation
-  vec4 tan_half_fov;          // x, y; z = near plane in m; w = pixels per unit tangent
-  uvec4 format_px;            // width, height, pixels per plane, EMIT_OUTPUT_* flags
+  vec4 ray;                   // tangents in the sensor's axes: x = per pixel, y = 0, zw = at the corner of pixel 0
+  uvec4 format_px;            // width, height, pixels per plane
   vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K;
                               // foster: z = tolerance of a step in K, w = nodes per axis of the spin-up table
-  uvec4 bands;                // x = number of bands, y = nodes of a band's table
+  uvec4 bands;                // x = nodes of a band's table, y = place of the emissivities behind the tables
   vec4 samples;               // cached: x = way of now between the two nodes of the samples, 0..1
   vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
 };
@@ -25,7 +25,7 @@ struct InstanceParams {
   vec4 ids;  // x = object id (1 + index of the scenario's object); cached: 4096 y + z = sample - gl_VertexID. Exact in float32
 };
 
-// Four texels of the material table.
+// Three texels of the material table.
 struct MaterialParams {
   float solar_absorptance_frac;
   float emissivity_frac;
@@ -35,7 +35,6 @@ struct MaterialParams {
   float prescribed_offset_k;  // if prescribed
   float prescribed;           // 1: temperature is given; 0: simulated
   float base_offset_k;        // foster: base minus the reference temperature
-  vec4 band_emissivity_frac;  // by scenario band
   vec4 resistance_m2k_w;      // foster: of the modes
 };
 
@@ -92,10 +91,7 @@ struct BandParams {
 
 // Counters of one frame, written with atomics.
 struct FrameStatsGpu {
-  uint nonfinite_px;
-  uint clamped_px;
-  uint surface_px;
-  uint pad;
+  uint flagged_px[4];  // by EMIT_FLAG_*; of a pixel with both, at their sum
 };
 
 EMIT_SHARED_END

@@ -64,10 +64,12 @@ struct StageTimes {
 struct FrameStats {
   std::uint32_t nonfinite_px = 0;  ///< NaN or Inf pixels, written as 0
   std::uint32_t clamped_px = 0;    ///< model evaluations with an input outside the valid range
-  std::uint32_t surface_px = 0;    ///< pixels that show geometry
   /// Live poses the entities' histories forgot since the last reset because their store was full:
   /// shade of the distant past is coarser than it was sent.
   std::uint64_t dropped_poses = 0;
+  /// thermal.method = "cached": the camera stands where no one said it would, so that triangles may
+  /// be wider than its pixels and shadows coarser than thermal.tolerance_k.
+  bool coarse = false;
 };
 
 /// One rendered frame. Rows go down, row-major, float32, no padding.

@@ -26,16 +26,22 @@ namespace emit::reference {
 
 struct VoxelShape;
 
+struct PastSun {
+  glm::dvec3 to_sun{0.0};  ///< unit vector
+  double age_s = 0.0;      ///< before the instant of the picture
+};
+
 struct VoxelOptions {
   double normal_cell_m = 0.0025;  ///< first cell below an exposed face
   double swept_cell_m = 0.015;    ///< along a face, where shadow edges pass
+  double shadow_cell_m = 0.004;   ///< across the edge of a shadow that is still sharp
   double growth_frac = 0.16;      ///< growth of the cells per length of distance
   double max_cell_m = 1.0;
   double refine = 1.0;  ///< multiplies the cells along every axis
   std::uint64_t max_nodes = 60'000'000;
-  /// Directions to the sun over the history; shadow edges pass where their shadows lie. Empty:
+  /// The sun over the history, oldest first; shadow edges pass where their shadows lie. Empty:
   /// nowhere, as for the unshadowed start.
-  std::vector<glm::dvec3> suns;
+  std::vector<PastSun> suns;
 };
 
 /// What a face of the model is, beside SolidFace.

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <glm/ext/vector_double3.hpp>
+#include <span>
+
+#include "emit/scene/mesh.hpp"
+
+namespace emit::scene {
+
+/// From where, and how finely, a scene is looked at.
+struct DetailView {
+  std::span<const glm::dvec3> eyes_world_m;  ///< every place of the camera; empty: unknown
+  double pixel_rad = 1e-3;                   ///< angle of a pixel
+};
+
+/// Fewer triangles where a mesh has more than its pixels can show: edge collapses by quadric error
+/// (Garland and Heckbert 1997, SIGGRAPH), at most a quarter of a pixel seen from the nearest eye; as
+/// that is a mean over the faces around a collapse, the surface itself moves by up to half a pixel.
+/// Meshes whose triangles are wider than some pixels, and those of moving entities, stay as they
+/// are. Vertices are a subset of the old ones with their normals; borders of submeshes do not move,
+/// so that neighbours still meet. `triangles` is counted anew. Setup only: about a second per
+/// million triangles.
+[[nodiscard]] SceneGeometry simplified(SceneGeometry geometry, const DetailView& view);
+
+/// Reorders the triangles of every submesh so that neighbours follow each other: a device then
+/// transforms a vertex about once. Vertices keep their places. Setup only.
+void order_for_drawing(Mesh& mesh);
+
+}  // namespace emit::scene

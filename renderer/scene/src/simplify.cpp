@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/scene/simplify.hpp"
+
+#include <meshoptimizer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace emit::scene {
+namespace {
+
+constexpr double kErrorPx = 0.25;
+/// Wider triangles than this, on average, are left alone: there is little to gain.
+constexpr double kLeastEdgePx = 6.0;
+/// Below this the collapse itself is all rounding.
+constexpr double kLeastErrorM = 1e-6;
+
+double distance_m(const Aabb& box, const glm::dvec3& point_m) {
+  return glm::length(glm::max(glm::max(box.min_m - point_m, point_m - box.max_m), glm::dvec3(0.0)));
+}
+
+double greatest_scale(const glm::dmat4& m) {
+  return std::max({glm::length(glm::dvec3(m[0])), glm::length(glm::dvec3(m[1])),
+                   glm::length(glm::dvec3(m[2]))});
+}
+
+/// Width of a pixel on the nearest instance of every mesh, in the mesh's own lengths; 0 where a
+/// mesh may come as close as it likes.
+std::vector<double> pixel_widths(const SceneGeometry& geometry, const DetailView& view) {
+  std::vector<double> widths(geometry.meshes.size(), std::numeric_limits<double>::infinity());
+  for (const Instance& instance : geometry.instances) {
+    double& width = widths[instance.mesh];
+    if (instance.entity_id != 0 || view.eyes_world_m.empty()) {
+      width = 0.0;
+      continue;
+    }
+    if (instance.world_bounds.empty()) continue;
+    const double scale = greatest_scale(instance.world_from_mesh);
+    for (const glm::dvec3& eye_m : view.eyes_world_m) {
+      width = std::min(width, view.pixel_rad * distance_m(instance.world_bounds, eye_m) / scale);
+    }
+  }
+  return widths;
+}
+
+/// Of an equilateral triangle of the mean area.
+double mean_edge(const Mesh& mesh) {
+  double area = 0.0;
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    const glm::dvec3 a(mesh.positions_m[mesh.indices[i]]);
+    const glm::dvec3 b(mesh.positions_m[mesh.indices[i + 1]]);
+    const glm::dvec3 c(mesh.positions_m[mesh.indices[i + 2]]);
+    area += 0.5 * glm::length(glm::cross(b - a, c - a));
+  }
+  const auto triangles = static_cast<double>(std::max<std::size_t>(1, mesh.indices.size() / 3));
+  return std::sqrt(area / triangles * 4.0 / std::sqrt(3.0));
+}
+
+/// Renumbers the vertices; entries of `remap` that no triangle uses are ~0U.
+void renumber(Mesh& mesh, std::span<const std::uint32_t> remap, std::size_t count) {
+  const std::size_t vertices = mesh.positions_m.size();
+  meshopt_remapIndexBuffer(mesh.indices.data(), mesh.indices.data(), mesh.indices.size(),
+                           remap.data());
+  const auto gather = [&](std::vector<glm::vec3>& values) {
+    std::vector<glm::vec3> out(count);
+    meshopt_remapVertexBuffer(out.data(), values.data(), vertices, sizeof(glm::vec3), remap.data());
+    values = std::move(out);
+  };
+  gather(mesh.normals);
+  gather(mesh.positions_m);
+}
+
+void collapse(Mesh& mesh, double error) {
+  const float* positions = &mesh.positions_m[0].x;
+  const std::size_t vertices = mesh.positions_m.size();
+  const float scale = meshopt_simplifyScale(positions, vertices, sizeof(glm::vec3));
+  // Neighbours of another material keep the border they share.
+  unsigned int options = 0;
+  if (mesh.submeshes.size() > 1) options = meshopt_SimplifyLockBorder;
+  std::vector<std::uint32_t> indices;
+  std::vector<std::uint32_t> part;
+  for (Submesh& submesh : mesh.submeshes) {
+    const std::uint32_t* from = mesh.indices.data() + submesh.first_index;
+    part.resize(submesh.index_count);
+    const std::size_t count =
+        meshopt_simplify(part.data(), from, submesh.index_count, positions, vertices,
+                         sizeof(glm::vec3), 0, static_cast<float>(error) / scale, options, nullptr);
+    submesh.first_index = static_cast<std::uint32_t>(indices.size());
+    submesh.index_count = static_cast<std::uint32_t>(count);
+    indices.insert(indices.end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+  mesh.indices = std::move(indices);
+  std::vector<std::uint32_t> remap(vertices);
+  const std::size_t kept = meshopt_optimizeVertexFetchRemap(remap.data(), mesh.indices.data(),
+                                                            mesh.indices.size(), vertices);
+  renumber(mesh, remap, kept);
+  mesh.bounds = {};
+  for (const glm::vec3& p : mesh.positions_m) mesh.bounds.add(glm::dvec3(p));
+}
+
+}  // namespace
+
+void order_for_drawing(Mesh& mesh) {
+  for (const Submesh& submesh : mesh.submeshes) {
+    std::uint32_t* indices = mesh.indices.data() + submesh.first_index;
+    meshopt_optimizeVertexCache(indices, indices, submesh.index_count, mesh.positions_m.size());
+  }
+}
+
+SceneGeometry simplified(SceneGeometry geometry, const DetailView& view) {
+  const std::vector<double> widths = pixel_widths(geometry, view);
+  for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {
+    Mesh& mesh = geometry.meshes[m];
+    const double error = kErrorPx * widths[m];
+    if (!(error > kLeastErrorM) || !std::isfinite(error) || mesh.indices.empty()) continue;
+    if (mean_edge(mesh) > kLeastEdgePx * widths[m]) continue;
+    collapse(mesh, error);
+  }
+  geometry.triangles = 0;
+  geometry.static_bounds = {};
+  geometry.bounds = {};
+  for (Instance& instance : geometry.instances) {
+    const Mesh& mesh = geometry.meshes[instance.mesh];
+    geometry.triangles += mesh.indices.size() / 3;
+    instance.world_bounds = transformed(mesh.bounds, instance.world_from_mesh);
+    geometry.bounds.add(instance.world_bounds);
+    if (instance.entity_id == 0) geometry.static_bounds.add(instance.world_bounds);
+  }
+  return geometry;
+}
+
+}  // namespace emit::scene

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <set>
+#include <vector>
+
+#include "emit/physics/constants.hpp"
+#include "emit/scene/simplify.hpp"
+
+namespace emit::scene {
+namespace {
+
+constexpr double kPixelRad = 1e-3;
+
+/// Sphere of radius 1 m with `rings` bands of latitude; its upper half may be of another material.
+Mesh sphere(std::uint32_t rings, bool two_materials) {
+  Mesh mesh;
+  const std::uint32_t columns = 2 * rings;
+  for (std::uint32_t r = 0; r <= rings; ++r) {
+    const double polar = physics::kPi * r / rings;
+    for (std::uint32_t c = 0; c < columns; ++c) {
+      const double turn = 2.0 * physics::kPi * c / columns;
+      mesh.normals.emplace_back(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn),
+                                std::cos(polar));
+    }
+  }
+  mesh.positions_m = mesh.normals;
+  const auto vertex = [columns](std::uint32_t r, std::uint32_t c) {
+    return r * columns + c % columns;
+  };
+  const auto band = [&](std::uint32_t r) {
+    for (std::uint32_t c = 0; c < columns; ++c) {
+      if (r > 0) {
+        for (const std::uint32_t v : {vertex(r, c), vertex(r + 1, c), vertex(r, c + 1)}) {
+          mesh.indices.push_back(v);
+        }
+      }
+      if (r + 1 < rings) {
+        for (const std::uint32_t v : {vertex(r, c + 1), vertex(r + 1, c), vertex(r + 1, c + 1)}) {
+          mesh.indices.push_back(v);
+        }
+      }
+    }
+  };
+  for (std::uint32_t r = 0; r < rings; ++r) {
+    if (r == 0 || (two_materials && r == rings / 2)) {
+      mesh.submeshes.push_back({static_cast<std::uint32_t>(mesh.indices.size()), 0,
+                                static_cast<std::uint32_t>(mesh.submeshes.size()), false});
+    }
+    band(r);
+    mesh.submeshes.back().index_count =
+        static_cast<std::uint32_t>(mesh.indices.size()) - mesh.submeshes.back().first_index;
+  }
+  for (const glm::vec3& p : mesh.positions_m) mesh.bounds.add(glm::dvec3(p));
+  return mesh;
+}
+
+SceneGeometry scene_of(Mesh mesh, std::uint32_t entity_id = 0) {
+  SceneGeometry geometry;
+  Instance instance;
+  instance.entity_id = entity_id;
+  instance.world_bounds = mesh.bounds;
+  geometry.triangles = mesh.indices.size() / 3;
+  geometry.meshes.push_back(std::move(mesh));
+  geometry.instances.push_back(instance);
+  geometry.materials.resize(2);
+  return geometry;
+}
+
+/// Greatest depth of a triangle of the unit sphere's mesh below the sphere.
+double sag_m(const Mesh& mesh) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    glm::dvec3 centre(0.0);
+    for (std::size_t k = 0; k < 3; ++k) {
+      centre += glm::dvec3(mesh.positions_m[mesh.indices[i + k]]) / 3.0;
+    }
+    worst = std::max(worst, std::abs(1.0 - glm::length(centre)));
+  }
+  return worst;
+}
+
+TEST(Simplify, a_far_sphere_keeps_its_shape_to_half_a_pixel) {
+  const std::array<glm::dvec3, 2> eyes{glm::dvec3(0.0, 0.0, 21.0), glm::dvec3(0.0, 0.0, 90.0)};
+  const SceneGeometry fine = scene_of(sphere(300, false));
+  const SceneGeometry coarse = simplified(fine, {eyes, kPixelRad});
+  const Mesh& mesh = coarse.meshes[0];
+  EXPECT_LT(coarse.triangles, fine.triangles / 20);
+  EXPECT_EQ(coarse.triangles, mesh.indices.size() / 3);
+  EXPECT_EQ(mesh.submeshes[0].index_count, mesh.indices.size());
+  // 20 m to the nearer eye: 20 mm a pixel.
+  EXPECT_LT(sag_m(mesh), 0.5 * 0.020);
+  EXPECT_GT(sag_m(mesh), 0.1 * 0.020);  // and it uses what it may
+  // Vertices are old ones, with their normals, none unused.
+  ASSERT_EQ(mesh.positions_m.size(), mesh.normals.size());
+  std::vector<char> used(mesh.positions_m.size(), 0);
+  for (const std::uint32_t v : mesh.indices) used[v] = 1;
+  EXPECT_EQ(std::ranges::count(used, 0), 0);
+  for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
+    EXPECT_EQ(mesh.positions_m[v], mesh.normals[v]);
+  }
+}
+
+TEST(Simplify, nothing_changes_where_pixels_are_finer_or_the_distance_is_unknown) {
+  const std::vector<std::uint32_t> before = sphere(40, false).indices;
+  const std::array<glm::dvec3, 1> near{glm::dvec3(0.0, 0.0, 2.0)};
+  const std::array<glm::dvec3, 1> inside{glm::dvec3(0.0)};
+  const std::array<glm::dvec3, 1> far{glm::dvec3(0.0, 0.0, 500.0)};
+  EXPECT_EQ(simplified(scene_of(sphere(40, false)), {near, kPixelRad}).meshes[0].indices, before);
+  EXPECT_EQ(simplified(scene_of(sphere(40, false)), {inside, 1.0}).meshes[0].indices, before);
+  EXPECT_EQ(simplified(scene_of(sphere(40, false)), {{}, kPixelRad}).meshes[0].indices, before);
+  // An entity may come as close as it likes.
+  EXPECT_EQ(simplified(scene_of(sphere(40, false), 7), {far, kPixelRad}).meshes[0].indices, before);
+  EXPECT_LT(simplified(scene_of(sphere(40, false)), {far, kPixelRad}).triangles,
+            before.size() / 3 / 4);
+}
+
+TEST(Simplify, the_seam_between_two_materials_does_not_move) {
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
+  const SceneGeometry coarse = simplified(scene_of(sphere(200, true)), {eyes, kPixelRad});
+  const Mesh& mesh = coarse.meshes[0];
+  ASSERT_EQ(mesh.submeshes.size(), 2U);
+  EXPECT_LT(coarse.triangles, 40000U);
+  const auto on_seam = [&mesh](const Submesh& submesh) {
+    std::set<std::pair<float, float>> places;
+    for (std::uint32_t i = 0; i < submesh.index_count; ++i) {
+      const glm::vec3& p = mesh.positions_m[mesh.indices[submesh.first_index + i]];
+      if (std::abs(p.z) < 1e-5F) places.emplace(p.x, p.y);
+    }
+    return places;
+  };
+  const auto above = on_seam(mesh.submeshes[0]);
+  EXPECT_EQ(above.size(), 400U);
+  EXPECT_EQ(above, on_seam(mesh.submeshes[1]));
+}
+
+TEST(Simplify, order_for_drawing_keeps_the_triangles_and_brings_neighbours_together) {
+  Mesh mesh = sphere(30, true);
+  // Far apart on purpose.
+  for (const Submesh& submesh : mesh.submeshes) {
+    for (std::uint32_t i = 0; i + 3 < submesh.index_count / 2; i += 6) {
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        std::swap(mesh.indices[submesh.first_index + i + k],
+                  mesh.indices[submesh.first_index + submesh.index_count - 3 - i + k]);
+      }
+    }
+  }
+  const auto triangles = [](const Mesh& m, const Submesh& submesh) {
+    std::set<std::array<std::uint32_t, 3>> out;
+    for (std::uint32_t i = 0; i < submesh.index_count; i += 3) {
+      std::array<std::uint32_t, 3> t{m.indices[submesh.first_index + i],
+                                     m.indices[submesh.first_index + i + 1],
+                                     m.indices[submesh.first_index + i + 2]};
+      std::ranges::rotate(t, std::ranges::min_element(t));  // same winding, any first corner
+      out.insert(t);
+    }
+    return out;
+  };
+  const auto repeats = [](const Mesh& m) {
+    std::size_t near = 0;
+    for (std::size_t i = 48; i < m.indices.size(); ++i) {
+      const auto window = std::span(m.indices).subspan(i - 48, 48);
+      if (std::ranges::find(window, m.indices[i]) != window.end()) ++near;
+    }
+    return near;
+  };
+  const Mesh before = mesh;
+  order_for_drawing(mesh);
+  for (std::size_t s = 0; s < 2; ++s) {
+    EXPECT_EQ(triangles(mesh, mesh.submeshes[s]), triangles(before, before.submeshes[s]));
+  }
+  EXPECT_GT(repeats(mesh), repeats(before));
+  EXPECT_GT(repeats(mesh), mesh.indices.size() * 3 / 4);
+}
+
+}  // namespace
+}  // namespace emit::scene
