@@ -39,6 +39,9 @@ class Builder {
   /// Gives every vertex that has no sample yet one; false when stopped.
   bool sample_new_vertices(double begin_frac, double end_frac);
   void find_inward(std::uint32_t mesh);
+  /// Makes covered samples next to open ones copies of those: nobody sees them, but triangles that
+  /// a foot cuts would show a mixture of both.
+  void replace_covered();
   [[nodiscard]] std::size_t sample_count() const noexcept;
   bool report(double frac) const { return !progress_ || progress_(frac); }
 
@@ -156,6 +159,37 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   return true;
 }
 
+void Builder::replace_covered() {
+  SurfaceSamples& all = model_.samples;
+  for (std::size_t p = 0; p < in_.geometry.instances.size(); ++p) {
+    const RefinedMesh& mesh = model_.meshes[patches_[p].mesh];
+    const std::uint32_t first = model_.first_sample[p];
+    const auto vertices = mesh.vertices();
+    std::vector<std::uint32_t> open(vertices.size(), kNoSample);
+    const auto apart_m = [&](std::uint32_t a, std::uint32_t b) {
+      return glm::distance(vertices[a].position_m, vertices[b].position_m);
+    };
+    for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
+      for (const std::uint32_t covered : mesh.leaf(slot)) {
+        if (!all.samples[first + covered].covered) continue;
+        for (const std::uint32_t other : mesh.leaf(slot)) {
+          if (all.samples[first + other].covered) continue;
+          std::uint32_t& nearest = open[covered];
+          if (nearest == kNoSample || apart_m(covered, other) < apart_m(covered, nearest)) {
+            nearest = other;
+          }
+        }
+      }
+    }
+    for (std::uint32_t v = 0; v < open.size(); ++v) {
+      if (open[v] == kNoSample) continue;
+      all.samples[first + v] = all.samples[first + open[v]];
+      model_.states[first + v] = model_.states[first + open[v]];
+      model_.outputs[first + v] = model_.outputs[first + open[v]];
+    }
+  }
+}
+
 std::size_t Builder::sample_count() const noexcept {
   std::size_t count = 0;
   for (const SurfacePatch& patch : patches_) {
@@ -198,6 +232,7 @@ physics::Result<SurfaceModel> Builder::run() {
   number_samples(in_, sampler_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
   if (!exchange(in_, sampler_, patches_, model_, exchanged)) return stopped();
+  replace_covered();
   return std::move(model_);
 }
 

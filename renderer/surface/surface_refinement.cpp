@@ -25,11 +25,14 @@ constexpr float kTestedPx = 8.0F;
 constexpr float kBackSine = 0.2F;
 /// Share of the way to a point that must be free.
 constexpr float kSeenFrac = 0.999F;
+/// Corners that differ by more lie on either side of an edge: of a shadow that is still sharp, or
+/// where a body stands on the face.
+constexpr float kSharpK = 2.0F;
 /// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
 constexpr float kCreaseS = 1000.0F;
 constexpr float kCreaseDepths = 3.0F;
-/// The shortest edges that are halved, in pixels: where temperature is smooth, and where the edge
-/// of a shadow runs (finer ones change no pixel by more than a tenth of a kelvin, emit bench
+/// The shortest edges that are halved, in pixels: where temperature is smooth, and where an edge
+/// runs (finer ones change no pixel by more than a tenth of a kelvin, emit bench
 /// error-vs-time).
 constexpr float kLeastEdgePx = 2.5F;
 constexpr float kLeastShadowEdgePx = 0.9F;
@@ -170,7 +173,7 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
   const float range_k = std::max({offset_k(0), offset_k(1), offset_k(2)}) -
                         std::min({offset_k(0), offset_k(1), offset_k(2)});
   const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
-  if (smooth && patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
+  if ((smooth || range_k > kSharpK) && patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
   if (range_k < tolerance_k_) return false;
   const std::size_t count = in_.record.size();
   for (std::size_t i = recent_; i < count; ++i) {

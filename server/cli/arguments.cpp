@@ -540,6 +540,14 @@ void Tool::add_bench_commands() {
     add_json(app, o.json);
   }
   {
+    auto [app, o] = add<BenchConvergenceCommand>(
+        *bench, "convergence",
+        "How the error of the reference solvers falls with their cells and steps",
+        "emit bench convergence --plot convergence.svg", run_bench_convergence);
+    app.add_option("--plot", o.plot, "Write the diagrams as SVG");
+    add_json(app, o.json);
+  }
+  {
     auto [app, o] = add<BenchThermalTruthCommand>(
         *bench, "thermal-truth",
         "Split steps, a moved camera, a parked vehicle's print and a restart: what the thermal "

@@ -243,6 +243,12 @@ struct BenchStabilityCommand {
 int run_bench_stability(const BenchStabilityCommand& command);
 [[nodiscard]] std::vector<std::string> stability_parts();
 
+struct BenchConvergenceCommand {
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> plot;
+};
+int run_bench_convergence(const BenchConvergenceCommand& command);
+
 struct BenchThermalTruthCommand {
   std::optional<std::filesystem::path> json;
   std::string method = "per-frame";

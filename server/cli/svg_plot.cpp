@@ -141,16 +141,18 @@ class PlotWriter {
   void write() {
     write_frame();
     std::size_t color = 0;
-    double legend_y = kTop + 16.0;
+    const Corner corner = emptiest_corner();
+    double legend_y = corner.top ? kTop + 16.0 : kHeight - kBottom + 6.0 - legend_height();
     for (const PlotSeries& series : plot_.series) {
       const std::string ink = series.emphasis ? "#111111" : kColors[color++ % kColors.size()];
       write_series(series, ink);
       if (series.label.empty()) continue;
       // A white rim keeps the text legible over lines.
-      append(R"(<circle cx="{:.1f}" cy="{:.1f}" r="4" fill="{}"/>)", kWidth - kRight - 10.0,
-             legend_y - 4.0, ink);
-      append(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="end" class="legend">{}</text>)",
-             kWidth - kRight - 20.0, legend_y, escaped(series.label));
+      append(R"(<circle cx="{:.1f}" cy="{:.1f}" r="4" fill="{}"/>)",
+             corner.left ? kLeft + 10.0 : kWidth - kRight - 10.0, legend_y - 4.0, ink);
+      append(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" class="legend">{}</text>)",
+             corner.left ? kLeft + 20.0 : kWidth - kRight - 20.0, legend_y,
+             corner.left ? "start" : "end", escaped(series.label));
       legend_y += kLegendLine;
     }
     if (left_out_ > 0) {
@@ -160,6 +162,45 @@ class PlotWriter {
   }
 
  private:
+  struct Corner {
+    bool left = false;
+    bool top = true;
+  };
+  [[nodiscard]] double legend_height() const {
+    const auto named = std::ranges::count_if(
+        plot_.series, [](const PlotSeries& series) { return !series.label.empty(); });
+    return kLegendLine * static_cast<double>(named);
+  }
+  /// Where the legend hides the fewest points; the first of equals.
+  [[nodiscard]] Corner emptiest_corner() const {
+    constexpr double kCharPx = 6.5;
+    std::size_t longest = 0;
+    for (const PlotSeries& series : plot_.series) longest = std::max(longest, series.label.size());
+    const double width = 32.0 + kCharPx * static_cast<double>(longest);
+    const double height = legend_height() + 8.0;
+    Corner best;
+    std::size_t fewest = std::numeric_limits<std::size_t>::max();
+    for (const Corner corner :
+         {Corner{false, true}, Corner{true, true}, Corner{false, false}, Corner{true, false}}) {
+      std::size_t hidden = 0;
+      for (const PlotSeries& series : plot_.series) {
+        for (const PlotPoint& point : series.points) {
+          const double x = x_.px(point.x);
+          const double y = y_.px(point.y);
+          if ((corner.left ? x < kLeft + width : x > kWidth - kRight - width) &&
+              (corner.top ? y < kTop + height : y > kHeight - kBottom - height)) {
+            ++hidden;
+          }
+        }
+      }
+      if (hidden < fewest) {
+        fewest = hidden;
+        best = corner;
+      }
+    }
+    return best;
+  }
+
   template <class... Args>
   void append(fmt::format_string<Args...> text, Args&&... args) {
     fmt::format_to(std::back_inserter(out_), text, std::forward<Args>(args)...);

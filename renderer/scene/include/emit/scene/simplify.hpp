@@ -14,11 +14,11 @@ struct DetailView {
 };
 
 /// Fewer triangles where a mesh has more than its pixels can show: edge collapses by quadric error
-/// (Garland and Heckbert 1997, SIGGRAPH), at most a quarter of a pixel seen from the nearest eye; as
-/// that is a mean over the faces around a collapse, the surface itself moves by up to half a pixel.
-/// Meshes whose triangles are wider than some pixels, and those of moving entities, stay as they
-/// are. Vertices are a subset of the old ones with their normals; borders of submeshes do not move,
-/// so that neighbours still meet. `triangles` is counted anew. Setup only: about a second per
+/// (Garland and Heckbert 1997, SIGGRAPH), at most a quarter of a pixel seen from the nearest eye;
+/// as that is a mean over the faces around a collapse, the surface itself moves by up to half a
+/// pixel. Meshes whose triangles are wider than some pixels, and those of moving entities, stay as
+/// they are. Vertices are a subset of the old ones with their normals; borders of submeshes do not
+/// move, so that neighbours still meet. `triangles` is counted anew. Setup only: about a second per
 /// million triangles.
 [[nodiscard]] SceneGeometry simplified(SceneGeometry geometry, const DetailView& view);
 
