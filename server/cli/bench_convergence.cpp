@@ -136,8 +136,8 @@ Result<std::vector<double>> solid_k(std::uint32_t cells, std::uint32_t steps) {
 }
 
 struct Study {
-  const char* solver;  ///< "layer": one dimension, "solid": three
-  const char* axis;    ///< "time" or "space"
+  const char* solver;   ///< "layer": one dimension, "solid": three
+  const char* axis;     ///< "time" or "space"
   const char* refined;  ///< what the refinement counts
   const char* unit;
   double size_at_one;  ///< step or cell of refinement 1
@@ -207,13 +207,37 @@ Plot diagram(const std::vector<Row>& rows) {
 
 int run_bench_convergence(const BenchConvergenceCommand& command) {
   const std::array<Study, 4> studies{{
-      {"layer", "time", "steps", "s", kEndS, {16, 32, 64, 128, 256}, 4096,
+      {"layer",
+       "time",
+       "steps",
+       "s",
+       kEndS,
+       {16, 32, 64, 128, 256},
+       4096,
        [](std::uint32_t steps) { return layers_k(8, steps); }},
-      {"layer", "space", "cells over those of the coarsest mesh", "of the coarsest", 1.0, {1, 2, 4, 8, 16}, 64,
+      {"layer",
+       "space",
+       "cells over those of the coarsest mesh",
+       "of the coarsest",
+       1.0,
+       {1, 2, 4, 8, 16},
+       64,
        [](std::uint32_t refine) { return layers_k(refine, 1024); }},
-      {"solid", "time", "steps", "s", kEndS, {8, 16, 32, 64, 128}, 1024,
+      {"solid",
+       "time",
+       "steps",
+       "s",
+       kEndS,
+       {8, 16, 32, 64, 128},
+       1024,
        [](std::uint32_t steps) { return solid_k(16, steps); }},
-      {"solid", "space", "cells in 0.16 m", "m", 0.16, {4, 8, 16, 32}, 128,
+      {"solid",
+       "space",
+       "cells in 0.16 m",
+       "m",
+       0.16,
+       {4, 8, 16, 32},
+       128,
        [](std::uint32_t cells) { return solid_k(cells, 64); }},
   }};
   std::uint64_t work = 0;

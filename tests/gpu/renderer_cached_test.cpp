@@ -339,6 +339,20 @@ TEST(RendererCached, WhatNoEyeSeesIsNotRefined) {
   EXPECT_GT(2 * samples_from(-5.0), 3 * samples_from(5.0));
 }
 
+TEST(RendererCached, GroundUnderABodyDoesNotShowThroughAtItsFoot) {
+  // Two hours into the morning the ground west of the box has lain in its shade since the start.
+  auto scenario = cached_scenario(box_on_ground());
+  scenario.sensor.fov_h_rad = 0.35;
+  scenario.materials[0].base_k = 340.0;  // so that covered ground is hot
+  Session run(scenario);
+  const auto sunlit = run.frame_k(2 * kHourNs, looking({9.0, -9.0, 4.0}, {6.0, -6.0, 0.0}));
+  const float ground_k = sunlit[sunlit.size() / 2 + kWidth / 2];
+  const auto foot = run.frame_k(2 * kHourNs, looking({-3.0, 0.1, 0.8}, {-1.0, 0.1, 0.05}));
+  const auto [low, high] = std::ranges::minmax(foot);
+  EXPECT_LT(high, ground_k - 5.0F);
+  EXPECT_LT(high - low, 1.5F);
+}
+
 TEST(RendererCached, FramesFromWhereNoOneSaidTheCameraWouldBeAreFlagged) {
   auto scenario = cached_scenario(box_on_ground());
   const glm::dvec3 eye(3.0, -9.0, 6.0);

@@ -24,8 +24,8 @@ std::vector<double> numbers_of(const std::string& json, const std::string& key) 
 
 TEST(CliBench, TheReferenceSolversConvergeWithSecondOrder) {
   const TemporaryFolder folder;
-  const ProcessResult run = run_emit({"bench", "convergence", "--plot", folder.file("c.svg"),
-                                      "--json", folder.file("c.json")});
+  const ProcessResult run = run_emit(
+      {"bench", "convergence", "--plot", folder.file("c.svg"), "--json", folder.file("c.json")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("c.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"convergence\"");
