@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "emit/scene/simplify.hpp"
@@ -44,12 +43,6 @@ FosterHistory foster_of(const scene::ScenarioDesc& scenario, std::vector<FosterM
   return FosterHistory(scenario, std::move(materials), surroundings, environment, kReferenceK);
 }
 
-double distance_m(const scene::Aabb& box, const glm::dvec3& point_m) {
-  return box.empty() ? 0.0
-                     : glm::length(glm::max(glm::max(box.min_m - point_m, point_m - box.max_m),
-                                            glm::dvec3(0.0)));
-}
-
 RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& request) {
   RefineView view;
   view.pixel_rad = pixel_rad(sensor);
@@ -74,7 +67,7 @@ std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const glm::dvec
     // On the way to the next place, too.
     const double way_m =
         i + 1 < eyes_world_m.size() ? glm::distance(eyes_world_m[i], eyes_world_m[i + 1]) : 0.0;
-    const double around_m = kReachFrac * distance_m(static_bounds, eyes_world_m[i]);
+    const double around_m = kReachFrac * scene::distance_m(static_bounds, eyes_world_m[i]);
     eyes.push_back({eyes_world_m[i], std::max(way_m, around_m)});
   }
   return eyes;

@@ -16,9 +16,11 @@ namespace emit::renderer {
 ///   larger than a part of that caster: so that no shadow slips between its corners;
 /// - where its newest vertex is not what its parents interpolate to: the error of a linear
 ///   triangle is a quarter of its parent's;
-/// - where corners saw a different sun lately: an edge of a shadow runs through.
-/// It is never halved below some pixels (the last reason: one pixel) at the nearest place of the
-/// camera, and only for the first reason where no place of the camera sees it.
+/// - near edges and feet of bodies, where heat moves along the surface;
+/// - where sunlight fell on its corners unequally of late: an edge of a shadow runs through.
+/// It is never halved below some pixels at the nearest place of the camera (one pixel where an edge
+/// runs: of a shadow, or between temperatures far apart), and only for the first reason where no
+/// place of the camera sees it.
 class SurfaceRefinement {
  public:
   SurfaceRefinement(const SurfaceInputs& inputs, const RefineView& view,

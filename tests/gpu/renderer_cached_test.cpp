@@ -336,7 +336,8 @@ TEST(RendererCached, WhatNoEyeSeesIsNotRefined) {
     (void)run.frame_k(2 * kHourNs, looking({east_m, 0.0, 1.5}, {0.0, 0.0, 0.5}));
     return run.renderer().scene_stats().samples;
   };
-  EXPECT_GT(2 * samples_from(-5.0), 3 * samples_from(5.0));
+  // Three times as many from the shaded side would do without the test of being seen.
+  EXPECT_GT(samples_from(-5.0), 5 * samples_from(5.0));
 }
 
 TEST(RendererCached, GroundUnderABodyDoesNotShowThroughAtItsFoot) {

@@ -21,10 +21,6 @@ constexpr double kLeastEdgePx = 6.0;
 /// Below this the collapse itself is all rounding.
 constexpr double kLeastErrorM = 1e-6;
 
-double distance_m(const Aabb& box, const glm::dvec3& point_m) {
-  return glm::length(glm::max(glm::max(box.min_m - point_m, point_m - box.max_m), glm::dvec3(0.0)));
-}
-
 double greatest_scale(const glm::dmat4& m) {
   return std::max({glm::length(glm::dvec3(m[0])), glm::length(glm::dvec3(m[1])),
                    glm::length(glm::dvec3(m[2]))});
@@ -105,6 +101,11 @@ void collapse(Mesh& mesh, double error) {
 }
 
 }  // namespace
+
+double distance_m(const Aabb& box, const glm::dvec3& point_m) noexcept {
+  if (box.empty()) return 0.0;
+  return glm::length(glm::max(glm::max(box.min_m - point_m, point_m - box.max_m), glm::dvec3(0.0)));
+}
 
 void order_for_drawing(Mesh& mesh) {
   for (const Submesh& submesh : mesh.submeshes) {

@@ -13,6 +13,9 @@ struct DetailView {
   double pixel_rad = 1e-3;                   ///< angle of a pixel
 };
 
+/// From a point to the nearest place of a box; 0 inside it and for an empty one.
+[[nodiscard]] double distance_m(const Aabb& box, const glm::dvec3& point_m) noexcept;
+
 /// Fewer triangles where a mesh has more than its pixels can show: edge collapses by quadric error
 /// (Garland and Heckbert 1997, SIGGRAPH), at most a quarter of a pixel seen from the nearest eye;
 /// as that is a mean over the faces around a collapse, the surface itself moves by up to half a
