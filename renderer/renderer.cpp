@@ -262,7 +262,6 @@ void GlRenderer::upload_frame() noexcept {
 void GlRenderer::bind_frame() const noexcept {
   frame_buffer_.bind_uniform(EMIT_BIND_FRAME);
   band_buffer_.bind_uniform(EMIT_BIND_BANDS);
-  stage_->drawn().instance_table.bind(EMIT_TEX_INSTANCES);
   band_table_.bind(EMIT_TEX_BAND_LUT);
   output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
   output_buffer_.bind_storage(EMIT_BIND_STATS, stats_offset_, sizeof(gpu::FrameStatsGpu));

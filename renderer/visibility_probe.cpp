@@ -76,7 +76,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
                                                    double obscurance_radius_m) {
   const SceneBuffers scene(std::move(geometry));
   const std::array<std::int32_t, 1> no_history{-1};
-  DrawLists lists(scene, no_history, thermal_.max_cascades, {});
+  DrawLists lists(scene, no_history, thermal_.max_cascades);
   lists.begin(sensor_pose.position_world_m, 0, {});
 
   sensor_.near_m = near_m;
@@ -107,15 +107,12 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   const gl::Buffer frame_buffer(sizeof(frame), &frame, 0);
   const gl::Buffer step_buffer(sizeof(step), &step, 0);
   const gl::Buffer tap_buffer(sizeof(taps_), &taps_, 0);
-  const gl::Buffer instances = buffer_of(lists.instance_params());
   const gl::Buffer records = buffer_of(lists.records());
   const gl::Buffer light_records = buffer_of(lists.light_records());
-  const gl::BufferTexture instance_table(GL_RGBA32F, instances);
   const SceneVertexArrays vertices(scene, records, light_records);
   frame_buffer.bind_uniform(EMIT_BIND_FRAME);
   step_buffer.bind_uniform(EMIT_BIND_STEP);
   tap_buffer.bind_uniform(EMIT_BIND_TAPS);
-  instance_table.bind(EMIT_TEX_INSTANCES);
   geometry_.bind_textures();
   occlusion_.bind_texture();
   shadow_.bind_texture();

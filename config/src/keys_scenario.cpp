@@ -395,6 +395,10 @@ const KeyTable<ThermalOptions>& thermal_keys() {
       boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
                               "cached: heat is also conducted along the surface and across convex "
                               "edges."),
+      boolean<ThermalOptions>("exchange", EMIT_FIELD(exchange),
+                              "cached: faces exchange radiation with each other; false: they see "
+                              "the surroundings' temperature where others hide the sky, as with "
+                              "per-frame."),
   };
   return keys;
 }

@@ -108,12 +108,12 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, foster_, progress);
   if (!ready) return ready;
   refined_eyes_ = eyes_around(view.eyes_world_m, static_bounds_);
-  std::vector<std::uint32_t> first_sample;
-  scene::SceneGeometry geometry = surface_->drawn_geometry(first_sample);
   drawn_.reset();  // its device memory goes before that of the next one is taken
-  drawn_ = std::make_unique<DrawnScene>(std::move(geometry), history_of_object_, 0,
-                                        std::move(first_sample));
-  make_sample_buffers();
+  drawn_ =
+      std::make_unique<DrawnScene>(SceneBuffers(surface_->drawn_scene()), history_of_object_, 0);
+  for (gl::Buffer& node : node_buffers_) {
+    node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
+  }
   if (glGetError() != GL_NO_ERROR) {
     return physics::make_error(physics::ErrorCode::gpu,
                                "the device cannot hold the samples of this scenario");
@@ -136,21 +136,6 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.samples_full = surface_->model().full;
 }
 
-void CachedStage::make_sample_buffers() {
-  const SurfaceModel& model = surface_->model();
-  std::vector<float> sky_frac;
-  for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
-    sky_frac.push_back(model.samples.samples[i].sky_frac);
-  }
-  sky_buffer_ = gl::Buffer::dynamic(sky_frac.size() * sizeof(float));
-  sky_buffer_.upload(std::span<const float>(sky_frac));
-  sky_table_ = gl::BufferTexture(GL_R32F, sky_buffer_);
-  for (std::size_t i = 0; i < node_buffers_.size(); ++i) {
-    node_buffers_[i] = gl::Buffer::dynamic(model.drawn_samples * sizeof(SampleVertex));
-    node_tables_[i] = gl::BufferTexture(GL_RG32F, node_buffers_[i]);
-  }
-}
-
 void CachedStage::prepare(const FrameRequest& request, CameraSetup&,
                           gpu::FrameParams& frame) noexcept {
   surface_->advance(request.thermal_time_ns, {history_.environment, history_.entities}, foster_);
@@ -171,9 +156,8 @@ void CachedStage::upload() noexcept {
 }
 
 void CachedStage::bind() const noexcept {
-  node_tables_[surface_->storage(0)].bind(EMIT_TEX_NODE_BEFORE);
-  node_tables_[surface_->storage(1)].bind(EMIT_TEX_NODE_AFTER);
-  sky_table_.bind(EMIT_TEX_SAMPLE_SKY);
+  drawn_->vertices.read_nodes(node_buffers_[surface_->storage(0)],
+                              node_buffers_[surface_->storage(1)]);
 }
 
 }  // namespace emit::renderer

@@ -49,7 +49,6 @@ class CachedStage final : public ThermalStage {
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history);
-  void make_sample_buffers();
 
   scene::SensorDesc sensor_;
   scene::Aabb static_bounds_;
@@ -65,9 +64,6 @@ class CachedStage final : public ThermalStage {
   physics::Forcing forcing_now_;
 
   std::array<gl::Buffer, 3> node_buffers_;  ///< by storage of CachedSurface
-  std::array<gl::BufferTexture, 3> node_tables_;
-  gl::Buffer sky_buffer_;
-  gl::BufferTexture sky_table_;
 };
 
 }  // namespace emit::renderer

@@ -22,15 +22,14 @@ struct CommandRange {
   std::uint32_t count = 0;
 };
 
-/// What is drawn in one frame: instance transforms relative to the camera, and per pass the draws
-/// that survive culling by their boxes. Owner: Renderer. Real time: all but the constructor RT-safe
-/// (capacity for the worst case is taken there).
+/// What is drawn in one frame: per pass the draws that survive culling by their boxes and clusters.
+/// Owner: Renderer. Real time: all but the constructor RT-safe (capacity for the worst case is
+/// taken there).
 class DrawLists {
  public:
-  /// `max_passes`: most shadow passes (steps x cascades) of a frame. `first_sample`: by instance,
-  /// the thermal sample of its mesh's first vertex; empty where the state is not on samples.
+  /// `max_passes`: most shadow passes (steps x cascades) of a frame.
   DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-            std::uint32_t max_passes, std::vector<std::uint32_t> first_sample);
+            std::uint32_t max_passes);
 
   /// Starts a frame: all instances at `sim_time_ns` around a camera at `camera_world_m`.
   void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
@@ -46,9 +45,6 @@ class DrawLists {
                            std::span<const PoseHistory> entities) noexcept;
   [[nodiscard]] CommandRange cull_light(const LightFrustum& frustum) noexcept;
 
-  [[nodiscard]] std::span<const gpu::InstanceParams> instance_params() const noexcept {
-    return params_;
-  }
   [[nodiscard]] std::span<const DrawRecord> records() const noexcept { return records_; }
   [[nodiscard]] std::span<const LightRecord> light_records() const noexcept {
     return light_records_;
@@ -56,35 +52,42 @@ class DrawLists {
   [[nodiscard]] std::span<const DrawCommand> commands(CommandRange range) const noexcept {
     return std::span(commands_).subspan(range.first, range.count);
   }
-  [[nodiscard]] std::size_t max_instance_params() const noexcept { return params_.capacity(); }
   [[nodiscard]] std::size_t max_records() const noexcept { return records_.capacity(); }
   [[nodiscard]] std::size_t max_light_records() const noexcept { return light_records_.capacity(); }
   /// Box around everything, relative to the camera, at the frame's instant.
   [[nodiscard]] const scene::Aabb& bounds() const noexcept { return bounds_; }
+  /// Triangles that the last cull_view() left.
+  [[nodiscard]] std::uint64_t view_triangles() const noexcept { return view_triangles_; }
 
  private:
   struct Placed {
-    glm::dmat4 relworld_from_mesh{1.0};
-    scene::Aabb box;  ///< relative to the camera
+    glm::dmat4 world_from_mesh{1.0};
+    scene::Aabb box_world;
     bool on = true;
+    bool in_view = false;
   };
   [[nodiscard]] Placed place(std::uint32_t instance, const glm::dmat4& world_from_mesh,
                              bool on) const noexcept;
+  [[nodiscard]] glm::dmat4 relworld_from_mesh(const Placed& placed) const noexcept;
+  /// Appends the draws of an instance's submesh; `record` is its DrawRecord.
+  void add(std::uint32_t instance, const SceneBuffers::DrawRange& submesh, const ViewVolume& view,
+           const glm::dmat4& relworld_from_mesh, std::uint32_t record) noexcept;
+  void add_command(const SceneBuffers::DrawRange& range, std::int32_t base_vertex,
+                   std::uint32_t record) noexcept;
 
   const SceneBuffers& scene_;
   std::vector<std::int32_t> history_of_instance_;  ///< -1: static
   std::vector<std::uint32_t> moving_;              ///< instances of entities
   std::vector<double> size_of_instance_m_;
-  /// By instance: sample of a vertex minus its gl_VertexID.
-  std::vector<std::int64_t> sample_offset_;
-  std::vector<Placed> view_placed_;
-  std::vector<Placed> light_placed_;
-  std::vector<gpu::InstanceParams> params_;
+  std::vector<Placed> view_placed_;   ///< static ones for good
+  std::vector<Placed> light_placed_;  ///< for shadow passes
+  scene::Aabb static_bounds_world_;
   std::vector<DrawRecord> records_;
   std::vector<LightRecord> light_records_;
   std::vector<DrawCommand> commands_;
   glm::dvec3 camera_world_m_{0.0};
   scene::Aabb bounds_;
+  std::uint64_t view_triangles_ = 0;
 };
 
 }  // namespace emit::renderer

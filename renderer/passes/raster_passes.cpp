@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -17,6 +18,20 @@ void issue(std::span<const DrawCommand> commands) noexcept {
         reinterpret_cast<const void*>(offset), static_cast<GLsizei>(command.count),
         command.base_vertex, command.first_record);
   }
+}
+
+constexpr GLuint kRecordBinding = 2;
+
+/// One record per instance, rows of a matrix first.
+void read_records(GLuint array, const gl::Buffer& records, std::size_t stride) {
+  glVertexArrayVertexBuffer(array, kRecordBinding, records.id(), 0, static_cast<GLsizei>(stride));
+  for (GLuint row = 0; row < 3; ++row) {
+    const GLuint attribute = EMIT_ATTR_ROW + row;
+    glVertexArrayAttribFormat(array, attribute, 4, GL_FLOAT, GL_FALSE, row * 4 * sizeof(float));
+    glVertexArrayAttribBinding(array, attribute, kRecordBinding);
+    glEnableVertexArrayAttrib(array, attribute);
+  }
+  glVertexArrayBindingDivisor(array, kRecordBinding, 1);
 }
 
 physics::Result<void> check_complete(const gl::Framebuffer& framebuffer, const char* name) {
@@ -45,21 +60,24 @@ SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer
   glVertexArrayAttribFormat(view, EMIT_ATTR_NORMAL, 4, GL_SHORT, GL_TRUE, 0);
   glVertexArrayAttribBinding(view, EMIT_ATTR_NORMAL, 1);
   glEnableVertexArrayAttrib(view, EMIT_ATTR_NORMAL);
-  glVertexArrayVertexBuffer(view, 2, draw_records.id(), 0, sizeof(DrawRecord));
-  glVertexArrayAttribIFormat(view, EMIT_ATTR_DRAW, 2, GL_UNSIGNED_INT, 0);
-  glVertexArrayAttribBinding(view, EMIT_ATTR_DRAW, 2);
-  glVertexArrayBindingDivisor(view, 2, 1);
+  read_records(view, draw_records, sizeof(DrawRecord));
+  glVertexArrayAttribIFormat(view, EMIT_ATTR_DRAW, 2, GL_UNSIGNED_INT,
+                             offsetof(DrawRecord, material));
+  glVertexArrayAttribBinding(view, EMIT_ATTR_DRAW, kRecordBinding);
   glEnableVertexArrayAttrib(view, EMIT_ATTR_DRAW);
+  read_records(light_.id(), light_records, sizeof(LightRecord));
+}
 
-  const GLuint light = light_.id();
-  glVertexArrayVertexBuffer(light, 1, light_records.id(), 0, sizeof(LightRecord));
-  for (GLuint row = 0; row < 3; ++row) {
-    const GLuint attribute = EMIT_ATTR_LIGHT_ROW + row;
-    glVertexArrayAttribFormat(light, attribute, 4, GL_FLOAT, GL_FALSE, row * 4 * sizeof(float));
-    glVertexArrayAttribBinding(light, attribute, 1);
-    glEnableVertexArrayAttrib(light, attribute);
-  }
-  glVertexArrayBindingDivisor(light, 1, 1);
+void SceneVertexArrays::read_nodes(const gl::Buffer& before,
+                                   const gl::Buffer& after) const noexcept {
+  const auto read = [this](GLuint attribute, GLuint binding, const gl::Buffer& node) {
+    glVertexArrayVertexBuffer(view_.id(), binding, node.id(), 0, 2 * sizeof(float));
+    glVertexArrayAttribFormat(view_.id(), attribute, 2, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(view_.id(), attribute, binding);
+    glEnableVertexArrayAttrib(view_.id(), attribute);
+  };
+  read(EMIT_ATTR_NODE_BEFORE, 3, before);
+  read(EMIT_ATTR_NODE_AFTER, 4, after);
 }
 
 physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::uint32_t height_px,

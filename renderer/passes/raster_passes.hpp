@@ -18,6 +18,8 @@ class SceneVertexArrays {
                     const gl::Buffer& light_records);
   void bind_view() const noexcept { glBindVertexArray(view_.id()); }
   void bind_light() const noexcept { glBindVertexArray(light_.id()); }
+  /// Where the camera's draws read the samples' two nodes of time from: two floats by vertex each.
+  void read_nodes(const gl::Buffer& before, const gl::Buffer& after) const noexcept;
 
  private:
   gl::VertexArray view_;

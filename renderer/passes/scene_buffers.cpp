@@ -9,61 +9,102 @@
 namespace emit::renderer {
 namespace {
 
+using Normal = std::array<std::int16_t, 4>;
+
 std::int16_t snorm16(float value) noexcept {
   return static_cast<std::int16_t>(std::lround(std::clamp(value, -1.0F, 1.0F) * 32767.0F));
 }
 
+Normal packed(const glm::vec3& n, float sky_frac) noexcept {
+  return {snorm16(n.x), snorm16(n.y), snorm16(n.z), snorm16(sky_frac)};
+}
+
+/// GL knows no empty storage.
+template <class T>
+gl::Buffer storage(std::vector<T>& data) {
+  if (data.empty()) data.emplace_back();
+  return gl::Buffer::from(std::span<const T>(data));
+}
+
 }  // namespace
 
-SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
-    : instances_(std::move(geometry.instances)) {
-  std::size_t vertex_count = 0;
-  std::size_t index_count = 0;
-  for (const scene::Mesh& mesh : geometry.meshes) {
-    vertex_count += mesh.positions_m.size();
-    index_count += mesh.indices.size();
-  }
-  std::vector<glm::vec3> positions;
-  std::vector<std::array<std::int16_t, 4>> normals;
+void SceneBuffers::add_meshes(std::span<const scene::Mesh> meshes) {
   std::vector<std::uint32_t> indices;
-  positions.reserve(std::max<std::size_t>(vertex_count, 1));
-  normals.reserve(std::max<std::size_t>(vertex_count, 1));
-  indices.reserve(std::max<std::size_t>(index_count, 1));
-
-  std::stable_sort(
-      instances_.begin(), instances_.end(),
-      [](const scene::Instance& a, const scene::Instance& b) { return a.mesh < b.mesh; });
   std::uint32_t next_instance = 0;
-  for (std::uint32_t m = 0; m < geometry.meshes.size(); ++m) {
-    const scene::Mesh& mesh = geometry.meshes[m];
+  for (std::uint32_t m = 0; m < meshes.size(); ++m) {
+    const scene::Mesh& mesh = meshes[m];
     MeshRange range;
-    range.base_vertex = static_cast<std::int32_t>(positions.size());
     const auto first = static_cast<std::uint32_t>(indices.size());
     for (const scene::Submesh& submesh : mesh.submeshes) {
       range.submeshes.push_back({first + submesh.first_index, submesh.index_count, submesh.material,
-                                 submesh.double_sided});
+                                 submesh.double_sided, 0, 0});
     }
-    range.whole = {first, static_cast<std::uint32_t>(mesh.indices.size()), 0, !mesh.closed};
+    range.whole = {first, static_cast<std::uint32_t>(mesh.indices.size()), 0, !mesh.closed, 0, 0};
     range.first_instance = next_instance;
     while (next_instance < instances_.size() && instances_[next_instance].mesh == m) {
       ++next_instance;
     }
     range.instance_count = next_instance - range.first_instance;
-
-    positions.insert(positions.end(), mesh.positions_m.begin(), mesh.positions_m.end());
-    for (const glm::vec3& n : mesh.normals) {
-      normals.push_back({snorm16(n.x), snorm16(n.y), snorm16(n.z), 0});
-    }
     indices.insert(indices.end(), mesh.indices.begin(), mesh.indices.end());
     meshes_.push_back(std::move(range));
     mesh_bounds_.push_back(mesh.bounds);
   }
-  if (positions.empty()) positions.emplace_back(0.0F);  // GL knows no empty storage
-  if (normals.empty()) normals.push_back({});
-  if (indices.empty()) indices.push_back(0);
-  positions_ = gl::Buffer::from(std::span<const glm::vec3>(positions));
-  normals_ = gl::Buffer::from(std::span<const std::array<std::int16_t, 4>>(normals));
-  indices_ = gl::Buffer::from(std::span<const std::uint32_t>(indices));
+  indices_ = storage(indices);
+}
+
+SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
+    : instances_(std::move(geometry.instances)) {
+  std::ranges::stable_sort(instances_, {}, &scene::Instance::mesh);
+  std::vector<glm::vec3> positions;
+  std::vector<Normal> normals;
+  std::vector<std::int32_t> base_vertex_of_mesh;
+  for (const scene::Mesh& mesh : geometry.meshes) {
+    base_vertex_of_mesh.push_back(static_cast<std::int32_t>(positions.size()));
+    positions.insert(positions.end(), mesh.positions_m.begin(), mesh.positions_m.end());
+    for (const glm::vec3& n : mesh.normals) normals.push_back(packed(n, 0.0F));
+  }
+  for (const scene::Instance& instance : instances_) {
+    base_vertex_.push_back(base_vertex_of_mesh[instance.mesh]);
+  }
+  positions_ = storage(positions);
+  normals_ = storage(normals);
+  add_meshes(geometry.meshes);
+}
+
+SceneBuffers::SceneBuffers(SampledScene scene) : instances_(std::move(scene.geometry.instances)) {
+  std::vector<scene::Mesh>& meshes = scene.geometry.meshes;
+  std::vector<std::vector<scene::Cluster>> clusters;
+  for (scene::Mesh& mesh : meshes) clusters.push_back(scene::cut_into_clusters(mesh));
+  add_meshes(meshes);
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    const std::uint32_t first_index = meshes_[m].whole.first_index;
+    for (scene::Cluster& cluster : clusters[m]) cluster.first_index += first_index;
+    std::size_t next = 0;
+    for (DrawRange& submesh : meshes_[m].submeshes) {
+      submesh.first_cluster = static_cast<std::uint32_t>(clusters_.size() + next);
+      const std::uint32_t end = submesh.first_index + submesh.index_count;
+      while (next < clusters[m].size() && clusters[m][next].first_index >= submesh.first_index &&
+             clusters[m][next].first_index < end) {
+        ++next;
+        ++submesh.cluster_count;
+      }
+    }
+    clusters_.insert(clusters_.end(), clusters[m].begin(), clusters[m].end());
+  }
+
+  std::vector<glm::vec3> positions(scene.sky_frac.size());
+  std::vector<Normal> normals(scene.sky_frac.size());
+  for (std::size_t i = 0; i < instances_.size(); ++i) {
+    const scene::Mesh& mesh = meshes[instances_[i].mesh];
+    const std::uint32_t first = scene.first_sample[i];
+    base_vertex_.push_back(static_cast<std::int32_t>(first));
+    for (std::size_t v = 0; v < mesh.positions_m.size(); ++v) {
+      positions[first + v] = mesh.positions_m[v];
+      normals[first + v] = packed(mesh.normals[v], scene.sky_frac[first + v]);
+    }
+  }
+  positions_ = storage(positions);
+  normals_ = storage(normals);
 }
 
 }  // namespace emit::renderer

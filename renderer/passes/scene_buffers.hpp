@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <glm/ext/vector_float4.hpp>
 #include <span>
 #include <vector>
 
+#include "emit/scene/clusters.hpp"
 #include "emit/scene/mesh.hpp"
 #include "gl/objects.hpp"
 #include "shared/frame_params.glsl.h"
+#include "surface/cached_surface.hpp"
 
 namespace emit::renderer {
 
@@ -19,40 +22,55 @@ class SceneBuffers {
     std::uint32_t index_count = 0;
     std::uint32_t material = 0;
     bool double_sided = false;
+    std::uint32_t first_cluster = 0;  ///< entries of clusters(); none: drawn whole or not at all
+    std::uint32_t cluster_count = 0;
   };
   struct MeshRange {
     DrawRange whole;  ///< all submeshes, for depth-only passes; one-sided if closed
     std::vector<DrawRange> submeshes;
-    std::int32_t base_vertex = 0;
     std::uint32_t first_instance = 0;  ///< instances() are grouped by mesh
     std::uint32_t instance_count = 0;
   };
 
+  /// One set of vertices per mesh, drawn whole.
   explicit SceneBuffers(scene::SceneGeometry geometry);
+  /// Vertex i of the buffers is sample i. Meshes are cut into clusters.
+  explicit SceneBuffers(SampledScene scene);
 
   [[nodiscard]] std::span<const MeshRange> meshes() const noexcept { return meshes_; }
   [[nodiscard]] std::span<const scene::Instance> instances() const noexcept { return instances_; }
+  /// Number of an instance's first vertex.
+  [[nodiscard]] std::int32_t base_vertex(std::uint32_t instance) const noexcept {
+    return base_vertex_[instance];
+  }
   [[nodiscard]] const scene::Aabb& mesh_bounds(std::uint32_t mesh) const noexcept {
     return mesh_bounds_[mesh];
   }
+  /// first_index of each counts from the start of the index buffer.
+  [[nodiscard]] std::span<const scene::Cluster> clusters() const noexcept { return clusters_; }
   [[nodiscard]] GLuint positions() const noexcept { return positions_.id(); }
   [[nodiscard]] GLuint normals() const noexcept { return normals_.id(); }
   [[nodiscard]] GLuint indices() const noexcept { return indices_.id(); }
 
  private:
+  void add_meshes(std::span<const scene::Mesh> meshes);
+
   std::vector<MeshRange> meshes_;
   std::vector<scene::Instance> instances_;
+  std::vector<std::int32_t> base_vertex_;
   std::vector<scene::Aabb> mesh_bounds_;
+  std::vector<scene::Cluster> clusters_;
   gl::Buffer positions_;  ///< float32 x 3
-  gl::Buffer normals_;    ///< snorm16 x 4
+  gl::Buffer normals_;    ///< snorm16 x 4; the fourth is the share of the sky, if sampled
   gl::Buffer indices_;    ///< uint32
 };
 
-/// One drawn instance: slot in the instance table and material, read per instance by the vertex
-/// shader.
+/// One drawn instance, read per instance by the vertex shader.
 struct DrawRecord {
-  std::uint32_t slot = 0;
+  glm::vec4 relworld_from_mesh_row[3];
   std::uint32_t material = 0;
+  std::uint32_t object = 0;  ///< 1 + index of the scenario's object
+  std::uint32_t unused[2] = {};
 };
 
 /// One instance drawn into a shadow map: rows of the affine clip_from_mesh, depth in 0..1.

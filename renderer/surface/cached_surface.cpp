@@ -9,7 +9,6 @@
 #include <glm/gtc/quaternion.hpp>
 #include <utility>
 
-#include "emit/scene/simplify.hpp"
 #include "surface/parallel.hpp"
 #include "surface/surface_patch.hpp"
 
@@ -123,6 +122,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
   options.lateral = options_.lateral;
+  options.exchange = options_.exchange;
   auto model = build_surface_model(surface, view, options, progress);
   if (!model) return tl::unexpected(std::move(model.error()));
   offset_m_ = PatchSampler(surface, options).offset_m();
@@ -238,15 +238,15 @@ CachedSurface::Range CachedSurface::take_changes(std::size_t storage) noexcept {
   return std::exchange(nodes_[storage].changes, {});
 }
 
-scene::SceneGeometry CachedSurface::drawn_geometry(std::vector<std::uint32_t>& first_sample) const {
-  scene::SceneGeometry out = geometry_;
+SampledScene CachedSurface::drawn_scene() const {
+  SampledScene scene{geometry_, {}, {}};
+  scene::SceneGeometry& out = scene.geometry;
   std::vector<std::uint32_t> order(out.instances.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return out.instances[i].mesh; });
-  first_sample.clear();
   for (std::uint32_t i = 0; i < order.size(); ++i) {
     out.instances[i] = geometry_.instances[order[i]];
-    first_sample.push_back(model_->first_sample[order[i]]);
+    scene.first_sample.push_back(model_->first_sample[order[i]]);
   }
   std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges;
   for (std::size_t m = 0; m < out.meshes.size(); ++m) {
@@ -263,9 +263,11 @@ scene::SceneGeometry CachedSurface::drawn_geometry(std::vector<std::uint32_t>& f
       mesh.positions_m.push_back(vertex.position_m);
       mesh.normals.push_back(vertex.normal);
     }
-    scene::order_for_drawing(mesh);
   }
-  return out;
+  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
+    scene.sky_frac.push_back(model_->samples.samples[i].sky_frac);
+  }
+  return scene;
 }
 
 }  // namespace emit::renderer

@@ -22,6 +22,13 @@ struct SampleVertex {
   float sun_frac = 0.0F;
 };
 
+/// A scene whose vertices are samples: every instance has its own.
+struct SampledScene {
+  scene::SceneGeometry geometry;            ///< instances grouped by mesh
+  std::vector<std::uint32_t> first_sample;  ///< by instance: sample of its mesh's first vertex
+  std::vector<float> sky_frac;              ///< by sample: share of the hemisphere that shows sky
+};
+
 /// The thermal method `cached`: temperatures live on samples of the surface. Time goes in intervals
 /// of thermal.first_step_s. While frames interpolate between the two ends of the current one, the
 /// next is computed, as much per frame as sim time has moved: no frame does more than its share,
@@ -74,9 +81,8 @@ class CachedSurface {
   [[nodiscard]] Range take_changes(std::size_t storage) noexcept;
 
   [[nodiscard]] const SurfaceModel& model() const noexcept { return *model_; }
-  /// The refined meshes as a scene whose instances are grouped by mesh, and for each instance the
-  /// number of its first sample.
-  [[nodiscard]] scene::SceneGeometry drawn_geometry(std::vector<std::uint32_t>& first_sample) const;
+  /// The refined meshes as a scene whose instances are grouped by mesh.
+  [[nodiscard]] SampledScene drawn_scene() const;
 
  private:
   CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,

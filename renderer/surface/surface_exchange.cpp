@@ -208,6 +208,10 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
         }
       }
       sample.first_seen = static_cast<std::uint32_t>(model.samples.seen.size());
+      if (!options.exchange) {
+        sample.far_frac = 1.0F - sample.sky_frac;
+        patches[p].seen[i].clear();
+      }
       for (const SeenPlace& place : patches[p].seen[i]) {
         const RefinedMesh& mesh = model.meshes[inputs.geometry.instances[place.instance].mesh];
         const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
@@ -226,8 +230,8 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
 }
 
 bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
-              std::vector<SurfacePatch>& patches, SurfaceModel& model,
-              const SurfaceProgress& report) {
+              const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
+              SurfaceModel& model, const SurfaceProgress& report) {
   const HistoryRecord& record = inputs.record;
   const std::size_t intervals = record.size();
   const std::size_t nodes = intervals + 1;
@@ -308,9 +312,10 @@ bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
     }
     std::swap(before, after);
   };
-  for (std::uint32_t i = 0; i <= kSweeps; ++i) {
+  const std::uint32_t sweeps = options.exchange || options.lateral ? kSweeps : 0;
+  for (std::uint32_t i = 0; i <= sweeps; ++i) {
     sweep(i == 0);
-    if (report && !report((i + 1.0) / (kSweeps + 1.0))) return false;
+    if (report && !report((i + 1.0) / (sweeps + 1.0))) return false;
   }
   return true;
 }

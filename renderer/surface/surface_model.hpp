@@ -26,7 +26,8 @@ struct SurfaceModelOptions {
   double tolerance_k = 0.1;
   std::size_t max_samples = 1'000'000;
   double max_blur_m = 0.5;
-  bool lateral = true;  ///< heat moves along the surface and across convex edges
+  bool lateral = true;   ///< heat moves along the surface and across convex edges
+  bool exchange = true;  ///< faces exchange radiation; false: what hides the sky is surroundings
 };
 
 /// Everything a sample carries after the history.

@@ -10,7 +10,7 @@
 namespace emit::renderer {
 namespace {
 
-constexpr std::uint32_t kViewRays = 128;
+constexpr std::uint32_t kViewRays = 256;
 /// Ray starts lie this far off the surface, more where float32 resolves less.
 constexpr float kLeastOffsetM = 5e-4F;
 constexpr float kOffsetFrac = 1e-6F;

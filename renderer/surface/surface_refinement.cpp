@@ -17,6 +17,8 @@ constexpr float kRecentS = 900.0F;
 /// Corners on which that much more of the sun's flux falls than on others have the edge of a shadow
 /// between them.
 constexpr float kEdgeSunFrac = 0.2F;
+/// Down to so many pixels that alone is reason to cut; finer, only what interpolation gets wrong.
+constexpr float kEdgeSunPx = 4.0F;
 /// Triangles of up to so many pixels are tested for being seen at all: by their corners and centre,
 /// which is too little for larger ones.
 constexpr float kTestedPx = 8.0F;
@@ -174,7 +176,7 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
                         std::min({offset_k(0), offset_k(1), offset_k(2)});
   const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
   if ((smooth || range_k > kSharpK) && patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
-  if (range_k < tolerance_k_) return false;
+  if (range_k < tolerance_k_ || longest_m < kEdgeSunPx * pixel_m) return false;
   const std::size_t count = in_.record.size();
   for (std::size_t i = recent_; i < count; ++i) {
     const auto sun = [&](std::size_t corner) {

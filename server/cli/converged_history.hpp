@@ -20,8 +20,9 @@ struct ConvergedOptions {
   std::uint32_t pixels = 20'000;
   /// Intervals of the history, uniform, 1 or more. Where a caster moves they are cut finer.
   std::uint32_t steps = 1440;
-  std::uint32_t sun_rays = 64;   ///< over the sun's disc
-  std::uint32_t sky_rays = 256;  ///< over the hemisphere
+  std::uint32_t sun_rays = 64;  ///< over the sun's disc
+  /// Over the hemisphere; 256 would leave 0.05 K RMS on a statue's folds.
+  std::uint32_t sky_rays = 4096;
   /// Called now and then with the share done; false stops. May be empty.
   std::function<bool(double done_frac)> progress;
 };

@@ -112,8 +112,10 @@ PaperRun make_paper_run(scene::ScenarioDesc scenario, const PaperMethod& method,
   scenario.thermal.spacing = scene::StepSpacing::uniform;  // as published
   const std::int64_t from_ns = scenario.thermal.history_start_ns;
   run.start_ns = observation_ns(scenario);
-  // The reference conducts heat straight down, as the published model does.
+  // One thermal model for both methods and the reference: heat is conducted straight down, and what
+  // hides the sky has the surroundings' temperature, as in the published one.
   scenario.thermal.lateral = false;
+  scenario.thermal.exchange = false;
   const double interval_s = method.method == scene::ThermalMethod::cached
                                 ? scenario.thermal.first_step_s
                                 : 1e-9 * static_cast<double>(run.start_ns - from_ns) / steps;

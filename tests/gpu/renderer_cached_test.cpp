@@ -336,8 +336,8 @@ TEST(RendererCached, WhatNoEyeSeesIsNotRefined) {
     (void)run.frame_k(2 * kHourNs, looking({east_m, 0.0, 1.5}, {0.0, 0.0, 0.5}));
     return run.renderer().scene_stats().samples;
   };
-  // Three times as many from the shaded side would do without the test of being seen.
-  EXPECT_GT(samples_from(-5.0), 5 * samples_from(5.0));
+  // Without the test of being seen it would be one and a half times as many.
+  EXPECT_GT(samples_from(-5.0), 2 * samples_from(5.0));
 }
 
 TEST(RendererCached, GroundUnderABodyDoesNotShowThroughAtItsFoot) {

@@ -61,7 +61,6 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
             static_cast<GLint>(2 * sizeof(gpu::BandParams) +
                                offsetof(gpu::BandParams, atmosphere_table)));
   // Tables fetched as texels of four floats.
-  EXPECT_EQ(sizeof(gpu::InstanceParams), 4U * 16U);
   EXPECT_EQ(sizeof(gpu::MaterialParams), 3U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, base_offset_k), 28U);

@@ -8,56 +8,13 @@
 #include <set>
 #include <vector>
 
-#include "emit/physics/constants.hpp"
 #include "emit/scene/simplify.hpp"
+#include "scene_sphere.hpp"
 
 namespace emit::scene {
 namespace {
 
 constexpr double kPixelRad = 1e-3;
-
-/// Sphere of radius 1 m with `rings` bands of latitude; its upper half may be of another material.
-Mesh sphere(std::uint32_t rings, bool two_materials) {
-  Mesh mesh;
-  const std::uint32_t columns = 2 * rings;
-  for (std::uint32_t r = 0; r <= rings; ++r) {
-    const double polar = physics::kPi * r / rings;
-    for (std::uint32_t c = 0; c < columns; ++c) {
-      const double turn = 2.0 * physics::kPi * c / columns;
-      mesh.normals.emplace_back(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn),
-                                std::cos(polar));
-    }
-  }
-  mesh.positions_m = mesh.normals;
-  const auto vertex = [columns](std::uint32_t r, std::uint32_t c) {
-    return r * columns + c % columns;
-  };
-  const auto band = [&](std::uint32_t r) {
-    for (std::uint32_t c = 0; c < columns; ++c) {
-      if (r > 0) {
-        for (const std::uint32_t v : {vertex(r, c), vertex(r + 1, c), vertex(r, c + 1)}) {
-          mesh.indices.push_back(v);
-        }
-      }
-      if (r + 1 < rings) {
-        for (const std::uint32_t v : {vertex(r, c + 1), vertex(r + 1, c), vertex(r + 1, c + 1)}) {
-          mesh.indices.push_back(v);
-        }
-      }
-    }
-  };
-  for (std::uint32_t r = 0; r < rings; ++r) {
-    if (r == 0 || (two_materials && r == rings / 2)) {
-      mesh.submeshes.push_back({static_cast<std::uint32_t>(mesh.indices.size()), 0,
-                                static_cast<std::uint32_t>(mesh.submeshes.size()), false});
-    }
-    band(r);
-    mesh.submeshes.back().index_count =
-        static_cast<std::uint32_t>(mesh.indices.size()) - mesh.submeshes.back().first_index;
-  }
-  for (const glm::vec3& p : mesh.positions_m) mesh.bounds.add(glm::dvec3(p));
-  return mesh;
-}
 
 SceneGeometry scene_of(Mesh mesh, std::uint32_t entity_id = 0) {
   SceneGeometry geometry;
@@ -136,45 +93,6 @@ TEST(Simplify, the_seam_between_two_materials_does_not_move) {
   const auto above = on_seam(mesh.submeshes[0]);
   EXPECT_EQ(above.size(), 400U);
   EXPECT_EQ(above, on_seam(mesh.submeshes[1]));
-}
-
-TEST(Simplify, order_for_drawing_keeps_the_triangles_and_brings_neighbours_together) {
-  Mesh mesh = sphere(30, true);
-  // Far apart on purpose.
-  for (const Submesh& submesh : mesh.submeshes) {
-    for (std::uint32_t i = 0; i + 3 < submesh.index_count / 2; i += 6) {
-      for (std::uint32_t k = 0; k < 3; ++k) {
-        std::swap(mesh.indices[submesh.first_index + i + k],
-                  mesh.indices[submesh.first_index + submesh.index_count - 3 - i + k]);
-      }
-    }
-  }
-  const auto triangles = [](const Mesh& m, const Submesh& submesh) {
-    std::set<std::array<std::uint32_t, 3>> out;
-    for (std::uint32_t i = 0; i < submesh.index_count; i += 3) {
-      std::array<std::uint32_t, 3> t{m.indices[submesh.first_index + i],
-                                     m.indices[submesh.first_index + i + 1],
-                                     m.indices[submesh.first_index + i + 2]};
-      std::ranges::rotate(t, std::ranges::min_element(t));  // same winding, any first corner
-      out.insert(t);
-    }
-    return out;
-  };
-  const auto repeats = [](const Mesh& m) {
-    std::size_t near = 0;
-    for (std::size_t i = 48; i < m.indices.size(); ++i) {
-      const auto window = std::span(m.indices).subspan(i - 48, 48);
-      if (std::ranges::find(window, m.indices[i]) != window.end()) ++near;
-    }
-    return near;
-  };
-  const Mesh before = mesh;
-  order_for_drawing(mesh);
-  for (std::size_t s = 0; s < 2; ++s) {
-    EXPECT_EQ(triangles(mesh, mesh.submeshes[s]), triangles(before, before.submeshes[s]));
-  }
-  EXPECT_GT(repeats(mesh), repeats(before));
-  EXPECT_GT(repeats(mesh), mesh.indices.size() * 3 / 4);
 }
 
 }  // namespace

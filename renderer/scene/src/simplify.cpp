@@ -107,13 +107,6 @@ double distance_m(const Aabb& box, const glm::dvec3& point_m) noexcept {
   return glm::length(glm::max(glm::max(box.min_m - point_m, point_m - box.max_m), glm::dvec3(0.0)));
 }
 
-void order_for_drawing(Mesh& mesh) {
-  for (const Submesh& submesh : mesh.submeshes) {
-    std::uint32_t* indices = mesh.indices.data() + submesh.first_index;
-    meshopt_optimizeVertexCache(indices, indices, submesh.index_count, mesh.positions_m.size());
-  }
-}
-
 SceneGeometry simplified(SceneGeometry geometry, const DetailView& view) {
   const std::vector<double> widths = pixel_widths(geometry, view);
   for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {

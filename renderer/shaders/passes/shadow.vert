@@ -4,7 +4,7 @@
 #include "shared/bindings.glsl.h"
 
 layout(location = EMIT_ATTR_POSITION) in vec3 position_mesh_m;
-layout(location = EMIT_ATTR_LIGHT_ROW) in vec4 clip_from_mesh_row[3];
+layout(location = EMIT_ATTR_ROW) in vec4 clip_from_mesh_row[3];
 
 void main() {
   vec4 p = vec4(position_mesh_m, 1.0);

@@ -24,12 +24,8 @@
 #define EMIT_TEX_MATERIALS 7
 #define EMIT_TEX_RELAXATION 8
 #define EMIT_TEX_BAND_LUT 9
-#define EMIT_TEX_INSTANCES 10
-#define EMIT_TEX_SPIN_UP 11
-#define EMIT_TEX_NODE_BEFORE 12
-#define EMIT_TEX_NODE_AFTER 13
-#define EMIT_TEX_SAMPLE_SKY 14
-#define EMIT_TEX_SURFACE 15
+#define EMIT_TEX_SPIN_UP 10
+#define EMIT_TEX_SURFACE 11
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
@@ -40,7 +36,9 @@
 #define EMIT_ATTR_POSITION 0
 #define EMIT_ATTR_NORMAL 1
 #define EMIT_ATTR_DRAW 2
-#define EMIT_ATTR_LIGHT_ROW 3  // three of them
+#define EMIT_ATTR_ROW 3  // three of them
+#define EMIT_ATTR_NODE_BEFORE 6
+#define EMIT_ATTR_NODE_AFTER 7
 
 #define EMIT_MAX_CASCADES 4
 #define EMIT_MAX_BANDS 4

@@ -17,14 +17,6 @@ struct FrameParams {
   vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
 };
 
-// One placed mesh, four texels of the instance table: rows of the affine relworld_from_mesh.
-struct InstanceParams {
-  vec4 relworld_from_mesh_row0;
-  vec4 relworld_from_mesh_row1;
-  vec4 relworld_from_mesh_row2;
-  vec4 ids;  // x = object id (1 + index of the scenario's object); cached: 4096 y + z = sample - gl_VertexID. Exact in float32
-};
-
 // Three texels of the material table.
 struct MaterialParams {
   float solar_absorptance_frac;

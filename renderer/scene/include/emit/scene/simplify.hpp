@@ -25,8 +25,4 @@ struct DetailView {
 /// million triangles.
 [[nodiscard]] SceneGeometry simplified(SceneGeometry geometry, const DetailView& view);
 
-/// Reorders the triangles of every submesh so that neighbours follow each other: a device then
-/// transforms a vertex about once. Vertices keep their places. Setup only.
-void order_for_drawing(Mesh& mesh);
-
 }  // namespace emit::scene

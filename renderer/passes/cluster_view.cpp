@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/cluster_view.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace emit::renderer {
+namespace {
+
+/// Of float32, relative, several operations deep.
+constexpr float kRounding = 4e-6F;
+
+}  // namespace
+
+std::array<glm::dvec3, 5> view_planes(const ViewVolume& view) noexcept {
+  const glm::dmat3& m = view.relworld_from_sensor;
+  return {m * glm::dvec3(1.0, 0.0, view.tan_half_h), m * glm::dvec3(-1.0, 0.0, view.tan_half_h),
+          m * glm::dvec3(0.0, 1.0, view.tan_half_v), m * glm::dvec3(0.0, -1.0, view.tan_half_v),
+          m * glm::dvec3(0.0, 0.0, 1.0)};
+}
+
+ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from_mesh) noexcept {
+  const glm::dmat3 linear(relworld_from_mesh);
+  const glm::dvec3 origin_m(relworld_from_mesh[3]);
+  const std::array<glm::dvec3, 5> normals = view_planes(view);
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    const glm::dvec3 in_mesh = glm::transpose(linear) * normals[i];
+    const double length = glm::length(in_mesh);
+    planes_[i] = {glm::vec3(in_mesh / length),
+                  static_cast<float>(glm::dot(normals[i], origin_m) / length)};
+  }
+  const glm::dvec3 eye_m = -(glm::inverse(linear) * origin_m);
+  eye_m_ = glm::vec3(eye_m);
+  margin_m_ = kRounding * static_cast<float>(glm::length(eye_m));
+  mirrored_ = glm::determinant(linear) < 0.0;
+}
+
+bool ClusterView::shows(const scene::Cluster& cluster, bool double_sided) const noexcept {
+  const float reach_m =
+      (1.0F + kRounding) * cluster.radius_m + margin_m_ + kRounding * glm::length(cluster.centre_m);
+  for (const Plane& plane : planes_) {
+    if (glm::dot(plane.normal, cluster.centre_m) + plane.offset_m < -reach_m) return false;
+  }
+  if (double_sided || mirrored_ || cluster.cone_cutoff >= 1.0F) return true;
+  const glm::vec3 way = cluster.cone_apex_m - eye_m_;
+  return glm::dot(way, cluster.cone_axis) <
+         cluster.cone_cutoff * glm::length(way) + reach_m * 1e-3F;
+}
+
+}  // namespace emit::renderer

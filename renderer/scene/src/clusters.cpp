@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/scene/clusters.hpp"
+
+#include <meshoptimizer.h>
+
+#include <cstring>
+#include <span>
+
+namespace emit::scene {
+namespace {
+
+/// Triangles alone do not fill a cluster whose vertices are all different.
+constexpr std::size_t kClusterVertices = 192;
+/// How much facing alike counts against lying close.
+constexpr float kConeWeight = 0.5F;
+
+glm::vec3 vec3(const float (&v)[3]) {
+  return {v[0], v[1], v[2]};
+}
+
+/// Clusters of one submesh, whose triangles are put into their order.
+void cut(Mesh& mesh, const Submesh& submesh, std::vector<Cluster>& clusters) {
+  const std::span<std::uint32_t> indices(mesh.indices.data() + submesh.first_index,
+                                         submesh.index_count);
+  const float* positions = &mesh.positions_m[0].x;
+  const std::size_t vertices = mesh.positions_m.size();
+  meshopt_optimizeVertexCache(indices.data(), indices.data(), indices.size(), vertices);
+  const std::size_t most =
+      meshopt_buildMeshletsBound(indices.size(), kClusterVertices, kClusterTriangles);
+  std::vector<meshopt_Meshlet> meshlets(most);
+  std::vector<unsigned int> own_vertices(most * kClusterVertices);
+  std::vector<unsigned char> corners(most * kClusterTriangles * 3);
+  meshlets.resize(meshopt_buildMeshlets(
+      meshlets.data(), own_vertices.data(), corners.data(), indices.data(), indices.size(),
+      positions, vertices, sizeof(glm::vec3), kClusterVertices, kClusterTriangles, kConeWeight));
+  std::vector<std::uint32_t> ordered;
+  ordered.reserve(indices.size());
+  std::vector<std::uint32_t> part;
+  for (const meshopt_Meshlet& meshlet : meshlets) {
+    const unsigned int* own = own_vertices.data() + meshlet.vertex_offset;
+    const unsigned char* corner = corners.data() + meshlet.triangle_offset;
+    part.assign(corner, corner + std::size_t{meshlet.triangle_count} * 3);
+    meshopt_optimizeVertexCache(part.data(), part.data(), part.size(), meshlet.vertex_count);
+    for (std::uint32_t& index : part) index = own[index];
+    const meshopt_Bounds bounds = meshopt_computeClusterBounds(part.data(), part.size(), positions,
+                                                               vertices, sizeof(glm::vec3));
+    Cluster cluster;
+    cluster.first_index = submesh.first_index + static_cast<std::uint32_t>(ordered.size());
+    cluster.index_count = static_cast<std::uint32_t>(part.size());
+    cluster.centre_m = vec3(bounds.center);
+    cluster.radius_m = bounds.radius;
+    cluster.cone_apex_m = vec3(bounds.cone_apex);
+    cluster.cone_axis = vec3(bounds.cone_axis);
+    cluster.cone_cutoff = bounds.cone_cutoff;
+    clusters.push_back(cluster);
+    ordered.insert(ordered.end(), part.begin(), part.end());
+  }
+  std::memcpy(indices.data(), ordered.data(), indices.size_bytes());
+}
+
+}  // namespace
+
+std::vector<Cluster> cut_into_clusters(Mesh& mesh) {
+  std::vector<Cluster> clusters;
+  for (const Submesh& submesh : mesh.submeshes) {
+    if (submesh.index_count > 0) cut(mesh, submesh, clusters);
+  }
+  return clusters;
+}
+
+}  // namespace emit::scene
