@@ -36,6 +36,9 @@ class IntervalRays {
               const Environment& environment, std::span<const PoseHistory> entities,
               const glm::dvec3& origin_world_m) noexcept;
 
+  /// The sun stands still in the direction of the unit vector `to_sun`, and no entity is there.
+  void hold(const glm::dvec3& to_sun) noexcept;
+
   /// Mean share of the sun's disc that the sample sees while the sun stands before its face; 0 if
   /// it never does. `blur_m`: standard deviation of the origin along the surface, which stands for
   /// the lateral conduction since then. Any thread; RT-safe.
@@ -61,6 +64,9 @@ class IntervalRays {
   [[nodiscard]] const MoverPlacement& placed(std::size_t mover, std::size_t ray) const noexcept {
     return placements_[ray * mover_radius_m_.size() + mover];
   }
+
+  /// Sends a ray to its place in the disc around `to_sun`.
+  void aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to_sun) noexcept;
 
   /// Rays that left a sample's face, and those of them that met nothing.
   struct Seen {

@@ -10,7 +10,6 @@
 namespace emit::renderer {
 namespace {
 
-constexpr std::uint32_t kViewRays = 128;
 /// Ray starts lie this far off the surface, more where float32 resolves less.
 constexpr float kLeastOffsetM = 5e-4F;
 constexpr float kOffsetFrac = 1e-6F;
@@ -23,7 +22,7 @@ constexpr float kUnderOffsets = 8.0F;
 }  // namespace
 
 PatchSampler::PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
-    : in_(inputs), options_(options), view_(kViewRays) {
+    : in_(inputs), options_(options), view_(kSampleViewRays) {
   const scene::Aabb& bounds = inputs.geometry.bounds;
   if (!bounds.empty()) {
     const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);

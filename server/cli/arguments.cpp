@@ -403,8 +403,10 @@ void Tool::add_model_commands() {
                  "sun-disc, wall-shadow, sky-view on the cpu: rays per row and measure")
       ->type_name("N")
       ->check(CLI::Range(1, 1 << 30));
-  app.add_option("--method", o.method, "wall-shadow, sky-view on the gpu: method of the frame")
-      ->check(CLI::IsMember({"per-frame"}));
+  app.add_option("--method", o.method,
+                 "sun-disc, wall-shadow, sky-view with --device gpu: thermal method whose "
+                 "visibility answers; default: per-frame")
+      ->check(CLI::IsMember({"per-frame", "cached"}));
   add_gpu(app, o.gpu_index);
   {
     auto [fit, f] = add<FitCommand>(
