@@ -165,7 +165,8 @@ float IntervalRays::hidden_sky_frac(const CasterRays& rays, const SurfaceSample&
       const glm::vec3 way = place.position_m - start_m;
       const float reach_m = kNearRadii * mover_radius_m_[m];
       if (!place.on || glm::dot(way, way) > reach_m * reach_m) continue;
-      const double r = std::sqrt((static_cast<double>(i) + 0.5) / kSkyRays);
+      const double share = (static_cast<double>(i) + 0.5) / kSkyRays;
+      const double r = std::sqrt(sky_ == SkyMeasure::cosine ? share : share * (2.0 - share));
       const double angle =
           2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(i) + 0.5));
       const glm::vec3 direction = static_cast<float>(r * std::cos(angle)) * tangents.u +

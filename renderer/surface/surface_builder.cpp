@@ -231,7 +231,7 @@ physics::Result<SurfaceModel> Builder::run() {
   }
   number_samples(in_, sampler_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
-  if (!exchange(in_, sampler_, patches_, model_, exchanged)) return stopped();
+  if (!exchange(in_, sampler_, options_, patches_, model_, exchanged)) return stopped();
   replace_covered();
   return std::move(model_);
 }

@@ -60,7 +60,7 @@ std::array<float, physics::kMaxFosterModes> Partners::weights(std::uint32_t mate
                                                               float distance_m) const {
   std::array<float, physics::kMaxFosterModes> out{};
   const double a = diffusivity_m2_s(in_.materials[material]);
-  const physics::FosterNetwork& network = in_.foster.materials()[material].network;
+  const physics::FosterNetwork& network = in_.history.network(material);
   for (std::size_t i = 0; i < network.count; ++i) {
     const double z = static_cast<double>(distance_m) / std::sqrt(a * network.modes[i].tau_s);
     out[i] = static_cast<float>(std::exp(-0.5 * z * z));
@@ -72,7 +72,7 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
   const SurfaceSample& own = patch.samples[index];
   const scene::Material& material = in_.materials[own.material];
   const double a = diffusivity_m2_s(material);
-  const physics::FosterNetwork& network = in_.foster.materials()[own.material].network;
+  const physics::FosterNetwork& network = in_.history.network(own.material);
   if (!(a > 0.0) || network.count == 0) return;
   const double slowest_s = network.modes[network.count - 1].tau_s;
   const float reach_m = std::min(kMaxReachM, 5.0F * static_cast<float>(std::sqrt(a * slowest_s)));
@@ -208,6 +208,10 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
         }
       }
       sample.first_seen = static_cast<std::uint32_t>(model.samples.seen.size());
+      if (!options.exchange) {
+        sample.far_frac = 1.0F - sample.sky_frac;
+        patches[p].seen[i].clear();
+      }
       for (const SeenPlace& place : patches[p].seen[i]) {
         const RefinedMesh& mesh = model.meshes[inputs.geometry.instances[place.instance].mesh];
         const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
@@ -226,8 +230,8 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
 }
 
 bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
-              std::vector<SurfacePatch>& patches, SurfaceModel& model,
-              const SurfaceProgress& report) {
+              const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
+              SurfaceModel& model, const SurfaceProgress& report) {
   const HistoryRecord& record = inputs.record;
   const std::size_t intervals = record.size();
   const std::size_t nodes = intervals + 1;
@@ -308,9 +312,10 @@ bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
     }
     std::swap(before, after);
   };
-  for (std::uint32_t i = 0; i <= kSweeps; ++i) {
+  const std::uint32_t sweeps = options.exchange || options.lateral ? kSweeps : 0;
+  for (std::uint32_t i = 0; i <= sweeps; ++i) {
     sweep(i == 0);
-    if (report && !report((i + 1.0) / (kSweeps + 1.0))) return false;
+    if (report && !report((i + 1.0) / (sweeps + 1.0))) return false;
   }
   return true;
 }

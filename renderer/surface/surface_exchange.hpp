@@ -16,7 +16,7 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
 /// the exchange has settled (Jacobi sweeps over whole histories, so the result does not depend on
 /// the order of samples). Fills states and outputs of the model. False when `report` stopped it.
 [[nodiscard]] bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
-                            std::vector<SurfacePatch>& patches, SurfaceModel& model,
-                            const SurfaceProgress& report);
+                            const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
+                            SurfaceModel& model, const SurfaceProgress& report);
 
 }  // namespace emit::renderer

@@ -26,7 +26,8 @@ struct SurfaceModelOptions {
   double tolerance_k = 0.1;
   std::size_t max_samples = 1'000'000;
   double max_blur_m = 0.5;
-  bool lateral = true;  ///< heat moves along the surface and across convex edges
+  bool lateral = true;   ///< heat moves along the surface and across convex edges
+  bool exchange = true;  ///< faces exchange radiation; false: what hides the sky is surroundings
 };
 
 /// Everything a sample carries after the history.
@@ -50,7 +51,7 @@ struct SurfaceInputs {
   std::span<const std::int32_t> mover_of_object;  ///< -1: static
   const CasterRays& rays;
   const SampleHeat& heat;
-  const FosterHistory& foster;
+  const SurfaceHistory& history;
   const HistoryRecord& record;
   std::span<const MoverPlacement> movers_now;
 };
