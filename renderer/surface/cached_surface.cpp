@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "emit/scene/simplify.hpp"
-#include "surface/parallel.hpp"
 #include "surface/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -58,6 +57,7 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
       extended_(scenario.thermal.model == scene::ThermalModel::foster),
       heat_(heat_of(scenario.thermal, materials_, networks, reference_k)),
       interval_(heat_.sized_interval()),
+      workers_(WorkerPool::all_cores()),
       interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
@@ -181,7 +181,7 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
   const SurfaceSamples& all = model_->samples;
   const std::uint32_t first = done_;
   if (last <= first) return;
-  run_parallel(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
+  workers_.run(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = first + begin; i < first + end; ++i) {
       const SurfaceSample& sample = all.samples[i];
       SampleDrive drive;

@@ -13,6 +13,7 @@
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
 #include "surface/surface_model.hpp"
+#include "surface/worker_pool.hpp"
 
 namespace emit::renderer {
 
@@ -28,7 +29,7 @@ struct SampleVertex {
 /// and the result depends on the inputs alone.
 ///
 /// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
-/// nothing of its own; everything else is setup.
+/// nothing, on any thread; everything else is setup.
 class CachedSurface {
  public:
   struct Inputs {
@@ -111,6 +112,7 @@ class CachedSurface {
   SampleHeat heat_;
   std::optional<IntervalRays> interval_rays_;
   HeatInterval interval_;
+  WorkerPool workers_;
   float offset_m_ = 0.0F;
   std::vector<MoverPlacement> movers_now_;
   std::optional<SurfaceModel> model_;
