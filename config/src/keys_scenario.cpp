@@ -340,7 +340,7 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           EMIT_FIELD(method),
           "How the history is evaluated. per-frame: all steps again for every "
           "pixel of every frame. cached: once, on samples of the surface that "
-          "are carried on from interval to interval (foster only)."),
+          "are carried on from interval to interval."),
       number<ThermalOptions>("tolerance_k", "K", above_to(0, 50), EMIT_FIELD(tolerance_k),
                              "Aimed-at error of surface temperatures. foster: history steps are "
                              "split until halving them changes less. Not used by emit2014."),
@@ -393,12 +393,12 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "cached: most thermal samples, about 1.5 kB each; those of the meshes' own "
           "vertices are always taken."),
       boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
-                              "cached: heat is also conducted along the surface and across convex "
-                              "edges."),
+                              "cached, foster: heat is also conducted along the surface and across "
+                              "convex edges. emit2014 conducts straight down."),
       boolean<ThermalOptions>("exchange", EMIT_FIELD(exchange),
-                              "cached: faces exchange radiation with each other; false: they see "
-                              "the surroundings' temperature where others hide the sky, as with "
-                              "per-frame."),
+                              "cached, foster: faces exchange radiation with each other; false: "
+                              "they see the surroundings' temperature where others hide the sky, "
+                              "as with per-frame and emit2014."),
   };
   return keys;
 }

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "emit/physics/surface_balance.hpp"
 #include "history/environment.hpp"
 #include "history/foster_history.hpp"
+#include "history/surface_history.hpp"
 #include "passes/foster_setup.hpp"
 
 namespace emit::renderer {
@@ -13,12 +13,6 @@ namespace {
 
 // Offsets of the surroundings' temperature are from here: their float64 does not care.
 constexpr double kReferenceK = 295.0;
-
-SurfaceForcing with_environment(const physics::SunPosition& sun, const physics::Forcing& weather) {
-  SurfaceForcing forcing = open_forcing(sun, weather);
-  forcing.environment_w_m2 = physics::environment_input_w_m2(1.0, weather.environment_k);
-  return forcing;
-}
 
 }  // namespace
 
@@ -42,10 +36,7 @@ physics::Result<std::vector<IntervalForcing>> surface_forcing(
     return out;
   }
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const HistoryInterval interval = interval_between(nodes_ns[i], nodes_ns[i + 1], environment);
-    out[i] = {with_environment(interval.sun_begin, interval.forcing_begin),
-              with_environment(interval.sun_end, interval.forcing_end),
-              static_cast<double>(interval.end_ns - interval.begin_ns) * 1e-9};
+    out[i] = weather_forcing(interval_between(nodes_ns[i], nodes_ns[i + 1], environment));
   }
   return out;
 }

@@ -36,13 +36,6 @@ std::vector<glm::dvec3> all_eyes(const scene::Trajectory& keys) {
   return eyes_world_m;
 }
 
-FosterHistory foster_of(const scene::ScenarioDesc& scenario, std::vector<FosterMaterial> materials,
-                        const Environment& environment) {
-  const FosterMaterial surroundings = materials[materials.size() - 1];
-  materials.pop_back();
-  return FosterHistory(scenario, std::move(materials), surroundings, environment, kReferenceK);
-}
-
 RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& request) {
   RefineView view;
   view.pixel_rad = pixel_rad(sensor);
@@ -98,14 +91,16 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       history_of_object_(histories_of_objects(scenario)),
       history_(history),
       plan_(scenario.thermal),
-      foster_(foster_of(scenario, std::move(foster_materials), history.environment)),
+      surface_history_(scenario.thermal.steps, make_foster(scenario, std::move(foster_materials),
+                                                           history.environment, kReferenceK)),
       surface_(std::move(surface)) {}
 
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
   const RefineView view = refine_view(sensor_, request);
-  auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, foster_, progress);
+  auto ready =
+      surface_->prepare(request.thermal_time_ns, view, inputs, plan_, surface_history_, progress);
   if (!ready) return ready;
   refined_eyes_ = eyes_around(view.eyes_world_m, static_bounds_);
   drawn_.reset();  // its device memory goes before that of the next one is taken
@@ -138,11 +133,13 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
 
 void CachedStage::prepare(const FrameRequest& request, CameraSetup&,
                           gpu::FrameParams& frame) noexcept {
-  surface_->advance(request.thermal_time_ns, {history_.environment, history_.entities}, foster_);
+  surface_->advance(request.thermal_time_ns, {history_.environment, history_.entities},
+                    surface_history_);
   frame.samples.x = surface_->fraction();
   sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
   forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);
-  forcing_now_.environment_k = foster_.surroundings_now_k();
+  forcing_now_.environment_k =
+      surface_history_.surroundings_now_k().value_or(forcing_now_.environment_k);
 }
 
 void CachedStage::upload() noexcept {

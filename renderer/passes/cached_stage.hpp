@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "history/foster_history.hpp"
 #include "history/step_plan.hpp"
+#include "history/surface_history.hpp"
 #include "passes/thermal_stage.hpp"
 #include "surface/cached_surface.hpp"
 
@@ -57,7 +57,7 @@ class CachedStage final : public ThermalStage {
   std::vector<std::int32_t> history_of_object_;
   const SceneHistory& history_;
   StepPlan plan_;
-  FosterHistory foster_;
+  SurfaceHistory surface_history_;
   std::unique_ptr<CachedSurface> surface_;
   std::unique_ptr<DrawnScene> drawn_;
   physics::SunPosition sun_now_;

@@ -9,7 +9,6 @@
 #include <glm/gtc/quaternion.hpp>
 #include <utility>
 
-#include "surface/parallel.hpp"
 #include "surface/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -35,33 +34,39 @@ std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size
   return radius_m;
 }
 
+SampleHeat heat_of(const scene::ThermalOptions& options, std::span<const scene::Material> materials,
+                   std::span<const FosterMaterial> networks, double reference_k) {
+  if (options.model == scene::ThermalModel::emit2014) {
+    return SampleHeat(Emit2014Heat(materials, options.initial_k, reference_k));
+  }
+  return SampleHeat(FosterHeat(networks, reference_k, std::min(0.02, 0.2 * options.tolerance_k)));
+}
+
 }  // namespace
 
 CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
                              std::vector<std::int32_t> mover_of_object,
-                             std::span<const FosterMaterial> materials, CasterRays rays,
+                             std::span<const FosterMaterial> networks, CasterRays rays,
                              double reference_k)
     : geometry_(std::move(geometry)),
       materials_(geometry_.materials),
       options_(scenario.thermal),
       mover_of_object_(std::move(mover_of_object)),
       rays_(std::move(rays)),
-      heat_(materials, reference_k, std::min(0.02, 0.2 * scenario.thermal.tolerance_k)),
+      extended_(scenario.thermal.model == scene::ThermalModel::foster),
+      heat_(heat_of(scenario.thermal, materials_, networks, reference_k)),
+      interval_(heat_.sized_interval()),
+      workers_(WorkerPool::all_cores()),
       interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
-  interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_));
-  interval_.ladders.resize(materials.size());
+  interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
 }
 
 physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-    std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> materials,
+    std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
     double reference_k) {
-  if (scenario.thermal.model != scene::ThermalModel::foster) {
-    return physics::make_error(physics::ErrorCode::config,
-                               "thermal.method \"cached\" needs thermal.model \"foster\"");
-  }
   auto rays = CasterRays::create(geometry);
   if (!rays) return tl::unexpected(std::move(rays.error()));
   // Entities and what shades must be numbered alike.
@@ -76,7 +81,7 @@ physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     ++mover;
   }
   return std::unique_ptr<CachedSurface>(new CachedSurface(scenario, std::move(geometry),
-                                                          std::move(mover_of_object), materials,
+                                                          std::move(mover_of_object), networks,
                                                           std::move(*rays), reference_k));
 }
 
@@ -105,24 +110,25 @@ std::uint64_t CachedSurface::revision(const Inputs& inputs) const noexcept {
 
 physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineView& view,
                                              const Inputs& inputs, StepPlan& plan,
-                                             FosterHistory& foster,
+                                             SurfaceHistory& history,
                                              const SurfaceProgress& progress) {
   const std::int64_t start_ns =
       options_.history_start_ns +
       std::max<std::int64_t>(0, now_ns - options_.history_start_ns) / interval_ns_ * interval_ns_;
   place_movers(start_ns, inputs.entities);
   plan.update(start_ns, inputs.environment, inputs.entities);
-  foster.update(plan, inputs.environment);
+  history.update(plan, inputs.environment);
   const HistoryRecord record =
-      make_history_record(plan, foster, heat_, inputs.environment, inputs.entities, *interval_rays_,
-                          rays_.origin_world_m());
+      make_history_record(plan, history, heat_, inputs.environment, inputs.entities,
+                          *interval_rays_, rays_.origin_world_m());
   const SurfaceInputs surface{geometry_, materials_, mover_of_object_, rays_,
-                              heat_,     foster,     record,           movers_now_};
+                              heat_,     history,    record,           movers_now_};
   SurfaceModelOptions options;
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
-  options.lateral = options_.lateral;
-  options.exchange = options_.exchange;
+  // The published model conducts straight down and knows no other surface.
+  options.lateral = extended_ && options_.lateral;
+  options.exchange = extended_ && options_.exchange;
   auto model = build_surface_model(surface, view, options, progress);
   if (!model) return tl::unexpected(std::move(model.error()));
   offset_m_ = PatchSampler(surface, options).offset_m();
@@ -140,28 +146,28 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   first.states = std::move(model_->states);
   first.outputs = std::move(model_->outputs);
   first.at_ns = start_ns;
-  first.surroundings = foster.surroundings();
+  first.surroundings = history.surroundings();
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
   }
   revision_ = revision(inputs);
   turn_ = static_cast<std::uint32_t>(record.size());
   node(1).at_ns = start_ns + interval_ns_;
-  begin_interval(0, inputs, foster);
+  begin_interval(0, inputs, history);
   compute(0, static_cast<std::uint32_t>(count));
   node(2).at_ns = node(1).at_ns + interval_ns_;
-  begin_interval(1, inputs, foster);
+  begin_interval(1, inputs, history);
   for (Node& node : nodes_) node.changes = {0, model_->drawn_samples};
   return {};
 }
 
 void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
-                                   FosterHistory& foster) noexcept {
+                                   SurfaceHistory& history) noexcept {
   const Node& from = node(index);
   Node& to = node(index + 1);
-  foster.restore_surroundings(from.surroundings);
-  interval_.forcing = foster.extend(from.at_ns, to.at_ns, inputs.environment);
-  to.surroundings = foster.surroundings();
+  history.restore_surroundings(from.surroundings);
+  interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
+  to.surroundings = history.surroundings();
   heat_.prepare(interval_);
   interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment, inputs.entities,
                          rays_.origin_world_m());
@@ -174,7 +180,7 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
   const SurfaceSamples& all = model_->samples;
   const std::uint32_t first = done_;
   if (last <= first) return;
-  run_parallel(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
+  workers_.run(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = first + begin; i < first + end; ++i) {
       const SurfaceSample& sample = all.samples[i];
       SampleDrive drive;
@@ -210,22 +216,22 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
 }
 
 void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
-                            FosterHistory& foster) noexcept {
+                            SurfaceHistory& history) noexcept {
   const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
   if (const std::uint64_t revision_now = revision(inputs); revision_now != revision_) {
     // The host has changed the weather, or an entity came, went, stopped or left: the interval of
     // now was computed without that.
     revision_ = revision_now;
-    begin_interval(0, inputs, foster);
+    begin_interval(0, inputs, history);
     compute(0, count);
-    begin_interval(1, inputs, foster);
+    begin_interval(1, inputs, history);
   }
   while (now_ns > node(1).at_ns) {
     compute(1, count);
     rotate();
     node(2).at_ns = node(1).at_ns + interval_ns_;
     node(2).changes = {};
-    begin_interval(1, inputs, foster);
+    begin_interval(1, inputs, history);
   }
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);

@@ -9,10 +9,11 @@
 
 #include "emit/scene/scene_desc.hpp"
 #include "history/environment.hpp"
-#include "history/foster_history.hpp"
 #include "history/pose_history.hpp"
 #include "history/step_plan.hpp"
+#include "history/surface_history.hpp"
 #include "surface/surface_model.hpp"
+#include "surface/worker_pool.hpp"
 
 namespace emit::renderer {
 
@@ -35,7 +36,7 @@ struct SampledScene {
 /// and the result depends on the inputs alone.
 ///
 /// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
-/// nothing of its own; everything else is setup.
+/// nothing, on any thread; everything else is setup.
 class CachedSurface {
  public:
   struct Inputs {
@@ -48,18 +49,18 @@ class CachedSurface {
     std::uint32_t count = 0;
   };
 
-  /// `mover_of_object`: index of an object's PoseHistory, -1: static. Errors: config (thermal.model
-  /// other than foster, an entity without triangles), those of CasterRays.
+  /// `mover_of_object`: index of an object's PoseHistory, -1: static. `networks` by material, none
+  /// for emit2014. Errors: config (an entity without triangles), those of CasterRays.
   [[nodiscard]] static physics::Result<std::unique_ptr<CachedSurface>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-      std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> materials,
+      std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
       double reference_k);
 
   /// Samples the surface as it is to be seen at `now_ns` and computes the interval that holds it.
-  /// `plan` and `foster` are brought there. Setup: seconds.
+  /// `plan` and `history` are brought there. Setup: seconds.
   [[nodiscard]] physics::Result<void> prepare(std::int64_t now_ns, const RefineView& view,
                                               const Inputs& inputs, StepPlan& plan,
-                                              FosterHistory& foster,
+                                              SurfaceHistory& history,
                                               const SurfaceProgress& progress);
 
   /// True when frames at `now_ns` need prepare() first: sim time went back behind the current
@@ -67,7 +68,7 @@ class CachedSurface {
   [[nodiscard]] bool stale(std::int64_t now_ns) const noexcept;
 
   /// Brings the samples to `now_ns`. @pre !stale(now_ns)
-  void advance(std::int64_t now_ns, const Inputs& inputs, FosterHistory& foster) noexcept;
+  void advance(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
 
   /// Way of `now_ns` of the last advance() between the two nodes.
   [[nodiscard]] float fraction() const noexcept { return fraction_; }
@@ -86,8 +87,8 @@ class CachedSurface {
 
  private:
   CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-                std::vector<std::int32_t> mover_of_object,
-                std::span<const FosterMaterial> materials, CasterRays rays, double reference_k);
+                std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
+                CasterRays rays, double reference_k);
 
   /// What one node of time needs to go on from.
   struct Node {
@@ -101,7 +102,7 @@ class CachedSurface {
 
   void place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities);
   /// Forcing, gains and rays from `node` to the next one, which nothing has been computed of yet.
-  void begin_interval(std::size_t node, const Inputs& inputs, FosterHistory& foster) noexcept;
+  void begin_interval(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
   /// Advances the samples up to `last` from `node` to the next one.
   void compute(std::size_t node, std::uint32_t last) noexcept;
   void rotate() noexcept { ring_ = (ring_ + 1) % 3; }
@@ -113,9 +114,11 @@ class CachedSurface {
   scene::ThermalOptions options_;
   std::vector<std::int32_t> mover_of_object_;
   CasterRays rays_;
+  bool extended_ = false;  ///< thermal.model foster
   SampleHeat heat_;
   std::optional<IntervalRays> interval_rays_;
   HeatInterval interval_;
+  WorkerPool workers_;
   float offset_m_ = 0.0F;
   std::vector<MoverPlacement> movers_now_;
   std::optional<SurfaceModel> model_;

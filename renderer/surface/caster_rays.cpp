@@ -154,6 +154,16 @@ std::uint32_t CasterRays::blocked_in_body(std::size_t mover,
   return blocked_mover(mover, MoverPlacement{}, rays);
 }
 
+std::uint32_t CasterRays::blocked(std::span<const CasterRay> rays,
+                                  const CasterSelection& selection) const noexcept {
+  std::uint32_t blocked = selection.fixed ? blocked_static(rays) : 0;
+  const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
+  for (std::size_t m = 0; m < count && blocked != all_of(rays); ++m) {
+    blocked |= blocked_mover(m, selection.movers[m], rays);
+  }
+  return blocked;
+}
+
 std::optional<CasterHit> CasterRays::first_hit(
     const CasterRay& ray, std::span<const MoverPlacement> movers) const noexcept {
   CasterHit hit;

@@ -87,6 +87,10 @@ class CasterRays {
   [[nodiscard]] std::uint32_t blocked_in_body(std::size_t mover,
                                               std::span<const CasterRay> rays) const noexcept;
 
+  /// The same for everything that is selected.
+  [[nodiscard]] std::uint32_t blocked(std::span<const CasterRay> rays,
+                                      const CasterSelection& selection) const noexcept;
+
   /// The nearest face of static geometry and of the movers where `movers` puts them.
   [[nodiscard]] std::optional<CasterHit> first_hit(
       const CasterRay& ray, std::span<const MoverPlacement> movers) const noexcept;

@@ -3,23 +3,24 @@
 
 namespace emit::renderer {
 
-HistoryRecord make_history_record(const StepPlan& plan, const FosterHistory& foster,
+HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,
                                   const SampleHeat& heat, const Environment& environment,
                                   std::span<const PoseHistory> entities,
                                   const IntervalRays& prototype, const glm::dvec3& origin_world_m) {
   HistoryRecord record;
   const auto heat_interval = [&](const IntervalForcing& forcing) {
-    HeatInterval interval{forcing, std::vector<physics::FosterLadder>(foster.materials().size())};
+    HeatInterval interval = heat.sized_interval();
+    interval.forcing = forcing;
     heat.prepare(interval);
     return interval;
   };
-  for (const IntervalForcing& forcing : foster.tail())
+  for (const IntervalForcing& forcing : history.tail())
     record.tail.push_back(heat_interval(forcing));
   const auto intervals = plan.intervals();
   const std::int64_t now_ns = intervals.back().end_ns;
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     const HistoryInterval& interval = intervals[i];
-    record.intervals.push_back(heat_interval(foster.intervals()[i]));
+    record.intervals.push_back(heat_interval(history.intervals()[i]));
     IntervalRays& rays = record.rays.emplace_back(prototype);
     rays.update(interval.begin_ns, interval.end_ns, static_cast<std::uint32_t>(i), environment,
                 entities, origin_world_m);

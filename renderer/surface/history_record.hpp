@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "history/foster_history.hpp"
 #include "history/step_plan.hpp"
+#include "history/surface_history.hpp"
 #include "surface/interval_rays.hpp"
 #include "surface/sample_heat.hpp"
 
@@ -21,8 +21,8 @@ struct HistoryRecord {
   [[nodiscard]] std::size_t size() const noexcept { return intervals.size(); }
 };
 
-/// Record of the plan's intervals. Setup only. @pre foster.update() has seen the plan
-[[nodiscard]] HistoryRecord make_history_record(const StepPlan& plan, const FosterHistory& foster,
+/// Record of the plan's intervals. Setup only. @pre history.update() has seen the plan
+[[nodiscard]] HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,
                                                 const SampleHeat& heat,
                                                 const Environment& environment,
                                                 std::span<const PoseHistory> entities,

@@ -10,6 +10,7 @@
 
 #include "emit/physics/constants.hpp"
 #include "history/step_plan.hpp"
+#include "surface/tangents.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -21,17 +22,6 @@ constexpr std::size_t kSkyRays = 16;
 
 double fraction_of(double x) noexcept {
   return x - std::floor(x);
-}
-
-struct Tangents {
-  glm::vec3 u, v;
-};
-/// Duff et al. (2017), "Building an orthonormal basis, revisited".
-Tangents tangents_of(const glm::vec3& n) noexcept {
-  const float sign = std::copysign(1.0F, n.z);
-  const float a = -1.0F / (sign + n.z);
-  const float b = n.x * n.y * a;
-  return {{1.0F + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}};
 }
 
 /// Inverse of the normal distribution.
@@ -46,6 +36,11 @@ double normal_deviate(double u) noexcept {
   return 0.5 * (low + high);
 }
 
+/// From the disc's rim inwards: if the first packet agrees, so does next to all of the disc.
+constexpr std::size_t place_in_disc(std::size_t ray) noexcept {
+  return kSunRays - 1 - ray;
+}
+
 std::array<double, kSunRays> normal_deviates() noexcept {
   std::array<double, kSunRays> out{};
   for (std::size_t i = 0; i < kSunRays; ++i)
@@ -55,37 +50,38 @@ std::array<double, kSunRays> normal_deviates() noexcept {
 
 }  // namespace
 
+void IntervalRays::aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to_sun) noexcept {
+  static const std::array<double, kSunRays> deviates = normal_deviates();
+  const std::size_t place = place_in_disc(ray);
+  const double radius = std::tan(physics::kSunSemiAngleRad) *
+                        std::sqrt((static_cast<double>(place) + 0.5) / kSunRays);
+  // The golden ratio moves the pattern from turn to turn.
+  const double angle =
+      2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(place) + 0.5) + 0.37 * turn);
+  const glm::dvec3 u = glm::normalize(glm::cross(
+      std::abs(to_sun.z) < 0.9 ? glm::dvec3(0.0, 0.0, 1.0) : glm::dvec3(1.0, 0.0, 0.0), to_sun));
+  const glm::dvec3 v = glm::cross(to_sun, u);
+  direction_[ray] =
+      glm::vec3(glm::normalize(to_sun + radius * (std::cos(angle) * u + std::sin(angle) * v)));
+  spread_[ray] = glm::vec2(static_cast<float>(deviates[(place * 23 + turn * 3) % kSunRays]),
+                           static_cast<float>(deviates[(place * 45 + 5 + turn * 9) % kSunRays]));
+}
+
 void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
                           const Environment& environment, std::span<const PoseHistory> entities,
                           const glm::dvec3& origin_world_m) noexcept {
-  static const std::array<double, kSunRays> deviates = normal_deviates();
   const std::size_t movers = mover_radius_m_.size();
   any_mover_on_ = false;
   sun_up_ = false;
   for (std::size_t i = 0; i < kSunRays; ++i) {
-    // From the disc's rim inwards: if the first packet agrees, so does next to all of the disc. Odd
-    // multipliers permute the strata; the golden ratio moves the pattern from turn to turn.
-    const std::size_t place_in_disc = kSunRays - 1 - i;
-    const std::size_t stratum = (place_in_disc * 27 + turn * 5) % kSunRays;
+    // Odd multipliers permute the strata of time.
+    const std::size_t stratum = (place_in_disc(i) * 27 + turn * 5) % kSunRays;
     if (stratum == kSunRays / 2) middle_ray_ = i;
     const double t = (static_cast<double>(stratum) + 0.5) / kSunRays;
     const auto at_ns = begin_ns + std::llround(t * static_cast<double>(end_ns - begin_ns));
     const physics::SunPosition sun = environment.sun_at(at_ns);
     sun_up_ = sun_up_ || sun.elevation.value() > StepPlan::kMinSunElevationRad;
-    const glm::dvec3 to_sun = sun.direction_enu;
-    const double radius = std::tan(physics::kSunSemiAngleRad) *
-                          std::sqrt((static_cast<double>(place_in_disc) + 0.5) / kSunRays);
-    const double angle =
-        2.0 * physics::kPi *
-        fraction_of(kGolden * (static_cast<double>(place_in_disc) + 0.5) + 0.37 * turn);
-    const glm::dvec3 u = glm::normalize(glm::cross(
-        std::abs(to_sun.z) < 0.9 ? glm::dvec3(0.0, 0.0, 1.0) : glm::dvec3(1.0, 0.0, 0.0), to_sun));
-    const glm::dvec3 v = glm::cross(to_sun, u);
-    direction_[i] =
-        glm::vec3(glm::normalize(to_sun + radius * (std::cos(angle) * u + std::sin(angle) * v)));
-    spread_[i] =
-        glm::vec2(static_cast<float>(deviates[(place_in_disc * 23 + turn * 3) % kSunRays]),
-                  static_cast<float>(deviates[(place_in_disc * 45 + 5 + turn * 9) % kSunRays]));
+    aim(i, turn, sun.direction_enu);
     for (std::size_t m = 0; m < movers; ++m) {
       const TrajectoryState state = entities[m].at(at_ns);
       MoverPlacement& place = placements_[i * movers + m];
@@ -95,6 +91,13 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
       any_mover_on_ = any_mover_on_ || state.on;
     }
   }
+}
+
+void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {
+  for (MoverPlacement& place : placements_) place.on = false;
+  any_mover_on_ = false;
+  sun_up_ = to_sun.z > std::sin(StepPlan::kMinSunElevationRad);
+  for (std::size_t i = 0; i < kSunRays; ++i) aim(i, 0, to_sun);
 }
 
 glm::vec3 IntervalRays::normal(const SurfaceSample& sample) const noexcept {
@@ -162,7 +165,8 @@ float IntervalRays::hidden_sky_frac(const CasterRays& rays, const SurfaceSample&
       const glm::vec3 way = place.position_m - start_m;
       const float reach_m = kNearRadii * mover_radius_m_[m];
       if (!place.on || glm::dot(way, way) > reach_m * reach_m) continue;
-      const double r = std::sqrt((static_cast<double>(i) + 0.5) / kSkyRays);
+      const double share = (static_cast<double>(i) + 0.5) / kSkyRays;
+      const double r = std::sqrt(sky_ == SkyMeasure::cosine ? share : share * (2.0 - share));
       const double angle =
           2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(i) + 0.5));
       const glm::vec3 direction = static_cast<float>(r * std::cos(angle)) * tangents.u +

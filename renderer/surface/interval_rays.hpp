@@ -25,9 +25,11 @@ inline constexpr std::size_t kSunRays = 4 * kPacketRays;
 /// penumbra comes out as a fine staircase and not as noise.
 class IntervalRays {
  public:
-  /// By entity: the radius of its geometry around the body's origin, in m.
-  explicit IntervalRays(std::vector<float> mover_radius_m)
+  /// By entity: the radius of its geometry around the body's origin, in m. `sky` says which
+  /// directions hidden_sky_frac() weighs.
+  explicit IntervalRays(std::vector<float> mover_radius_m, SkyMeasure sky = SkyMeasure::cosine)
       : mover_radius_m_(std::move(mover_radius_m)),
+        sky_(sky),
         placements_(mover_radius_m_.size() * kSunRays) {}
 
   /// Directions and places for [begin_ns, end_ns]; `turn` varies the pattern between intervals.
@@ -36,14 +38,17 @@ class IntervalRays {
               const Environment& environment, std::span<const PoseHistory> entities,
               const glm::dvec3& origin_world_m) noexcept;
 
+  /// The sun stands still in the direction of the unit vector `to_sun`, and no entity is there.
+  void hold(const glm::dvec3& to_sun) noexcept;
+
   /// Mean share of the sun's disc that the sample sees while the sun stands before its face; 0 if
   /// it never does. `blur_m`: standard deviation of the origin along the surface, which stands for
   /// the lateral conduction since then. Any thread; RT-safe.
   [[nodiscard]] float sun_frac(const CasterRays& rays, const SurfaceSample& sample,
                                float start_offset_m, float blur_m) const noexcept;
 
-  /// Share of the sample's sky that entities hide, mean over the interval: rays of a fixed
-  /// cosine-weighted set. Zero where none is near. Any thread; RT-safe.
+  /// Share of the sample's sky that entities hide, mean over the interval: rays of a fixed set that
+  /// are spread by the sky's measure. Zero where none is near. Any thread; RT-safe.
   [[nodiscard]] float hidden_sky_frac(const CasterRays& rays, const SurfaceSample& sample,
                                       float start_offset_m) const noexcept;
 
@@ -62,6 +67,9 @@ class IntervalRays {
     return placements_[ray * mover_radius_m_.size() + mover];
   }
 
+  /// Sends a ray to its place in the disc around `to_sun`.
+  void aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to_sun) noexcept;
+
   /// Rays that left a sample's face, and those of them that met nothing.
   struct Seen {
     std::uint32_t rays = 0;
@@ -77,6 +85,7 @@ class IntervalRays {
                             std::size_t first) const noexcept;
 
   std::vector<float> mover_radius_m_;
+  SkyMeasure sky_ = SkyMeasure::cosine;
   std::vector<MoverPlacement> placements_;  ///< by ray, then entity
   std::array<glm::vec3, kSunRays> direction_{};
   std::array<glm::vec2, kSunRays> spread_{};  ///< unit normal deviates

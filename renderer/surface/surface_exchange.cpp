@@ -60,7 +60,7 @@ std::array<float, physics::kMaxFosterModes> Partners::weights(std::uint32_t mate
                                                               float distance_m) const {
   std::array<float, physics::kMaxFosterModes> out{};
   const double a = diffusivity_m2_s(in_.materials[material]);
-  const physics::FosterNetwork& network = in_.foster.materials()[material].network;
+  const physics::FosterNetwork& network = in_.history.network(material);
   for (std::size_t i = 0; i < network.count; ++i) {
     const double z = static_cast<double>(distance_m) / std::sqrt(a * network.modes[i].tau_s);
     out[i] = static_cast<float>(std::exp(-0.5 * z * z));
@@ -72,7 +72,7 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
   const SurfaceSample& own = patch.samples[index];
   const scene::Material& material = in_.materials[own.material];
   const double a = diffusivity_m2_s(material);
-  const physics::FosterNetwork& network = in_.foster.materials()[own.material].network;
+  const physics::FosterNetwork& network = in_.history.network(own.material);
   if (!(a > 0.0) || network.count == 0) return;
   const double slowest_s = network.modes[network.count - 1].tau_s;
   const float reach_m = std::min(kMaxReachM, 5.0F * static_cast<float>(std::sqrt(a * slowest_s)));

@@ -51,7 +51,7 @@ struct SurfaceInputs {
   std::span<const std::int32_t> mover_of_object;  ///< -1: static
   const CasterRays& rays;
   const SampleHeat& heat;
-  const FosterHistory& foster;
+  const SurfaceHistory& history;
   const HistoryRecord& record;
   std::span<const MoverPlacement> movers_now;
 };

@@ -10,7 +10,6 @@
 namespace emit::renderer {
 namespace {
 
-constexpr std::uint32_t kViewRays = 256;
 /// Ray starts lie this far off the surface, more where float32 resolves less.
 constexpr float kLeastOffsetM = 5e-4F;
 constexpr float kOffsetFrac = 1e-6F;
@@ -23,7 +22,7 @@ constexpr float kUnderOffsets = 8.0F;
 }  // namespace
 
 PatchSampler::PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
-    : in_(inputs), options_(options), view_(kViewRays) {
+    : in_(inputs), options_(options), view_(kSampleViewRays), sphere_(kSampleViewRays) {
   const scene::Aabb& bounds = inputs.geometry.bounds;
   if (!bounds.empty()) {
     const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);
@@ -36,17 +35,8 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOption
 }
 
 SampleState PatchSampler::start_state(const SurfaceSample& sample) const noexcept {
-  SampleState state;
-  const glm::vec3 normal = in_.record.rays.front().normal(sample);
-  state.modes_k = in_.foster.start_states(sample.material, glm::dvec3(normal));
-  for (const HeatInterval& interval : in_.record.tail) {
-    in_.heat.advance_unshadowed(sample.material, normal, interval, state.modes_k);
-  }
-  // What covers part of the ground did so before the history as well.
-  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
-    state.modes_k[i] *= sample.open_before_frac[i];
-  }
-  return state;
+  return in_.heat.start_state(sample, in_.record.rays.front().normal(sample), in_.history,
+                              in_.record.tail);
 }
 
 void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
@@ -69,6 +59,9 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
   const SurfaceView view = view_.view(in_.rays, point, selection);
   sample.sky_frac = view.sky_frac;
   sample.far_frac = view.far_frac;
+  if (in_.heat.sky_measure() == SkyMeasure::sphere) {
+    sample.sphere_sky_frac = sphere_.of_face(in_.rays, point, selection).sky_frac;
+  }
   std::vector<SeenPlace>& seen = patch.seen[index];
   seen.clear();
   bool inside_a_body = view.sky_frac + view.far_frac == 0.0F;
@@ -128,7 +121,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
     }
   }
   if (!any) return;
-  const physics::FosterNetwork& network = in_.foster.materials()[sample.material].network;
+  const physics::FosterNetwork& network = in_.history.network(sample.material);
   const auto open = [&](double memory_s) {
     const double depth_m =
         std::sqrt(static_cast<double>(diffusivity_m2_s_[sample.material]) * memory_s);

@@ -6,6 +6,7 @@
 #include <glm/ext/matrix_float4x4.hpp>
 #include <vector>
 
+#include "surface/sphere_view.hpp"
 #include "surface/surface_model.hpp"
 
 namespace emit::renderer {
@@ -49,7 +50,7 @@ class PatchSampler {
   /// patch.samples already. What it sees counts as the surroundings here.
   void evaluate(SurfacePatch& patch, std::uint32_t index, const glm::vec3& inward) const;
 
-  /// States at the start of the record: spin-up and tail, unshadowed.
+  /// State at the start of the record, as the thermal model has it.
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
 
  private:
@@ -63,6 +64,7 @@ class PatchSampler {
   const SurfaceInputs& in_;
   SurfaceModelOptions options_;
   ViewSampler view_;
+  SphereSampler sphere_;
   float offset_m_ = 1e-3F;
   double history_s_ = 0.0;
   std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer

@@ -36,8 +36,10 @@ struct SurfaceSample {
   glm::vec3 normal{0.0F};
   std::int32_t mover = -1;  ///< entity, or -1: static
   std::uint32_t material = 0;
-  float sky_frac = 1.0F;         ///< cosine-weighted share of the hemisphere that shows sky
-  float far_frac = 0.0F;         ///< ... and that leaves the scene below the horizon
+  float sky_frac = 1.0F;  ///< cosine-weighted share of the hemisphere that shows sky
+  float far_frac = 0.0F;  ///< ... and that leaves the scene below the horizon
+  /// Share of the full sphere that shows sky; filled where the thermal model has that measure.
+  float sphere_sky_frac = 0.5F;
   std::uint32_t first_seen = 0;  ///< the rest: entries of SurfaceSamples::seen
   std::uint32_t seen_count = 0;
   /// Another face lies on it: no air and no radiation in between, and for want of a path between
@@ -52,9 +54,16 @@ struct SurfaceSample {
   std::array<Partner, kMaxPartners> partners{};
 };
 
-/// Heat of a sample at the end of an interval.
+/// Which directions count when a sample looks for sky.
+enum class SkyMeasure : std::uint8_t {
+  cosine,  ///< by the cosine to the normal
+  sphere,  ///< every direction of the full sphere alike
+};
+
+/// Heat of a sample at the end of an interval: modes of the thermal model, as offsets.
 struct SampleState {
-  physics::FosterState<double> modes_k{};  ///< driven by the sample's own flux
+  /// foster: driven by the sample's own flux; emit2014: by its equilibrium temperature.
+  physics::FosterState<double> modes_k{};
   /// Driven by the fluxes of its partners (physics.md, edges); all modes of one partner.
   std::array<physics::FosterState<double>, kMaxPartners> partner_k{};
 };

@@ -11,6 +11,9 @@
 
 namespace emit::renderer {
 
+/// Rays of a thermal sample into its hemisphere.
+inline constexpr std::uint32_t kSampleViewRays = 256;
+
 /// A point of a surface and the side it looks to, in the axes of CasterRay.
 struct ViewPoint {
   glm::vec3 position_m{0.0F};

@@ -403,8 +403,10 @@ void Tool::add_model_commands() {
                  "sun-disc, wall-shadow, sky-view on the cpu: rays per row and measure")
       ->type_name("N")
       ->check(CLI::Range(1, 1 << 30));
-  app.add_option("--method", o.method, "wall-shadow, sky-view on the gpu: method of the frame")
-      ->check(CLI::IsMember({"per-frame"}));
+  app.add_option("--method", o.method,
+                 "sun-disc, wall-shadow, sky-view with --device gpu: thermal method whose "
+                 "visibility answers; default: per-frame")
+      ->check(CLI::IsMember({"per-frame", "cached"}));
   add_gpu(app, o.gpu_index);
   {
     auto [fit, f] = add<FitCommand>(
@@ -458,7 +460,7 @@ void Tool::add_bench_commands() {
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
-    app.add_option("--method", o.methods, "Thermal method; repeatable; cached needs --model foster")
+    app.add_option("--method", o.methods, "Thermal method; repeatable")
         ->allow_extra_args(false)
         ->check(CLI::IsMember({"per-frame", "cached"}))
         ->capture_default_str();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The frame's soft shadow and obscurance by themselves, on geometry built from rows. The bounds are
-// those of the method as published, a little above what was measured over the whole tables.
+// What the two thermal methods see, by itself, on geometry built from rows: the frame's soft shadow
+// and obscurance, with bounds a little above what was measured over the whole tables, and the rays
+// of the method `cached` against every row of them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,21 +9,27 @@
 
 #include "csv_table.hpp"
 #include "emit/evaluate/evaluate.hpp"
+#include "support/oracle_check.hpp"
 
 namespace emit {
 namespace {
+
+evaluate::EvaluateRequest gpu_request(const std::string& model, const std::filesystem::path& table,
+                                      const std::string& method) {
+  evaluate::EvaluateRequest request;
+  request.model = model;
+  request.table = table;
+  request.device = evaluate::Device::gpu;
+  request.precision = evaluate::Precision::float32;
+  request.method = method;
+  return request;
+}
 
 std::vector<double> on_gpu(const std::string& model, const std::string& text,
                            const std::string& column) {
   const auto file = std::filesystem::path(testing::TempDir()) / (model + "_gpu.csv");
   std::ofstream(file) << text;
-  evaluate::EvaluateRequest request;
-  request.model = model;
-  request.table = file;
-  request.device = evaluate::Device::gpu;
-  request.precision = evaluate::Precision::float32;
-  request.method = "per-frame";
-  const auto result = evaluate::evaluate(request);
+  const auto result = evaluate::evaluate(gpu_request(model, file, "per-frame"));
   if (!result) {
     ADD_FAILURE() << result.error().text;
     return {};
@@ -67,6 +74,46 @@ TEST(EvaluateVisibilityGpu, ObscuranceKnowsFlatConcaveAndConvex) {
   EXPECT_LT(f[1], 0.42);
   EXPECT_NEAR(f[2], 0.75, 0.05);
   EXPECT_NEAR(f[3], 0.875, 0.05);
+}
+
+/// Every row of a column against the exact value; rows without one must have none.
+void expect_all_near(const std::string& model, const std::string& table, const std::string& column,
+                     const std::string& exact, double bar) {
+  const auto file = test::oracle_file(table);
+  const auto result = evaluate::evaluate(gpu_request(model, file, "cached"));
+  ASSERT_TRUE(result.has_value()) << result.error().text;
+  const auto rows = evaluate::CsvTable::read(file);
+  const auto found = evaluate::CsvTable::parse(*result, "result");
+  ASSERT_TRUE(rows.has_value() && found.has_value());
+  const auto expected = rows->numbers(exact);
+  const auto got = found->numbers(column);
+  ASSERT_TRUE(expected.has_value() && got.has_value());
+  ASSERT_EQ(got->size(), expected->size());
+  ASSERT_GT(got->size(), 100U);
+  for (std::size_t i = 0; i < got->size(); ++i) {
+    if (std::isnan((*expected)[i])) {
+      EXPECT_TRUE(std::isnan((*got)[i])) << table << ":" << rows->line_of(i);
+    } else {
+      EXPECT_NEAR((*got)[i], (*expected)[i], bar) << table << ":" << rows->line_of(i);
+    }
+  }
+}
+
+TEST(EvaluateVisibilityGpu, RaysOfSamplesSeeTheSunBehindEveryWall) {
+  expect_all_near("wall-shadow", "wall_penumbra.csv", "f", "f_spherical", 0.05);
+  expect_all_near("sun-disc", "sun_disc_edge.csv", "f", "f_spherical", 0.05);
+}
+
+TEST(EvaluateVisibilityGpu, RaysOfSamplesSeeTheSkyOfEveryRow) {
+  expect_all_near("sky-view", "sky_view.csv", "svf", "svf", 0.03);
+  expect_all_near("sky-view", "sky_view.csv", "f_uni", "f_uni", 0.03);
+}
+
+TEST(EvaluateVisibilityGpu, UnknownMethodIsBadUsage) {
+  const auto result =
+      evaluate::evaluate(gpu_request("sky-view", test::oracle_file("sky_view.csv"), "by-guess"));
+  ASSERT_FALSE(result.has_value());
+  EXPECT_EQ(result.error().code, physics::ErrorCode::invalid_argument);
 }
 
 }  // namespace

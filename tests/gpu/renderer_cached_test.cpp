@@ -377,13 +377,5 @@ TEST(RendererCached, FramesFromWhereNoOneSaidTheCameraWouldBeAreFlagged) {
   EXPECT_FALSE(coarse_at(eye));
 }
 
-TEST(RendererCached, TheLiteralModelOfThePaperIsRefused) {
-  auto scenario = cached_scenario(box_on_ground());
-  scenario.thermal.model = scene::ThermalModel::emit2014;
-  auto made = renderer::Renderer::create(scenario, {}, {});
-  ASSERT_FALSE(made);
-  EXPECT_NE(made.error().text.find("foster"), std::string::npos);
-}
-
 }  // namespace
 }  // namespace emit::test

@@ -15,12 +15,12 @@ physics::Result<std::string> run_sky_view(const EvaluateRequest& request, const 
   if (!kinds) return tl::unexpected(std::move(kinds.error()));
   auto columns = read_columns<7>(table, {"p1", "p2", "p3", "p4", "p5", "p6", "p7"});
   if (!columns) return tl::unexpected(std::move(columns.error()));
-  const auto make = [&](std::size_t i) {
+  const MakeRow make = [&](std::size_t i) {
     std::array<double, 7> p;
     for (std::size_t k = 0; k < p.size(); ++k) p[k] = (*columns)[k][i];
     return sky_view_row((*kinds)[i], p);
   };
-  if (request.device == Device::gpu) return gpu_sky_views(request, table, kSkyViewOutputs, make);
+  if (request.device == Device::gpu) return gpu_sky_views({request, table, kSkyViewOutputs, make});
   std::vector<std::vector<double>> out(2, std::vector<double>(table.rows(), kUndefined<double>));
   const std::uint32_t rays = request.rays.value_or(kSkyRays);
   auto done = for_each_row(

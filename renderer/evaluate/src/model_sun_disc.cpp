@@ -14,10 +14,10 @@ physics::Result<std::string> run_sun_disc(const EvaluateRequest& request, const 
   auto columns = read_columns<1>(table, {"delta_deg"});
   if (!columns) return tl::unexpected(std::move(columns.error()));
   const std::vector<double>& delta_deg = (*columns)[0];
-  const auto make = [&](std::size_t i) -> physics::Result<VisibilityRow> {
+  const MakeRow make = [&](std::size_t i) -> physics::Result<VisibilityRow> {
     return sun_disc_row(delta_deg[i] * physics::kDegree);
   };
-  if (request.device == Device::gpu) return gpu_sun_shares(request, table, kSunDiscOutputs, make);
+  if (request.device == Device::gpu) return gpu_sun_shares({request, table, kSunDiscOutputs, make});
   std::vector<std::vector<double>> out(1, std::vector<double>(table.rows(), kUndefined<double>));
   auto done = for_each_row(
       table, make,

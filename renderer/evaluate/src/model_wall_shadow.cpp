@@ -14,11 +14,11 @@ physics::Result<std::string> run_wall_shadow(const EvaluateRequest& request,
   auto columns = read_columns<3>(table, {"H", "e_deg", "x"});
   if (!columns) return tl::unexpected(std::move(columns.error()));
   const auto& [height_m, elevation_deg, distance_m] = *columns;
-  const auto make = [&](std::size_t i) {
+  const MakeRow make = [&](std::size_t i) {
     return wall_shadow_row(height_m[i], elevation_deg[i] * physics::kDegree, distance_m[i]);
   };
   if (request.device == Device::gpu) {
-    return gpu_sun_shares(request, table, kWallShadowOutputs, make);
+    return gpu_sun_shares({request, table, kWallShadowOutputs, make});
   }
   std::vector<std::vector<double>> out(1, std::vector<double>(table.rows(), kUndefined<double>));
   const reference::SunQuery query{.rays = request.rays.value_or(kSunRays)};

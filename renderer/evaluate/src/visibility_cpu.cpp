@@ -62,6 +62,11 @@ Result<void> check_visibility_options(const EvaluateRequest& request) {
   if (request.rays) {
     return make_error(ErrorCode::invalid_argument, "--rays belongs to --device cpu");
   }
+  if (!request.method.empty() && request.method != "per-frame" && request.method != "cached") {
+    return make_error(
+        ErrorCode::invalid_argument,
+        fmt::format("unknown method '{}'; there are per-frame, cached", request.method));
+  }
   return {};
 }
 

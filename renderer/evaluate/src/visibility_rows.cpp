@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <initializer_list>
 
 #include "emit/physics/constants.hpp"
@@ -184,6 +185,7 @@ Result<VisibilityRow> sky_view_row(std::string_view kind, const std::array<doubl
   } else if (kind == "cube_corner") {
     add_box(row, glm::dvec3(-1.0), glm::dvec3(0.0));
     row.normal = glm::dvec3(0.0);
+    row.outward = glm::normalize(glm::dvec3(1.0));
   } else {
     return make_error(ErrorCode::invalid_argument,
                       fmt::format("unknown kind '{}'; there are flat, wall, canyon, vgroove, disc, "
@@ -191,6 +193,34 @@ Result<VisibilityRow> sky_view_row(std::string_view kind, const std::array<doubl
                                   kind));
   }
   return row;
+}
+
+scene::SceneGeometry scene_geometry(const VisibilityRow& row) {
+  scene::SceneGeometry geometry;
+  scene::Mesh mesh;
+  for (const glm::dvec3& p : row.positions_m) {
+    mesh.positions_m.emplace_back(p);
+    mesh.bounds.add(glm::dvec3(mesh.positions_m.back()));
+  }
+  mesh.normals.resize(mesh.positions_m.size(), glm::vec3(0.0F, 0.0F, 1.0F));
+  for (std::size_t i = 0; i + 2 < row.indices.size(); i += 3) {
+    // Corners are shared within a plane only.
+    const glm::dvec3& a = row.positions_m[row.indices[i]];
+    const glm::dvec3 normal = glm::normalize(glm::cross(row.positions_m[row.indices[i + 1]] - a,
+                                                        row.positions_m[row.indices[i + 2]] - a));
+    for (std::size_t k = 0; k < 3; ++k) mesh.normals[row.indices[i + k]] = glm::vec3(normal);
+  }
+  mesh.indices = row.indices;
+  mesh.submeshes.push_back(
+      {.index_count = static_cast<std::uint32_t>(row.indices.size()), .double_sided = row.sheets});
+  scene::Instance instance;
+  instance.world_bounds = mesh.bounds;
+  geometry.static_bounds = geometry.bounds = mesh.bounds;
+  geometry.triangles = row.indices.size() / 3;
+  geometry.meshes.push_back(std::move(mesh));
+  geometry.instances.push_back(instance);
+  geometry.materials.emplace_back();
+  return geometry;
 }
 
 }  // namespace emit::evaluate

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "emit/physics/error.hpp"
+#include "emit/scene/mesh.hpp"
 
 namespace emit::evaluate {
 
@@ -21,11 +22,19 @@ struct VisibilityRow {
   std::vector<glm::dvec3> positions_m;
   std::vector<std::uint32_t> indices;  ///< counter-clockwise from outside
   glm::dvec3 point_m{0.0};
-  glm::dvec3 normal{0.0, 0.0, 1.0};  ///< zero: a point without tangent plane (edge, corner)
+  glm::dvec3 normal{0.0, 0.0, 1.0};   ///< zero: a point without tangent plane (edge, corner)
+  glm::dvec3 outward{0.0, 0.0, 1.0};  ///< unit vector away from the solid
   glm::dvec3 to_sun{0.0, 0.0, 1.0};
   bool sheets = false;    ///< open surfaces, seen from both sides
   double length_m = 1.0;  ///< the row's largest
 };
+
+[[nodiscard]] inline bool on_face(const VisibilityRow& row) {
+  return row.normal != glm::dvec3(0.0);
+}
+
+/// The row as the renderer takes it: one static mesh, world axes.
+[[nodiscard]] scene::SceneGeometry scene_geometry(const VisibilityRow& row);
 
 /// Wall of height H, the point at distance x behind it, the sun at elevation e beyond it.
 /// Errors: invalid_argument for a height, distance or elevation that is not positive.

@@ -52,8 +52,9 @@ struct EvaluateRequest {
   Device device = Device::cpu;
   /// Visibility models on the CPU: rays per row and measure; the error falls with their number.
   std::optional<std::uint32_t> rays;
-  std::string method;  ///< visibility models on the GPU: "per-frame"; empty: the default method
-  int gpu_index = -1;  ///< as gl::EglContext::create()
+  /// Visibility models on the GPU: "per-frame" or "cached"; empty: the default method.
+  std::string method;
+  int gpu_index = -1;        ///< as gl::EglContext::create()
   std::uint32_t refine = 1;  ///< conduction and surface-history: 1, 2 or 4 scales cells and steps
   HistoryOptions history;
 };

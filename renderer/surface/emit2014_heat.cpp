@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/emit2014_heat.hpp"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "emit/physics/equilibrium.hpp"
+
+namespace emit::renderer {
+namespace {
+
+double core_conductance_w_m2_k(const scene::Material& material) noexcept {
+  if (material.core_conductance_w_m2_k) return *material.core_conductance_w_m2_k;
+  if (material.layers.empty()) return 0.0;
+  return material.layers.front().conductivity_w_m_k / material.layers.front().thickness_m;
+}
+
+}  // namespace
+
+Emit2014Heat::Emit2014Heat(std::span<const scene::Material> materials, double initial_k,
+                           double reference_k)
+    : reference_k_(reference_k) {
+  for (const scene::Material& material : materials) {
+    Material& own = materials_.emplace_back();
+    own.solar_absorptance_frac = material.solar_absorptance_frac;
+    own.exchange.emissivity_frac = material.emissivity_frac;
+    own.exchange.core_k = material.base_k;
+    own.exchange.core_conductance_w_m2_k = core_conductance_w_m2_k(material);
+    own.mode_count = std::min(material.modes.size(), kMaxRelaxationModes);
+    std::copy_n(material.modes.begin(), own.mode_count, own.modes.begin());
+    own.initial_k = material.initial_k.value_or(initial_k);
+    own.prescribed_k = material.prescribed_k;
+  }
+}
+
+void Emit2014Heat::prepare(HeatInterval& interval) const noexcept {
+  for (std::size_t m = 0; m < materials_.size(); ++m) {
+    for (std::size_t i = 0; i < materials_[m].mode_count; ++i) {
+      interval.relaxation[m][i] =
+          physics::relaxation_gains(interval.forcing.dt_s, materials_[m].modes[i].tau_s);
+    }
+  }
+}
+
+SampleState Emit2014Heat::start_state(const SurfaceSample& sample) const noexcept {
+  SampleState state;
+  const Material& material = materials_[sample.material];
+  for (std::size_t i = 0; i < material.mode_count; ++i) {
+    state.modes_k[i] = material.initial_k - reference_k_;
+  }
+  return state;
+}
+
+double Emit2014Heat::equilibrium_k(const SurfaceSample& sample, const glm::vec3& normal,
+                                   const SurfaceForcing& forcing,
+                                   const SampleDrive& drive) const noexcept {
+  const Material& material = materials_[sample.material];
+  physics::SurfaceFluxes<double> in;
+  in.direct_w_m2 = std::max(0.0, glm::dot(glm::dvec3(normal), forcing.sun_w_m2));
+  in.sun_frac = drive.sun_frac;
+  in.diffuse_w_m2 = physics::diffuse_input_w_m2(forcing.diffuse_w_m2);
+  in.environment_w_m2 = material.exchange.emissivity_frac * forcing.environment_w_m2;
+  in.longwave_w_m2 = 2.0 * forcing.longwave_w_m2 - forcing.environment_w_m2;
+  in.sky_frac = sample.sphere_sky_frac * (1.0 - drive.hidden_sky_frac);
+  const double absorbed_w_m2 = physics::absorbed_flux_w_m2(in, material.solar_absorptance_frac,
+                                                           material.exchange.emissivity_frac);
+  return physics::solve_equilibrium(physics::surface_balance(absorbed_w_m2, material.exchange))
+      .temperature_k;
+}
+
+SampleOutput Emit2014Heat::output(const SurfaceSample& sample, const SampleDrive& drive,
+                                  const SampleState& state) const noexcept {
+  const Material& material = materials_[sample.material];
+  double offset_k = 0.0;
+  if (material.prescribed_k) {
+    offset_k = *material.prescribed_k - reference_k_;
+  } else {
+    for (std::size_t i = 0; i < material.mode_count; ++i) {
+      offset_k += material.modes[i].weight_frac * state.modes_k[i];
+    }
+  }
+  SampleOutput out;
+  out.offset_k = static_cast<float>(offset_k);
+  out.sun_frac = drive.sun_frac;
+  return out;
+}
+
+SampleOutput Emit2014Heat::advance(const SurfaceSample& sample, const glm::vec3& normal,
+                                   const HeatInterval& interval, const SampleDrive& drive,
+                                   SampleState& state) const noexcept {
+  const Material& material = materials_[sample.material];
+  if (!material.prescribed_k) {
+    const double begin_k =
+        equilibrium_k(sample, normal, interval.forcing.begin, drive) - reference_k_;
+    const double end_k = equilibrium_k(sample, normal, interval.forcing.end, drive) - reference_k_;
+    for (std::size_t i = 0; i < material.mode_count; ++i) {
+      state.modes_k[i] = physics::relax_linear(state.modes_k[i], begin_k, end_k,
+                                               interval.relaxation[sample.material][i]);
+    }
+  }
+  return output(sample, drive, state);
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <glm/ext/vector_float3.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "emit/physics/surface_balance.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "surface/heat_interval.hpp"
+#include "surface/surface_samples.hpp"
+
+namespace emit::renderer {
+
+/// The published model on samples: modes relax towards the equilibrium temperature, which is linear
+/// over an interval (physics.md eq. 1-6). Sky counts by the full sphere; samples exchange nothing
+/// with each other, so what they send out stays zero. Immutable; any thread; RT-safe but for the
+/// constructor.
+class Emit2014Heat {
+ public:
+  /// Materials without an initial temperature of their own start from `initial_k`. States are
+  /// offsets from `reference_k`.
+  Emit2014Heat(std::span<const scene::Material> materials, double initial_k, double reference_k);
+
+  /// Gives `interval` room for the gains. Allocates.
+  void size(HeatInterval& interval) const { interval.relaxation.resize(materials_.size()); }
+  void prepare(HeatInterval& interval) const noexcept;
+
+  [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
+  SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
+                       const HeatInterval& interval, const SampleDrive& drive,
+                       SampleState& state) const noexcept;
+  [[nodiscard]] SampleOutput output(const SurfaceSample& sample, const SampleDrive& drive,
+                                    const SampleState& state) const noexcept;
+
+ private:
+  struct Material {
+    double solar_absorptance_frac = 0.0;
+    physics::SurfaceExchange<double> exchange;
+    std::array<scene::RelaxationMode, kMaxRelaxationModes> modes{};
+    std::size_t mode_count = 0;
+    double initial_k = 0.0;
+    std::optional<double> prescribed_k;
+  };
+  /// Eq. 1 and 4.
+  [[nodiscard]] double equilibrium_k(const SurfaceSample& sample, const glm::vec3& normal,
+                                     const SurfaceForcing& forcing,
+                                     const SampleDrive& drive) const noexcept;
+
+  std::vector<Material> materials_;
+  double reference_k_ = 0.0;
+};
+
+}  // namespace emit::renderer
