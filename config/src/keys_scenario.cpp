@@ -395,6 +395,10 @@ const KeyTable<ThermalOptions>& thermal_keys() {
       boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
                               "cached: heat is also conducted along the surface and across convex "
                               "edges."),
+      path<ThermalOptions>("state_file", EMIT_FIELD(state_file),
+                           "cached: keeps the warmed-up surface. Written by the first run, read by "
+                           "those after it; one that does not fit scene, materials, place, date, "
+                           "weather, thermal options, sensor or first frame is refused."),
   };
   return keys;
 }

@@ -78,6 +78,10 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     std::vector<FosterMaterial> foster_materials, const SceneHistory& history) {
   const std::vector<glm::dvec3> eyes_world_m = all_eyes(scenario.sensor.trajectory);
   const scene::Aabb bounds = geometry.static_bounds;
+  std::optional<CachedSurface::Saved> saved;
+  if (!scenario.thermal.state_file.empty()) {
+    saved = {scenario.thermal.state_file, scenario_key(scenario, geometry), true};
+  }
   geometry = scene::simplified(std::move(geometry), {eyes_world_m, pixel_rad(scenario.sensor)});
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
   auto surface =
@@ -86,12 +90,13 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   if (!surface) return tl::unexpected(std::move(surface.error()));
   return std::unique_ptr<ThermalStage>(
       new CachedStage(scenario, bounds, eyes_around(eyes_world_m, bounds), std::move(*surface),
-                      std::move(foster_materials), history));
+                      std::move(foster_materials), history, std::move(saved)));
 }
 
 CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
-                         std::vector<FosterMaterial> foster_materials, const SceneHistory& history)
+                         std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
+                         std::optional<CachedSurface::Saved> saved)
     : sensor_(scenario.sensor),
       static_bounds_(static_bounds),
       detail_eyes_(std::move(detail_eyes)),
@@ -99,14 +104,17 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       history_(history),
       plan_(scenario.thermal),
       foster_(foster_of(scenario, std::move(foster_materials), history.environment)),
-      surface_(std::move(surface)) {}
+      surface_(std::move(surface)),
+      saved_(std::move(saved)) {}
 
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
   const RefineView view = refine_view(sensor_, request);
-  auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, foster_, progress);
+  auto ready =
+      surface_->prepare(request.thermal_time_ns, view, inputs, plan_, foster_, saved_, progress);
   if (!ready) return ready;
+  if (saved_) saved_->start = false;  // after a jump of sim time the start's state need not fit
   refined_eyes_ = eyes_around(view.eyes_world_m, static_bounds_);
   std::vector<std::uint32_t> first_sample;
   scene::SceneGeometry geometry = surface_->drawn_geometry(first_sample);

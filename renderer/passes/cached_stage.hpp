@@ -48,7 +48,8 @@ class CachedStage final : public ThermalStage {
 
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
-              std::vector<FosterMaterial> foster_materials, const SceneHistory& history);
+              std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
+              std::optional<CachedSurface::Saved> saved);
   void make_sample_buffers();
 
   scene::SensorDesc sensor_;
@@ -60,6 +61,7 @@ class CachedStage final : public ThermalStage {
   StepPlan plan_;
   FosterHistory foster_;
   std::unique_ptr<CachedSurface> surface_;
+  std::optional<CachedSurface::Saved> saved_;
   std::unique_ptr<DrawnScene> drawn_;
   physics::SunPosition sun_now_;
   physics::Forcing forcing_now_;

@@ -104,9 +104,34 @@ std::uint64_t CachedSurface::revision(const Inputs& inputs) const noexcept {
   return revision;
 }
 
+physics::Result<SurfaceModel> CachedSurface::make_model(const SurfaceInputs& surface,
+                                                        const RefineView& view,
+                                                        const SurfaceModelOptions& options,
+                                                        const std::optional<Saved>& saved,
+                                                        const SurfaceProgress& progress) const {
+  const bool there = saved && std::filesystem::exists(saved->file);
+  if (there) {
+    auto read = read_state(saved->file, saved->key, geometry_, surface.movers_now.size(), options);
+    if (read || saved->start) return read;
+  }
+  const bool writes = saved && saved->start;
+  if (writes) {  // before the work, not after it
+    if (auto writable = check_state_writable(saved->file); !writable) {
+      return tl::unexpected(std::move(writable.error()));
+    }
+  }
+  auto model = build_surface_model(surface, view, options, progress);
+  if (!model || !writes) return model;
+  if (auto written = write_state(saved->file, saved->key, *model); !written) {
+    return tl::unexpected(std::move(written.error()));
+  }
+  return model;
+}
+
 physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineView& view,
                                              const Inputs& inputs, StepPlan& plan,
                                              FosterHistory& foster,
+                                             const std::optional<Saved>& saved,
                                              const SurfaceProgress& progress) {
   const std::int64_t start_ns =
       options_.history_start_ns +
@@ -123,7 +148,9 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
   options.lateral = options_.lateral;
-  auto model = build_surface_model(surface, view, options, progress);
+  std::optional<Saved> here = saved;
+  if (here) add_first_frame(here->key, start_ns, view, inputs.environment, inputs.entities);
+  auto model = make_model(surface, view, options, here, progress);
   if (!model) return tl::unexpected(std::move(model.error()));
   offset_m_ = PatchSampler(surface, options).offset_m();
   model_ = std::move(*model);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -44,6 +45,15 @@ class RefinedMesh {
     glm::vec3 weight{0.0F};
   };
 
+  /// Triangles and vertices as they stand, to be kept somewhere: see from().
+  struct Parts {
+    std::vector<Vertex> vertices;
+    std::vector<std::array<std::uint32_t, 3>> leaves;
+    std::vector<std::uint32_t> leaf_submesh;
+    std::vector<std::uint32_t> leaf_node;
+    std::vector<std::uint32_t> nodes;
+  };
+
   /// No vertex is added by split() beyond `max_vertices`. Vertices that no triangle uses stay, with
   /// material 0. O(n).
   explicit RefinedMesh(const scene::Mesh& mesh, std::size_t max_vertices);
@@ -58,6 +68,13 @@ class RefinedMesh {
   [[nodiscard]] const std::array<std::uint32_t, 3>& leaf(std::uint32_t slot) const noexcept {
     return leaves_[slot];
   }
+  [[nodiscard]] Parts parts() const {
+    return {vertices_, leaves_, leaf_submesh_, leaf_node_, nodes_};
+  }
+  /// The refined mesh that had these parts; nothing when they contradict each other or `mesh`.
+  [[nodiscard]] static std::optional<RefinedMesh> from(const scene::Mesh& mesh,
+                                                       std::size_t max_vertices, Parts parts);
+
   /// Index into scene::Mesh::submeshes.
   [[nodiscard]] std::uint32_t submesh(std::uint32_t slot) const noexcept {
     return leaf_submesh_[slot];

@@ -191,8 +191,10 @@ struct ThermalOptions {
   std::uint32_t filter_taps = 32;
   double obscurance_radius_m = 0.5;
   std::uint32_t max_samples =
-      1'000'000;        ///< cached: thermal samples, about 1.5 kB each at 27 steps
-  bool lateral = true;  ///< cached: conduction along the surface and across convex edges
+      1'000'000;         ///< cached: thermal samples, about 1.5 kB each at 27 steps
+  bool lateral = true;   ///< cached: conduction along the surface and across convex edges
+  bool exchange = true;  ///< cached: what a face sees of others is these, not the surroundings
+  std::filesystem::path state_file;  ///< cached: the warmed-up state; empty: kept nowhere
 };
 
 struct Place {
