@@ -399,6 +399,10 @@ const KeyTable<ThermalOptions>& thermal_keys() {
                               "cached, foster: faces exchange radiation with each other; false: "
                               "they see the surroundings' temperature where others hide the sky, "
                               "as with per-frame and emit2014."),
+      path<ThermalOptions>("state_file", EMIT_FIELD(state_file),
+                           "cached: keeps the warmed-up surface. Written by the first run, read by "
+                           "those after it; one that does not fit scene, materials, place, date, "
+                           "weather, thermal options, sensor or first frame is refused."),
   };
   return keys;
 }

@@ -26,6 +26,9 @@ class Environment {
   /// Instants at which live weather changes, ascending.
   [[nodiscard]] std::span<const std::int64_t> changes_ns() const noexcept { return changes_ns_; }
 
+  /// What the host sent and is kept, ascending.
+  [[nodiscard]] std::span<const physics::WeatherRow> live() const noexcept { return live_; }
+
   /// Goes up with every change by the host.
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 

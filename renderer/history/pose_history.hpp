@@ -41,6 +41,9 @@ class PoseHistory {
   /// Instants at which the entity appears, vanishes, starts or stops, ascending.
   [[nodiscard]] std::span<const std::int64_t> events_ns() const noexcept { return events_ns_; }
 
+  /// What the host sent and is kept, ascending.
+  [[nodiscard]] std::span<const scene::Keyframe> live() const noexcept { return live_; }
+
   /// Live poses dropped since the last reset because the store was full; the oldest are halved in
   /// density then.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }

@@ -71,20 +71,33 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     std::vector<FosterMaterial> foster_materials, const SceneHistory& history) {
   const std::vector<glm::dvec3> eyes_world_m = all_eyes(scenario.sensor.trajectory);
   const scene::Aabb bounds = geometry.static_bounds;
+  std::optional<CachedSurface::Saved> saved;
+  if (!scenario.thermal.state_file.empty()) {
+    saved = {scenario.thermal.state_file, scenario_key(scenario, geometry), true};
+  }
+  scene::SceneGeometry full = geometry;
   geometry = scene::simplified(std::move(geometry), {eyes_world_m, pixel_rad(scenario.sensor)});
+  std::optional<SurfaceDetail> detail;
+  if (geometry.triangles < full.triangles) {
+    auto created = SurfaceDetail::create(std::move(full), geometry);
+    if (!created) return tl::unexpected(std::move(created.error()));
+    detail = std::move(*created);
+  }
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
   auto surface =
       CachedSurface::create(scenario, std::move(geometry), histories_of_objects(scenario),
-                            std::span(foster_materials).first(simulated), kReferenceK);
+                            std::span(foster_materials).first(simulated), kReferenceK,
+                            std::move(detail));
   if (!surface) return tl::unexpected(std::move(surface.error()));
   return std::unique_ptr<ThermalStage>(
       new CachedStage(scenario, bounds, eyes_around(eyes_world_m, bounds), std::move(*surface),
-                      std::move(foster_materials), history));
+                      std::move(foster_materials), history, std::move(saved)));
 }
 
 CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
-                         std::vector<FosterMaterial> foster_materials, const SceneHistory& history)
+                         std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
+                         std::optional<CachedSurface::Saved> saved)
     : sensor_(scenario.sensor),
       static_bounds_(static_bounds),
       detail_eyes_(std::move(detail_eyes)),
@@ -93,15 +106,17 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       plan_(scenario.thermal),
       surface_history_(scenario.thermal.steps, make_foster(scenario, std::move(foster_materials),
                                                            history.environment, kReferenceK)),
-      surface_(std::move(surface)) {}
+      surface_(std::move(surface)),
+      saved_(std::move(saved)) {}
 
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
   const RefineView view = refine_view(sensor_, request);
-  auto ready =
-      surface_->prepare(request.thermal_time_ns, view, inputs, plan_, surface_history_, progress);
+  auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, surface_history_,
+                                 saved_, progress);
   if (!ready) return ready;
+  if (saved_) saved_->start = false;  // after a jump of sim time the start's state need not fit
   refined_eyes_ = eyes_around(view.eyes_world_m, static_bounds_);
   drawn_.reset();  // its device memory goes before that of the next one is taken
   drawn_ =

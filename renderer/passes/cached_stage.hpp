@@ -48,7 +48,8 @@ class CachedStage final : public ThermalStage {
 
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
-              std::vector<FosterMaterial> foster_materials, const SceneHistory& history);
+              std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
+              std::optional<CachedSurface::Saved> saved);
 
   scene::SensorDesc sensor_;
   scene::Aabb static_bounds_;
@@ -59,6 +60,7 @@ class CachedStage final : public ThermalStage {
   StepPlan plan_;
   SurfaceHistory surface_history_;
   std::unique_ptr<CachedSurface> surface_;
+  std::optional<CachedSurface::Saved> saved_;
   std::unique_ptr<DrawnScene> drawn_;
   physics::SunPosition sun_now_;
   physics::Forcing forcing_now_;

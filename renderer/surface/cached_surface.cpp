@@ -66,7 +66,7 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
 physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
     std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
-    double reference_k) {
+    double reference_k, std::optional<SurfaceDetail> detail) {
   auto rays = CasterRays::create(geometry);
   if (!rays) return tl::unexpected(std::move(rays.error()));
   // Entities and what shades must be numbered alike.
@@ -80,9 +80,11 @@ physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     }
     ++mover;
   }
-  return std::unique_ptr<CachedSurface>(new CachedSurface(scenario, std::move(geometry),
-                                                          std::move(mover_of_object), networks,
-                                                          std::move(*rays), reference_k));
+  std::unique_ptr<CachedSurface> surface(
+      new CachedSurface(scenario, std::move(geometry), std::move(mover_of_object), networks,
+                        std::move(*rays), reference_k));
+  surface->detail_ = std::move(detail);
+  return surface;
 }
 
 void CachedSurface::place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities) {
@@ -108,9 +110,34 @@ std::uint64_t CachedSurface::revision(const Inputs& inputs) const noexcept {
   return revision;
 }
 
+physics::Result<SurfaceModel> CachedSurface::make_model(const SurfaceInputs& surface,
+                                                        const RefineView& view,
+                                                        const SurfaceModelOptions& options,
+                                                        const std::optional<Saved>& saved,
+                                                        const SurfaceProgress& progress) const {
+  const bool there = saved && std::filesystem::exists(saved->file);
+  if (there) {
+    auto read = read_state(saved->file, saved->key, geometry_, surface.movers_now.size(), options);
+    if (read || saved->start) return read;
+  }
+  const bool writes = saved && saved->start;
+  if (writes) {  // before the work, not after it
+    if (auto writable = check_state_writable(saved->file); !writable) {
+      return tl::unexpected(std::move(writable.error()));
+    }
+  }
+  auto model = build_surface_model(surface, view, options, progress);
+  if (!model || !writes) return model;
+  if (auto written = write_state(saved->file, saved->key, *model); !written) {
+    return tl::unexpected(std::move(written.error()));
+  }
+  return model;
+}
+
 physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineView& view,
                                              const Inputs& inputs, StepPlan& plan,
                                              SurfaceHistory& history,
+                                             const std::optional<Saved>& saved,
                                              const SurfaceProgress& progress) {
   const std::int64_t start_ns =
       options_.history_start_ns +
@@ -121,15 +148,18 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   const HistoryRecord record =
       make_history_record(plan, history, heat_, inputs.environment, inputs.entities,
                           *interval_rays_, rays_.origin_world_m());
-  const SurfaceInputs surface{geometry_, materials_, mover_of_object_, rays_,
-                              heat_,     history,    record,           movers_now_};
+  const SurfaceInputs surface{geometry_, materials_,  mover_of_object_,
+                              rays_,     heat_,       history,
+                              record,    movers_now_, detail_ ? &*detail_ : nullptr};
   SurfaceModelOptions options;
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
   // The published model conducts straight down and knows no other surface.
   options.lateral = extended_ && options_.lateral;
   options.exchange = extended_ && options_.exchange;
-  auto model = build_surface_model(surface, view, options, progress);
+  std::optional<Saved> here = saved;
+  if (here) add_first_frame(here->key, start_ns, view, inputs.environment, inputs.entities);
+  auto model = make_model(surface, view, options, here, progress);
   if (!model) return tl::unexpected(std::move(model.error()));
   offset_m_ = PatchSampler(surface, options).offset_m();
   model_ = std::move(*model);

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,6 +13,7 @@
 #include "history/pose_history.hpp"
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
+#include "surface/state_file.hpp"
 #include "surface/surface_model.hpp"
 #include "surface/worker_pool.hpp"
 
@@ -50,17 +52,29 @@ class CachedSurface {
   };
 
   /// `mover_of_object`: index of an object's PoseHistory, -1: static. `networks` by material, none
-  /// for emit2014. Errors: config (an entity without triangles), those of CasterRays.
+  /// for emit2014. `detail`: where meshes were simplified. Errors: config (an entity without
+  /// triangles), those of CasterRays.
   [[nodiscard]] static physics::Result<std::unique_ptr<CachedSurface>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
       std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
-      double reference_k);
+      double reference_k, std::optional<SurfaceDetail> detail = std::nullopt);
 
-  /// Samples the surface as it is to be seen at `now_ns` and computes the interval that holds it.
-  /// `plan` and `history` are brought there. Setup: seconds.
+  /// thermal.state_file, and what the state in it must be made for.
+  struct Saved {
+    std::filesystem::path file;
+    StateKey key{};  ///< of the scenario: scenario_key()
+    /// The start of a run: what does not fit is an error, what is not there is written. False: the
+    /// file is used where it fits and left as it is.
+    bool start = true;
+  };
+
+  /// Samples the surface as it is to be seen at `now_ns`, or takes it from `saved`, and computes
+  /// the interval that holds it. `plan` and `history` are brought there. Setup: seconds.
+  /// Errors: those of build_surface_model(), read_state() and write_state().
   [[nodiscard]] physics::Result<void> prepare(std::int64_t now_ns, const RefineView& view,
                                               const Inputs& inputs, StepPlan& plan,
                                               SurfaceHistory& history,
+                                              const std::optional<Saved>& saved,
                                               const SurfaceProgress& progress);
 
   /// True when frames at `now_ns` need prepare() first: sim time went back behind the current
@@ -100,6 +114,11 @@ class CachedSurface {
     physics::FosterState<double> surroundings{};
   };
 
+  [[nodiscard]] physics::Result<SurfaceModel> make_model(const SurfaceInputs& surface,
+                                                         const RefineView& view,
+                                                         const SurfaceModelOptions& options,
+                                                         const std::optional<Saved>& saved,
+                                                         const SurfaceProgress& progress) const;
   void place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities);
   /// Forcing, gains and rays from `node` to the next one, which nothing has been computed of yet.
   void begin_interval(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
@@ -114,6 +133,7 @@ class CachedSurface {
   scene::ThermalOptions options_;
   std::vector<std::int32_t> mover_of_object_;
   CasterRays rays_;
+  std::optional<SurfaceDetail> detail_;
   bool extended_ = false;  ///< thermal.model foster
   SampleHeat heat_;
   std::optional<IntervalRays> interval_rays_;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -31,7 +32,7 @@ class RefinedMesh {
  public:
   struct Vertex {
     glm::vec3 position_m;
-    glm::vec3 normal;  ///< unit; of a new vertex the normalised mean of its parents'
+    glm::vec3 normal;  ///< unit; of a new vertex the mean of its parents' at first
     std::uint32_t material = 0;
     bool sheet = false;  ///< of a double-sided submesh
     /// Ends of the edge it halves, both below its own index; its own index for original vertices
@@ -42,6 +43,15 @@ class RefinedMesh {
   struct Place {
     std::array<std::uint32_t, 3> vertex{};
     glm::vec3 weight{0.0F};
+  };
+
+  /// Triangles and vertices as they stand, to be kept somewhere: see from().
+  struct Parts {
+    std::vector<Vertex> vertices;
+    std::vector<std::array<std::uint32_t, 3>> leaves;
+    std::vector<std::uint32_t> leaf_submesh;
+    std::vector<std::uint32_t> leaf_node;
+    std::vector<std::uint32_t> nodes;
   };
 
   /// No vertex is added by split() beyond `max_vertices`. Vertices that no triangle uses stay, with
@@ -58,6 +68,13 @@ class RefinedMesh {
   [[nodiscard]] const std::array<std::uint32_t, 3>& leaf(std::uint32_t slot) const noexcept {
     return leaves_[slot];
   }
+  [[nodiscard]] Parts parts() const {
+    return {vertices_, leaves_, leaf_submesh_, leaf_node_, nodes_};
+  }
+  /// The refined mesh that had these parts; nothing when they contradict each other or `mesh`.
+  [[nodiscard]] static std::optional<RefinedMesh> from(const scene::Mesh& mesh,
+                                                       std::size_t max_vertices, Parts parts);
+
   /// Index into scene::Mesh::submeshes.
   [[nodiscard]] std::uint32_t submesh(std::uint32_t slot) const noexcept {
     return leaf_submesh_[slot];
@@ -71,6 +88,11 @@ class RefinedMesh {
   /// have been passed; its neighbours may have been halved by then, and later leaves of the list
   /// are still tried.
   bool split(std::span<const std::uint32_t> slots);
+
+  /// Turns a vertex that split() has made towards where the surface really faces. Unit length.
+  void set_normal(std::uint32_t vertex, const glm::vec3& normal) noexcept {
+    vertices_[vertex].normal = normal;
+  }
 
   /// The leaf that holds a point of an original triangle (index / 3 of the mesh; below its number
   /// of triangles). `barycentric`: weights of the second and third vertex, as ray tracers give

@@ -15,6 +15,8 @@ namespace {
 
 constexpr std::uint32_t kMaxRounds = 48;
 constexpr std::size_t kGrain = 64;
+/// The full surface is looked for within this share of the halved edge.
+constexpr float kDetailReachFrac = 0.5F;
 
 /// A sample to be evaluated.
 struct Job {
@@ -39,6 +41,8 @@ class Builder {
   /// Gives every vertex that has no sample yet one; false when stopped.
   bool sample_new_vertices(double begin_frac, double end_frac);
   void find_inward(std::uint32_t mesh);
+  /// Vertices from `first` on face as the surface did before it was simplified.
+  void adopt_normals(std::uint32_t mesh, std::uint32_t first);
   /// Makes covered samples next to open ones copies of those: nobody sees them, but triangles that
   /// a foot cuts would show a mixture of both.
   void replace_covered();
@@ -99,6 +103,23 @@ void Builder::find_inward(std::uint32_t mesh) {
   }
 }
 
+void Builder::adopt_normals(std::uint32_t mesh, std::uint32_t first) {
+  if (in_.detail == nullptr || !in_.detail->has(mesh)) return;
+  RefinedMesh& refined = model_.meshes[mesh];
+  const auto vertices = refined.vertices();
+  run_parallel(vertices.size() - first, kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = first + from; i < first + to; ++i) {
+      const RefinedMesh::Vertex& vertex = vertices[i];
+      if (vertex.parent[0] == i) continue;
+      const float edge_m = glm::distance(vertices[vertex.parent[0]].position_m,
+                                         vertices[vertex.parent[1]].position_m);
+      const auto normal =
+          in_.detail->normal(mesh, vertex.position_m, vertex.normal, kDetailReachFrac * edge_m);
+      if (normal) refined.set_normal(static_cast<std::uint32_t>(i), *normal);
+    }
+  });
+}
+
 bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   jobs_.clear();
   job_inward_.clear();
@@ -110,9 +131,12 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
     for (std::uint32_t p = 0; p < patches_.size(); ++p) {
       SurfacePatch& patch = patches_[p];
       if (patch.mesh != mesh || patch.samples.size() == vertices.size()) continue;
-      if (!looked) find_inward(mesh);
-      looked = true;
       const auto first = static_cast<std::uint32_t>(patch.samples.size());
+      if (!looked) {
+        adopt_normals(mesh, first);
+        find_inward(mesh);
+      }
+      looked = true;
       patch.samples.resize(vertices.size());
       patch.seen.resize(vertices.size());
       patch.states.resize(vertices.size());

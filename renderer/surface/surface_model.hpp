@@ -11,6 +11,7 @@
 #include "surface/history_record.hpp"
 #include "surface/refined_mesh.hpp"
 #include "surface/sample_heat.hpp"
+#include "surface/surface_detail.hpp"
 #include "surface/surface_samples.hpp"
 #include "surface/surface_view.hpp"
 
@@ -54,6 +55,7 @@ struct SurfaceInputs {
   const SurfaceHistory& history;
   const HistoryRecord& record;
   std::span<const MoverPlacement> movers_now;
+  const SurfaceDetail* detail = nullptr;  ///< null: no mesh has lost triangles
 };
 
 /// Of the outermost layer; 0 for a prescribed material.

@@ -33,6 +33,9 @@ constexpr float kSharpK = 2.0F;
 /// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
 constexpr float kCreaseS = 1000.0F;
 constexpr float kCreaseDepths = 3.0F;
+/// Sunlight on a surface that is turned by so much differs by a tenth of a kelvin or so.
+constexpr float kBentRad = 0.02F;
+constexpr float kBentReachFrac = 0.25F;
 /// The shortest edges that are halved, in pixels: where temperature is smooth, and where an edge
 /// runs (finer ones change no pixel by more than a tenth of a kelvin, emit bench
 /// error-vs-time).
@@ -136,6 +139,30 @@ bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const Re
   return false;
 }
 
+bool SurfaceRefinement::bent(std::uint32_t mesh, const RefinedMesh& refined, std::uint32_t slot,
+                             float longest_m) const {
+  if (in_.detail == nullptr || !in_.detail->has(mesh)) return false;
+  const auto& leaf = refined.leaf(slot);
+  const auto vertices = refined.vertices();
+  const auto differs = [&](const glm::vec3& weight) {
+    glm::vec3 position_m(0.0F);
+    glm::vec3 normal(0.0F);
+    for (glm::length_t k = 0; k < 3; ++k) {
+      const RefinedMesh::Vertex& vertex = vertices[leaf[static_cast<std::size_t>(k)]];
+      position_m += weight[k] * vertex.position_m;
+      normal += weight[k] * vertex.normal;
+    }
+    const float length = glm::length(normal);
+    if (!(length > 0.0F)) return true;
+    normal /= length;
+    const auto full = in_.detail->normal(mesh, position_m, normal, kBentReachFrac * longest_m);
+    return full && glm::distance(*full, normal) > kBentRad;
+  };
+  constexpr float kThird = 1.0F / 3.0F;
+  return differs({kThird, kThird, kThird}) || differs({0.5F, 0.5F, 0.0F}) ||
+         differs({0.0F, 0.5F, 0.5F}) || differs({0.5F, 0.0F, 0.5F});
+}
+
 bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slot,
                                    const SurfacePatch& patch) const {
   const auto& leaf = refined.leaf(slot);
@@ -162,10 +189,20 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
     return false;
   }
 
+  const bool smooth = longest_m > kLeastEdgePx * pixel_m;
+  const std::size_t count = in_.record.size();
+  const auto lately_lit = [&](std::uint32_t vertex) {
+    return *std::max_element(&patch.sun_frac[vertex * count + recent_],
+                             &patch.sun_frac[vertex * count] + count) > 0.0F;
+  };
+  if (smooth && std::ranges::any_of(leaf, lately_lit) &&
+      bent(patch.mesh, refined, slot, longest_m)) {
+    return true;
+  }
+
   // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
   const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
   const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
-  const bool smooth = longest_m > kLeastEdgePx * pixel_m;
   if (smooth && lateral_ && longest_m > depth_m &&
       std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
     return true;
@@ -177,7 +214,6 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
   const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
   if ((smooth || range_k > kSharpK) && patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
   if (range_k < tolerance_k_ || longest_m < kEdgeSunPx * pixel_m) return false;
-  const std::size_t count = in_.record.size();
   for (std::size_t i = recent_; i < count; ++i) {
     const auto sun = [&](std::size_t corner) {
       const glm::vec3 normal = in_.record.rays[i].normal(patch.samples[leaf[corner]]);

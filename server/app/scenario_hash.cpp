@@ -127,6 +127,7 @@ Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
   // Folders differ from machine to machine, contents must not.
   scene::ScenarioDesc plain = scenario;
   plain.file.clear();
+  plain.thermal.state_file.clear();  // holds what the rest makes, nothing of its own
   for (auto& object : plain.objects) {
     object.gltf = label_of(object.gltf, folder);
   }

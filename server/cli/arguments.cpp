@@ -7,6 +7,7 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "emit/version.hpp"
+#include "scaling_axes.hpp"
 
 namespace emit::cli {
 namespace {
@@ -112,6 +113,7 @@ class Tool {
   void add_log_commands();
   void add_model_commands();
   void add_bench_commands();
+  void add_frame_time_benches(CLI::App& bench);
 
   CLI::App app_;
   std::vector<std::pair<CLI::App*, std::function<int()>>> actions_;
@@ -565,6 +567,56 @@ void Tool::add_bench_commands() {
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
     add_path(app, "--pictures", o.pictures, "Existing folder for the judged frames as PNG")
         ->type_name("DIR");
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  add_frame_time_benches(*bench);
+}
+
+void Tool::add_frame_time_benches(CLI::App& bench) {
+  {
+    auto [app, o] = add<BenchScalingCommand>(
+        bench, "scaling",
+        "How frame time grows with history steps, triangles, pixels, objects out of view and "
+        "thermal samples",
+        "emit bench scaling --json scaling.json --axis steps", run_bench_scaling);
+    app.add_option("--axis", o.axes, "Axis; repeatable; default all")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember(scaling_axes()));
+    app.add_option("--method", o.methods, "Thermal method; repeatable; default both")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"per-frame", "cached"}));
+    app.add_flag("--quick", o.quick, "Small scenes and coarse pictures, in seconds");
+    app.add_option("--pairs", o.pairs, "cached: frames of two scenes that are shown in turn")
+        ->check(CLI::Range(15U, 100'000U))
+        ->capture_default_str();
+    app.add_option("--per-frame-frames", o.per_frame_frames, "per-frame: frames timed per scene")
+        ->check(CLI::Range(1U, 100'000U))
+        ->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchTurnCommand>(
+        bench, "turn",
+        "Worst frame while the camera turns all round in a second, and after jumps to places that "
+        "nobody announced",
+        "emit bench turn --json turn.json --set thermal.tolerance_k=0.5", run_bench_turn);
+    app.add_option("--scene", o.scene, "Scenario with a camera trajectory: turns at its end")
+        ->capture_default_str();
+    add_set(app, o.set);
+    app.add_option("--method", o.methods, "Thermal method; repeatable")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"per-frame", "cached"}))
+        ->capture_default_str();
+    app.add_option("--runs", o.runs, "Turns, and jumps; all after one warm-up")
+        ->check(CLI::Range(1U, 1000U))
+        ->capture_default_str();
+    app.add_option("--frames", o.frames, "Frames per turn")
+        ->check(CLI::Range(2U, 100'000U))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
     add_gpu(app, o.gpu_index);
     add_json(app, o.json);
   }

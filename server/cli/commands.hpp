@@ -260,6 +260,30 @@ struct BenchThermalTruthCommand {
 };
 int run_bench_thermal_truth(const BenchThermalTruthCommand& command);
 
+struct BenchScalingCommand {
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> axes;     ///< of scaling_axes(); empty: all
+  std::vector<std::string> methods;  ///< empty: both
+  bool quick = false;
+  std::uint32_t pairs = 45;
+  std::uint32_t per_frame_frames = 3;
+  int gpu_index = -1;
+};
+int run_bench_scaling(const BenchScalingCommand& command);
+
+struct BenchTurnCommand {
+  std::optional<std::filesystem::path> json;
+  std::string scene = "airfield";
+  std::vector<std::string> set;
+  std::vector<std::string> methods{"cached"};
+  std::uint32_t runs = 5;
+  std::uint32_t frames = 100;  ///< per turn
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  int gpu_index = -1;
+};
+int run_bench_turn(const BenchTurnCommand& command);
+
 /// Parses the command line and runs the chosen subcommand; returns the process's exit code.
 int run_tool(int argc, char** argv);
 

@@ -40,5 +40,42 @@ TEST(CliBench, TheReferenceSolversConvergeWithSecondOrder) {
   EXPECT_NE(svg.find("3 dimensions, space"), std::string::npos);
 }
 
+TEST(CliBench, ScalingComparesEachCaseWithTheOneBefore) {
+  const TemporaryFolder folder;
+  const ProcessResult run = run_emit({"bench", "scaling", "--quick", "--pairs", "15",
+                                      "--per-frame-frames", "1", "--json", folder.file("s.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string json = read_text(folder.file("s.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"scaling\"");
+  // Two cases of each axis, both methods but for the samples.
+  const std::vector<double> values = numbers_of(json, "value");
+  ASSERT_EQ(values.size(), 18U) << run.out;
+  const std::vector<double> known(values.begin(), values.end() - 2);
+  EXPECT_EQ(known, (std::vector<double>{27, 54, 27, 54, 1e4, 1e5, 1e4, 1e5, 3072, 12288, 3072,
+                                        12288, 10, 100, 10, 100}));
+  EXPECT_LT(values[16], values[17]);
+  EXPECT_EQ(numbers_of(json, "samples").back(), values.back());
+  EXPECT_EQ(numbers_of(json, "ratio_to_previous").size(), 9U);
+  EXPECT_EQ(numbers_of(json, "self_ratio_spread").size(), 5U);
+  EXPECT_EQ(numbers_of(json, "limit_ratio"), (std::vector<double>{1.02, 1.5, 1.1}));
+  for (const double ms : numbers_of(json, "frame_ms_median")) EXPECT_GT(ms, 0.0);
+  const std::vector<double> instances = numbers_of(json, "instances");
+  ASSERT_EQ(instances.size(), 18U);
+  EXPECT_GE(instances[13] - instances[12], 90.0);
+}
+
+TEST(CliBench, TurnFlagsJumpsToPlacesNobodyAnnounced) {
+  const TemporaryFolder folder;
+  const ProcessResult run = run_emit(
+      {"bench", "turn", "--scene", "box", "--set", "thermal.tolerance_k=2", "--runs", "2",
+       "--frames", "8", "--width", "64", "--height", "48", "--json", folder.file("t.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string json = read_text(folder.file("t.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"turn\"");
+  EXPECT_EQ(numbers_of(json, "frames"), (std::vector<double>{16, 16}));
+  EXPECT_EQ(numbers_of(json, "coarse_frames"), (std::vector<double>{0, 16}));
+  for (const double ratio : numbers_of(json, "ratio")) EXPECT_GE(ratio, 1.0);
+}
+
 }  // namespace
 }  // namespace emit::test

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "console.hpp"
+#include "scaling_axes.hpp"
 
 namespace emit::cli {
 namespace {
@@ -54,6 +56,35 @@ TEST(CliStatistics, samples_of_zero_and_below_stay_in_the_first_bin) {
   samples.add(-1.0);
   const std::string text = histogram_text(samples, "ms");
   EXPECT_NE(text.find(" 2 ####"), std::string::npos) << text;
+}
+
+TEST(CliPairedRatio, a_machine_that_slows_down_in_the_middle_changes_no_ratio) {
+  std::vector<double> a;
+  std::vector<double> twin;
+  std::vector<double> b;
+  for (int i = 0; i < 30; ++i) {
+    const double busy = i < 13 ? 1.0 : 3.0;
+    a.push_back(busy * 10.0);
+    twin.push_back(busy * 10.0);
+    b.push_back(busy * 10.15);
+  }
+  const PairedRatio pairs = paired_ratio(a, twin, b);
+  EXPECT_EQ(pairs.pairs, 30U);
+  EXPECT_NEAR(pairs.ratio, 1.015, 1e-12);
+  EXPECT_NEAR(pairs.self_ratio, 1.0, 1e-12);
+  EXPECT_NEAR(pairs.self_spread, 0.0, 1e-12);
+  EXPECT_TRUE(pairs.within(1.02));
+  EXPECT_FALSE(pairs.within(1.01));
+}
+
+TEST(CliPairedRatio, the_limit_counts_as_met_only_as_far_as_a_run_lies_from_itself) {
+  const std::vector<double> a(30, 10.0);
+  std::vector<double> twin(30, 10.0);
+  for (std::size_t i = 20; i < 30; ++i) twin[i] = 9.6;  // the last third
+  const PairedRatio near = paired_ratio(a, twin, std::vector<double>(30, 10.3));
+  EXPECT_NEAR(near.self_spread, 0.04, 1e-12);
+  EXPECT_TRUE(near.within(1.02));
+  EXPECT_FALSE(paired_ratio(a, twin, std::vector<double>(30, 10.5)).within(1.02));
 }
 
 TEST(CliTable, columns_are_as_wide_as_their_widest_cell) {

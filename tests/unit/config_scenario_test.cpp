@@ -55,6 +55,7 @@ max_cascades = 3
 blocker_taps = 4
 filter_taps = 16
 obscurance_radius_m = 0.75
+state_file = "warm.emitstate"
 
 [sensor]
 name = "cam"
@@ -184,6 +185,7 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   EXPECT_EQ(s.thermal.blocker_taps, 4U);
   EXPECT_EQ(s.thermal.filter_taps, 16U);
   EXPECT_EQ(s.thermal.obscurance_radius_m, 0.75);
+  EXPECT_EQ(s.thermal.state_file, s.file.parent_path() / "warm.emitstate");
   EXPECT_EQ(s.sensor.name, "cam");
   EXPECT_EQ(s.sensor.width_px, 320U);
   EXPECT_EQ(s.sensor.height_px, 256U);

@@ -45,6 +45,13 @@ TEST(ScenarioHash, IsTheSameWhereverTheFolderLies) {
   EXPECT_EQ(Files().hash().size(), 64U);
 }
 
+TEST(ScenarioHash, DoesNotHangOnWhereTheWarmedUpStateIsKept) {
+  Files files;
+  const std::string before = files.hash();
+  files.scenario.thermal.state_file = "/var/cache/emit/x.emitstate";
+  EXPECT_EQ(files.hash(), before);
+}
+
 TEST(ScenarioHash, FollowsBuffersBesideAGltfFile) {
   const Files files;
   const std::string before = files.hash();

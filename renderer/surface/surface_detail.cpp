@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/surface_detail.hpp"
+
+#include <array>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <utility>
+
+namespace emit::renderer {
+namespace {
+
+/// The full surface faces within 60 degrees of the coarse one.
+constexpr float kLeastCos = 0.5F;
+
+}  // namespace
+
+SurfaceDetail::SurfaceDetail(scene::SceneGeometry full, CasterRays rays) noexcept
+    : full_(std::move(full)), rays_(std::move(rays)) {}
+
+physics::Result<SurfaceDetail> SurfaceDetail::create(scene::SceneGeometry full,
+                                                     const scene::SceneGeometry& coarse) {
+  auto rays = CasterRays::create(full);
+  if (!rays) return tl::unexpected(std::move(rays.error()));
+  SurfaceDetail detail(std::move(full), std::move(*rays));
+  detail.instance_of_mesh_.assign(coarse.meshes.size(), kNone);
+  for (std::uint32_t i = 0; i < coarse.instances.size(); ++i) {
+    const std::uint32_t mesh = coarse.instances[i].mesh;
+    if (coarse.instances[i].entity_id == 0 &&
+        coarse.meshes[mesh].indices.size() < detail.full_.meshes[mesh].indices.size()) {
+      detail.instance_of_mesh_[mesh] = i;
+    }
+  }
+  return detail;
+}
+
+std::optional<glm::vec3> SurfaceDetail::normal(std::uint32_t mesh, const glm::vec3& position_m,
+                                               const glm::vec3& normal,
+                                               float reach_m) const noexcept {
+  const std::uint32_t index = instance_of_mesh_[mesh];
+  const glm::dmat4& world_from_mesh = full_.instances[index].world_from_mesh;
+  const glm::dvec3 to_world = glm::dmat3(world_from_mesh) * glm::dvec3(normal);
+  const double scale = glm::length(to_world);
+  const glm::vec3 direction(-to_world / scale);
+  const float reach_rel_m = reach_m * static_cast<float>(scale);
+  const glm::vec3 at_m(glm::dvec3(world_from_mesh * glm::dvec4(glm::dvec3(position_m), 1.0)) -
+                       rays_.origin_world_m());
+  const CasterRay ray{at_m - reach_rel_m * direction, direction};
+  std::array<CasterHit, 1> hit;
+  if (rays_.first_hits({&ray, 1}, {true, {}}, hit) == 0U || hit[0].instance != index ||
+      hit[0].distance_m > 2.0F * reach_rel_m) {
+    return std::nullopt;
+  }
+  const scene::Mesh& full = full_.meshes[mesh];
+  const std::size_t first = std::size_t{3} * hit[0].triangle;
+  const auto corner = [&](std::size_t k) { return full.normals[full.indices[first + k]]; };
+  const glm::vec2 b = hit[0].barycentric;
+  const glm::vec3 sum = (1.0F - b.x - b.y) * corner(0) + b.x * corner(1) + b.y * corner(2);
+  const float length = glm::length(sum);
+  if (!(length > 0.0F) || glm::dot(sum, normal) < kLeastCos * length) return std::nullopt;
+  return sum / length;
+}
+
+}  // namespace emit::renderer

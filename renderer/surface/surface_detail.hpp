@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <glm/ext/vector_float3.hpp>
+#include <optional>
+#include <vector>
+
+#include "emit/scene/mesh.hpp"
+#include "surface/caster_rays.hpp"
+
+namespace emit::renderer {
+
+/// The surface as loaded, where what is drawn and sampled has fewer triangles: which way it faces
+/// between the vertices that are left. Half a degree is worth a tenth of a kelvin in the sun, which
+/// no bound on the surface's place holds. Immutable; any thread; queries allocate nothing.
+class SurfaceDetail {
+ public:
+  /// `full` and `coarse` have the same instances; entities may not differ. Errors: those of
+  /// CasterRays::create().
+  [[nodiscard]] static physics::Result<SurfaceDetail> create(scene::SceneGeometry full,
+                                                             const scene::SceneGeometry& coarse);
+
+  /// True when the coarse mesh has lost triangles and a static instance draws it.
+  [[nodiscard]] bool has(std::uint32_t mesh) const noexcept {
+    return !instance_of_mesh_.empty() && instance_of_mesh_[mesh] != kNone;
+  }
+
+  /// Normal of the full mesh next to a point of the coarse one, both in axes of the mesh, unit
+  /// length; none where the full surface lies farther than `reach_m` along the coarse normal or
+  /// faces elsewhere. @pre has(mesh)
+  [[nodiscard]] std::optional<glm::vec3> normal(std::uint32_t mesh, const glm::vec3& position_m,
+                                                const glm::vec3& normal,
+                                                float reach_m) const noexcept;
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffU;
+  SurfaceDetail(scene::SceneGeometry full, CasterRays rays) noexcept;
+
+  scene::SceneGeometry full_;
+  CasterRays rays_;
+  std::vector<std::uint32_t> instance_of_mesh_;  ///< a static one whose mesh has lost triangles
+};
+
+}  // namespace emit::renderer

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "bench_stability_scene.hpp"
+#include "commands.hpp"
+#include "console.hpp"
+#include "emit/version.hpp"
+#include "interrupt.hpp"
+#include "json.hpp"
+#include "renderer_thread.hpp"
+#include "scaling_axes.hpp"
+#include "scenario_input.hpp"
+#include "statistics.hpp"
+
+namespace emit::cli {
+namespace {
+
+using physics::Result;
+
+/// Sim time goes on as at this rate, in real time.
+constexpr double kRateHz = 200.0;
+/// Untimed frames of a renderer before the others join.
+constexpr std::uint32_t kSettleFrames = 3;
+
+/// One line of the result.
+struct Row {
+  std::string axis;
+  double value = 0.0;
+  const char* method = "cached";
+  scene::ScenarioDesc scenario;
+  Samples frame_ms;
+  renderer::SceneStats stats;
+  std::string device;
+  double warm_up_s = 0.0;
+  std::optional<double> ratio_to_previous;
+  std::optional<PairedRatio> pairs;  ///< cached: what that ratio comes from
+  std::optional<double> limit_ratio;
+};
+
+renderer::FrameRequest frame_of(const RendererThread& renderer, const scene::ScenarioDesc& scenario,
+                                std::uint32_t frame) {
+  renderer::FrameRequest request;
+  request.frame_number = frame;
+  request.sim_time_ns = observation_ns(scenario) + std::llround(1e9 * frame / kRateHz);
+  request.thermal_time_ns = request.sim_time_ns;
+  request.sensor_pose = renderer.scenario_pose_at(observation_ns(scenario));
+  return request;
+}
+
+/// A renderer of a case that has shown its first frames.
+struct Runner {
+  const scene::ScenarioDesc* scenario = nullptr;
+  std::unique_ptr<RendererThread> renderer;
+  double warm_up_s = 0.0;
+  std::uint32_t next_frame = 0;
+
+  Result<double> frame_ms() {
+    const auto frame = renderer->render(frame_of(*renderer, *scenario, next_frame++));
+    if (!frame) return tl::unexpected(frame.error());
+    return frame->frame_ms;
+  }
+};
+
+Result<Runner> start(const scene::ScenarioDesc& scenario, std::uint32_t settle_frames,
+                     int gpu_index) {
+  auto renderer = RendererThread::create(scenario, gpu_index);
+  if (!renderer) return tl::unexpected(std::move(renderer.error()));
+  Runner runner{&scenario, std::move(*renderer), 0.0, 0};
+  const auto warm_up_s = runner.renderer->warm_up(frame_of(*runner.renderer, scenario, 0));
+  if (!warm_up_s) return tl::unexpected(warm_up_s.error());
+  runner.warm_up_s = *warm_up_s;
+  for (std::uint32_t i = 0; i < settle_frames; ++i) {
+    const auto shown = runner.frame_ms();
+    if (!shown) return tl::unexpected(shown.error());
+  }
+  return runner;
+}
+
+/// Frame times of a, its twin and b, which take turns; who begins changes from round to round.
+using Rounds = std::array<std::vector<double>, 3>;
+Result<Rounds> take_turns(std::array<Runner*, 3> runners, std::uint32_t rounds) {
+  // All at the same sim times, whatever a has shown before.
+  const std::uint32_t first = std::ranges::max(runners, {}, [](const Runner* runner) {
+                                return runner->next_frame;
+                              })->next_frame;
+  for (Runner* runner : runners) runner->next_frame = first;
+  Rounds out;
+  for (std::uint32_t round = 0; round <= rounds; ++round) {
+    for (std::size_t turn = 0; turn < runners.size(); ++turn) {
+      const std::size_t who = (turn + round) % runners.size();
+      const auto frame_ms = runners[who]->frame_ms();
+      if (!frame_ms) return tl::unexpected(frame_ms.error());
+      if (round > 0) out[who].push_back(*frame_ms);  // the first may have to catch up
+    }
+  }
+  return out;
+}
+
+void add_all(Samples& samples, const std::vector<double>& values) {
+  for (const double value : values) samples.add(value);
+}
+
+Row row_of(const ScalingAxis& axis, const ScalingCase& made, const char* method,
+           const Runner& runner) {
+  Row row;
+  row.axis = axis.name;
+  row.method = method;
+  row.scenario = made.scenario;
+  row.stats = runner.renderer->stats();
+  row.device = runner.renderer->device();
+  row.warm_up_s = runner.warm_up_s;
+  row.value = axis.name == "samples" ? static_cast<double>(row.stats.samples) : made.value;
+  return row;
+}
+
+/// Each case against the one before, which runs twice: what differs then is the machine.
+Result<void> run_cached(const ScalingAxis& axis, const BenchScalingCommand& command,
+                        ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
+  std::optional<Runner> before;
+  for (const ScalingCase& made : axis.cases) {
+    auto runner = start(made.scenario, kSettleFrames, command.gpu_index);
+    if (!runner) return tl::unexpected(std::move(runner.error()));
+    Row row = row_of(axis, made, "cached", *runner);
+    if (before) {
+      auto twin = start(*before->scenario, kSettleFrames, command.gpu_index);
+      if (!twin) return tl::unexpected(std::move(twin.error()));
+      const auto rounds = take_turns({&*before, &*twin, &*runner}, command.pairs);
+      if (!rounds) return tl::unexpected(rounds.error());
+      const auto& [a_ms, twin_ms, b_ms] = *rounds;
+      add_all(rows[rows.size() - 1].frame_ms, a_ms);
+      add_all(row.frame_ms, b_ms);
+      row.pairs = paired_ratio(a_ms, twin_ms, b_ms);
+      row.ratio_to_previous = row.pairs->ratio;
+      row.limit_ratio = axis.limit_ratio;
+    }
+    before = std::move(*runner);
+    rows.push_back(std::move(row));
+    progress.advance_to(++done);
+  }
+  return {};
+}
+
+/// A few frames of the published method beside them.
+Result<void> run_per_frame(const ScalingAxis& axis, const BenchScalingCommand& command,
+                           ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
+  std::optional<double> before_ms;
+  for (const ScalingCase& made : axis.cases) {
+    scene::ScenarioDesc scenario = made.scenario;
+    scenario.thermal.method = scene::ThermalMethod::per_frame;
+    auto runner = start(scenario, 1, command.gpu_index);
+    if (!runner) return tl::unexpected(std::move(runner.error()));
+    Row row = row_of(axis, made, "per-frame", *runner);
+    for (std::uint32_t i = 0; i < command.per_frame_frames; ++i) {
+      const auto frame_ms = runner->frame_ms();
+      if (!frame_ms) return tl::unexpected(frame_ms.error());
+      row.frame_ms.add(*frame_ms);
+    }
+    if (before_ms) row.ratio_to_previous = row.frame_ms.median() / *before_ms;
+    before_ms = row.frame_ms.median();
+    rows.push_back(std::move(row));
+    progress.advance_to(++done);
+  }
+  return {};
+}
+
+Json optional_number(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json row_json(const Row& row) {
+  const bool cached = std::string_view(row.method) == "cached";
+  Json json = Json::object();
+  json.set("axis", row.axis).set("value", row.value).set("method", row.method);
+  json.set("frame_ms_median", row.frame_ms.median()).set("frame_ms_max", row.frame_ms.max());
+  json.set("frames", row.frame_ms.count());
+  json.set("ratio_to_previous", optional_number(row.ratio_to_previous));
+  json.set("pairs", row.pairs ? Json(row.pairs->pairs) : Json(nullptr));
+  json.set("self_ratio", row.pairs ? Json(row.pairs->self_ratio) : Json(nullptr));
+  json.set("self_ratio_spread", row.pairs ? Json(row.pairs->self_spread) : Json(nullptr));
+  json.set("limit_ratio", optional_number(row.limit_ratio));
+  json.set("limit_met", row.pairs && row.limit_ratio ? Json(row.pairs->within(*row.limit_ratio))
+                                                     : Json(nullptr));
+  json.set("scene", row.scenario.name).set("steps", row.scenario.thermal.steps);
+  json.set("triangles", row.stats.triangles).set("instances", row.stats.instances);
+  json.set("width", row.scenario.sensor.width_px).set("height", row.scenario.sensor.height_px);
+  json.set("tolerance_k", row.scenario.thermal.tolerance_k);
+  json.set("samples", cached ? Json(row.stats.samples) : Json(nullptr));
+  json.set("samples_full", cached ? Json(row.stats.samples_full) : Json(nullptr));
+  json.set("warm_up_s", cached ? Json(row.warm_up_s) : Json(nullptr));
+  json.set("rate_hz", kRateHz);
+  return json;
+}
+
+std::vector<std::string> table_line(const Row& row) {
+  std::vector<std::string> line{row.axis, fmt::format("{:.0f}", row.value), row.method,
+                                fmt::format("{:.2f}", row.frame_ms.median()),
+                                fmt::format("{:.2f}", row.frame_ms.max())};
+  const auto ratio = [](double value) { return fmt::format("{:.3f}", value); };
+  line.push_back(row.ratio_to_previous ? ratio(*row.ratio_to_previous) : "-");
+  line.push_back(row.pairs ? ratio(row.pairs->self_spread) : "-");
+  line.push_back(row.limit_ratio ? ratio(*row.limit_ratio) : "-");
+  const bool judged = row.pairs && row.limit_ratio;
+  line.push_back(!judged ? "-" : row.pairs->within(*row.limit_ratio) ? "yes" : "NO");
+  line.push_back(fmt::format("{}", row.stats.samples));
+  line.push_back(fmt::format("{:.1f}", row.warm_up_s));
+  return line;
+}
+
+bool wanted(const std::vector<std::string>& choice, const std::string& name) {
+  return choice.empty() || std::ranges::find(choice, name) != choice.end();
+}
+
+Result<void> run_axes(const BenchScalingCommand& command, std::vector<Row>& rows) {
+  const TemporaryFolder folder;
+  if (folder.path().empty()) {
+    return physics::make_error(physics::ErrorCode::io, "cannot create a temporary folder");
+  }
+  std::vector<ScalingAxis> axes;
+  std::uint64_t cases = 0;
+  for (const std::string& name : scaling_axes()) {
+    if (!wanted(command.axes, name)) continue;
+    auto axis = make_scaling_axis(name, command.quick, folder.path());
+    if (!axis) return tl::unexpected(std::move(axis.error()));
+    cases += axis->cases.size() * (name == "samples" ? 1 : 2);
+    axes.push_back(std::move(*axis));
+  }
+  ProgressBar progress("bench scaling", cases);
+  std::uint64_t done = 0;
+  for (const ScalingAxis& axis : axes) {
+    if (wanted(command.methods, "cached")) {
+      if (auto ran = run_cached(axis, command, progress, done, rows); !ran) return ran;
+    }
+    if (wanted(command.methods, "per-frame") && axis.name != "samples") {
+      if (auto ran = run_per_frame(axis, command, progress, done, rows); !ran) return ran;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+int run_bench_scaling(const BenchScalingCommand& command) {
+  const InterruptGuard interrupt;
+  std::vector<Row> rows;
+  if (const auto ran = run_axes(command, rows); !ran) return fail(ran.error());
+  TextTable table({"axis", "value", "method", "median ms", "max ms", "x previous", "self spread",
+                   "limit", "met", "samples", "warm-up s"});
+  Json results = Json::array();
+  for (const Row& row : rows) {
+    table.add(table_line(row));
+    results.push(row_json(row));
+  }
+  fmt::print(text_stream(command.json), "{}, commit {}\n{}", rows[0].device, kCommit,
+             table.to_string());
+  if (command.json) {
+    Json json = Json::object();
+    json.set("device", rows[0].device).set("commit", kCommit).set("suite", "scaling");
+    json.set("results", std::move(results));
+    if (auto written = write_json(*command.json, json); !written) return fail(written.error());
+  }
+  return kExitOk;
+}
+
+}  // namespace emit::cli

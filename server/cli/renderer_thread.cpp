@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "renderer_thread.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "interrupt.hpp"
+
+namespace emit::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+}  // namespace
+
+RendererThread::RendererThread() : thread_([this] { loop(); }) {}
+
+RendererThread::~RendererThread() {
+  call([this] { renderer_.reset(); });
+  {
+    const std::scoped_lock lock(mutex_);
+    ends_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void RendererThread::loop() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return job_ != nullptr || ends_; });
+    if (ends_) return;
+    (*job_)();
+    job_ = nullptr;
+    changed_.notify_all();
+  }
+}
+
+void RendererThread::call(const std::function<void()>& job) {
+  std::unique_lock lock(mutex_);
+  job_ = &job;
+  changed_.notify_all();
+  changed_.wait(lock, [this] { return job_ == nullptr; });
+}
+
+Result<std::unique_ptr<RendererThread>> RendererThread::create(const scene::ScenarioDesc& scenario,
+                                                               int gpu_index) {
+  std::unique_ptr<RendererThread> thread(new RendererThread());
+  Result<void> made;
+  thread->call([&] {
+    renderer::OutputOptions output;
+    output.slots = 2;
+    auto created = renderer::Renderer::create(scenario, {gpu_index, false}, output);
+    if (created) {
+      thread->renderer_ = std::move(*created);
+    } else {
+      made = tl::unexpected(std::move(created.error()));
+    }
+  });
+  if (!made) return tl::unexpected(std::move(made.error()));
+  return thread;
+}
+
+Result<double> RendererThread::warm_up(const renderer::FrameRequest& first) {
+  Result<void> ready;
+  const auto start = Clock::now();
+  call([&] {
+    ready = renderer_->warm_up(first, [](double) { return !InterruptGuard::interrupted(); });
+  });
+  if (InterruptGuard::interrupted()) return make_error(ErrorCode::io, "interrupted");
+  if (!ready) return tl::unexpected(std::move(ready.error()));
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+Result<TimedFrame> RendererThread::render(const renderer::FrameRequest& request) {
+  if (InterruptGuard::interrupted()) return make_error(ErrorCode::io, "interrupted");
+  TimedFrame out;
+  int slot = -1;
+  bool failed = false;
+  call([&] {
+    const auto start = Clock::now();
+    slot = renderer_->submit(request);
+    if (slot < 0) return;
+    const auto index = static_cast<renderer::SlotIndex>(slot);
+    const renderer::FrameView& view = renderer_->collect(index);
+    out.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+    out.coarse = view.stats.coarse;
+    failed = view.device_failed;
+    renderer_->release(index);
+  });
+  if (slot < 0) return make_error(ErrorCode::internal, "the renderer has no free slot");
+  if (failed) return make_error(ErrorCode::gpu, "the device reported an error");
+  return out;
+}
+
+}  // namespace emit::cli

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "emit/physics/error.hpp"
+#include "emit/renderer/renderer.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+namespace emit::cli {
+
+/// A frame from submit() until its pixels are there.
+struct TimedFrame {
+  double frame_ms = 0.0;
+  bool coarse = false;  ///< renderer::FrameStats::coarse
+};
+
+/// A renderer on a thread of its own, so that several, each with its own GL context, are alive at
+/// once and render in turn. Calls block until the thread has done them: at most one renderer works
+/// at a time when one thread calls. Setup class; the frames themselves are those of Renderer.
+class RendererThread {
+ public:
+  /// Errors: those of Renderer::create().
+  [[nodiscard]] static physics::Result<std::unique_ptr<RendererThread>> create(
+      const scene::ScenarioDesc& scenario, int gpu_index);
+  ~RendererThread();
+  RendererThread(const RendererThread&) = delete;
+  RendererThread& operator=(const RendererThread&) = delete;
+
+  /// Renderer::warm_up(); returns the seconds it took. Stops with an error (io) on an interrupt.
+  [[nodiscard]] physics::Result<double> warm_up(const renderer::FrameRequest& first);
+  /// Errors: io (interrupted), gpu (the device failed), internal.
+  [[nodiscard]] physics::Result<TimedFrame> render(const renderer::FrameRequest& request);
+
+  [[nodiscard]] physics::Pose scenario_pose_at(std::int64_t sim_time_ns) const noexcept {
+    return renderer_->scenario_sensor_pose_at(sim_time_ns);
+  }
+  [[nodiscard]] const renderer::SceneStats& stats() const noexcept {
+    return renderer_->scene_stats();
+  }
+  [[nodiscard]] const std::string& device() const noexcept { return renderer_->device_name(); }
+
+ private:
+  RendererThread();
+  /// Runs `job` on the thread and waits for its end.
+  void call(const std::function<void()>& job);
+  void loop();
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  const std::function<void()>* job_ = nullptr;
+  bool ends_ = false;
+  std::unique_ptr<renderer::Renderer> renderer_;  ///< made, used and destroyed on the thread
+  std::thread thread_;
+};
+
+}  // namespace emit::cli
