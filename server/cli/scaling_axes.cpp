@@ -113,17 +113,17 @@ std::vector<physics::Pose> places_behind(const physics::Pose& camera, std::uint3
   return places;
 }
 
-/// A small body, a rib on a plate, many times behind the camera.
+/// A box many times behind the camera.
 Result<void> add_objects(ScalingAxis& axis, bool quick, const Path& folder) {
   auto scenario = cached_scene("box", quick);
   if (!scenario) return tl::unexpected(std::move(scenario.error()));
   axis.limit_ratio = kObjectsLimit;
+  scenario->thermal.max_samples = 20'000'000;  // so that what is in view stays the same
   scenario->thermal.steps = 9;  // frames do not hang on it, the warm-up of many instances does
   scenegen::GenerateOptions options;
-  options.kind = scenegen::SceneKind::ribbed;
+  options.kind = scenegen::SceneKind::box;
   options.directory = folder;
-  options.ribbed.ribs = 1;
-  options.ribbed.length_m = 1.0;
+  options.box = {1.0, 0.0};
   const auto file = generated(options);
   if (!file) return tl::unexpected(file.error());
   const physics::Pose camera = scenario->sensor.trajectory.front().pose;

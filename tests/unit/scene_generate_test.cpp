@@ -129,6 +129,19 @@ TEST(GenerateBox, has_exactly_45_triangles_and_a_closed_box) {
   EXPECT_NEAR(enclosed_volume_m3(mesh_named(model, "box")), 8.0, 1e-5);
 }
 
+TEST(GenerateBox, stands_alone_without_a_plane) {
+  const auto folder = test::test_folder();
+  GenerateOptions options = of(SceneKind::box);
+  options.box = {1.0, 0.0};
+  const GeneratedFiles files = run(options, folder);
+  ASSERT_EQ(files.files.size(), 1U);
+  EXPECT_EQ(files.files[0].triangles, 20U);
+  const GltfModel model = load(folder / "box.glb");
+  ASSERT_EQ(model.meshes.size(), 1U);
+  EXPECT_EQ(open_edges(mesh_named(model, "box")), 0U);
+  EXPECT_NEAR(enclosed_volume_m3(mesh_named(model, "box")), 1.0, 1e-5);
+}
+
 TEST(GenerateBox, plane_covers_its_square_once) {
   const auto folder = test::test_folder();
   run(of(SceneKind::box), folder);

@@ -65,13 +65,6 @@ TEST(ScenarioHash, FollowsBuffersBesideAGltfFile) {
   EXPECT_NE(missing.error().text.find("my buffer.bin"), std::string::npos) << missing.error().text;
 }
 
-TEST(ScenarioHash, DoesNotHangOnWhereTheWarmedUpStateIsKept) {
-  Files files;
-  const std::string before = files.hash();
-  files.scenario.thermal.state_file = "/var/cache/emit/x.emitstate";
-  EXPECT_EQ(files.hash(), before);
-}
-
 TEST(ScenarioHash, FollowsBuffersOfABinaryGltfFile) {
   Files files;
   std::string json = kGltf;

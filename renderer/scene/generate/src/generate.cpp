@@ -53,10 +53,11 @@ bool in_range(double value, double lo, double hi) {
 constexpr double kMaxLengthM = 1e5;
 
 Result<void> check(const BoxOptions& o) {
-  return first_error({require(in_range(o.size_m, 1e-3, kMaxLengthM), "size_m", o.size_m,
-                              "must be in [0.001, 1e5]"),
-                      require(o.plane_m > 1.2 * o.size_m && o.plane_m <= kMaxLengthM, "plane_m",
-                              o.plane_m, "must exceed 1.2 size_m and be at most 1e5")});
+  return first_error(
+      {require(in_range(o.size_m, 1e-3, kMaxLengthM), "size_m", o.size_m,
+               "must be in [0.001, 1e5]"),
+       require(o.plane_m == 0.0 || (o.plane_m > 1.2 * o.size_m && o.plane_m <= kMaxLengthM),
+               "plane_m", o.plane_m, "must be 0, or exceed 1.2 size_m and be at most 1e5")});
 }
 
 Result<void> check(const StatueOptions& o) {

@@ -22,14 +22,8 @@ void grid_plane(MeshBuilder& builder, const std::vector<double>& xs, const std::
   }
 }
 
-}  // namespace
-
-Scene box_scene(const BoxOptions& options) {
-  const double h = 0.5 * options.size_m;
-  const double p = 0.5 * options.plane_m;
-  Scene scene;
-  // A closed box has an even number of triangles: 20 here, sides fanned around their middles. The
-  // plane, cut along the foot of the box, has the other 25; nothing meets at a T.
+/// Plane around a box of half edge `h`, cut along its foot; nothing meets at a T.
+void add_plane(Scene& scene, double h, double p) {
   MeshBuilder plane("plane");
   plane.material("asphalt");
   const std::vector<double> lines{-p, -h, h, p};
@@ -48,6 +42,17 @@ Scene box_scene(const BoxOptions& options) {
   }
   plane.polygon({{-m, p, 0.0}, {-p, p, 0.0}, {-p, h, 0.0}, {-h, h, 0.0}, {-h, p, 0.0}});  // 3
   scene.place(scene.add_mesh(plane.take()), "plane");
+}
+
+}  // namespace
+
+Scene box_scene(const BoxOptions& options) {
+  const double h = 0.5 * options.size_m;
+  const double p = 0.5 * options.plane_m;
+  Scene scene;
+  // A closed box has an even number of triangles: 20 here, sides fanned around their middles. The
+  // plane has the other 25.
+  if (p > 0.0) add_plane(scene, h, p);
 
   MeshBuilder box("box");
   box.material("concrete");

@@ -24,7 +24,7 @@ enum class SceneKind : std::uint8_t { box, statue, block_on_road, ribbed, airfie
 /// (plane), concrete (box).
 struct BoxOptions {
   double size_m = 2.0;    ///< edge of the box, > 0
-  double plane_m = 40.0;  ///< edge of the plane, > 1.2 size_m
+  double plane_m = 40.0;  ///< edge of the plane, > 1.2 size_m; 0: none, the box alone
 };
 
 /// Seated figure with folds on a plane: one closed surface. Materials: stone, asphalt.
