@@ -84,10 +84,9 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     detail = std::move(*created);
   }
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
-  auto surface =
-      CachedSurface::create(scenario, std::move(geometry), histories_of_objects(scenario),
-                            std::span(foster_materials).first(simulated), kReferenceK,
-                            std::move(detail));
+  auto surface = CachedSurface::create(
+      scenario, std::move(geometry), histories_of_objects(scenario),
+      std::span(foster_materials).first(simulated), kReferenceK, std::move(detail));
   if (!surface) return tl::unexpected(std::move(surface.error()));
   return std::unique_ptr<ThermalStage>(
       new CachedStage(scenario, bounds, eyes_around(eyes_world_m, bounds), std::move(*surface),

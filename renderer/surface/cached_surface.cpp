@@ -80,9 +80,9 @@ physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     }
     ++mover;
   }
-  std::unique_ptr<CachedSurface> surface(
-      new CachedSurface(scenario, std::move(geometry), std::move(mover_of_object), networks,
-                        std::move(*rays), reference_k));
+  std::unique_ptr<CachedSurface> surface(new CachedSurface(scenario, std::move(geometry),
+                                                           std::move(mover_of_object), networks,
+                                                           std::move(*rays), reference_k));
   surface->detail_ = std::move(detail);
   return surface;
 }
