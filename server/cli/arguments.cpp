@@ -462,7 +462,7 @@ void Tool::add_bench_commands() {
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
-    app.add_option("--method", o.methods, "Thermal method; repeatable")
+    app.add_option("--method", o.methods, "Thermal method; repeatable; default both")
         ->allow_extra_args(false)
         ->check(CLI::IsMember({"per-frame", "cached"}))
         ->capture_default_str();
