@@ -343,7 +343,8 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "are carried on from interval to interval."),
       number<ThermalOptions>("tolerance_k", "K", above_to(0, 50), EMIT_FIELD(tolerance_k),
                              "Aimed-at error of surface temperatures. foster: history steps are "
-                             "split until halving them changes less. Not used by emit2014."),
+                             "split until halving them changes less. cached: surfaces are "
+                             "refined for it. per-frame, emit2014: not used."),
       number<ThermalOptions>("initial_k", "K", between(150, 1000), EMIT_FIELD(initial_k),
                              "Surface temperature at the start of the history."),
       nanoseconds<ThermalOptions>("history_start_s", "s", 1e9, between(-1e9, 1e9),

@@ -44,7 +44,7 @@ bool ClusterView::shows(const scene::Cluster& cluster, bool double_sided) const 
   if (double_sided || mirrored_ || cluster.cone_cutoff >= 1.0F) return true;
   const glm::vec3 way = cluster.cone_apex_m - eye_m_;
   return glm::dot(way, cluster.cone_axis) <
-         cluster.cone_cutoff * glm::length(way) + reach_m * 1e-3F;
+         cluster.cone_cutoff * glm::length(way) + 1e-3F * reach_m + kRounding * glm::length(way);
 }
 
 }  // namespace emit::renderer

@@ -117,7 +117,6 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
 
 void DrawLists::add_command(const SceneBuffers::DrawRange& range, std::int32_t base_vertex,
                             std::uint32_t record) noexcept {
-  view_triangles_ += range.index_count / 3;
   commands_.push_back({range, base_vertex, record, 1});
 }
 
@@ -130,7 +129,6 @@ void DrawLists::add(std::uint32_t instance, const SceneBuffers::DrawRange& subme
     if (!commands_.empty() && commands_.back().range.first_index == submesh.first_index &&
         commands_.back().base_vertex == base_vertex) {
       ++commands_.back().count;
-      view_triangles_ += submesh.index_count / 3;
     } else {
       add_command(submesh, base_vertex, record);
     }
@@ -154,7 +152,6 @@ void DrawLists::add(std::uint32_t instance, const SceneBuffers::DrawRange& subme
 
 void DrawLists::cull_view(const ViewVolume& view, CommandRange& single_sided,
                           CommandRange& double_sided) noexcept {
-  view_triangles_ = 0;
   const std::array<glm::dvec3, 5> planes = view_planes(view);
   for (Placed& placed : view_placed_) {
     const scene::Aabb& box = placed.box_world;

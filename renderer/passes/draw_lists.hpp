@@ -56,8 +56,6 @@ class DrawLists {
   [[nodiscard]] std::size_t max_light_records() const noexcept { return light_records_.capacity(); }
   /// Box around everything, relative to the camera, at the frame's instant.
   [[nodiscard]] const scene::Aabb& bounds() const noexcept { return bounds_; }
-  /// Triangles that the last cull_view() left.
-  [[nodiscard]] std::uint64_t view_triangles() const noexcept { return view_triangles_; }
 
  private:
   struct Placed {
@@ -87,7 +85,6 @@ class DrawLists {
   std::vector<DrawCommand> commands_;
   glm::dvec3 camera_world_m_{0.0};
   scene::Aabb bounds_;
-  std::uint64_t view_triangles_ = 0;
 };
 
 }  // namespace emit::renderer

@@ -115,8 +115,9 @@ physics::Result<SurfaceModel> CachedSurface::make_model(const SurfaceInputs& sur
                                                         const SurfaceModelOptions& options,
                                                         const std::optional<Saved>& saved,
                                                         const SurfaceProgress& progress) const {
-  const bool there = saved && std::filesystem::exists(saved->file);
-  if (there) {
+  // Whatever is in the way of looking is told by read_state().
+  std::error_code error;
+  if (saved && (std::filesystem::exists(saved->file, error) || error)) {
     auto read = read_state(saved->file, saved->key, geometry_, surface.movers_now.size(), options);
     if (read || saved->start) return read;
   }

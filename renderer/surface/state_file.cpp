@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -122,13 +123,14 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                              [&](const SeenSample& s) { return s.sample < count; });
 }
 
-Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file) {
+/// The first `most` bytes of a file, or all of them.
+Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file, std::uintmax_t most) {
   const auto unreadable = [&file] {
     return make_error(ErrorCode::io,
                       fmt::format("thermal.state_file {}: cannot be read", file.string()));
   };
   std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);
+  const std::uintmax_t size = std::min(std::filesystem::file_size(file, error), most);
   std::ifstream in(file, std::ios::binary);
   if (error || !in) return unreadable();
   std::vector<std::byte> bytes(size);
@@ -177,10 +179,12 @@ std::string different_parts(const StateKey& a, const StateKey& b) {
   return text;
 }
 
-/// Why the bytes are no state for this key; empty when they are.
-std::string objection(std::span<const std::byte> bytes, const StateKey& key) {
-  ByteSource source(bytes.first(std::min(bytes.size(), kHeaderBytes)));
+/// Why a file of that size whose first bytes, or all, are these is no state for the key; empty when
+/// nothing speaks against it.
+std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_bytes,
+                      const StateKey& key) {
   Header header;
+  ByteSource source(bytes.first(std::min(bytes.size(), kHeaderBytes)));
   take_value(source, header.magic);
   if (!source.ok() || header.magic != kMagic) return "not a state of the thermal simulation";
   take_value(source, header.version);
@@ -191,10 +195,11 @@ std::string objection(std::span<const std::byte> bytes, const StateKey& key) {
   take_value(source, header.parts);
   take_value(source, header.key);
   take_value(source, header.body_bytes);
-  if (!source.ok() || header.parts != kStateParts || bytes.size() < kHeaderBytes + kHashBytes ||
-      header.body_bytes != bytes.size() - kHeaderBytes - kHashBytes) {
+  if (!source.ok() || header.parts != kStateParts || file_bytes < kHeaderBytes + kHashBytes ||
+      header.body_bytes != file_bytes - kHeaderBytes - kHashBytes) {
     return "truncated or damaged";
   }
+  if (bytes.size() < file_bytes) return {};
   Fnv64 hash;
   hash.put(bytes.data(), bytes.size() - kHashBytes);
   std::uint64_t stored = 0;
@@ -243,14 +248,20 @@ Result<void> check_state_writable(const std::filesystem::path& file) {
 Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateKey& key,
                                 const scene::SceneGeometry& geometry, std::size_t movers,
                                 const SurfaceModelOptions& options) {
-  const auto bytes = read_bytes(file);
-  if (!bytes) return tl::unexpected(bytes.error());
   const auto refuse = [&file](const std::string& why) {
     return make_error(ErrorCode::config,
                       fmt::format("thermal.state_file {}: {}. Remove it to have it made anew",
                                   file.string(), why));
   };
-  const std::string why = objection(*bytes, key);
+  // What is no state at all is not read whole.
+  const auto head = read_bytes(file, kHeaderBytes);
+  if (!head) return tl::unexpected(head.error());
+  std::error_code error;
+  std::string why = objection(*head, std::filesystem::file_size(file, error), key);
+  if (!why.empty()) return refuse(why);
+  const auto bytes = read_bytes(file, std::numeric_limits<std::uintmax_t>::max());
+  if (!bytes) return tl::unexpected(bytes.error());
+  why = objection(*bytes, bytes->size(), key);
   if (!why.empty()) return refuse(why);
   const std::span<const std::byte> all(*bytes);
   ByteSource source(all.subspan(kHeaderBytes, all.size() - kHeaderBytes - kHashBytes));

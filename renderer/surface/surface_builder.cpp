@@ -17,6 +17,7 @@ constexpr std::uint32_t kMaxRounds = 48;
 constexpr std::size_t kGrain = 64;
 /// The full surface is looked for within this share of the halved edge.
 constexpr float kDetailReachFrac = 0.5F;
+constexpr float kOffCreaseFrac = 0.02F;
 
 /// A sample to be evaluated.
 struct Job {
@@ -113,8 +114,10 @@ void Builder::adopt_normals(std::uint32_t mesh, std::uint32_t first) {
       if (vertex.parent[0] == i) continue;
       const float edge_m = glm::distance(vertices[vertex.parent[0]].position_m,
                                          vertices[vertex.parent[1]].position_m);
+      // On a crease, of the face that the vertex belongs to.
+      const glm::vec3 place_m = vertex.position_m + kOffCreaseFrac * edge_m * inward_[i];
       const auto normal =
-          in_.detail->normal(mesh, vertex.position_m, vertex.normal, kDetailReachFrac * edge_m);
+          in_.detail->normal(mesh, place_m, vertex.normal, kDetailReachFrac * edge_m);
       if (normal) refined.set_normal(static_cast<std::uint32_t>(i), *normal);
     }
   });
@@ -133,8 +136,8 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       if (patch.mesh != mesh || patch.samples.size() == vertices.size()) continue;
       const auto first = static_cast<std::uint32_t>(patch.samples.size());
       if (!looked) {
-        adopt_normals(mesh, first);
         find_inward(mesh);
+        adopt_normals(mesh, first);
       }
       looked = true;
       patch.samples.resize(vertices.size());

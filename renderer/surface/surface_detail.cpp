@@ -19,17 +19,27 @@ SurfaceDetail::SurfaceDetail(scene::SceneGeometry full, CasterRays rays) noexcep
 
 physics::Result<SurfaceDetail> SurfaceDetail::create(scene::SceneGeometry full,
                                                      const scene::SceneGeometry& coarse) {
+  // One instance of every mesh that has lost triangles, where it stands; what else stands there
+  // would only be in the way.
+  std::vector<std::uint32_t> instance_of_mesh(coarse.meshes.size(), kNone);
+  std::vector<scene::Instance> kept;
+  for (const scene::Instance& instance : full.instances) {
+    const std::uint32_t mesh = instance.mesh;
+    if (instance.entity_id != 0 || instance_of_mesh[mesh] != kNone ||
+        coarse.meshes[mesh].indices.size() >= full.meshes[mesh].indices.size()) {
+      continue;
+    }
+    instance_of_mesh[mesh] = static_cast<std::uint32_t>(kept.size());
+    kept.push_back(instance);
+  }
+  full.instances = std::move(kept);
+  for (std::size_t mesh = 0; mesh < full.meshes.size(); ++mesh) {
+    if (instance_of_mesh[mesh] == kNone) full.meshes[mesh] = {};
+  }
   auto rays = CasterRays::create(full);
   if (!rays) return tl::unexpected(std::move(rays.error()));
   SurfaceDetail detail(std::move(full), std::move(*rays));
-  detail.instance_of_mesh_.assign(coarse.meshes.size(), kNone);
-  for (std::uint32_t i = 0; i < coarse.instances.size(); ++i) {
-    const std::uint32_t mesh = coarse.instances[i].mesh;
-    if (coarse.instances[i].entity_id == 0 &&
-        coarse.meshes[mesh].indices.size() < detail.full_.meshes[mesh].indices.size()) {
-      detail.instance_of_mesh_[mesh] = i;
-    }
-  }
+  detail.instance_of_mesh_ = std::move(instance_of_mesh);
   return detail;
 }
 

@@ -38,7 +38,7 @@ class SurfaceDetail {
 
   scene::SceneGeometry full_;
   CasterRays rays_;
-  std::vector<std::uint32_t> instance_of_mesh_;  ///< a static one whose mesh has lost triangles
+  std::vector<std::uint32_t> instance_of_mesh_;  ///< entry of full_.instances
 };
 
 }  // namespace emit::renderer

@@ -139,11 +139,15 @@ bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const Re
   return false;
 }
 
-bool SurfaceRefinement::bent(std::uint32_t mesh, const RefinedMesh& refined, std::uint32_t slot,
-                             float longest_m) const {
+bool SurfaceRefinement::bent(std::uint32_t mesh, const RefinedMesh& refined,
+                             std::uint32_t slot) const {
   if (in_.detail == nullptr || !in_.detail->has(mesh)) return false;
   const auto& leaf = refined.leaf(slot);
   const auto vertices = refined.vertices();
+  const auto place = [&](std::size_t i) { return vertices[leaf[i]].position_m; };
+  const float reach_m = kBentReachFrac * std::max({glm::distance(place(0), place(1)),
+                                                   glm::distance(place(1), place(2)),
+                                                   glm::distance(place(2), place(0))});
   const auto differs = [&](const glm::vec3& weight) {
     glm::vec3 position_m(0.0F);
     glm::vec3 normal(0.0F);
@@ -155,12 +159,15 @@ bool SurfaceRefinement::bent(std::uint32_t mesh, const RefinedMesh& refined, std
     const float length = glm::length(normal);
     if (!(length > 0.0F)) return true;
     normal /= length;
-    const auto full = in_.detail->normal(mesh, position_m, normal, kBentReachFrac * longest_m);
+    const auto full = in_.detail->normal(mesh, position_m, normal, reach_m);
     return full && glm::distance(*full, normal) > kBentRad;
   };
   constexpr float kThird = 1.0F / 3.0F;
-  return differs({kThird, kThird, kThird}) || differs({0.5F, 0.5F, 0.0F}) ||
-         differs({0.0F, 0.5F, 0.5F}) || differs({0.5F, 0.0F, 0.5F});
+  // Near the middles of the edges, not on them: a crease has two normals.
+  constexpr float kNear = 0.46F;
+  constexpr float kFar = 1.0F - 2.0F * kNear;
+  return differs({kThird, kThird, kThird}) || differs({kNear, kNear, kFar}) ||
+         differs({kFar, kNear, kNear}) || differs({kNear, kFar, kNear});
 }
 
 bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slot,
@@ -195,8 +202,7 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
     return *std::max_element(&patch.sun_frac[vertex * count + recent_],
                              &patch.sun_frac[vertex * count] + count) > 0.0F;
   };
-  if (smooth && std::ranges::any_of(leaf, lately_lit) &&
-      bent(patch.mesh, refined, slot, longest_m)) {
+  if (smooth && std::ranges::any_of(leaf, lately_lit) && bent(patch.mesh, refined, slot)) {
     return true;
   }
 

@@ -40,8 +40,7 @@ class SurfaceRefinement {
   };
   /// True when the surface, before it was simplified, faces elsewhere than the triangle's corners
   /// make believe.
-  [[nodiscard]] bool bent(std::uint32_t mesh, const RefinedMesh& refined, std::uint32_t slot,
-                          float longest_m) const;
+  [[nodiscard]] bool bent(std::uint32_t mesh, const RefinedMesh& refined, std::uint32_t slot) const;
   [[nodiscard]] bool too_coarse(const RefinedMesh& refined, std::uint32_t slot,
                                 const SurfacePatch& patch) const;
   [[nodiscard]] bool seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,

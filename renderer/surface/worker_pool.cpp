@@ -4,11 +4,17 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <system_error>
 
 namespace emit::renderer {
 
 WorkerPool::WorkerPool(unsigned int threads) {
-  for (unsigned int i = 1; i < threads; ++i) threads_.emplace_back([this] { work(); });
+  threads_.reserve(threads);
+  try {
+    for (unsigned int i = 1; i < threads; ++i) threads_.emplace_back([this] { work(); });
+  } catch (const std::system_error&) {
+    // The system has no more: results do not depend on how many there are.
+  }
 }
 
 WorkerPool::~WorkerPool() {

@@ -102,7 +102,8 @@ Json row_json(const Row& row) {
   json.set("embree_ratio", ratio ? Json(*ratio) : Json(nullptr));
   json.set("frames", run.frames).set("triangles", row.free_run.triangles);
   json.set("width", run.scenario.sensor.width_px).set("height", run.scenario.sensor.height_px);
-  json.set("spacing", "uniform").set("camera_px_per_frame", kPaperPanPx);
+  const bool uniform = row.run.scenario.thermal.spacing == scene::StepSpacing::uniform;
+  json.set("spacing", uniform ? "uniform" : "geometric").set("camera_px_per_frame", kPaperPanPx);
   json.set("nominal_rate_hz", kNominalRateHz).set("sim_advance_s_per_frame", advance_s);
   json.set("newest_interval_closings", kPaperClosings);
   const bool statue = row.scene == "statue";

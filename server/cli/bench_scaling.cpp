@@ -259,6 +259,10 @@ int run_bench_scaling(const BenchScalingCommand& command) {
     table.add(table_line(row));
     results.push(row_json(row));
   }
+  if (rows.empty()) {
+    return fail(physics::Error{physics::ErrorCode::invalid_argument,
+                               "no such axis for that method: per-frame has no samples"});
+  }
   fmt::print(text_stream(command.json), "{}, commit {}\n{}", rows[0].device, kCommit,
              table.to_string());
   if (command.json) {

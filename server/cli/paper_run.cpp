@@ -109,7 +109,10 @@ PaperRun make_paper_run(scene::ScenarioDesc scenario, const PaperMethod& method,
   scenario.sensor.height_px = command.height_px;
   scenario.thermal.method = method.method;
   scenario.thermal.steps = steps;
-  scenario.thermal.spacing = scene::StepSpacing::uniform;  // as published
+  // As published; cached spaces its steps as it does anywhere else.
+  scenario.thermal.spacing = method.method == scene::ThermalMethod::cached
+                                 ? scene::StepSpacing::geometric
+                                 : scene::StepSpacing::uniform;
   const std::int64_t from_ns = scenario.thermal.history_start_ns;
   run.start_ns = observation_ns(scenario);
   // One thermal model for both methods and the reference: heat is conducted straight down, and what

@@ -30,8 +30,9 @@ glm::vec3 wave_normal(float x, float y) {
                                   1.0F));
 }
 
-/// Gentle waves over [-1, 1]^2, in cells of a centimetre, 5 m up and turned.
-scene::SceneGeometry waves() {
+/// Gentle waves over [-1, 1]^2, in cells of a centimetre, 5 m up and turned. `unit`: length of the
+/// mesh's own unit, m.
+scene::SceneGeometry waves(float unit_m = 1.0F) {
   constexpr std::uint32_t kCells = 200;
   scene::Mesh mesh;
   for (std::uint32_t j = 0; j <= kCells; ++j) {
@@ -40,6 +41,7 @@ scene::SceneGeometry waves() {
       const float y = -1.0F + 2.0F * static_cast<float>(j) / kCells;
       mesh.positions_m.emplace_back(x, y, kHeightM * std::sin(kPerM * x) * std::cos(kPerM * y));
       mesh.normals.push_back(wave_normal(x, y));
+      mesh.positions_m.back() /= unit_m;
       mesh.bounds.add(glm::dvec3(mesh.positions_m.back()));
       if (i == kCells || j == kCells) continue;
       const std::uint32_t a = j * (kCells + 1) + i;
@@ -54,6 +56,7 @@ scene::SceneGeometry waves() {
   scene::Instance instance;
   instance.world_from_mesh = glm::rotate(glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, 5.0)),
                                          0.3, glm::dvec3(1.0, 1.0, 0.0));
+  instance.world_from_mesh = glm::scale(instance.world_from_mesh, glm::dvec3(unit_m));
   instance.world_bounds = scene::transformed(mesh.bounds, instance.world_from_mesh);
   geometry.static_bounds = geometry.bounds = instance.world_bounds;
   geometry.meshes.push_back(std::move(mesh));
@@ -90,17 +93,17 @@ TEST(SurfaceDetail, GivesTheNormalsOfTheFullSurface) {
 
 /// Greatest difference between the interpolated normals of the drawn surface, in the middle of its
 /// triangles, and the waves' own, but for the worst `left_out` of them.
-float normals_error(bool with_detail, double left_out) {
+float normals_error(bool with_detail, double left_out, float unit_m = 1.0F) {
   scene::ScenarioDesc scenario;
   scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
   scenario.epoch_utc_ns = 1'403'330'400 * kSecondNs;  // 2014-06-21 06:00 UTC
   scenario.thermal.model = scene::ThermalModel::foster;
   scenario.thermal.steps = 4;
   scenario.thermal.lateral = false;
-  scene::SceneGeometry full = waves();
+  scene::SceneGeometry full = waves(unit_m);
   scenario.materials = full.materials;
   scenario.default_material = "stone";
-  scene::SceneGeometry coarse = scene::simplified(waves(), {kEyes, kPixelRad});
+  scene::SceneGeometry coarse = scene::simplified(waves(unit_m), {kEyes, kPixelRad});
   const Environment environment(scenario);
   auto networks = build_foster_materials(scenario, full.materials);
   std::optional<SurfaceDetail> detail;
@@ -128,7 +131,8 @@ float normals_error(bool with_detail, double left_out) {
       middle_m += mesh.positions_m[mesh.indices[i + k]] / 3.0F;
       normal += mesh.normals[mesh.indices[i + k]];
     }
-    errors.push_back(glm::distance(glm::normalize(normal), wave_normal(middle_m.x, middle_m.y)));
+    errors.push_back(glm::distance(glm::normalize(normal),
+                                   wave_normal(unit_m * middle_m.x, unit_m * middle_m.y)));
   }
   std::ranges::sort(errors);
   return errors[static_cast<std::size_t>((1.0 - left_out) *
@@ -140,6 +144,8 @@ TEST(SurfaceDetail, SamplesOfASimplifiedSurfaceFaceAsItDid) {
   EXPECT_GT(with_rad, 0.0F);
   EXPECT_LT(with_rad, 0.02F);
   EXPECT_GT(normals_error(false, 0.02), 2.0F * with_rad);
+  // Whatever the unit of the mesh.
+  EXPECT_NEAR(normals_error(true, 0.02, 0.01F), with_rad, 0.004F);
 }
 
 }  // namespace
