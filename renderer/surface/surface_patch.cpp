@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "emit/physics/constants.hpp"
+#include "surface/tangents.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -79,9 +80,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
                               const CasterSelection& selection) const {
   SurfaceSample& sample = patch.samples[index];
   const glm::vec3& n = point.normal;
-  const glm::vec3 u = glm::normalize(glm::cross(
-      std::abs(n.z) < 0.9F ? glm::vec3(0.0F, 0.0F, 1.0F) : glm::vec3(1.0F, 0.0F, 0.0F), n));
-  const glm::vec3 v = glm::cross(n, u);
+  const auto [u, v] = tangents_of(n);
   const glm::vec3 base_m = point.position_m + offset_m_ * point.inward;
   std::array<CasterRay, kTangents> rays;
   std::array<CasterHit, kTangents> above;

@@ -10,22 +10,12 @@
 #include <utility>
 
 #include "emit/physics/constants.hpp"
+#include "surface/tangents.hpp"
 
 namespace emit::renderer {
 namespace {
 
 constexpr std::size_t kPacket = CasterRays::kMaxRays;
-
-struct Tangents {
-  glm::vec3 u;
-  glm::vec3 v;
-};
-Tangents tangents_of(const glm::vec3& normal) noexcept {
-  const glm::vec3 helper =
-      std::abs(normal.z) < 0.9F ? glm::vec3(0.0F, 0.0F, 1.0F) : glm::vec3(1.0F, 0.0F, 0.0F);
-  const glm::vec3 u = glm::normalize(glm::cross(helper, normal));
-  return {u, glm::cross(normal, u)};
-}
 
 /// Place along Hilbert's curve through a 32 x 32 grid over [-1, 1]^2.
 std::uint32_t hilbert_order(double px, double py) noexcept {

@@ -10,9 +10,9 @@
 
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
-#include "protocol/allocation_counter.hpp"
 #include "protocol/hex.hpp"
 #include "protocol/host_frames.hpp"
+#include "support/heap_counter.hpp"
 
 namespace emit::protocol {
 namespace {
@@ -123,10 +123,10 @@ TEST(HostFrameCodec, DoesNotAllocateInSteadyState) {
   for (int i = 0; i < 3; ++i) {
     ASSERT_EQ(decode_host_frame(encoder.encode(*sent), decoder, *out), DecodeStatus::ok);
   }
-  const std::uint64_t before = test::allocation_count();
+  const std::uint64_t before = test::heap_request_count();
   DecodeStatus status = DecodeStatus::malformed;
   for (int i = 0; i < 100; ++i) status = decode_host_frame(encoder.encode(*sent), decoder, *out);
-  const std::uint64_t after = test::allocation_count();
+  const std::uint64_t after = test::heap_request_count();
   EXPECT_EQ(status, DecodeStatus::ok);
   EXPECT_EQ(after - before, 0u);
 }

@@ -9,9 +9,9 @@
 #include "agents/render_agent.hpp"
 #include "agents/sender.hpp"
 #include "io/socket.hpp"
-#include "protocol/allocation_counter.hpp"
 #include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
+#include "support/heap_counter.hpp"
 
 namespace emit::server {
 namespace {
@@ -70,11 +70,11 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   for (std::uint64_t number = 1; number <= 20; ++number) {
     frame(number);
   }
-  const std::uint64_t before = test::allocation_count();
+  const std::uint64_t before = test::heap_request_count();
   for (std::uint64_t number = 21; number <= 520; ++number) {
     frame(number);
   }
-  EXPECT_EQ(test::allocation_count() - before, 0U);
+  EXPECT_EQ(test::heap_request_count() - before, 0U);
   EXPECT_EQ(context.counters.get(Counter::frames_sent), 520U);
   sender.on_stop();
   render.on_stop();

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "emit/version.hpp"
+
+/// The command line of `emit`: every option of every subcommand. Included by arguments*.cpp alone:
+/// nothing else knows CLI11.
+namespace emit::cli {
+
+/// Options that several subcommands have.
+CLI::Option* add_path(CLI::App& app, const std::string& name, std::filesystem::path& target,
+                      const std::string& text);
+CLI::Option* add_path(CLI::App& app, const std::string& name,
+                      std::optional<std::filesystem::path>& target, const std::string& text);
+void add_json(CLI::App& app, std::optional<std::filesystem::path>& target);
+void add_set(CLI::App& app, std::vector<std::string>& target);
+void add_scenario(CLI::App& app, ScenarioChoice& target, const std::string& name);
+void add_gpu(CLI::App& app, int& target);
+CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& target,
+                       const std::string& text);
+CLI::Option* add_seconds(CLI::App& app, const std::string& name, double& target,
+                         const std::string& text);
+
+/// A subcommand's options must outlive parsing: they live in the closure that runs it.
+class Tool {
+ public:
+  Tool()
+      : app_("emit: command-line tool of emitd, the real-time infrared image generator.", "emit") {
+    app_.set_version_flag("--version", std::string("emit ") + kVersion + " (" + kCommit + ")");
+    app_.require_subcommand(1);
+    app_.footer(
+        "Exit codes: 0 success, 2 bad usage, 78 bad configuration, 1 any other failure.\n"
+        "Example: emit demo --out frames");
+    add_scene_commands();
+    add_stream_commands();
+    add_log_commands();
+    add_model_commands();
+    add_bench_commands();
+  }
+
+  int run(int argc, char** argv) {
+    try {
+      app_.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      return app_.exit(error) == 0 ? kExitOk : kExitUsage;
+    }
+    for (const auto& [command, action] : actions_) {
+      if (command->parsed()) return action();
+    }
+    return kExitUsage;
+  }
+
+ private:
+  template <class Options>
+  struct Entry {
+    CLI::App& app;
+    Options& options;
+  };
+
+  template <class Options>
+  Entry<Options> add(CLI::App& parent, const std::string& name, const std::string& text,
+                     const std::string& example, int (*action)(const Options&)) {
+    CLI::App* command = parent.add_subcommand(name, text);
+    command->footer("Example: " + example);
+    auto options = std::make_shared<Options>();
+    actions_.emplace_back(command, [options, action] { return action(*options); });
+    return {*command, *options};
+  }
+
+  void add_scene_commands();
+  void add_stream_commands();
+  void add_log_commands();
+  void add_model_commands();
+  void add_bench_commands();
+  void add_frame_time_benches(CLI::App& bench);
+
+  CLI::App app_;
+  std::vector<std::pair<CLI::App*, std::function<int()>>> actions_;
+};
+
+}  // namespace emit::cli

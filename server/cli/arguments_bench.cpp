@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "arguments.hpp"
+#include "scaling_axes.hpp"
+
+namespace emit::cli {
+
+void Tool::add_bench_commands() {
+  CLI::App* bench = app_.add_subcommand("bench", "Benchmarks; results as JSON");
+  bench->require_subcommand(1);
+  bench->footer("Example: emit bench paper --json paper.json");
+  {
+    auto [app, o] = add<BenchPaperCommand>(
+        *bench, "paper", "Scenes and step counts of the published tables, 1024x768",
+        "emit bench paper --json paper.json --scene box --steps 27", run_bench_paper);
+    app.add_option("--scene", o.scenes, "box or statue; repeatable; default both")
+        ->allow_extra_args(false);
+    app.add_option("--steps", o.steps, "History steps; repeatable; default 27 and 90")
+        ->allow_extra_args(false)
+        ->check(CLI::PositiveNumber);
+    app.add_option("--frames", o.frames, "Frames per result, at least 5")
+        ->check(CLI::Range(5U, 100000U))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    app.add_option("--method", o.methods, "Thermal method; repeatable; default both")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"per-frame", "cached"}))
+        ->capture_default_str();
+    app.add_option("--model", o.model, "Thermal model; default that of the scene")
+        ->check(CLI::IsMember({"emit2014", "foster"}));
+    app.add_option("--pixels", o.pixels, "Surface pixels per picture whose error is computed")
+        ->check(CLI::Range(1U, 100'000'000U))
+        ->capture_default_str();
+    app.add_flag("--no-errors", o.no_errors, "Times only: spares the reference");
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchErrorCommand>(
+        *bench, "error-vs-time",
+        "What every setting costs in time and in error against the reference solver",
+        "emit bench error-vs-time --json error.json --csv error.csv --plot error.svg",
+        run_bench_error);
+    app.add_option("--scene", o.scenes,
+                   "Scenario; repeatable; default block-on-road, ribbed, statue, airfield")
+        ->allow_extra_args(false);
+    app.add_flag("--quick", o.quick, "Models, spacings and two step counts only");
+    app.add_option("--csv", o.csv, "Write the results as CSV");
+    app.add_option("--plot", o.plot, "Write the diagrams as SVG");
+    app.add_option("--figures", o.figures,
+                   "Folder for pictures and profiles of reference and models");
+    app.add_option("--frames", o.frames, "Frames timed per setting")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    app.add_option("--rays", o.rays, "Rays per face or pixel of the reference")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--refine", o.refine, "Refinement of the three-dimensional reference")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--pixels", o.pixels,
+                   "Surface pixels the reference solves (published figures: 20000 or more); 0: all")
+        ->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchStreamCommand>(
+        *bench, "stream", "Transport alone: canned frames over TCP and UDP loopback",
+        "emit bench stream --json stream.json --frames 1000 --rate 200", run_bench_stream);
+    add_count(app, "--frames", o.frames, "Frames per transport")->capture_default_str();
+    app.add_option("--rate", o.rate_hz, "Frames a second")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    app.add_option("--clients", o.clients, "Clients per transport")
+        ->check(CLI::Range(1U, 8U))
+        ->capture_default_str();
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchStabilityCommand>(*bench, "stability",
+                                               "Shader functions and whole frames under random and "
+                                               "hostile input, against double: NaN, Inf "
+                                               "and errors in kelvin",
+                                               "emit bench stability --json stability.json",
+                                               run_bench_stability);
+    add_count(app, "--cases", o.cases,
+              "Random surfaces of the equilibrium sweep; the other sweeps follow in proportion")
+        ->check(CLI::Range(std::uint64_t{1000}, std::uint64_t{4'000'000'000}))
+        ->capture_default_str();
+    app.add_option("--seed", o.seed, "Draws other cases")->type_name("N")->capture_default_str();
+    app.add_option("--part", o.parts, "Part of the suite; repeatable; default all")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember(stability_parts()));
+    app.add_option("--frame", o.frames, "Test of part frames, e.g. frame-zero-area; repeatable")
+        ->allow_extra_args(false);
+    add_path(app, "--pictures", o.pictures, "Existing folder for the hostile frames as PNG")
+        ->type_name("DIR");
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchConvergenceCommand>(
+        *bench, "convergence",
+        "How the error of the reference solvers falls with their cells and steps",
+        "emit bench convergence --plot convergence.svg", run_bench_convergence);
+    app.add_option("--plot", o.plot, "Write the diagrams as SVG");
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchThermalTruthCommand>(
+        *bench, "thermal-truth",
+        "Split steps, a moved camera, a parked vehicle's print and a restart: what the thermal "
+        "history must not depend on, and what it must show",
+        "emit bench thermal-truth --json truth.json", run_bench_thermal_truth);
+    app.add_option("--method", o.method, "thermal.method to judge")
+        ->check(CLI::IsMember({"per-frame"}))
+        ->capture_default_str();
+    app.add_option("--steps", o.steps, "History steps")
+        ->check(CLI::Range(1U, 4096U))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    add_path(app, "--pictures", o.pictures, "Existing folder for the judged frames as PNG")
+        ->type_name("DIR");
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  add_frame_time_benches(*bench);
+}
+
+void Tool::add_frame_time_benches(CLI::App& bench) {
+  {
+    auto [app, o] = add<BenchScalingCommand>(
+        bench, "scaling",
+        "How frame time grows with history steps, triangles, pixels, objects out of view and "
+        "thermal samples",
+        "emit bench scaling --json scaling.json --axis steps", run_bench_scaling);
+    app.add_option("--axis", o.axes, "Axis; repeatable; default all")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember(scaling_axes()));
+    app.add_option("--method", o.methods, "Thermal method; repeatable; default both")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"per-frame", "cached"}));
+    app.add_flag("--quick", o.quick, "Small scenes and coarse pictures, in seconds");
+    app.add_option("--pairs", o.pairs, "cached: frames of two scenes that are shown in turn")
+        ->check(CLI::Range(15U, 100'000U))
+        ->capture_default_str();
+    app.add_option("--per-frame-frames", o.per_frame_frames, "per-frame: frames timed per scene")
+        ->check(CLI::Range(1U, 100'000U))
+        ->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchTurnCommand>(
+        bench, "turn",
+        "Worst frame while the camera turns all round in a second, and after jumps to places that "
+        "nobody announced",
+        "emit bench turn --json turn.json --set thermal.tolerance_k=0.5", run_bench_turn);
+    app.add_option("--scene", o.scene, "Scenario with a camera trajectory: turns at its end")
+        ->capture_default_str();
+    add_set(app, o.set);
+    app.add_option("--method", o.methods, "Thermal method; repeatable")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"per-frame", "cached"}))
+        ->capture_default_str();
+    app.add_option("--runs", o.runs, "Turns, and jumps; all after one warm-up")
+        ->check(CLI::Range(1U, 1000U))
+        ->capture_default_str();
+    app.add_option("--frames", o.frames, "Frames per turn")
+        ->check(CLI::Range(2U, 100'000U))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+}
+
+}  // namespace emit::cli
