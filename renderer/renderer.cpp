@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
 
 #include "emit/scene/mesh.hpp"
 #include "gl/egl_context.hpp"
@@ -14,7 +17,9 @@
 #include "passes/compute_passes.hpp"
 #include "passes/foster_setup.hpp"
 #include "passes/frame_setup.hpp"
+#include "passes/ladder_survey.hpp"
 #include "passes/per_frame_stage.hpp"
+#include "passes/quality_ladder.hpp"
 #include "passes/raster_passes.hpp"
 #include "passes/readback_ring.hpp"
 
@@ -66,6 +71,7 @@ Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptio
 struct FramePasses {
   GeometryPass geometry;
   RadiancePass radiance;
+  std::optional<EnlargePass> enlarge;  ///< with a quality ladder
 };
 
 class GlRenderer final : public Renderer {
@@ -83,15 +89,12 @@ class GlRenderer final : public Renderer {
     return history_.environment.append(sample);
   }
   void reset() noexcept override;
-  Result<void> warm_up(const FrameRequest& first, const WarmUpProgress& progress) override {
-    auto ready = stage_->warm_up(first, progress);
-    if (ready) stage_->describe(scene_stats_);
-    return ready;
-  }
+  Result<void> warm_up(const FrameRequest& first, const WarmUpProgress& progress) override;
   int submit(const FrameRequest& request) noexcept override;
   bool poll(SlotIndex slot) noexcept override { return readback_.ready(slot); }
   const FrameView& collect(SlotIndex slot) noexcept override;
   void release(SlotIndex slot) noexcept override { readback_.release(slot); }
+  std::span<const RungStats> expected_rungs(const physics::Pose& sensor_pose) noexcept override;
   physics::Pose scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept override;
   const SceneStats& scene_stats() const noexcept override { return scene_stats_; }
   const std::string& device_name() const noexcept override { return context_.device_name(); }
@@ -99,7 +102,13 @@ class GlRenderer final : public Renderer {
   [[nodiscard]] bool memory_mapped() const noexcept { return readback_.mapped(); }
 
  private:
-  void prepare(const FrameRequest& request) noexcept;
+  [[nodiscard]] Result<void> warm_up_stage(const FrameRequest& first,
+                                           const WarmUpProgress& progress) {
+    auto ready = stage_->warm_up(first, progress);
+    if (ready) stage_->describe(scene_stats_);
+    return ready;
+  }
+  void prepare(const FrameRequest& request, const QualityRung& rung) noexcept;
   void upload_frame() noexcept;
   void bind_frame() const noexcept;
   [[nodiscard]] int find_entity(std::uint32_t entity_id) const noexcept;
@@ -127,6 +136,8 @@ class GlRenderer final : public Renderer {
   ReadbackRing readback_;
   std::vector<FrameView> views_;
   StageClock clock_;
+  LadderMap ladder_;
+  LadderMap::OfRungs expected_rungs_{};  ///< scratch of expected_rungs()
 };
 
 RadianceContent radiance_content(const BandModel& bands, const OutputOptions& output) {
@@ -177,8 +188,8 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
     history_.entities.emplace_back(object, object.instances.front());
   }
   const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
-  frame_params_.format_px = glm::uvec4(scenario_.sensor.width_px, scenario_.sensor.height_px,
-                                       static_cast<std::uint32_t>(plane_px), 0U);
+  frame_params_.picture_px = glm::uvec4(scenario_.sensor.width_px, scenario_.sensor.height_px,
+                                        static_cast<std::uint32_t>(plane_px), 0U);
   frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
                                        static_cast<float>(kReferenceK),
                                        static_cast<float>(scenario_.thermal.tolerance_k), 0.0F);
@@ -231,7 +242,21 @@ physics::Pose GlRenderer::scenario_sensor_pose_at(std::int64_t sim_time_ns) cons
   return trajectory_at(scenario_.sensor.trajectory, sim_time_ns).pose;
 }
 
-void GlRenderer::prepare(const FrameRequest& request) noexcept {
+Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress& progress) {
+  if (auto ready = warm_up_stage(first, progress);
+      !ready || output_.ladder != Ladder::live || !passes_.enlarge) {
+    return ready;
+  }
+  auto ladder =
+      survey_ladder(*this, scenario_.sensor, bands_.apparent_temperatures(), first, progress);
+  if (!ladder) return tl::unexpected(std::move(ladder.error()));
+  ladder_ = std::move(*ladder);
+  return {};
+}
+
+void GlRenderer::prepare(const FrameRequest& request, const QualityRung& rung) noexcept {
+  const glm::uvec2 size_px = rendered_px(rung, glm::uvec2(frame_params_.picture_px));
+  frame_params_.format_px = glm::uvec4(size_px, size_px.x * size_px.y, 0U);
   DrawLists& lists = stage_->drawn().lists;
   lists.begin(request.sensor_pose.position_world_m, request.sim_time_ns, history_.entities);
   CameraSetup camera = set_camera(scenario_.sensor, request.sensor_pose, frame_params_);
@@ -242,7 +267,9 @@ void GlRenderer::prepare(const FrameRequest& request) noexcept {
     const glm::dvec3 farthest = glm::max(glm::abs(bounds.min_m), glm::abs(bounds.max_m));
     camera.view.far_m = std::max(2.0 * camera.view.near_m, glm::length(farthest));
   }
-  lists.cull_view(camera.view, view_single_sided_, view_double_sided_);
+  LevelLimits limits = rung.limits;
+  limits.pixel_rad = camera.pixel_rad;
+  lists.cull_view(camera.view, limits, view_single_sided_, view_double_sided_);
   stage_->prepare(request, camera, frame_params_);
   const physics::SunPosition& sun = stage_->sun_now();
   const bool sun_up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
@@ -269,6 +296,13 @@ void GlRenderer::bind_frame() const noexcept {
   stage_->bind();
 }
 
+std::span<const RungStats> GlRenderer::expected_rungs(const physics::Pose& sensor_pose) noexcept {
+  static constexpr std::array<RungStats, 1> kFullOnly{};
+  if (ladder_.empty()) return kFullOnly;
+  (void)ladder_.at(sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
+  return expected_rungs_;
+}
+
 int GlRenderer::submit(const FrameRequest& request) noexcept {
   const int slot = readback_.acquire();
   if (slot < 0) return -1;
@@ -282,7 +316,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   }
   view.stages_ms = {};
   StageTimes& stages = view.stages_ms;
-  view.device_failed = stage_->cold(request) && !warm_up(request, {});
+  view.device_failed = stage_->cold(request) && !warm_up_stage(request, {});
   if (view.device_failed) {  // nothing can be drawn: what the planes held goes out, flagged
     readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot));
     return slot;
@@ -290,7 +324,13 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   view.stats.coarse = stage_->coarse_from(request.sensor_pose.position_world_m);
   clock_.start();
 
-  prepare(request);
+  view.rung = passes_.enlarge ? std::min<std::uint8_t>(request.rung, kQualityLadder.size() - 1) : 0;
+  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
+  view.estimated_error_k = view.rung == 0 ? 0.0F
+                           : known        ? static_cast<float>(expected_rungs_[view.rung].error_k)
+                                          : std::numeric_limits<float>::quiet_NaN();
+  const QualityRung& rung = kQualityLadder[view.rung];
+  prepare(request, rung);
   bind_frame();
   const std::uint32_t zero = 0;
   glClearNamedBufferSubData(output_buffer_.id(), GL_R32UI, static_cast<GLintptr>(stats_offset_),
@@ -298,10 +338,18 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
 
   const DrawnScene& drawn = stage_->drawn();
   passes_.geometry.draw(drawn.vertices, drawn.lists.commands(view_single_sided_),
-                        drawn.lists.commands(view_double_sided_));
+                        drawn.lists.commands(view_double_sided_),
+                        glm::uvec2(frame_params_.format_px));
   clock_.mark(stages.geometry_ms);
   stage_->draw(stages, clock_);
-  passes_.radiance.dispatch();
+  if (is_scaled(rung)) {
+    passes_.enlarge->planes().bind_storage(EMIT_BIND_OUTPUT);
+    passes_.radiance.dispatch(glm::uvec2(frame_params_.format_px));
+    output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
+    passes_.enlarge->dispatch(glm::uvec2(frame_params_.picture_px));
+  } else {
+    passes_.radiance.dispatch(glm::uvec2(frame_params_.format_px));
+  }
   clock_.mark(stages.radiance_ms);
   readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot));
   clock_.mark(stages.readback_ms);
@@ -343,13 +391,20 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   const bool cached = scenario.thermal.method == scene::ThermalMethod::cached;
   auto geometry_pass = GeometryPass::create(width_px, height_px, cached);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
-  auto radiance_pass =
-      RadiancePass::create(width_px, height_px, scenario.thermal, radiance_content(*bands, output));
+  auto radiance_pass = RadiancePass::create(scenario.thermal, radiance_content(*bands, output));
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
+  FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}};
+  if (cached && output.ladder != Ladder::none) {
+    auto enlarge_pass =
+        EnlargePass::create(static_cast<std::uint32_t>(scenario.bands.size()),
+                            static_cast<std::uint32_t>(plane_count(scenario, output)),
+                            std::size_t{width_px} * height_px);
+    if (!enlarge_pass) return tl::unexpected(std::move(enlarge_pass.error()));
+    passes.enlarge = std::move(*enlarge_pass);
+  }
 
-  auto renderer = std::make_unique<GlRenderer>(
-      scenario, std::move(*context), *geometry, output, std::move(*bands),
-      FramePasses{std::move(*geometry_pass), std::move(*radiance_pass)});
+  auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
+                                               std::move(*bands), std::move(passes));
   auto stage = cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
                                             renderer->history())
                       : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),

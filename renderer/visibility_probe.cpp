@@ -81,6 +81,8 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
 
   sensor_.near_m = near_m;
   gpu::FrameParams frame{};
+  frame.format_px = frame.picture_px =
+      glm::uvec4(sensor_.width_px, sensor_.height_px, sensor_.width_px * sensor_.height_px, 0U);
   CameraSetup camera = set_camera(sensor_, sensor_pose, frame);
   const scene::Aabb& bounds = lists.bounds();
   camera.view.scene_min_m = camera.view.casters_min_m = bounds.min_m;
@@ -89,9 +91,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
       std::max(2.0 * near_m, glm::length(glm::max(glm::abs(bounds.min_m), glm::abs(bounds.max_m))));
   CommandRange single_sided;
   CommandRange double_sided;
-  lists.cull_view(camera.view, single_sided, double_sided);
-  frame.format_px =
-      glm::uvec4(sensor_.width_px, sensor_.height_px, sensor_.width_px * sensor_.height_px, 0U);
+  lists.cull_view(camera.view, {}, single_sided, double_sided);
   frame.obscurance = glm::vec4(static_cast<float>(obscurance_radius_m), 0.0F, 0.0F, 0.0F);
 
   HistoryInterval now;
@@ -118,7 +118,8 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   shadow_.bind_texture();
   shade_.bind_textures();
 
-  geometry_.draw(vertices, lists.commands(single_sided), lists.commands(double_sided));
+  geometry_.draw(vertices, lists.commands(single_sided), lists.commands(double_sided),
+                 glm::uvec2(sensor_.width_px, sensor_.height_px));
   occlusion_.dispatch();
   for (std::uint32_t c = 0; c < frusta.count; ++c) {
     shadow_.draw(vertices, c, lists.commands(shadow_commands[c]));

@@ -44,7 +44,8 @@ const KeyTable<PacingConfig>& pacing_keys() {
       number<PacingConfig>("rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
                            "Frame rate of ig-clock."),
       nanoseconds<PacingConfig>("budget_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(budget_ns),
-                                "host-step: deadline after the pose arrived; 0: none."),
+                                "host-step: deadline after the pose arrived; 0: none. Frames shed "
+                                "quality to meet it (thermal.method cached)."),
       nanoseconds<PacingConfig>("horizon_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(horizon_ns),
                                 "Poses are extrapolated this far at most; then the frame is "
                                 "flagged stale."),

@@ -146,6 +146,12 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
   return model;
 }
 
+std::vector<physics::ApparentTemperature> BandModel::apparent_temperatures() const {
+  std::vector<physics::ApparentTemperature> out;
+  for (const Entry& entry : entries_) out.emplace_back(entry.band);
+  return out;
+}
+
 void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept {
   const double disc_sr_projected = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
   const double air_mass = physics::relative_air_mass(sun.elevation);

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/apparent_temperature.hpp"
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
@@ -35,6 +36,8 @@ class BandModel {
   [[nodiscard]] std::uint32_t max_terms() const noexcept { return max_terms_; }
   /// Place in tables() of the emissivities: by material, then by band.
   [[nodiscard]] std::uint32_t first_emissivity() const noexcept { return first_emissivity_; }
+  [[nodiscard]] std::vector<physics::ApparentTemperature> apparent_temperatures()
+      const;  ///< Setup only.
 
  private:
   struct Entry {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/cluster_view.hpp"
 
+#include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -19,7 +20,9 @@ std::array<glm::dvec3, 5> view_planes(const ViewVolume& view) noexcept {
           m * glm::dvec3(0.0, 0.0, 1.0)};
 }
 
-ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from_mesh) noexcept {
+ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from_mesh,
+                         const LevelLimits& limits) noexcept
+    : difference_(limits.difference) {
   const glm::dmat3 linear(relworld_from_mesh);
   const glm::dvec3 origin_m(relworld_from_mesh[3]);
   const std::array<glm::dvec3, 5> normals = view_planes(view);
@@ -33,6 +36,21 @@ ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from
   eye_m_ = glm::vec3(eye_m);
   margin_m_ = kRounding * static_cast<float>(glm::length(eye_m));
   mirrored_ = glm::determinant(linear) < 0.0;
+  // The mesh's lengths against distances in its own axes: where it is stretched unequally, the
+  // error may lie along the axis that is stretched most and the distance along the other.
+  const std::array<double, 3> scale = {glm::length(linear[0]), glm::length(linear[1]),
+                                       glm::length(linear[2])};
+  const auto [least, greatest] = std::ranges::minmax(scale);
+  const double pixel = limits.pixel_rad * least / greatest;
+  deviation_ = static_cast<float>(limits.deviation_px * pixel);
+  size_ = static_cast<float>(limits.size_px * pixel);
+  edge_ = static_cast<float>(limits.edge_px * pixel);
+}
+
+bool ClusterView::fine(const LevelError& error) const noexcept {
+  const float distance_m = std::max(0.0F, glm::distance(error.centre_m, eye_m_) - error.radius_m);
+  return error.deviation_m <= deviation_ * distance_m && error.size_m <= size_ * distance_m &&
+         error.edge_m[difference_] <= edge_ * distance_m;
 }
 
 bool ClusterView::shows(const scene::Cluster& cluster, bool double_sided) const noexcept {

@@ -87,8 +87,7 @@ void ThermalPass::bind_textures() const noexcept {
   sun_now_.bind(EMIT_TEX_SUN_NOW);
 }
 
-physics::Result<RadiancePass> RadiancePass::create(std::uint32_t width_px, std::uint32_t height_px,
-                                                   const scene::ThermalOptions& options,
+physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& options,
                                                    const RadianceContent& content) {
   RadiancePass pass;
   std::vector<gl::Define> defines{{"EMIT_BANDS", fmt::format("{}u", content.bands)},
@@ -101,14 +100,32 @@ physics::Result<RadiancePass> RadiancePass::create(std::uint32_t width_px, std::
   auto program = gl::Program::compute("passes/radiance.comp", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
-  pass.width_px_ = width_px;
-  pass.height_px_ = height_px;
   return pass;
 }
 
-void RadiancePass::dispatch() const noexcept {
+void RadiancePass::dispatch(const glm::uvec2& size_px) const noexcept {
   program_.use();
-  dispatch_pixels(width_px_, height_px_);
+  dispatch_pixels(size_px.x, size_px.y);
+}
+
+physics::Result<EnlargePass> EnlargePass::create(std::uint32_t bands, std::uint32_t planes,
+                                                 std::size_t rendered_px) {
+  EnlargePass pass;
+  const std::vector<gl::Define> defines{{"EMIT_BANDS", fmt::format("{}u", bands)},
+                                        {"EMIT_PLANES", fmt::format("{}u", planes)}};
+  auto program = gl::Program::compute("passes/enlarge.comp", defines);
+  if (!program) return tl::unexpected(std::move(program.error()));
+  pass.program_ = std::move(*program);
+  pass.planes_ = gl::Buffer(planes * rendered_px * sizeof(float), nullptr, 0);
+  pass.view_ = gl::BufferTexture(GL_R32F, pass.planes_);
+  return pass;
+}
+
+void EnlargePass::dispatch(const glm::uvec2& picture_px) const noexcept {
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+  program_.use();
+  view_.bind(EMIT_TEX_SCALED);
+  dispatch_pixels(picture_px.x, picture_px.y);
 }
 
 }  // namespace emit::renderer

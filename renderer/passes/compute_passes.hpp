@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstddef>
 #include <cstdint>
+#include <glm/ext/vector_uint2.hpp>
 
 #include "emit/scene/scene_desc.hpp"
 #include "gl/objects.hpp"
@@ -58,16 +60,30 @@ struct RadianceContent {
 
 class RadiancePass {
  public:
-  [[nodiscard]] static physics::Result<RadiancePass> create(std::uint32_t width_px,
-                                                            std::uint32_t height_px,
-                                                            const scene::ThermalOptions& options,
+  [[nodiscard]] static physics::Result<RadiancePass> create(const scene::ThermalOptions& options,
                                                             const RadianceContent& content);
-  void dispatch() const noexcept;
+  /// FrameParams::format_px tells the size, too.
+  void dispatch(const glm::uvec2& size_px) const noexcept;
 
  private:
   gl::Program program_;
-  std::uint32_t width_px_ = 0;
-  std::uint32_t height_px_ = 0;
+};
+
+/// Brings what was rendered with fewer pixels to the size of the picture.
+class EnlargePass {
+ public:
+  /// `planes`: of radiance and others, of up to `rendered_px` pixels each.
+  [[nodiscard]] static physics::Result<EnlargePass> create(std::uint32_t bands,
+                                                           std::uint32_t planes,
+                                                           std::size_t rendered_px);
+  /// Where the passes before write to.
+  [[nodiscard]] const gl::Buffer& planes() const noexcept { return planes_; }
+  void dispatch(const glm::uvec2& picture_px) const noexcept;
+
+ private:
+  gl::Program program_;
+  gl::Buffer planes_;
+  gl::BufferTexture view_;
 };
 
 }  // namespace emit::renderer

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <array>
 
-#include "passes/cluster_view.hpp"
-
 namespace emit::renderer {
 namespace {
 
@@ -60,8 +58,8 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
   for (const SceneBuffers::MeshRange& mesh : scene.meshes()) {
     submesh_instances += mesh.submeshes.size() * mesh.instance_count;
     for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
-      // Every other cluster alone, at worst.
-      view_commands += mesh.instance_count * (1 + submesh.cluster_count / 2);
+      // Every cluster alone, at worst.
+      view_commands += mesh.instance_count * (1 + submesh.cluster_count);
     }
   }
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
@@ -121,8 +119,7 @@ void DrawLists::add_command(const SceneBuffers::DrawRange& range, std::int32_t b
 }
 
 void DrawLists::add(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
-                    const ViewVolume& view, const glm::dmat4& relworld_from_mesh,
-                    std::uint32_t record) noexcept {
+                    const ClusterView& seen, std::uint32_t record) noexcept {
   const std::int32_t base_vertex = scene_.base_vertex(instance);
   if (submesh.cluster_count == 0) {
     // Instances that share their vertices go in one draw.
@@ -134,24 +131,24 @@ void DrawLists::add(std::uint32_t instance, const SceneBuffers::DrawRange& subme
     }
     return;
   }
-  const ClusterView seen(view, relworld_from_mesh);
   SceneBuffers::DrawRange run = submesh;
   run.index_count = 0;
-  for (const scene::Cluster& cluster :
-       scene_.clusters().subspan(submesh.first_cluster, submesh.cluster_count)) {
-    if (seen.shows(cluster, submesh.double_sided)) {
-      if (run.index_count == 0) run.first_index = cluster.first_index;
-      run.index_count += cluster.index_count;
-    } else if (run.index_count > 0) {
+  for (std::uint32_t c = submesh.first_cluster; c < submesh.first_cluster + submesh.cluster_count;
+       ++c) {
+    const scene::Cluster& cluster = scene_.clusters()[c];
+    if (!seen.fits(scene_.levels()[c]) || !seen.shows(cluster, submesh.double_sided)) continue;
+    if (run.index_count > 0 && cluster.first_index != run.first_index + run.index_count) {
       add_command(run, base_vertex, record);
       run.index_count = 0;
     }
+    if (run.index_count == 0) run.first_index = cluster.first_index;
+    run.index_count += cluster.index_count;
   }
   if (run.index_count > 0) add_command(run, base_vertex, record);
 }
 
-void DrawLists::cull_view(const ViewVolume& view, CommandRange& single_sided,
-                          CommandRange& double_sided) noexcept {
+void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
+                          CommandRange& single_sided, CommandRange& double_sided) noexcept {
   const std::array<glm::dvec3, 5> planes = view_planes(view);
   for (Placed& placed : view_placed_) {
     const scene::Aabb& box = placed.box_world;
@@ -170,7 +167,7 @@ void DrawLists::cull_view(const ViewVolume& view, CommandRange& single_sided,
           const glm::dmat4 matrix = relworld_from_mesh(view_placed_[i]);
           const auto record = static_cast<std::uint32_t>(records_.size());
           records_.push_back(record_of(matrix, scene_.instances()[i].object, submesh.material));
-          add(i, submesh, view, matrix, record);
+          add(i, submesh, ClusterView(view, matrix, limits), record);
         }
       }
     }

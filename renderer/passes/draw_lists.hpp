@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "history/pose_history.hpp"
+#include "passes/cluster_view.hpp"
 #include "passes/light_fit.hpp"
 #include "passes/scene_buffers.hpp"
 
@@ -34,8 +35,8 @@ class DrawLists {
   /// Starts a frame: all instances at `sim_time_ns` around a camera at `camera_world_m`.
   void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
              std::span<const PoseHistory> entities) noexcept;
-  /// Draws of the camera; double-sided ones apart.
-  void cull_view(const ViewVolume& view, CommandRange& single_sided,
+  /// Draws of the camera, in levels of detail that keep to `limits`; double-sided ones apart.
+  void cull_view(const ViewVolume& view, const LevelLimits& limits, CommandRange& single_sided,
                  CommandRange& double_sided) noexcept;
   /// Moves entities to their poses at `sample_ns` for the shadow passes that follow. Casters that
   /// travel farther than their own size between the two instants are left out: what shade they cast
@@ -68,8 +69,8 @@ class DrawLists {
                              bool on) const noexcept;
   [[nodiscard]] glm::dmat4 relworld_from_mesh(const Placed& placed) const noexcept;
   /// Appends the draws of an instance's submesh; `record` is its DrawRecord.
-  void add(std::uint32_t instance, const SceneBuffers::DrawRange& submesh, const ViewVolume& view,
-           const glm::dmat4& relworld_from_mesh, std::uint32_t record) noexcept;
+  void add(std::uint32_t instance, const SceneBuffers::DrawRange& submesh, const ClusterView& seen,
+           std::uint32_t record) noexcept;
   void add_command(const SceneBuffers::DrawRange& range, std::int32_t base_vertex,
                    std::uint32_t record) noexcept;
 

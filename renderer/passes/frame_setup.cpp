@@ -49,7 +49,7 @@ CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pos
   view.tan_half_h = std::tan(0.5 * sensor.fov_h_rad);
   view.tan_half_v = view.tan_half_h * sensor.height_px / sensor.width_px;
   view.near_m = sensor.near_m;
-  camera.pixel_rad = 2.0 * view.tan_half_h / sensor.width_px;
+  camera.pixel_rad = 2.0 * view.tan_half_h / params.format_px.x;
 
   // Reversed depth near/z with an infinite far plane; w is the distance along the boresight.
   const glm::dmat4 clip_from_sensor{{1.0 / view.tan_half_h, 0.0, 0.0, 0.0},
@@ -59,8 +59,9 @@ CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pos
   params.clip_from_relworld = glm::mat4(clip_from_sensor * glm::dmat4(sensor_from_world));
   params.relworld_from_sensor = glm::mat4(glm::dmat4(view.relworld_from_sensor));
   params.ray =
-      glm::vec4(static_cast<float>(camera.pixel_rad), 0.0F, static_cast<float>(-view.tan_half_h),
-                static_cast<float>(-view.tan_half_v));
+      glm::vec4(static_cast<float>(2.0 * view.tan_half_h / params.format_px.x),
+                static_cast<float>(2.0 * view.tan_half_v / params.format_px.y),
+                static_cast<float>(-view.tan_half_h), static_cast<float>(-view.tan_half_v));
   return camera;
 }
 

@@ -88,21 +88,21 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
-  pass.width_px_ = static_cast<GLsizei>(width_px);
-  pass.height_px_ = static_cast<GLsizei>(height_px);
+  const auto width = static_cast<GLsizei>(width_px);
+  const auto height = static_cast<GLsizei>(height_px);
   pass.sampled_ = sampled;
-  pass.depth_buffer_ = gl::Texture(GL_DEPTH_COMPONENT32F, pass.width_px_, pass.height_px_);
+  pass.depth_buffer_ = gl::Texture(GL_DEPTH_COMPONENT32F, width, height);
   pass.framebuffer_ = gl::Framebuffer::make();
   const GLuint id = pass.framebuffer_.id();
   glNamedFramebufferTexture(id, GL_DEPTH_ATTACHMENT, pass.depth_buffer_.id(), 0);
   if (sampled) {
-    pass.surface_ = gl::Texture(GL_RGBA32UI, pass.width_px_, pass.height_px_);
+    pass.surface_ = gl::Texture(GL_RGBA32UI, width, height);
     glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.surface_.id(), 0);
     glNamedFramebufferDrawBuffer(id, GL_COLOR_ATTACHMENT0);
   } else {
-    pass.depth_m_ = gl::Texture(GL_R32F, pass.width_px_, pass.height_px_);
-    pass.normal_ = gl::Texture(GL_RG16_SNORM, pass.width_px_, pass.height_px_);
-    pass.ids_ = gl::Texture(GL_RG16UI, pass.width_px_, pass.height_px_);
+    pass.depth_m_ = gl::Texture(GL_R32F, width, height);
+    pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
+    pass.ids_ = gl::Texture(GL_RG16UI, width, height);
     glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.depth_m_.id(), 0);
     glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.normal_.id(), 0);
     glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
@@ -117,9 +117,14 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::
 
 void GeometryPass::draw(const SceneVertexArrays& vertices,
                         std::span<const DrawCommand> single_sided,
-                        std::span<const DrawCommand> double_sided) const noexcept {
+                        std::span<const DrawCommand> double_sided,
+                        const glm::uvec2& size_px) const noexcept {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
-  glViewport(0, 0, width_px_, height_px_);
+  const auto width_px = static_cast<GLsizei>(size_px.x);
+  const auto height_px = static_cast<GLsizei>(size_px.y);
+  glViewport(0, 0, width_px, height_px);
+  glScissor(0, 0, width_px, height_px);
+  glEnable(GL_SCISSOR_TEST);      // what is not drawn need not be cleared
   const GLfloat far_away = 0.0F;  // reversed z
   if (sampled_) {
     const GLuint sky[4] = {std::bit_cast<GLuint>(EMIT_SKY_DEPTH_M), 0, 0, 0};
@@ -143,6 +148,7 @@ void GeometryPass::draw(const SceneVertexArrays& vertices,
   issue(single_sided);
   glDisable(GL_CULL_FACE);
   issue(double_sided);
+  glDisable(GL_SCISSOR_TEST);
 }
 
 void GeometryPass::bind_textures() const noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <glm/ext/vector_uint2.hpp>
 #include <span>
 
 #include "gl/objects.hpp"
@@ -34,7 +35,7 @@ class GeometryPass {
   [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
                                                             std::uint32_t height_px, bool sampled);
   void draw(const SceneVertexArrays& vertices, std::span<const DrawCommand> single_sided,
-            std::span<const DrawCommand> double_sided) const noexcept;
+            std::span<const DrawCommand> double_sided, const glm::uvec2& size_px) const noexcept;
   /// Binds what it drew to the texture units.
   void bind_textures() const noexcept;
 
@@ -46,8 +47,6 @@ class GeometryPass {
   gl::Texture surface_;  ///< instead of the three: passes/geometry.frag
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
-  GLsizei width_px_ = 0;
-  GLsizei height_px_ = 0;
   bool sampled_ = false;
 };
 

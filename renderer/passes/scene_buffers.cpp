@@ -39,7 +39,9 @@ void SceneBuffers::add_meshes(std::span<const scene::Mesh> meshes) {
       range.submeshes.push_back({first + submesh.first_index, submesh.index_count, submesh.material,
                                  submesh.double_sided, 0, 0});
     }
-    range.whole = {first, static_cast<std::uint32_t>(mesh.indices.size()), 0, !mesh.closed, 0, 0};
+    std::uint32_t count = 0;
+    for (const scene::Submesh& submesh : mesh.submeshes) count += submesh.index_count;
+    range.whole = {first, count, 0, !mesh.closed, 0, 0};
     range.first_instance = next_instance;
     while (next_instance < instances_.size() && instances_[next_instance].mesh == m) {
       ++next_instance;
@@ -73,23 +75,28 @@ SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
 
 SceneBuffers::SceneBuffers(SampledScene scene) : instances_(std::move(scene.geometry.instances)) {
   std::vector<scene::Mesh>& meshes = scene.geometry.meshes;
-  std::vector<std::vector<scene::Cluster>> clusters;
-  for (scene::Mesh& mesh : meshes) clusters.push_back(scene::cut_into_clusters(mesh));
+  std::vector<ClusterLevels> levels;
+  for (std::uint32_t m = 0; m < meshes.size(); ++m) {
+    VertexValues values;
+    for (std::size_t i = 0; i < instances_.size(); ++i) {
+      if (instances_[i].mesh != m) continue;
+      values.push_back(
+          std::span(scene.value_k).subspan(scene.first_sample[i], meshes[m].positions_m.size()));
+    }
+    levels.push_back(build_cluster_levels(meshes[m], values));
+  }
   add_meshes(meshes);
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     const std::uint32_t first_index = meshes_[m].whole.first_index;
-    for (scene::Cluster& cluster : clusters[m]) cluster.first_index += first_index;
-    std::size_t next = 0;
-    for (DrawRange& submesh : meshes_[m].submeshes) {
-      submesh.first_cluster = static_cast<std::uint32_t>(clusters_.size() + next);
-      const std::uint32_t end = submesh.first_index + submesh.index_count;
-      while (next < clusters[m].size() && clusters[m][next].first_index >= submesh.first_index &&
-             clusters[m][next].first_index < end) {
-        ++next;
-        ++submesh.cluster_count;
-      }
+    for (scene::Cluster& cluster : levels[m].clusters) cluster.first_index += first_index;
+    for (std::size_t k = 0; k < meshes_[m].submeshes.size(); ++k) {
+      DrawRange& submesh = meshes_[m].submeshes[k];
+      submesh.first_cluster =
+          static_cast<std::uint32_t>(clusters_.size()) + levels[m].of_submesh[k].first;
+      submesh.cluster_count = levels[m].of_submesh[k].count;
     }
-    clusters_.insert(clusters_.end(), clusters[m].begin(), clusters[m].end());
+    clusters_.insert(clusters_.end(), levels[m].clusters.begin(), levels[m].clusters.end());
+    levels_.insert(levels_.end(), levels[m].levels.begin(), levels[m].levels.end());
   }
 
   std::vector<glm::vec3> positions(scene.sky_frac.size());

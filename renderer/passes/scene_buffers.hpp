@@ -10,6 +10,7 @@
 #include "gl/objects.hpp"
 #include "shared/frame_params.glsl.h"
 #include "surface/cached_surface.hpp"
+#include "surface/cluster_levels.hpp"
 
 namespace emit::renderer {
 
@@ -34,7 +35,7 @@ class SceneBuffers {
 
   /// One set of vertices per mesh, drawn whole.
   explicit SceneBuffers(scene::SceneGeometry geometry);
-  /// Vertex i of the buffers is sample i. Meshes are cut into clusters.
+  /// Vertex i of the buffers is sample i. Meshes are cut into clusters of several levels of detail.
   explicit SceneBuffers(SampledScene scene);
 
   [[nodiscard]] std::span<const MeshRange> meshes() const noexcept { return meshes_; }
@@ -48,6 +49,8 @@ class SceneBuffers {
   }
   /// first_index of each counts from the start of the index buffer.
   [[nodiscard]] std::span<const scene::Cluster> clusters() const noexcept { return clusters_; }
+  /// By cluster.
+  [[nodiscard]] std::span<const ClusterLevel> levels() const noexcept { return levels_; }
   [[nodiscard]] GLuint positions() const noexcept { return positions_.id(); }
   [[nodiscard]] GLuint normals() const noexcept { return normals_.id(); }
   [[nodiscard]] GLuint indices() const noexcept { return indices_.id(); }
@@ -60,6 +63,7 @@ class SceneBuffers {
   std::vector<std::int32_t> base_vertex_;
   std::vector<scene::Aabb> mesh_bounds_;
   std::vector<scene::Cluster> clusters_;
+  std::vector<ClusterLevel> levels_;
   gl::Buffer positions_;  ///< float32 x 3
   gl::Buffer normals_;    ///< snorm16 x 4; the fourth is the share of the sky, if sampled
   gl::Buffer indices_;    ///< uint32

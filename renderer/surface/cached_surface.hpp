@@ -30,6 +30,9 @@ struct SampledScene {
   scene::SceneGeometry geometry;            ///< instances grouped by mesh
   std::vector<std::uint32_t> first_sample;  ///< by instance: sample of its mesh's first vertex
   std::vector<float> sky_frac;              ///< by sample: share of the hemisphere that shows sky
+  /// By sample, K: what it shows, reflected sunlight counted in; tells what a coarser surface may
+  /// leave out.
+  std::vector<float> value_k;
 };
 
 /// The thermal method `cached`: temperatures live on samples of the surface. Time goes in intervals

@@ -197,6 +197,7 @@ void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
   header.flags |= (control_.held() ? protocol::kFlagHold : 0U) |
                   (options_.canned ? protocol::kFlagCanned : 0U) |
                   (options_.tai_unset ? protocol::kFlagTimeUnset : 0U);
+  job.deadline_ns = header.deadline_ns;
   issued.thermal_time_ns = job.request.thermal_time_ns;
   issued.entity_count = job.entity_count;
   std::copy_n(job.entities.begin(), job.entity_count, issued.entities.begin());
@@ -287,6 +288,12 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   header.clamped_px = done.clamped_px;
   header.flags |= (done.nonfinite_px > 0 ? protocol::kFlagNonFinite : 0U) |
                   (done.clamped_px > 0 ? protocol::kFlagClamped : 0U);
+  if (done.rung > 0) {
+    header.flags |= protocol::kFlagDegraded;
+    header.quality_rung = done.rung;
+    header.estimated_error_k = done.estimated_error_k;
+    context_.counters.add(Counter::frames_shed);
+  }
   if (done.dropped_poses > 0 || done.coarse) {
     // How much the coarser past, or surface, matters depends on what it shaded: nobody knows.
     header.flags |= protocol::kFlagDegraded;

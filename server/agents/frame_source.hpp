@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -47,6 +48,13 @@ class FrameSource {
   /// Waits for the device. The view and its memory live until release().
   [[nodiscard]] virtual const renderer::FrameView& collect(renderer::SlotIndex slot) noexcept = 0;
   virtual void release(renderer::SlotIndex slot) noexcept = 0;
+
+  /// Renderer::expected_rungs(); sources without a ladder have one rung.
+  [[nodiscard]] virtual std::span<const renderer::RungStats> expected_rungs(
+      const physics::Pose& /*sensor_pose*/) noexcept {
+    static constexpr std::array<renderer::RungStats, 1> kFullOnly{};
+    return kFullOnly;
+  }
 
   [[nodiscard]] virtual const SourceInfo& info() const noexcept = 0;
 };

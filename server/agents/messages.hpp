@@ -79,7 +79,8 @@ inline constexpr std::size_t kMaxWeatherPerFrame = 32;
 struct RenderJob {
   enum class Kind : std::uint8_t { frame, reset };
   Kind kind = Kind::frame;
-  renderer::FrameRequest request;
+  renderer::FrameRequest request;  ///< its rung is the render agent's choice
+  std::int64_t deadline_ns = 0;    ///< when the pixels are due; 0: whenever
   std::uint32_t weather_count = 0;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather;
   std::uint32_t entity_count = 0;
@@ -102,6 +103,8 @@ struct RenderDone {
   std::uint32_t clamped_px = 0;
   std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
   bool coarse = false;              ///< the surface was not prepared for this camera
+  std::uint8_t rung = 0;            ///< of the quality ladder
+  float estimated_error_k = 0.0F;   ///< of that rung; NaN: not known
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
   std::int64_t render_start_ns = 0;
   std::int64_t render_end_ns = 0;

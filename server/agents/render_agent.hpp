@@ -8,6 +8,7 @@
 #include "agents/agent.hpp"
 #include "agents/frame_source.hpp"
 #include "app/context.hpp"
+#include "pacing/quality_policy.hpp"
 
 namespace emit::server {
 
@@ -32,12 +33,15 @@ class RenderAgent final : public Agent {
   struct InFlight {
     renderer::SlotIndex slot = 0;
     std::int64_t render_start_ns = 0;
+    double cost_frac = 1.0;  ///< of its rung
   };
   /// More than one in flight lets upload of the next overlap with read-back of the last.
   static constexpr std::size_t kDepth = 2;
 
   bool take_job(std::int64_t now_ns) noexcept;
   bool finish_oldest() noexcept;
+  /// Sets the job's rung; returns what it is expected to cost against full quality.
+  double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
 
@@ -49,6 +53,7 @@ class RenderAgent final : public Agent {
   std::array<InFlight, kDepth> in_flight_{};
   std::size_t first_ = 0;
   std::size_t count_ = 0;
+  QualityPolicy quality_;
   std::int64_t wake_at_ns_ = kNeverNs;
   bool starved_ = false;
   bool weather_lost_ = false;        // said so for this run

@@ -25,6 +25,10 @@ class RendererSource final : public FrameSource {
     return renderer_->collect(slot);
   }
   void release(renderer::SlotIndex slot) noexcept override { renderer_->release(slot); }
+  std::span<const renderer::RungStats> expected_rungs(
+      const physics::Pose& sensor_pose) noexcept override {
+    return renderer_->expected_rungs(sensor_pose);
+  }
   const SourceInfo& info() const noexcept override { return info_; }
 
  private:

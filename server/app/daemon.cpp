@@ -142,6 +142,9 @@ FrameSourceFactory DaemonImpl::source_factory() const {
     device.gpu_index = config_.device.gpu_index;
     renderer::OutputOptions output;
     output.slots = slot_count(config_);
+    const bool deadlines =
+        config_.pacing.mode == config::PacingMode::ig_clock || config_.pacing.budget_ns > 0;
+    output.ladder = deadlines ? renderer::Ladder::live : renderer::Ladder::none;
     return make_renderer_source(*scenario_, device, output);
   };
 }

@@ -118,7 +118,7 @@ void Tool::add_bench_commands() {
         "history must not depend on, and what it must show",
         "emit bench thermal-truth --json truth.json", run_bench_thermal_truth);
     app.add_option("--method", o.method, "thermal.method to judge")
-        ->check(CLI::IsMember({"per-frame"}))
+        ->check(CLI::IsMember({"per-frame", "cached"}))
         ->capture_default_str();
     app.add_option("--steps", o.steps, "History steps")
         ->check(CLI::Range(1U, 4096U))
@@ -174,6 +174,27 @@ void Tool::add_frame_time_benches(CLI::App& bench) {
         ->capture_default_str();
     app.add_option("--frames", o.frames, "Frames per turn")
         ->check(CLI::Range(2U, 100'000U))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
+    auto [app, o] = add<BenchBudgetCommand>(
+        bench, "budget",
+        "The scenario's flight within less time per frame than full quality takes: frames that "
+        "keep to it, and what they get wrong beside what they say",
+        "emit bench budget --budget 0.8 --json budget.json", run_bench_budget);
+    app.add_option("--scene", o.scene, "Scenario with a camera trajectory")->capture_default_str();
+    add_set(app, o.set);
+    app.add_option("--budget", o.budgets,
+                   "Time per frame, as a part of the median at full quality; repeatable")
+        ->allow_extra_args(false)
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--frames", o.frames, "Frames of the flight")
+        ->check(CLI::Range(2U, 1'000'000U))
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();

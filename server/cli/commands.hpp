@@ -284,6 +284,18 @@ struct BenchTurnCommand {
 };
 int run_bench_turn(const BenchTurnCommand& command);
 
+struct BenchBudgetCommand {
+  std::optional<std::filesystem::path> json;
+  std::string scene = "airfield";
+  std::vector<std::string> set;
+  std::vector<double> budgets{0.8, 0.6, 0.1};  ///< of the free-running median
+  std::uint32_t frames = 500;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  int gpu_index = -1;
+};
+int run_bench_budget(const BenchBudgetCommand& command);
+
 /// Parses the command line and runs the chosen subcommand; returns the process's exit code.
 int run_tool(int argc, char** argv);
 

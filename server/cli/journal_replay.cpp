@@ -55,6 +55,7 @@ physics::Result<JournalReplaySummary> replay_journal(
   renderer::OutputOptions output;
   output.temperature = output.depth = output.object = options.temperature;
   output.slots = 3;
+  output.ladder = renderer::Ladder::replayed;
   auto source = server::make_renderer_source(
       scenario, renderer::DeviceOptions{options.gpu_index, false}, output);
   if (!source) return tl::unexpected(source.error());

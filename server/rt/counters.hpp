@@ -20,6 +20,7 @@ namespace emit::server {
   X(weather_coalesced, "weather changes replaced by a newer one before any frame")   \
   X(weather_lost, "weather changes the source had no room for")                      \
   X(frames_coarse, "frames whose camera stood where the surface was not prepared")   \
+  X(frames_shed, "frames of less than full quality, to be ready in time")            \
   X(poses_dropped, "poses the histories forgot for want of room")                    \
   X(commands, "control commands taken")                                              \
   X(refused_wrong_version, "messages refused: wrong version")                        \

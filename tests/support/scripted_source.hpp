@@ -18,6 +18,7 @@ struct SourceScript {
   bool weather_full = false;        ///< apply_weather(): no room
   std::uint64_t dropped_poses = 0;  ///< of every frame's statistics
   bool coarse = false;              ///< likewise
+  std::vector<renderer::RungStats> rungs{renderer::RungStats{}};  ///< quality ladder
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
   std::vector<scene::WeatherSample> weather;
@@ -87,6 +88,7 @@ class ScriptedSource final : public server::FrameSource {
       mix(static_cast<double>(request.sim_time_ns));
       mix(static_cast<double>(request.thermal_time_ns));
       mix(request.sensor_pose.position_world_m.x);
+      mix(static_cast<double>(request.rung));
       auto& pixels = pixels_[slot];
       for (std::size_t i = 0; i < pixels.size(); ++i) {
         pixels[i] = static_cast<float>(state_ + static_cast<double>(i));
@@ -97,6 +99,10 @@ class ScriptedSource final : public server::FrameSource {
       view.sensor_pose = request.sensor_pose;
       view.stats.dropped_poses = script_.dropped_poses;
       view.stats.coarse = script_.coarse;
+      view.rung = request.rung;
+      view.estimated_error_k = request.rung < script_.rungs.size()
+                                   ? static_cast<float>(script_.rungs[request.rung].error_k)
+                                   : 0.0F;
       view.width_px = info_.width_px;
       view.height_px = info_.height_px;
       view.radiance_w_m2_sr = {std::span<const float>(pixels)};
@@ -111,6 +117,10 @@ class ScriptedSource final : public server::FrameSource {
   void release(renderer::SlotIndex slot) noexcept override {
     used_[slot].store(false);
     script_.held.fetch_sub(1);
+  }
+  std::span<const renderer::RungStats> expected_rungs(
+      const physics::Pose& /*sensor_pose*/) noexcept override {
+    return script_.rungs;
   }
   const server::SourceInfo& info() const noexcept override { return info_; }
 

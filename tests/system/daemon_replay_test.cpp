@@ -153,7 +153,11 @@ TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
   Replay from_stream;
   std::uint64_t published = 0;
   {
-    LiveDaemon live(configuration(GetParam(), folder.file("run.mcap")), live_script);
+    // Frames shed work, lock-step ones always: which did is for the journal to tell.
+    live_script.rungs = {{1.0, 0.0}, {0.5, 0.1}};
+    auto config = configuration(GetParam(), folder.file("run.mcap"));
+    if (lock_step) config.pacing.budget_ns = 1;
+    LiveDaemon live(config, live_script);
     auto frames = FrameClient::connect(live.url);
     ASSERT_TRUE(frames.has_value()) << frames.error().text;
     ASSERT_TRUE((*frames)->subscribe({}).has_value());
@@ -181,6 +185,9 @@ TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
     EXPECT_EQ(live.code, 0);
     published = live.daemon->counter(Counter::frames_published);
     EXPECT_EQ(live.daemon->counter(Counter::journal_dropped), 0U);
+    if (lock_step) {
+      EXPECT_EQ(live.daemon->counter(Counter::frames_shed), published);
+    }
     EXPECT_EQ(live.daemon->counter(Counter::host_epochs), 1U);
   }
   auto log = protocol::LogReader::open(folder.file("run.mcap"));

@@ -58,7 +58,8 @@ bool visible(const Look& look, const std::array<glm::dvec3, 3>& relworld_m, bool
 
 TEST(ClusterView, leaves_out_nothing_that_shows_and_much_that_does_not) {
   scene::Mesh mesh = scene::sphere(60, false);
-  const std::vector<scene::Cluster> clusters = scene::cut_into_clusters(mesh);
+  const std::vector<scene::Cluster> clusters =
+      scene::cut_into_clusters(mesh.positions_m, mesh.indices);
   std::mt19937 random(11);
   std::size_t shown = 0;
   std::size_t needed = 0;
@@ -66,7 +67,7 @@ TEST(ClusterView, leaves_out_nothing_that_shows_and_much_that_does_not) {
   for (int round = 0; round < 60; ++round) {
     const bool double_sided = round % 4 == 3;
     const Look look = random_look(random, round % 3 == 2);
-    const ClusterView view(look.view, look.relworld_from_mesh);
+    const ClusterView view(look.view, look.relworld_from_mesh, {});
     for (const scene::Cluster& cluster : clusters) {
       const bool shows = view.shows(cluster, double_sided);
       bool any = false;

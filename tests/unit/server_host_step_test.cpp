@@ -73,6 +73,52 @@ TEST(HostStep, FlagsALateFrameAndSendsItAllTheSame) {
   EXPECT_EQ(rig.count(Counter::frames_late), 1U);
 }
 
+TEST(HostStep, ShedsWorkToBeInTimeSaysSoAndStopsSheddingAfterwards) {
+  config::PacingConfig pacing;
+  pacing.budget_ns = 3 * kMs;
+  Rig rig(pacing);
+  rig.script.rungs = {{1.0, 0.0}, {0.5, 0.25}, {0.2, 2.0}};
+  const auto frame = [&](std::uint64_t number, std::int64_t work_ns) {
+    rig.script.ready = false;
+    rig.send(number, static_cast<std::int64_t>(number) * kMs);
+    rig.settle();
+    rig.clock.advance(work_ns);
+    rig.script.ready = true;
+    rig.settle();
+  };
+  frame(1, 5 * kMs);  // the first one nobody could foresee
+  frame(2, 2 * kMs);
+  frame(3, 5 * kMs);  // and this one took longer than expected
+  frame(4, 1 * kMs);
+  ASSERT_EQ(rig.frames.size(), 4U);
+  EXPECT_EQ(rig.frames[0].header.flags, protocol::kFlagLate);
+  EXPECT_EQ(rig.frames[0].header.quality_rung, 0U);
+  EXPECT_EQ(rig.frames[1].header.flags, protocol::kFlagDegraded);
+  EXPECT_EQ(rig.frames[1].header.quality_rung, 1U);
+  EXPECT_EQ(rig.frames[1].header.estimated_error_k, 0.25F);
+  EXPECT_EQ(rig.frames[2].header.flags, protocol::kFlagDegraded | protocol::kFlagLate);
+  EXPECT_EQ(rig.frames[3].header.quality_rung, 2U);
+  EXPECT_EQ(rig.frames[3].header.estimated_error_k, 2.0F);
+  EXPECT_EQ(rig.count(Counter::frames_shed), 3U);
+  for (std::uint64_t k = 5; k < 110; ++k) frame(k, kMs / 5);
+  EXPECT_EQ(rig.frames.back().header.flags, 0U);
+  EXPECT_EQ(rig.frames.back().header.quality_rung, 0U);
+}
+
+TEST(HostStep, WithoutBudgetNothingIsShed) {
+  Rig rig;
+  rig.script.rungs = {{1.0, 0.0}, {0.5, 0.25}};
+  for (std::uint64_t k = 1; k < 5; ++k) {
+    rig.script.ready = false;
+    rig.send(k, static_cast<std::int64_t>(k) * kMs);
+    rig.settle();
+    rig.clock.advance(1000 * kMs);
+    rig.script.ready = true;
+    rig.settle();
+    EXPECT_EQ(rig.frames.back().header.flags, 0U);
+  }
+}
+
 TEST(HostStep, AStepHasItsBudgetFromTheCommandOn) {
   config::PacingConfig pacing;
   pacing.budget_ns = 3 * kMs;

@@ -4,7 +4,6 @@
 #include <meshoptimizer.h>
 
 #include <cstring>
-#include <span>
 
 namespace emit::scene {
 namespace {
@@ -18,12 +17,14 @@ glm::vec3 vec3(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
 }
 
-/// Clusters of one submesh, whose triangles are put into their order.
-void cut(Mesh& mesh, const Submesh& submesh, std::vector<Cluster>& clusters) {
-  const std::span<std::uint32_t> indices(mesh.indices.data() + submesh.first_index,
-                                         submesh.index_count);
-  const float* positions = &mesh.positions_m[0].x;
-  const std::size_t vertices = mesh.positions_m.size();
+}  // namespace
+
+std::vector<Cluster> cut_into_clusters(std::span<const glm::vec3> positions_m,
+                                       std::span<std::uint32_t> indices) {
+  std::vector<Cluster> clusters;
+  if (indices.empty()) return clusters;
+  const float* positions = &positions_m[0].x;
+  const std::size_t vertices = positions_m.size();
   meshopt_optimizeVertexCache(indices.data(), indices.data(), indices.size(), vertices);
   const std::size_t most =
       meshopt_buildMeshletsBound(indices.size(), kClusterVertices, kClusterTriangles);
@@ -45,7 +46,7 @@ void cut(Mesh& mesh, const Submesh& submesh, std::vector<Cluster>& clusters) {
     const meshopt_Bounds bounds = meshopt_computeClusterBounds(part.data(), part.size(), positions,
                                                                vertices, sizeof(glm::vec3));
     Cluster cluster;
-    cluster.first_index = submesh.first_index + static_cast<std::uint32_t>(ordered.size());
+    cluster.first_index = static_cast<std::uint32_t>(ordered.size());
     cluster.index_count = static_cast<std::uint32_t>(part.size());
     cluster.centre_m = vec3(bounds.center);
     cluster.radius_m = bounds.radius;
@@ -56,16 +57,25 @@ void cut(Mesh& mesh, const Submesh& submesh, std::vector<Cluster>& clusters) {
     ordered.insert(ordered.end(), part.begin(), part.end());
   }
   std::memcpy(indices.data(), ordered.data(), indices.size_bytes());
+  return clusters;
 }
 
-}  // namespace
+std::vector<std::uint32_t> place_numbers(std::span<const glm::vec3> positions_m,
+                                         std::span<const std::uint32_t> indices) {
+  std::vector<std::uint32_t> numbers(positions_m.size());
+  const meshopt_Stream stream{positions_m.data(), sizeof(glm::vec3), sizeof(glm::vec3)};
+  meshopt_generateVertexRemapMulti(numbers.data(), indices.data(), indices.size(), numbers.size(),
+                                   &stream, 1);
+  return numbers;
+}
 
-std::vector<Cluster> cut_into_clusters(Mesh& mesh) {
-  std::vector<Cluster> clusters;
-  for (const Submesh& submesh : mesh.submeshes) {
-    if (submesh.index_count > 0) cut(mesh, submesh, clusters);
-  }
-  return clusters;
+std::vector<std::uint32_t> curve_order(std::span<const glm::vec3> points_m) {
+  std::vector<std::uint32_t> order(points_m.size());
+  if (points_m.empty()) return order;
+  std::vector<std::uint32_t> place(points_m.size());
+  meshopt_spatialSortRemap(place.data(), &points_m[0].x, points_m.size(), sizeof(glm::vec3));
+  for (std::uint32_t i = 0; i < place.size(); ++i) order[place[i]] = i;
+  return order;
 }
 
 }  // namespace emit::scene

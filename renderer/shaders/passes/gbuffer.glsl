@@ -17,7 +17,7 @@ uvec2 gbuffer_ids(ivec2 px) { return texelFetch(ids_texture, px, 0).rg; }
 
 // In the sensor's axes, through a pixel's centre, unit length along the boresight.
 vec3 sensor_ray(ivec2 px) {
-  return vec3((vec2(px) + 0.5) * frame.ray.x + frame.ray.zw, 1.0);
+  return vec3((vec2(px) + 0.5) * frame.ray.xy + frame.ray.zw, 1.0);
 }
 
 // The same in relworld axes.

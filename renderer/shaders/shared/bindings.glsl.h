@@ -26,6 +26,7 @@
 #define EMIT_TEX_BAND_LUT 9
 #define EMIT_TEX_SPIN_UP 10
 #define EMIT_TEX_SURFACE 11
+#define EMIT_TEX_SCALED 12
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0

@@ -8,8 +8,9 @@ EMIT_SHARED_BEGIN
 struct FrameParams {
   mat4 clip_from_relworld;    // reversed z, infinite far plane; image row 0 at NDC y = -1
   mat4 relworld_from_sensor;  // rotation
-  vec4 ray;                   // tangents in the sensor's axes: x = per pixel, y = 0, zw = at the corner of pixel 0
-  uvec4 format_px;            // width, height, pixels per plane
+  vec4 ray;                   // tangents in the sensor's axes: xy = per pixel, zw = at the corner of pixel 0
+  uvec4 format_px;            // rendered: width, height, pixels per plane
+  uvec4 picture_px;           // what is sent: the same, larger where fewer pixels are rendered
   vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K;
                               // foster: z = tolerance of a step in K, w = nodes per axis of the spin-up table
   uvec4 bands;                // x = nodes of a band's table, y = place of the emissivities behind the tables

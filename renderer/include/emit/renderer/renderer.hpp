@@ -28,10 +28,19 @@ struct DeviceOptions {
   bool debug_context = false;  ///< GL debug output; slow
 };
 
+/// Whether frames may shed work, see FrameRequest::rung. Takes memory for another picture. Without
+/// effect where the thermal method has nothing to shed: then there is one rung.
+enum class Ladder : std::uint8_t {
+  none,
+  replayed,  ///< rungs as they were chosen before
+  live,      ///< warm_up() measures what the rungs are worth: another 200 frames
+};
+
 struct OutputOptions {
   bool temperature = false;  ///< surface temperature, K; NaN where there is only sky
   bool depth = false;        ///< distance along the boresight, m; +Inf where there is only sky
   bool object = false;  ///< 1 + index of the scenario's object, as float; 0 where there is only sky
+  Ladder ladder = Ladder::none;
   std::uint32_t slots = 3;  ///< read-back ring, 2..16: frames in flight plus frames being streamed
   bool stage_timing = false;  ///< waits for the device after each stage: fills stages_ms, slower
 };
@@ -48,6 +57,7 @@ struct FrameRequest {
   std::int64_t sim_time_ns = 0;      ///< what the image shows: entities at this instant
   std::int64_t thermal_time_ns = 0;  ///< where the thermal clock stands; behind sim time in a hold
   physics::Pose sensor_pose;         ///< body frame of the seeker head, x along the boresight
+  std::uint8_t rung = 0;  ///< of the quality ladder, 0 = full; one that does not exist: the last
 };
 
 /// Time per stage of Table 3; only with OutputOptions::stage_timing.
@@ -58,6 +68,12 @@ struct StageTimes {
   double thermal_ms = 0.0;
   double radiance_ms = 0.0;
   double readback_ms = 0.0;
+};
+
+/// What a rung of the quality ladder is worth.
+struct RungStats {
+  double cost_frac = 1.0;  ///< time of a frame against full quality
+  double error_k = 0.0;    ///< as FrameView::estimated_error_k
 };
 
 /// Counted on the device for every frame: nothing is silently repaired.
@@ -84,6 +100,10 @@ struct FrameView {
   std::span<const float> depth_m;
   std::span<const float> object_id;
   FrameStats stats;
+  std::uint8_t rung = 0;  ///< of the quality ladder that was rendered
+  /// Expected difference to full quality: RMS of the apparent temperature over the picture, K, of
+  /// the band where it is largest. NaN: not measured near this camera.
+  float estimated_error_k = 0.0F;
   bool device_failed = false;  ///< the driver reported an error: pixels are not to be trusted
   StageTimes stages_ms;
 };
@@ -136,6 +156,11 @@ class Renderer {
   [[nodiscard]] virtual bool poll(SlotIndex slot) noexcept = 0;
   /// Waits for the frame of a slot that submit() returned. The view lives until release().
   [[nodiscard]] virtual const FrameView& collect(SlotIndex slot) noexcept = 0;
+  /// What the rungs are expected to be worth for that camera, as measured by warm_up() where it
+  /// came nearest, or on the way's median where it came not near. [0] is full quality; without a
+  /// ladder the only one. Holds until the next call. RT-safe.
+  [[nodiscard]] virtual std::span<const RungStats> expected_rungs(
+      const physics::Pose& sensor_pose) noexcept = 0;
   /// Gives the slot back. Any thread.
   virtual void release(SlotIndex slot) noexcept = 0;
 

@@ -2,13 +2,12 @@
 #pragma once
 #include <cstdint>
 #include <glm/ext/vector_float3.hpp>
+#include <span>
 #include <vector>
-
-#include "emit/scene/mesh.hpp"
 
 namespace emit::scene {
 
-/// Neighbouring triangles of one submesh that are drawn or left out together. Coordinates of the
+/// Neighbouring triangles of one material that are drawn or left out together. Coordinates of the
 /// mesh, metres.
 struct Cluster {
   std::uint32_t first_index = 0;
@@ -25,10 +24,19 @@ struct Cluster {
 /// Triangles that make a cluster at most.
 inline constexpr std::size_t kClusterTriangles = 256;
 
-/// Reorders the triangles of every submesh so that those of a cluster follow each other and a
-/// device transforms a vertex about once. Vertices keep their places. Clusters in the order of
-/// their indices; those of a submesh cover its range. Setup only: about a second per million
-/// triangles.
-[[nodiscard]] std::vector<Cluster> cut_into_clusters(Mesh& mesh);
+/// Reorders triangles so that those of a cluster follow each other and a device transforms a vertex
+/// about once. Clusters in the order of their indices, which they cover; first_index counts from
+/// the first of them. Setup only: about a second per million triangles, and time for every vertex.
+[[nodiscard]] std::vector<Cluster> cut_into_clusters(std::span<const glm::vec3> positions_m,
+                                                     std::span<std::uint32_t> indices);
+
+/// By vertex: the same number for all that lie in the same place, below the number of vertices; ~0
+/// for those that no triangle uses. Setup only.
+[[nodiscard]] std::vector<std::uint32_t> place_numbers(std::span<const glm::vec3> positions_m,
+                                                       std::span<const std::uint32_t> indices);
+
+/// Indices of points along a space-filling curve: neighbours in the list lie near each other.
+/// Setup only.
+[[nodiscard]] std::vector<std::uint32_t> curve_order(std::span<const glm::vec3> points_m);
 
 }  // namespace emit::scene

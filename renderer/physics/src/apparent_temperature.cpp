@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/physics/apparent_temperature.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+namespace emit::physics {
+namespace {
+
+constexpr double kLowestK = 150.0;
+constexpr double kHighestK = 3000.0;
+/// Nodes lie where all but the leading bits of a float are zero: 64 to every doubling of radiance.
+constexpr unsigned kDroppedBits = 17;
+
+std::size_t index_of(float radiance_w_m2_sr) noexcept {
+  return std::bit_cast<std::uint32_t>(radiance_w_m2_sr) >> kDroppedBits;
+}
+
+float radiance_at(std::size_t index) noexcept {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(index << kDroppedBits));
+}
+
+}  // namespace
+
+ApparentTemperature::ApparentTemperature(const Band& band) {
+  const auto radiance = [&](double at_k) {
+    return band_radiance(band, Kelvin(at_k)).radiance_w_m2_sr;
+  };
+  first_ = index_of(static_cast<float>(radiance(kLowestK)));
+  const std::size_t last = index_of(static_cast<float>(radiance(kHighestK))) + 1;
+  double low_k = kLowestK;
+  for (std::size_t i = first_; i <= last; ++i) {
+    const auto wanted = static_cast<double>(radiance_at(i));
+    double high_k = kHighestK;
+    for (int round = 0; round < 40; ++round) {  // bisection, from the node before on
+      const double middle_k = 0.5 * (low_k + high_k);
+      (radiance(middle_k) < wanted ? low_k : high_k) = middle_k;
+    }
+    node_k_.push_back(static_cast<float>(low_k));
+  }
+}
+
+float ApparentTemperature::k(float radiance_w_m2_sr) const noexcept {
+  const std::size_t index = radiance_w_m2_sr > 0.0F ? index_of(radiance_w_m2_sr) : 0;
+  if (index < first_) return node_k_.front();
+  const std::size_t i = index - first_;
+  if (i + 1 >= node_k_.size()) return node_k_.back();
+  const float low = radiance_at(index);
+  const float part = (radiance_w_m2_sr - low) / (radiance_at(index + 1) - low);
+  return std::lerp(node_k_[i], node_k_[i + 1], part);
+}
+
+double ApparentTemperature::rms_difference_k(std::span<const float> a_w_m2_sr,
+                                             std::span<const float> b_w_m2_sr) const noexcept {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a_w_m2_sr.size(); ++i) {
+    if (a_w_m2_sr[i] == b_w_m2_sr[i]) continue;
+    const auto difference = static_cast<double>(k(a_w_m2_sr[i]) - k(b_w_m2_sr[i]));
+    sum += difference * difference;
+  }
+  return std::sqrt(sum / static_cast<double>(a_w_m2_sr.size()));
+}
+
+}  // namespace emit::physics
