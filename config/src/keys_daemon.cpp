@@ -88,6 +88,11 @@ const KeyTable<StreamConfig>& stream_keys() {
                             EMIT_FIELD(udp_fragment_payload_bytes),
                             "Pixel bytes per datagram; 8900 needs jumbo frames beyond loopback, "
                             "1400 fits any Ethernet."),
+      integer<StreamConfig>("tcp_send_buffer_bytes", "bytes", 0, 1073741824,
+                            EMIT_FIELD(tcp_send_buffer_bytes),
+                            "What a TCP client may leave in its socket: what waits there is late, "
+                            "and skipped no more. Over long links at least rate x round trip; 0: "
+                            "the system's choice, up to megabytes."),
       integer<StreamConfig>("udp_send_buffer_bytes", "bytes", 65536, 1073741824,
                             EMIT_FIELD(udp_send_buffer_bytes), "Socket send buffer."),
       integer<StreamConfig>("multicast_ttl", "", 0, 255, EMIT_FIELD(multicast_ttl),

@@ -282,6 +282,7 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
         protocol::kMinFragmentPayloadBytes, protocol::kMaxFragmentPayloadBytes);
   } else {
     params.tcp_socket = &connection.socket;
+    connection.socket.set_send_buffer(config_.stream.tcp_send_buffer_bytes);
   }
   v1::ControlRecord answer;
   fill(*channel, *answer.mutable_subscribed()->mutable_channel());

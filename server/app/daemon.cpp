@@ -241,6 +241,11 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                   software, kCommit, source.device, scenario_ ? scenario_->file.string() : "",
                   pacing_name(config_.pacing.mode), context_.channels.size(), source.width_px,
                   source.height_px));
+  if (shm_) {
+    log_->write(LogLevel::info,
+                fmt::format("event=shm url=shm://{} slots={} mode={:04o}", config_.stream.shm,
+                            config_.stream.shm_slots, config_.stream.shm_mode));
+  }
   if (clock_.tai_offset_unset()) {
     log_->write(LogLevel::warn,
                 "event=tai_offset_unset effect=\"wall instants are UTC\" "

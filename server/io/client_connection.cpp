@@ -200,7 +200,10 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
                         fmt::format("{}: stream broken: {} ({})", to_string(peer_),
                                     protocol::to_string(status), parser_.offending_value()));
     }
-    const std::span<std::byte> space = parser_.writable();
+    // Not more at a time than the cache holds: the parser sums pixels behind every piece.
+    constexpr std::size_t kPieceBytes = 256u << 10;
+    const std::span<std::byte> writable = parser_.writable();
+    const std::span<std::byte> space = writable.first(std::min(writable.size(), kPieceBytes));
     const IoResult got = socket_.read_some(space);
     switch (got.status) {
       case IoStatus::done:

@@ -174,7 +174,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t 
     frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
     burst_begin_ns_ = 0;
     frame_.missing_px = 0;
-    if (!protocol::payload_crc_matches(*view)) {
+    if (record.payload_crc32c != view->header.payload_crc32c) {
       ++account_.counters.crc_errors;
     }
     frame_.pixels = aligned(view->pixels);

@@ -29,7 +29,7 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
       "[host]\nudp = \"\"\n"
       "[control]\ntcp = \"[::1]:7100\"\nmax_clients = 3\nmax_record_bytes = 2048\n"
       "[stream]\nqueue_frames = 2\nudp_fragment_payload_bytes = 1400\n"
-      "udp_send_buffer_bytes = 100000\nmulticast_ttl = 9\n"
+      "tcp_send_buffer_bytes = 70000\nudp_send_buffer_bytes = 100000\nmulticast_ttl = 9\n"
       "shm = \"rig.1\"\nshm_slots = 5\nshm_mode = \"0640\"\n"
       "[journal]\nfile = \"j.bin\"\nring_entries = 128\n"
       "[device]\ngpu_index = 2\n"
@@ -53,6 +53,7 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
   EXPECT_EQ(first->control.max_record_bytes, 2048U);
   EXPECT_EQ(first->stream.queue_frames, 2U);
   EXPECT_EQ(first->stream.udp_fragment_payload_bytes, 1400U);
+  EXPECT_EQ(first->stream.tcp_send_buffer_bytes, 70000U);
   EXPECT_EQ(first->stream.udp_send_buffer_bytes, 100000U);
   EXPECT_EQ(first->stream.multicast_ttl, 9);
   EXPECT_EQ(first->stream.shm, "rig.1");
