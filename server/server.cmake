@@ -15,6 +15,8 @@ add_library(emit_server STATIC
   agents/runner.cpp
   agents/sender.cpp
   agents/sender_client.cpp
+  agents/shm_client.cpp
+  agents/socket_client.cpp
   app/daemon.cpp
   app/emitd_main.cpp
   app/replay.cpp
@@ -25,6 +27,8 @@ add_library(emit_server STATIC
   io/frame_client.cpp
   io/host_client.cpp
   io/recorder_client.cpp
+  io/shm_frame_client.cpp
+  io/shm_object.cpp
   io/socket.cpp
   io/socket_address.cpp
   io/udp_batch.cpp
@@ -33,6 +37,7 @@ add_library(emit_server STATIC
   pacing/scenario_track.cpp
   rt/clock.cpp
   rt/doorbell.cpp
+  rt/futex.cpp
   telemetry/log.cpp)
 add_library(emit::server ALIAS emit_server)
 # g++ 12 sees null pointers inside Boost: in Asio's scheduler and below its JSON reader.

@@ -89,10 +89,27 @@ const KeyTable<StreamConfig>& stream_keys() {
                             EMIT_FIELD(udp_fragment_payload_bytes),
                             "Pixel bytes per datagram; 8900 needs jumbo frames beyond loopback, "
                             "1400 fits any Ethernet."),
+      integer<StreamConfig>("tcp_send_buffer_bytes", "bytes", 0, 1073741824,
+                            EMIT_FIELD(tcp_send_buffer_bytes),
+                            "What a TCP client may leave in its socket: what waits there is late, "
+                            "and skipped no more. Over long links at least rate x round trip; 0: "
+                            "the system's choice, up to megabytes."),
       integer<StreamConfig>("udp_send_buffer_bytes", "bytes", 65536, 1073741824,
                             EMIT_FIELD(udp_send_buffer_bytes), "Socket send buffer."),
       integer<StreamConfig>("multicast_ttl", "", 0, 255, EMIT_FIELD(multicast_ttl),
                             "Routers that multicast frames may pass; 0: this host only."),
+      text<StreamConfig>("shm", EMIT_FIELD(shm),
+                         "Name under which clients on this host read frames from shared memory "
+                         "(`shm://name`): letters, digits, `_`, `-`, `.`; empty: off."),
+      integer<StreamConfig>("shm_slots", "", 3, 64, EMIT_FIELD(shm_slots),
+                            "Frames in the shared memory: a client that reads them in place has "
+                            "one period less than this before a frame is overwritten."),
+      choice<StreamConfig>(
+          "shm_mode",
+          std::vector<std::pair<std::string, std::uint32_t>>{
+              {"0600", 0600}, {"0640", 0640}, {"0644", 0644}},
+          EMIT_FIELD(shm_mode),
+          "Who may read the shared memory: emitd's user, its group too, or everybody."),
   };
   return keys;
 }

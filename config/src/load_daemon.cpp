@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "data_files.hpp"
@@ -12,6 +13,10 @@ namespace emit::config {
 using physics::Result;
 
 namespace {
+
+bool is_ascii_alnum(char c) {
+  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+}
 
 /// host:port with a port of 0..65535; IPv6 addresses stand in brackets.
 bool is_endpoint(std::string_view text) {
@@ -76,6 +81,12 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
   check_endpoint(section(root, "control", reported_before), "tcp", daemon.control.tcp, false,
                  diagnostics);
   check_endpoint(section(root, "host", reported_before), "udp", daemon.host.udp, true, diagnostics);
+  if (!daemon.stream.shm.empty() && !is_shm_name(daemon.stream.shm)) {
+    diagnostics.add(key_location(section(root, "stream", reported_before), "shm"),
+                    fmt::format("'shm' is '{}', must be 1 to 64 letters, digits, '_', '-' or '.', "
+                                "beginning with a letter or digit",
+                                daemon.stream.shm));
+  }
   if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {
     std::error_code code;
     if (!std::filesystem::is_directory(daemon.source.canned_dir, code)) {
@@ -87,6 +98,13 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
 }
 
 }  // namespace
+
+bool is_shm_name(std::string_view text) noexcept {
+  constexpr std::size_t kMostCharacters = 64;
+  return !text.empty() && text.size() <= kMostCharacters && is_ascii_alnum(text.front()) &&
+         std::all_of(text.begin(), text.end(),
+                     [](char c) { return is_ascii_alnum(c) || c == '_' || c == '-' || c == '.'; });
+}
 
 Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
                                  std::span<const std::string> overrides,

@@ -21,6 +21,9 @@ pkg_check_modules(epoxy REQUIRED IMPORTED_TARGET epoxy)
 pkg_check_modules(egl REQUIRED IMPORTED_TARGET egl)
 pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
 
+# Optional: libzmq3-dev, a yardstick of `emit bench stream`.
+pkg_check_modules(zeromq IMPORTED_TARGET libzmq)
+
 # Header-only packages without a usable config file.
 find_path(EMIT_TINYGLTF_DIR tiny_gltf.h REQUIRED)
 find_path(EMIT_STB_DIR stb_image_write.h PATH_SUFFIXES stb REQUIRED)

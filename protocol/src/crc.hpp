@@ -16,6 +16,12 @@ namespace emit::protocol {
                                             std::uint32_t crc = 0) noexcept;
 [[nodiscard]] bool has_crc32c_instruction() noexcept;
 
+/// CRC-32C by carry-less products of 32 bytes; short pieces by the instruction. Precondition:
+/// has_crc32c_folding().
+[[nodiscard]] std::uint32_t crc32c_folding(std::span<const std::byte> bytes,
+                                           std::uint32_t crc = 0) noexcept;
+[[nodiscard]] bool has_crc32c_folding() noexcept;
+
 /// CRC-32 of zlib, PNG and MCAP (reflected 0x04C11DB7); `crc` continues an earlier call.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t crc = 0) noexcept;
 

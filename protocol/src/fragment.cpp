@@ -71,21 +71,26 @@ void encode(const FragmentHeader& header, std::span<std::byte, kFragmentHeaderBy
 
 FragmentStatus decode_fragment_header(std::span<const std::byte> datagram,
                                       FragmentHeader& out) noexcept {
-  if (datagram.size() < kFragmentHeaderBytes) return FragmentStatus::short_input;
-  if (wire::get<std::uint32_t>(datagram, 0) != kFragmentMagic) return FragmentStatus::wrong_magic;
-  if (wire::get<std::uint8_t>(datagram, 4) != kFragmentVersion) {
+  const std::size_t header_bytes = std::min(datagram.size(), kFragmentHeaderBytes);
+  return decode_fragment_header(datagram.first(header_bytes), datagram.size() - header_bytes, out);
+}
+
+FragmentStatus decode_fragment_header(std::span<const std::byte> header, std::size_t payload,
+                                      FragmentHeader& out) noexcept {
+  if (header.size() < kFragmentHeaderBytes) return FragmentStatus::short_input;
+  if (wire::get<std::uint32_t>(header, 0) != kFragmentMagic) return FragmentStatus::wrong_magic;
+  if (wire::get<std::uint8_t>(header, 4) != kFragmentVersion) {
     return FragmentStatus::wrong_version;
   }
-  out.flags = wire::get<std::uint8_t>(datagram, 5);
-  out.stream_id = wire::get<std::uint16_t>(datagram, 6);
-  out.frame_id = wire::get<std::uint32_t>(datagram, 8);
-  out.byte_offset = wire::get<std::uint32_t>(datagram, 12);
-  out.total_bytes = wire::get<std::uint32_t>(datagram, 16);
-  out.payload_bytes = wire::get<std::uint16_t>(datagram, 20);
-  out.row = wire::get<std::uint16_t>(datagram, 22);
-  out.sim_time_ns = wire::get<std::int64_t>(datagram, 24);
+  out.flags = wire::get<std::uint8_t>(header, 5);
+  out.stream_id = wire::get<std::uint16_t>(header, 6);
+  out.frame_id = wire::get<std::uint32_t>(header, 8);
+  out.byte_offset = wire::get<std::uint32_t>(header, 12);
+  out.total_bytes = wire::get<std::uint32_t>(header, 16);
+  out.payload_bytes = wire::get<std::uint16_t>(header, 20);
+  out.row = wire::get<std::uint16_t>(header, 22);
+  out.sim_time_ns = wire::get<std::int64_t>(header, 24);
 
-  const std::size_t payload = datagram.size() - kFragmentHeaderBytes;
   if (payload < out.payload_bytes) return FragmentStatus::short_input;
   if (payload != out.payload_bytes || payload == 0 || payload % 4 != 0) {
     return FragmentStatus::bad_length;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "wire_bytes.hpp"
 
@@ -75,15 +76,30 @@ ParseStatus RecordParser::next(Record& record) noexcept {
   offending_value_ = length;
   if (length > limit_of(kind)) return error_ = ParseStatus::oversize;
   offending_value_ = 0;
+  sum(kind, length);
   if (held.size() - kRecordHeaderBytes < length) return ParseStatus::need_more;
   record.kind = kind;
   record.body = held.subspan(kRecordHeaderBytes, length);
+  record.payload_crc32c = std::exchange(payload_crc32c_, 0);
+  summed_ = 0;
   begin_ += kRecordHeaderBytes + length;
   return ParseStatus::record;
 }
 
+/// Pixels are summed when they have just arrived: they are still in the cache.
+void RecordParser::sum(RecordKind kind, std::size_t body_bytes) noexcept {
+  constexpr std::size_t kFirst = kRecordHeaderBytes + kFrameHeaderBytes;
+  const std::size_t from = std::max(summed_, kFirst);
+  const std::size_t to = std::min(end_ - begin_, kRecordHeaderBytes + body_bytes);
+  if (kind != RecordKind::frame || to <= from) return;
+  payload_crc32c_ = crc32c({buffer_.get() + begin_ + from, to - from}, payload_crc32c_);
+  summed_ = to;
+}
+
 void RecordParser::reset() noexcept {
   begin_ = end_ = 0;
+  summed_ = 0;
+  payload_crc32c_ = 0;
   error_ = ParseStatus::need_more;
   offending_value_ = 0;
 }

@@ -64,8 +64,29 @@ struct Reassembler::Slot {
   std::int64_t sim_time_ns = 0;
   std::size_t received_words = 0;
   std::uint64_t opened_at = 0;
+  std::size_t prefix_bytes = 0;     // that arrived in order
+  std::uint16_t payload_bytes = 0;  // of a fragment, as the newest in order had it
+  std::size_t summed_bytes = 0;     // from the front, what `crc32c` covers: fragments in order
+  std::uint32_t crc32c = 0;         // of the pixels among them
   ReceivedFrame frame;
 
+  /// Sums a payload while it is in the cache; what comes out of order is summed by finish_sum().
+  void sum(std::size_t offset, std::span<const std::byte> payload) noexcept {
+    // Up to here every byte is the first header's or a pixel's, however long the padding is.
+    constexpr std::size_t kMostBehind = 2 * kFrameHeaderBytes;  // padding and second header
+    const std::size_t sure = std::max<std::size_t>(total_bytes, kMostBehind) - kMostBehind;
+    const std::size_t end = std::min(offset + payload.size(), sure);
+    if (offset != summed_bytes || end <= offset) return;
+    const std::size_t begin = std::max(offset, kFrameHeaderBytes);
+    if (begin < end) {
+      crc32c = protocol::crc32c(payload.subspan(begin - offset, end - begin), crc32c);
+    }
+    summed_bytes = end;
+  }
+  [[nodiscard]] std::uint32_t finish_sum(std::size_t pixel_bytes) const noexcept {
+    const std::size_t begin = std::max(summed_bytes, kFrameHeaderBytes);
+    return protocol::crc32c({bytes.get() + begin, kFrameHeaderBytes + pixel_bytes - begin}, crc32c);
+  }
   [[nodiscard]] bool has_words(std::size_t begin, std::size_t count) const noexcept {
     return bits::count_set(received, begin, count) == count;
   }
@@ -111,13 +132,34 @@ Reassembler::Reassembler(Reassembler&&) noexcept = default;
 Reassembler& Reassembler::operator=(Reassembler&&) noexcept = default;
 
 FragmentStatus Reassembler::push(std::span<const std::byte> datagram) noexcept {
-  FragmentHeader header;
-  FragmentStatus status = decode_fragment_header(datagram, header);
+  const std::size_t header_bytes = std::min(datagram.size(), kFragmentHeaderBytes);
+  return push(datagram.first(header_bytes), datagram.subspan(header_bytes));
+}
+
+FragmentStatus Reassembler::push(std::span<const std::byte> header,
+                                 std::span<const std::byte> payload) noexcept {
+  FragmentHeader fields;
+  FragmentStatus status = decode_fragment_header(header, payload.size(), fields);
   if (status == FragmentStatus::accepted) {
-    status = take(header, datagram.subspan(kFragmentHeaderBytes));
+    status = take(fields, payload);
   }
   ++counters_.fragments[static_cast<std::size_t>(status)];
   return status;
+}
+
+Reassembler::Expected Reassembler::expected() noexcept {
+  if (newest_ == nullptr || newest_->state != Slot::State::open ||
+      newest_->received_words * kWordBytes != newest_->prefix_bytes) {
+    return {};
+  }
+  Expected out;
+  out.rest = {newest_->bytes.get() + newest_->prefix_bytes,
+              newest_->total_bytes - newest_->prefix_bytes};
+  out.next.stream_id = newest_->stream->id;
+  out.next.frame_id = newest_->frame_id;
+  out.next.byte_offset = static_cast<std::uint32_t>(newest_->prefix_bytes);
+  out.next.payload_bytes = newest_->payload_bytes;
+  return out;
 }
 
 FragmentStatus Reassembler::take(const FragmentHeader& header,
@@ -154,7 +196,16 @@ FragmentStatus Reassembler::take(const FragmentHeader& header,
   const std::size_t present = bits::count_set(slot->received, first_word, words);
   if (present == words) return FragmentStatus::duplicate;
   if (present != 0) return FragmentStatus::overlap;
-  std::memcpy(slot->bytes.get() + header.byte_offset, payload.data(), payload.size());
+  newest_ = slot;
+  std::byte* const place = slot->bytes.get() + header.byte_offset;
+  if (payload.data() != place) {
+    std::memcpy(place, payload.data(), payload.size());
+  }
+  if (header.byte_offset == slot->prefix_bytes) {
+    slot->prefix_bytes += payload.size();
+    slot->payload_bytes = header.payload_bytes;
+  }
+  if (params_.check_crc) slot->sum(header.byte_offset, payload);
   bits::set_range(slot->received, first_word, words);
   slot->received_words += words;
   if (slot->received_words == slot->total_bytes / kWordBytes) {
@@ -209,6 +260,9 @@ Reassembler::Slot* Reassembler::open_slot(Stream& stream, const FragmentHeader& 
   vacant->total_bytes = header.total_bytes;
   vacant->sim_time_ns = header.sim_time_ns;
   vacant->received_words = 0;
+  vacant->prefix_bytes = 0;
+  vacant->summed_bytes = 0;
+  vacant->crc32c = 0;
   vacant->opened_at = ++arrivals_;
   std::ranges::fill(vacant->received, std::uint64_t{0});
   return vacant;
@@ -302,7 +356,7 @@ void Reassembler::finish(Slot& slot) noexcept {
   if (frame.complete) {
     ++counters_.frames_complete;
     if (params_.check_crc && known) {
-      frame.crc_ok = crc32c({pixel_memory, pixel_bytes}) == header.payload_crc32c;
+      frame.crc_ok = slot.finish_sum(pixel_bytes) == header.payload_crc32c;
       if (!frame.crc_ok) ++counters_.crc_mismatches;
     }
   } else {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "agents/agent.hpp"
-#include "agents/sender_client.hpp"
+#include "agents/socket_client.hpp"
 #include "app/context.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/protocol/codec.hpp"
@@ -18,7 +18,8 @@
 
 namespace emit::v1 {
 class ControlRecord;
-}
+class Welcome;
+}  // namespace emit::v1
 
 namespace emit::server {
 
@@ -45,6 +46,8 @@ class Receiver final : public Agent {
   [[nodiscard]] physics::Result<void> open();
   /// Before start.
   void set_identity(Identity identity) { identity_ = std::move(identity); }
+  /// Serialised emit.v1.Welcome, as a client would get it now.
+  [[nodiscard]] std::vector<std::byte> welcome() const;
   [[nodiscard]] SocketAddress control_address() const noexcept;
   /// length 0: no host port.
   [[nodiscard]] SocketAddress host_address() const noexcept;
@@ -78,6 +81,7 @@ class Receiver final : public Agent {
   void take_host_frame(Connection& connection, std::span<const std::byte> bytes,
                        std::int64_t now_ns);
   void take_control(Connection& connection, std::span<const std::byte> body);
+  void fill_welcome(v1::Welcome& welcome) const;
   void take_hello(Connection& connection, const v1::ControlRecord& record);
   void take_subscribe(Connection& connection, const v1::ControlRecord& record);
   [[nodiscard]] physics::Result<UdpSocket> open_stream_socket(const Connection& connection,

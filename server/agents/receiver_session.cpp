@@ -169,6 +169,27 @@ void fill(const Channel& channel, v1::ChannelInfo& out) {
 
 }  // namespace
 
+void Receiver::fill_welcome(v1::Welcome& welcome) const {
+  welcome.set_protocol_version(kProtocolVersion);
+  welcome.set_software(identity_.software);
+  welcome.set_scenario(identity_.scenario);
+  welcome.set_pacing(identity_.pacing);
+  welcome.set_run_id(context_.run_id.load(std::memory_order_relaxed));
+  welcome.set_tai_offset_unset(context_.clock.tai_offset_unset());
+  welcome.set_device(identity_.device);
+  for (const Channel& channel : context_.channels) {
+    fill(channel, *welcome.add_channels());
+  }
+}
+
+std::vector<std::byte> Receiver::welcome() const {
+  v1::Welcome message;
+  fill_welcome(message);
+  std::vector<std::byte> out(message.ByteSizeLong());
+  message.SerializeToArray(out.data(), static_cast<int>(out.size()));
+  return out;
+}
+
 void Receiver::take_hello(Connection& connection, const v1::ControlRecord& record) {
   const v1::Hello& hello = record.hello();
   const auto end = [&](StatusCode code, const std::string& text) {
@@ -201,17 +222,7 @@ void Receiver::take_hello(Connection& connection, const v1::ControlRecord& recor
   }
   connection.welcomed = true;
   v1::ControlRecord answer;
-  v1::Welcome& welcome = *answer.mutable_welcome();
-  welcome.set_protocol_version(kProtocolVersion);
-  welcome.set_software(identity_.software);
-  welcome.set_scenario(identity_.scenario);
-  welcome.set_pacing(identity_.pacing);
-  welcome.set_run_id(context_.run_id.load(std::memory_order_relaxed));
-  welcome.set_tai_offset_unset(context_.clock.tai_offset_unset());
-  welcome.set_device(identity_.device);
-  for (const Channel& channel : context_.channels) {
-    fill(channel, *welcome.add_channels());
-  }
+  fill_welcome(*answer.mutable_welcome());
   queue(connection, answer);
   flush(connection);
   context_.receiver_events.push(EventKind::hello, connection.key(),
@@ -252,7 +263,7 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
                        subscribe.channel_kind(), subscribe.sensor(), subscribe.band(), known));
     return;
   }
-  SenderClient::Params params;
+  SocketClient::Params params;
   params.connection = connection.key();
   params.channel = channel;
   params.every_frame = subscribe.every_frame();
@@ -271,6 +282,7 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
         protocol::kMinFragmentPayloadBytes, protocol::kMaxFragmentPayloadBytes);
   } else {
     params.tcp_socket = &connection.socket;
+    connection.socket.set_send_buffer(config_.stream.tcp_send_buffer_bytes);
   }
   v1::ControlRecord answer;
   fill(*channel, *answer.mutable_subscribed()->mutable_channel());
@@ -294,7 +306,7 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
     connection.dirty = true;
   }
   connection.lent = true;
-  connection.client = std::make_unique<SenderClient>(std::move(params));
+  connection.client = std::make_unique<SocketClient>(std::move(params));
   static_cast<void>(context_.to_sender.push(
       {ClientCommand::Kind::add, connection.key(), connection.client.get()}));
   context_.bells.sender.ring();

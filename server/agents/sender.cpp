@@ -9,14 +9,19 @@
 namespace emit::server {
 
 Sender::Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients,
-               bool keep_last)
+               bool keep_last, SenderClient* resident)
     : Agent(context.bells.sender),
       context_(context),
       queue_frames_(std::max(queue_frames, 1U)),
       keep_last_(keep_last),
+      resident_(resident),
       epoll_(::epoll_create1(EPOLL_CLOEXEC)),
       window_(queue_frames_ + 1) {
-  clients_.reserve(max_clients);
+  clients_.reserve(max_clients + 1);
+  if (resident_ != nullptr) {
+    resident_->next = end_;
+    clients_.push_back(resident_);
+  }
 }
 
 bool Sender::on_start() noexcept {
@@ -62,10 +67,9 @@ int Sender::take_commands() noexcept {
       client->next = end_;
       clients_.push_back(client);
     } else {
-      const auto found =
-          std::find_if(clients_.begin(), clients_.end(), [&](const SenderClient* client) {
-            return client->params().connection == command->connection;
-          });
+      const auto found = std::find_if(
+          clients_.begin(), clients_.end(),
+          [&](const SenderClient* client) { return client->connection() == command->connection; });
       if (found != clients_.end()) {
         remove(static_cast<std::size_t>(found - clients_.begin()), false);
       }
@@ -121,9 +125,9 @@ void Sender::evict_oldest() noexcept {
       context_.counters.add(Counter::frames_spilled);
     }
     if (client.next == first_) {
-      if (client.params().every_frame) {
+      if (client.every_frame()) {
         context_.counters.add(Counter::clients_disconnected_slow);
-        context_.sender_events.push(EventKind::client_slow, client.params().connection);
+        context_.sender_events.push(EventKind::client_slow, client.connection());
         remove(i, true);
         continue;
       }
@@ -196,10 +200,8 @@ bool Sender::advance(SenderClient& client) noexcept {
   if (!client.busy() && client.next < end_) {
     client.next = std::max(client.next, first_);
     const Entry& next = entry(client.next);
-    const std::size_t plane = client.params().channel->plane;
     client.in_transit = client.next++;
-    client.begin(next.header, next.image.planes[plane], next.image.crc32c[plane],
-                 context_.clock.tai_ns());
+    client.begin(next.header, next.image, context_.clock.tai_ns());
   }
   switch (client.send(batch_, context_)) {
     case SenderClient::Progress::idle:
@@ -241,13 +243,16 @@ void Sender::remove(std::size_t index, bool failed) noexcept {
     ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, client->fd(), nullptr);
   }
   clients_.erase(clients_.begin() + static_cast<std::ptrdiff_t>(index));
+  if (client == resident_) {
+    return;
+  }
   if (failed && client->error() != 0) {
-    context_.sender_events.push(EventKind::client_failed, client->params().connection,
+    context_.sender_events.push(EventKind::client_failed, client->connection(),
                                 static_cast<std::uint64_t>(client->error()));
   }
   // Room is certain: the receiver has at most max_clients clients lent, the ring holds four times
   // that.
-  static_cast<void>(context_.from_sender.push({client->params().connection, client}));
+  static_cast<void>(context_.from_sender.push({client->connection(), client}));
   context_.bells.receiver.ring();
 }
 

@@ -23,7 +23,9 @@ namespace emit::server {
 class Sender final : public Agent {
  public:
   /// `keep_last`: the newest image stays held, because it may have to be sent again (ig-clock).
-  Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients, bool keep_last);
+  /// `resident`: a client that is served from start to end and belongs to no connection, or null.
+  Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients, bool keep_last,
+         SenderClient* resident = nullptr);
 
   [[nodiscard]] std::string_view name() const noexcept override { return "sender"; }
   [[nodiscard]] bool on_start() noexcept override;
@@ -62,6 +64,7 @@ class Sender final : public Agent {
   Context& context_;
   const std::uint32_t queue_frames_;
   const bool keep_last_;
+  SenderClient* const resident_;
   Fd epoll_;
   UdpBatch batch_;
   std::vector<SenderClient*> clients_;  // reserved at start

@@ -1,34 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/sender_client.hpp"
 
-#include <algorithm>
-#include <cstring>
-
 namespace emit::server {
-namespace {
 
-/// What one turn hands over at most, so that several clients advance side by side.
-constexpr std::size_t kTcpTurnBytes = 512u << 10;
-constexpr int kUdpTurnCalls = 6;
-
-}  // namespace
-
-SenderClient::SenderClient(Params params) : params_(std::move(params)) {
-  const auto& channel = *params_.channel;
-  spill_.resize(std::size_t{channel.width_px} * channel.height_px * sizeof(float));
-  segmentation_ = params_.udp && udp_segmentation_supported(params_.udp_socket.fd());
-}
-
-void SenderClient::begin(const protocol::FrameHeader& header, std::span<const float> pixels,
-                         std::uint32_t crc32c, std::int64_t now_ns) noexcept {
-  const Channel& channel = *params_.channel;
+void SenderClient::start(const protocol::FrameHeader& header, std::int64_t now_ns) noexcept {
   header_ = header;
-  header_.channel_kind = static_cast<std::uint8_t>(channel.kind);
-  header_.channel_index = channel.index;
-  header_.width_px = channel.width_px;
-  header_.height_px = channel.height_px;
-  header_.band_lo_um = static_cast<float>(channel.band_lo_um);
-  header_.band_hi_um = static_cast<float>(channel.band_hi_um);
   if (gap) {
     header_.flags |= protocol::kFlagGapBefore;
     gap = false;
@@ -37,110 +13,22 @@ void SenderClient::begin(const protocol::FrameHeader& header, std::span<const fl
   header_.previous_age_ns = previous_age_ns_;
   header_.previous_delay_ns = previous_delay_ns_;
   header_.previous_frame_number = previous_frame_number_;
-  header_.payload_bytes = pixels.size_bytes();
-  header_.payload_crc32c = crc32c;
-
-  pixels_ = std::as_bytes(pixels);
-  const std::span head(head_);
-  const auto header_bytes =
-      head.subspan<protocol::kRecordHeaderBytes, protocol::kFrameHeaderBytes>();
-  protocol::encode(header_, header_bytes);
-  if (params_.udp) {
-    fragments_.emplace(
-        protocol::Fragmenter::Params{params_.stream_id, frame_id_++, header_.sim_time_ns,
-                                     channel.width_px * static_cast<std::uint32_t>(sizeof(float)),
-                                     params_.fragment_payload_bytes},
-        header_bytes, pixels_);
-    fragment_ = 0;
-  } else {
-    protocol::encode_record_header(
-        protocol::RecordKind::frame,
-        static_cast<std::uint32_t>(protocol::kFrameHeaderBytes + pixels_.size()),
-        head.first<protocol::kRecordHeaderBytes>());
-    offset_ = 0;
-  }
   busy_ = true;
   spilled_ = false;
 }
 
-SenderClient::Progress SenderClient::send(UdpBatch& batch, Context& context) noexcept {
-  return params_.udp ? send_udp(batch, context) : send_tcp(context);
-}
-
-SenderClient::Progress SenderClient::send_tcp(Context& context) noexcept {
-  std::array<std::span<const std::byte>, 3> pieces;
-  std::size_t count = 0;
-  std::size_t budget = kTcpTurnBytes;
-  const auto add = [&](std::span<const std::byte> bytes, std::size_t from) {
-    if (from < bytes.size() && budget > 0) {
-      const std::size_t length = std::min(bytes.size() - from, budget);
-      pieces[count++] = bytes.subspan(from, length);
-      budget -= length;
-    }
-  };
-  add(params_.first_bytes, first_sent_);
-  if (busy_) {
-    add(head_, static_cast<std::size_t>(offset_));
-    add(pixels_, static_cast<std::size_t>(offset_ > head_.size() ? offset_ - head_.size()
-                                                                 : std::uint64_t{0}));
-  }
-  if (count == 0) {
-    return Progress::idle;
-  }
-  const IoResult sent = params_.tcp_socket->write_some(std::span(pieces).first(count));
-  if (sent.status == IoStatus::would_block) {
-    return Progress::blocked;
-  }
-  if (sent.status != IoStatus::done) {
-    error_ = sent.error;
-    return Progress::failed;
-  }
-  std::size_t rest = sent.bytes;
-  context.counters.add(Counter::bytes_sent, rest);
-  const std::size_t first = std::min(rest, params_.first_bytes.size() - first_sent_);
-  first_sent_ += first;
-  rest -= first;
-  offset_ += rest;
-  if (busy_ && offset_ == head_.size() + pixels_.size()) {
-    return Progress::finished;
-  }
-  return Progress::more;
-}
-
-SenderClient::Progress SenderClient::send_udp(UdpBatch& batch, Context& context) noexcept {
-  if (!busy_) {
-    return Progress::idle;
-  }
-  for (int call = 0; call < kUdpTurnCalls; ++call) {
-    const auto result = batch.send(params_.udp_socket.fd(), *fragments_, fragment_, segmentation_);
-    switch (result.status) {
-      case UdpBatch::Status::sent:
-        fragment_ += result.fragments;
-        context.counters.add(Counter::bytes_sent, result.bytes);
-        if (fragment_ == fragments_->fragment_count()) {
-          return Progress::finished;
-        }
-        break;
-      case UdpBatch::Status::would_block:
-        return Progress::blocked;
-      case UdpBatch::Status::no_buffers:
-        return Progress::retry_soon;
-      case UdpBatch::Status::no_segmentation:
-        segmentation_ = false;
-        context.sender_events.push(EventKind::no_gso, params_.connection,
-                                   static_cast<std::uint64_t>(result.error));
-        break;
-      case UdpBatch::Status::failed:
-        // Nobody listens, no route: the client's control connection decides whether it is gone.
-        // The datagram counts as lost on the way.
-        context.counters.add(Counter::send_errors);
-        if (++fragment_ == fragments_->fragment_count()) {
-          return Progress::finished;
-        }
-        break;
-    }
-  }
-  return Progress::more;
+protocol::FrameHeader SenderClient::header_for(const Channel& channel,
+                                               const Image& image) const noexcept {
+  protocol::FrameHeader out = header_;
+  out.channel_kind = static_cast<std::uint8_t>(channel.kind);
+  out.channel_index = channel.index;
+  out.width_px = channel.width_px;
+  out.height_px = channel.height_px;
+  out.band_lo_um = static_cast<float>(channel.band_lo_um);
+  out.band_hi_um = static_cast<float>(channel.band_hi_um);
+  out.payload_bytes = image.planes[channel.plane].size_bytes();
+  out.payload_crc32c = image.crc32c[channel.plane];
+  return out;
 }
 
 void SenderClient::complete(std::int64_t now_ns) noexcept {
@@ -151,24 +39,6 @@ void SenderClient::complete(std::int64_t now_ns) noexcept {
     previous_delay_ns_ = now_ns - header_.host_received_ns;
     previous_age_ns_ = previous_delay_ns_ - (header_.sim_time_ns - header_.pose_sim_time_ns);
   }
-}
-
-void SenderClient::spill() noexcept {
-  const std::size_t length = std::min(pixels_.size(), spill_.size());
-  std::memcpy(spill_.data(), pixels_.data(), length);
-  const std::span<const std::byte> own(spill_.data(), length);
-  pixels_ = own;
-  if (params_.udp) {
-    const auto header_bytes =
-        std::span(head_).subspan<protocol::kRecordHeaderBytes, protocol::kFrameHeaderBytes>();
-    fragments_.emplace(
-        protocol::Fragmenter::Params{
-            params_.stream_id, frame_id_ - 1, header_.sim_time_ns,
-            params_.channel->width_px * static_cast<std::uint32_t>(sizeof(float)),
-            params_.fragment_payload_bytes},
-        header_bytes, pixels_);
-  }
-  spilled_ = true;
 }
 
 }  // namespace emit::server

@@ -16,6 +16,7 @@
 #include "agents/render_agent.hpp"
 #include "agents/runner.hpp"
 #include "agents/sender.hpp"
+#include "agents/shm_client.hpp"
 #include "app/context.hpp"
 #include "app/replay.hpp"
 #include "emit/version.hpp"
@@ -118,6 +119,7 @@ class DaemonImpl final : public Daemon {
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<RenderAgent> render_;
   std::unique_ptr<Recorder> recorder_;
+  std::unique_ptr<ShmClient> shm_;
   std::unique_ptr<Sender> sender_;
   std::unique_ptr<Conductor> conductor_;
   std::unique_ptr<AgentRunner> receiver_runner_;
@@ -169,6 +171,11 @@ physics::Result<void> DaemonImpl::setup() {
   if (auto opened = receiver_->open(); !opened) {
     return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
   }
+  if (!config_.stream.shm.empty()) {
+    if (auto free = check_shm_name_free(config_.stream.shm); !free) {
+      return tl::unexpected<Error>(std::move(free.error()).with_context("stream.shm"));
+    }
+  }
   render_ = std::make_unique<RenderAgent>(context_, source_factory());
   render_runner_ = std::make_unique<AgentRunner>(*render_, clock_);
   const bool started =
@@ -213,7 +220,16 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   // Three slots beside the window: one being rendered, one on its way here, one free.
   const std::uint32_t window =
       std::min(std::max(config_.stream.queue_frames, 1U), std::max(source.slots, 4U) - 3);
-  sender_ = std::make_unique<Sender>(context_, window, config_.control.max_clients, ig_clock);
+  if (!config_.stream.shm.empty()) {
+    auto shm =
+        ShmClient::create(config_.stream, context_.channels, receiver_->welcome(), clock_.tai_ns());
+    if (!shm) {
+      return tl::unexpected<Error>(std::move(shm.error()).with_context("stream.shm"));
+    }
+    shm_ = std::move(*shm);
+  }
+  sender_ =
+      std::make_unique<Sender>(context_, window, config_.control.max_clients, ig_clock, shm_.get());
   Conductor::Options options;
   options.pacing = config_.pacing;
   options.first_plane = context_.channels.front().plane;
@@ -228,6 +244,11 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                   software, kCommit, source.device, scenario_ ? scenario_->file.string() : "",
                   pacing_name(config_.pacing.mode), context_.channels.size(), source.width_px,
                   source.height_px));
+  if (shm_) {
+    log_->write(LogLevel::info,
+                fmt::format("event=shm url=shm://{} slots={} mode={:04o}", config_.stream.shm,
+                            config_.stream.shm_slots, config_.stream.shm_mode));
+  }
   if (clock_.tai_offset_unset()) {
     log_->write(LogLevel::warn,
                 "event=tai_offset_unset effect=\"wall instants are UTC\" "

@@ -145,7 +145,7 @@ void Tool::add_scene_commands() {
         "  (number pad: - + and / *), R limits from the picture, T radiance or temperature, Esc "
         "closes",
         run_view);
-    app.add_option("source", o.source, "Scenario name, .toml file, tcp:// or udp:// URL")
+    app.add_option("source", o.source, "Scenario name, .toml file, tcp://, udp:// or shm:// URL")
         ->required()
         ->type_name("SCENARIO|URL");
     add_set(app, o.set);
@@ -194,7 +194,8 @@ void Tool::add_stream_commands() {
         "emit receive tcp://127.0.0.1:7000 --frames 100 --out frames", run_receive);
     app.add_option("url", o.url,
                    "Control address of the daemon; the scheme chooses how frames travel: "
-                   "tcp://host:port or udp://host:port")
+                   "tcp://host:port or udp://host:port; shm://name: shared memory of a daemon on "
+                   "this host that has stream.shm = \"name\"")
         ->required()
         ->type_name("URL");
     add_count(app, "--frames", o.frames, "Stop after this many; 0: until interrupted");
@@ -211,8 +212,7 @@ void Tool::add_stream_commands() {
     add_seconds(app, "--timeout-s", o.timeout_s, "Give up when no frame comes for this long")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    app.add_flag("--every-frame", o.every_frame,
-                 "TCP: ask the daemon to disconnect rather than to skip frames");
+    app.add_flag("--every-frame", o.every_frame, "TCP, shm: end rather than skip frames");
     app.add_option("--min-k", o.min_k, "Lower limit of the PNG's colours")->capture_default_str();
     app.add_option("--max-k", o.max_k, "Upper limit of the PNG's colours")->capture_default_str();
     add_json(app, o.json);

@@ -68,16 +68,28 @@ void Tool::add_bench_commands() {
   }
   {
     auto [app, o] = add<BenchStreamCommand>(
-        *bench, "stream", "Transport alone: canned frames over TCP and UDP loopback",
+        *bench, "stream",
+        "Transport alone: canned frames over loopback and shared memory, first at a fixed rate, "
+        "then as fast as they go, beside bare sockets in the same run",
         "emit bench stream --json stream.json --frames 1000 --rate 200", run_bench_stream);
-    add_count(app, "--frames", o.frames, "Frames per transport")->capture_default_str();
+    add_count(app, "--frames", o.frames, "Frames per client at the fixed rate")
+        ->capture_default_str();
     app.add_option("--rate", o.rate_hz, "Frames a second")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
-    app.add_option("--clients", o.clients, "Clients per transport")
+    app.add_option("--clients", o.clients, "Clients at the fixed rate")
         ->check(CLI::Range(1U, 8U))
+        ->capture_default_str();
+    app.add_option("--transport", o.transports,
+                   "Transport at the fixed rate; repeatable; mixed: tcp, udp, shm in turn")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember({"tcp", "udp", "shm", "mixed"}))
+        ->capture_default_str();
+    app.add_option("--repeats", o.repeats,
+                   "Interleaved measurements of throughput, medians of which count; 0: none")
+        ->check(CLI::Range(0U, 1000U))
         ->capture_default_str();
     add_json(app, o.json);
   }

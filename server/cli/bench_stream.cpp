@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
 #include <system_error>
 #include <thread>
 
@@ -15,75 +19,143 @@
 #include "json.hpp"
 #include "statistics.hpp"
 #include "stream_client.hpp"
+#include "stream_throughput.hpp"
+#include "stream_yardstick.hpp"
 
 namespace emit::cli {
 namespace {
 
 using physics::Result;
 
-struct StreamResult {
+/// One row of the results; the keys that every result has.
+struct Row {
+  std::string transport;
+  std::uint32_t clients = 1;
+  std::optional<double> rate_hz;  ///< none: as fast as it goes
   std::uint64_t frames = 0;
   std::uint64_t lost = 0;
   std::uint64_t late = 0;
-  std::uint64_t partial = 0;
-  std::uint64_t gaps = 0;
-  Samples delay_ms;
-  double seconds = 0.0;
-  double cpu_frac = 0.0;
-  std::string device;
-  std::string advice;
+  Samples delay_us;
+  std::optional<double> gbit_s;
+  std::optional<double> cpu_frac;
+  Json more = Json::object();  ///< beyond the common keys
 };
 
-config::DaemonConfig canned_config(const BenchStreamCommand& command) {
-  config::DaemonConfig daemon;
-  daemon.source.kind = config::SourceKind::canned;
-  daemon.source.canned_width_px = command.width_px;
-  daemon.source.canned_height_px = command.height_px;
-  daemon.pacing.mode = config::PacingMode::ig_clock;
-  daemon.pacing.rate_hz = command.rate_hz;
-  daemon.host.udp = "";
-  daemon.control.tcp = "127.0.0.1:0";
-  return daemon;
+class StreamBench {
+ public:
+  StreamBench(const BenchStreamCommand& command, std::filesystem::path work)
+      : command_(command), work_(std::move(work)) {
+    yardstick_.frame_bytes =
+        sizeof(float) * static_cast<std::size_t>(command.width_px) * command.height_px;
+  }
+
+  Result<void> run();
+  [[nodiscard]] const std::string& device() const { return device_; }
+  [[nodiscard]] Json json() const;
+  void print(std::FILE* out) const;
+  /// Nothing was lost or torn.
+  [[nodiscard]] bool sound() const {
+    return std::all_of(rows_.begin(), rows_.end(), [](const Row& row) { return row.lost == 0; });
+  }
+
+ private:
+  Result<Row> paced(const std::string& transport);
+  Result<Row> bare_paced();
+  Result<void> throughput();
+
+  const BenchStreamCommand& command_;
+  std::filesystem::path work_;
+  YardstickOptions yardstick_;
+  std::string device_;
+  std::vector<Row> rows_;
+};
+
+Result<void> StreamBench::run() {
+  for (const std::string& transport : command_.transports) {
+    auto row = paced(transport);
+    if (!row) return tl::unexpected(row.error());
+    rows_.push_back(std::move(*row));
+  }
+  if (!command_.transports.empty()) {
+    auto row = bare_paced();
+    if (!row) return tl::unexpected(row.error());
+    rows_.push_back(std::move(*row));
+  }
+  return command_.repeats > 0 ? throughput() : Result<void>();
 }
 
-Result<StreamResult> run_transport(const BenchStreamCommand& command, const std::string& scheme,
-                                   const std::filesystem::path& work) {
-  auto daemon = DaemonProcess::start(canned_config(command), {}, work, std::chrono::seconds(60));
+/// Sums over clients what the paced results say beside delays.
+struct PacedCounts {
+  std::uint64_t partial = 0;
+  std::uint64_t gaps = 0;
+  std::uint64_t skipped = 0;
+  std::uint64_t crc_errors = 0;
+  std::uint64_t unflagged_gaps = 0;
+  std::uint64_t os_drops = 0;
+  std::uint64_t repeated = 0;
+};
+
+void add_delays(const Samples& from_ms, Samples& to_us) {
+  for (const double value : from_ms.values()) to_us.add(1e3 * value);
+}
+
+Result<Row> StreamBench::paced(const std::string& transport) {
+  const bool mixed = transport == "mixed";
+  const std::string shm = mixed || transport == "shm" ? own_shm_name() : "";
+  config::DaemonConfig config = canned_daemon(command_.width_px, command_.height_px, shm);
+  config.pacing.mode = config::PacingMode::ig_clock;
+  config.pacing.rate_hz = command_.rate_hz;
+  auto daemon = DaemonProcess::start(config, {}, work_, std::chrono::seconds(60));
   if (!daemon) return tl::unexpected(daemon.error());
+  constexpr std::array<const char*, 3> kInTurn{"tcp", "udp", "shm"};
   std::vector<std::unique_ptr<StreamClient>> clients;
-  for (std::uint32_t i = 0; i < command.clients; ++i) {
+  for (std::uint32_t i = 0; i < command_.clients; ++i) {
+    const std::string scheme = mixed ? kInTurn[i % kInTurn.size()] : transport;
     StreamClient::Options options;
-    options.url = scheme + "://" + daemon->control_address();
+    options.url = scheme + "://" + (scheme == "shm" ? shm : daemon->control_address());
+    options.subscribe.in_place = true;
     auto client = StreamClient::start(options);
     if (!client) return tl::unexpected(client.error());
     clients.push_back(std::move(*client));
   }
-  StreamResult result;
+  Row row;
+  row.transport = transport;
+  row.clients = command_.clients;
+  row.rate_hz = command_.rate_hz;
   const double cpu_before_s = daemon->cpu_seconds();
   const auto start = std::chrono::steady_clock::now();
   const auto timeout = std::chrono::milliseconds(
-      static_cast<std::int64_t>(3e3 * static_cast<double>(command.frames) / command.rate_hz) +
+      static_cast<std::int64_t>(3e3 * static_cast<double>(command_.frames) / command_.rate_hz) +
       10'000);
   bool complete = true;
-  std::string reason;
   for (const auto& client : clients) {
-    result.device = client->server().device;
-    complete = client->wait_for_frames(command.frames, timeout) && complete;
+    complete = client->wait_for_frames(command_.frames, timeout) && complete;
   }
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  result.cpu_frac = (daemon->cpu_seconds() - cpu_before_s) / result.seconds;
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  row.cpu_frac = (daemon->cpu_seconds() - cpu_before_s) / seconds;
+
+  PacedCounts counts;
+  Samples own_us;
+  std::string reason;
+  std::string advice;
   for (const auto& client : clients) {
     client->stop();
+    device_ = client->server().device;
     const auto& counters = client->counters();
-    result.frames += client->report().frames();
-    result.lost += counters.lost;
-    result.partial += counters.partial;
-    result.gaps += counters.gaps;
-    result.late += client->report().flagged(protocol::kFlagLate);
-    for (const double value : client->report().ready_to_received_ms().values()) {
-      result.delay_ms.add(value);
-    }
-    if (result.advice.empty()) result.advice = client->advice();
+    row.frames += client->report().frames();
+    row.lost += counters.lost + counters.crc_errors + counters.partial;
+    row.late += client->report().flagged(protocol::kFlagLate);
+    counts.partial += counters.partial;
+    counts.gaps += counters.gaps;
+    counts.skipped += counters.skipped;
+    counts.crc_errors += counters.crc_errors;
+    counts.os_drops += counters.os_drops;
+    counts.repeated += counters.repeated;
+    counts.unflagged_gaps += client->report().unflagged_gaps();
+    add_delays(client->report().ready_to_received_ms(), row.delay_us);
+    add_delays(client->report().ready_to_send_ms(), own_us);
+    if (advice.empty()) advice = client->advice();
     if (reason.empty()) reason = client->error();
   }
   clients.clear();
@@ -93,10 +165,198 @@ Result<StreamResult> run_transport(const BenchStreamCommand& command, const std:
   if (!complete) {
     return physics::make_error(
         physics::ErrorCode::io,
-        fmt::format("{}: only {} of {} frames came{}{}", scheme, result.frames,
-                    command.frames * command.clients, reason.empty() ? "" : ": ", reason));
+        fmt::format("{}: only {} of {} frames came{}{}", transport, row.frames,
+                    command_.frames * command_.clients, reason.empty() ? "" : ": ", reason));
   }
-  return result;
+  if (!advice.empty()) warn(advice);
+  row.gbit_s = 8e-9 * static_cast<double>(yardstick_.frame_bytes * row.frames) / seconds;
+  row.more.set("partial", counts.partial).set("gaps", counts.gaps).set("skipped", counts.skipped);
+  row.more.set("unflagged_gaps", counts.unflagged_gaps).set("crc_errors", counts.crc_errors);
+  row.more.set("os_drops", counts.os_drops).set("repeated", counts.repeated);
+  row.more.set("own_p50_us", own_us.percentile(0.5)).set("own_p99_us", own_us.percentile(0.99));
+  row.more.set("own_p999_us", own_us.percentile(0.999)).set("own_max_us", own_us.percentile(1.0));
+  row.more.set("delay", "pixels ready in the daemon to last byte at the client");
+  row.more.set("own", "pixels ready in the daemon to this client's first byte given away");
+  return row;
+}
+
+Result<Row> StreamBench::bare_paced() {
+  YardstickOptions options = yardstick_;
+  options.frames = command_.frames;
+  auto delay = measure_bare_delay_us(options, command_.clients, command_.rate_hz);
+  if (!delay) return tl::unexpected(delay.error());
+  Row row;
+  row.transport = "bare-tcp-paced";
+  row.clients = command_.clients;
+  row.rate_hz = command_.rate_hz;
+  row.frames = delay->count();
+  row.delay_us = std::move(*delay);
+  row.gbit_s = 8e-9 * static_cast<double>(options.frame_bytes) * row.clients * command_.rate_hz;
+  row.more.set("delay", "start of the slot to last byte at the client, no service in between");
+  return row;
+}
+
+/// What is measured in turn, and beside which bare loop it is put.
+struct Contender {
+  const char* name;
+  const char* yardstick;  ///< null: is one
+};
+constexpr std::array<Contender, 7> kContenders{{{"bare-tcp", nullptr},
+                                                {"tcp", "bare-tcp"},
+                                                {"bare-udp", nullptr},
+                                                {"udp", "bare-udp"},
+                                                {"shm", "bare-tcp"},
+                                                {"zeromq", nullptr},
+                                                {"iperf3", nullptr}}};
+
+/// All measurements of one contender.
+struct Series {
+  Samples gbit_s;
+  Samples cpu_frac;
+  Samples cpu_s_per_gbit;  ///< holds still where other work on the machine takes its share
+  Samples ratio;           ///< to the yardstick of the same round
+  std::uint64_t frames = 0;
+  std::uint64_t lost = 0;
+  std::string missing;  ///< why there is none
+};
+
+Result<void> StreamBench::throughput() {
+  // Long enough that starting up does not show.
+  constexpr double kBytes = 2e9;
+  constexpr std::uint64_t kLeastFrames = 200;
+  constexpr std::uint64_t kMostFrames = 4000;
+  yardstick_.frames =
+      std::clamp(static_cast<std::uint64_t>(kBytes / static_cast<double>(yardstick_.frame_bytes)),
+                 kLeastFrames, kMostFrames);
+  const std::string shm = own_shm_name();
+  // The ring is written whether or not somebody reads: the others get a daemon without one.
+  const auto start = [&](const std::string& name) -> Result<StreamThroughput> {
+    const auto directory = work_ / (name.empty() ? "plain" : "shared");
+    if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
+    return StreamThroughput::start(canned_daemon(command_.width_px, command_.height_px, name),
+                                   directory);
+  };
+  auto plain = start("");
+  if (!plain) return tl::unexpected(plain.error());
+  auto shared = start(shm);
+  if (!shared) return tl::unexpected(shared.error());
+  const auto measure = [&](const std::string& name) -> Result<YardstickResult> {
+    if (name == "bare-tcp") return measure_bare_tcp(yardstick_);
+    if (name == "bare-udp") return measure_bare_udp(yardstick_);
+    if (name == "zeromq") return measure_zeromq(yardstick_);
+    if (name == "iperf3") {
+      constexpr int kSeconds = 1;
+      const auto gbit_s = measure_iperf3_gbit_s(work_, kSeconds);
+      if (!gbit_s) return tl::unexpected(gbit_s.error());
+      YardstickResult result;
+      result.seconds = kSeconds;
+      result.frames = static_cast<std::uint64_t>(*gbit_s * 1e9 / 8.0 /
+                                                 static_cast<double>(yardstick_.frame_bytes));
+      return result;
+    }
+    return (name == "shm" ? *shared : *plain).measure(name, yardstick_.frames, yardstick_.window);
+  };
+  std::map<std::string, Series> series;
+  ProgressBar progress("throughput", command_.repeats * kContenders.size());
+  for (std::uint32_t round = 0; round < command_.repeats; ++round) {
+    std::map<std::string, double> of_round;
+    for (std::size_t i = 0; i < kContenders.size(); ++i) {
+      const Contender& contender = kContenders[i];
+      Series& own = series[contender.name];
+      progress.advance_to(round * kContenders.size() + i);
+      if (!own.missing.empty()) continue;
+      const auto result = measure(contender.name);
+      if (!result) {
+        const auto code = result.error().code;
+        if (code != physics::ErrorCode::not_found && code != physics::ErrorCode::unsupported) {
+          return tl::unexpected(result.error());
+        }
+        own.missing = result.error().text;
+        continue;
+      }
+      const double gbit_s =
+          8e-9 * static_cast<double>(result->frames * yardstick_.frame_bytes) / result->seconds;
+      of_round[contender.name] = gbit_s;
+      own.gbit_s.add(gbit_s);
+      if (result->cpu_s > 0.0) {
+        own.cpu_frac.add(result->cpu_s / result->seconds);
+        own.cpu_s_per_gbit.add(result->cpu_s / (gbit_s * result->seconds));
+      }
+      own.frames += result->frames;
+      own.lost += result->lost;
+      if (contender.yardstick != nullptr) own.ratio.add(gbit_s / of_round[contender.yardstick]);
+    }
+  }
+  progress.finish();
+  for (StreamThroughput* daemon : {&*plain, &*shared}) {
+    if (auto stopped = daemon->stop(); !stopped) return stopped;
+  }
+  for (const Contender& contender : kContenders) {
+    const Series& own = series[contender.name];
+    Row row;
+    row.transport = contender.name;
+    row.frames = own.frames;
+    row.lost = own.lost;
+    row.more.set("repeats", own.gbit_s.count());
+    if (own.missing.empty()) {
+      row.gbit_s = own.gbit_s.median();
+      if (!own.cpu_frac.empty()) {
+        row.cpu_frac = own.cpu_frac.median();
+        row.more.set("cpu_s_per_gbit", own.cpu_s_per_gbit.median());
+      }
+      row.more.set("min_gbit_s", own.gbit_s.percentile(0.0)).set("max_gbit_s", own.gbit_s.max());
+    } else {
+      row.more.set("reason", own.missing);
+    }
+    if (contender.yardstick != nullptr) {
+      row.more.set("yardstick", contender.yardstick).set("ratio", own.ratio.median());
+    }
+    row.more.set("cpu", "daemon and client, or sender and receiver; cores");
+    rows_.push_back(std::move(row));
+  }
+  return {};
+}
+
+Json optional_json(const std::optional<double>& value) {
+  return value ? Json(*value) : Json();
+}
+
+Json StreamBench::json() const {
+  Json results = Json::array();
+  for (const Row& row : rows_) {
+    Json json = Json::object();
+    json.set("transport", row.transport).set("clients", row.clients);
+    json.set("width", command_.width_px).set("height", command_.height_px);
+    json.set("rate_hz", optional_json(row.rate_hz)).set("frames", row.frames);
+    json.set("lost", row.lost).set("late", row.late);
+    const auto us = [&](double frac) {
+      return row.delay_us.empty() ? Json() : Json(row.delay_us.percentile(frac));
+    };
+    json.set("p50_us", us(0.5)).set("p99_us", us(0.99)).set("p999_us", us(0.999));
+    json.set("max_us", us(1.0)).set("gbit_s", optional_json(row.gbit_s));
+    json.set("cpu_frac", optional_json(row.cpu_frac));
+    json.merge(row.more);
+    results.push(std::move(json));
+  }
+  return results;
+}
+
+void StreamBench::print(std::FILE* out) const {
+  TextTable table({"transport", "clients", "rate Hz", "frames", "lost", "late", "p50 us", "p99 us",
+                   "p99.9 us", "max us", "Gbit/s", "CPU"});
+  for (const Row& row : rows_) {
+    const auto count = [](std::uint64_t value) { return fmt::format("{}", value); };
+    const auto us = [&](double frac) {
+      return row.delay_us.empty() ? "-" : fmt::format("{:.0f}", row.delay_us.percentile(frac));
+    };
+    const auto number = [](const std::optional<double>& value, int digits) {
+      return value ? fmt::format("{:.{}f}", *value, digits) : "-";
+    };
+    table.add({row.transport, count(row.clients), row.rate_hz ? number(row.rate_hz, 0) : "max",
+               count(row.frames), count(row.lost), count(row.late), us(0.5), us(0.99), us(0.999),
+               us(1.0), number(row.gbit_s, 2), number(row.cpu_frac, 2)});
+  }
+  fmt::print(out, "{}x{}, loopback\n{}", command_.width_px, command_.height_px, table.to_string());
 }
 
 }  // namespace
@@ -107,52 +367,19 @@ int run_bench_stream(const BenchStreamCommand& command) {
       std::filesystem::temp_directory_path(error) /
       fmt::format("emit-bench-{}", std::chrono::steady_clock::now().time_since_epoch().count());
   if (auto made = make_directory(work); !made) return fail(made.error());
-  Json results = Json::array();
-  TextTable table({"transport", "clients", "frames", "lost", "partial", "gaps", "late", "p50 us",
-                   "p99 us", "p99.9 us", "max us", "Gbit/s", "CPU"});
-  std::string device;
-  int exit_code = kExitOk;
-  for (const std::string scheme : {"tcp", "udp"}) {
-    const auto result = run_transport(command, scheme, work);
-    if (!result) {
-      std::filesystem::remove_all(work, error);
-      return fail(result.error());
-    }
-    device = result->device;
-    const double bits = 32.0 * command.width_px * command.height_px;
-    const double gbit_s = 1e-9 * bits * static_cast<double>(result->frames) / result->seconds;
-    const auto us = [&](double frac) { return 1e3 * result->delay_ms.percentile(frac); };
-    Json json = Json::object();
-    json.set("transport", scheme).set("clients", command.clients);
-    json.set("width", command.width_px).set("height", command.height_px);
-    json.set("rate_hz", command.rate_hz).set("frames", result->frames);
-    json.set("lost", result->lost).set("late", result->late);
-    json.set("p50_us", us(0.5)).set("p99_us", us(0.99)).set("p999_us", us(0.999));
-    json.set("max_us", us(1.0)).set("gbit_s", gbit_s).set("cpu_frac", result->cpu_frac);
-    json.set("partial", result->partial).set("gaps", result->gaps);
-    json.set("delay", "pixels ready in the daemon to last byte at the client");
-    results.push(std::move(json));
-    const auto whole = [](double value) { return fmt::format("{:.0f}", value); };
-    const auto count = [](std::uint64_t value) { return fmt::format("{}", value); };
-    table.add({scheme, count(command.clients), count(result->frames), count(result->lost),
-               count(result->partial), count(result->gaps), count(result->late), whole(us(0.5)),
-               whole(us(0.99)), whole(us(0.999)), whole(us(1.0)), fmt::format("{:.2f}", gbit_s),
-               fmt::format("{:.2f}", result->cpu_frac)});
-    if (!result->advice.empty()) warn(result->advice);
-    if (result->lost > 0 || result->partial > 0) exit_code = kExitFailure;
-  }
+  StreamBench bench(command, work);
+  const auto done = bench.run();
   std::filesystem::remove_all(work, error);
-  if (command.json != std::filesystem::path("-")) {
-    fmt::print("{}x{} at {:g} Hz, loopback\n{}", command.width_px, command.height_px,
-               command.rate_hz, table.to_string());
-  }
+  if (!done) return fail(done.error());
+  bench.print(text_stream(command.json));
   if (command.json) {
     Json json = Json::object();
-    json.set("device", device).set("commit", kCommit).set("suite", "stream");
-    json.set("results", std::move(results));
+    json.set("device", bench.device()).set("commit", kCommit).set("suite", "stream");
+    json.set("cores", std::thread::hardware_concurrency());
+    json.set("results", bench.json());
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
-  return exit_code;
+  return bench.sound() ? kExitOk : kExitFailure;
 }
 
 }  // namespace emit::cli

@@ -227,7 +227,9 @@ struct BenchStreamCommand {
   double rate_hz = 200.0;
   std::uint32_t width_px = 640;
   std::uint32_t height_px = 512;
-  std::uint32_t clients = 2;
+  std::uint32_t clients = 4;
+  std::vector<std::string> transports{"tcp", "udp", "shm", "mixed"};
+  std::uint32_t repeats = 5;  ///< of the throughput measurements; 0: none
 };
 int run_bench_stream(const BenchStreamCommand& command);
 

@@ -75,6 +75,11 @@ Json& Json::set(std::string_view key, Json value) {
   return *this;
 }
 
+Json& Json::merge(const Json& other) {
+  for (const auto& [key, value] : std::get<Members>(other.value_)) set(key, value);
+  return *this;
+}
+
 Json& Json::push(Json value) {
   std::get<Items>(value_).push_back(std::move(value));
   return *this;

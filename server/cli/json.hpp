@@ -36,6 +36,8 @@ class Json {
 
   /// Replaces or appends a key of an object.
   Json& set(std::string_view key, Json value);
+  /// Sets every key of another object.
+  Json& merge(const Json& other);
   /// Appends to an array.
   Json& push(Json value);
 

@@ -65,7 +65,7 @@ int run_receive(const ReceiveCommand& command) {
   if (command.out) {
     if (auto made = make_directory(*command.out); !made) return fail(made.error());
   }
-  if (const auto url = server::parse_url(command.url); !url) {
+  if (const auto url = server::parse_frame_url(command.url); !url) {
     return fail(kExitUsage, url.error().text);
   }
   if (!(command.max_k > command.min_k)) return fail(kExitUsage, "--max-k must exceed --min-k");
@@ -79,6 +79,9 @@ int run_receive(const ReceiveCommand& command) {
   options.band = command.band;
   options.every_frame = command.every_frame;
   options.multicast_group = command.multicast_group;
+  // Checks are made while the pixels are looked at first; writing files takes longer than the
+  // daemon waits.
+  options.in_place = !command.out;
   const auto channel = client.subscribe(options);
   if (!channel) return fail(channel.error());
   fmt::print(stderr, "emit: {} ({}), scenario {}, {}\n", client.server().software,

@@ -78,6 +78,11 @@ bool StreamClient::wait_for_frames(std::uint64_t frames, std::chrono::millisecon
   return count_ >= frames;
 }
 
+std::uint64_t StreamClient::frames() {
+  const std::lock_guard lock(mutex_);
+  return count_;
+}
+
 StreamClient::Snapshot StreamClient::last_frame() {
   const std::lock_guard lock(mutex_);
   return last_;

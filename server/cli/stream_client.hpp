@@ -38,6 +38,9 @@ class StreamClient {
   /// Waits until this many frames have come. False: timeout or stream ended.
   [[nodiscard]] bool wait_for_frames(std::uint64_t frames, std::chrono::milliseconds timeout);
 
+  /// Frames that have come so far.
+  [[nodiscard]] std::uint64_t frames();
+
   struct Snapshot {
     protocol::FrameHeader header;
     std::vector<float> pixels;

@@ -26,6 +26,8 @@ class StreamReport {
   [[nodiscard]] const Samples& pose_to_received_ms() const noexcept { return stages_[kTotal]; }
   /// First byte given to the kernel to last byte here, ms.
   [[nodiscard]] const Samples& send_to_received_ms() const noexcept { return stages_[kTransport]; }
+  /// Pixels in CPU memory to this client's turn, ms: the daemon's own share.
+  [[nodiscard]] const Samples& ready_to_send_ms() const noexcept { return stages_[kHandOver]; }
   /// Pixels in CPU memory to last byte here, ms: what the daemon and the wire add to a render.
   [[nodiscard]] const Samples& ready_to_received_ms() const noexcept { return ready_ms_; }
 

@@ -241,7 +241,7 @@ int Viewer::run() {
 }  // namespace
 
 int run_view(const ViewCommand& command) {
-  const bool stream = command.source.starts_with("tcp://") || command.source.starts_with("udp://");
+  const bool stream = command.source.find("://") != std::string::npos;
   auto provider =
       stream ? view::make_stream_provider(command) : view::make_scenario_provider(command);
   if (!provider) {

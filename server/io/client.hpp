@@ -21,15 +21,17 @@ class JournalEntry;
 /// polls.
 namespace emit::server {
 
-/// scheme://host:port; schemes tcp and udp, IPv6 hosts in brackets.
+/// scheme://host:port; schemes tcp and udp, IPv6 hosts in brackets. shm://name: frames only.
 struct Url {
-  enum class Scheme : std::uint8_t { tcp, udp };
+  enum class Scheme : std::uint8_t { tcp, udp, shm };
   Scheme scheme = Scheme::tcp;
-  std::string host;
+  std::string host;  ///< shm: the name
   std::uint16_t port = 0;
 };
-/// Errors (invalid_argument): anything else, naming the text.
+/// tcp and udp. Errors (invalid_argument): anything else, naming the text.
 [[nodiscard]] physics::Result<Url> parse_url(const std::string& text);
+/// Where frames come from: tcp, udp and shm. Errors (invalid_argument): anything else.
+[[nodiscard]] physics::Result<Url> parse_frame_url(const std::string& text);
 
 /// emit.v1.Status as plain data; `code` has the values of Status::Code (1 = OK).
 struct ServerStatus {
@@ -78,6 +80,8 @@ struct SubscribeOptions {
   std::uint32_t fragment_payload_bytes = 0;  ///< UDP; 0 = daemon's choice
   std::string multicast_group;               ///< UDP; empty = unicast
   std::uint16_t udp_port = 0;                ///< UDP; 0 = any free port
+  /// shm: pixels are not copied but stay where the daemon writes them: see FrameClient::intact().
+  bool in_place = false;
 };
 
 /// Pixels stay valid until the next receive().
@@ -103,7 +107,8 @@ struct ReceiveCounters {
 };
 
 /// Receives frames. tcp://host:port: frames on the control connection; udp://host:port: control
-/// over TCP to host:port, frames as UDP fragments.
+/// over TCP to host:port, frames as UDP fragments; shm://name: from the memory of a daemon on this
+/// host, which neither knows nor waits for its readers.
 class FrameClient {
  public:
   /// Hello and Welcome. Errors: io (refused, timeout), protocol (version).
@@ -119,6 +124,10 @@ class FrameClient {
   /// Next frame in order; null when the timeout ran out first. Errors: io (connection closed),
   /// protocol (stream broken). After an error the client is of no further use.
   [[nodiscard]] virtual physics::Result<const ReceivedFrame*> receive(std::int64_t timeout_ns) = 0;
+  /// With SubscribeOptions::in_place, to be asked after the last use of a frame's pixels. False:
+  /// the daemon has overwritten them meanwhile, so what was made of them is void. Without it,
+  /// always true.
+  [[nodiscard]] virtual bool intact() const noexcept = 0;
 
   [[nodiscard]] virtual const ReceiveCounters& counters() const noexcept = 0;
   /// Statuses the daemon sent in between, oldest first; clears the list.

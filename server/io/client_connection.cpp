@@ -9,6 +9,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "emit/config/daemon_config.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
@@ -67,6 +68,39 @@ ChannelDescription describe_channel(const v1::ChannelInfo& info) {
 ServerStatus to_status(const v1::Status& status) {
   return {static_cast<std::uint32_t>(status.code()), status.text(), status.host_frame_number(),
           status.count()};
+}
+
+ServerInfo to_server_info(const v1::Welcome& welcome) {
+  ServerInfo info;
+  info.software = welcome.software();
+  info.scenario = welcome.scenario();
+  info.pacing = welcome.pacing();
+  info.device = welcome.device();
+  info.run_id = welcome.run_id();
+  info.tai_offset_unset = welcome.tai_offset_unset();
+  for (const v1::ChannelInfo& channel : welcome.channels()) {
+    info.channels.push_back(describe_channel(channel));
+  }
+  return info;
+}
+
+physics::Result<Url> parse_frame_url(const std::string& text) {
+  constexpr std::string_view kShm = "shm://";
+  if (text.starts_with(kShm)) {
+    Url url{Url::Scheme::shm, text.substr(kShm.size()), 0};
+    if (!config::is_shm_name(url.host)) {
+      return make_error(ErrorCode::invalid_argument,
+                        fmt::format("'{}': not shm://name, a name as stream.shm takes it", text));
+    }
+    return url;
+  }
+  auto url = parse_url(text);
+  if (!url) {
+    return make_error(
+        ErrorCode::invalid_argument,
+        fmt::format("'{}': not tcp://host:port, udp://host:port or shm://name", text));
+  }
+  return url;
 }
 
 physics::Result<Url> parse_url(const std::string& text) {
@@ -145,16 +179,7 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
                       fmt::format("{}: speaks protocol version {}, this client {}", where,
                                   welcome.protocol_version(), protocol::kProtocolVersion));
   }
-  ServerInfo& info = connection.info_;
-  info.software = welcome.software();
-  info.scenario = welcome.scenario();
-  info.pacing = welcome.pacing();
-  info.device = welcome.device();
-  info.run_id = welcome.run_id();
-  info.tai_offset_unset = welcome.tai_offset_unset();
-  for (const v1::ChannelInfo& channel : welcome.channels()) {
-    info.channels.push_back(describe_channel(channel));
-  }
+  connection.info_ = to_server_info(welcome);
   return connection;
 }
 
@@ -175,7 +200,10 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
                         fmt::format("{}: stream broken: {} ({})", to_string(peer_),
                                     protocol::to_string(status), parser_.offending_value()));
     }
-    const std::span<std::byte> space = parser_.writable();
+    // Not more at a time than the cache holds: the parser sums pixels behind every piece.
+    constexpr std::size_t kPieceBytes = 256u << 10;
+    const std::span<std::byte> writable = parser_.writable();
+    const std::span<std::byte> space = writable.first(std::min(writable.size(), kPieceBytes));
     const IoResult got = socket_.read_some(space);
     switch (got.status) {
       case IoStatus::done:

@@ -15,6 +15,7 @@ namespace emit::v1 {
 class ChannelInfo;
 class ControlRecord;
 class Status;
+class Welcome;
 }  // namespace emit::v1
 
 namespace emit::server {
@@ -24,6 +25,7 @@ namespace emit::server {
 [[nodiscard]] bool wait_for(int fd, short events, std::int64_t end_ns) noexcept;
 [[nodiscard]] ServerStatus to_status(const v1::Status& status);
 [[nodiscard]] ChannelDescription describe_channel(const v1::ChannelInfo& info);
+[[nodiscard]] ServerInfo to_server_info(const v1::Welcome& welcome);
 
 enum class ClientRole : std::uint8_t { host = 1, client = 2, recorder = 3 };
 

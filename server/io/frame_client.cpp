@@ -11,6 +11,8 @@
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
 #include "io/client_connection.hpp"
+#include "io/frame_account.hpp"
+#include "io/shm_frame_client.hpp"
 #include "io/udp_frame_receiver.hpp"
 #include "rt/clock.hpp"
 
@@ -28,7 +30,8 @@ class FrameClientImpl final : public FrameClient {
   const ServerInfo& server() const noexcept override { return connection_.server(); }
   physics::Result<ChannelDescription> subscribe(const SubscribeOptions& options) override;
   physics::Result<const ReceivedFrame*> receive(std::int64_t timeout_ns) override;
-  const ReceiveCounters& counters() const noexcept override { return counters_; }
+  bool intact() const noexcept override { return true; }
+  const ReceiveCounters& counters() const noexcept override { return account_.counters; }
   std::vector<ServerStatus> take_statuses() override { return std::exchange(statuses_, {}); }
   std::uint64_t receive_buffer_bytes() const noexcept override {
     return receiver_ ? receiver_->buffer_bytes() : 0;
@@ -39,8 +42,8 @@ class FrameClientImpl final : public FrameClient {
   physics::Result<const ReceivedFrame*> receive_tcp(std::int64_t end_ns);
   physics::Result<const ReceivedFrame*> receive_udp(std::int64_t end_ns);
   const ReceivedFrame* pop_udp();
+  std::span<const float> aligned(std::span<const std::byte> pixels);
   void take_control(std::span<const std::byte> body);
-  void account();
 
   ClientConnection connection_;
   bool udp_;
@@ -48,18 +51,15 @@ class FrameClientImpl final : public FrameClient {
   std::uint16_t stream_id_ = 0;
   ChannelDescription channel_;
   SystemClock clock_;
-  ReceiveCounters counters_;
+  FrameAccount account_;
   std::vector<ServerStatus> statuses_;
   ReceivedFrame frame_;
-  std::vector<float> pixels_;  // tcp: aligned copy of the record's pixels
+  std::vector<float> pixels_;  // tcp: where a record's pixels lie unaligned
   std::optional<UdpFrameReceiver> receiver_;
   std::optional<protocol::Reassembler> reassembler_;
   const protocol::ReceivedFrame* held_ = nullptr;
   std::int64_t burst_begin_ns_ = 0;
   std::int64_t quiet_since_ns_ = 0;
-  std::uint64_t run_id_ = 0;
-  std::uint64_t last_frame_number_ = 0;
-  bool any_ = false;
 };
 
 physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOptions& options) {
@@ -174,13 +174,12 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t 
     frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
     burst_begin_ns_ = 0;
     frame_.missing_px = 0;
-    if (!protocol::payload_crc_matches(*view)) {
-      ++counters_.crc_errors;
+    if (record.payload_crc32c != view->header.payload_crc32c) {
+      ++account_.counters.crc_errors;
     }
-    std::memcpy(pixels_.data(), view->pixels.data(), view->pixels.size());
-    frame_.pixels = std::span<const float>(pixels_).first(view->pixels.size() / sizeof(float));
-    ++counters_.received;
-    account();
+    frame_.pixels = aligned(view->pixels);
+    ++account_.counters.received;
+    account_.take(frame_.header);
     return &frame_;
   }
 }
@@ -196,7 +195,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
     if (const ReceivedFrame* frame = pop_udp()) {
       return frame;
     }
-    const int taken = receiver_->take(*reassembler_, counters_);
+    const int taken = receiver_->take(*reassembler_, account_.counters);
     if (taken > 0) {
       quiet_since_ns_ = 0;
       if (burst_begin_ns_ == 0) {
@@ -224,7 +223,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
       auto received = connection_.receive(record, monotonic_now_ns());
       if (!received) {
         // The daemon went away: what is still in the socket comes first.
-        if (receiver_->take(*reassembler_, counters_) > 0) {
+        if (receiver_->take(*reassembler_, account_.counters) > 0) {
           continue;
         }
         reassembler_->flush();
@@ -253,7 +252,7 @@ const ReceivedFrame* FrameClientImpl::pop_udp() {
       break;
     }
     // Somebody else's frames on this port.
-    ++counters_.bad_datagrams;
+    ++account_.counters.bad_datagrams;
     reassembler_->release(held_);
   }
   frame_.header = held_->header;
@@ -262,30 +261,25 @@ const ReceivedFrame* FrameClientImpl::pop_udp() {
   frame_.last_byte_ns = clock_.tai_ns();
   frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
   burst_begin_ns_ = 0;
-  counters_.received += held_->complete ? 1 : 0;
-  counters_.partial += held_->complete ? 0 : 1;
-  counters_.crc_errors += held_->complete && !held_->crc_ok ? 1 : 0;
+  account_.counters.received += held_->complete ? 1 : 0;
+  account_.counters.partial += held_->complete ? 0 : 1;
+  account_.counters.crc_errors += held_->complete && !held_->crc_ok ? 1 : 0;
   if (held_->header_known) {
-    account();
+    account_.take(frame_.header);
   } else {
-    // The frame number went with the header; the gap to the next one is this frame.
-    ++last_frame_number_;
+    account_.take_unknown();
   }
   return &frame_;
 }
 
-void FrameClientImpl::account() {
-  const protocol::FrameHeader& header = frame_.header;
-  counters_.late += (header.flags & protocol::kFlagLate) != 0 ? 1 : 0;
-  counters_.repeated += (header.flags & protocol::kFlagRepeated) != 0 ? 1 : 0;
-  const bool gap = (header.flags & protocol::kFlagGapBefore) != 0;
-  counters_.gaps += gap ? 1 : 0;
-  if (any_ && header.run_id == run_id_ && header.frame_number > last_frame_number_ + 1) {
-    (gap ? counters_.skipped : counters_.lost) += header.frame_number - last_frame_number_ - 1;
+std::span<const float> FrameClientImpl::aligned(std::span<const std::byte> pixels) {
+  const std::size_t count = pixels.size() / sizeof(float);
+  // Only records other than frames can bring them out of step.
+  if (reinterpret_cast<std::uintptr_t>(pixels.data()) % alignof(float) == 0) {
+    return {reinterpret_cast<const float*>(pixels.data()), count};
   }
-  any_ = true;
-  run_id_ = header.run_id;
-  last_frame_number_ = header.frame_number;
+  std::memcpy(pixels_.data(), pixels.data(), pixels.size());
+  return std::span<const float>(pixels_).first(count);
 }
 
 void FrameClientImpl::take_control(std::span<const std::byte> body) {
@@ -315,9 +309,12 @@ std::string FrameClientImpl::receive_buffer_advice() const {
 
 physics::Result<std::unique_ptr<FrameClient>> FrameClient::connect(const std::string& url,
                                                                    std::int64_t timeout_ns) {
-  const auto parsed = parse_url(url);
+  const auto parsed = parse_frame_url(url);
   if (!parsed) {
     return tl::unexpected<physics::Error>(physics::Error(parsed.error()));
+  }
+  if (parsed->scheme == Url::Scheme::shm) {
+    return open_shm_frame_client(parsed->host);
   }
   auto connection = ClientConnection::open(*parsed, ClientRole::client, timeout_ns);
   if (!connection) {

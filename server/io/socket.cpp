@@ -213,6 +213,12 @@ void TcpSocket::shutdown_send() noexcept {
   impl_->socket.shutdown(tcp::socket::shutdown_send, ignored);
 }
 
+void TcpSocket::set_send_buffer(std::uint64_t bytes) noexcept {
+  if (bytes > 0) {
+    wish(impl_->socket, tcp::socket::send_buffer_size(buffer_size(bytes)));
+  }
+}
+
 IoResult TcpSocket::read_some(std::span<std::byte> space) noexcept {
   if (space.empty()) {
     return {IoStatus::failed, 0, ENOBUFS};  // Asio would report success without reading

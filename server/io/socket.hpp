@@ -64,6 +64,9 @@ class TcpSocket {
   void close() noexcept;
   void shutdown_send() noexcept;
 
+  /// A wish; 0: the system goes on choosing.
+  void set_send_buffer(std::uint64_t bytes) noexcept;
+
   [[nodiscard]] IoResult read_some(std::span<std::byte> space) noexcept;
   /// Like read_some, but what is read stays in the socket.
   [[nodiscard]] IoResult peek(std::span<std::byte> space) noexcept;

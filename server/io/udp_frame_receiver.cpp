@@ -24,7 +24,9 @@ using physics::make_error;
 UdpFrameReceiver::UdpFrameReceiver(UdpSocket socket)
     : socket_(std::move(socket)),
       data_(kBatch * kDatagramBytes),
-      control_(kBatch * kControlBytes) {}
+      control_(kBatch * kControlBytes),
+      messages_(kBatch),
+      headers_(kBatch) {}
 
 physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketContext& context,
                                                          const SocketAddress& peer,
@@ -68,51 +70,156 @@ void UdpFrameReceiver::size_buffer(std::uint64_t frame_bytes) {
       socket_.set_receive_buffer(std::max<std::uint64_t>(kFrames * frame_bytes, 1u << 20));
 }
 
+/// Lays out where a message goes; returns where in the frame the one behind it begins.
+std::size_t UdpFrameReceiver::plan(std::size_t index, const Expected& expected,
+                                   std::size_t from) noexcept {
+  Message& message = messages_[index];
+  const std::size_t payload = expected.next.payload_bytes;
+  const std::size_t left = expected.rest.size() - from;
+  message.planned = payload == 0 ? 0 : std::min(segments_, (left + payload - 1) / payload);
+  std::size_t pieces = 0;
+  std::size_t bytes = 0;
+  const auto add = [&](std::byte* to, std::size_t length) {
+    message.iov[pieces++] = {to, length};
+    bytes += length;
+  };
+  for (std::size_t i = 0; i < message.planned; ++i) {
+    const std::size_t length = std::min(payload, expected.rest.size() - from);
+    add(message.headers[i].data(), message.headers[i].size());
+    add(expected.rest.data() + from, length);
+    from += length;
+  }
+  // What does not fit the plan: behind the room that bring_together() needs.
+  add(data(index) + bytes, kDatagramBytes - bytes);
+  msghdr& header = headers_[index].msg_hdr;
+  header = {};
+  header.msg_iov = message.iov.data();
+  header.msg_iovlen = pieces;
+  header.msg_control = control_.data() + index * kControlBytes;
+  header.msg_controllen = kControlBytes;
+  return from;
+}
+
+void UdpFrameReceiver::read_control(std::size_t index, ReceiveCounters& counters) noexcept {
+  Message& message = messages_[index];
+  msghdr& header = headers_[index].msg_hdr;
+  message.bytes = headers_[index].msg_len;
+  message.segment_bytes = message.bytes;
+  for (cmsghdr* entry = CMSG_FIRSTHDR(&header); entry != nullptr;
+       entry = CMSG_NXTHDR(&header, entry)) {
+    if (entry->cmsg_level == SOL_UDP && entry->cmsg_type == UDP_GRO) {
+      int size = 0;
+      std::memcpy(&size, CMSG_DATA(entry), sizeof(size));
+      message.segment_bytes = size > 0 ? static_cast<std::size_t>(size) : message.segment_bytes;
+    } else if (entry->cmsg_level == SOL_SOCKET && entry->cmsg_type == SO_RXQ_OVFL) {
+      std::uint32_t drops = 0;
+      std::memcpy(&drops, CMSG_DATA(entry), sizeof(drops));
+      counters.os_drops += drops - drops_seen_;
+      drops_seen_ = drops;
+    }
+  }
+}
+
+/// Every datagram of the message is the fragment that was expected at its place.
+bool UdpFrameReceiver::as_planned(const Message& message, const Expected& expected,
+                                  std::size_t from) const noexcept {
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < message.planned && bytes < message.bytes; ++i) {
+    const std::size_t datagram = std::min(message.segment_bytes, message.bytes - bytes);
+    const std::size_t payload = message.iov[2 * i + 1].iov_len;
+    protocol::FragmentHeader header;
+    if (datagram != protocol::kFragmentHeaderBytes + payload ||
+        protocol::decode_fragment_header(message.headers[i], payload, header) !=
+            protocol::FragmentStatus::accepted ||
+        header.stream_id != expected.next.stream_id || header.frame_id != expected.next.frame_id ||
+        header.byte_offset != expected.next.byte_offset + from) {
+      return false;
+    }
+    bytes += datagram;
+    from += payload;
+  }
+  return bytes > 0 && bytes == message.bytes;
+}
+
+/// The whole message in data(), as if it had been received there.
+void UdpFrameReceiver::bring_together(std::size_t index) noexcept {
+  Message& message = messages_[index];
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < 2 * message.planned && at < message.bytes; ++i) {
+    const std::size_t length = std::min(message.iov[i].iov_len, message.bytes - at);
+    std::memcpy(data(index) + at, message.iov[i].iov_base, length);
+    at += length;
+  }
+  message.planned = 0;
+}
+
+void UdpFrameReceiver::count(protocol::FragmentStatus status, ReceiveCounters& counters) noexcept {
+  switch (status) {
+    case protocol::FragmentStatus::accepted:
+    case protocol::FragmentStatus::duplicate:
+    case protocol::FragmentStatus::late:
+      break;
+    default:
+      ++counters.bad_datagrams;
+      break;
+  }
+}
+
+void UdpFrameReceiver::push_planned(const Message& message, protocol::Reassembler& reassembler,
+                                    ReceiveCounters& counters) {
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; bytes < message.bytes; ++i) {
+    const iovec& payload = message.iov[2 * i + 1];
+    count(reassembler.push(message.headers[i],
+                           {static_cast<const std::byte*>(payload.iov_base), payload.iov_len}),
+          counters);
+    bytes += protocol::kFragmentHeaderBytes + payload.iov_len;
+  }
+}
+
+void UdpFrameReceiver::push_data(std::size_t index, protocol::Reassembler& reassembler,
+                                 ReceiveCounters& counters) {
+  const Message& message = messages_[index];
+  std::span<const std::byte> rest(data(index), message.bytes);
+  do {
+    const auto datagram = rest.first(std::min(message.segment_bytes, rest.size()));
+    rest = rest.subspan(datagram.size());
+    count(reassembler.push(datagram), counters);
+  } while (!rest.empty());
+}
+
 int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& counters) {
-  std::array<mmsghdr, kBatch> messages{};
-  std::array<iovec, kBatch> iov{};
-  for (std::size_t i = 0; i < kBatch; ++i) {
-    iov[i] = {data_.data() + i * kDatagramBytes, kDatagramBytes};
-    messages[i].msg_hdr.msg_iov = &iov[i];
-    messages[i].msg_hdr.msg_iovlen = 1;
-    messages[i].msg_hdr.msg_control = control_.data() + i * kControlBytes;
-    messages[i].msg_hdr.msg_controllen = kControlBytes;
+  const Expected expected = reassembler.expected();
+  std::array<std::size_t, kBatch + 1> from{};
+  for (std::size_t i = 0; i < batch_; ++i) {
+    from[i + 1] = plan(i, expected, from[i]);
   }
   // Natively: Asio knows neither many messages per call nor control messages (drops, UDP_GRO).
-  const int count = ::recvmmsg(socket_.fd(), messages.data(), kBatch, MSG_DONTWAIT, nullptr);
-  for (int i = 0; i < count; ++i) {
-    const auto index = static_cast<std::size_t>(i);
-    msghdr& message = messages[index].msg_hdr;
-    std::size_t segment = messages[index].msg_len;
-    for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr;
-         header = CMSG_NXTHDR(&message, header)) {
-      if (header->cmsg_level == SOL_UDP && header->cmsg_type == UDP_GRO) {
-        int size = 0;
-        std::memcpy(&size, CMSG_DATA(header), sizeof(size));
-        segment = size > 0 ? static_cast<std::size_t>(size) : segment;
-      } else if (header->cmsg_level == SOL_SOCKET && header->cmsg_type == SO_RXQ_OVFL) {
-        std::uint32_t drops = 0;
-        std::memcpy(&drops, CMSG_DATA(header), sizeof(drops));
-        counters.os_drops += drops - drops_seen_;
-        drops_seen_ = drops;
-      }
-    }
-    std::span<const std::byte> rest(data_.data() + index * kDatagramBytes, messages[index].msg_len);
-    do {
-      const auto datagram = rest.first(std::min(segment, rest.size()));
-      rest = rest.subspan(datagram.size());
-      switch (reassembler.push(datagram)) {
-        case protocol::FragmentStatus::accepted:
-        case protocol::FragmentStatus::duplicate:
-        case protocol::FragmentStatus::late:
-          break;
-        default:
-          ++counters.bad_datagrams;
-          break;
-      }
-    } while (!rest.empty());
+  const int received = ::recvmmsg(socket_.fd(), headers_.data(), batch_, MSG_DONTWAIT, nullptr);
+  const auto taken = static_cast<std::size_t>(std::max(received, 0));
+  for (std::size_t i = 0; i < taken; ++i) {
+    read_control(i, counters);
   }
-  return std::max(count, 0);
+  for (std::size_t i = 0; i < taken; ++i) {
+    if (messages_[i].planned > 0 && as_planned(messages_[i], expected, from[i])) {
+      push_planned(messages_[i], reassembler, counters);
+      continue;
+    }
+    // From here on places in the frame may be wanted for other payloads than lie there.
+    for (std::size_t later = i; later < taken; ++later) {
+      bring_together(later);
+    }
+    push_data(i, reassembler, counters);
+  }
+  if (taken > 0) {
+    const Message& first = messages_[0];
+    segments_ = std::clamp<std::size_t>(
+        first.segment_bytes == 0 ? 1
+                                 : (first.bytes + first.segment_bytes - 1) / first.segment_bytes,
+        1, kMaxSegments);
+    batch_ = segments_ > 1 ? kJoinedBatch : kBatch;
+  }
+  return std::max(received, 0);
 }
 
 }  // namespace emit::server

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <sys/socket.h>
+#include <sys/uio.h>
+
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -11,7 +15,9 @@
 namespace emit::server {
 
 /// Fragments from a UDP socket into a reassembler; takes several datagrams per system call, joined
-/// by the kernel (UDP_GRO) where it can.
+/// by the kernel (UDP_GRO) where it can. While fragments come in order, the kernel writes their
+/// payloads straight to where the reassembler wants them; what turns out to be something else is
+/// brought together and pushed in the ordinary way.
 class UdpFrameReceiver {
  public:
   /// `local`: this side's address of the control connection; a group is joined on its interface.
@@ -31,17 +37,47 @@ class UdpFrameReceiver {
   int take(protocol::Reassembler& reassembler, ReceiveCounters& counters);
 
  private:
-  static constexpr std::size_t kBatch = 16;
+  static constexpr unsigned kBatch = 16;
+  // Of joined datagrams few are taken at a time, so that they are still in the cache when they are
+  // put together.
+  static constexpr unsigned kJoinedBatch = 4;
   static constexpr std::size_t kDatagramBytes = 65536;
   static constexpr std::size_t kControlBytes = 64;
+  static constexpr std::size_t kMaxSegments = 64;  // datagrams that the kernel joins
+
+  /// One message of a batch: where the kernel was told to put it, and what came.
+  struct Message {
+    std::size_t planned = 0;  // datagrams whose payloads go to their place; 0: all to data()
+    std::size_t bytes = 0;
+    std::size_t segment_bytes = 0;
+    std::array<std::array<std::byte, protocol::kFragmentHeaderBytes>, kMaxSegments> headers;
+    std::array<iovec, 2 * kMaxSegments + 1> iov;
+  };
+  using Expected = protocol::Reassembler::Expected;
 
   explicit UdpFrameReceiver(UdpSocket socket);
+  [[nodiscard]] std::byte* data(std::size_t index) noexcept {
+    return data_.data() + index * kDatagramBytes;
+  }
+  std::size_t plan(std::size_t index, const Expected& expected, std::size_t from) noexcept;
+  void read_control(std::size_t index, ReceiveCounters& counters) noexcept;
+  [[nodiscard]] bool as_planned(const Message& message, const Expected& expected,
+                                std::size_t from) const noexcept;
+  void bring_together(std::size_t index) noexcept;
+  static void count(protocol::FragmentStatus status, ReceiveCounters& counters) noexcept;
+  void push_planned(const Message& message, protocol::Reassembler& reassembler,
+                    ReceiveCounters& counters);
+  void push_data(std::size_t index, protocol::Reassembler& reassembler, ReceiveCounters& counters);
 
   UdpSocket socket_;
+  unsigned batch_ = kBatch;
+  std::size_t segments_ = 1;  // joined in the message before
   std::uint64_t buffer_bytes_ = 0;
   std::uint32_t drops_seen_ = 0;
   std::vector<std::byte> data_;
   std::vector<std::byte> control_;
+  std::vector<Message> messages_;
+  std::vector<mmsghdr> headers_;
 };
 
 }  // namespace emit::server

@@ -51,6 +51,7 @@ namespace emit::server {
   X(slots_missed, "clock slots skipped because the conductor was not running")       \
   X(no_free_slot, "attempts to render while every slot was in use")                  \
   X(frames_sent, "frames sent completely, all clients")                              \
+  X(frames_shared, "frames put into shared memory, counted as sent too")             \
   X(frames_skipped, "frames skipped for slow clients, flagged gap-before")           \
   X(frames_spilled, "partly sent frames moved to a client's own buffer")             \
   X(bytes_sent, "bytes handed to the kernel, all clients")                           \

@@ -55,6 +55,17 @@ TEST(Crc32c, InstructionAndTablesAgreeForEveryLengthAndAlignment) {
   }
 }
 
+TEST(Crc32c, FoldingAndTablesAgreeForEveryLengthAndAlignment) {
+  if (!has_crc32c_folding()) GTEST_SKIP() << "the CPU has no carry-less product of 32 bytes";
+  const auto bytes = random_bytes(20000, 4);
+  const std::span<const std::byte> all(bytes);
+  for (std::size_t length = 0; length < 1200; ++length) {
+    const auto part = all.subspan(length % 37, length);
+    ASSERT_EQ(crc32c_folding(part, 0x12345678u), crc32c_portable(part, 0x12345678u)) << length;
+  }
+  EXPECT_EQ(crc32c_folding(all), crc32c_portable(all));
+}
+
 TEST(Crc32c, ContinuesAnEarlierCall) {
   const auto bytes = random_bytes(40000, 2);
   const std::span<const std::byte> all(bytes);

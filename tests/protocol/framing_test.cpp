@@ -73,6 +73,37 @@ TEST(RecordParser, CutsTheSameRecordsWhateverThePiecesTheyArriveIn) {
   }
 }
 
+TEST(RecordParser, SumsTheBytesBehindAFrameHeaderHoweverTheyArrive) {
+  std::mt19937 random(11);
+  for (const std::size_t largest_piece : {1u, 7u, 333u, 5000u}) {
+    RecordParser parser({.max_control_bytes = 100, .max_frame_bytes = 3000});
+    Bytes stream;
+    std::vector<std::uint32_t> sums;
+    for (const std::size_t bytes : {320u, 321u, 3000u, 50u, 3000u, 1000u}) {
+      Bytes body(bytes);
+      std::ranges::generate(body, [&] { return static_cast<std::byte>(random() & 0xFFu); });
+      append_record(stream, RecordKind::frame, body);
+      append_record(stream, RecordKind::control, Bytes(random() % 100));
+      const std::size_t header = std::min(bytes, kFrameHeaderBytes);
+      sums.push_back(crc32c(std::span<const std::byte>(body).subspan(header)));
+    }
+    std::size_t found = 0;
+    for (std::size_t at = 0;;) {
+      Record record;
+      while (parser.next(record) == ParseStatus::record) {
+        if (record.kind != RecordKind::frame) continue;
+        ASSERT_LT(found, sums.size());
+        EXPECT_EQ(record.payload_crc32c, sums[found]) << found;
+        ++found;
+      }
+      if (at == stream.size()) break;
+      const std::size_t piece = std::min(1 + random() % largest_piece, stream.size() - at);
+      at += feed(parser, std::span(stream).subspan(at, piece));
+    }
+    EXPECT_EQ(found, sums.size());
+  }
+}
+
 TEST(RecordParser, TellsWrongMagicWrongVersionAndOversizeApart) {
   Bytes good;
   append_record(good, RecordKind::control, Bytes(10));

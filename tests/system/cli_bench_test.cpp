@@ -64,6 +64,30 @@ TEST(CliBench, ScalingComparesEachCaseWithTheOneBefore) {
   EXPECT_GE(instances[13] - instances[12], 90.0);
 }
 
+TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
+  const TemporaryFolder folder;
+  const ProcessResult run =
+      run_emit({"bench", "stream", "--frames", "40", "--rate", "50", "--width", "64", "--height",
+                "48", "--repeats", "1", "--json", folder.file("s.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  const std::string json = read_text(folder.file("s.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"stream\"");
+  for (const char* transport : {"tcp", "udp", "shm", "mixed", "bare-tcp-paced", "bare-tcp",
+                                "bare-udp", "zeromq", "iperf3"}) {
+    EXPECT_NE(json.find("\"transport\": \"" + std::string(transport) + "\""), std::string::npos)
+        << transport;
+  }
+  // Five at a fixed rate, then each alone; what is not installed has null and a reason.
+  EXPECT_EQ(numbers_of(json, "clients"), (std::vector<double>{4, 4, 4, 4, 4, 1, 1, 1, 1, 1, 1, 1}));
+  EXPECT_EQ(numbers_of(json, "rate_hz"), std::vector<double>(5, 50));
+  EXPECT_EQ(numbers_of(json, "lost"), std::vector<double>(12, 0));
+  EXPECT_EQ(numbers_of(json, "unflagged_gaps"), std::vector<double>(4, 0));
+  EXPECT_EQ(numbers_of(json, "crc_errors"), std::vector<double>(4, 0));
+  EXPECT_EQ(numbers_of(json, "p999_us").size(), 5U);
+  EXPECT_EQ(numbers_of(json, "ratio").size(), 3U);
+  EXPECT_GE(numbers_of(json, "gbit_s").size(), 10U);
+}
+
 TEST(CliBench, TurnFlagsJumpsToPlacesNobodyAnnounced) {
   const TemporaryFolder folder;
   const ProcessResult run = run_emit(

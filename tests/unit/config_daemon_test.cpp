@@ -29,7 +29,8 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
       "[host]\nudp = \"\"\n"
       "[control]\ntcp = \"[::1]:7100\"\nmax_clients = 3\nmax_record_bytes = 2048\n"
       "[stream]\nqueue_frames = 2\nudp_fragment_payload_bytes = 1400\n"
-      "udp_send_buffer_bytes = 100000\nmulticast_ttl = 9\n"
+      "tcp_send_buffer_bytes = 70000\nudp_send_buffer_bytes = 100000\nmulticast_ttl = 9\n"
+      "shm = \"rig.1\"\nshm_slots = 5\nshm_mode = \"0640\"\n"
       "[journal]\nfile = \"j.bin\"\nring_entries = 128\n"
       "[device]\ngpu_index = 2\n"
       "[log]\nlevel = \"debug\"\nfile = \"l.txt\"\n";
@@ -52,8 +53,12 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
   EXPECT_EQ(first->control.max_record_bytes, 2048U);
   EXPECT_EQ(first->stream.queue_frames, 2U);
   EXPECT_EQ(first->stream.udp_fragment_payload_bytes, 1400U);
+  EXPECT_EQ(first->stream.tcp_send_buffer_bytes, 70000U);
   EXPECT_EQ(first->stream.udp_send_buffer_bytes, 100000U);
   EXPECT_EQ(first->stream.multicast_ttl, 9);
+  EXPECT_EQ(first->stream.shm, "rig.1");
+  EXPECT_EQ(first->stream.shm_slots, 5U);
+  EXPECT_EQ(first->stream.shm_mode, 0640U);
   EXPECT_EQ(first->journal.file, folder_ / "j.bin");
   EXPECT_EQ(first->journal.ring_entries, 128U);
   EXPECT_EQ(first->device.gpu_index, 2);
@@ -81,6 +86,11 @@ TEST_F(ConfigTest, daemon_combinations_and_ranges_are_checked) {
             "d.toml:4:7: 'udp' is 'a:70000', must be address:port or empty");
   EXPECT_EQ(daemon_error(kCanned + "[stream]\nqueue_frames = 14\n"),
             "d.toml:4:16: 'queue_frames' is 14, must be 1 .. 13");
+  EXPECT_EQ(daemon_error(kCanned + "[stream]\nshm = \"../rig\"\n"),
+            "d.toml:4:7: 'shm' is '../rig', must be 1 to 64 letters, digits, '_', '-' or '.', "
+            "beginning with a letter or digit");
+  EXPECT_EQ(daemon_error(kCanned + "[stream]\nshm_mode = \"0666\"\n"),
+            "d.toml:4:12: 'shm_mode' is '0666', must be one of: 0600, 0640, 0644");
   EXPECT_EQ(daemon_error(kCanned + "[log]\nlevel = \"loud\"\n"),
             "d.toml:4:9: 'level' is 'loud', must be one of: error, warn, info, debug");
   EXPECT_EQ(daemon_error(kCanned + "canned_dir = \"none\"\n"),

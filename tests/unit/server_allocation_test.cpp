@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <array>
 #include <memory>
+#include <string>
 
 #include "agents/conductor.hpp"
 #include "agents/render_agent.hpp"
 #include "agents/sender.hpp"
+#include "agents/shm_client.hpp"
+#include "agents/socket_client.hpp"
 #include "io/socket.hpp"
 #include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
@@ -28,19 +32,24 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   source.canned_frames = 4;
   RenderAgent render(context, [&] { return make_canned_source(source, 7, 1); });
   Conductor conductor(context, tracks, {});
-  Sender sender(context, 4, 4, false);
-  ASSERT_TRUE(render.on_start() && conductor.on_start() && sender.on_start());
+  ASSERT_TRUE(render.on_start() && conductor.on_start());
   context.channels = *make_channels(no_scenario, *render.source_info());
+  config::StreamConfig stream;
+  stream.shm = "test-allocation-" + std::to_string(::getpid());
+  auto shm = ShmClient::create(stream, context.channels, {}, 1);
+  ASSERT_TRUE(shm.has_value()) << shm.error().text;
+  Sender sender(context, 4, 4, false, shm->get());
+  ASSERT_TRUE(sender.on_start());
 
   int pair[2] = {-1, -1};
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
   auto near = TcpSocket::adopt(SocketContext(), pair[0]);
   ASSERT_TRUE(near.has_value());
   const Fd far(pair[1]);
-  SenderClient::Params params;
+  SocketClient::Params params;
   params.channel = &context.channels.front();
   params.tcp_socket = &*near;
-  SenderClient client(std::move(params));
+  SocketClient client(std::move(params));
   ASSERT_TRUE(context.to_sender.push({ClientCommand::Kind::add, 0, &client}));
 
   std::array<std::byte, 65536> sink;
@@ -75,7 +84,8 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
     frame(number);
   }
   EXPECT_EQ(test::heap_request_count() - before, 0U);
-  EXPECT_EQ(context.counters.get(Counter::frames_sent), 520U);
+  EXPECT_EQ(context.counters.get(Counter::frames_sent), 2 * 520U);
+  EXPECT_EQ(context.counters.get(Counter::frames_shared), 520U);
   sender.on_stop();
   render.on_stop();
 }

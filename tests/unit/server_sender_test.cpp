@@ -3,12 +3,16 @@
 #include <sys/socket.h>
 
 #include <memory>
+#include <optional>
+#include <random>
 #include <vector>
 
 #include "agents/sender.hpp"
+#include "agents/socket_client.hpp"
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/reassembler.hpp"
 #include "io/socket.hpp"
+#include "io/udp_frame_receiver.hpp"
 #include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"
@@ -38,7 +42,7 @@ class Rig {
   struct Peer {
     TcpSocket near;
     Fd far;
-    std::unique_ptr<SenderClient> client;
+    std::unique_ptr<SocketClient> client;
     protocol::RecordParser parser{
         {1u << 16,
          static_cast<std::uint32_t>(protocol::kFrameHeaderBytes) + kWidthPx* kHeightPx * 4}};
@@ -80,14 +84,14 @@ class Rig {
     // Less than a frame, so that a client that does not read stops in the middle of one.
     const int send_bytes = 32 << 10;
     EXPECT_EQ(::setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &send_bytes, sizeof(send_bytes)), 0);
-    SenderClient::Params params;
+    SocketClient::Params params;
     params.connection = next_connection_++;
     params.channel = &context_.channels.front();
     params.every_frame = every_frame;
     params.tcp_socket = &peer->near;
-    peer->client = std::make_unique<SenderClient>(std::move(params));
+    peer->client = std::make_unique<SocketClient>(std::move(params));
     EXPECT_TRUE(context_.to_sender.push(
-        {ClientCommand::Kind::add, peer->client->params().connection, peer->client.get()}));
+        {ClientCommand::Kind::add, peer->client->connection(), peer->client.get()}));
     sender_.do_work(clock_.tai_ns());
     return peer;
   }
@@ -203,7 +207,7 @@ TEST(Sender, GivesAClientBackWhenItsSocketFailsOrItIsAskedTo) {
   EXPECT_EQ(released->client, gone->client.get());
   rig.context().from_sender.pop();
   ASSERT_TRUE(rig.context().to_sender.push(
-      {ClientCommand::Kind::remove, left->client->params().connection, nullptr}));
+      {ClientCommand::Kind::remove, left->client->connection(), nullptr}));
   rig.settle({});
   released = rig.context().from_sender.front();
   ASSERT_NE(released, nullptr);
@@ -262,6 +266,141 @@ TEST(UdpBatch, DeliversEveryFragmentWithAndWithoutSegmentation) {
     EXPECT_TRUE(frame->crc_ok);
     EXPECT_EQ(frame->header.frame_number, id);
     reassembler.release(frame);
+  }
+}
+
+/// Datagrams of a frame through a real socket into a receiver that has the kernel write payloads to
+/// their place, in the order that `order` gives.
+class UdpInPlace : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto any = numeric_address("127.0.0.1", 0);
+    auto receiver = UdpFrameReceiver::open(sockets_, any, any, {});
+    ASSERT_TRUE(receiver.has_value()) << receiver.error().text;
+    receiver_.emplace(std::move(*receiver));
+    receiver_->size_buffer(4u << 20);
+    auto sender = UdpSocket::open(sockets_, any);
+    ASSERT_TRUE(sender.has_value());
+    sender_ = std::move(*sender);
+    ASSERT_TRUE(sender_.connect(numeric_address("127.0.0.1", receiver_->port())).has_value());
+  }
+  /// Datagrams of frame `id`, whose pixels are all different.
+  std::vector<std::vector<std::byte>> datagrams(std::uint32_t id, std::uint32_t payload_bytes) {
+    std::vector<float> pixels(kWidthPx * kHeightPx);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      pixels[i] = static_cast<float>(i + 1 + id);
+    }
+    protocol::FrameHeader header;
+    header.frame_number = id;
+    header.width_px = kWidthPx;
+    header.height_px = kHeightPx;
+    header.payload_bytes = pixels.size() * sizeof(float);
+    header.payload_crc32c = protocol::crc32c(std::as_bytes(std::span<const float>(pixels)));
+    std::array<std::byte, protocol::kFrameHeaderBytes> head{};
+    protocol::encode(header, head);
+    const protocol::Fragmenter fragments({1, id, 0, kWidthPx * 4, payload_bytes}, head,
+                                         std::as_bytes(std::span<const float>(pixels)));
+    std::vector<std::vector<std::byte>> out;
+    for (std::uint32_t i = 0; i < fragments.fragment_count(); ++i) {
+      std::array<std::byte, protocol::kFragmentHeaderBytes> memory{};
+      const auto pieces = fragments.pieces(i, memory);
+      auto& datagram = out.emplace_back();
+      for (std::uint32_t k = 0; k < pieces.count; ++k) {
+        datagram.insert(datagram.end(), pieces.piece[k].begin(), pieces.piece[k].end());
+      }
+    }
+    return out;
+  }
+  void send(const std::vector<std::byte>& datagram) {
+    ASSERT_EQ(sender_.send(datagram).status, IoStatus::done);
+  }
+  void take() {
+    while (receiver_->take(reassembler_, counters_) > 0) {
+    }
+  }
+  void expect_frame(std::uint32_t id) {
+    const auto* frame = reassembler_.pop();
+    ASSERT_NE(frame, nullptr);
+    EXPECT_TRUE(frame->complete);
+    EXPECT_TRUE(frame->crc_ok);
+    EXPECT_EQ(frame->header.frame_number, id);
+    EXPECT_EQ(frame->pixels.front(), static_cast<float>(1 + id));
+    EXPECT_EQ(frame->pixels.back(), static_cast<float>(frame->pixels.size() + id));
+    reassembler_.release(frame);
+  }
+
+  SocketContext sockets_;
+  std::optional<UdpFrameReceiver> receiver_;
+  UdpSocket sender_;
+  ReceiveCounters counters_;
+  protocol::Reassembler reassembler_{
+      {static_cast<std::uint32_t>(kWidthPx * kHeightPx * sizeof(float)), 4, 2, 2, true}};
+};
+
+TEST_F(UdpInPlace, FramesInOrderAreWholeWhateverTheFragments) {
+  std::uint32_t id = 0;
+  for (const std::uint32_t payload_bytes : {1440U, 8900U, 320U, 65000U}) {
+    for (int frame = 0; frame < 3; ++frame) {
+      for (const auto& datagram : datagrams(++id, payload_bytes)) {
+        send(datagram);
+      }
+      take();
+      expect_frame(id);
+    }
+  }
+  EXPECT_EQ(counters_.bad_datagrams, 0U);
+}
+
+TEST_F(UdpInPlace, WhatWasNotExpectedComesOutRightAllTheSame) {
+  std::mt19937 random(9);
+  for (std::uint32_t id = 1; id <= 30; ++id) {
+    auto order = datagrams(id, id % 2 == 0 ? 1440 : 8900);
+    const std::size_t count = order.size();
+    // Neighbours change places, some come twice, strangers come between.
+    for (int swap = 0; swap < 6; ++swap) {
+      std::swap(order[random() % count], order[random() % count]);
+    }
+    for (int twice = 0; twice < 3; ++twice) {
+      order.insert(order.begin() + static_cast<std::ptrdiff_t>(random() % count),
+                   order[random() % count]);
+    }
+    order.insert(order.begin() + static_cast<std::ptrdiff_t>(random() % count),
+                 std::vector<std::byte>(random() % 9000 + 1, std::byte{7}));
+    std::size_t sent = 0;
+    for (const auto& datagram : order) {
+      send(datagram);
+      if (++sent % (random() % 40 + 1) == 0) {
+        take();
+      }
+    }
+    take();
+    expect_frame(id);
+  }
+  EXPECT_EQ(counters_.bad_datagrams, 30U) << "the strangers";
+}
+
+TEST_F(UdpInPlace, PixelsOfALostDatagramAreZero) {
+  for (std::uint32_t id = 1; id <= 4; ++id) {
+    const auto order = datagrams(id, 1440);
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      if (i != 20) {
+        send(order[i]);
+      }
+      if (i == 10) {
+        take();
+      }
+    }
+    take();
+    reassembler_.flush();
+    const auto* frame = reassembler_.pop();
+    ASSERT_NE(frame, nullptr);
+    EXPECT_EQ(frame->missing_px, 1440U / 4);
+    const std::size_t first = (20 * 1440 - protocol::kFrameHeaderBytes) / 4;
+    for (std::size_t i = first - 1; i <= first + 360; ++i) {
+      const bool missing = i >= first && i < first + 360;
+      ASSERT_EQ(frame->pixels[i], missing ? 0.0F : static_cast<float>(i + 1 + id)) << i;
+    }
+    reassembler_.release(frame);
   }
 }
 

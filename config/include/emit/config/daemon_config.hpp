@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 /// What emitd reads from --config; keys are documented in config/README.md. Plain data.
 namespace emit::config {
@@ -43,9 +44,16 @@ struct ControlConfig {
 struct StreamConfig {
   std::uint32_t queue_frames = 4;  ///< per client, bounded; slots = queue + 3
   std::uint32_t udp_fragment_payload_bytes = 8900;
+  std::uint32_t tcp_send_buffer_bytes = 256u << 10;  ///< 0 = the system's choice
   std::uint32_t udp_send_buffer_bytes = 8u << 20;
   std::uint8_t multicast_ttl = 1;
+  std::string shm;              ///< frames in shared memory under this name; empty = off
+  std::uint32_t shm_slots = 8;  ///< a reader in place has slots - 1 frame periods for a frame
+  std::uint32_t shm_mode = 0600;
 };
+
+/// 1 to 64 letters, digits, `_`, `-` and `.`, the first a letter or digit: no path can come of it.
+[[nodiscard]] bool is_shm_name(std::string_view text) noexcept;
 
 struct JournalConfig {
   std::filesystem::path file;  ///< written while running; empty = only on request of a recorder

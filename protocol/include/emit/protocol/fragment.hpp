@@ -61,6 +61,10 @@ void encode(const FragmentHeader& header, std::span<std::byte, kFragmentHeaderBy
 /// Checks everything that one datagram alone can tell; `datagram` is header + payload. RT-safe.
 [[nodiscard]] FragmentStatus decode_fragment_header(std::span<const std::byte> datagram,
                                                     FragmentHeader& out) noexcept;
+/// The same for a header whose payload, that many bytes, lies elsewhere.
+[[nodiscard]] FragmentStatus decode_fragment_header(std::span<const std::byte> header,
+                                                    std::size_t payload_bytes,
+                                                    FragmentHeader& out) noexcept;
 
 /// Cuts a frame into fragments without copying pixels.
 ///

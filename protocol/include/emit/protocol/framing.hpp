@@ -41,6 +41,8 @@ enum class ParseStatus : std::uint8_t {
 struct Record {
   RecordKind kind{};                ///< may hold a value outside the enum
   std::span<const std::byte> body;  ///< points into the parser
+  /// Frames: CRC-32C of what follows the frame header, summed as it arrived.
+  std::uint32_t payload_crc32c = 0;
 };
 
 struct RecordLimits {
@@ -82,12 +84,15 @@ class RecordParser {
 
  private:
   [[nodiscard]] std::uint32_t limit_of(RecordKind kind) const noexcept;
+  void sum(RecordKind kind, std::size_t body_bytes) noexcept;
 
   RecordLimits limits_;
   std::size_t capacity_;
   std::unique_ptr<std::byte[]> buffer_;
-  std::size_t begin_ = 0;  // first byte not yet taken
-  std::size_t end_ = 0;    // behind the last byte held
+  std::size_t begin_ = 0;   // first byte not yet taken
+  std::size_t end_ = 0;     // behind the last byte held
+  std::size_t summed_ = 0;  // bytes of the record at begin_ that payload_crc32c_ has passed
+  std::uint32_t payload_crc32c_ = 0;
   ParseStatus error_ = ParseStatus::need_more;
   std::uint32_t offending_value_ = 0;
 };

@@ -86,6 +86,18 @@ class Reassembler {
   /// Takes one datagram; copies its payload.
   FragmentStatus push(std::span<const std::byte> datagram) noexcept;
 
+  /// Where the next payloads belong if fragments go on coming in order: the part of the newest
+  /// frame behind what has arrived. A receiver may have the kernel write payloads there at once and
+  /// then push them from there, which spares the copy. Empty when fragments came out of order.
+  struct Expected {
+    std::span<std::byte> rest;  ///< to the end of the frame's byte stream
+    FragmentHeader next;        ///< stream, frame, offset and length of the next fragment
+  };
+  [[nodiscard]] Expected expected() noexcept;
+  /// Header and payload apart; a payload that lies where it belongs is not copied.
+  FragmentStatus push(std::span<const std::byte> header,
+                      std::span<const std::byte> payload) noexcept;
+
   /// Hands out the next finished frame or nullptr. Keep it until release(); buffers held are
   /// missing for new frames.
   [[nodiscard]] const ReceivedFrame* pop() noexcept;
@@ -117,6 +129,7 @@ class Reassembler {
   std::size_t ready_begin_ = 0;
   std::size_t ready_count_ = 0;
   std::uint64_t arrivals_ = 0;
+  Slot* newest_ = nullptr;  // of the fragment accepted last
   ReassemblerCounters counters_;
 };
 

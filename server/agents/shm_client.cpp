@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/shm_client.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "rt/futex.hpp"
+
+namespace emit::server {
+namespace {
+
+/// What one turn copies at most, so that the other clients advance beside it. More than a socket
+/// takes in a turn: a copy to memory is the quickest of all, and whoever is done first waits least.
+constexpr std::size_t kTurnBytes = 2u << 20;
+
+}  // namespace
+
+physics::Result<std::unique_ptr<ShmClient>> ShmClient::create(const config::StreamConfig& config,
+                                                              const std::vector<Channel>& channels,
+                                                              std::span<const std::byte> welcome,
+                                                              std::int64_t now_ns) {
+  protocol::RingParams params;
+  params.slots = config.shm_slots;
+  params.welcome = welcome;
+  params.started_ns = now_ns;
+  std::vector<std::size_t> planes;
+  for (const Channel& channel : channels) {
+    const auto known = std::find(planes.begin(), planes.end(), channel.plane);
+    params.plane_of_channel.push_back(static_cast<std::uint32_t>(known - planes.begin()));
+    if (known == planes.end()) {
+      planes.push_back(channel.plane);
+      params.plane_bytes.push_back(std::uint64_t{channel.width_px} * channel.height_px *
+                                   sizeof(float));
+    }
+  }
+  auto object = ShmObject::create(protocol::ring_bytes(params), config.shm_mode);
+  if (!object) {
+    return tl::unexpected<physics::Error>(std::move(object.error()));
+  }
+  std::unique_ptr<ShmClient> out(
+      new ShmClient(std::move(*object), params, channels, std::move(planes)));
+  if (auto named = out->object_.publish(config.shm); !named) {
+    return tl::unexpected<physics::Error>(std::move(named.error()));
+  }
+  return out;
+}
+
+ShmClient::ShmClient(ShmObject object, const protocol::RingParams& params,
+                     const std::vector<Channel>& channels, std::vector<std::size_t> planes)
+    : object_(std::move(object)),
+      ring_(object_.writable(), params),
+      channels_(channels),
+      planes_(std::move(planes)) {}
+
+ShmClient::~ShmClient() {
+  ring_.end();
+  futex_wake_all(ring_.signal());
+}
+
+void ShmClient::begin(const protocol::FrameHeader& header, const Image& image,
+                      std::int64_t now_ns) noexcept {
+  start(header, now_ns);
+  image_ = image;
+  plane_ = 0;
+  offset_ = 0;
+  ring_.begin();
+  for (const Channel& channel : channels_) {
+    protocol::encode(header_for(channel, image), ring_.header(channel.index));
+  }
+}
+
+void ShmClient::copy(std::size_t budget_bytes) noexcept {
+  while (plane_ < planes_.size() && budget_bytes > 0) {
+    const std::span<std::byte> to = ring_.plane(plane_);
+    const std::span<const std::byte> from = std::as_bytes(image_.planes[planes_[plane_]]);
+    const std::size_t whole = std::min(to.size(), from.size());
+    const std::size_t bytes = std::min(whole - offset_, budget_bytes);
+    std::memcpy(to.data() + offset_, from.data() + offset_, bytes);
+    budget_bytes -= bytes;
+    offset_ += bytes;
+    if (offset_ == whole) {
+      offset_ = 0;
+      ++plane_;
+    }
+  }
+}
+
+SenderClient::Progress ShmClient::send(UdpBatch& /*batch*/, Context& context) noexcept {
+  if (!busy_) {
+    return Progress::idle;
+  }
+  copy(kTurnBytes);
+  if (plane_ < planes_.size()) {
+    return Progress::more;
+  }
+  ring_.commit();
+  futex_wake_all(ring_.signal());
+  context.counters.add(Counter::frames_shared);
+  return Progress::finished;
+}
+
+void ShmClient::spill() noexcept {
+  copy(SIZE_MAX);
+  spilled_ = true;
+}
+
+}  // namespace emit::server

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "agents/sender_client.hpp"
+#include "emit/protocol/fragment.hpp"
+#include "emit/protocol/framing.hpp"
+#include "io/socket.hpp"
+
+namespace emit::server {
+
+/// One subscriber over TCP or UDP, who gets one channel.
+///
+/// Made by the receiver with all memory, lent to the sender, given back when it ends.
+class SocketClient final : public SenderClient {
+ public:
+  struct Params {
+    std::uint32_t connection = 0;
+    const Channel* channel = nullptr;
+    bool every_frame = false;
+    bool udp = false;
+    TcpSocket* tcp_socket = nullptr;  ///< of the control connection; stays the receiver's
+    UdpSocket udp_socket;             ///< connected to the client's port or group
+    std::uint16_t stream_id = 0;
+    std::uint32_t fragment_payload_bytes = 0;
+    std::vector<std::byte> first_bytes;  ///< tcp: goes out before any frame
+  };
+  explicit SocketClient(Params params);
+
+  void begin(const protocol::FrameHeader& header, const Image& image,
+             std::int64_t now_ns) noexcept override;
+  [[nodiscard]] Progress send(UdpBatch& batch, Context& context) noexcept override;
+  /// Moves what is left of the frame into this client's own memory.
+  void spill() noexcept override;
+  [[nodiscard]] std::uint32_t connection() const noexcept override { return params_.connection; }
+  [[nodiscard]] bool every_frame() const noexcept override { return params_.every_frame; }
+  [[nodiscard]] int fd() const noexcept override {
+    return params_.udp ? params_.udp_socket.fd() : params_.tcp_socket->fd();
+  }
+
+ private:
+  [[nodiscard]] Progress send_tcp(Context& context) noexcept;
+  [[nodiscard]] Progress send_udp(UdpBatch& batch, Context& context) noexcept;
+  void make_fragments(std::uint32_t frame_id) noexcept;
+
+  Params params_;
+  bool segmentation_ = false;
+  std::size_t first_sent_ = 0;  // of params_.first_bytes
+  std::uint64_t offset_ = 0;    // tcp: bytes of head and pixels sent
+  std::uint32_t fragment_ = 0;  // udp: next fragment
+  std::uint32_t frame_id_ = 0;
+  std::array<std::byte, protocol::kRecordHeaderBytes + protocol::kFrameHeaderBytes> head_{};
+  std::span<const std::byte> pixels_;
+  std::int64_t sim_time_ns_ = 0;
+  std::optional<protocol::Fragmenter> fragments_;
+  std::vector<std::byte> spill_;
+};
+
+}  // namespace emit::server

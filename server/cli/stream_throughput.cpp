@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stream_throughput.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <ctime>
+
+#include "stream_client.hpp"
+
+namespace emit::cli {
+namespace {
+
+using physics::Result;
+
+/// Of this process, all threads.
+double process_cpu_s() {
+  timespec t{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+}  // namespace
+
+config::DaemonConfig canned_daemon(std::uint32_t width_px, std::uint32_t height_px,
+                                   const std::string& shm) {
+  config::DaemonConfig daemon;
+  daemon.source.kind = config::SourceKind::canned;
+  daemon.source.canned_width_px = width_px;
+  daemon.source.canned_height_px = height_px;
+  daemon.host.udp = "127.0.0.1:0";
+  daemon.control.tcp = "127.0.0.1:0";
+  daemon.stream.shm = shm;
+  return daemon;
+}
+
+std::string own_shm_name() {
+  static std::atomic<int> count{0};
+  return fmt::format("bench-{}-{}", ::getpid(), count++);
+}
+
+Result<StreamThroughput> StreamThroughput::start(const config::DaemonConfig& config,
+                                                 const std::filesystem::path& directory) {
+  auto daemon = DaemonProcess::start(config, {}, directory, std::chrono::seconds(60));
+  if (!daemon) return tl::unexpected(daemon.error());
+  auto host = server::HostClient::connect("udp://" + daemon->host_udp_address());
+  if (!host) return tl::unexpected(host.error());
+  return StreamThroughput(std::move(*daemon), std::move(*host), config.stream.shm);
+}
+
+Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std::uint64_t frames,
+                                                  std::uint32_t window) {
+  StreamClient::Options options;
+  options.url = scheme + "://" + (scheme == "shm" ? shm_ : daemon_.control_address());
+  options.subscribe.in_place = true;
+  auto client = StreamClient::start(options);
+  if (!client) return tl::unexpected(client.error());
+  constexpr auto kTimeout = std::chrono::seconds(20);
+  const auto ask = [&]() -> Result<void> {
+    protocol::HostFrameData frame;
+    frame.run_id = 1;
+    frame.frame_number = ++last_host_frame_;
+    frame.sim_time_ns = static_cast<std::int64_t>(last_host_frame_) * 1'000'000;
+    return host_->send(frame);
+  };
+  // The first one shows that the subscription has reached the sender.
+  std::uint64_t asked = 0;
+  for (; asked == 0 || !(*client)->wait_for_frames(1, std::chrono::milliseconds(50)); ++asked) {
+    if (auto sent = ask(); !sent) return tl::unexpected(sent.error());
+    constexpr std::uint64_t kPatience = 100;
+    if (asked > kPatience) return physics::make_error(physics::ErrorCode::io, "no frame came");
+  }
+  const std::uint64_t before = (*client)->frames();
+  YardstickResult result;
+  const double cpu_before_s = daemon_.cpu_seconds() + process_cpu_s();
+  const auto start = std::chrono::steady_clock::now();
+  for (std::uint64_t k = 0; k < frames; ++k) {
+    const std::uint64_t needed = before + k + 1 > window ? before + k + 1 - window : 0;
+    if (!(*client)->wait_for_frames(needed, kTimeout)) break;
+    if (auto sent = ask(); !sent) return tl::unexpected(sent.error());
+  }
+  const bool complete = (*client)->wait_for_frames(before + frames, kTimeout);
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.cpu_s = daemon_.cpu_seconds() + process_cpu_s() - cpu_before_s;
+  (*client)->stop();
+  const auto& counters = (*client)->counters();
+  result.frames = (*client)->frames() - before;
+  result.lost = counters.lost + counters.skipped + counters.partial + counters.crc_errors;
+  if (!complete) {
+    return physics::make_error(physics::ErrorCode::io,
+                               fmt::format("{}: {} of {} frames came. {}", scheme, result.frames,
+                                           frames, (*client)->error()));
+  }
+  return result;
+}
+
+Result<void> StreamThroughput::stop() {
+  return daemon_.stop(std::chrono::seconds(20));
+}
+
+}  // namespace emit::cli

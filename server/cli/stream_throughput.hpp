@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "daemon_process.hpp"
+#include "emit/config/daemon_config.hpp"
+#include "emit/physics/error.hpp"
+#include "io/client.hpp"
+#include "stream_yardstick.hpp"
+
+namespace emit::cli {
+
+/// Canned frames of this size, as `emit bench stream` shows them. `shm` names the ring; empty:
+/// none.
+[[nodiscard]] config::DaemonConfig canned_daemon(std::uint32_t width_px, std::uint32_t height_px,
+                                                 const std::string& shm);
+/// A name for shared memory that no other process uses.
+[[nodiscard]] std::string own_shm_name();
+
+/// As fast as one client takes frames: the host asks for the next one as soon as fewer than
+/// `window` are under way, so that nothing is ever skipped or dropped and every transport is held
+/// back by its client alone. Owns a daemon. One thread.
+class StreamThroughput {
+ public:
+  /// Errors: those of DaemonProcess::start() and HostClient::connect().
+  [[nodiscard]] static physics::Result<StreamThroughput> start(
+      const config::DaemonConfig& config, const std::filesystem::path& directory);
+
+  /// One measurement with a client of its own. `scheme`: tcp, udp or shm.
+  /// Errors: io (the stream ended or stood still).
+  [[nodiscard]] physics::Result<YardstickResult> measure(const std::string& scheme,
+                                                         std::uint64_t frames,
+                                                         std::uint32_t window);
+  [[nodiscard]] physics::Result<void> stop();
+
+ private:
+  StreamThroughput(DaemonProcess daemon, std::unique_ptr<server::HostClient> host, std::string shm)
+      : daemon_(std::move(daemon)), host_(std::move(host)), shm_(std::move(shm)) {}
+
+  DaemonProcess daemon_;
+  std::unique_ptr<server::HostClient> host_;
+  std::string shm_;
+  std::uint64_t last_host_frame_ = 0;
+};
+
+}  // namespace emit::cli

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+
+#include "emit/physics/error.hpp"
+#include "statistics.hpp"
+
+/// What the machine moves over loopback without any service in between: the measure of what emitd
+/// streams. Each call is one measurement; sender and receiver are a thread each. Nothing is
+/// checked, summed or put together: bytes go out and come in.
+namespace emit::cli {
+
+struct YardstickOptions {
+  std::size_t frame_bytes = 0;
+  std::uint64_t frames = 0;
+  /// Frames that may be under way at once where the transport itself does not hold the sender back.
+  std::uint32_t window = 4;
+  std::uint32_t datagram_bytes = 8932;  ///< UDP
+};
+
+struct YardstickResult {
+  std::uint64_t frames = 0;
+  std::uint64_t lost = 0;
+  double seconds = 0.0;
+  double cpu_s = 0.0;  ///< of sender and receiver, system time included
+};
+
+/// send() and recv() of whole frames from and into memory as emitd has it: 16 images in turn, one
+/// buffer. Errors: io.
+[[nodiscard]] physics::Result<YardstickResult> measure_bare_tcp(const YardstickOptions& options);
+/// sendmsg() with UDP_SEGMENT and recvmmsg() with UDP_GRO of datagrams as large and as many as
+/// emitd's. Errors: io.
+[[nodiscard]] physics::Result<YardstickResult> measure_bare_udp(const YardstickOptions& options);
+/// One thread that sends a frame to each of `clients` TCP connections at a fixed rate: delay from
+/// the slot's start to the last byte at each, us. The least that any daemon adds on this machine.
+/// Errors: io.
+[[nodiscard]] physics::Result<Samples> measure_bare_delay_us(const YardstickOptions& options,
+                                                             std::uint32_t clients, double rate_hz);
+/// Gbit/s of `iperf3` over loopback TCP for `seconds`. Errors: not_found (no such program), io.
+[[nodiscard]] physics::Result<double> measure_iperf3_gbit_s(const std::filesystem::path& directory,
+                                                            int seconds);
+/// ZeroMQ PUB and SUB over loopback TCP, zero-copy messages of a frame, `window` queued at most.
+/// Errors: unsupported (built without the library), io.
+[[nodiscard]] physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options);
+
+}  // namespace emit::cli

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// emit receive against a daemon with canned frames.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "support/daemon_process.hpp"
+#include "system/cli_process.hpp"
+
+namespace emit::test {
+namespace {
+
+TEST(CliReceive, shared_memory_works_like_every_other_transport) {
+  const ScratchFolder folder;
+  const std::string name = "cli-" + std::to_string(::getpid());
+  DaemonProcess daemon(
+      folder, {"--config", folder.write("emitd.toml",
+                                        canned_config(320, 256, "mode = \"ig-clock\"\nrate_hz = 50",
+                                                      "[stream]\nshm = \"" + name + "\"\n"))});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  for (const std::string& url : {"shm://" + name, "tcp://" + daemon.control()}) {
+    const std::string out = folder.file("out-" + url.substr(0, 3));
+    const ProcessResult checked = run_emit({"receive", url, "--frames", "60", "--json", "-"});
+    EXPECT_EQ(checked.exit_code, 0) << checked.err;
+    EXPECT_EQ(json_value(checked.out, "frames"), "60") << checked.out;
+    EXPECT_EQ(json_value(checked.out, "crc_errors"), "0");
+    EXPECT_EQ(json_value(checked.out, "lost"), "0");
+    EXPECT_EQ(json_value(checked.out, "unflagged_gaps"), "0");
+    EXPECT_EQ(json_value(checked.out, "device"), "\"canned: test pattern\"");
+    EXPECT_NE(checked.err.find("send start -> frame received: p50"), std::string::npos);
+    const ProcessResult saved = run_emit({"receive", url, "--frames", "3", "--out", out});
+    EXPECT_EQ(saved.exit_code, 0) << saved.err;
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(out)) {
+      files += entry.path().extension() == ".exr" || entry.path().extension() == ".png" ? 1U : 0U;
+    }
+    EXPECT_EQ(files, 6U);
+  }
+  const ProcessResult band = run_emit({"receive", "shm://" + name, "--band", "none"});
+  EXPECT_EQ(band.exit_code, 1);
+  EXPECT_NE(band.err.find("no channel"), std::string::npos) << band.err;
+  EXPECT_EQ(run_emit({"receive", "shm://a/b"}).exit_code, 2);
+  const ProcessResult nobody = run_emit({"receive", "shm://" + name + "-x"});
+  EXPECT_EQ(nobody.exit_code, 1);
+  EXPECT_NE(nobody.err.find("no emitd on this host"), std::string::npos) << nobody.err;
+}
+
+}  // namespace
+}  // namespace emit::test
