@@ -6,6 +6,7 @@ add_library(emit_client STATIC
   io/client_connection.cpp
   io/frame_client.cpp
   io/host_client.cpp
+  io/http_get.cpp
   io/recorder_client.cpp
   io/socket.cpp
   io/socket_address.cpp
@@ -45,15 +46,18 @@ add_library(emit_server STATIC
   pacing/pose_track.cpp
   pacing/scenario_track.cpp
   rt/doorbell.cpp
-  telemetry/log.cpp)
+  telemetry/log.cpp
+  telemetry/metrics_server.cpp
+  telemetry/metrics_text.cpp
+  telemetry/status_board.cpp)
 add_library(emit::server ALIAS emit_server)
-# g++ 12 sees null pointers inside Boost: in Asio's scheduler and below its JSON reader.
-set_source_files_properties(app/scenario_hash.cpp io/asio.cpp PROPERTIES
+# g++ 12 sees null pointers inside Boost: in Asio's scheduler, in Beast and below its JSON reader.
+set_source_files_properties(app/scenario_hash.cpp io/asio.cpp telemetry/metrics_server.cpp PROPERTIES
                             COMPILE_OPTIONS -Wno-null-dereference)
 if(EMIT_SANITIZE MATCHES thread)
   # Asio's reference counts use fences, which the sanitizer does not model; each Asio context here
   # belongs to one thread.
-  set_property(SOURCE io/asio.cpp io/socket.cpp io/socket_address.cpp
+  set_property(SOURCE io/asio.cpp io/socket.cpp io/socket_address.cpp telemetry/metrics_server.cpp
                APPEND PROPERTY COMPILE_OPTIONS -Wno-tsan)
 endif()
 target_include_directories(emit_server PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})

@@ -49,6 +49,7 @@ class Sender final : public Agent {
   int take_writable() noexcept;
   int send_all() noexcept;
   bool advance(SenderClient& client) noexcept;
+  void account(SenderClient& client) noexcept;
   void evict_oldest() noexcept;
   void trim() noexcept;
   void hold(const Image& image) noexcept;

@@ -54,6 +54,8 @@ class SenderClient {
     return params_.udp ? params_.udp_socket.fd() : params_.tcp_socket->fd();
   }
   [[nodiscard]] const Params& params() const noexcept { return params_; }
+  /// Of the frame begun last, as this client gets it.
+  [[nodiscard]] const protocol::FrameHeader& header() const noexcept { return header_; }
   /// Why send() failed; for the log.
   [[nodiscard]] int error() const noexcept { return error_; }
 

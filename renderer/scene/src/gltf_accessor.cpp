@@ -18,7 +18,7 @@ using physics::make_error;
 using physics::Result;
 
 /// Elements without a buffer view are zeros that the file does not pay for; no real file has more.
-constexpr std::size_t kMaxFreeElements = std::size_t{1} << 22U;
+constexpr std::size_t kMaxFreeElements = std::size_t{1} << 20U;
 
 /// A checked region of a buffer: element i begins at data + i * stride.
 struct View {

@@ -47,6 +47,10 @@ struct StreamConfig {
   std::uint8_t multicast_ttl = 1;
 };
 
+struct MetricsConfig {
+  std::string listen;  ///< /metrics, /healthz and /readyz over HTTP; empty = off
+};
+
 struct JournalConfig {
   std::filesystem::path file;  ///< written while running; empty = only on request of a recorder
   std::uint32_t ring_entries = 4096;
@@ -69,6 +73,7 @@ struct DaemonConfig {
   HostConfig host;
   ControlConfig control;
   StreamConfig stream;
+  MetricsConfig metrics;
   JournalConfig journal;
   DeviceConfig device;
   LogConfig log;
