@@ -1,4 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
+# emit::client: sockets, and the client side of the wire protocol, for the tool, the tests and
+# integrators' programs.
+add_library(emit_client STATIC
+  io/asio.cpp
+  io/client_connection.cpp
+  io/frame_client.cpp
+  io/host_client.cpp
+  io/http_get.cpp
+  io/recorder_client.cpp
+  io/shm_frame_client.cpp
+  io/shm_object.cpp
+  io/socket.cpp
+  io/socket_address.cpp
+  io/udp_frame_receiver.cpp
+  rt/clock.cpp
+  rt/futex.cpp)
+add_library(emit::client ALIAS emit_client)
+target_include_directories(emit_client PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+# Asio's non-template half is compiled once, in io/asio.cpp. Public: whoever includes Asio has to
+# agree on this.
+target_compile_definitions(emit_client PUBLIC BOOST_ASIO_SEPARATE_COMPILATION BOOST_ASIO_NO_DEPRECATED)
+target_link_libraries(emit_client
+  PUBLIC emit::physics emit::protocol Threads::Threads
+  PRIVATE fmt::fmt emit_options)
+
 # emit::server: everything of the daemon but main(), linked by emitd, emit and the tests.
 add_library(emit_server STATIC
   agents/canned_source.cpp
@@ -22,39 +47,27 @@ add_library(emit_server STATIC
   app/replay.cpp
   app/scenario_hash.cpp
   app/sha256.cpp
-  io/asio.cpp
-  io/client_connection.cpp
-  io/frame_client.cpp
-  io/host_client.cpp
-  io/recorder_client.cpp
-  io/shm_frame_client.cpp
-  io/shm_object.cpp
-  io/socket.cpp
-  io/socket_address.cpp
   io/udp_batch.cpp
-  io/udp_frame_receiver.cpp
   pacing/pose_track.cpp
   pacing/scenario_track.cpp
-  rt/clock.cpp
   rt/doorbell.cpp
-  rt/futex.cpp
-  telemetry/log.cpp)
+  telemetry/log.cpp
+  telemetry/metrics_server.cpp
+  telemetry/metrics_text.cpp
+  telemetry/status_board.cpp)
 add_library(emit::server ALIAS emit_server)
-# g++ 12 sees null pointers inside Boost: in Asio's scheduler and below its JSON reader.
-set_source_files_properties(app/scenario_hash.cpp io/asio.cpp PROPERTIES
+# g++ 12 sees null pointers inside Boost: in Asio's scheduler, in Beast and below its JSON reader.
+set_source_files_properties(app/scenario_hash.cpp io/asio.cpp telemetry/metrics_server.cpp PROPERTIES
                             COMPILE_OPTIONS -Wno-null-dereference)
 if(EMIT_SANITIZE MATCHES thread)
   # Asio's reference counts use fences, which the sanitizer does not model; each Asio context here
   # belongs to one thread.
-  set_property(SOURCE io/asio.cpp io/socket.cpp io/socket_address.cpp
+  set_property(SOURCE io/asio.cpp io/socket.cpp io/socket_address.cpp telemetry/metrics_server.cpp
                APPEND PROPERTY COMPILE_OPTIONS -Wno-tsan)
 endif()
 target_include_directories(emit_server PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
-# Asio's non-template half is compiled once, in io/asio.cpp. Public: whoever includes Asio has to
-# agree on this.
-target_compile_definitions(emit_server PUBLIC BOOST_ASIO_SEPARATE_COMPILATION BOOST_ASIO_NO_DEPRECATED)
 target_link_libraries(emit_server
-  PUBLIC emit::physics emit::protocol emit::config emit::renderer emit::image fmt::fmt Threads::Threads
+  PUBLIC emit::client emit::physics emit::protocol emit::config emit::renderer emit::image fmt::fmt Threads::Threads
   PRIVATE spdlog::spdlog emit_options emit_version)
 
 add_executable(emitd main.cpp)

@@ -98,6 +98,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<HostConfig>& host_keys();
 [[nodiscard]] const KeyTable<ControlConfig>& control_keys();
 [[nodiscard]] const KeyTable<StreamConfig>& stream_keys();
+[[nodiscard]] const KeyTable<MetricsConfig>& metrics_keys();
 [[nodiscard]] const KeyTable<JournalConfig>& journal_keys();
 [[nodiscard]] const KeyTable<DeviceConfig>& device_keys();
 [[nodiscard]] const KeyTable<LogConfig>& log_keys();

@@ -114,6 +114,16 @@ const KeyTable<StreamConfig>& stream_keys() {
   return keys;
 }
 
+const KeyTable<MetricsConfig>& metrics_keys() {
+  static const KeyTable<MetricsConfig> keys = {
+      text<MetricsConfig>("listen", EMIT_FIELD(listen),
+                          "`address:port` for HTTP: /metrics (Prometheus text), /healthz, /readyz; "
+                          "empty: off. Answers anybody who reaches it: keep it on loopback or a "
+                          "monitoring network."),
+  };
+  return keys;
+}
+
 const KeyTable<JournalConfig>& journal_keys() {
   static const KeyTable<JournalConfig> keys = {
       path<JournalConfig>("file", EMIT_FIELD(file),

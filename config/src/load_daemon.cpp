@@ -87,6 +87,8 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
                                 "beginning with a letter or digit",
                                 daemon.stream.shm));
   }
+  check_endpoint(section(root, "metrics", reported_before), "listen", daemon.metrics.listen, true,
+                 diagnostics);
   if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {
     std::error_code code;
     if (!std::filesystem::is_directory(daemon.source.canned_dir, code)) {
@@ -134,6 +136,7 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   read_table(section(root, "host", diagnostics), host_keys(), daemon.host, diagnostics);
   read_table(section(root, "control", diagnostics), control_keys(), daemon.control, diagnostics);
   read_table(section(root, "stream", diagnostics), stream_keys(), daemon.stream, diagnostics);
+  read_table(section(root, "metrics", diagnostics), metrics_keys(), daemon.metrics, diagnostics);
   read_table(section(root, "journal", diagnostics), journal_keys(), daemon.journal, diagnostics);
   read_table(section(root, "device", diagnostics), device_keys(), daemon.device, diagnostics);
   read_table(section(root, "log", diagnostics), log_keys(), daemon.log, diagnostics);

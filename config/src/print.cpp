@@ -125,6 +125,7 @@ std::string print_daemon(const DaemonConfig& daemon) {
   print_section("[host]", daemon.host, host_keys(), out);
   print_section("[control]", daemon.control, control_keys(), out);
   print_section("[stream]", daemon.stream, stream_keys(), out);
+  print_section("[metrics]", daemon.metrics, metrics_keys(), out);
   print_section("[journal]", daemon.journal, journal_keys(), out);
   print_section("[device]", daemon.device, device_keys(), out);
   print_section("[log]", daemon.log, log_keys(), out);

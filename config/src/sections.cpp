@@ -66,6 +66,7 @@ const std::vector<SectionDoc>& daemon_sections() {
       section_doc("control", false, "The TCP port for everything but datagrams.", control_keys(),
                   ControlConfig{}),
       section_doc("stream", false, "Frames out.", stream_keys(), StreamConfig{}),
+      section_doc("metrics", false, "Numbers for monitoring.", metrics_keys(), MetricsConfig{}),
       section_doc("journal", false, "The record that makes replay exact.", journal_keys(),
                   JournalConfig{}),
       section_doc("device", false, "The graphics device.", device_keys(), DeviceConfig{}),

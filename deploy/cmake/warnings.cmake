@@ -15,5 +15,6 @@ if(EMIT_SANITIZE)
     -fno-sanitize-recover=all)
   target_link_options(emit_options INTERFACE -fsanitize=${EMIT_SANITIZE})
   # g++ 12 reports false null dereferences and maybe-uninitialised reads in instrumented code.
-  target_compile_options(emit_options INTERFACE -Wno-null-dereference -Wno-maybe-uninitialized)
+  target_compile_options(emit_options INTERFACE -Wno-null-dereference
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()

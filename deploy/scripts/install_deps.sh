@@ -10,7 +10,7 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
            libtomlplusplus-dev libcli11-dev libexpected-dev libembree-dev libtbb-dev libeigen3-dev
            libceres-dev libmeshoptimizer-dev libgtest-dev libgmock-dev)
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
-checkers=(clang-format clang-tidy)
+checkers=(clang-format clang-tidy clang libclang-rt-dev)
 
 packages=("${build_tools[@]}" "${libraries[@]}" "${runtime[@]}")
 if [[ "${1:-}" == "--with-checkers" ]]; then

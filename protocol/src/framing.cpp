@@ -40,7 +40,7 @@ RecordParser::RecordParser(const RecordLimits& limits)
     : limits_(limits),
       capacity_(2 * (kRecordHeaderBytes +
                      std::size_t{std::max(limits.max_control_bytes, limits.max_frame_bytes)})),
-      buffer_(std::make_unique<std::byte[]>(capacity_)) {}
+      buffer_(std::make_unique_for_overwrite<std::byte[]>(capacity_)) {}
 
 std::uint32_t RecordParser::limit_of(RecordKind kind) const noexcept {
   return kind == RecordKind::frame ? limits_.max_frame_bytes : limits_.max_control_bytes;

@@ -346,6 +346,7 @@ void Reassembler::finish(Slot& slot) noexcept {
   const auto pixel_bytes = static_cast<std::size_t>(header.payload_bytes);
   const std::size_t pixel_count = pixel_bytes / kWordBytes;
   frame.header = header;
+  frame.header.flags &= ~std::uint32_t{kFlagPartial};  // this side's to say
   frame.header_known = known;
   if (stream.has_delivered) frame.frames_lost_before = slot.frame_id - stream.delivered_id - 1;
   stream.has_delivered = true;

@@ -316,6 +316,7 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   context_.frames_handed_over.fetch_add(1, std::memory_order_release);
   context_.bells.sender.ring();
   count_flags(shown_.flags);
+  record_times(shown_);
   journal_frame(shown_, &issued, now_ns);
   issued_first_ = (issued_first_ + 1) % kMaxIssued;
   --issued_count_;
@@ -354,6 +355,16 @@ void Conductor::count_flags(std::uint32_t flags) noexcept {
   count(protocol::kFlagRepeated, Counter::frames_repeated);
   count(protocol::kFlagStale, Counter::frames_stale);
   count(protocol::kFlagExtrapolated, Counter::frames_extrapolated);
+}
+
+void Conductor::record_times(const FrameHeader& header) noexcept {
+  FrameTimes& times = context_.times;
+  if (header.host_received_ns != 0) {
+    times.wait.record(header.render_start_ns - header.host_received_ns);
+  }
+  times.render.record(header.render_end_ns - header.render_start_ns);
+  times.readback.record(header.readback_end_ns - header.render_end_ns);
+  times.frame.record(header.readback_end_ns - header.render_start_ns);
 }
 
 void Conductor::journal_frame(const FrameHeader& header, const Issued* issued,

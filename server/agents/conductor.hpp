@@ -102,6 +102,7 @@ class Conductor final : public Agent {
   void journal_frame(const protocol::FrameHeader& header, const Issued* issued,
                      std::int64_t now_ns) noexcept;
   void count_flags(std::uint32_t flags) noexcept;
+  void record_times(const protocol::FrameHeader& header) noexcept;
 
   Context& context_;
   const ScenarioTracks& scenario_;

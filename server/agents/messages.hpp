@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 
 #include "agents/frame_source.hpp"
 #include "emit/protocol/frame_header.hpp"
@@ -21,6 +22,11 @@ inline constexpr std::uint32_t kConnectionPlaceBits = 10;
 inline constexpr std::uint32_t kMaxConnections = 1u << kConnectionPlaceBits;
 [[nodiscard]] constexpr std::uint32_t connection_place(std::uint64_t key) noexcept {
   return static_cast<std::uint32_t>(key) & (kMaxConnections - 1);
+}
+
+/// "PLACE.USE", as the log names a connection.
+[[nodiscard]] inline std::string connection_name(std::uint64_t key) {
+  return std::to_string(connection_place(key)) + "." + std::to_string(key >> kConnectionPlaceBits);
 }
 
 /// Values of emit.v1.Status.Code.

@@ -215,6 +215,9 @@ int Receiver::accept_connections(std::int64_t now_ns) {
       connection.socket.close();
       continue;
     }
+    if (ClientCounts* counts = context_.counts_of(connection.key())) {
+      counts->begin(connection.key());
+    }
     context_.counters.add(Counter::connections_accepted);
     context_.receiver_events.push(EventKind::connected, connection.key(), 0, to_string(peer));
   }
@@ -354,6 +357,9 @@ void Receiver::close(Connection& connection, std::string_view why) noexcept {
 void Receiver::finish_close(Connection& connection) noexcept {
   ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.socket.fd(), nullptr);
   connection.socket.close();
+  if (ClientCounts* counts = context_.counts_of(connection.key())) {
+    counts->end();
+  }
   connection.client.reset();
   connection.parser.reset();
   connection.lent = false;

@@ -134,6 +134,9 @@ void Sender::evict_oldest() noexcept {
       ++client.next;
       client.gap = true;
       context_.counters.add(Counter::frames_skipped);
+      if (ClientCounts* counts = counts_of(client)) {
+        counts->skipped.fetch_add(1, std::memory_order_relaxed);
+      }
     }
   }
   let_go(entry(first_).image);
@@ -209,8 +212,7 @@ bool Sender::advance(SenderClient& client) noexcept {
     case SenderClient::Progress::more:
       return true;
     case SenderClient::Progress::finished:
-      client.complete(context_.clock.tai_ns());
-      context_.counters.add(Counter::frames_sent);
+      account(client);
       return true;
     case SenderClient::Progress::blocked:
       block(client);
@@ -224,6 +226,30 @@ bool Sender::advance(SenderClient& client) noexcept {
       return true;
   }
   return false;
+}
+
+ClientCounts* Sender::counts_of(const SenderClient& client) const noexcept {
+  // The ring in shared memory is nobody's connection.
+  return client.fd() >= 0 ? context_.counts_of(client.connection()) : nullptr;
+}
+
+void Sender::account(SenderClient& client) noexcept {
+  const std::int64_t now_ns = context_.clock.tai_ns();
+  client.complete(now_ns);
+  context_.counters.add(Counter::frames_sent);
+  context_.times.send.record(now_ns - client.header().send_start_ns);
+  ClientCounts* counts = counts_of(client);
+  if (counts != nullptr) {
+    counts->frames.fetch_add(1, std::memory_order_relaxed);
+  }
+  if (client.header().host_received_ns == 0) {
+    return;
+  }
+  const std::int64_t delay_ns = now_ns - client.header().host_received_ns;
+  context_.times.pose_to_last_byte.record(delay_ns);
+  if (counts != nullptr) {
+    counts->delay_ns.store(delay_ns, std::memory_order_relaxed);
+  }
 }
 
 void Sender::block(SenderClient& client) noexcept {

@@ -51,6 +51,8 @@ class Sender final : public Agent {
   int take_writable() noexcept;
   int send_all() noexcept;
   bool advance(SenderClient& client) noexcept;
+  [[nodiscard]] ClientCounts* counts_of(const SenderClient& client) const noexcept;
+  void account(SenderClient& client) noexcept;
   void evict_oldest() noexcept;
   void trim() noexcept;
   void hold(const Image& image) noexcept;

@@ -41,6 +41,8 @@ class SenderClient {
 
   [[nodiscard]] bool busy() const noexcept { return busy_; }
   [[nodiscard]] bool spilled() const noexcept { return spilled_; }
+  /// Of the publication begun last, as this client gets it.
+  [[nodiscard]] const protocol::FrameHeader& header() const noexcept { return header_; }
   /// Why send() failed; for the log.
   [[nodiscard]] int error() const noexcept { return error_; }
 

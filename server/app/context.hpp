@@ -3,15 +3,19 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <string_view>
 #include <vector>
 
 #include "agents/channel_table.hpp"
 #include "agents/messages.hpp"
 #include "rt/byte_ring.hpp"
+#include "rt/client_counts.hpp"
 #include "rt/clock.hpp"
 #include "rt/counters.hpp"
 #include "rt/doorbell.hpp"
+#include "rt/histogram.hpp"
 #include "rt/spsc_ring.hpp"
 
 namespace emit::server {
@@ -86,10 +90,23 @@ struct Context {
         to_sender(4 * max_clients),
         from_sender(4 * max_clients),
         to_recorder(4 * max_clients),
-        from_recorder(4 * max_clients) {}
+        from_recorder(4 * max_clients),
+        client_places_(max_clients),
+        clients_(std::make_unique<ClientCounts[]>(max_clients)) {}
+
+  /// By place in the receiver's table. Any thread.
+  [[nodiscard]] std::span<ClientCounts> clients() const noexcept {
+    return {clients_.get(), client_places_};
+  }
+  /// Of a connection; nullptr when it has no place in the table.
+  [[nodiscard]] ClientCounts* counts_of(std::uint32_t connection) const noexcept {
+    const std::uint32_t place = connection_place(connection);
+    return place < client_places_ ? &clients_[place] : nullptr;
+  }
 
   const Clock& clock;
   Counters counters;
+  FrameTimes times;
   Doorbells bells;
   std::vector<Channel> channels;  ///< fixed before the agents run
   std::atomic<std::uint64_t> run_id{0};
@@ -112,6 +129,10 @@ struct Context {
   EventLog render_events{64, counters};
   EventLog sender_events{256, counters};
   EventLog recorder_events{64, counters};
+
+ private:
+  std::size_t client_places_;
+  std::unique_ptr<ClientCounts[]> clients_;
 };
 
 /// Counter of a refusal. Precondition: not ok.

@@ -21,6 +21,9 @@
 #include "app/replay.hpp"
 #include "emit/version.hpp"
 #include "telemetry/log.hpp"
+#include "telemetry/metrics_server.hpp"
+#include "telemetry/metrics_text.hpp"
+#include "telemetry/status_board.hpp"
 
 namespace emit::server {
 namespace {
@@ -62,6 +65,7 @@ class DaemonImpl final : public Daemon {
         stop_event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
   ~DaemonImpl() override {
+    metrics_.reset();
     if (options_.stepped && conductor_runner_) {
       drain_stepped();
     }
@@ -89,8 +93,12 @@ class DaemonImpl final : public Daemon {
   std::uint64_t counter(Counter id) const noexcept override { return context_.counters.get(id); }
   std::string ready_line() const override {
     const SocketAddress host = receiver_->host_address();
-    return fmt::format("ready control={} host_udp={}", to_string(receiver_->control_address()),
-                       host.length != 0 ? to_string(host) : std::string("off"));
+    return fmt::format("ready control={} host_udp={}{}", to_string(receiver_->control_address()),
+                       host.length != 0 ? to_string(host) : std::string("off"),
+                       metrics_ ? " metrics=" + to_string(metrics_->address()) : std::string());
+  }
+  std::uint16_t metrics_port() const noexcept override {
+    return metrics_ ? metrics_->address().port() : std::uint16_t{0};
   }
 
  private:
@@ -100,6 +108,8 @@ class DaemonImpl final : public Daemon {
   bool wait_until(Predicate done, std::int64_t limit_ns);
   void drain_stepped();
   void stop_agents();
+  [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
+  [[nodiscard]] MetricsMoment moment() const;
   void housekeep();
   void log_summary();
 
@@ -113,8 +123,12 @@ class DaemonImpl final : public Daemon {
   std::unique_ptr<Log> log_;
   DistinctTable distinct_;
   DistinctTable errors_;
+  StatusBoard board_;
   Fd stop_event_;
   std::atomic<bool> stop_{false};
+  std::atomic<bool> serving_{false};
+  std::int64_t started_ns_ = 0;
+  std::atomic<std::int64_t> housekept_ns_{0};  ///< monotonic
 
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<RenderAgent> render_;
@@ -127,6 +141,8 @@ class DaemonImpl final : public Daemon {
   std::unique_ptr<AgentRunner> recorder_runner_;
   std::unique_ptr<AgentRunner> sender_runner_;
   std::unique_ptr<AgentRunner> conductor_runner_;
+  MetricsSources sources_;
+  std::unique_ptr<MetricsServer> metrics_;  ///< reads all of the above
 };
 
 FrameSourceFactory DaemonImpl::source_factory() const {
@@ -152,6 +168,8 @@ FrameSourceFactory DaemonImpl::source_factory() const {
 }
 
 physics::Result<void> DaemonImpl::setup() {
+  started_ns_ = clock_.monotonic_ns();
+  housekept_ns_.store(started_ns_, std::memory_order_release);
   if (options_.on_log) {
     log_ = make_log(options_.on_log);
   } else {
@@ -267,7 +285,56 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
       }
     }
   }
+  return open_metrics({{"version", kVersion},
+                       {"commit", kCommit},
+                       {"device", source.device},
+                       {"scenario", scenario_name},
+                       {"pacing", std::string(pacing_name(config_.pacing.mode))}});
+}
+
+physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
+  if (config_.metrics.listen.empty()) {
+    return {};
+  }
+  const auto named = [this](const Error& error) {
+    return tl::unexpected<Error>(
+        Error(error).with_context("metrics.listen").with_context(config_.file.string()));
+  };
+  const auto where = parse_host_port(config_.metrics.listen);
+  if (!where) {
+    return named(where.error());
+  }
+  const auto address = resolve(*where, Transport::tcp, true);
+  if (!address) {
+    return named(address.error());
+  }
+  sources_.counters = &context_.counters;
+  sources_.times = &context_.times;
+  sources_.clients = context_.clients();
+  sources_.board = &board_;
+  sources_.build = std::move(build);
+  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
+                              sender_runner_.get(), recorder_runner_.get()}) {
+    sources_.agents.emplace_back(runner->agent().name(), &runner->duty_cycle());
+  }
+  MetricsServer::Answers answers;
+  answers.metrics = [this] { return metrics_text(sources_, moment()); };
+  answers.ready = [this] { return serving_.load(std::memory_order_acquire); };
+  answers.healthy = [this] {
+    constexpr std::int64_t kStuckNs = 5'000'000'000;
+    return clock_.monotonic_ns() - housekept_ns_.load(std::memory_order_acquire) < kStuckNs;
+  };
+  auto opened = MetricsServer::start(*address, std::move(answers));
+  if (!opened) {
+    return named(opened.error());
+  }
+  metrics_ = std::move(*opened);
   return {};
+}
+
+MetricsMoment DaemonImpl::moment() const {
+  return {context_.run_id.load(std::memory_order_relaxed), serving_.load(std::memory_order_acquire),
+          clock_.monotonic_ns() - started_ns_};
 }
 
 int DaemonImpl::run() {
@@ -280,6 +347,7 @@ int DaemonImpl::run() {
       return 1;
     }
   }
+  serving_.store(true, std::memory_order_release);
   log_->write(LogLevel::info, ready_line());
   while (!stop_.load(std::memory_order_acquire)) {
     pollfd wait{stop_event_.get(), POLLIN, 0};
@@ -287,6 +355,7 @@ int DaemonImpl::run() {
     ::poll(&wait, 1, kHousekeepingMs);
     housekeep();
   }
+  serving_.store(false, std::memory_order_release);
   log_->write(LogLevel::info, "event=stopping");
   receiver_->drain();
   context_.bells.receiver.ring();
@@ -351,12 +420,15 @@ void DaemonImpl::stop_agents() {
 }
 
 void DaemonImpl::housekeep() {
+  bool warned = false;
   for (EventLog* events :
        {&context_.conductor_events, &context_.receiver_events, &context_.render_events,
         &context_.sender_events, &context_.recorder_events}) {
     while (const Event* event = events->ring().front()) {
       const EventText line = describe(*event);
+      board_.note(*event);
       events->ring().pop();
+      warned = warned || line.distinct;
       if (!log_) {
         continue;
       }
@@ -368,6 +440,11 @@ void DaemonImpl::housekeep() {
       }
     }
   }
+  if (warned) {
+    board_.set_warnings(LogLevel::warn, distinct_);
+    board_.set_warnings(LogLevel::error, errors_);
+  }
+  housekept_ns_.store(clock_.monotonic_ns(), std::memory_order_release);
 }
 
 void DaemonImpl::log_summary() {

@@ -54,8 +54,9 @@ class Daemon {
 
   [[nodiscard]] virtual std::uint16_t control_port() const noexcept = 0;
   [[nodiscard]] virtual std::uint16_t host_udp_port() const noexcept = 0;  ///< 0 = off
+  [[nodiscard]] virtual std::uint16_t metrics_port() const noexcept = 0;   ///< 0 = off
   [[nodiscard]] virtual std::uint64_t counter(Counter id) const noexcept = 0;
-  /// "ready control=HOST:PORT host_udp=HOST:PORT"
+  /// "ready control=HOST:PORT host_udp=HOST:PORT", and " metrics=HOST:PORT" unless that is off.
   [[nodiscard]] virtual std::string ready_line() const = 0;
 };
 

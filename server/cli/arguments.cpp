@@ -218,6 +218,20 @@ void Tool::add_stream_commands() {
     add_json(app, o.json);
   }
   {
+    auto [app, o] = add<StatCommand>(
+        app_, "stat",
+        "Counters, times, clients and warnings of a daemon with metrics.listen, again and again",
+        "emit stat http://127.0.0.1:7002", run_stat);
+    app.add_option("url", o.url, "http://host:port of metrics.listen")
+        ->required()
+        ->type_name("URL");
+    app.add_flag("--once", o.once, "One table, then the end");
+    add_seconds(app, "--interval-s", o.interval_s, "Time between two tables")
+        ->check(CLI::Range(0.1, 3600.0))
+        ->capture_default_str();
+    add_json(app, o.json);
+  }
+  {
     auto [app, o] =
         add<SendCommand>(app_, "send", "Host stand-in: plays the poses of a log to a daemon",
                          "emit send airfield.mcap --to udp://127.0.0.1:7001 --rate 200", run_send);

@@ -64,6 +64,14 @@ struct ReceiveCommand {
 };
 int run_receive(const ReceiveCommand& command);
 
+struct StatCommand {
+  std::string url;
+  bool once = false;
+  double interval_s = 1.0;
+  std::optional<std::filesystem::path> json;  ///< one reading, then the end
+};
+int run_stat(const StatCommand& command);
+
 struct SendCommand {
   std::filesystem::path log;
   std::string to;

@@ -124,11 +124,13 @@ physics::Result<Url> parse_url(const std::string& text) {
   return url;
 }
 
-ClientConnection::ClientConnection(SocketContext context, TcpSocket socket, SocketAddress peer)
+ClientConnection::ClientConnection(SocketContext context, TcpSocket socket, SocketAddress peer,
+                                   const protocol::RecordLimits& limits)
     : context_(std::move(context)),
       socket_(std::move(socket)),
       peer_(peer),
-      parser_(protocol::RecordLimits{}) {}
+      limits_(limits),
+      parser_(limits) {}
 
 physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientRole role,
                                                          std::int64_t timeout_ns) {
@@ -142,8 +144,14 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
   if (!socket) {
     return tl::unexpected<physics::Error>(std::move(socket.error()));
   }
-  ClientConnection connection(std::move(context), std::move(*socket), *address);
+  return greet(std::move(context), std::move(*socket), *address, role, end_ns);
+}
 
+physics::Result<ClientConnection> ClientConnection::greet(SocketContext context, TcpSocket socket,
+                                                          SocketAddress peer, ClientRole role,
+                                                          std::int64_t end_ns,
+                                                          const protocol::RecordLimits& limits) {
+  ClientConnection connection(std::move(context), std::move(socket), peer, limits);
   v1::ControlRecord request;
   v1::Hello& hello = *request.mutable_hello();
   hello.set_protocol_version(protocol::kProtocolVersion);
@@ -157,7 +165,7 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
   if (!received) {
     return tl::unexpected<physics::Error>(std::move(received.error()));
   }
-  const std::string where = to_string(*address);
+  const std::string where = to_string(peer);
   if (!*received) {
     return make_error(ErrorCode::io, where + ": no welcome within the timeout");
   }
@@ -184,9 +192,8 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
 }
 
 void ClientConnection::allow_frames(std::uint32_t max_frame_bytes) {
-  protocol::RecordLimits limits;
-  limits.max_frame_bytes = max_frame_bytes;
-  parser_ = protocol::RecordParser(limits);
+  limits_.max_frame_bytes = max_frame_bytes;
+  parser_ = protocol::RecordParser(limits_);
 }
 
 physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::int64_t end_ns) {

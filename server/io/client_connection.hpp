@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -35,6 +36,11 @@ class ClientConnection {
   /// Hello and Welcome. Errors: io, protocol (what the daemon answered instead).
   [[nodiscard]] static physics::Result<ClientConnection> open(const Url& url, ClientRole role,
                                                               std::int64_t timeout_ns);
+  /// The same over a stream that is connected already, until `end_ns` (monotonic). `limits`: of
+  /// what the daemon may send.
+  [[nodiscard]] static physics::Result<ClientConnection> greet(
+      SocketContext context, TcpSocket socket, SocketAddress peer, ClientRole role,
+      std::int64_t end_ns, const protocol::RecordLimits& limits = {});
 
   [[nodiscard]] int fd() const noexcept { return socket_.fd(); }
   [[nodiscard]] const SocketContext& context() const noexcept { return context_; }
@@ -54,15 +60,22 @@ class ClientConnection {
   [[nodiscard]] physics::Result<void> send(const v1::ControlRecord& record, std::int64_t end_ns);
 
  private:
-  ClientConnection(SocketContext context, TcpSocket socket, SocketAddress peer);
+  ClientConnection(SocketContext context, TcpSocket socket, SocketAddress peer,
+                   const protocol::RecordLimits& limits);
 
   SocketContext context_;
   TcpSocket socket_;
   SocketAddress peer_;
+  protocol::RecordLimits limits_;
   protocol::RecordParser parser_;
   ServerInfo info_;
   std::vector<std::byte> out_;
   bool closed_ = false;
 };
+
+/// What client.hpp makes from a URL, over a connection that is open in that role.
+[[nodiscard]] std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool udp);
+[[nodiscard]] std::unique_ptr<HostClient> make_tcp_host(ClientConnection connection);
+[[nodiscard]] std::unique_ptr<RecorderClient> make_recorder(ClientConnection connection);
 
 }  // namespace emit::server

@@ -22,6 +22,14 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
+constexpr std::uint64_t kMostFrameBytes = 1u << 30;
+
+/// Bytes of a channel's frames; more than kMostFrameBytes where the daemon claims what no frame is.
+std::uint64_t frame_bytes_of(const ChannelDescription& channel) {
+  const std::uint64_t pixels = std::uint64_t{channel.width_px} * channel.height_px;
+  return std::min(pixels, kMostFrameBytes) * sizeof(float);
+}
+
 class FrameClientImpl final : public FrameClient {
  public:
   FrameClientImpl(ClientConnection connection, bool udp)
@@ -71,12 +79,11 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   // Frames may follow the answer at once: the parser must take the largest channel's.
   std::uint64_t largest = 0;
   for (const auto& channel : connection_.server().channels) {
-    largest =
-        std::max(largest, std::uint64_t{channel.width_px} * channel.height_px * sizeof(float));
+    largest = std::max(largest, frame_bytes_of(channel));
   }
-  constexpr std::uint64_t kMostBytes = 1u << 30;
-  if (largest > kMostBytes) {
-    return make_error(ErrorCode::protocol, fmt::format("frames of {} bytes are refused", largest));
+  if (largest > kMostFrameBytes) {
+    return make_error(ErrorCode::protocol,
+                      fmt::format("frames of more than {} bytes are refused", kMostFrameBytes));
   }
   v1::ControlRecord request;
   v1::Subscribe& subscribe = *request.mutable_subscribe();
@@ -170,6 +177,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t 
       return make_error(ErrorCode::protocol, "a frame larger than its channel");
     }
     frame_.header = view->header;
+    frame_.header.flags &= ~std::uint32_t{protocol::kFlagPartial};  // this side's to say
     frame_.last_byte_ns = clock_.tai_ns();
     frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
     burst_begin_ns_ = 0;
@@ -294,8 +302,7 @@ std::string FrameClientImpl::receive_buffer_advice() const {
     return {};
   }
   constexpr std::uint64_t kFrames = 4;
-  const std::uint64_t frame_bytes =
-      std::uint64_t{channel_.width_px} * channel_.height_px * sizeof(float);
+  const std::uint64_t frame_bytes = frame_bytes_of(channel_);
   if (receiver_->buffer_bytes() >= kFrames * frame_bytes) {
     return {};
   }
@@ -306,6 +313,10 @@ std::string FrameClientImpl::receive_buffer_advice() const {
 }
 
 }  // namespace
+
+std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool udp) {
+  return std::make_unique<FrameClientImpl>(std::move(connection), udp);
+}
 
 physics::Result<std::unique_ptr<FrameClient>> FrameClient::connect(const std::string& url,
                                                                    std::int64_t timeout_ns) {
@@ -320,8 +331,7 @@ physics::Result<std::unique_ptr<FrameClient>> FrameClient::connect(const std::st
   if (!connection) {
     return tl::unexpected<physics::Error>(std::move(connection.error()));
   }
-  return std::make_unique<FrameClientImpl>(std::move(*connection),
-                                           parsed->scheme == Url::Scheme::udp);
+  return make_frame_client(std::move(*connection), parsed->scheme == Url::Scheme::udp);
 }
 
 }  // namespace emit::server

@@ -122,6 +122,10 @@ class UdpHost final : public HostClient {
 
 }  // namespace
 
+std::unique_ptr<HostClient> make_tcp_host(ClientConnection connection) {
+  return std::make_unique<TcpHost>(std::move(connection));
+}
+
 physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::string& url,
                                                                  std::int64_t timeout_ns) {
   const auto parsed = parse_url(url);
@@ -133,7 +137,7 @@ physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::stri
     if (!connection) {
       return tl::unexpected<physics::Error>(std::move(connection.error()));
     }
-    return std::make_unique<TcpHost>(std::move(*connection));
+    return make_tcp_host(std::move(*connection));
   }
   const auto address = resolve({parsed->host, parsed->port}, Transport::udp, false);
   if (!address) {

@@ -35,6 +35,10 @@ class TcpRecorder final : public RecorderClient {
 
 }  // namespace
 
+std::unique_ptr<RecorderClient> make_recorder(ClientConnection connection) {
+  return std::make_unique<TcpRecorder>(std::move(connection));
+}
+
 physics::Result<std::unique_ptr<RecorderClient>> RecorderClient::connect(const std::string& url,
                                                                          std::int64_t timeout_ns) {
   const auto parsed = parse_url(url);
@@ -49,7 +53,7 @@ physics::Result<std::unique_ptr<RecorderClient>> RecorderClient::connect(const s
   if (!connection) {
     return tl::unexpected<physics::Error>(std::move(connection.error()));
   }
-  return std::make_unique<TcpRecorder>(std::move(*connection));
+  return make_recorder(std::move(*connection));
 }
 
 }  // namespace emit::server

@@ -97,10 +97,7 @@ std::string DistinctTable::note(const std::string& text, std::int64_t now_ns) {
   return entry.count > 1 ? fmt::format("{} repeats={}", line, entry.count) : line;
 }
 
-namespace {
-
-/// Peers choose some of the text: it must not break lines or quotes of the log.
-std::string printable(const Event& event) {
+std::string printable_text(const Event& event) {
   std::string text(event.text.data());
   for (char& c : text) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F || c == '"') {
@@ -110,13 +107,14 @@ std::string printable(const Event& event) {
   return text;
 }
 
-}  // namespace
+std::string_view role_name(std::uint64_t role) noexcept {
+  static constexpr std::array<std::string_view, 4> kRoles{"none", "host", "client", "recorder"};
+  return role < kRoles.size() ? kRoles[role] : "?";
+}
 
 EventText describe(const Event& event) {
-  const std::string text = printable(event);
-  const auto connection = [&] {
-    return fmt::format("{}.{}", connection_place(event.a), event.a >> kConnectionPlaceBits);
-  };
+  const std::string text = printable_text(event);
+  const auto connection = [&] { return connection_name(event.a); };
   switch (event.kind) {
     case EventKind::run_started:
       return {LogLevel::info, fmt::format("event=run_started run_id={}", event.a), false};
@@ -140,13 +138,11 @@ EventText describe(const Event& event) {
       return {LogLevel::info,
               fmt::format("event=disconnected connection={} why=\"{}\"", connection(), text),
               false};
-    case EventKind::hello: {
-      static constexpr std::array kRoles{"none", "host", "client", "recorder"};
+    case EventKind::hello:
       return {LogLevel::info,
               fmt::format("event=hello connection={} role={} software=\"{}\"", connection(),
-                          event.b < kRoles.size() ? kRoles[event.b] : "?", text),
+                          role_name(event.b), text),
               false};
-    }
     case EventKind::subscribed:
       return {LogLevel::info,
               fmt::format("event=subscribed connection={} channel={} transport={}", connection(),

@@ -63,6 +63,11 @@ class DistinctTable {
   std::map<std::string, Entry> entries_;
 };
 
+/// The event's text without what would break a line or a quote: peers choose some of it.
+[[nodiscard]] std::string printable_text(const Event& event);
+/// Of emit.v1.Hello.Role.
+[[nodiscard]] std::string_view role_name(std::uint64_t role) noexcept;
+
 struct EventText {
   LogLevel level = LogLevel::info;
   std::string text;

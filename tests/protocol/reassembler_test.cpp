@@ -69,6 +69,20 @@ TEST(Reassembler, GivesACompleteFrameFromFragmentsInAnyOrder) {
   }
 }
 
+TEST(Reassembler, AFrameIsPartialByWhatArrivedWhateverItsHeaderClaims) {
+  Frame frame = test::make_frame(kWidthPx, kHeightPx, 7);
+  frame.header.flags = kFlagPartial | kFlagLate;
+  encode(frame.header, frame.header_bytes);
+  Reassembler reassembler(params());
+  for (const Datagram& datagram : test::datagrams_of(frame, kPayload, 1)) {
+    EXPECT_EQ(reassembler.push(datagram), FragmentStatus::accepted);
+  }
+  const ReceivedFrame* received = reassembler.pop();
+  ASSERT_NE(received, nullptr);
+  expect_true_to(*received, frame);
+  EXPECT_EQ(received->header.flags, kFlagLate);
+}
+
 TEST(Reassembler, OneLostFragmentCostsOnlyItsOwnPixels) {
   const Frame frame = test::make_frame(kWidthPx, kHeightPx, 3);
   const auto datagrams = test::datagrams_of(frame, kPayload, 1);

@@ -92,6 +92,11 @@ class DaemonProcess {
         control_ = word.substr(word.find('=') + 1);
         words >> word;
         host_udp_ = word.substr(word.find('=') + 1);
+        std::string rest;
+        std::getline(words, rest);
+        if (const auto at = rest.find("metrics="); at != std::string::npos) {
+          metrics_ = rest.substr(at + 8);
+        }
         return true;
       }
       if (ended()) {
@@ -103,6 +108,8 @@ class DaemonProcess {
   }
   [[nodiscard]] const std::string& control() const { return control_; }
   [[nodiscard]] const std::string& host_udp() const { return host_udp_; }
+  /// Empty: off.
+  [[nodiscard]] const std::string& metrics() const { return metrics_; }
   void signal(int number) const { ::kill(pid_, number); }
   /// Exit code, 128 + signal, or -1 when it does not end within the limit.
   [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
@@ -130,6 +137,7 @@ class DaemonProcess {
   int exit_code_ = -1;
   std::string control_;
   std::string host_udp_;
+  std::string metrics_;
 };
 
 /// Configuration of a daemon with canned frames on free ports; `more` is appended.

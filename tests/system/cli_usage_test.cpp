@@ -15,9 +15,9 @@ TEST_P(CliHelp, every_command_explains_itself_with_an_example) {
   EXPECT_NE(result.out.find("Example: emit "), std::string::npos) << result.out;
 }
 INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
-                         testing::Values("render", "receive", "send", "record", "replay", "demo",
-                                         "view", "compare", "inspect", "evaluate", "generate",
-                                         "make-log", "bench"));
+                         testing::Values("render", "receive", "send", "stat", "record", "replay",
+                                         "demo", "view", "compare", "inspect", "evaluate",
+                                         "generate", "make-log", "bench"));
 
 TEST(CliUsage, version_names_tool_and_number) {
   const ProcessResult result = run_emit({"--version"});
@@ -57,6 +57,8 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"compare", "a.exr"},
         std::vector<std::string>{"receive", "http://localhost:1"},
         std::vector<std::string>{"receive", "tcp://localhost"},
+        std::vector<std::string>{"stat", "tcp://localhost:7002"},
+        std::vector<std::string>{"stat", "http://localhost"},
         std::vector<std::string>{"send", "x.mcap", "--to", "nowhere"},
         std::vector<std::string>{"send", "x.mcap", "--to", "udp://127.0.0.1:1", "--step"},
         std::vector<std::string>{"replay", "x.mcap", "--scenario", "box", "--speed", "0"},

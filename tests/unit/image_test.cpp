@@ -6,7 +6,10 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
+#include <string>
+#include <string_view>
 
 #include "emit/image/exr_image.hpp"
 #include "emit/image/false_color.hpp"
@@ -156,6 +159,38 @@ TEST(ExrImage, unreadable_files_are_errors_that_name_them) {
   std::filesystem::resize_file(whole, std::filesystem::file_size(whole) - 40);
   EXPECT_FALSE(read_exr(whole));
   EXPECT_EQ(write_exr("/nowhere/at/all.exr", sample_image()).error().code, ErrorCode::io);
+}
+
+/// The file written by write_exr() with some bytes after `mark` replaced.
+std::string error_after_damage(std::string_view mark, std::size_t skip, std::string_view bytes) {
+  const auto file = scratch("damaged.exr");
+  ExrImage image = sample_image();
+  image.attributes["scale"] = 1.5;
+  EXPECT_TRUE(write_exr(file, image));
+  std::ifstream in(file, std::ios::binary);
+  std::string whole{std::istreambuf_iterator<char>(in), {}};
+  const auto at = whole.find(mark);
+  EXPECT_NE(at, std::string::npos) << mark;
+  whole.replace(at + mark.size() + skip, bytes.size(), bytes);
+  std::ofstream(file, std::ios::binary) << whole;
+  const auto read = read_exr(file);
+  return read ? std::string() : read.error().text;
+}
+
+TEST(ExrImage, headers_that_ask_for_more_memory_than_the_file_has_bytes_are_refused) {
+  using namespace std::string_literals;
+  const std::string huge = "\xFF\xFF\xFF\x7F"s;
+  EXPECT_EQ(error_after_damage("scale\0double\0"s, 4, ""), "") << "undamaged";
+  EXPECT_THAT(error_after_damage("scale\0double\0"s, 0, huge),
+              HasSubstr("damaged.exr: attribute 'scale' of 2147483647 bytes"));
+  EXPECT_THAT(error_after_damage("scale\0double\0"s, 0, "\x09"s),
+              HasSubstr("attribute 'scale': 9 bytes are no double"));
+  EXPECT_THAT(error_after_damage("dataWindow\0box2i\0"s, 4 + 12, huge),
+              HasSubstr("pixels is out of range"));
+  EXPECT_THAT(error_after_damage("dataWindow\0box2i\0"s, 4 + 12, "\xFF\xFF\0\0"s),
+              HasSubstr("a table of 4096 pieces"));
+  EXPECT_THAT(error_after_damage("compression\0compression\0"s, 4, "\x63"s),
+              HasSubstr("attribute 'compression'"));
 }
 
 TEST(PngImage, file_carries_signature_and_size) {

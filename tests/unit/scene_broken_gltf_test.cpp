@@ -55,7 +55,10 @@ const Broken kBroken[] = {
        put(t.accessors, R"("bufferView":0,"componentType":5126,"count":3)",
            R"("componentType":5126,"count":4000000000)");
      },
-     "accessor 0: 4000000000 elements"},
+     "accessor 0: 4000000000 elements without a bufferView"},
+    {"coordinate_beyond_arithmetic",
+     [](GltfText& t) { t.buffer.replace(16, 4, packed<float>({2e9F})); },
+     "mesh 0 'part' primitive 0: POSITION: element 1 lies beyond 1e+09"},
     {"view_beyond_buffer",
      [](GltfText& t) { put(t.views, R"("byteLength":36)", R"("byteLength":3600)"); },
      "bufferView 0: bytes 0 + 3600 exceed buffer 0"},

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <set>
 #include <span>
@@ -84,6 +85,29 @@ TEST(Clusters, keep_the_triangles_of_every_submesh_and_bring_neighbours_together
   EXPECT_EQ(next, mesh.indices.size());
   EXPECT_TRUE(starts.contains(mesh.submeshes[1].first_index));
   EXPECT_LT(clusters.size(), 3 * mesh.indices.size() / 3 / kClusterTriangles);
+}
+
+TEST(Clusters, at_the_ends_of_float32_every_triangle_stays_and_is_always_drawn) {
+  for (const float size_m : {1e-25F, 1e25F}) {
+    Mesh mesh = shuffled_sphere();
+    for (glm::vec3& position_m : mesh.positions_m) position_m *= size_m;
+    std::vector<Triangles> before;
+    for (const Submesh& submesh : mesh.submeshes) before.push_back(triangles(mesh, submesh));
+    std::vector<Cluster> clusters;
+    for (const Submesh& submesh : mesh.submeshes) {
+      for (Cluster& cluster : cut(mesh, submesh)) clusters.push_back(cluster);
+    }
+    std::uint32_t next = 0;
+    for (const Cluster& cluster : clusters) {
+      EXPECT_EQ(cluster.first_index, next);
+      EXPECT_FALSE(std::isnan(cluster.radius_m));
+      next += cluster.index_count;
+    }
+    EXPECT_EQ(next, mesh.indices.size());
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      EXPECT_EQ(triangles(mesh, mesh.submeshes[i]), before[i]) << size_m;
+    }
+  }
 }
 
 TEST(Clusters, a_cluster_lies_in_its_sphere_and_its_cone_tells_its_back) {

@@ -22,6 +22,8 @@
 #include <set>
 #include <utility>
 
+#include "exr_header.hpp"
+
 namespace emit::image {
 namespace {
 
@@ -88,6 +90,28 @@ Imf::Slice slice_of(float* pixels, const Imath::Box2i& window, std::uint32_t wid
                           sizeof(float), sizeof(float) * width);
 }
 
+/// Memory for the planes grows with what was read, so that a small file cannot ask for much.
+void read_pixels(Imf::InputFile& input, const Imath::Box2i& window, ExrImage& image) {
+  constexpr std::size_t kBandValues = std::size_t{1} << 22U;
+  const std::size_t row_values = std::size_t{image.width_px} * image.channels.size();
+  const auto band_rows = static_cast<int>(
+      std::clamp<std::size_t>(kBandValues / std::max<std::size_t>(row_values, 1), 1, 65536));
+  for (int first = window.min.y; first <= window.max.y;) {
+    const int last =
+        static_cast<int>(std::min<std::int64_t>(std::int64_t{first} + band_rows - 1, window.max.y));
+    const auto rows = static_cast<std::size_t>(std::int64_t{last} - window.min.y + 1);
+    Imf::FrameBuffer frame;
+    for (ExrChannel& channel : image.channels) {
+      channel.pixels.resize(rows * image.width_px);
+      frame.insert(channel.name, slice_of(channel.pixels.data(), window, image.width_px));
+    }
+    input.setFrameBuffer(frame);
+    input.readPixels(first, last);
+    if (last == window.max.y) break;
+    first = last + 1;
+  }
+}
+
 physics::Result<ExrImage> read_open_file(Imf::InputFile& input) {
   const Imf::Header& header = input.header();
   const Imath::Box2i window = header.dataWindow();
@@ -101,20 +125,14 @@ physics::Result<ExrImage> read_open_file(Imf::InputFile& input) {
   ExrImage image;
   image.width_px = static_cast<std::uint32_t>(width);
   image.height_px = static_cast<std::uint32_t>(height);
-  const std::size_t pixels = std::size_t{image.width_px} * image.height_px;
   for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
     if (it.channel().xSampling != 1 || it.channel().ySampling != 1) {
       return make_error(ErrorCode::unsupported,
                         fmt::format("channel '{}' is subsampled", it.name()));
     }
-    image.channels.push_back({it.name(), std::vector<float>(pixels)});
+    image.channels.push_back({it.name(), {}});
   }
-  Imf::FrameBuffer frame;
-  for (ExrChannel& channel : image.channels) {
-    frame.insert(channel.name, slice_of(channel.pixels.data(), window, image.width_px));
-  }
-  input.setFrameBuffer(frame);
-  input.readPixels(window.min.y, window.max.y);
+  read_pixels(input, window, image);
   read_attributes(header, image);
   return image;
 }
@@ -231,6 +249,9 @@ physics::Result<ExrImage> read_exr(const std::filesystem::path& file) {
     return make_error(ErrorCode::not_found, fmt::format("{}: no such file", file.string()));
   }
   try {
+    if (auto checked = check_exr_header(file); !checked) {
+      return tl::unexpected(std::move(checked.error()).with_context(file.string()));
+    }
     Imf::InputFile input(file.c_str());
     physics::Result<ExrImage> image = read_open_file(input);
     if (!image) {

@@ -3,7 +3,10 @@
 
 #include <meshoptimizer.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace emit::scene {
 namespace {
@@ -15,6 +18,27 @@ constexpr float kConeWeight = 0.5F;
 
 glm::vec3 vec3(const float (&v)[3]) {
   return {v[0], v[1], v[2]};
+}
+
+bool is_finite(const Cluster& cluster) {
+  const float sum = cluster.centre_m.x + cluster.centre_m.y + cluster.centre_m.z +
+                    cluster.radius_m + cluster.cone_apex_m.x + cluster.cone_apex_m.y +
+                    cluster.cone_apex_m.z + cluster.cone_axis.x + cluster.cone_axis.y +
+                    cluster.cone_axis.z + cluster.cone_cutoff;
+  return std::isfinite(sum);
+}
+
+/// Where the library's arithmetic ends, at the extremes of float32, it leaves triangles out: then
+/// they stay in their order, in clusters that are always drawn.
+void cut_in_order(std::uint32_t indices, std::vector<Cluster>& clusters) {
+  constexpr auto kIndices = static_cast<std::uint32_t>(3 * kClusterTriangles);
+  for (std::uint32_t at = 0; at < indices; at += kIndices) {
+    Cluster cluster;
+    cluster.first_index = at;
+    cluster.index_count = std::min(indices - at, kIndices);
+    cluster.radius_m = std::numeric_limits<float>::infinity();
+    clusters.push_back(cluster);
+  }
 }
 
 }  // namespace
@@ -37,6 +61,7 @@ std::vector<Cluster> cut_into_clusters(std::span<const glm::vec3> positions_m,
   std::vector<std::uint32_t> ordered;
   ordered.reserve(indices.size());
   std::vector<std::uint32_t> part;
+  bool finite = true;
   for (const meshopt_Meshlet& meshlet : meshlets) {
     const unsigned int* own = own_vertices.data() + meshlet.vertex_offset;
     const unsigned char* corner = corners.data() + meshlet.triangle_offset;
@@ -53,8 +78,14 @@ std::vector<Cluster> cut_into_clusters(std::span<const glm::vec3> positions_m,
     cluster.cone_apex_m = vec3(bounds.cone_apex);
     cluster.cone_axis = vec3(bounds.cone_axis);
     cluster.cone_cutoff = bounds.cone_cutoff;
+    finite = finite && is_finite(cluster);
     clusters.push_back(cluster);
     ordered.insert(ordered.end(), part.begin(), part.end());
+  }
+  if (!finite || ordered.size() != indices.size()) {
+    clusters.clear();
+    cut_in_order(static_cast<std::uint32_t>(indices.size()), clusters);
+    return clusters;
   }
   std::memcpy(indices.data(), ordered.data(), indices.size_bytes());
   return clusters;

@@ -18,7 +18,7 @@ using physics::make_error;
 using physics::Result;
 
 /// Elements without a buffer view are zeros that the file does not pay for; no real file has more.
-constexpr std::size_t kMaxElements = std::size_t{1} << 28U;
+constexpr std::size_t kMaxFreeElements = std::size_t{1} << 20U;
 
 /// A checked region of a buffer: element i begins at data + i * stride.
 struct View {
@@ -174,8 +174,9 @@ Result<std::vector<float>> read_checked(const tinygltf::Model& model,
                       fmt::format("{} components of type {} instead of {} numbers", found,
                                   accessor.componentType, components));
   }
-  if (accessor.count > kMaxElements) {
-    return make_error(ErrorCode::unsupported, fmt::format("{} elements", accessor.count));
+  if (accessor.bufferView < 0 && accessor.count > kMaxFreeElements) {
+    return make_error(ErrorCode::unsupported,
+                      fmt::format("{} elements without a bufferView", accessor.count));
   }
   std::vector<float> values;
   if (accessor.bufferView >= 0) {

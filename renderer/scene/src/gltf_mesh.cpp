@@ -24,6 +24,10 @@ using physics::Result;
 /// Relative to the longest edge squared: below this a triangle has no direction in float32.
 constexpr double kZeroAreaFrac = 1e-12;
 
+/// In the units of the mesh. Beyond it the squares and products of float32 arithmetic overflow, on
+/// the device too; nothing on Earth is as large.
+constexpr float kMaxCoordinate = 1e9F;
+
 struct Soup {
   std::vector<glm::vec3> positions_m;
   std::vector<glm::vec3> normals;  ///< empty: to be computed
@@ -180,6 +184,12 @@ Result<Soup> read_geometry(const tinygltf::Model& model, const tinygltf::Primiti
   const Result<std::vector<float>> positions = read_floats(model, position->second, 3);
   if (!positions) {
     return tl::unexpected(physics::Error(positions.error()).with_context("POSITION"));
+  }
+  for (std::size_t i = 0; i < positions->size(); ++i) {
+    if (std::abs((*positions)[i]) > kMaxCoordinate) {
+      return make_error(ErrorCode::unsupported, fmt::format("POSITION: element {} lies beyond {:g}",
+                                                            i / 3, kMaxCoordinate));
+    }
   }
   soup.positions_m = to_vectors(*positions);
   if (const auto normal = primitive.attributes.find("NORMAL");

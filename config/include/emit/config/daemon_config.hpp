@@ -55,6 +55,10 @@ struct StreamConfig {
 /// 1 to 64 letters, digits, `_`, `-` and `.`, the first a letter or digit: no path can come of it.
 [[nodiscard]] bool is_shm_name(std::string_view text) noexcept;
 
+struct MetricsConfig {
+  std::string listen;  ///< /metrics, /healthz and /readyz over HTTP; empty = off
+};
+
 struct JournalConfig {
   std::filesystem::path file;  ///< written while running; empty = only on request of a recorder
   std::uint32_t ring_entries = 4096;
@@ -77,6 +81,7 @@ struct DaemonConfig {
   HostConfig host;
   ControlConfig control;
   StreamConfig stream;
+  MetricsConfig metrics;
   JournalConfig journal;
   DeviceConfig device;
   LogConfig log;

@@ -41,7 +41,8 @@ struct ExrImage {
 [[nodiscard]] physics::Result<void> write_exr(const std::filesystem::path& file,
                                               const ExrImage& image);
 /// Reads half, float and uint channels into float. Errors: not_found, io, parse, unsupported (deep
-/// or subsampled images); a message names the file. Sizes over 2^28 pixels are refused.
+/// or subsampled images; more than 65536 pixels a side, 2^28 in all or 256 channels); a message
+/// names the file. Takes memory only as the file's pixels come.
 [[nodiscard]] physics::Result<ExrImage> read_exr(const std::filesystem::path& file);
 
 /// What a frame says about itself. Attribute names: simTimeNs and frameNumber (decimal strings,

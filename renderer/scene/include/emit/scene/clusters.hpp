@@ -13,7 +13,7 @@ struct Cluster {
   std::uint32_t first_index = 0;
   std::uint32_t index_count = 0;
   glm::vec3 centre_m{0.0F};  ///< of a sphere around all of them
-  float radius_m = 0.0F;
+  float radius_m = 0.0F;     ///< infinite: always drawn
   /// All turn their backs to a point p where
   /// dot(normalize(cone_apex_m - p), cone_axis) >= cone_cutoff; never where cone_cutoff is 1.
   glm::vec3 cone_apex_m{0.0F};

@@ -14,8 +14,9 @@
 /// first, else all root nodes), any number of primitives and materials, triangle lists, strips and
 /// fans, 8/16/32-bit and no indices, interleaved, strided, normalised and sparse accessors,
 /// EXT_mesh_gpu_instancing, KHR_mesh_quantization, doubleSided. Images are not read. Points, lines,
-/// skins and morph targets are skipped with a warning; an unknown required extension is an error.
-/// Missing normals are computed flat, as the glTF specification asks.
+/// skins and morph targets are skipped with a warning; an unknown required extension is an error,
+/// and so are coordinates beyond 1e9. Missing normals are computed flat, as the glTF specification
+/// asks.
 namespace emit::scene {
 
 inline constexpr std::uint32_t kNoGltfMaterial = 0xffffffffU;

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "rt/client_counts.hpp"
+#include "rt/counters.hpp"
+#include "rt/histogram.hpp"
+#include "telemetry/duty_cycle.hpp"
+#include "telemetry/status_board.hpp"
+
+namespace emit::server {
+
+/// Metrics in Prometheus' text format, version 0.0.4. Names begin with `emitd_`.
+class MetricsText {
+ public:
+  using Labels = std::vector<std::pair<std::string_view, std::string>>;
+
+  /// Begins a metric; `type`: counter, gauge or histogram. Samples follow.
+  void family(std::string_view name, std::string_view type, std::string_view help);
+  void sample(const Labels& labels, std::uint64_t value);
+  void sample(const Labels& labels, double value);
+  /// Buckets, sum (seconds) and count.
+  void histogram(const Labels& labels, const Histogram& histogram);
+
+  [[nodiscard]] const std::string& text() const noexcept { return text_; }
+
+ private:
+  void line(std::string_view suffix, const Labels& labels, std::string_view value);
+
+  std::string name_;
+  std::string text_;
+};
+
+/// Where the numbers come from; all of it is atomic, fixed after start or behind a lock.
+struct MetricsSources {
+  const Counters* counters = nullptr;
+  const FrameTimes* times = nullptr;
+  std::span<const ClientCounts> clients;
+  const StatusBoard* board = nullptr;
+  std::vector<std::pair<std::string, const DutyCycle*>> agents;  ///< by name
+  MetricsText::Labels build;                                     ///< labels of emitd_build_info
+};
+/// What changes with the moment.
+struct MetricsMoment {
+  std::uint64_t run_id = 0;
+  bool ready = false;
+  std::int64_t uptime_ns = 0;
+};
+
+[[nodiscard]] std::string metrics_text(const MetricsSources& sources, const MetricsMoment& moment);
+
+}  // namespace emit::server

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// UDP fragments put together to frames. Input: datagrams, each behind a byte of instructions and
+// its length (u16). Bits of the byte: 1 seal the frame header in front (its checksum is made
+// right), 2 seal the one at the end, 4 take what is finished, 8 flush.
+#include <cmath>
+#include <vector>
+
+#include "emit/protocol/reassembler.hpp"
+#include "fuzz/frame_seal.hpp"
+#include "fuzz/fuzz_input.hpp"
+
+namespace {
+
+using namespace emit;
+
+constexpr std::uint32_t kMaxPayloadBytes = 4096;
+
+void check(const protocol::ReceivedFrame& frame) {
+  const auto& header = frame.header;
+  fuzz::require(frame.pixels.size() == std::size_t{header.width_px} * header.height_px &&
+                    frame.pixels.size_bytes() <= kMaxPayloadBytes,
+                "a frame has the pixels of its header");
+  std::uint64_t missing = 0;
+  for (std::size_t i = 0; i < frame.pixels.size(); ++i) {
+    if (frame.validity.pixel(i)) continue;
+    ++missing;
+    fuzz::require(frame.pixels[i] == 0.0F, "missing pixels are 0");
+  }
+  fuzz::require(missing == frame.missing_px, "missing pixels are counted");
+  fuzz::require(frame.complete == (missing == 0), "complete: nothing is missing");
+  fuzz::require(((header.flags & protocol::kFlagPartial) != 0) == !frame.complete,
+                "partial frames are flagged");
+  fuzz::require(frame.complete || !frame.crc_ok, "only complete frames have a checksum");
+  fuzz::require(frame.validity.all(0, frame.pixels.size()) == frame.complete,
+                "rows tell the same as pixels");
+}
+
+void drain(protocol::Reassembler& reassembler) {
+  while (const protocol::ReceivedFrame* frame = reassembler.pop()) {
+    check(*frame);
+    reassembler.release(frame);
+  }
+}
+
+}  // namespace
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  protocol::Reassembler::Params params;
+  params.max_payload_bytes = kMaxPayloadBytes;
+  params.buffers = 3;
+  params.max_streams = 2;
+  protocol::Reassembler reassembler(params);
+  fuzz::InputReader input(fuzz::as_bytes(data, size));
+  std::uint64_t pushed = 0;
+  while (!input.empty()) {
+    const auto instructions = input.number<std::uint8_t>();
+    const auto piece = input.bytes(input.number<std::uint16_t>());
+    std::vector<std::byte> datagram(piece.begin(), piece.end());
+    const std::span<std::byte> bytes(datagram);
+    if ((instructions & 1u) != 0 && bytes.size() > protocol::kFragmentHeaderBytes) {
+      fuzz::seal_frame_header(bytes.subspan(protocol::kFragmentHeaderBytes));
+    }
+    if ((instructions & 2u) != 0 && bytes.size() > protocol::kFrameHeaderBytes) {
+      fuzz::seal_frame_header(bytes.last(protocol::kFrameHeaderBytes));
+    }
+    static_cast<void>(reassembler.push(datagram));
+    ++pushed;
+    if ((instructions & 8u) != 0) reassembler.flush();
+    if ((instructions & 4u) != 0) drain(reassembler);
+  }
+  reassembler.flush();
+  drain(reassembler);
+  std::uint64_t counted = 0;
+  for (const std::uint64_t count : reassembler.counters().fragments) counted += count;
+  fuzz::require(counted == pushed, "every datagram is counted once");
+  return 0;
+}

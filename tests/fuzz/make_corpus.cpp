@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writes the binary seeds of corpus/: make_corpus FOLDER. Seeds made of text lie there as they are,
+// and so does what once was a finding (regression_*).
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "emit/image/exr_image.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/protocol/record/log.hpp"
+#include "emit/scenegen/generate.hpp"
+#include "emit/v1/control.pb.h"
+#include "fuzz/state_world.hpp"
+#include "protocol/frames.hpp"
+#include "protocol/host_frames.hpp"
+
+namespace {
+
+using namespace emit;
+namespace fs = std::filesystem;
+using Bytes = std::vector<std::byte>;
+
+fs::path root;
+
+fs::path seed(const char* target, const char* name) {
+  fs::create_directories(root / target);
+  return root / target / name;
+}
+
+void write(const char* target, const char* name, std::span<const std::byte> bytes) {
+  std::ofstream out(seed(target, name), std::ios::binary);
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
+}
+
+void append(Bytes& out, std::span<const std::byte> more) {
+  out.insert(out.end(), more.begin(), more.end());
+}
+template <class T>
+void append_number(Bytes& out, T value, bool big_endian = false) {
+  Bytes bytes(sizeof value);
+  std::memcpy(bytes.data(), &value, sizeof value);
+  if (big_endian) std::reverse(bytes.begin(), bytes.end());
+  append(out, bytes);
+}
+
+Bytes host_frame(std::uint32_t entities) {
+  protocol::HostFrameEncoder encoder;
+  const auto encoded = encoder.encode(*test::make_host_frame(entities));
+  return {encoded.begin(), encoded.end()};
+}
+
+Bytes record(protocol::RecordKind kind, std::span<const std::byte> body) {
+  Bytes out(protocol::kRecordHeaderBytes);
+  protocol::encode_record_header(kind, static_cast<std::uint32_t>(body.size()),
+                                 std::span(out).first<protocol::kRecordHeaderBytes>());
+  append(out, body);
+  return out;
+}
+
+Bytes record(const v1::ControlRecord& message) {
+  Bytes out;
+  protocol::append_control_record(message, out);
+  return out;
+}
+
+Bytes frame_record(std::uint64_t number) {
+  const test::Frame frame = test::make_frame(4, 3, number);
+  Bytes body(frame.header_bytes.begin(), frame.header_bytes.end());
+  append(body, frame.pixels);
+  return record(protocol::RecordKind::frame, body);
+}
+
+void fill(v1::ChannelInfo& channel) {
+  channel.set_name("lwir");
+  channel.set_kind("injection");
+  channel.set_sensor("seeker");
+  channel.set_band("8-12");
+  channel.set_band_lo_um(8.0);
+  channel.set_band_hi_um(12.0);
+  channel.set_width_px(4);
+  channel.set_height_px(3);
+  for (const double at_um : {8.0, 10.0, 12.0}) {
+    channel.add_response_um(at_um);
+    channel.add_response_frac(at_um == 10.0 ? 1.0 : 0.5);
+  }
+}
+
+v1::ControlRecord hello(v1::Hello::Role role) {
+  v1::ControlRecord out;
+  out.mutable_hello()->set_protocol_version(protocol::kProtocolVersion);
+  out.mutable_hello()->set_software("seed");
+  out.mutable_hello()->set_role(role);
+  return out;
+}
+v1::ControlRecord welcome() {
+  v1::ControlRecord out;
+  out.mutable_welcome()->set_protocol_version(protocol::kProtocolVersion);
+  out.mutable_welcome()->set_scenario("airfield");
+  out.mutable_welcome()->set_run_id(7);
+  fill(*out.mutable_welcome()->add_channels());
+  return out;
+}
+v1::ControlRecord subscribe(std::uint32_t udp_port, const char* group) {
+  v1::ControlRecord out;
+  out.mutable_subscribe()->set_band("8-12");
+  out.mutable_subscribe()->set_udp_port(udp_port);
+  out.mutable_subscribe()->set_multicast_group(group);
+  return out;
+}
+v1::ControlRecord subscribed() {
+  v1::ControlRecord out;
+  fill(*out.mutable_subscribed()->mutable_channel());
+  out.mutable_subscribed()->set_stream_id(1);
+  return out;
+}
+v1::ControlRecord status() {
+  v1::ControlRecord out;
+  out.mutable_status()->set_code(v1::Status::CODE_UNKNOWN_ENTITY);
+  out.mutable_status()->set_text("unknown entity 3");
+  out.mutable_status()->set_count(2);
+  return out;
+}
+v1::ControlRecord command(v1::Command::Kind kind) {
+  v1::ControlRecord out;
+  out.mutable_command()->set_kind(kind);
+  return out;
+}
+v1::JournalEntry decision() {
+  v1::JournalEntry out;
+  out.set_sequence(3);
+  out.set_wall_time_ns(1'000'000'000);
+  v1::FrameDecision& frame = *out.mutable_frame();
+  frame.set_frame_number(1);
+  frame.set_radiance_crc32c(77);
+  frame.set_rendered(true);
+  const auto host = test::make_host_frame(3);
+  protocol::to_proto(host->seeker, host->seeker_rates, *frame.mutable_sensor_pose());
+  for (const auto& entity : host->entity_span()) protocol::to_proto(entity, *frame.add_entities());
+  return out;
+}
+v1::JournalEntry run_start() {
+  v1::JournalEntry out;
+  out.set_sequence(1);
+  out.mutable_run_start()->set_run_id(7);
+  out.mutable_run_start()->set_scenario_name("airfield");
+  return out;
+}
+v1::ControlRecord journal(const v1::JournalEntry& entry) {
+  v1::ControlRecord out;
+  *out.mutable_journal() = entry;
+  return out;
+}
+
+Bytes joined(std::initializer_list<Bytes> parts) {
+  Bytes out;
+  for (const Bytes& part : parts) append(out, part);
+  return out;
+}
+/// As the targets receiver and fragments take their input.
+Bytes piece(std::uint8_t instructions, const Bytes& bytes) {
+  Bytes out{std::byte{instructions}};
+  append_number(out, static_cast<std::uint16_t>(bytes.size()));
+  append(out, bytes);
+  return out;
+}
+
+void make_network_seeds() {
+  write("host_datagram", "plain", host_frame(0));
+  write("host_datagram", "entities", host_frame(5));
+
+  v1::ControlRecord wrapped;
+  protocol::to_proto(*test::make_host_frame(1), *wrapped.mutable_host_frame());
+  Bytes stream{std::byte{31}};
+  append(stream, record(hello(v1::Hello::ROLE_HOST)));
+  append(stream, record(protocol::RecordKind::host_frame, host_frame(2)));
+  append(stream, record(wrapped));
+  append(stream, frame_record(1));
+  append(stream, record(static_cast<protocol::RecordKind>(9), host_frame(0)));
+  write("record_stream", "mixed", stream);
+
+  const std::pair<const char*, v1::ControlRecord> messages[] = {
+      {"hello", hello(v1::Hello::ROLE_CLIENT)},
+      {"welcome", welcome()},
+      {"subscribe", subscribe(7002, "239.1.2.3")},
+      {"subscribed", subscribed()},
+      {"command", command(v1::Command::KIND_STEP)},
+      {"host_frame", wrapped},
+      {"status", status()},
+      {"journal_decision", journal(decision())},
+      {"journal_run_start", journal(run_start())}};
+  for (const auto& [name, message] : messages) {
+    const Bytes wire = record(message);
+    write("control_record", name, std::span(wire).subspan(protocol::kRecordHeaderBytes));
+  }
+
+  const Bytes tcp{std::byte{0}};
+  const Bytes udp{std::byte{1}};
+  write("frame_client", "two_frames",
+        joined({tcp, record(welcome()), record(subscribed()), record(status()), frame_record(1),
+                frame_record(3)}));
+  write("frame_client", "udp",
+        joined({udp, record(welcome()), record(subscribed()), record(status())}));
+  v1::ControlRecord huge = subscribed();
+  huge.mutable_subscribed()->mutable_channel()->set_width_px(~0u);
+  huge.mutable_subscribed()->mutable_channel()->set_height_px(~0u);
+  write("frame_client", "udp_huge_channel", joined({udp, record(welcome()), record(huge)}));
+  write("frame_client", "refused", joined({tcp, record(status())}));
+  write("host_client", "answers", joined({record(welcome()), record(status()), record(status())}));
+  write("recorder_client", "journal",
+        joined({record(welcome()), record(journal(run_start())), record(journal(decision()))}));
+
+  const Bytes host = record(hello(v1::Hello::ROLE_HOST));
+  const Bytes client = record(hello(v1::Hello::ROLE_CLIENT));
+  write("receiver", "host",
+        joined({piece(0, host), piece(0, record(protocol::RecordKind::host_frame, host_frame(1))),
+                piece(4, record(command(v1::Command::KIND_HOLD))), piece(0, record(wrapped))}));
+  write("receiver", "client_tcp", joined({piece(0, client), piece(0, record(subscribe(0, "")))}));
+  write("receiver", "client_udp",
+        joined({piece(0, client), piece(0, record(subscribe(7002, ""))), piece(2, client)}));
+  write("receiver", "client_group",
+        joined({piece(0, client), piece(0, record(subscribe(7002, "239.1.2.3")))}));
+  write("receiver", "recorder", piece(0, record(hello(v1::Hello::ROLE_RECORDER))));
+  write("receiver", "datagrams", joined({piece(1, host_frame(0)), piece(1, host_frame(2))}));
+}
+
+void make_fragment_seeds() {
+  Bytes whole;
+  Bytes lossy;
+  for (std::uint32_t id = 1; id <= 2; ++id) {
+    const test::Frame frame = test::make_frame(16, 12, id);
+    protocol::Fragmenter::Params params;
+    params.stream_id = 1;
+    params.frame_id = id;
+    params.sim_time_ns = frame.header.sim_time_ns;
+    params.row_bytes = 64;
+    params.max_payload_bytes = 400;
+    const protocol::Fragmenter cut(params, frame.header_bytes, frame.pixels);
+    for (std::uint32_t i = 0; i < cut.fragment_count(); ++i) {
+      std::array<std::byte, protocol::kFragmentHeaderBytes> memory{};
+      const auto pieces = cut.pieces(i, memory);
+      Bytes datagram;
+      for (std::uint32_t k = 0; k < pieces.count; ++k) append(datagram, pieces.piece[k]);
+      const auto instructions = static_cast<std::uint8_t>(i == 0 ? 1 : 2);
+      append(whole, piece(instructions, datagram));
+      if (i != id) append(lossy, piece(static_cast<std::uint8_t>(instructions | 4), datagram));
+    }
+  }
+  write("fragments", "whole", whole);
+  write("fragments", "lossy", lossy);
+}
+
+void make_log_seeds() {
+  for (const auto& [name, chunk_bytes] :
+       {std::pair("chunks.mcap", 1024u), std::pair("plain.mcap", 0u)}) {
+    protocol::LogWriterOptions options;
+    options.chunk_bytes = chunk_bytes;
+    auto writer = protocol::LogWriter::create(seed("mcap_log", name), options);
+    if (!writer) std::abort();
+    const auto frame = test::make_host_frame(1);
+    for (std::uint64_t i = 1; i <= 2; ++i) {
+      frame->frame_number = i;
+      static_cast<void>(writer->write_host(*frame, static_cast<std::int64_t>(i) * 5'000'000));
+      static_cast<void>(writer->write_journal(decision()));
+    }
+    static_cast<void>(writer->close());
+  }
+}
+
+Bytes ipv4_udp(const Bytes& payload) {
+  const auto size = [](std::size_t bytes) { return static_cast<std::uint16_t>(bytes); };
+  Bytes out;
+  append_number(out, std::uint16_t{0x4500}, true);
+  append_number(out, size(28 + payload.size()), true);
+  append_number(out, std::uint32_t{0x00074000}, true);
+  append_number(out, std::uint32_t{0x40110000}, true);
+  append_number(out, std::uint32_t{0x7F000001}, true);
+  append_number(out, std::uint32_t{0x7F000001}, true);
+  append_number(out, std::uint16_t{40000}, true);
+  append_number(out, std::uint16_t{7001}, true);
+  append_number(out, size(8 + payload.size()), true);
+  append_number(out, std::uint16_t{0}, true);
+  append(out, payload);
+  return out;
+}
+
+void make_capture_seeds() {
+  const Bytes packet = ipv4_udp(host_frame(1));
+  Bytes pcap;
+  for (const std::uint32_t word : {0xA1B2C3D4u, 0x00040002u, 0u, 0u, 262144u, 101u}) {
+    append_number(pcap, word);
+  }
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    for (const std::uint32_t word : {1'700'000'000u, i, 0u, 0u}) append_number(pcap, word);
+    const auto bytes = static_cast<std::uint32_t>(packet.size());
+    std::memcpy(pcap.data() + pcap.size() - 8, &bytes, 4);
+    std::memcpy(pcap.data() + pcap.size() - 4, &bytes, 4);
+    append(pcap, packet);
+  }
+  write("pose_pcap", "raw.pcap", pcap);
+
+  Bytes pcapng;
+  const auto block = [&pcapng](std::uint32_t type, Bytes content) {
+    content.resize((content.size() + 3) / 4 * 4);
+    const auto bytes = static_cast<std::uint32_t>(content.size() + 12);
+    append_number(pcapng, type);
+    append_number(pcapng, bytes);
+    append(pcapng, content);
+    append_number(pcapng, bytes);
+  };
+  const auto words = [](std::initializer_list<std::uint32_t> values) {
+    Bytes out;
+    for (const std::uint32_t value : values) append_number(out, value);
+    return out;
+  };
+  block(0x0A0D0D0A, words({0x1A2B3C4D, 1, ~0u, ~0u}));
+  block(1, words({101, 0}));
+  const auto bytes = static_cast<std::uint32_t>(packet.size());
+  block(6, joined({words({0, 0x50000, 0x1234, bytes, bytes}), packet}));
+  write("pose_pcap", "raw.pcapng", pcapng);
+}
+
+void make_image_seeds() {
+  image::ExrImage picture;
+  picture.width_px = 8;
+  picture.height_px = 6;
+  std::vector<float> pixels(48);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<float>(i) * 0.25F;
+  picture.add(image::kRadianceChannel, pixels);
+  picture.add(image::kTemperatureChannel, pixels);
+  image::FrameMetadata metadata;
+  metadata.frame_number = 42;
+  metadata.band_name = "8-12";
+  metadata.band_lo_um = 8.0;
+  metadata.band_hi_um = 12.0;
+  metadata.band_response = {{8.0, 0.5}, {10.0, 1.0}, {12.0, 0.5}};
+  image::set_frame_metadata(picture, metadata);
+  if (!image::write_exr(seed("exr", "frame.exr"), picture)) std::abort();
+}
+
+void make_scene_seeds() {
+  scenegen::GenerateOptions options;
+  options.kind = scenegen::SceneKind::box;
+  options.directory = seed("gltf", "");
+  if (!scenegen::generate(options)) std::abort();
+}
+
+void make_state_seeds() {
+  const scene::SceneGeometry geometry = fuzz::state_geometry();
+  renderer::SurfaceModel model;
+  renderer::SurfaceModelOptions options;
+  model.meshes.emplace_back(geometry.meshes[0], options.max_samples);
+  static_cast<void>(model.meshes[0].split(std::vector<std::uint32_t>{0, 3}));
+  model.drawn_samples = static_cast<std::uint32_t>(model.meshes[0].vertices().size());
+  model.first_sample = {0};
+  for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
+    renderer::SurfaceSample sample;
+    sample.material = i % 3;
+    sample.mover = static_cast<std::int32_t>(i % 3) - 1;
+    sample.first_seen = i;
+    sample.seen_count = 1;
+    model.samples.samples.push_back(sample);
+    model.samples.seen.push_back({model.drawn_samples - 1 - i, 0.5F});
+    model.states.emplace_back();
+    model.outputs.emplace_back();
+  }
+  if (!renderer::write_state(seed("state_file", "split.emitstate"), fuzz::state_key(), model)) {
+    std::abort();
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: %s FOLDER\n", argv[0]);
+    return 2;
+  }
+  root = argv[1];
+  make_network_seeds();
+  make_fragment_seeds();
+  make_log_seeds();
+  make_capture_seeds();
+  make_image_seeds();
+  make_scene_seeds();
+  make_state_seeds();
+  return 0;
+}

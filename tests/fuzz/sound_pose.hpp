@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cmath>
+
+#include "emit/protocol/codec.hpp"
+#include "fuzz/fuzz_input.hpp"
+
+/// What a host frame that was accepted promises.
+namespace emit::fuzz {
+
+inline void require_sound(const physics::Pose& pose) {
+  const auto& p = pose.position_world_m;
+  const auto& q = pose.world_from_body;
+  const double norm = std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+  for (const double coordinate_m : {p.x, p.y, p.z}) {
+    require(std::abs(coordinate_m) <= protocol::kMaxPositionM, "positions are within the limit");
+  }
+  require(std::abs(norm - 1.0) < 1e-9, "attitudes are unit quaternions");
+}
+
+inline void require_sound(const protocol::HostFrameData& frame) {
+  require(std::abs(frame.sim_time_ns) <= protocol::kMaxSimTimeNs, "sim times are within the limit");
+  require(frame.entity_count <= protocol::kMaxEntitiesPerFrame, "entities fit");
+  require_sound(frame.seeker);
+  for (const auto& entity : frame.entity_span()) {
+    if (entity.has_pose) require_sound(entity.pose);
+  }
+  if (frame.environment) {
+    require(std::isfinite(frame.environment->air_k), "the weather is made of numbers");
+  }
+}
+
+}  // namespace emit::fuzz
