@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scene files (.glb, .gltf), and what loading a scene does with their meshes.
 #include <cmath>
+#include <span>
 
 #include "emit/scene/clusters.hpp"
 #include "emit/scene/gltf_import.hpp"
