@@ -46,6 +46,8 @@ TEST(CliReceive, shared_memory_works_like_every_other_transport) {
   const ProcessResult nobody = run_emit({"receive", "shm://" + name + "-x"});
   EXPECT_EQ(nobody.exit_code, 1);
   EXPECT_NE(nobody.err.find("no emitd on this host"), std::string::npos) << nobody.err;
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
 }
 
 }  // namespace

@@ -172,6 +172,8 @@ TEST(DaemonShm, AtItsOwn200HzWhatAReaderMissedIsAnnounced) {
   EXPECT_GT(counters.gaps, 0U) << "40 frames were overwritten while it slept";
   EXPECT_EQ(counters.received + counters.skipped, newest - first + 1)
       << "received and announced skips account for every frame number";
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
 }
 
 TEST(DaemonShm, AKilledDaemonIsNoticedAndItsSuccessorTakesTheNameOver) {
