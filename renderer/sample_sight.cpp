@@ -37,8 +37,8 @@ physics::Result<SampleSight> sight_of_sample(const scene::SceneGeometry& geometr
   }
   const SphereShares shares = sphere.of_face(*casters, point, everything);
   sight.sphere_frac = static_cast<double>(shares.sky_frac) + shares.far_frac;
-  const SurfaceView view = ViewSampler(kSampleViewRays).view(*casters, point, everything);
-  sight.cosine_frac = static_cast<double>(view.sky_frac) + view.far_frac;
+  const ViewShares open = ViewSampler(kSampleSkyRays).shares(*casters, point, everything);
+  sight.cosine_frac = static_cast<double>(open.sky_frac) + open.far_frac;
   SurfaceSample sample;
   sample.position_m = point.position_m;
   sample.normal = point.normal;

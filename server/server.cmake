@@ -22,7 +22,7 @@ target_include_directories(emit_client PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
 target_compile_definitions(emit_client PUBLIC BOOST_ASIO_SEPARATE_COMPILATION BOOST_ASIO_NO_DEPRECATED)
 target_link_libraries(emit_client
   PUBLIC emit::physics emit::protocol Threads::Threads
-  PRIVATE fmt::fmt emit_options)
+  PRIVATE emit::config fmt::fmt emit_options)
 
 # emit::server: everything of the daemon but main(), linked by emitd, emit and the tests.
 add_library(emit_server STATIC

@@ -48,13 +48,14 @@ SampleHeat heat_of(const scene::ThermalOptions& options, std::span<const scene::
 
 CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
                              std::vector<std::int32_t> mover_of_object,
-                             std::span<const FosterMaterial> networks, CasterRays rays,
-                             double reference_k)
+                             std::span<const FosterMaterial> networks, CasterRays places,
+                             std::optional<SurfaceDetail> detail, double reference_k)
     : geometry_(std::move(geometry)),
       materials_(geometry_.materials),
       options_(scenario.thermal),
       mover_of_object_(std::move(mover_of_object)),
-      rays_(std::move(rays)),
+      places_(std::move(places)),
+      detail_(std::move(detail)),
       extended_(scenario.thermal.model == scene::ThermalModel::foster),
       heat_(heat_of(scenario.thermal, materials_, networks, reference_k)),
       interval_(heat_.sized_interval()),
@@ -69,7 +70,8 @@ physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
     std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
     double reference_k, std::optional<SurfaceDetail> detail) {
-  auto rays = CasterRays::create(geometry);
+  auto rays = CasterRays::create(
+      geometry, detail ? std::optional(detail->rays().origin_world_m()) : std::nullopt);
   if (!rays) return tl::unexpected(std::move(rays.error()));
   // Entities and what shades must be numbered alike.
   std::size_t mover = 0;
@@ -82,11 +84,9 @@ physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     }
     ++mover;
   }
-  std::unique_ptr<CachedSurface> surface(new CachedSurface(scenario, std::move(geometry),
-                                                           std::move(mover_of_object), networks,
-                                                           std::move(*rays), reference_k));
-  surface->detail_ = std::move(detail);
-  return surface;
+  return std::unique_ptr<CachedSurface>(
+      new CachedSurface(scenario, std::move(geometry), std::move(mover_of_object), networks,
+                        std::move(*rays), std::move(detail), reference_k));
 }
 
 void CachedSurface::place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities) {
@@ -94,7 +94,7 @@ void CachedSurface::place_movers(std::int64_t now_ns, std::span<const PoseHistor
   for (std::size_t m = 0; m < entities.size(); ++m) {
     const TrajectoryState state = entities[m].at(now_ns);
     movers_now_[m] = {glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
-                      glm::vec3(state.pose.position_world_m - rays_.origin_world_m()), state.on};
+                      glm::vec3(state.pose.position_world_m - rays().origin_world_m()), state.on};
   }
 }
 
@@ -150,10 +150,10 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   history.update(plan, inputs.environment);
   const HistoryRecord record =
       make_history_record(plan, history, heat_, inputs.environment, inputs.entities,
-                          *interval_rays_, rays_.origin_world_m());
-  const SurfaceInputs surface{geometry_, materials_,  mover_of_object_,
-                              rays_,     heat_,       history,
-                              record,    movers_now_, detail_ ? &*detail_ : nullptr};
+                          *interval_rays_, rays().origin_world_m());
+  const SurfaceInputs surface{
+      geometry_, materials_, mover_of_object_, rays(),      places_,
+      heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr};
   SurfaceModelOptions options;
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
@@ -203,7 +203,7 @@ void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
   to.surroundings = history.surroundings();
   heat_.prepare(interval_);
   interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment, inputs.entities,
-                         rays_.origin_world_m());
+                         rays().origin_world_m());
   done_ = 0;
 }
 
@@ -217,8 +217,8 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
     for (std::size_t i = first + begin; i < first + end; ++i) {
       const SurfaceSample& sample = all.samples[i];
       SampleDrive drive;
-      drive.sun_frac = interval_rays_->sun_frac(rays_, sample, offset_m_, 0.0F);
-      drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays_, sample, offset_m_);
+      drive.sun_frac = interval_rays_->sun_frac(rays(), sample, offset_m_, 0.0F);
+      drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays(), sample, offset_m_);
       for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
         const SeenSample& seen = all.seen[sample.first_seen + k];
         const SampleOutput& other = from.outputs[seen.sample];

@@ -105,7 +105,7 @@ class CachedSurface {
  private:
   CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
                 std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
-                CasterRays rays, double reference_k);
+                CasterRays places, std::optional<SurfaceDetail> detail, double reference_k);
 
   /// What one node of time needs to go on from.
   struct Node {
@@ -129,13 +129,17 @@ class CachedSurface {
   void compute(std::size_t node, std::uint32_t last) noexcept;
   void rotate() noexcept { ring_ = (ring_ + 1) % 3; }
   [[nodiscard]] std::uint64_t revision(const Inputs& inputs) const noexcept;
+  /// What shades.
+  [[nodiscard]] const CasterRays& rays() const noexcept {
+    return detail_ ? detail_->rays() : places_;
+  }
   [[nodiscard]] Node& node(std::size_t index) noexcept { return nodes_[storage(index)]; }
 
   scene::SceneGeometry geometry_;
   std::vector<scene::Material> materials_;
   scene::ThermalOptions options_;
   std::vector<std::int32_t> mover_of_object_;
-  CasterRays rays_;
+  CasterRays places_;
   std::optional<SurfaceDetail> detail_;
   bool extended_ = false;  ///< thermal.model foster
   SampleHeat heat_;

@@ -82,7 +82,8 @@ CasterRays::CasterRays(CasterRays&&) noexcept = default;
 CasterRays& CasterRays::operator=(CasterRays&&) noexcept = default;
 CasterRays::~CasterRays() = default;
 
-Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry) {
+Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
+                                      const std::optional<glm::dvec3>& origin_world_m) {
   auto impl = std::make_unique<Impl>();
   impl->device.reset(rtcNewDevice(nullptr));
   if (!impl->device) {
@@ -110,7 +111,8 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry) {
       moving[instance.object].push_back(part);
     }
   }
-  impl->origin_world_m = centre(bounds_of(fixed.empty() ? everything : fixed));
+  impl->origin_world_m =
+      origin_world_m ? *origin_world_m : centre(bounds_of(fixed.empty() ? everything : fixed));
 
   auto set = CasterSet::create(impl->device.get(), fixed, impl->origin_world_m);
   if (!set) return tl::unexpected(std::move(set.error()).with_context("static geometry"));

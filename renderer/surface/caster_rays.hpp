@@ -62,15 +62,19 @@ class CasterRays {
   static constexpr std::size_t kMaxRays = 16;  ///< of one call
 
   /// Takes instances with entity_id 0 by world_from_mesh and the others by body_from_mesh. Setup
-  /// only; seconds for 1e7 triangles.
+  /// only; seconds for 1e7 triangles. `origin_world_m`: where another one's is the same; none: the
+  /// centre of the geometry.
   /// Errors: invalid_argument (an index out of range, more than 2^31 triangles or a scene wider
   /// than 1e8 m), internal (Embree ran out of memory).
-  [[nodiscard]] static physics::Result<CasterRays> create(const scene::SceneGeometry& geometry);
+  [[nodiscard]] static physics::Result<CasterRays> create(
+      const scene::SceneGeometry& geometry,
+      const std::optional<glm::dvec3>& origin_world_m = std::nullopt);
   CasterRays(CasterRays&&) noexcept;
   CasterRays& operator=(CasterRays&&) noexcept;
   ~CasterRays();
 
-  /// Centre of the static geometry's box, or of everything's where nothing is static.
+  /// As asked for; else the centre of the static geometry's box, or of everything's where nothing
+  /// is static.
   [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept;
   /// Moving objects that own an instance, ascending by Instance::object.
   [[nodiscard]] std::size_t movers() const noexcept;

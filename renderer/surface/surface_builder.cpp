@@ -42,8 +42,9 @@ class Builder {
   /// Gives every vertex that has no sample yet one; false when stopped.
   bool sample_new_vertices(double begin_frac, double end_frac);
   void find_inward(std::uint32_t mesh);
-  /// Vertices from `first` on face as the surface did before it was simplified.
-  void adopt_normals(std::uint32_t mesh, std::uint32_t first);
+  /// Vertices from `first` on face as the surface did before it was simplified, and their samples
+  /// lie on it.
+  void adopt_detail(std::uint32_t mesh, std::uint32_t first);
   /// Makes covered samples next to open ones copies of those: nobody sees them, but triangles that
   /// a foot cuts would show a mixture of both.
   void replace_covered();
@@ -57,9 +58,11 @@ class Builder {
   SurfaceRefinement refinement_;
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
-  std::vector<glm::vec3> inward_;  ///< by vertex of the mesh at hand
+  // By vertex of the mesh at hand:
+  std::vector<glm::vec3> inward_;
+  std::vector<glm::vec3> place_m_;  ///< of its samples
   std::vector<Job> jobs_;
-  std::vector<glm::vec3> job_inward_;
+  std::vector<SampleStand> job_stand_;
 };
 
 void Builder::make_patches() {
@@ -104,10 +107,12 @@ void Builder::find_inward(std::uint32_t mesh) {
   }
 }
 
-void Builder::adopt_normals(std::uint32_t mesh, std::uint32_t first) {
-  if (in_.detail == nullptr || !in_.detail->has(mesh)) return;
+void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
   RefinedMesh& refined = model_.meshes[mesh];
   const auto vertices = refined.vertices();
+  place_m_.clear();
+  for (const RefinedMesh::Vertex& vertex : vertices) place_m_.push_back(vertex.position_m);
+  if (in_.detail == nullptr || !in_.detail->has(mesh)) return;
   run_parallel(vertices.size() - first, kGrain, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = first + from; i < first + to; ++i) {
       const RefinedMesh::Vertex& vertex = vertices[i];
@@ -116,16 +121,17 @@ void Builder::adopt_normals(std::uint32_t mesh, std::uint32_t first) {
                                          vertices[vertex.parent[1]].position_m);
       // On a crease, of the face that the vertex belongs to.
       const glm::vec3 place_m = vertex.position_m + kOffCreaseFrac * edge_m * inward_[i];
-      const auto normal =
-          in_.detail->normal(mesh, place_m, vertex.normal, kDetailReachFrac * edge_m);
-      if (normal) refined.set_normal(static_cast<std::uint32_t>(i), *normal);
+      const auto full = in_.detail->place(mesh, place_m, vertex.normal, kDetailReachFrac * edge_m);
+      if (!full) continue;
+      refined.set_normal(static_cast<std::uint32_t>(i), full->normal);
+      place_m_[i] = full->position_m;
     }
   });
 }
 
 bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   jobs_.clear();
-  job_inward_.clear();
+  job_stand_.clear();
   const std::size_t intervals = in_.record.size();
   const bool movers = !in_.movers_now.empty();
   for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
@@ -137,7 +143,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       const auto first = static_cast<std::uint32_t>(patch.samples.size());
       if (!looked) {
         find_inward(mesh);
-        adopt_normals(mesh, first);
+        adopt_detail(mesh, first);
       }
       looked = true;
       patch.samples.resize(vertices.size());
@@ -145,6 +151,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       patch.states.resize(vertices.size());
       patch.outputs.resize(vertices.size());
       patch.surplus_k.resize(vertices.size(), -1.0F);
+      patch.to_sky.resize(vertices.size());
       patch.sun_frac.resize(vertices.size() * intervals);
       if (movers) patch.hidden_sky_frac.resize(vertices.size() * intervals);
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
@@ -152,14 +159,16 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
         const float length = glm::length(inward);
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
-        sample.position_m =
-            glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F)) +
-            sampler_.offset_m() * unit_inward;
+        const glm::vec3 off_edge_m = sampler_.offset_m() * unit_inward;
+        const auto to_rel = [&](const glm::vec3& at_m) {
+          return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
+        };
+        sample.position_m = to_rel(place_m_[v]);
         sample.normal = glm::normalize(patch.normal_from_mesh * vertices[v].normal);
         sample.mover = patch.mover;
         sample.material = vertices[v].material;
         jobs_.push_back({p, v});
-        job_inward_.push_back(unit_inward);
+        job_stand_.push_back({to_rel(vertices[v].position_m), unit_inward});
       }
     }
   }
@@ -169,7 +178,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
     const std::size_t end = std::min(jobs_.size(), begin + kSlice);
     run_parallel(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
       for (std::size_t j = begin + from; j < begin + to; ++j) {
-        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_inward_[j]);
+        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_stand_[j]);
       }
     });
     const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());

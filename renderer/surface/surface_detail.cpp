@@ -19,33 +19,29 @@ SurfaceDetail::SurfaceDetail(scene::SceneGeometry full, CasterRays rays) noexcep
 
 physics::Result<SurfaceDetail> SurfaceDetail::create(scene::SceneGeometry full,
                                                      const scene::SceneGeometry& coarse) {
-  // One instance of every mesh that has lost triangles, where it stands; what else stands there
-  // would only be in the way.
+  // One instance of every mesh that has lost triangles, where it stands.
   std::vector<std::uint32_t> instance_of_mesh(coarse.meshes.size(), kNone);
-  std::vector<scene::Instance> kept;
-  for (const scene::Instance& instance : full.instances) {
-    const std::uint32_t mesh = instance.mesh;
-    if (instance.entity_id != 0 || instance_of_mesh[mesh] != kNone ||
-        coarse.meshes[mesh].indices.size() >= full.meshes[mesh].indices.size()) {
-      continue;
+  for (std::size_t i = 0; i < full.instances.size(); ++i) {
+    const std::uint32_t mesh = full.instances[i].mesh;
+    if (full.instances[i].entity_id == 0 && instance_of_mesh[mesh] == kNone &&
+        coarse.meshes[mesh].indices.size() < full.meshes[mesh].indices.size()) {
+      instance_of_mesh[mesh] = static_cast<std::uint32_t>(i);
     }
-    instance_of_mesh[mesh] = static_cast<std::uint32_t>(kept.size());
-    kept.push_back(instance);
-  }
-  full.instances = std::move(kept);
-  for (std::size_t mesh = 0; mesh < full.meshes.size(); ++mesh) {
-    if (instance_of_mesh[mesh] == kNone) full.meshes[mesh] = {};
   }
   auto rays = CasterRays::create(full);
   if (!rays) return tl::unexpected(std::move(rays.error()));
+  for (std::size_t mesh = 0; mesh < full.meshes.size(); ++mesh) {
+    if (instance_of_mesh[mesh] == kNone) full.meshes[mesh] = {};  // the rays have their own copy
+  }
   SurfaceDetail detail(std::move(full), std::move(*rays));
   detail.instance_of_mesh_ = std::move(instance_of_mesh);
   return detail;
 }
 
-std::optional<glm::vec3> SurfaceDetail::normal(std::uint32_t mesh, const glm::vec3& position_m,
-                                               const glm::vec3& normal,
-                                               float reach_m) const noexcept {
+std::optional<SurfaceDetail::Place> SurfaceDetail::place(std::uint32_t mesh,
+                                                         const glm::vec3& position_m,
+                                                         const glm::vec3& normal,
+                                                         float reach_m) const noexcept {
   const std::uint32_t index = instance_of_mesh_[mesh];
   const glm::dmat4& world_from_mesh = full_.instances[index].world_from_mesh;
   const glm::dvec3 to_world = glm::dmat3(world_from_mesh) * glm::dvec3(normal);
@@ -67,7 +63,8 @@ std::optional<glm::vec3> SurfaceDetail::normal(std::uint32_t mesh, const glm::ve
   const glm::vec3 sum = (1.0F - b.x - b.y) * corner(0) + b.x * corner(1) + b.y * corner(2);
   const float length = glm::length(sum);
   if (!(length > 0.0F) || glm::dot(sum, normal) < kLeastCos * length) return std::nullopt;
-  return sum / length;
+  const auto to_full = static_cast<float>((reach_rel_m - hit[0].distance_m) / scale);
+  return Place{position_m + to_full * normal, sum / length};
 }
 
 }  // namespace emit::renderer

@@ -10,11 +10,18 @@
 
 namespace emit::renderer {
 
-/// The surface as loaded, where what is drawn and sampled has fewer triangles: which way it faces
-/// between the vertices that are left. Half a degree is worth a tenth of a kelvin in the sun, which
-/// no bound on the surface's place holds. Immutable; any thread; queries allocate nothing.
+/// The scene as loaded, where what is drawn and sampled has fewer triangles: where its surface lies
+/// and which way it faces between the vertices that are left, and what it shades. Half a degree is
+/// worth a tenth of a kelvin in the sun, which no bound on the surface's place holds. Immutable;
+/// any thread; queries allocate nothing.
 class SurfaceDetail {
  public:
+  /// A point of the full surface, in axes of its mesh.
+  struct Place {
+    glm::vec3 position_m{0.0F};
+    glm::vec3 normal{0.0F};  ///< unit length
+  };
+
   /// `full` and `coarse` have the same instances; entities may not differ. Errors: those of
   /// CasterRays::create().
   [[nodiscard]] static physics::Result<SurfaceDetail> create(scene::SceneGeometry full,
@@ -25,12 +32,14 @@ class SurfaceDetail {
     return !instance_of_mesh_.empty() && instance_of_mesh_[mesh] != kNone;
   }
 
-  /// Normal of the full mesh next to a point of the coarse one, both in axes of the mesh, unit
-  /// length; none where the full surface lies farther than `reach_m` along the coarse normal or
-  /// faces elsewhere. @pre has(mesh)
-  [[nodiscard]] std::optional<glm::vec3> normal(std::uint32_t mesh, const glm::vec3& position_m,
-                                                const glm::vec3& normal,
-                                                float reach_m) const noexcept;
+  /// Where the full mesh lies next to a point of the coarse one, in axes of the mesh; none where
+  /// the full surface is farther than `reach_m` along the coarse normal, faces elsewhere or is
+  /// covered. @pre has(mesh)
+  [[nodiscard]] std::optional<Place> place(std::uint32_t mesh, const glm::vec3& position_m,
+                                           const glm::vec3& normal, float reach_m) const noexcept;
+
+  /// Against all of the full scene.
+  [[nodiscard]] const CasterRays& rays() const noexcept { return rays_; }
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffU;

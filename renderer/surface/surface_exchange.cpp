@@ -85,7 +85,7 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
     selection.movers = alone;
   }
   const ViewPoint point{own.position_m, own.normal, glm::vec3(0.0F), sampler_.offset_m()};
-  const AdjacentFaces adjacent = adjacent_faces(in_.rays, point, reach_m, selection);
+  const AdjacentFaces adjacent = adjacent_faces(in_.places, point, reach_m, selection);
   for (std::uint32_t k = 0; k < adjacent.count && found_[index].size() < kMaxPartners; ++k) {
     const glm::vec3 m = adjacent.faces[k].normal;
     const float x_m = std::max(adjacent.faces[k].distance_m, 0.0F);
@@ -98,7 +98,7 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
     const float lift_m = 20.0F * sampler_.offset_m();
     const CasterRay probe{at_m + lift_m * m, -m};
     std::array<CasterHit, 1> hit;
-    if (in_.rays.first_hits({&probe, 1}, selection, hit) == 0U ||
+    if (in_.places.first_hits({&probe, 1}, selection, hit) == 0U ||
         std::abs(hit[0].distance_m - lift_m) > 0.5F * lift_m || glm::dot(hit[0].normal, m) < 0.9F) {
       continue;
     }
@@ -119,7 +119,7 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
     // A body that stands on something: beside it, that something lies in the face's plane.
     const CasterRay beside{own.position_m + kBesideOffsets * sampler_.offset_m() * own.normal, m};
     found.sample.covered =
-        in_.rays.first_hits({&beside, 1}, selection, hit) != 0U &&
+        in_.places.first_hits({&beside, 1}, selection, hit) != 0U &&
         std::abs(hit[0].distance_m - x_m) < kBesideOffsets * sampler_.offset_m() &&
         glm::dot(hit[0].normal, m) < -0.9F;
     const auto weight = weights(own.material, x_m);
@@ -157,11 +157,13 @@ void Partners::add() {
   partners.seen.resize(count);
   partners.states.resize(count);
   partners.outputs.resize(count);
+  partners.to_sky.resize(count);
   partners.sun_frac.resize(count * intervals);
   if (!in_.movers_now.empty()) partners.hidden_sky_frac.resize(count * intervals);
   run_parallel(count, kGrain, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
-      sampler_.evaluate(partners, static_cast<std::uint32_t>(i), glm::vec3(0.0F));
+      sampler_.evaluate(partners, static_cast<std::uint32_t>(i),
+                        {partners.samples[i].position_m, glm::vec3(0.0F)});
     }
   });
   patches_.push_back(std::move(partners));

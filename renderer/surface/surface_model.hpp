@@ -50,7 +50,8 @@ struct SurfaceInputs {
   const scene::SceneGeometry& geometry;
   std::span<const scene::Material> materials;
   std::span<const std::int32_t> mover_of_object;  ///< -1: static
-  const CasterRays& rays;
+  const CasterRays& rays;                         ///< what shades, as loaded
+  const CasterRays& places;  ///< `geometry`, same origin: where on it a ray ends
   const SampleHeat& heat;
   const SurfaceHistory& history;
   const HistoryRecord& record;

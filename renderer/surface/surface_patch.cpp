@@ -23,7 +23,11 @@ constexpr float kUnderOffsets = 8.0F;
 }  // namespace
 
 PatchSampler::PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
-    : in_(inputs), options_(options), view_(kSampleViewRays), sphere_(kSampleViewRays) {
+    : in_(inputs),
+      options_(options),
+      view_(kSampleViewRays),
+      sky_(kSampleSkyRays),
+      sphere_(kSampleViewRays) {
   const scene::Aabb& bounds = inputs.geometry.bounds;
   if (!bounds.empty()) {
     const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);
@@ -41,9 +45,10 @@ SampleState PatchSampler::start_state(const SurfaceSample& sample) const noexcep
 }
 
 void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
-                               const glm::vec3& inward) const {
+                               const SampleStand& stand) const {
   SurfaceSample& sample = patch.samples[index];
-  ViewPoint point{sample.position_m, sample.normal, inward, offset_m_};
+  ViewPoint point{sample.position_m, sample.normal, stand.inward, offset_m_};
+  ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offset_m_};
   std::array<MoverPlacement, 1> self;
   CasterSelection selection{true, {}};
   std::vector<MoverPlacement> placed;
@@ -52,28 +57,47 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
     placed.assign(in_.movers_now.begin(), in_.movers_now.end());
     MoverPlacement& own = placed[static_cast<std::size_t>(sample.mover)];
     own.on = true;
-    point.position_m = own.rel_from_body * point.position_m + own.position_m;
-    point.normal = own.rel_from_body * point.normal;
-    point.inward = own.rel_from_body * point.inward;
+    for (ViewPoint* each : {&point, &drawn}) {
+      each->position_m = own.rel_from_body * each->position_m + own.position_m;
+      each->normal = own.rel_from_body * each->normal;
+      each->inward = own.rel_from_body * each->inward;
+    }
     selection.movers = placed;
   }
-  const SurfaceView view = view_.view(in_.rays, point, selection);
-  sample.sky_frac = view.sky_frac;
-  sample.far_frac = view.far_frac;
+  const ViewShares open = sky_.shares(in_.rays, point, selection);
+  sample.sky_frac = open.sky_frac;
+  sample.far_frac = open.far_frac;
+  patch.to_sky[index] = open.to_sky;
   if (in_.heat.sky_measure() == SkyMeasure::sphere) {
     sample.sphere_sky_frac = sphere_.of_face(in_.rays, point, selection).sky_frac;
   }
+  if (open.sky_frac + open.far_frac == 0.0F) {
+    const SurfaceView view = view_.view(in_.rays, point, selection);
+    const std::span<const SeenFace> faces(view.seen.data(), view.seen_count);
+    const bool inside_a_body =
+        std::ranges::none_of(faces, [](const SeenFace& face) { return face.front; });
+    sample.covered = sample.covered || inside_a_body;
+  }
+  if (options_.exchange) look_at_faces(patch, index, drawn, selection);
+  feel_along(patch, index, point, selection);
+}
+
+void PatchSampler::look_at_faces(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                                 const CasterSelection& selection) const {
+  const SurfaceView view = view_.view(in_.places, point, selection);
   std::vector<SeenPlace>& seen = patch.seen[index];
   seen.clear();
-  bool inside_a_body = view.sky_frac + view.far_frac == 0.0F;
+  float seen_frac = 0.0F;
   for (std::uint32_t i = 0; i < view.seen_count; ++i) {
     const SeenFace& face = view.seen[i];
     seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac});
-    inside_a_body = inside_a_body && !face.front;
+    seen_frac += face.weight_frac;
   }
-  sample.covered = sample.covered || inside_a_body;
-
-  feel_along(patch, index, point, selection);
+  // The shares that are open know better how much is left for faces.
+  SurfaceSample& sample = patch.samples[index];
+  if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
+  const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
+  for (SeenPlace& place : seen) place.weight_frac *= left_frac / seen_frac;
 }
 
 void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
@@ -138,8 +162,8 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
 }
 
 void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
-                            const glm::vec3& inward) const {
-  look_around(patch, index, inward);
+                            const SampleStand& stand) const {
+  look_around(patch, index, stand);
   SurfaceSample& sample = patch.samples[index];
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();

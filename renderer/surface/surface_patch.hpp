@@ -33,8 +33,15 @@ struct SurfacePatch {
   std::vector<SampleOutput> outputs;
   /// Difference from the mean of the vertex's parents, K; negative where it has none.
   std::vector<float> surplus_k;
+  std::vector<glm::vec3> to_sky;       ///< ViewShares::to_sky
   std::vector<float> sun_frac;         ///< by vertex, then interval
   std::vector<float> hidden_sky_frac;  ///< likewise; empty without entities
+};
+
+/// Where a sample stands, beside its own place.
+struct SampleStand {
+  glm::vec3 drawn_m{0.0F};  ///< its place on the surface as drawn, off edges
+  glm::vec3 inward{0.0F};   ///< unit tangent away from the edge it lies on; zero where on none
 };
 
 /// Evaluates single samples of patches: view, visibility and history. Owner: the builder. Any
@@ -48,13 +55,17 @@ class PatchSampler {
 
   /// Fills everything of sample `index`, whose position, normal, material and mover stand in
   /// patch.samples already. What it sees counts as the surroundings here.
-  void evaluate(SurfacePatch& patch, std::uint32_t index, const glm::vec3& inward) const;
+  void evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
   /// State at the start of the record, as the thermal model has it.
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
 
  private:
-  void look_around(SurfacePatch& patch, std::uint32_t index, const glm::vec3& inward) const;
+  void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
+
+  /// Faces that fill the part of the hemisphere which is not open.
+  void look_at_faces(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                     const CasterSelection& selection) const;
 
   /// Rays along the surface, a little above and a little below: how far it is a plane, and which
   /// walls stand on it.
@@ -64,6 +75,7 @@ class PatchSampler {
   const SurfaceInputs& in_;
   SurfaceModelOptions options_;
   ViewSampler view_;
+  ViewSampler sky_;
   SphereSampler sphere_;
   float offset_m_ = 1e-3F;
   double history_s_ = 0.0;

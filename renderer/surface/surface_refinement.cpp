@@ -27,15 +27,18 @@ constexpr float kTestedPx = 8.0F;
 constexpr float kBackSine = 0.2F;
 /// Share of the way to a point that must be free.
 constexpr float kSeenFrac = 0.999F;
-/// Corners that differ by more lie on either side of an edge: of a shadow that is still sharp, or
-/// where a body stands on the face.
-constexpr float kSharpK = 2.0F;
+/// How far the newest vertex may lie from what its parents interpolate to, in tolerances: a
+/// triangle's own error is about half of that. Where triangles are large, and where they are down
+/// to some pixels.
+constexpr float kSurplusFrac = 1.2F;
+constexpr float kSharpSurplusFrac = 8.0F;
 /// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
 constexpr float kCreaseS = 1000.0F;
 constexpr float kCreaseDepths = 3.0F;
-/// Sunlight on a surface that is turned by so much differs by a tenth of a kelvin or so.
-constexpr float kBentRad = 0.02F;
-constexpr float kBentReachFrac = 0.25F;
+/// What facing elsewhere may cost in the middle of a triangle or of an edge, in tolerances: where
+/// triangles are large, and where they are down to some pixels.
+constexpr float kBendFrac = 1.0F;
+constexpr float kSharpBendFrac = 4.0F;
 /// The shortest edges that are halved, in pixels: where temperature is smooth, and where an edge
 /// runs (finer ones change no pixel by more than a tenth of a kelvin, emit bench
 /// error-vs-time).
@@ -47,6 +50,7 @@ constexpr float kLeastShadowEdgePx = 0.9F;
 SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const RefineView& view,
                                      const SurfaceModelOptions& options)
     : in_(inputs),
+      bend_(inputs),
       pixel_rad_(static_cast<float>(view.pixel_rad)),
       tolerance_k_(static_cast<float>(options.tolerance_k)),
       lateral_(options.lateral) {
@@ -139,37 +143,6 @@ bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const Re
   return false;
 }
 
-bool SurfaceRefinement::bent(std::uint32_t mesh, const RefinedMesh& refined,
-                             std::uint32_t slot) const {
-  if (in_.detail == nullptr || !in_.detail->has(mesh)) return false;
-  const auto& leaf = refined.leaf(slot);
-  const auto vertices = refined.vertices();
-  const auto place = [&](std::size_t i) { return vertices[leaf[i]].position_m; };
-  const float reach_m = kBentReachFrac * std::max({glm::distance(place(0), place(1)),
-                                                   glm::distance(place(1), place(2)),
-                                                   glm::distance(place(2), place(0))});
-  const auto differs = [&](const glm::vec3& weight) {
-    glm::vec3 position_m(0.0F);
-    glm::vec3 normal(0.0F);
-    for (glm::length_t k = 0; k < 3; ++k) {
-      const RefinedMesh::Vertex& vertex = vertices[leaf[static_cast<std::size_t>(k)]];
-      position_m += weight[k] * vertex.position_m;
-      normal += weight[k] * vertex.normal;
-    }
-    const float length = glm::length(normal);
-    if (!(length > 0.0F)) return true;
-    normal /= length;
-    const auto full = in_.detail->normal(mesh, position_m, normal, reach_m);
-    return full && glm::distance(*full, normal) > kBentRad;
-  };
-  constexpr float kThird = 1.0F / 3.0F;
-  // Near the middles of the edges, not on them: a crease has two normals.
-  constexpr float kNear = 0.46F;
-  constexpr float kFar = 1.0F - 2.0F * kNear;
-  return differs({kThird, kThird, kThird}) || differs({kNear, kNear, kFar}) ||
-         differs({kFar, kNear, kNear}) || differs({kNear, kFar, kNear});
-}
-
 bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slot,
                                    const SurfacePatch& patch) const {
   const auto& leaf = refined.leaf(slot);
@@ -198,13 +171,8 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
 
   const bool smooth = longest_m > kLeastEdgePx * pixel_m;
   const std::size_t count = in_.record.size();
-  const auto lately_lit = [&](std::uint32_t vertex) {
-    return *std::max_element(&patch.sun_frac[vertex * count + recent_],
-                             &patch.sun_frac[vertex * count] + count) > 0.0F;
-  };
-  if (smooth && std::ranges::any_of(leaf, lately_lit) && bent(patch.mesh, refined, slot)) {
-    return true;
-  }
+  const float bend_k = bend_.cost_k(refined, slot, patch);
+  if (bend_k > (smooth ? kBendFrac : kSharpBendFrac) * tolerance_k_) return true;
 
   // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
   const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
@@ -218,7 +186,8 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
   const float range_k = std::max({offset_k(0), offset_k(1), offset_k(2)}) -
                         std::min({offset_k(0), offset_k(1), offset_k(2)});
   const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
-  if ((smooth || range_k > kSharpK) && patch.surplus_k[newest] > 2.0F * tolerance_k_) return true;
+  if (patch.surplus_k[newest] > (smooth ? kSurplusFrac : kSharpSurplusFrac) * tolerance_k_)
+    return true;
   if (range_k < tolerance_k_ || longest_m < kEdgeSunPx * pixel_m) return false;
   for (std::size_t i = recent_; i < count; ++i) {
     const auto sun = [&](std::size_t corner) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "surface/surface_bend.hpp"
 #include "surface/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -38,9 +39,6 @@ class SurfaceRefinement {
     float radius_m = 0.0F;
     float width_m = 0.0F;
   };
-  /// True when the surface, before it was simplified, faces elsewhere than the triangle's corners
-  /// make believe.
-  [[nodiscard]] bool bent(std::uint32_t mesh, const RefinedMesh& refined, std::uint32_t slot) const;
   [[nodiscard]] bool too_coarse(const RefinedMesh& refined, std::uint32_t slot,
                                 const SurfacePatch& patch) const;
   [[nodiscard]] bool seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
@@ -50,6 +48,7 @@ class SurfaceRefinement {
   [[nodiscard]] float seed_edge_m(const glm::vec3& centre_m, float longest_m) const noexcept;
 
   const SurfaceInputs& in_;
+  SurfaceBend bend_;
   std::vector<glm::vec3> eyes_rel_m_;
   float pixel_rad_ = 1e-3F;
   float tolerance_k_ = 0.1F;

@@ -48,6 +48,12 @@ std::uint32_t side_of(const glm::vec3& normal) noexcept {
   return 2U * static_cast<std::uint32_t>(axis) + (normal[axis] < 0.0F ? 1U : 0U);
 }
 
+/// From (tangent, bitangent, normal) to the axes of those.
+glm::vec3 turned(const glm::vec3& local, const Tangents& tangents,
+                 const glm::vec3& normal) noexcept {
+  return glm::normalize(local.x * tangents.u + local.y * tangents.v + local.z * normal);
+}
+
 /// Hits side by side in the sorted list that one entry stands for.
 struct Group {
   std::uint32_t first = 0;
@@ -140,7 +146,7 @@ const SeenFace& middle_of(const Group& group, std::span<const SeenFace> faces) n
 }  // namespace
 
 ViewSampler::ViewSampler(std::uint32_t rays) {
-  rays = std::clamp<std::uint32_t>((rays + 15U) / 16U * 16U, 16U, kMaxRays);
+  rays = std::max((rays + 15U) / 16U * 16U, 16U);
   struct Point {
     std::uint32_t order;
     std::uint32_t index;
@@ -164,6 +170,31 @@ ViewSampler::ViewSampler(std::uint32_t rays) {
   }
 }
 
+ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point,
+                               const CasterSelection& selection) const noexcept {
+  const Tangents tangents = tangents_of(point.normal);
+  const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
+  std::uint32_t sky = 0;
+  std::uint32_t far = 0;
+  glm::vec3 to_sky(0.0F);
+  for (std::size_t begin = 0; begin < directions_.size(); begin += kPacket) {
+    std::array<CasterRay, kPacket> rays;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      rays[i] = {start_m, turned(directions_[begin + i], tangents, point.normal)};
+    }
+    const std::uint32_t blocked = casters.blocked(rays, selection);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      if (((blocked >> i) & 1U) != 0U) continue;
+      const bool up = rays[i].direction.z >= 0.0F;
+      ++(up ? sky : far);
+      if (up) to_sky += rays[i].direction / directions_[begin + i].z;
+    }
+  }
+  const float weight_frac = 1.0F / static_cast<float>(directions_.size());
+  return {static_cast<float>(sky) * weight_frac, static_cast<float>(far) * weight_frac,
+          weight_frac * to_sky};
+}
+
 SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
                               const CasterSelection& selection) const noexcept {
   const Tangents tangents = tangents_of(point.normal);
@@ -175,9 +206,7 @@ SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
     std::array<CasterRay, kPacket> rays;
     std::array<CasterHit, kPacket> found;
     for (std::size_t i = 0; i < kPacket; ++i) {
-      const glm::vec3& local = directions_[begin + i];
-      rays[i] = {start_m, glm::normalize(local.x * tangents.u + local.y * tangents.v +
-                                         local.z * point.normal)};
+      rays[i] = {start_m, turned(directions_[begin + i], tangents, point.normal)};
     }
     const std::uint32_t hit_lanes = casters.first_hits(rays, selection, found);
     for (std::size_t i = 0; i < kPacket; ++i) {

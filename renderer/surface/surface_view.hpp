@@ -11,8 +11,10 @@
 
 namespace emit::renderer {
 
-/// Rays of a thermal sample into its hemisphere.
+/// Rays of a thermal sample into its hemisphere: those that look for faces, and those that look for
+/// the sky, of which an error of a hundredth is worth a tenth of a kelvin.
 inline constexpr std::uint32_t kSampleViewRays = 256;
+inline constexpr std::uint32_t kSampleSkyRays = 1024;
 
 /// A point of a surface and the side it looks to, in the axes of CasterRay.
 struct ViewPoint {
@@ -48,20 +50,32 @@ struct SurfaceView {
   std::array<SeenFace, kMaxSeen> seen;
 };
 
+/// Cosine-weighted shares of a hemisphere; the rest shows faces.
+struct ViewShares {
+  float sky_frac = 0.0F;  ///< left the scene at or above the horizon (+z is up)
+  float far_frac = 0.0F;  ///< left the scene below the horizon
+  /// What sky_frac grows by when the normal turns: d sky_frac = dot(to_sky, d normal).
+  glm::vec3 to_sky{0.0F};
+};
+
 /// Cosine-weighted view of a point by a fixed set of directions around its normal: an equal-area
 /// spiral on the unit disc lifted to the hemisphere (Malley's method), so every ray weighs the
 /// same. View factors come out within about 1/rays^0.75. Immutable, any thread, no allocation after
 /// construction.
 class ViewSampler {
  public:
-  static constexpr std::uint32_t kMaxRays = 256;
+  static constexpr std::uint32_t kMaxRays = 256;  ///< of view()
 
-  /// `rays` is brought into 16..kMaxRays and up to a multiple of 16.
+  /// `rays` is brought up to a multiple of 16, at least 16.
   explicit ViewSampler(std::uint32_t rays);
+
+  /// What is open, by rays that need not know what stops them.
+  [[nodiscard]] ViewShares shares(const CasterRays& casters, const ViewPoint& point,
+                                  const CasterSelection& selection) const noexcept;
 
   /// More than kMaxSeen hits are joined with their neighbours in direction, of one instance and
   /// alike in orientation first; the most central hit stands for the group. Faces seen from behind
-  /// are hits like others.
+  /// are hits like others. @pre made with at most kMaxRays
   [[nodiscard]] SurfaceView view(const CasterRays& casters, const ViewPoint& point,
                                  const CasterSelection& selection) const noexcept;
 

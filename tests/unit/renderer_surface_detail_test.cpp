@@ -65,6 +65,8 @@ scene::SceneGeometry waves(float unit_m = 1.0F) {
   stone.name = "stone";
   stone.layers = {{0.15, 0.7, 2120, 920}, {0.3, 1.5, 2000, 950}};
   stone.base_k = 286.15;
+  stone.solar_absorptance_frac = 0.7;
+  stone.emissivity_frac = 0.95;
   geometry.materials = {stone};
   return geometry;
 }
@@ -72,7 +74,7 @@ scene::SceneGeometry waves(float unit_m = 1.0F) {
 const std::array<glm::dvec3, 1> kEyes{glm::dvec3(0.0, -8.0, 13.0)};
 constexpr double kPixelRad = 1e-3;
 
-TEST(SurfaceDetail, GivesTheNormalsOfTheFullSurface) {
+TEST(SurfaceDetail, GivesPlacesAndNormalsOfTheFullSurface) {
   const scene::SceneGeometry coarse = scene::simplified(waves(), {kEyes, kPixelRad});
   ASSERT_LT(coarse.triangles, 20'000U);
   auto detail = SurfaceDetail::create(waves(), coarse);
@@ -81,13 +83,14 @@ TEST(SurfaceDetail, GivesTheNormalsOfTheFullSurface) {
   EXPECT_FALSE(SurfaceDetail::create(waves(), waves())->has(0));
   for (float x = -0.9F; x < 0.9F; x += 0.07F) {
     const glm::vec3 near_m(x, 0.4F * x, kHeightM);
-    const auto normal = detail->normal(0, near_m, {0.0F, 0.0F, 1.0F}, 0.03F);
-    ASSERT_TRUE(normal.has_value());
-    EXPECT_LT(glm::distance(*normal, wave_normal(near_m.x, near_m.y)), 2e-3F);
+    const auto place = detail->place(0, near_m, {0.0F, 0.0F, 1.0F}, 0.03F);
+    ASSERT_TRUE(place.has_value());
+    EXPECT_LT(glm::distance(place->normal, wave_normal(near_m.x, near_m.y)), 2e-3F);
+    const float height_m = kHeightM * std::sin(kPerM * near_m.x) * std::cos(kPerM * near_m.y);
+    EXPECT_LT(glm::distance(place->position_m, glm::vec3(near_m.x, near_m.y, height_m)), 3e-4F);
     // Too far away, and facing the other way.
-    EXPECT_FALSE(
-        detail->normal(0, near_m + glm::vec3(0.0F, 0.0F, 0.1F), {0.0F, 0.0F, 1.0F}, 0.03F));
-    EXPECT_FALSE(detail->normal(0, near_m, {0.0F, 0.0F, -1.0F}, 0.03F));
+    EXPECT_FALSE(detail->place(0, near_m + glm::vec3(0.0F, 0.0F, 0.1F), {0.0F, 0.0F, 1.0F}, 0.03F));
+    EXPECT_FALSE(detail->place(0, near_m, {0.0F, 0.0F, -1.0F}, 0.03F));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <random>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "emit/physics/constants.hpp"
 #include "surface/surface_view.hpp"
@@ -62,6 +63,42 @@ SurfaceView view_of(const CasterRays& casters, ViewPoint point, std::uint32_t ra
 
 scene::Mesh ground() {
   return test::level_mesh(glm::vec3(-1e4F), glm::vec3(1e4F), 0.0F);
+}
+
+TEST(SurfaceView, shares_are_those_of_the_view) {
+  SurfaceScene scene;
+  scene.add_static(ground());
+  scene.add_static(test::level_mesh({1.0F, -2.0F, 0.0F}, {4.0F, 2.0F, 0.0F}, 2.0F));
+  const CasterRays casters = rays_of(scene);
+  const ViewSampler sampler(256);
+  for (const glm::vec3& normal : {kUp, glm::vec3(1.0F, 0.0F, 0.0F), glm::vec3(0.6F, 0.0F, 0.8F)}) {
+    const ViewPoint point{glm::vec3(0.0F, 0.0F, 0.5F) - glm::vec3(casters.origin_world_m()), normal,
+                          glm::vec3(0.0F), 1e-3F};
+    const SurfaceView view = sampler.view(casters, point, {});
+    const ViewShares shares = sampler.shares(casters, point, {});
+    EXPECT_FLOAT_EQ(shares.sky_frac, view.sky_frac);
+    EXPECT_FLOAT_EQ(shares.far_frac, view.far_frac);
+  }
+}
+
+TEST(SurfaceView, shares_tell_what_a_turn_of_the_face_changes) {
+  SurfaceScene scene;
+  scene.add_static(ground());
+  const CasterRays casters = rays_of(scene);
+  const ViewSampler sampler(1024);
+  const auto at = [&](float tilt_rad) {
+    const ViewPoint point{glm::vec3(0.0F, 0.0F, 0.5F) - glm::vec3(casters.origin_world_m()),
+                          {std::sin(tilt_rad), 0.0F, std::cos(tilt_rad)},
+                          glm::vec3(0.0F),
+                          1e-3F};
+    return std::pair(sampler.shares(casters, point, {}), point.normal);
+  };
+  for (const float tilt_rad : {0.1F, 0.8F, 1.5F, 2.2F}) {
+    const auto [shares, normal] = at(tilt_rad);
+    const auto [turned, turned_normal] = at(tilt_rad + 0.2F);
+    EXPECT_NEAR(turned.sky_frac - shares.sky_frac,
+                glm::dot(0.5F * (shares.to_sky + turned.to_sky), turned_normal - normal), 0.01F);
+  }
 }
 
 TEST(SurfaceView, open_ground_sees_the_sky_alone) {

@@ -2,24 +2,22 @@
 #include "shared/frame_params.glsl.h"
 #include "passes/octahedral.glsl"
 
-in vec3 normal_relworld;
 flat in uvec2 ids;
 
 #ifdef EMIT_CACHED
-layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
-in vec3 sample_state;
+in vec4 sample_state;
 // All that the radiance pass needs, so that it reads one texel (gbuffer.glsl unpacks it).
 layout(location = 0) out uvec4 surface;
 
 void main() {
   float boresight_m = 1.0 / gl_FragCoord.w;  // clip w is the distance along the boresight
-  vec3 n = normalize(normal_relworld);
-  float cosine = dot(gl_FrontFacing ? n : -n, frame.sun_now.xyz) * frame.sun_now.w;
+  float cosine = gl_FrontFacing ? sample_state.w : -sample_state.w;
   surface = uvec4(floatBitsToUint(boresight_m), floatBitsToUint(sample_state.x),
                   packUnorm2x16(vec2(sample_state.y * max(cosine, 0.0), sample_state.z)),
                   ids.y << 16 | ids.x);
 }
 #else
+in vec3 normal_relworld;
 layout(location = 0) out float depth_m;
 layout(location = 1) out vec2 normal_octahedral;
 layout(location = 2) out uvec2 material_and_object;

@@ -15,10 +15,12 @@ layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
 // Temperature offset in K and visible share of the sun, at the two nodes of time around now.
 layout(location = EMIT_ATTR_NODE_BEFORE) in vec2 node_before;
 layout(location = EMIT_ATTR_NODE_AFTER) in vec2 node_after;
-out vec3 sample_state;  // temperature offset in K, share of the sun, share of the sky
+// Temperature offset in K, share of the sun, share of the sky, cosine of the sun's incidence on the front.
+out vec4 sample_state;
+#else
+out vec3 normal_relworld;
 #endif
 
-out vec3 normal_relworld;
 flat out uvec2 ids;
 
 void main() {
@@ -26,11 +28,13 @@ void main() {
   vec3 relworld_m = vec3(dot(row0, p), dot(row1, p), dot(row2, p));
   // Normals go with the cofactors of the linear part, which also holds for unequal scales.
   vec3 n = normal_mesh.xyz;
-  normal_relworld = vec3(dot(cross(row1.xyz, row2.xyz), n), dot(cross(row2.xyz, row0.xyz), n),
-                         dot(cross(row0.xyz, row1.xyz), n));
+  n = vec3(dot(cross(row1.xyz, row2.xyz), n), dot(cross(row2.xyz, row0.xyz), n), dot(cross(row0.xyz, row1.xyz), n));
   ids = draw;
 #ifdef EMIT_CACHED
-  sample_state = vec3(mix(node_before, node_after, frame.samples.x), normal_mesh.w);
+  float cosine = dot(n, frame.sun_now.xyz) * inversesqrt(max(dot(n, n), 1e-30)) * frame.sun_now.w;
+  sample_state = vec4(mix(node_before, node_after, frame.samples.x), normal_mesh.w, cosine);
+#else
+  normal_relworld = n;
 #endif
   gl_Position = frame.clip_from_relworld * vec4(relworld_m, 1.0);
 }

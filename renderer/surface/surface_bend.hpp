@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "surface/surface_patch.hpp"
+
+namespace emit::renderer {
+
+/// What it costs that a surface, before it was simplified, faces elsewhere than the corners of a
+/// triangle make believe: in the sun and under the sky that they see. Immutable; any thread;
+/// allocates nothing after construction.
+class SurfaceBend {
+ public:
+  /// `inputs` must outlive it.
+  explicit SurfaceBend(const SurfaceInputs& inputs);
+
+  /// Greatest difference in temperature at the triangle's centre and at the middles of its edges,
+  /// K; 0 where the mesh has lost no triangle. By first-order worths of sun and sky.
+  [[nodiscard]] float cost_k(const RefinedMesh& refined, std::uint32_t slot,
+                             const SurfacePatch& patch) const;
+
+ private:
+  /// The same at one place: weights of the corners.
+  [[nodiscard]] float cost_at_k(const glm::vec3& weight, const RefinedMesh& refined,
+                                std::uint32_t slot, const SurfacePatch& patch) const;
+
+  const SurfaceInputs& in_;
+  /// Temperature now per share of the sun's disc times cosine, by material, then interval; and per
+  /// share of the sky, by material.
+  std::vector<float> sun_worth_k_;
+  std::vector<float> sky_worth_k_;
+};
+
+}  // namespace emit::renderer
