@@ -170,8 +170,25 @@ ViewSampler::ViewSampler(std::uint32_t rays) {
   }
 }
 
+bool ViewSampler::nothing_near(const CasterRays& casters, const ViewPoint& point,
+                               const CasterSelection& selection) const noexcept {
+  constexpr std::size_t kStride = 4;  // neighbours in the list are neighbours in direction
+  if (directions_.size() % (kStride * kPacket) != 0) return false;
+  const Tangents tangents = tangents_of(point.normal);
+  const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
+  for (std::size_t begin = 0; begin < directions_.size(); begin += kStride * kPacket) {
+    std::array<CasterRay, kPacket> rays;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      rays[i] = {start_m, turned(directions_[begin + kStride * i], tangents, point.normal)};
+    }
+    if (casters.blocked(rays, selection) != 0U) return false;
+  }
+  return true;
+}
+
 ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point,
                                const CasterSelection& selection) const noexcept {
+  const bool open = nothing_near(casters, point, selection);
   const Tangents tangents = tangents_of(point.normal);
   const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
   std::uint32_t sky = 0;
@@ -182,7 +199,7 @@ ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point
     for (std::size_t i = 0; i < kPacket; ++i) {
       rays[i] = {start_m, turned(directions_[begin + i], tangents, point.normal)};
     }
-    const std::uint32_t blocked = casters.blocked(rays, selection);
+    const std::uint32_t blocked = open ? 0U : casters.blocked(rays, selection);
     for (std::size_t i = 0; i < kPacket; ++i) {
       if (((blocked >> i) & 1U) != 0U) continue;
       const bool up = rays[i].direction.z >= 0.0F;

@@ -69,7 +69,8 @@ class ViewSampler {
   /// `rays` is brought up to a multiple of 16, at least 16.
   explicit ViewSampler(std::uint32_t rays);
 
-  /// What is open, by rays that need not know what stops them.
+  /// What is open, by rays that need not know what stops them: by a quarter of them where these
+  /// meet nothing, as on open ground.
   [[nodiscard]] ViewShares shares(const CasterRays& casters, const ViewPoint& point,
                                   const CasterSelection& selection) const noexcept;
 
@@ -80,6 +81,10 @@ class ViewSampler {
                                  const CasterSelection& selection) const noexcept;
 
  private:
+  /// True when a quarter of the rays, spread evenly, all leave the scene.
+  [[nodiscard]] bool nothing_near(const CasterRays& casters, const ViewPoint& point,
+                                  const CasterSelection& selection) const noexcept;
+
   std::vector<glm::vec3> directions_;  ///< (tangent, bitangent, normal), neighbours side by side
 };
 
