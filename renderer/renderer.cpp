@@ -243,9 +243,14 @@ physics::Pose GlRenderer::scenario_sensor_pose_at(std::int64_t sim_time_ns) cons
 }
 
 Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress& progress) {
-  if (auto ready = warm_up_stage(first, progress);
-      !ready || output_.ladder != Ladder::live || !passes_.enlarge) {
-    return ready;
+  if (auto ready = warm_up_stage(first, progress); !ready) return ready;
+  if (output_.ladder != Ladder::live || !passes_.enlarge) {
+    // Drivers compile when something is drawn for the first time.
+    if (const int slot = submit(first); slot >= 0) {
+      (void)collect(static_cast<SlotIndex>(slot));
+      release(static_cast<SlotIndex>(slot));
+    }
+    return {};
   }
   auto ladder =
       survey_ladder(*this, scenario_.sensor, bands_.apparent_temperatures(), first, progress);
