@@ -320,6 +320,8 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
     view.stats.dropped_poses += history.dropped();
   }
   view.stages_ms = {};
+  view.rung = 0;
+  view.estimated_error_k = 0.0F;
   StageTimes& stages = view.stages_ms;
   view.device_failed = stage_->cold(request) && !warm_up_stage(request, {});
   if (view.device_failed) {  // nothing can be drawn: what the planes held goes out, flagged
