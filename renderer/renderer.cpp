@@ -328,7 +328,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
     readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot));
     return slot;
   }
-  view.stats.coarse = stage_->coarse_from(request.sensor_pose.position_world_m);
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose);
   clock_.start();
 
   view.rung = passes_.enlarge ? std::min<std::uint8_t>(request.rung, kQualityLadder.size() - 1) : 0;

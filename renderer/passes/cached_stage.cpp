@@ -15,61 +15,75 @@ namespace {
 constexpr double kReachFrac = 0.05;
 /// Places along a known trajectory of the camera that the refinement looks from.
 constexpr std::size_t kEyes = 16;
+/// The camera may point that share of its field of view aside of where it was said to.
+constexpr double kFieldMarginFrac = 0.5;
 
 double pixel_rad(const scene::SensorDesc& sensor) {
   return 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
 }
 
+/// From the boresight to a corner of the picture.
+double half_diagonal_rad(const scene::SensorDesc& sensor) {
+  const double corner_px = std::hypot(sensor.width_px, sensor.height_px);
+  return std::atan(std::tan(0.5 * sensor.fov_h_rad) * corner_px / sensor.width_px);
+}
+
+RefineView::Eye eye_of(const physics::Pose& pose) {
+  return {pose.position_world_m, pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0)};
+}
+
 /// Every place of the camera that the scenario tells.
-std::vector<glm::dvec3> all_eyes(const scene::Trajectory& keys) {
-  std::vector<glm::dvec3> eyes_world_m;
+std::vector<RefineView::Eye> all_eyes(const scene::Trajectory& keys) {
+  std::vector<RefineView::Eye> eyes;
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    eyes_world_m.push_back(keys[i].pose.position_world_m);
+    eyes.push_back(eye_of(keys[i].pose));
     if (i + 1 == keys.size()) break;
     const std::int64_t length_ns = keys[i + 1].sim_time_ns - keys[i].sim_time_ns;
     for (std::size_t part = 1; part < kEyes; ++part) {
       const auto way = static_cast<double>(length_ns) * static_cast<double>(part) / kEyes;
-      eyes_world_m.push_back(
-          trajectory_at(keys, keys[i].sim_time_ns + std::llround(way)).pose.position_world_m);
+      eyes.push_back(eye_of(trajectory_at(keys, keys[i].sim_time_ns + std::llround(way)).pose));
     }
   }
-  return eyes_world_m;
+  return eyes;
 }
 
 RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& request) {
   RefineView view;
   view.pixel_rad = pixel_rad(sensor);
-  view.eyes_world_m.push_back(request.sensor_pose.position_world_m);
+  view.field_rad = (1.0 + kFieldMarginFrac) * half_diagonal_rad(sensor);
+  view.eyes.push_back(eye_of(request.sensor_pose));
   const scene::Trajectory& keys = sensor.trajectory;
   if (keys.size() < 2) return view;
   const std::int64_t end_ns = keys[keys.size() - 1].sim_time_ns;
   for (std::size_t i = 1; i <= kEyes && request.sim_time_ns < end_ns; ++i) {
     const auto way = static_cast<double>(end_ns - request.sim_time_ns) * static_cast<double>(i);
     const std::int64_t at_ns = request.sim_time_ns + std::llround(way / kEyes);
-    view.eyes_world_m.push_back(trajectory_at(keys, at_ns).pose.position_world_m);
+    view.eyes.push_back(eye_of(trajectory_at(keys, at_ns).pose));
   }
   return view;
 }
 
 }  // namespace
 
-std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const glm::dvec3> eyes_world_m,
+std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineView::Eye> eyes,
                                                        const scene::Aabb& static_bounds) {
-  std::vector<Eye> eyes;
-  for (std::size_t i = 0; i < eyes_world_m.size(); ++i) {
+  std::vector<Eye> out;
+  for (std::size_t i = 0; i < eyes.size(); ++i) {
     // On the way to the next place, too.
     const double way_m =
-        i + 1 < eyes_world_m.size() ? glm::distance(eyes_world_m[i], eyes_world_m[i + 1]) : 0.0;
-    const double around_m = kReachFrac * scene::distance_m(static_bounds, eyes_world_m[i]);
-    eyes.push_back({eyes_world_m[i], std::max(way_m, around_m)});
+        i + 1 < eyes.size() ? glm::distance(eyes[i].world_m, eyes[i + 1].world_m) : 0.0;
+    const double around_m = kReachFrac * scene::distance_m(static_bounds, eyes[i].world_m);
+    out.push_back({eyes[i], std::max(way_m, around_m)});
   }
-  return eyes;
+  return out;
 }
 
 physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
     std::vector<FosterMaterial> foster_materials, const SceneHistory& history) {
-  const std::vector<glm::dvec3> eyes_world_m = all_eyes(scenario.sensor.trajectory);
+  const std::vector<RefineView::Eye> eyes = all_eyes(scenario.sensor.trajectory);
+  std::vector<glm::dvec3> eyes_world_m;
+  for (const RefineView::Eye& eye : eyes) eyes_world_m.push_back(eye.world_m);
   const scene::Aabb bounds = geometry.static_bounds;
   std::optional<CachedSurface::Saved> saved;
   if (!scenario.thermal.state_file.empty()) {
@@ -89,7 +103,7 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
       std::span(foster_materials).first(simulated), kReferenceK, std::move(detail));
   if (!surface) return tl::unexpected(std::move(surface.error()));
   return std::unique_ptr<ThermalStage>(
-      new CachedStage(scenario, bounds, eyes_around(eyes_world_m, bounds), std::move(*surface),
+      new CachedStage(scenario, bounds, eyes_around(eyes, bounds), std::move(*surface),
                       std::move(foster_materials), history, std::move(saved)));
 }
 
@@ -116,7 +130,7 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                  saved_, progress);
   if (!ready) return ready;
   if (saved_) saved_->start = false;  // after a jump of sim time the start's state need not fit
-  refined_eyes_ = eyes_around(view.eyes_world_m, static_bounds_);
+  refined_eyes_ = eyes_around(view.eyes, static_bounds_);
   drawn_.reset();  // its device memory goes before that of the next one is taken
   drawn_ =
       std::make_unique<DrawnScene>(SceneBuffers(surface_->drawn_scene()), history_of_object_, 0);
@@ -130,14 +144,20 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   return {};
 }
 
-bool CachedStage::coarse_from(const glm::dvec3& eye_world_m) const noexcept {
-  const auto stands_near = [&](const std::vector<Eye>& eyes) {
-    return std::ranges::any_of(eyes, [&](const Eye& eye) {
-      return glm::distance(eye.world_m, eye_world_m) <= eye.reach_m;
+bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
+  const RefineView::Eye here = eye_of(camera);
+  // Where samples ran out, they went to what was said to be in view.
+  const double least_cos =
+      surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : -2.0;
+  const auto stands_near = [&](const std::vector<Eye>& eyes, double cos_at_least) {
+    return std::ranges::any_of(eyes, [&](const Eye& each) {
+      return glm::distance(each.eye.world_m, here.world_m) <= each.reach_m &&
+             glm::dot(each.eye.boresight, here.boresight) >= cos_at_least;
     });
   };
   // Without known eyes no mesh was simplified.
-  return !stands_near(refined_eyes_) || (!detail_eyes_.empty() && !stands_near(detail_eyes_));
+  return surface_->model().full_in_view || !stands_near(refined_eyes_, least_cos) ||
+         (!detail_eyes_.empty() && !stands_near(detail_eyes_, -2.0));
 }
 
 void CachedStage::describe(SceneStats& stats) const noexcept {

@@ -28,7 +28,7 @@ class CachedStage final : public ThermalStage {
   }
   DrawnScene& drawn() noexcept override { return *drawn_; }
   void describe(SceneStats& stats) const noexcept override;
-  bool coarse_from(const glm::dvec3& eye_world_m) const noexcept override;
+  bool coarse_from(const physics::Pose& camera) const noexcept override;
   void prepare(const FrameRequest& request, CameraSetup& camera,
                gpu::FrameParams& frame) noexcept override;
   const physics::SunPosition& sun_now() const noexcept override { return sun_now_; }
@@ -40,10 +40,10 @@ class CachedStage final : public ThermalStage {
  private:
   /// A place the surface was prepared for, and how far around it that holds.
   struct Eye {
-    glm::dvec3 world_m{0.0};
+    RefineView::Eye eye;
     double reach_m = 0.0;
   };
-  static std::vector<Eye> eyes_around(std::span<const glm::dvec3> eyes_world_m,
+  static std::vector<Eye> eyes_around(std::span<const RefineView::Eye> eyes,
                                       const scene::Aabb& static_bounds);
 
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,

@@ -59,8 +59,8 @@ class ThermalStage {
   /// Adds what the method knows about the scene.
   virtual void describe(SceneStats&) const noexcept {}
 
-  /// True when the surface was not prepared for a camera at that place.
-  [[nodiscard]] virtual bool coarse_from(const glm::dvec3& /*eye_world_m*/) const noexcept {
+  /// True when the surface was not prepared for a camera that stands so.
+  [[nodiscard]] virtual bool coarse_from(const physics::Pose& /*camera*/) const noexcept {
     return false;
   }
 

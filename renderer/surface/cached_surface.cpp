@@ -164,7 +164,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   if (here) add_first_frame(here->key, start_ns, view, inputs.environment, inputs.entities);
   auto model = make_model(surface, view, options, here, progress);
   if (!model) return tl::unexpected(std::move(model.error()));
-  offset_m_ = PatchSampler(surface, options).offset_m();
+  offset_m_ = ray_offset_m(geometry_);
   model_ = std::move(*model);
 
   const std::size_t count = model_->samples.samples.size();

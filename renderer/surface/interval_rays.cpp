@@ -105,51 +105,73 @@ glm::vec3 IntervalRays::normal(const SurfaceSample& sample) const noexcept {
   return placed(static_cast<std::size_t>(sample.mover), middle_ray_).rel_from_body * sample.normal;
 }
 
-IntervalRays::Seen IntervalRays::packet(const CasterRays& rays, const SurfaceSample& sample,
-                                        const Start& start, std::size_t first) const noexcept {
+IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSample& face,
+                                       std::span<const glm::vec3> starts_m,
+                                       std::size_t first) const noexcept {
   std::array<CasterRay, kPacketRays> sent;
-  std::array<std::uint8_t, kPacketRays> index{};
+  std::array<std::uint8_t, kPacketRays> start_of{};
   std::uint32_t count = 0;
-  for (std::size_t i = first; i < first + kPacketRays; ++i) {
-    glm::vec3 n = sample.normal;
-    glm::vec3 start_m = start.position_m + spread_[i].x * start.u_m + spread_[i].y * start.v_m;
-    if (sample.mover >= 0) {
-      const MoverPlacement& place = placed(static_cast<std::size_t>(sample.mover), i);
+  Spots spots;
+  for (std::size_t k = 0; k < starts_m.size(); ++k) {
+    const std::size_t ray = first + k;
+    glm::vec3 n = face.normal;
+    glm::vec3 start_m = starts_m[k];
+    if (face.mover >= 0) {
+      const MoverPlacement& place = placed(static_cast<std::size_t>(face.mover), ray);
       n = place.rel_from_body * n;
       start_m = place.rel_from_body * start_m + place.position_m;
     }
-    if (!(glm::dot(n, direction_[i]) > 0.0F)) continue;
-    index[count] = static_cast<std::uint8_t>(i);
-    sent[count++] = {start_m, direction_[i]};
+    if (!(glm::dot(n, direction_[ray]) > 0.0F)) continue;
+    spots.faced |= 1U << k;
+    start_of[count] = static_cast<std::uint8_t>(k);
+    sent[count++] = {start_m, direction_[ray]};
   }
-  if (count == 0) return {};
+  if (count == 0) return spots;
   std::uint32_t blocked = rays.blocked_static({sent.data(), count});
-  if (any_mover_on_) {
-    for (std::size_t k = 0; k < count; ++k) {
-      for (std::size_t m = 0; m < mover_radius_m_.size() && ((blocked >> k) & 1U) == 0U; ++m) {
-        const MoverPlacement& place = placed(m, index[k]);
-        if (place.on && rays.blocked_mover(m, place, {&sent[k], 1}) != 0U) blocked |= 1U << k;
-      }
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t ray = first + start_of[i];
+    for (std::size_t m = 0;
+         any_mover_on_ && m < mover_radius_m_.size() && ((blocked >> i) & 1U) == 0U; ++m) {
+      const MoverPlacement& place = placed(m, ray);
+      if (place.on && rays.blocked_mover(m, place, {&sent[i], 1}) != 0U) blocked |= 1U << i;
     }
+    if (((blocked >> i) & 1U) == 0U) spots.lit |= 1U << start_of[i];
   }
-  return {count, count - static_cast<std::uint32_t>(std::popcount(blocked))};
+  return spots;
 }
 
 float IntervalRays::sun_frac(const CasterRays& rays, const SurfaceSample& sample,
                              float start_offset_m, float blur_m) const noexcept {
   if (!sun_up_) return 0.0F;
   const Tangents tangents = tangents_of(sample.normal);
-  const Start start{sample.position_m + start_offset_m * sample.normal, blur_m * tangents.u,
-                    blur_m * tangents.v};
-  Seen seen = packet(rays, sample, start, 0);
-  if (seen.rays == 0) return 0.0F;
-  for (std::size_t first = kPacketRays; first < kSunRays; first += kPacketRays) {
-    if (first == kPacketRays && (seen.lit == 0 || seen.lit == seen.rays)) break;
-    const Seen more = packet(rays, sample, start, first);
-    seen.rays += more.rays;
-    seen.lit += more.lit;
+  const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
+  const glm::vec3 u_m = blur_m * tangents.u;
+  const glm::vec3 v_m = blur_m * tangents.v;
+  int faced = 0;
+  int lit = 0;
+  for (std::size_t first = 0; first < kSunRays; first += kPacketRays) {
+    if (first == kPacketRays && (lit == 0 || lit == faced)) break;
+    std::array<glm::vec3, kPacketRays> starts_m;
+    for (std::size_t k = 0; k < kPacketRays; ++k) {
+      starts_m[k] = start_m + spread_[first + k].x * u_m + spread_[first + k].y * v_m;
+    }
+    const Spots spots = send(rays, sample, starts_m, first);
+    faced += std::popcount(spots.faced);
+    lit += std::popcount(spots.lit);
+    if (faced == 0) return 0.0F;
   }
-  return static_cast<float>(seen.lit) / static_cast<float>(seen.rays);
+  return static_cast<float>(lit) / static_cast<float>(faced);
+}
+
+IntervalRays::Spots IntervalRays::spots(const CasterRays& rays, const SurfaceSample& face,
+                                        std::span<const glm::vec3> points_m,
+                                        float start_offset_m) const noexcept {
+  if (!sun_up_) return {};
+  std::array<glm::vec3, kPacketRays> starts_m;
+  for (std::size_t k = 0; k < points_m.size(); ++k) {
+    starts_m[k] = points_m[k] + start_offset_m * face.normal;
+  }
+  return send(rays, face, {starts_m.data(), points_m.size()}, 0);
 }
 
 float IntervalRays::hidden_sky_frac(const CasterRays& rays, const SurfaceSample& sample,

@@ -47,6 +47,17 @@ class IntervalRays {
   [[nodiscard]] float sun_frac(const CasterRays& rays, const SurfaceSample& sample,
                                float start_offset_m, float blur_m) const noexcept;
 
+  /// Points of a face by bits.
+  struct Spots {
+    std::uint32_t faced = 0;  ///< the sun stood before the face
+    std::uint32_t lit = 0;    ///< and was not hidden
+  };
+  /// One ray of the interval for each of up to kPacketRays points. `face` gives their normal,
+  /// material and entity; points in its frame. Any thread; RT-safe.
+  [[nodiscard]] Spots spots(const CasterRays& rays, const SurfaceSample& face,
+                            std::span<const glm::vec3> points_m,
+                            float start_offset_m) const noexcept;
+
   /// Share of the sample's sky that entities hide, mean over the interval: rays of a fixed set that
   /// are spread by the sky's measure. Zero where none is near. Any thread; RT-safe.
   [[nodiscard]] float hidden_sky_frac(const CasterRays& rays, const SurfaceSample& sample,
@@ -70,19 +81,9 @@ class IntervalRays {
   /// Sends a ray to its place in the disc around `to_sun`.
   void aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to_sun) noexcept;
 
-  /// Rays that left a sample's face, and those of them that met nothing.
-  struct Seen {
-    std::uint32_t rays = 0;
-    std::uint32_t lit = 0;
-  };
-  /// Start of a sample's rays, and how far a unit deviate moves it.
-  struct Start {
-    glm::vec3 position_m{0.0F};
-    glm::vec3 u_m{0.0F};
-    glm::vec3 v_m{0.0F};
-  };
-  [[nodiscard]] Seen packet(const CasterRays& rays, const SurfaceSample& sample, const Start& start,
-                            std::size_t first) const noexcept;
+  /// Sends ray `first` + k from start k.
+  [[nodiscard]] Spots send(const CasterRays& rays, const SurfaceSample& face,
+                           std::span<const glm::vec3> starts_m, std::size_t first) const noexcept;
 
   std::vector<float> mover_radius_m_;
   SkyMeasure sky_ = SkyMeasure::cosine;

@@ -68,6 +68,8 @@ class RefinedMesh {
   [[nodiscard]] const std::array<std::uint32_t, 3>& leaf(std::uint32_t slot) const noexcept {
     return leaves_[slot];
   }
+  /// Of the triangle in this slot; another one once it was halved. slot < leaf_count().
+  [[nodiscard]] std::uint32_t node(std::uint32_t slot) const noexcept { return leaf_node_[slot]; }
   [[nodiscard]] Parts parts() const {
     return {vertices_, leaves_, leaf_submesh_, leaf_node_, nodes_};
   }
@@ -79,6 +81,9 @@ class RefinedMesh {
   [[nodiscard]] std::uint32_t submesh(std::uint32_t slot) const noexcept {
     return leaf_submesh_[slot];
   }
+
+  /// From now on no vertex is added beyond `max_vertices`.
+  void limit(std::size_t max_vertices) noexcept { max_vertices_ = max_vertices; }
 
   /// Halves the longest edge of each of these leaves (as they are at the time of the call, each
   /// once) together with every leaf that shares this edge, after halving those neighbours whose own

@@ -79,6 +79,7 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.states);
   put_value(sink, model.outputs);
   put_value(sink, model.full);
+  put_value(sink, model.full_in_view);
 }
 
 bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::size_t max_vertices,
@@ -276,6 +277,7 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateKe
   take_value(source, model.states);
   take_value(source, model.outputs);
   take_value(source, model.full);
+  take_value(source, model.full_in_view);
   if (!source.ok() || !source.at_end() || !consistent(model, geometry, movers)) {
     return refuse("damaged: its contents contradict each other");
   }

@@ -167,7 +167,10 @@ void add_first_frame(StateKey& key, std::int64_t start_ns, const RefineView& vie
   add(time, start_ns);
   at(key, StatePart::first_time) = time.value();
   Fnv64 camera;
-  add(camera, view.eyes_world_m);
+  for (const RefineView::Eye& eye : view.eyes) {
+    add(camera, eye.world_m);
+    add(camera, eye.boresight);
+  }
   at(key, StatePart::first_camera) = camera.value();
   Fnv64 live;
   for (const PoseHistory& entity : entities) add_keys(live, entity.live());

@@ -13,44 +13,6 @@ constexpr float kReachFrac = 0.25F;
 
 }  // namespace
 
-SurfaceBend::SurfaceBend(const SurfaceInputs& inputs) : in_(inputs) {
-  if (inputs.detail == nullptr) return;
-  // Differences around half of what there is.
-  constexpr float kHalf = 0.5F;
-  constexpr float kMore = 0.25F;
-  const HistoryRecord& record = inputs.record;
-  const std::size_t count = record.size();
-  const auto offset_k = [&](const SurfaceSample& sample, std::size_t interval, float sun_frac) {
-    SampleState state = inputs.heat.start_state(sample, sample.normal, inputs.history, record.tail);
-    SampleOutput output;
-    for (std::size_t k = 0; k < count; ++k) {
-      SampleDrive drive;
-      drive.sun_frac = k == interval ? sun_frac : kHalf;
-      output = inputs.heat.advance(sample, sample.normal, record.intervals[k], drive, state);
-    }
-    return output.offset_k;
-  };
-  sun_worth_k_.assign(inputs.materials.size() * count, 0.0F);
-  for (std::uint32_t m = 0; m < inputs.materials.size(); ++m) {
-    SurfaceSample sample;
-    sample.material = m;
-    sample.sky_frac = kHalf;
-    sample.far_frac = kHalf;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!record.rays[i].sun_up()) continue;
-      sample.normal = record.rays[i].to_sun();
-      sun_worth_k_[m * count + i] =
-          (offset_k(sample, i, kHalf + kMore) - offset_k(sample, i, kHalf)) / kMore;
-    }
-    sample.normal = {1.0F, 0.0F, 0.0F};
-    const float before_k = offset_k(sample, count, 0.0F);
-    sample.sky_frac += kMore;
-    sample.far_frac -= kMore;
-    sample.sphere_sky_frac += kHalf * kMore;
-    sky_worth_k_.push_back((offset_k(sample, count, 0.0F) - before_k) / kMore);
-  }
-}
-
 float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined,
                              std::uint32_t slot, const SurfacePatch& patch) const {
   const auto& leaf = refined.leaf(slot);
@@ -77,7 +39,7 @@ float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined
   const auto full = in_.detail->place(patch.mesh, position_m, normal / length, reach_m);
   if (!full) return 0.0F;
   const glm::vec3 facing = glm::normalize(patch.normal_from_mesh * full->normal);
-  float cost_k = sky_worth_k_[material] * glm::dot(to_sky, facing - drawn_facing);
+  float cost_k = worth_.sky_k(material) * glm::dot(to_sky, facing - drawn_facing);
   for (std::size_t i = 0; i < count; ++i) {
     const glm::vec3& to_sun = in_.record.rays[i].to_sun();
     float sun_frac = 0.0F;
@@ -88,7 +50,7 @@ float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined
       sun_frac += share;
       drawn_frac += share * std::max(0.0F, glm::dot(patch.samples[corner].normal, to_sun));
     }
-    cost_k += sun_worth_k_[material * count + i] *
+    cost_k += worth_.sun_k(material, i) *
               (sun_frac * std::max(0.0F, glm::dot(facing, to_sun)) - drawn_frac);
   }
   return std::abs(cost_k);

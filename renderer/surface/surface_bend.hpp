@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
-#include <vector>
 
+#include "surface/drive_worth.hpp"
 #include "surface/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -12,8 +12,8 @@ namespace emit::renderer {
 /// allocates nothing after construction.
 class SurfaceBend {
  public:
-  /// `inputs` must outlive it.
-  explicit SurfaceBend(const SurfaceInputs& inputs);
+  /// Both must outlive it.
+  SurfaceBend(const SurfaceInputs& inputs, const DriveWorth& worth) : in_(inputs), worth_(worth) {}
 
   /// Greatest difference in temperature at the triangle's centre and at the middles of its edges,
   /// K; 0 where the mesh has lost no triangle. By first-order worths of sun and sky.
@@ -26,10 +26,7 @@ class SurfaceBend {
                                 std::uint32_t slot, const SurfacePatch& patch) const;
 
   const SurfaceInputs& in_;
-  /// Temperature now per share of the sun's disc times cosine, by material, then interval; and per
-  /// share of the sky, by material.
-  std::vector<float> sun_worth_k_;
-  std::vector<float> sky_worth_k_;
+  const DriveWorth& worth_;
 };
 
 }  // namespace emit::renderer

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 
 #include "surface/parallel.hpp"
 #include "surface/surface_exchange.hpp"
@@ -13,7 +14,9 @@
 namespace emit::renderer {
 namespace {
 
-constexpr std::uint32_t kMaxRounds = 48;
+constexpr std::uint32_t kMaxRounds = 400;
+/// What needs less than this share of the neediest waits for another round.
+constexpr float kNeedStep = 4.0F;
 constexpr std::size_t kGrain = 64;
 /// The full surface is looked for within this share of the halved edge.
 constexpr float kDetailReachFrac = 0.5F;
@@ -32,13 +35,17 @@ class Builder {
       : in_(inputs),
         options_(options),
         progress_(progress),
-        sampler_(inputs, options),
-        refinement_(inputs, view, options) {}
+        worth_(inputs),
+        sampler_(inputs, worth_, options),
+        refinement_(inputs, worth_, view, options) {}
 
   physics::Result<SurfaceModel> run();
 
  private:
   void make_patches();
+  /// Halves the leaves of a mesh that need more than `above`, the neediest first, as far as samples
+  /// are left.
+  void split(std::uint32_t mesh, float above);
   /// Gives every vertex that has no sample yet one; false when stopped.
   bool sample_new_vertices(double begin_frac, double end_frac);
   void find_inward(std::uint32_t mesh);
@@ -54,6 +61,7 @@ class Builder {
   const SurfaceInputs& in_;
   SurfaceModelOptions options_;
   const SurfaceProgress& progress_;
+  DriveWorth worth_;
   PatchSampler sampler_;
   SurfaceRefinement refinement_;
   SurfaceModel model_;
@@ -62,6 +70,8 @@ class Builder {
   std::vector<glm::vec3> inward_;
   std::vector<glm::vec3> place_m_;  ///< of its samples
   std::vector<Job> jobs_;
+  std::vector<SurfaceRefinement::Need> needs_;
+  std::vector<std::uint32_t> slots_;
   std::vector<SampleStand> job_stand_;
 };
 
@@ -152,6 +162,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       patch.outputs.resize(vertices.size());
       patch.surplus_k.resize(vertices.size(), -1.0F);
       patch.to_sky.resize(vertices.size());
+      patch.sky_surplus_frac.resize(vertices.size(), std::numeric_limits<float>::infinity());
       patch.sun_frac.resize(vertices.size() * intervals);
       if (movers) patch.hidden_sky_frac.resize(vertices.size() * intervals);
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
@@ -168,7 +179,9 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         sample.mover = patch.mover;
         sample.material = vertices[v].material;
         jobs_.push_back({p, v});
-        job_stand_.push_back({to_rel(vertices[v].position_m), unit_inward});
+        const std::array<std::uint32_t, 2>& parent = vertices[v].parent;
+        job_stand_.push_back({to_rel(vertices[v].position_m), unit_inward, std::nullopt});
+        if (parent[0] < first && parent[1] < first) job_stand_.back().parents = parent;
       }
     }
   }
@@ -191,6 +204,15 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
     const float mean_k = 0.5F * (patch.outputs[vertex.parent[0]].offset_k +
                                  patch.outputs[vertex.parent[1]].offset_k);
     patch.surplus_k[job.index] = std::abs(patch.outputs[job.index].offset_k - mean_k);
+    if (!std::isinf(patch.sky_surplus_frac[job.index])) continue;  // taken over
+    const auto off_mean = [&](float SurfaceSample::*share) {
+      const float mean =
+          0.5F * (patch.samples[vertex.parent[0]].*share + patch.samples[vertex.parent[1]].*share);
+      return std::abs(patch.samples[job.index].*share - mean);
+    };
+    patch.sky_surplus_frac[job.index] =
+        std::max({off_mean(&SurfaceSample::sky_frac), off_mean(&SurfaceSample::far_frac),
+                  off_mean(&SurfaceSample::sphere_sky_frac)});
   }
   return true;
 }
@@ -234,6 +256,26 @@ std::size_t Builder::sample_count() const noexcept {
   return count;
 }
 
+void Builder::split(std::uint32_t mesh, float above) {
+  refinement_.list(mesh, above, needs_);
+  if (needs_.empty()) return;
+  RefinedMesh& refined = model_.meshes[mesh];
+  const auto uses = static_cast<std::size_t>(
+      std::ranges::count(patches_, mesh, [](const SurfacePatch& patch) { return patch.mesh; }));
+  const std::size_t count = sample_count();
+  const std::size_t left = options_.max_samples > count ? options_.max_samples - count : 0;
+  refined.limit(refined.vertices().size() + left / uses);
+  if (needs_.size() > left / uses) {
+    std::ranges::sort(needs_, [](const auto& a, const auto& b) {
+      return a.need != b.need ? a.need > b.need : a.slot < b.slot;
+    });
+  }
+  slots_.clear();
+  for (const SurfaceRefinement::Need& need : needs_) slots_.push_back(need.slot);
+  if (!refined.split(slots_)) model_.full = true;
+  refinement_.leave(mesh, refined, slots_);
+}
+
 physics::Result<SurfaceModel> Builder::run() {
   const auto stopped = [] {
     return physics::make_error(physics::ErrorCode::internal, "stopped while sampling the surface");
@@ -247,20 +289,22 @@ physics::Result<SurfaceModel> Builder::run() {
   const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
   double to_frac = next_frac();
   if (!sample_new_vertices(done_frac, to_frac)) return stopped();
-  std::vector<std::uint32_t> slots;
-  for (std::uint32_t round = 0; round < kMaxRounds; ++round) {
-    bool cut = false;
+  // Where need is greatest first: when samples run out, what is left matters least.
+  for (std::uint32_t round = 0;; ++round) {
+    SurfaceRefinement::Most most;
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
-      refinement_.flag(mesh, model_.meshes[mesh], patches_, slots);
-      if (slots.empty()) continue;
-      if (sample_count() + slots.size() > options_.max_samples) {
-        model_.full = true;
-        continue;
-      }
-      if (!model_.meshes[mesh].split(slots)) model_.full = true;
-      cut = true;
+      const auto here = refinement_.judge(mesh, model_.meshes[mesh], patches_);
+      most.need = std::max(most.need, here.need);
+      most.in_view = std::max(most.in_view, here.in_view);
     }
-    if (!cut) break;
+    if (model_.full || round == kMaxRounds) {
+      model_.full = true;
+      model_.full_in_view = most.in_view > 0.0F;
+      break;
+    }
+    if (most.need == 0.0F) break;
+    const float above = most.need / kNeedStep;
+    for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
     done_frac = to_frac;
     to_frac = next_frac();
     if (!sample_new_vertices(done_frac, to_frac)) return stopped();

@@ -19,8 +19,13 @@ namespace emit::renderer {
 
 /// From where, and how finely, the surface will be looked at.
 struct RefineView {
-  std::vector<glm::dvec3> eyes_world_m;  ///< places of the camera
+  struct Eye {
+    glm::dvec3 world_m{0.0};
+    glm::dvec3 boresight{0.0};  ///< unit length; zero: all around
+  };
+  std::vector<Eye> eyes;  ///< places of the camera
   double pixel_rad = 1e-3;
+  double field_rad = 3.1416;  ///< what lies within that angle of a boresight comes first
 };
 
 struct SurfaceModelOptions {
@@ -40,6 +45,7 @@ struct SurfaceModel {
   std::vector<SampleState> states;    ///< at the end of the record
   std::vector<SampleOutput> outputs;  ///< at the end of the record
   bool full = false;                  ///< max_samples stopped the refinement
+  bool full_in_view = false;          ///< ... also of what lies in the announced field of view
 };
 
 /// Fraction done; false stops.

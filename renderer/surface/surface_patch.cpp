@@ -19,29 +19,84 @@ constexpr std::size_t kTangents = CasterRays::kMaxRays;
 constexpr float kWallCos = 0.3F;
 constexpr float kMaxFootM = 3.0F;
 constexpr float kUnderOffsets = 8.0F;
+/// What a share of sky may be wrong by, in tolerances; and what rays do not resolve anyway.
+constexpr float kAlikeFrac = 0.25F;
+constexpr float kSkyNoiseFrac = 0.002F;
+/// Nothing stands up within that many lengths of an edge whose middle takes over the view.
+constexpr float kFreeLengths = 2.0F;
 
 }  // namespace
 
-PatchSampler::PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
+float ray_offset_m(const scene::SceneGeometry& geometry) noexcept {
+  const scene::Aabb& bounds = geometry.bounds;
+  if (bounds.empty()) return kLeastOffsetM;
+  const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);
+  return std::max(kLeastOffsetM, kOffsetFrac * static_cast<float>(radius_m));
+}
+
+PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
+                           const SurfaceModelOptions& options)
     : in_(inputs),
       options_(options),
       view_(kSampleViewRays),
-      sky_(kSampleSkyRays),
-      sphere_(kSampleViewRays) {
-  const scene::Aabb& bounds = inputs.geometry.bounds;
-  if (!bounds.empty()) {
-    const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);
-    offset_m_ = std::max(kLeastOffsetM, kOffsetFrac * static_cast<float>(radius_m));
-  }
+      sky_(inputs.heat.sky_measure() == SkyMeasure::cosine ? kSampleSkyRays : kSampleViewRays),
+      sphere_(kSampleViewRays),
+      offset_m_(ray_offset_m(inputs.geometry)) {
   history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+  }
+  for (std::uint32_t m = 0; m < inputs.materials.size(); ++m) {
+    const auto alike_k = kAlikeFrac * static_cast<float>(options.tolerance_k);
+    sky_limit_frac_.push_back(
+        std::max(kSkyNoiseFrac, alike_k / std::max(std::abs(worth.sky_k(m)), 1e-3F)));
   }
 }
 
 SampleState PatchSampler::start_state(const SurfaceSample& sample) const noexcept {
   return in_.heat.start_state(sample, in_.record.rays.front().normal(sample), in_.history,
                               in_.record.tail);
+}
+
+bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
+                                const SampleStand& stand) const {
+  if (!stand.parents) return false;
+  const auto [a, b] = *stand.parents;
+  SurfaceSample& sample = patch.samples[index];
+  const SurfaceSample& low = patch.samples[a];
+  const SurfaceSample& high = patch.samples[b];
+  const float limit_frac = sky_limit_frac_[sample.material];
+  const float surplus_frac = std::max(patch.sky_surplus_frac[a], patch.sky_surplus_frac[b]);
+  if (surplus_frac > limit_frac || low.covered || high.covered) return false;
+  const float edge_m = glm::distance(low.position_m, high.position_m);
+  if (kFreeLengths * edge_m > std::min(low.flat_m, high.flat_m)) return false;
+  const glm::vec3 to_sky = 0.5F * (patch.to_sky[a] + patch.to_sky[b]);
+  const glm::vec3 turn = sample.normal - 0.5F * (low.normal + high.normal);
+  if (std::abs(glm::dot(to_sky, turn)) > limit_frac) return false;
+
+  const auto mean = [](float x, float y) { return 0.5F * (x + y); };
+  sample.sky_frac = mean(low.sky_frac, high.sky_frac);
+  sample.far_frac = mean(low.far_frac, high.far_frac);
+  sample.sphere_sky_frac = mean(low.sphere_sky_frac, high.sphere_sky_frac);
+  for (std::size_t i = 0; i < sample.open_frac.size(); ++i) {
+    sample.open_frac[i] = mean(low.open_frac[i], high.open_frac[i]);
+    sample.open_before_frac[i] = mean(low.open_before_frac[i], high.open_before_frac[i]);
+  }
+  // What is free around a point is free around its neighbour but for the way there.
+  sample.flat_m = std::max(low.flat_m, high.flat_m) - 0.5F * edge_m;
+  patch.to_sky[index] = to_sky;
+  patch.sky_surplus_frac[index] = surplus_frac;
+  if (options_.exchange) {
+    // Of the faces they see either's will do; weights fill what is not open.
+    std::vector<SeenPlace>& seen = patch.seen[index];
+    seen = patch.seen[patch.seen[a].empty() ? b : a];
+    float seen_frac = 0.0F;
+    for (const SeenPlace& place : seen) seen_frac += place.weight_frac;
+    const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
+    for (SeenPlace& place : seen) place.weight_frac *= left_frac / seen_frac;
+    if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
+  }
+  return true;
 }
 
 void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
@@ -163,7 +218,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
 
 void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
                             const SampleStand& stand) const {
-  look_around(patch, index, stand);
+  if (!inherit_view(patch, index, stand)) look_around(patch, index, stand);
   SurfaceSample& sample = patch.samples[index];
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();

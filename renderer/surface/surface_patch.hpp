@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <glm/ext/matrix_float3x3.hpp>
 #include <glm/ext/matrix_float4x4.hpp>
+#include <optional>
 #include <vector>
 
+#include "surface/drive_worth.hpp"
 #include "surface/sphere_view.hpp"
 #include "surface/surface_model.hpp"
 
@@ -33,22 +35,31 @@ struct SurfacePatch {
   std::vector<SampleOutput> outputs;
   /// Difference from the mean of the vertex's parents, K; negative where it has none.
   std::vector<float> surplus_k;
-  std::vector<glm::vec3> to_sky;       ///< ViewShares::to_sky
+  std::vector<glm::vec3> to_sky;  ///< ViewShares::to_sky
+  /// How far its shares of the sky were from the mean of the vertex's parents; infinite where it
+  /// has none, and until that is known.
+  std::vector<float> sky_surplus_frac;
   std::vector<float> sun_frac;         ///< by vertex, then interval
   std::vector<float> hidden_sky_frac;  ///< likewise; empty without entities
 };
+
+/// Distance of ray starts from the surface.
+[[nodiscard]] float ray_offset_m(const scene::SceneGeometry& geometry) noexcept;
 
 /// Where a sample stands, beside its own place.
 struct SampleStand {
   glm::vec3 drawn_m{0.0F};  ///< its place on the surface as drawn, off edges
   glm::vec3 inward{0.0F};   ///< unit tangent away from the edge it lies on; zero where on none
+  /// Vertices of the edge it halves, where both are evaluated.
+  std::optional<std::array<std::uint32_t, 2>> parents = std::nullopt;
 };
 
 /// Evaluates single samples of patches: view, visibility and history. Owner: the builder. Any
 /// thread.
 class PatchSampler {
  public:
-  PatchSampler(const SurfaceInputs& inputs, const SurfaceModelOptions& options);
+  PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
+               const SurfaceModelOptions& options);
 
   /// Distance of ray starts from the surface.
   [[nodiscard]] float offset_m() const noexcept { return offset_m_; }
@@ -61,6 +72,10 @@ class PatchSampler {
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
 
  private:
+  /// Takes the view of its parents where theirs was what it would have been of their own; false,
+  /// and nothing changed, where rays are needed.
+  bool inherit_view(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
+
   void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
   /// Faces that fill the part of the hemisphere which is not open.
@@ -77,9 +92,10 @@ class PatchSampler {
   ViewSampler view_;
   ViewSampler sky_;
   SphereSampler sphere_;
-  float offset_m_ = 1e-3F;
+  float offset_m_ = 0.0F;
   double history_s_ = 0.0;
   std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
+  std::vector<float> sky_limit_frac_;    ///< by material: shares that differ less are alike
 };
 
 }  // namespace emit::renderer

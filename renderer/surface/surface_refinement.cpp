@@ -4,14 +4,22 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 
 #include "surface/parallel.hpp"
 
 namespace emit::renderer {
 namespace {
 
-/// Share of a caster's width that a triangle in its shade may have.
-constexpr float kSeedFrac = 0.25F;
+/// No triangle is wider, whether anything is known to lie in it or not: in view, and elsewhere. In
+/// pixels.
+constexpr float kBasePx = 32.0F;
+constexpr float kBaseAsidePx = 128.0F;
+constexpr float kBaseNeed = 1e6F;  ///< of triangles wider than that
+/// What the need of a triangle out of view counts.
+constexpr float kAsideFrac = 1.0F / 64.0F;
+/// What points between the corners may make of it, in tolerances.
+constexpr float kMissedFrac = 2.0F;
 /// Edges of shadows this young are still sharp.
 constexpr float kRecentS = 900.0F;
 /// Corners on which that much more of the sun's flux falls than on others have the edge of a shadow
@@ -19,9 +27,8 @@ constexpr float kRecentS = 900.0F;
 constexpr float kEdgeSunFrac = 0.2F;
 /// Down to so many pixels that alone is reason to cut; finer, only what interpolation gets wrong.
 constexpr float kEdgeSunPx = 4.0F;
-/// Triangles of up to so many pixels are tested for being seen at all: by their corners and centre,
-/// which is too little for larger ones.
-constexpr float kTestedPx = 8.0F;
+/// Corners of which more or less of the sun's disc was visible do not agree on it.
+constexpr float kAgreeFrac = 1e-3F;
 /// A triangle that turns its back to an eye by more than this sine is not seen from there, whatever
 /// curvature its vertices' normals stand for.
 constexpr float kBackSine = 0.2F;
@@ -47,82 +54,65 @@ constexpr float kLeastShadowEdgePx = 0.9F;
 
 }  // namespace
 
-SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const RefineView& view,
-                                     const SurfaceModelOptions& options)
+SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWorth& worth,
+                                     const RefineView& view, const SurfaceModelOptions& options)
     : in_(inputs),
-      bend_(inputs),
+      worth_(worth),
+      bend_(inputs, worth_),
       pixel_rad_(static_cast<float>(view.pixel_rad)),
+      field_rad_(static_cast<float>(view.field_rad)),
       tolerance_k_(static_cast<float>(options.tolerance_k)),
-      lateral_(options.lateral) {
+      start_offset_m_(ray_offset_m(inputs.geometry)),
+      lateral_(options.lateral),
+      judged_(inputs.geometry.meshes.size()) {
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
   }
-  for (const glm::dvec3& eye : view.eyes_world_m) {
-    eyes_rel_m_.emplace_back(eye - inputs.rays.origin_world_m());
+  for (const RefineView::Eye& eye : view.eyes) {
+    eyes_.push_back(
+        {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
   }
   const HistoryRecord& record = inputs.record;
   recent_ = record.size() - 1;
   while (recent_ > 0 && record.lag_s[recent_ - 1] < kRecentS) --recent_;
-  for (const scene::Instance& instance : inputs.geometry.instances) {
-    if (instance.world_bounds.empty()) continue;
-    glm::dvec3 size_m = instance.world_bounds.max_m - instance.world_bounds.min_m;
-    std::array<double, 3> sorted = {size_m.x, size_m.y, size_m.z};
-    std::ranges::sort(sorted);
-    const glm::dvec3 centre_m = 0.5 * (instance.world_bounds.max_m + instance.world_bounds.min_m);
-    Caster caster;
-    caster.radius_m = static_cast<float>(0.5 * glm::length(size_m));
-    caster.width_m = static_cast<float>(sorted[1]);
-    const std::int32_t mover = inputs.mover_of_object[instance.object];
-    if (mover < 0) {
-      caster.centre_m = glm::vec3(centre_m - inputs.rays.origin_world_m());
-      for (std::size_t i = 0; i < record.size(); ++i) {
-        if (!record.rays[i].sun_up()) continue;
-        caster.to_sun = record.rays[i].to_sun();
-        casters_.push_back(caster);
-      }
-      continue;
-    }
-    for (std::size_t i = 0; i < record.size(); ++i) {
-      const MoverPlacement& place = record.rays[i].placement(static_cast<std::size_t>(mover));
-      if (!record.rays[i].sun_up() || !place.on) continue;
-      caster.centre_m = place.position_m;
-      caster.to_sun = record.rays[i].to_sun();
-      casters_.push_back(caster);
-    }
-  }
 }
 
-float SurfaceRefinement::pixel_m(const glm::vec3& centre_m) const noexcept {
-  float distance_m = 1e30F;
-  for (const glm::vec3& eye : eyes_rel_m_) {
-    distance_m = std::min(distance_m, glm::distance(eye, centre_m));
+SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>& corners_m,
+                                                  float longest_m) const noexcept {
+  constexpr float kLeastM = 1e-6F;
+  const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
+  const glm::vec3 twice_area_m2 =
+      glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
+  Width width;
+  for (const Eye& eye : eyes_) {
+    const glm::vec3 way_m = centre_m - eye.rel_m;
+    const float distance_m = std::max(glm::length(way_m), kLeastM);
+    const float px_m = std::max(pixel_rad_ * distance_m, kLeastM);
+    const glm::vec3 ahead = way_m / distance_m;
+    const float looks_px =
+        std::min(std::sqrt(std::abs(glm::dot(twice_area_m2, ahead))) / px_m, longest_m / px_m);
+    width.edge_px = std::max(width.edge_px, longest_m / px_m);
+    width.anywhere_px = std::max(width.anywhere_px, looks_px);
+    if (looks_px <= width.in_view_px) continue;
+    const float cosine = std::clamp(glm::dot(ahead, eye.boresight), -1.0F, 1.0F);
+    const bool in_view = eye.boresight == glm::vec3(0.0F) || distance_m < longest_m ||
+                         std::acos(cosine) < field_rad_ + longest_m / distance_m;
+    if (in_view) width.in_view_px = looks_px;
   }
-  return eyes_rel_m_.empty() ? 0.0F : pixel_rad_ * distance_m;
-}
-
-float SurfaceRefinement::seed_edge_m(const glm::vec3& centre_m, float longest_m) const noexcept {
-  float seed_m = 1e30F;
-  for (const Caster& caster : casters_) {
-    const float edge_m = kSeedFrac * caster.width_m;
-    if (edge_m >= std::min(seed_m, longest_m)) continue;  // changes nothing
-    const glm::vec3 way = centre_m - caster.centre_m;
-    const float along_m = std::max(0.0F, -glm::dot(way, caster.to_sun));
-    const float beside_m = glm::length(way + along_m * caster.to_sun);
-    if (beside_m < caster.radius_m + longest_m) seed_m = edge_m;
-  }
-  return seed_m;
+  return width;
 }
 
 bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
                              std::uint32_t slot, const SurfacePatch& patch) const {
-  if (eyes_rel_m_.empty() || patch.mover >= 0) return true;
+  if (eyes_.empty() || patch.mover >= 0) return true;
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
   const glm::vec3 across = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   const float area = glm::length(across);
   if (!(area > 0.0F)) return false;
   const glm::vec3 normal = across / area;
   const bool sheet = refined.vertices()[refined.leaf(slot)[0]].sheet;
-  for (const glm::vec3& eye_m : eyes_rel_m_) {
+  for (const Eye& eye : eyes_) {
+    const glm::vec3& eye_m = eye.rel_m;
     const glm::vec3 to_eye = eye_m - centre_m;
     const float sine = glm::dot(normal, to_eye) / std::max(glm::length(to_eye), 1e-6F);
     if (!sheet && sine < -kBackSine) continue;
@@ -143,52 +133,14 @@ bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const Re
   return false;
 }
 
-bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slot,
-                                   const SurfacePatch& patch) const {
+float SurfaceRefinement::shadow_edge_k(const RefinedMesh& refined, std::uint32_t slot,
+                                       const SurfacePatch& patch) const {
   const auto& leaf = refined.leaf(slot);
-  const auto vertices = refined.vertices();
-  std::array<glm::vec3, 3> corners_m;
-  glm::vec3 centre_m(0.0F);
-  for (std::size_t i = 0; i < 3; ++i) {
-    // Not the samples' own places: those are moved off edges.
-    corners_m[i] = glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[leaf[i]].position_m, 1.0F));
-    if (patch.mover >= 0) {
-      const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(patch.mover)];
-      corners_m[i] = place.rel_from_body * corners_m[i] + place.position_m;
-    }
-    centre_m += corners_m[i] / 3.0F;
-  }
-  const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
-                                    glm::distance(corners_m[1], corners_m[2]),
-                                    glm::distance(corners_m[2], corners_m[0])});
-  const float pixel_m = this->pixel_m(centre_m);
-  if (longest_m <= kLeastShadowEdgePx * pixel_m) return false;
-  if (in_.materials[vertices[leaf[0]].material].prescribed_k) return false;
-  if (longest_m > seed_edge_m(centre_m, longest_m)) return true;
-  if (longest_m < kTestedPx * pixel_m && !seen(corners_m, refined, slot, patch)) {
-    return false;
-  }
-
-  const bool smooth = longest_m > kLeastEdgePx * pixel_m;
   const std::size_t count = in_.record.size();
-  const float bend_k = bend_.cost_k(refined, slot, patch);
-  if (bend_k > (smooth ? kBendFrac : kSharpBendFrac) * tolerance_k_) return true;
-
-  // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
-  const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
-  const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
-  if (smooth && lateral_ && longest_m > depth_m &&
-      std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
-    return true;
-  }
-
   const auto offset_k = [&](std::size_t i) { return patch.outputs[leaf[i]].offset_k; };
   const float range_k = std::max({offset_k(0), offset_k(1), offset_k(2)}) -
                         std::min({offset_k(0), offset_k(1), offset_k(2)});
-  const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
-  if (patch.surplus_k[newest] > (smooth ? kSurplusFrac : kSharpSurplusFrac) * tolerance_k_)
-    return true;
-  if (range_k < tolerance_k_ || longest_m < kEdgeSunPx * pixel_m) return false;
+  if (range_k < tolerance_k_) return 0.0F;
   for (std::size_t i = recent_; i < count; ++i) {
     const auto sun = [&](std::size_t corner) {
       const glm::vec3 normal = in_.record.rays[i].normal(patch.samples[leaf[corner]]);
@@ -197,28 +149,152 @@ bool SurfaceRefinement::too_coarse(const RefinedMesh& refined, std::uint32_t slo
     };
     const float high = std::max({sun(0), sun(1), sun(2)});
     const float low = std::min({sun(0), sun(1), sun(2)});
-    if (high - low > kEdgeSunFrac) return true;
+    if (high - low > kEdgeSunFrac) return range_k;
   }
-  return false;
+  return 0.0F;
 }
 
-void SurfaceRefinement::flag(std::uint32_t mesh, const RefinedMesh& refined,
-                             std::span<const SurfacePatch> patches,
-                             std::vector<std::uint32_t>& slots) const {
-  std::vector<std::uint8_t> flagged(refined.leaf_count(), 0);
-  for (const SurfacePatch& patch : patches) {
-    if (patch.mesh != mesh) continue;
-    run_parallel(flagged.size(), 256, [&](std::size_t from, std::size_t to) {
-      for (std::size_t slot = from; slot < to; ++slot) {
-        if (flagged[slot] == 0 && too_coarse(refined, static_cast<std::uint32_t>(slot), patch)) {
-          flagged[slot] = 1;
-        }
-      }
-    });
+float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_t slot,
+                                        const SurfacePatch& patch) const {
+  const auto& leaf = refined.leaf(slot);
+  const std::size_t count = in_.record.size();
+  const SurfaceSample& a = patch.samples[leaf[0]];
+  const SurfaceSample& b = patch.samples[leaf[1]];
+  const SurfaceSample& c = patch.samples[leaf[2]];
+  SurfaceSample face;
+  const glm::vec3 normal = a.normal + b.normal + c.normal;
+  const float length = glm::length(normal);
+  if (!(length > 0.0F)) return 0.0F;
+  face.normal = normal / length;
+  face.mover = patch.mover;
+  face.material = a.material;
+  // Spread evenly (R2 sequence, Roberts 2018), from leaf to leaf at other places.
+  constexpr float kStepU = 0.7548776662F;
+  constexpr float kStepV = 0.5698402910F;
+  std::array<glm::vec3, kPacketRays> points_m;
+  for (std::size_t k = 0; k < points_m.size(); ++k) {
+    const auto turn = static_cast<float>((leaf[0] * 7U + leaf[1] * 5U + leaf[2] * 3U) % 1021U +
+                                         static_cast<std::uint32_t>(k) + 1U);
+    float u = turn * kStepU - std::floor(turn * kStepU);
+    float v = turn * kStepV - std::floor(turn * kStepV);
+    if (u + v > 1.0F) {
+      u = 1.0F - u;
+      v = 1.0F - v;
+    }
+    points_m[k] = (1.0F - u - v) * a.position_m + u * b.position_m + v * c.position_m;
   }
-  slots.clear();
-  for (std::uint32_t slot = 0; slot < flagged.size(); ++slot) {
-    if (flagged[slot] != 0) slots.push_back(slot);
+  std::array<float, kPacketRays> missed_k{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const IntervalRays& rays = in_.record.rays[i];
+    if (!rays.sun_up()) continue;
+    const auto frac = [&](std::size_t corner) { return patch.sun_frac[leaf[corner] * count + i]; };
+    const float low = std::min({frac(0), frac(1), frac(2)});
+    const float high = std::max({frac(0), frac(1), frac(2)});
+    const bool lit = low > 1.0F - kAgreeFrac;
+    if (!lit && high > kAgreeFrac) continue;
+    const float worth_k =
+        worth_.sun_k(face.material, i) * std::max(0.0F, glm::dot(rays.normal(face), rays.to_sun()));
+    const IntervalRays::Spots spots = rays.spots(in_.rays, face, points_m, start_offset_m_);
+    const std::uint32_t odd = spots.faced & (lit ? ~spots.lit : spots.lit);
+    for (std::size_t k = 0; k < points_m.size(); ++k) {
+      if (((odd >> k) & 1U) != 0U) missed_k[k] += lit ? -worth_k : worth_k;
+    }
+  }
+  float most_k = 0.0F;
+  for (const float k : missed_k) most_k = std::max(most_k, std::abs(k));
+  return most_k;
+}
+
+SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, std::uint32_t slot,
+                                                  const SurfacePatch& patch) const {
+  const auto& leaf = refined.leaf(slot);
+  const auto vertices = refined.vertices();
+  std::array<glm::vec3, 3> corners_m;
+  for (std::size_t i = 0; i < 3; ++i) {
+    // Not the samples' own places: those are moved off edges.
+    corners_m[i] = glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[leaf[i]].position_m, 1.0F));
+    if (patch.mover >= 0) {
+      const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(patch.mover)];
+      corners_m[i] = place.rel_from_body * corners_m[i] + place.position_m;
+    }
+  }
+  const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
+                                    glm::distance(corners_m[1], corners_m[2]),
+                                    glm::distance(corners_m[2], corners_m[0])});
+  const Width width = this->width(corners_m, longest_m);
+  Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
+  if (width.edge_px <= kLeastShadowEdgePx) return judged;
+  if (in_.materials[vertices[leaf[0]].material].prescribed_k) return judged;
+  const float over_base = std::max(width.in_view_px / kBasePx, width.anywhere_px / kBaseAsidePx);
+  if (over_base > 1.0F) {
+    judged.need = kBaseNeed * over_base;
+    return judged;
+  }
+  if (!seen(corners_m, refined, slot, patch)) return judged;
+
+  const bool smooth = width.edge_px > kLeastEdgePx;
+  float error_k = 0.0F;
+  const auto count_in = [&](float found_k, float limit_frac) {
+    if (found_k > limit_frac * tolerance_k_) error_k = std::max(error_k, found_k);
+  };
+  const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
+  count_in(patch.surplus_k[newest], smooth ? kSurplusFrac : kSharpSurplusFrac);
+  count_in(bend_.cost_k(refined, slot, patch), smooth ? kBendFrac : kSharpBendFrac);
+  // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
+  const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
+  const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
+  if (smooth && lateral_ && longest_m > depth_m &&
+      std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
+    error_k = std::max(error_k, tolerance_k_);
+  }
+  if (width.edge_px >= kEdgeSunPx) {
+    error_k = std::max(error_k, shadow_edge_k(refined, slot, patch));
+    if (error_k == 0.0F) count_in(missed_shade_k(refined, slot, patch), kMissedFrac);
+  }
+  const float weighed_px = std::max(width.in_view_px, kAsideFrac * width.anywhere_px);
+  judged.need = error_k / tolerance_k_ * weighed_px;
+  return judged;
+}
+
+SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const RefinedMesh& refined,
+                                                 std::span<const SurfacePatch> patches) {
+  std::vector<Judged>& judged = judged_[mesh];
+  judged.resize(refined.leaf_count());
+  constexpr std::size_t kGrain = 256;
+  run_parallel(judged.size(), kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const auto slot = static_cast<std::uint32_t>(i);
+      if (judged[i].node == refined.node(slot)) continue;
+      judged[i] = {refined.node(slot)};
+      for (const SurfacePatch& patch : patches) {
+        if (patch.mesh != mesh) continue;
+        const Judged here = need(refined, slot, patch);
+        judged[i].need = std::max(judged[i].need, here.need);
+        judged[i].in_view = judged[i].in_view || here.in_view;
+      }
+    }
+  });
+  Most most;
+  for (const Judged& leaf : judged) {
+    most.need = std::max(most.need, leaf.need);
+    if (leaf.in_view) most.in_view = std::max(most.in_view, leaf.need);
+  }
+  return most;
+}
+
+void SurfaceRefinement::list(std::uint32_t mesh, float above, std::vector<Need>& needs) const {
+  needs.clear();
+  const std::vector<Judged>& judged = judged_[mesh];
+  for (std::uint32_t slot = 0; slot < judged.size(); ++slot) {
+    if (judged[slot].need > above) needs.push_back({slot, judged[slot].need});
+  }
+}
+
+void SurfaceRefinement::leave(std::uint32_t mesh, const RefinedMesh& refined,
+                              std::span<const std::uint32_t> slots) {
+  for (const std::uint32_t slot : slots) {
+    Judged& leaf = judged_[mesh][slot];
+    if (leaf.node == refined.node(slot)) leaf.need = 0.0F;
   }
 }
 

@@ -80,7 +80,7 @@ TEST_P(SteadyState, IntervalsOfSamplesNeedNoHeap) {
                          make_foster(scenario_, std::move(*networks), environment, kReferenceK));
   StepPlan plan(scenario_.thermal);
   const CachedSurface::Inputs inputs{environment, entities_};
-  const RefineView view{{{0.0, -12.0, 8.0}}, 2e-2};
+  const RefineView view{{{{0.0, -12.0, 8.0}, {}}}, 2e-2};
   ASSERT_TRUE((*surface)->prepare(kStartNs, view, inputs, plan, history, std::nullopt, {}));
   ASSERT_GT((*surface)->model().samples.samples.size(), 500U);
 

@@ -119,7 +119,9 @@ float normals_error(bool with_detail, double left_out, float unit_m = 1.0F) {
   SurfaceHistory history(scenario.thermal.steps,
                          make_foster(scenario, std::move(*networks), environment, kReferenceK));
   StepPlan plan(scenario.thermal);
-  const RefineView view{{kEyes.begin(), kEyes.end()}, kPixelRad};
+  RefineView view;
+  view.pixel_rad = kPixelRad;
+  for (const glm::dvec3& eye : kEyes) view.eyes.push_back({eye, {}});
   if (!(*surface)->prepare(7200 * kSecondNs, view, {environment, {}}, plan, history, std::nullopt,
                            {})) {
     return -1.0F;
