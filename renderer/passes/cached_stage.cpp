@@ -89,8 +89,10 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   if (!scenario.thermal.state_file.empty()) {
     saved = {scenario.thermal.state_file, scenario_key(scenario, geometry), true};
   }
+  const scene::DetailView view{eyes_world_m, pixel_rad(scenario.sensor)};
+  geometry = scene::separated(std::move(geometry), view);
   scene::SceneGeometry full = geometry;
-  geometry = scene::simplified(std::move(geometry), {eyes_world_m, pixel_rad(scenario.sensor)});
+  geometry = scene::simplified(std::move(geometry), view);
   std::optional<SurfaceDetail> detail;
   if (geometry.triangles < full.triangles) {
     auto created = SurfaceDetail::create(std::move(full), geometry);

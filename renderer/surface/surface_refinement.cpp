@@ -16,6 +16,8 @@ namespace {
 constexpr float kBasePx = 32.0F;
 constexpr float kBaseAsidePx = 128.0F;
 constexpr float kBaseNeed = 1e6F;  ///< of triangles wider than that
+/// What needs less is left as it is: an error of a tolerance in a triangle of so many pixels.
+constexpr float kLeastNeed = 4.0F;
 /// What the need of a triangle out of view counts.
 constexpr float kAsideFrac = 1.0F / 64.0F;
 /// What points between the corners may make of it, in tolerances.
@@ -39,6 +41,8 @@ constexpr float kSeenFrac = 0.999F;
 /// to some pixels.
 constexpr float kSurplusFrac = 1.2F;
 constexpr float kSharpSurplusFrac = 8.0F;
+/// What a foot in the middle of a triangle counts, in tolerances.
+constexpr float kFootFrac = 30.0F;
 /// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
 constexpr float kCreaseS = 1000.0F;
 constexpr float kCreaseDepths = 3.0F;
@@ -240,6 +244,10 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
   count_in(patch.surplus_k[newest], smooth ? kSurplusFrac : kSharpSurplusFrac);
   count_in(bend_.cost_k(refined, slot, patch), smooth ? kBendFrac : kSharpBendFrac);
+  // Where a foot runs through, covered corners will take the values of others.
+  const auto covered = [&](std::size_t i) { return patch.samples[leaf[i]].covered ? 1 : 0; };
+  const int under = covered(0) + covered(1) + covered(2);
+  if (smooth && under > 0 && under < 3) error_k = std::max(error_k, kFootFrac * tolerance_k_);
   // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
   const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
   const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
@@ -266,12 +274,18 @@ SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const Refin
       const auto slot = static_cast<std::uint32_t>(i);
       if (judged[i].node == refined.node(slot)) continue;
       judged[i] = {refined.node(slot)};
+      float squares = 0.0F;
+      float uses = 0.0F;
       for (const SurfacePatch& patch : patches) {
         if (patch.mesh != mesh) continue;
         const Judged here = need(refined, slot, patch);
-        judged[i].need = std::max(judged[i].need, here.need);
+        squares += here.need * here.need;
+        uses += 1.0F;
         judged[i].in_view = judged[i].in_view || here.in_view;
       }
+      // A vertex costs a sample on every instance: what one gains counts that much less.
+      const float mean_need = std::sqrt(squares / std::max(uses, 1.0F));
+      if (mean_need > kLeastNeed) judged[i].need = mean_need;
     }
   });
   Most most;

@@ -355,7 +355,7 @@ void Tool::add_model_commands() {
       ->check(CLI::Range(1, 1 << 30));
   app.add_option("--method", o.method,
                  "sun-disc, wall-shadow, sky-view with --device gpu: thermal method whose "
-                 "visibility answers; default: per-frame")
+                 "visibility answers; default: cached")
       ->check(CLI::IsMember({"per-frame", "cached"}));
   add_gpu(app, o.gpu_index);
   {

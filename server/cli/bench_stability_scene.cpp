@@ -175,6 +175,7 @@ scene::ScenarioDesc plain_scenario(std::uint32_t width_px, std::uint32_t height_
   scenario.materials = {material};
   scenario.default_material = "surface";
   scenario.sensor = {"camera", width_px, height_px, 40.0 * physics::kDegree, 0.1, {}};
+  scenario.thermal.method = scene::ThermalMethod::per_frame;
   scenario.thermal.steps = 9;
   scenario.thermal.shadow_map_px = 512;
   scenario.thermal.max_cascades = 2;

@@ -139,10 +139,13 @@ config::DaemonConfig daemon_config(const scene::ScenarioDesc& scenario,
   return daemon;
 }
 
+/// Thermal samples of the demo where the scenario would take more: warmed up within its time.
+constexpr std::uint32_t kDemoSamples = 100'000;
+
 class Demo {
  public:
-  Demo(const DemoCommand& command, const scene::ScenarioDesc& scenario, WorkFolder& work)
-      : command_(command), scenario_(scenario), work_(work) {}
+  Demo(const DemoCommand& command, scene::ScenarioDesc scenario, WorkFolder& work)
+      : command_(command), scenario_(std::move(scenario)), work_(work) {}
 
   int run();
 
@@ -158,7 +161,7 @@ class Demo {
   int report();
 
   const DemoCommand& command_;
-  const scene::ScenarioDesc& scenario_;
+  scene::ScenarioDesc scenario_;
   WorkFolder& work_;
   Clock::time_point begin_ = Clock::now();
   std::filesystem::path log_;
@@ -192,8 +195,15 @@ Result<void> Demo::start() {
   fmt::print(text_stream(command_.json), "starting emitd on scenario {} ({})\n", scenario_.name,
              scenario_.file.string());
   const auto started = Clock::now();
-  auto daemon = DaemonProcess::start(daemon_config(scenario_, work_.path()), command_.input.set,
-                                     work_.path(), std::chrono::seconds(120));
+  // The replay warms up from what the daemon has kept.
+  std::error_code ignored;
+  scenario_.thermal.state_file = std::filesystem::absolute(work_.path() / "thermal.state", ignored);
+  scenario_.thermal.max_samples = std::min(scenario_.thermal.max_samples, kDemoSamples);
+  std::vector<std::string> set = command_.input.set;
+  set.push_back(fmt::format("thermal.max_samples={}", scenario_.thermal.max_samples));
+  set.push_back(fmt::format("thermal.state_file=\"{}\"", scenario_.thermal.state_file.string()));
+  auto daemon = DaemonProcess::start(daemon_config(scenario_, work_.path()), set, work_.path(),
+                                     std::chrono::seconds(120));
   if (!daemon) return tl::unexpected(daemon.error());
   daemon_.emplace(std::move(*daemon));
   setup_s_ = seconds_since(started);

@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "emit/renderer/renderer.hpp"
+#include "emit/scene/trajectory.hpp"
 #include "frame_files.hpp"
 #include "interrupt.hpp"
 #include "json.hpp"
@@ -48,12 +49,19 @@ Json plane_json(std::span<const float> plane) {
 }  // namespace
 
 int run_render(const RenderCommand& command) {
-  const auto scenario = load_scenario_choice(command.input);
+  auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
   const auto band = find_band(*scenario, command.band);
   if (!band) return fail(kExitUsage, band.error().text);
   if (!std::isfinite(command.time_s) || std::abs(command.time_s) > 9e9) {
     return fail(kExitUsage, "--time-s: not a time");
+  }
+
+  // Surfaces need only be fine enough for this frame, unless their state is shared with others.
+  scene::Trajectory& way = scenario->sensor.trajectory;
+  const std::int64_t sim_time_ns = std::llround(command.time_s * 1e9);
+  if (way.size() > 1 && scenario->thermal.state_file.empty()) {
+    way = {{sim_time_ns, scene::trajectory_at(way, sim_time_ns).pose}};
   }
 
   renderer::OutputOptions output;
@@ -71,7 +79,7 @@ int run_render(const RenderCommand& command) {
   start = std::chrono::steady_clock::now();
   renderer::FrameRequest request;
   request.frame_number = 1;
-  request.sim_time_ns = std::llround(command.time_s * 1e9);
+  request.sim_time_ns = sim_time_ns;
   request.thermal_time_ns = request.sim_time_ns;
   request.sensor_pose = renderer.scenario_sensor_pose_at(request.sim_time_ns);
   {

@@ -30,10 +30,12 @@ constexpr Tolerance kRadianceWPerM2Sr{0.002, 2e-4, 0.002};
 
 struct Case {
   const char* scenario;
+  const char* method;
   double time_s;
+  [[nodiscard]] std::string name() const { return std::string(scenario) + "_" + method; }
 };
 void PrintTo(const Case& c, std::ostream* out) {
-  *out << c.scenario;
+  *out << c.name();
 }
 
 class Golden : public testing::TestWithParam<Case> {};
@@ -60,12 +62,13 @@ void compare(const image::ExrImage& image, const image::ExrImage& reference, con
 }
 
 TEST_P(Golden, matches_the_stored_image) {
-  const auto [name, time_s] = GetParam();
+  const Case& param = GetParam();
   const std::vector<std::string> overrides = {"sensor.width_px=320", "sensor.height_px=256",
-                                              "thermal.steps=13"};
-  auto scenario = config::load_scenario(
-      std::filesystem::path(EMIT_TEST_SHARE_DIR) / "scenarios" / (std::string(name) + ".toml"),
-      overrides);
+                                              "thermal.steps=13",
+                                              std::string("thermal.method=") + param.method};
+  auto scenario = config::load_scenario(std::filesystem::path(EMIT_TEST_SHARE_DIR) / "scenarios" /
+                                            (std::string(param.scenario) + ".toml"),
+                                        overrides);
   ASSERT_TRUE(scenario) << scenario.error().text;
   renderer::OutputOptions output;
   output.temperature = true;
@@ -73,7 +76,7 @@ TEST_P(Golden, matches_the_stored_image) {
   ASSERT_TRUE(renderer) << renderer.error().text;
 
   renderer::FrameRequest request;
-  request.sim_time_ns = request.thermal_time_ns = std::llround(time_s * 1e9);
+  request.sim_time_ns = request.thermal_time_ns = std::llround(param.time_s * 1e9);
   request.sensor_pose = (*renderer)->scenario_sensor_pose_at(request.sim_time_ns);
   const int slot = (*renderer)->submit(request);
   ASSERT_GE(slot, 0);
@@ -86,8 +89,8 @@ TEST_P(Golden, matches_the_stored_image) {
   image.height_px = frame.height_px;
   image.add("radiance", frame.radiance_w_m2_sr[0]);
   image.add("temperature", frame.temperature_k);
-  const std::filesystem::path file = std::filesystem::path(EMIT_TEST_SOURCE_DIR) / "golden" /
-                                     "refs" / (std::string(name) + ".exr");
+  const std::filesystem::path file =
+      std::filesystem::path(EMIT_TEST_SOURCE_DIR) / "golden" / "refs" / (param.name() + ".exr");
   if (std::getenv("EMIT_UPDATE_GOLDENS") != nullptr) {
     const auto written = image::write_exr(file, image);
     ASSERT_TRUE(written) << written.error().text;
@@ -101,20 +104,21 @@ TEST_P(Golden, matches_the_stored_image) {
   compare(image, *reference, "temperature", kTemperatureK);
   compare(image, *reference, "radiance", kRadianceWPerM2Sr);
   if (HasFailure()) {
-    const auto failed =
-        std::filesystem::path(testing::TempDir()) / (std::string(name) + "_failed.exr");
+    const auto failed = std::filesystem::path(testing::TempDir()) / (param.name() + "_failed.exr");
     if (image::write_exr(failed, image)) std::printf("wrote %s\n", failed.c_str());
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenarios, Golden,
-                         testing::Values(Case{"box", 12600.0}, Case{"block-on-road", 12600.0},
-                                         Case{"ribbed", 7200.0}),
-                         [](const auto& case_info) {
-                           std::string name = case_info.param.scenario;
-                           for (char& c : name) c = c == '-' ? '_' : c;
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Scenarios, Golden,
+    testing::Values(Case{"box", "per-frame", 12600.0}, Case{"block-on-road", "per-frame", 12600.0},
+                    Case{"ribbed", "per-frame", 7200.0}, Case{"box", "cached", 12600.0},
+                    Case{"block-on-road", "cached", 12600.0}, Case{"ribbed", "cached", 7200.0}),
+    [](const auto& case_info) {
+      std::string name = case_info.param.name();
+      for (char& c : name) c = c == '-' ? '_' : c;
+      return name;
+    });
 
 }  // namespace
 }  // namespace emit::test

@@ -152,6 +152,24 @@ TEST(RendererCached, ShadowLiesWhereThePerFrameMethodPutsIt) {
   EXPECT_GT(high - low, 8.0F);
 }
 
+TEST(RendererCached, ASmallBodyInALargeMeshCastsItsShade) {
+  // Nothing tells the ground's triangles of it but rays between their corners.
+  auto quads = box({6.8, 3.2, 0.0}, {7.4, 3.8, 1.0});
+  quads.push_back(ground(60.0, 60.0));
+  auto scenario = cached_scenario(write_quads("post", quads));
+  const auto cool_px = [&](scene::ThermalMethod method) {
+    scenario.thermal.method = method;
+    const auto picture =
+        Session(scenario).frame_k(3 * kHourNs, looking({7.0, -9.0, 9.0}, {6.0, 3.5, 0.0}));
+    const float ground_k = picture[picture.size() - kWidth / 2];
+    return std::ranges::count_if(picture, [&](float k) { return k < ground_k - 4.0F; });
+  };
+  const auto expected = cool_px(scene::ThermalMethod::per_frame);
+  EXPECT_GT(expected, 30);
+  EXPECT_NEAR(static_cast<double>(cool_px(scene::ThermalMethod::cached)),
+              static_cast<double>(expected), 0.2 * static_cast<double>(expected));
+}
+
 TEST(RendererCached, ACameraThatTurnedAwayFindsWhatOneThatStayedSees) {
   const auto scenario = cached_scenario(box_on_ground());
   const auto pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
@@ -327,17 +345,14 @@ TEST(RendererCached, AMeshFinerThanThePixelsIsSampledAsTheCameraNeedsIt) {
 }
 
 TEST(RendererCached, WhatNoEyeSeesIsNotRefined) {
-  // A wall that runs north; in the morning its shade lies west of it.
-  std::vector<Quad> quads = box({-0.2, -6.0, 0.0}, {0.2, 6.0, 4.0});
-  quads.push_back(ground(12.0, 12.0));
-  const auto scenario = cached_scenario(write_quads("wall", quads));
-  const auto samples_from = [&](double east_m) {
+  // From below, the ground turns its back and hides what stands on it.
+  const auto scenario = cached_scenario(box_on_ground());
+  const auto samples_from = [&](double up_m) {
     Session run(scenario);
-    (void)run.frame_k(2 * kHourNs, looking({east_m, 0.0, 1.5}, {0.0, 0.0, 0.5}));
+    (void)run.frame_k(2 * kHourNs, looking({-9.0, 0.0, up_m}, {-2.0, 0.0, 0.0}));
     return run.renderer().scene_stats().samples;
   };
-  // Without the test of being seen it would be one and a half times as many.
-  EXPECT_GT(samples_from(-5.0), 2 * samples_from(5.0));
+  EXPECT_GT(samples_from(6.0), 2 * samples_from(-6.0));
 }
 
 TEST(RendererCached, GroundUnderABodyDoesNotShowThroughAtItsFoot) {
@@ -345,10 +360,12 @@ TEST(RendererCached, GroundUnderABodyDoesNotShowThroughAtItsFoot) {
   auto scenario = cached_scenario(box_on_ground());
   scenario.sensor.fov_h_rad = 0.35;
   scenario.materials[0].base_k = 340.0;  // so that covered ground is hot
-  Session run(scenario);
-  const auto sunlit = run.frame_k(2 * kHourNs, looking({9.0, -9.0, 4.0}, {6.0, -6.0, 0.0}));
+  const auto seen_from = [&](const glm::dvec3& eye, const glm::dvec3& at) {
+    return Session(scenario).frame_k(2 * kHourNs, looking(eye, at));
+  };
+  const auto sunlit = seen_from({9.0, -9.0, 4.0}, {6.0, -6.0, 0.0});
   const float ground_k = sunlit[sunlit.size() / 2 + kWidth / 2];
-  const auto foot = run.frame_k(2 * kHourNs, looking({-3.0, 0.1, 0.8}, {-1.0, 0.1, 0.05}));
+  const auto foot = seen_from({-3.0, 0.1, 0.8}, {-1.0, 0.1, 0.05});
   const auto [low, high] = std::ranges::minmax(foot);
   EXPECT_LT(high, ground_k - 5.0F);
   EXPECT_LT(high - low, 1.5F);

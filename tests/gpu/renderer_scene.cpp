@@ -92,6 +92,7 @@ scene::ScenarioDesc instant_scenario(const std::filesystem::path& gltf) {
       {glm::dvec3(0.0), physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0)}};
   scenario.objects = {object};
   scenario.sensor = {"camera", 320, 256, 40.0 * physics::kDegree, 0.1, {}};
+  scenario.thermal.method = scene::ThermalMethod::per_frame;
   scenario.thermal.steps = 1;
   scenario.thermal.spacing = scene::StepSpacing::uniform;
   return scenario;

@@ -18,6 +18,10 @@ namespace {
 constexpr double kErrorPx = 0.25;
 /// Wider triangles than this, on average, are left alone: there is little to gain.
 constexpr double kLeastEdgePx = 6.0;
+/// Instances that look wider have their own mesh, as long as the copies have no more vertices than
+/// this.
+constexpr double kOwnMeshPx = 16.0;
+constexpr std::size_t kMostCopied = 2'000'000;
 /// Below this the collapse itself is all rounding.
 constexpr double kLeastErrorM = 1e-6;
 
@@ -105,6 +109,31 @@ void collapse(Mesh& mesh, double error) {
 double distance_m(const Aabb& box, const glm::dvec3& point_m) noexcept {
   if (box.empty()) return 0.0;
   return glm::length(glm::max(glm::max(box.min_m - point_m, point_m - box.max_m), glm::dvec3(0.0)));
+}
+
+SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
+  std::vector<std::uint32_t> uses(geometry.meshes.size(), 0);
+  for (const Instance& instance : geometry.instances) ++uses[instance.mesh];
+  std::size_t copied = 0;
+  for (Instance& instance : geometry.instances) {
+    const std::size_t vertices = geometry.meshes[instance.mesh].positions_m.size();
+    if (instance.entity_id != 0 || instance.world_bounds.empty() || uses[instance.mesh] < 2 ||
+        copied + vertices > kMostCopied) {
+      continue;
+    }
+    const double width_m = glm::length(instance.world_bounds.max_m - instance.world_bounds.min_m);
+    const bool wide = std::ranges::any_of(view.eyes_world_m, [&](const glm::dvec3& eye_m) {
+      return width_m > kOwnMeshPx * view.pixel_rad * distance_m(instance.world_bounds, eye_m);
+    });
+    if (!wide) continue;
+    copied += vertices;
+    --uses[instance.mesh];
+    Mesh own = geometry.meshes[instance.mesh];
+    instance.mesh = static_cast<std::uint32_t>(geometry.meshes.size());
+    geometry.meshes.push_back(std::move(own));
+    uses.push_back(1);
+  }
+  return geometry;
 }
 
 SceneGeometry simplified(SceneGeometry geometry, const DetailView& view) {

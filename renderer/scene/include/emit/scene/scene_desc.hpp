@@ -169,7 +169,7 @@ enum class ThermalModel : std::uint8_t { emit2014, foster };
 enum class StepSpacing : std::uint8_t { uniform, geometric };
 
 struct ThermalOptions {
-  ThermalMethod method = ThermalMethod::per_frame;
+  ThermalMethod method = ThermalMethod::cached;
   ThermalModel model = ThermalModel::emit2014;
   double tolerance_k = 0.1;
   double initial_k = 290.0;           ///< surface temperature at history start

@@ -16,6 +16,11 @@ struct DetailView {
 /// From a point to the nearest place of a box; 0 inside it and for an empty one.
 [[nodiscard]] double distance_m(const Aabb& box, const glm::dvec3& point_m) noexcept;
 
+/// Gives every static instance that looks wide from some eye a mesh of its own, so that each can be
+/// cut as finely as it needs; far ones go on sharing, and all do where the eyes are unknown or the
+/// copies would have more than some million vertices. Instances keep their order. Setup only.
+[[nodiscard]] SceneGeometry separated(SceneGeometry geometry, const DetailView& view);
+
 /// Fewer triangles where a mesh has more than its pixels can show: edge collapses by quadric error
 /// (Garland and Heckbert 1997, SIGGRAPH), at most a quarter of a pixel seen from the nearest eye;
 /// as that is a mean over the faces around a collapse, the surface itself moves by up to half a
