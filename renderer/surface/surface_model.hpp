@@ -23,7 +23,7 @@ struct RefineView {
     glm::dvec3 world_m{0.0};
     glm::dvec3 boresight{0.0};  ///< unit length; zero: all around
   };
-  std::vector<Eye> eyes;  ///< places of the camera
+  std::vector<Eye> eyes;  ///< places of the camera; without any nothing is refined
   double pixel_rad = 1e-3;
   double field_rad = 3.1416;  ///< what lies within that angle of a boresight comes first
 };

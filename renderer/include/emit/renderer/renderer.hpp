@@ -83,8 +83,9 @@ struct FrameStats {
   /// Live poses the entities' histories forgot since the last reset because their store was full:
   /// shade of the distant past is coarser than it was sent.
   std::uint64_t dropped_poses = 0;
-  /// thermal.method = "cached": the camera stands where no one said it would, so that triangles may
-  /// be wider than its pixels and shadows coarser than thermal.tolerance_k.
+  /// thermal.method = "cached": the camera stands where no one said it would, or samples ran out
+  /// before what it sees was fine enough: triangles may be wider than its pixels and shadows
+  /// coarser than thermal.tolerance_k.
   bool coarse = false;
 };
 
