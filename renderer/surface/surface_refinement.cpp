@@ -108,7 +108,7 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
 
 bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
                              std::uint32_t slot, const SurfacePatch& patch) const {
-  if (eyes_.empty() || patch.mover >= 0) return true;
+  if (patch.mover >= 0) return true;
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
   const glm::vec3 across = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   const float area = glm::length(across);

@@ -195,13 +195,26 @@ Result<void> Demo::start() {
   fmt::print(text_stream(command_.json), "starting emitd on scenario {} ({})\n", scenario_.name,
              scenario_.file.string());
   const auto started = Clock::now();
-  // The replay warms up from what the daemon has kept.
-  std::error_code ignored;
-  scenario_.thermal.state_file = std::filesystem::absolute(work_.path() / "thermal.state", ignored);
-  scenario_.thermal.max_samples = std::min(scenario_.thermal.max_samples, kDemoSamples);
   std::vector<std::string> set = command_.input.set;
-  set.push_back(fmt::format("thermal.max_samples={}", scenario_.thermal.max_samples));
-  set.push_back(fmt::format("thermal.state_file=\"{}\"", scenario_.thermal.state_file.string()));
+  const auto asked_for = [&](std::string_view key) {
+    return std::ranges::any_of(set,
+                               [&](const std::string& entry) { return entry.starts_with(key); });
+  };
+  scene::ThermalOptions& thermal = scenario_.thermal;
+  if (thermal.method == scene::ThermalMethod::cached && !asked_for("thermal.max_samples=") &&
+      thermal.max_samples > kDemoSamples) {
+    fmt::print(text_stream(command_.json),
+               "with {} thermal samples instead of {}: frames are flagged degraded\n", kDemoSamples,
+               thermal.max_samples);
+    thermal.max_samples = kDemoSamples;
+    set.push_back(fmt::format("thermal.max_samples={}", kDemoSamples));
+  }
+  if (thermal.method == scene::ThermalMethod::cached && thermal.state_file.empty()) {
+    // The replay warms up from what the daemon has kept.
+    std::error_code ignored;
+    thermal.state_file = std::filesystem::absolute(work_.path() / "thermal.state", ignored);
+    set.push_back(fmt::format("thermal.state_file=\"{}\"", thermal.state_file.string()));
+  }
   auto daemon = DaemonProcess::start(daemon_config(scenario_, work_.path()), set, work_.path(),
                                      std::chrono::seconds(120));
   if (!daemon) return tl::unexpected(daemon.error());

@@ -303,7 +303,11 @@ TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
   auto scenario = cached_scenario(box_on_ground());
   scenario.thermal.max_samples = 300;
   Session run(scenario);
-  (void)run.frame_k(kHourNs, looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0}));
+  renderer::FrameRequest request;
+  request.sim_time_ns = request.thermal_time_ns = kHourNs;
+  request.sensor_pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+  const int slot = run.renderer().submit(request);
+  EXPECT_TRUE(run.renderer().collect(static_cast<renderer::SlotIndex>(slot)).stats.coarse);
   EXPECT_LE(run.renderer().scene_stats().samples, 300U);
   EXPECT_TRUE(run.renderer().scene_stats().samples_full);
 }

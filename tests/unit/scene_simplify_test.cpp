@@ -76,6 +76,25 @@ TEST(Simplify, nothing_changes_where_pixels_are_finer_or_the_distance_is_unknown
             before.size() / 3 / 4);
 }
 
+TEST(Separated, near_instances_have_a_mesh_of_their_own_and_far_ones_share) {
+  SceneGeometry geometry = scene_of(sphere(8, false));
+  for (const double x_m : {10.0, 1000.0, 1010.0}) {
+    Instance instance = geometry.instances[0];
+    instance.world_bounds.min_m.x += x_m;
+    instance.world_bounds.max_m.x += x_m;
+    geometry.instances.push_back(instance);
+  }
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
+  const SceneGeometry own = separated(geometry, {eyes, kPixelRad});
+  EXPECT_NE(own.instances[0].mesh, own.instances[1].mesh);
+  EXPECT_EQ(own.instances[2].mesh, own.instances[3].mesh);
+  EXPECT_NE(own.instances[1].mesh, own.instances[2].mesh);
+  for (const Instance& instance : own.instances) {
+    EXPECT_EQ(own.meshes[instance.mesh].indices, geometry.meshes[0].indices);
+  }
+  EXPECT_EQ(separated(geometry, {{}, kPixelRad}).meshes.size(), 1U);
+}
+
 TEST(Simplify, the_seam_between_two_materials_does_not_move) {
   const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
   const SceneGeometry coarse = simplified(scene_of(sphere(200, true)), {eyes, kPixelRad});
