@@ -41,7 +41,7 @@ class Taken {
     slot_ = renderer.submit(request);
     if (slot_ < 0) return;
     view_ = &renderer.collect(static_cast<SlotIndex>(slot_));
-    duration_s_ = std::chrono::duration<double>(Clock::now() - start).count();
+    frame_ms_ = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
   }
   ~Taken() {
     if (slot_ >= 0) renderer_.release(static_cast<SlotIndex>(slot_));
@@ -51,13 +51,13 @@ class Taken {
 
   [[nodiscard]] bool good() const noexcept { return view_ != nullptr && !view_->device_failed; }
   [[nodiscard]] const FrameView& view() const noexcept { return *view_; }
-  [[nodiscard]] double duration_s() const noexcept { return duration_s_; }
+  [[nodiscard]] double frame_ms() const noexcept { return frame_ms_; }
 
  private:
   Renderer& renderer_;
   int slot_ = -1;
   const FrameView* view_ = nullptr;
-  double duration_s_ = 0.0;
+  double frame_ms_ = 0.0;
 };
 
 double difference_k(const FrameView& full, const FrameView& shed,
@@ -80,7 +80,6 @@ Result<LadderMap> survey_ladder(Renderer& renderer, const scene::SensorDesc& sen
   for (std::size_t p = 0; p < at.size(); ++p) {
     FrameRequest request = at[p];
     LadderMap::OfRungs rungs{};
-    std::array<double, kQualityLadder.size()> duration_s{};
     for (int round = 0; round < 2; ++round) {  // the first one also fills caches
       request.rung = 0;
       const Taken full(renderer, request);
@@ -91,11 +90,10 @@ Result<LadderMap> survey_ladder(Renderer& renderer, const scene::SensorDesc& sen
           return make_error(ErrorCode::gpu, "the device failed in its first frames");
         }
         rungs[r].error_k = difference_k(full.view(), shed.view(), apparent);
-        duration_s[r] = round == 0 ? shed.duration_s() : std::min(duration_s[r], shed.duration_s());
+        rungs[r].frame_ms =
+            round == 0 ? shed.frame_ms() : std::min(rungs[r].frame_ms, shed.frame_ms());
       }
     }
-    for (std::size_t r = 0; r < rungs.size(); ++r)
-      rungs[r].cost_frac = duration_s[r] / duration_s[0];
     map.add(request.sensor_pose, rungs);
     if (progress && !progress(static_cast<double>(p + 1) / static_cast<double>(at.size()))) {
       return make_error(ErrorCode::internal, "stopped while the quality ladder was measured");

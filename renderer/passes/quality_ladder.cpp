@@ -32,7 +32,7 @@ void LadderMap::add(const physics::Pose& camera, const OfRungs& rungs) {
     return values[values.size() / 2];
   };
   for (std::size_t r = 0; r < medians_.size(); ++r) {
-    medians_[r] = {median(r, &RungStats::cost_frac), median(r, &RungStats::error_k)};
+    medians_[r] = {median(r, &RungStats::frame_ms), median(r, &RungStats::error_k)};
   }
 }
 
@@ -61,7 +61,7 @@ bool LadderMap::at(const physics::Pose& camera, double fov_rad, OfRungs& rungs) 
   const double along =
       length_m > 0.0 ? std::clamp(offset_m / (length_m * length_m), 0.0, 1.0) : 0.0;
   for (std::size_t r = 0; r < rungs.size(); ++r) {
-    rungs[r].cost_frac = std::lerp(here.rungs[r].cost_frac, other->rungs[r].cost_frac, along);
+    rungs[r].frame_ms = std::lerp(here.rungs[r].frame_ms, other->rungs[r].frame_ms, along);
     rungs[r].error_k = std::lerp(here.rungs[r].error_k, other->rungs[r].error_k, along);
   }
   return true;

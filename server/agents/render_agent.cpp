@@ -67,7 +67,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
                                 std::span(job->entities.data(), job->entity_count));
         job_prepared_ = true;
       }
-      const double cost_frac = choose_rung(*job, now_ns);
+      const double expected_ms = choose_rung(*job, now_ns);
       const int slot = source_->submit(job->request);
       if (slot < 0) {
         // A slot comes free when the sender or the conductor is done with one; both ring.
@@ -80,7 +80,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       starved_ = false;
       job_prepared_ = false;
       in_flight_[(first_ + count_) % kDepth] = {static_cast<renderer::SlotIndex>(slot), now_ns,
-                                                cost_frac};
+                                                expected_ms};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;
@@ -93,12 +93,12 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
 double RenderAgent::choose_rung(RenderJob& job, std::int64_t now_ns) noexcept {
   job.request.rung = 0;
   if (job.deadline_ns == 0) {
-    return 1.0;
+    return 0.0;
   }
   const auto rungs = source_->expected_rungs(job.request.sensor_pose);
   const std::size_t rung = quality_.choose(rungs, job.deadline_ns - now_ns);
   job.request.rung = static_cast<std::uint8_t>(rung);
-  return rungs[rung].cost_frac;
+  return rungs[rung].frame_ms;
 }
 
 void RenderAgent::apply_weather(const RenderJob& job) noexcept {
@@ -153,7 +153,7 @@ bool RenderAgent::finish_oldest() noexcept {
   }
   done->rung = view.rung;
   done->estimated_error_k = view.estimated_error_k;
-  quality_.finished(done->readback_end_ns - oldest.render_start_ns, oldest.cost_frac);
+  quality_.finished(done->readback_end_ns - oldest.render_start_ns, oldest.expected_ms);
   done->device_failed = view.device_failed;
   if (view.device_failed) {
     context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");

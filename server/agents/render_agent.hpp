@@ -33,14 +33,14 @@ class RenderAgent final : public Agent {
   struct InFlight {
     renderer::SlotIndex slot = 0;
     std::int64_t render_start_ns = 0;
-    double cost_frac = 1.0;  ///< of its rung
+    double expected_ms = 0.0;  ///< for its rung, by the ladder
   };
   /// More than one in flight lets upload of the next overlap with read-back of the last.
   static constexpr std::size_t kDepth = 2;
 
   bool take_job(std::int64_t now_ns) noexcept;
   bool finish_oldest() noexcept;
-  /// Sets the job's rung; returns what it is expected to cost against full quality.
+  /// Sets the job's rung; returns RungStats::frame_ms of it.
   double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;

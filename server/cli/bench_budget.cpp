@@ -108,12 +108,12 @@ class Flight {
       const auto start = Clock::now();
       const auto rungs = renderer_->expected_rungs(wanted.sensor_pose);
       const std::size_t rung = policy.choose(rungs, budget_ns);
-      const double cost_frac = rungs[rung].cost_frac;
+      const double expected_ms = rungs[rung].frame_ms;
       wanted.rung = static_cast<std::uint8_t>(rung);
       auto shed = render(wanted);
       if (!shed) return tl::unexpected(std::move(shed.error()));
       const double frame_ms = ms_since(start);
-      policy.finished(static_cast<std::int64_t>(1e6 * frame_ms), cost_frac);
+      policy.finished(static_cast<std::int64_t>(1e6 * frame_ms), expected_ms);
       row.frame_ms.add(frame_ms);
       if (frame_ms <= row.budget_ms) ++row.within;
       row.of_rung.resize(std::max(row.of_rung.size(), rungs.size()));

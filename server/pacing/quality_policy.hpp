@@ -11,36 +11,34 @@
 namespace emit::server {
 
 /// Which rung of the quality ladder a frame is rendered with, so that it is ready in time: the one
-/// with the least error among those whose expected time fits, else the fastest. The expected time
-/// is that of full quality, an average of the latest frames judged from the rungs they had, times
-/// the rung's cost, plus the most by which one of the latest frames took longer than expected: what
-/// disturbs a machine does not grow with the work. Pure. RT-safe.
+/// with the least error among those whose expected time fits, else the fastest. A frame is expected
+/// to take what the ladder measured for its rung and camera, at the machine's present pace, plus
+/// what every frame takes beside it (both fitted to the latest frames), plus the most by which one
+/// of the latest frames took longer than expected. Pure. RT-safe.
 class QualityPolicy {
  public:
   /// `rungs`: what each costs and gets wrong in the frame that is next; not empty, [0] is full
   /// quality. `available_ns`: from now until the frame is due; <= 0: too late for any.
   [[nodiscard]] std::size_t choose(std::span<const renderer::RungStats> rungs,
                                    std::int64_t available_ns) const noexcept {
-    const double spare_ns = kUsedFrac * static_cast<double>(available_ns) - excess_ns();
+    const double spare_ms = kUsedFrac * 1e-6 * static_cast<double>(available_ns) - excess_ms();
     std::size_t best = rungs.size();
     std::size_t fastest = 0;
     for (std::size_t i = 0; i < rungs.size(); ++i) {
-      if (rungs[i].cost_frac < rungs[fastest].cost_frac) fastest = i;
-      if (full_ns_ * rungs[i].cost_frac > spare_ns) continue;
+      if (rungs[i].frame_ms < rungs[fastest].frame_ms) fastest = i;
+      if (expected_ms(rungs[i].frame_ms) > spare_ms) continue;
       if (best == rungs.size() || rungs[i].error_k < rungs[best].error_k) best = i;
     }
     return best < rungs.size() ? best : fastest;
   }
 
-  /// A frame was ready `work_ns` after its begin, with a rung of that cost.
-  void finished(std::int64_t work_ns, double cost_frac) noexcept {
-    const auto work = static_cast<double>(work_ns);
-    const double cost = std::max(cost_frac, 1e-3);
-    if (count_ == 0) full_ns_ = work / cost;
-    excess_ns_[next_] = work - full_ns_ * cost;
-    next_ = (next_ + 1) % excess_ns_.size();
-    count_ = std::min(count_ + 1, excess_ns_.size());
-    full_ns_ += kFollow * (work / cost - full_ns_);
+  /// A frame was ready `work_ns` after its begin, with a rung of that RungStats::frame_ms.
+  void finished(std::int64_t work_ns, double rung_ms) noexcept {
+    const double work_ms = 1e-6 * static_cast<double>(work_ns);
+    excess_ms_[next_] = work_ms - expected_ms(rung_ms);
+    next_ = (next_ + 1) % excess_ms_.size();
+    count_ = std::min(count_ + 1, excess_ms_.size());
+    fit(work_ms, rung_ms);
   }
 
  private:
@@ -48,19 +46,52 @@ class QualityPolicy {
   static constexpr std::size_t kRemembered = 100;
   /// Of the time there is: costs are measured, and no better than this.
   static constexpr double kUsedFrac = 0.92;
-  /// Share of what a frame tells of the next: the camera moves on within some ten frames.
-  static constexpr double kFollow = 0.1;
+  /// What a frame's share in the fit is worth one frame later.
+  static constexpr double kKept = 0.95;
+  /// The ladder's own word (pace 1, nothing beside) counts as this many frames.
+  static constexpr double kPrior = 0.5;
+  /// Beyond, the work does not follow the rungs' times: then it all counts as beside.
+  static constexpr double kLeastPace = 0.25;
+  static constexpr double kMostPace = 4.0;
 
-  [[nodiscard]] double excess_ns() const noexcept {
-    double largest_ns = 0.0;
-    for (std::size_t i = 0; i < count_; ++i) largest_ns = std::max(largest_ns, excess_ns_[i]);
-    return largest_ns;
+  [[nodiscard]] double expected_ms(double rung_ms) const noexcept {
+    return pace_ * rung_ms + beside_ms_;
   }
 
-  std::array<double, kRemembered> excess_ns_{};
-  double full_ns_ = 0.0;
+  [[nodiscard]] double excess_ms() const noexcept {
+    double largest_ms = 0.0;
+    for (std::size_t i = 0; i < count_; ++i) largest_ms = std::max(largest_ms, excess_ms_[i]);
+    return largest_ms;
+  }
+
+  /// Least squares of work = pace * rung + beside, older frames fading, drawn towards pace 1.
+  void fit(double work_ms, double rung_ms) noexcept {
+    for (double* sum : {&n_, &r_, &rr_, &w_, &rw_}) *sum *= kKept;
+    n_ += 1.0;
+    r_ += rung_ms;
+    rr_ += rung_ms * rung_ms;
+    w_ += work_ms;
+    rw_ += rung_ms * work_ms;
+    const double prior_rr = kPrior * rr_ / n_;
+    const double a = rr_ + prior_rr;
+    const double d = n_ + kPrior;
+    const double determinant = a * d - r_ * r_;
+    if (determinant <= 0.0) return;  // rungs without a time: nothing was measured
+    pace_ = std::clamp(((rw_ + prior_rr) * d - w_ * r_) / determinant, kLeastPace, kMostPace);
+    beside_ms_ = (w_ - pace_ * r_) / d;
+  }
+
+  std::array<double, kRemembered> excess_ms_{};
   std::size_t next_ = 0;
   std::size_t count_ = 0;
+  double pace_ = 1.0;
+  double beside_ms_ = 0.0;
+  // Fading sums over frames: weight, rung, rung squared, work, rung times work.
+  double n_ = 0.0;
+  double r_ = 0.0;
+  double rr_ = 0.0;
+  double w_ = 0.0;
+  double rw_ = 0.0;
 };
 
 }  // namespace emit::server

@@ -4,48 +4,77 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <random>
 
 namespace emit::server {
 namespace {
 
 constexpr std::array<renderer::RungStats, 4> kRungs{
-    {{1.0, 0.0}, {0.7, 0.2}, {0.75, 0.3}, {0.4, 2.0}}};
+    {{10.0, 0.0}, {7.0, 0.2}, {7.5, 0.3}, {4.0, 2.0}}};
 constexpr std::int64_t kMs = 1'000'000;
 
-TEST(QualityPolicy, full_quality_while_it_fits_or_nothing_is_known) {
-  QualityPolicy policy;
-  EXPECT_EQ(policy.choose(kRungs, 10 * kMs), 0U);
-  policy.finished(9 * kMs, 1.0);
-  EXPECT_EQ(policy.choose(kRungs, 10 * kMs), 0U);
+/// Until it has no doubt: what was wrong at first is forgotten after a hundred frames.
+void settle(QualityPolicy& policy, double rung_ms, double work_ms) {
+  for (int i = 0; i < 220; ++i) policy.finished(std::llround(1e6 * work_ms), rung_ms);
 }
 
-TEST(QualityPolicy, sheds_what_costs_the_least_error) {
-  QualityPolicy policy;
-  policy.finished(12 * kMs, 1.0);
-  EXPECT_EQ(policy.choose(kRungs, 10 * kMs), 1U);  // not 2: dearer and worse
+TEST(QualityPolicy, the_first_frame_goes_by_what_the_ladder_measured) {
+  const QualityPolicy policy;
+  EXPECT_EQ(policy.choose(kRungs, 11 * kMs), 0U);
+  EXPECT_EQ(policy.choose(kRungs, 8 * kMs), 1U);  // not 2: dearer and worse
   EXPECT_EQ(policy.choose(kRungs, 6 * kMs), 3U);
   EXPECT_EQ(policy.choose(kRungs, 1 * kMs), 3U);  // nothing fits: the fastest
   EXPECT_EQ(policy.choose(kRungs, -1), 3U);
 }
 
-TEST(QualityPolicy, judges_by_what_full_quality_would_have_taken) {
+TEST(QualityPolicy, without_measured_times_there_is_nothing_to_shed) {
+  constexpr std::array<renderer::RungStats, 1> kFullOnly{};
   QualityPolicy policy;
-  policy.finished(6 * kMs, 0.4);  // 15 ms at full quality
+  for (int i = 0; i < 5; ++i) policy.finished(50 * kMs, 0.0);
+  EXPECT_EQ(policy.choose(kFullOnly, 1 * kMs), 0U);
+}
+
+TEST(QualityPolicy, follows_the_pace_of_the_machine) {
+  QualityPolicy policy;
+  for (int i = 0; i < 220; ++i) {  // half as long again as when it was measured
+    policy.finished(6 * kMs, 4.0);
+    policy.finished(15 * kMs, 10.0);
+  }
   EXPECT_EQ(policy.choose(kRungs, 15 * kMs), 1U);
   EXPECT_EQ(policy.choose(kRungs, 17 * kMs), 0U);
 }
 
+TEST(QualityPolicy, tells_what_every_frame_takes_beside_from_what_rungs_take) {
+  QualityPolicy policy;
+  for (int i = 0; i < 220; ++i) {  // 3 ms beside each
+    policy.finished(7 * kMs, 4.0);
+    policy.finished(13 * kMs, 10.0);
+  }
+  EXPECT_EQ(policy.choose(kRungs, 12 * kMs), 1U);  // 10 ms of it
+  EXPECT_EQ(policy.choose(kRungs, 15 * kMs), 0U);
+  EXPECT_EQ(policy.choose(kRungs, 10 * kMs), 3U);
+}
+
+TEST(QualityPolicy, a_place_that_costs_more_is_foreseen) {
+  QualityPolicy policy;
+  settle(policy, 10.0, 10.0);
+  std::array<renderer::RungStats, 4> dear = kRungs;
+  for (auto& rung : dear) rung.frame_ms *= 2.0;
+  EXPECT_EQ(policy.choose(kRungs, 12 * kMs), 0U);
+  EXPECT_EQ(policy.choose(dear, 12 * kMs), 3U);
+}
+
 TEST(QualityPolicy, keeps_room_for_what_disturbed_a_frame_until_that_is_long_ago) {
   QualityPolicy policy;
-  for (int i = 0; i < 20; ++i) policy.finished(8 * kMs, 1.0);
+  settle(policy, 10.0, 8.0);
   EXPECT_EQ(policy.choose(kRungs, 12 * kMs), 0U);
-  policy.finished(12 * kMs, 1.0);  // 4 ms late, for whatever reason
+  policy.finished(12 * kMs, 10.0);  // 4 ms late, for whatever reason
   for (int i = 0; i < 99; ++i) {
     EXPECT_NE(policy.choose(kRungs, 12 * kMs), 0U);
-    policy.finished(8 * kMs, 1.0);
+    policy.finished(8 * kMs, 10.0);
   }
-  policy.finished(8 * kMs, 1.0);
+  policy.finished(8 * kMs, 10.0);
   EXPECT_EQ(policy.choose(kRungs, 12 * kMs), 0U);
 }
 
@@ -58,9 +87,9 @@ TEST(QualityPolicy, nearly_all_frames_of_a_noisy_machine_are_in_time) {
   for (int i = 0; i < kFrames; ++i) {
     const std::size_t rung = policy.choose(kRungs, 10 * kMs);
     const auto work_ns =
-        static_cast<std::int64_t>(1e6 * 11.0 * noise(random) * kRungs[rung].cost_frac);
+        static_cast<std::int64_t>(1e6 * 1.1 * noise(random) * kRungs[rung].frame_ms);
     if (work_ns > 10 * kMs) ++late;
-    policy.finished(work_ns, kRungs[rung].cost_frac);
+    policy.finished(work_ns, kRungs[rung].frame_ms);
   }
   EXPECT_LT(late, kFrames / 100);
 }

@@ -72,8 +72,9 @@ struct StageTimes {
 
 /// What a rung of the quality ladder is worth.
 struct RungStats {
-  double cost_frac = 1.0;  ///< time of a frame against full quality
-  double error_k = 0.0;    ///< as FrameView::estimated_error_k
+  double frame_ms =
+      0.0;  ///< from submit() to the end of collect(), with nothing else to do; 0: not measured
+  double error_k = 0.0;  ///< as FrameView::estimated_error_k
 };
 
 /// Counted on the device for every frame: nothing is silently repaired.
