@@ -94,7 +94,7 @@ class GlRenderer final : public Renderer {
   bool poll(SlotIndex slot) noexcept override { return readback_.ready(slot); }
   const FrameView& collect(SlotIndex slot) noexcept override;
   void release(SlotIndex slot) noexcept override { readback_.release(slot); }
-  std::span<const RungStats> expected_rungs(const physics::Pose& sensor_pose) noexcept override;
+  std::span<const RungStats> expected_rungs(const FrameRequest& request) noexcept override;
   physics::Pose scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept override;
   const SceneStats& scene_stats() const noexcept override { return scene_stats_; }
   const std::string& device_name() const noexcept override { return context_.device_name(); }
@@ -108,6 +108,13 @@ class GlRenderer final : public Renderer {
     if (ready) stage_->describe(scene_stats_);
     return ready;
   }
+  [[nodiscard]] glm::uvec2 picture_px() const noexcept {
+    return glm::uvec2(frame_params_.picture_px);
+  }
+  /// Instances at the frame's instant around its camera; starts the draw lists anew.
+  [[nodiscard]] CameraSetup place_camera(const FrameRequest& request,
+                                         const QualityRung& rung) noexcept;
+  [[nodiscard]] TrianglesOfRungs count_triangles(const FrameRequest& request) noexcept;
   void prepare(const FrameRequest& request, const QualityRung& rung) noexcept;
   void upload_frame() noexcept;
   void bind_frame() const noexcept;
@@ -137,6 +144,7 @@ class GlRenderer final : public Renderer {
   std::vector<FrameView> views_;
   StageClock clock_;
   LadderMap ladder_;
+  FrameCost frame_cost_;
   LadderMap::OfRungs expected_rungs_{};  ///< scratch of expected_rungs()
 };
 
@@ -252,15 +260,19 @@ Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress
     }
     return {};
   }
-  auto ladder =
-      survey_ladder(*this, scenario_.sensor, bands_.apparent_temperatures(), first, progress);
-  if (!ladder) return tl::unexpected(std::move(ladder.error()));
-  ladder_ = std::move(*ladder);
+  auto survey =
+      survey_ladder({*this, scenario_.sensor, bands_.apparent_temperatures(), picture_px(),
+                     [this](const FrameRequest& request) { return count_triangles(request); }},
+                    first, progress);
+  if (!survey) return tl::unexpected(std::move(survey.error()));
+  ladder_ = std::move(survey->map);
+  frame_cost_ = std::move(survey->cost);
   return {};
 }
 
-void GlRenderer::prepare(const FrameRequest& request, const QualityRung& rung) noexcept {
-  const glm::uvec2 size_px = rendered_px(rung, glm::uvec2(frame_params_.picture_px));
+CameraSetup GlRenderer::place_camera(const FrameRequest& request,
+                                     const QualityRung& rung) noexcept {
+  const glm::uvec2 size_px = rendered_px(rung, picture_px());
   frame_params_.format_px = glm::uvec4(size_px, size_px.x * size_px.y, 0U);
   DrawLists& lists = stage_->drawn().lists;
   lists.begin(request.sensor_pose.position_world_m, request.sim_time_ns, history_.entities);
@@ -272,9 +284,14 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityRung& rung) n
     const glm::dvec3 farthest = glm::max(glm::abs(bounds.min_m), glm::abs(bounds.max_m));
     camera.view.far_m = std::max(2.0 * camera.view.near_m, glm::length(farthest));
   }
+  return camera;
+}
+
+void GlRenderer::prepare(const FrameRequest& request, const QualityRung& rung) noexcept {
+  CameraSetup camera = place_camera(request, rung);
   LevelLimits limits = rung.limits;
   limits.pixel_rad = camera.pixel_rad;
-  lists.cull_view(camera.view, limits, view_single_sided_, view_double_sided_);
+  stage_->drawn().lists.cull_view(camera.view, limits, view_single_sided_, view_double_sided_);
   stage_->prepare(request, camera, frame_params_);
   const physics::SunPosition& sun = stage_->sun_now();
   const bool sun_up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
@@ -301,11 +318,30 @@ void GlRenderer::bind_frame() const noexcept {
   stage_->bind();
 }
 
-std::span<const RungStats> GlRenderer::expected_rungs(const physics::Pose& sensor_pose) noexcept {
+std::span<const RungStats> GlRenderer::expected_rungs(const FrameRequest& request) noexcept {
   static constexpr std::array<RungStats, 1> kFullOnly{};
   if (ladder_.empty()) return kFullOnly;
-  (void)ladder_.at(sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
+  if (!ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_)) {
+    const TrianglesOfRungs triangles = count_triangles(request);
+    for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
+      expected_rungs_[r].frame_ms =
+          frame_cost_.frame_ms(triangles[r], rendered_pixels(kQualityLadder[r], picture_px()));
+    }
+  }
   return expected_rungs_;
+}
+
+TrianglesOfRungs GlRenderer::count_triangles(const FrameRequest& request) noexcept {
+  const CameraSetup camera = place_camera(request, kQualityLadder[0]);
+  std::array<LevelLimits, kQualityLadder.size()> limits;
+  for (std::size_t r = 0; r < limits.size(); ++r) {
+    limits[r] = kQualityLadder[r].limits;
+    limits[r].pixel_rad =
+        camera.pixel_rad * picture_px().x / rendered_px(kQualityLadder[r], picture_px()).x;
+  }
+  TrianglesOfRungs triangles{};
+  stage_->drawn().lists.count_triangles(camera.view, limits, triangles);
+  return triangles;
 }
 
 int GlRenderer::submit(const FrameRequest& request) noexcept {

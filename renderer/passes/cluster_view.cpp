@@ -21,8 +21,7 @@ std::array<glm::dvec3, 5> view_planes(const ViewVolume& view) noexcept {
 }
 
 ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from_mesh,
-                         const LevelLimits& limits) noexcept
-    : difference_(limits.difference) {
+                         const LevelLimits& limits) noexcept {
   const glm::dmat3 linear(relworld_from_mesh);
   const glm::dvec3 origin_m(relworld_from_mesh[3]);
   const std::array<glm::dvec3, 5> normals = view_planes(view);
@@ -41,10 +40,16 @@ ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from
   const std::array<double, 3> scale = {glm::length(linear[0]), glm::length(linear[1]),
                                        glm::length(linear[2])};
   const auto [least, greatest] = std::ranges::minmax(scale);
-  const double pixel = limits.pixel_rad * least / greatest;
+  evenness_ = least / greatest;
+  set_limits(limits);
+}
+
+void ClusterView::set_limits(const LevelLimits& limits) noexcept {
+  const double pixel = limits.pixel_rad * evenness_;
   deviation_ = static_cast<float>(limits.deviation_px * pixel);
   size_ = static_cast<float>(limits.size_px * pixel);
   edge_ = static_cast<float>(limits.edge_px * pixel);
+  difference_ = limits.difference;
 }
 
 bool ClusterView::fine(const LevelError& error) const noexcept {

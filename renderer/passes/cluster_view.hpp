@@ -20,6 +20,8 @@ class ClusterView {
  public:
   ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from_mesh,
               const LevelLimits& limits) noexcept;
+  /// Other limits for fits().
+  void set_limits(const LevelLimits& limits) noexcept;
 
   /// False: outside the pyramid or, unless `double_sided`, all of it turned away.
   [[nodiscard]] bool shows(const scene::Cluster& cluster, bool double_sided) const noexcept;
@@ -39,6 +41,7 @@ class ClusterView {
   glm::vec3 eye_m_{0.0F};
   float margin_m_ = 0.0F;
   bool mirrored_ = false;
+  double evenness_ = 1.0;  ///< least stretch of the mesh's axes against the greatest
   /// Lengths that may be wrong, per length of distance.
   float deviation_ = 0.0F;
   float size_ = 0.0F;

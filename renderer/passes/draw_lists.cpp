@@ -147,14 +147,51 @@ void DrawLists::add(std::uint32_t instance, const SceneBuffers::DrawRange& subme
   if (run.index_count > 0) add_command(run, base_vertex, record);
 }
 
-void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
-                          CommandRange& single_sided, CommandRange& double_sided) noexcept {
+void DrawLists::find_in_view(const ViewVolume& view) noexcept {
   const std::array<glm::dvec3, 5> planes = view_planes(view);
   for (Placed& placed : view_placed_) {
     const scene::Aabb& box = placed.box_world;
     placed.in_view = placed.on && !outside(planes, 0.5 * (box.min_m + box.max_m) - camera_world_m_,
                                            0.5 * (box.max_m - box.min_m));
   }
+}
+
+void DrawLists::count_triangles(const ViewVolume& view, std::span<const LevelLimits> limits,
+                                std::span<std::uint32_t> triangles) noexcept {
+  std::ranges::fill(triangles, 0U);
+  find_in_view(view);
+  for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
+    for (std::uint32_t i = mesh.first_instance; i < mesh.first_instance + mesh.instance_count;
+         ++i) {
+      if (!view_placed_[i].in_view) continue;
+      ClusterView seen(view, relworld_from_mesh(view_placed_[i]), limits[0]);
+      for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
+        for (std::size_t l = 0; l < limits.size(); ++l) {
+          seen.set_limits(limits[l]);
+          triangles[l] += indices_in_view(submesh, seen) / 3;
+        }
+      }
+    }
+  }
+}
+
+std::uint32_t DrawLists::indices_in_view(const SceneBuffers::DrawRange& submesh,
+                                         const ClusterView& seen) const noexcept {
+  if (submesh.cluster_count == 0) return submesh.index_count;
+  std::uint32_t indices = 0;
+  for (std::uint32_t c = submesh.first_cluster; c < submesh.first_cluster + submesh.cluster_count;
+       ++c) {
+    const scene::Cluster& cluster = scene_.clusters()[c];
+    if (seen.fits(scene_.levels()[c]) && seen.shows(cluster, submesh.double_sided)) {
+      indices += cluster.index_count;
+    }
+  }
+  return indices;
+}
+
+void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
+                          CommandRange& single_sided, CommandRange& double_sided) noexcept {
+  find_in_view(view);
   for (const bool sheets : {false, true}) {
     CommandRange& range = sheets ? double_sided : single_sided;
     range.first = static_cast<std::uint32_t>(commands_.size());

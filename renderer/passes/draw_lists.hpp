@@ -38,6 +38,9 @@ class DrawLists {
   /// Draws of the camera, in levels of detail that keep to `limits`; double-sided ones apart.
   void cull_view(const ViewVolume& view, const LevelLimits& limits, CommandRange& single_sided,
                  CommandRange& double_sided) noexcept;
+  /// Triangles that cull_view() would draw under each of `limits`. Precondition: equal lengths.
+  void count_triangles(const ViewVolume& view, std::span<const LevelLimits> limits,
+                       std::span<std::uint32_t> triangles) noexcept;
   /// Moves entities to their poses at `sample_ns` for the shadow passes that follow. Casters that
   /// travel farther than their own size between the two instants are left out: what shade they cast
   /// lasts a smaller share of the interval than size / way, and one pose would paint all of it.
@@ -68,6 +71,9 @@ class DrawLists {
   [[nodiscard]] Placed place(std::uint32_t instance, const glm::dmat4& world_from_mesh,
                              bool on) const noexcept;
   [[nodiscard]] glm::dmat4 relworld_from_mesh(const Placed& placed) const noexcept;
+  void find_in_view(const ViewVolume& view) noexcept;
+  [[nodiscard]] std::uint32_t indices_in_view(const SceneBuffers::DrawRange& submesh,
+                                              const ClusterView& seen) const noexcept;
   /// Appends the draws of an instance's submesh; `record` is its DrawRecord.
   void add(std::uint32_t instance, const SceneBuffers::DrawRange& submesh, const ClusterView& seen,
            std::uint32_t record) noexcept;

@@ -5,7 +5,10 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <vector>
 
+#include "emit/physics/constants.hpp"
 #include "emit/scene/trajectory.hpp"
 
 namespace emit::renderer {
@@ -17,17 +20,33 @@ using physics::Result;
 
 /// Places on the camera's way: errors in between are interpolated.
 constexpr int kPlaces = 12;
+/// Directions of a camera that stands still.
+constexpr int kDirections = 4;
 
-std::vector<FrameRequest> places(const scene::SensorDesc& sensor, const FrameRequest& first) {
-  std::vector<FrameRequest> out{first};
-  if (sensor.trajectory.size() < 2) return out;
+struct Place {
+  FrameRequest request;
+  bool on_the_way = true;  ///< where the scenario has the camera
+};
+
+std::vector<Place> places(const scene::SensorDesc& sensor, const FrameRequest& first) {
+  std::vector<Place> out{{first}};
+  if (sensor.trajectory.size() < 2) {
+    for (int i = 1; i < kDirections; ++i) {
+      FrameRequest next = first;
+      const double yaw_rad = 2.0 * physics::kPi * i / kDirections;
+      next.sensor_pose.world_from_body =
+          glm::angleAxis(yaw_rad, glm::dvec3(0.0, 0.0, 1.0)) * first.sensor_pose.world_from_body;
+      out.push_back({next, false});
+    }
+    return out;
+  }
   const std::int64_t end_ns = sensor.trajectory[sensor.trajectory.size() - 1].sim_time_ns;
   for (int i = 1; i < kPlaces && first.sim_time_ns < end_ns; ++i) {
     FrameRequest next = first;  // the thermal clock stands still meanwhile
     const double way = static_cast<double>(i) / (kPlaces - 1);
     next.sim_time_ns += std::llround(way * static_cast<double>(end_ns - first.sim_time_ns));
     next.sensor_pose = trajectory_at(sensor.trajectory, next.sim_time_ns).pose;
-    out.push_back(next);
+    out.push_back({next});
   }
   return out;
 }
@@ -72,34 +91,39 @@ double difference_k(const FrameView& full, const FrameView& shed,
 
 }  // namespace
 
-Result<LadderMap> survey_ladder(Renderer& renderer, const scene::SensorDesc& sensor,
-                                std::span<const physics::ApparentTemperature> apparent,
-                                const FrameRequest& first, const WarmUpProgress& progress) {
-  const std::vector<FrameRequest> at = places(sensor, first);
-  LadderMap map;
+Result<LadderSurvey> survey_ladder(const LadderSubject& subject, const FrameRequest& first,
+                                   const WarmUpProgress& progress) {
+  const std::vector<Place> at = places(subject.sensor, first);
+  LadderSurvey survey;
   for (std::size_t p = 0; p < at.size(); ++p) {
-    FrameRequest request = at[p];
+    FrameRequest request = at[p].request;
     LadderMap::OfRungs rungs{};
     for (int round = 0; round < 2; ++round) {  // the first one also fills caches
       request.rung = 0;
-      const Taken full(renderer, request);
+      const Taken full(subject.renderer, request);
       for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
         request.rung = static_cast<std::uint8_t>(r);
-        const Taken shed(renderer, request);
+        const Taken shed(subject.renderer, request);
         if (!full.good() || !shed.good()) {
           return make_error(ErrorCode::gpu, "the device failed in its first frames");
         }
-        rungs[r].error_k = difference_k(full.view(), shed.view(), apparent);
+        rungs[r].error_k = difference_k(full.view(), shed.view(), subject.apparent);
         rungs[r].frame_ms =
             round == 0 ? shed.frame_ms() : std::min(rungs[r].frame_ms, shed.frame_ms());
       }
     }
-    map.add(request.sensor_pose, rungs);
+    const TrianglesOfRungs triangles = subject.triangles(request);
+    for (std::size_t r = 0; r < rungs.size(); ++r) {
+      survey.cost.add(triangles[r], rendered_pixels(kQualityLadder[r], subject.picture_px),
+                      rungs[r].frame_ms);
+    }
+    if (at[p].on_the_way) survey.map.add(request.sensor_pose, rungs);
     if (progress && !progress(static_cast<double>(p + 1) / static_cast<double>(at.size()))) {
       return make_error(ErrorCode::internal, "stopped while the quality ladder was measured");
     }
   }
-  return map;
+  survey.cost.fit();
+  return survey;
 }
 
 }  // namespace emit::renderer

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <glm/ext/vector_uint2.hpp>
 #include <vector>
 
@@ -39,6 +40,14 @@ inline constexpr std::array<QualityRung, 11> kQualityLadder = {{
 /// Pixels that a rung renders of a picture.
 [[nodiscard]] glm::uvec2 rendered_px(const QualityRung& rung,
                                      const glm::uvec2& picture_px) noexcept;
+
+[[nodiscard]] inline double rendered_pixels(const QualityRung& rung,
+                                            const glm::uvec2& picture_px) noexcept {
+  const glm::uvec2 px = rendered_px(rung, picture_px);
+  return static_cast<double>(px.x) * px.y;
+}
+/// Triangles that each rung draws of a frame.
+using TrianglesOfRungs = std::array<std::uint32_t, kQualityLadder.size()>;
 
 /// What every rung is worth, measured where the camera is going to be.
 class LadderMap {

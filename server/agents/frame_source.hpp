@@ -51,7 +51,7 @@ class FrameSource {
 
   /// Renderer::expected_rungs(); sources without a ladder have one rung.
   [[nodiscard]] virtual std::span<const renderer::RungStats> expected_rungs(
-      const physics::Pose& /*sensor_pose*/) noexcept {
+      const renderer::FrameRequest& /*request*/) noexcept {
     static constexpr std::array<renderer::RungStats, 1> kFullOnly{};
     return kFullOnly;
   }

@@ -95,7 +95,7 @@ double RenderAgent::choose_rung(RenderJob& job, std::int64_t now_ns) noexcept {
   if (job.deadline_ns == 0) {
     return 0.0;
   }
-  const auto rungs = source_->expected_rungs(job.request.sensor_pose);
+  const auto rungs = source_->expected_rungs(job.request);
   const std::size_t rung = quality_.choose(rungs, job.deadline_ns - now_ns);
   job.request.rung = static_cast<std::uint8_t>(rung);
   return rungs[rung].frame_ms;

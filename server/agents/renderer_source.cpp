@@ -26,8 +26,8 @@ class RendererSource final : public FrameSource {
   }
   void release(renderer::SlotIndex slot) noexcept override { renderer_->release(slot); }
   std::span<const renderer::RungStats> expected_rungs(
-      const physics::Pose& sensor_pose) noexcept override {
-    return renderer_->expected_rungs(sensor_pose);
+      const renderer::FrameRequest& request) noexcept override {
+    return renderer_->expected_rungs(request);
   }
   const SourceInfo& info() const noexcept override { return info_; }
 

@@ -187,6 +187,10 @@ void Tool::add_frame_time_benches(CLI::App& bench) {
     app.add_option("--frames", o.frames, "Frames per turn")
         ->check(CLI::Range(2U, 100'000U))
         ->capture_default_str();
+    app.add_option("--budget", o.budget_frac,
+                   "Once more with a deadline: share of the free-running median")
+        ->check(CLI::Range(0.01, 100.0))
+        ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
     add_gpu(app, o.gpu_index);

@@ -106,7 +106,7 @@ class Flight {
     for (std::uint32_t i = 0; i < frames_; ++i) {
       renderer::FrameRequest wanted = request(i);
       const auto start = Clock::now();
-      const auto rungs = renderer_->expected_rungs(wanted.sensor_pose);
+      const auto rungs = renderer_->expected_rungs(wanted);
       const std::size_t rung = policy.choose(rungs, budget_ns);
       const double expected_ms = rungs[rung].frame_ms;
       wanted.rung = static_cast<std::uint8_t>(rung);

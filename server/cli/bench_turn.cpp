@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,9 +35,12 @@ constexpr double kJumpM = 100.0;
 struct Row {
   const char* name = "turn";
   std::string method;
+  std::optional<double> budget_ms;  ///< none: full quality, however long it takes
   Samples frame_ms;
   Samples worst_ms;  ///< of each run
   std::uint64_t coarse_frames = 0;
+  std::uint64_t shed_frames = 0;
+  std::uint64_t late_frames = 0;
 
   [[nodiscard]] double ratio() const { return worst_ms.median() / frame_ms.median(); }
 };
@@ -65,7 +69,7 @@ class Turntable {
     keys.erase(keys.begin(), keys.end() - 1);
     scenario->sensor.width_px = command.width_px;
     scenario->sensor.height_px = command.height_px;
-    auto renderer = RendererThread::create(*scenario, command.gpu_index);
+    auto renderer = RendererThread::create(*scenario, command.gpu_index, renderer::Ladder::live);
     if (!renderer) return tl::unexpected(std::move(renderer.error()));
     return Turntable(command, *scenario, std::move(*renderer));
   }
@@ -81,8 +85,11 @@ class Turntable {
   Result<void> turn(const glm::dvec3& eye_m, Row& row) {
     Samples frame_ms;
     for (std::uint32_t i = 0; i < frames_; ++i) {
-      const auto frame = renderer_->render(request(eye_m, i));
+      const auto frame = row.budget_ms ? renderer_->render_within(request(eye_m, i), *row.budget_ms)
+                                       : renderer_->render(request(eye_m, i));
       if (!frame) return tl::unexpected(frame.error());
+      if (frame->rung > 0) ++row.shed_frames;
+      if (row.budget_ms && frame->frame_ms > *row.budget_ms) ++row.late_frames;
       frame_ms.add(frame->frame_ms);
       row.frame_ms.add(frame->frame_ms);
       if (frame->coarse) ++row.coarse_frames;
@@ -132,24 +139,33 @@ class Turntable {
 
 Result<void> run_method(Turntable& table, const BenchTurnCommand& command,
                         const std::string& method, std::vector<Row>& rows) {
-  ProgressBar progress("bench turn", 2 * std::uint64_t{command.runs});
+  ProgressBar progress("bench turn", 4 * std::uint64_t{command.runs});
   std::uint64_t done = 0;
-  Row turns{"turn", method, {}, {}, 0};
-  Row jumps{"teleport", method, {}, {}, 0};
-  for (std::uint32_t run = 0; run < command.runs; ++run) {
-    if (auto settled = table.settle(); !settled) return settled;
-    if (auto turned = table.turn(table.eye_m(), turns); !turned) return turned;
-    progress.advance_to(++done);
+  const auto fly = [&](const char* name, bool jump,
+                       std::optional<double> budget_ms) -> Result<Row> {
+    Row row;
+    row.name = name;
+    row.method = method;
+    row.budget_ms = budget_ms;
+    for (std::uint32_t run = 0; run < command.runs; ++run) {
+      const double way_rad = 2.0 * physics::kPi * run / command.runs;
+      const glm::dvec3 way(std::sin(way_rad), std::cos(way_rad), 0.0);
+      if (auto settled = table.settle(); !settled) return tl::unexpected(settled.error());
+      auto turned = table.turn(table.eye_m() + (jump ? kJumpM : 0.0) * way, row);
+      if (!turned) return tl::unexpected(turned.error());
+      progress.advance_to(++done);
+    }
+    return row;
+  };
+  std::optional<double> budget_ms;
+  for (const bool within : {false, true}) {
+    for (const bool jump : {false, true}) {
+      auto row = fly(jump ? "teleport" : "turn", jump, budget_ms);
+      if (!row) return tl::unexpected(row.error());
+      rows.push_back(std::move(*row));
+    }
+    if (!within) budget_ms = command.budget_frac * rows.front().frame_ms.median();
   }
-  for (std::uint32_t run = 0; run < command.runs; ++run) {
-    const double way_rad = 2.0 * physics::kPi * run / command.runs;
-    const glm::dvec3 jump_m(kJumpM * std::sin(way_rad), kJumpM * std::cos(way_rad), 0.0);
-    if (auto settled = table.settle(); !settled) return settled;
-    if (auto turned = table.turn(table.eye_m() + jump_m, jumps); !turned) return turned;
-    progress.advance_to(++done);
-  }
-  rows.push_back(std::move(turns));
-  rows.push_back(std::move(jumps));
   return {};
 }
 
@@ -157,6 +173,8 @@ Json row_json(const Row& row, const BenchTurnCommand& command, const Turntable& 
   const bool cached = row.method == "cached";
   Json json = Json::object();
   json.set("case", row.name).set("method", row.method);
+  json.set("budget_ms", row.budget_ms ? Json(*row.budget_ms) : Json(nullptr));
+  json.set("late_frames", row.late_frames).set("shed_frames", row.shed_frames);
   json.set("frame_ms_median", row.frame_ms.median());
   json.set("frame_ms_max_median_of_runs", row.worst_ms.median()).set("ratio", row.ratio());
   json.set("frame_ms_max", row.frame_ms.max()).set("frame_ms_p99", row.frame_ms.percentile(0.99));
@@ -174,8 +192,8 @@ Json row_json(const Row& row, const BenchTurnCommand& command, const Turntable& 
 
 int run_bench_turn(const BenchTurnCommand& command) {
   const InterruptGuard interrupt;
-  TextTable text({"case", "method", "median ms", "worst ms, median of runs", "ratio", "frames",
-                  "coarse", "samples", "warm-up s"});
+  TextTable text({"case", "method", "budget ms", "median ms", "worst ms, median of runs", "ratio",
+                  "frames", "late", "shed", "coarse", "samples", "warm-up s"});
   Json results = Json::array();
   std::string device;
   for (const std::string& method : command.methods) {
@@ -186,9 +204,11 @@ int run_bench_turn(const BenchTurnCommand& command) {
     if (auto ran = run_method(*table, command, method, rows); !ran) return fail(ran.error());
     device = table->device();
     for (const Row& row : rows) {
-      text.add({row.name, method, fmt::format("{:.2f}", row.frame_ms.median()),
+      text.add({row.name, method, row.budget_ms ? fmt::format("{:.2f}", *row.budget_ms) : "-",
+                fmt::format("{:.2f}", row.frame_ms.median()),
                 fmt::format("{:.2f}", row.worst_ms.median()), fmt::format("{:.2f}", row.ratio()),
-                fmt::format("{}", row.frame_ms.count()), fmt::format("{}", row.coarse_frames),
+                fmt::format("{}", row.frame_ms.count()), fmt::format("{}", row.late_frames),
+                fmt::format("{}", row.shed_frames), fmt::format("{}", row.coarse_frames),
                 fmt::format("{}", table->stats().samples),
                 fmt::format("{:.1f}", table->warm_up_s())});
       results.push(row_json(row, command, *table));

@@ -288,6 +288,7 @@ struct BenchTurnCommand {
   std::vector<std::string> methods{"cached"};
   std::uint32_t runs = 5;
   std::uint32_t frames = 100;  ///< per turn
+  double budget_frac = 1.7;    ///< of the free-running median
   std::uint32_t width_px = 640;
   std::uint32_t height_px = 512;
   int gpu_index = -1;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer_thread.hpp"
 
-#include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "interrupt.hpp"
@@ -47,12 +47,14 @@ void RendererThread::call(const std::function<void()>& job) {
 }
 
 Result<std::unique_ptr<RendererThread>> RendererThread::create(const scene::ScenarioDesc& scenario,
-                                                               int gpu_index) {
+                                                               int gpu_index,
+                                                               renderer::Ladder ladder) {
   std::unique_ptr<RendererThread> thread(new RendererThread());
   Result<void> made;
   thread->call([&] {
     renderer::OutputOptions output;
     output.slots = 2;
+    output.ladder = ladder;
     auto created = renderer::Renderer::create(scenario, {gpu_index, false}, output);
     if (created) {
       thread->renderer_ = std::move(*created);
@@ -75,25 +77,44 @@ Result<double> RendererThread::warm_up(const renderer::FrameRequest& first) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-Result<TimedFrame> RendererThread::render(const renderer::FrameRequest& request) {
+Result<TimedFrame> RendererThread::timed(const std::function<int(Clock::time_point)>& submit) {
   if (InterruptGuard::interrupted()) return make_error(ErrorCode::io, "interrupted");
   TimedFrame out;
   int slot = -1;
   bool failed = false;
   call([&] {
     const auto start = Clock::now();
-    slot = renderer_->submit(request);
+    slot = submit(start);
     if (slot < 0) return;
     const auto index = static_cast<renderer::SlotIndex>(slot);
     const renderer::FrameView& view = renderer_->collect(index);
     out.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     out.coarse = view.stats.coarse;
+    out.rung = view.rung;
     failed = view.device_failed;
     renderer_->release(index);
   });
   if (slot < 0) return make_error(ErrorCode::internal, "the renderer has no free slot");
   if (failed) return make_error(ErrorCode::gpu, "the device reported an error");
   return out;
+}
+
+Result<TimedFrame> RendererThread::render(const renderer::FrameRequest& request) {
+  return timed([&](Clock::time_point) { return renderer_->submit(request); });
+}
+
+Result<TimedFrame> RendererThread::render_within(renderer::FrameRequest request, double budget_ms) {
+  double rung_ms = 0.0;
+  const auto frame = timed([&](Clock::time_point start) {
+    const auto rungs = renderer_->expected_rungs(request);
+    const std::chrono::duration<double, std::milli> spent = Clock::now() - start;
+    const std::size_t rung = policy_.choose(rungs, std::llround(1e6 * (budget_ms - spent.count())));
+    rung_ms = rungs[rung].frame_ms;
+    request.rung = static_cast<std::uint8_t>(rung);
+    return renderer_->submit(request);
+  });
+  if (frame) policy_.finished(std::llround(1e6 * frame->frame_ms), rung_ms);
+  return frame;
 }
 
 }  // namespace emit::cli

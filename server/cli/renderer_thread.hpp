@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -10,6 +11,7 @@
 #include "emit/physics/error.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "emit/scene/scene_desc.hpp"
+#include "pacing/quality_policy.hpp"
 
 namespace emit::cli {
 
@@ -17,6 +19,7 @@ namespace emit::cli {
 struct TimedFrame {
   double frame_ms = 0.0;
   bool coarse = false;  ///< renderer::FrameStats::coarse
+  std::uint8_t rung = 0;
 };
 
 /// A renderer on a thread of its own, so that several, each with its own GL context, are alive at
@@ -26,7 +29,8 @@ class RendererThread {
  public:
   /// Errors: those of Renderer::create().
   [[nodiscard]] static physics::Result<std::unique_ptr<RendererThread>> create(
-      const scene::ScenarioDesc& scenario, int gpu_index);
+      const scene::ScenarioDesc& scenario, int gpu_index,
+      renderer::Ladder ladder = renderer::Ladder::none);
   ~RendererThread();
   RendererThread(const RendererThread&) = delete;
   RendererThread& operator=(const RendererThread&) = delete;
@@ -35,6 +39,9 @@ class RendererThread {
   [[nodiscard]] physics::Result<double> warm_up(const renderer::FrameRequest& first);
   /// Errors: io (interrupted), gpu (the device failed), internal.
   [[nodiscard]] physics::Result<TimedFrame> render(const renderer::FrameRequest& request);
+  /// As the daemon does with a deadline: the rung by server::QualityPolicy, its time included.
+  [[nodiscard]] physics::Result<TimedFrame> render_within(renderer::FrameRequest request,
+                                                          double budget_ms);
 
   [[nodiscard]] physics::Pose scenario_pose_at(std::int64_t sim_time_ns) const noexcept {
     return renderer_->scenario_sensor_pose_at(sim_time_ns);
@@ -48,12 +55,15 @@ class RendererThread {
   RendererThread();
   /// Runs `job` on the thread and waits for its end.
   void call(const std::function<void()>& job);
+  [[nodiscard]] physics::Result<TimedFrame> timed(
+      const std::function<int(std::chrono::steady_clock::time_point start)>& submit);
   void loop();
 
   std::mutex mutex_;
   std::condition_variable changed_;
   const std::function<void()>* job_ = nullptr;
   bool ends_ = false;
+  server::QualityPolicy policy_;
   std::unique_ptr<renderer::Renderer> renderer_;  ///< made, used and destroyed on the thread
   std::thread thread_;
 };

@@ -157,7 +157,7 @@ TEST(RendererLadder, WhatIsNotMeasuredIsNotClaimed) {
   request = run.request(4.0, 3);
   request.sensor_pose = looking(request.sensor_pose.position_world_m, {30.0, 0.0, 0.5});
   EXPECT_TRUE(std::isnan(run.frame(request).estimated_error_k));
-  const auto rungs = run.renderer().expected_rungs(request.sensor_pose);
+  const auto rungs = run.renderer().expected_rungs(request);
   ASSERT_EQ(rungs.size(), std::size_t{kRungs});
   EXPECT_EQ(rungs[0].error_k, 0.0);
   for (const renderer::RungStats& rung : rungs) EXPECT_GT(rung.frame_ms, 0.0);

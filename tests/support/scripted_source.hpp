@@ -119,7 +119,7 @@ class ScriptedSource final : public server::FrameSource {
     script_.held.fetch_sub(1);
   }
   std::span<const renderer::RungStats> expected_rungs(
-      const physics::Pose& /*sensor_pose*/) noexcept override {
+      const renderer::FrameRequest& /*request*/) noexcept override {
     return script_.rungs;
   }
   const server::SourceInfo& info() const noexcept override { return info_; }

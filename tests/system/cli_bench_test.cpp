@@ -90,14 +90,18 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
 
 TEST(CliBench, TurnFlagsJumpsToPlacesNobodyAnnounced) {
   const TemporaryFolder folder;
-  const ProcessResult run = run_emit(
-      {"bench", "turn", "--scene", "box", "--set", "thermal.tolerance_k=2", "--runs", "2",
-       "--frames", "8", "--width", "64", "--height", "48", "--json", folder.file("t.json")});
+  const ProcessResult run =
+      run_emit({"bench", "turn", "--scene", "box", "--set", "thermal.tolerance_k=2", "--runs", "2",
+                "--frames", "8", "--width", "64", "--height", "48", "--budget", "0.01", "--json",
+                folder.file("t.json")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("t.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"turn\"");
-  EXPECT_EQ(numbers_of(json, "frames"), (std::vector<double>{16, 16}));
-  EXPECT_EQ(numbers_of(json, "coarse_frames"), (std::vector<double>{0, 16}));
+  EXPECT_EQ(numbers_of(json, "frames"), (std::vector<double>{16, 16, 16, 16}));
+  EXPECT_EQ(numbers_of(json, "coarse_frames"), (std::vector<double>{0, 16, 0, 16}));
+  // Without a deadline nothing is shed; one that nothing meets sheds and is missed every time.
+  EXPECT_EQ(numbers_of(json, "shed_frames"), (std::vector<double>{0, 0, 16, 16}));
+  EXPECT_EQ(numbers_of(json, "late_frames"), (std::vector<double>{0, 0, 16, 16}));
   for (const double ratio : numbers_of(json, "ratio")) EXPECT_GE(ratio, 1.0);
 }
 

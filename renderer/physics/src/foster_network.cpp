@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "emit/physics/foster.hpp"
-#include "nnls.hpp"
+#include "emit/physics/nnls.hpp"
 
 namespace emit::physics {
 namespace {

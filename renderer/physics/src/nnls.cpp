@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "nnls.hpp"
+#include "emit/physics/nnls.hpp"
 
 #include <algorithm>
 #include <cmath>

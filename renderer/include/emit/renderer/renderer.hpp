@@ -158,11 +158,12 @@ class Renderer {
   [[nodiscard]] virtual bool poll(SlotIndex slot) noexcept = 0;
   /// Waits for the frame of a slot that submit() returned. The view lives until release().
   [[nodiscard]] virtual const FrameView& collect(SlotIndex slot) noexcept = 0;
-  /// What the rungs are expected to be worth for that camera, as measured by warm_up() where it
-  /// came nearest, or on the way's median where it came not near. [0] is full quality; without a
-  /// ladder the only one. Holds until the next call. RT-safe.
+  /// What the rungs are expected to be worth in that frame, as measured by warm_up() where the
+  /// camera came nearest; where it came not near: times by what is in view, errors the median of
+  /// the way. [0] is full quality; without a ladder the only one. Holds until the next call.
+  /// RT-safe.
   [[nodiscard]] virtual std::span<const RungStats> expected_rungs(
-      const physics::Pose& sensor_pose) noexcept = 0;
+      const FrameRequest& request) noexcept = 0;
   /// Gives the slot back. Any thread.
   virtual void release(SlotIndex slot) noexcept = 0;
 
