@@ -31,12 +31,13 @@ constexpr std::array<FlagName, 12> kFlagNames{{{protocol::kFlagLate, "late"},
 
 void StreamReport::add(const server::ReceivedFrame& frame) {
   const protocol::FrameHeader& header = frame.header;
-  const bool continues = frames_ > 0 && header.run_id == last_run_;
-  if (continues && header.frame_number != last_number_ + 1 &&
+  const bool continues = last_run_ != 0 && header.run_id == last_run_;
+  if (continues && header.frame_number != last_number_ + every_nth_ &&
       (header.flags & protocol::kFlagGapBefore) == 0) {
     ++unflagged_gaps_;
   }
-  last_run_ = header.run_id;
+  runs_ += header.run_id != newest_run_ ? 1U : 0U;
+  newest_run_ = last_run_ = header.run_id;
   last_number_ = header.frame_number;
   ++frames_;
   for (std::size_t bit = 0; bit < flag_counts_.size(); ++bit) {

@@ -15,7 +15,15 @@ namespace emit::cli {
 /// clocks agree. One thread.
 class StreamReport {
  public:
+  /// @param every_nth  which frames were asked for: the others are no gap.
+  explicit StreamReport(std::uint32_t every_nth = 1) : every_nth_(every_nth) {}
+
   void add(const server::ReceivedFrame& frame);
+  /// What comes next comes over another connection: numbers missing in between are no gap, the
+  /// client was not there.
+  void begin_connection() noexcept { last_run_ = 0; }
+  /// Runs of the daemon that frames came from, one after the other.
+  [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
@@ -49,7 +57,10 @@ class StreamReport {
   std::array<std::uint64_t, 32> flag_counts_{};
   std::uint64_t frames_ = 0;
   std::uint64_t unflagged_gaps_ = 0;
-  std::uint64_t last_run_ = 0;
+  std::uint32_t every_nth_;
+  std::uint64_t runs_ = 0;
+  std::uint64_t newest_run_ = 0;
+  std::uint64_t last_run_ = 0;  // on this connection; 0: none yet
   std::uint64_t last_number_ = 0;
 };
 
