@@ -105,8 +105,7 @@ EGLContext make_context(EGLDisplay display, bool debug, std::string& why) {
                                 EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY,
                                 EGL_LOSE_CONTEXT_ON_RESET,
                                 EGL_NONE};
-  EGLContext context =
-      eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes.data());
+  EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes.data());
   if (context == EGL_NO_CONTEXT) {
     context_attributes[8] = EGL_NONE;
     context = eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes.data());

@@ -33,8 +33,8 @@ class RenderAgent final : public Agent {
   struct InFlight {
     renderer::SlotIndex slot = 0;
     std::int64_t render_start_ns = 0;
-    double cost_frac = 1.0;             ///< of its rung
-    std::int64_t submitted_ns = 0;      ///< monotonic
+    double cost_frac = 1.0;         ///< of its rung
+    std::int64_t submitted_ns = 0;  ///< monotonic
   };
   /// More than one in flight lets upload of the next overlap with read-back of the last.
   static constexpr std::size_t kDepth = 2;

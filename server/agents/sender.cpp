@@ -150,7 +150,7 @@ void Sender::evict_oldest() noexcept {
 void Sender::pass_over_unwanted(SenderClient& client) noexcept {
   while (client.next < end_ && !client.wants(entry(client.next).header)) {
     ++client.next;
-    context_.counters.add(Counter::frames_left_out);
+    context_.counters.add(&client == resident_ ? Counter::frames_unread : Counter::frames_left_out);
   }
 }
 

@@ -35,7 +35,7 @@ class SenderClient {
   [[nodiscard]] virtual bool every_frame() const noexcept { return false; }
   /// Wants frames 1, 1 + n, 1 + 2 n, ... of every run.
   [[nodiscard]] virtual std::uint32_t every_nth() const noexcept { return 1; }
-  [[nodiscard]] bool wants(const protocol::FrameHeader& header) const noexcept {
+  [[nodiscard]] virtual bool wants(const protocol::FrameHeader& header) const noexcept {
     return protocol::is_every_nth(header.frame_number, every_nth());
   }
   /// Turns writable when a blocked client can go on.

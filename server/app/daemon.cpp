@@ -133,7 +133,7 @@ class DaemonImpl final : public Daemon {
   std::atomic<bool> stop_{false};
   std::atomic<bool> serving_{false};
   std::int64_t started_ns_ = 0;
-  std::atomic<std::int64_t> housekept_ns_{0};  ///< monotonic
+  std::atomic<std::int64_t> housekept_ns_{0};    ///< monotonic
   std::optional<std::int64_t> clock_offset_ns_;  ///< wall less monotonic, when looked at last
 
   std::unique_ptr<Receiver> receiver_;
@@ -394,8 +394,8 @@ int DaemonImpl::run() {
 int DaemonImpl::end_without_device() {
   serving_.store(false, std::memory_order_release);
   housekeep();
-  log_->write(LogLevel::error, fmt::format("event=stopping reason=device_lost exit={}",
-                                           kExitDeviceLost));
+  log_->write(LogLevel::error,
+              fmt::format("event=stopping reason=device_lost exit={}", kExitDeviceLost));
   receiver_->drain();
   context_.bells.receiver.ring();
   static_cast<void>(wait_until([this] { return sender_->idle(); }, kLostDrainNs));

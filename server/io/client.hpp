@@ -106,6 +106,9 @@ struct ReceiveCounters {
   std::uint64_t bad_datagrams = 0;
   std::uint64_t late = 0;      ///< frames with kFlagLate
   std::uint64_t repeated = 0;  ///< frames with kFlagRepeated
+
+  /// Of two connections, one after the other.
+  ReceiveCounters& operator+=(const ReceiveCounters& other) noexcept;
 };
 
 /// Receives frames. tcp://host:port: frames on the control connection; udp://host:port: control

@@ -322,6 +322,20 @@ std::string FrameClientImpl::receive_buffer_advice() const {
 
 }  // namespace
 
+ReceiveCounters& ReceiveCounters::operator+=(const ReceiveCounters& other) noexcept {
+  received += other.received;
+  partial += other.partial;
+  lost += other.lost;
+  gaps += other.gaps;
+  skipped += other.skipped;
+  crc_errors += other.crc_errors;
+  os_drops += other.os_drops;
+  bad_datagrams += other.bad_datagrams;
+  late += other.late;
+  repeated += other.repeated;
+  return *this;
+}
+
 std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool udp) {
   return std::make_unique<FrameClientImpl>(std::move(connection), udp);
 }

@@ -166,9 +166,10 @@ EventText describe(const Event& event) {
     case EventKind::source_failed:
       return {LogLevel::error, fmt::format("event=source_failed why=\"{}\"", text), true};
     case EventKind::device_lost:
-      return {LogLevel::error,
-              fmt::format("event=device_lost why=\"{}\" effect=\"no more frames: emitd ends\"", text),
-              false};
+      return {
+          LogLevel::error,
+          fmt::format("event=device_lost why=\"{}\" effect=\"no more frames: emitd ends\"", text),
+          false};
     case EventKind::journal_failed:
       return {
           LogLevel::error,
