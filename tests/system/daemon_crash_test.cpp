@@ -315,8 +315,8 @@ TEST(Crash, WithoutReconnectTheEndOfTheDaemonIsTheEnd) {
 }
 
 TEST(Crash, AFullDiskEndsTheJournalLoudlyAndNoFrame) {
-  constexpr rlim_t kDiskBytes = 48 << 10;
-  constexpr std::uint64_t kFrames = 400;
+  constexpr rlim_t kDiskBytes = 600 << 10;  // some chunks, which hold 256 KiB at most
+  constexpr std::uint64_t kFrames = 3000;
   ScratchFolder folder;
   const std::string journal = folder.file("journal.mcap");
   DaemonProcess daemon(
@@ -330,6 +330,9 @@ TEST(Crash, AFullDiskEndsTheJournalLoudlyAndNoFrame) {
       folder, "record",
       {"record", "--from", "tcp://" + daemon.control(), "--out", folder.file("record.mcap")},
       kDiskBytes);
+  for (int i = 0; i < 6000 && !std::filesystem::exists(folder.file("record.mcap")); ++i) {
+    std::this_thread::sleep_for(5ms);  // it is made once the recorder is connected
+  }
   auto client = FrameClient::connect("tcp://" + daemon.control());
   auto host = HostClient::connect("tcp://" + daemon.control());
   ASSERT_TRUE(client.has_value() && host.has_value());

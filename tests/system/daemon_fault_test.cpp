@@ -201,7 +201,7 @@ TEST_F(DaemonFaults, FloodsOfEveryKindCostAWellBehavedClientNoFrame) {
   while (bytes.load() < 1'000'000 || connections.load() < 100) {
     std::this_thread::yield();
   }
-  for (int i = 0; i < 300 && !HasFatalFailure(); ++i) lock_step();
+  for (int i = 0; i < 100 && !HasFatalFailure(); ++i) lock_step();
   over.store(true);
   for (auto& thread : bad) thread.join();
   ASSERT_FALSE(HasFatalFailure());
