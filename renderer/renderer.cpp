@@ -402,6 +402,8 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
 const FrameView& GlRenderer::collect(SlotIndex slot) noexcept {
   FrameView& view = views_[slot];
   view.device_failed = !readback_.wait(slot) || glGetError() != GL_NO_ERROR || view.device_failed;
+  view.device_lost = glGetGraphicsResetStatus() != GL_NO_ERROR;
+  view.device_failed = view.device_failed || view.device_lost;
   gpu::FrameStatsGpu stats{};
   std::copy_n(readback_.data(slot) + stats_offset_, sizeof(stats),
               reinterpret_cast<std::byte*>(&stats));

@@ -93,16 +93,23 @@ EGLContext make_context(EGLDisplay display, bool debug, std::string& why) {
   if (eglChooseConfig(display, attributes, &config, 1, &count) != EGL_TRUE || count == 0) {
     config = nullptr;  // EGL_KHR_no_config_context
   }
-  const EGLint context_attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                                       4,
-                                       EGL_CONTEXT_MINOR_VERSION,
-                                       5,
-                                       EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                       EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                       EGL_CONTEXT_OPENGL_DEBUG,
-                                       debug ? EGL_TRUE : EGL_FALSE,
-                                       EGL_NONE};
-  const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes);
+  // With notification a context that the device lost says so. Not every driver offers it.
+  std::array context_attributes{EGL_CONTEXT_MAJOR_VERSION,
+                                4,
+                                EGL_CONTEXT_MINOR_VERSION,
+                                5,
+                                EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                EGL_CONTEXT_OPENGL_DEBUG,
+                                debug ? EGL_TRUE : EGL_FALSE,
+                                EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY,
+                                EGL_LOSE_CONTEXT_ON_RESET,
+                                EGL_NONE};
+  EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes.data());
+  if (context == EGL_NO_CONTEXT) {
+    context_attributes[8] = EGL_NONE;
+    context = eglCreateContext(display, config, EGL_NO_CONTEXT, context_attributes.data());
+  }
   if (context == EGL_NO_CONTEXT) {
     why = fmt::format("no OpenGL 4.5 core context (EGL error 0x{:x})", eglGetError());
     return EGL_NO_CONTEXT;

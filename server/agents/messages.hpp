@@ -137,6 +137,7 @@ enum class EventKind : std::uint8_t {
   client_slow,      ///< a = connection
   no_gso,           ///< a = connection, text = why
   source_failed,    ///< text = why
+  device_lost,      ///< text = why; the daemon ends
   journal_failed,   ///< text = why
   journal_overrun,  ///< a = first sequence lost
   slots_missed,     ///< a = how many

@@ -235,11 +235,14 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
     }
     return 1;
   }
-  const std::span<std::byte> space = connection.parser->writable();
+  std::span<std::byte> space = connection.parser->writable();
   if (space.empty()) {
     close(connection, "no room for a record");
     return 1;
   }
+  // A little of each in turn: who sends as fast as it can must not keep a host's pose waiting.
+  constexpr std::size_t kTurnBytes = 16u << 10;
+  space = space.first(std::min(space.size(), kTurnBytes));
   const IoResult got = connection.socket.read_some(space);
   switch (got.status) {
     case IoStatus::done:

@@ -263,10 +263,16 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
                        subscribe.channel_kind(), subscribe.sensor(), subscribe.band(), known));
     return;
   }
+  if (subscribe.every_nth() > protocol::kMaxEveryNth) {
+    refuse(connection, StatusCode::malformed,
+           fmt::format("every_nth {}, at most {}", subscribe.every_nth(), protocol::kMaxEveryNth));
+    return;
+  }
   SocketClient::Params params;
   params.connection = connection.key();
   params.channel = channel;
   params.every_frame = subscribe.every_frame();
+  params.every_nth = std::max(subscribe.every_nth(), 1U);
   params.udp = subscribe.udp_port() != 0;
   params.stream_id = next_stream_id_++;
   if (params.udp) {
@@ -287,6 +293,7 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
   v1::ControlRecord answer;
   fill(*channel, *answer.mutable_subscribed()->mutable_channel());
   answer.mutable_subscribed()->set_stream_id(params.stream_id);
+  answer.mutable_subscribed()->set_every_nth(params.every_nth);
   const bool udp = params.udp;
   if (udp) {
     queue(connection, answer);

@@ -42,11 +42,12 @@ bool Recorder::on_start() noexcept {
 }
 
 int Recorder::do_work(std::int64_t now_ns) noexcept {
-  static_cast<void>(now_ns);
+  wake_at_ns_ = kNeverNs;
   // Memory may run out while lines are kept or encoded: the journal ends then, the frames do not.
   try {
     int work = take_commands();
     work += take_lines();
+    flush_when_due(now_ns);
     work += take_writable();
     work += send_all();
     discard_old();
@@ -134,12 +135,30 @@ void Recorder::add_record(std::span<const std::byte> line) {
     const auto written = file_->write_journal(entry);
     if (!written) {
       file_failed(written.error());
+    } else if (unflushed_since_ns_ == 0) {
+      unflushed_since_ns_ = context_.clock.monotonic_ns();
     }
   }
   std::vector<std::byte> framed;
   protocol::append_control_record(record, framed);
   kept_bytes_ += framed.size();
   kept_.push_back(std::move(framed));
+}
+
+void Recorder::flush_when_due(std::int64_t now_ns) {
+  if (!file_ || unflushed_since_ns_ == 0) {
+    return;
+  }
+  // Steps of the wall clock must not stretch it.
+  const std::int64_t age_ns = context_.clock.monotonic_ns() - unflushed_since_ns_;
+  if (age_ns < kFlushAfterNs) {
+    wake_at_ns_ = now_ns + kFlushAfterNs - age_ns;
+    return;
+  }
+  unflushed_since_ns_ = 0;
+  if (const auto flushed = file_->flush(); !flushed) {
+    file_failed(flushed.error());
+  }
 }
 
 void Recorder::file_failed(const physics::Error& error) noexcept {

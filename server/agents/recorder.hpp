@@ -42,6 +42,7 @@ class Recorder final : public Agent {
   [[nodiscard]] bool on_start() noexcept override;
   int do_work(std::int64_t now_ns) noexcept override;
   void on_stop() noexcept override;
+  [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
   [[nodiscard]] int wait_fd() const noexcept override { return epoll_.get(); }
 
   /// Any thread; true when every line that the conductor handed over reached file and peers.
@@ -53,6 +54,9 @@ class Recorder final : public Agent {
  private:
   /// Bytes of the current run kept for recorders that come later.
   static constexpr std::size_t kKeptBytes = 64u << 20;
+  /// A line waits no longer than this before the kernel has it: a killed process loses no more.
+  /// Half of what is promised, the other half is for threads that wait for their core.
+  static constexpr std::int64_t kFlushAfterNs = 50'000'000;
 
   struct Peer {
     std::uint32_t connection = 0;
@@ -72,6 +76,7 @@ class Recorder final : public Agent {
   void discard_old();
   void remove(std::size_t index) noexcept;
   void file_failed(const physics::Error& error) noexcept;
+  void flush_when_due(std::int64_t now_ns);
 
   Context& context_;
   config::JournalConfig config_;
@@ -83,7 +88,8 @@ class Recorder final : public Agent {
   std::uint64_t kept_first_ = 0;             // index of kept_.front()
   std::uint64_t run_first_ = 0;              // index of the run's first record
   std::size_t kept_bytes_ = 0;
-  std::vector<std::byte> scratch_;
+  std::int64_t unflushed_since_ns_ = 0;  // monotonic; 0: the kernel has everything
+  std::int64_t wake_at_ns_ = kNeverNs;
   std::uint64_t taken_ = 0;                 // lines taken so far
   std::atomic<std::uint64_t> finished_{0};  // taken_ when peers had everything; else the last such
 };

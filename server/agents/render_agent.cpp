@@ -22,7 +22,9 @@ bool RenderAgent::on_start() noexcept {
 void RenderAgent::on_stop() noexcept {
   while (count_ > 0) {
     const auto slot = in_flight_[first_].slot;
-    static_cast<void>(source_->collect(slot));
+    if (!lost_) {  // a device that is gone might be waited for for ever
+      static_cast<void>(source_->collect(slot));
+    }
     source_->release(slot);
     first_ = (first_ + 1) % kDepth;
     --count_;
@@ -33,6 +35,9 @@ void RenderAgent::on_stop() noexcept {
 int RenderAgent::do_work(std::int64_t now_ns) noexcept {
   int work = 0;
   wake_at_ns_ = kNeverNs;
+  if (lost_) {
+    return 0;
+  }
   if (finish_oldest()) {
     ++work;
   }
@@ -42,6 +47,9 @@ int RenderAgent::do_work(std::int64_t now_ns) noexcept {
   if (work == 0 && count_ > 0) {
     // The device does not ring; looking again after 50 us costs little beside a frame.
     wake_at_ns_ = now_ns + 50'000;
+    if (context_.clock.monotonic_ns() - in_flight_[first_].submitted_ns > kLongestFrameNs) {
+      lose_device("a frame is not done within 60 s");
+    }
   }
   return work;
 }
@@ -80,7 +88,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       starved_ = false;
       job_prepared_ = false;
       in_flight_[(first_ + count_) % kDepth] = {static_cast<renderer::SlotIndex>(slot), now_ns,
-                                                expected_ms};
+                                                  expected_ms, context_.clock.monotonic_ns()};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;
@@ -127,6 +135,26 @@ void RenderAgent::note_dropped_poses(std::uint64_t in_run) noexcept {
   dropped_poses_ = in_run;
 }
 
+void RenderAgent::note_device(const renderer::FrameView& view) noexcept {
+  if (!view.device_failed) {
+    failures_ = 0;
+    return;
+  }
+  context_.counters.add(Counter::device_failures);
+  context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");
+  if (view.device_lost) {
+    lose_device("the driver reset the context");
+  } else if (++failures_ >= kMostFailures) {
+    lose_device("the device reported errors for 30 frames in a row");
+  }
+}
+
+void RenderAgent::lose_device(std::string_view why) noexcept {
+  lost_ = true;
+  context_.render_events.push(EventKind::device_lost, 0, 0, why);
+  context_.device_lost.store(true, std::memory_order_release);
+}
+
 bool RenderAgent::finish_oldest() noexcept {
   if (count_ == 0) {
     return false;
@@ -155,9 +183,7 @@ bool RenderAgent::finish_oldest() noexcept {
   done->estimated_error_k = view.estimated_error_k;
   quality_.finished(done->readback_end_ns - oldest.render_start_ns, oldest.expected_ms);
   done->device_failed = view.device_failed;
-  if (view.device_failed) {
-    context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");
-  }
+  note_device(view);
   done->image.source = source_.get();
   done->image.slot = oldest.slot;
   done->image.plane_count =

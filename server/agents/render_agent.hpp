@@ -33,10 +33,15 @@ class RenderAgent final : public Agent {
   struct InFlight {
     renderer::SlotIndex slot = 0;
     std::int64_t render_start_ns = 0;
-    double expected_ms = 0.0;  ///< for its rung, by the ladder
+    double expected_ms = 0.0;       ///< for its rung, by the ladder
+    std::int64_t submitted_ns = 0;  ///< monotonic
   };
   /// More than one in flight lets upload of the next overlap with read-back of the last.
   static constexpr std::size_t kDepth = 2;
+  /// Frames in a row with an error of the driver, and how long one may be in work, before the
+  /// device counts as lost. A software renderer may take seconds for a frame.
+  static constexpr std::uint32_t kMostFailures = 30;
+  static constexpr std::int64_t kLongestFrameNs = 60'000'000'000;
 
   bool take_job(std::int64_t now_ns) noexcept;
   bool finish_oldest() noexcept;
@@ -44,6 +49,9 @@ class RenderAgent final : public Agent {
   double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
+  void note_device(const renderer::FrameView& view) noexcept;
+  /// No frame comes any more: the daemon is told, and ends.
+  void lose_device(std::string_view why) noexcept;
 
   Context& context_;
   FrameSourceFactory factory_;
@@ -55,6 +63,8 @@ class RenderAgent final : public Agent {
   std::size_t count_ = 0;
   QualityPolicy quality_;
   std::int64_t wake_at_ns_ = kNeverNs;
+  std::uint32_t failures_ = 0;  // of the device, in a row
+  bool lost_ = false;
   bool starved_ = false;
   bool weather_lost_ = false;        // said so for this run
   std::uint64_t dropped_poses_ = 0;  // counted in this run

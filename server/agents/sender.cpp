@@ -101,6 +101,9 @@ int Sender::take_published() noexcept {
     }
     ++end_;
     ++taken_;
+    for (SenderClient* client : clients_) {
+      pass_over_unwanted(*client);
+    }
     context_.published.pop();
     ++work;
     // Between two publications clients get a chance, so that a burst does not skip frames.
@@ -132,6 +135,7 @@ void Sender::evict_oldest() noexcept {
         continue;
       }
       ++client.next;
+      pass_over_unwanted(client);
       client.gap = true;
       context_.counters.add(Counter::frames_skipped);
       if (ClientCounts* counts = counts_of(client)) {
@@ -141,6 +145,13 @@ void Sender::evict_oldest() noexcept {
   }
   let_go(entry(first_).image);
   ++first_;
+}
+
+void Sender::pass_over_unwanted(SenderClient& client) noexcept {
+  while (client.next < end_ && !client.wants(entry(client.next).header)) {
+    ++client.next;
+    context_.counters.add(&client == resident_ ? Counter::frames_unread : Counter::frames_left_out);
+  }
 }
 
 void Sender::trim() noexcept {
@@ -204,6 +215,7 @@ bool Sender::advance(SenderClient& client) noexcept {
     client.next = std::max(client.next, first_);
     const Entry& next = entry(client.next);
     client.in_transit = client.next++;
+    pass_over_unwanted(client);
     client.begin(next.header, next.image, context_.clock.tai_ns());
   }
   switch (client.send(batch_, context_)) {

@@ -17,6 +17,7 @@ namespace emit::server {
 /// The newest `queue_frames` publications form the window. A client is a position in it. When a
 /// publication leaves the window although a client has not had it yet, that client skips it: the
 /// next frame it gets carries kFlagGapBefore (newest-wins), or it is disconnected (every_frame).
+/// What a client asked not to get (every_nth) it is never waited for, and no gap.
 /// What such a client has half sent moves to its own memory. So the sender holds at most
 /// queue_frames + 1 images, whatever clients do, and a source with queue_frames + 3 slots always
 /// has one to render into.
@@ -51,6 +52,8 @@ class Sender final : public Agent {
   int take_writable() noexcept;
   int send_all() noexcept;
   bool advance(SenderClient& client) noexcept;
+  /// Moves a client on to the next publication that it wants.
+  void pass_over_unwanted(SenderClient& client) noexcept;
   [[nodiscard]] ClientCounts* counts_of(const SenderClient& client) const noexcept;
   void account(SenderClient& client) noexcept;
   void evict_oldest() noexcept;

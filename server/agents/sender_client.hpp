@@ -33,6 +33,11 @@ class SenderClient {
   [[nodiscard]] virtual std::uint32_t connection() const noexcept = 0;
   /// Would rather be disconnected than skip a publication.
   [[nodiscard]] virtual bool every_frame() const noexcept { return false; }
+  /// Wants frames 1, 1 + n, 1 + 2 n, ... of every run.
+  [[nodiscard]] virtual std::uint32_t every_nth() const noexcept { return 1; }
+  [[nodiscard]] virtual bool wants(const protocol::FrameHeader& header) const noexcept {
+    return protocol::is_every_nth(header.frame_number, every_nth());
+  }
   /// Turns writable when a blocked client can go on.
   [[nodiscard]] virtual int fd() const noexcept { return -1; }
 

@@ -11,8 +11,9 @@
 
 namespace emit::server {
 
-/// Writes every publication, with all channels, into a ring of shared memory, for clients on this
-/// host. Readers map it read-only: no reader, dead or alive, can delay or disturb anybody.
+/// Writes every publication, with all channels, while somebody reads, into a ring of shared memory,
+/// for clients on this host. Readers map it read-only: no reader, dead or alive, can delay or
+/// disturb anybody.
 ///
 /// Owner: the daemon. Thread: the sender's between construction and destruction.
 class ShmClient final : public SenderClient {
@@ -31,6 +32,10 @@ class ShmClient final : public SenderClient {
   /// Copies the rest now: that is all the source has to wait for.
   void spill() noexcept override;
   [[nodiscard]] std::uint32_t connection() const noexcept override { return 0; }
+  /// Nothing is copied that nobody reads.
+  [[nodiscard]] bool wants(const protocol::FrameHeader& /*header*/) const noexcept override {
+    return object_.has_readers();
+  }
 
  private:
   ShmClient(ShmObject object, const protocol::RingParams& params,

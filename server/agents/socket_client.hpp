@@ -23,6 +23,7 @@ class SocketClient final : public SenderClient {
     std::uint32_t connection = 0;
     const Channel* channel = nullptr;
     bool every_frame = false;
+    std::uint32_t every_nth = 1;
     bool udp = false;
     TcpSocket* tcp_socket = nullptr;  ///< of the control connection; stays the receiver's
     UdpSocket udp_socket;             ///< connected to the client's port or group
@@ -39,6 +40,7 @@ class SocketClient final : public SenderClient {
   void spill() noexcept override;
   [[nodiscard]] std::uint32_t connection() const noexcept override { return params_.connection; }
   [[nodiscard]] bool every_frame() const noexcept override { return params_.every_frame; }
+  [[nodiscard]] std::uint32_t every_nth() const noexcept override { return params_.every_nth; }
   [[nodiscard]] int fd() const noexcept override {
     return params_.udp ? params_.udp_socket.fd() : params_.tcp_socket->fd();
   }

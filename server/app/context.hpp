@@ -110,6 +110,7 @@ struct Context {
   Doorbells bells;
   std::vector<Channel> channels;  ///< fixed before the agents run
   std::atomic<std::uint64_t> run_id{0};
+  std::atomic<bool> device_lost{false};               ///< set by render: no frame comes any more
   std::atomic<std::uint64_t> frames_handed_over{0};   ///< put on `published` by the conductor
   std::atomic<std::uint64_t> journal_handed_over{0};  ///< lines put on `journal`
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdlib>
 #include <ctime>
 
 #include "agents/conductor.hpp"
@@ -36,6 +37,8 @@ using physics::ErrorCode;
 constexpr std::int64_t kFramesDrainNs = 60'000'000'000;
 constexpr std::int64_t kClientsDrainNs = 2'000'000'000;
 constexpr std::int64_t kJournalDrainNs = 5'000'000'000;
+/// After the device was lost a new process is wanted soon.
+constexpr std::int64_t kLostDrainNs = 300'000'000;
 
 std::uint32_t slot_count(const config::DaemonConfig& config) {
   return std::clamp<std::uint32_t>(config.stream.queue_frames + 3, 4, kMaxSlots);
@@ -108,6 +111,8 @@ class DaemonImpl final : public Daemon {
   bool wait_until(Predicate done, std::int64_t limit_ns);
   void drain_stepped();
   void stop_agents();
+  [[nodiscard]] int end_without_device();
+  void watch_clock();
   [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
   [[nodiscard]] MetricsMoment moment() const;
   void housekeep();
@@ -128,7 +133,8 @@ class DaemonImpl final : public Daemon {
   std::atomic<bool> stop_{false};
   std::atomic<bool> serving_{false};
   std::int64_t started_ns_ = 0;
-  std::atomic<std::int64_t> housekept_ns_{0};  ///< monotonic
+  std::atomic<std::int64_t> housekept_ns_{0};    ///< monotonic
+  std::optional<std::int64_t> clock_offset_ns_;  ///< wall less monotonic, when looked at last
 
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<RenderAgent> render_;
@@ -350,6 +356,9 @@ int DaemonImpl::run() {
   serving_.store(true, std::memory_order_release);
   log_->write(LogLevel::info, ready_line());
   while (!stop_.load(std::memory_order_acquire)) {
+    if (context_.device_lost.load(std::memory_order_acquire)) {
+      return end_without_device();
+    }
     pollfd wait{stop_event_.get(), POLLIN, 0};
     constexpr int kHousekeepingMs = 100;
     ::poll(&wait, 1, kHousekeepingMs);
@@ -361,7 +370,12 @@ int DaemonImpl::run() {
   context_.bells.receiver.ring();
   conductor_->drain();
   context_.bells.conductor.ring();
-  const bool frames = wait_until([this] { return conductor_->drained(); }, kFramesDrainNs);
+  const auto lost = [this] { return context_.device_lost.load(std::memory_order_acquire); };
+  const bool frames =
+      wait_until([&] { return conductor_->drained() || lost(); }, kFramesDrainNs) && !lost();
+  if (lost()) {
+    return end_without_device();
+  }
   const bool clients = wait_until([this] { return sender_->idle(); }, kClientsDrainNs);
   const bool journal = wait_until([this] { return recorder_->idle(); }, kJournalDrainNs);
   stop_agents();
@@ -373,6 +387,51 @@ int DaemonImpl::run() {
                   clients ? "drained" : "given_up", journal ? "drained" : "given_up"));
   log_->flush();
   return 0;
+}
+
+/// What was rendered goes out and into the journal. The render thread is left alone: it may hang in
+/// the driver.
+int DaemonImpl::end_without_device() {
+  serving_.store(false, std::memory_order_release);
+  housekeep();
+  log_->write(LogLevel::error,
+              fmt::format("event=stopping reason=device_lost exit={}", kExitDeviceLost));
+  receiver_->drain();
+  context_.bells.receiver.ring();
+  static_cast<void>(wait_until([this] { return sender_->idle(); }, kLostDrainNs));
+  static_cast<void>(wait_until([this] { return recorder_->idle(); }, kLostDrainNs));
+  for (AgentRunner* runner : {conductor_runner_.get(), sender_runner_.get(), recorder_runner_.get(),
+                              receiver_runner_.get()}) {
+    runner->stop();
+  }
+  housekeep();
+  log_summary();
+  log_->flush();
+  return kExitDeviceLost;
+}
+
+/// Nothing hangs on it: pacing mends itself (IgClock). But whoever looks at late or repeated frames
+/// wants to know.
+void DaemonImpl::watch_clock() {
+  constexpr std::int64_t kStepNs = 1'000'000;
+  constexpr std::int64_t kTrustNs = 100'000;
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    const std::int64_t before_ns = clock_.monotonic_ns();
+    const std::int64_t tai_ns = clock_.tai_ns();
+    const std::int64_t after_ns = clock_.monotonic_ns();
+    if (after_ns - before_ns > kTrustNs) {
+      continue;  // something came in between
+    }
+    const std::int64_t offset_ns = tai_ns - before_ns;
+    const std::int64_t step_ns = offset_ns - clock_offset_ns_.value_or(offset_ns);
+    clock_offset_ns_ = offset_ns;
+    if (std::abs(step_ns) > kStepNs && log_) {
+      context_.counters.add(Counter::clock_steps);
+      log_->write(LogLevel::warn, fmt::format("event=clock_step by_ms={:.3f}",
+                                              static_cast<double>(step_ns) * 1e-6));
+    }
+    return;
+  }
 }
 
 template <class Predicate>
@@ -420,6 +479,7 @@ void DaemonImpl::stop_agents() {
 }
 
 void DaemonImpl::housekeep() {
+  watch_clock();
   bool warned = false;
   for (EventLog* events :
        {&context_.conductor_events, &context_.receiver_events, &context_.render_events,

@@ -24,6 +24,10 @@ struct DaemonOptions {
       on_log;  ///< null: spdlog as configured; set: log lines go here
 };
 
+/// Exit code when the device is lost, or fails again and again: EX_TEMPFAIL of sysexits.h, a new
+/// process may well succeed.
+inline constexpr int kExitDeviceLost = 75;
+
 /// The whole daemon: agents, sockets, journal and frame source behind one object.
 ///
 ///   auto daemon = Daemon::create(config, scenario, {});
@@ -44,7 +48,9 @@ class Daemon {
   virtual ~Daemon() = default;
 
   /// Runs until request_stop(), then drains: frames in flight are sent, the journal is flushed and
-  /// closed. Returns what a process exits with: 0, or 1 when an agent failed. Once per daemon.
+  /// closed. Returns what a process exits with: 0, 1 when an agent failed, or kExitDeviceLost: then
+  /// the render thread may hang in the driver, and with it this object's destructor; a process
+  /// leaves by std::_Exit. Once per daemon.
   [[nodiscard]] virtual int run() = 0;
   /// Any thread, and signal handlers.
   virtual void request_stop() noexcept = 0;
@@ -60,8 +66,8 @@ class Daemon {
   [[nodiscard]] virtual std::string ready_line() const = 0;
 };
 
-/// main() of emitd and of `emit serve`. Exit codes: 0 after SIGTERM or SIGINT, 2 usage, 78 bad
-/// configuration (file:line:column on standard error), 1 otherwise.
+/// main() of emitd and of `emit serve`. Exit codes: 0 after SIGTERM or SIGINT, 2 usage, 75
+/// the device was lost, 78 bad configuration (file:line:column on standard error), 1 otherwise.
 /// @param program  name shown in messages, "emitd" or "emit serve"; argv[0] is skipped.
 [[nodiscard]] int emitd_main(int argc, char** argv, const char* program = "emitd");
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string>
 #include <string_view>
@@ -44,7 +45,8 @@ void print_usage(std::FILE* out, const char* program) {
              "  --set key=value  overrides a key of the configuration or of the scenario\n"
              "  --check          load configuration and scenario, say what is wrong, and exit\n"
              "\n"
-             "exit: 0 after SIGTERM or SIGINT, 2 usage, 78 bad configuration, 1 otherwise\n",
+             "exit: 0 after SIGTERM or SIGINT, 2 usage, 75 the device was lost (start it again),\n"
+             "      78 bad configuration, 1 otherwise\n",
              program, program);
 }
 
@@ -150,11 +152,16 @@ int serve(const Arguments& arguments, const char* program) {
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files ends the journal, not the frames
 
   fmt::print("{}\n", (*daemon)->ready_line());
   std::fflush(stdout);
   const int code = (*daemon)->run();
   g_daemon.store(nullptr);
+  if (code == kExitDeviceLost) {
+    std::fflush(nullptr);
+    std::_Exit(code);  // taking the context down may hang in the driver
+  }
   return code;
 }
 

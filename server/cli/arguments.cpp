@@ -213,6 +213,14 @@ void Tool::add_stream_commands() {
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_flag("--every-frame", o.every_frame, "TCP, shm: end rather than skip frames");
+    app.add_option("--every", o.every_nth,
+                   "Only frames 1, 1 + N, 1 + 2 N, ... of a run; those left out are no gap")
+        ->type_name("N")
+        ->check(CLI::Range(1U, 1000U))
+        ->capture_default_str();
+    app.add_flag(
+        "--reconnect", o.reconnect,
+        "When the stream ends, connect again and go on, until no frame came for --timeout-s");
     app.add_option("--min-k", o.min_k, "Lower limit of the PNG's colours")->capture_default_str();
     app.add_option("--max-k", o.max_k, "Upper limit of the PNG's colours")->capture_default_str();
     add_json(app, o.json);

@@ -94,6 +94,28 @@ void Tool::add_bench_commands() {
     add_json(app, o.json);
   }
   {
+    auto [app, o] = add<BenchIsolationCommand>(
+        *bench, "isolation",
+        "What a stopped and a flooding client cost the others: p99 of their intervals between "
+        "frames, in interleaved pairs of runs with and without, beside a run against itself",
+        "emit bench isolation --json isolation.json", run_bench_isolation);
+    add_count(app, "--frames", o.frames, "Frames per client and run")
+        ->check(CLI::Range(10U, 1'000'000U))
+        ->capture_default_str();
+    app.add_option("--rate", o.rate_hz, "Frames a second")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    app.add_option("--clients", o.clients, "Clients that are watched: tcp, udp, shm in turn")
+        ->check(CLI::Range(1U, 8U))
+        ->capture_default_str();
+    app.add_option("--pairs", o.pairs, "Pairs of runs; medians count")
+        ->check(CLI::Range(1U, 1000U))
+        ->capture_default_str();
+    add_json(app, o.json);
+  }
+  {
     auto [app, o] = add<BenchStabilityCommand>(*bench, "stability",
                                                "Shader functions and whole frames under random and "
                                                "hostile input, against double: NaN, Inf "

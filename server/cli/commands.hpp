@@ -59,6 +59,8 @@ struct ReceiveCommand {
   std::string multicast_group;
   double timeout_s = 10.0;
   bool every_frame = false;
+  std::uint32_t every_nth = 1;
+  bool reconnect = false;
   double min_k = 280.0;
   double max_k = 330.0;
 };
@@ -240,6 +242,17 @@ struct BenchStreamCommand {
   std::uint32_t repeats = 5;  ///< of the throughput measurements; 0: none
 };
 int run_bench_stream(const BenchStreamCommand& command);
+
+struct BenchIsolationCommand {
+  std::optional<std::filesystem::path> json;
+  std::uint64_t frames = 400;  ///< per client and run
+  double rate_hz = 200.0;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  std::uint32_t clients = 4;  ///< of mixed transports; the disturbing ones are beside them
+  std::uint32_t pairs = 15;
+};
+int run_bench_isolation(const BenchIsolationCommand& command);
 
 struct BenchStabilityCommand {
   std::optional<std::filesystem::path> json;

@@ -13,6 +13,7 @@
 #include "io/client.hpp"
 #include "json.hpp"
 #include "stream_report.hpp"
+#include "stream_subscription.hpp"
 
 namespace emit::cli {
 namespace {
@@ -69,35 +70,37 @@ int run_receive(const ReceiveCommand& command) {
     return fail(kExitUsage, url.error().text);
   }
   if (!(command.max_k > command.min_k)) return fail(kExitUsage, "--max-k must exceed --min-k");
-  auto connected = server::FrameClient::connect(command.url);
-  if (!connected) return fail(connected.error());
-  server::FrameClient& client = **connected;
-
   server::SubscribeOptions options;
   options.channel_kind = command.channel_kind;
   options.sensor = command.sensor;
   options.band = command.band;
   options.every_frame = command.every_frame;
+  options.every_nth = command.every_nth;
   options.multicast_group = command.multicast_group;
   // Checks are made while the pixels are looked at first; writing files takes longer than the
   // daemon waits.
   options.in_place = !command.out;
-  const auto channel = client.subscribe(options);
-  if (!channel) return fail(channel.error());
-  fmt::print(stderr, "emit: {} ({}), scenario {}, {}\n", client.server().software,
-             client.server().device, client.server().scenario, channel_text(*channel));
-  if (const auto band = channel->spectral_band(); band && command.out) {
-    fmt::print(stderr, "emit: colours show apparent temperature, {}\n",
-               conversion_text(*band, channel->response.has_value()));
-  }
-  if (client.server().tai_offset_unset) {
-    warn("the daemon's kernel has no TAI offset: its instants are UTC");
-  }
-  if (const std::string advice = client.receive_buffer_advice(); !advice.empty()) warn(advice);
+  auto opened = StreamSubscription::open(command.url, options);
+  if (!opened) return fail(opened.error());
+  StreamSubscription& stream = *opened;
+  const auto greet = [&] {
+    const server::FrameClient& client = stream.client();
+    fmt::print(stderr, "emit: {} ({}), scenario {}, {}\n", client.server().software,
+               client.server().device, client.server().scenario, channel_text(stream.channel()));
+    if (const auto band = stream.channel().spectral_band(); band && command.out) {
+      fmt::print(stderr, "emit: colours show apparent temperature, {}\n",
+                 conversion_text(*band, stream.channel().response.has_value()));
+    }
+    if (client.server().tai_offset_unset) {
+      warn("the daemon's kernel has no TAI offset: its instants are UTC");
+    }
+    if (const std::string advice = client.receive_buffer_advice(); !advice.empty()) warn(advice);
+  };
+  greet();
 
   std::optional<ApparentTemperature> apparent;
   const InterruptGuard interrupt;
-  StreamReport report;
+  StreamReport report(command.every_nth);
   ProgressBar progress("frames", command.frames == 0 ? 1 : command.frames);
   const auto timeout =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(command.timeout_s));
@@ -108,13 +111,25 @@ int run_receive(const ReceiveCommand& command) {
   while (!InterruptGuard::interrupted() &&
          (command.frames == 0 || report.frames() < command.frames)) {
     constexpr std::int64_t kPollNs = 200'000'000;
-    const auto received = client.receive(kPollNs);
-    for (const auto& status : client.take_statuses()) {
+    const auto received = stream.client().receive(kPollNs);
+    for (const auto& status : stream.client().take_statuses()) {
       if (!status.ok()) warn(fmt::format("daemon: {}", status.text));
     }
     if (!received) {
       ended = received.error().text;
-      break;
+      if (!command.reconnect) break;
+      warn(ended + "; connecting again");
+      const auto again = stream.reopen(
+          [&] { return !InterruptGuard::interrupted() && Clock::now() - last_frame < timeout; });
+      if (!again) {
+        ended += fmt::format("; not connected again: {}", again.error().text);
+        break;
+      }
+      ended.clear();
+      report.begin_connection();
+      apparent.reset();
+      greet();
+      continue;
     }
     if (*received == nullptr) {
       if (Clock::now() - last_frame > timeout) {
@@ -126,8 +141,8 @@ int run_receive(const ReceiveCommand& command) {
     last_frame = Clock::now();
     report.add(**received);
     if (command.out) {
-      const auto saved =
-          save(*command.out, **received, *channel, {command.min_k, command.max_k}, apparent);
+      const auto saved = save(*command.out, **received, stream.channel(),
+                              {command.min_k, command.max_k}, apparent);
       if (!saved) return fail(saved.error());
     }
     if (command.frames != 0) progress.advance_to(report.frames());
@@ -135,8 +150,14 @@ int run_receive(const ReceiveCommand& command) {
   progress.finish();
   const double seconds = std::chrono::duration<double>(last_frame - start).count();
 
-  const server::ReceiveCounters& counters = client.counters();
+  const server::ReceiveCounters counters = stream.counters();
+  const server::FrameClient& client = stream.client();
+  const server::ChannelDescription& channel = stream.channel();
   print_losses(text_stream(command.json), counters, report);
+  if (stream.reconnects() > 0) {
+    fmt::print(text_stream(command.json), "connected again {} times, {} runs of the daemon\n",
+               stream.reconnects(), report.runs());
+  }
   fmt::print(text_stream(command.json), "{}{}{}{}",
              latency_line("pose received -> frame received", report.pose_to_received_ms()),
              latency_line("send start -> frame received", report.send_to_received_ms()),
@@ -159,13 +180,16 @@ int run_receive(const ReceiveCommand& command) {
   if (command.json) {
     Json json = Json::object();
     json.set("url", command.url).set("device", client.server().device);
-    json.set("scenario", client.server().scenario).set("channel", channel->name);
-    json.set("band", channel->band).set("width", channel->width_px);
-    json.set("height", channel->height_px).set("frames", report.frames()).set("seconds", seconds);
+    json.set("scenario", client.server().scenario).set("channel", channel.name);
+    json.set("band", channel.band).set("width", channel.width_px);
+    json.set("height", channel.height_px).set("frames", report.frames()).set("seconds", seconds);
     json.set("counters", counters_json(counters)).set("flags", report.flags_json());
     json.set("unflagged_gaps", report.unflagged_gaps());
+    json.set("every_nth", command.every_nth).set("reconnects", stream.reconnects());
+    json.set("runs", report.runs());
     json.set("pose_to_received_ms", latency_json(report.pose_to_received_ms()));
     json.set("send_to_received_ms", latency_json(report.send_to_received_ms()));
+    json.set("interval_ms", latency_json(report.interval_ms()));
     json.set("stages", report.stages_json());
     json.set("receive_buffer_bytes", client.receive_buffer_bytes());
     json.set("receive_buffer_advice", client.receive_buffer_advice());

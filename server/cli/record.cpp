@@ -40,9 +40,20 @@ int run_record(const RecordCommand& command) {
   std::uint64_t lost_entries = 0;
   std::uint64_t last_sequence = 0;
   std::string broken;
+  // A killed process loses no more than what came in this time and in one poll.
+  constexpr auto kFlushAfter = std::chrono::milliseconds(50);
+  bool unflushed = false;
+  Clock::time_point unflushed_since;
+  const auto flush_when_due = [&]() -> physics::Result<void> {
+    if (!unflushed || Clock::now() - unflushed_since < kFlushAfter) return {};
+    unflushed = false;
+    return writer->flush();
+  };
   while (!InterruptGuard::interrupted() && Clock::now() < end &&
          (command.frames == 0 || frames < command.frames)) {
-    const auto received = recorder.receive(entry, 100'000'000);
+    if (auto flushed = flush_when_due(); !flushed) return fail(flushed.error());
+    constexpr std::int64_t kPollNs = 20'000'000;
+    const auto received = recorder.receive(entry, kPollNs);
     if (!received) {
       if (!recorder.closed()) broken = received.error().text;
       break;
@@ -59,6 +70,8 @@ int run_record(const RecordCommand& command) {
     if (entry.has_frame()) ++frames;
     if (entry.has_host_frame()) ++host_frames;
     if (auto written = writer->write_journal(entry); !written) return fail(written.error());
+    if (!unflushed) unflushed_since = Clock::now();
+    unflushed = true;
     if (command.frames != 0) progress.advance_to(frames);
   }
   progress.finish();

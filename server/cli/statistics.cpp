@@ -7,11 +7,21 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace emit::cli {
 namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+}
+
+void Samples::add(double value) {
+  max_ = count_ == 0 ? value : std::max(max_, value);
+  sum_ += value;
+  if (count_++ % stride_ != 0) return;
+  values_.push_back(value);
+  if (most_ == 0 || values_.size() < most_) return;
+  for (std::size_t i = 0; 2 * i < values_.size(); ++i) values_[i] = values_[2 * i];
+  values_.resize((values_.size() + 1) / 2);
+  stride_ *= 2;
 }
 
 double Samples::percentile(double frac) const {
@@ -33,15 +43,15 @@ double Samples::median() const {
 }
 
 double Samples::mean() const {
-  return values_.empty() ? kNan : sum() / static_cast<double>(values_.size());
+  return values_.empty() ? kNan : sum_ / static_cast<double>(count_);
 }
 
 double Samples::max() const {
-  return values_.empty() ? kNan : *std::max_element(values_.begin(), values_.end());
+  return values_.empty() ? kNan : max_;
 }
 
 double Samples::sum() const {
-  return std::accumulate(values_.begin(), values_.end(), 0.0);
+  return sum_;
 }
 
 std::string histogram_text(const Samples& samples, const std::string& unit) {

@@ -11,13 +11,16 @@ physics::Result<std::unique_ptr<StreamClient>> StreamClient::start(const Options
   auto channel = (*connected)->subscribe(options.subscribe);
   if (!channel) return tl::unexpected(channel.error());
   std::unique_ptr<StreamClient> client(
-      new StreamClient(std::move(*connected), std::move(*channel), options.keep_pixels));
+      new StreamClient(std::move(*connected), std::move(*channel), options));
   return client;
 }
 
 StreamClient::StreamClient(std::unique_ptr<server::FrameClient> client,
-                           server::ChannelDescription channel, bool keep_pixels)
-    : client_(std::move(client)), channel_(std::move(channel)), keep_pixels_(keep_pixels) {
+                           server::ChannelDescription channel, const Options& options)
+    : client_(std::move(client)),
+      channel_(std::move(channel)),
+      keep_pixels_(options.keep_pixels),
+      report_(options.subscribe.every_nth) {
   thread_ = std::thread([this] { run(); });
 }
 

@@ -69,7 +69,7 @@ class StreamClient {
 
  private:
   StreamClient(std::unique_ptr<server::FrameClient> client, server::ChannelDescription channel,
-               bool keep_pixels);
+               const Options& options);
   void run();
 
   std::unique_ptr<server::FrameClient> client_;

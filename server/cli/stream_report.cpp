@@ -29,14 +29,19 @@ constexpr std::array<FlagName, 12> kFlagNames{{{protocol::kFlagLate, "late"},
 
 }  // namespace
 
+StreamReport::StreamReport(std::uint32_t every_nth) : every_nth_(every_nth) {
+  stages_.fill(Samples(kMostSamples));
+}
+
 void StreamReport::add(const server::ReceivedFrame& frame) {
   const protocol::FrameHeader& header = frame.header;
-  const bool continues = frames_ > 0 && header.run_id == last_run_;
-  if (continues && header.frame_number != last_number_ + 1 &&
+  const bool continues = last_run_ != 0 && header.run_id == last_run_;
+  if (continues && header.frame_number != last_number_ + every_nth_ &&
       (header.flags & protocol::kFlagGapBefore) == 0) {
     ++unflagged_gaps_;
   }
-  last_run_ = header.run_id;
+  runs_ += header.run_id != newest_run_ ? 1U : 0U;
+  newest_run_ = last_run_ = header.run_id;
   last_number_ = header.frame_number;
   ++frames_;
   for (std::size_t bit = 0; bit < flag_counts_.size(); ++bit) {
@@ -46,6 +51,8 @@ void StreamReport::add(const server::ReceivedFrame& frame) {
   const auto add_span = [](Samples& samples, std::int64_t from_ns, std::int64_t to_ns) {
     if (from_ns > 0 && to_ns > 0) samples.add(1e-6 * static_cast<double>(to_ns - from_ns));
   };
+  add_span(interval_ms_, last_byte_ns_, frame.last_byte_ns);
+  last_byte_ns_ = frame.last_byte_ns;
   // A repeated frame's render instants are those of the image shown before: not this frame's.
   if ((header.flags & protocol::kFlagRepeated) == 0) {
     add_span(stages_[kQueue], header.host_received_ns, header.render_start_ns);

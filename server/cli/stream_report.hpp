@@ -15,7 +15,18 @@ namespace emit::cli {
 /// clocks agree. One thread.
 class StreamReport {
  public:
+  /// @param every_nth  which frames were asked for: the others are no gap.
+  explicit StreamReport(std::uint32_t every_nth = 1);
+
   void add(const server::ReceivedFrame& frame);
+  /// What comes next comes over another connection: numbers missing in between are no gap, the
+  /// client was not there.
+  void begin_connection() noexcept {
+    last_run_ = 0;
+    last_byte_ns_ = 0;
+  }
+  /// Runs of the daemon that frames came from, one after the other.
+  [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
@@ -31,6 +42,9 @@ class StreamReport {
   /// Pixels in CPU memory to last byte here, ms: what the daemon and the wire add to a render.
   [[nodiscard]] const Samples& ready_to_received_ms() const noexcept { return ready_ms_; }
 
+  /// Last byte of one frame to last byte of the next, ms.
+  [[nodiscard]] const Samples& interval_ms() const noexcept { return interval_ms_; }
+
   /// Table of stages: median, p99 and largest, ms.
   [[nodiscard]] std::string stage_table() const;
   [[nodiscard]] Json stages_json() const;
@@ -44,12 +58,20 @@ class StreamReport {
   static constexpr std::array<const char*, kStages> kKeys{
       "queue_ms", "render_ms", "readback_ms", "hand_over_ms", "transport_ms", "total_ms"};
 
+  /// A client may run for weeks.
+  static constexpr std::size_t kMostSamples = 1u << 18;
+
   std::array<Samples, kStages> stages_;
-  Samples ready_ms_;
+  Samples ready_ms_{kMostSamples};
+  Samples interval_ms_{kMostSamples};
+  std::int64_t last_byte_ns_ = 0;  // of the frame before, on this connection
   std::array<std::uint64_t, 32> flag_counts_{};
   std::uint64_t frames_ = 0;
   std::uint64_t unflagged_gaps_ = 0;
-  std::uint64_t last_run_ = 0;
+  std::uint32_t every_nth_;
+  std::uint64_t runs_ = 0;
+  std::uint64_t newest_run_ = 0;
+  std::uint64_t last_run_ = 0;  // on this connection; 0: none yet
   std::uint64_t last_number_ = 0;
 };
 

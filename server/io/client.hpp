@@ -77,6 +77,8 @@ struct SubscribeOptions {
   std::string sensor;
   std::string band;
   bool every_frame = false;  ///< the daemon disconnects this client rather than skip a frame
+  /// 1..kMaxEveryNth: frames 1, 1 + n, 1 + 2 n, ... of every run; what is left out is no gap.
+  std::uint32_t every_nth = 1;
   std::uint32_t fragment_payload_bytes = 0;  ///< UDP; 0 = daemon's choice
   std::string multicast_group;               ///< UDP; empty = unicast
   std::uint16_t udp_port = 0;                ///< UDP; 0 = any free port
@@ -104,6 +106,9 @@ struct ReceiveCounters {
   std::uint64_t bad_datagrams = 0;
   std::uint64_t late = 0;      ///< frames with kFlagLate
   std::uint64_t repeated = 0;  ///< frames with kFlagRepeated
+
+  /// Of two connections, one after the other.
+  ReceiveCounters& operator+=(const ReceiveCounters& other) noexcept;
 };
 
 /// Receives frames. tcp://host:port: frames on the control connection; udp://host:port: control
@@ -117,7 +122,8 @@ class FrameClient {
   virtual ~FrameClient() = default;
 
   [[nodiscard]] virtual const ServerInfo& server() const noexcept = 0;
-  /// Once. Errors: protocol with the daemon's status text (unknown channel, too many clients).
+  /// Once. Errors: protocol with the daemon's status text (unknown channel, too many clients), or
+  /// where a daemon does not know every_nth; invalid_argument (every_nth).
   [[nodiscard]] virtual physics::Result<ChannelDescription> subscribe(
       const SubscribeOptions& options) = 0;
 

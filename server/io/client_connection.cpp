@@ -65,6 +65,10 @@ ChannelDescription describe_channel(const v1::ChannelInfo& info) {
   return out;
 }
 
+std::string every_nth_error(std::uint32_t every_nth) {
+  return fmt::format("every_nth is {}, must be 1 to {}", every_nth, protocol::kMaxEveryNth);
+}
+
 ServerStatus to_status(const v1::Status& status) {
   return {static_cast<std::uint32_t>(status.code()), status.text(), status.host_frame_number(),
           status.count()};

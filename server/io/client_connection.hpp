@@ -73,6 +73,9 @@ class ClientConnection {
   bool closed_ = false;
 };
 
+/// Why SubscribeOptions::every_nth is refused.
+[[nodiscard]] std::string every_nth_error(std::uint32_t every_nth);
+
 /// What client.hpp makes from a URL, over a connection that is open in that role.
 [[nodiscard]] std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool udp);
 [[nodiscard]] std::unique_ptr<HostClient> make_tcp_host(ClientConnection connection);

@@ -13,19 +13,26 @@ class FrameAccount {
     counters.repeated += (header.flags & protocol::kFlagRepeated) != 0 ? 1 : 0;
     const bool gap = (header.flags & protocol::kFlagGapBefore) != 0;
     counters.gaps += gap ? 1 : 0;
-    if (any_ && header.run_id == run_id_ && header.frame_number > last_frame_number_ + 1) {
-      (gap ? counters.skipped : counters.lost) += header.frame_number - last_frame_number_ - 1;
-    }
+    (gap ? counters.skipped : counters.lost) += missing_before(header);
     any_ = true;
     run_id_ = header.run_id;
     last_frame_number_ = header.frame_number;
   }
+  /// Frames that this client wanted between the one taken last and this one.
+  [[nodiscard]] std::uint64_t missing_before(const protocol::FrameHeader& header) const noexcept {
+    return any_ && header.run_id == run_id_ && header.frame_number > last_frame_number_
+               ? (header.frame_number - last_frame_number_ - 1) / every_nth_
+               : 0;
+  }
   /// A frame whose number went with its header: the gap to the next one is this frame.
-  void take_unknown() noexcept { ++last_frame_number_; }
+  void take_unknown() noexcept { last_frame_number_ += every_nth_; }
+  /// Before the first frame: only every n-th one is to come, the rest is not missing.
+  void set_every_nth(std::uint32_t every_nth) noexcept { every_nth_ = every_nth; }
 
   ReceiveCounters counters;
 
  private:
+  std::uint32_t every_nth_ = 1;
   std::uint64_t run_id_ = 0;
   std::uint64_t last_frame_number_ = 0;
   bool any_ = false;

@@ -76,6 +76,9 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   if (subscribed_) {
     return make_error(ErrorCode::invalid_argument, "already subscribed");
   }
+  if (options.every_nth < 1 || options.every_nth > protocol::kMaxEveryNth) {
+    return make_error(ErrorCode::invalid_argument, every_nth_error(options.every_nth));
+  }
   // Frames may follow the answer at once: the parser must take the largest channel's.
   std::uint64_t largest = 0;
   for (const auto& channel : connection_.server().channels) {
@@ -91,6 +94,7 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   subscribe.set_sensor(options.sensor);
   subscribe.set_band(options.band);
   subscribe.set_every_frame(options.every_frame);
+  subscribe.set_every_nth(options.every_nth);
   if (udp_) {
     auto receiver = UdpFrameReceiver::open(connection_.context(), connection_.peer(),
                                            connection_.local_address(), options);
@@ -133,6 +137,10 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
     if (answer.has_subscribed()) {
       channel_ = describe_channel(answer.subscribed().channel());
       stream_id_ = static_cast<std::uint16_t>(answer.subscribed().stream_id());
+      if (std::max(answer.subscribed().every_nth(), 1U) != options.every_nth) {
+        return make_error(ErrorCode::protocol, "this daemon cannot leave frames out (every_nth)");
+      }
+      account_.set_every_nth(options.every_nth);
       subscribed_ = true;
       return channel_;
     }
@@ -313,6 +321,20 @@ std::string FrameClientImpl::receive_buffer_advice() const {
 }
 
 }  // namespace
+
+ReceiveCounters& ReceiveCounters::operator+=(const ReceiveCounters& other) noexcept {
+  received += other.received;
+  partial += other.partial;
+  lost += other.lost;
+  gaps += other.gaps;
+  skipped += other.skipped;
+  crc_errors += other.crc_errors;
+  os_drops += other.os_drops;
+  bad_datagrams += other.bad_datagrams;
+  late += other.late;
+  repeated += other.repeated;
+  return *this;
+}
 
 std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool udp) {
   return std::make_unique<FrameClientImpl>(std::move(connection), udp);

@@ -46,7 +46,8 @@ class ShmFrameClient final : public FrameClient {
   std::string receive_buffer_advice() const override { return {}; }
 
  private:
-  physics::Result<bool> take(std::uint64_t publication);
+  enum class Taken : std::uint8_t { frame, left_out, overwritten };
+  physics::Result<Taken> take(std::uint64_t publication);
   physics::Result<void> skip_to(std::uint64_t publication);
 
   std::string name_;
@@ -69,6 +70,9 @@ physics::Result<ChannelDescription> ShmFrameClient::subscribe(const SubscribeOpt
   if (subscribed_) {
     return make_error(ErrorCode::invalid_argument, "already subscribed");
   }
+  if (options.every_nth < 1 || options.every_nth > protocol::kMaxEveryNth) {
+    return make_error(ErrorCode::invalid_argument, every_nth_error(options.every_nth));
+  }
   const auto fits = [](const std::string& wanted, const std::string& have) {
     return wanted.empty() || wanted == have;
   };
@@ -88,6 +92,7 @@ physics::Result<ChannelDescription> ShmFrameClient::subscribe(const SubscribeOpt
     pixels_.resize(static_cast<std::size_t>(ring_.pixel_bytes(channel_) / sizeof(float)));
   }
   publication_ = ring_.newest();
+  account_.set_every_nth(options.every_nth);
   subscribed_ = true;
   return *found;
 }
@@ -114,8 +119,11 @@ physics::Result<const ReceivedFrame*> ShmFrameClient::receive(std::int64_t timeo
       if (!taken) {
         return tl::unexpected<physics::Error>(physics::Error(taken.error()));
       }
-      if (*taken) {
+      if (*taken == Taken::frame) {
         return &frame_;
+      }
+      if (*taken == Taken::left_out) {
+        continue;
       }
       if (auto skipped = skip_to(ring_.newest() - 1); !skipped) {
         return tl::unexpected<physics::Error>(std::move(skipped.error()));
@@ -155,15 +163,25 @@ physics::Result<void> ShmFrameClient::skip_to(std::uint64_t publication) {
   return {};
 }
 
-/// False: overwritten before it was read.
-physics::Result<bool> ShmFrameClient::take(std::uint64_t publication) {
+physics::Result<ShmFrameClient::Taken> ShmFrameClient::take(std::uint64_t publication) {
   const auto view = ring_.view(publication, channel_);
   if (!view) {
-    return false;
+    return Taken::overwritten;
   }
   frame_.first_byte_ns = clock_.tai_ns();
   std::array<std::byte, protocol::kFrameHeaderBytes> head;
   std::copy(view->header.begin(), view->header.end(), head.begin());
+  if (!ring_.intact(publication)) {
+    return Taken::overwritten;
+  }
+  auto header = protocol::decode_frame_header(head);
+  if (!header) {
+    return tl::unexpected<physics::Error>(std::move(header.error()));
+  }
+  if (!protocol::is_every_nth(header->frame_number, options_.every_nth)) {
+    publication_ = publication;
+    return Taken::left_out;
+  }
   std::span<const std::byte> pixels = view->pixels;
   if (!options_.in_place) {
     std::memcpy(pixels_.data(), pixels.data(), pixels.size());
@@ -172,18 +190,16 @@ physics::Result<bool> ShmFrameClient::take(std::uint64_t publication) {
   frame_.last_byte_ns = clock_.tai_ns();
   const std::uint32_t crc32c = protocol::crc32c(pixels);
   if (!ring_.intact(publication)) {
-    return false;
-  }
-  auto header = protocol::decode_frame_header(head);
-  if (!header) {
-    return tl::unexpected<physics::Error>(std::move(header.error()));
+    return Taken::overwritten;
   }
   if (header->payload_bytes != pixels.size()) {
     return make_error(ErrorCode::protocol, "a frame of another size than its channel");
   }
   publication_ = publication;
   frame_.header = *header;
-  if (std::exchange(gap_, false)) {
+  // Among the publications that were overwritten there may be none that this reader wanted.
+  if (std::exchange(gap_, false) &&
+      (options_.every_nth == 1 || account_.missing_before(*header) > 0)) {
     frame_.header.flags |= protocol::kFlagGapBefore;
   }
   // The ring keeps pixels aligned.
@@ -192,7 +208,7 @@ physics::Result<bool> ShmFrameClient::take(std::uint64_t publication) {
   account_.counters.crc_errors += crc32c != header->payload_crc32c ? 1U : 0U;
   ++account_.counters.received;
   account_.take(frame_.header);
-  return true;
+  return Taken::frame;
 }
 
 }  // namespace

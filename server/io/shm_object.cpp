@@ -27,21 +27,29 @@ std::string errno_text(int error) {
   return std::generic_category().message(error);
 }
 
-struct flock whole_object() {
+/// Bytes of the object that stand for something when they are locked; what they hold does not
+/// matter.
+constexpr off_t kMakerByte = 0;   ///< written by a process that lives: write lock
+constexpr off_t kReaderByte = 1;  ///< somebody reads: read lock of each
+
+struct flock lock_of(off_t byte, short type) {
   struct flock lock {};
-  lock.l_type = F_WRLCK;
+  lock.l_type = type;
   lock.l_whence = SEEK_SET;
+  lock.l_start = byte;
+  lock.l_len = 1;
   return lock;
 }
 
 /// Of the open file description, so that it ends with the last descriptor of its process.
-bool take_lock(int fd) {
-  struct flock lock = whole_object();
+bool take_lock(int fd, off_t byte, short type) {
+  struct flock lock = lock_of(byte, type);
   return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
 }
 
-bool is_locked(int fd) {
-  struct flock lock = whole_object();
+/// By another file description.
+bool is_locked(int fd, off_t byte) {
+  struct flock lock = lock_of(byte, F_WRLCK);
   return ::fcntl(fd, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
 }
 
@@ -60,7 +68,7 @@ physics::Result<void> remove_stale(const std::string& path) {
   }
   // Whoever holds the lock of the object that bears the name may take the name away; nobody else
   // does, so it cannot change hands in between.
-  if (!take_lock(fd.get())) {
+  if (!take_lock(fd.get(), kMakerByte, F_WRLCK)) {
     return name_in_use(path);
   }
   struct stat held {};
@@ -121,7 +129,8 @@ physics::Result<ShmObject> ShmObject::create(std::uint64_t bytes, std::uint32_t 
     return make_error(ErrorCode::io,
                       fmt::format("{}: {} bytes: {}", kFolder, bytes, errno_text(error)));
   }
-  if (!take_lock(out.fd_.get()) || ::fchmod(out.fd_.get(), static_cast<mode_t>(mode)) != 0) {
+  if (!take_lock(out.fd_.get(), kMakerByte, F_WRLCK) ||
+      ::fchmod(out.fd_.get(), static_cast<mode_t>(mode)) != 0) {
     return make_error(ErrorCode::io, fmt::format("{}: {}", kFolder, errno_text(errno)));
   }
   if (auto mapped = out.map(bytes, PROT_READ | PROT_WRITE); !mapped) {
@@ -168,6 +177,10 @@ physics::Result<ShmObject> ShmObject::open(std::string_view name) {
   if (!out.alive()) {
     return make_error(ErrorCode::io, path + ": left behind by an emitd that is gone");
   }
+  // From here on its maker writes.
+  if (!take_lock(out.fd_.get(), kReaderByte, F_RDLCK)) {
+    return make_error(ErrorCode::io, fmt::format("{}: {}", path, errno_text(errno)));
+  }
   if (auto mapped = out.map(static_cast<std::uint64_t>(status.st_size), PROT_READ); !mapped) {
     return tl::unexpected<physics::Error>(std::move(mapped.error()).with_context(path));
   }
@@ -175,13 +188,17 @@ physics::Result<ShmObject> ShmObject::open(std::string_view name) {
 }
 
 bool ShmObject::alive() const noexcept {
-  return is_locked(fd_.get());
+  return is_locked(fd_.get(), kMakerByte);
+}
+
+bool ShmObject::has_readers() const noexcept {
+  return is_locked(fd_.get(), kReaderByte);
 }
 
 physics::Result<void> check_shm_name_free(std::string_view name) {
   const std::string path = path_of(name);
   const Fd fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
-  if (fd && is_locked(fd.get())) {
+  if (fd && is_locked(fd.get(), kMakerByte)) {
     return name_in_use(path);
   }
   return {};

@@ -13,7 +13,7 @@ namespace emit::server {
 
 /// A named piece of shared memory, /dev/shm/emitd-NAME. Its maker holds a lock on it while it
 /// lives, so that others can tell a living object from what a crashed process left behind.
-/// Setup only, but for alive(). Thread: one owner.
+/// Setup only, but for alive() and has_readers(). Thread: one owner.
 class ShmObject {
  public:
   ShmObject() noexcept = default;
@@ -30,11 +30,13 @@ class ShmObject {
   /// Precondition: config::is_shm_name(name).
   [[nodiscard]] physics::Result<void> publish(std::string_view name);
 
-  /// Maps what is under that name, read-only. Errors: not_found, io (not permitted; its maker has
-  /// gone). Precondition: config::is_shm_name(name).
+  /// Maps what is under that name, read-only, and tells its maker that somebody reads. Errors:
+  /// not_found, io (not permitted; its maker has gone). Precondition: config::is_shm_name(name).
   [[nodiscard]] static physics::Result<ShmObject> open(std::string_view name);
   /// True while the process that made it lives and has it open. One system call.
   [[nodiscard]] bool alive() const noexcept;
+  /// Of create(): true while somebody has it open by open(). One system call.
+  [[nodiscard]] bool has_readers() const noexcept;
 
   /// Of create().
   [[nodiscard]] std::span<std::byte> writable() const noexcept { return {memory_, size_}; }

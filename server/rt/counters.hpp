@@ -19,6 +19,8 @@ namespace emit::server {
   X(host_epochs, "restarts of the host seen by a new run id")                        \
   X(weather_coalesced, "weather changes replaced by a newer one before any frame")   \
   X(weather_lost, "weather changes the source had no room for")                      \
+  X(device_failures, "frames during which the driver reported an error")             \
+  X(clock_steps, "steps of the wall clock of more than 1 ms")                        \
   X(frames_coarse, "frames whose camera stood where the surface was not prepared")   \
   X(frames_shed, "frames of less than full quality, to be ready in time")            \
   X(poses_dropped, "poses the histories forgot for want of room")                    \
@@ -52,7 +54,9 @@ namespace emit::server {
   X(no_free_slot, "attempts to render while every slot was in use")                  \
   X(frames_sent, "frames sent completely, all clients")                              \
   X(frames_shared, "frames put into shared memory, counted as sent too")             \
+  X(frames_unread, "frames not put into shared memory because nobody reads it")      \
   X(frames_skipped, "frames skipped for slow clients, flagged gap-before")           \
+  X(frames_left_out, "frames not sent by the clients' own wish (every_nth)")         \
   X(frames_spilled, "partly sent frames moved to a client's own buffer")             \
   X(bytes_sent, "bytes handed to the kernel, all clients")                           \
   X(send_errors, "datagrams the kernel refused")                                     \

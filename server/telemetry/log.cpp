@@ -165,6 +165,11 @@ EventText describe(const Event& event) {
               false};
     case EventKind::source_failed:
       return {LogLevel::error, fmt::format("event=source_failed why=\"{}\"", text), true};
+    case EventKind::device_lost:
+      return {
+          LogLevel::error,
+          fmt::format("event=device_lost why=\"{}\" effect=\"no more frames: emitd ends\"", text),
+          false};
     case EventKind::journal_failed:
       return {
           LogLevel::error,

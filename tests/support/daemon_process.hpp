@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -48,10 +49,103 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
+/// In a child before exec.
+inline void limit_files(rlim_t bytes) {
+  if (bytes != RLIM_INFINITY) {
+    const rlimit limit{bytes, bytes};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+}
+
+/// A real `emit` with these arguments. Standard output and error go to NAME.out and NAME.err of
+/// `folder`; killed at the end if need be.
+class ToolProcess {
+ public:
+  ToolProcess(const ScratchFolder& folder, std::string name, std::vector<std::string> arguments,
+              rlim_t file_limit_bytes = RLIM_INFINITY)
+      : folder_(folder), name_(std::move(name)) {
+    std::string program = std::string(EMIT_TEST_BIN_DIR) + "/emit";
+    std::vector<char*> argv{program.data()};
+    for (auto& argument : arguments) {
+      argv.push_back(argument.data());
+    }
+    argv.push_back(nullptr);
+    const std::string out = folder.file(name_ + ".out");
+    const std::string err = folder.file(name_ + ".err");
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::dup2(::open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600), 1);
+      ::dup2(::open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600), 2);
+      limit_files(file_limit_bytes);
+      ::execv(argv[0], argv.data());
+      ::_exit(127);
+    }
+  }
+  ~ToolProcess() {
+    if (pid_ > 0) {
+      ::kill(pid_, SIGKILL);
+      ::waitpid(pid_, nullptr, 0);
+    }
+  }
+  ToolProcess(const ToolProcess&) = delete;
+  ToolProcess& operator=(const ToolProcess&) = delete;
+
+  void signal(int number) const { ::kill(pid_, number); }
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  [[nodiscard]] std::string out() const { return folder_.read(name_ + ".out"); }
+  [[nodiscard]] std::string err() const { return folder_.read(name_ + ".err"); }
+  /// Until standard error holds `text` this often. False: not within the limit, or it ended before.
+  [[nodiscard]] bool says(const std::string& text, std::size_t times = 1,
+                          std::chrono::seconds limit = std::chrono::seconds(60)) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    for (;;) {
+      const bool over = ended() || std::chrono::steady_clock::now() > end;
+      const std::string all = err();
+      std::size_t found = 0;
+      for (std::size_t at = all.find(text); at != std::string::npos;
+           at = all.find(text, at + text.size())) {
+        ++found;
+      }
+      if (found >= times || over) {
+        return found >= times;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+  /// Exit code, 128 + signal, or -1 when it does not end within the limit.
+  [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    while (!ended()) {
+      if (std::chrono::steady_clock::now() > end) {
+        return -1;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return exit_code_;
+  }
+  [[nodiscard]] bool ended() {
+    int status = 0;
+    if (pid_ > 0 && ::waitpid(pid_, &status, WNOHANG) == pid_) {
+      pid_ = -1;
+      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    }
+    return pid_ <= 0;
+  }
+
+ private:
+  const ScratchFolder& folder_;
+  std::string name_;
+  pid_t pid_ = -1;
+  int exit_code_ = -1;
+};
+
 /// A real emitd. Standard output and error go to files of `folder`; killed at the end if need be.
 class DaemonProcess {
  public:
-  DaemonProcess(const ScratchFolder& folder, std::vector<std::string> arguments) : folder_(folder) {
+  /// `file_limit_bytes`: no file it writes gets longer (RLIMIT_FSIZE), as on a full disk.
+  DaemonProcess(const ScratchFolder& folder, std::vector<std::string> arguments,
+                rlim_t file_limit_bytes = RLIM_INFINITY)
+      : folder_(folder) {
     std::string program = std::string(EMIT_TEST_BIN_DIR) + "/emitd";
     std::vector<char*> argv{program.data()};
     for (auto& argument : arguments) {
@@ -66,6 +160,7 @@ class DaemonProcess {
       const int err_fd = ::open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
       ::dup2(out_fd, 1);
       ::dup2(err_fd, 2);
+      limit_files(file_limit_bytes);
       ::execv(argv[0], argv.data());
       ::_exit(127);
     }
@@ -111,6 +206,7 @@ class DaemonProcess {
   /// Empty: off.
   [[nodiscard]] const std::string& metrics() const { return metrics_; }
   void signal(int number) const { ::kill(pid_, number); }
+  [[nodiscard]] pid_t pid() const { return pid_; }
   /// Exit code, 128 + signal, or -1 when it does not end within the limit.
   [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + limit;

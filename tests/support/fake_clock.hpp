@@ -13,16 +13,19 @@ class FakeClock final : public server::Clock {
 
   void advance(std::int64_t by_ns) noexcept { now_ns_.fetch_add(by_ns); }
   void set(std::int64_t now_ns) noexcept { now_ns_.store(now_ns); }
+  /// Somebody sets the wall clock; no time passes.
+  void step_wall(std::int64_t by_ns) noexcept { wall_step_ns_.fetch_add(by_ns); }
 
-  std::int64_t tai_ns() const noexcept override { return now_ns_.load(); }
+  std::int64_t tai_ns() const noexcept override { return now_ns_.load() + wall_step_ns_.load(); }
   std::int64_t monotonic_ns() const noexcept override { return now_ns_.load(); }
   std::int64_t tai_from_utc_offset_ns() const noexcept override { return 37'000'000'000; }
   std::int64_t tai_from_kernel_stamp_ns(std::int64_t /*kernel_utc_ns*/) const noexcept override {
-    return now_ns_.load();
+    return tai_ns();
   }
 
  private:
   std::atomic<std::int64_t> now_ns_;
+  std::atomic<std::int64_t> wall_step_ns_{0};
 };
 
 }  // namespace emit::test

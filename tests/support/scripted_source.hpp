@@ -14,10 +14,12 @@ namespace emit::test {
 
 /// What a source was asked to do, kept by the test so that it outlives the source.
 struct SourceScript {
-  bool ready = true;                ///< poll(): false holds frames back
-  bool weather_full = false;        ///< apply_weather(): no room
-  std::uint64_t dropped_poses = 0;  ///< of every frame's statistics
-  bool coarse = false;              ///< likewise
+  bool ready = true;                       ///< poll(): false holds frames back
+  bool weather_full = false;               ///< apply_weather(): no room
+  std::uint64_t dropped_poses = 0;         ///< of every frame's statistics
+  bool coarse = false;                     ///< likewise
+  std::atomic<bool> device_failed{false};  ///< of every frame collected
+  std::atomic<bool> device_lost{false};    ///< likewise
   std::vector<renderer::RungStats> rungs{renderer::RungStats{}};  ///< quality ladder
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
@@ -112,6 +114,8 @@ class ScriptedSource final : public server::FrameSource {
   }
   bool poll(renderer::SlotIndex /*slot*/) noexcept override { return script_.ready; }
   const renderer::FrameView& collect(renderer::SlotIndex slot) noexcept override {
+    views_[slot].device_lost = script_.device_lost.load();
+    views_[slot].device_failed = script_.device_failed.load() || views_[slot].device_lost;
     return views_[slot];
   }
   void release(renderer::SlotIndex slot) noexcept override {

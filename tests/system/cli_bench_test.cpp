@@ -88,6 +88,26 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   EXPECT_GE(numbers_of(json, "gbit_s").size(), 10U);
 }
 
+TEST(CliBench, IsolationComparesPairsOfRunsBesideARunAgainstItself) {
+  const TemporaryFolder folder;
+  const ProcessResult run = run_emit({"bench", "isolation", "--frames", "20", "--rate", "100",
+                                      "--width", "64", "--height", "48", "--clients", "3",
+                                      "--pairs", "2", "--json", folder.file("i.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  const std::string json = read_text(folder.file("i.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"isolation\"");
+  EXPECT_EQ(json_value(json, "test"), "\"stopped-and-flooding\"");
+  EXPECT_EQ(json_value(json, "clients"), "3");
+  EXPECT_EQ(json_value(json, "pairs"), "2");
+  EXPECT_EQ(json_value(json, "lost"), "0");
+  EXPECT_EQ(json_value(json, "unflagged_gaps"), "0");
+  EXPECT_GE(numbers_of(json, "frames").at(0), 3.0 * 20 * 2 * 3);
+  EXPECT_GT(numbers_of(json, "ratio").at(0), 0.0);
+  EXPECT_GT(numbers_of(json, "self_ratio").at(0), 0.0);
+  EXPECT_GT(numbers_of(json, "flood_records").at(0), 0.0);
+  EXPECT_FALSE(json_value(json, "met").empty());
+}
+
 TEST(CliBench, TurnFlagsJumpsToPlacesNobodyAnnounced) {
   const TemporaryFolder folder;
   const ProcessResult run =

@@ -31,6 +31,14 @@ TEST(CliReceive, shared_memory_works_like_every_other_transport) {
     EXPECT_EQ(json_value(checked.out, "unflagged_gaps"), "0");
     EXPECT_EQ(json_value(checked.out, "device"), "\"canned: test pattern\"");
     EXPECT_NE(checked.err.find("send start -> frame received: p50"), std::string::npos);
+    const ProcessResult thirds =
+        run_emit({"receive", url, "--every", "3", "--frames", "10", "--json", "-"});
+    EXPECT_EQ(thirds.exit_code, 0) << thirds.err;
+    EXPECT_EQ(json_value(thirds.out, "every_nth"), "3");
+    EXPECT_EQ(json_value(thirds.out, "lost"), "0");
+    EXPECT_EQ(json_value(thirds.out, "gaps"), "0") << "what it did not want is no gap";
+    EXPECT_EQ(json_value(thirds.out, "unflagged_gaps"), "0");
+    EXPECT_EQ(json_value(thirds.out, "reconnects"), "0");
     const ProcessResult saved = run_emit({"receive", url, "--frames", "3", "--out", out});
     EXPECT_EQ(saved.exit_code, 0) << saved.err;
     std::size_t files = 0;

@@ -57,6 +57,8 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"compare", "a.exr"},
         std::vector<std::string>{"receive", "http://localhost:1"},
         std::vector<std::string>{"receive", "tcp://localhost"},
+        std::vector<std::string>{"receive", "tcp://localhost:1", "--every", "0"},
+        std::vector<std::string>{"receive", "tcp://localhost:1", "--every", "1001"},
         std::vector<std::string>{"stat", "tcp://localhost:7002"},
         std::vector<std::string>{"stat", "http://localhost"},
         std::vector<std::string>{"send", "x.mcap", "--to", "nowhere"},

@@ -31,6 +31,26 @@ TEST(CliStatistics, the_median_of_an_even_count_is_the_mean_of_the_middle_two) {
   EXPECT_EQ(samples.sum(), 10.0);
 }
 
+TEST(CliStatistics, limited_samples_keep_an_even_choice_and_exact_sums) {
+  Samples samples(64);
+  Samples all;
+  for (int i = 0; i < 10'000; ++i) {
+    const double value = (i * 7919) % 10'000;
+    samples.add(value);
+    all.add(value);
+  }
+  EXPECT_LE(samples.values().size(), 64U);
+  EXPECT_GE(samples.values().size(), 32U);
+  EXPECT_EQ(samples.count(), 10'000U);
+  EXPECT_EQ(samples.max(), 9999.0);
+  EXPECT_EQ(samples.sum(), all.sum());
+  EXPECT_EQ(samples.mean(), all.mean());
+  EXPECT_NEAR(samples.median(), all.median(), 2000.0);
+  // Every 256th from the first on: nothing of the end is missing.
+  EXPECT_EQ(samples.values().front(), all.values().front());
+  EXPECT_EQ(samples.values().back(), all.values()[(10'000 - 1) / 256 * 256]);
+}
+
 TEST(CliStatistics, no_samples_give_nan_rather_than_a_number) {
   const Samples samples;
   EXPECT_TRUE(std::isnan(samples.median()));

@@ -38,6 +38,8 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   stream.shm = "test-allocation-" + std::to_string(::getpid());
   auto shm = ShmClient::create(stream, context.channels, {}, 1);
   ASSERT_TRUE(shm.has_value()) << shm.error().text;
+  const auto reader = ShmObject::open(stream.shm);  // or nothing would be copied
+  ASSERT_TRUE(reader.has_value()) << reader.error().text;
   Sender sender(context, 4, 4, false, shm->get());
   ASSERT_TRUE(sender.on_start());
 

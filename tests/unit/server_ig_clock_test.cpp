@@ -89,6 +89,66 @@ TEST(IgClockPacing, RepeatsThePreviousFrameThenShowsTheLateOne) {
   EXPECT_EQ(rig.frames[5].header.flags & (protocol::kFlagLate | protocol::kFlagRepeated), 0U);
 }
 
+/// Frames of the next `slots` slots: one each, none twice, none more.
+void expect_a_frame_per_slot(Rig& rig, int slots) {
+  for (int slot = 0; slot < slots; ++slot) {
+    const std::size_t before = rig.frames.size();
+    rig.next_slot();
+    ASSERT_EQ(rig.frames.size(), before + 1) << slot;
+    EXPECT_FALSE(rig.frames.back().repeat) << slot;
+  }
+}
+
+TEST(IgClockPacing, AWallClockSetForwardSkipsItsSlotsInsteadOfABurstOfFrames) {
+  Rig rig(ig_clock());
+  rig.settle();
+  rig.send(1, 0);
+  ASSERT_NO_FATAL_FAILURE(expect_a_frame_per_slot(rig, 5));
+  const std::size_t before = rig.frames.size();
+  rig.clock.step_wall(10'000 * kMs);
+  rig.settle();
+  EXPECT_LE(rig.frames.size(), before + 2) << "the slot that ended and the one that began";
+  EXPECT_GE(rig.count(server::Counter::slots_missed), 998U);
+  EXPECT_LE(rig.count(server::Counter::slots_missed), 1000U);
+  for (int slot = 0; slot < 5; ++slot) {
+    const std::size_t count = rig.frames.size();
+    rig.clock.advance(10 * kMs);
+    rig.settle();
+    EXPECT_EQ(rig.frames.size(), count + 1);
+  }
+  EXPECT_NE(rig.frames.back().header.flags & protocol::kFlagStale, 0U)
+      << "by the new clock the pose is old";
+  rig.send(2, 100 * kMs);
+  rig.settle();
+  rig.clock.advance(10 * kMs);
+  rig.settle();
+  EXPECT_EQ(rig.frames.back().header.flags & protocol::kFlagStale, 0U);
+  for (std::size_t i = 0; i < rig.frames.size(); ++i) {
+    EXPECT_EQ(rig.frames[i].header.frame_number, i + 1);
+  }
+}
+
+TEST(IgClockPacing, AWallClockSetBackStartsItsSlotsAnewInsteadOfWaiting) {
+  Rig rig(ig_clock());
+  rig.settle();
+  rig.send(1, 0);
+  ASSERT_NO_FATAL_FAILURE(expect_a_frame_per_slot(rig, 5));
+  rig.clock.step_wall(-10'000 * kMs);
+  rig.settle();
+  std::int64_t sim_ns = rig.frames.back().header.sim_time_ns;
+  for (int slot = 0; slot < 5; ++slot) {
+    const std::size_t count = rig.frames.size();
+    rig.clock.advance(10 * kMs);
+    rig.settle();
+    EXPECT_EQ(rig.frames.size(), count + 1) << slot;
+    EXPECT_GE(rig.frames.back().header.sim_time_ns, sim_ns) << "nothing moves backwards";
+    sim_ns = rig.frames.back().header.sim_time_ns;
+  }
+  for (std::size_t i = 0; i < rig.frames.size(); ++i) {
+    EXPECT_EQ(rig.frames[i].header.frame_number, i + 1);
+  }
+}
+
 TEST(IgClockPacing, FlagsATeleportWithTheFirstPoseBehindIt) {
   Rig rig(ig_clock());
   rig.settle();

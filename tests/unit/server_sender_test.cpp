@@ -73,7 +73,7 @@ class Rig {
     }
   };
 
-  Peer* connect(bool every_frame = false) {
+  Peer* connect(bool every_frame = false, std::uint32_t every_nth = 1) {
     Peer* peer = peers_.emplace_back(std::make_unique<Peer>()).get();
     int pair[2] = {-1, -1};
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
@@ -88,6 +88,7 @@ class Rig {
     params.connection = next_connection_++;
     params.channel = &context_.channels.front();
     params.every_frame = every_frame;
+    params.every_nth = every_nth;
     params.tcp_socket = &peer->near;
     peer->client = std::make_unique<SocketClient>(std::move(params));
     EXPECT_TRUE(context_.to_sender.push(
@@ -179,6 +180,54 @@ TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
   }
   EXPECT_EQ(rig.context().counters.get(Counter::frames_skipped), missing);
   EXPECT_EQ(rig.script().held.load(), 0) << "slots go back when everybody has the frame";
+}
+
+TEST(Sender, WhatAClientDoesNotWantIsNeitherSentNorWaitedForNorAGap) {
+  Rig rig;
+  Rig::Peer* all = rig.connect();
+  Rig::Peer* thirds = rig.connect(false, 3);
+  Rig::Peer* strict_tenths = rig.connect(true, 10);
+  for (int i = 0; i < 40; ++i) {
+    ASSERT_TRUE(rig.publish());
+    rig.settle({all, thirds});
+    if (i % 10 == 5) {
+      rig.settle({strict_tenths});  // too slow for every frame, quick enough for its own
+    }
+  }
+  EXPECT_EQ(strict_tenths->frames.size(), 4U);
+  EXPECT_EQ(rig.context().counters.get(Counter::clients_disconnected_slow), 0U);
+  EXPECT_EQ(all->frames.size(), 40U);
+  ASSERT_EQ(thirds->frames.size(), 14U);
+  for (std::size_t i = 0; i < thirds->frames.size(); ++i) {
+    EXPECT_EQ(thirds->frames[i].frame_number, 1 + 3 * i);
+    EXPECT_EQ(thirds->frames[i].flags, 0U) << "its own wish";
+  }
+  EXPECT_EQ(thirds->frames.back().previous_frame_number, 37U);
+  EXPECT_EQ(rig.context().counters.get(Counter::frames_left_out), 26U + 36U);
+  EXPECT_EQ(rig.script().held.load(), 0) << "nobody waits for what nobody wants";
+}
+
+TEST(Sender, AStoppedClientThatWantsEveryThirdFrameSkipsOnlyWhatItWanted) {
+  Rig rig;
+  Rig::Peer* stopped = rig.connect(false, 3);
+  for (int i = 0; i < 40; ++i) {
+    ASSERT_TRUE(rig.publish()) << i;
+    rig.settle({});
+  }
+  rig.settle({stopped});
+  ASSERT_GE(stopped->frames.size(), 2U);
+  EXPECT_EQ(stopped->frames.back().frame_number, 40U);
+  std::uint64_t expected = 1;
+  std::uint64_t missing = 0;
+  for (const auto& header : stopped->frames) {
+    EXPECT_EQ(header.frame_number % 3, 1U);
+    EXPECT_EQ((header.flags & protocol::kFlagGapBefore) != 0, header.frame_number != expected);
+    missing += (header.frame_number - expected) / 3;
+    expected = header.frame_number + 3;
+  }
+  EXPECT_GT(missing, 0U);
+  EXPECT_EQ(rig.context().counters.get(Counter::frames_skipped), missing);
+  EXPECT_EQ(rig.script().held.load(), 0);
 }
 
 TEST(Sender, DisconnectsAnEveryFrameClientThatFallsBehind) {

@@ -452,6 +452,39 @@ TEST(Shm, NamesThatCouldBePathsAreRefused) {
   EXPECT_FALSE(HostClient::connect("shm://rig").has_value());
 }
 
+TEST(Shm, ReadersAreKnownAsLongAsTheyLive) {
+  const std::string name = own_name();
+  auto object = ShmObject::create(4096, 0600);
+  ASSERT_TRUE(object.has_value());
+  ASSERT_TRUE(object->publish(name).has_value());
+  EXPECT_FALSE(object->has_readers());
+  {
+    const auto first = ShmObject::open(name);
+    ASSERT_TRUE(first.has_value()) << first.error().text;
+    EXPECT_TRUE(object->has_readers());
+    {
+      const auto second = ShmObject::open(name);
+      ASSERT_TRUE(second.has_value()) << "readers do not shut each other out";
+      EXPECT_TRUE(second->alive());
+    }
+    EXPECT_TRUE(object->has_readers());
+  }
+  EXPECT_FALSE(object->has_readers());
+  const pid_t reader = ::fork();
+  if (reader == 0) {
+    const auto opened = ShmObject::open(name);
+    ::raise(opened ? SIGSTOP : SIGKILL);
+    ::_exit(1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(reader, &status, WUNTRACED), reader);
+  ASSERT_TRUE(WIFSTOPPED(status));
+  EXPECT_TRUE(object->has_readers()) << "a stopped reader is one";
+  ::kill(reader, SIGKILL);
+  ASSERT_EQ(::waitpid(reader, &status, 0), reader);
+  EXPECT_FALSE(object->has_readers()) << "a killed one is none";
+}
+
 TEST(Shm, TheSenderServesItAndKeepsItToItself) {
   const std::string name = own_name();
   const test::FakeClock clock;
@@ -474,9 +507,13 @@ TEST(Shm, TheSenderServesItAndKeepsItToItself) {
   test::ScriptedSource source(script, kWidthPx, kHeightPx, kQueue + 3);
   Sender sender(context, kQueue, 4, false, shm->get());
   ASSERT_TRUE(sender.on_start());
-  const auto reader = open_reader(name, in_place());
-  ASSERT_NE(reader, nullptr);
+  std::unique_ptr<FrameClient> reader;
+  constexpr std::uint64_t kUnread = 10;  // nobody reads so long
   for (std::uint64_t number = 1; number <= 30; ++number) {
+    if (number == kUnread + 1) {
+      reader = open_reader(name, in_place());
+      ASSERT_NE(reader, nullptr);
+    }
     renderer::FrameRequest request;
     request.frame_number = number;
     const int slot = source.submit(request);
@@ -493,12 +530,17 @@ TEST(Shm, TheSenderServesItAndKeepsItToItself) {
     while (sender.do_work(clock.tai_ns()) > 0) {
     }
     EXPECT_EQ(script.held.load(), 0) << "the source has its slot back";
+    if (number <= kUnread) {
+      continue;
+    }
     const ReceivedFrame* received = take(*reader);
     ASSERT_NE(received, nullptr);
     EXPECT_EQ(received->header.frame_number, number);
   }
   EXPECT_EQ(reader->counters().crc_errors, 0U);
-  EXPECT_EQ(context.counters.get(Counter::frames_shared), 30U);
+  EXPECT_EQ(context.counters.get(Counter::frames_shared), 20U);
+  EXPECT_EQ(context.counters.get(Counter::frames_unread), kUnread);
+  EXPECT_EQ(reader->counters().lost + reader->counters().gaps, 0U);
   sender.on_stop();
   EXPECT_EQ(context.from_sender.front(), nullptr) << "it belongs to no connection";
 }

@@ -68,6 +68,16 @@ struct FrameHeader {
   std::uint32_t payload_crc32c = 0;
 };
 
+/// Most that a client may ask for as "every n-th frame".
+inline constexpr std::uint32_t kMaxEveryNth = 1000;
+
+/// True for frames 1, 1 + n, 1 + 2 n, ... of a run: who takes every n-th frame takes these, so that
+/// all who do have the same ones, and know which number comes next. Precondition: every_nth > 0.
+[[nodiscard]] constexpr bool is_every_nth(std::uint64_t frame_number,
+                                          std::uint32_t every_nth) noexcept {
+  return every_nth == 1 || frame_number % every_nth == 1;
+}
+
 /// Writes the header with its own CRC32C in the last four bytes. RT-safe.
 void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> out) noexcept;
 

@@ -15,7 +15,7 @@
 namespace emit::protocol {
 
 inline constexpr std::uint32_t kRingMagic = 0x534D4645;  ///< "EFMS" as bytes E F M S
-inline constexpr std::uint16_t kRingVersion = 1;
+inline constexpr std::uint16_t kRingVersion = 2;
 inline constexpr std::uint32_t kMinRingSlots = 3;
 inline constexpr std::uint32_t kMaxRingSlots = 1024;
 inline constexpr std::uint32_t kMaxRingChannels = 1024;

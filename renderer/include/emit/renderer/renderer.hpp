@@ -107,6 +107,7 @@ struct FrameView {
   /// the band where it is largest. NaN: not measured near this camera.
   float estimated_error_k = 0.0F;
   bool device_failed = false;  ///< the driver reported an error: pixels are not to be trusted
+  bool device_lost = false;    ///< the context was reset: nothing can be drawn with it any more
   StageTimes stages_ms;
 };
 

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "io/client.hpp"
+
+namespace emit::cli {
+
+/// A subscription that can be taken up again after the daemon, or the way to it, went away.
+/// One thread.
+class StreamSubscription {
+ public:
+  /// Errors: those of FrameClient::connect() and subscribe().
+  [[nodiscard]] static physics::Result<StreamSubscription> open(
+      const std::string& url, const server::SubscribeOptions& options);
+
+  /// After an error of client(): tries again and again, every 100 ms, while `go_on` says so. The
+  /// channel may be another one then: the daemon may have started with another scenario.
+  /// Errors: that of the last attempt.
+  [[nodiscard]] physics::Result<void> reopen(const std::function<bool()>& go_on);
+
+  [[nodiscard]] server::FrameClient& client() noexcept { return *client_; }
+  [[nodiscard]] const server::ChannelDescription& channel() const noexcept { return channel_; }
+  /// Of all connections so far.
+  [[nodiscard]] server::ReceiveCounters counters() const noexcept;
+  [[nodiscard]] std::uint64_t reconnects() const noexcept { return reconnects_; }
+
+ private:
+  StreamSubscription(std::string url, server::SubscribeOptions options)
+      : url_(std::move(url)), options_(std::move(options)) {}
+  [[nodiscard]] physics::Result<void> connect(std::int64_t timeout_ns);
+
+  std::string url_;
+  server::SubscribeOptions options_;
+  std::unique_ptr<server::FrameClient> client_;
+  server::ChannelDescription channel_;
+  server::ReceiveCounters before_;  // of the connections before this one
+  std::uint64_t reconnects_ = 0;
+};
+
+}  // namespace emit::cli
