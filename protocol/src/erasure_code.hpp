@@ -6,8 +6,9 @@
 
 /// Arithmetic of the erasure code, by Intel's ISA-L: GF(2^8) with the polynomial
 /// x^8 + x^4 + x^3 + x^2 + 1. Parity p of a group is the sum over its fragments j of
-/// coefficient(p, j) times fragment j, byte by byte. The coefficients form a Cauchy matrix, of which
-/// every square part can be inverted: that is what makes any loss of up to m fragments repairable.
+/// coefficient(p, j) times fragment j, byte by byte. The coefficients form a Cauchy matrix, of
+/// which every square part can be inverted: that is what makes any loss of up to m fragments
+/// repairable.
 namespace emit::protocol::erasure {
 
 /// ISA-L's expanded form of one coefficient.

@@ -236,9 +236,9 @@ bool GroupDecoder::decode(std::size_t bytes, std::span<const std::byte* const> d
     for (std::uint32_t e = 0; e < missing; ++e) {
       std::uint8_t sum = 0;
       for (std::uint32_t r = 0; r < rows; ++r) {
-        sum = static_cast<std::uint8_t>(
-            sum ^ erasure::multiply(code.inverse[e * missing + r],
-                                    erasure::coefficient(code.rows[r], j)));
+        sum = static_cast<std::uint8_t>(sum ^
+                                        erasure::multiply(code.inverse[e * missing + r],
+                                                          erasure::coefficient(code.rows[r], j)));
       }
       code.coefficients[std::size_t{e} * inputs + columns] = sum;
     }

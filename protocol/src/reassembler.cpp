@@ -146,8 +146,8 @@ Reassembler::Slot* Reassembler::enter(const FrameKey& key, FragmentStatus& statu
 FragmentStatus Reassembler::take(const FragmentHeader& header,
                                  std::span<const std::byte> payload) noexcept {
   auto status = FragmentStatus::accepted;
-  Slot* slot = enter({header.stream_id, header.frame_id, header.total_bytes, header.sim_time_ns},
-                     status);
+  Slot* slot =
+      enter({header.stream_id, header.frame_id, header.total_bytes, header.sim_time_ns}, status);
   if (slot == nullptr) return status;
 
   const std::size_t first_word = header.byte_offset / kWordBytes;
@@ -266,16 +266,17 @@ Reassembler::Slot* Reassembler::oldest_open(const Stream* stream) noexcept {
   Slot* oldest = nullptr;
   for (Slot& slot : slots_) {
     if (slot.state != Slot::State::open || (stream != nullptr && slot.stream != stream)) continue;
-    const bool older =
-        oldest == nullptr || (stream != nullptr ? frame_distance(slot.frame_id, oldest->frame_id) < 0
-                                                : slot.opened_at < oldest->opened_at);
+    const bool older = oldest == nullptr ||
+                       (stream != nullptr ? frame_distance(slot.frame_id, oldest->frame_id) < 0
+                                          : slot.opened_at < oldest->opened_at);
     if (older) oldest = &slot;
   }
   return oldest;
 }
 
 void Reassembler::finish_older(Stream& stream, std::uint32_t frame_id) noexcept {
-  for (Slot* slot = oldest_open(&stream); slot != nullptr && frame_distance(slot->frame_id, frame_id) < 0;
+  for (Slot* slot = oldest_open(&stream);
+       slot != nullptr && frame_distance(slot->frame_id, frame_id) < 0;
        slot = oldest_open(&stream)) {
     finish(*slot);
   }
@@ -347,7 +348,8 @@ void Reassembler::finish(Slot& slot) noexcept {
   const auto pixel_bytes = static_cast<std::size_t>(header.payload_bytes);
   const std::size_t pixel_count = pixel_bytes / kWordBytes;
   frame.header = header;
-  frame.header.flags &= ~std::uint32_t{kFlagPartial};  // this side's to say
+  // These are this side's to say.
+  frame.header.flags &= ~std::uint32_t{kFlagPartial | kFlagCorrupt};
   frame.header_known = known;
   frame.repaired_fragments = slot.repaired;
   frame.resent_fragments = slot.resent;

@@ -10,8 +10,8 @@ namespace emit::protocol {
 FragmentStatus Reassembler::take_parity(const ParityHeader& header,
                                         std::span<const std::byte> payload) noexcept {
   auto status = FragmentStatus::accepted;
-  Slot* slot = enter({header.stream_id, header.frame_id, header.total_bytes, header.sim_time_ns},
-                     status);
+  Slot* slot =
+      enter({header.stream_id, header.frame_id, header.total_bytes, header.sim_time_ns}, status);
   if (slot == nullptr) return status;
   if (slot->all_received()) return FragmentStatus::late;  // waits for an older frame
   const auto geometry = ParityGeometry::of(params_.fec, header.total_bytes,
@@ -88,8 +88,7 @@ void Reassembler::repair(Slot& slot, std::uint32_t group) noexcept {
     if (missing[i] == last) std::memcpy(slot.bytes.get() + begin, scratch, length);
     const std::size_t words = length / kWordBytes;
     // A part of it may have come in another cut.
-    slot.received_words +=
-        words - bits::count_set(slot.received, begin / kWordBytes, words);
+    slot.received_words += words - bits::count_set(slot.received, begin / kWordBytes, words);
     bits::set_range(slot.received, begin / kWordBytes, words);
     if (begin < slot.summed_bytes) {
       slot.summed_bytes = 0;
@@ -162,7 +161,8 @@ std::size_t Reassembler::missing(std::uint16_t stream_id, std::uint32_t frame_id
     while (from < words) {
       const std::uint64_t word = set ? slot->received[from / 64] : ~slot->received[from / 64];
       const std::uint64_t rest = word >> (from % 64);
-      if (rest != 0) return std::min(words, from + static_cast<std::size_t>(std::countr_zero(rest)));
+      if (rest != 0)
+        return std::min(words, from + static_cast<std::size_t>(std::countr_zero(rest)));
       from = (from / 64 + 1) * 64;
     }
     return words;

@@ -50,7 +50,7 @@ struct Reassembler::Slot {
   ReceivedFrame frame;
 
   // Error correction: what came of it, by group.
-  std::vector<std::byte> parity_bytes;       // payloads, by index within the group, then by group
+  std::vector<std::byte> parity_bytes;        // payloads, by index within the group, then by group
   std::vector<std::uint32_t> parity_arrived;  // one bit per parity fragment
   bool has_parity = false;
   ParityGeometry geometry;  // valid with has_parity

@@ -25,8 +25,9 @@ inline constexpr std::uint32_t kMaxFragmentPayloadBytes = 65472;
 enum FragmentFlags : std::uint8_t {
   kFragmentFirst = 1u << 0,  ///< begins with the frame header
   kFragmentLast = 1u << 1,   ///< ends with the frame header
-  kFragmentParity = 1u << 2, ///< holds no part of the frame but of its error correction (parity.hpp)
-  kFragmentResent = 1u << 3, ///< sent again because the receiver asked for it
+  kFragmentParity =
+      1u << 2,  ///< holds no part of the frame but of its error correction (parity.hpp)
+  kFragmentResent = 1u << 3,  ///< sent again because the receiver asked for it
 };
 
 struct FragmentHeader {

@@ -57,7 +57,7 @@ struct ReassemblerCounters {
   std::uint64_t frames_lost = 0;      ///< frame ids of which no fragment arrived
   std::uint64_t missing_px = 0;
   std::uint64_t crc_mismatches = 0;
-  std::uint64_t resyncs = 0;  ///< a stream's frame ids started again
+  std::uint64_t resyncs = 0;              ///< a stream's frame ids started again
   std::uint64_t fragments_repaired = 0;   ///< brought back by error correction
   std::uint64_t frames_repaired = 0;      ///< complete because of that
   std::uint64_t groups_unrepairable = 0;  ///< of frames handed out: lost more than their parity
@@ -75,8 +75,9 @@ struct ByteRange {
 ///
 /// Frames of one stream come out in order of frame id. A frame leaves as complete when its last
 /// byte arrives or error correction brings it back, as partial when a newer frame of its stream
-/// completes, when its buffer is needed, or on flush(). Trusts nothing: every offset and length is checked before a byte is copied.
-/// Thread: one owner.  Real time: the constructor allocates, everything else is RT-safe.
+/// completes, when its buffer is needed, or on flush(). Trusts nothing: every offset and length is
+/// checked before a byte is copied. Thread: one owner.  Real time: the constructor allocates,
+/// everything else is RT-safe.
 /// @code
 ///   reassembler.push(datagram);
 ///   while (const ReceivedFrame* frame = reassembler.pop()) {
@@ -92,7 +93,7 @@ class Reassembler {
     std::uint32_t max_open_per_stream = 2;  ///< newer frames push the oldest out beyond this; >= 1
     std::uint32_t max_streams = 8;
     bool check_crc = true;  ///< of complete frames
-    FecParams fec;          ///< as agreed with the sender; off: parity fragments are refused
+    FecParams fec = {};     ///< as agreed with the sender; off: parity fragments are refused
     /// A complete frame waits for older ones of its stream that may still be asked for: until they
     /// are complete, given up, or their buffers are needed.
     bool wait_for_missing = false;

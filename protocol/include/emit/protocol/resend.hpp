@@ -26,7 +26,8 @@ struct ResendRequest {
 };
 
 /// Bytes written. Precondition: count <= kMaxResendRanges. RT-safe.
-std::size_t encode(const ResendRequest& request, std::span<std::byte, kMaxResendBytes> out) noexcept;
+std::size_t encode(const ResendRequest& request,
+                   std::span<std::byte, kMaxResendBytes> out) noexcept;
 /// False: malformed (length, count, an empty range, one that ends beyond 2^32). RT-safe.
 [[nodiscard]] bool decode_resend(std::span<const std::byte> body, ResendRequest& out) noexcept;
 
