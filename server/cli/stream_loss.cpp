@@ -99,7 +99,7 @@ class LossClient {
     std::uint64_t wrong = 0;
     for (std::size_t i = 0; i < image.size(); ++i) {
       const bool valid = !partial || frame.validity.pixel(i);
-      wrong += frame.pixels[i] != (valid ? image[i] : 0.0F) ? 1 : 0;
+  wrong += frame.pixels[i] != (valid ? image[i] : 0.0F) ? 1U : 0U;
     }
     return wrong;
   }

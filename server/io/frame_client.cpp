@@ -294,7 +294,10 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
       if (burst_begin_ns_ == 0) {
         burst_begin_ns_ = clock_.tai_ns();
       }
-      continue;
+      if (!receiver_->drained()) {
+        continue;
+      }
+      // An empty socket need not be asked again before it is waited for.
     }
     if (const ReceivedFrame* frame = pop_udp()) {
       return frame;
