@@ -4,10 +4,13 @@
 add_library(emit_client STATIC
   io/asio.cpp
   io/client_connection.cpp
+  io/fault_injector.cpp
+  io/fault_relay.cpp
   io/frame_client.cpp
   io/host_client.cpp
   io/http_get.cpp
   io/recorder_client.cpp
+  io/resend_planner.cpp
   io/shm_frame_client.cpp
   io/shm_object.cpp
   io/socket.cpp
@@ -37,6 +40,7 @@ add_library(emit_server STATIC
   agents/recorder.cpp
   agents/render_agent.cpp
   agents/renderer_source.cpp
+  agents/resend_window.cpp
   agents/runner.cpp
   agents/sender.cpp
   agents/sender_client.cpp

@@ -96,6 +96,19 @@ const KeyTable<StreamConfig>& stream_keys() {
                             "the system's choice, up to megabytes."),
       integer<StreamConfig>("udp_send_buffer_bytes", "bytes", 65536, 1073741824,
                             EMIT_FIELD(udp_send_buffer_bytes), "Socket send buffer."),
+      integer<StreamConfig>("fec_data_fragments", "", 1, 128, EMIT_FIELD(fec_data_fragments),
+                            "UDP: fragments of a group of the error correction, at most, for "
+                            "clients that do not say what they want."),
+      integer<StreamConfig>("fec_parity_fragments", "", 0, 32, EMIT_FIELD(fec_parity_fragments),
+                            "UDP: parity fragments of such a group: so many lost ones come back; "
+                            "5 of 48 for 1 % loss; 0: none, for clients that do not say."),
+      number<StreamConfig>("fec_max_parity_frac", "", between(0, 32),
+                           EMIT_FIELD(fec_max_parity_frac),
+                           "UDP: parity per data fragment that a client may ask for; 0: no client "
+                           "gets error correction."),
+      number<StreamConfig>("resend_max_frac", "", between(0, 10), EMIT_FIELD(resend_max_frac),
+                           "UDP, host-step: missing fragments are sent again on request, at most "
+                           "this part of the bytes sent, and up to a frame at once; 0: never."),
       integer<StreamConfig>("multicast_ttl", "", 0, 255, EMIT_FIELD(multicast_ttl),
                             "Routers that multicast frames may pass; 0: this host only."),
       text<StreamConfig>("shm", EMIT_FIELD(shm),

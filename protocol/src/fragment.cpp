@@ -52,6 +52,8 @@ std::string_view to_string(FragmentStatus status) noexcept {
       return "no free buffer";
     case FragmentStatus::too_many_streams:
       return "too many streams";
+    case FragmentStatus::bad_parity:
+      return "parity of another geometry";
   }
   return "unknown";
 }
@@ -126,14 +128,21 @@ Fragmenter::Fragmenter(const Params& params,
   fragment_count_ = (total_bytes_ - 1) / payload_bytes_ + 1;
 }
 
-Fragmenter::Pieces Fragmenter::pieces(
-    std::uint32_t index, std::span<std::byte, kFragmentHeaderBytes> header_memory) const noexcept {
+std::span<const std::byte> Fragmenter::pixels_of(std::uint32_t index) const noexcept {
+  const std::uint64_t begin = std::uint64_t{index} * payload_bytes_;
+  if (begin < kHeader || begin + payload_bytes_ > kHeader + pixels_.size()) return {};
+  return pixels_.subspan(static_cast<std::size_t>(begin - kHeader), payload_bytes_);
+}
+
+Fragmenter::Pieces Fragmenter::pieces(std::uint32_t index,
+                                      std::span<std::byte, kFragmentHeaderBytes> header_memory,
+                                      std::uint8_t more_flags) const noexcept {
   const std::uint64_t begin = std::uint64_t{index} * payload_bytes_;
   const std::uint64_t end = std::min<std::uint64_t>(begin + payload_bytes_, total_bytes_);
 
   FragmentHeader header;
   header.flags = static_cast<std::uint8_t>((begin == 0 ? kFragmentFirst : 0) |
-                                           (end == total_bytes_ ? kFragmentLast : 0));
+                                           (end == total_bytes_ ? kFragmentLast : 0) | more_flags);
   header.stream_id = params_.stream_id;
   header.frame_id = params_.frame_id;
   header.byte_offset = static_cast<std::uint32_t>(begin);

@@ -4,20 +4,14 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <new>
 
-#include "bit_range.hpp"
 #include "frame_header_parse.hpp"
+#include "reassembler_slot.hpp"
 
 namespace emit::protocol {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "pixels are handed out as they arrive");
-
-constexpr std::size_t kWordBytes = sizeof(float);
-constexpr std::size_t kHeaderWords = kFrameHeaderBytes / kWordBytes;
-constexpr std::size_t kAlignment = 64;
-static_assert(kFrameHeaderBytes % kAlignment == 0, "pixels start aligned");
 
 /// Fragments this far behind are not reordered ones: after kResyncCount of them in a row the sender
 /// is taken to have started again.
@@ -26,22 +20,10 @@ constexpr std::uint32_t kResyncCount = 16;
 /// A wider gap in frame ids is a restart too, not a loss.
 constexpr std::uint32_t kMaxCountedGap = 65536;
 
-struct AlignedDelete {
-  void operator()(std::byte* bytes) const noexcept {
-    ::operator delete[](bytes, std::align_val_t{kAlignment});
-  }
-};
-using AlignedBytes = std::unique_ptr<std::byte[], AlignedDelete>;
-
 AlignedBytes allocate_aligned(std::size_t count) {
-  void* memory = ::operator new[](count, std::align_val_t{kAlignment});
+  void* memory = ::operator new[](count, std::align_val_t{kPixelAlignment});
   std::memset(memory, 0, count);  // also touches the pages, before frames are due
   return AlignedBytes(static_cast<std::byte*>(memory));
-}
-
-/// Frame ids wrap: positive when `a` comes after `b`.
-std::int32_t distance(std::uint32_t a, std::uint32_t b) noexcept {
-  return static_cast<std::int32_t>(a - b);
 }
 
 /// Bytes of zeros between pixels and second header are fewer than a header.
@@ -52,56 +34,6 @@ bool fits(std::uint32_t total_bytes, std::uint64_t payload_bytes) noexcept {
 }
 
 }  // namespace
-
-struct Reassembler::Slot {
-  enum class State : std::uint8_t { free, open, ready, held };
-  AlignedBytes bytes;
-  std::vector<std::uint64_t> received;  // one bit per four bytes
-  State state = State::free;
-  Stream* stream = nullptr;
-  std::uint32_t frame_id = 0;
-  std::uint32_t total_bytes = 0;
-  std::int64_t sim_time_ns = 0;
-  std::size_t received_words = 0;
-  std::uint64_t opened_at = 0;
-  std::size_t prefix_bytes = 0;     // that arrived in order
-  std::uint16_t payload_bytes = 0;  // of a fragment, as the newest in order had it
-  std::size_t summed_bytes = 0;     // from the front, what `crc32c` covers: fragments in order
-  std::uint32_t crc32c = 0;         // of the pixels among them
-  ReceivedFrame frame;
-
-  /// Sums a payload while it is in the cache; what comes out of order is summed by finish_sum().
-  void sum(std::size_t offset, std::span<const std::byte> payload) noexcept {
-    // Up to here every byte is the first header's or a pixel's, however long the padding is.
-    constexpr std::size_t kMostBehind = 2 * kFrameHeaderBytes;  // padding and second header
-    const std::size_t sure = std::max<std::size_t>(total_bytes, kMostBehind) - kMostBehind;
-    const std::size_t end = std::min(offset + payload.size(), sure);
-    if (offset != summed_bytes || end <= offset) return;
-    const std::size_t begin = std::max(offset, kFrameHeaderBytes);
-    if (begin < end) {
-      crc32c = protocol::crc32c(payload.subspan(begin - offset, end - begin), crc32c);
-    }
-    summed_bytes = end;
-  }
-  [[nodiscard]] std::uint32_t finish_sum(std::size_t pixel_bytes) const noexcept {
-    const std::size_t begin = std::max(summed_bytes, kFrameHeaderBytes);
-    return protocol::crc32c({bytes.get() + begin, kFrameHeaderBytes + pixel_bytes - begin}, crc32c);
-  }
-  [[nodiscard]] bool has_words(std::size_t begin, std::size_t count) const noexcept {
-    return bits::count_set(received, begin, count) == count;
-  }
-};
-
-struct Reassembler::Stream {
-  std::uint16_t id = 0;
-  bool has_finished = false;
-  std::uint32_t finished_id = 0;  // newest frame that left
-  std::uint32_t far_behind = 0;   // fragments in a row from far behind it
-  bool has_delivered = false;
-  std::uint32_t delivered_id = 0;  // newest frame that was handed out
-  bool has_geometry = false;
-  FrameHeader geometry;  // of the newest frame whose header was known
-};
 
 bool PixelValidity::pixel(std::size_t index) const noexcept {
   const std::size_t bit = first_bit_ + index;
@@ -117,11 +49,21 @@ Reassembler::Reassembler(const Params& params) : params_(params) {
   params_.buffers = std::max({params_.buffers, 2u, params_.max_open_per_stream + 1});
   params_.max_streams = std::max(params_.max_streams, 1u);
   params_.max_payload_bytes &= ~std::uint32_t{3};
+  if (!params_.fec.valid()) params_.fec = {};
   const std::size_t capacity = std::size_t{params_.max_payload_bytes} + 3 * kFrameHeaderBytes;
   slots_.resize(params_.buffers);
   for (Slot& slot : slots_) {
     slot.bytes = allocate_aligned(capacity);
     slot.received.resize(capacity / kWordBytes / 64 + 1);
+  }
+  if (params_.fec.on()) {
+    for (Slot& slot : slots_) {
+      const auto most_bytes = static_cast<std::uint32_t>(capacity);
+      slot.parity_bytes.resize(max_parity_bytes(params_.fec, most_bytes));
+      slot.parity_arrived.resize(max_parity_groups(params_.fec, most_bytes));
+    }
+    scratch_.resize(kMaxFragmentPayloadBytes);
+    decoder_.emplace(params_.fec);
   }
   streams_.reserve(params_.max_streams);
   ready_.resize(params_.buffers);
@@ -138,10 +80,15 @@ FragmentStatus Reassembler::push(std::span<const std::byte> datagram) noexcept {
 
 FragmentStatus Reassembler::push(std::span<const std::byte> header,
                                  std::span<const std::byte> payload) noexcept {
-  FragmentHeader fields;
-  FragmentStatus status = decode_fragment_header(header, payload.size(), fields);
-  if (status == FragmentStatus::accepted) {
-    status = take(fields, payload);
+  FragmentStatus status;
+  if (is_parity(header)) {
+    ParityHeader fields;
+    status = decode_parity_header(header, payload.size(), params_.fec, fields);
+    if (status == FragmentStatus::accepted) status = take_parity(fields, payload);
+  } else {
+    FragmentHeader fields;
+    status = decode_fragment_header(header, payload.size(), fields);
+    if (status == FragmentStatus::accepted) status = take(fields, payload);
   }
   ++counters_.fragments[static_cast<std::size_t>(status)];
   return status;
@@ -149,7 +96,7 @@ FragmentStatus Reassembler::push(std::span<const std::byte> header,
 
 Reassembler::Expected Reassembler::expected() noexcept {
   if (newest_ == nullptr || newest_->state != Slot::State::open ||
-      newest_->received_words * kWordBytes != newest_->prefix_bytes) {
+      newest_->received_words * kWordBytes != newest_->prefix_bytes || newest_->all_received()) {
     return {};
   }
   Expected out;
@@ -162,21 +109,24 @@ Reassembler::Expected Reassembler::expected() noexcept {
   return out;
 }
 
-FragmentStatus Reassembler::take(const FragmentHeader& header,
-                                 std::span<const std::byte> payload) noexcept {
+Reassembler::Slot* Reassembler::enter(const FrameKey& key, FragmentStatus& status) noexcept {
   // The padding is shorter than a header, so the constructor's three headers always suffice.
-  if (header.total_bytes - 2 * kFrameHeaderBytes >=
+  if (key.total_bytes - 2 * kFrameHeaderBytes >=
       std::uint64_t{params_.max_payload_bytes} + kFrameHeaderBytes) {
-    return FragmentStatus::oversize;
+    status = FragmentStatus::oversize;
+    return nullptr;
   }
-  Stream* stream = stream_of(header.stream_id);
-  if (stream == nullptr) return FragmentStatus::too_many_streams;
-
-  if (stream->has_finished && distance(header.frame_id, stream->finished_id) <= 0) {
-    if (distance(header.frame_id, stream->finished_id) > -kReorderWindow) {
-      return FragmentStatus::late;
+  Stream* stream = stream_of(key.stream_id);
+  if (stream == nullptr) {
+    status = FragmentStatus::too_many_streams;
+    return nullptr;
+  }
+  if (stream->has_finished && frame_distance(key.frame_id, stream->finished_id) <= 0) {
+    if (frame_distance(key.frame_id, stream->finished_id) > -kReorderWindow ||
+        ++stream->far_behind < kResyncCount) {
+      status = FragmentStatus::late;
+      return nullptr;
     }
-    if (++stream->far_behind < kResyncCount) return FragmentStatus::late;
     while (Slot* slot = oldest_open(stream)) finish(*slot);
     stream->has_finished = false;
     stream->has_delivered = false;
@@ -184,12 +134,21 @@ FragmentStatus Reassembler::take(const FragmentHeader& header,
   }
   stream->far_behind = 0;
 
-  auto status = FragmentStatus::accepted;
-  Slot* slot = open_slot(*stream, header, status);
-  if (slot == nullptr) return status;
-  if (slot->total_bytes != header.total_bytes || slot->sim_time_ns != header.sim_time_ns) {
-    return FragmentStatus::inconsistent;
+  Slot* slot = open_slot(*stream, key, status);
+  if (slot == nullptr) return nullptr;
+  if (slot->total_bytes != key.total_bytes || slot->sim_time_ns != key.sim_time_ns) {
+    status = FragmentStatus::inconsistent;
+    return nullptr;
   }
+  return slot;
+}
+
+FragmentStatus Reassembler::take(const FragmentHeader& header,
+                                 std::span<const std::byte> payload) noexcept {
+  auto status = FragmentStatus::accepted;
+  Slot* slot =
+      enter({header.stream_id, header.frame_id, header.total_bytes, header.sim_time_ns}, status);
+  if (slot == nullptr) return status;
 
   const std::size_t first_word = header.byte_offset / kWordBytes;
   const std::size_t words = payload.size() / kWordBytes;
@@ -208,11 +167,34 @@ FragmentStatus Reassembler::take(const FragmentHeader& header,
   if (params_.check_crc) slot->sum(header.byte_offset, payload);
   bits::set_range(slot->received, first_word, words);
   slot->received_words += words;
-  if (slot->received_words == slot->total_bytes / kWordBytes) {
-    finish_older(*stream, slot->frame_id);
-    finish(*slot);
+  ++slot->arrivals;
+  slot->end_seen = slot->end_seen || (header.flags & kFragmentLast) != 0;
+  if ((header.flags & kFragmentResent) != 0) {
+    ++slot->resent;
+    ++counters_.fragments_resent;
+  }
+  if (slot->all_received()) {
+    complete(*slot);
+  } else if (slot->has_parity) {
+    repair(*slot, header.byte_offset / slot->geometry.fragment_bytes % slot->geometry.groups);
   }
   return FragmentStatus::accepted;
+}
+
+void Reassembler::complete(Slot& slot) noexcept {
+  Stream& stream = *slot.stream;
+  if (params_.wait_for_missing && oldest_open(&stream) != &slot) return;
+  finish_older(stream, slot.frame_id);
+  finish(slot);
+  finish_complete(stream);
+}
+
+/// Complete frames that waited for the one that has left.
+void Reassembler::finish_complete(Stream& stream) noexcept {
+  for (Slot* slot = oldest_open(&stream); slot != nullptr && slot->all_received();
+       slot = oldest_open(&stream)) {
+    finish(*slot);
+  }
 }
 
 Reassembler::Stream* Reassembler::stream_of(std::uint16_t stream_id) noexcept {
@@ -225,44 +207,56 @@ Reassembler::Stream* Reassembler::stream_of(std::uint16_t stream_id) noexcept {
   return &stream;
 }
 
-Reassembler::Slot* Reassembler::open_slot(Stream& stream, const FragmentHeader& header,
+Reassembler::Slot* Reassembler::open_slot(Stream& stream, const FrameKey& key,
                                           FragmentStatus& status) noexcept {
   std::uint32_t open = 0;
   Slot* vacant = nullptr;
   for (Slot& slot : slots_) {
     if (slot.state == Slot::State::free) vacant = &slot;
     if (slot.state != Slot::State::open || slot.stream != &stream) continue;
-    if (slot.frame_id == header.frame_id) return &slot;
+    if (slot.frame_id == key.frame_id) return &slot;
     ++open;
   }
   if (open >= params_.max_open_per_stream) {
     Slot* oldest = oldest_open(&stream);
-    if (oldest == nullptr || distance(header.frame_id, oldest->frame_id) < 0) {
+    if (oldest == nullptr || frame_distance(key.frame_id, oldest->frame_id) < 0) {
       status = FragmentStatus::late;
       return nullptr;
     }
     finish(*oldest);
     // Dropped as unusable, it is free again.
     if (vacant == nullptr && oldest->state == Slot::State::free) vacant = oldest;
+    finish_complete(stream);
+  }
+  if (stream.has_finished && frame_distance(key.frame_id, stream.finished_id) <= 0) {
+    status = FragmentStatus::late;  // a newer frame was complete and has just left
+    return nullptr;
   }
   if (vacant == nullptr) {
     // The next fragments find room once the consumer has taken this one.
     if (Slot* oldest = oldest_open(nullptr)) {
-      finish_older(*oldest->stream, oldest->frame_id);
+      Stream& its_stream = *oldest->stream;
+      finish_older(its_stream, oldest->frame_id);
       finish(*oldest);
+      finish_complete(its_stream);
     }
     status = FragmentStatus::no_buffer;
     return nullptr;
   }
   vacant->state = Slot::State::open;
   vacant->stream = &stream;
-  vacant->frame_id = header.frame_id;
-  vacant->total_bytes = header.total_bytes;
-  vacant->sim_time_ns = header.sim_time_ns;
+  vacant->frame_id = key.frame_id;
+  vacant->total_bytes = key.total_bytes;
+  vacant->sim_time_ns = key.sim_time_ns;
   vacant->received_words = 0;
   vacant->prefix_bytes = 0;
   vacant->summed_bytes = 0;
   vacant->crc32c = 0;
+  vacant->end_seen = false;
+  vacant->arrivals = 0;
+  vacant->repaired = 0;
+  vacant->resent = 0;
+  vacant->has_parity = false;
   vacant->opened_at = ++arrivals_;
   std::ranges::fill(vacant->received, std::uint64_t{0});
   return vacant;
@@ -272,46 +266,30 @@ Reassembler::Slot* Reassembler::oldest_open(const Stream* stream) noexcept {
   Slot* oldest = nullptr;
   for (Slot& slot : slots_) {
     if (slot.state != Slot::State::open || (stream != nullptr && slot.stream != stream)) continue;
-    const bool older =
-        oldest == nullptr || (stream != nullptr ? distance(slot.frame_id, oldest->frame_id) < 0
-                                                : slot.opened_at < oldest->opened_at);
+    const bool older = oldest == nullptr ||
+                       (stream != nullptr ? frame_distance(slot.frame_id, oldest->frame_id) < 0
+                                          : slot.opened_at < oldest->opened_at);
     if (older) oldest = &slot;
   }
   return oldest;
 }
 
 void Reassembler::finish_older(Stream& stream, std::uint32_t frame_id) noexcept {
-  for (Slot* slot = oldest_open(&stream); slot != nullptr && distance(slot->frame_id, frame_id) < 0;
+  for (Slot* slot = oldest_open(&stream);
+       slot != nullptr && frame_distance(slot->frame_id, frame_id) < 0;
        slot = oldest_open(&stream)) {
     finish(*slot);
   }
 }
 
-void Reassembler::finish(Slot& slot) noexcept {
+/// Finds out what a frame is, by either of its headers or by the frame before it.
+bool Reassembler::identify(Slot& slot, FrameHeader& header, bool& known) noexcept {
   Stream& stream = *slot.stream;
-  ReceivedFrame& frame = slot.frame;
-  frame = ReceivedFrame{};
-  frame.stream_id = stream.id;
-  frame.frame_id = slot.frame_id;
-
-  if (stream.has_finished) {
-    const std::uint32_t gap = slot.frame_id - stream.finished_id - 1;
-    if (gap <= kMaxCountedGap) {
-      counters_.frames_lost += gap;
-    } else {
-      ++counters_.resyncs;
-      stream.has_delivered = false;
-    }
-  }
-  stream.has_finished = true;
-  stream.finished_id = slot.frame_id;
-
   const std::span<const std::byte> bytes{slot.bytes.get(), slot.total_bytes};
   const std::size_t total_words = slot.total_bytes / kWordBytes;
-  FrameHeader header;
   const bool has_first = slot.has_words(0, kHeaderWords);
   const bool has_second = slot.has_words(total_words - kHeaderWords, kHeaderWords);
-  bool known = has_first && parse_frame_header(bytes, header) == HeaderFault::none;
+  known = has_first && parse_frame_header(bytes, header) == HeaderFault::none;
   known = known || (has_second &&
                     parse_frame_header(bytes.last(kFrameHeaderBytes), header) == HeaderFault::none);
   bool usable = false;
@@ -337,7 +315,31 @@ void Reassembler::finish(Slot& slot) noexcept {
     header.payload_bytes = stream.geometry.payload_bytes;
     header.sim_time_ns = slot.sim_time_ns;
   }
-  if (!usable) {
+  return usable;
+}
+
+void Reassembler::finish(Slot& slot) noexcept {
+  Stream& stream = *slot.stream;
+  ReceivedFrame& frame = slot.frame;
+  frame = ReceivedFrame{};
+  frame.stream_id = stream.id;
+  frame.frame_id = slot.frame_id;
+
+  if (stream.has_finished) {
+    const std::uint32_t gap = slot.frame_id - stream.finished_id - 1;
+    if (gap <= kMaxCountedGap) {
+      counters_.frames_lost += gap;
+    } else {
+      ++counters_.resyncs;
+      stream.has_delivered = false;
+    }
+  }
+  stream.has_finished = true;
+  stream.finished_id = slot.frame_id;
+
+  FrameHeader header;
+  bool known = false;
+  if (!identify(slot, header, known)) {
     ++counters_.frames_unusable;
     slot.state = Slot::State::free;
     return;
@@ -346,8 +348,11 @@ void Reassembler::finish(Slot& slot) noexcept {
   const auto pixel_bytes = static_cast<std::size_t>(header.payload_bytes);
   const std::size_t pixel_count = pixel_bytes / kWordBytes;
   frame.header = header;
-  frame.header.flags &= ~std::uint32_t{kFlagPartial};  // this side's to say
+  // These are this side's to say.
+  frame.header.flags &= ~std::uint32_t{kFlagPartial | kFlagCorrupt};
   frame.header_known = known;
+  frame.repaired_fragments = slot.repaired;
+  frame.resent_fragments = slot.resent;
   if (stream.has_delivered) frame.frames_lost_before = slot.frame_id - stream.delivered_id - 1;
   stream.has_delivered = true;
   stream.delivered_id = slot.frame_id;
@@ -356,12 +361,14 @@ void Reassembler::finish(Slot& slot) noexcept {
   std::byte* pixel_memory = slot.bytes.get() + kFrameHeaderBytes;
   if (frame.complete) {
     ++counters_.frames_complete;
+    counters_.frames_repaired += slot.repaired != 0 ? 1 : 0;
     if (params_.check_crc && known) {
       frame.crc_ok = slot.finish_sum(pixel_bytes) == header.payload_crc32c;
       if (!frame.crc_ok) ++counters_.crc_mismatches;
     }
   } else {
     ++counters_.frames_partial;
+    counters_.groups_unrepairable += unrepaired_groups(slot);
     counters_.missing_px += frame.missing_px;
     frame.header.flags |= kFlagPartial;
     // The buffer still holds an earlier frame: nothing of it may show.

@@ -72,29 +72,6 @@ class CannedSource final : public FrameSource {
   std::array<std::atomic<bool>, kMaxSlots> used_{};
 };
 
-/// A ramp of plausible radiance with a hot disc that walks along the diagonal: every frame differs,
-/// and rows, columns and order can be told by eye and by program.
-std::vector<std::vector<float>> test_pattern(const config::SourceConfig& source) {
-  std::vector<std::vector<float>> images(source.canned_frames);
-  const double width = source.canned_width_px;
-  const double height = source.canned_height_px;
-  const double radius = std::max(2.0, height / 16.0);
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const double phase = (static_cast<double>(i) + 0.5) / static_cast<double>(images.size());
-    images[i].reserve(std::size_t{source.canned_width_px} * source.canned_height_px);
-    for (std::uint32_t row = 0; row < source.canned_height_px; ++row) {
-      for (std::uint32_t column = 0; column < source.canned_width_px; ++column) {
-        const double x = column + 0.5;
-        const double y = row + 0.5;
-        const bool hot = std::hypot(x - phase * width, y - phase * height) < radius;
-        images[i].push_back(
-            static_cast<float>(hot ? 120.0 : 25.0 + 20.0 * x / width + 5.0 * y / height));
-      }
-    }
-  }
-  return images;
-}
-
 physics::Result<std::vector<std::vector<float>>> load_folder(const std::filesystem::path& folder,
                                                              SourceInfo& info) {
   std::vector<std::filesystem::path> files;
@@ -140,6 +117,29 @@ physics::Result<std::vector<std::vector<float>>> load_folder(const std::filesyst
 
 }  // namespace
 
+/// A ramp of plausible radiance with a hot disc that walks along the diagonal: every frame differs,
+/// and rows, columns and order can be told by eye and by program.
+std::vector<std::vector<float>> canned_pattern(const config::SourceConfig& source) {
+  std::vector<std::vector<float>> images(source.canned_frames);
+  const double width = source.canned_width_px;
+  const double height = source.canned_height_px;
+  const double radius = std::max(2.0, height / 16.0);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const double phase = (static_cast<double>(i) + 0.5) / static_cast<double>(images.size());
+    images[i].reserve(std::size_t{source.canned_width_px} * source.canned_height_px);
+    for (std::uint32_t row = 0; row < source.canned_height_px; ++row) {
+      for (std::uint32_t column = 0; column < source.canned_width_px; ++column) {
+        const double x = column + 0.5;
+        const double y = row + 0.5;
+        const bool hot = std::hypot(x - phase * width, y - phase * height) < radius;
+        images[i].push_back(
+            static_cast<float>(hot ? 120.0 : 25.0 + 20.0 * x / width + 5.0 * y / height));
+      }
+    }
+  }
+  return images;
+}
+
 physics::Result<std::unique_ptr<FrameSource>> make_canned_source(const config::SourceConfig& source,
                                                                  std::uint32_t slots,
                                                                  std::size_t planes) {
@@ -154,7 +154,7 @@ physics::Result<std::unique_ptr<FrameSource>> make_canned_source(const config::S
     info.width_px = source.canned_width_px;
     info.height_px = source.canned_height_px;
     info.device = "canned: test pattern";
-    return std::make_unique<CannedSource>(test_pattern(source), std::move(info));
+    return std::make_unique<CannedSource>(canned_pattern(source), std::move(info));
   }
   auto images = load_folder(source.canned_dir, info);
   if (!images) {

@@ -67,6 +67,10 @@ using FrameSourceFactory = std::function<physics::Result<std::unique_ptr<FrameSo
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
     const renderer::OutputOptions& output);
 
+/// The images of make_canned_source() where `canned_dir` is empty: frame k shows the one at
+/// (k - 1) modulo their number.
+[[nodiscard]] std::vector<std::vector<float>> canned_pattern(const config::SourceConfig& source);
+
 /// Pre-rendered frames: a folder of frame_*.exr with a `radiance` channel in name order, or a
 /// moving test pattern; shown again and again. All memory is taken here. Errors: not_found (no
 /// frame in the folder), parse (file at fault, or frames of different size).

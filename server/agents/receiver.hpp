@@ -18,6 +18,7 @@
 
 namespace emit::v1 {
 class ControlRecord;
+class Subscribe;
 class Welcome;
 }  // namespace emit::v1
 
@@ -84,6 +85,10 @@ class Receiver final : public Agent {
   void fill_welcome(v1::Welcome& welcome) const;
   void take_hello(Connection& connection, const v1::ControlRecord& record);
   void take_subscribe(Connection& connection, const v1::ControlRecord& record);
+  void take_resend(Connection& connection, std::span<const std::byte> body);
+  [[nodiscard]] physics::Result<protocol::FecParams> error_correction_for(
+      const v1::Subscribe& subscribe, const Channel& channel,
+      std::uint32_t fragment_payload_bytes) const;
   [[nodiscard]] physics::Result<UdpSocket> open_stream_socket(const Connection& connection,
                                                               std::uint32_t port,
                                                               const std::string& group) const;

@@ -65,6 +65,9 @@ void Receiver::take_record(Connection& connection, const protocol::Record& recor
       }
       return;
     }
+    case protocol::RecordKind::resend:
+      take_resend(connection, record.body);
+      return;
     case protocol::RecordKind::frame:
       refuse(connection, StatusCode::not_allowed, "frames go the other way");
       return;
@@ -286,6 +289,19 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
         subscribe.fragment_payload_bytes() != 0 ? subscribe.fragment_payload_bytes()
                                                 : config_.stream.udp_fragment_payload_bytes,
         protocol::kMinFragmentPayloadBytes, protocol::kMaxFragmentPayloadBytes);
+    auto fec = error_correction_for(subscribe, *channel, params.fragment_payload_bytes);
+    if (!fec) {
+      refuse(connection, StatusCode::not_allowed, fec.error().text);
+      return;
+    }
+    params.fec = *fec;
+    // Of a group everybody would have to lose the same, and pixels of ig-clock are soon replaced.
+    if (subscribe.resend() && subscribe.multicast_group().empty() &&
+        config_.pacing.mode == config::PacingMode::host_step &&
+        config_.stream.resend_max_frac > 0.0) {
+      params.resend_frames = std::max(config_.stream.queue_frames, 1U);
+      params.resend_max_frac = config_.stream.resend_max_frac;
+    }
   } else {
     params.tcp_socket = &connection.socket;
     connection.socket.set_send_buffer(config_.stream.tcp_send_buffer_bytes);
@@ -293,6 +309,12 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
   v1::ControlRecord answer;
   fill(*channel, *answer.mutable_subscribed()->mutable_channel());
   answer.mutable_subscribed()->set_stream_id(params.stream_id);
+  answer.mutable_subscribed()->set_resend(params.resend_frames > 0);
+  if (params.fec.on()) {
+    v1::ErrorCorrection& granted = *answer.mutable_subscribed()->mutable_error_correction();
+    granted.set_data_fragments(params.fec.data_fragments);
+    granted.set_parity_fragments(params.fec.parity_fragments);
+  }
   answer.mutable_subscribed()->set_every_nth(params.every_nth);
   const bool udp = params.udp;
   if (udp) {
@@ -319,6 +341,65 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
   context_.bells.sender.ring();
   context_.receiver_events.push(EventKind::subscribed, connection.key(), channel->index,
                                 udp ? "udp" : "tcp");
+}
+
+physics::Result<protocol::FecParams> Receiver::error_correction_for(
+    const v1::Subscribe& subscribe, const Channel& channel,
+    std::uint32_t fragment_payload_bytes) const {
+  using physics::ErrorCode;
+  protocol::FecParams fec{config_.stream.fec_data_fragments, config_.stream.fec_parity_fragments};
+  if (subscribe.has_error_correction()) {
+    const v1::ErrorCorrection& wish = subscribe.error_correction();
+    fec = {wish.data_fragments(), wish.parity_fragments()};
+  }
+  if (!fec.on()) {
+    return protocol::FecParams{};
+  }
+  if (!fec.valid()) {
+    return physics::make_error(
+        ErrorCode::protocol,
+        fmt::format(
+            "error correction {}+{}: groups have 1 to {} data and up to {} parity fragments",
+            fec.data_fragments, fec.parity_fragments, protocol::kMaxFecData,
+            protocol::kMaxFecParity));
+  }
+  const double most = config_.stream.fec_max_parity_frac;
+  if (static_cast<double>(fec.parity_fragments) > most * fec.data_fragments) {
+    return physics::make_error(
+        ErrorCode::protocol,
+        fmt::format("error correction {}+{}: stream.fec_max_parity_frac allows {:g} parity "
+                    "fragments per data fragment",
+                    fec.data_fragments, fec.parity_fragments, most));
+  }
+  constexpr std::uint64_t kMostGroups = 65535;  // by the parity fragment's header
+  const std::uint64_t bytes = std::uint64_t{channel.width_px} * channel.height_px * sizeof(float) +
+                              3 * protocol::kFrameHeaderBytes;
+  if (bytes / fragment_payload_bytes / fec.data_fragments >= kMostGroups) {
+    return physics::make_error(ErrorCode::protocol,
+                               fmt::format("error correction {}+{}: more than {} groups in a frame",
+                                           fec.data_fragments, fec.parity_fragments, kMostGroups));
+  }
+  return fec;
+}
+
+/// Nothing here allocates while the request is sound: losses must not cost the host its turn.
+void Receiver::take_resend(Connection& connection, std::span<const std::byte> body) {
+  if (connection.role != Role::client || !connection.lent) {
+    refuse(connection, StatusCode::not_allowed, "a resend request needs a subscription");
+    return;
+  }
+  ResendCommand* command = context_.resends.claim();
+  if (command == nullptr) {
+    context_.counters.add(Counter::resends_refused);
+    return;
+  }
+  command->connection = connection.key();
+  if (!protocol::decode_resend(body, command->request)) {
+    refuse(connection, StatusCode::malformed, "not a resend request");
+    return;
+  }
+  context_.resends.commit();
+  context_.bells.sender.ring();
 }
 
 physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connection,

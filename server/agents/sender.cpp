@@ -32,6 +32,7 @@ int Sender::do_work(std::int64_t now_ns) noexcept {
   static_cast<void>(now_ns);
   wake_at_ns_ = kNeverNs;
   int work = take_commands();
+  work += take_resends();
   work += take_published();
   work += take_writable();
   work += send_all();
@@ -76,6 +77,21 @@ int Sender::take_commands() noexcept {
     }
     context_.to_sender.pop();
     ++work;
+  }
+  return work;
+}
+
+int Sender::take_resends() noexcept {
+  int work = 0;
+  for (; const ResendCommand* command = context_.resends.front(); ++work) {
+    context_.counters.add(Counter::resend_requests);
+    const auto found = std::find_if(
+        clients_.begin(), clients_.end(),
+        [&](const SenderClient* client) { return client->connection() == command->connection; });
+    if (found == clients_.end() || !(*found)->ask_again(command->request)) {
+      context_.counters.add(Counter::resends_refused);
+    }
+    context_.resends.pop();
   }
   return work;
 }
@@ -143,6 +159,13 @@ void Sender::evict_oldest() noexcept {
       }
     }
   }
+  drop_oldest();
+}
+
+void Sender::drop_oldest() noexcept {
+  for (SenderClient* client : clients_) {
+    client->forget(first_);
+  }
   let_go(entry(first_).image);
   ++first_;
 }
@@ -158,14 +181,13 @@ void Sender::trim() noexcept {
   while (first_ < end_) {
     const bool needed =
         std::any_of(clients_.begin(), clients_.end(), [this](const SenderClient* client) {
-          return client->next <= first_ ||
+          return client->next <= first_ || client->may_ask_again() ||
                  (client->busy() && !client->spilled() && client->in_transit <= first_);
         });
     if (needed) {
       return;
     }
-    let_go(entry(first_).image);
-    ++first_;
+    drop_oldest();
   }
 }
 

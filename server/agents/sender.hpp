@@ -48,6 +48,7 @@ class Sender final : public Agent {
   };
 
   int take_commands() noexcept;
+  int take_resends() noexcept;
   int take_published() noexcept;
   int take_writable() noexcept;
   int send_all() noexcept;
@@ -57,6 +58,7 @@ class Sender final : public Agent {
   [[nodiscard]] ClientCounts* counts_of(const SenderClient& client) const noexcept;
   void account(SenderClient& client) noexcept;
   void evict_oldest() noexcept;
+  void drop_oldest() noexcept;
   void trim() noexcept;
   void hold(const Image& image) noexcept;
   void let_go(const Image& image) noexcept;

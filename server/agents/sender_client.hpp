@@ -4,6 +4,7 @@
 
 #include "app/context.hpp"
 #include "emit/protocol/frame_header.hpp"
+#include "emit/protocol/resend.hpp"
 #include "io/udp_batch.hpp"
 
 namespace emit::server {
@@ -28,6 +29,15 @@ class SenderClient {
   /// Makes what is left of the publication on its way independent of the source's memory, so that
   /// the source gets its slot back however slow the client is. Precondition: busy().
   virtual void spill() noexcept = 0;
+
+  /// May ask for fragments again: the sender keeps publications as long as its window has room.
+  [[nodiscard]] virtual bool may_ask_again() const noexcept { return false; }
+  /// Takes a request on; what it may have goes out with the next send(). False: nothing of it.
+  [[nodiscard]] virtual bool ask_again(const protocol::ResendRequest& /*request*/) noexcept {
+    return false;
+  }
+  /// The publication leaves the window: its pixels are not to be touched any more.
+  virtual void forget(std::uint64_t /*sequence*/) noexcept {}
 
   /// Key of the connection it belongs to.
   [[nodiscard]] virtual std::uint32_t connection() const noexcept = 0;

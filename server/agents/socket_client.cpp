@@ -10,6 +10,8 @@ namespace {
 /// What one turn hands over at most, so that several clients advance side by side.
 constexpr std::size_t kTcpTurnBytes = 512u << 10;
 constexpr int kUdpTurnCalls = 6;
+/// Of a frame, read to make its parity in one turn.
+constexpr std::size_t kParityTurnBytes = 256u << 10;
 
 }  // namespace
 
@@ -17,6 +19,17 @@ SocketClient::SocketClient(Params params) : params_(std::move(params)) {
   const auto& channel = *params_.channel;
   spill_.resize(std::size_t{channel.width_px} * channel.height_px * sizeof(float));
   segmentation_ = params_.udp && udp_segmentation_supported(params_.udp_socket.fd());
+  if (params_.udp) {
+    pixels_ = spill_;
+    make_fragments(0);  // the cut is the same for every frame
+    if (params_.fec.on()) {
+      parity_.emplace(params_.fec, *fragments_);
+    }
+    if (params_.resend_frames > 0) {
+      resend_.emplace(ResendWindow::Params{params_.resend_frames, fragments_->fragment_count(),
+                                           params_.resend_max_frac});
+    }
+  }
 }
 
 void SocketClient::begin(const protocol::FrameHeader& header, const Image& image,
@@ -31,6 +44,15 @@ void SocketClient::begin(const protocol::FrameHeader& header, const Image& image
   if (params_.udp) {
     make_fragments(frame_id_++);
     fragment_ = 0;
+    parity_sent_ = 0;
+    if (parity_) {
+      parity_->begin();
+    }
+    if (resend_) {
+      resend_->add(in_transit, fragments_->params(),
+                   head.subspan<protocol::kRecordHeaderBytes, protocol::kFrameHeaderBytes>(),
+                   pixels_);
+    }
   } else {
     protocol::encode_record_header(
         protocol::RecordKind::frame,
@@ -95,18 +117,29 @@ SocketClient::Progress SocketClient::send_tcp(Context& context) noexcept {
 }
 
 SocketClient::Progress SocketClient::send_udp(UdpBatch& batch, Context& context) noexcept {
-  if (!busy_) {
-    return Progress::idle;
-  }
+  const int fd = params_.udp_socket.fd();
   for (int call = 0; call < kUdpTurnCalls; ++call) {
-    const auto result = batch.send(params_.udp_socket.fd(), *fragments_, fragment_, segmentation_);
+    // What somebody waits for goes first, then the frame, then its parity.
+    const bool again = resend_ && resend_->pending();
+    if (!again && !busy_) {
+      return call == 0 ? Progress::idle : Progress::more;
+    }
+    std::uint32_t datagrams = 0;
+    const bool parity = !again && fragment_ == fragments_->fragment_count();
+    if (parity && !parity_->encode_some(*fragments_, kParityTurnBytes)) {
+      return Progress::more;
+    }
+    const auto result =
+        again ? resend_->send(fd, batch)
+        : parity
+            ? batch.send_datagrams(
+                  fd, parity_->datagrams(parity_sent_, parity_->datagram_count() - parity_sent_),
+                  parity_->datagram_bytes(), segmentation_)
+            : batch.send(fd, *fragments_, fragment_, segmentation_);
     switch (result.status) {
       case UdpBatch::Status::sent:
-        fragment_ += result.fragments;
+        datagrams = result.fragments;
         context.counters.add(Counter::bytes_sent, result.bytes);
-        if (fragment_ == fragments_->fragment_count()) {
-          return Progress::finished;
-        }
         break;
       case UdpBatch::Status::would_block:
         return Progress::blocked;
@@ -121,13 +154,40 @@ SocketClient::Progress SocketClient::send_udp(UdpBatch& batch, Context& context)
         // Nobody listens, no route: the client's control connection decides whether it is gone.
         // The datagram counts as lost on the way.
         context.counters.add(Counter::send_errors);
-        if (++fragment_ == fragments_->fragment_count()) {
-          return Progress::finished;
-        }
+        datagrams = 1;
         break;
+    }
+    if (again) {
+      context.counters.add(Counter::fragments_resent, result.fragments);
+      continue;
+    }
+    (parity ? parity_sent_ : fragment_) += datagrams;
+    if (parity) {
+      context.counters.add(Counter::parity_sent, result.fragments);
+    }
+    if (fragment_ == fragments_->fragment_count() &&
+        (!parity_ || parity_sent_ == parity_->datagram_count())) {
+      return Progress::finished;
     }
   }
   return Progress::more;
+}
+
+bool SocketClient::ask_again(const protocol::ResendRequest& request) noexcept {
+  if (!resend_) {
+    return false;
+  }
+  std::optional<ResendWindow::OnItsWay> on_its_way;
+  if (busy_) {
+    on_its_way = {frame_id_ - 1, fragment_};
+  }
+  return resend_->ask(request, on_its_way);
+}
+
+void SocketClient::forget(std::uint64_t sequence) noexcept {
+  if (resend_) {
+    resend_->forget(sequence);
+  }
 }
 
 void SocketClient::spill() noexcept {

@@ -7,9 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "agents/resend_window.hpp"
 #include "agents/sender_client.hpp"
 #include "emit/protocol/fragment.hpp"
 #include "emit/protocol/framing.hpp"
+#include "emit/protocol/parity.hpp"
 #include "io/socket.hpp"
 
 namespace emit::server {
@@ -30,6 +32,10 @@ class SocketClient final : public SenderClient {
     std::uint16_t stream_id = 0;
     std::uint32_t fragment_payload_bytes = 0;
     std::vector<std::byte> first_bytes;  ///< tcp: goes out before any frame
+    protocol::FecParams fec = {};        ///< udp
+    /// udp: publications that may be asked for again; 0: none
+    std::uint32_t resend_frames = 0;
+    double resend_max_frac = 0.0;  ///< of the bytes sent, that may be sent again
   };
   explicit SocketClient(Params params);
 
@@ -38,6 +44,9 @@ class SocketClient final : public SenderClient {
   [[nodiscard]] Progress send(UdpBatch& batch, Context& context) noexcept override;
   /// Moves what is left of the frame into this client's own memory.
   void spill() noexcept override;
+  [[nodiscard]] bool may_ask_again() const noexcept override { return params_.resend_frames > 0; }
+  [[nodiscard]] bool ask_again(const protocol::ResendRequest& request) noexcept override;
+  void forget(std::uint64_t sequence) noexcept override;
   [[nodiscard]] std::uint32_t connection() const noexcept override { return params_.connection; }
   [[nodiscard]] bool every_frame() const noexcept override { return params_.every_frame; }
   [[nodiscard]] std::uint32_t every_nth() const noexcept override { return params_.every_nth; }
@@ -61,6 +70,9 @@ class SocketClient final : public SenderClient {
   std::int64_t sim_time_ns_ = 0;
   std::optional<protocol::Fragmenter> fragments_;
   std::vector<std::byte> spill_;
+  std::optional<protocol::ParityEncoder> parity_;
+  std::uint32_t parity_sent_ = 0;  // datagrams of the frame on its way
+  std::optional<ResendWindow> resend_;
 };
 
 }  // namespace emit::server

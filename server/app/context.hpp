@@ -10,6 +10,7 @@
 
 #include "agents/channel_table.hpp"
 #include "agents/messages.hpp"
+#include "emit/protocol/resend.hpp"
 #include "rt/byte_ring.hpp"
 #include "rt/client_counts.hpp"
 #include "rt/clock.hpp"
@@ -34,6 +35,11 @@ struct ClientCommand {
 struct ClientReleased {
   std::uint32_t connection = 0;
   SenderClient* client = nullptr;
+};
+/// receiver -> sender: a client lacks parts of a frame.
+struct ResendCommand {
+  std::uint32_t connection = 0;
+  protocol::ResendRequest request;
 };
 /// receiver -> recorder, and back, as above.
 struct RecorderCommand {
@@ -122,6 +128,7 @@ struct Context {
   ByteRing journal;                          // conductor -> recorder
   SpscRing<ClientCommand> to_sender;         // receiver -> sender
   SpscRing<ClientReleased> from_sender;      // sender -> receiver
+  SpscRing<ResendCommand> resends{64};       // receiver -> sender
   SpscRing<RecorderCommand> to_recorder;     // receiver -> recorder
   SpscRing<RecorderReleased> from_recorder;  // recorder -> receiver
 

@@ -212,6 +212,9 @@ void Tool::add_stream_commands() {
     add_seconds(app, "--timeout-s", o.timeout_s, "Give up when no frame comes for this long")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
+    add_error_correction(app, "--fec", o.fec);
+    app.add_flag("--resend", o.resend,
+                 "UDP, daemon in host-step: ask for fragments that are missing");
     app.add_flag("--every-frame", o.every_frame, "TCP, shm: end rather than skip frames");
     app.add_option("--every", o.every_nth,
                    "Only frames 1, 1 + N, 1 + 2 N, ... of a run; those left out are no gap")

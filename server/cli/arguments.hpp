@@ -13,6 +13,7 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "emit/version.hpp"
+#include "error_correction.hpp"
 
 /// The command line of `emit`: every option of every subcommand. Included by arguments*.cpp alone:
 /// nothing else knows CLI11.
@@ -31,6 +32,22 @@ CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& ta
                        const std::string& text);
 CLI::Option* add_seconds(CLI::App& app, const std::string& name, double& target,
                          const std::string& text);
+
+/// K+M, groups of up to K fragments with M of parity, or off.
+template <class Target>
+CLI::Option* add_error_correction(CLI::App& app, const std::string& name, Target& target) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [&target](const std::string& text) {
+            const auto fec = parse_error_correction(text);
+            if (!fec) throw CLI::ValidationError("--fec", fec.error().text);
+            target = *fec;
+          },
+          "UDP: error correction, K+M: groups of up to K fragments with M parity fragments, of "
+          "which any M may be lost, e.g. 48+5; off: none")
+      ->type_name("K+M");
+}
 
 /// A subcommand's options must outlive parsing: they live in the closure that runs it.
 class Tool {

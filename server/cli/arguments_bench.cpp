@@ -91,6 +91,22 @@ void Tool::add_bench_commands() {
                    "Interleaved measurements of throughput, medians of which count; 0: none")
         ->check(CLI::Range(0U, 1000U))
         ->capture_default_str();
+    app.add_option("--loss", o.losses,
+                   "Nothing but this: frames over UDP through a network that loses this share of "
+                   "the datagrams: without help, with error correction, with resend; repeatable")
+        ->allow_extra_args(false)
+        ->check(CLI::Range(0.0, 0.9))
+        ->type_name("FRAC");
+    app.add_option("--burst", o.burst_mean, "--loss: datagrams lost in a row, mean")
+        ->check(CLI::Range(1.0, 1000.0))
+        ->capture_default_str();
+    add_error_correction(app, "--fec", o.fec);
+    app.add_option("--payload", o.payload_bytes, "--loss: bytes of a fragment")
+        ->check(CLI::Range(320U, 65000U))
+        ->capture_default_str();
+    app.add_option("--seed", o.seed, "--loss: loses other datagrams")
+        ->type_name("N")
+        ->capture_default_str();
     add_json(app, o.json);
   }
   {

@@ -19,6 +19,7 @@
 #include "json.hpp"
 #include "statistics.hpp"
 #include "stream_client.hpp"
+#include "stream_loss.hpp"
 #include "stream_throughput.hpp"
 #include "stream_yardstick.hpp"
 
@@ -39,6 +40,8 @@ struct Row {
   std::optional<double> gbit_s;
   std::optional<double> cpu_frac;
   Json more = Json::object();  ///< beyond the common keys
+  bool lossy = false;          ///< lost frames were the question
+  bool wrong = false;          ///< lossy: something came that was not as it said
 };
 
 class StreamBench {
@@ -55,12 +58,14 @@ class StreamBench {
   void print(std::FILE* out) const;
   /// Nothing was lost or torn.
   [[nodiscard]] bool sound() const {
-    return std::all_of(rows_.begin(), rows_.end(), [](const Row& row) { return row.lost == 0; });
+    return std::all_of(rows_.begin(), rows_.end(),
+                       [](const Row& row) { return row.lossy ? !row.wrong : row.lost == 0; });
   }
 
  private:
   Result<Row> paced(const std::string& transport);
   Result<Row> bare_paced();
+  Result<void> lossy();
   Result<void> throughput();
 
   const BenchStreamCommand& command_;
@@ -71,6 +76,7 @@ class StreamBench {
 };
 
 Result<void> StreamBench::run() {
+  if (!command_.losses.empty()) return lossy();
   for (const std::string& transport : command_.transports) {
     auto row = paced(transport);
     if (!row) return tl::unexpected(row.error());
@@ -178,6 +184,44 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   row.more.set("delay", "pixels ready in the daemon to last byte at the client");
   row.more.set("own", "pixels ready in the daemon to this client's first byte given away");
   return row;
+}
+
+/// Each share of losses without help, with error correction and with resend.
+Result<void> StreamBench::lossy() {
+  for (const double loss : command_.losses) {
+    for (const bool fec : {false, true}) {
+      for (const bool resend : {false, true}) {
+        if (fec && resend) continue;
+        LossyStream::Options options;
+        options.width_px = command_.width_px;
+        options.height_px = command_.height_px;
+        options.frames = command_.frames;
+        options.faults.seed = command_.seed;
+        options.faults.loss_frac = loss;
+        options.faults.burst_mean = command_.burst_mean;
+        options.payload_bytes = command_.payload_bytes;
+        if (fec) options.fec = command_.fec;
+        options.resend = resend;
+        auto result = LossyStream::measure(options, work_);
+        if (!result) return tl::unexpected(result.error());
+        device_ = result->device;
+        Row row;
+        row.transport = fec ? "udp-fec" : resend ? "udp-resend" : "udp";
+        row.frames = result->frames;
+        row.lost = result->lost;
+        row.late = result->late;
+        row.lossy = true;
+        row.wrong = result->unflagged > 0 || result->wrong_px > 0;
+        row.gbit_s =
+            8e-9 * static_cast<double>(yardstick_.frame_bytes * result->frames) / result->seconds;
+        row.cpu_frac = result->cpu_s / result->seconds;
+        add_delays(result->ready_to_received_ms, row.delay_us);
+        row.more = loss_json(options, *result);
+        rows_.push_back(std::move(row));
+      }
+    }
+  }
+  return {};
 }
 
 Result<Row> StreamBench::bare_paced() {

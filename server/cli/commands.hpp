@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "emit/protocol/parity.hpp"
+
 /// One options struct and one function per subcommand of `emit`. The functions return the exit
 /// code, print results to standard output and everything else to standard error.
 namespace emit::cli {
@@ -57,6 +59,8 @@ struct ReceiveCommand {
   std::string band;
   std::string sensor;
   std::string multicast_group;
+  std::optional<protocol::FecParams> fec;  ///< absent: the daemon's choice
+  bool resend = false;
   double timeout_s = 10.0;
   bool every_frame = false;
   std::uint32_t every_nth = 1;
@@ -240,6 +244,12 @@ struct BenchStreamCommand {
   std::uint32_t clients = 4;
   std::vector<std::string> transports{"tcp", "udp", "shm", "mixed"};
   std::uint32_t repeats = 5;  ///< of the throughput measurements; 0: none
+  /// Shares of datagrams lost on the way; not empty: nothing but lossy networks is measured.
+  std::vector<double> losses;
+  double burst_mean = 1.0;  ///< datagrams lost in a row
+  protocol::FecParams fec{protocol::kDefaultFecData, protocol::kDefaultFecParity};
+  std::uint32_t payload_bytes = 1400;  ///< of a fragment on lossy networks
+  std::uint64_t seed = 1;
 };
 int run_bench_stream(const BenchStreamCommand& command);
 

@@ -111,6 +111,11 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
   add(image::kTemperatureChannel, frame.temperature_k);
   add(image::kDepthChannel, frame.depth_m);
   add(image::kObjectChannel, frame.object_id);
+  add(image::kValidChannel, frame.valid);
+  if (!frame.valid.empty()) {
+    exr.attributes["missingPx"] =
+        std::to_string(std::count(frame.valid.begin(), frame.valid.end(), 0.0F));
+  }
   image::set_frame_metadata(exr, frame.metadata);
   return image::write_exr(file, exr);
 }

@@ -52,6 +52,8 @@ struct FramePlanes {
   std::span<const float> temperature_k;
   std::span<const float> depth_m;
   std::span<const float> object_id;
+  /// 1 where a pixel arrived, else 0; not empty: the frame is marked as partial.
+  std::span<const float> valid;
   /// For pictures of frames without temperature; absent: built from the metadata's band, which
   /// costs a second or so. Callers of many frames set it.
   const ApparentTemperature* apparent = nullptr;

@@ -5,9 +5,11 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "error_correction.hpp"
 #include "frame_files.hpp"
 #include "interrupt.hpp"
 #include "io/client.hpp"
@@ -33,6 +35,14 @@ physics::Result<void> save(const std::filesystem::path& directory,
   if (!temperature && !apparent) {
     if (const auto band = channel.spectral_band()) apparent.emplace(*band);
   }
+  std::vector<float> valid;
+  if (frame.missing_px > 0) {
+    valid.resize(frame.pixels.size());
+    for (std::size_t i = 0; i < valid.size(); ++i) {
+      valid[i] = frame.validity.pixel(i) ? 1.0F : 0.0F;
+    }
+    planes.valid = valid;
+  }
   planes.apparent = apparent ? &*apparent : nullptr;
   planes.metadata = {frame.header.sim_time_ns,
                      frame.header.frame_number,
@@ -51,6 +61,12 @@ void print_losses(std::FILE* out, const server::ReceiveCounters& c, const Stream
              "{} CRC errors, {} datagrams dropped by the kernel, {} bad datagrams\n",
              c.received, c.partial, c.lost, c.gaps, c.skipped, c.crc_errors, c.os_drops,
              c.bad_datagrams);
+  if (c.repaired + c.unrepairable + c.resend_requests > 0) {
+    fmt::print(out,
+               "repair: {} fragments brought back by error correction ({} frames whole by it, {} "
+               "groups beyond it), {} resent on {} requests\n",
+               c.repaired, c.repaired_frames, c.unrepairable, c.resent, c.resend_requests);
+  }
   fmt::print(out,
              "flags: {} late, {} repeated, {} stale, {} degraded, {} extrapolated, {} nonfinite, "
              "{} clamped\n",
@@ -77,6 +93,8 @@ int run_receive(const ReceiveCommand& command) {
   options.every_frame = command.every_frame;
   options.every_nth = command.every_nth;
   options.multicast_group = command.multicast_group;
+  options.fec = command.fec;
+  options.resend = command.resend;
   // Checks are made while the pixels are looked at first; writing files takes longer than the
   // daemon waits.
   options.in_place = !command.out;
@@ -97,6 +115,19 @@ int run_receive(const ReceiveCommand& command) {
     if (const std::string advice = client.receive_buffer_advice(); !advice.empty()) warn(advice);
   };
   greet();
+  const server::StreamTerms terms = stream.client().terms();
+  if (terms.udp_port != 0) {
+    fmt::print(stderr, "emit: error correction {}, resend {}\n", to_string(terms.fec),
+               terms.resend ? "on" : "off");
+  }
+  if (command.resend && !terms.resend) {
+    warn(
+        "resend is not granted: it needs udp:// without a group, a daemon in host-step, and "
+        "stream.resend_max_frac above 0");
+  }
+  if (command.fec && command.fec->on() && !terms.fec.on()) {
+    warn("error correction needs udp:// and a daemon that knows it");
+  }
 
   std::optional<ApparentTemperature> apparent;
   const InterruptGuard interrupt;
@@ -183,6 +214,7 @@ int run_receive(const ReceiveCommand& command) {
     json.set("scenario", client.server().scenario).set("channel", channel.name);
     json.set("band", channel.band).set("width", channel.width_px);
     json.set("height", channel.height_px).set("frames", report.frames()).set("seconds", seconds);
+    json.set("error_correction", to_string(terms.fec)).set("resend", terms.resend);
     json.set("counters", counters_json(counters)).set("flags", report.flags_json());
     json.set("unflagged_gaps", report.unflagged_gaps());
     json.set("every_nth", command.every_nth).set("reconnects", stream.reconnects());

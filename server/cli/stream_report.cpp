@@ -14,7 +14,7 @@ struct FlagName {
   protocol::FrameFlags flag;
   const char* name;
 };
-constexpr std::array<FlagName, 12> kFlagNames{{{protocol::kFlagLate, "late"},
+constexpr std::array<FlagName, 13> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagRepeated, "repeated"},
                                                {protocol::kFlagStale, "stale"},
                                                {protocol::kFlagDegraded, "degraded"},
@@ -25,7 +25,8 @@ constexpr std::array<FlagName, 12> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagExtrapolated, "extrapolated"},
                                                {protocol::kFlagGapBefore, "gap_before"},
                                                {protocol::kFlagCanned, "canned"},
-                                               {protocol::kFlagTimeUnset, "time_unset"}}};
+                                               {protocol::kFlagTimeUnset, "time_unset"},
+                                               {protocol::kFlagCorrupt, "corrupt"}}};
 
 }  // namespace
 
@@ -117,6 +118,9 @@ Json counters_json(const server::ReceiveCounters& c) {
   json.set("gaps", c.gaps).set("skipped", c.skipped).set("crc_errors", c.crc_errors);
   json.set("os_drops", c.os_drops).set("bad_datagrams", c.bad_datagrams);
   json.set("late", c.late).set("repeated", c.repeated);
+  json.set("repaired", c.repaired).set("repaired_frames", c.repaired_frames);
+  json.set("unrepairable", c.unrepairable).set("resent", c.resent);
+  json.set("resend_requests", c.resend_requests);
   return json;
 }
 

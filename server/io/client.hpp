@@ -11,6 +11,8 @@
 #include "emit/physics/planck.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/host_frame.hpp"
+#include "emit/protocol/parity.hpp"
+#include "emit/protocol/reassembler.hpp"
 
 namespace emit::v1 {
 class JournalEntry;
@@ -84,14 +86,36 @@ struct SubscribeOptions {
   std::uint16_t udp_port = 0;                ///< UDP; 0 = any free port
   /// shm: pixels are not copied but stay where the daemon writes them: see FrameClient::intact().
   bool in_place = false;
+  /// UDP: error correction; absent = daemon's choice, off() = none. FrameClient::terms() tells what
+  /// came of it.
+  std::optional<protocol::FecParams> fec;
+  /// UDP unicast, daemon in host-step: missing fragments are asked for again.
+  bool resend = false;
+  /// UDP: the port that the daemon is told, where a relay on this host takes the datagrams first;
+  /// 0 = this client's own.
+  std::uint16_t announced_udp_port = 0;
+};
+
+/// What the daemon granted a subscription.
+struct StreamTerms {
+  protocol::FecParams fec;
+  bool resend = false;
+  std::uint16_t udp_port = 0;  ///< where this client receives; 0: not over UDP
 };
 
 /// Pixels stay valid until the next receive().
 struct ReceivedFrame {
-  protocol::FrameHeader header;    ///< kFlagPartial is set here when fragments are missing
-  std::span<const float> pixels;   ///< width_px * height_px; missing pixels are 0
-  std::uint64_t missing_px = 0;    ///< of a partial frame
-  std::int64_t first_byte_ns = 0;  ///< wall (TAI), when this client began to have it
+  /// kFlagPartial is set here when fragments are missing, kFlagCorrupt when none is but the
+  /// checksum is wrong.
+  protocol::FrameHeader header;
+  std::span<const float> pixels;     ///< width_px * height_px; missing pixels are 0
+  std::uint64_t missing_px = 0;      ///< of a partial frame
+  protocol::PixelValidity validity;  ///< of a partial frame: which pixels arrived
+  /// False: both headers of a partial frame were lost: only size, band and sim_time_ns are known.
+  bool header_known = true;
+  std::uint32_t repaired_fragments = 0;  ///< brought back by error correction
+  std::uint32_t resent_fragments = 0;    ///< that this client asked for again
+  std::int64_t first_byte_ns = 0;        ///< wall (TAI), when this client began to have it
   std::int64_t last_byte_ns = 0;
 };
 
@@ -104,8 +128,13 @@ struct ReceiveCounters {
   std::uint64_t crc_errors = 0;
   std::uint64_t os_drops = 0;  ///< datagrams the kernel dropped for want of buffer space
   std::uint64_t bad_datagrams = 0;
-  std::uint64_t late = 0;      ///< frames with kFlagLate
-  std::uint64_t repeated = 0;  ///< frames with kFlagRepeated
+  std::uint64_t late = 0;             ///< frames with kFlagLate
+  std::uint64_t repeated = 0;         ///< frames with kFlagRepeated
+  std::uint64_t repaired = 0;         ///< fragments brought back by error correction
+  std::uint64_t repaired_frames = 0;  ///< complete frames among whose fragments those were
+  std::uint64_t unrepairable = 0;     ///< groups of fragments that lost more than their parity
+  std::uint64_t resend_requests = 0;
+  std::uint64_t resent = 0;  ///< fragments that came because they were asked for
 
   /// Of two connections, one after the other.
   ReceiveCounters& operator+=(const ReceiveCounters& other) noexcept;
@@ -126,6 +155,9 @@ class FrameClient {
   /// where a daemon does not know every_nth; invalid_argument (every_nth).
   [[nodiscard]] virtual physics::Result<ChannelDescription> subscribe(
       const SubscribeOptions& options) = 0;
+
+  /// What the daemon granted; after subscribe().
+  [[nodiscard]] virtual const StreamTerms& terms() const noexcept = 0;
 
   /// Next frame in order; null when the timeout ran out first. Errors: io (connection closed),
   /// protocol (stream broken). After an error the client is of no further use.

@@ -9,9 +9,11 @@
 #include <cstring>
 
 #include "emit/protocol/convert.hpp"
+#include "emit/protocol/resend.hpp"
 #include "emit/v1/control.pb.h"
 #include "io/client_connection.hpp"
 #include "io/frame_account.hpp"
+#include "io/resend_planner.hpp"
 #include "io/shm_frame_client.hpp"
 #include "io/udp_frame_receiver.hpp"
 #include "rt/clock.hpp"
@@ -39,6 +41,7 @@ class FrameClientImpl final : public FrameClient {
   physics::Result<ChannelDescription> subscribe(const SubscribeOptions& options) override;
   physics::Result<const ReceivedFrame*> receive(std::int64_t timeout_ns) override;
   bool intact() const noexcept override { return true; }
+  const StreamTerms& terms() const noexcept override { return terms_; }
   const ReceiveCounters& counters() const noexcept override { return account_.counters; }
   std::vector<ServerStatus> take_statuses() override { return std::exchange(statuses_, {}); }
   std::uint64_t receive_buffer_bytes() const noexcept override {
@@ -50,6 +53,8 @@ class FrameClientImpl final : public FrameClient {
   physics::Result<const ReceivedFrame*> receive_tcp(std::int64_t end_ns);
   physics::Result<const ReceivedFrame*> receive_udp(std::int64_t end_ns);
   const ReceivedFrame* pop_udp();
+  void make_reassembler(std::uint64_t frame_bytes);
+  physics::Result<void> ask_for_missing(std::int64_t now_ns, std::int64_t& wake_ns);
   std::span<const float> aligned(std::span<const std::byte> pixels);
   void take_control(std::span<const std::byte> body);
 
@@ -66,6 +71,8 @@ class FrameClientImpl final : public FrameClient {
   std::optional<UdpFrameReceiver> receiver_;
   std::optional<protocol::Reassembler> reassembler_;
   const protocol::ReceivedFrame* held_ = nullptr;
+  StreamTerms terms_;
+  ResendPlanner planner_;
   std::int64_t burst_begin_ns_ = 0;
   std::int64_t quiet_since_ns_ = 0;
 };
@@ -103,13 +110,17 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
     }
     receiver_ = std::move(*receiver);
     receiver_->size_buffer(largest);
-    subscribe.set_udp_port(receiver_->port());
+    subscribe.set_udp_port(options.announced_udp_port != 0 ? options.announced_udp_port
+                                                           : receiver_->port());
     subscribe.set_fragment_payload_bytes(options.fragment_payload_bytes);
     subscribe.set_multicast_group(options.multicast_group);
-    protocol::Reassembler::Params params;
-    params.max_payload_bytes = static_cast<std::uint32_t>(largest);
-    params.max_streams = 2;
-    reassembler_.emplace(params);
+    terms_.udp_port = receiver_->port();
+    subscribe.set_resend(options.resend);
+    if (options.fec) {
+      v1::ErrorCorrection& wish = *subscribe.mutable_error_correction();
+      wish.set_data_fragments(options.fec->data_fragments);
+      wish.set_parity_fragments(options.fec->parity_fragments);
+    }
   } else {
     connection_.allow_frames(static_cast<std::uint32_t>(largest + protocol::kFrameHeaderBytes));
     pixels_.resize(static_cast<std::size_t>(largest / sizeof(float)));
@@ -141,8 +152,73 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
         return make_error(ErrorCode::protocol, "this daemon cannot leave frames out (every_nth)");
       }
       account_.set_every_nth(options.every_nth);
+      terms_.fec = {answer.subscribed().error_correction().data_fragments(),
+                    answer.subscribed().error_correction().parity_fragments()};
+      terms_.resend = udp_ && answer.subscribed().resend();
+      if (!udp_ || !terms_.fec.on()) {
+        terms_.fec = {};
+      } else if (!terms_.fec.valid() ||
+                 (options.fec ? terms_.fec != *options.fec
+                              : terms_.fec.parity_fragments > terms_.fec.data_fragments)) {
+        // It decides how much memory is taken here.
+        return make_error(ErrorCode::protocol,
+                          fmt::format("error correction of {}+{} was not asked for",
+                                      terms_.fec.data_fragments, terms_.fec.parity_fragments));
+      }
+      if (udp_) {
+        make_reassembler(largest);
+      }
       subscribed_ = true;
       return channel_;
+    }
+  }
+}
+
+void FrameClientImpl::make_reassembler(std::uint64_t frame_bytes) {
+  protocol::Reassembler::Params params;
+  params.max_payload_bytes = static_cast<std::uint32_t>(frame_bytes);
+  params.max_streams = 2;
+  params.fec = terms_.fec;
+  if (terms_.resend) {
+    // Frames wait for an older one while it is asked for.
+    params.wait_for_missing = true;
+    params.max_open_per_stream = 4;
+    params.buffers = 6;
+  }
+  reassembler_.emplace(params);
+}
+
+/// Asks the daemon for what is missing, where it is time to; `wake_ns`: when to look again.
+physics::Result<void> FrameClientImpl::ask_for_missing(std::int64_t now_ns, std::int64_t& wake_ns) {
+  for (;;) {
+    std::array<protocol::Reassembler::OpenFrame, ResendPlanner::kMaxFrames> open;
+    const std::size_t count = reassembler_->open_frames(stream_id_, open);
+    const auto step = planner_.next(std::span(open).first(count), now_ns);
+    wake_ns = step.wake_ns;
+    if (step.kind == ResendPlanner::Step::Kind::wait) {
+      return {};
+    }
+    if (step.kind == ResendPlanner::Step::Kind::give_up) {
+      reassembler_->give_up(stream_id_, step.frame_id);
+      continue;
+    }
+    protocol::ResendRequest request;
+    request.stream_id = stream_id_;
+    request.frame_id = step.frame_id;
+    request.count = static_cast<std::uint16_t>(
+        reassembler_->missing(stream_id_, step.frame_id, request.ranges));
+    std::array<std::byte, protocol::kRecordHeaderBytes + protocol::kMaxResendBytes> bytes;
+    const std::span all(bytes);
+    const std::size_t length = protocol::encode(
+        request, all.subspan<protocol::kRecordHeaderBytes, protocol::kMaxResendBytes>());
+    protocol::encode_record_header(protocol::RecordKind::resend, static_cast<std::uint32_t>(length),
+                                   all.first<protocol::kRecordHeaderBytes>());
+    constexpr std::int64_t kTimeoutNs = 100'000'000;
+    ++account_.counters.resend_requests;
+    if (auto sent =
+            connection_.send(all.first(protocol::kRecordHeaderBytes + length), now_ns + kTimeoutNs);
+        !sent) {
+      return sent;
     }
   }
 }
@@ -185,13 +261,15 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t 
       return make_error(ErrorCode::protocol, "a frame larger than its channel");
     }
     frame_.header = view->header;
-    frame_.header.flags &= ~std::uint32_t{protocol::kFlagPartial};  // this side's to say
+    // These are this side's to say.
+    frame_.header.flags &= ~std::uint32_t{protocol::kFlagPartial | protocol::kFlagCorrupt};
     frame_.last_byte_ns = clock_.tai_ns();
     frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
     burst_begin_ns_ = 0;
     frame_.missing_px = 0;
     if (record.payload_crc32c != view->header.payload_crc32c) {
       ++account_.counters.crc_errors;
+      frame_.header.flags |= protocol::kFlagCorrupt;
     }
     frame_.pixels = aligned(view->pixels);
     ++account_.counters.received;
@@ -212,12 +290,25 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
       return frame;
     }
     const int taken = receiver_->take(*reassembler_, account_.counters);
+    std::int64_t ask_ns = 0;
+    // What waits in the socket may be what seems to be missing.
+    if (terms_.resend && receiver_->drained()) {
+      if (auto asked = ask_for_missing(monotonic_now_ns(), ask_ns); !asked) {
+        return tl::unexpected<physics::Error>(std::move(asked.error()));
+      }
+    }
     if (taken > 0) {
       quiet_since_ns_ = 0;
       if (burst_begin_ns_ == 0) {
         burst_begin_ns_ = clock_.tai_ns();
       }
-      continue;
+      if (!receiver_->drained()) {
+        continue;
+      }
+      // An empty socket need not be asked again before it is waited for.
+    }
+    if (const ReceivedFrame* frame = pop_udp()) {
+      return frame;
     }
     const std::int64_t now_ns = monotonic_now_ns();
     if (quiet_since_ns_ == 0) {
@@ -229,7 +320,11 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
         return frame;
       }
     }
-    const std::int64_t wait_ns = std::min(end_ns, quiet_since_ns_ + kQuietNs + 1'000'000) - now_ns;
+    std::int64_t wake_ns = std::min(end_ns, quiet_since_ns_ + kQuietNs + 1'000'000);
+    if (ask_ns != 0) {
+      wake_ns = std::min(wake_ns, ask_ns);
+    }
+    const std::int64_t wait_ns = wake_ns - now_ns;
     std::array<pollfd, 2> fds{{{receiver_->fd(), POLLIN, 0}, {connection_.fd(), POLLIN, 0}}};
     const timespec timeout{static_cast<time_t>(std::max<std::int64_t>(wait_ns, 0) / 1'000'000'000),
                            static_cast<long>(std::max<std::int64_t>(wait_ns, 0) % 1'000'000'000)};
@@ -274,12 +369,24 @@ const ReceivedFrame* FrameClientImpl::pop_udp() {
   frame_.header = held_->header;
   frame_.pixels = held_->pixels;
   frame_.missing_px = held_->missing_px;
+  frame_.validity = held_->validity;
+  frame_.header_known = held_->header_known;
+  frame_.repaired_fragments = held_->repaired_fragments;
+  frame_.resent_fragments = held_->resent_fragments;
   frame_.last_byte_ns = clock_.tai_ns();
   frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
   burst_begin_ns_ = 0;
   account_.counters.received += held_->complete ? 1 : 0;
   account_.counters.partial += held_->complete ? 0 : 1;
-  account_.counters.crc_errors += held_->complete && !held_->crc_ok ? 1 : 0;
+  if (held_->complete && !held_->crc_ok) {
+    ++account_.counters.crc_errors;
+    frame_.header.flags |= protocol::kFlagCorrupt;
+  }
+  const auto& work = reassembler_->counters();
+  account_.counters.repaired = work.fragments_repaired;
+  account_.counters.repaired_frames = work.frames_repaired;
+  account_.counters.unrepairable = work.groups_unrepairable;
+  account_.counters.resent = work.fragments_resent;
   if (held_->header_known) {
     account_.take(frame_.header);
   } else {
@@ -333,6 +440,11 @@ ReceiveCounters& ReceiveCounters::operator+=(const ReceiveCounters& other) noexc
   bad_datagrams += other.bad_datagrams;
   late += other.late;
   repeated += other.repeated;
+  repaired += other.repaired;
+  repaired_frames += other.repaired_frames;
+  unrepairable += other.unrepairable;
+  resend_requests += other.resend_requests;
+  resent += other.resent;
   return *this;
 }
 

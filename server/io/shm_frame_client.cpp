@@ -40,6 +40,7 @@ class ShmFrameClient final : public FrameClient {
   bool intact() const noexcept override {
     return !options_.in_place || publication_ == 0 || ring_.intact(publication_);
   }
+  const StreamTerms& terms() const noexcept override { return terms_; }
   const ReceiveCounters& counters() const noexcept override { return account_.counters; }
   std::vector<ServerStatus> take_statuses() override { return {}; }
   std::uint64_t receive_buffer_bytes() const noexcept override { return 0; }
@@ -61,6 +62,7 @@ class ShmFrameClient final : public FrameClient {
   bool gap_ = false;               // publications were overwritten before they were read
   std::int64_t alive_at_ns_ = 0;
   std::vector<float> pixels_;  // unless in place
+  StreamTerms terms_;
   FrameAccount account_;
   SystemClock clock_;
   ReceivedFrame frame_;

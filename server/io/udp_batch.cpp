@@ -45,22 +45,61 @@ UdpBatch::Result UdpBatch::send(int fd, const protocol::Fragmenter& fragments, s
   std::uint64_t bytes = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
     const auto pieces = fragments.pieces(first + i, memory_->headers[i]);
-    msghdr& message = memory_->messages[i].msg_hdr;
-    message = {};
-    message.msg_iov = &memory_->iov[iov_count];
-    message.msg_iovlen = pieces.count;
-    for (std::uint32_t piece = 0; piece < pieces.count; ++piece) {
-      // sendmsg only reads what iov_base points at.
-      memory_->iov[iov_count++] = {const_cast<std::byte*>(pieces.piece[piece].data()),
-                                   pieces.piece[piece].size()};
-    }
-    memory_->sizes[i] = pieces.bytes;
+    add_message(i, pieces, iov_count);
     bytes += pieces.bytes;
   }
   if (segmentation && count > 1) {
     return send_segmented(fd, count, iov_count, bytes, fragments.datagram_bytes());
   }
   return send_many(fd, count);
+}
+
+UdpBatch::Result UdpBatch::send_some(int fd, const protocol::Fragmenter& fragments,
+                                     std::span<const std::uint32_t> indices,
+                                     std::uint8_t more_flags) noexcept {
+  const auto count = static_cast<std::uint32_t>(std::min(indices.size(), kMaxBatch));
+  std::size_t iov_count = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    add_message(i, fragments.pieces(indices[i], memory_->headers[i], more_flags), iov_count);
+  }
+  return send_many(fd, count);
+}
+
+UdpBatch::Result UdpBatch::send_datagrams(int fd, std::span<const std::byte> datagrams,
+                                          std::uint32_t datagram_bytes,
+                                          bool segmentation) noexcept {
+  std::size_t most = kMaxBatch;
+  if (segmentation) {
+    most = std::clamp<std::size_t>(kMaxDatagramBytes / datagram_bytes, 1, kMaxBatch);
+  }
+  const auto count = static_cast<std::uint32_t>(std::min(datagrams.size() / datagram_bytes, most));
+  std::size_t iov_count = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    protocol::Fragmenter::Pieces whole;
+    whole.piece[0] = datagrams.subspan(std::size_t{i} * datagram_bytes, datagram_bytes);
+    whole.count = 1;
+    whole.bytes = datagram_bytes;
+    add_message(i, whole, iov_count);
+  }
+  if (segmentation && count > 1) {
+    memory_->iov[0].iov_len = std::size_t{count} * datagram_bytes;  // they lie in one piece
+    return send_segmented(fd, count, 1, memory_->iov[0].iov_len, datagram_bytes);
+  }
+  return send_many(fd, count);
+}
+
+void UdpBatch::add_message(std::uint32_t index, const protocol::Fragmenter::Pieces& pieces,
+                           std::size_t& iov_count) noexcept {
+  msghdr& message = memory_->messages[index].msg_hdr;
+  message = {};
+  message.msg_iov = &memory_->iov[iov_count];
+  message.msg_iovlen = pieces.count;
+  for (std::uint32_t piece = 0; piece < pieces.count; ++piece) {
+    // sendmsg only reads what iov_base points at.
+    memory_->iov[iov_count++] = {const_cast<std::byte*>(pieces.piece[piece].data()),
+                                 pieces.piece[piece].size()};
+  }
+  memory_->sizes[index] = pieces.bytes;
 }
 
 UdpBatch::Result UdpBatch::send_segmented(int fd, std::uint32_t count, std::size_t iov_count,

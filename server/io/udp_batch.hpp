@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "emit/protocol/fragment.hpp"
 
@@ -31,14 +32,23 @@ class UdpBatch {
   /// One call's worth of fragments from `first` on, over a connected socket.
   [[nodiscard]] Result send(int fd, const protocol::Fragmenter& fragments, std::uint32_t first,
                             bool segmentation) noexcept;
+  /// One call's worth of these fragments of a frame, with `more_flags` in their headers.
+  [[nodiscard]] Result send_some(int fd, const protocol::Fragmenter& fragments,
+                                 std::span<const std::uint32_t> indices,
+                                 std::uint8_t more_flags) noexcept;
+  /// One call's worth of datagrams of `datagram_bytes` each that lie one behind the other.
+  [[nodiscard]] Result send_datagrams(int fd, std::span<const std::byte> datagrams,
+                                      std::uint32_t datagram_bytes, bool segmentation) noexcept;
+  static constexpr std::size_t kMaxBatch = 64;  ///< limit of UDP_SEGMENT on older kernels
 
  private:
-  static constexpr std::size_t kMaxBatch = 64;  // limit of UDP_SEGMENT on older kernels
   static constexpr std::size_t kPieces = 5;
 
   [[nodiscard]] Result send_segmented(int fd, std::uint32_t count, std::size_t iov_count,
                                       std::uint64_t bytes, std::uint32_t segment_bytes) noexcept;
   [[nodiscard]] Result send_many(int fd, std::uint32_t count) noexcept;
+  void add_message(std::uint32_t index, const protocol::Fragmenter::Pieces& pieces,
+                   std::size_t& iov_count) noexcept;
 
   struct Memory {
     std::array<std::array<std::byte, protocol::kFragmentHeaderBytes>, kMaxBatch> headers;

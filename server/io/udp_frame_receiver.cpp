@@ -200,16 +200,23 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
   for (std::size_t i = 0; i < taken; ++i) {
     read_control(i, counters);
   }
+  drained_ = taken < batch_;
+  std::size_t in_place = 0;
+  while (in_place < taken && messages_[in_place].planned > 0 &&
+         as_planned(messages_[in_place], expected, from[in_place])) {
+    ++in_place;
+  }
+  // Before anything is pushed: places in the frame may then be wanted for other payloads than lie
+  // there.
+  for (std::size_t i = in_place; i < taken; ++i) {
+    bring_together(i);
+  }
   for (std::size_t i = 0; i < taken; ++i) {
-    if (messages_[i].planned > 0 && as_planned(messages_[i], expected, from[i])) {
+    if (i < in_place) {
       push_planned(messages_[i], reassembler, counters);
-      continue;
+    } else {
+      push_data(i, reassembler, counters);
     }
-    // From here on places in the frame may be wanted for other payloads than lie there.
-    for (std::size_t later = i; later < taken; ++later) {
-      bring_together(later);
-    }
-    push_data(i, reassembler, counters);
   }
   if (taken > 0) {
     const Message& first = messages_[0];

@@ -35,6 +35,8 @@ class UdpFrameReceiver {
 
   /// Takes what lies in the socket, at most one batch. Returns the datagrams taken.
   int take(protocol::Reassembler& reassembler, ReceiveCounters& counters);
+  /// True when the last take() left nothing in the socket.
+  [[nodiscard]] bool drained() const noexcept { return drained_; }
 
  private:
   static constexpr unsigned kBatch = 16;
@@ -71,6 +73,7 @@ class UdpFrameReceiver {
 
   UdpSocket socket_;
   unsigned batch_ = kBatch;
+  bool drained_ = true;
   std::size_t segments_ = 1;  // joined in the message before
   std::uint64_t buffer_bytes_ = 0;
   std::uint32_t drops_seen_ = 0;

@@ -60,6 +60,10 @@ namespace emit::server {
   X(frames_spilled, "partly sent frames moved to a client's own buffer")             \
   X(bytes_sent, "bytes handed to the kernel, all clients")                           \
   X(send_errors, "datagrams the kernel refused")                                     \
+  X(parity_sent, "parity fragments sent, beside the frames' own")                    \
+  X(resend_requests, "requests for missing fragments")                               \
+  X(resends_refused, "such requests refused: frame gone, over the limit, no room")   \
+  X(fragments_resent, "fragments sent again on request")                             \
   X(journal_entries, "journal entries recorded")                                     \
   X(journal_dropped, "journal entries lost: recorder too slow")                      \
   X(journal_errors, "failures writing the journal file")                             \

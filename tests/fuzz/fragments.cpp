@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // UDP fragments put together to frames. Input: datagrams, each behind a byte of instructions and
 // its length (u16). Bits of the byte: 1 seal the frame header in front (its checksum is made
-// right), 2 seal the one at the end, 4 take what is finished, 8 flush.
+// right), 2 seal the one at the end, 4 take what is finished, 8 flush, 16 look at what is missing
+// and give the oldest up; of the first also 32: complete frames wait for older ones.
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -42,6 +44,28 @@ void drain(protocol::Reassembler& reassembler) {
   }
 }
 
+/// What a client would ask for lies within the frame, in order, and is not there.
+void look_at_missing(protocol::Reassembler& reassembler) {
+  std::array<protocol::Reassembler::OpenFrame, 8> open;
+  std::array<protocol::ByteRange, 16> ranges;
+  for (std::uint16_t stream = 0; stream < 4; ++stream) {
+    const std::size_t frames = reassembler.open_frames(stream, open);
+    for (std::size_t i = 0; i < frames; ++i) {
+      const std::size_t count = reassembler.missing(stream, open[i].frame_id, ranges);
+      fuzz::require(count > 0, "something is missing of an open frame");
+      std::uint64_t end = 0;
+      for (std::size_t k = 0; k < count; ++k) {
+        fuzz::require(ranges[k].bytes > 0 && (k == 0 || ranges[k].begin > end),
+                      "missing ranges are apart and in order");
+        end = std::uint64_t{ranges[k].begin} + ranges[k].bytes;
+      }
+      fuzz::require(end <= kMaxPayloadBytes + 3 * protocol::kFrameHeaderBytes,
+                    "they lie within the frame");
+    }
+    if (frames > 0) reassembler.give_up(stream, open[0].frame_id);
+  }
+}
+
 }  // namespace
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -49,6 +73,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   params.max_payload_bytes = kMaxPayloadBytes;
   params.buffers = 3;
   params.max_streams = 2;
+  params.fec = {3, 2};
+  params.wait_for_missing = size > 0 && (data[0] & 32u) != 0;
   protocol::Reassembler reassembler(params);
   fuzz::InputReader input(fuzz::as_bytes(data, size));
   std::uint64_t pushed = 0;
@@ -66,6 +92,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     static_cast<void>(reassembler.push(datagram));
     ++pushed;
     if ((instructions & 8u) != 0) reassembler.flush();
+    if ((instructions & 16u) != 0) look_at_missing(reassembler);
     if ((instructions & 4u) != 0) drain(reassembler);
   }
   reassembler.flush();

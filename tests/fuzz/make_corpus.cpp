@@ -12,6 +12,7 @@
 #include "emit/image/exr_image.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/record/log.hpp"
+#include "emit/protocol/resend.hpp"
 #include "emit/scenegen/generate.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/state_world.hpp"
@@ -209,6 +210,11 @@ void make_network_seeds() {
   huge.mutable_subscribed()->mutable_channel()->set_width_px(~0u);
   huge.mutable_subscribed()->mutable_channel()->set_height_px(~0u);
   write("frame_client", "udp_huge_channel", joined({udp, record(welcome()), record(huge)}));
+  v1::ControlRecord granted = subscribed();
+  granted.mutable_subscribed()->mutable_error_correction()->set_data_fragments(4);
+  granted.mutable_subscribed()->mutable_error_correction()->set_parity_fragments(2);
+  granted.mutable_subscribed()->set_resend(true);
+  write("frame_client", "udp_help", joined({udp, record(welcome()), record(granted)}));
   write("frame_client", "refused", joined({tcp, record(status())}));
   write("host_client", "answers", joined({record(welcome()), record(status()), record(status())}));
   write("recorder_client", "journal",
@@ -224,8 +230,71 @@ void make_network_seeds() {
         joined({piece(0, client), piece(0, record(subscribe(7002, ""))), piece(2, client)}));
   write("receiver", "client_group",
         joined({piece(0, client), piece(0, record(subscribe(7002, "239.1.2.3")))}));
+  v1::ControlRecord help = subscribe(7002, "");
+  help.mutable_subscribe()->mutable_error_correction()->set_data_fragments(4);
+  help.mutable_subscribe()->mutable_error_correction()->set_parity_fragments(2);
+  help.mutable_subscribe()->set_resend(true);
+  protocol::ResendRequest missing;
+  missing.stream_id = 1;
+  missing.count = 2;
+  missing.ranges[0] = {0, 400};
+  missing.ranges[1] = {800, 4};
+  Bytes body(protocol::kMaxResendBytes);
+  body.resize(protocol::encode(missing, std::span(body).first<protocol::kMaxResendBytes>()));
+  write("receiver", "client_resend",
+        joined({piece(0, client), piece(0, record(help)),
+                piece(0, record(protocol::RecordKind::resend, body))}));
   write("receiver", "recorder", piece(0, record(hello(v1::Hello::ROLE_RECORDER))));
   write("receiver", "datagrams", joined({piece(1, host_frame(0)), piece(1, host_frame(2))}));
+}
+
+/// Frames that lost fragments: repaired by parity, beyond repair, and waited for.
+void make_loss_seeds() {
+  const protocol::FecParams fec{3, 2};  // as the target has it
+  const test::Frame frame = test::make_frame(32, 20, 1);
+  const auto data = test::datagrams_of(frame, 400, 1);
+  protocol::Fragmenter::Params params;
+  params.stream_id = 1;
+  params.frame_id = 1;
+  params.sim_time_ns = frame.header.sim_time_ns;
+  params.row_bytes = 128;
+  params.max_payload_bytes = 400;
+  const protocol::Fragmenter cut(params, frame.header_bytes, frame.pixels);
+  protocol::ParityEncoder encoder(fec, cut);
+  encoder.begin();
+  while (!encoder.encode_some(cut, 1)) {
+  }
+  const auto parity = [&encoder](std::uint32_t index) {
+    const auto bytes = encoder.datagrams(index, 1);
+    return Bytes(bytes.begin(), bytes.end());
+  };
+  Bytes repaired;
+  Bytes beyond;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const auto instructions = static_cast<std::uint8_t>(i == 0 ? 1 : 2);
+    if (i % 4 != 1) append(repaired, piece(instructions, data[i]));
+    if (i % 2 == 0) append(beyond, piece(instructions, data[i]));
+  }
+  for (std::uint32_t i = 0; i < encoder.datagram_count(); ++i) {
+    append(repaired, piece(4, parity(i)));
+    append(beyond, piece(static_cast<std::uint8_t>(i == 4 ? 16 : 0), parity(i)));
+  }
+  write("fragments", "parity", repaired);
+  write("fragments", "parity_too_little", beyond);
+
+  Bytes waited;
+  for (std::uint32_t id = 1; id <= 3; ++id) {
+    const test::Frame each = test::make_frame(16, 12, id);
+    const auto datagrams = test::datagrams_of(each, 400, id);
+    for (std::size_t i = 0; i < datagrams.size(); ++i) {
+      if (id != 1 || i != 1)
+        append(waited, piece(static_cast<std::uint8_t>(i == 0 ? 33 : 2), datagrams[i]));
+    }
+  }
+  Bytes late = test::datagrams_of(test::make_frame(16, 12, 1), 400, 1)[1];
+  late[5] |= std::byte{protocol::kFragmentResent};
+  append(waited, piece(20, late));
+  write("fragments", "waiting", waited);
 }
 
 void make_fragment_seeds() {
@@ -251,6 +320,7 @@ void make_fragment_seeds() {
     }
   }
   write("fragments", "whole", whole);
+  make_loss_seeds();
   write("fragments", "lossy", lossy);
 }
 

@@ -105,6 +105,14 @@ class Rig {
       context_.to_sender.pop();
       add ? lent_to_sender_.push_back(client) : give_back();
     }
+    for (; const server::ResendCommand* command = context_.resends.front(); ++work) {
+      for (const server::ClientReleased& lent : lent_to_sender_) {
+        if (lent.connection == command->connection) {
+          static_cast<void>(lent.client->ask_again(command->request));
+        }
+      }
+      context_.resends.pop();
+    }
     for (; const server::RecorderCommand* command = context_.to_recorder.front(); ++work) {
       const server::RecorderReleased recorder{command->connection};
       const bool add = command->kind == server::ClientCommand::Kind::add;

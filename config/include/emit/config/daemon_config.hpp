@@ -47,8 +47,12 @@ struct StreamConfig {
   std::uint32_t tcp_send_buffer_bytes = 256u << 10;  ///< 0 = the system's choice
   std::uint32_t udp_send_buffer_bytes = 8u << 20;
   std::uint8_t multicast_ttl = 1;
-  std::string shm;              ///< frames in shared memory under this name; empty = off
-  std::uint32_t shm_slots = 8;  ///< a reader in place has slots - 1 frame periods for a frame
+  std::uint32_t fec_data_fragments = 48;   ///< of a group, for clients that do not say
+  std::uint32_t fec_parity_fragments = 0;  ///< likewise; 0 = no error correction
+  double fec_max_parity_frac = 0.5;        ///< parity per data fragment that a client may ask for
+  double resend_max_frac = 0.25;  ///< of a client's bytes, sent again on request; 0 = never
+  std::string shm;                ///< frames in shared memory under this name; empty = off
+  std::uint32_t shm_slots = 8;    ///< a reader in place has slots - 1 frame periods for a frame
   std::uint32_t shm_mode = 0600;
 };
 

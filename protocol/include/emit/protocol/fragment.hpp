@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -24,6 +25,9 @@ inline constexpr std::uint32_t kMaxFragmentPayloadBytes = 65472;
 enum FragmentFlags : std::uint8_t {
   kFragmentFirst = 1u << 0,  ///< begins with the frame header
   kFragmentLast = 1u << 1,   ///< ends with the frame header
+  kFragmentParity =
+      1u << 2,  ///< holds no part of the frame but of its error correction (parity.hpp)
+  kFragmentResent = 1u << 3,  ///< sent again because the receiver asked for it
 };
 
 struct FragmentHeader {
@@ -51,8 +55,9 @@ enum class FragmentStatus : std::uint8_t {
   late,          ///< of a frame that was already handed out or pushed out
   no_buffer,     ///< every buffer is held by the consumer
   too_many_streams,
+  bad_parity,  ///< of another geometry than was agreed, or none was agreed
 };
-inline constexpr std::size_t kFragmentStatusCount = 13;
+inline constexpr std::size_t kFragmentStatusCount = 14;
 [[nodiscard]] std::string_view to_string(FragmentStatus status) noexcept;
 
 /// RT-safe.
@@ -99,11 +104,20 @@ class Fragmenter {
   [[nodiscard]] std::uint32_t datagram_bytes() const noexcept {
     return payload_bytes_ + static_cast<std::uint32_t>(kFragmentHeaderBytes);
   }
+  /// Payload of every fragment but the last; of the only one.
+  [[nodiscard]] std::uint32_t payload_bytes() const noexcept {
+    return std::min(payload_bytes_, total_bytes_);
+  }
+  [[nodiscard]] const Params& params() const noexcept { return params_; }
 
   /// Writes fragment `index`'s header into `header_memory` and points at its parts; any order.
   /// Precondition: index < fragment_count().
-  [[nodiscard]] Pieces pieces(
-      std::uint32_t index, std::span<std::byte, kFragmentHeaderBytes> header_memory) const noexcept;
+  /// `more_flags`: kFragmentResent or 0.
+  [[nodiscard]] Pieces pieces(std::uint32_t index,
+                              std::span<std::byte, kFragmentHeaderBytes> header_memory,
+                              std::uint8_t more_flags = 0) const noexcept;
+  /// Payload of a fragment that consists of pixels alone, where they lie; empty for the others.
+  [[nodiscard]] std::span<const std::byte> pixels_of(std::uint32_t index) const noexcept;
 
  private:
   Params params_;

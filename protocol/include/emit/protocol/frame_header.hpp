@@ -32,6 +32,7 @@ enum FrameFlags : std::uint32_t {
   kFlagGapBefore = 1u << 9,     ///< frames in front of this one were not sent to this client
   kFlagCanned = 1u << 10,       ///< pre-rendered pixels
   kFlagTimeUnset = 1u << 11,    ///< kernel TAI offset unknown: wall instants are UTC
+  kFlagCorrupt = 1u << 15,  ///< set by a receiver: nothing is missing, but the checksum is wrong
 };
 
 struct FrameHeader {

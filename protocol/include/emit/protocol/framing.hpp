@@ -22,7 +22,8 @@ enum class RecordKind : std::uint8_t {
   control = 1,  ///< Protobuf emit.v1.ControlRecord
   frame = 2,    ///< frame header (320 bytes) + raw pixels
   host_frame =
-      3,  ///< Protobuf emit.v1.HostFrame without the envelope: no allocation at the receiver
+      3,       ///< Protobuf emit.v1.HostFrame without the envelope: no allocation at the receiver
+  resend = 4,  ///< resend.hpp: fragments that a client is missing; no allocation either
 };
 
 /// RT-safe.

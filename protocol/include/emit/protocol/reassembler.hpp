@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "emit/protocol/fragment.hpp"
+#include "emit/protocol/parity.hpp"
 
 namespace emit::protocol {
 
@@ -39,6 +41,8 @@ struct ReceivedFrame {
   bool crc_ok = false;    ///< complete and the payload CRC matches (when it was checked)
   std::uint64_t missing_px = 0;
   std::uint32_t frames_lost_before = 0;  ///< frame ids between this and the one handed out before
+  std::uint32_t repaired_fragments = 0;  ///< brought back by error correction
+  std::uint32_t resent_fragments = 0;    ///< that came because they were asked for
   std::span<const float> pixels;         ///< missing ones are 0; aligned to 64 bytes
   PixelValidity validity;
 };
@@ -53,15 +57,27 @@ struct ReassemblerCounters {
   std::uint64_t frames_lost = 0;      ///< frame ids of which no fragment arrived
   std::uint64_t missing_px = 0;
   std::uint64_t crc_mismatches = 0;
-  std::uint64_t resyncs = 0;  ///< a stream's frame ids started again
+  std::uint64_t resyncs = 0;              ///< a stream's frame ids started again
+  std::uint64_t fragments_repaired = 0;   ///< brought back by error correction
+  std::uint64_t frames_repaired = 0;      ///< complete because of that
+  std::uint64_t groups_unrepairable = 0;  ///< of frames handed out: lost more than their parity
+  std::uint64_t fragments_resent = 0;     ///< accepted ones that had been asked for
+};
+
+/// Bytes of a frame's byte stream.
+struct ByteRange {
+  std::uint32_t begin = 0;
+  std::uint32_t bytes = 0;
+  friend bool operator==(const ByteRange&, const ByteRange&) = default;
 };
 
 /// Puts frames together from fragments: lost, doubled, reordered, interleaved or corrupt ones.
 ///
 /// Frames of one stream come out in order of frame id. A frame leaves as complete when its last
-/// byte arrives, as partial when a newer frame of its stream completes, when its buffer is needed,
-/// or on flush(). Trusts nothing: every offset and length is checked before a byte is copied.
-/// Thread: one owner.  Real time: the constructor allocates, everything else is RT-safe.
+/// byte arrives or error correction brings it back, as partial when a newer frame of its stream
+/// completes, when its buffer is needed, or on flush(). Trusts nothing: every offset and length is
+/// checked before a byte is copied. Thread: one owner.  Real time: the constructor allocates,
+/// everything else is RT-safe.
 /// @code
 ///   reassembler.push(datagram);
 ///   while (const ReceivedFrame* frame = reassembler.pop()) {
@@ -77,6 +93,10 @@ class Reassembler {
     std::uint32_t max_open_per_stream = 2;  ///< newer frames push the oldest out beyond this; >= 1
     std::uint32_t max_streams = 8;
     bool check_crc = true;  ///< of complete frames
+    FecParams fec = {};     ///< as agreed with the sender; off: parity fragments are refused
+    /// A complete frame waits for older ones of its stream that may still be asked for: until they
+    /// are complete, given up, or their buffers are needed.
+    bool wait_for_missing = false;
   };
   explicit Reassembler(const Params& params);
   ~Reassembler();
@@ -107,20 +127,52 @@ class Reassembler {
   /// Finishes every frame in work as partial: the stream ended or fell silent.
   void flush() noexcept;
 
+  /// A frame of which something is missing.
+  struct OpenFrame {
+    std::uint32_t frame_id = 0;
+    std::uint64_t arrivals = 0;  ///< goes up with everything that is taken for it
+    bool end_seen = false;       ///< its last byte has arrived, or one of a newer frame
+  };
+  /// Frames of the stream in work and not complete, oldest first. Returns how many were written.
+  [[nodiscard]] std::size_t open_frames(std::uint16_t stream_id,
+                                        std::span<OpenFrame> out) const noexcept;
+  /// What is missing of one of them, front to back. Returns how many ranges were written.
+  [[nodiscard]] std::size_t missing(std::uint16_t stream_id, std::uint32_t frame_id,
+                                    std::span<ByteRange> out) const noexcept;
+  /// Hands the frame out as it is, and older ones before it.
+  void give_up(std::uint16_t stream_id, std::uint32_t frame_id) noexcept;
+
   [[nodiscard]] const ReassemblerCounters& counters() const noexcept { return counters_; }
 
  private:
   struct Slot;
   struct Stream;
 
+  /// What data and parity fragments alike say of their frame.
+  struct FrameKey {
+    std::uint16_t stream_id = 0;
+    std::uint32_t frame_id = 0;
+    std::uint32_t total_bytes = 0;
+    std::int64_t sim_time_ns = 0;
+  };
   [[nodiscard]] FragmentStatus take(const FragmentHeader& header,
                                     std::span<const std::byte> payload) noexcept;
+  [[nodiscard]] FragmentStatus take_parity(const ParityHeader& header,
+                                           std::span<const std::byte> payload) noexcept;
+  [[nodiscard]] Slot* enter(const FrameKey& key, FragmentStatus& status) noexcept;
   [[nodiscard]] Stream* stream_of(std::uint16_t stream_id) noexcept;
-  [[nodiscard]] Slot* open_slot(Stream& stream, const FragmentHeader& header,
+  [[nodiscard]] const Stream* known_stream(std::uint16_t stream_id) const noexcept;
+  [[nodiscard]] Slot* open_slot(Stream& stream, const FrameKey& key,
                                 FragmentStatus& status) noexcept;
+  [[nodiscard]] const Slot* find_open(const Stream& stream, std::uint32_t frame_id) const noexcept;
   [[nodiscard]] Slot* oldest_open(const Stream* stream) noexcept;
+  void repair(Slot& slot, std::uint32_t group) noexcept;
+  [[nodiscard]] std::uint32_t unrepaired_groups(const Slot& slot) const noexcept;
+  void complete(Slot& slot) noexcept;
   void finish(Slot& slot) noexcept;
   void finish_older(Stream& stream, std::uint32_t frame_id) noexcept;
+  void finish_complete(Stream& stream) noexcept;
+  [[nodiscard]] bool identify(Slot& slot, FrameHeader& header, bool& known) noexcept;
 
   Params params_;
   std::vector<Slot> slots_;
@@ -130,6 +182,8 @@ class Reassembler {
   std::size_t ready_count_ = 0;
   std::uint64_t arrivals_ = 0;
   Slot* newest_ = nullptr;  // of the fragment accepted last
+  std::optional<GroupDecoder> decoder_;
+  std::vector<std::byte> scratch_;  // the last fragment of a frame, filled up with zeros
   ReassemblerCounters counters_;
 };
 

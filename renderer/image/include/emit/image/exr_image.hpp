@@ -69,5 +69,7 @@ inline constexpr char kRadianceChannel[] = "radiance";        ///< W m-2 sr-1 in
 inline constexpr char kTemperatureChannel[] = "temperature";  ///< K; NaN: sky
 inline constexpr char kDepthChannel[] = "depth";              ///< m along the boresight; +Inf: sky
 inline constexpr char kObjectChannel[] = "object";            ///< id; 0: sky
+inline constexpr char kValidChannel[] =
+    "valid";  ///< 1, or 0: the pixel never arrived; absent: all did
 
 }  // namespace emit::image
