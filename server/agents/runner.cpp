@@ -53,6 +53,7 @@ void AgentRunner::stop() noexcept {
 
 int AgentRunner::turn() noexcept {
   const std::int64_t begin_ns = clock_.monotonic_ns();
+  duty_.beat(begin_ns);
   const int work = agent_.do_work(clock_.tai_ns());
   if (work != 0) {
     duty_.record(clock_.monotonic_ns() - begin_ns);
@@ -71,7 +72,11 @@ void AgentRunner::run() noexcept {
   pthread_setname_np(pthread_self(), thread_name.data());
   prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
 
+  static_cast<void>(apply_before_start(realtime_));
   const bool started = agent_.on_start();
+  if (started) {
+    static_cast<void>(apply_after_start(realtime_));
+  }
   state_.store(static_cast<int>(started ? State::running : State::failed));
   state_.notify_all();
   if (!started) {

@@ -3,9 +3,11 @@
 #include <atomic>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "agents/agent.hpp"
 #include "rt/clock.hpp"
+#include "rt/realtime.hpp"
 #include "telemetry/duty_cycle.hpp"
 
 namespace emit::server {
@@ -20,6 +22,10 @@ class AgentRunner {
   ~AgentRunner() { stop(); }
   AgentRunner(const AgentRunner&) = delete;
   AgentRunner& operator=(const AgentRunner&) = delete;
+
+  /// Before start_thread(). Stepped mode asks nothing of the host.
+  /// What the host refuses of it is left out: the daemon has asked for the same before and told.
+  void set_realtime(ThreadRealtime wish) { realtime_ = std::move(wish); }
 
   /// Starts the thread and waits for on_start. False when on_start failed; the thread is gone then.
   [[nodiscard]] bool start_thread();
@@ -40,6 +46,7 @@ class AgentRunner {
   Agent& agent_;
   const Clock& clock_;
   DutyCycle duty_;
+  ThreadRealtime realtime_;
   std::atomic<bool> stop_{false};
   enum class State : int { idle, starting, running, failed };
   std::atomic<int> state_{0};
