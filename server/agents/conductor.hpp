@@ -42,7 +42,9 @@ class Conductor final : public Agent {
   int do_work(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override;
   [[nodiscard]] int wait_fd() const noexcept override {
-    return triggers_ != nullptr ? triggers_->fd() : -1;
+    // Nobody reads it while draining, and what waits there must not wake the agent over and over.
+    return triggers_ != nullptr && !draining_.load(std::memory_order_relaxed) ? triggers_->fd()
+                                                                              : -1;
   }
 
   /// Any thread: takes no further input, finishes what is in work; then drained() is true.

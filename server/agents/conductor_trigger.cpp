@@ -10,11 +10,13 @@ namespace {
 /// what is long past, and hold up those behind it.
 constexpr std::int64_t kStalePeriods = 4;
 constexpr std::int64_t kSilencePeriods = 10;
+/// Triggers that begin no slot, such as a source gone wild, take no more of a turn than this.
+constexpr int kMostPerTurn = 64;
 
 }  // namespace
 
 void Conductor::poll_triggers(std::int64_t now_ns) noexcept {
-  while (!pending_trigger_) {
+  for (int taken = 0; taken < kMostPerTurn && !pending_trigger_; ++taken) {
     std::optional<ReceivedTrigger> received = triggers_->next();
     if (!received) {
       break;

@@ -7,6 +7,7 @@
 
 #include "agents/agent.hpp"
 #include "rt/clock.hpp"
+#include "rt/fd.hpp"
 #include "rt/realtime.hpp"
 #include "telemetry/duty_cycle.hpp"
 
@@ -15,7 +16,8 @@ namespace emit::server {
 /// Drives one agent: on a thread of its own, or stepped by the caller.
 ///
 /// A thread that finds no work sleeps in ppoll until its doorbell rings, its descriptor turns
-/// readable or its wake instant comes; it never spins, so that emitd shares small machines.
+/// readable or its wake instant comes, by an absolute timer; it never spins, so that emitd shares
+/// small machines.
 class AgentRunner {
  public:
   AgentRunner(Agent& agent, const Clock& clock) : agent_(agent), clock_(clock) {}
@@ -42,11 +44,15 @@ class AgentRunner {
   void run() noexcept;
   int turn() noexcept;
   void sleep() noexcept;
+  /// Sets the timer to a wall instant, for good until it is set anew. False: there is none.
+  [[nodiscard]] bool arm_timer(std::int64_t wake_ns) noexcept;
 
   Agent& agent_;
   const Clock& clock_;
   DutyCycle duty_;
   ThreadRealtime realtime_;
+  Fd timer_;  // on the agent's thread alone, as the next
+  std::int64_t armed_utc_ns_ = 0;
   std::atomic<bool> stop_{false};
   enum class State : int { idle, starting, running, failed };
   std::atomic<int> state_{0};

@@ -465,9 +465,9 @@ int DaemonImpl::run() {
     ::poll(&wait, 1, kHousekeepingMs);
     housekeep();
     if (const auto stuck = health_.turn(sources_.agents, clock_.monotonic_ns()); !stuck.empty()) {
-      log_->write(
-          LogLevel::error,
-          fmt::format("event=agent_stuck agent={} effect=\"a watchdog ends the daemon\"", stuck));
+      log_->write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
+                                               "watchdog, where there is one, ends the daemon\"",
+                                               stuck));
     }
     if (ptp_) {
       watch_ptp();

@@ -172,12 +172,12 @@ Result<void> LatencyProbe::sample(bool counts) {
     if (!entity_) return by_number;
     const std::optional<bool> seen = marker_.shows(frame.pixels);
     const bool by_picture = seen.has_value() && *seen == on_;
-    disagreed_ += counts && by_picture != by_number ? 1 : 0;
+    if (counts && by_picture != by_number) ++disagreed_;
     return by_picture;
   });
   if (!shown) return tl::unexpected(shown.error());
   if (*shown == nullptr) {
-    missed_ += InterruptGuard::interrupted() ? 0 : 1;
+    if (!InterruptGuard::interrupted()) ++missed_;
     return {};
   }
   if (counts) report_.add((*shown)->header, *sent, (*shown)->last_byte_ns);

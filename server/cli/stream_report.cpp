@@ -14,7 +14,7 @@ struct FlagName {
   protocol::FrameFlags flag;
   const char* name;
 };
-constexpr std::array<FlagName, 12> kFlagNames{{{protocol::kFlagLate, "late"},
+constexpr std::array<FlagName, 13> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagRepeated, "repeated"},
                                                {protocol::kFlagStale, "stale"},
                                                {protocol::kFlagDegraded, "degraded"},
@@ -25,7 +25,8 @@ constexpr std::array<FlagName, 12> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagExtrapolated, "extrapolated"},
                                                {protocol::kFlagGapBefore, "gap_before"},
                                                {protocol::kFlagCanned, "canned"},
-                                               {protocol::kFlagTimeUnset, "time_unset"}}};
+                                               {protocol::kFlagTimeUnset, "time_unset"},
+                                               {protocol::kFlagTriggerFault, "trigger_fault"}}};
 
 }  // namespace
 

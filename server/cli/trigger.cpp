@@ -49,7 +49,7 @@ int run_trigger(const TriggerCommand& command) {
     trigger.edge_ns = command.stamp ? clock.tai_ns() : 0;
     std::array<std::byte, protocol::kTriggerBytes> bytes;
     protocol::encode(trigger, bytes);
-    failed += socket->send_to(bytes, *address).status == server::IoStatus::done ? 0 : 1;
+    if (socket->send_to(bytes, *address).status != server::IoStatus::done) ++failed;
     if (command.frames != 0) progress.advance_to(trigger.number);
   }
   progress.finish();

@@ -39,7 +39,7 @@ class TriggerGate {
       result.missing = trigger.number - number_ - 1;
       // In double: numbers may skip by as much as they like.
       const double due_ns =
-          static_cast<double>(trigger.number - number_) * static_cast<double>(period_ns_);
+          static_cast<double>(trigger.number - used_number_) * static_cast<double>(period_ns_);
       result.late = static_cast<double>(since_ns) - due_ns > static_cast<double>(half_ns);
     }
     if (trigger.edge_ns != 0 && received_ns - trigger.edge_ns > half_ns) result.late = true;
@@ -47,7 +47,10 @@ class TriggerGate {
     if (started_ && since_ns >= 0 && since_ns <= half_ns) result.verdict = Verdict::too_fast;
     run_id_ = trigger.run_id;
     number_ = trigger.number;
-    if (result.verdict == Verdict::use) received_ns_ = received_ns;
+    if (result.verdict == Verdict::use) {
+      used_number_ = number_;
+      received_ns_ = received_ns;
+    }
     started_ = true;
     return result;
   }
@@ -81,6 +84,7 @@ class TriggerGate {
   bool started_ = false;
   std::uint64_t run_id_ = 0;
   std::uint64_t number_ = 0;
+  std::uint64_t used_number_ = 0;  // came at received_ns_
   std::int64_t received_ns_ = 0;
   bool open_ = false;
   std::uint64_t slot_ = 0;
