@@ -33,6 +33,7 @@ add_library(emit_server STATIC
   agents/channel_table.cpp
   agents/conductor.cpp
   agents/conductor_input.cpp
+  agents/conductor_trigger.cpp
   agents/journal_encode.cpp
   agents/receiver.cpp
   agents/receiver_session.cpp
@@ -50,14 +51,20 @@ add_library(emit_server STATIC
   app/emitd_main.cpp
   app/replay.cpp
   app/scenario_hash.cpp
+  app/service_notifier.cpp
   app/sha256.cpp
+  io/trigger_port.cpp
   io/udp_batch.cpp
   pacing/pose_track.cpp
   pacing/scenario_track.cpp
   rt/doorbell.cpp
+  rt/realtime.cpp
+  telemetry/frame_trace.cpp
   telemetry/log.cpp
   telemetry/metrics_server.cpp
   telemetry/metrics_text.cpp
+  telemetry/ptp_monitor.cpp
+  telemetry/ptp_status.cpp
   telemetry/status_board.cpp)
 add_library(emit::server ALIAS emit_server)
 # g++ 12 sees null pointers inside Boost: in Asio's scheduler, in Beast and below its JSON reader.

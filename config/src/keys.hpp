@@ -95,6 +95,9 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<DaemonHead>& daemon_head_keys();
 [[nodiscard]] const KeyTable<SourceConfig>& source_keys();
 [[nodiscard]] const KeyTable<PacingConfig>& pacing_keys();
+[[nodiscard]] const KeyTable<TriggerConfig>& trigger_keys();
+[[nodiscard]] const KeyTable<ClockConfig>& clock_keys();
+[[nodiscard]] const KeyTable<RealtimeConfig>& realtime_keys();
 [[nodiscard]] const KeyTable<HostConfig>& host_keys();
 [[nodiscard]] const KeyTable<ControlConfig>& control_keys();
 [[nodiscard]] const KeyTable<StreamConfig>& stream_keys();

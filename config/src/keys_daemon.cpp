@@ -38,21 +38,76 @@ const KeyTable<PacingConfig>& pacing_keys() {
       choice<PacingConfig>(
           "mode",
           std::vector<std::pair<std::string, PacingMode>>{{"host-step", PacingMode::host_step},
-                                                          {"ig-clock", PacingMode::ig_clock}},
+                                                          {"ig-clock", PacingMode::ig_clock},
+                                                          {"trigger", PacingMode::trigger}},
           EMIT_FIELD(mode),
-          "host-step: pose k triggers frame k. ig-clock: own period, newest pose."),
-      number<PacingConfig>("rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
-                           "Frame rate of ig-clock."),
-      nanoseconds<PacingConfig>("budget_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(budget_ns),
-                                "host-step: deadline after the pose arrived; 0: none. Frames shed "
-                                "quality to meet it (thermal.method cached)."),
+          "host-step: pose k triggers frame k. ig-clock: own period, newest pose. trigger: a "
+          "datagram of a sync source starts the frame, newest pose."),
+      number<PacingConfig>(
+          "rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
+          "ig-clock: frame rate. trigger: the rate that the source is set to, for telling "
+          "late and spurious triggers."),
+      nanoseconds<PacingConfig>(
+          "budget_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(budget_ns),
+          "host-step: deadline after the pose arrived; 0: none. trigger: after "
+          "the trigger; 0: one period. Frames shed "
+          "quality to meet it (thermal.method cached)."),
       nanoseconds<PacingConfig>("horizon_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(horizon_ns),
                                 "Poses are extrapolated this far at most; then the frame is "
                                 "flagged stale."),
-      nanoseconds<PacingConfig>("display_delay_ms", "ms", 1e6, between(0, 60000),
-                                EMIT_FIELD(display_delay_ns),
-                                "ig-clock: poses are predicted to the start of the slot plus this; "
-                                "at most horizon_ms."),
+      nanoseconds<PacingConfig>(
+          "display_delay_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(display_delay_ns),
+          "ig-clock, trigger: poses are predicted to the start of the slot plus this; "
+          "at most horizon_ms."),
+  };
+  return keys;
+}
+
+const KeyTable<TriggerConfig>& trigger_keys() {
+  static const KeyTable<TriggerConfig> keys = {
+      text<TriggerConfig>("udp", EMIT_FIELD(udp),
+                          "`address:port` for trigger datagrams; opened by `pacing.mode = "
+                          "\"trigger\"` alone. Beyond loopback it needs `peer`."),
+      text<TriggerConfig>("peer", EMIT_FIELD(peer),
+                          "Numeric address of the sync source: triggers of others are refused. "
+                          "Empty: any, on loopback only."),
+  };
+  return keys;
+}
+
+const KeyTable<ClockConfig>& clock_keys() {
+  static const KeyTable<ClockConfig> keys = {
+      path<ClockConfig>("ptp_socket", EMIT_FIELD(ptp_socket),
+                        "Management socket of linuxptp's ptp4l, whose state then shows in "
+                        "/metrics: `/var/run/ptp4lro`; absent: off."),
+      integer<ClockConfig>("ptp_domain", "", 0, 127, EMIT_FIELD(ptp_domain),
+                           "PTP domain of that ptp4l."),
+  };
+  return keys;
+}
+
+const KeyTable<RealtimeConfig>& realtime_keys() {
+  static const KeyTable<RealtimeConfig> keys = {
+      choice<RealtimeConfig>("scheduler",
+                             std::vector<std::pair<std::string, SchedulerKind>>{
+                                 {"other", SchedulerKind::other}, {"fifo", SchedulerKind::fifo}},
+                             EMIT_FIELD(scheduler),
+                             "fifo: conductor, receiver, sender and render run as real-time "
+                             "threads (SCHED_FIFO). Needs LimitRTPRIO."),
+      integer<RealtimeConfig>("priority", "", 4, 99, EMIT_FIELD(priority),
+                              "fifo: priority of the conductor; receiver, sender and render have "
+                              "1, 2 and 3 less."),
+      text<RealtimeConfig>("cpus", EMIT_FIELD(cpus),
+                           "Cores of agents, such as `conductor=2, receiver=2, sender=3, "
+                           "render=4-7`; those not named run anywhere."),
+      boolean<RealtimeConfig>("lock_memory", EMIT_FIELD(lock_memory),
+                              "Lock all memory and touch stacks and heap at start: no page faults "
+                              "later. Needs LimitMEMLOCK=infinity."),
+      integer<RealtimeConfig>("heap_touch_mib", "MiB", 0, 65536, EMIT_FIELD(heap_touch_mib),
+                              "lock_memory: heap touched at start and kept."),
+      boolean<RealtimeConfig>("required", EMIT_FIELD(required),
+                              "true: what the host refuses of this section ends the start with an "
+                              "error; false: it is warned of and shows in /metrics."),
   };
   return keys;
 }

@@ -70,7 +70,7 @@ void resolve_daemon_scenario(const Node& root, const std::string& text, DaemonCo
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
   Diagnostics reported_before;  // section() reported wrong kinds already
   const Node& pacing = section(root, "pacing", reported_before);
-  if (daemon.pacing.mode == PacingMode::ig_clock &&
+  if (daemon.pacing.mode != PacingMode::host_step &&
       daemon.pacing.display_delay_ns > daemon.pacing.horizon_ns) {
     diagnostics.add(key_location(pacing, "display_delay_ms"),
                     fmt::format("'display_delay_ms' ({}) is beyond 'horizon_ms' ({}): every frame "
@@ -86,6 +86,12 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
                     fmt::format("'shm' is '{}', must be 1 to 64 letters, digits, '_', '-' or '.', "
                                 "beginning with a letter or digit",
                                 daemon.stream.shm));
+  }
+  check_endpoint(section(root, "trigger", reported_before), "udp", daemon.trigger.udp, false,
+                 diagnostics);
+  if (const auto cpus = parse_agent_cpus(daemon.realtime.cpus); !cpus) {
+    diagnostics.add(key_location(section(root, "realtime", reported_before), "cpus"),
+                    cpus.error().text);
   }
   check_endpoint(section(root, "metrics", reported_before), "listen", daemon.metrics.listen, true,
                  diagnostics);
@@ -133,6 +139,9 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   read_table(root, daemon_head_keys(), head, diagnostics, names);
   read_table(section(root, "source", diagnostics), source_keys(), daemon.source, diagnostics);
   read_table(section(root, "pacing", diagnostics), pacing_keys(), daemon.pacing, diagnostics);
+  read_table(section(root, "trigger", diagnostics), trigger_keys(), daemon.trigger, diagnostics);
+  read_table(section(root, "clock", diagnostics), clock_keys(), daemon.clock, diagnostics);
+  read_table(section(root, "realtime", diagnostics), realtime_keys(), daemon.realtime, diagnostics);
   read_table(section(root, "host", diagnostics), host_keys(), daemon.host, diagnostics);
   read_table(section(root, "control", diagnostics), control_keys(), daemon.control, diagnostics);
   read_table(section(root, "stream", diagnostics), stream_keys(), daemon.stream, diagnostics);

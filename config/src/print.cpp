@@ -122,6 +122,9 @@ std::string print_daemon(const DaemonConfig& daemon) {
   write_table(DaemonHead{daemon.scenario.string()}, daemon_head_keys(), out);
   print_section("[source]", daemon.source, source_keys(), out);
   print_section("[pacing]", daemon.pacing, pacing_keys(), out);
+  print_section("[trigger]", daemon.trigger, trigger_keys(), out);
+  print_section("[clock]", daemon.clock, clock_keys(), out);
+  print_section("[realtime]", daemon.realtime, realtime_keys(), out);
   print_section("[host]", daemon.host, host_keys(), out);
   print_section("[control]", daemon.control, control_keys(), out);
   print_section("[stream]", daemon.stream, stream_keys(), out);

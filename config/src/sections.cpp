@@ -62,6 +62,13 @@ const std::vector<SectionDoc>& daemon_sections() {
       section_doc("", false, "Above the first section.", daemon_head_keys(), DaemonHead{}),
       section_doc("source", false, "Where the frames come from.", source_keys(), SourceConfig{}),
       section_doc("pacing", false, "When a frame is due.", pacing_keys(), PacingConfig{}),
+      section_doc("trigger", false, "The external sync source of `pacing.mode = \"trigger\"`.",
+                  trigger_keys(), TriggerConfig{}),
+      section_doc("clock", false, "What disciplines the clock.", clock_keys(), ClockConfig{}),
+      section_doc("realtime", false,
+                  "What the agents ask of the host; `deploy/scripts/check_host.sh` tells what it "
+                  "would refuse.",
+                  realtime_keys(), RealtimeConfig{}),
       section_doc("host", false, "Poses in.", host_keys(), HostConfig{}),
       section_doc("control", false, "The TCP port for everything but datagrams.", control_keys(),
                   ControlConfig{}),

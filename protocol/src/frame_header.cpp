@@ -15,7 +15,7 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-// Offsets of docs/wire.md. kReservedAt..kCrcAt is zero.
+// Offsets of docs/wire.md. kReservedAt..kPreviousJitterAt and kReservedBehindAt..kCrcAt are zero.
 enum Offset : std::size_t {
   kMagicAt = 0,
   kVersionAt = 4,
@@ -52,6 +52,13 @@ enum Offset : std::size_t {
   kQuaternionAt = 192,
   kQualityRungAt = 224,
   kReservedAt = 225,
+  kPreviousJitterAt = 232,
+  kSlotBeginAt = 240,
+  kTriggerNumberAt = 248,
+  kPredictionErrorMAt = 256,
+  kPredictionErrorRadAt = 260,
+  kPredictionsAt = 264,
+  kReservedBehindAt = 268,
   kCrcAt = 316,
 };
 static_assert(kCrcAt + 4 == kFrameHeaderBytes);
@@ -137,7 +144,14 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kQuaternionAt + 16, attitude.y);
   wire::put(to, kQuaternionAt + 24, attitude.z);
   wire::put(to, kQualityRungAt, header.quality_rung);
-  std::ranges::fill(to.subspan(kReservedAt, kCrcAt - kReservedAt), std::byte{0});
+  std::ranges::fill(to.subspan(kReservedAt, kPreviousJitterAt - kReservedAt), std::byte{0});
+  wire::put(to, kPreviousJitterAt, header.previous_jitter_ns);
+  wire::put(to, kSlotBeginAt, header.slot_begin_ns);
+  wire::put(to, kTriggerNumberAt, header.trigger_number);
+  wire::put(to, kPredictionErrorMAt, header.prediction_error_m);
+  wire::put(to, kPredictionErrorRadAt, header.prediction_error_rad);
+  wire::put(to, kPredictionsAt, header.predictions);
+  std::ranges::fill(to.subspan(kReservedBehindAt, kCrcAt - kReservedBehindAt), std::byte{0});
   wire::put(to, kCrcAt, crc32c(to.first(kCrcAt)));
 }
 
@@ -196,6 +210,12 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
       wire::get<double>(bytes, kQuaternionAt), wire::get<double>(bytes, kQuaternionAt + 8),
       wire::get<double>(bytes, kQuaternionAt + 16), wire::get<double>(bytes, kQuaternionAt + 24)};
   header.quality_rung = wire::get<std::uint8_t>(bytes, kQualityRungAt);
+  header.previous_jitter_ns = wire::get<std::int64_t>(bytes, kPreviousJitterAt);
+  header.slot_begin_ns = wire::get<std::int64_t>(bytes, kSlotBeginAt);
+  header.trigger_number = wire::get<std::uint64_t>(bytes, kTriggerNumberAt);
+  header.prediction_error_m = wire::get<float>(bytes, kPredictionErrorMAt);
+  header.prediction_error_rad = wire::get<float>(bytes, kPredictionErrorRadAt);
+  header.predictions = wire::get<std::uint32_t>(bytes, kPredictionsAt);
 
   const std::uint64_t expected = expected_payload_bytes(header.width_px, header.height_px);
   return expected == 0 || header.payload_bytes != expected ? HeaderFault::payload_size

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "agents/canned_marker.hpp"
 #include "agents/frame_source.hpp"
 #include "agents/messages.hpp"
 #include "emit/image/exr_image.hpp"
@@ -18,12 +19,17 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-/// Shows image (frame number - 1) mod count; a slot is a ticket for it, so that the slot rules of a
-/// real renderer apply here as well.
+/// Shows image (frame number - 1) mod count, of a second set while the marker entity is on; a slot
+/// is a ticket for it, so that the slot rules of a real renderer apply here as well.
 class CannedSource final : public FrameSource {
  public:
-  CannedSource(std::vector<std::vector<float>> images, SourceInfo info)
-      : images_(std::move(images)), info_(std::move(info)), views_(info_.slots) {
+  /// `marked`: as many as `images`, or none.
+  CannedSource(std::vector<std::vector<float>> images, std::vector<std::vector<float>> marked,
+               SourceInfo info)
+      : images_(std::move(images)),
+        marked_(std::move(marked)),
+        info_(std::move(info)),
+        views_(info_.slots) {
     for (auto& view : views_) {
       view.radiance_w_m2_sr.resize(info_.planes);
       view.width_px = info_.width_px;
@@ -33,10 +39,15 @@ class CannedSource final : public FrameSource {
 
   std::size_t apply_entities(std::int64_t /*sim_time_ns*/,
                              std::span<const renderer::EntityUpdate> updates) noexcept override {
+    for (const renderer::EntityUpdate& update : updates) {
+      if (update.entity_id == kCannedMarkerEntity) {
+        marker_on_ = update.on;
+      }
+    }
     return updates.size();
   }
   bool apply_weather(const scene::WeatherSample& /*sample*/) noexcept override { return true; }
-  void reset() noexcept override {}
+  void reset() noexcept override { marker_on_ = false; }
 
   int submit(const renderer::FrameRequest& request) noexcept override {
     for (std::size_t slot = 0; slot < views_.size(); ++slot) {
@@ -50,8 +61,9 @@ class CannedSource final : public FrameSource {
       view.sensor_pose = request.sensor_pose;
       const std::size_t image =
           static_cast<std::size_t>((request.frame_number + images_.size() - 1) % images_.size());
-      std::fill(view.radiance_w_m2_sr.begin(), view.radiance_w_m2_sr.end(),
-                std::span<const float>(images_[image]));
+      std::fill(
+          view.radiance_w_m2_sr.begin(), view.radiance_w_m2_sr.end(),
+          std::span<const float>(marker_on_ && !marked_.empty() ? marked_[image] : images_[image]));
       return static_cast<int>(slot);
     }
     return -1;
@@ -67,10 +79,21 @@ class CannedSource final : public FrameSource {
 
  private:
   std::vector<std::vector<float>> images_;
+  std::vector<std::vector<float>> marked_;
+  bool marker_on_ = false;
   SourceInfo info_;
   std::vector<renderer::FrameView> views_;
   std::array<std::atomic<bool>, kMaxSlots> used_{};
 };
+
+void paint_marker(const config::SourceConfig& source, std::vector<float>& image) {
+  const std::size_t rows = (source.canned_height_px + 7) / 8;
+  const std::size_t columns = (source.canned_width_px + 7) / 8;
+  for (std::size_t row = 0; row < rows; ++row) {
+    std::fill_n(image.begin() + static_cast<std::ptrdiff_t>(row * source.canned_width_px), columns,
+                kCannedMarkerRadiance);
+  }
+}
 
 physics::Result<std::vector<std::vector<float>>> load_folder(const std::filesystem::path& folder,
                                                              SourceInfo& info) {
@@ -154,14 +177,20 @@ physics::Result<std::unique_ptr<FrameSource>> make_canned_source(const config::S
     info.width_px = source.canned_width_px;
     info.height_px = source.canned_height_px;
     info.device = "canned: test pattern";
-    return std::make_unique<CannedSource>(canned_pattern(source), std::move(info));
+    auto images = canned_pattern(source);
+    auto marked = images;
+    for (auto& image : marked) {
+      paint_marker(source, image);
+    }
+    return std::make_unique<CannedSource>(std::move(images), std::move(marked), std::move(info));
   }
   auto images = load_folder(source.canned_dir, info);
   if (!images) {
     return tl::unexpected<physics::Error>(std::move(images.error()));
   }
   info.device = "canned: " + source.canned_dir.string();
-  return std::make_unique<CannedSource>(std::move(*images), std::move(info));
+  return std::make_unique<CannedSource>(std::move(*images), std::vector<std::vector<float>>{},
+                                        std::move(info));
 }
 
 }  // namespace emit::server

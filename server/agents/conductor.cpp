@@ -8,13 +8,16 @@ namespace emit::server {
 
 using protocol::FrameHeader;
 
-Conductor::Conductor(Context& context, const ScenarioTracks& scenario, const Options& options)
+Conductor::Conductor(Context& context, const ScenarioTracks& scenario, const Options& options,
+                     TriggerInput* triggers)
     : Agent(context.bells.conductor),
       context_(context),
       scenario_(scenario),
       options_(options),
       journal_(context.journal, context.journal_handed_over),
       clock_(options.pacing.rate_hz),
+      triggers_(triggers),
+      trigger_(options.pacing.rate_hz, options.pacing.budget_ns),
       issued_(kMaxIssued) {
   entities_.reserve(kMaxTracked);
   touched_.reserve(kMaxTracked);
@@ -26,12 +29,29 @@ bool Conductor::on_start() noexcept {
 }
 
 std::int64_t Conductor::wake_at_ns() const noexcept {
+  if (triggered()) {
+    return trigger_wake_at_ns();
+  }
   return ig_clock() && clock_started_ && !draining_.load(std::memory_order_relaxed)
              ? clock_.end_ns()
              : kNeverNs;
 }
 
+std::int64_t Conductor::slot_end_ns() const noexcept {
+  if (ig_clock()) {
+    return clock_started_ ? clock_.end_ns() : kNeverNs;
+  }
+  if (!trigger_.is_open()) {
+    return kNeverNs;
+  }
+  return pending_trigger_ ? std::min(trigger_.end_ns(), pending_trigger_->received_ns)
+                          : trigger_.end_ns();
+}
+
 int Conductor::do_work(std::int64_t now_ns) noexcept {
+  if (triggered() && !draining_.load(std::memory_order_acquire)) {
+    poll_triggers(now_ns);
+  }
   int work = take_images_and_slots(now_ns);
   if (draining_.load(std::memory_order_acquire)) {
     if (issued_count_ == 0) {
@@ -46,6 +66,10 @@ int Conductor::do_work(std::int64_t now_ns) noexcept {
     begin_slot();
     ++work;
   }
+  // Behind the inputs: the frame shows the newest pose that is there.
+  if (triggered() && begin_triggered_slot()) {
+    ++work;
+  }
   return work;
 }
 
@@ -56,6 +80,7 @@ void Conductor::start_run(std::int64_t now_ns) noexcept {
   control_.new_run();
   weather_count_ = 0;
   seeker_.clear();
+  prediction_.clear();
   entities_.clear();
   touched_.clear();
   next_entity_ = 0;
@@ -144,12 +169,18 @@ void Conductor::issue_host_step(bool is_step, std::int64_t received_ns) noexcept
   issue(job, issued, is_step);
 }
 
-void Conductor::issue_ig_clock() noexcept {
+void Conductor::issue_slotted() noexcept {
   RenderJob& job = context_.jobs.claim_reserved();
   Issued& issued = next_issued();
   job.kind = RenderJob::Kind::frame;
   job.entity_count = 0;
-  issued.header.deadline_ns = clock_.end_ns();
+  issued.header.deadline_ns = slot_deadline_ns();
+  issued.header.slot_begin_ns = slot_begin_ns();
+  if (triggered()) {
+    issued.header.trigger_number = trigger_.slot_number();
+    issued.header.flags |= trigger_fault_ ? protocol::kFlagTriggerFault : 0U;
+    trigger_fault_ = false;
+  }
   issued.header.host_received_ns = host_received_ns_;
   if (!have_host_frame_) {
     // Until the host speaks: the scenario's own start, and the frame says that nobody steers it.
@@ -157,7 +188,7 @@ void Conductor::issue_ig_clock() noexcept {
     job.request.sensor_pose = scenario_.sensor_at(0);
     issued.header.flags |= protocol::kFlagStale;
   } else {
-    const std::int64_t display_ns = clock_.begin_ns() + options_.pacing.display_delay_ns;
+    const std::int64_t display_ns = slot_begin_ns() + options_.pacing.display_delay_ns;
     // No overflow: host times stay within protocol::kMaxSimTimeNs, 1e18, and the instant between
     // two wall clocks that both count from 1970 below 8e18 until the year 2220.
     std::int64_t wanted_ns = host_sim_time_ns_ + (display_ns - host_received_ns_);
@@ -168,6 +199,9 @@ void Conductor::issue_ig_clock() noexcept {
     const PoseSample sample = seeker_.sample(wanted_ns, options_.pacing.horizon_ns);
     job.request.sim_time_ns = sample.shown_ns;
     job.request.sensor_pose = sample.pose;
+    if (sample.extrapolated) {
+      prediction_.predicted(sample.shown_ns, sample.pose);
+    }
     issued.header.pose_sim_time_ns = sample.newest_ns;
     issued.header.flags |= (sample.extrapolated ? protocol::kFlagExtrapolated : 0U) |
                            (sample.stale ? protocol::kFlagStale : 0U);
@@ -194,6 +228,9 @@ void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
   header.host_frame_number = host_frame_number_;
   header.sim_time_ns = job.request.sim_time_ns;
   header.pose = job.request.sensor_pose;
+  header.prediction_error_m = static_cast<float>(prediction_.latest().position_m);
+  header.prediction_error_rad = static_cast<float>(prediction_.latest().attitude_rad);
+  header.predictions = prediction_.measured();
   header.flags |= (control_.held() ? protocol::kFlagHold : 0U) |
                   (options_.canned ? protocol::kFlagCanned : 0U) |
                   (options_.tai_unset ? protocol::kFlagTimeUnset : 0U);
@@ -210,16 +247,18 @@ void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
 }
 
 void Conductor::begin_slot() noexcept {
-  slots_.begin(clock_.slot(), control_.running() || control_.step_pending());
+  slots_.begin(triggered() ? trigger_.slot() : clock_.slot(),
+               control_.running() || control_.step_pending());
   if (slots_.may_issue() && can_issue()) {
-    issue_ig_clock();
+    issue_slotted();
   }
 }
 
 int Conductor::take_images_and_slots(std::int64_t now_ns) noexcept {
   int work = 0;
-  const bool slots_run = ig_clock() && clock_started_ && !draining_.load(std::memory_order_acquire);
-  if (slots_run && clock_.must_restart(now_ns)) {
+  const bool slots_run =
+      slotted() && (triggered() || clock_started_) && !draining_.load(std::memory_order_acquire);
+  if (slots_run && ig_clock() && clock_.must_restart(now_ns)) {
     clock_.start(now_ns);
     context_.conductor_events.push(EventKind::slots_missed, 0);
   }
@@ -227,8 +266,8 @@ int Conductor::take_images_and_slots(std::int64_t now_ns) noexcept {
   constexpr int kMaxPerTurn = 32;
   while (work < kMaxPerTurn) {
     const RenderDone* done = context_.done.front();
-    const bool slot_ended = slots_run && now_ns >= clock_.end_ns();
-    if (slot_ended && (done == nullptr || done->readback_end_ns > clock_.end_ns())) {
+    const bool slot_ended = slots_run && now_ns >= slot_end_ns();
+    if (slot_ended && (done == nullptr || done->readback_end_ns > slot_end_ns())) {
       if (!end_slot(now_ns)) {
         break;
       }
@@ -260,6 +299,10 @@ bool Conductor::end_slot(std::int64_t now_ns) noexcept {
         return false;
       }
       break;
+  }
+  if (triggered()) {
+    trigger_.close();
+    return true;  // the next slot begins with its trigger
   }
   const std::uint64_t missed = clock_.advance(now_ns);
   if (missed > 0) {
@@ -303,8 +346,10 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
     header.flags |= protocol::kFlagDegraded;
     header.estimated_error_k = std::numeric_limits<float>::infinity();
   }
-  const bool late =
-      ig_clock() ? slots_.finished() : host_step_is_late(header.deadline_ns, done.readback_end_ns);
+  bool late = slotted() && slots_.finished();
+  if (!ig_clock()) {
+    late = late || is_past_deadline(header.deadline_ns, done.readback_end_ns);
+  }
   if (late) {
     header.flags |= protocol::kFlagLate;
   }
@@ -332,7 +377,9 @@ bool Conductor::publish_repeat(std::int64_t now_ns) noexcept {
   frame->image = {};
   frame->header = shown_;
   frame->header.frame_number = ++frame_number_;
-  frame->header.deadline_ns = clock_.end_ns();
+  frame->header.deadline_ns = slot_deadline_ns();
+  frame->header.slot_begin_ns = slot_begin_ns();
+  frame->header.trigger_number = triggered() ? trigger_.slot_number() : 0;
   frame->header.flags =
       (shown_.flags & ~std::uint32_t{protocol::kFlagLate}) | protocol::kFlagRepeated;
   const FrameHeader header = frame->header;
@@ -361,6 +408,9 @@ void Conductor::record_times(const FrameHeader& header) noexcept {
   FrameTimes& times = context_.times;
   if (header.host_received_ns != 0) {
     times.wait.record(header.render_start_ns - header.host_received_ns);
+    if (header.slot_begin_ns != 0) {
+      times.sampling.record(header.slot_begin_ns - header.host_received_ns);
+    }
   }
   times.render.record(header.render_end_ns - header.render_start_ns);
   times.readback.record(header.readback_end_ns - header.render_end_ns);
@@ -381,6 +431,8 @@ void Conductor::journal_frame(const FrameHeader& header, const Issued* issued,
   line.quality_rung = header.quality_rung;
   line.radiance_crc32c = shown_crc_;
   line.rendered = issued != nullptr;
+  line.trigger_number = header.trigger_number;
+  line.slot_begin_ns = header.slot_begin_ns;
   line.entity_count = issued != nullptr ? issued->entity_count : 0;
   const std::span<const renderer::EntityUpdate> entities =
       issued != nullptr

@@ -2,18 +2,22 @@
 #pragma once
 #include <array>
 #include <atomic>
+#include <optional>
 #include <vector>
 
 #include "agents/agent.hpp"
 #include "agents/journal_ring.hpp"
 #include "app/context.hpp"
 #include "emit/config/daemon_config.hpp"
+#include "io/trigger_port.hpp"
 #include "pacing/deadline_policy.hpp"
 #include "pacing/ig_clock.hpp"
 #include "pacing/input_gate.hpp"
 #include "pacing/pose_track.hpp"
+#include "pacing/prediction_check.hpp"
 #include "pacing/run_control.hpp"
 #include "pacing/scenario_track.hpp"
+#include "pacing/trigger_gate.hpp"
 
 namespace emit::server {
 
@@ -29,12 +33,19 @@ class Conductor final : public Agent {
     bool canned = false;
     bool tai_unset = false;
   };
-  Conductor(Context& context, const ScenarioTracks& scenario, const Options& options);
+  /// `triggers`: of pacing mode trigger, which needs them; read on the agent's thread.
+  Conductor(Context& context, const ScenarioTracks& scenario, const Options& options,
+            TriggerInput* triggers = nullptr);
 
   [[nodiscard]] std::string_view name() const noexcept override { return "conductor"; }
   [[nodiscard]] bool on_start() noexcept override;
   int do_work(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override;
+  [[nodiscard]] int wait_fd() const noexcept override {
+    // Nobody reads it while draining, and what waits there must not wake the agent over and over.
+    return triggers_ != nullptr && !draining_.load(std::memory_order_relaxed) ? triggers_->fd()
+                                                                              : -1;
+  }
 
   /// Any thread: takes no further input, finishes what is in work; then drained() is true.
   void drain() noexcept { draining_.store(true, std::memory_order_release); }
@@ -63,6 +74,9 @@ class Conductor final : public Agent {
   [[nodiscard]] bool ig_clock() const noexcept {
     return options_.pacing.mode == config::PacingMode::ig_clock;
   }
+  [[nodiscard]] bool triggered() const noexcept { return triggers_ != nullptr; }
+  /// Frames belong to slots, not to poses.
+  [[nodiscard]] bool slotted() const noexcept { return ig_clock() || triggered(); }
 
   // Inputs (conductor_input.cpp).
   int take_inputs(std::int64_t now_ns) noexcept;
@@ -87,13 +101,22 @@ class Conductor final : public Agent {
   [[nodiscard]] bool reset_run(std::int64_t now_ns) noexcept;
   /// `received_ns`: when what asked for the frame came; its deadline counts from there.
   void issue_host_step(bool is_step, std::int64_t received_ns) noexcept;
-  void issue_ig_clock() noexcept;
+  void issue_slotted() noexcept;
   void issue(RenderJob& job, Issued& issued, bool is_step) noexcept;
   [[nodiscard]] Issued& next_issued() noexcept;
   /// `base_ns`: time stamp of the received pose that `pose` starts from (PoseSample).
   void add_update(RenderJob& job, Entity& entity, const physics::Pose& pose,
                   std::int64_t base_ns) noexcept;
   void begin_slot() noexcept;
+  [[nodiscard]] std::int64_t slot_begin_ns() const noexcept {
+    return triggered() ? trigger_.begin_ns() : clock_.begin_ns();
+  }
+  /// When the slot's frame is due.
+  [[nodiscard]] std::int64_t slot_deadline_ns() const noexcept {
+    return triggered() ? trigger_.end_ns() : clock_.end_ns();
+  }
+  /// When the slot under way is over as far as is known now; kNeverNs without one.
+  [[nodiscard]] std::int64_t slot_end_ns() const noexcept;
   [[nodiscard]] bool can_issue() noexcept;
   int take_images_and_slots(std::int64_t now_ns) noexcept;
   bool end_slot(std::int64_t now_ns) noexcept;
@@ -103,6 +126,12 @@ class Conductor final : public Agent {
                      std::int64_t now_ns) noexcept;
   void count_flags(std::uint32_t flags) noexcept;
   void record_times(const protocol::FrameHeader& header) noexcept;
+
+  // Pacing mode trigger (conductor_trigger.cpp).
+  void poll_triggers(std::int64_t now_ns) noexcept;
+  bool begin_triggered_slot() noexcept;
+  void watch_silence(std::int64_t now_ns) noexcept;
+  [[nodiscard]] std::int64_t trigger_wake_at_ns() const noexcept;
 
   Context& context_;
   const ScenarioTracks& scenario_;
@@ -115,7 +144,14 @@ class Conductor final : public Agent {
   SlotPolicy slots_;
   bool clock_started_ = false;
 
+  TriggerInput* triggers_;
+  TriggerGate trigger_;
+  std::optional<ReceivedTrigger> pending_trigger_;  // passed the gate, its slot has not begun
+  bool trigger_fault_ = false;                      // to be flagged on the next frame issued
+  bool trigger_silent_ = false;
+
   PoseTrack seeker_;
+  PredictionCheck prediction_;
   std::vector<Entity> entities_;  // reserved at start, sorted by id
   bool have_host_frame_ = false;
   std::uint64_t host_frame_number_ = 0;

@@ -47,9 +47,9 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
     refuse(input.origin, StatusCode::not_allowed, frame.frame_number, kDetailOldRun);
     return true;
   }
-  // In lock step each input becomes a frame. On a clock of its own emitd takes inputs at any time,
+  // In lock step each input becomes a frame. With slots emitd takes inputs at any time,
   // so that the newest pose known is the newest that came.
-  if (!ig_clock() && !can_issue() && !reset_pending_) {
+  if (!slotted() && !can_issue() && !reset_pending_) {
     return false;
   }
   if (gate.verdict == GateVerdict::new_epoch) {
@@ -67,7 +67,7 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   }
   remember(frame);
   journal_host_frame(frame, now_ns);
-  if (!ig_clock()) {
+  if (!slotted()) {
     if (control_.running()) {
       issue_host_step(false, frame.received_ns);
     } else {
@@ -83,6 +83,9 @@ void Conductor::remember(const HostFrameData& frame) noexcept {
   host_sim_time_ns_ = frame.sim_time_ns;
   host_received_ns_ = frame.received_ns;
   seeker_.push({frame.sim_time_ns, frame.seeker, frame.seeker_rates, false});
+  prediction_.compare(seeker_, [this](const PredictionError& error) {
+    context_.prediction.record(error.position_m, error.attitude_rad);
+  });
   for (const EntityStateData& state : frame.entity_span()) {
     remember_entity(state, frame.sim_time_ns);
   }
@@ -115,7 +118,7 @@ void Conductor::remember_entity(const EntityStateData& state, std::int64_t sim_t
     constexpr bool kNoMotionBefore = true;
     body.track.push({sim_time_ns, pose, std::nullopt, kNoMotionBefore});
   }
-  if (!body.touched && !ig_clock()) {
+  if (!body.touched && !slotted()) {
     body.touched = true;
     touched_.push_back(body.id);
   }
@@ -176,7 +179,7 @@ Conductor::Entity* Conductor::entity(std::uint32_t id) noexcept {
 
 bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexcept {
   const CommandKind command = input.command;
-  const bool immediate_step = command == CommandKind::step && !ig_clock();
+  const bool immediate_step = command == CommandKind::step && !slotted();
   if (immediate_step && have_host_frame_ && !can_issue()) {
     return false;
   }
@@ -198,6 +201,7 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
   context_.bells.recorder.ring();
   if (command == CommandKind::reset) {
     gate_.reset();
+    trigger_.forget_source();
     static_cast<void>(reset_run(now_ns));  // room and idleness were checked above
   } else if (immediate_step) {
     // The pose may be old; the frame was asked for now.

@@ -62,10 +62,10 @@ class FrameSource {
 /// Called once, on the thread that will own the source (a GL context is bound to its thread).
 using FrameSourceFactory = std::function<physics::Result<std::unique_ptr<FrameSource>>()>;
 
-/// Frames of emit::renderer.
+/// Frames of emit::renderer. `progress` is told how far the warm-up is.
 [[nodiscard]] physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
-    const renderer::OutputOptions& output);
+    const renderer::OutputOptions& output, const renderer::WarmUpProgress& progress = {});
 
 /// The images of make_canned_source() where `canned_dir` is empty: frame k shows the one at
 /// (k - 1) modulo their number.

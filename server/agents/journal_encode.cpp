@@ -70,6 +70,8 @@ bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
   out.set_quality_rung(line.quality_rung);
   out.set_radiance_crc32c(line.radiance_crc32c);
   out.set_rendered(line.rendered);
+  out.set_trigger_number(line.trigger_number);
+  out.set_slot_begin_ns(line.slot_begin_ns);
   for (std::uint32_t i = 0; i < line.entity_count; ++i) {
     protocol::EntityStateData state;
     state.entity_id = entities[i].entity_id;

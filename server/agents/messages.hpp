@@ -143,6 +143,7 @@ enum class EventKind : std::uint8_t {
   slots_missed,     ///< a = how many
   weather_lost,     ///< a = sim time of the sample, ns
   poses_dropped,    ///< a = how many
+  trigger_silent,   ///< a = number of the last one
 };
 
 /// any agent -> housekeeping: what happened, as numbers; the text is put together there.

@@ -40,7 +40,7 @@ class RendererSource final : public FrameSource {
 
 physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
-    const renderer::OutputOptions& output) {
+    const renderer::OutputOptions& output, const renderer::WarmUpProgress& progress) {
   auto renderer = renderer::Renderer::create(scenario, device, output);
   if (!renderer) {
     return tl::unexpected<physics::Error>(std::move(renderer.error()));
@@ -48,7 +48,7 @@ physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
   // The first frame shall be as fast as the thousandth.
   renderer::FrameRequest first;
   first.sensor_pose = (*renderer)->scenario_sensor_pose_at(0);
-  if (auto warm = (*renderer)->warm_up(first); !warm) {
+  if (auto warm = (*renderer)->warm_up(first, progress); !warm) {
     return tl::unexpected<physics::Error>(std::move(warm.error()));
   }
   SourceInfo info;

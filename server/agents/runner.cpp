@@ -4,6 +4,8 @@
 #include <poll.h>
 #include <pthread.h>
 #include <sys/prctl.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -53,6 +55,7 @@ void AgentRunner::stop() noexcept {
 
 int AgentRunner::turn() noexcept {
   const std::int64_t begin_ns = clock_.monotonic_ns();
+  duty_.beat(begin_ns);
   const int work = agent_.do_work(clock_.tai_ns());
   if (work != 0) {
     duty_.record(clock_.monotonic_ns() - begin_ns);
@@ -71,7 +74,12 @@ void AgentRunner::run() noexcept {
   pthread_setname_np(pthread_self(), thread_name.data());
   prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
 
+  timer_ = Fd(::timerfd_create(CLOCK_REALTIME, TFD_NONBLOCK | TFD_CLOEXEC));
+  static_cast<void>(apply_before_start(realtime_));
   const bool started = agent_.on_start();
+  if (started) {
+    static_cast<void>(apply_after_start(realtime_));
+  }
   state_.store(static_cast<int>(started ? State::running : State::failed));
   state_.notify_all();
   if (!started) {
@@ -91,17 +99,54 @@ void AgentRunner::sleep() noexcept {
     agent_.doorbell().disarm();
     return;
   }
-  // Bounded, so that a step of the wall clock cannot leave an agent asleep.
+  // Bounded, whatever happens to the clock.
   constexpr std::int64_t kLongestNs = 100'000'000;
   const std::int64_t wake_ns = agent_.wake_at_ns();
-  const std::int64_t now_ns = clock_.tai_ns();
-  const std::int64_t wait_ns =
-      wake_ns == kNeverNs ? kLongestNs : std::clamp(wake_ns - now_ns, std::int64_t{0}, kLongestNs);
-  std::array<pollfd, 2> fds{{{agent_.doorbell().fd(), POLLIN, 0}, {agent_.wait_fd(), POLLIN, 0}}};
+  std::int64_t wait_ns = kLongestNs;
+  std::array<pollfd, 3> fds{{{agent_.doorbell().fd(), POLLIN, 0}}};
+  nfds_t count = 1;
+  if (agent_.wait_fd() >= 0) {
+    fds[count++] = {agent_.wait_fd(), POLLIN, 0};
+  }
+  const bool timed = wake_ns != kNeverNs && arm_timer(wake_ns);
+  const nfds_t timer_at = count;
+  if (timed) {
+    fds[count++] = {timer_.get(), POLLIN, 0};
+  } else if (wake_ns != kNeverNs) {
+    wait_ns = std::clamp(wake_ns - clock_.tai_ns(), std::int64_t{0}, kLongestNs);
+  }
   const timespec timeout{static_cast<time_t>(wait_ns / 1'000'000'000),
                          static_cast<long>(wait_ns % 1'000'000'000)};
-  ::ppoll(fds.data(), fds[1].fd >= 0 ? 2 : 1, &timeout, nullptr);
+  ::ppoll(fds.data(), count, &timeout, nullptr);
+  if (timed && fds[timer_at].revents != 0) {
+    // Gone off, or cancelled because the clock was set: the next instant is set anew.
+    std::uint64_t expirations = 0;
+    [[maybe_unused]] const auto read = ::read(timer_.get(), &expirations, sizeof expirations);
+    armed_utc_ns_ = 0;
+  }
   agent_.doorbell().disarm();
+}
+
+bool AgentRunner::arm_timer(std::int64_t wake_ns) noexcept {
+  // CLOCK_TAI has no timer descriptors; CLOCK_REALTIME is the same clock less whole seconds.
+  const std::int64_t utc_ns = wake_ns - clock_.tai_from_utc_offset_ns();
+  if (utc_ns == armed_utc_ns_) {
+    return true;
+  }
+  if (!timer_ || utc_ns <= 0) {
+    return false;
+  }
+  itimerspec at{};
+  at.it_value.tv_sec = static_cast<time_t>(utc_ns / 1'000'000'000);
+  at.it_value.tv_nsec = static_cast<long>(utc_ns % 1'000'000'000);
+  if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME | TFD_TIMER_CANCEL_ON_SET, &at, nullptr) !=
+      0) {
+    // Cancelled by a clock that was set meanwhile, which setting it again has acknowledged.
+    armed_utc_ns_ = 0;
+    return false;
+  }
+  armed_utc_ns_ = utc_ns;
+  return true;
 }
 
 }  // namespace emit::server

@@ -276,13 +276,19 @@ void Sender::account(SenderClient& client) noexcept {
   if (counts != nullptr) {
     counts->frames.fetch_add(1, std::memory_order_relaxed);
   }
+  context_.trace.add(client.header(),
+                     client.fd() >= 0 ? client.connection() : FrameTrace::kSharedMemory, now_ns);
   if (client.header().host_received_ns == 0) {
     return;
   }
-  const std::int64_t delay_ns = now_ns - client.header().host_received_ns;
-  context_.times.pose_to_last_byte.record(delay_ns);
+  context_.times.pose_to_last_byte.record(client.delay_ns());
+  context_.times.sim_age.record(client.age_ns());
+  if (const auto change_ns = client.delay_change_ns()) {
+    context_.times.jitter.record(*change_ns);
+  }
   if (counts != nullptr) {
-    counts->delay_ns.store(delay_ns, std::memory_order_relaxed);
+    counts->delay_ns.store(client.delay_ns(), std::memory_order_relaxed);
+    counts->jitter_ns.store(client.jitter_ns(), std::memory_order_relaxed);
   }
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/sender_client.hpp"
 
+#include <cstdlib>
+
 namespace emit::server {
 
 void SenderClient::start(const protocol::FrameHeader& header, std::int64_t now_ns) noexcept {
@@ -13,6 +15,7 @@ void SenderClient::start(const protocol::FrameHeader& header, std::int64_t now_n
   header_.previous_age_ns = previous_age_ns_;
   header_.previous_delay_ns = previous_delay_ns_;
   header_.previous_frame_number = previous_frame_number_;
+  header_.previous_jitter_ns = static_cast<std::int64_t>(jitter_ns_);
   busy_ = true;
   spilled_ = false;
 }
@@ -35,8 +38,15 @@ void SenderClient::complete(std::int64_t now_ns) noexcept {
   busy_ = false;
   spilled_ = false;
   previous_frame_number_ = header_.frame_number;
+  delay_change_ns_.reset();
   if (header_.host_received_ns != 0) {
-    previous_delay_ns_ = now_ns - header_.host_received_ns;
+    const std::int64_t delay_ns = now_ns - header_.host_received_ns;
+    if (have_delay_) {
+      delay_change_ns_ = std::abs(delay_ns - previous_delay_ns_);
+      jitter_ns_ += (static_cast<double>(*delay_change_ns_) - jitter_ns_) / 16.0;
+    }
+    have_delay_ = true;
+    previous_delay_ns_ = delay_ns;
     previous_age_ns_ = previous_delay_ns_ - (header_.sim_time_ns - header_.pose_sim_time_ns);
   }
 }

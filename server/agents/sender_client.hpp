@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <optional>
 
 #include "app/context.hpp"
 #include "emit/protocol/frame_header.hpp"
@@ -58,6 +59,16 @@ class SenderClient {
   [[nodiscard]] bool spilled() const noexcept { return spilled_; }
   /// Of the publication begun last, as this client gets it.
   [[nodiscard]] const protocol::FrameHeader& header() const noexcept { return header_; }
+  // Of the publication completed last; a frame without a host frame changes nothing.
+  [[nodiscard]] std::int64_t delay_ns() const noexcept { return previous_delay_ns_; }
+  [[nodiscard]] std::int64_t age_ns() const noexcept { return previous_age_ns_; }
+  [[nodiscard]] std::int64_t jitter_ns() const noexcept {
+    return static_cast<std::int64_t>(jitter_ns_);
+  }
+  /// |delay_ns() less the one before|; absent for the first, and without a host frame.
+  [[nodiscard]] std::optional<std::int64_t> delay_change_ns() const noexcept {
+    return delay_change_ns_;
+  }
   /// Why send() failed; for the log.
   [[nodiscard]] int error() const noexcept { return error_; }
 
@@ -85,6 +96,9 @@ class SenderClient {
   std::int64_t previous_age_ns_ = 0;
   std::int64_t previous_delay_ns_ = 0;
   std::uint64_t previous_frame_number_ = 0;
+  bool have_delay_ = false;
+  double jitter_ns_ = 0.0;  // smoothed: FrameHeader::previous_jitter_ns
+  std::optional<std::int64_t> delay_change_ns_;
 };
 
 }  // namespace emit::server

@@ -17,7 +17,9 @@
 #include "rt/counters.hpp"
 #include "rt/doorbell.hpp"
 #include "rt/histogram.hpp"
+#include "rt/prediction_error.hpp"
 #include "rt/spsc_ring.hpp"
+#include "telemetry/frame_trace.hpp"
 
 namespace emit::server {
 
@@ -113,6 +115,8 @@ struct Context {
   const Clock& clock;
   Counters counters;
   FrameTimes times;
+  PredictionErrors prediction;
+  FrameTrace trace;
   Doorbells bells;
   std::vector<Channel> channels;  ///< fixed before the agents run
   std::atomic<std::uint64_t> run_id{0};

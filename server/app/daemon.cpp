@@ -20,10 +20,13 @@
 #include "agents/shm_client.hpp"
 #include "app/context.hpp"
 #include "app/replay.hpp"
+#include "app/service_health.hpp"
 #include "emit/version.hpp"
+#include "io/trigger_port.hpp"
 #include "telemetry/log.hpp"
 #include "telemetry/metrics_server.hpp"
 #include "telemetry/metrics_text.hpp"
+#include "telemetry/ptp_monitor.hpp"
 #include "telemetry/status_board.hpp"
 
 namespace emit::server {
@@ -51,7 +54,15 @@ std::size_t journal_bytes(const config::JournalConfig& config) {
 }
 
 std::string_view pacing_name(config::PacingMode mode) {
-  return mode == config::PacingMode::ig_clock ? "ig-clock" : "host-step";
+  switch (mode) {
+    case config::PacingMode::host_step:
+      break;
+    case config::PacingMode::ig_clock:
+      return "ig-clock";
+    case config::PacingMode::trigger:
+      return "trigger";
+  }
+  return "host-step";
 }
 
 class DaemonImpl final : public Daemon {
@@ -96,16 +107,20 @@ class DaemonImpl final : public Daemon {
   std::uint64_t counter(Counter id) const noexcept override { return context_.counters.get(id); }
   std::string ready_line() const override {
     const SocketAddress host = receiver_->host_address();
-    return fmt::format("ready control={} host_udp={}{}", to_string(receiver_->control_address()),
+    return fmt::format("ready control={} host_udp={}{}{}", to_string(receiver_->control_address()),
                        host.length != 0 ? to_string(host) : std::string("off"),
+                       triggers_ ? " trigger=" + to_string(triggers_->address()) : std::string(),
                        metrics_ ? " metrics=" + to_string(metrics_->address()) : std::string());
   }
   std::uint16_t metrics_port() const noexcept override {
     return metrics_ ? metrics_->address().port() : std::uint16_t{0};
   }
+  std::uint16_t trigger_port() const noexcept override {
+    return triggers_ ? triggers_->address().port() : std::uint16_t{0};
+  }
 
  private:
-  [[nodiscard]] FrameSourceFactory source_factory() const;
+  [[nodiscard]] FrameSourceFactory source_factory();
   [[nodiscard]] physics::Result<void> make_agents(const SourceInfo& source);
   template <class Predicate>
   bool wait_until(Predicate done, std::int64_t limit_ns);
@@ -116,7 +131,13 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
   [[nodiscard]] MetricsMoment moment() const;
   void housekeep();
+  void watch_ptp();
   void log_summary();
+  [[nodiscard]] physics::Result<void> open_clocks();
+  [[nodiscard]] physics::Result<void> check_realtime();
+  void plan_realtime(AgentRunner& runner) const {
+    runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
+  }
 
   config::DaemonConfig config_;
   std::optional<scene::ScenarioDesc> scenario_;
@@ -136,6 +157,11 @@ class DaemonImpl final : public Daemon {
   std::atomic<std::int64_t> housekept_ns_{0};    ///< monotonic
   std::optional<std::int64_t> clock_offset_ns_;  ///< wall less monotonic, when looked at last
 
+  ServiceNotifier nobody_;
+  ServiceHealth health_{options_.notifier != nullptr ? *options_.notifier : nobody_};
+  RealtimeReport realtime_;
+  std::unique_ptr<PtpMonitor> ptp_;
+  std::unique_ptr<TriggerPort> triggers_;
   std::unique_ptr<Receiver> receiver_;
   std::unique_ptr<RenderAgent> render_;
   std::unique_ptr<Recorder> recorder_;
@@ -151,7 +177,7 @@ class DaemonImpl final : public Daemon {
   std::unique_ptr<MetricsServer> metrics_;  ///< reads all of the above
 };
 
-FrameSourceFactory DaemonImpl::source_factory() const {
+FrameSourceFactory DaemonImpl::source_factory() {
   if (options_.source_factory) {
     return options_.source_factory;
   }
@@ -167,9 +193,10 @@ FrameSourceFactory DaemonImpl::source_factory() const {
     renderer::OutputOptions output;
     output.slots = slot_count(config_);
     const bool deadlines =
-        config_.pacing.mode == config::PacingMode::ig_clock || config_.pacing.budget_ns > 0;
+        config_.pacing.mode != config::PacingMode::host_step || config_.pacing.budget_ns > 0;
     output.ladder = deadlines ? renderer::Ladder::live : renderer::Ladder::none;
-    return make_renderer_source(*scenario_, device, output);
+    return make_renderer_source(*scenario_, device, output,
+                                [this](double done_frac) { return health_.warming_up(done_frac); });
   };
 }
 
@@ -190,6 +217,17 @@ physics::Result<void> DaemonImpl::setup() {
     return physics::make_error(ErrorCode::config,
                                config_.file.string() + ": a renderer needs a scenario");
   }
+  health_.starting();
+  if (!options_.stepped) {
+    // Before anything is made: what follows comes from memory that stays.
+    realtime_ = ask_for_realtime(config_.realtime);
+    if (auto checked = check_realtime(); !checked) {
+      return checked;
+    }
+  }
+  if (auto opened = open_clocks(); !opened) {
+    return opened;
+  }
   // Ports first: an address in use shows at once, not after a scene has been loaded.
   receiver_ = std::make_unique<Receiver>(context_, config_);
   if (auto opened = receiver_->open(); !opened) {
@@ -202,6 +240,7 @@ physics::Result<void> DaemonImpl::setup() {
   }
   render_ = std::make_unique<RenderAgent>(context_, source_factory());
   render_runner_ = std::make_unique<AgentRunner>(*render_, clock_);
+  plan_realtime(*render_runner_);
   const bool started =
       options_.stepped ? render_runner_->start_stepped() : render_runner_->start_thread();
   if (!started) {
@@ -221,7 +260,7 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
 
   const std::string software = fmt::format("emitd {} ({})", kVersion, kCommit);
   const std::string scenario_name = scenario_ ? scenario_->name : std::string();
-  const bool ig_clock = config_.pacing.mode == config::PacingMode::ig_clock;
+  const bool slotted = config_.pacing.mode != config::PacingMode::host_step;
   Recorder::Identity identity;
   identity.scenario_name = scenario_name;
   identity.software = software;
@@ -253,13 +292,13 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
     shm_ = std::move(*shm);
   }
   sender_ =
-      std::make_unique<Sender>(context_, window, config_.control.max_clients, ig_clock, shm_.get());
+      std::make_unique<Sender>(context_, window, config_.control.max_clients, slotted, shm_.get());
   Conductor::Options options;
   options.pacing = config_.pacing;
   options.first_plane = context_.channels.front().plane;
   options.canned = source.canned;
   options.tai_unset = clock_.tai_offset_unset();
-  conductor_ = std::make_unique<Conductor>(context_, tracks_, options);
+  conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers_.get());
 
   log_->write(
       LogLevel::info,
@@ -282,6 +321,10 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   sender_runner_ = std::make_unique<AgentRunner>(*sender_, clock_);
   conductor_runner_ = std::make_unique<AgentRunner>(*conductor_, clock_);
   receiver_runner_ = std::make_unique<AgentRunner>(*receiver_, clock_);
+  for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(), conductor_runner_.get(),
+                              receiver_runner_.get()}) {
+    plan_realtime(*runner);
+  }
   if (options_.stepped) {
     for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(),
                                 conductor_runner_.get(), receiver_runner_.get()}) {
@@ -299,6 +342,10 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
 }
 
 physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
+  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
+                              sender_runner_.get(), recorder_runner_.get()}) {
+    sources_.agents.emplace_back(runner->agent().name(), &runner->duty_cycle());
+  }
   if (config_.metrics.listen.empty()) {
     return {};
   }
@@ -316,19 +363,20 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   }
   sources_.counters = &context_.counters;
   sources_.times = &context_.times;
+  sources_.prediction = &context_.prediction;
+  sources_.realtime = &realtime_;
   sources_.clients = context_.clients();
   sources_.board = &board_;
   sources_.build = std::move(build);
-  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
-                              sender_runner_.get(), recorder_runner_.get()}) {
-    sources_.agents.emplace_back(runner->agent().name(), &runner->duty_cycle());
-  }
   MetricsServer::Answers answers;
   answers.metrics = [this] { return metrics_text(sources_, moment()); };
+  answers.trace = [this] { return chrome_trace(context_.trace.entries()); };
   answers.ready = [this] { return serving_.load(std::memory_order_acquire); };
   answers.healthy = [this] {
     constexpr std::int64_t kStuckNs = 5'000'000'000;
-    return clock_.monotonic_ns() - housekept_ns_.load(std::memory_order_acquire) < kStuckNs;
+    const std::int64_t now_ns = clock_.monotonic_ns();
+    return now_ns - housekept_ns_.load(std::memory_order_acquire) < kStuckNs &&
+           ServiceHealth::stuck_agent(sources_.agents, now_ns, ServiceHealth::kStuckNs).empty();
   };
   auto opened = MetricsServer::start(*address, std::move(answers));
   if (!opened) {
@@ -339,8 +387,69 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
 }
 
 MetricsMoment DaemonImpl::moment() const {
+  const std::int64_t now_ns = clock_.monotonic_ns();
   return {context_.run_id.load(std::memory_order_relaxed), serving_.load(std::memory_order_acquire),
-          clock_.monotonic_ns() - started_ns_};
+          now_ns - started_ns_, now_ns, ptp_ ? std::optional(ptp_->status()) : std::nullopt};
+}
+
+physics::Result<void> DaemonImpl::open_clocks() {
+  const auto named = [this](const Error& error, const char* key) {
+    return tl::unexpected<Error>(
+        Error(error).with_context(key).with_context(config_.file.string()));
+  };
+  if (!config_.clock.ptp_socket.empty()) {
+    auto ptp = PtpMonitor::open(config_.clock.ptp_socket,
+                                static_cast<std::uint8_t>(config_.clock.ptp_domain));
+    if (!ptp) {
+      return named(ptp.error(), "clock.ptp_socket");
+    }
+    ptp_ = std::move(*ptp);
+  }
+  if (config_.pacing.mode == config::PacingMode::trigger) {
+    auto port =
+        TriggerPort::open(config_.trigger.udp, config_.trigger.peer, clock_, context_.counters);
+    if (!port) {
+      return tl::unexpected<Error>(std::move(port.error()).with_context(config_.file.string()));
+    }
+    triggers_ = std::move(*port);
+  }
+  return {};
+}
+
+physics::Result<void> DaemonImpl::check_realtime() {
+  const std::string refused = realtime_.refusals();
+  if (refused.empty()) {
+    return {};
+  }
+  if (config_.realtime.required) {
+    return physics::make_error(ErrorCode::io,
+                               fmt::format("{}: [realtime] is required, but the host refuses: {}",
+                                           config_.file.string(), refused));
+  }
+  log_->write(LogLevel::warn,
+              fmt::format("event=realtime_refused what=\"{}\" effect=\"timing is as the host "
+                          "schedules other programs\"",
+                          refused));
+  return {};
+}
+
+void DaemonImpl::watch_ptp() {
+  switch (ptp_->turn(clock_.monotonic_ns())) {
+    case PtpMonitor::Change::none:
+      return;
+    case PtpMonitor::Change::went_down:
+      log_->write(LogLevel::warn,
+                  "event=ptp_silent effect=\"nobody says whether the clock follows its master\" "
+                  "remedy=\"ptp4l, clock.ptp_socket and who may write to it\"");
+      return;
+    case PtpMonitor::Change::went_up:
+    case PtpMonitor::Change::state:
+      break;
+  }
+  const PtpStatus status = ptp_->status();
+  log_->write(LogLevel::info,
+              fmt::format("event=ptp state={} grandmaster={} offset_ns={}", to_string(status.state),
+                          status.grandmaster, status.offset_ns));
 }
 
 int DaemonImpl::run() {
@@ -354,6 +463,7 @@ int DaemonImpl::run() {
     }
   }
   serving_.store(true, std::memory_order_release);
+  health_.ready(ready_line());
   log_->write(LogLevel::info, ready_line());
   while (!stop_.load(std::memory_order_acquire)) {
     if (context_.device_lost.load(std::memory_order_acquire)) {
@@ -363,8 +473,17 @@ int DaemonImpl::run() {
     constexpr int kHousekeepingMs = 100;
     ::poll(&wait, 1, kHousekeepingMs);
     housekeep();
+    if (const auto stuck = health_.turn(sources_.agents, clock_.monotonic_ns()); !stuck.empty()) {
+      log_->write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
+                                               "watchdog, where there is one, ends the daemon\"",
+                                               stuck));
+    }
+    if (ptp_) {
+      watch_ptp();
+    }
   }
   serving_.store(false, std::memory_order_release);
+  health_.stopping();
   log_->write(LogLevel::info, "event=stopping");
   receiver_->drain();
   context_.bells.receiver.ring();

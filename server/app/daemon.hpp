@@ -15,11 +15,14 @@
 
 namespace emit::server {
 
+class ServiceNotifier;
+
 /// What a caller may replace: tests give a fake clock and a null source.
 struct DaemonOptions {
   Clock* clock = nullptr;             ///< null: SystemClock; must outlive the daemon
   FrameSourceFactory source_factory;  ///< empty: what the configuration names
   bool stepped = false;               ///< no threads: the caller turns the crank with step()
+  const ServiceNotifier* notifier = nullptr;  ///< null: nobody; must outlive the daemon
   std::function<void(const std::string&)>
       on_log;  ///< null: spdlog as configured; set: log lines go here
 };
@@ -61,8 +64,10 @@ class Daemon {
   [[nodiscard]] virtual std::uint16_t control_port() const noexcept = 0;
   [[nodiscard]] virtual std::uint16_t host_udp_port() const noexcept = 0;  ///< 0 = off
   [[nodiscard]] virtual std::uint16_t metrics_port() const noexcept = 0;   ///< 0 = off
+  [[nodiscard]] virtual std::uint16_t trigger_port() const noexcept = 0;   ///< 0 = off
   [[nodiscard]] virtual std::uint64_t counter(Counter id) const noexcept = 0;
-  /// "ready control=HOST:PORT host_udp=HOST:PORT", and " metrics=HOST:PORT" unless that is off.
+  /// "ready control=HOST:PORT host_udp=HOST:PORT", then " trigger=HOST:PORT" and
+  /// " metrics=HOST:PORT" unless these are off.
   [[nodiscard]] virtual std::string ready_line() const = 0;
 };
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "app/daemon.hpp"
+#include "app/service_notifier.hpp"
 #include "emit/config/load.hpp"
 #include "emit/version.hpp"
 
@@ -141,7 +142,10 @@ int serve(const Arguments& arguments, const char* program) {
     fmt::print("{}: ok\n", arguments.config_file);
     return 0;
   }
-  auto daemon = Daemon::create(*daemon_config, std::move(scenario), {});
+  const ServiceNotifier notifier = ServiceNotifier::from_environment();
+  DaemonOptions options;
+  options.notifier = &notifier;
+  auto daemon = Daemon::create(*daemon_config, std::move(scenario), std::move(options));
   if (!daemon) {
     return fail(program, daemon.error());
   }

@@ -61,6 +61,7 @@ class Tool {
         "Example: emit demo --out frames");
     add_scene_commands();
     add_stream_commands();
+    add_timing_commands();
     add_log_commands();
     add_model_commands();
     add_bench_commands();
@@ -97,6 +98,7 @@ class Tool {
 
   void add_scene_commands();
   void add_stream_commands();
+  void add_timing_commands();
   void add_log_commands();
   void add_model_commands();
   void add_bench_commands();

@@ -14,7 +14,7 @@ struct FlagName {
   protocol::FrameFlags flag;
   const char* name;
 };
-constexpr std::array<FlagName, 13> kFlagNames{{{protocol::kFlagLate, "late"},
+constexpr std::array<FlagName, 14> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagRepeated, "repeated"},
                                                {protocol::kFlagStale, "stale"},
                                                {protocol::kFlagDegraded, "degraded"},
@@ -26,6 +26,7 @@ constexpr std::array<FlagName, 13> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagGapBefore, "gap_before"},
                                                {protocol::kFlagCanned, "canned"},
                                                {protocol::kFlagTimeUnset, "time_unset"},
+                                               {protocol::kFlagTriggerFault, "trigger_fault"},
                                                {protocol::kFlagCorrupt, "corrupt"}}};
 
 }  // namespace

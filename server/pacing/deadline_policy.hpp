@@ -4,16 +4,17 @@
 
 namespace emit::server {
 
-/// host-step: frame k is always sent for pose k; late when its pixels came after the deadline.
-[[nodiscard]] inline bool host_step_is_late(std::int64_t deadline_ns,
-                                            std::int64_t done_ns) noexcept {
+/// host-step: frame k is always sent for pose k; trigger: a frame may come between two slots. Late
+/// when its pixels came after the deadline.
+[[nodiscard]] inline bool is_past_deadline(std::int64_t deadline_ns,
+                                           std::int64_t done_ns) noexcept {
   return deadline_ns != 0 && done_ns > deadline_ns;
 }
 
-/// ig-clock: what goes out in each slot. One frame is in work at a time; it goes out in the slot in
-/// which it finishes, late when that is not the slot it was made for. A slot that ends without a
-/// frame repeats the previous one. So every slot after the first image carries exactly one frame.
-/// Pure. RT-safe.
+/// ig-clock and trigger: what goes out in each slot. One frame is in work at a time; it goes out in
+/// the slot in which it finishes, late when that is not the slot it was made for. A slot that ends
+/// without a frame repeats the previous one. So every slot after the first image carries exactly
+/// one frame. Pure. RT-safe.
 class SlotPolicy {
  public:
   enum class SlotEnd : std::uint8_t {

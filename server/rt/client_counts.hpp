@@ -14,12 +14,14 @@ struct alignas(kCacheLineBytes) ClientCounts {
   std::atomic<std::uint64_t> frames{0};      ///< sent completely
   std::atomic<std::uint64_t> skipped{0};     ///< not sent because the client was slow
   std::atomic<std::int64_t> delay_ns{0};     ///< of the last frame: pose received to last byte sent
+  std::atomic<std::int64_t> jitter_ns{0};    ///< of delay_ns, smoothed (FrameHeader)
 
   /// For a connection that begins.
   void begin(std::uint32_t key) noexcept {
     frames.store(0, std::memory_order_relaxed);
     skipped.store(0, std::memory_order_relaxed);
     delay_ns.store(0, std::memory_order_relaxed);
+    jitter_ns.store(0, std::memory_order_relaxed);
     connection.store(key, std::memory_order_release);
   }
   void end() noexcept { connection.store(0, std::memory_order_release); }

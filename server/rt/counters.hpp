@@ -51,6 +51,15 @@ namespace emit::server {
   X(frames_extrapolated, "frames flagged extrapolated")                              \
   X(slots_without_image, "clock slots before the first image")                       \
   X(slots_missed, "clock slots skipped because the conductor was not running")       \
+  X(triggers, "trigger datagrams received on the trigger port")                      \
+  X(triggers_used, "triggers that began a slot")                                     \
+  X(triggers_refused, "trigger datagrams refused: malformed or of another sender")   \
+  X(triggers_missing, "trigger numbers that never arrived")                          \
+  X(triggers_duplicate, "triggers refused: number already seen")                     \
+  X(triggers_too_fast, "triggers refused: half a period or less after the last")     \
+  X(triggers_late, "triggers that came more than half a period late")                \
+  X(trigger_silences, "times no trigger came for ten periods or more")               \
+  X(trigger_os_drops, "triggers dropped by the kernel for want of buffer space")     \
   X(no_free_slot, "attempts to render while every slot was in use")                  \
   X(frames_sent, "frames sent completely, all clients")                              \
   X(frames_shared, "frames put into shared memory, counted as sent too")             \

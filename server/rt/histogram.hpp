@@ -44,7 +44,7 @@ class Histogram {
 };
 
 /// Where the time of frames goes. A frame counts once in the first four, and once for each client
-/// that it was sent to in the last two; repeated frames count in the last two alone.
+/// that it was sent to in those of sending; repeated frames count in these alone.
 struct FrameTimes {
   Histogram wait;               ///< pose received to start of rendering
   Histogram render;             ///< start of rendering to device finished
@@ -52,6 +52,9 @@ struct FrameTimes {
   Histogram frame;              ///< start of rendering to pixels visible to the CPU
   Histogram send;               ///< first byte handed to the kernel to last byte
   Histogram pose_to_last_byte;  ///< pose received to last byte handed to the kernel
+  Histogram jitter;             ///< |difference of two consecutive pose_to_last_byte| of a client
+  Histogram sim_age;            ///< sim time passed since the instant shown, at the last byte
+  Histogram sampling;           ///< ig-clock, trigger: pose received to begin of its slot
 };
 
 }  // namespace emit::server

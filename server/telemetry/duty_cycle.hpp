@@ -24,6 +24,16 @@ class alignas(kCacheLineBytes) DutyCycle {
     cycles_.store(cycles_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
 
+  /// Every time the agent comes round, working or not: at least each 100 ms.
+  void beat(std::int64_t monotonic_ns) noexcept {
+    beat_ns_.store(monotonic_ns, std::memory_order_relaxed);
+  }
+  /// Since the last beat; 0 before the first: nothing is expected of an agent that has not begun.
+  [[nodiscard]] std::int64_t silent_ns(std::int64_t monotonic_ns) const noexcept {
+    const std::int64_t beat_ns = beat_ns_.load(std::memory_order_relaxed);
+    return beat_ns == 0 || monotonic_ns < beat_ns ? 0 : monotonic_ns - beat_ns;
+  }
+
   [[nodiscard]] std::int64_t max_ns() const noexcept {
     return max_ns_.load(std::memory_order_relaxed);
   }
@@ -43,6 +53,7 @@ class alignas(kCacheLineBytes) DutyCycle {
   std::atomic<std::uint64_t> over_{0};
   std::atomic<std::int64_t> busy_ns_{0};
   std::atomic<std::uint64_t> cycles_{0};
+  std::atomic<std::int64_t> beat_ns_{0};
 };
 
 }  // namespace emit::server

@@ -182,6 +182,11 @@ EventText describe(const Event& event) {
               false};
     case EventKind::slots_missed:
       return {LogLevel::warn, fmt::format("event=slots_missed count={}", event.a), true};
+    case EventKind::trigger_silent:
+      return {LogLevel::warn,
+              "event=trigger_silent effect=\"no frames until the next trigger\" remedy=\"the sync "
+              "source, its link, trigger.peer\"",
+              true};
     case EventKind::weather_lost:
       return {LogLevel::error,
               fmt::format("event=weather_lost sim_time_ns={} effect=\"the host's weather no longer "

@@ -43,13 +43,16 @@ Response answer_to(const http::request<http::empty_body>& request,
     response.set(http::field::allow, "GET, HEAD");
   } else if (target == "/metrics") {
     response.body() = answers.metrics();
+  } else if (target == "/trace") {
+    response.set(http::field::content_type, "application/json");
+    response.body() = answers.trace();
   } else if (target == "/healthz") {
     say_whether(answers.healthy());
   } else if (target == "/readyz") {
     say_whether(answers.ready());
   } else {
     response.result(http::status::not_found);
-    response.body() = "there are /metrics, /healthz and /readyz\n";
+    response.body() = "there are /metrics, /trace, /healthz and /readyz\n";
   }
   response.content_length(response.body().size());
   if (head) response.body().clear();

@@ -9,9 +9,9 @@
 
 namespace emit::server {
 
-/// Answers GET /metrics, /healthz and /readyz over HTTP, one request a connection, on a thread of
-/// its own that no agent waits for. Bounded: kMaxConnections at a time, further ones are closed at
-/// once; kMaxRequestBytes of request; kTimeoutNs for a request and its answer.
+/// Answers GET /metrics, /trace, /healthz and /readyz over HTTP, one request a connection, on a
+/// thread of its own that no agent waits for. Bounded: kMaxConnections at a time, further ones are
+/// closed at once; kMaxRequestBytes of request; kTimeoutNs for a request and its answer.
 class MetricsServer {
  public:
   static constexpr int kMaxConnections = 16;
@@ -21,6 +21,7 @@ class MetricsServer {
   /// Called on the server's thread.
   struct Answers {
     std::function<std::string()> metrics;  ///< body of /metrics
+    std::function<std::string()> trace;    ///< body of /trace, JSON
     std::function<bool()> healthy;         ///< /healthz: 200 or 503
     std::function<bool()> ready;           ///< /readyz: 200 or 503
   };

@@ -62,9 +62,56 @@ void add_times(MetricsText& out, const FrameTimes& times) {
   out.family("pose_to_last_byte_seconds", "histogram",
              "Delay from the arrival of a pose to the last byte of its frame, per client");
   out.histogram({}, times.pose_to_last_byte);
+  out.family(
+      "delay_jitter_seconds", "histogram",
+      "Difference between the pose_to_last_byte delays of two consecutive frames, per client");
+  out.histogram({}, times.jitter);
+  out.family(
+      "sim_age_seconds", "histogram",
+      "Simulation time passed since the instant a frame shows, at its last byte, per client");
+  out.histogram({}, times.sim_age);
+  out.family("sampling_seconds", "histogram",
+             "ig-clock, trigger: time a pose waited for the slot that used it");
+  out.histogram({}, times.sampling);
 }
 
-void add_agents(MetricsText& out, const MetricsSources& sources) {
+void add_prediction(MetricsText& out, const PredictionErrors& errors) {
+  out.family("prediction_error_metres", "histogram",
+             "Distance of predicted sensor poses from the truth that came later");
+  out.histogram({}, errors.position);
+  out.family("prediction_error_radians", "histogram",
+             "Angle between predicted sensor attitudes and the truth that came later");
+  out.histogram({}, errors.attitude);
+  out.family("prediction_error_max_metres", "gauge", "Largest prediction_error_metres so far");
+  out.sample({}, errors.max_position_m.load(std::memory_order_relaxed));
+  out.family("prediction_error_max_radians", "gauge", "Largest prediction_error_radians so far");
+  out.sample({}, errors.max_attitude_rad.load(std::memory_order_relaxed));
+}
+
+void add_realtime(MetricsText& out, const RealtimeReport& report) {
+  out.family("realtime_granted", "gauge",
+             "1 where the host grants what [realtime] asks for, 0 where it refuses; nothing where "
+             "nothing is asked");
+  for (const RealtimeReport::Item& item : report.items()) {
+    out.sample({{"setting", item.setting}, {"agent", item.agent}},
+               std::uint64_t{item.granted ? 1U : 0U});
+  }
+}
+
+void add_ptp(MetricsText& out, const PtpStatus& ptp) {
+  out.family("ptp_up", "gauge", "1 while ptp4l answers on clock.ptp_socket");
+  out.sample({}, std::uint64_t{ptp.up ? 1U : 0U});
+  if (!ptp.up) return;
+  out.family("ptp_offset_seconds", "gauge", "Offset of the PTP clock from its master");
+  out.sample({}, seconds(ptp.offset_ns));
+  out.family("ptp_grandmaster_present", "gauge", "1 while ptp4l follows another clock");
+  out.sample({}, std::uint64_t{ptp.grandmaster_present ? 1U : 0U});
+  out.family("ptp_info", "gauge", "Port state and grandmaster; always 1");
+  out.sample({{"state", std::string(to_string(ptp.state))}, {"grandmaster", ptp.grandmaster}},
+             std::uint64_t{1});
+}
+
+void add_agents(MetricsText& out, const MetricsSources& sources, const MetricsMoment& moment) {
   const auto each = [&](std::string_view name, std::string_view type, std::string_view help,
                         const auto& value) {
     out.family(name, type, help);
@@ -78,6 +125,8 @@ void add_agents(MetricsText& out, const MetricsSources& sources) {
        [](const DutyCycle& duty) { return seconds(duty.busy_ns()); });
   each("agent_longest_turn_seconds", "gauge", "Longest turn of an agent so far",
        [](const DutyCycle& duty) { return seconds(duty.max_ns()); });
+  each("agent_heartbeat_age_seconds", "gauge", "Time since an agent last came round its loop",
+       [&](const DutyCycle& duty) { return seconds(duty.silent_ns(moment.now_ns)); });
 }
 
 void add_clients(MetricsText& out, const MetricsSources& sources) {
@@ -112,6 +161,9 @@ void add_clients(MetricsText& out, const MetricsSources& sources) {
   each("client_delay_seconds", "gauge",
        "Delay of a connection's last frame, from the pose's arrival to the last byte",
        [](const ClientCounts& c) { return seconds(c.delay_ns.load(std::memory_order_relaxed)); });
+  each("client_jitter_seconds", "gauge",
+       "Smoothed jitter (RFC 3550) of client_delay_seconds, as in the frame headers",
+       [](const ClientCounts& c) { return seconds(c.jitter_ns.load(std::memory_order_relaxed)); });
 }
 
 void add_warnings(MetricsText& out, const StatusBoard& board) {
@@ -173,7 +225,10 @@ std::string metrics_text(const MetricsSources& sources, const MetricsMoment& mom
   add_state(out, sources, moment);
   add_counters(out, *sources.counters);
   add_times(out, *sources.times);
-  add_agents(out, sources);
+  if (sources.prediction != nullptr) add_prediction(out, *sources.prediction);
+  add_agents(out, sources, moment);
+  if (sources.realtime != nullptr) add_realtime(out, *sources.realtime);
+  if (moment.ptp) add_ptp(out, *moment.ptp);
   add_clients(out, sources);
   add_warnings(out, *sources.board);
   return out.text();

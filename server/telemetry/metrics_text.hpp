@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -10,7 +11,10 @@
 #include "rt/client_counts.hpp"
 #include "rt/counters.hpp"
 #include "rt/histogram.hpp"
+#include "rt/prediction_error.hpp"
+#include "rt/realtime.hpp"
 #include "telemetry/duty_cycle.hpp"
+#include "telemetry/ptp_status.hpp"
 #include "telemetry/status_board.hpp"
 
 namespace emit::server {
@@ -40,6 +44,8 @@ class MetricsText {
 struct MetricsSources {
   const Counters* counters = nullptr;
   const FrameTimes* times = nullptr;
+  const PredictionErrors* prediction = nullptr;  ///< null: left out
+  const RealtimeReport* realtime = nullptr;      ///< likewise
   std::span<const ClientCounts> clients;
   const StatusBoard* board = nullptr;
   std::vector<std::pair<std::string, const DutyCycle*>> agents;  ///< by name
@@ -50,6 +56,8 @@ struct MetricsMoment {
   std::uint64_t run_id = 0;
   bool ready = false;
   std::int64_t uptime_ns = 0;
+  std::int64_t now_ns = 0;       ///< monotonic
+  std::optional<PtpStatus> ptp;  ///< absent: not asked for
 };
 
 [[nodiscard]] std::string metrics_text(const MetricsSources& sources, const MetricsMoment& moment);

@@ -13,6 +13,7 @@
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/resend.hpp"
+#include "emit/protocol/trigger.hpp"
 #include "emit/scenegen/generate.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/state_world.hpp"
@@ -443,6 +444,17 @@ void make_state_seeds() {
   }
 }
 
+void make_trigger_seeds() {
+  for (const auto& [name, trigger] :
+       {std::pair("stamped",
+                  protocol::Trigger{0x1122334455667788, 1000, 1'800'000'000'000'000'005}),
+        std::pair("plain", protocol::Trigger{1, 1, 0})}) {
+    Bytes bytes(protocol::kTriggerBytes);
+    protocol::encode(trigger, std::span(bytes).first<protocol::kTriggerBytes>());
+    write("trigger", name, bytes);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -452,6 +464,7 @@ int main(int argc, char** argv) {
   }
   root = argv[1];
   make_network_seeds();
+  make_trigger_seeds();
   make_fragment_seeds();
   make_log_seeds();
   make_capture_seeds();

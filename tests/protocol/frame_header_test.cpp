@@ -21,9 +21,9 @@ constexpr std::string_view kGolden =
     "00f2052a0100000000f7c2ffffffffff0000b49376e2fa180100b49376e2fa180200b49376e2fa18"
     "0300b49376e2fa180400b49376e2fa180500b49376e2fa18f9ffffffffffffff40e2010000000000"
     "e603000000000000000000000000f83f00000000000002c00000000000408f40000000000000e03f"
-    "000000000000e0bf000000000000e03f000000000000e0bf04000000000000000000000000000000"
-    "00000000000000000000000000000000000000000000000000000000000000000000000000000000"
-    "000000000000000000000000000000000000000000000000000000000000000000000000daada8f6";
+    "000000000000e0bf000000000000e03f000000000000e0bf04000000000000003412000000000000"
+    "ffffb39376e2fa184d000000000000000000003f0000803e09000000000000000000000000000000"
+    "000000000000000000000000000000000000000000000000000000000000000000000000a9faa438";
 
 FrameHeader golden_header() {
   constexpr std::int64_t kWallNs = 1'800'000'000'000'000'000;
@@ -54,6 +54,12 @@ FrameHeader golden_header() {
   header.previous_age_ns = -7;
   header.previous_delay_ns = 123456;
   header.previous_frame_number = 998;
+  header.previous_jitter_ns = 4660;
+  header.slot_begin_ns = kWallNs - 1;
+  header.trigger_number = 77;
+  header.prediction_error_m = 0.5F;
+  header.prediction_error_rad = 0.25F;
+  header.predictions = 9;
   header.pose.position_world_m = {1.5, -2.25, 1000.0};
   header.pose.world_from_body = {0.5, -0.5, 0.5, -0.5};
   header.payload_bytes = 640 * 512 * 4;
@@ -108,6 +114,12 @@ TEST(FrameHeader, DecodesEveryFieldOfTheGoldenBytes) {
   EXPECT_EQ(header->pose.world_from_body, expected.pose.world_from_body);
   EXPECT_EQ(header->pose_sim_time_ns, expected.pose_sim_time_ns);
   EXPECT_EQ(header->previous_age_ns, expected.previous_age_ns);
+  EXPECT_EQ(header->previous_jitter_ns, expected.previous_jitter_ns);
+  EXPECT_EQ(header->slot_begin_ns, expected.slot_begin_ns);
+  EXPECT_EQ(header->trigger_number, expected.trigger_number);
+  EXPECT_EQ(header->prediction_error_m, expected.prediction_error_m);
+  EXPECT_EQ(header->prediction_error_rad, expected.prediction_error_rad);
+  EXPECT_EQ(header->predictions, expected.predictions);
   // Whatever is not compared above would differ here.
   EXPECT_EQ(to_hex(encoded(*header)), kGolden);
 }
@@ -137,7 +149,7 @@ TEST(FrameHeader, RefusesSizesWhosePixelsOverflow64Bits) {
 }
 
 TEST(FrameHeader, IgnoresReservedBytesAndWhatFollows) {
-  auto bytes = forged(230, 0x55);
+  auto bytes = forged(270, 0x55);
   bytes.push_back(std::byte{1});
   EXPECT_EQ(error_of(bytes), "decoded");
 }

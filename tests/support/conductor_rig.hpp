@@ -2,6 +2,7 @@
 #pragma once
 #include <gtest/gtest.h>
 
+#include <deque>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -14,6 +15,18 @@
 namespace emit::test {
 
 inline constexpr std::int64_t kMs = 1'000'000;
+
+/// Triggers as the test hands them out.
+class FakeTriggers final : public server::TriggerInput {
+ public:
+  std::optional<server::ReceivedTrigger> next() noexcept override {
+    if (waiting.empty()) return std::nullopt;
+    const server::ReceivedTrigger first = waiting.front();
+    waiting.pop_front();
+    return first;
+  }
+  std::deque<server::ReceivedTrigger> waiting;
+};
 
 /// Conductor and render agent on a fake clock; the test plays receiver and sender.
 class ConductorRig {
@@ -28,7 +41,8 @@ class ConductorRig {
                   return physics::Result<std::unique_ptr<server::FrameSource>>(
                       std::make_unique<ScriptedSource>(script, 8, 4, 7));
                 }),
-        conductor_(context_, tracks_, options(pacing)) {
+        conductor_(context_, tracks_, options(pacing),
+                   pacing.mode == config::PacingMode::trigger ? &triggers_ : nullptr) {
     EXPECT_TRUE(render_.on_start());
     EXPECT_TRUE(conductor_.on_start());
   }
@@ -92,6 +106,14 @@ class ConductorRig {
     edit_ = std::move(edit);
     return *this;
   }
+  /// A trigger that arrives now.
+  void trigger(std::uint64_t number, std::uint64_t run = 1, std::int64_t edge_ns = 0) {
+    triggers_.waiting.push_back({{run, number, edge_ns}, clock.tai_ns()});
+  }
+  void pass(std::int64_t ns) {
+    clock.set(clock.tai_ns() + ns);
+    settle();
+  }
   /// Ends the slot under way.
   void next_slot() {
     clock.set(conductor_.wake_at_ns());
@@ -116,6 +138,7 @@ class ConductorRig {
   std::optional<scene::ScenarioDesc> scenario_;
   server::ScenarioTracks tracks_;
   server::Context context_;
+  FakeTriggers triggers_;
   server::RenderAgent render_;
   server::Conductor conductor_;
   std::function<void(protocol::HostFrameData&)> edit_;

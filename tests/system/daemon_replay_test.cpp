@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <optional>
 #include <thread>
 #include <vector>
 
 #include "app/daemon.hpp"
 #include "app/replay.hpp"
 #include "emit/protocol/record/log.hpp"
+#include "emit/protocol/trigger.hpp"
 #include "emit/v1/control.pb.h"
 #include "io/client.hpp"
+#include "io/socket.hpp"
 #include "support/daemon_process.hpp"
 #include "support/scripted_source.hpp"
 
@@ -59,9 +65,42 @@ config::DaemonConfig configuration(config::PacingMode mode, const std::string& j
   config.pacing.rate_hz = 400.0;
   config.host.udp = "127.0.0.1:0";
   config.control.tcp = "127.0.0.1:0";
+  config.trigger.udp = "127.0.0.1:0";
   config.journal.file = journal;
   return config;
 }
+
+/// A sync source at 400 Hz, with faults: numbers missing, sent twice and too early.
+class Triggers {
+ public:
+  explicit Triggers(const Daemon& daemon)
+      : address_(numeric_address("127.0.0.1", daemon.trigger_port())), thread_([this] { run(); }) {}
+  ~Triggers() {
+    stop_.store(true);
+    thread_.join();
+  }
+  Triggers(const Triggers&) = delete;
+  Triggers& operator=(const Triggers&) = delete;
+
+ private:
+  void run() {
+    auto socket = UdpSocket::open(SocketContext(), address_);
+    protocol::Trigger trigger{1, 0, 0};
+    while (socket && !stop_.load()) {
+      trigger.number += trigger.number % 31 == 0 ? 3 : 1;
+      std::array<std::byte, protocol::kTriggerBytes> bytes;
+      protocol::encode(trigger, bytes);
+      for (int copy = trigger.number % 17 == 0 ? 2 : 1; copy > 0; --copy) {
+        static_cast<void>(socket->send_to(bytes, address_));
+      }
+      std::this_thread::sleep_for(std::chrono::microseconds(trigger.number % 23 == 0 ? 100 : 2500));
+    }
+  }
+
+  SocketAddress address_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
 
 /// Everything that a journal must carry: entities, jumps, weather, hold, stop and step, reset, a
 /// restart of the host.
@@ -165,6 +204,8 @@ TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
     ASSERT_TRUE(recorder.has_value()) << recorder.error().text;
     auto host = HostClient::connect(live.url);
     ASSERT_TRUE(host.has_value()) << host.error().text;
+    std::optional<Triggers> triggers;
+    if (GetParam() == config::PacingMode::trigger) triggers.emplace(*live.daemon);
     ASSERT_NO_FATAL_FAILURE(drive(**host, **frames));
 
     std::thread stopping([&] { live.stop(); });
@@ -211,10 +252,12 @@ TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
 
 INSTANTIATE_TEST_SUITE_P(Pacing, DaemonReplay,
                          ::testing::Values(config::PacingMode::host_step,
-                                           config::PacingMode::ig_clock),
+                                           config::PacingMode::ig_clock,
+                                           config::PacingMode::trigger),
                          [](const auto& parameter) {
-                           return parameter.param == config::PacingMode::host_step ? "HostStep"
-                                                                                   : "IgClock";
+                           return parameter.param == config::PacingMode::host_step  ? "HostStep"
+                                  : parameter.param == config::PacingMode::ig_clock ? "IgClock"
+                                                                                    : "Trigger";
                          });
 
 TEST(JournalPlayer, RefusesAJournalWithAHole) {

@@ -99,6 +99,45 @@ TEST_F(ConfigTest, daemon_combinations_and_ranges_are_checked) {
             "d.toml:4:1: unknown key 'queue', did you mean 'queue_frames'?");
 }
 
+TEST_F(ConfigTest, timing_sections_are_read_printed_and_checked) {
+  const auto defaults = daemon(kCanned);
+  ASSERT_TRUE(defaults.has_value()) << defaults.error().text;
+  EXPECT_EQ(defaults->realtime.scheduler, SchedulerKind::other);
+  EXPECT_FALSE(defaults->realtime.lock_memory);
+  EXPECT_TRUE(defaults->clock.ptp_socket.empty());
+  EXPECT_EQ(defaults->trigger.udp, "127.0.0.1:7003");
+  const auto first = daemon(kCanned +
+                            "[pacing]\nmode = \"trigger\"\n"
+                            "[trigger]\nudp = \"[::1]:9\"\npeer = \"::1\"\n"
+                            "[clock]\nptp_socket = \"/run/ptp\"\nptp_domain = 5\n"
+                            "[realtime]\nscheduler = \"fifo\"\npriority = 9\n"
+                            "cpus = \"sender=1-2\"\nlock_memory = true\nheap_touch_mib = 3\n"
+                            "required = true\n");
+  ASSERT_TRUE(first.has_value()) << first.error().text;
+  EXPECT_EQ(first->pacing.mode, PacingMode::trigger);
+  EXPECT_EQ(first->trigger.udp, "[::1]:9");
+  EXPECT_EQ(first->trigger.peer, "::1");
+  EXPECT_EQ(first->clock.ptp_socket, "/run/ptp");
+  EXPECT_EQ(first->clock.ptp_domain, 5U);
+  EXPECT_EQ(first->realtime.scheduler, SchedulerKind::fifo);
+  EXPECT_EQ(first->realtime.priority, 9U);
+  EXPECT_EQ(first->realtime.cpus, "sender=1-2");
+  EXPECT_TRUE(first->realtime.lock_memory);
+  EXPECT_EQ(first->realtime.heap_touch_mib, 3U);
+  EXPECT_TRUE(first->realtime.required);
+  const std::string printed = print_daemon(*first);
+  const auto second = daemon(printed);
+  ASSERT_TRUE(second.has_value()) << second.error().text;
+  EXPECT_EQ(print_daemon(*second), printed);
+
+  EXPECT_EQ(daemon_error(kCanned + "[trigger]\nudp = \"\"\n"),
+            "d.toml:4:7: 'udp' is '', must be address:port");
+  EXPECT_THAT(daemon_error(kCanned + "[realtime]\ncpus = \"pilot=1\"\n"),
+              ::testing::StartsWith("d.toml:4:8: 'cpus': 'pilot=1' is not AGENT=CORE"));
+  EXPECT_EQ(daemon_error(kCanned + "[realtime]\npriority = 3\n"),
+            "d.toml:4:12: 'priority' is 3, must be 4 .. 99");
+}
+
 TEST_F(ConfigTest, an_unknown_scenario_is_reported_where_it_is_named) {
   EXPECT_THAT(daemon_error("scenario = \"no_such_scenario\"\n"),
               ::testing::StartsWith(

@@ -154,7 +154,7 @@ TEST_P(ShippedProfile, loads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, ShippedProfile,
-                         ::testing::Values("default", "ci_llvmpipe", "canned"));
+                         ::testing::Values("default", "ci_llvmpipe", "canned", "low_latency"));
 
 }  // namespace
 }  // namespace emit::config::testing

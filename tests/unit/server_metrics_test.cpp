@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "app/context.hpp"
@@ -30,6 +32,8 @@ struct Sources {
   Context context{clock, 1u << 16, 4};
   StatusBoard board;
   DutyCycle duty;
+  RealtimeReport realtime;
+  std::optional<PtpStatus> ptp;
 
   [[nodiscard]] std::string text() const {
     MetricsSources sources;
@@ -39,7 +43,9 @@ struct Sources {
     sources.board = &board;
     sources.agents = {{"sender", &duty}};
     sources.build = {{"version", "1.2"}, {"device", "a \"b\" \\ c\nd"}};
-    return metrics_text(sources, {7, true, 1'500'000'000});
+    sources.prediction = &context.prediction;
+    sources.realtime = &realtime;
+    return metrics_text(sources, {7, true, 1'500'000'000, 9'000'000'000, ptp});
   }
 };
 
@@ -85,6 +91,52 @@ TEST(MetricsText, IsSoundWhetherThereIsMuchToSayOrNothing) {
   EXPECT_EQ(metrics.value("emitd_agent_longest_turn_seconds", {{"agent", "sender"}}), 0.002);
   EXPECT_EQ(metrics.value("emitd_warnings_total", {{"level", "warn"}}), 2.0);
   EXPECT_EQ(metrics.value("emitd_warning_last_seconds", {{"level", "warn"}}), 6.0);
+}
+
+TEST(MetricsText, TellsOfTimingOnlyWhatThereIs) {
+  Sources sources;
+  EXPECT_TRUE(std::isnan(Exposition(sources.text()).value("emitd_ptp_up")));
+  EXPECT_TRUE(std::isnan(Exposition(sources.text()).value("emitd_realtime_granted")));
+  sources.ptp.emplace();
+  EXPECT_EQ(Exposition(sources.text()).value("emitd_ptp_up"), 0.0);
+  EXPECT_TRUE(std::isnan(Exposition(sources.text()).value("emitd_ptp_offset_seconds")));
+  *sources.ptp = {true, PtpState::slave, -250, true, "0011aa.fffe.bbccdd"};
+  sources.realtime.add({"fifo", "conductor", true, ""});
+  sources.realtime.add({"lock_memory", "", false, "no"});
+  sources.context.prediction.record(0.5, 0.002);
+  sources.context.prediction.record(0.25, 0.004);
+  sources.duty.beat(7'500'000'000);
+  sources.context.clients()[2].begin(kKey);
+  sources.board.note(event(EventKind::connected, kKey, 0, "127.0.0.1:5"));
+  sources.context.clients()[2].jitter_ns.store(3'000);
+  sources.context.times.jitter.record(15'000);
+  sources.context.times.sim_age.record(15'000);
+  sources.context.times.sampling.record(15'000);
+  const Exposition metrics(sources.text());
+  EXPECT_EQ(metrics.fault(), "");
+  EXPECT_EQ(metrics.value("emitd_ptp_up"), 1.0);
+  EXPECT_EQ(metrics.value("emitd_ptp_offset_seconds"), -250e-9);
+  EXPECT_EQ(metrics.value("emitd_ptp_grandmaster_present"), 1.0);
+  EXPECT_EQ(
+      metrics.value("emitd_ptp_info", {{"state", "slave"}, {"grandmaster", "0011aa.fffe.bbccdd"}}),
+      1.0);
+  EXPECT_EQ(metrics.value("emitd_realtime_granted", {{"setting", "fifo"}, {"agent", "conductor"}}),
+            1.0);
+  EXPECT_EQ(metrics.value("emitd_realtime_granted", {{"setting", "lock_memory"}, {"agent", ""}}),
+            0.0);
+  EXPECT_EQ(metrics.value("emitd_prediction_error_metres_count"), 2.0);
+  EXPECT_EQ(metrics.value("emitd_prediction_error_metres_sum"), 0.75);
+  EXPECT_EQ(metrics.value("emitd_prediction_error_metres_bucket", {{"le", "0.2"}}), 0.0);
+  EXPECT_EQ(metrics.value("emitd_prediction_error_metres_bucket", {{"le", "0.5"}}), 2.0);
+  EXPECT_EQ(metrics.value("emitd_prediction_error_max_metres"), 0.5);
+  EXPECT_EQ(metrics.value("emitd_prediction_error_max_radians"), 0.004);
+  EXPECT_EQ(metrics.value("emitd_agent_heartbeat_age_seconds", {{"agent", "sender"}}), 1.5);
+  EXPECT_EQ(metrics.value("emitd_client_jitter_seconds"), 3e-6);
+  for (const char* name : {"delay_jitter", "sim_age", "sampling"}) {
+    const std::string family = std::string("emitd_") + name + "_seconds";
+    EXPECT_EQ(metrics.value(family + "_count"), 1.0) << name;
+    EXPECT_EQ(metrics.value(family + "_bucket", {{"le", "2e-05"}}), 1.0) << name;
+  }
 }
 
 TEST(MetricsText, HasEveryCounterWithItsHelp) {

@@ -287,9 +287,9 @@ TEST(SlotPolicy, SendsNothingWhileStopped) {
 }
 
 TEST(HostStepPolicy, HasNoDeadlineWithoutABudget) {
-  EXPECT_FALSE(host_step_is_late(0, 1'000'000));
-  EXPECT_FALSE(host_step_is_late(100, 100));
-  EXPECT_TRUE(host_step_is_late(100, 101));
+  EXPECT_FALSE(is_past_deadline(0, 1'000'000));
+  EXPECT_FALSE(is_past_deadline(100, 100));
+  EXPECT_TRUE(is_past_deadline(100, 101));
 }
 
 }  // namespace

@@ -4,12 +4,16 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "emit/physics/error.hpp"
 
 /// What emitd reads from --config; keys are documented in config/README.md. Plain data.
 namespace emit::config {
 
 enum class SourceKind : std::uint8_t { renderer, canned };
-enum class PacingMode : std::uint8_t { host_step, ig_clock };
+enum class PacingMode : std::uint8_t { host_step, ig_clock, trigger };
+enum class SchedulerKind : std::uint8_t { other, fifo };
 
 struct SourceConfig {
   SourceKind kind = SourceKind::renderer;
@@ -23,11 +27,42 @@ struct SourceConfig {
 
 struct PacingConfig {
   PacingMode mode = PacingMode::host_step;
-  double rate_hz = 200.0;      ///< ig_clock: own period
+  double rate_hz = 200.0;      ///< ig_clock: own period; trigger: what the triggers come at
   std::int64_t budget_ns = 0;  ///< host_step: deadline after the pose arrived; 0 = none
   std::int64_t horizon_ns =
       50'000'000;                     ///< extrapolation is clamped here and the frame flagged stale
-  std::int64_t display_delay_ns = 0;  ///< ig_clock: pose is predicted to slot start + this
+  std::int64_t display_delay_ns = 0;  ///< not host_step: pose is predicted to slot start + this
+};
+
+/// Where the datagrams of pacing mode trigger arrive.
+struct TriggerConfig {
+  std::string udp = "127.0.0.1:7003";
+  std::string peer;  ///< the only address triggers are taken from; empty: any, on loopback only
+};
+
+/// What the agents ask of the host; everything is off by default.
+struct RealtimeConfig {
+  SchedulerKind scheduler = SchedulerKind::other;
+  std::uint32_t priority = 50;  ///< fifo: of the conductor; the others lie just below
+  std::string cpus;             ///< see parse_agent_cpus(); empty = wherever the kernel likes
+  bool lock_memory = false;
+  std::uint32_t heap_touch_mib = 64;  ///< lock_memory: heap touched at start and kept
+  bool required = false;              ///< what the host refuses ends the start
+};
+
+/// Cores of one agent.
+struct AgentCpus {
+  std::string agent;
+  std::vector<std::uint32_t> cpus;  ///< ascending, not empty
+};
+/// "conductor=2, receiver=2, render=4-7": agents of receiver, conductor, render, sender, recorder,
+/// each at most once; cores below kMaxCpus. Errors (config) name the part at fault.
+[[nodiscard]] physics::Result<std::vector<AgentCpus>> parse_agent_cpus(std::string_view text);
+inline constexpr std::uint32_t kMaxCpus = 1024;
+
+struct ClockConfig {
+  std::filesystem::path ptp_socket;  ///< of linuxptp's ptp4l; empty = off
+  std::uint32_t ptp_domain = 0;
 };
 
 struct HostConfig {
@@ -82,6 +117,9 @@ struct DaemonConfig {
   std::filesystem::path scenario;  ///< resolved; empty only for a canned source
   SourceConfig source;
   PacingConfig pacing;
+  TriggerConfig trigger;
+  ClockConfig clock;
+  RealtimeConfig realtime;
   HostConfig host;
   ControlConfig control;
   StreamConfig stream;

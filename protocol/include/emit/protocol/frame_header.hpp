@@ -20,19 +20,20 @@ enum class PixelQuantity : std::uint8_t { radiance_w_m2_sr = 1, temperature_k = 
 
 /// Set on a frame whenever it is not simply right and on time. Names are part of the contract.
 enum FrameFlags : std::uint32_t {
-  kFlagLate = 1u << 0,          ///< finished after its deadline
-  kFlagRepeated = 1u << 1,      ///< the previous frame's pixels sent again at this slot
-  kFlagStale = 1u << 2,         ///< rendered on a pose older than the extrapolation horizon
-  kFlagDegraded = 1u << 3,      ///< less than full quality; see quality_rung, estimated_error_k
-  kFlagPartial = 1u << 4,       ///< set by a receiver: pixels are missing
-  kFlagHold = 1u << 5,          ///< thermal clock frozen by the host
-  kFlagNonFinite = 1u << 6,     ///< nonfinite_px > 0: those pixels are written as 0
-  kFlagClamped = 1u << 7,       ///< clamped_px > 0
-  kFlagExtrapolated = 1u << 8,  ///< pose predicted beyond the newest one received
-  kFlagGapBefore = 1u << 9,     ///< frames in front of this one were not sent to this client
-  kFlagCanned = 1u << 10,       ///< pre-rendered pixels
-  kFlagTimeUnset = 1u << 11,    ///< kernel TAI offset unknown: wall instants are UTC
-  kFlagCorrupt = 1u << 15,  ///< set by a receiver: nothing is missing, but the checksum is wrong
+  kFlagLate = 1u << 0,           ///< finished after its deadline
+  kFlagRepeated = 1u << 1,       ///< the previous frame's pixels sent again at this slot
+  kFlagStale = 1u << 2,          ///< rendered on a pose older than the extrapolation horizon
+  kFlagDegraded = 1u << 3,       ///< less than full quality; see quality_rung, estimated_error_k
+  kFlagPartial = 1u << 4,        ///< set by a receiver: pixels are missing
+  kFlagHold = 1u << 5,           ///< thermal clock frozen by the host
+  kFlagNonFinite = 1u << 6,      ///< nonfinite_px > 0: those pixels are written as 0
+  kFlagClamped = 1u << 7,        ///< clamped_px > 0
+  kFlagExtrapolated = 1u << 8,   ///< pose predicted beyond the newest one received
+  kFlagGapBefore = 1u << 9,      ///< frames in front of this one were not sent to this client
+  kFlagCanned = 1u << 10,        ///< pre-rendered pixels
+  kFlagTimeUnset = 1u << 11,     ///< kernel TAI offset unknown: wall instants are UTC
+  kFlagTriggerFault = 1u << 12,  ///< trigger late, or others before it missing or refused
+  kFlagCorrupt = 1u << 13,       ///< set by a receiver: nothing is missing, but the checksum is wrong
 };
 
 struct FrameHeader {
@@ -64,7 +65,15 @@ struct FrameHeader {
   std::int64_t previous_age_ns = 0;    ///< last completed frame: sim-time age at its last byte
   std::int64_t previous_delay_ns = 0;  ///< last completed frame: pose received to last byte sent
   std::uint64_t previous_frame_number = 0;
-  physics::Pose pose;  ///< of the sensor, as used
+  /// Smoothed jitter of previous_delay_ns on this client's stream, as in RFC 3550: |difference of
+  /// two consecutive delays|, each with a weight of 1/16.
+  std::int64_t previous_jitter_ns = 0;
+  std::int64_t slot_begin_ns = 0;     ///< ig-clock, trigger: wall instant the slot began; else 0
+  std::uint64_t trigger_number = 0;   ///< trigger: of the trigger that asked for it; else 0
+  float prediction_error_m = 0.0F;    ///< of the newest predicted sensor pose whose truth has come
+  float prediction_error_rad = 0.0F;  ///< likewise
+  std::uint32_t predictions = 0;      ///< predicted poses of this run whose truth has come
+  physics::Pose pose;                 ///< of the sensor, as used
   std::uint64_t payload_bytes = 0;
   std::uint32_t payload_crc32c = 0;
 };

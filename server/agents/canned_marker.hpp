@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+
+namespace emit::server {
+
+/// An entity that the canned test pattern knows: while a host has it on, the upper left eighth of
+/// the picture is at kCannedMarkerRadiance. It shows from pixels alone when a pose came through.
+inline constexpr std::uint32_t kCannedMarkerEntity = 0xFFFFFFFFU;
+inline constexpr float kCannedMarkerRadiance = 200.0F;  ///< W m-2 sr-1
+
+}  // namespace emit::server

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "app/service_notifier.hpp"
+#include "telemetry/duty_cycle.hpp"
+
+namespace emit::server {
+
+/// What the service manager is told, and when: how far the start is, ready, alive as long as every
+/// agent comes round its loop, stopping. Main's, but for warming_up().
+class ServiceHealth {
+ public:
+  /// An agent is stuck when it has not come round for so long. The render agent of a slow software
+  /// renderer may take seconds for a frame.
+  static constexpr std::int64_t kStuckNs = 30'000'000'000;
+
+  explicit ServiceHealth(const ServiceNotifier& notifier) : notifier_(notifier) {}
+
+  using Agents = std::vector<std::pair<std::string, const DutyCycle*>>;
+  /// The first agent silent for longer than that; empty: none.
+  [[nodiscard]] static std::string_view stuck_agent(const Agents& agents, std::int64_t now_ns,
+                                                    std::int64_t limit_ns) noexcept {
+    for (const auto& [name, duty] : agents) {
+      if (duty->silent_ns(now_ns) > limit_ns) return name;
+    }
+    return {};
+  }
+
+  void starting() const { notifier_.status("loading scene and device", kStartPieceS); }
+  /// Thread: the render agent's. Always goes on.
+  bool warming_up(double done_frac) {
+    const int percent = static_cast<int>(done_frac * 100.0);
+    if (percent != told_percent_) {
+      told_percent_ = percent;
+      notifier_.status("warming up: " + std::to_string(percent) + " %", kStartPieceS);
+    }
+    return true;
+  }
+  void ready(std::string_view status) const { notifier_.ready(status); }
+  void stopping() const { notifier_.stopping(); }
+
+  /// Each turn of main while serving. Tells the manager that the daemon lives, twice within the
+  /// time it waits, unless an agent is stuck.
+  /// @return the agent that is stuck, once for each time it gets stuck; else empty.
+  [[nodiscard]] std::string_view turn(const Agents& agents, std::int64_t now_ns) {
+    const std::int64_t watchdog_ns = notifier_.watchdog_ns();
+    const std::int64_t limit_ns = watchdog_ns > 0 ? watchdog_ns : kStuckNs;
+    const std::string_view stuck = stuck_agent(agents, now_ns, limit_ns);
+    if (!stuck.empty()) return std::exchange(told_stuck_, true) ? std::string_view{} : stuck;
+    told_stuck_ = false;
+    if (watchdog_ns > 0 && now_ns - alive_ns_ >= watchdog_ns / 4) {
+      alive_ns_ = now_ns;
+      notifier_.alive();
+    }
+    return {};
+  }
+
+ private:
+  /// What may pass between two pieces of news of the start.
+  static constexpr std::int64_t kStartPieceS = 300;
+
+  const ServiceNotifier& notifier_;
+  int told_percent_ = -1;
+  bool told_stuck_ = false;
+  std::int64_t alive_ns_ = 0;
+};
+
+}  // namespace emit::server

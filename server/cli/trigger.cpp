@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <time.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+
+#include "console.hpp"
+#include "emit/protocol/trigger.hpp"
+#include "interrupt.hpp"
+#include "io/client.hpp"
+#include "io/socket.hpp"
+#include "json.hpp"
+#include "rt/clock.hpp"
+#include "timing_commands.hpp"
+
+namespace emit::cli {
+
+int run_trigger(const TriggerCommand& command) {
+  const auto url = server::parse_url(command.to);
+  if (!url) return fail(kExitUsage, url.error().text);
+  if (url->scheme != server::Url::Scheme::udp) {
+    return fail(kExitUsage, fmt::format("{}: triggers go by udp://host:port", command.to));
+  }
+  const auto address = server::resolve({url->host, url->port}, server::Transport::udp, false);
+  if (!address) return fail(address.error());
+  const server::SocketContext context;
+  auto socket = server::UdpSocket::open(context, *address);
+  if (!socket) return fail(socket.error());
+
+  const InterruptGuard interrupt;
+  const server::SystemClock clock;
+  protocol::Trigger trigger;
+  trigger.run_id = static_cast<std::uint64_t>(clock.tai_ns());
+  ProgressBar progress("triggers", command.frames == 0 ? 1 : command.frames);
+  const std::int64_t start_ns = clock.tai_ns();
+  std::uint64_t failed = 0;
+  while (!InterruptGuard::interrupted() &&
+         (command.frames == 0 || trigger.number < command.frames)) {
+    const std::int64_t due_ns =
+        start_ns +
+        static_cast<std::int64_t>(static_cast<double>(trigger.number) * 1e9 / command.rate_hz);
+    const timespec due{static_cast<time_t>(due_ns / 1'000'000'000),
+                       static_cast<long>(due_ns % 1'000'000'000)};
+    // By an absolute timer: a late trigger does not delay those behind it.
+    if (::clock_nanosleep(CLOCK_TAI, TIMER_ABSTIME, &due, nullptr) == EINTR) continue;
+    ++trigger.number;
+    trigger.edge_ns = command.stamp ? clock.tai_ns() : 0;
+    std::array<std::byte, protocol::kTriggerBytes> bytes;
+    protocol::encode(trigger, bytes);
+    if (socket->send_to(bytes, *address).status != server::IoStatus::done) ++failed;
+    if (command.frames != 0) progress.advance_to(trigger.number);
+  }
+  progress.finish();
+  const double seconds = static_cast<double>(clock.tai_ns() - start_ns) * 1e-9;
+  fmt::print(text_stream(command.json),
+             "{} triggers sent in {:.3f} s, {} not taken by the kernel\n", trigger.number - failed,
+             seconds, failed);
+  if (command.json) {
+    Json json = Json::object();
+    json.set("sent", trigger.number - failed).set("failed", failed).set("seconds", seconds);
+    json.set("rate_hz", command.rate_hz);
+    if (auto done = write_json(*command.json, json); !done) return fail(done.error());
+  }
+  return failed > 0 ? kExitFailure : kExitOk;
+}
+
+}  // namespace emit::cli
