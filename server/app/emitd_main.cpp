@@ -139,7 +139,9 @@ int serve(const Arguments& arguments, const char* program) {
     fmt::print("{}: ok\n", arguments.config_file);
     return 0;
   }
-  auto daemon = Daemon::create(*daemon_config, std::move(scenario), {});
+  DaemonOptions options;
+  options.drop_privileges = true;
+  auto daemon = Daemon::create(*daemon_config, std::move(scenario), std::move(options));
   if (!daemon) {
     return fail(program, daemon.error());
   }

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "io/security.hpp"
+
 /// One options struct and one function per subcommand of `emit`. The functions return the exit
 /// code, print results to standard output and everything else to standard error.
 namespace emit::cli {
@@ -61,6 +63,7 @@ struct ReceiveCommand {
   bool every_frame = false;
   double min_k = 280.0;
   double max_k = 330.0;
+  server::Security security;
 };
 int run_receive(const ReceiveCommand& command);
 
@@ -84,6 +87,7 @@ struct SendCommand {
   std::optional<std::uint64_t> run_id;  ///< absent: from the wall clock
   std::uint16_t host_port = 7001;       ///< of captures: where the host's datagrams went
   std::optional<std::filesystem::path> json;
+  server::Security security;
 };
 int run_send(const SendCommand& command);
 
@@ -93,6 +97,7 @@ struct RecordCommand {
   std::uint64_t frames = 0;
   double duration_s = 0.0;
   std::optional<std::filesystem::path> json;
+  server::Security security;
 };
 int run_record(const RecordCommand& command);
 
@@ -129,6 +134,7 @@ struct ViewCommand {
   std::uint64_t frames = 0;
   std::optional<std::filesystem::path> screenshot;
   int gpu_index = -1;
+  server::Security security;
 };
 int run_view(const ViewCommand& command);
 

@@ -110,6 +110,7 @@ class DaemonProcess {
   [[nodiscard]] const std::string& host_udp() const { return host_udp_; }
   /// Empty: off.
   [[nodiscard]] const std::string& metrics() const { return metrics_; }
+  [[nodiscard]] pid_t pid() const { return pid_; }
   void signal(int number) const { ::kill(pid_, number); }
   /// Exit code, 128 + signal, or -1 when it does not end within the limit.
   [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
