@@ -85,9 +85,6 @@ physics::Result<TlsContext> TlsContext::make(const TlsFiles& files, bool server)
   if (SSL_CTX_use_PrivateKey_file(context, files.key.c_str(), SSL_FILETYPE_PEM) != 1) {
     return failure(files.key, tls_error_text());
   }
-  if (SSL_CTX_check_private_key(context) != 1) {
-    return failure(files.key, "not the key of " + files.certificate.string());
-  }
   if (SSL_CTX_load_verify_locations(context, files.ca.c_str(), nullptr) != 1) {
     return failure(files.ca, tls_error_text());
   }

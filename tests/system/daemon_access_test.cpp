@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <csignal>
 #include <optional>
+#include <ostream>
 #include <random>
 
 #include "emit/protocol/codec.hpp"
@@ -18,10 +19,12 @@
 #include "emit/protocol/host_session.hpp"
 #include "emit/v1/control.pb.h"
 #include "io/client.hpp"
+#include "io/http_get.hpp"
 #include "io/socket_address.hpp"
 #include "rt/fd.hpp"
 #include "support/certificates.hpp"
 #include "support/daemon_process.hpp"
+#include "support/exposition.hpp"
 #include "support/two_networks.hpp"
 
 namespace emit::server {
@@ -80,7 +83,7 @@ Bytes garbage(std::size_t length) {
 std::string config(const std::string& address, const std::string& protections,
                    const std::string& host_more = {}) {
   return "[source]\nkind = \"canned\"\ncanned_width_px = 64\ncanned_height_px = 48\n"
-         "[pacing]\nmode = \"host-step\"\n[journal]\nfile = \"run.mcap\"\n"
+         "[pacing]\nmode = \"host-step\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n[journal]\nfile = \"run.mcap\"\n"
          "[control]\ntcp = \"" + address + ":0\"\n[host]\nudp = \"" + address + ":0\"\n" +
          host_more + protections;
 }
@@ -268,6 +271,18 @@ bool is_host_frame(const Bytes& datagram) {
   return read && read->header.kind == protocol::SessionKind::host_frame;
 }
 
+/// Until the daemon has counted that many: it is through with what was sent.
+bool wait_counted(const DaemonProcess& daemon, const std::string& name, std::uint64_t at_least) {
+  for (int i = 0; i < 3000; ++i, ::usleep(10'000)) {
+    const auto page = http_get("http://" + daemon.metrics() + "/metrics", kLongNs);
+    if (page && test::Exposition(page->body).value("emitd_" + name + "_total") >=
+                    static_cast<double>(at_least)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// Value of a counter in the summary that a daemon logs at its end.
 std::uint64_t counted(const ScratchFolder& folder, const std::string& name) {
   const std::string log = folder.read("stderr");
@@ -315,6 +330,7 @@ TEST(DaemonAccess, AStrangerGetsNothingFromADaemonWithTlsAndKeys) {
       Stranger stranger(networks, daemon, "192.0.2.1");
       stranger.try_everything(recorded);
       rightful.expect_frames(10);
+      EXPECT_TRUE(wait_counted(daemon, "host_datagrams", 10 + 5 + 5 * recorded.size()));
       expect_end(daemon, folder);
       // A TLS alert is all that is ever said to a stranger; to who repeats the opening, the nonce.
       EXPECT_LT(stranger.longest_heard(), 64U);
@@ -332,10 +348,12 @@ TEST(DaemonAccess, AStrangerGetsNothingFromADaemonWithTlsAndKeys) {
     EXPECT_EQ(counted(folder, "host_sessions"), 1U);
 
     // A daemon that has seen nothing yet takes nothing that was recorded before, either.
+    folder.write("stdout", "");
     DaemonProcess daemon(folder, {"--config", folder.write("emitd.toml", text)});
     ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
     Stranger stranger(networks, daemon, "192.0.2.1");
     stranger.try_everything(recorded);
+    EXPECT_TRUE(wait_counted(daemon, "host_datagrams", 5 + 4 * recorded.size()));
     Rightful rightful(daemon, security);
     rightful.expect_frames(5);
     expect_end(daemon, folder);
@@ -358,6 +376,9 @@ constexpr ListCase kLists[] = {
     {"V6", "[fd00:77::1]", "fd00:77::1", "\"fd00:78::/32\", \"fd00:77::1\"", "\"fd00:77::/64\""},
     {"V4OnBothFamilies", "[::]", "192.0.2.1", "\"::/0\", \"192.0.2.1\"", "\"192.0.2.2\""},
 };
+void PrintTo(const ListCase& list, std::ostream* out) {
+  *out << list.name;
+}
 class DaemonAllowList : public ::testing::TestWithParam<ListCase> {};
 
 TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
@@ -373,6 +394,7 @@ TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
       ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
       Stranger stranger(networks, daemon, test.reached_by);
       stranger.try_everything({});
+      EXPECT_TRUE(wait_counted(daemon, "host_datagrams", 5));
       expect_end(daemon, folder);
       EXPECT_EQ(stranger.longest_heard(), 0U);
       EXPECT_EQ(stranger.datagrams_heard(), 0U);
@@ -384,13 +406,14 @@ TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
     EXPECT_NE(folder.read("stderr").find("not in access.allow"), std::string::npos);
 
     // The same from an address that is listed: so it was the list that kept it out.
+    ScratchFolder second;
     DaemonProcess daemon(
-        folder,
+        second,
         {"--config",
-         folder.write("emitd.toml",
+         second.write("emitd.toml",
                       config(test.address, "[access]\nmax_connections_per_peer = 1\nallow = [" +
                                                std::string(test.own) + "]\n"))});
-    ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+    ASSERT_TRUE(daemon.wait_ready()) << second.read("stderr");
     Stranger neighbour(networks, daemon, test.reached_by);
     const auto welcome = neighbour.say({hello(v1::Hello::ROLE_CLIENT)});
     ASSERT_TRUE(welcome.has_value());
@@ -408,10 +431,10 @@ TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
     const auto refusal = neighbour.say({});
     ASSERT_TRUE(refusal.has_value());
     EXPECT_GT(refusal->size(), protocol::kRecordHeaderBytes);
-    expect_end(daemon, folder);
-    EXPECT_EQ(counted(folder, "peer_limit_refused"), 1U);
-    EXPECT_EQ(counted(folder, "host_frames_accepted"), 1U);
-    EXPECT_EQ(counted(folder, "peers_refused"), 0U);
+    expect_end(daemon, second);
+    EXPECT_EQ(counted(second, "peer_limit_refused"), 1U);
+    EXPECT_EQ(counted(second, "host_frames_accepted"), 1U);
+    EXPECT_EQ(counted(second, "peers_refused"), 0U);
   });
 }
 
