@@ -9,13 +9,18 @@ add_library(emit_client STATIC
   io/frame_client.cpp
   io/host_client.cpp
   io/http_get.cpp
+  io/ip_address.cpp
+  io/lent_socket.cpp
   io/recorder_client.cpp
   io/resend_planner.cpp
   io/shm_frame_client.cpp
   io/shm_object.cpp
   io/socket.cpp
   io/socket_address.cpp
+  io/tls_context.cpp
+  io/tls_session.cpp
   io/udp_frame_receiver.cpp
+  io/udp_session_host.cpp
   rt/clock.cpp
   rt/futex.cpp)
 add_library(emit::client ALIAS emit_client)
@@ -25,7 +30,7 @@ target_include_directories(emit_client PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
 target_compile_definitions(emit_client PUBLIC BOOST_ASIO_SEPARATE_COMPILATION BOOST_ASIO_NO_DEPRECATED)
 target_link_libraries(emit_client
   PUBLIC emit::physics emit::protocol Threads::Threads
-  PRIVATE emit::config fmt::fmt emit_options)
+  PRIVATE emit::config fmt::fmt emit_options OpenSSL::SSL)
 
 # emit::server: everything of the daemon but main(), linked by emitd, emit and the tests.
 add_library(emit_server STATIC
@@ -34,8 +39,10 @@ add_library(emit_server STATIC
   agents/conductor.cpp
   agents/conductor_input.cpp
   agents/conductor_trigger.cpp
+  agents/host_sessions.cpp
   agents/journal_encode.cpp
   agents/receiver.cpp
+  agents/receiver_access.cpp
   agents/receiver_session.cpp
   agents/receiver_udp.cpp
   agents/recorder.cpp
@@ -49,6 +56,7 @@ add_library(emit_server STATIC
   agents/socket_client.cpp
   app/daemon.cpp
   app/emitd_main.cpp
+  app/privileges.cpp
   app/replay.cpp
   app/scenario_hash.cpp
   app/service_notifier.cpp

@@ -116,6 +116,10 @@ const KeyTable<HostConfig>& host_keys() {
   static const KeyTable<HostConfig> keys = {
       text<HostConfig>("udp", EMIT_FIELD(udp),
                        "`address:port` for host frames as datagrams; empty: off."),
+      path<HostConfig>("key_file", EMIT_FIELD(key_file),
+                       "Pre-shared keys, one per line as 64 hexadecimal digits, not readable by "
+                       "others. Datagrams must then carry a MAC by one of them, or by a key agreed "
+                       "over TLS (see `[tls]`); bare ones are dropped."),
   };
   return keys;
 }
@@ -186,8 +190,7 @@ const KeyTable<MetricsConfig>& metrics_keys() {
   static const KeyTable<MetricsConfig> keys = {
       text<MetricsConfig>("listen", EMIT_FIELD(listen),
                           "`address:port` for HTTP: /metrics (Prometheus text), /healthz, /readyz; "
-                          "empty: off. Answers anybody who reaches it: keep it on loopback or a "
-                          "monitoring network."),
+                          "empty: off. Beyond loopback only with `access.allow`."),
   };
   return keys;
 }

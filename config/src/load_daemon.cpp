@@ -18,23 +18,6 @@ bool is_ascii_alnum(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
 }
 
-/// host:port with a port of 0..65535; IPv6 addresses stand in brackets.
-bool is_endpoint(std::string_view text) {
-  const std::size_t colon = text.rfind(':');
-  if (colon == std::string_view::npos || colon == 0) {
-    return false;
-  }
-  const std::string_view host = text.substr(0, colon);
-  const std::string_view port = text.substr(colon + 1);
-  const bool bracketed = host.front() == '[' && host.back() == ']' && host.size() > 2;
-  if (!bracketed && host.find_first_of(":[] ") != std::string_view::npos) {
-    return false;
-  }
-  unsigned value = 0;
-  const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
-  return parsed.ec == std::errc() && parsed.ptr == port.data() + port.size() && value <= 65535;
-}
-
 void check_endpoint(const Node& table, std::string_view key, const std::string& value,
                     bool may_be_empty, Diagnostics& diagnostics) {
   if ((may_be_empty && value.empty()) || is_endpoint(value)) {
@@ -95,6 +78,7 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
   }
   check_endpoint(section(root, "metrics", reported_before), "listen", daemon.metrics.listen, true,
                  diagnostics);
+  check_access(root, daemon, diagnostics);
   if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {
     std::error_code code;
     if (!std::filesystem::is_directory(daemon.source.canned_dir, code)) {
@@ -106,6 +90,22 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
 }
 
 }  // namespace
+
+bool is_endpoint(std::string_view text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) {
+    return false;
+  }
+  const std::string_view host = text.substr(0, colon);
+  const std::string_view port = text.substr(colon + 1);
+  const bool bracketed = host.front() == '[' && host.back() == ']' && host.size() > 2;
+  if (!bracketed && host.find_first_of(":[] ") != std::string_view::npos) {
+    return false;
+  }
+  unsigned value = 0;
+  const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
+  return parsed.ec == std::errc() && parsed.ptr == port.data() + port.size() && value <= 65535;
+}
 
 bool is_shm_name(std::string_view text) noexcept {
   constexpr std::size_t kMostCharacters = 64;
@@ -146,6 +146,8 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   read_table(section(root, "control", diagnostics), control_keys(), daemon.control, diagnostics);
   read_table(section(root, "stream", diagnostics), stream_keys(), daemon.stream, diagnostics);
   read_table(section(root, "metrics", diagnostics), metrics_keys(), daemon.metrics, diagnostics);
+  read_table(section(root, "access", diagnostics), access_keys(), daemon.access, diagnostics);
+  read_table(section(root, "tls", diagnostics), tls_keys(), daemon.tls, diagnostics);
   read_table(section(root, "journal", diagnostics), journal_keys(), daemon.journal, diagnostics);
   read_table(section(root, "device", diagnostics), device_keys(), daemon.device, diagnostics);
   read_table(section(root, "log", diagnostics), log_keys(), daemon.log, diagnostics);

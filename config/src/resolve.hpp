@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "emit/config/daemon_config.hpp"
 #include "emit/config/load.hpp"
 #include "keys.hpp"
 
@@ -52,6 +53,11 @@ namespace emit::config {
     const Node& root, const std::vector<scene::Material>& materials, bool require_files,
     Diagnostics& diagnostics);
 [[nodiscard]] scene::SensorDesc resolve_sensor(const Node& root, Diagnostics& diagnostics);
+
+/// host:port with a port of 0..65535; IPv6 addresses stand in brackets.
+[[nodiscard]] bool is_endpoint(std::string_view text);
+/// Reports ports that other hosts may reach unprotected, and TLS that is half configured.
+void check_access(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics);
 
 /// The sub-table of the root, or an empty one.
 [[nodiscard]] const Node& section(const Node& root, std::string_view name,

@@ -74,6 +74,16 @@ const std::vector<SectionDoc>& daemon_sections() {
                   ControlConfig{}),
       section_doc("stream", false, "Frames out.", stream_keys(), StreamConfig{}),
       section_doc("metrics", false, "Numbers for monitoring.", metrics_keys(), MetricsConfig{}),
+      section_doc("access", false,
+                  "Who may connect. A port that other hosts reach is refused at start unless "
+                  "something keeps strangers out: `allow`, or for `control.tcp` `[tls]`, or for "
+                  "`host.udp` `host.key_file` or `[tls]`.",
+                  access_keys(), AccessConfig{}),
+      section_doc("tls", false,
+                  "Mutual TLS 1.3 on `control.tcp`: with a certificate, plain connections are "
+                  "refused, and so are host datagrams without a MAC by `host.key_file` or by the "
+                  "key that a host agrees over its TLS connection.",
+                  tls_keys(), TlsConfig{}),
       section_doc("journal", false, "The record that makes replay exact.", journal_keys(),
                   JournalConfig{}),
       section_doc("device", false, "The graphics device.", device_keys(), DeviceConfig{}),

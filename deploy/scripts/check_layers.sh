@@ -73,6 +73,7 @@ only spdlog   'spdlog/'           'server/'
 only Embree   'embree3/'          'renderer/reference/|renderer/surface/caster_'
 only Eigen    'Eigen/'            'renderer/reference/'
 only Ceres    'ceres/'            'renderer/reference/'
+only OpenSSL  'openssl/'          'protocol/src/|server/io/tls_'
 only CLI11    'CLI/'              'server/'
 only "the renderer's insides" 'gl/|passes/|history/|surface/' 'renderer/'
 

@@ -144,7 +144,13 @@ enum class EventKind : std::uint8_t {
   weather_lost,     ///< a = sim time of the sample, ns
   poses_dropped,    ///< a = how many
   trigger_silent,   ///< a = number of the last one
+  peer_refused,     ///< text = address, a = PeerRefusal
+  secured,          ///< a = connection, text = names in the peer's certificate
+  host_session,     ///< text = address
 };
+
+/// Why a peer is turned away before anything it says is looked at.
+enum class PeerRefusal : std::uint8_t { not_allowed, handshake, mac };
 
 /// any agent -> housekeeping: what happened, as numbers; the text is put together there.
 struct Event {

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "agents/receiver_connection.hpp"
+#include "io/ip_address.hpp"
 
 namespace emit::server {
 namespace {
@@ -27,20 +28,43 @@ Receiver::Receiver(Context& context, const config::DaemonConfig& config)
       context_(context),
       config_(config),
       epoll_(::epoll_create1(EPOLL_CLOEXEC)),
-      udp_memory_(std::make_unique<UdpMemory>()) {}
+      udp_memory_(std::make_unique<UdpMemory>()),
+      limits_(config.access) {}
 
 Receiver::~Receiver() = default;
 
-physics::Result<void> Receiver::open() {
-  const auto where = parse_host_port(config_.control.tcp);
+physics::Result<SocketAddress> Receiver::listen_address(std::string_view key,
+                                                        const std::string& endpoint,
+                                                        Transport transport,
+                                                        config::Port port) const {
+  const auto named = [key](const physics::Error& error) {
+    return tl::unexpected<physics::Error>(physics::Error(error).with_context(std::string(key)));
+  };
+  const auto where = parse_host_port(endpoint);
   if (!where) {
-    return tl::unexpected<physics::Error>(
-        physics::Error(where.error()).with_context("control.tcp"));
+    return named(where.error());
   }
-  const auto address = resolve(*where, Transport::tcp, true);
+  const auto address = resolve(*where, transport, true);
   if (!address) {
-    return tl::unexpected<physics::Error>(
-        physics::Error(address.error()).with_context("control.tcp"));
+    return named(address.error());
+  }
+  // The configuration was judged by its text; a name may stand for any address.
+  if (!ip_of(*address).is_loopback() && !config::is_protected(config_, port)) {
+    return named({physics::ErrorCode::config,
+                  to_string(*address) + ": other hosts may reach it: that needs " +
+                      std::string(config::protections_of(port))});
+  }
+  return *address;
+}
+
+physics::Result<void> Receiver::open() {
+  if (auto secured = open_security(); !secured) {
+    return secured;
+  }
+  const auto address =
+      listen_address("control.tcp", config_.control.tcp, Transport::tcp, config::Port::control);
+  if (!address) {
+    return tl::unexpected<physics::Error>(physics::Error(address.error()));
   }
   auto listener = TcpListener::open(sockets_, *address);
   if (!listener) {
@@ -49,15 +73,10 @@ physics::Result<void> Receiver::open() {
   listener_ = std::move(*listener);
 
   if (!config_.host.udp.empty()) {
-    const auto udp_where = parse_host_port(config_.host.udp);
-    if (!udp_where) {
-      return tl::unexpected<physics::Error>(
-          physics::Error(udp_where.error()).with_context("host.udp"));
-    }
-    const auto udp_address = resolve(*udp_where, Transport::udp, true);
+    const auto udp_address =
+        listen_address("host.udp", config_.host.udp, Transport::udp, config::Port::host);
     if (!udp_address) {
-      return tl::unexpected<physics::Error>(
-          physics::Error(udp_address.error()).with_context("host.udp"));
+      return tl::unexpected<physics::Error>(physics::Error(udp_address.error()));
     }
     auto udp = UdpSocket::open_bound(sockets_, *udp_address);
     if (!udp) {
@@ -135,8 +154,12 @@ int Receiver::do_work(std::int64_t now_ns) noexcept {
           continue;
         }
         if ((event.events & EPOLLOUT) != 0) {
-          flush(connection);
-          ++work;
+          if (connection.handshaking) {
+            work += handshake(connection, now_ns);
+          } else {
+            flush(connection);
+            ++work;
+          }
         }
         if ((event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0 && connection.open()) {
           work += read(connection, now_ns);
@@ -148,6 +171,11 @@ int Receiver::do_work(std::int64_t now_ns) noexcept {
         connection->stuck = false;
         connection->dirty = true;
         work += 1 + parse(*connection, now_ns);
+        connection->reread = connection->open() && connection->socket.has_buffered();
+      }
+      if (connection->open() && connection->reread && !connection->stuck) {
+        connection->reread = false;
+        work += read(*connection, now_ns);
       }
     }
     if (udp_ && !udp_watched_ && !draining_.load(std::memory_order_acquire)) {
@@ -176,55 +204,15 @@ int Receiver::accept_connections(std::int64_t now_ns) {
     if (!socket) {
       break;
     }
-    const auto place = std::find_if(connections_.begin(), connections_.end(),
-                                    [](const auto& connection) { return !connection->open(); });
-    if (place == connections_.end() || draining_.load(std::memory_order_acquire)) {
-      // One connection more than allowed gets an answer of its own, without a place in the table.
-      Connection guest;
-      guest.socket = std::move(socket);
-      refuse(guest, StatusCode::overloaded,
-             place == connections_.end() ? "as many connections as control.max_clients allows"
-                                         : "the daemon is stopping");
-      guest.socket.shutdown_send();
-      continue;
-    }
-    Connection& connection = **place;
-    // First what may throw, so that a place is never half taken.
-    protocol::RecordLimits limits;
-    limits.max_control_bytes = config_.control.max_record_bytes;
-    connection.parser.emplace(limits);
-    connection.socket = std::move(socket);
-    connection.peer = peer;
-    connection.generation = (connection.generation + 1) & (~0U >> kConnectionPlaceBits);
-    connection.role = Role::none;
-    connection.welcomed = false;
-    connection.closing = false;
-    connection.flush_close = false;
-    connection.lent = false;
-    connection.write_lent = false;
-    connection.stuck = false;
-    connection.dirty = false;
-    connection.misbehaved = 0;
-    connection.since_ns = now_ns;
-    connection.out.clear();
-    connection.out_sent = 0;
-    epoll_event event{};
-    event.events = EPOLLIN;
-    event.data.u64 = connection.key();
-    if (::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, connection.socket.fd(), &event) != 0) {
-      connection.socket.close();
-      continue;
-    }
-    if (ClientCounts* counts = context_.counts_of(connection.key())) {
-      counts->begin(connection.key());
-    }
-    context_.counters.add(Counter::connections_accepted);
-    context_.receiver_events.push(EventKind::connected, connection.key(), 0, to_string(peer));
+    static_cast<void>(admit(std::move(socket), peer, now_ns));
   }
   return work;
 }
 
 int Receiver::read(Connection& connection, std::int64_t now_ns) {
+  if (connection.handshaking) {
+    return handshake(connection, now_ns);
+  }
   if (connection.stuck || connection.closing || connection.flush_close) {
     // Only the end of the stream is of interest; anything else is thrown away or waits.
     std::array<std::byte, 4096> trash;
@@ -245,9 +233,15 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
   space = space.first(std::min(space.size(), kTurnBytes));
   const IoResult got = connection.socket.read_some(space);
   switch (got.status) {
-    case IoStatus::done:
+    case IoStatus::done: {
       connection.parser->commit(got.bytes);
-      return 1 + parse(connection, now_ns);
+      const int work = 1 + parse(connection, now_ns);
+      connection.reread = connection.open() && connection.socket.has_buffered();
+      return work;
+    }
+    case IoStatus::busy:
+      connection.reread = true;
+      break;
     case IoStatus::closed:
       close(connection, connection.parser->pending_bytes() != 0 ? "closed in the middle of a record"
                                                                 : "closed by the peer");
@@ -299,7 +293,7 @@ void Receiver::flush(Connection& connection) noexcept {
     const IoResult sent = connection.socket.write_some(
         std::span<const std::byte>(connection.out).subspan(connection.out_sent));
     if (sent.status != IoStatus::done) {
-      if (sent.status != IoStatus::would_block) {
+      if (sent.status != IoStatus::would_block && sent.status != IoStatus::busy) {
         close(connection, "write failed");
       }
       connection.dirty = true;
@@ -322,8 +316,9 @@ void Receiver::watch(Connection& connection) noexcept {
   connection.dirty = false;
   epoll_event event{};
   const bool reading = !connection.stuck && !connection.closing;
-  const bool writing =
-      !connection.write_lent && !connection.closing && connection.out_sent < connection.out.size();
+  const bool writing = (connection.handshaking && connection.socket.tls()->wants_write()) ||
+                       (!connection.write_lent && !connection.closing &&
+                        connection.out_sent < connection.out.size());
   event.events = (reading ? std::uint32_t{EPOLLIN} : 0U) | (writing ? std::uint32_t{EPOLLOUT} : 0U);
   event.data.u64 = connection.key();
   if (connection.closing) {
@@ -360,6 +355,10 @@ void Receiver::close(Connection& connection, std::string_view why) noexcept {
 void Receiver::finish_close(Connection& connection) noexcept {
   ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.socket.fd(), nullptr);
   connection.socket.close();
+  if (connection.agreed_key) {
+    connection.agreed_key = false;
+    sessions_->remove_key(connection.key());
+  }
   if (ClientCounts* counts = context_.counts_of(connection.key())) {
     counts->end();
   }
@@ -431,7 +430,11 @@ void Receiver::check_timeouts(std::int64_t now_ns) noexcept {
     } else if (!connection->welcomed || connection->flush_close) {
       const std::int64_t end_ns = connection->since_ns + kHelloTimeoutNs;
       if (now_ns >= end_ns) {
-        close(*connection, "no hello within 5 s");
+        if (connection->handshaking) {
+          context_.counters.add(Counter::handshakes_failed);
+        }
+        close(*connection, connection->handshaking ? "TLS handshake not done within 5 s"
+                                                   : "no hello within 5 s");
       } else {
         wake_at_ns_ = std::min(wake_at_ns_, end_ns);
       }

@@ -8,12 +8,15 @@
 #include <vector>
 
 #include "agents/agent.hpp"
+#include "agents/host_sessions.hpp"
+#include "agents/peer_limits.hpp"
 #include "agents/socket_client.hpp"
 #include "app/context.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/protocol/codec.hpp"
 #include "emit/protocol/framing.hpp"
 #include "io/socket.hpp"
+#include "io/tls_session.hpp"
 #include "rt/fd.hpp"
 
 namespace emit::v1 {
@@ -60,6 +63,8 @@ class Receiver final : public Agent {
   [[nodiscard]] int wait_fd() const noexcept override { return epoll_.get(); }
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
 
+  /// Whether access.allow lets this address in. Any thread.
+  [[nodiscard]] bool may_connect(const config::IpAddress& peer) const noexcept;
   /// Any thread: takes no further host frames, commands or connections.
   void drain() noexcept { draining_.store(true, std::memory_order_release); }
 
@@ -67,6 +72,17 @@ class Receiver final : public Agent {
   struct Connection;
   struct UdpMemory;
   enum class Role : std::uint8_t { none, host, client, recorder };
+
+  // Who may connect (receiver_access.cpp).
+  [[nodiscard]] physics::Result<void> open_security();
+  void turn_away(PeerRefusal why, Counter counter, const config::IpAddress& peer,
+                 const std::string& detail = {});
+  [[nodiscard]] std::size_t connections_from(const config::IpAddress& peer) const noexcept;
+  [[nodiscard]] std::size_t handshakes() const noexcept;
+  int handshake(Connection& connection, std::int64_t now_ns);
+  void agree_on_key(Connection& connection);
+  [[nodiscard]] std::optional<std::span<const std::byte>> authenticate(
+      std::span<const std::byte> datagram, const config::IpAddress& peer, Origin& origin);
 
   // UDP host port (receiver_udp.cpp).
   int receive_datagrams(std::int64_t now_ns) noexcept;
@@ -82,6 +98,12 @@ class Receiver final : public Agent {
   void take_host_frame(Connection& connection, std::span<const std::byte> bytes,
                        std::int64_t now_ns);
   void take_control(Connection& connection, std::span<const std::byte> body);
+  [[nodiscard]] physics::Result<SocketAddress> listen_address(std::string_view key,
+                                                              const std::string& endpoint,
+                                                              Transport transport,
+                                                              config::Port port) const;
+  /// True when the connection was taken into the table.
+  bool admit(TcpSocket socket, const SocketAddress& peer, std::int64_t now_ns);
   void fill_welcome(v1::Welcome& welcome) const;
   void take_hello(Connection& connection, const v1::ControlRecord& record);
   void take_subscribe(Connection& connection, const v1::ControlRecord& record);
@@ -115,6 +137,10 @@ class Receiver final : public Agent {
   std::unique_ptr<UdpMemory> udp_memory_;
   bool udp_watched_ = false;
   std::uint32_t os_drops_seen_ = 0;
+  std::optional<TlsContext> tls_;
+  std::unique_ptr<HostSessions> sessions_;  // null: bare datagrams are taken
+  PeerLimits limits_;
+  std::int64_t warned_ns_ = 0;  // of datagrams dropped unread
   protocol::HostFrameDecoder decoder_;
   protocol::HostFrameData refused_;  // what a refused frame decodes into
   std::vector<std::unique_ptr<Connection>> connections_;

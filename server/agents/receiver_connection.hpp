@@ -4,6 +4,7 @@
 #include <sys/uio.h>
 
 #include "agents/receiver.hpp"
+#include "io/tls_session.hpp"
 
 namespace emit::server {
 
@@ -12,6 +13,7 @@ struct Receiver::Connection {
   std::uint32_t generation = 0;
   TcpSocket socket;
   SocketAddress peer;
+  config::IpAddress ip;
   Role role = Role::none;
   bool welcomed = false;
   bool closing = false;      ///< to be closed as soon as nobody else uses the descriptor
@@ -20,6 +22,9 @@ struct Receiver::Connection {
   bool write_lent = false;   ///< they write to the descriptor: nobody else may
   bool stuck = false;        ///< the conductor's ring is full: records wait in the parser
   bool dirty = false;        ///< watch() has to be called
+  bool handshaking = false;  ///< TLS: neither side has proved itself yet
+  bool reread = false;       ///< bytes wait where the descriptor does not show them
+  bool agreed_key = false;   ///< sessions_ knows the key of this connection
   std::uint32_t misbehaved = 0;
   std::int64_t since_ns = 0;
   std::optional<protocol::RecordParser> parser;  ///< taken on connecting: a large buffer

@@ -7,6 +7,7 @@
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
+#include "io/ip_address.hpp"
 
 namespace emit::server {
 
@@ -84,6 +85,12 @@ void Receiver::take_host_frame(Connection& connection, std::span<const std::byte
   if (draining_.load(std::memory_order_acquire)) {
     return;
   }
+  if (!limits_.take_host_frame(connection.ip, context_.clock.monotonic_ns())) {
+    context_.counters.add(Counter::host_frames_over_rate);
+    refuse(connection, StatusCode::overloaded,
+           "more host frames a second than access.max_host_frames_hz");
+    return;
+  }
   // parse() looked for room before it took the record.
   HostInput& input = context_.host_inputs.claim_reserved();
   const protocol::DecodeStatus decoded = protocol::decode_host_frame(bytes, decoder_, input.frame);
@@ -103,6 +110,12 @@ void Receiver::take_host_frame(Connection& connection, std::span<const std::byte
 }
 
 void Receiver::take_control(Connection& connection, std::span<const std::byte> body) {
+  if (!limits_.take_control_record(connection.ip, context_.clock.monotonic_ns())) {
+    context_.counters.add(Counter::control_over_rate);
+    refuse(connection, StatusCode::overloaded,
+           "more control records a second than access.max_control_records_hz");
+    return;
+  }
   v1::ControlRecord record;
   if (!protocol::parse_control_record(body, record)) {
     refuse(connection, StatusCode::malformed, "not a control record");
@@ -224,6 +237,7 @@ void Receiver::take_hello(Connection& connection, const v1::ControlRecord& recor
       return;
   }
   connection.welcomed = true;
+  agree_on_key(connection);
   v1::ControlRecord answer;
   fill_welcome(*answer.mutable_welcome());
   queue(connection, answer);
@@ -238,7 +252,8 @@ void Receiver::take_hello(Connection& connection, const v1::ControlRecord& recor
     connection.lent = true;
     connection.write_lent = true;
     static_cast<void>(context_.to_recorder.push({ClientCommand::Kind::add, connection.key(),
-                                                 connection.socket.fd(), connection.generation}));
+                                                 connection.socket.fd(), connection.generation,
+                                                 &connection.socket}));
     context_.bells.recorder.ring();
   }
 }
@@ -417,6 +432,10 @@ physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connec
     if (!target.is_multicast()) {
       // Otherwise anybody could have frames sent to anybody.
       return physics::make_error(ErrorCode::protocol, "'" + group + "' is not a multicast group");
+    }
+    if (!config::any_contains(config_.access.multicast_groups, ip_of(target))) {
+      return physics::make_error(ErrorCode::protocol,
+                                 "group " + group + " is not in access.multicast_groups");
     }
   }
   target.set_port(static_cast<std::uint16_t>(port));

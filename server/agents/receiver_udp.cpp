@@ -8,6 +8,7 @@
 
 #include "agents/receiver_connection.hpp"
 #include "emit/v1/status.pb.h"
+#include "io/ip_address.hpp"
 
 namespace emit::server {
 namespace {
@@ -77,6 +78,11 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
     }
   }
 
+  const config::IpAddress peer = ip_of(memory.peers[index]);
+  if (!may_connect(peer)) {
+    turn_away(PeerRefusal::not_allowed, Counter::host_peers_refused, peer);
+    return;
+  }
   Origin origin;
   origin.kind = Origin::Kind::udp;
   origin.address_bytes = std::min<std::uint32_t>(message.msg_namelen,
@@ -87,8 +93,22 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
   if (input == nullptr) {
     return;  // room for the batch was looked up before it was read
   }
-  const std::span<const std::byte> datagram(memory.data.data() + index * UdpMemory::kDatagramBytes,
-                                            bytes);
+  std::span<const std::byte> datagram(memory.data.data() + index * UdpMemory::kDatagramBytes,
+                                      bytes);
+  if (sessions_) {
+    const auto frame = authenticate(datagram, peer, origin);
+    if (!frame) {
+      return;
+    }
+    datagram = *frame;
+  }
+  if (!limits_.take_host_frame(peer, context_.clock.monotonic_ns())) {
+    context_.counters.add(Counter::host_frames_over_rate);
+    const std::uint64_t count = context_.counters.add(Counter::refused_overloaded);
+    send_udp_status(origin, StatusCode::overloaded, 0, count,
+                    "more host frames a second than access.max_host_frames_hz");
+    return;
+  }
   const protocol::DecodeStatus decoded =
       protocol::decode_host_frame(datagram, decoder_, input->frame);
   if (decoded != protocol::DecodeStatus::ok) {
@@ -124,15 +144,23 @@ void Receiver::send_udp_status(const Origin& origin, StatusCode code,
   status.set_text(text);
   status.set_host_frame_number(host_frame_number);
   status.set_count(count);
-  std::array<std::byte, 512> bytes;
+  std::array<std::byte, HostSessions::kMaxAnswerBytes> own_space;
+  const std::span<std::byte> space = sessions_ ? sessions_->answer_payload() : own_space;
   const auto length = status.ByteSizeLong();
-  if (length > bytes.size() || !status.SerializeToArray(bytes.data(), static_cast<int>(length))) {
+  if (length > space.size() || !status.SerializeToArray(space.data(), static_cast<int>(length))) {
+    return;
+  }
+  const std::span<const std::byte> bytes =
+      sessions_ ? sessions_->answer(origin.connection, origin.generation, length)
+                : std::span<const std::byte>(space.first(length));
+  if (bytes.empty()) {
+    context_.counters.add(Counter::statuses_suppressed);
     return;
   }
   SocketAddress target;
   target.length = origin.address_bytes;
   std::memcpy(&target.storage, origin.address.data(), origin.address_bytes);
-  if (udp_.send_to(std::span(bytes).first(length), target).status != IoStatus::done) {
+  if (udp_.send_to(bytes, target).status != IoStatus::done) {
     context_.counters.add(Counter::statuses_suppressed);
   }
 }

@@ -91,6 +91,7 @@ int Recorder::take_commands() {
       Peer peer;
       peer.connection = command->connection;
       peer.fd = command->fd;
+      peer.socket = command->socket;
       peer.next = std::max(run_first_, kept_first_);
       peers_.push_back(peer);
     } else {
@@ -235,10 +236,13 @@ bool Recorder::send_some(Peer& peer, bool& failed) noexcept {
   if (count == 0) {
     return false;
   }
-  const IoResult sent = write_lent(peer.fd, std::span(pieces).first(count));
-  if (sent.status == IoStatus::failed) {
+  const IoResult sent = write_lent(*peer.socket, std::span(pieces).first(count));
+  if (sent.status == IoStatus::failed || sent.status == IoStatus::closed) {
     failed = true;
     return false;
+  }
+  if (sent.status == IoStatus::busy) {
+    return true;  // the receiver is inside for microseconds
   }
   if (sent.status == IoStatus::would_block) {
     peer.blocked = true;

@@ -100,6 +100,9 @@ SocketClient::Progress SocketClient::send_tcp(Context& context) noexcept {
   if (sent.status == IoStatus::would_block) {
     return Progress::blocked;
   }
+  if (sent.status == IoStatus::busy) {
+    return Progress::retry_soon;
+  }
   if (sent.status != IoStatus::done) {
     error_ = sent.error;
     return Progress::failed;

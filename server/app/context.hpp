@@ -25,6 +25,7 @@ namespace emit::server {
 
 class SenderClient;
 class RecorderPeer;
+class TcpSocket;
 
 /// receiver -> sender.
 struct ClientCommand {
@@ -49,6 +50,7 @@ struct RecorderCommand {
   std::uint32_t connection = 0;
   int fd = -1;
   std::uint64_t handle = 0;  ///< generation of the connection
+  TcpSocket* socket = nullptr;  ///< add: lent until it comes back with RecorderReleased
 };
 struct RecorderReleased {
   std::uint32_t connection = 0;
@@ -141,6 +143,7 @@ struct Context {
   EventLog render_events{64, counters};
   EventLog sender_events{256, counters};
   EventLog recorder_events{64, counters};
+  EventLog metrics_events{64, counters};
 
  private:
   std::size_t client_places_;

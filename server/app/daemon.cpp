@@ -19,10 +19,12 @@
 #include "agents/sender.hpp"
 #include "agents/shm_client.hpp"
 #include "app/context.hpp"
+#include "app/privileges.hpp"
 #include "app/replay.hpp"
 #include "app/service_health.hpp"
 #include "emit/version.hpp"
 #include "io/trigger_port.hpp"
+#include "io/ip_address.hpp"
 #include "telemetry/log.hpp"
 #include "telemetry/metrics_server.hpp"
 #include "telemetry/metrics_text.hpp"
@@ -203,15 +205,6 @@ FrameSourceFactory DaemonImpl::source_factory() {
 physics::Result<void> DaemonImpl::setup() {
   started_ns_ = clock_.monotonic_ns();
   housekept_ns_.store(started_ns_, std::memory_order_release);
-  if (options_.on_log) {
-    log_ = make_log(options_.on_log);
-  } else {
-    auto log = make_log(config_.log);
-    if (!log) {
-      return tl::unexpected<Error>(std::move(log.error()));
-    }
-    log_ = std::move(*log);
-  }
   if (!scenario_ && !options_.source_factory &&
       config_.source.kind == config::SourceKind::renderer) {
     return physics::make_error(ErrorCode::config,
@@ -232,6 +225,27 @@ physics::Result<void> DaemonImpl::setup() {
   receiver_ = std::make_unique<Receiver>(context_, config_);
   if (auto opened = receiver_->open(); !opened) {
     return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
+  }
+  std::string privileges;
+  if (options_.drop_privileges) {
+    // While this thread is the only one: each has privileges of its own.
+    auto dropped = drop_privileges();
+    if (!dropped) {
+      return tl::unexpected<Error>(std::move(dropped.error()));
+    }
+    privileges = std::move(*dropped);
+  }
+  if (options_.on_log) {
+    log_ = make_log(options_.on_log);
+  } else {
+    auto log = make_log(config_.log);
+    if (!log) {
+      return tl::unexpected<Error>(std::move(log.error()));
+    }
+    log_ = std::move(*log);
+  }
+  if (!privileges.empty()) {
+    log_->write(LogLevel::info, privileges);
   }
   if (!config_.stream.shm.empty()) {
     if (auto free = check_shm_name_free(config_.stream.shm); !free) {
@@ -361,6 +375,11 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   if (!address) {
     return named(address.error());
   }
+  if (!ip_of(*address).is_loopback() && !config::is_protected(config_, config::Port::metrics)) {
+    return named({ErrorCode::config,
+                  fmt::format("{}: other hosts may reach it: that needs {}", to_string(*address),
+                              config::protections_of(config::Port::metrics))});
+  }
   sources_.counters = &context_.counters;
   sources_.times = &context_.times;
   sources_.prediction = &context_.prediction;
@@ -372,6 +391,17 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   answers.metrics = [this] { return metrics_text(sources_, moment()); };
   answers.trace = [this] { return chrome_trace(context_.trace.entries()); };
   answers.ready = [this] { return serving_.load(std::memory_order_acquire); };
+  answers.admits = [this](const SocketAddress& peer) {
+    const config::IpAddress ip = ip_of(peer);
+    if (receiver_->may_connect(ip)) {
+      return true;
+    }
+    context_.counters.add(Counter::peers_refused);
+    context_.metrics_events.push(EventKind::peer_refused,
+                                 static_cast<std::uint64_t>(PeerRefusal::not_allowed), 0,
+                                 config::to_string(ip));
+    return false;
+  };
   answers.healthy = [this] {
     constexpr std::int64_t kStuckNs = 5'000'000'000;
     const std::int64_t now_ns = clock_.monotonic_ns();
@@ -602,7 +632,7 @@ void DaemonImpl::housekeep() {
   bool warned = false;
   for (EventLog* events :
        {&context_.conductor_events, &context_.receiver_events, &context_.render_events,
-        &context_.sender_events, &context_.recorder_events}) {
+        &context_.sender_events, &context_.recorder_events, &context_.metrics_events}) {
     while (const Event* event = events->ring().front()) {
       const EventText line = describe(*event);
       board_.note(*event);

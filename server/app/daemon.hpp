@@ -23,6 +23,9 @@ struct DaemonOptions {
   FrameSourceFactory source_factory;  ///< empty: what the configuration names
   bool stepped = false;               ///< no threads: the caller turns the crank with step()
   const ServiceNotifier* notifier = nullptr;  ///< null: nobody; must outlive the daemon
+  /// Gives up what the process could do beyond its user once the ports are open. For programs that
+  /// are the daemon: it does so for good.
+  bool drop_privileges = false;
   std::function<void(const std::string&)>
       on_log;  ///< null: spdlog as configured; set: log lines go here
 };

@@ -145,6 +145,7 @@ int serve(const Arguments& arguments, const char* program) {
   const ServiceNotifier notifier = ServiceNotifier::from_environment();
   DaemonOptions options;
   options.notifier = &notifier;
+  options.drop_privileges = true;
   auto daemon = Daemon::create(*daemon_config, std::move(scenario), std::move(options));
   if (!daemon) {
     return fail(program, daemon.error());

@@ -158,6 +158,7 @@ void Tool::add_scene_commands() {
     app.add_option("--band", o.band, "Name of the band")->type_name("NAME");
     add_count(app, "--frames", o.frames,
               "Close after this many frames; 0: until the window closes");
+    add_security(app, o.security);
     add_path(app, "--screenshot", o.screenshot, "Write the window's last picture as PNG");
     add_gpu(app, o.gpu_index);
   }
@@ -224,6 +225,7 @@ void Tool::add_stream_commands() {
     app.add_flag(
         "--reconnect", o.reconnect,
         "When the stream ends, connect again and go on, until no frame came for --timeout-s");
+    add_security(app, o.security);
     app.add_option("--min-k", o.min_k, "Lower limit of the PNG's colours")->capture_default_str();
     app.add_option("--max-k", o.max_k, "Upper limit of the PNG's colours")->capture_default_str();
     add_json(app, o.json);
@@ -261,8 +263,13 @@ void Tool::add_stream_commands() {
     add_count(app, "--every", o.every, "Send every Nth pose, numbered anew")
         ->check(CLI::PositiveNumber);
     app.add_option("--control", o.control,
-                   "With --step and udp: control port to watch the frames, tcp://host:port")
+                   "With udp: control port to watch the frames (--step) and to agree on a key over "
+                   "TLS (--tls-*), tcp://host:port")
         ->type_name("URL");
+    add_path(app, "--key-file", o.security.key_file,
+             "udp: pre-shared key (its first line) for the MAC of every datagram, as in the "
+             "daemon's host.key_file");
+    add_security(app, o.security);
     app.add_option("--host-port", o.host_port, "Capture: UDP port the host sent to")
         ->type_name("PORT")
         ->check(CLI::Range(1, 65535))
@@ -288,6 +295,7 @@ void Tool::add_log_commands() {
         ->required()
         ->type_name("URL");
     add_path(app, "--out", o.out, "MCAP log to write")->required();
+    add_security(app, o.security);
     add_count(app, "--frames", o.frames, "Stop after this many frames; 0: no limit");
     add_seconds(app, "--duration-s", o.duration_s, "Stop after this long; 0: until interrupted");
     add_json(app, o.json);

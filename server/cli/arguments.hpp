@@ -28,6 +28,8 @@ void add_json(CLI::App& app, std::optional<std::filesystem::path>& target);
 void add_set(CLI::App& app, std::vector<std::string>& target);
 void add_scenario(CLI::App& app, ScenarioChoice& target, const std::string& name);
 void add_gpu(CLI::App& app, int& target);
+/// --tls-* of every command that connects to a control port.
+void add_security(CLI::App& app, server::Security& target);
 CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& target,
                        const std::string& text);
 CLI::Option* add_seconds(CLI::App& app, const std::string& name, double& target,

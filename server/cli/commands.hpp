@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "emit/protocol/parity.hpp"
+#include "io/security.hpp"
 
 /// One options struct and one function per subcommand of `emit`. The functions return the exit
 /// code, print results to standard output and everything else to standard error.
@@ -67,6 +68,7 @@ struct ReceiveCommand {
   bool reconnect = false;
   double min_k = 280.0;
   double max_k = 330.0;
+  server::Security security;
 };
 int run_receive(const ReceiveCommand& command);
 
@@ -90,6 +92,7 @@ struct SendCommand {
   std::optional<std::uint64_t> run_id;  ///< absent: from the wall clock
   std::uint16_t host_port = 7001;       ///< of captures: where the host's datagrams went
   std::optional<std::filesystem::path> json;
+  server::Security security;
 };
 int run_send(const SendCommand& command);
 
@@ -99,6 +102,7 @@ struct RecordCommand {
   std::uint64_t frames = 0;
   double duration_s = 0.0;
   std::optional<std::filesystem::path> json;
+  server::Security security;
 };
 int run_record(const RecordCommand& command);
 
@@ -135,6 +139,7 @@ struct ViewCommand {
   std::uint64_t frames = 0;
   std::optional<std::filesystem::path> screenshot;
   int gpu_index = -1;
+  server::Security security;
 };
 int run_view(const ViewCommand& command);
 

@@ -98,7 +98,7 @@ int run_receive(const ReceiveCommand& command) {
   // Checks are made while the pixels are looked at first; writing files takes longer than the
   // daemon waits.
   options.in_place = !command.out;
-  auto opened = StreamSubscription::open(command.url, options);
+  auto opened = StreamSubscription::open(command.url, options, command.security);
   if (!opened) return fail(opened.error());
   StreamSubscription& stream = *opened;
   const auto greet = [&] {

@@ -101,18 +101,25 @@ int run_send(const SendCommand& command) {
   if (command.step && udp && command.control.empty()) {
     return fail(kExitUsage, "--step over udp needs --control tcp://host:port to watch the frames");
   }
+  if (udp && command.security.tls() && command.security.key_file.empty() &&
+      command.control.empty()) {
+    return fail(kExitUsage, "--tls-* over udp needs --control tcp://host:port to agree on a key");
+  }
   auto log = PoseLog::open(command.log, command.host_port);
   if (!log) return fail(log.error());
 
   std::unique_ptr<server::FrameClient> watcher;
   if (command.step) {
     auto connected =
-        server::FrameClient::connect(command.control.empty() ? command.to : command.control);
+        server::FrameClient::connect(command.control.empty() ? command.to : command.control,
+                                     server::kConnectTimeoutNs, command.security);
     if (!connected) return fail(connected.error());
     watcher = std::move(*connected);
     if (auto subscribed = watcher->subscribe({}); !subscribed) return fail(subscribed.error());
   }
-  auto connected = server::HostClient::connect(command.to);
+  server::Security security = command.security;
+  security.control = command.control;
+  auto connected = server::HostClient::connect(command.to, server::kConnectTimeoutNs, security);
   if (!connected) return fail(connected.error());
   server::HostClient& host = **connected;
 

@@ -10,8 +10,9 @@ namespace emit::cli {
 using physics::Result;
 
 Result<StreamSubscription> StreamSubscription::open(const std::string& url,
-                                                    const server::SubscribeOptions& options) {
-  StreamSubscription out(url, options);
+                                                    const server::SubscribeOptions& options,
+                                                    const server::Security& security) {
+  StreamSubscription out(url, options, security);
   constexpr std::int64_t kTimeoutNs = 5'000'000'000;
   if (auto connected = out.connect(kTimeoutNs); !connected) {
     return tl::unexpected<physics::Error>(std::move(connected.error()));
@@ -20,7 +21,7 @@ Result<StreamSubscription> StreamSubscription::open(const std::string& url,
 }
 
 Result<void> StreamSubscription::connect(std::int64_t timeout_ns) {
-  auto client = server::FrameClient::connect(url_, timeout_ns);
+  auto client = server::FrameClient::connect(url_, timeout_ns, security_);
   if (!client) return tl::unexpected<physics::Error>(std::move(client.error()));
   auto channel = (*client)->subscribe(options_);
   if (!channel) return tl::unexpected<physics::Error>(std::move(channel.error()));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "io/client.hpp"
+#include "io/security.hpp"
 
 namespace emit::cli {
 
@@ -15,7 +16,8 @@ class StreamSubscription {
  public:
   /// Errors: those of FrameClient::connect() and subscribe().
   [[nodiscard]] static physics::Result<StreamSubscription> open(
-      const std::string& url, const server::SubscribeOptions& options);
+      const std::string& url, const server::SubscribeOptions& options,
+      const server::Security& security = {});
 
   /// After an error of client(): tries again and again, every 100 ms, while `go_on` says so. The
   /// channel may be another one then: the daemon may have started with another scenario.
@@ -29,12 +31,13 @@ class StreamSubscription {
   [[nodiscard]] std::uint64_t reconnects() const noexcept { return reconnects_; }
 
  private:
-  StreamSubscription(std::string url, server::SubscribeOptions options)
-      : url_(std::move(url)), options_(std::move(options)) {}
+  StreamSubscription(std::string url, server::SubscribeOptions options, server::Security security)
+      : url_(std::move(url)), options_(std::move(options)), security_(std::move(security)) {}
   [[nodiscard]] physics::Result<void> connect(std::int64_t timeout_ns);
 
   std::string url_;
   server::SubscribeOptions options_;
+  server::Security security_;
   std::unique_ptr<server::FrameClient> client_;
   server::ChannelDescription channel_;
   server::ReceiveCounters before_;  // of the connections before this one

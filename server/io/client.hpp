@@ -13,6 +13,7 @@
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/parity.hpp"
 #include "emit/protocol/reassembler.hpp"
+#include "io/security.hpp"
 
 namespace emit::v1 {
 class JournalEntry;
@@ -22,6 +23,8 @@ class JournalEntry;
 /// Blocking with a timeout; one thread per object. Timeouts are in ns of the monotonic clock; 0
 /// polls.
 namespace emit::server {
+
+inline constexpr std::int64_t kConnectTimeoutNs = 5'000'000'000;
 
 /// scheme://host:port; schemes tcp and udp, IPv6 hosts in brackets. shm://name: frames only.
 struct Url {
@@ -145,9 +148,11 @@ struct ReceiveCounters {
 /// host, which neither knows nor waits for its readers.
 class FrameClient {
  public:
-  /// Hello and Welcome. Errors: io (refused, timeout), protocol (version).
+  /// Hello and Welcome. Errors: io (refused, timeout, TLS), protocol (version), config (files of
+  /// `security`).
   [[nodiscard]] static physics::Result<std::unique_ptr<FrameClient>> connect(
-      const std::string& url, std::int64_t timeout_ns = 5'000'000'000);
+      const std::string& url, std::int64_t timeout_ns = kConnectTimeoutNs,
+      const Security& security = {});
   virtual ~FrameClient() = default;
 
   [[nodiscard]] virtual const ServerInfo& server() const noexcept = 0;
@@ -184,7 +189,8 @@ enum class HostCommand : std::uint8_t { start = 1, stop = 2, hold = 3, step = 4,
 class HostClient {
  public:
   [[nodiscard]] static physics::Result<std::unique_ptr<HostClient>> connect(
-      const std::string& url, std::int64_t timeout_ns = 5'000'000'000);
+      const std::string& url, std::int64_t timeout_ns = kConnectTimeoutNs,
+      const Security& security = {});
   virtual ~HostClient() = default;
 
   /// TCP: waits up to `timeout_ns` for room. UDP: one datagram. Errors: io, timeout included.
@@ -205,7 +211,8 @@ class HostClient {
 class RecorderClient {
  public:
   [[nodiscard]] static physics::Result<std::unique_ptr<RecorderClient>> connect(
-      const std::string& url, std::int64_t timeout_ns = 5'000'000'000);
+      const std::string& url, std::int64_t timeout_ns = kConnectTimeoutNs,
+      const Security& security = {});
   virtual ~RecorderClient() = default;
 
   [[nodiscard]] virtual const ServerInfo& server() const noexcept = 0;

@@ -136,8 +136,40 @@ ClientConnection::ClientConnection(SocketContext context, TcpSocket socket, Sock
       limits_(limits),
       parser_(limits) {}
 
+namespace {
+
+/// TLS over a connected socket, until both sides have proved themselves.
+physics::Result<void> secure(TcpSocket& socket, const Security& security, const std::string& name,
+                             const SocketAddress& peer, std::int64_t end_ns) {
+  auto context =
+      TlsContext::client({security.tls_ca, security.tls_certificate, security.tls_key});
+  if (!context) {
+    return tl::unexpected<physics::Error>(std::move(context.error()));
+  }
+  if (auto started = socket.start_tls(*context, name); !started) {
+    return started;
+  }
+  TlsSession& tls = *socket.tls();
+  for (;;) {
+    const IoResult result = tls.handshake();
+    if (result.status == IoStatus::done) {
+      return {};
+    }
+    if (result.status != IoStatus::would_block) {
+      return make_error(ErrorCode::io, fmt::format("{}: TLS: {}", to_string(peer), tls.error()));
+    }
+    if (!wait_for(socket.fd(), tls.wants_write() ? POLLOUT : POLLIN, end_ns)) {
+      return make_error(ErrorCode::io,
+                        to_string(peer) + ": TLS: no answer to the handshake within the timeout");
+    }
+  }
+}
+
+}  // namespace
+
 physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientRole role,
-                                                         std::int64_t timeout_ns) {
+                                                         std::int64_t timeout_ns,
+                                                         const Security& security) {
   const std::int64_t end_ns = monotonic_now_ns() + timeout_ns;
   const auto address = resolve({url.host, url.port}, Transport::tcp, false);
   if (!address) {
@@ -147,6 +179,12 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
   auto socket = TcpSocket::connect(context, *address, timeout_ns);
   if (!socket) {
     return tl::unexpected<physics::Error>(std::move(socket.error()));
+  }
+  if (security.tls()) {
+    const std::string name = security.tls_name.empty() ? url.host : security.tls_name;
+    if (auto secured = secure(*socket, security, name, *address, end_ns); !secured) {
+      return tl::unexpected<physics::Error>(std::move(secured.error()));
+    }
   }
   return greet(std::move(context), std::move(*socket), *address, role, end_ns);
 }
@@ -228,6 +266,7 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
       case IoStatus::failed:
         return make_error(ErrorCode::io,
                           fmt::format("{}: {}", to_string(peer_), error_text(got.error)));
+      case IoStatus::busy:
       case IoStatus::would_block:
         if (!wait_for(socket_.fd(), POLLIN, end_ns)) {
           return false;

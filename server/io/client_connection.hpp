@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "emit/protocol/framing.hpp"
+#include "emit/protocol/host_session.hpp"
 #include "io/client.hpp"
 #include "io/socket.hpp"
+#include "io/tls_session.hpp"
 
 namespace emit::v1 {
 class ChannelInfo;
@@ -35,7 +37,8 @@ class ClientConnection {
  public:
   /// Hello and Welcome. Errors: io, protocol (what the daemon answered instead).
   [[nodiscard]] static physics::Result<ClientConnection> open(const Url& url, ClientRole role,
-                                                              std::int64_t timeout_ns);
+                                                              std::int64_t timeout_ns,
+                                                              const Security& security = {});
   /// The same over a stream that is connected already, until `end_ns` (monotonic). `limits`: of
   /// what the daemon may send.
   [[nodiscard]] static physics::Result<ClientConnection> greet(
@@ -47,6 +50,8 @@ class ClientConnection {
   [[nodiscard]] const ServerInfo& server() const noexcept { return info_; }
   [[nodiscard]] const SocketAddress& peer() const noexcept { return peer_; }
   [[nodiscard]] SocketAddress local_address() const noexcept { return socket_.local_address(); }
+  /// Null: plain.
+  [[nodiscard]] TlsSession* tls() const noexcept { return socket_.tls(); }
   /// True after the peer closed in order, between two records.
   [[nodiscard]] bool closed() const noexcept { return closed_; }
 
@@ -75,6 +80,11 @@ class ClientConnection {
 
 /// Why SubscribeOptions::every_nth is refused.
 [[nodiscard]] std::string every_nth_error(std::uint32_t every_nth);
+/// Host datagrams with a MAC by `key`; `control`: the connection over which it was agreed, if any.
+/// Waits up to `timeout_ns` for the daemon's challenge. Errors: io, internal.
+[[nodiscard]] physics::Result<std::unique_ptr<HostClient>> make_session_host(
+    UdpSocket socket, const SocketAddress& peer, const protocol::SessionKey& key,
+    std::optional<ClientConnection> control, std::int64_t timeout_ns);
 
 /// What client.hpp makes from a URL, over a connection that is open in that role.
 [[nodiscard]] std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool udp);

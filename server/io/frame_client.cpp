@@ -453,7 +453,8 @@ std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool
 }
 
 physics::Result<std::unique_ptr<FrameClient>> FrameClient::connect(const std::string& url,
-                                                                   std::int64_t timeout_ns) {
+                                                                   std::int64_t timeout_ns,
+                                                                   const Security& security) {
   const auto parsed = parse_frame_url(url);
   if (!parsed) {
     return tl::unexpected<physics::Error>(physics::Error(parsed.error()));
@@ -461,7 +462,7 @@ physics::Result<std::unique_ptr<FrameClient>> FrameClient::connect(const std::st
   if (parsed->scheme == Url::Scheme::shm) {
     return open_shm_frame_client(parsed->host);
   }
-  auto connection = ClientConnection::open(*parsed, ClientRole::client, timeout_ns);
+  auto connection = ClientConnection::open(*parsed, ClientRole::client, timeout_ns, security);
   if (!connection) {
     return tl::unexpected<physics::Error>(std::move(connection.error()));
   }

@@ -120,6 +120,41 @@ class UdpHost final : public HostClient {
   protocol::HostFrameEncoder encoder_;
 };
 
+physics::Result<protocol::SessionKey> first_key(const std::filesystem::path& file) {
+  auto text = read_secret_file(file);
+  if (!text) {
+    return tl::unexpected<physics::Error>(std::move(text.error()));
+  }
+  auto keys = protocol::parse_key_file(*text);
+  if (!keys) {
+    return tl::unexpected<physics::Error>(std::move(keys.error()).with_context(file.string()));
+  }
+  return keys->front();
+}
+
+/// The key comes from the TLS session of a connection that stays open as long as the host does.
+physics::Result<std::unique_ptr<HostClient>> agree_and_connect(UdpSocket socket,
+                                                               const SocketAddress& peer,
+                                                               std::int64_t timeout_ns,
+                                                               const Security& security) {
+  const auto control = parse_url(security.control);
+  if (!control || control->scheme != Url::Scheme::tcp) {
+    return make_error(ErrorCode::invalid_argument,
+                      "host datagrams with TLS agree on a key over tcp://host:port of the "
+                      "control port, not '" +
+                          security.control + "'");
+  }
+  auto connection = ClientConnection::open(*control, ClientRole::host, timeout_ns, security);
+  if (!connection) {
+    return tl::unexpected<physics::Error>(std::move(connection.error()));
+  }
+  protocol::SessionKey key;
+  if (!connection->tls()->export_key(key)) {
+    return make_error(ErrorCode::io, to_string(connection->peer()) + ": TLS gives no key");
+  }
+  return make_session_host(std::move(socket), peer, key, std::move(*connection), timeout_ns);
+}
+
 }  // namespace
 
 std::unique_ptr<HostClient> make_tcp_host(ClientConnection connection) {
@@ -127,13 +162,14 @@ std::unique_ptr<HostClient> make_tcp_host(ClientConnection connection) {
 }
 
 physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::string& url,
-                                                                 std::int64_t timeout_ns) {
+                                                                 std::int64_t timeout_ns,
+                                                                 const Security& security) {
   const auto parsed = parse_url(url);
   if (!parsed) {
     return tl::unexpected<physics::Error>(physics::Error(parsed.error()));
   }
   if (parsed->scheme == Url::Scheme::tcp) {
-    auto connection = ClientConnection::open(*parsed, ClientRole::host, timeout_ns);
+    auto connection = ClientConnection::open(*parsed, ClientRole::host, timeout_ns, security);
     if (!connection) {
       return tl::unexpected<physics::Error>(std::move(connection.error()));
     }
@@ -149,6 +185,16 @@ physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::stri
   }
   if (auto connected = socket->connect(*address); !connected) {
     return tl::unexpected<physics::Error>(std::move(connected.error()));
+  }
+  if (!security.key_file.empty()) {
+    const auto key = first_key(security.key_file);
+    if (!key) {
+      return tl::unexpected<physics::Error>(physics::Error(key.error()));
+    }
+    return make_session_host(std::move(*socket), *address, *key, std::nullopt, timeout_ns);
+  }
+  if (security.tls()) {
+    return agree_and_connect(std::move(*socket), *address, timeout_ns, security);
   }
   return std::make_unique<UdpHost>(std::move(*socket), *address);
 }

@@ -40,7 +40,8 @@ std::unique_ptr<RecorderClient> make_recorder(ClientConnection connection) {
 }
 
 physics::Result<std::unique_ptr<RecorderClient>> RecorderClient::connect(const std::string& url,
-                                                                         std::int64_t timeout_ns) {
+                                                                         std::int64_t timeout_ns,
+                                                                         const Security& security) {
   const auto parsed = parse_url(url);
   if (!parsed) {
     return tl::unexpected<physics::Error>(physics::Error(parsed.error()));
@@ -49,7 +50,7 @@ physics::Result<std::unique_ptr<RecorderClient>> RecorderClient::connect(const s
     return physics::make_error(physics::ErrorCode::invalid_argument,
                                "'" + url + "': the journal comes over tcp://host:port");
   }
-  auto connection = ClientConnection::open(*parsed, ClientRole::recorder, timeout_ns);
+  auto connection = ClientConnection::open(*parsed, ClientRole::recorder, timeout_ns, security);
   if (!connection) {
     return tl::unexpected<physics::Error>(std::move(connection.error()));
   }

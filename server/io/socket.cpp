@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <sys/uio.h>
 
 #include <algorithm>
 #include <array>
@@ -20,6 +19,7 @@
 #include <exception>
 
 #include "io/asio_endpoint.hpp"
+#include "io/tls_session.hpp"
 
 namespace emit::server {
 namespace {
@@ -135,6 +135,7 @@ struct TcpSocket::Impl {
       : context(std::move(shared)), socket(*context) {}
   std::shared_ptr<asio::io_context> context;  // outlives the socket
   tcp::socket socket;
+  std::unique_ptr<TlsSession> tls;  // ends before the socket: it says goodbye
 };
 
 TcpSocket::TcpSocket() noexcept = default;
@@ -208,7 +209,27 @@ void TcpSocket::close() noexcept {
   impl_.reset();
 }
 
+physics::Result<void> TcpSocket::start_tls(const TlsContext& context, const std::string& name) {
+  auto session = TlsSession::create(context, fd(), name);
+  if (!session) {
+    return tl::unexpected<physics::Error>(std::move(session.error()));
+  }
+  impl_->tls = std::move(*session);
+  return {};
+}
+
+TlsSession* TcpSocket::tls() const noexcept {
+  return impl_ ? impl_->tls.get() : nullptr;
+}
+
+bool TcpSocket::has_buffered() const noexcept {
+  return tls() != nullptr && tls()->has_buffered();
+}
+
 void TcpSocket::shutdown_send() noexcept {
+  if (impl_->tls) {
+    impl_->tls->shutdown();
+  }
   error_code ignored;
   impl_->socket.shutdown(tcp::socket::shutdown_send, ignored);
 }
@@ -223,6 +244,9 @@ IoResult TcpSocket::read_some(std::span<std::byte> space) noexcept {
   if (space.empty()) {
     return {IoStatus::failed, 0, ENOBUFS};  // Asio would report success without reading
   }
+  if (impl_->tls) {
+    return impl_->tls->read(space);
+  }
   error_code error;
   const std::size_t bytes =
       impl_->socket.read_some(asio::buffer(space.data(), space.size()), error);
@@ -230,6 +254,9 @@ IoResult TcpSocket::read_some(std::span<std::byte> space) noexcept {
 }
 
 IoResult TcpSocket::peek(std::span<std::byte> space) noexcept {
+  if (impl_->tls) {
+    return impl_->tls->peek(space);
+  }
   error_code error;
   const std::size_t bytes = impl_->socket.receive(asio::buffer(space.data(), space.size()),
                                                   tcp::socket::message_peek, error);
@@ -237,6 +264,9 @@ IoResult TcpSocket::peek(std::span<std::byte> space) noexcept {
 }
 
 IoResult TcpSocket::write_some(std::span<const std::byte> bytes) noexcept {
+  if (impl_->tls) {
+    return impl_->tls->write(std::span(&bytes, 1));
+  }
   error_code error;
   const std::size_t sent =
       impl_->socket.write_some(asio::buffer(bytes.data(), bytes.size()), error);
@@ -244,6 +274,9 @@ IoResult TcpSocket::write_some(std::span<const std::byte> bytes) noexcept {
 }
 
 IoResult TcpSocket::write_some(std::span<const std::span<const std::byte>> pieces) noexcept {
+  if (impl_->tls) {
+    return impl_->tls->write(pieces);
+  }
   std::array<asio::const_buffer, kMaxPieces> buffers;
   const std::size_t count = std::min(pieces.size(), buffers.size());
   for (std::size_t i = 0; i < count; ++i) {
@@ -253,24 +286,6 @@ IoResult TcpSocket::write_some(std::span<const std::span<const std::byte>> piece
   const std::size_t sent =
       impl_->socket.write_some(std::span<const asio::const_buffer>(buffers.data(), count), error);
   return to_result(error, sent);
-}
-
-IoResult write_lent(int fd, std::span<const std::span<const std::byte>> pieces) noexcept {
-  std::array<iovec, kMaxLentPieces> iov{};
-  const std::size_t count = std::min(pieces.size(), iov.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    // The kernel only reads what is sent.
-    iov[i] = {const_cast<std::byte*>(pieces[i].data()), pieces[i].size()};
-  }
-  msghdr message{};
-  message.msg_iov = iov.data();
-  message.msg_iovlen = count;
-  const ssize_t sent = ::sendmsg(fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
-  if (sent >= 0) {
-    return {IoStatus::done, static_cast<std::size_t>(sent), 0};
-  }
-  const bool again = errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
-  return {again ? IoStatus::would_block : IoStatus::failed, 0, errno};
 }
 
 // TcpListener

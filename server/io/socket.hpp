@@ -6,6 +6,7 @@
 #include <span>
 
 #include "emit/physics/error.hpp"
+#include "io/io_result.hpp"
 #include "io/socket_address.hpp"
 
 namespace boost::asio {
@@ -32,15 +33,12 @@ class SocketContext {
   std::shared_ptr<boost::asio::io_context> context_;
 };
 
-enum class IoStatus : std::uint8_t { done, would_block, closed, failed };
-struct IoResult {
-  IoStatus status = IoStatus::done;
-  std::size_t bytes = 0;
-  int error = 0;  ///< errno of failed
-};
+class TlsContext;
+class TlsSession;
 
-/// Connected stream. Thread: one owner; in addition, another thread may write while the owner
-/// reads: Asio's synchronous send and receive only read what the object holds.
+/// Connected stream, plain or through TLS. Thread: one owner; in addition, another thread may write
+/// while the owner reads: Asio's synchronous send and receive only read what the object holds, and
+/// a TLS session says `busy` to whoever meets the other inside.
 class TcpSocket {
  public:
   TcpSocket() noexcept;  ///< closed
@@ -67,6 +65,14 @@ class TcpSocket {
   /// A wish; 0: the system goes on choosing.
   void set_send_buffer(std::uint64_t bytes) noexcept;
 
+  /// From here on all goes through TLS; the handshake is the caller's to drive (tls()). `name`: of
+  /// the server, for clients. Errors: io.
+  [[nodiscard]] physics::Result<void> start_tls(const TlsContext& context, const std::string& name);
+  /// Null: plain.
+  [[nodiscard]] TlsSession* tls() const noexcept;
+  /// More was received than the descriptor shows: read before waiting for it.
+  [[nodiscard]] bool has_buffered() const noexcept;
+
   [[nodiscard]] IoResult read_some(std::span<std::byte> space) noexcept;
   /// Like read_some, but what is read stays in the socket.
   [[nodiscard]] IoResult peek(std::span<std::byte> space) noexcept;
@@ -82,9 +88,9 @@ class TcpSocket {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Up to kMaxLentPieces pieces in one system call to a stream that another agent owns and has lent
-/// by its descriptor. RT-safe.
-[[nodiscard]] IoResult write_lent(int fd,
+/// Up to kMaxLentPieces pieces to a stream that another agent owns and has lent; in one system call
+/// where it is plain. RT-safe.
+[[nodiscard]] IoResult write_lent(TcpSocket& socket,
                                   std::span<const std::span<const std::byte>> pieces) noexcept;
 inline constexpr std::size_t kMaxLentPieces = 64;
 

@@ -40,6 +40,19 @@ namespace emit::server {
   X(statuses_suppressed, "answers not sent: rate limit or no room")                  \
   X(connections_accepted, "TCP connections accepted")                                \
   X(connections_closed, "TCP connections closed")                                    \
+  X(peers_refused, "connections closed at once: peer not in access.allow")           \
+  X(peer_limit_refused, "connections refused: access.max_connections_per_peer")      \
+  X(handshakes_refused, "connections closed: tls.max_handshakes under way")          \
+  X(handshakes_done, "TLS handshakes completed")                                     \
+  X(handshakes_failed, "TLS handshakes failed: no or wrong certificate, no TLS 1.3") \
+  X(host_peers_refused, "host datagrams dropped: sender not in access.allow")        \
+  X(host_unauthenticated, "host datagrams dropped: bare, where a MAC is required")   \
+  X(host_unknown_key, "host datagrams dropped: MAC by a key that is not known")      \
+  X(host_bad_mac, "host datagrams dropped: wrong MAC")                               \
+  X(host_replayed, "host datagrams dropped: counter seen before, or too old")        \
+  X(host_sessions, "authenticated sessions that hosts began")                        \
+  X(host_frames_over_rate, "host frames refused: access.max_host_frames_hz")         \
+  X(control_over_rate, "control records refused: access.max_control_records_hz")     \
   X(clients_disconnected_slow, "clients disconnected: fell behind with every_frame") \
   X(recorders_disconnected_slow, "recorders disconnected: fell behind")              \
   X(frames_submitted, "frames issued to the source")                                 \

@@ -200,6 +200,19 @@ EventText describe(const Event& event) {
                           "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
                           event.a),
               false};
+    case EventKind::peer_refused: {
+      static constexpr std::array kWhy{"not in access.allow", "TLS handshake failed",
+                                       "host datagram without a valid MAC"};
+      return {LogLevel::warn,
+              fmt::format("event=peer_refused why=\"{}\" peer=\"{}\"",
+                          event.a < kWhy.size() ? kWhy[event.a] : "?", text),
+              true};
+    }
+    case EventKind::secured:
+      return {LogLevel::info,
+              fmt::format("event=secured connection={} names=\"{}\"", connection(), text), false};
+    case EventKind::host_session:
+      return {LogLevel::info, fmt::format("event=host_session peer={}", text), false};
   }
   return {LogLevel::error, "event=unknown", true};
 }

@@ -116,11 +116,20 @@ struct MetricsServer::Impl {
   void accept() {
     acceptor.async_accept([this](const error_code& error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error && sessions < kMaxConnections) {
+      if (!error && sessions < kMaxConnections && admits(socket)) {
         std::make_shared<Session>(std::move(socket), answers, sessions)->run();
       }
       accept();
     });
+  }
+
+  bool admits(const tcp::socket& socket) const {
+    error_code error;
+    const tcp::endpoint peer = socket.remote_endpoint(error);
+    SocketAddress address;
+    std::memcpy(address.get(), peer.data(), peer.size());
+    address.length = static_cast<socklen_t>(peer.size());
+    return !error && answers.admits(address);
   }
 
   void run() noexcept {

@@ -24,6 +24,8 @@ class MetricsServer {
     std::function<std::string()> trace;    ///< body of /trace, JSON
     std::function<bool()> healthy;         ///< /healthz: 200 or 503
     std::function<bool()> ready;           ///< /readyz: 200 or 503
+    /// Whether this peer may ask; others are closed at once.
+    std::function<bool(const SocketAddress&)> admits;
   };
 
   /// Opens the port and starts the thread. Errors (io): address in use and so on, naming it.

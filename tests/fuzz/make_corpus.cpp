@@ -11,6 +11,7 @@
 
 #include "emit/image/exr_image.hpp"
 #include "emit/protocol/convert.hpp"
+#include "emit/protocol/host_session.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/resend.hpp"
 #include "emit/protocol/trigger.hpp"
@@ -296,6 +297,27 @@ void make_loss_seeds() {
   late[5] |= std::byte{protocol::kFragmentResent};
   append(waited, piece(20, late));
   write("fragments", "waiting", waited);
+void make_session_seeds() {
+  // The target puts the MACs right, and knows key zero.
+  auto mac = std::move(*protocol::SessionMac::create());
+  const protocol::SharedKey shared = protocol::make_shared_key({}, mac);
+  const auto datagram = [&](protocol::SessionKind kind, std::uint64_t counter, const Bytes& body) {
+    Bytes out(protocol::kSessionHeaderBytes + body.size() + protocol::kSessionTagBytes);
+    std::copy(body.begin(), body.end(), out.begin() + protocol::kSessionHeaderBytes);
+    mac.set_key(shared.open_key);
+    mac.seal({kind, shared.id, 7, counter}, out, body.size());
+    return out;
+  };
+  const Bytes open = datagram(protocol::SessionKind::open, 3, {});
+  const Bytes frame = datagram(protocol::SessionKind::host_frame, 1500, host_frame(1));
+  write("host_sessions", "openings", joined({piece(0, open), piece(2, open), piece(4, open)}));
+  write("host_sessions", "frames",
+        joined({piece(1, host_frame(0)), piece(1, host_frame(2)), piece(4, frame), piece(4, frame),
+                piece(2, frame), piece(0, frame), piece(0, host_frame(0))}));
+  write("host_sessions", "answers",
+        joined({piece(2, datagram(protocol::SessionKind::challenge, 1, Bytes(17))),
+                piece(1, {}),
+                piece(4, datagram(protocol::SessionKind::answer, 1, host_frame(0)))}));
 }
 
 void make_fragment_seeds() {
@@ -465,6 +487,7 @@ int main(int argc, char** argv) {
   root = argv[1];
   make_network_seeds();
   make_trigger_seeds();
+  make_session_seeds();
   make_fragment_seeds();
   make_log_seeds();
   make_capture_seeds();

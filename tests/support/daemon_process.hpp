@@ -205,6 +205,7 @@ class DaemonProcess {
   [[nodiscard]] const std::string& host_udp() const { return host_udp_; }
   /// Empty: off.
   [[nodiscard]] const std::string& metrics() const { return metrics_; }
+  [[nodiscard]] pid_t pid() const { return pid_; }
   void signal(int number) const { ::kill(pid_, number); }
   [[nodiscard]] pid_t pid() const { return pid_; }
   /// Exit code, 128 + signal, or -1 when it does not end within the limit.

@@ -103,6 +103,12 @@ std::vector<std::string> own_addresses(bool v6) {
   return out;
 }
 
+/// What lets a program on this machine connect by an address that is not loopback's.
+std::string allowed(std::string host) {
+  std::erase_if(host, [](char c) { return c == '[' || c == ']'; });
+  return "[access]\nallow = [\"" + host + "\"]\n";
+}
+
 /// Takes frames until kFrames came; all complete, none lost.
 void expect_frames(FrameClient& client) {
   std::uint64_t newest = 0;
@@ -189,7 +195,7 @@ TEST_P(DaemonMulticast, FramesArriveByTheGroupOfTheSubscription) {
   DaemonProcess daemon(
       folder, {"--config",
                folder.write("emitd.toml", config_at(host, "mode = \"ig-clock\"\nrate_hz = 50.0") +
-                                              "[stream]\nmulticast_ttl = 0\n")});
+                                              "[stream]\nmulticast_ttl = 0\n" + allowed(host))});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
   auto client = FrameClient::connect("udp://" + daemon.control());
   ASSERT_TRUE(client.has_value()) << client.error().text;
@@ -218,6 +224,22 @@ TEST(DaemonNetwork, AnAddressThatIsNoGroupIsRefused) {
   const auto channel = (*client)->subscribe(options);
   ASSERT_FALSE(channel.has_value());
   EXPECT_NE(channel.error().text.find("'192.0.2.7' is not a multicast group"), std::string::npos);
+}
+
+TEST(DaemonNetwork, AGroupThatIsNotListedIsRefused) {
+  ScratchFolder folder;
+  DaemonProcess daemon(
+      folder,
+      {"--config", folder.write("emitd.toml", config_at("127.0.0.1", "mode = \"host-step\""))});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  for (const char* group : {"239.1.2.3", "224.0.0.251", "ff02::1", "::ffff:239.1.2.3"}) {
+    auto client = FrameClient::connect("udp://" + daemon.control());
+    ASSERT_TRUE(client.has_value()) << client.error().text;
+    SubscribeOptions options;
+    options.multicast_group = group;
+    const auto channel = (*client)->subscribe(options);
+    ASSERT_FALSE(channel.has_value()) << group;
+  }
 }
 
 }  // namespace

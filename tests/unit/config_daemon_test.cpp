@@ -26,12 +26,17 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
       "canned_height_px = 240\ncanned_frames = 3\n"
       "[pacing]\nmode = \"ig-clock\"\nrate_hz = 59.94\nbudget_ms = 4.5\nhorizon_ms = 20\n"
       "display_delay_ms = 7.25\n"
-      "[host]\nudp = \"\"\n"
+      "[host]\nudp = \"\"\nkey_file = \"k\"\n"
       "[control]\ntcp = \"[::1]:7100\"\nmax_clients = 3\nmax_record_bytes = 2048\n"
       "[stream]\nqueue_frames = 2\nudp_fragment_payload_bytes = 1400\n"
       "tcp_send_buffer_bytes = 70000\nudp_send_buffer_bytes = 100000\nmulticast_ttl = 9\n"
       "shm = \"rig.1\"\nshm_slots = 5\nshm_mode = \"0640\"\n"
       "[journal]\nfile = \"j.bin\"\nring_entries = 128\n"
+      "[access]\nallow = [\"10.0.0.0/8\", \"::ffff:192.0.2.0/120\", \"fd00::1\"]\n"
+      "multicast_groups = []\nmax_connections_per_peer = 5\nmax_host_frames_hz = 400\n"
+      "max_control_records_hz = 6\n"
+      "[tls]\ncertificate = \"a.pem\"\nkey = \"b.pem\"\nclient_ca = \"c.pem\"\n"
+      "allow_names = [\"rig\", \"view\"]\nmax_handshakes = 2\n"
       "[device]\ngpu_index = 2\n"
       "[log]\nlevel = \"debug\"\nfile = \"l.txt\"\n";
   const auto first = daemon(text);
@@ -61,6 +66,20 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
   EXPECT_EQ(first->stream.shm_mode, 0640U);
   EXPECT_EQ(first->journal.file, folder_ / "j.bin");
   EXPECT_EQ(first->journal.ring_entries, 128U);
+  EXPECT_EQ(first->host.key_file, folder_ / "k");
+  ASSERT_EQ(first->access.allow.size(), 3U);
+  EXPECT_EQ(to_string(first->access.allow[0]), "10.0.0.0/8");
+  EXPECT_EQ(to_string(first->access.allow[1]), "192.0.2.0/24");
+  EXPECT_EQ(to_string(first->access.allow[2]), "fd00::1/128");
+  EXPECT_TRUE(first->access.multicast_groups.empty());
+  EXPECT_EQ(first->access.max_connections_per_peer, 5U);
+  EXPECT_EQ(first->access.max_host_frames_hz, 400U);
+  EXPECT_EQ(first->access.max_control_records_hz, 6U);
+  EXPECT_EQ(first->tls.certificate, folder_ / "a.pem");
+  EXPECT_EQ(first->tls.key, folder_ / "b.pem");
+  EXPECT_EQ(first->tls.client_ca, folder_ / "c.pem");
+  EXPECT_EQ(first->tls.allow_names, (std::vector<std::string>{"rig", "view"}));
+  EXPECT_EQ(first->tls.max_handshakes, 2U);
   EXPECT_EQ(first->device.gpu_index, 2);
   EXPECT_EQ(first->log.level, "debug");
   EXPECT_EQ(first->log.file, folder_ / "l.txt");

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "emit/config/network.hpp"
 #include "emit/physics/error.hpp"
 
 /// What emitd reads from --config; keys are documented in config/README.md. Plain data.
@@ -67,6 +68,8 @@ struct ClockConfig {
 
 struct HostConfig {
   std::string udp = "127.0.0.1:7001";  ///< host frames as datagrams; empty = off
+  /// Pre-shared keys of authenticated sessions; empty: none.
+  std::filesystem::path key_file;
 };
 
 /// Control, host and stream connections all start on this TCP port (Hello names the role).
@@ -98,6 +101,29 @@ struct MetricsConfig {
   std::string listen;  ///< /metrics, /healthz and /readyz over HTTP; empty = off
 };
 
+/// Who may connect beside programs on this host.
+struct AccessConfig {
+  std::vector<Network> allow;  ///< empty: whoever reaches the port
+  /// Groups that a client may ask for: site-local scopes (RFC 2365, RFC 4291).
+  std::vector<Network> multicast_groups = default_multicast_groups();
+  std::uint32_t max_connections_per_peer = 8;  ///< peers on this host are not counted
+  std::uint32_t max_host_frames_hz = 20'000;   ///< per peer address
+  std::uint32_t max_control_records_hz = 1000;
+
+  [[nodiscard]] static std::vector<Network> default_multicast_groups();
+};
+
+/// Mutual TLS 1.3 on the control port.
+struct TlsConfig {
+  std::filesystem::path certificate;  ///< PEM, with the chain behind it
+  std::filesystem::path key;
+  std::filesystem::path client_ca;
+  std::vector<std::string> allow_names;  ///< of client certificates; empty: any of the CA's
+  std::uint32_t max_handshakes = 8;      ///< at a time
+
+  [[nodiscard]] bool enabled() const noexcept { return !certificate.empty(); }
+};
+
 struct JournalConfig {
   std::filesystem::path file;  ///< written while running; empty = only on request of a recorder
   std::uint32_t ring_entries = 4096;
@@ -124,9 +150,23 @@ struct DaemonConfig {
   ControlConfig control;
   StreamConfig stream;
   MetricsConfig metrics;
+  AccessConfig access;
+  TlsConfig tls;
   JournalConfig journal;
   DeviceConfig device;
   LogConfig log;
+
+  /// Host datagrams have to belong to an authenticated session.
+  [[nodiscard]] bool authenticated_host() const noexcept {
+    return !host.key_file.empty() || tls.enabled();
+  }
 };
+
+/// A listening port of the daemon.
+enum class Port : std::uint8_t { control, host, metrics };
+/// Something keeps strangers from this port, so that it may be reached from other hosts.
+[[nodiscard]] bool is_protected(const DaemonConfig& daemon, Port port) noexcept;
+/// What such a port asks for, for messages.
+[[nodiscard]] std::string_view protections_of(Port port) noexcept;
 
 }  // namespace emit::config

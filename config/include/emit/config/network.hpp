@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::config {
+
+/// An internet address without port. IPv4 in the first 4 bytes; an IPv4 address mapped into IPv6
+/// (::ffff:a.b.c.d) is the IPv4 address.
+struct IpAddress {
+  bool v4 = true;
+  std::array<std::uint8_t, 16> bytes{};
+
+  /// 127.0.0.0/8 and ::1.
+  [[nodiscard]] bool is_loopback() const noexcept;
+  friend bool operator==(const IpAddress&, const IpAddress&) = default;
+};
+
+/// From the 4 or 16 bytes of an address in network order. Thread: any. RT-safe.
+[[nodiscard]] IpAddress ip_from_bytes(std::span<const std::uint8_t> bytes) noexcept;
+/// "10.1.2.3", "fd00::1". Empty when it is no address in numbers.
+[[nodiscard]] std::optional<IpAddress> parse_ip(std::string_view text) noexcept;
+[[nodiscard]] std::string to_string(const IpAddress& address);
+
+/// The addresses that begin with the same bits (RFC 4632, RFC 4291 section 2.3).
+struct Network {
+  IpAddress first;                ///< bits behind the prefix are 0
+  std::uint8_t prefix_bits = 32;  ///< 0..32, 0..128
+
+  /// Never true across families: ::/0 holds no IPv4 address. Thread: any. RT-safe.
+  [[nodiscard]] bool contains(const IpAddress& address) const noexcept;
+  friend bool operator==(const Network&, const Network&) = default;
+};
+
+/// "10.0.0.0/8", "fd00::/8", or one address. Errors (config), naming the text: not an address, a
+/// prefix too long, bits set behind the prefix.
+[[nodiscard]] physics::Result<Network> parse_network(std::string_view text);
+[[nodiscard]] std::string to_string(const Network& network);
+
+[[nodiscard]] inline bool any_contains(std::span<const Network> networks,
+                                       const IpAddress& address) noexcept {
+  for (const Network& network : networks) {
+    if (network.contains(address)) return true;
+  }
+  return false;
+}
+
+}  // namespace emit::config

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "keys.hpp"
+
+/// Keys of the daemon's configuration: who may connect.
+namespace emit::config {
+
+namespace {
+
+/// An array of strings that `take` turns into elements; it returns false after reporting a fault.
+template <class T, class Field, class Take, class Write>
+Key<T> texts(std::string name, std::string range, Field field, Take take, Write write,
+             std::string meaning) {
+  return custom<T>(
+      {name, "array of strings", "", std::move(range), std::move(meaning), false},
+      [name, field, take](T& out, const Node& node, Diagnostics& diagnostics) {
+        if (node.kind != Node::Kind::array) {
+          diagnostics.add(node.at, "'" + name + "' must be an array of strings, not " +
+                                       std::string(kind_name(node.kind)));
+          return;
+        }
+        std::decay_t<decltype(field(out))> elements;
+        for (const Node& item : node.items) {
+          std::string word;
+          if (read_text(item, name, word, diagnostics)) take(elements, word, item.at, diagnostics);
+        }
+        field(out) = std::move(elements);
+      },
+      [field, write](const T& in) -> std::optional<std::string> {
+        std::string out = "[";
+        for (const auto& element : field(in)) {
+          out += (out.size() > 1 ? ", " : "") + toml_string(write(element));
+        }
+        return out + "]";
+      });
+}
+
+template <class Field>
+Key<AccessConfig> networks(std::string name, Field field, std::string meaning) {
+  return texts<AccessConfig>(
+      name, "networks such as 10.0.0.0/8, fd00::/8", field,
+      [name](std::vector<Network>& out, const std::string& word, const Location& at,
+             Diagnostics& diagnostics) {
+        const auto network = parse_network(word);
+        network ? out.push_back(*network)
+                : diagnostics.add(at, "'" + name + "': " + network.error().text);
+      },
+      [](const Network& network) { return to_string(network); }, std::move(meaning));
+}
+
+}  // namespace
+
+std::vector<Network> AccessConfig::default_multicast_groups() {
+  return {*parse_network("239.255.0.0/16"), *parse_network("ff15::/16")};
+}
+
+const KeyTable<AccessConfig>& access_keys() {
+  static const KeyTable<AccessConfig> keys = {
+      networks("allow", EMIT_FIELD(allow),
+               "Networks whose hosts may reach the control, host and metrics ports; others are "
+               "dropped before a byte is read. Loopback always may. Empty: whoever "
+               "reaches a port."),
+      networks("multicast_groups", EMIT_FIELD(multicast_groups),
+               "Groups that a client may have frames sent to. Default: the site-local scopes."),
+      integer<AccessConfig>("max_connections_per_peer", "", 1, 1024,
+                            EMIT_FIELD(max_connections_per_peer),
+                            "Connections at a time from one address of another host."),
+      integer<AccessConfig>("max_host_frames_hz", "1/s", 1, 10'000'000,
+                            EMIT_FIELD(max_host_frames_hz),
+                            "Host frames a second from one address; more are refused "
+                            "(`CODE_OVERLOADED`). A quarter of a second's worth may come at once."),
+      integer<AccessConfig>("max_control_records_hz", "1/s", 1, 10'000'000,
+                            EMIT_FIELD(max_control_records_hz),
+                            "The same for hello, subscribe and commands."),
+  };
+  return keys;
+}
+
+const KeyTable<TlsConfig>& tls_keys() {
+  static const KeyTable<TlsConfig> keys = {
+      path<TlsConfig>("certificate", EMIT_FIELD(certificate),
+                      "The daemon's certificate, PEM, with intermediate ones behind it; absent: no "
+                      "TLS."),
+      path<TlsConfig>("key", EMIT_FIELD(key), "Its private key, PEM, not readable by others."),
+      path<TlsConfig>("client_ca", EMIT_FIELD(client_ca),
+                      "Certificates (PEM) of the authorities that sign clients' certificates."),
+      texts<TlsConfig>(
+          "allow_names", "", EMIT_FIELD(allow_names),
+          [](std::vector<std::string>& out, const std::string& word, const Location&,
+             Diagnostics&) { out.push_back(word); },
+          [](const std::string& name) { return name; },
+          "Names in a client's certificate (subject CN or a DNS name of subjectAltName) that may "
+          "connect; empty: every certificate of the authorities."),
+      integer<TlsConfig>("max_handshakes", "", 1, 1024, EMIT_FIELD(max_handshakes),
+                         "Handshakes under way at a time; further connections are closed."),
+  };
+  return keys;
+}
+
+}  // namespace emit::config
