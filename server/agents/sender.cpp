@@ -150,8 +150,7 @@ void Sender::evict_oldest() noexcept {
         remove(i, true);
         continue;
       }
-      ++client.next;
-      pass_over_unwanted(client);
+      ++client.next;  // what it does not want is passed over when the new publication is in
       client.gap = true;
       context_.counters.add(Counter::frames_skipped);
       if (ClientCounts* counts = counts_of(client)) {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cstdlib>
 #include <ctime>
 
 #include "agents/conductor.hpp"
@@ -18,6 +17,7 @@
 #include "agents/runner.hpp"
 #include "agents/sender.hpp"
 #include "agents/shm_client.hpp"
+#include "app/clock_watch.hpp"
 #include "app/context.hpp"
 #include "app/privileges.hpp"
 #include "app/replay.hpp"
@@ -129,7 +129,6 @@ class DaemonImpl final : public Daemon {
   void drain_stepped();
   void stop_agents();
   [[nodiscard]] int end_without_device();
-  void watch_clock();
   [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
   [[nodiscard]] MetricsMoment moment() const;
   void housekeep();
@@ -156,8 +155,8 @@ class DaemonImpl final : public Daemon {
   std::atomic<bool> stop_{false};
   std::atomic<bool> serving_{false};
   std::int64_t started_ns_ = 0;
-  std::atomic<std::int64_t> housekept_ns_{0};    ///< monotonic
-  std::optional<std::int64_t> clock_offset_ns_;  ///< wall less monotonic, when looked at last
+  std::atomic<std::int64_t> housekept_ns_{0};  ///< monotonic
+  ClockWatch clock_watch_{clock_};
 
   ServiceNotifier nobody_;
   ServiceHealth health_{options_.notifier != nullptr ? *options_.notifier : nobody_};
@@ -559,30 +558,6 @@ int DaemonImpl::end_without_device() {
   return kExitDeviceLost;
 }
 
-/// Nothing hangs on it: pacing mends itself (IgClock). But whoever looks at late or repeated frames
-/// wants to know.
-void DaemonImpl::watch_clock() {
-  constexpr std::int64_t kStepNs = 1'000'000;
-  constexpr std::int64_t kTrustNs = 100'000;
-  for (int attempt = 0; attempt < 3; ++attempt) {
-    const std::int64_t before_ns = clock_.monotonic_ns();
-    const std::int64_t tai_ns = clock_.tai_ns();
-    const std::int64_t after_ns = clock_.monotonic_ns();
-    if (after_ns - before_ns > kTrustNs) {
-      continue;  // something came in between
-    }
-    const std::int64_t offset_ns = tai_ns - before_ns;
-    const std::int64_t step_ns = offset_ns - clock_offset_ns_.value_or(offset_ns);
-    clock_offset_ns_ = offset_ns;
-    if (std::abs(step_ns) > kStepNs && log_) {
-      context_.counters.add(Counter::clock_steps);
-      log_->write(LogLevel::warn, fmt::format("event=clock_step by_ms={:.3f}",
-                                              static_cast<double>(step_ns) * 1e-6));
-    }
-    return;
-  }
-}
-
 template <class Predicate>
 bool DaemonImpl::wait_until(Predicate done, std::int64_t limit_ns) {
   const std::int64_t end_ns = clock_.monotonic_ns() + limit_ns;
@@ -628,7 +603,11 @@ void DaemonImpl::stop_agents() {
 }
 
 void DaemonImpl::housekeep() {
-  watch_clock();
+  if (const std::int64_t step_ns = clock_watch_.look(); step_ns != 0 && log_) {
+    context_.counters.add(Counter::clock_steps);
+    log_->write(LogLevel::warn,
+                fmt::format("event=clock_step by_ms={:.3f}", static_cast<double>(step_ns) * 1e-6));
+  }
   bool warned = false;
   for (EventLog* events :
        {&context_.conductor_events, &context_.receiver_events, &context_.render_events,

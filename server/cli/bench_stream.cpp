@@ -273,7 +273,7 @@ Result<void> StreamBench::throughput() {
       std::clamp(static_cast<std::uint64_t>(kBytes / static_cast<double>(yardstick_.frame_bytes)),
                  kLeastFrames, kMostFrames);
   const std::string shm = own_shm_name();
-  // The ring is written whether or not somebody reads: the others get a daemon without one.
+  // What the ring costs is the ring's: the others get a daemon without one.
   const auto start = [&](const std::string& name) -> Result<StreamThroughput> {
     const auto directory = work_ / (name.empty() ? "plain" : "shared");
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());

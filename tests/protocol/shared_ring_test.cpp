@@ -74,7 +74,7 @@ TEST(SharedRing, LiesInMemoryAsDocumented) {
   RingWriter writer(memory.span(), params);
   EXPECT_EQ(memory.get<std::uint32_t>(0), 0x534D4645u);
   EXPECT_EQ(std::memcmp(memory.span().data(), "EFMS", 4), 0);
-  EXPECT_EQ(memory.get<std::uint16_t>(4), 1u);
+  EXPECT_EQ(memory.get<std::uint16_t>(4), 2u);
   EXPECT_EQ(memory.get<std::uint32_t>(8), 4u);
   EXPECT_EQ(memory.get<std::uint32_t>(12), 3u);
   EXPECT_EQ(memory.get<std::uint64_t>(16), memory.span().size());

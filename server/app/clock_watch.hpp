@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+
+#include "rt/clock.hpp"
+
+namespace emit::server {
+
+/// Notices when somebody sets the wall clock. Nothing hangs on it, pacing mends itself (IgClock);
+/// but whoever looks at late or repeated frames wants to know. Thread: one owner.
+class ClockWatch {
+ public:
+  explicit ClockWatch(const Clock& clock) noexcept : clock_(clock) {}
+
+  /// By how much the wall clock was set since the last look, ns; 0: by less than 1 ms, or this
+  /// thread was interrupted at every attempt to tell.
+  [[nodiscard]] std::int64_t look() noexcept {
+    constexpr std::int64_t kStepNs = 1'000'000;
+    constexpr std::int64_t kTrustNs = 100'000;
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      const std::int64_t before_ns = clock_.monotonic_ns();
+      const std::int64_t tai_ns = clock_.tai_ns();
+      if (clock_.monotonic_ns() - before_ns > kTrustNs) {
+        continue;
+      }
+      const std::int64_t offset_ns = tai_ns - before_ns;
+      const std::int64_t step_ns = offset_ns - offset_ns_.value_or(offset_ns);
+      offset_ns_ = offset_ns;
+      return std::abs(step_ns) > kStepNs ? step_ns : 0;
+    }
+    return 0;
+  }
+
+ private:
+  const Clock& clock_;
+  std::optional<std::int64_t> offset_ns_;  // wall less monotonic
+};
+
+}  // namespace emit::server
