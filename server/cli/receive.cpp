@@ -69,7 +69,8 @@ int run_receive(const ReceiveCommand& command) {
     return fail(kExitUsage, url.error().text);
   }
   if (!(command.max_k > command.min_k)) return fail(kExitUsage, "--max-k must exceed --min-k");
-  auto connected = server::FrameClient::connect(command.url, server::kConnectTimeoutNs, command.security);
+  auto connected =
+      server::FrameClient::connect(command.url, server::kConnectTimeoutNs, command.security);
   if (!connected) return fail(connected.error());
   server::FrameClient& client = **connected;
 

@@ -48,14 +48,14 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const auto piece = input.bytes(input.number<std::uint16_t>());
     if ((instructions & 1) != 0) {
       peer.mac.set_key(peer.shared.open_key);
-      const auto open = peer.mac.seal(
-          {protocol::SessionKind::open, peer.shared.id, kSession, 1}, peer.space, 0);
+      const auto open =
+          peer.mac.seal({protocol::SessionKind::open, peer.shared.id, kSession, 1}, peer.space, 0);
       if (!challenged) challenge_of(sessions->take(open).header);
       std::copy(piece.begin(), piece.end(), peer.space.begin() + protocol::kSessionHeaderBytes);
       peer.mac.set_key(peer.session);
       const auto sealed = peer.mac.seal(
-          {protocol::SessionKind::host_frame, peer.shared.id, kSession, ++peer.counter},
-          peer.space, piece.size());
+          {protocol::SessionKind::host_frame, peer.shared.id, kSession, ++peer.counter}, peer.space,
+          piece.size());
       fuzz::require(sealed.size() == piece.size() + 48 || piece.size() > 65'459,
                     "whatever fits is sealed");
       // A session stays while there are fewer than the table holds, which one host cannot exceed.
