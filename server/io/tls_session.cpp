@@ -243,9 +243,8 @@ IoResult TlsSession::write(std::span<const std::span<const std::byte>> pieces) n
     IoResult result{IoStatus::busy, 0, 0};
     if (lock.owns_lock()) {
       // A record that met a full descriptor is offered again by the caller, perhaps cut otherwise.
-      const std::size_t length =
-          impl_->unfinished_bytes != 0 ? from.skip(impl_->unfinished_bytes)
-                                       : from.copy(impl_->record);
+      const std::size_t length = impl_->unfinished_bytes != 0 ? from.skip(impl_->unfinished_bytes)
+                                                              : from.copy(impl_->record);
       if (length < impl_->unfinished_bytes) return {IoStatus::failed, 0, EPROTO};
       if (length == 0) return {IoStatus::done, total, 0};
       ERR_clear_error();

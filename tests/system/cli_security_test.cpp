@@ -27,23 +27,24 @@ TEST(CliSecurity, commands_prove_who_they_are) {
   };
   const std::string key = key_file("right.keys", '1');
   const std::string wrong_key = key_file("wrong.keys", '2');
-  const std::string config = folder.write(
-      "emitd.toml", canned_config(64, 48, "mode = \"ig-clock\"\nrate_hz = 50",
-                                  "[tls]\ncertificate = \"d.pem\"\nkey = \"d.key\"\n"
-                                  "client_ca = \"ca.pem\"\n"));
+  const std::string config =
+      folder.write("emitd.toml", canned_config(64, 48, "mode = \"ig-clock\"\nrate_hz = 50",
+                                               "[tls]\ncertificate = \"d.pem\"\nkey = \"d.key\"\n"
+                                               "client_ca = \"ca.pem\"\n"));
   DaemonProcess daemon(folder, {"--config", config, "--set", "host.key_file=" + key});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
   const std::string tcp = "tcp://" + daemon.control();
   const std::string udp = "udp://" + daemon.host_udp();
-  const std::vector<std::string> tls = {"--tls-ca",  folder.file("ca.pem"),
+  const std::vector<std::string> tls = {"--tls-ca",   folder.file("ca.pem"),
                                         "--tls-cert", folder.file("c.pem"),
-                                        "--tls-key", folder.file("c.key")};
+                                        "--tls-key",  folder.file("c.key")};
   const auto run = [&](std::vector<std::string> arguments, bool with_tls) {
     if (with_tls) arguments.insert(arguments.end(), tls.begin(), tls.end());
     return run_emit(arguments);
   };
   const std::string poses = folder.write(
-      "poses.csv", "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz\n0,0,0,1,1,0,0,0\n0.01,0,0,1,1,0,0,0\n");
+      "poses.csv",
+      "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz\n0,0,0,1,1,0,0,0\n0.01,0,0,1,1,0,0,0\n");
 
   const ProcessResult received = run({"receive", tcp, "--frames", "5"}, true);
   EXPECT_EQ(received.exit_code, 0) << received.err;

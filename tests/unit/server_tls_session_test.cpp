@@ -97,7 +97,8 @@ TEST_F(TlsPair, AWriteThatMeetsAFullSocketGoesOnFromOtherMemory) {
     for (;;) {
       const IoResult result = far_->read(space);
       if (result.status != IoStatus::done) break;
-      got.insert(got.end(), space.begin(), space.begin() + static_cast<std::ptrdiff_t>(result.bytes));
+      got.insert(got.end(), space.begin(),
+                 space.begin() + static_cast<std::ptrdiff_t>(result.bytes));
     }
   }
   EXPECT_TRUE(blocked);
