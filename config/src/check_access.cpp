@@ -49,7 +49,8 @@ void check_access(const Node& root, const DaemonConfig& daemon, Diagnostics& dia
   Diagnostics reported_before;  // section() reported wrong kinds already
   const auto check = [&](Port port, std::string_view table, std::string_view key,
                          const std::string& endpoint) {
-    if (!is_endpoint(endpoint) || is_loopback_endpoint(endpoint) || is_protected(daemon, port)) return;
+    if (!is_endpoint(endpoint) || is_loopback_endpoint(endpoint) || is_protected(daemon, port))
+      return;
     diagnostics.add(key_location(section(root, table, reported_before), key),
                     fmt::format("'{}.{}' is '{}', which other hosts may reach: that needs {}",
                                 table, key, endpoint, protections_of(port)));

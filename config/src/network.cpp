@@ -40,8 +40,8 @@ bool IpAddress::is_loopback() const noexcept {
 
 IpAddress ip_from_bytes(std::span<const std::uint8_t> bytes) noexcept {
   IpAddress out;
-  const bool mapped = bytes.size() == 16 &&
-                      std::equal(kMappedPrefix.begin(), kMappedPrefix.end(), bytes.begin());
+  const bool mapped =
+      bytes.size() == 16 && std::equal(kMappedPrefix.begin(), kMappedPrefix.end(), bytes.begin());
   if (mapped) bytes = bytes.subspan(kMappedPrefix.size());
   out.v4 = bytes.size() == 4;
   std::copy_n(bytes.begin(), std::min(bytes.size(), out.bytes.size()), out.bytes.begin());

@@ -104,12 +104,11 @@ SessionKey SessionMac::derive(std::string_view purpose,
   EVP_MAC_CTX* const mac = impl_->context.get();
   // The purpose's end is marked, so that no two pairs read alike.
   constexpr unsigned char kEnd = 0;
-  const bool made =
-      start(mac, impl_->key, out.size()) &&
-      EVP_MAC_update(mac, reinterpret_cast<const unsigned char*>(purpose.data()), purpose.size()) ==
-          1 &&
-      EVP_MAC_update(mac, &kEnd, 1) == 1 &&
-      EVP_MAC_update(mac, raw(context), context.size()) == 1 && finish(mac, out);
+  const bool made = start(mac, impl_->key, out.size()) &&
+                    EVP_MAC_update(mac, reinterpret_cast<const unsigned char*>(purpose.data()),
+                                   purpose.size()) == 1 &&
+                    EVP_MAC_update(mac, &kEnd, 1) == 1 &&
+                    EVP_MAC_update(mac, raw(context), context.size()) == 1 && finish(mac, out);
   // create() has shown that it works. Should it fail all the same: a key that fits nothing.
   if (!made) RAND_bytes(reinterpret_cast<unsigned char*>(out.data()), static_cast<int>(out.size()));
   return out;

@@ -43,9 +43,9 @@ class PeerLimits {
       });
     }
     if (found == entries_.end()) {
-      found = std::min_element(
-          entries_.begin(), entries_.end(),
-          [](const Entry& a, const Entry& b) { return a.heard_ns < b.heard_ns; });
+      found =
+          std::min_element(entries_.begin(), entries_.end(),
+                           [](const Entry& a, const Entry& b) { return a.heard_ns < b.heard_ns; });
       *found = {peer, now_ns, TokenBucket(access_.max_host_frames_hz),
                 TokenBucket(access_.max_control_records_hz)};
     }

@@ -50,9 +50,9 @@ physics::Result<SocketAddress> Receiver::listen_address(std::string_view key,
   }
   // The configuration was judged by its text; a name may stand for any address.
   if (!ip_of(*address).is_loopback() && !config::is_protected(config_, port)) {
-    return named({physics::ErrorCode::config,
-                  to_string(*address) + ": other hosts may reach it: that needs " +
-                      std::string(config::protections_of(port))});
+    return named({physics::ErrorCode::config, to_string(*address) +
+                                                  ": other hosts may reach it: that needs " +
+                                                  std::string(config::protections_of(port))});
   }
   return *address;
 }

@@ -71,17 +71,15 @@ void Receiver::turn_away(PeerRefusal why, Counter counter, const config::IpAddre
 }
 
 std::size_t Receiver::connections_from(const config::IpAddress& peer) const noexcept {
-  return static_cast<std::size_t>(
-      std::count_if(connections_.begin(), connections_.end(), [&](const auto& connection) {
-        return connection->open() && connection->ip == peer;
-      }));
+  return static_cast<std::size_t>(std::count_if(
+      connections_.begin(), connections_.end(),
+      [&](const auto& connection) { return connection->open() && connection->ip == peer; }));
 }
 
 std::size_t Receiver::handshakes() const noexcept {
-  return static_cast<std::size_t>(
-      std::count_if(connections_.begin(), connections_.end(), [](const auto& connection) {
-        return connection->open() && connection->handshaking;
-      }));
+  return static_cast<std::size_t>(std::count_if(
+      connections_.begin(), connections_.end(),
+      [](const auto& connection) { return connection->open() && connection->handshaking; }));
 }
 
 bool Receiver::admit(TcpSocket socket, const SocketAddress& peer, std::int64_t now_ns) {

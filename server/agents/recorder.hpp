@@ -62,8 +62,8 @@ class Recorder final : public Agent {
     std::uint32_t connection = 0;
     int fd = -1;
     TcpSocket* socket = nullptr;  // the receiver's
-    std::uint64_t next = 0;  // index of the record being sent
-    std::size_t offset = 0;  // bytes of it sent
+    std::uint64_t next = 0;       // index of the record being sent
+    std::size_t offset = 0;       // bytes of it sent
     bool blocked = false;
     bool registered = false;
   };

@@ -49,7 +49,7 @@ struct RecorderCommand {
   ClientCommand::Kind kind = ClientCommand::Kind::add;
   std::uint32_t connection = 0;
   int fd = -1;
-  std::uint64_t handle = 0;  ///< generation of the connection
+  std::uint64_t handle = 0;     ///< generation of the connection
   TcpSocket* socket = nullptr;  ///< add: lent until it comes back with RecorderReleased
 };
 struct RecorderReleased {

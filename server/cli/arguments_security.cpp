@@ -4,12 +4,12 @@
 namespace emit::cli {
 
 void add_security(CLI::App& app, server::Security& target) {
-  CLI::Option* certificate = add_path(app, "--tls-cert", target.tls_certificate,
-                                      "TLS: this client's certificate, PEM");
+  CLI::Option* certificate =
+      add_path(app, "--tls-cert", target.tls_certificate, "TLS: this client's certificate, PEM");
   CLI::Option* key = add_path(app, "--tls-key", target.tls_key,
                               "TLS: its private key, PEM, not readable by others");
-  CLI::Option* authority = add_path(app, "--tls-ca", target.tls_ca,
-                                    "TLS: who signs the daemon's certificate, PEM");
+  CLI::Option* authority =
+      add_path(app, "--tls-ca", target.tls_ca, "TLS: who signs the daemon's certificate, PEM");
   certificate->needs(key)->needs(authority);
   key->needs(certificate);
   authority->needs(certificate);

@@ -17,7 +17,8 @@ namespace emit::cli {
 int run_record(const RecordCommand& command) {
   const auto url = server::parse_url(command.from);
   if (!url) return fail(kExitUsage, url.error().text);
-  auto connected = server::RecorderClient::connect(command.from, server::kConnectTimeoutNs, command.security);
+  auto connected =
+      server::RecorderClient::connect(command.from, server::kConnectTimeoutNs, command.security);
   if (!connected) return fail(connected.error());
   server::RecorderClient& recorder = **connected;
   protocol::LogWriterOptions options;

@@ -141,8 +141,7 @@ namespace {
 /// TLS over a connected socket, until both sides have proved themselves.
 physics::Result<void> secure(TcpSocket& socket, const Security& security, const std::string& name,
                              const SocketAddress& peer, std::int64_t end_ns) {
-  auto context =
-      TlsContext::client({security.tls_ca, security.tls_certificate, security.tls_key});
+  auto context = TlsContext::client({security.tls_ca, security.tls_certificate, security.tls_key});
   if (!context) {
     return tl::unexpected<physics::Error>(std::move(context.error()));
   }

@@ -92,8 +92,6 @@ physics::Result<TlsContext> TlsContext::make(const TlsFiles& files, bool server)
   // Neither side may carry a session over to another connection: every one proves itself anew.
   SSL_CTX_set_num_tickets(context, 0);
   SSL_CTX_set_session_cache_mode(context, SSL_SESS_CACHE_OFF);
-  // Frames move to a client's own memory while half sent.
-  SSL_CTX_set_mode(context, SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
   return TlsContext(std::move(impl));
 }
 

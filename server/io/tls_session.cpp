@@ -72,6 +72,42 @@ const BIO_METHOD* descriptor_method() noexcept {
   return method;
 }
 
+/// Walks along pieces as if they were one.
+class PieceReader {
+ public:
+  explicit PieceReader(std::span<const std::span<const std::byte>> pieces) noexcept
+      : pieces_(pieces) {}
+  /// As many as there are and fit.
+  std::size_t copy(std::span<std::byte> space) noexcept {
+    return walk(space.size(), [&](std::span<const std::byte> part, std::size_t done) {
+      std::copy(part.begin(), part.end(), space.begin() + static_cast<std::ptrdiff_t>(done));
+    });
+  }
+  std::size_t skip(std::size_t count) noexcept {
+    return walk(count, [](std::span<const std::byte>, std::size_t) {});
+  }
+
+ private:
+  template <class Take>
+  std::size_t walk(std::size_t most, const Take& take) noexcept {
+    std::size_t done = 0;
+    while (done < most && !pieces_.empty()) {
+      const std::size_t length = std::min(pieces_.front().size() - offset_, most - done);
+      take(pieces_.front().subspan(offset_, length), done);
+      done += length;
+      offset_ += length;
+      if (offset_ == pieces_.front().size()) {
+        pieces_ = pieces_.subspan(1);
+        offset_ = 0;
+      }
+    }
+    return done;
+  }
+
+  std::span<const std::span<const std::byte>> pieces_;
+  std::size_t offset_ = 0;
+};
+
 }  // namespace
 
 struct TlsSession::Impl {
@@ -81,7 +117,8 @@ struct TlsSession::Impl {
   std::atomic<bool> established{false};
   std::atomic<bool> broken{false};  ///< OpenSSL allows no further call that writes
   bool wants_write = false;
-  std::size_t unfinished_bytes = 0;  ///< of a write that met a full descriptor
+  std::array<std::byte, kRecordBytes> record;  ///< being written
+  std::size_t unfinished_bytes = 0;            ///< of it, when the descriptor was full
   std::string error;
 
   /// Turns the outcome of an SSL call that returned <= 0 into a result.
@@ -158,7 +195,7 @@ IoResult TlsSession::handshake() noexcept {
   const IoResult result = impl_->outcome(returned, false);
   if (result.status == IoStatus::failed) {
     const long verdict = SSL_get_verify_result(impl_->ssl.get());
-    impl_->error = verdict != X509_V_OK ? X509_verify_cert_error_string(verdict)
+    impl_->error = verdict != X509_V_OK    ? X509_verify_cert_error_string(verdict)
                    : ERR_peek_error() != 0 ? tls_error_text()
                                            : "the peer hung up";
   }
@@ -198,36 +235,33 @@ IoResult TlsSession::peek(std::span<std::byte> space) noexcept {
 }
 
 IoResult TlsSession::write(std::span<const std::span<const std::byte>> pieces) noexcept {
+  PieceReader from(pieces);
   std::size_t total = 0;
-  for (const std::span<const std::byte> piece : pieces) {
-    for (std::size_t offset = 0; offset < piece.size();) {
-      if (total >= kMaxWriteBytes) return {IoStatus::done, total, 0};
-      // For one record at a time: the reader gets its turn in between.
-      const std::unique_lock lock(impl_->mutex, std::try_to_lock);
-      IoResult result{IoStatus::busy, 0, 0};
-      if (lock.owns_lock()) {
-        const std::size_t left = piece.size() - offset;
-        const std::size_t length = impl_->unfinished_bytes != 0 ? impl_->unfinished_bytes
-                                                                : std::min(left, kRecordBytes);
-        if (length > left) return {IoStatus::failed, 0, EPROTO};  // not the same bytes again
-        ERR_clear_error();
-        errno = 0;
-        std::size_t bytes = 0;
-        const int returned =
-            SSL_write_ex(impl_->ssl.get(), piece.data() + offset, length, &bytes);
-        if (returned == 1) {
-          impl_->unfinished_bytes = 0;
-          offset += bytes;
-          total += bytes;
-          continue;
-        }
-        result = impl_->outcome(returned, true);
-        impl_->unfinished_bytes = length;
+  while (total < kMaxWriteBytes) {
+    // For one record at a time: the reader gets its turn in between.
+    const std::unique_lock lock(impl_->mutex, std::try_to_lock);
+    IoResult result{IoStatus::busy, 0, 0};
+    if (lock.owns_lock()) {
+      // A record that met a full descriptor is offered again by the caller, perhaps cut otherwise.
+      const std::size_t length = impl_->unfinished_bytes != 0 ? from.skip(impl_->unfinished_bytes)
+                                                              : from.copy(impl_->record);
+      if (length < impl_->unfinished_bytes) return {IoStatus::failed, 0, EPROTO};
+      if (length == 0) return {IoStatus::done, total, 0};
+      ERR_clear_error();
+      errno = 0;
+      std::size_t bytes = 0;
+      const int returned = SSL_write_ex(impl_->ssl.get(), impl_->record.data(), length, &bytes);
+      if (returned == 1) {
+        impl_->unfinished_bytes = 0;
+        total += bytes;
+        continue;
       }
-      // What went out counts; the caller meets the obstacle again when it goes on.
-      return total > 0 && result.status != IoStatus::failed ? IoResult{IoStatus::done, total, 0}
-                                                            : result;
+      result = impl_->outcome(returned, true);
+      impl_->unfinished_bytes = length;
     }
+    // What went out counts; the caller meets the obstacle again when it goes on.
+    return total > 0 && result.status != IoStatus::failed ? IoResult{IoStatus::done, total, 0}
+                                                          : result;
   }
   return {IoStatus::done, total, 0};
 }

@@ -40,7 +40,8 @@ class TlsContext {
 /// One connection's session. Two threads may use it, one reading and one writing: whoever comes
 /// while the other is inside is told `busy` and tries again soon; nobody waits. A turn holds it for
 /// one TLS record (16 KiB), tens of microseconds.
-/// Real time: reading and writing are RT-safe once the handshake is over.
+/// Real time: reading and writing never wait, but OpenSSL takes two small blocks of heap memory for
+/// every record: connections that must not allocate are plain ones.
 class TlsSession {
  public:
   /// `name`: client only, the name or address that the server's certificate must bear.
@@ -62,7 +63,8 @@ class TlsSession {
 
   [[nodiscard]] IoResult read(std::span<std::byte> space) noexcept;
   [[nodiscard]] IoResult peek(std::span<std::byte> space) noexcept;
-  /// Up to a few records. After would_block the same bytes have to be offered again.
+  /// Up to a few records. After would_block or busy the bytes that did not count have to be offered
+  /// again; pieces may be cut otherwise and lie elsewhere.
   [[nodiscard]] IoResult write(std::span<const std::span<const std::byte>> pieces) noexcept;
   /// Bytes lie decrypted in the session: the descriptor will not announce them.
   [[nodiscard]] bool has_buffered() noexcept;

@@ -80,9 +80,10 @@ class SessionHost final : public HostClient {
                                     body.size(), protocol::kMaxSessionPayloadBytes));
     }
     std::copy(body.begin(), body.end(), space_.begin() + protocol::kSessionHeaderBytes);
-    return transmit(session_mac_.seal({SessionKind::host_frame, shared_.id, session_id_, ++counter_},
-                                      space_, body.size()),
-                    end_ns);
+    return transmit(
+        session_mac_.seal({SessionKind::host_frame, shared_.id, session_id_, ++counter_}, space_,
+                          body.size()),
+        end_ns);
   }
   physics::Result<void> command(HostCommand /*command*/, std::int64_t /*timeout_ns*/) override {
     return make_error(ErrorCode::unsupported, "commands need a tcp:// connection");
@@ -115,8 +116,8 @@ class SessionHost final : public HostClient {
     }
     echo_ = random_number();
     std::array<std::byte, protocol::kSessionHeaderBytes + protocol::kSessionTagBytes> bytes;
-    return transmit(
-        open_mac_.seal({SessionKind::open, shared_.id, session_id_, echo_}, bytes, 0), asked_ns_);
+    return transmit(open_mac_.seal({SessionKind::open, shared_.id, session_id_, echo_}, bytes, 0),
+                    asked_ns_);
   }
 
   physics::Result<void> transmit(std::span<const std::byte> datagram, std::int64_t end_ns) {
@@ -209,9 +210,8 @@ physics::Result<std::unique_ptr<HostClient>> make_session_host(
   if (!session_mac || !open_mac) {
     return tl::unexpected((session_mac ? open_mac : session_mac).error());
   }
-  auto host =
-      std::make_unique<SessionHost>(std::move(socket), peer, key, std::move(control),
-                                    std::move(*session_mac), std::move(*open_mac));
+  auto host = std::make_unique<SessionHost>(std::move(socket), peer, key, std::move(control),
+                                            std::move(*session_mac), std::move(*open_mac));
   if (auto opened = host->open(monotonic_now_ns() + timeout_ns); !opened) {
     return tl::unexpected(std::move(opened.error()));
   }

@@ -28,10 +28,13 @@ struct Peer {
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Peer peer;
-  const protocol::SessionKey key{};
-  auto sessions = std::move(*HostSessions::create(std::span(&key, 1), 0));
+  static const protocol::SessionKey key{};
+  // Kept from input to input, because it takes long to make: each input is another session, and the
+  // oldest ones are forgotten.
+  static auto sessions = std::move(*HostSessions::create(std::span(&key, 1), 0));
+  static std::uint64_t session_id = 0;
+  ++session_id;
   fuzz::InputReader input(fuzz::as_bytes(data, size));
-  constexpr std::uint64_t kSession = 7;
   peer.counter = 0;
   bool challenged = false;
   const auto challenge_of = [&](const protocol::SessionHeader& open) {
@@ -40,7 +43,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     fuzz::require(read && read->header.counter == open.counter, "a challenge echoes its opening");
     const auto content = protocol::parse_challenge(read->payload);
     fuzz::require(content.has_value(), "a challenge holds a nonce");
-    peer.session = protocol::session_key(peer.shared, kSession, content->nonce, peer.mac);
+    peer.session = protocol::session_key(peer.shared, session_id, content->nonce, peer.mac);
     challenged = true;
   };
   while (!input.empty()) {
@@ -48,13 +51,13 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const auto piece = input.bytes(input.number<std::uint16_t>());
     if ((instructions & 1) != 0) {
       peer.mac.set_key(peer.shared.open_key);
-      const auto open = peer.mac.seal(
-          {protocol::SessionKind::open, peer.shared.id, kSession, 1}, peer.space, 0);
+      const auto open = peer.mac.seal({protocol::SessionKind::open, peer.shared.id, session_id, 1},
+                                      peer.space, 0);
       if (!challenged) challenge_of(sessions->take(open).header);
       std::copy(piece.begin(), piece.end(), peer.space.begin() + protocol::kSessionHeaderBytes);
       peer.mac.set_key(peer.session);
       const auto sealed = peer.mac.seal(
-          {protocol::SessionKind::host_frame, peer.shared.id, kSession, ++peer.counter},
+          {protocol::SessionKind::host_frame, peer.shared.id, session_id, ++peer.counter},
           peer.space, piece.size());
       fuzz::require(sealed.size() == piece.size() + 48 || piece.size() > 65'459,
                     "whatever fits is sealed");
@@ -72,20 +75,25 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
       continue;
     }
     std::vector<std::byte> datagram(piece.begin(), piece.end());
-    bool genuine = false;
     if ((instructions & 6) != 0 && datagram.size() >= 48) {
       peer.mac.set_key((instructions & 2) != 0 ? peer.shared.open_key : peer.session);
       // seal() writes a header of its own: keep what the input says by sealing what it means.
-      if (const auto read = protocol::parse_session_datagram(datagram)) {
-        genuine = !peer.mac.seal(read->header, datagram, read->payload.size()).empty();
+      if (auto read = protocol::parse_session_datagram(datagram)) {
+        read->header.session_id = session_id;
+        fuzz::require(!peer.mac.seal(read->header, datagram, read->payload.size()).empty(),
+                      "what was read can be sealed");
       }
     }
     const auto taken = sessions->take(datagram);
-    if (taken.verdict == Verdict::host_frame) {
-      fuzz::require(genuine, "nothing passes without the key");
+    const auto sealed_by = [&](const protocol::SessionKey& by) {
+      peer.mac.set_key(by);
+      return peer.mac.verify(datagram);
+    };
+    if (taken.verdict == Verdict::host_frame || taken.verdict == Verdict::replayed) {
+      fuzz::require(sealed_by(peer.session), "nothing passes without the key");
     }
     if (taken.verdict == Verdict::open) {
-      fuzz::require(genuine, "nothing is answered without the key");
+      fuzz::require(sealed_by(peer.shared.open_key), "nothing is answered without the key");
       static_cast<void>(sessions->challenge(taken.header));
     }
   }

@@ -5,8 +5,7 @@
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emit;
-  const auto keys =
-      protocol::parse_key_file({reinterpret_cast<const char*>(data), size});
+  const auto keys = protocol::parse_key_file({reinterpret_cast<const char*>(data), size});
   if (!keys) {
     fuzz::require(!keys.error().text.empty(), "an error says why");
     return 0;

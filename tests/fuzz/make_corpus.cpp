@@ -305,7 +305,7 @@ void make_session_seeds() {
     Bytes out(protocol::kSessionHeaderBytes + body.size() + protocol::kSessionTagBytes);
     std::copy(body.begin(), body.end(), out.begin() + protocol::kSessionHeaderBytes);
     mac.set_key(shared.open_key);
-    mac.seal({kind, shared.id, 7, counter}, out, body.size());
+    static_cast<void>(mac.seal({kind, shared.id, 7, counter}, out, body.size()));
     return out;
   };
   const Bytes open = datagram(protocol::SessionKind::open, 3, {});
@@ -315,8 +315,7 @@ void make_session_seeds() {
         joined({piece(1, host_frame(0)), piece(1, host_frame(2)), piece(4, frame), piece(4, frame),
                 piece(2, frame), piece(0, frame), piece(0, host_frame(0))}));
   write("host_sessions", "answers",
-        joined({piece(2, datagram(protocol::SessionKind::challenge, 1, Bytes(17))),
-                piece(1, {}),
+        joined({piece(2, datagram(protocol::SessionKind::challenge, 1, Bytes(17))), piece(1, {}),
                 piece(4, datagram(protocol::SessionKind::answer, 1, host_frame(0)))}));
 }
 

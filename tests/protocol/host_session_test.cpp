@@ -58,8 +58,8 @@ TEST_F(HostSession, TheBytesOnTheWireAreTheDocumentedOnes) {
   mac_.set_key(key_of(1));
   const Sealed sealed = seal(mac_, header_, "");
   const unsigned char head[kSessionHeaderBytes] = {
-      'E',  'M',  'H',  'S',  1, 3, 0, 0, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,
-      7,    0,    0,    0,    0, 0, 0, 0, 42,   0,    0,    0,    0,    0,    0,    0};
+      'E', 'M', 'H', 'S', 1, 3, 0, 0, 0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11,
+      7,   0,   0,   0,   0, 0, 0, 0, 42,   0,    0,    0,    0,    0,    0,    0};
   EXPECT_EQ(std::memcmp(sealed.bytes.data(), head, sizeof head), 0);
 }
 

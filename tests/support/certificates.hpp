@@ -16,7 +16,8 @@ namespace emit::test {
 class Authority {
  public:
   explicit Authority(const std::string& name)
-      : key_(EVP_EC_gen("P-256")), certificate_(make(name, key_.get(), true, {}, nullptr, nullptr)) {}
+      : key_(EVP_EC_gen("P-256")),
+        certificate_(make(name, key_.get(), true, {}, nullptr, nullptr)) {}
 
   void write(const std::string& file) const { write_certificate(certificate_.get(), file); }
 

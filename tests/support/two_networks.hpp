@@ -42,13 +42,16 @@ class TwoNetworks {
     const std::string there =
         "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(there_);
     if (!run("ip link set lo up && ip link add cable0 type veth peer name cable1 && "
-             "ip link set cable1 netns " + there + " && ip addr add 192.0.2.1/24 dev cable0 && "
+             "ip link set cable1 netns " +
+             there +
+             " && ip addr add 192.0.2.1/24 dev cable0 && "
              "ip addr add fd00:77::1/64 dev cable0 nodad && ip link set cable0 up")) {
       return "ip(8) cannot make a virtual cable here";
     }
     enter_there();
-    const bool done = run("ip link set lo up && ip addr add 192.0.2.2/24 dev cable1 && "
-                          "ip addr add fd00:77::2/64 dev cable1 nodad && ip link set cable1 up");
+    const bool done =
+        run("ip link set lo up && ip addr add 192.0.2.2/24 dev cable1 && "
+            "ip addr add fd00:77::2/64 dev cable1 nodad && ip link set cable1 up");
     enter_here();
     return done ? "" : "ip(8) cannot set up the other end of the cable";
   }

@@ -83,9 +83,10 @@ Bytes garbage(std::size_t length) {
 std::string config(const std::string& address, const std::string& protections,
                    const std::string& host_more = {}) {
   return "[source]\nkind = \"canned\"\ncanned_width_px = 64\ncanned_height_px = 48\n"
-         "[pacing]\nmode = \"host-step\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n[journal]\nfile = \"run.mcap\"\n"
-         "[control]\ntcp = \"" + address + ":0\"\n[host]\nudp = \"" + address + ":0\"\n" +
-         host_more + protections;
+         "[pacing]\nmode = \"host-step\"\n[metrics]\nlisten = \"127.0.0.1:0\"\n[journal]\nfile = "
+         "\"run.mcap\"\n"
+         "[control]\ntcp = \"" +
+         address + ":0\"\n[host]\nudp = \"" + address + ":0\"\n" + host_more + protections;
 }
 
 std::uint16_t port_of(const std::string& endpoint) {
@@ -100,7 +101,8 @@ class Stranger {
         control_(numeric_address(address, port_of(daemon.control()))),
         host_(numeric_address(address, port_of(daemon.host_udp()))) {
     frames_ = socket_there(SOCK_DGRAM);
-    SocketAddress any = numeric_address(control_.storage.ss_family == AF_INET6 ? "::" : "0.0.0.0", 0);
+    SocketAddress any =
+        numeric_address(control_.storage.ss_family == AF_INET6 ? "::" : "0.0.0.0", 0);
     ::bind(frames_.get(), any.get(), any.length);
     socklen_t length = sizeof any.storage;
     ::getsockname(frames_.get(), any.get(), &length);
@@ -220,7 +222,8 @@ class Recording {
       const auto byte = [&](std::size_t at) { return std::to_integer<unsigned>(space[at]); };
       const std::size_t head = (byte(0) & 15U) * 4;
       const bool udp = byte(9) == IPPROTO_UDP;
-      if (from.sll_pkttype == PACKET_OUTGOING || !udp || (byte(head + 2) << 8U | byte(head + 3)) != port_) {
+      if (from.sll_pkttype == PACKET_OUTGOING || !udp ||
+          (byte(head + 2) << 8U | byte(head + 3)) != port_) {
         continue;
       }
       out.emplace_back(space.begin() + static_cast<std::ptrdiff_t>(head + 8), space.begin() + got);
@@ -305,10 +308,9 @@ TEST(DaemonAccess, AStrangerGetsNothingFromADaemonWithTlsAndKeys) {
     rig.issue("viewer", "DNS:viewer", folder.file("c.pem"), folder.file("c.key"));
     folder.write("host.keys", std::string(64, '7') + "\n");
     ::chmod(folder.file("host.keys").c_str(), 0600);
-    const std::string text =
-        config("192.0.2.1",
-               "[tls]\ncertificate = \"d.pem\"\nkey = \"d.key\"\nclient_ca = \"ca.pem\"\n",
-               "key_file = \"host.keys\"\n");
+    const std::string text = config(
+        "192.0.2.1", "[tls]\ncertificate = \"d.pem\"\nkey = \"d.key\"\nclient_ca = \"ca.pem\"\n",
+        "key_file = \"host.keys\"\n");
     Security security;
     security.tls_ca = folder.file("ca.pem");
     security.tls_certificate = folder.file("c.pem");
@@ -364,6 +366,32 @@ TEST(DaemonAccess, AStrangerGetsNothingFromADaemonWithTlsAndKeys) {
   });
 }
 
+TEST(DaemonLimits, WhatIsBeyondARateIsRefusedByCode) {
+  ScratchFolder folder;
+  DaemonProcess daemon(
+      folder, {"--config",
+               folder.write("emitd.toml", canned_config(64, 48, "mode = \"host-step\"",
+                                                        "[access]\nmax_host_frames_hz = 1\n"))});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  constexpr std::uint32_t kOverloaded = 11;
+  const auto tcp = HostClient::connect("tcp://" + daemon.control(), kLongNs);
+  const auto udp = HostClient::connect("udp://" + daemon.host_udp(), kLongNs);
+  ASSERT_TRUE(tcp.has_value() && udp.has_value());
+  // Twenty at once, whoever sends them, are more than one a second however slow this machine is.
+  std::uint64_t number = 0;
+  for (HostClient* host : {tcp->get(), udp->get()}) {
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_TRUE(host->send(host_frame(++number)).has_value());
+    }
+    const auto status = host->receive_status(kLongNs);
+    ASSERT_TRUE(status.has_value() && status->has_value());
+    EXPECT_EQ((*status)->code, kOverloaded) << (*status)->text;
+    EXPECT_NE((*status)->text.find("access.max_host_frames_hz"), std::string::npos);
+  }
+  expect_end(daemon, folder);
+  EXPECT_GE(counted(folder, "host_frames_over_rate"), 2U);
+}
+
 struct ListCase {
   const char* name;
   const char* address;     ///< in the configuration
@@ -387,10 +415,10 @@ TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
     ScratchFolder folder;
     {
       DaemonProcess daemon(
-          folder, {"--config",
-                   folder.write("emitd.toml",
-                                config(test.address, "[access]\nallow = [" +
-                                                         std::string(test.other) + "]\n"))});
+          folder,
+          {"--config",
+           folder.write("emitd.toml", config(test.address, "[access]\nallow = [" +
+                                                               std::string(test.other) + "]\n"))});
       ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
       Stranger stranger(networks, daemon, test.reached_by);
       stranger.try_everything({});

@@ -23,8 +23,8 @@ std::string field(const std::filesystem::path& status, const std::string& name) 
 TEST(DaemonPrivileges, NoThreadKeepsACapabilityOrMayGainOne) {
   test::ScratchFolder folder;
   const std::string config = folder.write(
-      "emitd.toml", test::canned_config(64, 48, "mode = \"host-step\"",
-                                        "[metrics]\nlisten = \"127.0.0.1:0\"\n"));
+      "emitd.toml",
+      test::canned_config(64, 48, "mode = \"host-step\"", "[metrics]\nlisten = \"127.0.0.1:0\"\n"));
   test::DaemonProcess daemon(folder, {"--config", config});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
   int threads = 0;

@@ -85,8 +85,7 @@ class DaemonTls : public ::testing::Test {
       ASSERT_TRUE(frame.has_value()) << frame.error().text;
       ASSERT_NE(*frame, nullptr) << folder_.read("stderr");
       EXPECT_EQ((*frame)->header.host_frame_number, k);
-      EXPECT_EQ(protocol::crc32c(std::as_bytes((*frame)->pixels)),
-                (*frame)->header.payload_crc32c);
+      EXPECT_EQ(protocol::crc32c(std::as_bytes((*frame)->pixels)), (*frame)->header.payload_crc32c);
     }
   }
 
@@ -294,8 +293,9 @@ TEST(DaemonSecrets, FilesThatOthersMayReadAndHalfConfigurationsExit78) {
   expect_78(base + tls, "open to others (mode 0604)");
   ::chmod(folder.file("d.key").c_str(), 0640);
   ::chmod(folder.file("k").c_str(), 0644);
-  const std::string keyed = "[host]\nudp = \"127.0.0.1:0\"\nkey_file = \"k\"\n"
-                            "[source]\nkind = \"canned\"\n[control]\ntcp = \"127.0.0.1:0\"\n";
+  const std::string keyed =
+      "[host]\nudp = \"127.0.0.1:0\"\nkey_file = \"k\"\n"
+      "[source]\nkind = \"canned\"\n[control]\ntcp = \"127.0.0.1:0\"\n";
   expect_78(keyed, "host.key_file");
   ::chmod(folder.file("k").c_str(), 0600);
   folder.write("k", "secret");

@@ -42,7 +42,8 @@ TEST(Network, EveryPrefixLengthCutsAtItsBit) {
     network.prefix_bits = static_cast<std::uint8_t>(bits);
     const std::uint32_t mask = ~std::uint32_t{0} << (32 - bits);
     for (unsigned byte = 0; byte < 4; ++byte) {
-      network.first.bytes[byte] = static_cast<std::uint8_t>((0xAAAAAAAAU & mask) >> (24 - 8 * byte));
+      network.first.bytes[byte] =
+          static_cast<std::uint8_t>((0xAAAAAAAAU & mask) >> (24 - 8 * byte));
     }
     for (unsigned flipped = 0; flipped < 32; ++flipped) {
       IpAddress other = address;

@@ -36,7 +36,8 @@ class Peer {
   bool take(std::span<const std::byte> challenge) {
     mac_.set_key(shared_.open_key);
     const auto read = protocol::parse_session_datagram(challenge);
-    if (!mac_.verify(challenge) || !read || read->header.kind != SessionKind::challenge) return false;
+    if (!mac_.verify(challenge) || !read || read->header.kind != SessionKind::challenge)
+      return false;
     const auto content = protocol::parse_challenge(read->payload);
     known_ = content->session_known;
     key_ = protocol::session_key(shared_, session_id_, content->nonce, mac_);
@@ -57,7 +58,7 @@ class Peer {
     Bytes out(protocol::kSessionHeaderBytes + payload.size() + protocol::kSessionTagBytes);
     std::transform(payload.begin(), payload.end(), out.begin() + protocol::kSessionHeaderBytes,
                    [](char c) { return static_cast<std::byte>(c); });
-    mac_.seal({kind, shared_.id, session_id_, counter}, out, payload.size());
+    static_cast<void>(mac_.seal({kind, shared_.id, session_id_, counter}, out, payload.size()));
     return out;
   }
 

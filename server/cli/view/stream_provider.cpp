@@ -82,7 +82,8 @@ class StreamProvider final : public FrameProvider {
 }  // namespace
 
 physics::Result<std::unique_ptr<FrameProvider>> make_stream_provider(const ViewCommand& command) {
-  auto client = server::FrameClient::connect(command.source, server::kConnectTimeoutNs, command.security);
+  auto client =
+      server::FrameClient::connect(command.source, server::kConnectTimeoutNs, command.security);
   if (!client) return tl::unexpected(client.error());
   server::SubscribeOptions options;
   options.channel_kind = command.channel_kind;
