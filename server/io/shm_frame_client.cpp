@@ -191,7 +191,10 @@ physics::Result<bool> ShmFrameClient::take(std::uint64_t publication) {
   // The ring keeps pixels aligned.
   frame_.pixels = {reinterpret_cast<const float*>(pixels.data()), pixels.size() / sizeof(float)};
   frame_.missing_px = 0;
-  account_.counters.crc_errors += crc32c != header->payload_crc32c ? 1U : 0U;
+  if (crc32c != header->payload_crc32c) {
+    ++account_.counters.crc_errors;
+    frame_.header.flags |= protocol::kFlagCorrupt;
+  }
   ++account_.counters.received;
   account_.take(frame_.header);
   return true;
