@@ -67,7 +67,7 @@ TEST(FaultInjector, LosesTheShareAskedForInBurstsAskedFor) {
     std::uint32_t bursts = 0;
     std::uint32_t before = 0;
     for (const auto& bytes : out) {
-      bursts += number_of(bytes) > before + 1 ? 1 : 0;
+      bursts += number_of(bytes) > before + 1 ? 1U : 0U;
       before = number_of(bytes);
     }
     EXPECT_NEAR(lost / bursts, burst == 1.0 ? 1.0 / 0.95 : burst, 0.25);
