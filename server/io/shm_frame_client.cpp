@@ -207,7 +207,10 @@ physics::Result<ShmFrameClient::Taken> ShmFrameClient::take(std::uint64_t public
   // The ring keeps pixels aligned.
   frame_.pixels = {reinterpret_cast<const float*>(pixels.data()), pixels.size() / sizeof(float)};
   frame_.missing_px = 0;
-  account_.counters.crc_errors += crc32c != header->payload_crc32c ? 1U : 0U;
+  if (crc32c != header->payload_crc32c) {
+    ++account_.counters.crc_errors;
+    frame_.header.flags |= protocol::kFlagCorrupt;
+  }
   ++account_.counters.received;
   account_.take(frame_.header);
   return Taken::frame;

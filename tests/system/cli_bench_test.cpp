@@ -64,6 +64,35 @@ TEST(CliBench, ScalingComparesEachCaseWithTheOneBefore) {
   EXPECT_GE(instances[13] - instances[12], 90.0);
 }
 
+TEST(CliBench, LossyStreamsSayWhatCameAndNothingOfItIsWrong) {
+  const TemporaryFolder folder;
+  const ProcessResult run =
+      run_emit({"bench", "stream", "--loss", "0.01", "--frames", "300", "--width", "256",
+                "--height", "128", "--fec", "24+4", "--json", folder.file("s.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  const std::string json = read_text(folder.file("s.json"));
+  for (const char* transport : {"udp", "udp-fec", "udp-resend"}) {
+    EXPECT_NE(json.find("\"transport\": \"" + std::string(transport) + "\""), std::string::npos)
+        << transport;
+  }
+  const std::vector<double> whole = numbers_of(json, "whole_frac");
+  ASSERT_EQ(whole.size(), 3U);
+  EXPECT_LT(whole[0], 0.8);
+  EXPECT_GT(whole[1], 0.99);
+  EXPECT_GT(whole[2], 0.97);
+  const std::vector<double> repaired = numbers_of(json, "repaired");
+  ASSERT_EQ(repaired.size(), 3U);
+  EXPECT_EQ(repaired[0], 0.0);
+  EXPECT_GT(repaired[1], 0.0);
+  EXPECT_GT(numbers_of(json, "resent").back(), 0.0);
+  EXPECT_GT(numbers_of(json, "partial").front(), 60.0);
+  EXPECT_EQ(numbers_of(json, "unflagged"), (std::vector<double>{0, 0, 0}));
+  EXPECT_EQ(numbers_of(json, "wrong_px"), (std::vector<double>{0, 0, 0}));
+  EXPECT_EQ(json_value(json, "fec"), "\"off\"");
+  EXPECT_NE(json.find("\"fec\": \"24+4\""), std::string::npos);
+  EXPECT_EQ(run_emit({"bench", "stream", "--loss", "0.01", "--fec", "24+40"}).exit_code, 2);
+}
+
 TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   const TemporaryFolder folder;
   const ProcessResult run =

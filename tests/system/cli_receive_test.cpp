@@ -58,5 +58,29 @@ TEST(CliReceive, shared_memory_works_like_every_other_transport) {
   EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
 }
 
+TEST(CliReceive, TellsWhatHelpAgainstLossesWasGranted) {
+  const ScratchFolder folder;
+  DaemonProcess daemon(
+      folder,
+      {"--config", folder.write("emitd.toml", canned_config(320, 256, "mode = \"ig-clock\"\nrate_hz = 50",
+                                                            "[stream]\nfec_max_parity_frac = 0.25\n"))});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  const std::string url = "udp://" + daemon.control();
+  const ProcessResult granted =
+      run_emit({"receive", url, "--frames", "20", "--fec", "48+5", "--resend", "--json", "-"});
+  EXPECT_EQ(granted.exit_code, 0) << granted.err;
+  EXPECT_EQ(json_value(granted.out, "error_correction"), "\"48+5\"") << granted.out;
+  EXPECT_EQ(json_value(granted.out, "resend"), "false") << "ig-clock";
+  EXPECT_EQ(json_value(granted.out, "repaired"), "0");
+  EXPECT_NE(granted.err.find("resend is not granted"), std::string::npos) << granted.err;
+  const ProcessResult too_much = run_emit({"receive", url, "--frames", "1", "--fec", "8+4"});
+  EXPECT_EQ(too_much.exit_code, 1);
+  EXPECT_NE(too_much.err.find("stream.fec_max_parity_frac allows 0.25"), std::string::npos)
+      << too_much.err;
+  EXPECT_EQ(run_emit({"receive", url, "--fec", "lots"}).exit_code, 2);
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
+}
+
 }  // namespace
 }  // namespace emit::test

@@ -32,6 +32,29 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+TEST(CliFrameFiles, a_partial_frame_says_which_pixels_never_arrived) {
+  const TemporaryFolder folder;
+  const std::vector<float> pixels{1.0F, 2.0F, 0.0F, 4.0F};
+  const std::vector<float> valid{1.0F, 1.0F, 0.0F, 1.0F};
+  FramePlanes frame;
+  frame.width_px = frame.height_px = 2;
+  frame.radiance_w_m2_sr = pixels;
+  const auto whole_file = folder.path() / "whole.exr";
+  ASSERT_TRUE(write_frame_exr(whole_file, frame).has_value());
+  frame.valid = valid;
+  const auto partial_file = folder.path() / "partial.exr";
+  ASSERT_TRUE(write_frame_exr(partial_file, frame).has_value());
+  const auto whole = image::read_exr(whole_file);
+  const auto partial = image::read_exr(partial_file);
+  ASSERT_TRUE(whole.has_value() && partial.has_value());
+  EXPECT_EQ(whole->find(image::kValidChannel), nullptr);
+  EXPECT_FALSE(whole->attributes.contains("missingPx"));
+  const image::ExrChannel* channel = partial->find(image::kValidChannel);
+  ASSERT_NE(channel, nullptr);
+  EXPECT_EQ(channel->pixels, valid);
+  EXPECT_TRUE(partial->attributes.contains("missingPx"));
+}
+
 TEST(CliApparentTemperature, inverts_the_band_integral_to_a_millikelvin) {
   for (const auto& [lo_um, hi_um] : {std::pair{3.0, 5.0}, std::pair{8.0, 12.0}}) {
     const ApparentTemperature table(lo_um, hi_um);
