@@ -148,6 +148,7 @@ class DaemonImpl final : public Daemon {
   ScenarioTracks tracks_;
   Context context_;
   std::unique_ptr<Log> log_;
+  std::string privileges_;  ///< what was given up, for the log
   DistinctTable distinct_;
   DistinctTable errors_;
   StatusBoard board_;
@@ -225,14 +226,13 @@ physics::Result<void> DaemonImpl::setup() {
   if (auto opened = receiver_->open(); !opened) {
     return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
   }
-  std::string privileges;
   if (options_.drop_privileges) {
     // While this thread is the only one: each has privileges of its own.
     auto dropped = drop_privileges();
     if (!dropped) {
       return tl::unexpected<Error>(std::move(dropped.error()));
     }
-    privileges = std::move(*dropped);
+    privileges_ = std::move(*dropped);
   }
   if (options_.on_log) {
     log_ = make_log(options_.on_log);
@@ -242,9 +242,6 @@ physics::Result<void> DaemonImpl::setup() {
       return tl::unexpected<Error>(std::move(log.error()));
     }
     log_ = std::move(*log);
-  }
-  if (!privileges.empty()) {
-    log_->write(LogLevel::info, privileges);
   }
   if (!config_.stream.shm.empty()) {
     if (auto free = check_shm_name_free(config_.stream.shm); !free) {
@@ -320,6 +317,9 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                   software, kCommit, source.device, scenario_ ? scenario_->file.string() : "",
                   pacing_name(config_.pacing.mode), context_.channels.size(), source.width_px,
                   source.height_px));
+  if (!privileges_.empty()) {
+    log_->write(LogLevel::info, privileges_);
+  }
   if (shm_) {
     log_->write(LogLevel::info,
                 fmt::format("event=shm url=shm://{} slots={} mode={:04o}", config_.stream.shm,
