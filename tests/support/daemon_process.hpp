@@ -207,7 +207,6 @@ class DaemonProcess {
   [[nodiscard]] const std::string& metrics() const { return metrics_; }
   [[nodiscard]] pid_t pid() const { return pid_; }
   void signal(int number) const { ::kill(pid_, number); }
-  [[nodiscard]] pid_t pid() const { return pid_; }
   /// Exit code, 128 + signal, or -1 when it does not end within the limit.
   [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + limit;
