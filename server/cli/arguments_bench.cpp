@@ -93,7 +93,7 @@ void Tool::add_bench_commands() {
         ->capture_default_str();
     app.add_option("--loss", o.losses,
                    "Nothing but this: frames over UDP through a network that loses this share of "
-                   "the datagrams: without help, with error correction, with resend; repeatable")
+                   "the datagrams: without help, with resend, with error correction; repeatable")
         ->allow_extra_args(false)
         ->check(CLI::Range(0.0, 0.9))
         ->type_name("FRAC");

@@ -186,7 +186,7 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   return row;
 }
 
-/// Each share of losses without help, with error correction and with resend.
+/// Each share of losses without help, with resend and with error correction.
 Result<void> StreamBench::lossy() {
   for (const double loss : command_.losses) {
     for (const bool fec : {false, true}) {

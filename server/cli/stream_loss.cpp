@@ -120,6 +120,8 @@ physics::Result<LossyStream::Result> LossyStream::measure(const Options& options
                                                           const std::filesystem::path& directory) {
   config::DaemonConfig config = canned_daemon(options.width_px, options.height_px, "");
   config.stream.fec_max_parity_frac = protocol::kMaxFecParity;
+  // Longer than the frames under way here, so that what is asked for is still held.
+  config.stream.queue_frames = 8;
   auto daemon = DaemonProcess::start(config, {}, directory, std::chrono::seconds(60));
   if (!daemon) return tl::unexpected(daemon.error());
   auto host = server::HostClient::connect("udp://" + daemon->host_udp_address());

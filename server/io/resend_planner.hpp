@@ -18,8 +18,8 @@ class ResendPlanner {
   struct Params {
     std::int64_t settle_ns = 500'000;  ///< reordered fragments and parity may still come
     std::int64_t quiet_ns = 3'000'000;
-    std::int64_t answer_ns = 10'000'000;  ///< from a request to the next
-    std::uint32_t requests = 3;           ///< per frame at most
+    std::int64_t answer_ns = 20'000'000;  ///< from a request to the next
+    std::uint32_t requests = 4;           ///< per frame at most
   };
   static constexpr std::size_t kMaxFrames = 8;
 

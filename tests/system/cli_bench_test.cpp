@@ -78,13 +78,13 @@ TEST(CliBench, LossyStreamsSayWhatCameAndNothingOfItIsWrong) {
   const std::vector<double> whole = numbers_of(json, "whole_frac");
   ASSERT_EQ(whole.size(), 3U);
   EXPECT_LT(whole[0], 0.8);
-  EXPECT_GT(whole[1], 0.99);
-  EXPECT_GT(whole[2], 0.97);
+  EXPECT_GT(whole[1], 0.97);
+  EXPECT_GT(whole[2], 0.99);
   const std::vector<double> repaired = numbers_of(json, "repaired");
   ASSERT_EQ(repaired.size(), 3U);
   EXPECT_EQ(repaired[0], 0.0);
-  EXPECT_GT(repaired[1], 0.0);
-  EXPECT_GT(numbers_of(json, "resent").back(), 0.0);
+  EXPECT_GT(repaired[2], 0.0);
+  EXPECT_GT(numbers_of(json, "resent")[1], 0.0);
   EXPECT_GT(numbers_of(json, "partial").front(), 60.0);
   EXPECT_EQ(numbers_of(json, "unflagged"), (std::vector<double>{0, 0, 0}));
   EXPECT_EQ(numbers_of(json, "wrong_px"), (std::vector<double>{0, 0, 0}));
