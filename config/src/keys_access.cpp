@@ -64,10 +64,10 @@ const KeyTable<AccessConfig>& access_keys() {
       integer<AccessConfig>("max_connections_per_peer", "", 1, 1024,
                             EMIT_FIELD(max_connections_per_peer),
                             "Connections at a time from one address of another host."),
-      integer<AccessConfig>("max_host_frames_hz", "1/s", 1, 10'000'000,
-                            EMIT_FIELD(max_host_frames_hz),
-                            "Host frames a second from one address; more are refused "
-                            "(`CODE_OVERLOADED`). A quarter of a second's worth may come at once."),
+      integer<AccessConfig>(
+          "max_host_frames_hz", "1/s", 1, 10'000'000, EMIT_FIELD(max_host_frames_hz),
+          "Host frames a second from one address (on this host: from one socket); more are refused "
+          "(`CODE_OVERLOADED`). A quarter of a second's worth may come at once."),
       integer<AccessConfig>("max_control_records_hz", "1/s", 1, 10'000'000,
                             EMIT_FIELD(max_control_records_hz),
                             "The same for hello, subscribe and commands."),

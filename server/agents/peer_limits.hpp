@@ -10,8 +10,9 @@
 
 namespace emit::server {
 
-/// What one address may send in a second, over all its connections and datagrams. Remembers the
-/// kPeers addresses heard last. Thread: one owner. Real time: RT-safe.
+/// What one peer may send in a second: an address, over all its connections and datagrams; on this
+/// host, where all programs share an address, one connection or socket. Remembers the kPeers heard
+/// last. Thread: one owner. Real time: RT-safe.
 class PeerLimits {
  public:
   static constexpr std::size_t kPeers = 64;
@@ -19,34 +20,39 @@ class PeerLimits {
   explicit PeerLimits(const config::AccessConfig& access) noexcept : access_(access) {}
 
   /// `now_ns`: monotonic.
-  [[nodiscard]] bool take_host_frame(const config::IpAddress& peer, std::int64_t now_ns) noexcept {
-    return find(peer, now_ns).host_frames.take(now_ns);
+  [[nodiscard]] bool take_host_frame(const config::IpAddress& peer, std::uint16_t port,
+                                     std::int64_t now_ns) noexcept {
+    return find(peer, port, now_ns).host_frames.take(now_ns);
   }
-  [[nodiscard]] bool take_control_record(const config::IpAddress& peer,
+  [[nodiscard]] bool take_control_record(const config::IpAddress& peer, std::uint16_t port,
                                          std::int64_t now_ns) noexcept {
-    return find(peer, now_ns).control_records.take(now_ns);
+    return find(peer, port, now_ns).control_records.take(now_ns);
   }
 
  private:
   struct Entry {
     config::IpAddress peer;
+    std::uint16_t port = 0;  ///< on this host, else 0
     std::int64_t heard_ns = INT64_MIN;
     TokenBucket host_frames;
     TokenBucket control_records;
   };
 
-  Entry& find(const config::IpAddress& peer, std::int64_t now_ns) noexcept {
+  Entry& find(const config::IpAddress& peer, std::uint16_t source_port,
+              std::int64_t now_ns) noexcept {
+    const std::uint16_t port = peer.is_loopback() ? source_port : std::uint16_t{0};
+    const auto is_peer = [&](const Entry& entry) {
+      return entry.heard_ns != INT64_MIN && entry.peer == peer && entry.port == port;
+    };
     Entry* found = &entries_[last_];
-    if (found->heard_ns == INT64_MIN || found->peer != peer) {
-      found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) {
-        return entry.heard_ns != INT64_MIN && entry.peer == peer;
-      });
+    if (!is_peer(*found)) {
+      found = std::find_if(entries_.begin(), entries_.end(), is_peer);
     }
     if (found == entries_.end()) {
       found =
           std::min_element(entries_.begin(), entries_.end(),
                            [](const Entry& a, const Entry& b) { return a.heard_ns < b.heard_ns; });
-      *found = {peer, now_ns, TokenBucket(access_.max_host_frames_hz),
+      *found = {peer, port, now_ns, TokenBucket(access_.max_host_frames_hz),
                 TokenBucket(access_.max_control_records_hz)};
     }
     found->heard_ns = now_ns;

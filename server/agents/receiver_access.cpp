@@ -214,10 +214,8 @@ std::optional<std::span<const std::byte>> Receiver::authenticate(
       origin.generation = taken.generation;
       return taken.payload;
     case Verdict::open: {
-      SocketAddress target;
-      target.length = origin.address_bytes;
-      std::memcpy(&target.storage, origin.address.data(), origin.address_bytes);
-      if (!limits_.take_control_record(peer, context_.clock.monotonic_ns())) {
+      const SocketAddress target = address_of(origin);
+      if (!limits_.take_control_record(peer, target.port(), context_.clock.monotonic_ns())) {
         context_.counters.add(Counter::control_over_rate);
       } else if (udp_.send_to(sessions_->challenge(taken.header), target).status !=
                  IoStatus::done) {

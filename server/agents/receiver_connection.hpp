@@ -3,6 +3,8 @@
 #include <sys/socket.h>
 #include <sys/uio.h>
 
+#include <cstring>
+
 #include "agents/receiver.hpp"
 #include "io/tls_session.hpp"
 
@@ -52,6 +54,14 @@ struct Receiver::UdpMemory {
   std::array<iovec, kBatch> iov{};
   std::array<mmsghdr, kBatch> messages{};
 };
+
+/// Where a datagram came from.
+[[nodiscard]] inline SocketAddress address_of(const Origin& origin) noexcept {
+  SocketAddress out;
+  out.length = origin.address_bytes;
+  std::memcpy(&out.storage, origin.address.data(), origin.address_bytes);
+  return out;
+}
 
 /// Text of a Status for people. `detail` as in StatusReply.
 [[nodiscard]] std::string status_text(StatusCode code, std::uint64_t detail);

@@ -85,7 +85,8 @@ void Receiver::take_host_frame(Connection& connection, std::span<const std::byte
   if (draining_.load(std::memory_order_acquire)) {
     return;
   }
-  if (!limits_.take_host_frame(connection.ip, context_.clock.monotonic_ns())) {
+  if (!limits_.take_host_frame(connection.ip, connection.peer.port(),
+                               context_.clock.monotonic_ns())) {
     context_.counters.add(Counter::host_frames_over_rate);
     refuse(connection, StatusCode::overloaded,
            "more host frames a second than access.max_host_frames_hz");
@@ -110,7 +111,8 @@ void Receiver::take_host_frame(Connection& connection, std::span<const std::byte
 }
 
 void Receiver::take_control(Connection& connection, std::span<const std::byte> body) {
-  if (!limits_.take_control_record(connection.ip, context_.clock.monotonic_ns())) {
+  if (!limits_.take_control_record(connection.ip, connection.peer.port(),
+                                   context_.clock.monotonic_ns())) {
     context_.counters.add(Counter::control_over_rate);
     refuse(connection, StatusCode::overloaded,
            "more control records a second than access.max_control_records_hz");

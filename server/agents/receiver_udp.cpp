@@ -102,7 +102,7 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
     }
     datagram = *frame;
   }
-  if (!limits_.take_host_frame(peer, context_.clock.monotonic_ns())) {
+  if (!limits_.take_host_frame(peer, address_of(origin).port(), context_.clock.monotonic_ns())) {
     context_.counters.add(Counter::host_frames_over_rate);
     const std::uint64_t count = context_.counters.add(Counter::refused_overloaded);
     send_udp_status(origin, StatusCode::overloaded, 0, count,
@@ -157,9 +157,7 @@ void Receiver::send_udp_status(const Origin& origin, StatusCode code,
     context_.counters.add(Counter::statuses_suppressed);
     return;
   }
-  SocketAddress target;
-  target.length = origin.address_bytes;
-  std::memcpy(&target.storage, origin.address.data(), origin.address_bytes);
+  const SocketAddress target = address_of(origin);
   if (udp_.send_to(bytes, target).status != IoStatus::done) {
     context_.counters.add(Counter::statuses_suppressed);
   }

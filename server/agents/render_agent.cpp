@@ -88,7 +88,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       starved_ = false;
       job_prepared_ = false;
       in_flight_[(first_ + count_) % kDepth] = {static_cast<renderer::SlotIndex>(slot), now_ns,
-                                                  expected_ms, context_.clock.monotonic_ns()};
+                                                expected_ms, context_.clock.monotonic_ns()};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;

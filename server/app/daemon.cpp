@@ -23,8 +23,8 @@
 #include "app/replay.hpp"
 #include "app/service_health.hpp"
 #include "emit/version.hpp"
-#include "io/trigger_port.hpp"
 #include "io/ip_address.hpp"
+#include "io/trigger_port.hpp"
 #include "telemetry/log.hpp"
 #include "telemetry/metrics_server.hpp"
 #include "telemetry/metrics_text.hpp"
@@ -211,13 +211,6 @@ physics::Result<void> DaemonImpl::setup() {
                                config_.file.string() + ": a renderer needs a scenario");
   }
   health_.starting();
-  if (!options_.stepped) {
-    // Before anything is made: what follows comes from memory that stays.
-    realtime_ = ask_for_realtime(config_.realtime);
-    if (auto checked = check_realtime(); !checked) {
-      return checked;
-    }
-  }
   if (auto opened = open_clocks(); !opened) {
     return opened;
   }
@@ -242,6 +235,14 @@ physics::Result<void> DaemonImpl::setup() {
       return tl::unexpected<Error>(std::move(log.error()));
     }
     log_ = std::move(*log);
+  }
+  if (!options_.stepped) {
+    // With the privileges that stay, and before anything large is made: it comes from memory that
+    // is locked.
+    realtime_ = ask_for_realtime(config_.realtime);
+    if (auto checked = check_realtime(); !checked) {
+      return checked;
+    }
   }
   if (!config_.stream.shm.empty()) {
     if (auto free = check_shm_name_free(config_.stream.shm); !free) {

@@ -215,14 +215,25 @@ TEST(PeerLimits, EachAddressHasItsOwn) {
   PeerLimits limits(access);
   const config::IpAddress a = *config::parse_ip("192.0.2.1");
   const config::IpAddress b = *config::parse_ip("192.0.2.2");
-  EXPECT_TRUE(limits.take_host_frame(a, 1));
-  EXPECT_FALSE(limits.take_host_frame(a, 2));
-  EXPECT_TRUE(limits.take_host_frame(b, 3));
-  EXPECT_TRUE(limits.take_control_record(a, 4));
-  EXPECT_TRUE(limits.take_control_record(a, 5));
-  EXPECT_FALSE(limits.take_control_record(a, 6));
-  EXPECT_FALSE(limits.take_host_frame(b, 7));
-  EXPECT_TRUE(limits.take_host_frame(a, 250'000'001));
+  EXPECT_TRUE(limits.take_host_frame(a, 4000, 1));
+  EXPECT_FALSE(limits.take_host_frame(a, 4000, 2));
+  EXPECT_TRUE(limits.take_host_frame(b, 4000, 3));
+  EXPECT_TRUE(limits.take_control_record(a, 4000, 4));
+  EXPECT_TRUE(limits.take_control_record(a, 4000, 5));
+  EXPECT_FALSE(limits.take_control_record(a, 4000, 6));
+  EXPECT_FALSE(limits.take_host_frame(b, 4000, 7));
+  EXPECT_TRUE(limits.take_host_frame(a, 4000, 250'000'001));
+  EXPECT_FALSE(limits.take_host_frame(a, 4001, 250'000'002));  // another port changes nothing
+}
+
+TEST(PeerLimits, OnThisHostEachSocketHasItsOwn) {
+  config::AccessConfig access;
+  access.max_host_frames_hz = 4;
+  PeerLimits limits(access);
+  const config::IpAddress here = *config::parse_ip("127.0.0.1");
+  EXPECT_TRUE(limits.take_host_frame(here, 4000, 1));
+  EXPECT_FALSE(limits.take_host_frame(here, 4000, 2));
+  EXPECT_TRUE(limits.take_host_frame(here, 4001, 3));
 }
 
 }  // namespace
