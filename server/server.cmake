@@ -55,6 +55,7 @@ add_library(emit_server STATIC
   agents/shm_client.cpp
   agents/socket_client.cpp
   app/daemon.cpp
+  app/daemon_telemetry.cpp
   app/emitd_main.cpp
   app/privileges.cpp
   app/replay.cpp

@@ -6,30 +6,12 @@
 #include <sys/eventfd.h>
 
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <ctime>
 
-#include "agents/conductor.hpp"
-#include "agents/receiver.hpp"
-#include "agents/recorder.hpp"
-#include "agents/render_agent.hpp"
-#include "agents/runner.hpp"
-#include "agents/sender.hpp"
-#include "agents/shm_client.hpp"
-#include "app/clock_watch.hpp"
-#include "app/context.hpp"
+#include "app/daemon_impl.hpp"
 #include "app/privileges.hpp"
 #include "app/replay.hpp"
-#include "app/service_health.hpp"
 #include "emit/version.hpp"
-#include "io/ip_address.hpp"
-#include "io/trigger_port.hpp"
-#include "telemetry/log.hpp"
-#include "telemetry/metrics_server.hpp"
-#include "telemetry/metrics_text.hpp"
-#include "telemetry/ptp_monitor.hpp"
-#include "telemetry/status_board.hpp"
 
 namespace emit::server {
 namespace {
@@ -67,117 +49,18 @@ std::string_view pacing_name(config::PacingMode mode) {
   return "host-step";
 }
 
-class DaemonImpl final : public Daemon {
- public:
-  DaemonImpl(const config::DaemonConfig& config, std::optional<scene::ScenarioDesc> scenario,
-             DaemonOptions options)
-      : config_(config),
-        scenario_(std::move(scenario)),
-        options_(std::move(options)),
-        clock_(options_.clock != nullptr ? *options_.clock : system_clock_),
-        tracks_(scenario_),
-        context_(clock_, journal_bytes(config_.journal),
-                 std::max<std::size_t>(config_.control.max_clients, 1)),
-        stop_event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+}  // namespace
 
-  ~DaemonImpl() override {
-    metrics_.reset();
-    if (options_.stepped && conductor_runner_) {
-      drain_stepped();
-    }
-    stop_agents();
-    housekeep();
-  }
-
-  [[nodiscard]] physics::Result<void> setup();
-
-  int run() override;
-  void request_stop() noexcept override {
-    stop_.store(true, std::memory_order_release);
-    const std::uint64_t one = 1;
-    [[maybe_unused]] const auto written = ::write(stop_event_.get(), &one, sizeof(one));
-  }
-  int step() override;
-
-  std::uint16_t control_port() const noexcept override {
-    return receiver_->control_address().port();
-  }
-  std::uint16_t host_udp_port() const noexcept override {
-    const SocketAddress address = receiver_->host_address();
-    return address.length != 0 ? address.port() : std::uint16_t{0};
-  }
-  std::uint64_t counter(Counter id) const noexcept override { return context_.counters.get(id); }
-  std::string ready_line() const override {
-    const SocketAddress host = receiver_->host_address();
-    return fmt::format("ready control={} host_udp={}{}{}", to_string(receiver_->control_address()),
-                       host.length != 0 ? to_string(host) : std::string("off"),
-                       triggers_ ? " trigger=" + to_string(triggers_->address()) : std::string(),
-                       metrics_ ? " metrics=" + to_string(metrics_->address()) : std::string());
-  }
-  std::uint16_t metrics_port() const noexcept override {
-    return metrics_ ? metrics_->address().port() : std::uint16_t{0};
-  }
-  std::uint16_t trigger_port() const noexcept override {
-    return triggers_ ? triggers_->address().port() : std::uint16_t{0};
-  }
-
- private:
-  [[nodiscard]] FrameSourceFactory source_factory();
-  [[nodiscard]] physics::Result<void> make_agents(const SourceInfo& source);
-  template <class Predicate>
-  bool wait_until(Predicate done, std::int64_t limit_ns);
-  void drain_stepped();
-  void stop_agents();
-  [[nodiscard]] int end_without_device();
-  [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
-  [[nodiscard]] MetricsMoment moment() const;
-  void housekeep();
-  void watch_ptp();
-  void log_summary();
-  [[nodiscard]] physics::Result<void> open_clocks();
-  [[nodiscard]] physics::Result<void> check_realtime();
-  void plan_realtime(AgentRunner& runner) const {
-    runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
-  }
-
-  config::DaemonConfig config_;
-  std::optional<scene::ScenarioDesc> scenario_;
-  DaemonOptions options_;
-  SystemClock system_clock_;
-  const Clock& clock_;
-  ScenarioTracks tracks_;
-  Context context_;
-  std::unique_ptr<Log> log_;
-  std::string privileges_;  ///< what was given up, for the log
-  DistinctTable distinct_;
-  DistinctTable errors_;
-  StatusBoard board_;
-  Fd stop_event_;
-  std::atomic<bool> stop_{false};
-  std::atomic<bool> serving_{false};
-  std::int64_t started_ns_ = 0;
-  std::atomic<std::int64_t> housekept_ns_{0};  ///< monotonic
-  ClockWatch clock_watch_{clock_};
-
-  ServiceNotifier nobody_;
-  ServiceHealth health_{options_.notifier != nullptr ? *options_.notifier : nobody_};
-  RealtimeReport realtime_;
-  std::unique_ptr<PtpMonitor> ptp_;
-  std::unique_ptr<TriggerPort> triggers_;
-  std::unique_ptr<Receiver> receiver_;
-  std::unique_ptr<RenderAgent> render_;
-  std::unique_ptr<Recorder> recorder_;
-  std::unique_ptr<ShmClient> shm_;
-  std::unique_ptr<Sender> sender_;
-  std::unique_ptr<Conductor> conductor_;
-  std::unique_ptr<AgentRunner> receiver_runner_;
-  std::unique_ptr<AgentRunner> render_runner_;
-  std::unique_ptr<AgentRunner> recorder_runner_;
-  std::unique_ptr<AgentRunner> sender_runner_;
-  std::unique_ptr<AgentRunner> conductor_runner_;
-  MetricsSources sources_;
-  std::unique_ptr<MetricsServer> metrics_;  ///< reads all of the above
-};
+DaemonImpl::DaemonImpl(const config::DaemonConfig& config,
+                       std::optional<scene::ScenarioDesc> scenario, DaemonOptions options)
+    : config_(config),
+      scenario_(std::move(scenario)),
+      options_(std::move(options)),
+      clock_(options_.clock != nullptr ? *options_.clock : system_clock_),
+      tracks_(scenario_),
+      context_(clock_, journal_bytes(config_.journal),
+               std::max<std::size_t>(config_.control.max_clients, 1)),
+      stop_event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
 FrameSourceFactory DaemonImpl::source_factory() {
   if (options_.source_factory) {
@@ -355,73 +238,6 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                        {"pacing", std::string(pacing_name(config_.pacing.mode))}});
 }
 
-physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
-  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
-                              sender_runner_.get(), recorder_runner_.get()}) {
-    sources_.agents.emplace_back(runner->agent().name(), &runner->duty_cycle());
-  }
-  if (config_.metrics.listen.empty()) {
-    return {};
-  }
-  const auto named = [this](const Error& error) {
-    return tl::unexpected<Error>(
-        Error(error).with_context("metrics.listen").with_context(config_.file.string()));
-  };
-  const auto where = parse_host_port(config_.metrics.listen);
-  if (!where) {
-    return named(where.error());
-  }
-  const auto address = resolve(*where, Transport::tcp, true);
-  if (!address) {
-    return named(address.error());
-  }
-  if (!ip_of(*address).is_loopback() && !config::is_protected(config_, config::Port::metrics)) {
-    return named({ErrorCode::config,
-                  fmt::format("{}: other hosts may reach it: that needs {}", to_string(*address),
-                              config::protections_of(config::Port::metrics))});
-  }
-  sources_.counters = &context_.counters;
-  sources_.times = &context_.times;
-  sources_.prediction = &context_.prediction;
-  sources_.realtime = &realtime_;
-  sources_.clients = context_.clients();
-  sources_.board = &board_;
-  sources_.build = std::move(build);
-  MetricsServer::Answers answers;
-  answers.metrics = [this] { return metrics_text(sources_, moment()); };
-  answers.trace = [this] { return chrome_trace(context_.trace.entries()); };
-  answers.ready = [this] { return serving_.load(std::memory_order_acquire); };
-  answers.admits = [this](const SocketAddress& peer) {
-    const config::IpAddress ip = ip_of(peer);
-    if (receiver_->may_connect(ip)) {
-      return true;
-    }
-    context_.counters.add(Counter::peers_refused);
-    context_.metrics_events.push(EventKind::peer_refused,
-                                 static_cast<std::uint64_t>(PeerRefusal::not_allowed), 0,
-                                 config::to_string(ip));
-    return false;
-  };
-  answers.healthy = [this] {
-    constexpr std::int64_t kStuckNs = 5'000'000'000;
-    const std::int64_t now_ns = clock_.monotonic_ns();
-    return now_ns - housekept_ns_.load(std::memory_order_acquire) < kStuckNs &&
-           ServiceHealth::stuck_agent(sources_.agents, now_ns, ServiceHealth::kStuckNs).empty();
-  };
-  auto opened = MetricsServer::start(*address, std::move(answers));
-  if (!opened) {
-    return named(opened.error());
-  }
-  metrics_ = std::move(*opened);
-  return {};
-}
-
-MetricsMoment DaemonImpl::moment() const {
-  const std::int64_t now_ns = clock_.monotonic_ns();
-  return {context_.run_id.load(std::memory_order_relaxed), serving_.load(std::memory_order_acquire),
-          now_ns - started_ns_, now_ns, ptp_ ? std::optional(ptp_->status()) : std::nullopt};
-}
-
 physics::Result<void> DaemonImpl::open_clocks() {
   const auto named = [this](const Error& error, const char* key) {
     return tl::unexpected<Error>(
@@ -461,25 +277,6 @@ physics::Result<void> DaemonImpl::check_realtime() {
                           "schedules other programs\"",
                           refused));
   return {};
-}
-
-void DaemonImpl::watch_ptp() {
-  switch (ptp_->turn(clock_.monotonic_ns())) {
-    case PtpMonitor::Change::none:
-      return;
-    case PtpMonitor::Change::went_down:
-      log_->write(LogLevel::warn,
-                  "event=ptp_silent effect=\"nobody says whether the clock follows its master\" "
-                  "remedy=\"ptp4l, clock.ptp_socket and who may write to it\"");
-      return;
-    case PtpMonitor::Change::went_up:
-    case PtpMonitor::Change::state:
-      break;
-  }
-  const PtpStatus status = ptp_->status();
-  log_->write(LogLevel::info,
-              fmt::format("event=ptp state={} grandmaster={} offset_ns={}", to_string(status.state),
-                          status.grandmaster, status.offset_ns));
 }
 
 int DaemonImpl::run() {
@@ -602,62 +399,6 @@ void DaemonImpl::stop_agents() {
     }
   }
 }
-
-void DaemonImpl::housekeep() {
-  if (const std::int64_t step_ns = clock_watch_.look(); step_ns != 0 && log_) {
-    context_.counters.add(Counter::clock_steps);
-    log_->write(LogLevel::warn,
-                fmt::format("event=clock_step by_ms={:.3f}", static_cast<double>(step_ns) * 1e-6));
-  }
-  bool warned = false;
-  for (EventLog* events :
-       {&context_.conductor_events, &context_.receiver_events, &context_.render_events,
-        &context_.sender_events, &context_.recorder_events, &context_.metrics_events}) {
-    while (const Event* event = events->ring().front()) {
-      const EventText line = describe(*event);
-      board_.note(*event);
-      events->ring().pop();
-      warned = warned || line.distinct;
-      if (!log_) {
-        continue;
-      }
-      // Errors have a table of their own, which peers cannot fill.
-      DistinctTable& table = line.level == LogLevel::error ? errors_ : distinct_;
-      const std::string text = line.distinct ? table.note(line.text, clock_.tai_ns()) : line.text;
-      if (!text.empty()) {
-        log_->write(line.level, text);
-      }
-    }
-  }
-  if (warned) {
-    board_.set_warnings(LogLevel::warn, distinct_);
-    board_.set_warnings(LogLevel::error, errors_);
-  }
-  housekept_ns_.store(clock_.monotonic_ns(), std::memory_order_release);
-}
-
-void DaemonImpl::log_summary() {
-  std::string counters = "event=counters";
-  for (std::size_t i = 0; i < kCounterCount; ++i) {
-    const std::uint64_t value = context_.counters.get(static_cast<Counter>(i));
-    if (value != 0) {
-      counters += fmt::format(" {}={}", kCounterLabels[i].name, value);
-    }
-  }
-  log_->write(LogLevel::info, counters);
-  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
-                              sender_runner_.get(), recorder_runner_.get()}) {
-    const DutyCycle& duty = runner->duty_cycle();
-    log_->write(LogLevel::info,
-                fmt::format("event=duty_cycle agent={} turns={} busy_ms={:.1f} max_turn_us={} "
-                            "turns_over_1ms={}",
-                            runner->agent().name(), duty.cycles(),
-                            static_cast<double>(duty.busy_ns()) * 1e-6, duty.max_ns() / 1000,
-                            duty.over_threshold()));
-  }
-}
-
-}  // namespace
 
 physics::Result<std::unique_ptr<Daemon>> Daemon::create(const config::DaemonConfig& config,
                                                         std::optional<scene::ScenarioDesc> scenario,

@@ -40,6 +40,9 @@ void Tool::add_timing_commands() {
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--seed", o.seed, "Of the distances between poses")->capture_default_str();
+    add_path(app, "--key-file", o.security.key_file,
+             "Poses by udp: pre-shared key, as in the daemon's host.key_file");
+    add_security(app, o.security);
     add_json(app, o.json);
   }
   {

@@ -230,14 +230,17 @@ int run_latency(const LatencyCommand& command) {
   const auto to_url = server::parse_url(to);
   if (!to_url) return fail(kExitUsage, to_url.error().text);
 
-  auto connected = server::FrameClient::connect(command.url);
+  server::Security security = command.security;
+  if (url->scheme != server::Url::Scheme::shm) security.control = url_text("tcp", *url);
+  auto connected =
+      server::FrameClient::connect(command.url, server::kConnectTimeoutNs, command.security);
   if (!connected) return fail(connected.error());
   server::FrameClient& client = **connected;
   if (const auto channel = client.subscribe({}); !channel) return fail(channel.error());
   if (client.server().tai_offset_unset) {
     warn("the daemon's kernel has no TAI offset: across machines instants may differ by it");
   }
-  auto host = server::HostClient::connect(to);
+  auto host = server::HostClient::connect(to, server::kConnectTimeoutNs, security);
   if (!host) return fail(host.error());
 
   const InterruptGuard interrupt;

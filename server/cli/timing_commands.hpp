@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "io/security.hpp"
+
 /// Subcommands that measure and drive a daemon's timing; as in commands.hpp.
 namespace emit::cli {
 
@@ -18,6 +20,7 @@ struct LatencyCommand {
   double time_s = 0.0;
   double timeout_s = 10.0;
   std::uint32_t seed = 1;
+  server::Security security;
   std::optional<std::filesystem::path> json;
 };
 int run_latency(const LatencyCommand& command);

@@ -2,41 +2,18 @@
 #include "io/trigger_port.hpp"
 
 #include <fmt/format.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <cstring>
 #include <ctime>
+
+#include "io/ip_address.hpp"
 
 namespace emit::server {
 namespace {
 
 using physics::ErrorCode;
 using physics::make_error;
-
-/// The address without port, IPv4 ones as IPv6 has them, so that both families compare.
-std::array<std::uint8_t, 16> bytes_of(const sockaddr_storage& address) noexcept {
-  std::array<std::uint8_t, 16> out{};
-  if (address.ss_family == AF_INET) {
-    sockaddr_in v4{};
-    std::memcpy(&v4, &address, sizeof v4);
-    out[10] = 0xFF;
-    out[11] = 0xFF;
-    std::memcpy(&out[12], &v4.sin_addr, 4);
-  } else if (address.ss_family == AF_INET6) {
-    sockaddr_in6 v6{};
-    std::memcpy(&v6, &address, sizeof v6);
-    std::memcpy(out.data(), &v6.sin6_addr, 16);
-  }
-  return out;
-}
-
-bool is_loopback(const sockaddr_storage& address) noexcept {
-  const auto bytes = bytes_of(address);
-  const std::array<std::uint8_t, 16> v6_loopback{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1};
-  const bool v4 = bytes[10] == 0xFF && bytes[11] == 0xFF;
-  return v4 ? bytes[12] == 127 : bytes == v6_loopback;
-}
 
 /// Datagrams looked at per call, so that a flood of bad ones cannot hold the caller up.
 constexpr int kMaxPerCall = 32;
@@ -54,13 +31,13 @@ physics::Result<std::unique_ptr<TriggerPort>> TriggerPort::open(const std::strin
   if (!where) return named(where.error(), "trigger.udp");
   const auto address = resolve(*where, Transport::udp, true);
   if (!address) return named(address.error(), "trigger.udp");
-  SocketAddress from;
+  std::optional<config::IpAddress> from;
   if (!peer.empty()) {
-    from = numeric_address(peer, 0);
-    if (from.length == 0) {
+    from = config::parse_ip(peer);
+    if (!from) {
       return make_error(ErrorCode::config, fmt::format("trigger.peer: '{}' is no address", peer));
     }
-  } else if (!is_loopback(address->storage)) {
+  } else if (!ip_of(*address).is_loopback()) {
     return make_error(ErrorCode::config,
                       fmt::format("trigger.udp: {} is reachable from outside: say with "
                                   "trigger.peer whose triggers are taken",
@@ -109,7 +86,7 @@ std::optional<ReceivedTrigger> TriggerPort::next() noexcept {
       }
     }
     counters_.add(Counter::triggers);
-    const bool wrong_sender = peer_.length != 0 && bytes_of(from) != bytes_of(peer_.storage);
+    const bool wrong_sender = peer_ && ip_of(from) != *peer_;
     const std::span<const std::byte> datagram(bytes.data(), static_cast<std::size_t>(size));
     if (wrong_sender ||
         protocol::decode_trigger(datagram, out.trigger) != protocol::TriggerFault::none) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "emit/config/network.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/protocol/trigger.hpp"
 #include "io/socket.hpp"
@@ -50,11 +51,12 @@ class TriggerPort final : public TriggerInput {
   [[nodiscard]] SocketAddress address() const noexcept { return socket_.local_address(); }
 
  private:
-  TriggerPort(UdpSocket socket, const SocketAddress& peer, const Clock& clock, Counters& counters)
+  TriggerPort(UdpSocket socket, const std::optional<config::IpAddress>& peer, const Clock& clock,
+              Counters& counters)
       : socket_(std::move(socket)), peer_(peer), clock_(clock), counters_(counters) {}
 
   UdpSocket socket_;
-  SocketAddress peer_;  // length 0: any
+  std::optional<config::IpAddress> peer_;  // none: any
   const Clock& clock_;
   Counters& counters_;
   std::uint32_t os_drops_seen_ = 0;

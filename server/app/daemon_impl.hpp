@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "agents/conductor.hpp"
+#include "agents/receiver.hpp"
+#include "agents/recorder.hpp"
+#include "agents/render_agent.hpp"
+#include "agents/runner.hpp"
+#include "agents/sender.hpp"
+#include "agents/shm_client.hpp"
+#include "app/clock_watch.hpp"
+#include "app/context.hpp"
+#include "app/daemon.hpp"
+#include "app/service_health.hpp"
+#include "io/trigger_port.hpp"
+#include "telemetry/log.hpp"
+#include "telemetry/metrics_server.hpp"
+#include "telemetry/metrics_text.hpp"
+#include "telemetry/ptp_monitor.hpp"
+#include "telemetry/status_board.hpp"
+
+namespace emit::server {
+
+/// The daemon: makes the agents, turns or watches them, leads the shutdown (daemon.cpp), and tells
+/// about itself (daemon_telemetry.cpp).
+class DaemonImpl final : public Daemon {
+ public:
+  DaemonImpl(const config::DaemonConfig& config, std::optional<scene::ScenarioDesc> scenario,
+             DaemonOptions options);
+  ~DaemonImpl() override {
+    metrics_.reset();
+    if (options_.stepped && conductor_runner_) {
+      drain_stepped();
+    }
+    stop_agents();
+    housekeep();
+  }
+
+  [[nodiscard]] physics::Result<void> setup();
+
+  int run() override;
+  void request_stop() noexcept override {
+    stop_.store(true, std::memory_order_release);
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = ::write(stop_event_.get(), &one, sizeof(one));
+  }
+  int step() override;
+
+  std::uint16_t control_port() const noexcept override {
+    return receiver_->control_address().port();
+  }
+  std::uint16_t host_udp_port() const noexcept override {
+    const SocketAddress address = receiver_->host_address();
+    return address.length != 0 ? address.port() : std::uint16_t{0};
+  }
+  std::uint64_t counter(Counter id) const noexcept override { return context_.counters.get(id); }
+  std::string ready_line() const override;
+  std::uint16_t metrics_port() const noexcept override {
+    return metrics_ ? metrics_->address().port() : std::uint16_t{0};
+  }
+  std::uint16_t trigger_port() const noexcept override {
+    return triggers_ ? triggers_->address().port() : std::uint16_t{0};
+  }
+
+ private:
+  [[nodiscard]] FrameSourceFactory source_factory();
+  [[nodiscard]] physics::Result<void> make_agents(const SourceInfo& source);
+  template <class Predicate>
+  bool wait_until(Predicate done, std::int64_t limit_ns);
+  void drain_stepped();
+  void stop_agents();
+  [[nodiscard]] int end_without_device();
+  [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
+  [[nodiscard]] MetricsMoment moment() const;
+  void housekeep();
+  void watch_ptp();
+  void log_summary();
+  [[nodiscard]] physics::Result<void> open_clocks();
+  [[nodiscard]] physics::Result<void> check_realtime();
+  void plan_realtime(AgentRunner& runner) const {
+    runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
+  }
+
+  config::DaemonConfig config_;
+  std::optional<scene::ScenarioDesc> scenario_;
+  DaemonOptions options_;
+  SystemClock system_clock_;
+  const Clock& clock_;
+  ScenarioTracks tracks_;
+  Context context_;
+  std::unique_ptr<Log> log_;
+  std::string privileges_;  ///< what was given up, for the log
+  DistinctTable distinct_;
+  DistinctTable errors_;
+  StatusBoard board_;
+  Fd stop_event_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> serving_{false};
+  std::int64_t started_ns_ = 0;
+  std::atomic<std::int64_t> housekept_ns_{0};  ///< monotonic
+  ClockWatch clock_watch_{clock_};
+
+  ServiceNotifier nobody_;
+  ServiceHealth health_{options_.notifier != nullptr ? *options_.notifier : nobody_};
+  RealtimeReport realtime_;
+  std::unique_ptr<PtpMonitor> ptp_;
+  std::unique_ptr<TriggerPort> triggers_;
+  std::unique_ptr<Receiver> receiver_;
+  std::unique_ptr<RenderAgent> render_;
+  std::unique_ptr<Recorder> recorder_;
+  std::unique_ptr<ShmClient> shm_;
+  std::unique_ptr<Sender> sender_;
+  std::unique_ptr<Conductor> conductor_;
+  std::unique_ptr<AgentRunner> receiver_runner_;
+  std::unique_ptr<AgentRunner> render_runner_;
+  std::unique_ptr<AgentRunner> recorder_runner_;
+  std::unique_ptr<AgentRunner> sender_runner_;
+  std::unique_ptr<AgentRunner> conductor_runner_;
+  MetricsSources sources_;
+  std::unique_ptr<MetricsServer> metrics_;  ///< reads all of the above
+};
+
+}  // namespace emit::server
