@@ -57,21 +57,22 @@ inline void limit_files(rlim_t bytes) {
   }
 }
 
-/// A real `emit` with these arguments. Standard output and error go to NAME.out and NAME.err of
-/// `folder`; killed at the end if need be.
-class ToolProcess {
+/// A program of the build, with these arguments. Standard output and error go to files of `folder`;
+/// killed at the end if need be.
+class ChildProcess {
  public:
-  ToolProcess(const ScratchFolder& folder, std::string name, std::vector<std::string> arguments,
-              rlim_t file_limit_bytes = RLIM_INFINITY)
-      : folder_(folder), name_(std::move(name)) {
-    std::string program = std::string(EMIT_TEST_BIN_DIR) + "/emit";
+  /// `file_limit_bytes`: no file it writes gets longer (RLIMIT_FSIZE), as on a full disk.
+  ChildProcess(const ScratchFolder& folder, std::string program, std::string out_name,
+               std::string err_name, std::vector<std::string> arguments, rlim_t file_limit_bytes)
+      : folder_(folder), out_name_(std::move(out_name)), err_name_(std::move(err_name)) {
+    program.insert(0, std::string(EMIT_TEST_BIN_DIR) + "/");
     std::vector<char*> argv{program.data()};
     for (auto& argument : arguments) {
       argv.push_back(argument.data());
     }
     argv.push_back(nullptr);
-    const std::string out = folder.file(name_ + ".out");
-    const std::string err = folder.file(name_ + ".err");
+    const std::string out = folder.file(out_name_);
+    const std::string err = folder.file(err_name_);
     pid_ = ::fork();
     if (pid_ == 0) {
       ::dup2(::open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600), 1);
@@ -81,37 +82,19 @@ class ToolProcess {
       ::_exit(127);
     }
   }
-  ~ToolProcess() {
+  ~ChildProcess() {
     if (pid_ > 0) {
       ::kill(pid_, SIGKILL);
       ::waitpid(pid_, nullptr, 0);
     }
   }
-  ToolProcess(const ToolProcess&) = delete;
-  ToolProcess& operator=(const ToolProcess&) = delete;
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
 
   void signal(int number) const { ::kill(pid_, number); }
   [[nodiscard]] pid_t pid() const { return pid_; }
-  [[nodiscard]] std::string out() const { return folder_.read(name_ + ".out"); }
-  [[nodiscard]] std::string err() const { return folder_.read(name_ + ".err"); }
-  /// Until standard error holds `text` this often. False: not within the limit, or it ended before.
-  [[nodiscard]] bool says(const std::string& text, std::size_t times = 1,
-                          std::chrono::seconds limit = std::chrono::seconds(60)) {
-    const auto end = std::chrono::steady_clock::now() + limit;
-    for (;;) {
-      const bool over = ended() || std::chrono::steady_clock::now() > end;
-      const std::string all = err();
-      std::size_t found = 0;
-      for (std::size_t at = all.find(text); at != std::string::npos;
-           at = all.find(text, at + text.size())) {
-        ++found;
-      }
-      if (found >= times || over) {
-        return found >= times;
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-  }
+  [[nodiscard]] std::string out() const { return folder_.read(out_name_); }
+  [[nodiscard]] std::string err() const { return folder_.read(err_name_); }
   /// Exit code, 128 + signal, or -1 when it does not end within the limit.
   [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + limit;
@@ -134,54 +117,55 @@ class ToolProcess {
 
  private:
   const ScratchFolder& folder_;
-  std::string name_;
+  std::string out_name_;
+  std::string err_name_;
   pid_t pid_ = -1;
   int exit_code_ = -1;
 };
 
-/// A real emitd. Standard output and error go to files of `folder`; killed at the end if need be.
-class DaemonProcess {
+/// A real `emit`; it speaks to NAME.out and NAME.err.
+class ToolProcess : public ChildProcess {
  public:
-  /// `file_limit_bytes`: no file it writes gets longer (RLIMIT_FSIZE), as on a full disk.
+  ToolProcess(const ScratchFolder& folder, const std::string& name,
+              std::vector<std::string> arguments, rlim_t file_limit_bytes = RLIM_INFINITY)
+      : ChildProcess(folder, "emit", name + ".out", name + ".err", std::move(arguments),
+                     file_limit_bytes) {}
+
+  /// Until standard error holds `text` this often. False: not within the limit, or it ended before.
+  [[nodiscard]] bool says(const std::string& text, std::size_t times = 1,
+                          std::chrono::seconds limit = std::chrono::seconds(60)) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    for (;;) {
+      const bool over = ended() || std::chrono::steady_clock::now() > end;
+      const std::string all = err();
+      std::size_t found = 0;
+      for (std::size_t at = all.find(text); at != std::string::npos;
+           at = all.find(text, at + text.size())) {
+        ++found;
+      }
+      if (found >= times || over) {
+        return found >= times;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+};
+
+/// A real emitd; it speaks to `stdout` and `stderr`.
+class DaemonProcess : public ChildProcess {
+ public:
   DaemonProcess(const ScratchFolder& folder, std::vector<std::string> arguments,
                 rlim_t file_limit_bytes = RLIM_INFINITY)
-      : folder_(folder) {
-    std::string program = std::string(EMIT_TEST_BIN_DIR) + "/emitd";
-    std::vector<char*> argv{program.data()};
-    for (auto& argument : arguments) {
-      argv.push_back(argument.data());
-    }
-    argv.push_back(nullptr);
-    const std::string out = folder.file("stdout");
-    const std::string err = folder.file("stderr");
-    pid_ = ::fork();
-    if (pid_ == 0) {
-      const int out_fd = ::open(out.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
-      const int err_fd = ::open(err.c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600);
-      ::dup2(out_fd, 1);
-      ::dup2(err_fd, 2);
-      limit_files(file_limit_bytes);
-      ::execv(argv[0], argv.data());
-      ::_exit(127);
-    }
-  }
-  ~DaemonProcess() {
-    if (pid_ > 0) {
-      ::kill(pid_, SIGKILL);
-      ::waitpid(pid_, nullptr, 0);
-    }
-  }
-  DaemonProcess(const DaemonProcess&) = delete;
-  DaemonProcess& operator=(const DaemonProcess&) = delete;
+      : ChildProcess(folder, "emitd", "stdout", "stderr", std::move(arguments), file_limit_bytes) {}
 
   /// Waits for the ready line. False when the process ended first.
   [[nodiscard]] bool wait_ready(std::chrono::seconds limit = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (std::chrono::steady_clock::now() < end) {
-      const std::string out = folder_.read("stdout");
-      const std::size_t line = out.find("ready control=");
-      if (line != std::string::npos && out.find('\n', line) != std::string::npos) {
-        std::istringstream words(out.substr(line));
+      const std::string said = out();
+      const std::size_t line = said.find("ready control=");
+      if (line != std::string::npos && said.find('\n', line) != std::string::npos) {
+        std::istringstream words(said.substr(line));
         std::string word;
         words >> word >> word;
         control_ = word.substr(word.find('=') + 1);
@@ -205,32 +189,8 @@ class DaemonProcess {
   [[nodiscard]] const std::string& host_udp() const { return host_udp_; }
   /// Empty: off.
   [[nodiscard]] const std::string& metrics() const { return metrics_; }
-  [[nodiscard]] pid_t pid() const { return pid_; }
-  void signal(int number) const { ::kill(pid_, number); }
-  /// Exit code, 128 + signal, or -1 when it does not end within the limit.
-  [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
-    const auto end = std::chrono::steady_clock::now() + limit;
-    while (!ended()) {
-      if (std::chrono::steady_clock::now() > end) {
-        return -1;
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return exit_code_;
-  }
-  [[nodiscard]] bool ended() {
-    int status = 0;
-    if (pid_ > 0 && ::waitpid(pid_, &status, WNOHANG) == pid_) {
-      pid_ = -1;
-      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    }
-    return pid_ <= 0;
-  }
 
  private:
-  const ScratchFolder& folder_;
-  pid_t pid_ = -1;
-  int exit_code_ = -1;
   std::string control_;
   std::string host_udp_;
   std::string metrics_;
