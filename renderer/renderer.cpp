@@ -380,9 +380,8 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
                             sizeof(gpu::FrameStatsGpu), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
 
   const DrawnScene& drawn = stage_->drawn();
-  passes_.geometry.draw(drawn.vertices, drawn.lists.commands(view_single_sided_),
-                        drawn.lists.commands(view_double_sided_),
-                        glm::uvec2(frame_params_.format_px));
+  passes_.geometry.draw(drawn.vertices, drawn.lists, drawn.record_buffer, view_single_sided_,
+                        view_double_sided_, glm::uvec2(frame_params_.format_px));
   clock_.mark(stages.geometry_ms);
   stage_->draw(stages, clock_);
   if (is_scaled(rung)) {

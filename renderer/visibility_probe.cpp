@@ -109,7 +109,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   const gl::Buffer tap_buffer(sizeof(taps_), &taps_, 0);
   const gl::Buffer records = buffer_of(lists.records());
   const gl::Buffer light_records = buffer_of(lists.light_records());
-  const SceneVertexArrays vertices(scene, records, light_records);
+  const SceneVertexArrays vertices(scene, light_records);
   frame_buffer.bind_uniform(EMIT_BIND_FRAME);
   step_buffer.bind_uniform(EMIT_BIND_STEP);
   tap_buffer.bind_uniform(EMIT_BIND_TAPS);
@@ -118,11 +118,11 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   shadow_.bind_texture();
   shade_.bind_textures();
 
-  geometry_.draw(vertices, lists.commands(single_sided), lists.commands(double_sided),
+  geometry_.draw(vertices, lists, records, single_sided, double_sided,
                  glm::uvec2(sensor_.width_px, sensor_.height_px));
   occlusion_.dispatch();
   for (std::uint32_t c = 0; c < frusta.count; ++c) {
-    shadow_.draw(vertices, c, lists.commands(shadow_commands[c]));
+    shadow_.draw(vertices, c, lists.light_commands(shadow_commands[c]));
   }
   shade_.dispatch_sun_only();
   glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);

@@ -10,16 +10,17 @@
 namespace emit::renderer {
 namespace {
 
-DrawRecord record_of(const glm::dmat4& relworld_from_mesh, std::uint32_t object,
-                     std::uint32_t material) noexcept {
-  DrawRecord record;
-  for (glm::length_t r = 0; r < 3; ++r) {
-    record.relworld_from_mesh_row[r] =
-        glm::vec4(glm::dvec4(relworld_from_mesh[0][r], relworld_from_mesh[1][r],
-                             relworld_from_mesh[2][r], relworld_from_mesh[3][r]));
+DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& relworld_from_mesh,
+                     std::uint32_t object, std::uint32_t material) noexcept {
+  DrawRecord record{};
+  record.params.clip_from_mesh = glm::mat4(clip_from_relworld * relworld_from_mesh);
+  const glm::dmat3 m(relworld_from_mesh);
+  const std::array<glm::dvec3, 3> cofactors = {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
+                                               glm::cross(m[0], m[1])};
+  for (std::size_t column = 0; column < cofactors.size(); ++column) {
+    record.params.normal_from_mesh[column] = glm::vec4(glm::vec3(cofactors[column]), 0.0F);
   }
-  record.material = material;
-  record.object = object + 1;
+  record.params.ids = glm::uvec4(material, object + 1, 0U, 0U);
   return record;
 }
 
@@ -53,13 +54,13 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
                      std::uint32_t max_passes)
     : scene_(scene) {
   const auto instances = scene.instances();
-  std::size_t view_commands = 0;
+  std::size_t view_ranges = 0;
   std::size_t submesh_instances = 0;
   for (const SceneBuffers::MeshRange& mesh : scene.meshes()) {
     submesh_instances += mesh.submeshes.size() * mesh.instance_count;
     for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
       // Every cluster alone, at worst.
-      view_commands += mesh.instance_count * (1 + submesh.cluster_count);
+      view_ranges += mesh.instance_count * (1 + submesh.cluster_count);
     }
   }
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
@@ -79,7 +80,11 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
   light_placed_ = view_placed_;
   records_.reserve(std::max<std::size_t>(1, submesh_instances));
   light_records_.reserve(std::max<std::size_t>(1, instances.size() * max_passes));
-  commands_.reserve(view_commands + instances.size() * max_passes);
+  view_draws_.reserve(submesh_instances);
+  view_ranges_.index_count.reserve(view_ranges);
+  view_ranges_.index_offset.reserve(view_ranges);
+  view_ranges_.base_vertex.reserve(view_ranges);
+  light_commands_.reserve(instances.size() * max_passes);
 }
 
 DrawLists::Placed DrawLists::place(std::uint32_t instance, const glm::dmat4& world_from_mesh,
@@ -100,7 +105,11 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
   camera_world_m_ = camera_world_m;
   records_.clear();
   light_records_.clear();
-  commands_.clear();
+  view_draws_.clear();
+  view_ranges_.index_count.clear();
+  view_ranges_.index_offset.clear();
+  view_ranges_.base_vertex.clear();
+  light_commands_.clear();
   bounds_ = shifted(static_bounds_world_, -camera_world_m);
   const auto instances = scene_.instances();
   for (const std::uint32_t i : moving_) {
@@ -113,38 +122,36 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
   }
 }
 
-void DrawLists::add_command(const SceneBuffers::DrawRange& range, std::int32_t base_vertex,
-                            std::uint32_t record) noexcept {
-  commands_.push_back({range, base_vertex, record, 1});
+void DrawLists::add_range(std::uint32_t first_index, std::uint32_t index_count,
+                          std::int32_t base_vertex) noexcept {
+  const auto offset = std::uintptr_t{first_index} * sizeof(std::uint32_t);
+  view_ranges_.index_count.push_back(static_cast<std::int32_t>(index_count));
+  // GL takes a number of bytes in the guise of an address.
+  view_ranges_.index_offset.push_back(reinterpret_cast<const void*>(offset));
+  view_ranges_.base_vertex.push_back(base_vertex);
 }
 
-void DrawLists::add(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
-                    const ClusterView& seen, std::uint32_t record) noexcept {
+void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
+                           const ClusterView& seen) noexcept {
   const std::int32_t base_vertex = scene_.base_vertex(instance);
   if (submesh.cluster_count == 0) {
-    // Instances that share their vertices go in one draw.
-    if (!commands_.empty() && commands_.back().range.first_index == submesh.first_index &&
-        commands_.back().base_vertex == base_vertex) {
-      ++commands_.back().count;
-    } else {
-      add_command(submesh, base_vertex, record);
-    }
+    add_range(submesh.first_index, submesh.index_count, base_vertex);
     return;
   }
-  SceneBuffers::DrawRange run = submesh;
-  run.index_count = 0;
+  std::uint32_t first_index = 0;
+  std::uint32_t index_count = 0;  // of clusters in a row
   for (std::uint32_t c = submesh.first_cluster; c < submesh.first_cluster + submesh.cluster_count;
        ++c) {
     const scene::Cluster& cluster = scene_.clusters()[c];
     if (!seen.fits(scene_.levels()[c]) || !seen.shows(cluster, submesh.double_sided)) continue;
-    if (run.index_count > 0 && cluster.first_index != run.first_index + run.index_count) {
-      add_command(run, base_vertex, record);
-      run.index_count = 0;
+    if (index_count > 0 && cluster.first_index != first_index + index_count) {
+      add_range(first_index, index_count, base_vertex);
+      index_count = 0;
     }
-    if (run.index_count == 0) run.first_index = cluster.first_index;
-    run.index_count += cluster.index_count;
+    if (index_count == 0) first_index = cluster.first_index;
+    index_count += cluster.index_count;
   }
-  if (run.index_count > 0) add_command(run, base_vertex, record);
+  if (index_count > 0) add_range(first_index, index_count, base_vertex);
 }
 
 void DrawLists::find_in_view(const ViewVolume& view) noexcept {
@@ -194,7 +201,7 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
   find_in_view(view);
   for (const bool sheets : {false, true}) {
     CommandRange& range = sheets ? double_sided : single_sided;
-    range.first = static_cast<std::uint32_t>(commands_.size());
+    range.first = static_cast<std::uint32_t>(view_draws_.size());
     for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
       for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
         if (submesh.double_sided != sheets || submesh.index_count == 0) continue;
@@ -202,13 +209,17 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
              ++i) {
           if (!view_placed_[i].in_view) continue;
           const glm::dmat4 matrix = relworld_from_mesh(view_placed_[i]);
-          const auto record = static_cast<std::uint32_t>(records_.size());
-          records_.push_back(record_of(matrix, scene_.instances()[i].object, submesh.material));
-          add(i, submesh, ClusterView(view, matrix, limits), record);
+          const auto first = static_cast<std::uint32_t>(view_ranges_.index_count.size());
+          add_ranges(i, submesh, ClusterView(view, matrix, limits));
+          const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;
+          if (count == 0) continue;
+          view_draws_.push_back({static_cast<std::uint32_t>(records_.size()), first, count});
+          records_.push_back(record_of(view.clip_from_relworld, matrix,
+                                       scene_.instances()[i].object, submesh.material));
         }
       }
     }
-    range.count = static_cast<std::uint32_t>(commands_.size()) - range.first;
+    range.count = static_cast<std::uint32_t>(view_draws_.size()) - range.first;
   }
 }
 
@@ -236,7 +247,7 @@ CommandRange DrawLists::cull_light(const LightFrustum& frustum) noexcept {
     clip_rows[axis] = glm::dvec4(frustum.axes[static_cast<std::size_t>(axis)] * scale,
                                  frustum.offset_m[axis] * scale - (axis < 2 ? 1.0 : 0.0));
   }
-  CommandRange range{static_cast<std::uint32_t>(commands_.size()), 0};
+  CommandRange range{static_cast<std::uint32_t>(light_commands_.size()), 0};
   for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
     const auto first = static_cast<std::uint32_t>(light_records_.size());
     for (std::uint32_t i = mesh.first_instance; i < mesh.first_instance + mesh.instance_count;
@@ -255,10 +266,11 @@ CommandRange DrawLists::cull_light(const LightFrustum& frustum) noexcept {
     }
     const auto count = static_cast<std::uint32_t>(light_records_.size()) - first;
     if (count > 0) {
-      commands_.push_back({mesh.whole, scene_.base_vertex(mesh.first_instance), first, count});
+      light_commands_.push_back(
+          {mesh.whole, scene_.base_vertex(mesh.first_instance), first, count});
     }
   }
-  range.count = static_cast<std::uint32_t>(commands_.size()) - range.first;
+  range.count = static_cast<std::uint32_t>(light_commands_.size()) - range.first;
   return range;
 }
 

@@ -11,8 +11,21 @@
 
 namespace emit::renderer {
 
-/// Instanced draw of one mesh range: records [first_record, first_record + count).
-struct DrawCommand {
+/// Draws of the camera that share a record: entries [first, first + count) of ViewRanges.
+struct ViewDraw {
+  std::uint32_t record = 0;
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+};
+/// Index ranges, as glMultiDrawElementsBaseVertex takes them. Equal lengths.
+struct ViewRanges {
+  std::vector<std::int32_t> index_count;
+  std::vector<const void*> index_offset;  ///< bytes
+  std::vector<std::int32_t> base_vertex;
+};
+
+/// Instanced draw of one mesh into a shadow map: records [first_record, first_record + count).
+struct LightCommand {
   SceneBuffers::DrawRange range;
   std::int32_t base_vertex = 0;
   std::uint32_t first_record = 0;
@@ -35,7 +48,8 @@ class DrawLists {
   /// Starts a frame: all instances at `sim_time_ns` around a camera at `camera_world_m`.
   void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
              std::span<const PoseHistory> entities) noexcept;
-  /// Draws of the camera, in levels of detail that keep to `limits`; double-sided ones apart.
+  /// Draws of the camera, in levels of detail that keep to `limits`; double-sided ones apart: parts
+  /// of view_draws().
   void cull_view(const ViewVolume& view, const LevelLimits& limits, CommandRange& single_sided,
                  CommandRange& double_sided) noexcept;
   /// Triangles that cull_view() would draw under each of `limits`. Precondition: equal lengths.
@@ -53,8 +67,12 @@ class DrawLists {
   [[nodiscard]] std::span<const LightRecord> light_records() const noexcept {
     return light_records_;
   }
-  [[nodiscard]] std::span<const DrawCommand> commands(CommandRange range) const noexcept {
-    return std::span(commands_).subspan(range.first, range.count);
+  [[nodiscard]] std::span<const ViewDraw> view_draws(CommandRange range) const noexcept {
+    return std::span(view_draws_).subspan(range.first, range.count);
+  }
+  [[nodiscard]] const ViewRanges& view_ranges() const noexcept { return view_ranges_; }
+  [[nodiscard]] std::span<const LightCommand> light_commands(CommandRange range) const noexcept {
+    return std::span(light_commands_).subspan(range.first, range.count);
   }
   [[nodiscard]] std::size_t max_records() const noexcept { return records_.capacity(); }
   [[nodiscard]] std::size_t max_light_records() const noexcept { return light_records_.capacity(); }
@@ -74,11 +92,11 @@ class DrawLists {
   void find_in_view(const ViewVolume& view) noexcept;
   [[nodiscard]] std::uint32_t indices_in_view(const SceneBuffers::DrawRange& submesh,
                                               const ClusterView& seen) const noexcept;
-  /// Appends the draws of an instance's submesh; `record` is its DrawRecord.
-  void add(std::uint32_t instance, const SceneBuffers::DrawRange& submesh, const ClusterView& seen,
-           std::uint32_t record) noexcept;
-  void add_command(const SceneBuffers::DrawRange& range, std::int32_t base_vertex,
-                   std::uint32_t record) noexcept;
+  /// Appends the index ranges of an instance's submesh that `seen` shows.
+  void add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
+                  const ClusterView& seen) noexcept;
+  void add_range(std::uint32_t first_index, std::uint32_t index_count,
+                 std::int32_t base_vertex) noexcept;
 
   const SceneBuffers& scene_;
   std::vector<std::int32_t> history_of_instance_;  ///< -1: static
@@ -89,7 +107,9 @@ class DrawLists {
   scene::Aabb static_bounds_world_;
   std::vector<DrawRecord> records_;
   std::vector<LightRecord> light_records_;
-  std::vector<DrawCommand> commands_;
+  std::vector<ViewDraw> view_draws_;
+  ViewRanges view_ranges_;
+  std::vector<LightCommand> light_commands_;
   glm::dvec3 camera_world_m_{0.0};
   scene::Aabb bounds_;
 };

@@ -11,7 +11,7 @@ DrawnScene::DrawnScene(SceneBuffers scene, std::span<const std::int32_t> history
       lists(buffers, history_of_object, max_passes),
       record_buffer(gl::Buffer::dynamic(lists.max_records() * sizeof(DrawRecord))),
       light_record_buffer(gl::Buffer::dynamic(lists.max_light_records() * sizeof(LightRecord))),
-      vertices(buffers, record_buffer, light_record_buffer) {}
+      vertices(buffers, light_record_buffer) {}
 
 void DrawnScene::upload() const noexcept {
   record_buffer.upload(lists.records());

@@ -56,7 +56,7 @@ CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pos
                                     {0.0, 1.0 / view.tan_half_v, 0.0, 0.0},
                                     {0.0, 0.0, 0.0, 1.0},
                                     {0.0, 0.0, sensor.near_m, 0.0}};
-  params.clip_from_relworld = glm::mat4(clip_from_sensor * glm::dmat4(sensor_from_world));
+  view.clip_from_relworld = clip_from_sensor * glm::dmat4(sensor_from_world);
   params.relworld_from_sensor = glm::mat4(glm::dmat4(view.relworld_from_sensor));
   params.ray =
       glm::vec4(static_cast<float>(2.0 * view.tan_half_h / params.format_px.x),

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/ext/matrix_double3x3.hpp>
+#include <glm/ext/matrix_double4x4.hpp>
 #include <glm/ext/vector_double2.hpp>
 #include <glm/ext/vector_double3.hpp>
 
@@ -12,6 +13,7 @@ namespace emit::renderer {
 /// the boresight, and the box that holds all surfaces. Double, metres, relworld axes.
 struct ViewVolume {
   glm::dmat3 relworld_from_sensor{1.0};
+  glm::dmat4 clip_from_relworld{1.0};  ///< reversed depth, infinite far plane
   double tan_half_h = 0.1;
   double tan_half_v = 0.1;
   double near_m = 0.1;

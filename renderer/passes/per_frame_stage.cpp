@@ -180,7 +180,7 @@ void PerFrameStage::bind_step(std::uint32_t step) const noexcept {
 void PerFrameStage::draw_shadow(std::uint32_t step) noexcept {
   bind_step(step);
   for (std::uint32_t c = 0; c < step_params_[step].params.info.x; ++c) {
-    passes_.shadow.draw(drawn_.vertices, c, drawn_.lists.commands(shadow_commands_[step][c]));
+    passes_.shadow.draw(drawn_.vertices, c, drawn_.lists.light_commands(shadow_commands_[step][c]));
   }
 }
 

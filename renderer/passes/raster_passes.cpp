@@ -10,8 +10,19 @@
 namespace emit::renderer {
 namespace {
 
-void issue(std::span<const DrawCommand> commands) noexcept {
-  for (const DrawCommand& command : commands) {
+void issue(std::span<const ViewDraw> draws, const ViewRanges& ranges,
+           const gl::Buffer& records) noexcept {
+  for (const ViewDraw& draw : draws) {
+    records.bind_uniform(EMIT_BIND_DRAW, draw.record * sizeof(DrawRecord), sizeof(gpu::DrawParams));
+    glMultiDrawElementsBaseVertex(GL_TRIANGLES, ranges.index_count.data() + draw.first,
+                                  GL_UNSIGNED_INT, ranges.index_offset.data() + draw.first,
+                                  static_cast<GLsizei>(draw.count),
+                                  ranges.base_vertex.data() + draw.first);
+  }
+}
+
+void issue(std::span<const LightCommand> commands) noexcept {
+  for (const LightCommand& command : commands) {
     const auto offset = static_cast<std::uintptr_t>(command.range.first_index) * 4U;
     glDrawElementsInstancedBaseVertexBaseInstance(
         GL_TRIANGLES, static_cast<GLsizei>(command.range.index_count), GL_UNSIGNED_INT,
@@ -22,9 +33,9 @@ void issue(std::span<const DrawCommand> commands) noexcept {
 
 constexpr GLuint kRecordBinding = 2;
 
-/// One record per instance, rows of a matrix first.
-void read_records(GLuint array, const gl::Buffer& records, std::size_t stride) {
-  glVertexArrayVertexBuffer(array, kRecordBinding, records.id(), 0, static_cast<GLsizei>(stride));
+/// One record per instance.
+void read_records(GLuint array, const gl::Buffer& records) {
+  glVertexArrayVertexBuffer(array, kRecordBinding, records.id(), 0, sizeof(LightRecord));
   for (GLuint row = 0; row < 3; ++row) {
     const GLuint attribute = EMIT_ATTR_ROW + row;
     glVertexArrayAttribFormat(array, attribute, 4, GL_FLOAT, GL_FALSE, row * 4 * sizeof(float));
@@ -45,8 +56,7 @@ physics::Result<void> check_complete(const gl::Framebuffer& framebuffer, const c
 
 }  // namespace
 
-SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& draw_records,
-                                     const gl::Buffer& light_records)
+SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& light_records)
     : view_(gl::VertexArray::make()), light_(gl::VertexArray::make()) {
   for (const GLuint id : {view_.id(), light_.id()}) {
     glVertexArrayElementBuffer(id, scene.indices());
@@ -60,12 +70,7 @@ SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer
   glVertexArrayAttribFormat(view, EMIT_ATTR_NORMAL, 4, GL_SHORT, GL_TRUE, 0);
   glVertexArrayAttribBinding(view, EMIT_ATTR_NORMAL, 1);
   glEnableVertexArrayAttrib(view, EMIT_ATTR_NORMAL);
-  read_records(view, draw_records, sizeof(DrawRecord));
-  glVertexArrayAttribIFormat(view, EMIT_ATTR_DRAW, 2, GL_UNSIGNED_INT,
-                             offsetof(DrawRecord, material));
-  glVertexArrayAttribBinding(view, EMIT_ATTR_DRAW, kRecordBinding);
-  glEnableVertexArrayAttrib(view, EMIT_ATTR_DRAW);
-  read_records(light_.id(), light_records, sizeof(LightRecord));
+  read_records(light_.id(), light_records);
 }
 
 void SceneVertexArrays::read_nodes(const gl::Buffer& before,
@@ -115,10 +120,9 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::
   return pass;
 }
 
-void GeometryPass::draw(const SceneVertexArrays& vertices,
-                        std::span<const DrawCommand> single_sided,
-                        std::span<const DrawCommand> double_sided,
-                        const glm::uvec2& size_px) const noexcept {
+void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& lists,
+                        const gl::Buffer& records, CommandRange single_sided,
+                        CommandRange double_sided, const glm::uvec2& size_px) const noexcept {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
   const auto width_px = static_cast<GLsizei>(size_px.x);
   const auto height_px = static_cast<GLsizei>(size_px.y);
@@ -145,9 +149,9 @@ void GeometryPass::draw(const SceneVertexArrays& vertices,
   program_.use();
   vertices.bind_view();
   glEnable(GL_CULL_FACE);
-  issue(single_sided);
+  issue(lists.view_draws(single_sided), lists.view_ranges(), records);
   glDisable(GL_CULL_FACE);
-  issue(double_sided);
+  issue(lists.view_draws(double_sided), lists.view_ranges(), records);
   glDisable(GL_SCISSOR_TEST);
 }
 
@@ -183,7 +187,7 @@ physics::Result<ShadowPass> ShadowPass::create(std::uint32_t size_px, std::uint3
 }
 
 void ShadowPass::draw(const SceneVertexArrays& vertices, std::uint32_t cascade,
-                      std::span<const DrawCommand> commands) const noexcept {
+                      std::span<const LightCommand> commands) const noexcept {
   const gl::Framebuffer& framebuffer = framebuffers_[cascade];
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.id());
   glViewport(0, 0, size_px_, size_px_);
@@ -199,7 +203,7 @@ void ShadowPass::draw(const SceneVertexArrays& vertices, std::uint32_t cascade,
   // need no setup and no rasterisation. Sheets cast shadow with either side.
   while (!commands.empty()) {
     const bool both_sides = commands.front().range.double_sided;
-    const auto end = std::ranges::find_if(commands, [both_sides](const DrawCommand& command) {
+    const auto end = std::ranges::find_if(commands, [both_sides](const LightCommand& command) {
       return command.range.double_sided != both_sides;
     });
     const auto count = static_cast<std::size_t>(end - commands.begin());

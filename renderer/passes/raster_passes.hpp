@@ -11,12 +11,11 @@
 
 namespace emit::renderer {
 
-/// Vertex arrays that read SceneBuffers and one record per instance: a DrawRecord for the camera, a
-/// LightRecord (positions only) for shadow maps.
+/// Vertex arrays that read SceneBuffers: all of it for the camera, positions and one LightRecord
+/// per instance for shadow maps.
 class SceneVertexArrays {
  public:
-  SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& draw_records,
-                    const gl::Buffer& light_records);
+  SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& light_records);
   void bind_view() const noexcept { glBindVertexArray(view_.id()); }
   void bind_light() const noexcept { glBindVertexArray(light_.id()); }
   /// Where the camera's draws read the samples' two nodes of time from: two floats by vertex each.
@@ -34,8 +33,10 @@ class GeometryPass {
   /// `sampled`: the thermal state of the surface comes from its samples.
   [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
                                                             std::uint32_t height_px, bool sampled);
-  void draw(const SceneVertexArrays& vertices, std::span<const DrawCommand> single_sided,
-            std::span<const DrawCommand> double_sided, const glm::uvec2& size_px) const noexcept;
+  /// Draws two parts of what `lists` found in view; `records` holds its records.
+  void draw(const SceneVertexArrays& vertices, const DrawLists& lists, const gl::Buffer& records,
+            CommandRange single_sided, CommandRange double_sided,
+            const glm::uvec2& size_px) const noexcept;
   /// Binds what it drew to the texture units.
   void bind_textures() const noexcept;
 
@@ -57,7 +58,7 @@ class ShadowPass {
                                                           std::uint32_t layers);
   /// Draws into the layer of `cascade`.
   void draw(const SceneVertexArrays& vertices, std::uint32_t cascade,
-            std::span<const DrawCommand> commands) const noexcept;
+            std::span<const LightCommand> commands) const noexcept;
   void bind_texture() const noexcept;
 
  private:

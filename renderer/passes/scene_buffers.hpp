@@ -69,12 +69,9 @@ class SceneBuffers {
   gl::Buffer indices_;    ///< uint32
 };
 
-/// One drawn instance, read per instance by the vertex shader.
-struct DrawRecord {
-  glm::vec4 relworld_from_mesh_row[3];
-  std::uint32_t material = 0;
-  std::uint32_t object = 0;  ///< 1 + index of the scenario's object
-  std::uint32_t unused[2] = {};
+/// One drawn instance as a uniform block: at offsets that every device allows.
+struct alignas(256) DrawRecord {
+  gpu::DrawParams params;
 };
 
 /// One instance drawn into a shadow map: rows of the affine clip_from_mesh, depth in 0..1.

@@ -164,7 +164,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   if (here) add_first_frame(here->key, start_ns, view, inputs.environment, inputs.entities);
   auto model = make_model(surface, view, options, here, progress);
   if (!model) return tl::unexpected(std::move(model.error()));
-  offset_m_ = ray_offset_m(geometry_);
+  offsets_ = ray_offsets(geometry_);
   model_ = std::move(*model);
 
   const std::size_t count = model_->samples.samples.size();
@@ -217,8 +217,8 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
     for (std::size_t i = first + begin; i < first + end; ++i) {
       const SurfaceSample& sample = all.samples[i];
       SampleDrive drive;
-      drive.sun_frac = interval_rays_->sun_frac(rays(), sample, offset_m_, 0.0F);
-      drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays(), sample, offset_m_);
+      drive.sun_frac = interval_rays_->sun_frac(rays(), sample, offsets_.sun_m, 0.0F);
+      drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays(), sample, offsets_.around_m);
       for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
         const SeenSample& seen = all.seen[sample.first_seen + k];
         const SampleOutput& other = from.outputs[seen.sample];

@@ -13,6 +13,7 @@
 #include "history/pose_history.hpp"
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
+#include "surface/ray_offsets.hpp"
 #include "surface/state_file.hpp"
 #include "surface/surface_model.hpp"
 #include "surface/worker_pool.hpp"
@@ -146,7 +147,7 @@ class CachedSurface {
   std::optional<IntervalRays> interval_rays_;
   HeatInterval interval_;
   WorkerPool workers_;
-  float offset_m_ = 0.0F;
+  RayOffsets offsets_;
   std::vector<MoverPlacement> movers_now_;
   std::optional<SurfaceModel> model_;
 

@@ -11,9 +11,6 @@
 namespace emit::renderer {
 namespace {
 
-/// Ray starts lie this far off the surface, more where float32 resolves less.
-constexpr float kLeastOffsetM = 5e-4F;
-constexpr float kOffsetFrac = 1e-6F;
 constexpr std::size_t kTangents = CasterRays::kMaxRays;
 /// A face stands upright on another when the cosine between their normals is smaller.
 constexpr float kWallCos = 0.3F;
@@ -27,13 +24,6 @@ constexpr float kFreeLengths = 2.0F;
 
 }  // namespace
 
-float ray_offset_m(const scene::SceneGeometry& geometry) noexcept {
-  const scene::Aabb& bounds = geometry.bounds;
-  if (bounds.empty()) return kLeastOffsetM;
-  const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);
-  return std::max(kLeastOffsetM, kOffsetFrac * static_cast<float>(radius_m));
-}
-
 PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
                            const SurfaceModelOptions& options)
     : in_(inputs),
@@ -41,7 +31,7 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
       view_(kSampleViewRays),
       sky_(inputs.heat.sky_measure() == SkyMeasure::cosine ? kSampleSkyRays : kSampleViewRays),
       sphere_(kSampleViewRays),
-      offset_m_(ray_offset_m(inputs.geometry)) {
+      offsets_(ray_offsets(inputs.geometry)) {
   history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
@@ -102,8 +92,8 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
 void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
                                const SampleStand& stand) const {
   SurfaceSample& sample = patch.samples[index];
-  ViewPoint point{sample.position_m, sample.normal, stand.inward, offset_m_};
-  ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offset_m_};
+  ViewPoint point{sample.position_m, sample.normal, stand.inward, offsets_.around_m};
+  ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offsets_.around_m};
   std::array<MoverPlacement, 1> self;
   CasterSelection selection{true, {}};
   std::vector<MoverPlacement> placed;
@@ -160,17 +150,17 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   SurfaceSample& sample = patch.samples[index];
   const glm::vec3& n = point.normal;
   const auto [u, v] = tangents_of(n);
-  const glm::vec3 base_m = point.position_m + offset_m_ * point.inward;
+  const glm::vec3 base_m = point.position_m + offsets_.around_m * point.inward;
   std::array<CasterRay, kTangents> rays;
   std::array<CasterHit, kTangents> above;
   std::array<CasterHit, kTangents> below;
   for (std::size_t k = 0; k < kTangents; ++k) {
     const auto angle =
         static_cast<float>(2.0 * physics::kPi * (static_cast<double>(k) + 0.5) / kTangents);
-    rays[k] = {base_m + 2.0F * offset_m_ * n, std::cos(angle) * u + std::sin(angle) * v};
+    rays[k] = {base_m + 2.0F * offsets_.around_m * n, std::cos(angle) * u + std::sin(angle) * v};
   }
   const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above);
-  for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offset_m_ * n;
+  for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offsets_.around_m * n;
   const std::uint32_t met_below = in_.rays.first_hits(rays, selection, below);
   sample.flat_m = 1e6F;
   for (std::size_t k = 0; k < kTangents; ++k) {
@@ -188,12 +178,13 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
         std::abs(glm::dot(above[k].normal, n)) > kWallCos) {
       continue;
     }
-    const CasterRay down{rays[k].origin_m + 4.0F * offset_m_ * n +
-                             (above[k].distance_m + kUnderOffsets * offset_m_) * rays[k].direction,
-                         -n};
+    const CasterRay down{
+        rays[k].origin_m + 4.0F * offsets_.around_m * n +
+            (above[k].distance_m + kUnderOffsets * offsets_.around_m) * rays[k].direction,
+        -n};
     std::array<CasterHit, 1> under;
     if (in_.rays.first_hits({&down, 1}, selection, under) != 0U &&
-        under[0].distance_m < kUnderOffsets * offset_m_) {
+        under[0].distance_m < kUnderOffsets * offsets_.around_m) {
       wall_m[k] = above[k].distance_m;
       any = true;
     }
@@ -235,8 +226,8 @@ void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
     const float blur_m = std::min(
         max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
     SampleDrive drive;
-    drive.sun_frac = rays.sun_frac(in_.rays, sample, offset_m_, blur_m);
-    drive.hidden_sky_frac = rays.hidden_sky_frac(in_.rays, sample, offset_m_);
+    drive.sun_frac = rays.sun_frac(in_.rays, sample, offsets_.sun_m, blur_m);
+    drive.hidden_sky_frac = rays.hidden_sky_frac(in_.rays, sample, offsets_.around_m);
     patch.sun_frac[index * count + i] = drive.sun_frac;
     if (!patch.hidden_sky_frac.empty()) {
       patch.hidden_sky_frac[index * count + i] = drive.hidden_sky_frac;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "surface/drive_worth.hpp"
+#include "surface/ray_offsets.hpp"
 #include "surface/sphere_view.hpp"
 #include "surface/surface_model.hpp"
 
@@ -43,9 +44,6 @@ struct SurfacePatch {
   std::vector<float> hidden_sky_frac;  ///< likewise; empty without entities
 };
 
-/// Distance of ray starts from the surface.
-[[nodiscard]] float ray_offset_m(const scene::SceneGeometry& geometry) noexcept;
-
 /// Where a sample stands, beside its own place.
 struct SampleStand {
   glm::vec3 drawn_m{0.0F};  ///< its place on the surface as drawn, off edges
@@ -62,7 +60,7 @@ class PatchSampler {
                const SurfaceModelOptions& options);
 
   /// Distance of ray starts from the surface.
-  [[nodiscard]] float offset_m() const noexcept { return offset_m_; }
+  [[nodiscard]] float offset_m() const noexcept { return offsets_.around_m; }
 
   /// Fills everything of sample `index`, whose position, normal, material and mover stand in
   /// patch.samples already. What it sees counts as the surroundings here.
@@ -92,7 +90,7 @@ class PatchSampler {
   ViewSampler view_;
   ViewSampler sky_;
   SphereSampler sphere_;
-  float offset_m_ = 0.0F;
+  RayOffsets offsets_;
   double history_s_ = 0.0;
   std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
   std::vector<float> sky_limit_frac_;    ///< by material: shares that differ less are alike

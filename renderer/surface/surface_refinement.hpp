@@ -87,7 +87,7 @@ class SurfaceRefinement {
   float pixel_rad_ = 1e-3F;
   float field_rad_ = 0.0F;
   float tolerance_k_ = 0.1F;
-  float start_offset_m_ = 5e-4F;
+  float sun_offset_m_ = 0.0F;
   bool lateral_ = true;
   std::vector<float> diffusivity_m2_s_;  ///< by material
   std::size_t recent_ = 0;               ///< first of the intervals that count as lately

@@ -44,7 +44,11 @@ bool is_outline(const PixelSurface& a, const PixelSurface& b, double width_rad) 
   if (a.surface != b.surface) return true;
   if (!a.surface) return false;
   if (a.object != b.object) return true;
-  const double step_m = std::abs(glm::dot(b.position_m - a.position_m, a.normal));
+  // Along either normal: where a body turns away from the eye its own is next to square to the way
+  // to what lies behind it.
+  const glm::dvec3 way_m = b.position_m - a.position_m;
+  const double step_m =
+      std::max(std::abs(glm::dot(way_m, a.normal)), std::abs(glm::dot(way_m, b.normal)));
   return step_m > kStepPx * width_rad * std::min(a.distance_m, b.distance_m);
 }
 

@@ -121,6 +121,22 @@ PixelSurface ground_point(double x_m, double y_m) {
   return out;
 }
 
+TEST(CliConverged, an_outline_is_found_from_either_side) {
+  // A rim that turns away from an eye above it, and the ground half a metre behind it: the way
+  // there lies next to square to the rim's own normal.
+  PixelSurface rim = ground_point(0.0, 0.0);
+  rim.position_m = {0.0, 0.0, 0.5};
+  rim.normal = rim.shading_normal = {1.0, 0.0, 0.0};
+  rim.distance_m = 2.0;
+  PixelSurface ground = ground_point(0.002, 0.0);
+  ground.distance_m = 2.5;
+  EXPECT_TRUE(is_outline(rim, ground, 1e-3));
+  EXPECT_TRUE(is_outline(ground, rim, 1e-3));
+  PixelSurface beside = ground_point(0.006, 0.0);
+  beside.distance_m = 2.5;
+  EXPECT_FALSE(is_outline(ground, beside, 1e-3));
+}
+
 TEST(CliConverged, looking_coarse_to_fine_misses_no_shadow) {
   const auto scene = reference::RayScene::create({{wall_on_ground()}, {}});
   ASSERT_TRUE(scene.has_value());

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "emit/physics/constants.hpp"
+#include "surface/ray_offsets.hpp"
 #include "unit/surface_scene.hpp"
 
 namespace emit::renderer {
@@ -78,6 +79,32 @@ TEST_F(IntervalRaysTest, PenumbraIsThatOfTheSunsDisc) {
   }
   EXPECT_EQ(interval_.sun_frac(*rays_, ground_at(middle_m - 0.5), kOffsetM, 0.0F), 1.0F);
   EXPECT_EQ(interval_.sun_frac(*rays_, ground_at(middle_m + 0.5), kOffsetM, 0.0F), 0.0F);
+}
+
+TEST_F(IntervalRaysTest, AShadowIsNoShorterThanItsCaster) {
+  // 3 cm above the ground, where starting half a millimetre above it would show.
+  constexpr float kLowM = 0.03F;
+  test::SurfaceScene scene;
+  scene.add_static(scene.add_mesh(test::level_mesh(glm::vec3(0.0F, -20.0F, 0.0F),
+                                                   glm::vec3(20.0F, 20.0F, 0.0F), kLowM)),
+                   glm::dmat4(1.0));
+  const auto rays = CasterRays::create(scene.geometry);
+  ASSERT_TRUE(rays.has_value());
+  interval_.update(kNoonNs, kNoonNs, 3, environment_, {}, rays->origin_world_m());
+  const glm::dvec3 sun = environment_.sun_at(kNoonNs).direction_enu;
+  const double middle_m = -kLowM * sun.x / sun.z;
+  ASSERT_GT(std::abs(middle_m), 0.3 * kLowM);
+  const RayOffsets offsets = ray_offsets(scene.geometry);
+  double lit_m = 0.0;  // of two millimetres around the edge
+  constexpr int kPlaces = 400;
+  for (int i = 0; i < kPlaces; ++i) {
+    const double x_m = middle_m + 2e-3 * ((i + 0.5) / kPlaces - 0.5);
+    SurfaceSample sample;
+    sample.position_m = glm::vec3(glm::dvec3(x_m, 0.0, 0.0) - rays->origin_world_m());
+    sample.normal = glm::vec3(0.0F, 0.0F, 1.0F);
+    lit_m += 2e-3 / kPlaces * interval_.sun_frac(*rays, sample, offsets.sun_m, 0.0F);
+  }
+  EXPECT_NEAR(lit_m, 1e-3, 5e-5);
 }
 
 TEST_F(IntervalRaysTest, AnIntervalSeesTheMeanWhileTheEdgeMovesOver) {

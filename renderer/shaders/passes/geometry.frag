@@ -2,7 +2,7 @@
 #include "shared/frame_params.glsl.h"
 #include "passes/octahedral.glsl"
 
-flat in uvec2 ids;
+layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 
 #ifdef EMIT_CACHED
 in vec4 sample_state;
@@ -14,7 +14,7 @@ void main() {
   float cosine = gl_FrontFacing ? sample_state.w : -sample_state.w;
   surface = uvec4(floatBitsToUint(boresight_m), floatBitsToUint(sample_state.x),
                   packUnorm2x16(vec2(sample_state.y * max(cosine, 0.0), sample_state.z)),
-                  ids.y << 16 | ids.x);
+                  draw.ids.y << 16 | draw.ids.x);
 }
 #else
 in vec3 normal_relworld;
@@ -26,6 +26,6 @@ void main() {
   depth_m = 1.0 / gl_FragCoord.w;  // clip w is the distance along the boresight
   vec3 n = normalize(normal_relworld);
   normal_octahedral = octahedral_from_unit(gl_FrontFacing ? n : -n);
-  material_and_object = ids;
+  material_and_object = draw.ids.xy;
 }
 #endif

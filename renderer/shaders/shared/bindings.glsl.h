@@ -7,6 +7,7 @@
 #define EMIT_BIND_STEP 1
 #define EMIT_BIND_BANDS 2
 #define EMIT_BIND_TAPS 3
+#define EMIT_BIND_DRAW 4
 
 // Shader storage blocks: written.
 #define EMIT_BIND_OUTPUT 0
@@ -36,10 +37,9 @@
 // Vertex attributes.
 #define EMIT_ATTR_POSITION 0
 #define EMIT_ATTR_NORMAL 1
-#define EMIT_ATTR_DRAW 2
-#define EMIT_ATTR_ROW 3  // three of them
-#define EMIT_ATTR_NODE_BEFORE 6
-#define EMIT_ATTR_NODE_AFTER 7
+#define EMIT_ATTR_ROW 2  // three of them
+#define EMIT_ATTR_NODE_BEFORE 5
+#define EMIT_ATTR_NODE_AFTER 6
 
 #define EMIT_MAX_CASCADES 4
 #define EMIT_MAX_BANDS 4

@@ -6,7 +6,6 @@
 EMIT_SHARED_BEGIN
 
 struct FrameParams {
-  mat4 clip_from_relworld;    // reversed z, infinite far plane; image row 0 at NDC y = -1
   mat4 relworld_from_sensor;  // rotation
   vec4 ray;                   // tangents in the sensor's axes: xy = per pixel, zw = at the corner of pixel 0
   uvec4 format_px;            // rendered: width, height, pixels per plane
@@ -16,6 +15,13 @@ struct FrameParams {
   uvec4 bands;                // x = nodes of a band's table, y = place of the emissivities behind the tables
   vec4 samples;               // cached: x = way of now between the two nodes of the samples, 0..1
   vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
+};
+
+// One drawn instance of a mesh's submesh.
+struct DrawParams {
+  mat4 clip_from_mesh;         // reversed z, infinite far plane; image row 0 at NDC y = -1
+  vec4 normal_from_mesh[3];    // columns; xyz = cofactors of relworld_from_mesh: right for unequal scales too
+  uvec4 ids;                   // x = material, y = 1 + index of the scenario's object
 };
 
 // Three texels of the material table.
