@@ -129,8 +129,7 @@ int Sender::take_published() noexcept {
       break;
     }
   }
-  if (work > 0) {
-    // The conductor may wait for room.
+  if (work > 0 && context_.of_room.end()) {
     context_.bells.conductor.ring();
   }
   return work;
@@ -197,7 +196,9 @@ void Sender::hold(const Image& image) noexcept {
 void Sender::let_go(const Image& image) noexcept {
   if (--holds_[image.slot] == 0) {
     image.source->release(image.slot);
-    context_.bells.render.ring();
+    if (context_.of_slots.end()) {
+      context_.bells.render.ring();
+    }
   }
 }
 

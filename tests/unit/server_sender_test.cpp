@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/socket.h>
 
 #include <memory>
@@ -180,6 +181,32 @@ TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
   }
   EXPECT_EQ(rig.context().counters.get(Counter::frames_skipped), missing);
   EXPECT_EQ(rig.script().held.load(), 0) << "slots go back when everybody has the frame";
+}
+
+TEST(Sender, WakesConductorAndRenderOnlyWhereTheyWaitForIt) {
+  Rig rig;
+  Rig::Peer* peer = rig.connect();
+  Doorbells& bells = rig.context().bells;
+  const auto rung = [&](Doorbell& bell) {
+    pollfd wait{bell.fd(), POLLIN, 0};
+    const bool out = ::poll(&wait, 1, 0) != 0;
+    bell.disarm();
+    return out;
+  };
+  const auto nothing = [] { return false; };
+  for (const bool waited_for : {false, true, false}) {
+    if (waited_for) {
+      EXPECT_FALSE(rig.context().of_room.look(nothing));
+      EXPECT_FALSE(rig.context().of_slots.look(nothing));
+    }
+    bells.conductor.arm();
+    bells.render.arm();
+    ASSERT_TRUE(rig.publish());
+    rig.settle({peer});
+    EXPECT_EQ(rig.script().held.load(), 0);
+    EXPECT_EQ(rung(bells.conductor), waited_for);
+    EXPECT_EQ(rung(bells.render), waited_for);
+  }
 }
 
 TEST(Sender, WhatAClientDoesNotWantIsNeitherSentNorWaitedForNorAGap) {
@@ -398,6 +425,37 @@ TEST_F(UdpInPlace, FramesInOrderAreWholeWhateverTheFragments) {
     }
   }
   EXPECT_EQ(counters_.bad_datagrams, 0U);
+}
+
+TEST_F(UdpInPlace, OfJoinedDatagramsNothingButAFramesBeginningIsMisplaced) {
+  if (!udp_segmentation_supported(sender_.fd())) GTEST_SKIP() << "the kernel joins nothing";
+  constexpr std::uint32_t kFrames = 6;
+  constexpr std::size_t kJoined = 7;
+  for (std::uint32_t id = 1; id <= kFrames; ++id) {
+    const auto all = datagrams(id, 1440);
+    ASSERT_EQ(all.size() % kJoined, 1U) << "the last one comes alone";
+    for (std::size_t i = 0; i < all.size(); i += kJoined) {
+      std::vector<std::byte> joined;
+      for (std::size_t k = i; k < std::min(i + kJoined, all.size()); ++k) {
+        joined.insert(joined.end(), all[k].begin(), all[k].end());
+      }
+      UdpBatch batch;
+      const auto bytes = static_cast<std::uint32_t>(all.front().size());
+      if (joined.size() > bytes) {
+        ASSERT_EQ(batch.send_datagrams(sender_.fd(), joined, bytes, true).fragments, kJoined);
+      } else {
+        send(joined);
+      }
+    }
+  }
+  for (std::uint32_t id = 1; id <= kFrames; ++id) {
+    while (reassembler_.counters().frames_complete < id) {
+      ASSERT_GT(receiver_->take(reassembler_, counters_), 0);
+    }
+    expect_frame(id);
+  }
+  // Before the first message nobody knows that datagrams come joined.
+  EXPECT_LE(receiver_->misplaced(), 16U + kFrames - 1);
 }
 
 TEST_F(UdpInPlace, WhatWasNotExpectedComesOutRightAllTheSame) {
