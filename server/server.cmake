@@ -42,7 +42,7 @@ add_library(emit_server STATIC
   agents/host_sessions.cpp
   agents/journal_encode.cpp
   agents/receiver.cpp
-  agents/receiver_access.cpp
+  agents/receiver_access.cpp agents/receiver_connection.cpp
   agents/receiver_session.cpp
   agents/receiver_udp.cpp
   agents/recorder.cpp

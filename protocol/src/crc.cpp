@@ -151,6 +151,10 @@ bool has_crc32c_folding() noexcept {
          __builtin_cpu_supports("vpclmulqdq") != 0;
 }
 
+bool has_crc32c_wide_folding() noexcept {
+  return has_crc32c_folding() && __builtin_cpu_supports("avx512f") != 0;
+}
+
 namespace {
 
 /// x^n mod the polynomial, reflected as registers are: the highest bit is x^0.
@@ -178,7 +182,58 @@ __attribute__((target("avx2,vpclmulqdq"))) inline __m256i fold(__m256i lanes, __
                           _mm256_loadu_si256(reinterpret_cast<const __m256i*>(next)));
 }
 
+constexpr std::size_t kWideFoldBytes = 2 * kFoldBytes;
+
+__attribute__((target("avx512f,vpclmulqdq"))) inline __m512i load_wide(
+    const std::byte* from) noexcept {
+  return _mm512_loadu_si512(from);
+}
+
+__attribute__((target("avx512f,vpclmulqdq"))) inline __m512i fold_wide(
+    __m512i lanes, __m512i factors, const std::byte* next) noexcept {
+  return _mm512_xor_si512(_mm512_xor_si512(_mm512_clmulepi64_epi128(lanes, factors, 0x00),
+                                           _mm512_clmulepi64_epi128(lanes, factors, 0x11)),
+                          load_wide(next));
+}
+
+/// Of the bytes of lanes that are a message with the same remainder.
+__attribute__((target("sse4.2"))) inline std::uint32_t sum_of_lanes(
+    std::span<const std::byte> lanes) noexcept {
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < lanes.size(); i += 8) sum = _mm_crc32_u64(sum, load_u64(&lanes[i]));
+  return ~static_cast<std::uint32_t>(sum);
+}
+
 }  // namespace
+
+__attribute__((target("avx512f,vpclmulqdq,sse4.2"))) std::uint32_t crc32c_wide_folding(
+    std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  if (bytes.size() < 2 * kWideFoldBytes) return crc32c_folding(bytes, crc);
+  constexpr unsigned kBits = 8 * kWideFoldBytes;
+  const __m512i factors =
+      _mm512_set_epi64(fold_factor(kBits - 32), fold_factor(kBits + 32), fold_factor(kBits - 32),
+                       fold_factor(kBits + 32), fold_factor(kBits - 32), fold_factor(kBits + 32),
+                       fold_factor(kBits - 32), fold_factor(kBits + 32));
+  const std::byte* at = bytes.data();
+  const __m512i start = _mm512_set_epi64(0, 0, 0, 0, 0, 0, 0, static_cast<std::uint32_t>(~crc));
+  __m512i a = _mm512_xor_si512(load_wide(at), start);
+  __m512i b = load_wide(at + 64);
+  __m512i c = load_wide(at + 128);
+  __m512i d = load_wide(at + 192);
+  std::size_t left = bytes.size() - kWideFoldBytes;
+  for (at += kWideFoldBytes; left >= kWideFoldBytes; left -= kWideFoldBytes, at += kWideFoldBytes) {
+    a = fold_wide(a, factors, at);
+    b = fold_wide(b, factors, at + 64);
+    c = fold_wide(c, factors, at + 128);
+    d = fold_wide(d, factors, at + 192);
+  }
+  alignas(64) std::array<std::byte, kWideFoldBytes> lanes;
+  _mm512_store_si512(lanes.data(), a);
+  _mm512_store_si512(lanes.data() + 64, b);
+  _mm512_store_si512(lanes.data() + 128, c);
+  _mm512_store_si512(lanes.data() + 192, d);
+  return crc32c_hardware({at, left}, sum_of_lanes(lanes));
+}
 
 __attribute__((target("avx2,vpclmulqdq,sse4.2"))) std::uint32_t crc32c_folding(
     std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
@@ -201,15 +256,12 @@ __attribute__((target("avx2,vpclmulqdq,sse4.2"))) std::uint32_t crc32c_folding(
     c = fold(c, factors, at + 64);
     d = fold(d, factors, at + 96);
   }
-  // The lanes are now a message of 128 bytes with the same remainder.
   alignas(32) std::array<std::byte, kFoldBytes> lanes;
   _mm256_store_si256(reinterpret_cast<__m256i*>(lanes.data()), a);
   _mm256_store_si256(reinterpret_cast<__m256i*>(lanes.data() + 32), b);
   _mm256_store_si256(reinterpret_cast<__m256i*>(lanes.data() + 64), c);
   _mm256_store_si256(reinterpret_cast<__m256i*>(lanes.data() + 96), d);
-  std::uint64_t sum = 0;
-  for (std::size_t i = 0; i < kFoldBytes; i += 8) sum = _mm_crc32_u64(sum, load_u64(&lanes[i]));
-  return crc32c_hardware({at, left}, ~static_cast<std::uint32_t>(sum));
+  return crc32c_hardware({at, left}, sum_of_lanes(lanes));
 }
 
 #else
@@ -220,6 +272,14 @@ bool has_crc32c_instruction() noexcept {
 
 bool has_crc32c_folding() noexcept {
   return false;
+}
+
+bool has_crc32c_wide_folding() noexcept {
+  return false;
+}
+
+std::uint32_t crc32c_wide_folding(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  return crc32c_portable(bytes, crc);
 }
 
 std::uint32_t crc32c_folding(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
@@ -233,7 +293,8 @@ std::uint32_t crc32c_hardware(std::span<const std::byte> bytes, std::uint32_t cr
 #endif
 
 std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
-  static const auto best = has_crc32c_folding()       ? crc32c_folding
+  static const auto best = has_crc32c_wide_folding()  ? crc32c_wide_folding
+                           : has_crc32c_folding()     ? crc32c_folding
                            : has_crc32c_instruction() ? crc32c_hardware
                                                       : crc32c_portable;
   return best(bytes, crc);

@@ -22,6 +22,11 @@ namespace emit::protocol {
                                            std::uint32_t crc = 0) noexcept;
 [[nodiscard]] bool has_crc32c_folding() noexcept;
 
+/// The same by products of 64 bytes. Precondition: has_crc32c_wide_folding().
+[[nodiscard]] std::uint32_t crc32c_wide_folding(std::span<const std::byte> bytes,
+                                                std::uint32_t crc = 0) noexcept;
+[[nodiscard]] bool has_crc32c_wide_folding() noexcept;
+
 /// CRC-32 of zlib, PNG and MCAP (reflected 0x04C11DB7); `crc` continues an earlier call.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t crc = 0) noexcept;
 

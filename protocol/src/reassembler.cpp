@@ -152,7 +152,10 @@ FragmentStatus Reassembler::take(const FragmentHeader& header,
 
   const std::size_t first_word = header.byte_offset / kWordBytes;
   const std::size_t words = payload.size() / kWordBytes;
-  const std::size_t present = bits::count_set(slot->received, first_word, words);
+  // Where nothing but what came in order is here, the next in order is new.
+  const bool in_order = header.byte_offset == slot->prefix_bytes &&
+                        slot->received_words * kWordBytes == slot->prefix_bytes;
+  const std::size_t present = in_order ? 0 : bits::count_set(slot->received, first_word, words);
   if (present == words) return FragmentStatus::duplicate;
   if (present != 0) return FragmentStatus::overlap;
   newest_ = slot;
@@ -356,7 +359,9 @@ void Reassembler::finish(Slot& slot) noexcept {
   if (stream.has_delivered) frame.frames_lost_before = slot.frame_id - stream.delivered_id - 1;
   stream.has_delivered = true;
   stream.delivered_id = slot.frame_id;
-  frame.missing_px = pixel_count - bits::count_set(slot.received, kHeaderWords, pixel_count);
+  if (!slot.all_received()) {
+    frame.missing_px = pixel_count - bits::count_set(slot.received, kHeaderWords, pixel_count);
+  }
   frame.complete = frame.missing_px == 0;
   std::byte* pixel_memory = slot.bytes.get() + kFrameHeaderBytes;
   if (frame.complete) {

@@ -31,11 +31,14 @@ class Agent {
 
   /// TAI instant at which do_work must be called even if nothing else happens.
   [[nodiscard]] virtual std::int64_t wake_at_ns() const noexcept { return kNeverNs; }
+  /// Least time between work and the next look, 0 for most: who is not in a hurry lets work pile up
+  /// and spares those who bring it the waking.
+  [[nodiscard]] virtual std::int64_t rest_ns() const noexcept { return 0; }
   /// Readable when the outside world has work for this agent (an epoll descriptor); -1 = none.
   [[nodiscard]] virtual int wait_fd() const noexcept { return -1; }
 
   /// Rung by whoever put something on one of this agent's rings.
-  [[nodiscard]] Doorbell& doorbell() noexcept { return doorbell_; }
+  [[nodiscard]] Doorbell& doorbell() const noexcept { return doorbell_; }
 
  private:
   Doorbell& doorbell_;

@@ -285,7 +285,7 @@ int Conductor::take_images_and_slots(std::int64_t now_ns) noexcept {
 }
 
 bool Conductor::end_slot(std::int64_t now_ns) noexcept {
-  if (context_.published.claim() == nullptr) {
+  if (room_to_publish() == nullptr) {
     return false;
   }
   switch (slots_.end()) {
@@ -313,8 +313,12 @@ bool Conductor::end_slot(std::int64_t now_ns) noexcept {
   return true;
 }
 
+PublishFrame* Conductor::room_to_publish() noexcept {
+  return context_.of_room.look([this] { return context_.published.claim(); });
+}
+
 bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexcept {
-  PublishFrame* frame = context_.published.claim();
+  PublishFrame* frame = room_to_publish();
   if (frame == nullptr) {
     return false;
   }
@@ -369,7 +373,7 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
 }
 
 bool Conductor::publish_repeat(std::int64_t now_ns) noexcept {
-  PublishFrame* frame = context_.published.claim();
+  PublishFrame* frame = room_to_publish();
   if (frame == nullptr) {
     return false;
   }

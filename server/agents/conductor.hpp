@@ -120,6 +120,7 @@ class Conductor final : public Agent {
   [[nodiscard]] bool can_issue() noexcept;
   int take_images_and_slots(std::int64_t now_ns) noexcept;
   bool end_slot(std::int64_t now_ns) noexcept;
+  [[nodiscard]] PublishFrame* room_to_publish() noexcept;
   bool publish_image(const RenderDone& done, std::int64_t now_ns) noexcept;
   bool publish_repeat(std::int64_t now_ns) noexcept;
   void journal_frame(const protocol::FrameHeader& header, const Issued* issued,

@@ -167,13 +167,13 @@ int Receiver::do_work(std::int64_t now_ns) noexcept {
       }
     }
     for (auto& connection : connections_) {
-      if (connection->open() && connection->stuck && context_.host_inputs.claim() != nullptr) {
-        connection->stuck = false;
+      if (connection->open() && connection->waits() && may_go_on(*connection)) {
+        connection->stuck = connection->paused = false;
         connection->dirty = true;
         work += 1 + parse(*connection, now_ns);
         connection->reread = connection->open() && connection->socket.has_buffered();
       }
-      if (connection->open() && connection->reread && !connection->stuck) {
+      if (connection->open() && connection->reread && !connection->waits()) {
         connection->reread = false;
         work += read(*connection, now_ns);
       }
@@ -213,11 +213,11 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
   if (connection.handshaking) {
     return handshake(connection, now_ns);
   }
-  if (connection.stuck || connection.closing || connection.flush_close) {
+  if (connection.waits() || connection.closing || connection.flush_close) {
     // Only the end of the stream is of interest; anything else is thrown away or waits.
     std::array<std::byte, 4096> trash;
     const IoResult got =
-        connection.stuck ? connection.socket.peek(trash) : connection.socket.read_some(trash);
+        connection.waits() ? connection.socket.peek(trash) : connection.socket.read_some(trash);
     if (got.status == IoStatus::closed || got.status == IoStatus::failed) {
       close(connection, "closed by the peer");
     }
@@ -235,6 +235,7 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
   switch (got.status) {
     case IoStatus::done: {
       connection.parser->commit(got.bytes);
+      connection.pace.bytes(got.bytes, context_.clock.monotonic_ns());
       const int work = 1 + parse(connection, now_ns);
       connection.reread = connection.open() && connection.socket.has_buffered();
       return work;
@@ -255,9 +256,21 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
   return 1;
 }
 
+bool Receiver::may_go_on(const Connection& connection) noexcept {
+  return (!connection.stuck || context_.host_inputs.claim() != nullptr) &&
+         (!connection.paused || connection.pace.wait_ns(context_.clock.monotonic_ns()) <= 0);
+}
+
 int Receiver::parse(Connection& connection, std::int64_t now_ns) {
+  const std::int64_t monotonic_ns = context_.clock.monotonic_ns();
   int work = 0;
   while (connection.open() && !connection.closing && !connection.flush_close) {
+    if (connection.pace.in_debt(monotonic_ns)) {
+      connection.paused = true;
+      connection.dirty = true;
+      context_.counters.add(Counter::reads_paused);
+      break;
+    }
     if (connection.role == Role::host && !draining_.load(std::memory_order_acquire) &&
         context_.host_inputs.claim() == nullptr) {
       connection.stuck = true;
@@ -270,6 +283,7 @@ int Receiver::parse(Connection& connection, std::int64_t now_ns) {
       break;
     }
     ++work;
+    connection.pace.record(monotonic_ns);
     if (status == protocol::ParseStatus::record) {
       take_record(connection, record, now_ns);
       continue;
@@ -281,119 +295,6 @@ int Receiver::parse(Connection& connection, std::int64_t now_ns) {
     refuse(connection, code, std::string("record: ") + std::string(protocol::to_string(status)));
     connection.flush_close = true;
     flush(connection);
-  }
-  return work;
-}
-
-void Receiver::flush(Connection& connection) noexcept {
-  if (connection.write_lent) {
-    return;
-  }
-  while (connection.out_sent < connection.out.size()) {
-    const IoResult sent = connection.socket.write_some(
-        std::span<const std::byte>(connection.out).subspan(connection.out_sent));
-    if (sent.status != IoStatus::done) {
-      if (sent.status != IoStatus::would_block && sent.status != IoStatus::busy) {
-        close(connection, "write failed");
-      }
-      connection.dirty = true;
-      return;
-    }
-    connection.out_sent += sent.bytes;
-  }
-  if (!connection.out.empty()) {
-    connection.out.clear();
-    connection.out_sent = 0;
-    connection.dirty = true;
-  }
-  if (connection.flush_close) {
-    connection.socket.shutdown_send();
-    close(connection, "refused");
-  }
-}
-
-void Receiver::watch(Connection& connection) noexcept {
-  connection.dirty = false;
-  epoll_event event{};
-  const bool reading = !connection.stuck && !connection.closing;
-  const bool writing = (connection.handshaking && connection.socket.tls()->wants_write()) ||
-                       (!connection.write_lent && !connection.closing &&
-                        connection.out_sent < connection.out.size());
-  event.events = (reading ? std::uint32_t{EPOLLIN} : 0U) | (writing ? std::uint32_t{EPOLLOUT} : 0U);
-  event.data.u64 = connection.key();
-  if (connection.closing) {
-    // Waits for sender or recorder; a hang-up must not wake this agent over and over.
-    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.socket.fd(), nullptr);
-    return;
-  }
-  ::epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, connection.socket.fd(), &event);
-}
-
-void Receiver::close(Connection& connection, std::string_view why) noexcept {
-  if (connection.closing || connection.index >= connections_.size() ||
-      connections_[connection.index].get() != &connection) {
-    return;
-  }
-  connection.closing = true;
-  context_.receiver_events.push(EventKind::disconnected, connection.key(), 0, why);
-  if (!connection.lent) {
-    finish_close(connection);
-    return;
-  }
-  connection.dirty = true;
-  if (connection.role == Role::recorder) {
-    static_cast<void>(
-        context_.to_recorder.push({ClientCommand::Kind::remove, connection.key(), -1, 0}));
-    context_.bells.recorder.ring();
-  } else {
-    static_cast<void>(
-        context_.to_sender.push({ClientCommand::Kind::remove, connection.key(), nullptr}));
-    context_.bells.sender.ring();
-  }
-}
-
-void Receiver::finish_close(Connection& connection) noexcept {
-  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.socket.fd(), nullptr);
-  connection.socket.close();
-  if (connection.agreed_key) {
-    connection.agreed_key = false;
-    sessions_->remove_key(connection.key());
-  }
-  if (ClientCounts* counts = context_.counts_of(connection.key())) {
-    counts->end();
-  }
-  connection.client.reset();
-  connection.parser.reset();
-  connection.lent = false;
-  connection.write_lent = false;
-  context_.counters.add(Counter::connections_closed);
-}
-
-int Receiver::take_released() noexcept {
-  int work = 0;
-  const auto released = [&](std::uint32_t key) {
-    ++work;
-    Connection& connection = *connections_[connection_place(key)];
-    if (!connection.open() || connection.key() != key || !connection.lent) {
-      return;
-    }
-    connection.lent = false;
-    connection.write_lent = false;
-    connection.client.reset();
-    if (!connection.closing) {
-      // Ended by sender or recorder: too slow, or its socket failed.
-      context_.receiver_events.push(EventKind::disconnected, key, 0, "cannot keep up or failed");
-      connection.closing = true;
-    }
-    finish_close(connection);
-  };
-  while (const ClientReleased* client = context_.from_sender.front()) {
-    released(client->connection);
-    context_.from_sender.pop();
-  }
-  while (const RecorderReleased* recorder = context_.from_recorder.front()) {
-    released(recorder->connection);
-    context_.from_recorder.pop();
   }
   return work;
 }
@@ -425,9 +326,17 @@ void Receiver::check_timeouts(std::int64_t now_ns) noexcept {
     }
     if (connection->misbehaved > kMaxMisbehaved) {
       close(*connection, "too many refused messages");
-    } else if (connection->out.size() - connection->out_sent > kMaxQueuedBytes) {
+      continue;
+    }
+    if (connection->out.size() - connection->out_sent > kMaxQueuedBytes) {
       close(*connection, "does not read its answers");
-    } else if (!connection->welcomed || connection->flush_close) {
+      continue;
+    }
+    if (connection->paused) {
+      const std::int64_t wait_ns = connection->pace.wait_ns(context_.clock.monotonic_ns());
+      wake_at_ns_ = std::min(wake_at_ns_, now_ns + std::max<std::int64_t>(wait_ns, 0));
+    }
+    if (!connection->welcomed || connection->flush_close) {
       const std::int64_t end_ns = connection->since_ns + kHelloTimeoutNs;
       if (now_ns >= end_ns) {
         if (connection->handshaking) {

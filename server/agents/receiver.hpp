@@ -29,7 +29,8 @@ namespace emit::server {
 
 /// Takes host frames from the UDP port and everything that arrives over TCP; checks what a message
 /// alone can tell, answers refusals with a Status, hands the rest to the conductor in order of
-/// arrival. When the conductor's ring is full it stops reading, so that the kernel's buffers fill.
+/// arrival. When the conductor's ring is full it stops reading, so that the kernel's buffers fill;
+/// so it does with a connection that sends more than its pace.
 ///
 /// Owns every connection. Frames and journal are written by sender and recorder, which are lent the
 /// descriptor and give it back before it is closed.
@@ -94,6 +95,8 @@ class Receiver final : public Agent {
   int accept_connections(std::int64_t now_ns);
   int read(Connection& connection, std::int64_t now_ns);
   int parse(Connection& connection, std::int64_t now_ns);
+  /// Whether what a connection waits for has come.
+  [[nodiscard]] bool may_go_on(const Connection& connection) noexcept;
   void take_record(Connection& connection, const protocol::Record& record, std::int64_t now_ns);
   void take_host_frame(Connection& connection, std::span<const std::byte> bytes,
                        std::int64_t now_ns);

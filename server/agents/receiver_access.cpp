@@ -138,11 +138,14 @@ bool Receiver::admit(TcpSocket socket, const SocketAddress& peer, std::int64_t n
   connection.lent = false;
   connection.write_lent = false;
   connection.stuck = false;
+  connection.paused = false;
   connection.dirty = false;
   connection.handshaking = tls_.has_value();
   connection.reread = false;
   connection.agreed_key = false;
   connection.misbehaved = 0;
+  connection.pace =
+      ReadPace(config_.access.max_host_frames_hz + config_.access.max_control_records_hz);
   connection.since_ns = now_ns;
   connection.out.clear();
   connection.out_sent = 0;

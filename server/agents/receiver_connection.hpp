@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "agents/read_pace.hpp"
 #include "agents/receiver.hpp"
 #include "io/tls_session.hpp"
 
@@ -23,11 +24,13 @@ struct Receiver::Connection {
   bool lent = false;         ///< sender or recorder hold it (or its client) and must give it back
   bool write_lent = false;   ///< they write to the descriptor: nobody else may
   bool stuck = false;        ///< the conductor's ring is full: records wait in the parser
+  bool paused = false;       ///< sent more than its pace: records wait in the parser
   bool dirty = false;        ///< watch() has to be called
   bool handshaking = false;  ///< TLS: neither side has proved itself yet
   bool reread = false;       ///< bytes wait where the descriptor does not show them
   bool agreed_key = false;   ///< sessions_ knows the key of this connection
   std::uint32_t misbehaved = 0;
+  ReadPace pace;
   std::int64_t since_ns = 0;
   std::optional<protocol::RecordParser> parser;  ///< taken on connecting: a large buffer
   std::vector<std::byte> out;
@@ -35,6 +38,8 @@ struct Receiver::Connection {
   std::unique_ptr<SenderClient> client;
 
   [[nodiscard]] bool open() const noexcept { return static_cast<bool>(socket); }
+  /// Nothing is read: what was sent waits here and in the kernel.
+  [[nodiscard]] bool waits() const noexcept { return stuck || paused; }
   /// Key of the connection on rings: the place in the table and how often it was used.
   [[nodiscard]] std::uint32_t key() const noexcept {
     return generation << kConnectionPlaceBits | index;

@@ -465,6 +465,7 @@ void Receiver::refuse(Connection& connection, StatusCode code, const std::string
                       std::uint64_t host_frame_number) {
   const std::uint64_t count = context_.counters.add(counter_of(code));
   ++connection.misbehaved;
+  connection.pace.refusal(context_.clock.monotonic_ns());
   context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count, text);
   send_status(connection, code, text, host_frame_number, count);
 }

@@ -43,6 +43,8 @@ class Recorder final : public Agent {
   int do_work(std::int64_t now_ns) noexcept override;
   void on_stop() noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
+  /// A frame's line is worth no wake-up of its own.
+  [[nodiscard]] std::int64_t rest_ns() const noexcept override { return 2'000'000; }
   [[nodiscard]] int wait_fd() const noexcept override { return epoll_.get(); }
 
   /// Any thread; true when every line that the conductor handed over reached file and peers.

@@ -76,9 +76,15 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
         job_prepared_ = true;
       }
       const double expected_ms = choose_rung(*job, now_ns);
-      const int slot = source_->submit(job->request);
-      if (slot < 0) {
-        // A slot comes free when the sender or the conductor is done with one; both ring.
+      const auto slot = context_.of_slots.look([&]() -> std::optional<renderer::SlotIndex> {
+        const int free = source_->submit(job->request);
+        if (free < 0) {
+          return std::nullopt;
+        }
+        return static_cast<renderer::SlotIndex>(free);
+      });
+      if (!slot) {
+        // Whoever is done with one rings.
         if (!starved_) {
           context_.counters.add(Counter::no_free_slot);
           starved_ = true;
@@ -87,8 +93,8 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       }
       starved_ = false;
       job_prepared_ = false;
-      in_flight_[(first_ + count_) % kDepth] = {static_cast<renderer::SlotIndex>(slot), now_ns,
-                                                expected_ms, context_.clock.monotonic_ns()};
+      in_flight_[(first_ + count_) % kDepth] = {*slot, now_ns, expected_ms,
+                                                context_.clock.monotonic_ns()};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;

@@ -85,12 +85,27 @@ void AgentRunner::run() noexcept {
   if (!started) {
     return;
   }
+  bool worked = false;
   while (!stop_.load(std::memory_order_acquire)) {
-    if (turn() == 0) {
-      sleep();
+    if (turn() != 0) {
+      worked = true;
+      continue;
     }
+    if (worked) {
+      rest();
+      worked = false;
+    }
+    sleep();
   }
   agent_.on_stop();
+}
+
+void AgentRunner::rest() noexcept {
+  // The doorbell is not armed: whoever rings it goes on at once, and the next look sees the work.
+  if (const std::int64_t rest_ns = agent_.rest_ns(); rest_ns > 0) {
+    const timespec time{0, static_cast<long>(rest_ns)};
+    ::nanosleep(&time, nullptr);
+  }
 }
 
 void AgentRunner::sleep() noexcept {

@@ -43,6 +43,7 @@ class AgentRunner {
  private:
   void run() noexcept;
   int turn() noexcept;
+  void rest() noexcept;
   void sleep() noexcept;
   /// Sets the timer to a wall instant, for good until it is set anew. False: there is none.
   [[nodiscard]] bool arm_timer(std::int64_t wake_ns) noexcept;

@@ -129,8 +129,7 @@ int Sender::take_published() noexcept {
       break;
     }
   }
-  if (work > 0) {
-    // The conductor may wait for room.
+  if (work > 0 && context_.of_room.end()) {
     context_.bells.conductor.ring();
   }
   return work;
@@ -197,7 +196,9 @@ void Sender::hold(const Image& image) noexcept {
 void Sender::let_go(const Image& image) noexcept {
   if (--holds_[image.slot] == 0) {
     image.source->release(image.slot);
-    context_.bells.render.ring();
+    if (context_.of_slots.end()) {
+      context_.bells.render.ring();
+    }
   }
 }
 
@@ -232,14 +233,17 @@ int Sender::send_all() noexcept {
 }
 
 bool Sender::advance(SenderClient& client) noexcept {
+  auto turn = SenderClient::Turn::full;
   if (!client.busy() && client.next < end_) {
+    // The others begin at about this time: nobody's first byte waits for somebody else's frame.
+    turn = clients_.size() > 1 ? SenderClient::Turn::brief : turn;
     client.next = std::max(client.next, first_);
     const Entry& next = entry(client.next);
     client.in_transit = client.next++;
     pass_over_unwanted(client);
     client.begin(next.header, next.image, context_.clock.tai_ns());
   }
-  switch (client.send(batch_, context_)) {
+  switch (client.send(batch_, context_, turn)) {
     case SenderClient::Progress::idle:
       return false;
     case SenderClient::Progress::more:

@@ -25,8 +25,10 @@ class SenderClient {
   /// Begins a publication; `header` is the common part. Precondition: !busy().
   virtual void begin(const protocol::FrameHeader& header, const Image& image,
                      std::int64_t now_ns) noexcept = 0;
+  /// How much to move on: brief where others wait for their first byte.
+  enum class Turn : std::uint8_t { brief, full };
   /// Moves a bounded amount on. `finished`: the last byte went; call complete().
-  [[nodiscard]] virtual Progress send(UdpBatch& batch, Context& context) noexcept = 0;
+  [[nodiscard]] virtual Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept = 0;
   /// Makes what is left of the publication on its way independent of the source's memory, so that
   /// the source gets its slot back however slow the client is. Precondition: busy().
   virtual void spill() noexcept = 0;

@@ -12,6 +12,7 @@ namespace {
 /// What one turn copies at most, so that the other clients advance beside it. More than a socket
 /// takes in a turn: a copy to memory is the quickest of all, and whoever is done first waits least.
 constexpr std::size_t kTurnBytes = 2u << 20;
+constexpr std::size_t kBriefBytes = 64u << 10;
 
 }  // namespace
 
@@ -85,11 +86,11 @@ void ShmClient::copy(std::size_t budget_bytes) noexcept {
   }
 }
 
-SenderClient::Progress ShmClient::send(UdpBatch& /*batch*/, Context& context) noexcept {
+SenderClient::Progress ShmClient::send(UdpBatch& /*batch*/, Context& context, Turn turn) noexcept {
   if (!busy_) {
     return Progress::idle;
   }
-  copy(kTurnBytes);
+  copy(turn == Turn::brief ? kBriefBytes : kTurnBytes);
   if (plane_ < planes_.size()) {
     return Progress::more;
   }

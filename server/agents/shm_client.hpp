@@ -28,7 +28,7 @@ class ShmClient final : public SenderClient {
 
   void begin(const protocol::FrameHeader& header, const Image& image,
              std::int64_t now_ns) noexcept override;
-  [[nodiscard]] Progress send(UdpBatch& batch, Context& context) noexcept override;
+  [[nodiscard]] Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept override;
   /// Copies the rest now: that is all the source has to wait for.
   void spill() noexcept override;
   [[nodiscard]] std::uint32_t connection() const noexcept override { return 0; }

@@ -9,6 +9,7 @@ namespace {
 
 /// What one turn hands over at most, so that several clients advance side by side.
 constexpr std::size_t kTcpTurnBytes = 512u << 10;
+constexpr std::size_t kTcpBriefBytes = 64u << 10;
 constexpr int kUdpTurnCalls = 6;
 /// Of a frame, read to make its parity in one turn.
 constexpr std::size_t kParityTurnBytes = 256u << 10;
@@ -72,14 +73,14 @@ void SocketClient::make_fragments(std::uint32_t frame_id) noexcept {
       pixels_);
 }
 
-SocketClient::Progress SocketClient::send(UdpBatch& batch, Context& context) noexcept {
-  return params_.udp ? send_udp(batch, context) : send_tcp(context);
+SocketClient::Progress SocketClient::send(UdpBatch& batch, Context& context, Turn turn) noexcept {
+  return params_.udp ? send_udp(batch, context, turn) : send_tcp(context, turn);
 }
 
-SocketClient::Progress SocketClient::send_tcp(Context& context) noexcept {
+SocketClient::Progress SocketClient::send_tcp(Context& context, Turn turn) noexcept {
   std::array<std::span<const std::byte>, 3> pieces;
   std::size_t count = 0;
-  std::size_t budget = kTcpTurnBytes;
+  std::size_t budget = turn == Turn::brief ? kTcpBriefBytes : kTcpTurnBytes;
   const auto add = [&](std::span<const std::byte> bytes, std::size_t from) {
     if (from < bytes.size() && budget > 0) {
       const std::size_t length = std::min(bytes.size() - from, budget);
@@ -119,9 +120,11 @@ SocketClient::Progress SocketClient::send_tcp(Context& context) noexcept {
   return Progress::more;
 }
 
-SocketClient::Progress SocketClient::send_udp(UdpBatch& batch, Context& context) noexcept {
+SocketClient::Progress SocketClient::send_udp(UdpBatch& batch, Context& context,
+                                              Turn turn) noexcept {
   const int fd = params_.udp_socket.fd();
-  for (int call = 0; call < kUdpTurnCalls; ++call) {
+  const int calls = turn == Turn::brief ? 1 : kUdpTurnCalls;
+  for (int call = 0; call < calls; ++call) {
     // What somebody waits for goes first, then the frame, then its parity.
     const bool again = resend_ && resend_->pending();
     if (!again && !busy_) {

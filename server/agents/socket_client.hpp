@@ -41,7 +41,7 @@ class SocketClient final : public SenderClient {
 
   void begin(const protocol::FrameHeader& header, const Image& image,
              std::int64_t now_ns) noexcept override;
-  [[nodiscard]] Progress send(UdpBatch& batch, Context& context) noexcept override;
+  [[nodiscard]] Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept override;
   /// Moves what is left of the frame into this client's own memory.
   void spill() noexcept override;
   [[nodiscard]] bool may_ask_again() const noexcept override { return params_.resend_frames > 0; }
@@ -55,8 +55,8 @@ class SocketClient final : public SenderClient {
   }
 
  private:
-  [[nodiscard]] Progress send_tcp(Context& context) noexcept;
-  [[nodiscard]] Progress send_udp(UdpBatch& batch, Context& context) noexcept;
+  [[nodiscard]] Progress send_tcp(Context& context, Turn turn) noexcept;
+  [[nodiscard]] Progress send_udp(UdpBatch& batch, Context& context, Turn turn) noexcept;
   void make_fragments(std::uint32_t frame_id) noexcept;
 
   Params params_;

@@ -18,6 +18,7 @@
 #include "rt/doorbell.hpp"
 #include "rt/histogram.hpp"
 #include "rt/prediction_error.hpp"
+#include "rt/shortage.hpp"
 #include "rt/spsc_ring.hpp"
 #include "telemetry/frame_trace.hpp"
 
@@ -137,6 +138,9 @@ struct Context {
   SpscRing<ResendCommand> resends{64};       // receiver -> sender
   SpscRing<RecorderCommand> to_recorder;     // receiver -> recorder
   SpscRing<RecorderReleased> from_recorder;  // recorder -> receiver
+
+  Shortage of_room;   ///< on `published`: the conductor waits for the sender
+  Shortage of_slots;  ///< of the source: render waits for whoever releases one
 
   EventLog conductor_events{256, counters};
   EventLog receiver_events{256, counters};

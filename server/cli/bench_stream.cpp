@@ -37,6 +37,7 @@ struct Row {
   std::uint64_t lost = 0;
   std::uint64_t late = 0;
   Samples delay_us;
+  Samples own_us;  ///< paced: the daemon's share of it
   std::optional<double> gbit_s;
   std::optional<double> cpu_frac;
   Json more = Json::object();  ///< beyond the common keys
@@ -142,7 +143,6 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   row.cpu_frac = (daemon->cpu_seconds() - cpu_before_s) / seconds;
 
   PacedCounts counts;
-  Samples own_us;
   std::string reason;
   std::string advice;
   for (const auto& client : clients) {
@@ -160,7 +160,7 @@ Result<Row> StreamBench::paced(const std::string& transport) {
     counts.repeated += counters.repeated;
     counts.unflagged_gaps += client->report().unflagged_gaps();
     add_delays(client->report().ready_to_received_ms(), row.delay_us);
-    add_delays(client->report().ready_to_send_ms(), own_us);
+    add_delays(client->report().ready_to_send_ms(), row.own_us);
     if (advice.empty()) advice = client->advice();
     if (reason.empty()) reason = client->error();
   }
@@ -179,8 +179,6 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   row.more.set("partial", counts.partial).set("gaps", counts.gaps).set("skipped", counts.skipped);
   row.more.set("unflagged_gaps", counts.unflagged_gaps).set("crc_errors", counts.crc_errors);
   row.more.set("os_drops", counts.os_drops).set("repeated", counts.repeated);
-  row.more.set("own_p50_us", own_us.percentile(0.5)).set("own_p99_us", own_us.percentile(0.99));
-  row.more.set("own_p999_us", own_us.percentile(0.999)).set("own_max_us", own_us.percentile(1.0));
   row.more.set("delay", "pixels ready in the daemon to last byte at the client");
   row.more.set("own", "pixels ready in the daemon to this client's first byte given away");
   return row;
@@ -227,16 +225,18 @@ Result<void> StreamBench::lossy() {
 Result<Row> StreamBench::bare_paced() {
   YardstickOptions options = yardstick_;
   options.frames = command_.frames;
-  auto delay = measure_bare_delay_us(options, command_.clients, command_.rate_hz);
-  if (!delay) return tl::unexpected(delay.error());
+  auto delays = measure_bare_delays(options, command_.clients, command_.rate_hz);
+  if (!delays) return tl::unexpected(delays.error());
   Row row;
   row.transport = "bare-tcp-paced";
   row.clients = command_.clients;
   row.rate_hz = command_.rate_hz;
-  row.frames = delay->count();
-  row.delay_us = std::move(*delay);
+  row.frames = delays->delay_us.count();
+  row.delay_us = std::move(delays->delay_us);
+  row.own_us = std::move(delays->own_us);
   row.gbit_s = 8e-9 * static_cast<double>(options.frame_bytes) * row.clients * command_.rate_hz;
-  row.more.set("delay", "start of the slot to last byte at the client, no service in between");
+  row.more.set("delay", "ready to last byte at the client: a thread that sends, no service");
+  row.more.set("own", "ready to this client's first byte given away by the thread that sends");
   return row;
 }
 
@@ -379,6 +379,12 @@ Json StreamBench::json() const {
     json.set("p50_us", us(0.5)).set("p99_us", us(0.99)).set("p999_us", us(0.999));
     json.set("max_us", us(1.0)).set("gbit_s", optional_json(row.gbit_s));
     json.set("cpu_frac", optional_json(row.cpu_frac));
+    if (!row.own_us.empty()) {
+      json.set("own_p50_us", row.own_us.percentile(0.5));
+      json.set("own_p99_us", row.own_us.percentile(0.99));
+      json.set("own_p999_us", row.own_us.percentile(0.999));
+      json.set("own_max_us", row.own_us.percentile(1.0));
+    }
     json.merge(row.more);
     results.push(std::move(json));
   }
@@ -387,18 +393,19 @@ Json StreamBench::json() const {
 
 void StreamBench::print(std::FILE* out) const {
   TextTable table({"transport", "clients", "rate Hz", "frames", "lost", "late", "p50 us", "p99 us",
-                   "p99.9 us", "max us", "Gbit/s", "CPU"});
+                   "p99.9 us", "max us", "own p99.9", "Gbit/s", "CPU"});
   for (const Row& row : rows_) {
     const auto count = [](std::uint64_t value) { return fmt::format("{}", value); };
-    const auto us = [&](double frac) {
-      return row.delay_us.empty() ? "-" : fmt::format("{:.0f}", row.delay_us.percentile(frac));
+    const auto us_of = [](const Samples& samples, double frac) {
+      return samples.empty() ? "-" : fmt::format("{:.0f}", samples.percentile(frac));
     };
+    const auto us = [&](double frac) { return us_of(row.delay_us, frac); };
     const auto number = [](const std::optional<double>& value, int digits) {
       return value ? fmt::format("{:.{}f}", *value, digits) : "-";
     };
     table.add({row.transport, count(row.clients), row.rate_hz ? number(row.rate_hz, 0) : "max",
                count(row.frames), count(row.lost), count(row.late), us(0.5), us(0.99), us(0.999),
-               us(1.0), number(row.gbit_s, 2), number(row.cpu_frac, 2)});
+               us(1.0), us_of(row.own_us, 0.999), number(row.gbit_s, 2), number(row.cpu_frac, 2)});
   }
   fmt::print(out, "{}x{}, loopback\n{}", command_.width_px, command_.height_px, table.to_string());
 }

@@ -20,6 +20,7 @@ StreamClient::StreamClient(std::unique_ptr<server::FrameClient> client,
     : client_(std::move(client)),
       channel_(std::move(channel)),
       keep_pixels_(options.keep_pixels),
+      on_frame_(options.on_frame),
       report_(options.subscribe.every_nth) {
   thread_ = std::thread([this] { run(); });
 }
@@ -51,7 +52,7 @@ void StreamClient::run() {
                                              ? protocol::crc32c(std::as_bytes(frame.pixels))
                                              : frame.header.payload_crc32c;
     }
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     if (!received) {
       ended_ = true;
       error_ = received.error().text;
@@ -61,13 +62,17 @@ void StreamClient::run() {
     last_.header = (*received)->header;
     if (keep_pixels_) last_.pixels.assign((*received)->pixels.begin(), (*received)->pixels.end());
     ++count_;
-    arrived_.notify_all();
+    if (count_ >= wanted_) arrived_.notify_all();
+    const std::uint64_t count = count_;
+    lock.unlock();
+    if (on_frame_) on_frame_(count);
   }
 }
 
 bool StreamClient::wait_for_host_frame(std::uint64_t host_frame_number,
                                        std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
+  wanted_ = 0;
   const auto here = [&] {
     return count_ > 0 && last_.header.host_frame_number >= host_frame_number;
   };
@@ -77,6 +82,7 @@ bool StreamClient::wait_for_host_frame(std::uint64_t host_frame_number,
 
 bool StreamClient::wait_for_frames(std::uint64_t frames, std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
+  wanted_ = frames;
   arrived_.wait_for(lock, timeout, [&] { return ended_ || count_ >= frames; });
   return count_ >= frames;
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -26,6 +27,8 @@ class StreamClient {
     std::string url;
     server::SubscribeOptions subscribe;
     bool keep_pixels = false;  ///< of the newest frame, for last_frame()
+    /// On the client's thread, behind each frame: how many have come.
+    std::function<void(std::uint64_t)> on_frame;
   };
   [[nodiscard]] static physics::Result<std::unique_ptr<StreamClient>> start(const Options& options);
   ~StreamClient();
@@ -75,6 +78,7 @@ class StreamClient {
   std::unique_ptr<server::FrameClient> client_;
   server::ChannelDescription channel_;
   bool keep_pixels_;
+  std::function<void(std::uint64_t)> on_frame_;
   std::atomic<bool> stop_{false};
   std::atomic<bool> paused_{false};
 
@@ -82,6 +86,7 @@ class StreamClient {
   std::condition_variable arrived_;
   Snapshot last_;
   std::uint64_t count_ = 0;
+  std::uint64_t wanted_ = 0;  // who waits is not woken before as many have come
   bool ended_ = false;
   std::string error_;
 

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <ctime>
+#include <mutex>
 
 #include "stream_client.hpp"
 
@@ -52,36 +54,60 @@ Result<StreamThroughput> StreamThroughput::start(const config::DaemonConfig& con
 
 Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std::uint64_t frames,
                                                   std::uint32_t window) {
-  StreamClient::Options options;
-  options.url = scheme + "://" + (scheme == "shm" ? shm_ : daemon_.control_address());
-  options.subscribe.in_place = true;
-  auto client = StreamClient::start(options);
-  if (!client) return tl::unexpected(client.error());
-  constexpr auto kTimeout = std::chrono::seconds(20);
-  const auto ask = [&]() -> Result<void> {
+  std::mutex mutex;  // of what follows: asked for by this thread and by the client's
+  bool measuring = false;
+  std::uint64_t asked = 0;
+  std::uint64_t before = 0;  // frames taken when the measurement began
+  std::uint64_t taken = 0;   // since
+  Result<void> sent;
+  const auto ask = [&] {
     protocol::HostFrameData frame;
     frame.run_id = 1;
     frame.frame_number = ++last_host_frame_;
     frame.sim_time_ns = static_cast<std::int64_t>(last_host_frame_) * 1'000'000;
-    return host_->send(frame);
+    ++asked;
+    if (auto result = host_->send(frame); !result) sent = std::move(result);
   };
+  const auto ask_ahead = [&] {
+    while (sent && asked < std::min(frames, taken + window)) ask();
+  };
+  StreamClient::Options options;
+  options.url = scheme + "://" + (scheme == "shm" ? shm_ : daemon_.control_address());
+  options.subscribe.in_place = true;
+  // At once where the frame is taken: another thread between the two would be no part of a stream.
+  options.on_frame = [&](std::uint64_t count) {
+    const std::lock_guard lock(mutex);
+    if (!measuring || count <= before) return;
+    taken = count - before;
+    ask_ahead();
+  };
+  auto client = StreamClient::start(options);
+  if (!client) return tl::unexpected(client.error());
   // The first one shows that the subscription has reached the sender.
-  std::uint64_t asked = 0;
-  for (; asked == 0 || !(*client)->wait_for_frames(1, std::chrono::milliseconds(50)); ++asked) {
-    if (auto sent = ask(); !sent) return tl::unexpected(sent.error());
+  do {
+    const std::lock_guard lock(mutex);
+    ask();
     constexpr std::uint64_t kPatience = 100;
     if (asked > kPatience) return physics::make_error(physics::ErrorCode::io, "no frame came");
-  }
-  const std::uint64_t before = (*client)->frames();
+    if (!sent) return tl::unexpected(sent.error());
+  } while (!(*client)->wait_for_frames(1, std::chrono::milliseconds(50)));
+  constexpr auto kTimeout = std::chrono::seconds(20);
   YardstickResult result;
   const double cpu_before_s = daemon_.cpu_seconds() + process_cpu_s();
   const auto start = std::chrono::steady_clock::now();
-  for (std::uint64_t k = 0; k < frames; ++k) {
-    const std::uint64_t needed = before + k + 1 > window ? before + k + 1 - window : 0;
-    if (!(*client)->wait_for_frames(needed, kTimeout)) break;
-    if (auto sent = ask(); !sent) return tl::unexpected(sent.error());
+  {
+    const std::lock_guard lock(mutex);
+    before = (*client)->frames();
+    measuring = true;
+    asked = 0;
+    ask_ahead();
   }
-  const bool complete = (*client)->wait_for_frames(before + frames, kTimeout);
+  bool complete = false;
+  for (std::uint64_t seen = before, last = 0; !complete && seen != last;) {
+    last = seen;
+    complete = (*client)->wait_for_frames(before + frames, kTimeout);
+    seen = (*client)->frames();
+  }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.cpu_s = daemon_.cpu_seconds() + process_cpu_s() - cpu_before_s;
   (*client)->stop();
@@ -91,7 +117,7 @@ Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std
   if (!complete) {
     return physics::make_error(physics::ErrorCode::io,
                                fmt::format("{}: {} of {} frames came. {}", scheme, result.frames,
-                                           frames, (*client)->error()));
+                                           frames, sent ? (*client)->error() : sent.error().text));
   }
   return result;
 }

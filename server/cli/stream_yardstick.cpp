@@ -16,10 +16,12 @@
 #include <cstring>
 #include <fstream>
 #include <optional>
+#include <span>
 #include <sstream>
 #include <thread>
 #include <vector>
 
+#include "emit/protocol/frame_header.hpp"
 #include "rt/fd.hpp"
 #include "subprocess.hpp"
 
@@ -105,7 +107,7 @@ physics::Result<TcpPair> tcp_pair() {
   return out;
 }
 
-bool send_all(int fd, const std::vector<std::byte>& bytes) {
+bool send_all(int fd, std::span<const std::byte> bytes) {
   for (std::size_t at = 0; at < bytes.size();) {
     const ssize_t sent = ::send(fd, bytes.data() + at, bytes.size() - at, MSG_NOSIGNAL);
     if (sent <= 0) return false;
@@ -276,8 +278,8 @@ physics::Result<YardstickResult> measure_bare_udp(const YardstickOptions& option
   return result;
 }
 
-physics::Result<Samples> measure_bare_delay_us(const YardstickOptions& options,
-                                               std::uint32_t clients, double rate_hz) {
+physics::Result<BareDelays> measure_bare_delays(const YardstickOptions& options,
+                                                std::uint32_t clients, double rate_hz) {
   std::vector<TcpPair> pairs;
   for (std::uint32_t i = 0; i < clients; ++i) {
     auto pair = tcp_pair();
@@ -288,7 +290,11 @@ physics::Result<Samples> measure_bare_delay_us(const YardstickOptions& options,
   const auto frames = static_cast<std::size_t>(options.frames);
   const auto period =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / rate_hz));
-  const auto start = Clock::now() + period;
+  const auto us = [](Clock::duration time) {
+    return std::chrono::duration<double, std::micro>(time).count();
+  };
+  BareDelays out;
+  std::vector<Clock::time_point> ready(frames);
   std::vector<std::vector<Clock::time_point>> arrived(clients);
   std::vector<std::thread> receivers;
   for (std::uint32_t i = 0; i < clients; ++i) {
@@ -297,22 +303,40 @@ physics::Result<Samples> measure_bare_delay_us(const YardstickOptions& options,
       std::vector<std::byte> frame(options.frame_bytes);
       while (arrived[i].size() < frames && receive_all(pairs[i].receiver.get(), frame)) {
         arrived[i].push_back(Clock::now());
+        // Emitd's clients do so too: it keeps the cores as busy.
+        static_cast<void>(protocol::crc32c(frame));
       }
     });
   }
+  std::atomic<std::size_t> published{0};
+  std::thread sender([&] {
+    for (std::size_t k = 0; k < frames; ++k) {
+      for (std::size_t seen = published.load(); seen <= k; seen = published.load()) {
+        published.wait(seen);
+      }
+      // A piece for everybody first.
+      const std::span<const std::byte> image(images[k % kImages]);
+      const auto first = image.first(std::min<std::size_t>(image.size(), 64u << 10));
+      for (const TcpPair& pair : pairs) {
+        out.own_us.add(us(Clock::now() - ready[k]));
+        static_cast<void>(send_all(pair.sender.get(), first));
+      }
+      for (const TcpPair& pair : pairs) {
+        static_cast<void>(send_all(pair.sender.get(), image.subspan(first.size())));
+      }
+    }
+  });
+  const auto start = Clock::now() + period;
   for (std::size_t k = 0; k < frames; ++k) {
     std::this_thread::sleep_until(start + static_cast<Clock::rep>(k) * period);
-    for (const TcpPair& pair : pairs) {
-      static_cast<void>(send_all(pair.sender.get(), images[k % kImages]));
-    }
+    ready[k] = Clock::now();
+    published.store(k + 1);
+    published.notify_one();
   }
+  sender.join();
   for (std::thread& receiver : receivers) receiver.join();
-  Samples out;
   for (const auto& times : arrived) {
-    for (std::size_t k = 0; k < times.size(); ++k) {
-      const auto slot = start + static_cast<Clock::rep>(k) * period;
-      out.add(std::chrono::duration<double, std::micro>(times[k] - slot).count());
-    }
+    for (std::size_t k = 0; k < times.size(); ++k) out.delay_us.add(us(times[k] - ready[k]));
   }
   return out;
 }

@@ -33,11 +33,17 @@ struct YardstickResult {
 /// sendmsg() with UDP_SEGMENT and recvmmsg() with UDP_GRO of datagrams as large and as many as
 /// emitd's. Errors: io.
 [[nodiscard]] physics::Result<YardstickResult> measure_bare_udp(const YardstickOptions& options);
-/// One thread that sends a frame to each of `clients` TCP connections at a fixed rate: delay from
-/// the slot's start to the last byte at each, us. The least that any daemon adds on this machine.
-/// Errors: io.
-[[nodiscard]] physics::Result<Samples> measure_bare_delay_us(const YardstickOptions& options,
-                                                             std::uint32_t clients, double rate_hz);
+/// From the moment a frame is ready.
+struct BareDelays {
+  Samples own_us;    ///< to each client's first byte given away
+  Samples delay_us;  ///< to the last byte at each client
+};
+/// One thread that has a frame ready at a fixed rate and wakes another, which sends it to each of
+/// `clients` TCP connections, whose receivers sum it: the least that any daemon with a thread for
+/// sending adds on this machine, with as much else to do. Errors: io.
+[[nodiscard]] physics::Result<BareDelays> measure_bare_delays(const YardstickOptions& options,
+                                                              std::uint32_t clients,
+                                                              double rate_hz);
 /// Gbit/s of `iperf3` over loopback TCP for `seconds`. Errors: not_found (no such program), io.
 [[nodiscard]] physics::Result<double> measure_iperf3_gbit_s(const std::filesystem::path& directory,
                                                             int seconds);

@@ -191,16 +191,21 @@ void UdpFrameReceiver::push_data(std::size_t index, protocol::Reassembler& reass
 int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& counters) {
   const Expected expected = reassembler.expected();
   std::array<std::size_t, kBatch + 1> from{};
-  for (std::size_t i = 0; i < batch_; ++i) {
-    from[i + 1] = plan(i, expected, from[i]);
-  }
+  unsigned batch = 0;
+  do {
+    from[batch + 1] = plan(batch, expected, from[batch]);
+    ++batch;
+    // Behind the frame's end nothing is expected: it would be received to one place and copied to
+    // another. Of single datagrams that is little, and calls count more.
+  } while (batch < (segments_ > 1 ? kJoinedBatch : kBatch) &&
+           (segments_ == 1 || from[batch] < expected.rest.size()));
   // Natively: Asio knows neither many messages per call nor control messages (drops, UDP_GRO).
-  const int received = ::recvmmsg(socket_.fd(), headers_.data(), batch_, MSG_DONTWAIT, nullptr);
+  const int received = ::recvmmsg(socket_.fd(), headers_.data(), batch, MSG_DONTWAIT, nullptr);
   const auto taken = static_cast<std::size_t>(std::max(received, 0));
   for (std::size_t i = 0; i < taken; ++i) {
     read_control(i, counters);
   }
-  drained_ = taken < batch_;
+  drained_ = taken < batch;
   std::size_t in_place = 0;
   while (in_place < taken && messages_[in_place].planned > 0 &&
          as_planned(messages_[in_place], expected, from[in_place])) {
@@ -211,6 +216,7 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
   for (std::size_t i = in_place; i < taken; ++i) {
     bring_together(i);
   }
+  misplaced_ += taken - in_place;
   for (std::size_t i = 0; i < taken; ++i) {
     if (i < in_place) {
       push_planned(messages_[i], reassembler, counters);
@@ -218,13 +224,16 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
       push_data(i, reassembler, counters);
     }
   }
-  if (taken > 0) {
-    const Message& first = messages_[0];
-    segments_ = std::clamp<std::size_t>(
-        first.segment_bytes == 0 ? 1
-                                 : (first.bytes + first.segment_bytes - 1) / first.segment_bytes,
-        1, kMaxSegments);
-    batch_ = segments_ > 1 ? kJoinedBatch : kBatch;
+  std::size_t joined = 0;
+  for (std::size_t i = 0; i < taken; ++i) {
+    // What is left for a frame's last message says nothing about those to come.
+    if (i < in_place && from[i + 1] == expected.rest.size()) continue;
+    const Message& message = messages_[i];
+    const std::size_t bytes = std::max<std::size_t>(message.segment_bytes, 1);
+    joined = std::max(joined, (message.bytes + bytes - 1) / bytes);
+  }
+  if (joined > 0) {
+    segments_ = std::min(joined, kMaxSegments);
   }
   return std::max(received, 0);
 }

@@ -37,6 +37,8 @@ class UdpFrameReceiver {
   int take(protocol::Reassembler& reassembler, ReceiveCounters& counters);
   /// True when the last take() left nothing in the socket.
   [[nodiscard]] bool drained() const noexcept { return drained_; }
+  /// Messages so far that were not received to their place, but brought there.
+  [[nodiscard]] std::uint64_t misplaced() const noexcept { return misplaced_; }
 
  private:
   static constexpr unsigned kBatch = 16;
@@ -72,9 +74,9 @@ class UdpFrameReceiver {
   void push_data(std::size_t index, protocol::Reassembler& reassembler, ReceiveCounters& counters);
 
   UdpSocket socket_;
-  unsigned batch_ = kBatch;
   bool drained_ = true;
-  std::size_t segments_ = 1;  // joined in the message before
+  std::uint64_t misplaced_ = 0;
+  std::size_t segments_ = 1;  // joined in the messages before
   std::uint64_t buffer_bytes_ = 0;
   std::uint32_t drops_seen_ = 0;
   std::vector<std::byte> data_;

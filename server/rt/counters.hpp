@@ -53,6 +53,7 @@ namespace emit::server {
   X(host_sessions, "authenticated sessions that hosts began")                        \
   X(host_frames_over_rate, "host frames refused: access.max_host_frames_hz")         \
   X(control_over_rate, "control records refused: access.max_control_records_hz")     \
+  X(reads_paused, "times a connection was not read on: it sent more than its pace")  \
   X(clients_disconnected_slow, "clients disconnected: fell behind with every_frame") \
   X(recorders_disconnected_slow, "recorders disconnected: fell behind")              \
   X(frames_submitted, "frames issued to the source")                                 \

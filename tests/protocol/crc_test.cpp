@@ -55,15 +55,24 @@ TEST(Crc32c, InstructionAndTablesAgreeForEveryLengthAndAlignment) {
   }
 }
 
-TEST(Crc32c, FoldingAndTablesAgreeForEveryLengthAndAlignment) {
-  if (!has_crc32c_folding()) GTEST_SKIP() << "the CPU has no carry-less product of 32 bytes";
+void expect_as_by_tables(std::uint32_t (*crc)(std::span<const std::byte>, std::uint32_t) noexcept) {
   const auto bytes = random_bytes(20000, 4);
   const std::span<const std::byte> all(bytes);
-  for (std::size_t length = 0; length < 1200; ++length) {
-    const auto part = all.subspan(length % 37, length);
-    ASSERT_EQ(crc32c_folding(part, 0x12345678u), crc32c_portable(part, 0x12345678u)) << length;
+  for (std::size_t length = 0; length < 2000; ++length) {
+    const auto part = all.subspan(length % 67, length);
+    ASSERT_EQ(crc(part, 0x12345678u), crc32c_portable(part, 0x12345678u)) << length;
   }
-  EXPECT_EQ(crc32c_folding(all), crc32c_portable(all));
+  EXPECT_EQ(crc(all, 0), crc32c_portable(all));
+}
+
+TEST(Crc32c, FoldingAndTablesAgreeForEveryLengthAndAlignment) {
+  if (!has_crc32c_folding()) GTEST_SKIP() << "the CPU has no carry-less product of 32 bytes";
+  expect_as_by_tables(crc32c_folding);
+}
+
+TEST(Crc32c, WideFoldingAndTablesAgreeForEveryLengthAndAlignment) {
+  if (!has_crc32c_wide_folding()) GTEST_SKIP() << "the CPU has no carry-less product of 64 bytes";
+  expect_as_by_tables(crc32c_wide_folding);
 }
 
 TEST(Crc32c, ContinuesAnEarlierCall) {

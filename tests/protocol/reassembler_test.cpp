@@ -197,6 +197,10 @@ TEST(Reassembler, FragmentsThatContradictTheirFrameAreRefused) {
   auto shifted = header;
   shifted.byte_offset += 4;
   EXPECT_EQ(reassembler.push(forged(shifted, kPayload)), FragmentStatus::overlap);
+  auto too_long = header;
+  too_long.byte_offset = 0;
+  too_long.flags = kFragmentFirst;
+  EXPECT_EQ(reassembler.push(forged(too_long, kPayload + 4)), FragmentStatus::overlap);
   auto grown = header;
   grown.byte_offset = 2 * kPayload;
   grown.total_bytes += 4;

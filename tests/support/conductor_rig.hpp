@@ -78,6 +78,12 @@ class ConductorRig {
     }
   }
 
+  /// As settle(), with a sender that does not come to its turn.
+  void settle_without_sender() {
+    while (conductor_.do_work(clock.tai_ns()) + render_.do_work(clock.tai_ns()) > 0) {
+    }
+  }
+
   server::HostInput& next_input() { return context_.host_inputs.claim_reserved(); }
   void send(std::uint64_t number, std::int64_t sim_ns, double x_m = 0.0, std::uint64_t run = 1) {
     server::HostInput& input = next_input();

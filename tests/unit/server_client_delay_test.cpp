@@ -15,7 +15,7 @@ class Client final : public SenderClient {
              std::int64_t now_ns) noexcept override {
     start(header, now_ns);
   }
-  Progress send(UdpBatch& /*batch*/, Context& /*context*/) noexcept override {
+  Progress send(UdpBatch& /*batch*/, Context& /*context*/, Turn /*turn*/) noexcept override {
     return Progress::finished;
   }
   void spill() noexcept override {}

@@ -105,6 +105,32 @@ TEST(HostStep, ShedsWorkToBeInTimeSaysSoAndStopsSheddingAfterwards) {
   EXPECT_EQ(rig.frames.back().header.quality_rung, 0U);
 }
 
+TEST(HostStep, SaysThatItWaitsForASlotOrForRoom) {
+  Rig rig;
+  rig.send(1, 0);
+  rig.settle_without_sender();
+  EXPECT_FALSE(rig.context().of_slots.end()) << "there are six more";
+  for (std::uint64_t number = 2; number <= 8; ++number) {
+    rig.send(number, static_cast<std::int64_t>(number) * kMs);
+    rig.settle_without_sender();
+  }
+  EXPECT_TRUE(rig.context().of_slots.end());
+  EXPECT_FALSE(rig.context().of_room.end());
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 8U);
+
+  while (rig.context().published.push({})) {
+  }
+  rig.send(9, 9 * kMs);
+  rig.settle_without_sender();
+  EXPECT_TRUE(rig.context().of_room.end());
+  while (rig.context().published.front() != nullptr) {
+    rig.context().published.pop();
+  }
+  rig.settle();
+  EXPECT_EQ(rig.frames.size(), 9U);
+}
+
 TEST(HostStep, WithoutBudgetNothingIsShed) {
   Rig rig;
   rig.script.rungs = {{2.5, 0.0}, {1.2, 0.25}};

@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <poll.h>
 
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "agents/runner.hpp"
 #include "app/sha256.hpp"
 #include "rt/byte_ring.hpp"
 #include "rt/clock.hpp"
 #include "rt/counters.hpp"
+#include "rt/shortage.hpp"
 #include "rt/spsc_ring.hpp"
 #include "telemetry/log.hpp"
 
@@ -58,6 +62,74 @@ TEST(SpscRing, CarriesEveryElementBetweenTwoThreads) {
     }
   }
   producer.join();
+}
+
+TEST(Shortage, EndsOnceForWhoFoundNothing) {
+  Shortage shortage;
+  EXPECT_FALSE(shortage.end()) << "nobody looked";
+  EXPECT_EQ(shortage.look([] { return std::optional<int>(7); }), 7);
+  EXPECT_FALSE(shortage.end()) << "it was there";
+  EXPECT_FALSE(shortage.look([] { return std::optional<int>(); }));
+  EXPECT_TRUE(shortage.end());
+  EXPECT_FALSE(shortage.end());
+}
+
+TEST(Shortage, SeesWhatIsGivenBetweenTheLookAndTheWord) {
+  Shortage shortage;
+  int looks = 0;
+  const auto found = shortage.look([&] {
+    // The giver comes behind the first look and finds that nobody wants.
+    if (looks++ == 0) {
+      EXPECT_FALSE(shortage.end());
+      return std::optional<int>();
+    }
+    return std::optional<int>(1);
+  });
+  EXPECT_TRUE(found.has_value());
+}
+
+/// Works as often as it is told to and looks at its doorbell when it is about to rest.
+class RestingAgent final : public Agent {
+ public:
+  explicit RestingAgent(Doorbell& bell) : Agent(bell) {}
+  [[nodiscard]] std::string_view name() const noexcept override { return "resting"; }
+  int do_work(std::int64_t /*now_ns*/) noexcept override {
+    if (work_ == 0) {
+      done_.store(true);
+      done_.notify_one();
+      return 0;
+    }
+    --work_;
+    return 1;
+  }
+  [[nodiscard]] std::int64_t rest_ns() const noexcept override {
+    ++rests_;
+    doorbell().ring();
+    pollfd bell{doorbell().fd(), POLLIN, 0};
+    rung_ = rung_ || ::poll(&bell, 1, 0) != 0;
+    return 1;
+  }
+  void wait() { done_.wait(false); }
+  [[nodiscard]] int rests() const { return rests_; }
+  [[nodiscard]] bool rung() const { return rung_; }
+
+ private:
+  int work_ = 3;
+  std::atomic<bool> done_{false};
+  mutable int rests_ = 0;
+  mutable bool rung_ = false;
+};
+
+TEST(AgentRunner, LetsAnAgentRestOnceBehindItsWorkWhileRingsWakeNobody) {
+  Doorbell bell;
+  RestingAgent agent(bell);
+  const SystemClock clock;
+  AgentRunner runner(agent, clock);
+  ASSERT_TRUE(runner.start_thread());
+  agent.wait();
+  runner.stop();
+  EXPECT_EQ(agent.rests(), 1);
+  EXPECT_FALSE(agent.rung()) << "it is awake: no write to its descriptor";
 }
 
 TEST(ByteRing, CarriesRecordsOfAnyLengthBetweenTwoThreads) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/socket.h>
 
 #include <memory>
@@ -132,6 +133,10 @@ class Rig {
     }
     FAIL() << "never idle";
   }
+  void add(SenderClient& client) {
+    EXPECT_TRUE(context_.to_sender.push({ClientCommand::Kind::add, client.connection(), &client}));
+    sender_.do_work(clock_.tai_ns());
+  }
   Context& context() { return context_; }
   test::SourceScript& script() { return script_; }
   Sender& sender() { return sender_; }
@@ -180,6 +185,113 @@ TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
   }
   EXPECT_EQ(rig.context().counters.get(Counter::frames_skipped), missing);
   EXPECT_EQ(rig.script().held.load(), 0) << "slots go back when everybody has the frame";
+}
+
+using Turns = std::vector<std::pair<std::uint32_t, SenderClient::Turn>>;
+
+/// Needs two turns for a frame and says which it was given.
+class TwoTurnClient final : public SenderClient {
+ public:
+  TwoTurnClient(std::uint32_t connection, Turns& turns) : connection_(connection), turns_(turns) {}
+  void begin(const protocol::FrameHeader& header, const Image& /*image*/,
+             std::int64_t now_ns) noexcept override {
+    start(header, now_ns);
+    left_ = 2;
+  }
+  Progress send(UdpBatch& /*batch*/, Context& /*context*/, Turn turn) noexcept override {
+    if (left_ == 0) return Progress::idle;
+    turns_.emplace_back(connection_, turn);
+    return --left_ == 0 ? Progress::finished : Progress::more;
+  }
+  void spill() noexcept override {}
+  [[nodiscard]] std::uint32_t connection() const noexcept override { return connection_; }
+
+ private:
+  std::uint32_t connection_;
+  Turns& turns_;
+  int left_ = 0;
+};
+
+TEST(Sender, NobodysFirstByteWaitsForAnothersFrame) {
+  using enum SenderClient::Turn;
+  Turns turns;
+  TwoTurnClient first(11, turns);
+  TwoTurnClient second(12, turns);
+  Rig rig;
+  rig.add(first);
+  ASSERT_TRUE(rig.publish());
+  rig.settle({});
+  EXPECT_EQ(turns, (Turns{{11, full}, {11, full}})) << "nobody else waits";
+  turns.clear();
+  rig.add(second);
+  ASSERT_TRUE(rig.publish());
+  rig.settle({});
+  EXPECT_EQ(turns, (Turns{{12, brief}, {11, brief}, {12, full}, {11, full}}));
+}
+
+TEST(Sender, ABriefTurnOfASocketIsShort) {
+  int pair[2] = {-1, -1};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
+  const Fd far(pair[1]);
+  const int send_bytes = 4 << 20;
+  ::setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &send_bytes, sizeof(send_bytes));
+  const SocketContext sockets;
+  auto near = TcpSocket::adopt(sockets, pair[0]);
+  ASSERT_TRUE(near.has_value());
+  auto out = UdpSocket::open_bound(sockets, numeric_address("127.0.0.1", 0));
+  ASSERT_TRUE(out.has_value());
+  ASSERT_TRUE(out->connect(out->local_address()).has_value());
+  const test::FakeClock clock;
+  Context context(clock, 1u << 16, 4);
+  Channel channel;
+  channel.width_px = kWidthPx;
+  channel.height_px = kHeightPx;
+  const std::vector<float> pixels(kWidthPx * kHeightPx);
+  Image image;
+  image.plane_count = 1;
+  image.planes[0] = pixels;
+  UdpBatch batch;
+  for (const bool udp : {false, true}) {
+    SocketClient::Params params;
+    params.channel = &channel;
+    params.udp = udp;
+    params.tcp_socket = &*near;
+    params.fragment_payload_bytes = 1440;
+    if (udp) params.udp_socket = std::move(*out);
+    SocketClient client(std::move(params));
+    client.begin({}, image, 0);
+    const std::uint64_t before = context.counters.get(Counter::bytes_sent);
+    EXPECT_EQ(client.send(batch, context, SenderClient::Turn::brief), SenderClient::Progress::more);
+    const std::uint64_t sent = context.counters.get(Counter::bytes_sent) - before;
+    EXPECT_GT(sent, 0U);
+    EXPECT_LE(sent, 96u << 10) << "of 128 KiB";
+  }
+}
+
+TEST(Sender, WakesConductorAndRenderOnlyWhereTheyWaitForIt) {
+  Rig rig;
+  Rig::Peer* peer = rig.connect();
+  Doorbells& bells = rig.context().bells;
+  const auto rung = [&](Doorbell& bell) {
+    pollfd wait{bell.fd(), POLLIN, 0};
+    const bool out = ::poll(&wait, 1, 0) != 0;
+    bell.disarm();
+    return out;
+  };
+  const auto nothing = [] { return false; };
+  for (const bool waited_for : {false, true, false}) {
+    if (waited_for) {
+      EXPECT_FALSE(rig.context().of_room.look(nothing));
+      EXPECT_FALSE(rig.context().of_slots.look(nothing));
+    }
+    bells.conductor.arm();
+    bells.render.arm();
+    ASSERT_TRUE(rig.publish());
+    rig.settle({peer});
+    EXPECT_EQ(rig.script().held.load(), 0);
+    EXPECT_EQ(rung(bells.conductor), waited_for);
+    EXPECT_EQ(rung(bells.render), waited_for);
+  }
 }
 
 TEST(Sender, WhatAClientDoesNotWantIsNeitherSentNorWaitedForNorAGap) {
@@ -398,6 +510,37 @@ TEST_F(UdpInPlace, FramesInOrderAreWholeWhateverTheFragments) {
     }
   }
   EXPECT_EQ(counters_.bad_datagrams, 0U);
+}
+
+TEST_F(UdpInPlace, OfJoinedDatagramsNothingButAFramesBeginningIsMisplaced) {
+  if (!udp_segmentation_supported(sender_.fd())) GTEST_SKIP() << "the kernel joins nothing";
+  constexpr std::uint32_t kFrames = 6;
+  constexpr std::size_t kJoined = 7;
+  for (std::uint32_t id = 1; id <= kFrames; ++id) {
+    const auto all = datagrams(id, 1440);
+    ASSERT_EQ(all.size() % kJoined, 1U) << "the last one comes alone";
+    for (std::size_t i = 0; i < all.size(); i += kJoined) {
+      std::vector<std::byte> joined;
+      for (std::size_t k = i; k < std::min(i + kJoined, all.size()); ++k) {
+        joined.insert(joined.end(), all[k].begin(), all[k].end());
+      }
+      UdpBatch batch;
+      const auto bytes = static_cast<std::uint32_t>(all.front().size());
+      if (joined.size() > bytes) {
+        ASSERT_EQ(batch.send_datagrams(sender_.fd(), joined, bytes, true).fragments, kJoined);
+      } else {
+        send(joined);
+      }
+    }
+  }
+  for (std::uint32_t id = 1; id <= kFrames; ++id) {
+    while (reassembler_.counters().frames_complete < id) {
+      ASSERT_GT(receiver_->take(reassembler_, counters_), 0);
+    }
+    expect_frame(id);
+  }
+  // Before the first message nobody knows that datagrams come joined.
+  EXPECT_LE(receiver_->misplaced(), 16U + kFrames - 1);
 }
 
 TEST_F(UdpInPlace, WhatWasNotExpectedComesOutRightAllTheSame) {

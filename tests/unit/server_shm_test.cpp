@@ -93,7 +93,9 @@ class Ring {
     header.frame_number = number_;
     client_->begin(header, image_, clock_.tai_ns());
   }
-  [[nodiscard]] SenderClient::Progress send() { return client_->send(batch_, context_); }
+  [[nodiscard]] SenderClient::Progress send(SenderClient::Turn turn = SenderClient::Turn::full) {
+    return client_->send(batch_, context_, turn);
+  }
   void publish() {
     begin();
     while (send() != SenderClient::Progress::finished) {
@@ -234,6 +236,13 @@ TEST(Shm, PixelsInPlaceAreCalledVoidOnceOverwrittenAndCopiesStay) {
   EXPECT_EQ(frame->pixels.front(), 5.0F) << "the memory is the daemon's";
   EXPECT_TRUE(keeper->intact());
   EXPECT_EQ(kept->pixels.front(), 1.0F);
+}
+
+TEST(Shm, ABriefTurnWritesLittle) {
+  Ring ring(own_name(), 3, 256, 80);  // 80 KiB a channel
+  ring.begin();
+  EXPECT_EQ(ring.send(SenderClient::Turn::brief), SenderClient::Progress::more);
+  EXPECT_EQ(ring.send(), SenderClient::Progress::finished);
 }
 
 TEST(Shm, ALargeFrameIsWrittenInTurnsAndShowsWhenItIsWhole) {
