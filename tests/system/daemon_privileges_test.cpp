@@ -4,6 +4,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "support/daemon_process.hpp"
@@ -27,8 +28,17 @@ TEST(DaemonPrivileges, NoThreadKeepsACapabilityOrMayGainOne) {
       test::canned_config(64, 48, "mode = \"host-step\"", "[metrics]\nlisten = \"127.0.0.1:0\"\n"));
   test::DaemonProcess daemon(folder, {"--config", config});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
-  int threads = 0;
   const std::filesystem::path tasks = "/proc/" + std::to_string(daemon.pid()) + "/task";
+  const auto count = [&tasks] {
+    return std::distance(std::filesystem::directory_iterator(tasks), {});
+  };
+  // Ready says that its ports are open; some threads may still be on their way.
+  constexpr auto kPatience = std::chrono::seconds(20);
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (count() < 7 && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  int threads = 0;
   for (const auto& task : std::filesystem::directory_iterator(tasks)) {
     ++threads;
     const auto status = task.path() / "status";
