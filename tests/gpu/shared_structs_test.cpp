@@ -32,6 +32,14 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto radiance = gl::Program::compute("passes/radiance.comp", content);
   ASSERT_TRUE(radiance) << radiance.error().text;
 
+  const gl::Define cached[] = {{"EMIT_CACHED", "1"}};
+  auto geometry = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", cached);
+  ASSERT_TRUE(geometry) << geometry.error().text;
+
+  EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, clip_from_mesh);
+  EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, normal_from_mesh[0]);
+  EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, ids);
+  EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, samples);
   EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, relworld_from_sensor);
   EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, ray);
   EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, format_px);
