@@ -68,6 +68,10 @@ TEST_F(PoseCsv, ErrorsNameFileLineAndColumn) {
   EXPECT_THAT(outcome(head + "0,0,0,0,1,1,0,0,7\n"), HasSubstr(":2: invalid pose"));
   EXPECT_THAT(outcome(head + "0,nan,0,0,1,0,0,0,7\n"), HasSubstr(":2: invalid pose"));
   EXPECT_THAT(outcome(head + "1e300,0,0,0,1,0,0,0,7\n"), HasSubstr("'sim_time_s': out of range"));
+  // What a host may not send in a datagram cannot stand in a file either.
+  EXPECT_EQ(outcome(head + "1e9,0,0,0,1,0,0,0,7\n"), "1 rows");
+  EXPECT_THAT(outcome(head + "1000000001,0,0,0,1,0,0,0,7\n"),
+              HasSubstr("'sim_time_s': out of range"));
   EXPECT_THAT(outcome(head + "1,0,0,0,1,0,0,0,7\n0,0,0,0,1,0,0,0,8\n"),
               HasSubstr(":3: column 'sim_time_s': goes back"));
 }

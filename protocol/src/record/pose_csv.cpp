@@ -27,8 +27,8 @@ enum Column : std::size_t { kTime, kEast, kNorth, kUp, kQw, kQx, kQy, kQz, kFram
 constexpr std::array<std::string_view, kColumns> kNames{
     "sim_time_s", "east_m", "north_m", "up_m", "qw", "qx", "qy", "qz", "frame_number"};
 constexpr std::size_t kMandatory = kFrame;
-/// Beyond it nanoseconds do not fit into 64 bits.
-constexpr double kMaxTimeS = 9e9;
+/// As from the wire.
+constexpr double kMaxTimeS = kMaxSimTimeNs / 1e9;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";
