@@ -7,6 +7,7 @@
 
 #include "emit/scene/simplify.hpp"
 #include "passes/foster_setup.hpp"
+#include "surface/kept_facets.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -91,13 +92,17 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   }
   const scene::DetailView view{eyes_world_m, pixel_rad(scenario.sensor)};
   geometry = scene::separated(std::move(geometry), view);
-  scene::SceneGeometry full = geometry;
-  geometry = scene::simplified(std::move(geometry), view);
   std::optional<SurfaceDetail> detail;
-  if (geometry.triangles < full.triangles) {
-    auto created = SurfaceDetail::create(std::move(full), geometry);
-    if (!created) return tl::unexpected(std::move(created.error()));
-    detail = std::move(*created);
+  const std::vector<double> errors = scene::simplify_errors(geometry, view);
+  if (std::ranges::any_of(errors, [](double error) { return error > 0.0; })) {
+    scene::SceneGeometry full = geometry;
+    auto rays = CasterRays::create(full);
+    if (!rays) return tl::unexpected(std::move(rays.error()));
+    geometry =
+        scene::simplified(std::move(geometry), errors, kept_facets(full, errors, *rays, view));
+    if (geometry.triangles < full.triangles) {
+      detail.emplace(std::move(full), std::move(*rays), geometry);
+    }
   }
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
   auto surface = CachedSurface::create(

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <glm/geometric.hpp>
 #include <limits>
 
 namespace emit::renderer {
@@ -29,6 +30,14 @@ struct HalfEdge {
   std::uint32_t to;  ///< position at the end with the larger index
   std::uint32_t index;
 };
+
+/// So that sums of different vertices differ (splitmix64, Steele et al. 2014).
+std::uint64_t scrambled(std::uint32_t vertex) noexcept {
+  std::uint64_t x = vertex + 0x9e3779b97f4a7c15U;
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9U;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebU;
+  return x ^ (x >> 31U);
+}
 
 }  // namespace
 
@@ -92,6 +101,29 @@ std::vector<std::uint32_t> link_edges(std::span<const std::array<std::uint32_t, 
     }
   }
   return ring;
+}
+
+void find_inward(const RefinedMesh& mesh, std::vector<glm::vec3>& inward) {
+  const auto vertices = mesh.vertices();
+  inward.assign(vertices.size(), glm::vec3(0.0F));
+  // Inside a surface each neighbour follows the vertex in one leaf and precedes it in another.
+  std::vector<std::uint64_t> open(vertices.size(), 0);
+  for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
+    const auto& leaf = mesh.leaf(slot);
+    glm::vec3 centre_m(0.0F);
+    for (const std::uint32_t v : leaf) centre_m += vertices[v].position_m / 3.0F;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = leaf[k];
+      const glm::vec3 way_m = centre_m - vertices[v].position_m;
+      const float length_m = glm::length(way_m);
+      if (length_m > 0.0F) inward[v] += way_m / length_m;
+      open[v] += scrambled(leaf[(k + 1) % 3]) - scrambled(leaf[(k + 2) % 3]);
+    }
+  }
+  for (std::size_t v = 0; v < inward.size(); ++v) {
+    const float length = glm::length(inward[v]);
+    inward[v] = open[v] != 0 && length > 0.0F ? inward[v] / length : glm::vec3(0.0F);
+  }
 }
 
 }  // namespace emit::renderer

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <glm/ext/vector_float3.hpp>
 #include <span>
 #include <vector>
 
@@ -20,5 +21,11 @@ namespace emit::renderer {
 [[nodiscard]] std::vector<std::uint32_t> link_edges(
     std::span<const std::array<std::uint32_t, 3>> triangles,
     std::span<const std::uint32_t> position_id);
+
+/// By vertex the mean direction into its leaves where it lies on a rim, a border of the surface or
+/// a crease with vertices of each side's own: unit length, axes of the mesh. Zero inside, however
+/// uneven the leaves are, and where the leaves' directions cancel. Replaces the contents of
+/// `inward`; O(n).
+void find_inward(const RefinedMesh& mesh, std::vector<glm::vec3>& inward);
 
 }  // namespace emit::renderer

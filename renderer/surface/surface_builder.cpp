@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "surface/parallel.hpp"
+#include "surface/refined_mesh_edges.hpp"
 #include "surface/surface_exchange.hpp"
 #include "surface/surface_model.hpp"
 #include "surface/surface_patch.hpp"
@@ -48,7 +49,6 @@ class Builder {
   void split(std::uint32_t mesh, float above);
   /// Gives every vertex that has no sample yet one; false when stopped.
   bool sample_new_vertices(double begin_frac, double end_frac);
-  void find_inward(std::uint32_t mesh);
   /// Vertices from `first` on face as the surface did before it was simplified, and their samples
   /// lie on it.
   void adopt_detail(std::uint32_t mesh, std::uint32_t first);
@@ -92,31 +92,6 @@ void Builder::make_patches() {
   }
 }
 
-/// Mean direction from each vertex into its leaves; zero inside a smooth surface.
-void Builder::find_inward(std::uint32_t mesh) {
-  const RefinedMesh& refined = model_.meshes[mesh];
-  const auto vertices = refined.vertices();
-  inward_.assign(vertices.size(), glm::vec3(0.0F));
-  std::vector<float> leaves(vertices.size(), 0.0F);
-  for (std::uint32_t slot = 0; slot < refined.leaf_count(); ++slot) {
-    const auto& leaf = refined.leaf(slot);
-    glm::vec3 centre_m(0.0F);
-    for (const std::uint32_t v : leaf) centre_m += vertices[v].position_m / 3.0F;
-    for (const std::uint32_t v : leaf) {
-      const glm::vec3 way = centre_m - vertices[v].position_m;
-      const float length = glm::length(way);
-      if (length > 0.0F) inward_[v] += way / length;
-      leaves[v] += 1.0F;
-    }
-  }
-  for (std::size_t v = 0; v < inward_.size(); ++v) {
-    // Opposite leaves cancel: what is left tells a border from the inside.
-    inward_[v] = leaves[v] > 0.0F && glm::length(inward_[v]) > 0.3F * leaves[v]
-                     ? glm::normalize(inward_[v])
-                     : glm::vec3(0.0F);
-  }
-}
-
 void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
   RefinedMesh& refined = model_.meshes[mesh];
   const auto vertices = refined.vertices();
@@ -152,7 +127,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       if (patch.mesh != mesh || patch.samples.size() == vertices.size()) continue;
       const auto first = static_cast<std::uint32_t>(patch.samples.size());
       if (!looked) {
-        find_inward(mesh);
+        find_inward(model_.meshes[mesh], inward_);
         adopt_detail(mesh, first);
       }
       looked = true;

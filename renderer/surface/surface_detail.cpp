@@ -14,28 +14,22 @@ constexpr float kLeastCos = 0.5F;
 
 }  // namespace
 
-SurfaceDetail::SurfaceDetail(scene::SceneGeometry full, CasterRays rays) noexcept
-    : full_(std::move(full)), rays_(std::move(rays)) {}
-
-physics::Result<SurfaceDetail> SurfaceDetail::create(scene::SceneGeometry full,
-                                                     const scene::SceneGeometry& coarse) {
+SurfaceDetail::SurfaceDetail(scene::SceneGeometry full, CasterRays rays,
+                             const scene::SceneGeometry& coarse)
+    : full_(std::move(full)),
+      rays_(std::move(rays)),
+      instance_of_mesh_(coarse.meshes.size(), kNone) {
   // One instance of every mesh that has lost triangles, where it stands.
-  std::vector<std::uint32_t> instance_of_mesh(coarse.meshes.size(), kNone);
-  for (std::size_t i = 0; i < full.instances.size(); ++i) {
-    const std::uint32_t mesh = full.instances[i].mesh;
-    if (full.instances[i].entity_id == 0 && instance_of_mesh[mesh] == kNone &&
-        coarse.meshes[mesh].indices.size() < full.meshes[mesh].indices.size()) {
-      instance_of_mesh[mesh] = static_cast<std::uint32_t>(i);
+  for (std::size_t i = 0; i < full_.instances.size(); ++i) {
+    const std::uint32_t mesh = full_.instances[i].mesh;
+    if (full_.instances[i].entity_id == 0 && instance_of_mesh_[mesh] == kNone &&
+        coarse.meshes[mesh].indices.size() < full_.meshes[mesh].indices.size()) {
+      instance_of_mesh_[mesh] = static_cast<std::uint32_t>(i);
     }
   }
-  auto rays = CasterRays::create(full);
-  if (!rays) return tl::unexpected(std::move(rays.error()));
-  for (std::size_t mesh = 0; mesh < full.meshes.size(); ++mesh) {
-    if (instance_of_mesh[mesh] == kNone) full.meshes[mesh] = {};  // the rays have their own copy
+  for (std::size_t mesh = 0; mesh < full_.meshes.size(); ++mesh) {
+    if (instance_of_mesh_[mesh] == kNone) full_.meshes[mesh] = {};  // the rays have their own copy
   }
-  SurfaceDetail detail(std::move(full), std::move(*rays));
-  detail.instance_of_mesh_ = std::move(instance_of_mesh);
-  return detail;
 }
 
 std::optional<SurfaceDetail::Place> SurfaceDetail::place(std::uint32_t mesh,

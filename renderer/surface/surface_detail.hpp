@@ -22,10 +22,8 @@ class SurfaceDetail {
     glm::vec3 normal{0.0F};  ///< unit length
   };
 
-  /// `full` and `coarse` have the same instances; entities may not differ. Errors: those of
-  /// CasterRays::create().
-  [[nodiscard]] static physics::Result<SurfaceDetail> create(scene::SceneGeometry full,
-                                                             const scene::SceneGeometry& coarse);
+  /// `full` and `coarse` have the same instances; entities may not differ. `rays`: against `full`.
+  SurfaceDetail(scene::SceneGeometry full, CasterRays rays, const scene::SceneGeometry& coarse);
 
   /// True when the coarse mesh has lost triangles and a static instance draws it.
   [[nodiscard]] bool has(std::uint32_t mesh) const noexcept {
@@ -43,7 +41,6 @@ class SurfaceDetail {
 
  private:
   static constexpr std::uint32_t kNone = 0xffffffffU;
-  SurfaceDetail(scene::SceneGeometry full, CasterRays rays) noexcept;
 
   scene::SceneGeometry full_;
   CasterRays rays_;

@@ -14,7 +14,9 @@
 #include <utility>
 #include <vector>
 
+#include "emit/physics/constants.hpp"
 #include "refined_mesh_support.hpp"
+#include "surface/refined_mesh_edges.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -284,6 +286,45 @@ TEST(RefinedMesh, leaves_alone_triangles_with_two_corners_at_one_position) {
   EXPECT_TRUE(mesh.split(slots));
   EXPECT_EQ(mesh.leaf_count(), 3U);
   EXPECT_EQ(mesh.leaf(0), (std::array<std::uint32_t, 3>{0, 1, 2}));
+}
+
+/// Level fan around the origin with neighbours at these angles.
+scene::Mesh fan(std::initializer_list<double> angles_deg, bool closed) {
+  scene::Mesh mesh;
+  mesh.positions_m.emplace_back(0.0F);
+  for (const double angle_deg : angles_deg) {
+    const double angle = angle_deg * physics::kDegree;
+    mesh.positions_m.emplace_back(std::cos(angle), std::sin(angle), 0.0);
+  }
+  mesh.normals.assign(mesh.positions_m.size(), {0.0F, 0.0F, 1.0F});
+  const auto last = static_cast<std::uint32_t>(angles_deg.size());
+  for (std::uint32_t v = 1; v <= last; ++v) {
+    if (v == last && !closed) break;
+    for (const std::uint32_t corner : {0U, v, v % last + 1}) mesh.indices.push_back(corner);
+  }
+  mesh.submeshes = {{0, static_cast<std::uint32_t>(mesh.indices.size()), 0, false}};
+  return mesh;
+}
+
+TEST(FindInward, of_a_vertex_inside_is_nothing_however_uneven_its_leaves_are) {
+  std::vector<glm::vec3> inward;
+  // Four slim leaves to the east, two wide ones for the rest.
+  find_inward(RefinedMesh(fan({-20, -10, 0, 10, 20, 180}, true), kNoLimit), inward);
+  ASSERT_EQ(inward.size(), 7U);
+  EXPECT_EQ(inward[0], glm::vec3(0.0F));
+  for (std::size_t v = 1; v < inward.size(); ++v) EXPECT_NEAR(glm::length(inward[v]), 1.0F, 1e-5F);
+  EXPECT_GT(inward[6].x, 0.9F);  // into the fan
+}
+
+TEST(FindInward, of_a_vertex_on_the_rim_points_into_the_leaves_however_far_they_reach) {
+  std::vector<glm::vec3> inward;
+  // All but a gap of 20 degrees towards the west: directions nearly cancel.
+  find_inward(RefinedMesh(fan({-170, -90, 0, 90, 170}, false), kNoLimit), inward);
+  EXPECT_GT(inward[0].x, 0.99F);
+  // Where rims of two materials meet, both are on them.
+  find_inward(RefinedMesh(octahedron(), kNoLimit), inward);
+  EXPECT_EQ(inward[4], glm::vec3(0.0F));
+  for (std::size_t v = 6; v < 10; ++v) EXPECT_GT(glm::length(inward[v]), 0.99F);
 }
 
 }  // namespace

@@ -74,23 +74,33 @@ scene::SceneGeometry waves(float unit_m = 1.0F) {
 const std::array<glm::dvec3, 1> kEyes{glm::dvec3(0.0, -8.0, 13.0)};
 constexpr double kPixelRad = 1e-3;
 
+scene::SceneGeometry coarse_waves(float unit_m = 1.0F) {
+  scene::SceneGeometry full = waves(unit_m);
+  const std::vector<double> errors = scene::simplify_errors(full, {kEyes, kPixelRad});
+  return scene::simplified(std::move(full), errors);
+}
+
+SurfaceDetail detail_of(scene::SceneGeometry full, const scene::SceneGeometry& coarse) {
+  CasterRays rays = CasterRays::create(full).value();
+  return {std::move(full), std::move(rays), coarse};
+}
+
 TEST(SurfaceDetail, GivesPlacesAndNormalsOfTheFullSurface) {
-  const scene::SceneGeometry coarse = scene::simplified(waves(), {kEyes, kPixelRad});
+  const scene::SceneGeometry coarse = coarse_waves();
   ASSERT_LT(coarse.triangles, 20'000U);
-  auto detail = SurfaceDetail::create(waves(), coarse);
-  ASSERT_TRUE(detail.has_value());
-  ASSERT_TRUE(detail->has(0));
-  EXPECT_FALSE(SurfaceDetail::create(waves(), waves())->has(0));
+  const SurfaceDetail detail = detail_of(waves(), coarse);
+  ASSERT_TRUE(detail.has(0));
+  EXPECT_FALSE(detail_of(waves(), waves()).has(0));
   for (float x = -0.9F; x < 0.9F; x += 0.07F) {
     const glm::vec3 near_m(x, 0.4F * x, kHeightM);
-    const auto place = detail->place(0, near_m, {0.0F, 0.0F, 1.0F}, 0.03F);
+    const auto place = detail.place(0, near_m, {0.0F, 0.0F, 1.0F}, 0.03F);
     ASSERT_TRUE(place.has_value());
     EXPECT_LT(glm::distance(place->normal, wave_normal(near_m.x, near_m.y)), 2e-3F);
     const float height_m = kHeightM * std::sin(kPerM * near_m.x) * std::cos(kPerM * near_m.y);
     EXPECT_LT(glm::distance(place->position_m, glm::vec3(near_m.x, near_m.y, height_m)), 3e-4F);
     // Too far away, and facing the other way.
-    EXPECT_FALSE(detail->place(0, near_m + glm::vec3(0.0F, 0.0F, 0.1F), {0.0F, 0.0F, 1.0F}, 0.03F));
-    EXPECT_FALSE(detail->place(0, near_m, {0.0F, 0.0F, -1.0F}, 0.03F));
+    EXPECT_FALSE(detail.place(0, near_m + glm::vec3(0.0F, 0.0F, 0.1F), {0.0F, 0.0F, 1.0F}, 0.03F));
+    EXPECT_FALSE(detail.place(0, near_m, {0.0F, 0.0F, -1.0F}, 0.03F));
   }
 }
 
@@ -106,11 +116,11 @@ float normals_error(bool with_detail, double left_out, float unit_m = 1.0F) {
   scene::SceneGeometry full = waves(unit_m);
   scenario.materials = full.materials;
   scenario.default_material = "stone";
-  scene::SceneGeometry coarse = scene::simplified(waves(unit_m), {kEyes, kPixelRad});
+  scene::SceneGeometry coarse = coarse_waves(unit_m);
   const Environment environment(scenario);
   auto networks = build_foster_materials(scenario, full.materials);
   std::optional<SurfaceDetail> detail;
-  if (with_detail) detail = *SurfaceDetail::create(std::move(full), coarse);
+  if (with_detail) detail = detail_of(std::move(full), coarse);
   scenario.objects.resize(1);
   auto surface = CachedSurface::create(scenario, std::move(coarse), {-1},
                                        std::span(*networks).first(networks->size() - 1),

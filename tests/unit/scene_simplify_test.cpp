@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <map>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "emit/scene/simplify.hpp"
@@ -28,6 +30,21 @@ SceneGeometry scene_of(Mesh mesh, std::uint32_t entity_id = 0) {
   return geometry;
 }
 
+SceneGeometry simplified_for(const SceneGeometry& geometry, const DetailView& view) {
+  return simplified(geometry, simplify_errors(geometry, view));
+}
+
+/// Edges that not exactly two triangles share.
+std::size_t open_edges(const Mesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+    const std::size_t next = i % 3 == 2 ? i - 2 : i + 1;
+    ++uses[std::minmax(mesh.indices[i], mesh.indices[next])];
+  }
+  return static_cast<std::size_t>(
+      std::ranges::count_if(uses, [](const auto& use) { return use.second != 2; }));
+}
+
 /// Greatest depth of a triangle of the unit sphere's mesh below the sphere.
 double sag_m(const Mesh& mesh) {
   double worst = 0.0;
@@ -44,7 +61,7 @@ double sag_m(const Mesh& mesh) {
 TEST(Simplify, a_far_sphere_keeps_its_shape_to_half_a_pixel) {
   const std::array<glm::dvec3, 2> eyes{glm::dvec3(0.0, 0.0, 21.0), glm::dvec3(0.0, 0.0, 90.0)};
   const SceneGeometry fine = scene_of(sphere(300, false));
-  const SceneGeometry coarse = simplified(fine, {eyes, kPixelRad});
+  const SceneGeometry coarse = simplified_for(fine, {eyes, kPixelRad});
   const Mesh& mesh = coarse.meshes[0];
   EXPECT_LT(coarse.triangles, fine.triangles / 20);
   EXPECT_EQ(coarse.triangles, mesh.indices.size() / 3);
@@ -67,13 +84,46 @@ TEST(Simplify, nothing_changes_where_pixels_are_finer_or_the_distance_is_unknown
   const std::array<glm::dvec3, 1> near{glm::dvec3(0.0, 0.0, 2.0)};
   const std::array<glm::dvec3, 1> inside{glm::dvec3(0.0)};
   const std::array<glm::dvec3, 1> far{glm::dvec3(0.0, 0.0, 500.0)};
-  EXPECT_EQ(simplified(scene_of(sphere(40, false)), {near, kPixelRad}).meshes[0].indices, before);
-  EXPECT_EQ(simplified(scene_of(sphere(40, false)), {inside, 1.0}).meshes[0].indices, before);
-  EXPECT_EQ(simplified(scene_of(sphere(40, false)), {{}, kPixelRad}).meshes[0].indices, before);
+  EXPECT_EQ(simplified_for(scene_of(sphere(40, false)), {near, kPixelRad}).meshes[0].indices,
+            before);
+  EXPECT_EQ(simplified_for(scene_of(sphere(40, false)), {inside, 1.0}).meshes[0].indices, before);
+  EXPECT_EQ(simplified_for(scene_of(sphere(40, false)), {{}, kPixelRad}).meshes[0].indices, before);
   // An entity may come as close as it likes.
-  EXPECT_EQ(simplified(scene_of(sphere(40, false), 7), {far, kPixelRad}).meshes[0].indices, before);
-  EXPECT_LT(simplified(scene_of(sphere(40, false)), {far, kPixelRad}).triangles,
+  EXPECT_EQ(simplified_for(scene_of(sphere(40, false), 7), {far, kPixelRad}).meshes[0].indices,
+            before);
+  EXPECT_LT(simplified_for(scene_of(sphere(40, false)), {far, kPixelRad}).triangles,
             before.size() / 3 / 4);
+}
+
+TEST(Simplify, kept_triangles_stay_and_the_rest_meets_them) {
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 21.0)};
+  const SceneGeometry fine = scene_of(sphere(300, false));
+  const Mesh& before = fine.meshes[0];
+  using Corners = std::array<std::array<float, 3>, 3>;
+  const auto corners = [](const Mesh& mesh, std::size_t t) {
+    Corners out;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const glm::vec3& p = mesh.positions_m[mesh.indices[3 * t + k]];
+      out[k] = {p.x, p.y, p.z};
+    }
+    std::ranges::rotate(out, std::ranges::min_element(out));  // which corner is first is free
+    return out;
+  };
+  // The upper half.
+  std::vector<std::vector<bool>> kept(1);
+  std::set<Corners> missing;
+  for (std::size_t t = 0; t < before.indices.size() / 3; ++t) {
+    const Corners here = corners(before, t);
+    kept[0].push_back(std::min({here[0][2], here[1][2], here[2][2]}) > 0.0F);
+    if (kept[0].back()) missing.insert(here);
+  }
+  const std::size_t count = missing.size();
+  const SceneGeometry coarse = simplified(fine, simplify_errors(fine, {eyes, kPixelRad}), kept);
+  const Mesh& mesh = coarse.meshes[0];
+  EXPECT_LT(mesh.indices.size() / 3, count + (before.indices.size() / 3 - count) / 8);
+  EXPECT_EQ(open_edges(mesh), open_edges(before));
+  for (std::size_t t = 0; t < mesh.indices.size() / 3; ++t) missing.erase(corners(mesh, t));
+  EXPECT_TRUE(missing.empty());
 }
 
 TEST(Separated, near_instances_have_a_mesh_of_their_own_and_far_ones_share) {
@@ -97,7 +147,7 @@ TEST(Separated, near_instances_have_a_mesh_of_their_own_and_far_ones_share) {
 
 TEST(Simplify, the_seam_between_two_materials_does_not_move) {
   const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
-  const SceneGeometry coarse = simplified(scene_of(sphere(200, true)), {eyes, kPixelRad});
+  const SceneGeometry coarse = simplified_for(scene_of(sphere(200, true)), {eyes, kPixelRad});
   const Mesh& mesh = coarse.meshes[0];
   ASSERT_EQ(mesh.submeshes.size(), 2U);
   EXPECT_LT(coarse.triangles, 40000U);

@@ -76,30 +76,37 @@ void renumber(Mesh& mesh, std::span<const std::uint32_t> remap, std::size_t coun
   gather(mesh.positions_m);
 }
 
-void collapse(Mesh& mesh, double error) {
+/// `kept`: by triangle; empty: none.
+void collapse(Mesh& mesh, double error, const std::vector<bool>& kept) {
   const float* positions = &mesh.positions_m[0].x;
   const std::size_t vertices = mesh.positions_m.size();
   const float scale = meshopt_simplifyScale(positions, vertices, sizeof(glm::vec3));
-  // Neighbours of another material keep the border they share.
+  // Neighbours of another material, and those that are kept, keep the border they share.
   unsigned int options = 0;
-  if (mesh.submeshes.size() > 1) options = meshopt_SimplifyLockBorder;
+  if (mesh.submeshes.size() > 1 || !kept.empty()) options = meshopt_SimplifyLockBorder;
   std::vector<std::uint32_t> indices;
+  std::vector<std::uint32_t> rest;
   std::vector<std::uint32_t> part;
   for (Submesh& submesh : mesh.submeshes) {
-    const std::uint32_t* from = mesh.indices.data() + submesh.first_index;
-    part.resize(submesh.index_count);
-    const std::size_t count =
-        meshopt_simplify(part.data(), from, submesh.index_count, positions, vertices,
-                         sizeof(glm::vec3), 0, static_cast<float>(error) / scale, options, nullptr);
+    const std::uint32_t first = submesh.first_index;
     submesh.first_index = static_cast<std::uint32_t>(indices.size());
-    submesh.index_count = static_cast<std::uint32_t>(count);
+    rest.clear();
+    for (std::uint32_t i = first; i < first + submesh.index_count; i += 3) {
+      std::vector<std::uint32_t>& to = !kept.empty() && kept[i / 3] ? indices : rest;
+      for (std::uint32_t k = 0; k < 3; ++k) to.push_back(mesh.indices[i + k]);
+    }
+    part.resize(rest.size());
+    const std::size_t count =
+        meshopt_simplify(part.data(), rest.data(), rest.size(), positions, vertices,
+                         sizeof(glm::vec3), 0, static_cast<float>(error) / scale, options, nullptr);
     indices.insert(indices.end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(count));
+    submesh.index_count = static_cast<std::uint32_t>(indices.size()) - submesh.first_index;
   }
   mesh.indices = std::move(indices);
   std::vector<std::uint32_t> remap(vertices);
-  const std::size_t kept = meshopt_optimizeVertexFetchRemap(remap.data(), mesh.indices.data(),
+  const std::size_t used = meshopt_optimizeVertexFetchRemap(remap.data(), mesh.indices.data(),
                                                             mesh.indices.size(), vertices);
-  renumber(mesh, remap, kept);
+  renumber(mesh, remap, used);
   mesh.bounds = {};
   for (const glm::vec3& p : mesh.positions_m) mesh.bounds.add(glm::dvec3(p));
 }
@@ -136,14 +143,23 @@ SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
   return geometry;
 }
 
-SceneGeometry simplified(SceneGeometry geometry, const DetailView& view) {
+std::vector<double> simplify_errors(const SceneGeometry& geometry, const DetailView& view) {
   const std::vector<double> widths = pixel_widths(geometry, view);
-  for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {
-    Mesh& mesh = geometry.meshes[m];
+  std::vector<double> errors(widths.size(), 0.0);
+  for (std::size_t m = 0; m < widths.size(); ++m) {
+    const Mesh& mesh = geometry.meshes[m];
     const double error = kErrorPx * widths[m];
     if (!(error > kLeastErrorM) || !std::isfinite(error) || mesh.indices.empty()) continue;
-    if (mean_edge(mesh) > kLeastEdgePx * widths[m]) continue;
-    collapse(mesh, error);
+    if (mean_edge(mesh) <= kLeastEdgePx * widths[m]) errors[m] = error;
+  }
+  return errors;
+}
+
+SceneGeometry simplified(SceneGeometry geometry, std::span<const double> errors,
+                         std::span<const std::vector<bool>> kept) {
+  for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {
+    if (errors[m] == 0.0) continue;
+    collapse(geometry.meshes[m], errors[m], kept.empty() ? std::vector<bool>() : kept[m]);
   }
   geometry.triangles = 0;
   geometry.static_bounds = {};

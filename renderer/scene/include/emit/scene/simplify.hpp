@@ -2,6 +2,7 @@
 #pragma once
 #include <glm/ext/vector_double3.hpp>
 #include <span>
+#include <vector>
 
 #include "emit/scene/mesh.hpp"
 
@@ -21,13 +22,20 @@ struct DetailView {
 /// copies would have more than some million vertices. Instances keep their order. Setup only.
 [[nodiscard]] SceneGeometry separated(SceneGeometry geometry, const DetailView& view);
 
+/// By mesh the distance that its surface may move when it is simplified, in the mesh's own lengths:
+/// a quarter of a pixel seen from the nearest eye. 0: the mesh stays as it is, because its
+/// triangles are wider than some pixels, an entity has it, or the eyes are unknown.
+[[nodiscard]] std::vector<double> simplify_errors(const SceneGeometry& geometry,
+                                                  const DetailView& view);
+
 /// Fewer triangles where a mesh has more than its pixels can show: edge collapses by quadric error
-/// (Garland and Heckbert 1997, SIGGRAPH), at most a quarter of a pixel seen from the nearest eye;
-/// as that is a mean over the faces around a collapse, the surface itself moves by up to half a
-/// pixel. Meshes whose triangles are wider than some pixels, and those of moving entities, stay as
-/// they are. Vertices are a subset of the old ones with their normals; borders of submeshes do not
-/// move, so that neighbours still meet. `triangles` is counted anew. Setup only: about a second per
-/// million triangles.
-[[nodiscard]] SceneGeometry simplified(SceneGeometry geometry, const DetailView& view);
+/// (Garland and Heckbert 1997, SIGGRAPH), at most `errors` (of simplify_errors()); as that is a
+/// mean over the faces around a collapse, the surface itself moves by up to twice as much. Vertices
+/// are a subset of the old ones with their normals; borders of submeshes do not move, so that
+/// neighbours still meet. `kept`: by mesh the triangles that stay as they are, and what they meet
+/// the rest with; empty, or empty for a mesh: none. `triangles` is counted anew. Setup only: about
+/// a second per million triangles. Precondition: sizes that fit.
+[[nodiscard]] SceneGeometry simplified(SceneGeometry geometry, std::span<const double> errors,
+                                       std::span<const std::vector<bool>> kept = {});
 
 }  // namespace emit::scene
