@@ -81,6 +81,11 @@ class ChannelClients {
     sender_.do_work(clock_.tai_ns());
     return peer;
   }
+  void add(server::SenderClient& client) {
+    EXPECT_TRUE(
+        context_.to_sender.push({server::ClientCommand::Kind::add, client.connection(), &client}));
+    sender_.do_work(clock_.tai_ns());
+  }
   /// `channels`: that have pixels in it; `repeat`: the one before again, as far as it has them.
   void publish(server::ChannelSet channels, bool repeat = false) {
     server::PublishFrame frame;

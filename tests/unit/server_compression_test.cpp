@@ -41,6 +41,42 @@ TEST(Compression, EveryBitArrivesAndTheOthersGetTheirFrameFirst) {
   EXPECT_TRUE(raw.encoded.empty());
 }
 
+/// Needs several turns for a frame.
+class SlowClient final : public SenderClient {
+ public:
+  void begin(const protocol::FrameHeader& header, const Image& /*image*/,
+             std::int64_t now_ns) noexcept override {
+    start(header, now_ns);
+    left = 4;
+  }
+  Progress send(UdpBatch& /*batch*/, Context& /*context*/, Turn /*turn*/) noexcept override {
+    if (left == 0) return Progress::idle;
+    return --left == 0 ? Progress::finished : Progress::more;
+  }
+  void spill() noexcept override {}
+  [[nodiscard]] std::uint32_t connection() const noexcept override { return 99; }
+  int left = 0;
+};
+
+TEST(Compression, IsForWhenNobodyElseHasAnythingToSend) {
+  ChannelClients rig;
+  rig.sender().allow_compression();
+  SlowClient slow;
+  const auto& peer = rig.connect(kAll, 1, true);
+  rig.add(slow);
+  rig.publish(1);
+  ASSERT_GT(rig.turn(), 0);
+  int turns = 0;
+  for (; slow.left > 0; ++turns) {
+    EXPECT_TRUE(peer.numbers.empty());
+    ASSERT_GT(rig.turn(), 0);
+  }
+  EXPECT_GT(turns, 0);
+  EXPECT_TRUE(peer.numbers.empty()) << "not even encoded";
+  rig.settle();
+  EXPECT_EQ(peer.encoded, (Numbers{1}));
+}
+
 TEST(Compression, ThePlacesOfTheWindowAreUsedAnewByEveryPublication) {
   ChannelClients rig;
   rig.sender().allow_compression();
