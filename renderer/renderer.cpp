@@ -19,6 +19,7 @@
 #include "passes/frame_setup.hpp"
 #include "passes/ladder_survey.hpp"
 #include "passes/per_frame_stage.hpp"
+#include "passes/picture_window.hpp"
 #include "passes/quality_ladder.hpp"
 #include "passes/raster_passes.hpp"
 #include "passes/readback_ring.hpp"
@@ -31,6 +32,7 @@ using physics::make_error;
 using physics::Result;
 
 constexpr std::size_t kBlockAlignment = 256;  // GL guarantees that no driver asks for more
+constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 3;  // temperature, depth, object
 
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   const scene::ThermalOptions& thermal = scenario.thermal;
@@ -118,6 +120,8 @@ class GlRenderer final : public Renderer {
   void prepare(const FrameRequest& request, const QualityRung& rung) noexcept;
   void upload_frame() noexcept;
   void bind_frame() const noexcept;
+  /// Of every plane the rows of the window, and the counters.
+  void read_back(std::uint32_t slot) noexcept;
   [[nodiscard]] int find_entity(std::uint32_t entity_id) const noexcept;
 
   scene::ScenarioDesc scenario_;
@@ -139,6 +143,7 @@ class GlRenderer final : public Renderer {
   gl::Buffer table_buffer_;
   gl::BufferTexture band_table_;
   gl::Buffer output_buffer_;  ///< planes, then counters
+  std::size_t planes_ = 0;
   std::size_t stats_offset_ = 0;
   ReadbackRing readback_;
   std::vector<FrameView> views_;
@@ -186,6 +191,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       table_buffer_(gl::Buffer::from(bands_.tables())),
       band_table_(GL_R32F, table_buffer_),
       output_buffer_(planes_bytes(scenario, output) + sizeof(gpu::FrameStatsGpu), nullptr, 0),
+      planes_(plane_count(scenario, output)),
       stats_offset_(planes_bytes(scenario, output)),
       readback_(output.slots, output_buffer_.bytes()),
       views_(output.slots),
@@ -273,10 +279,21 @@ Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress
 CameraSetup GlRenderer::place_camera(const FrameRequest& request,
                                      const QualityRung& rung) noexcept {
   const glm::uvec2 size_px = rendered_px(rung, picture_px());
+  const glm::uvec4 window_px = window_of(request.window_px, picture_px());
   frame_params_.format_px = glm::uvec4(size_px, size_px.x * size_px.y, 0U);
+  frame_params_.picture_window_px = window_px;
+  frame_params_.format_window_px = rendered_window(window_px, picture_px(), size_px);
   DrawLists& lists = stage_->drawn().lists;
   lists.begin(request.sensor_pose.position_world_m, request.sim_time_ns, history_.entities);
   CameraSetup camera = set_camera(scenario_.sensor, request.sensor_pose, frame_params_);
+  if (!stage_->looks_around() && window_size_px(window_px) != picture_px()) {
+    // A pixel more on every side: what touches the window's outermost ones.
+    const glm::dvec4 px(glm::dvec4(frame_params_.format_window_px) +
+                        glm::dvec4(-1.0, -1.0, 1.0, 1.0));
+    const glm::dvec4 ray(frame_params_.ray);
+    camera.view.drawn_tan = glm::dvec4(ray.z + ray.x * px.x, ray.w + ray.y * px.y,
+                                       ray.z + ray.x * px.z, ray.w + ray.y * px.w);
+  }
   const scene::Aabb& bounds = lists.bounds();
   if (!bounds.empty()) {
     camera.view.scene_min_m = bounds.min_m;
@@ -318,14 +335,30 @@ void GlRenderer::bind_frame() const noexcept {
   stage_->bind();
 }
 
+void GlRenderer::read_back(std::uint32_t slot) noexcept {
+  const glm::uvec4& window_px = frame_params_.picture_window_px;
+  const std::size_t row_bytes = frame_params_.picture_px.x * sizeof(float);
+  const std::size_t plane_bytes = frame_params_.picture_px.z * sizeof(float);
+  std::array<ReadbackRing::Range, kMaxPlanes + 1> parts;
+  for (std::size_t plane = 0; plane < planes_; ++plane) {
+    parts[plane] = {plane * plane_bytes + window_px.y * row_bytes,
+                    window_size_px(window_px).y * row_bytes};
+  }
+  parts[planes_] = {stats_offset_, sizeof(gpu::FrameStatsGpu)};
+  readback_.copy_from(output_buffer_, slot, std::span(parts).first(planes_ + 1));
+}
+
 std::span<const RungStats> GlRenderer::expected_rungs(const FrameRequest& request) noexcept {
   static constexpr std::array<RungStats, 1> kFullOnly{};
   if (ladder_.empty()) return kFullOnly;
-  if (!ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_)) {
+  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
+  // What was measured are whole pictures.
+  const glm::uvec2 window_px = window_size_px(window_of(request.window_px, picture_px()));
+  if (!known || window_px != picture_px()) {
     const TrianglesOfRungs triangles = count_triangles(request);
     for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
       expected_rungs_[r].frame_ms =
-          frame_cost_.frame_ms(triangles[r], rendered_pixels(kQualityLadder[r], picture_px()));
+          frame_cost_.frame_ms(triangles[r], rendered_pixels(kQualityLadder[r], window_px));
     }
   }
   return expected_rungs_;
@@ -361,7 +394,8 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   StageTimes& stages = view.stages_ms;
   view.device_failed = stage_->cold(request) && !warm_up_stage(request, {});
   if (view.device_failed) {  // nothing can be drawn: what the planes held goes out, flagged
-    readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot));
+    const ReadbackRing::Range all{0, output_buffer_.bytes()};
+    readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot), {&all, 1});
     return slot;
   }
   view.stats.coarse = stage_->coarse_from(request.sensor_pose);
@@ -380,20 +414,23 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
                             sizeof(gpu::FrameStatsGpu), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
 
   const DrawnScene& drawn = stage_->drawn();
+  const glm::uvec2 size_px(frame_params_.format_px);
+  const glm::uvec4& window_px = frame_params_.format_window_px;
   passes_.geometry.draw(drawn.vertices, drawn.lists, drawn.record_buffer, view_single_sided_,
-                        view_double_sided_, glm::uvec2(frame_params_.format_px));
+                        view_double_sided_, size_px,
+                        stage_->looks_around() ? window_of({}, size_px) : window_px);
   clock_.mark(stages.geometry_ms);
-  stage_->draw(stages, clock_);
+  stage_->draw(window_size_px(window_px), stages, clock_);
   if (is_scaled(rung)) {
     passes_.enlarge->planes().bind_storage(EMIT_BIND_OUTPUT);
-    passes_.radiance.dispatch(glm::uvec2(frame_params_.format_px));
+    passes_.radiance.dispatch(window_size_px(window_px));
     output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
-    passes_.enlarge->dispatch(glm::uvec2(frame_params_.picture_px));
+    passes_.enlarge->dispatch(window_size_px(frame_params_.picture_window_px));
   } else {
-    passes_.radiance.dispatch(glm::uvec2(frame_params_.format_px));
+    passes_.radiance.dispatch(window_size_px(window_px));
   }
   clock_.mark(stages.radiance_ms);
-  readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot));
+  read_back(static_cast<std::uint32_t>(slot));
   clock_.mark(stages.readback_ms);
   return slot;
 }

@@ -13,6 +13,7 @@
 #include "passes/compute_passes.hpp"
 #include "passes/draw_lists.hpp"
 #include "passes/frame_setup.hpp"
+#include "passes/picture_window.hpp"
 #include "passes/raster_passes.hpp"
 #include "passes/scene_buffers.hpp"
 
@@ -83,6 +84,8 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   gpu::FrameParams frame{};
   frame.format_px = frame.picture_px =
       glm::uvec4(sensor_.width_px, sensor_.height_px, sensor_.width_px * sensor_.height_px, 0U);
+  const glm::uvec2 size_px(sensor_.width_px, sensor_.height_px);
+  frame.format_window_px = frame.picture_window_px = window_of({}, size_px);
   CameraSetup camera = set_camera(sensor_, sensor_pose, frame);
   const scene::Aabb& bounds = lists.bounds();
   camera.view.scene_min_m = camera.view.casters_min_m = bounds.min_m;
@@ -118,13 +121,13 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   shadow_.bind_texture();
   shade_.bind_textures();
 
-  geometry_.draw(vertices, lists, records, single_sided, double_sided,
-                 glm::uvec2(sensor_.width_px, sensor_.height_px));
-  occlusion_.dispatch();
+  geometry_.draw(vertices, lists, records, single_sided, double_sided, size_px,
+                 frame.format_window_px);
+  occlusion_.dispatch(size_px);
   for (std::uint32_t c = 0; c < frusta.count; ++c) {
     shadow_.draw(vertices, c, lists.light_commands(shadow_commands[c]));
   }
-  shade_.dispatch_sun_only();
+  shade_.dispatch_sun_only(size_px);
   glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);
 
   Answer answer;

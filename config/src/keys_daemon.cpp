@@ -168,6 +168,9 @@ const KeyTable<StreamConfig>& stream_keys() {
       number<StreamConfig>("resend_max_frac", "", between(0, 10), EMIT_FIELD(resend_max_frac),
                            "UDP, host-step: missing fragments are sent again on request, at most "
                            "this part of the bytes sent, and up to a frame at once; 0: never."),
+      boolean<StreamConfig>("compression", EMIT_FIELD(compression),
+                            "TCP: clients that ask for it get frames losslessly compressed, once "
+                            "for all of them, at the cost of CPU time."),
       integer<StreamConfig>("multicast_ttl", "", 0, 255, EMIT_FIELD(multicast_ttl),
                             "Routers that multicast frames may pass; 0: this host only."),
       text<StreamConfig>("shm", EMIT_FIELD(shm),

@@ -2,13 +2,11 @@
 #include "emit/physics/constants.hpp"
 #include "keys.hpp"
 
-/// Keys of a scenario: place, time, weather, atmosphere, thermal simulation, sensor, channels.
+/// Keys of a scenario: place, time, weather, atmosphere, thermal simulation, sensor.
 namespace emit::config {
 
 using physics::kDegree;
 using scene::BandAtmosphere;
-using scene::ChannelDesc;
-using scene::ChannelKind;
 using scene::DisplayOptions;
 using scene::Place;
 using scene::StepSpacing;
@@ -457,21 +455,6 @@ const KeyTable<BandDraft>& band_keys() {
           }),
       path<BandDraft>("response_file", EMIT_FIELD(response_file),
                       "CSV `wavelength_um,response_frac` in place of `response`."),
-  };
-  return keys;
-}
-
-const KeyTable<ChannelDesc>& channel_keys() {
-  static const KeyTable<ChannelDesc> keys = {
-      required(text<ChannelDesc>("name", EMIT_FIELD(name), "Name a client subscribes to.")),
-      choice<ChannelDesc>(
-          "kind",
-          std::vector<std::pair<std::string, ChannelKind>>{{"injection", ChannelKind::injection},
-                                                           {"projector", ChannelKind::projector}},
-          EMIT_FIELD(kind), "What the channel feeds."),
-      required(text<ChannelDesc>("band", EMIT_FIELD(band),
-                                 "Spectral band: `3-5`, `3.4-4.1`, `8-12`, `7.7-9.3` (um, perfect "
-                                 "rectangles) or one of `[[band]]`.")),
   };
   return keys;
 }

@@ -39,6 +39,9 @@ namespace emit::config {
                                                                       Diagnostics& diagnostics);
 [[nodiscard]] std::vector<scene::ChannelDesc> resolve_channels(
     const Node& root, const std::vector<std::string>& known_bands, Diagnostics& diagnostics);
+/// Against the sensor's format; and one channel shows every frame.
+void check_channel_windows(const Node& root, const scene::ScenarioDesc& scenario,
+                           Diagnostics& diagnostics);
 /// The bands channels use, in their order, then the declared ones that none uses.
 [[nodiscard]] std::vector<scene::SpectralBand> bands_in_use(
     const std::vector<scene::ChannelDesc>& channels,

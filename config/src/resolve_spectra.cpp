@@ -198,6 +198,33 @@ std::vector<ChannelDesc> resolve_channels(const Node& root,
   return channels;
 }
 
+void check_channel_windows(const Node& root, const scene::ScenarioDesc& scenario,
+                           Diagnostics& diagnostics) {
+  const Node* section = root.find("channel");
+  if (section == nullptr || section->items.size() != scenario.channels.size()) {
+    return;
+  }
+  bool all_frames = false;
+  for (std::size_t i = 0; i < scenario.channels.size(); ++i) {
+    const scene::PixelRect& window = scenario.channels[i].window_px;
+    const std::uint32_t width_px = scenario.sensor.width_px;
+    const std::uint32_t height_px = scenario.sensor.height_px;
+    if (window.x_px + window.width_px > width_px || window.y_px + window.height_px > height_px) {
+      diagnostics.add(key_location(section->items[i], "window_px"),
+                      fmt::format("'window_px' reaches to column {} and row {}; the sensor's image "
+                                  "is {} x {}",
+                                  window.x_px + window.width_px, window.y_px + window.height_px,
+                                  width_px, height_px));
+    }
+    all_frames = all_frames || scenario.channels[i].every_nth == 1;
+  }
+  if (!all_frames && !section->items.empty()) {
+    diagnostics.add(key_location(section->items.front(), "every_nth"),
+                    "no channel shows every frame: the daemon's rate is that of its fastest "
+                    "channel, 'every_nth' of one is 1");
+  }
+}
+
 std::vector<SpectralBand> bands_in_use(const std::vector<ChannelDesc>& channels,
                                        const std::vector<SpectralBand>& declared) {
   std::vector<SpectralBand> out;

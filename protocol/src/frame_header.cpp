@@ -51,14 +51,20 @@ enum Offset : std::size_t {
   kPositionAt = 168,
   kQuaternionAt = 192,
   kQualityRungAt = 224,
-  kReservedAt = 225,
+  kEncodingAt = 225,
+  kReservedAt = 226,
   kPreviousJitterAt = 232,
   kSlotBeginAt = 240,
   kTriggerNumberAt = 248,
   kPredictionErrorMAt = 256,
   kPredictionErrorRadAt = 260,
   kPredictionsAt = 264,
-  kReservedBehindAt = 268,
+  kWindowXAt = 268,
+  kWindowYAt = 272,
+  kSensorWidthAt = 276,
+  kSensorHeightAt = 280,
+  kEncodedBytesAt = 284,
+  kReservedBehindAt = 288,
   kCrcAt = 316,
 };
 static_assert(kCrcAt + 4 == kFrameHeaderBytes);
@@ -67,6 +73,12 @@ static_assert(kCrcAt + 4 == kFrameHeaderBytes);
 std::uint64_t expected_payload_bytes(std::uint32_t width_px, std::uint32_t height_px) noexcept {
   const std::uint64_t pixels = std::uint64_t{width_px} * height_px;
   return pixels > (std::uint64_t{1} << 61) ? 0 : pixels * sizeof(float);
+}
+
+bool window_fits(const FrameHeader& header) noexcept {
+  if (header.sensor_width_px == 0 && header.sensor_height_px == 0) return true;
+  return std::uint64_t{header.window_x_px} + header.width_px <= header.sensor_width_px &&
+         std::uint64_t{header.window_y_px} + header.height_px <= header.sensor_height_px;
 }
 
 std::string describe(HeaderFault fault, std::span<const std::byte> bytes,
@@ -95,6 +107,12 @@ std::string describe(HeaderFault fault, std::span<const std::byte> bytes,
     case HeaderFault::payload_size:
       return fmt::format("{} payload bytes for {}x{} float32 pixels", header.payload_bytes,
                          header.width_px, header.height_px);
+    case HeaderFault::encoding:
+      return fmt::format("unknown pixel encoding {}", wire::get<std::uint8_t>(bytes, kEncodingAt));
+    case HeaderFault::window:
+      return fmt::format("{}x{} pixels at {}, {} of a sensor of {}x{}", header.width_px,
+                         header.height_px, header.window_x_px, header.window_y_px,
+                         header.sensor_width_px, header.sensor_height_px);
   }
   return "unknown fault";
 }
@@ -144,6 +162,7 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kQuaternionAt + 16, attitude.y);
   wire::put(to, kQuaternionAt + 24, attitude.z);
   wire::put(to, kQualityRungAt, header.quality_rung);
+  wire::put(to, kEncodingAt, static_cast<std::uint8_t>(header.encoding));
   std::ranges::fill(to.subspan(kReservedAt, kPreviousJitterAt - kReservedAt), std::byte{0});
   wire::put(to, kPreviousJitterAt, header.previous_jitter_ns);
   wire::put(to, kSlotBeginAt, header.slot_begin_ns);
@@ -151,6 +170,11 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kPredictionErrorMAt, header.prediction_error_m);
   wire::put(to, kPredictionErrorRadAt, header.prediction_error_rad);
   wire::put(to, kPredictionsAt, header.predictions);
+  wire::put(to, kWindowXAt, header.window_x_px);
+  wire::put(to, kWindowYAt, header.window_y_px);
+  wire::put(to, kSensorWidthAt, header.sensor_width_px);
+  wire::put(to, kSensorHeightAt, header.sensor_height_px);
+  wire::put(to, kEncodedBytesAt, header.encoded_bytes);
   std::ranges::fill(to.subspan(kReservedBehindAt, kCrcAt - kReservedBehindAt), std::byte{0});
   wire::put(to, kCrcAt, crc32c(to.first(kCrcAt)));
 }
@@ -173,6 +197,10 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   if (quantity != static_cast<std::uint8_t>(PixelQuantity::radiance_w_m2_sr) &&
       quantity != static_cast<std::uint8_t>(PixelQuantity::temperature_k)) {
     return HeaderFault::quantity;
+  }
+  const auto encoding = wire::get<std::uint8_t>(bytes, kEncodingAt);
+  if (encoding > static_cast<std::uint8_t>(PixelEncoding::shuffled_lz4)) {
+    return HeaderFault::encoding;
   }
 
   header.format = static_cast<PixelFormat>(format);
@@ -216,10 +244,16 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   header.prediction_error_m = wire::get<float>(bytes, kPredictionErrorMAt);
   header.prediction_error_rad = wire::get<float>(bytes, kPredictionErrorRadAt);
   header.predictions = wire::get<std::uint32_t>(bytes, kPredictionsAt);
+  header.encoding = static_cast<PixelEncoding>(encoding);
+  header.window_x_px = wire::get<std::uint32_t>(bytes, kWindowXAt);
+  header.window_y_px = wire::get<std::uint32_t>(bytes, kWindowYAt);
+  header.sensor_width_px = wire::get<std::uint32_t>(bytes, kSensorWidthAt);
+  header.sensor_height_px = wire::get<std::uint32_t>(bytes, kSensorHeightAt);
+  header.encoded_bytes = wire::get<std::uint32_t>(bytes, kEncodedBytesAt);
 
   const std::uint64_t expected = expected_payload_bytes(header.width_px, header.height_px);
-  return expected == 0 || header.payload_bytes != expected ? HeaderFault::payload_size
-                                                           : HeaderFault::none;
+  if (expected == 0 || header.payload_bytes != expected) return HeaderFault::payload_size;
+  return window_fits(header) ? HeaderFault::none : HeaderFault::window;
 }
 
 physics::Result<FrameHeader> decode_frame_header(std::span<const std::byte> bytes) {

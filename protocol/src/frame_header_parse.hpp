@@ -13,7 +13,9 @@ enum class HeaderFault : std::uint8_t {
   crc,
   format,
   quantity,
-  payload_size
+  payload_size,
+  encoding,
+  window
 };
 
 /// decode_frame_header() without the text: RT-safe. `header` is filled for none and payload_size.

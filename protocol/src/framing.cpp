@@ -108,11 +108,17 @@ physics::Result<FrameView> decode_frame_record(std::span<const std::byte> body) 
   auto header = decode_frame_header(body);
   if (!header) return tl::unexpected(std::move(header).error());
   const auto pixels = body.subspan(kFrameHeaderBytes);
-  if (pixels.size() != header->payload_bytes) {
-    return physics::make_error(
-        physics::ErrorCode::protocol,
-        fmt::format("frame {}: {} bytes follow the header, {} announced", header->frame_number,
-                    pixels.size(), header->payload_bytes));
+  const bool raw = header->encoding == PixelEncoding::raw;
+  const std::uint64_t announced = raw ? header->payload_bytes : header->encoded_bytes;
+  if (!raw && announced >= header->payload_bytes) {
+    return physics::make_error(physics::ErrorCode::protocol,
+                               fmt::format("frame {}: {} bytes encode {} bytes of pixels",
+                                           header->frame_number, announced, header->payload_bytes));
+  }
+  if (pixels.size() != announced) {
+    return physics::make_error(physics::ErrorCode::protocol,
+                               fmt::format("frame {}: {} bytes follow the header, {} announced",
+                                           header->frame_number, pixels.size(), announced));
   }
   return FrameView{*header, pixels};
 }

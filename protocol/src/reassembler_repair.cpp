@@ -151,7 +151,7 @@ std::size_t Reassembler::open_frames(std::uint16_t stream_id,
   return count;
 }
 
-std::size_t Reassembler::missing(std::uint16_t stream_id, std::uint32_t frame_id,
+std::size_t Reassembler::missing(std::uint16_t stream_id, std::uint32_t frame_id, bool tail,
                                  std::span<ByteRange> out) const noexcept {
   const Stream* stream = known_stream(stream_id);
   const Slot* slot = stream == nullptr ? nullptr : find_open(*stream, frame_id);
@@ -170,6 +170,7 @@ std::size_t Reassembler::missing(std::uint16_t stream_id, std::uint32_t frame_id
   std::size_t count = 0;
   for (std::size_t at = next(0, false); at < words && count < out.size();) {
     const std::size_t end = next(at, true);
+    if (end == words && !tail) break;
     out[count++] = {static_cast<std::uint32_t>(at * kWordBytes),
                     static_cast<std::uint32_t>((end - at) * kWordBytes)};
     at = next(end, false);

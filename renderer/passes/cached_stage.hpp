@@ -35,7 +35,8 @@ class CachedStage final : public ThermalStage {
   const physics::Forcing& forcing_now() const noexcept override { return forcing_now_; }
   void upload() noexcept override;
   void bind() const noexcept override;
-  void draw(StageTimes&, StageClock&) noexcept override {}
+  [[nodiscard]] bool looks_around() const noexcept override { return false; }
+  void draw(const glm::uvec2&, StageTimes&, StageClock&) noexcept override {}
 
  private:
   /// A place the surface was prepared for, and how far around it that holds.

@@ -15,8 +15,10 @@ constexpr float kRounding = 4e-6F;
 
 std::array<glm::dvec3, 5> view_planes(const ViewVolume& view) noexcept {
   const glm::dmat3& m = view.relworld_from_sensor;
-  return {m * glm::dvec3(1.0, 0.0, view.tan_half_h), m * glm::dvec3(-1.0, 0.0, view.tan_half_h),
-          m * glm::dvec3(0.0, 1.0, view.tan_half_v), m * glm::dvec3(0.0, -1.0, view.tan_half_v),
+  const glm::dvec4 tan = view.drawn_tan.value_or(
+      glm::dvec4(-view.tan_half_h, -view.tan_half_v, view.tan_half_h, view.tan_half_v));
+  return {m * glm::dvec3(1.0, 0.0, -tan.x), m * glm::dvec3(-1.0, 0.0, tan.z),
+          m * glm::dvec3(0.0, 1.0, -tan.y), m * glm::dvec3(0.0, -1.0, tan.w),
           m * glm::dvec3(0.0, 0.0, 1.0)};
 }
 

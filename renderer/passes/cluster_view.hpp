@@ -10,8 +10,8 @@
 
 namespace emit::renderer {
 
-/// Inward normals of the planes that bound the view pyramid, through the camera; relworld axes, not
-/// of unit length.
+/// Inward normals of the planes that bound what is drawn of the view pyramid, through the camera;
+/// relworld axes, not of unit length.
 [[nodiscard]] std::array<glm::dvec3, 5> view_planes(const ViewVolume& view) noexcept;
 
 /// The camera's view in the coordinates of one mesh: which of its clusters are worth drawing.

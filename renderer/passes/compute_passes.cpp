@@ -10,8 +10,8 @@
 namespace emit::renderer {
 namespace {
 
-void dispatch_pixels(std::uint32_t width_px, std::uint32_t height_px) noexcept {
-  glDispatchCompute((width_px + 7) / 8, (height_px + 7) / 8, 1);
+void dispatch_pixels(const glm::uvec2& size_px) noexcept {
+  glDispatchCompute((size_px.x + 7) / 8, (size_px.y + 7) / 8, 1);
 }
 
 gl::Texture make_texture(GLenum format, std::uint32_t width_px, std::uint32_t height_px) {
@@ -27,15 +27,13 @@ physics::Result<OcclusionPass> OcclusionPass::create(std::uint32_t width_px,
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
   pass.sky_frac_ = make_texture(GL_R32F, width_px, height_px);
-  pass.width_px_ = width_px;
-  pass.height_px_ = height_px;
   return pass;
 }
 
-void OcclusionPass::dispatch() const noexcept {
+void OcclusionPass::dispatch(const glm::uvec2& size_px) const noexcept {
   program_.use();
   glBindImageTexture(EMIT_IMG_OCCLUSION, sky_frac_.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
-  dispatch_pixels(width_px_, height_px_);
+  dispatch_pixels(size_px);
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
 }
 
@@ -61,25 +59,23 @@ physics::Result<ThermalPass> ThermalPass::create(std::uint32_t width_px, std::ui
   if (foster) pass.state_format_ = GL_RGBA32F;
   pass.state_ = make_texture(pass.state_format_, width_px, height_px);
   pass.sun_now_ = make_texture(GL_R32F, width_px, height_px);
-  pass.width_px_ = width_px;
-  pass.height_px_ = height_px;
   return pass;
 }
 
-void ThermalPass::dispatch(const gl::Program& program) const noexcept {
+void ThermalPass::dispatch(const gl::Program& program, const glm::uvec2& size_px) const noexcept {
   program.use();
   glBindImageTexture(EMIT_IMG_STATE, state_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, state_format_);
   glBindImageTexture(EMIT_IMG_SUN_NOW, sun_now_.id(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R32F);
-  dispatch_pixels(width_px_, height_px_);
+  dispatch_pixels(size_px);
   glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
 }
 
-void ThermalPass::dispatch_step() const noexcept {
-  dispatch(step_program_);
+void ThermalPass::dispatch_step(const glm::uvec2& size_px) const noexcept {
+  dispatch(step_program_, size_px);
 }
 
-void ThermalPass::dispatch_sun_only() const noexcept {
-  dispatch(sun_program_);
+void ThermalPass::dispatch_sun_only(const glm::uvec2& size_px) const noexcept {
+  dispatch(sun_program_, size_px);
 }
 
 void ThermalPass::bind_textures() const noexcept {
@@ -105,7 +101,7 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
 
 void RadiancePass::dispatch(const glm::uvec2& size_px) const noexcept {
   program_.use();
-  dispatch_pixels(size_px.x, size_px.y);
+  dispatch_pixels(size_px);
 }
 
 physics::Result<EnlargePass> EnlargePass::create(std::uint32_t bands, std::uint32_t planes,
@@ -121,11 +117,11 @@ physics::Result<EnlargePass> EnlargePass::create(std::uint32_t bands, std::uint3
   return pass;
 }
 
-void EnlargePass::dispatch(const glm::uvec2& picture_px) const noexcept {
+void EnlargePass::dispatch(const glm::uvec2& size_px) const noexcept {
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
   program_.use();
   view_.bind(EMIT_TEX_SCALED);
-  dispatch_pixels(picture_px.x, picture_px.y);
+  dispatch_pixels(size_px);
 }
 
 }  // namespace emit::renderer

@@ -9,21 +9,20 @@
 #include "gl/program.hpp"
 
 /// Paper parts 2, 4 and 5: full-screen work in compute shaders of 8 x 8 pixels. Storage blocks are
-/// bound by the renderer; each pass binds the textures and images it owns.
+/// bound by the renderer; each pass binds the textures and images it owns. Where the pixels begin
+/// is in FrameParams, format_window_px and picture_window_px; how many they are, in the calls.
 namespace emit::renderer {
 
 class OcclusionPass {
  public:
   [[nodiscard]] static physics::Result<OcclusionPass> create(std::uint32_t width_px,
                                                              std::uint32_t height_px);
-  void dispatch() const noexcept;
+  void dispatch(const glm::uvec2& size_px) const noexcept;
   void bind_texture() const noexcept;
 
  private:
   gl::Program program_;
   gl::Texture sky_frac_;
-  std::uint32_t width_px_ = 0;
-  std::uint32_t height_px_ = 0;
 };
 
 class ThermalPass {
@@ -32,21 +31,19 @@ class ThermalPass {
                                                            std::uint32_t height_px,
                                                            const scene::ThermalOptions& options);
   /// Advances every visible point over the interval bound as EMIT_BIND_STEP.
-  void dispatch_step() const noexcept;
+  void dispatch_step(const glm::uvec2& size_px) const noexcept;
   /// Only stores the shade of that interval, for reflected sunlight.
-  void dispatch_sun_only() const noexcept;
+  void dispatch_sun_only(const glm::uvec2& size_px) const noexcept;
   void bind_textures() const noexcept;
 
  private:
-  void dispatch(const gl::Program& program) const noexcept;
+  void dispatch(const gl::Program& program, const glm::uvec2& size_px) const noexcept;
 
   gl::Program step_program_;
   gl::Program sun_program_;
   gl::Texture state_;  ///< two modes (foster: four), offsets in K
   GLenum state_format_ = GL_RG32F;
   gl::Texture sun_now_;  ///< visible share of the sun's disc at the frame's instant
-  std::uint32_t width_px_ = 0;
-  std::uint32_t height_px_ = 0;
 };
 
 /// What a scenario asks of the radiance pass; it is compiled for nothing else.
@@ -62,7 +59,6 @@ class RadiancePass {
  public:
   [[nodiscard]] static physics::Result<RadiancePass> create(const scene::ThermalOptions& options,
                                                             const RadianceContent& content);
-  /// FrameParams::format_px tells the size, too.
   void dispatch(const glm::uvec2& size_px) const noexcept;
 
  private:
@@ -78,7 +74,7 @@ class EnlargePass {
                                                            std::size_t rendered_px);
   /// Where the passes before write to.
   [[nodiscard]] const gl::Buffer& planes() const noexcept { return planes_; }
-  void dispatch(const glm::uvec2& picture_px) const noexcept;
+  void dispatch(const glm::uvec2& size_px) const noexcept;
 
  private:
   gl::Program program_;

@@ -6,6 +6,8 @@
 #include <glm/ext/matrix_double4x4.hpp>
 #include <glm/ext/vector_double2.hpp>
 #include <glm/ext/vector_double3.hpp>
+#include <glm/ext/vector_double4.hpp>
+#include <optional>
 
 namespace emit::renderer {
 
@@ -16,6 +18,8 @@ struct ViewVolume {
   glm::dmat4 clip_from_relworld{1.0};  ///< reversed depth, infinite far plane
   double tan_half_h = 0.1;
   double tan_half_v = 0.1;
+  /// Where less than all of it is drawn: least tangents to the right and down, then the greatest.
+  std::optional<glm::dvec4> drawn_tan = std::nullopt;
   double near_m = 0.1;
   double far_m = 1e5;
   glm::dvec3 scene_min_m{0.0};  ///< box around all receivers, relative to the camera

@@ -184,25 +184,26 @@ void PerFrameStage::draw_shadow(std::uint32_t step) noexcept {
   }
 }
 
-void PerFrameStage::draw(StageTimes& stages, StageClock& clock) noexcept {
-  passes_.occlusion.dispatch();
+void PerFrameStage::draw(const glm::uvec2& size_px, StageTimes& stages,
+                         StageClock& clock) noexcept {
+  passes_.occlusion.dispatch(size_px);
   clock.mark(stages.occlusion_ms);
   const auto steps = static_cast<std::uint32_t>(plan_.intervals().size());
   for (std::uint32_t i = 0; i < tail_steps_; ++i) {
     bind_step(steps + 1 + i);
-    passes_.thermal.dispatch_step();
+    passes_.thermal.dispatch_step(size_px);
     clock.mark(stages.thermal_ms);
   }
   for (std::uint32_t step = 0; step < steps; ++step) {
     draw_shadow(step);
     clock.mark(stages.shadow_ms);
-    passes_.thermal.dispatch_step();
+    passes_.thermal.dispatch_step(size_px);
     clock.mark(stages.thermal_ms);
   }
   if (extra_sun_pass_) {
     draw_shadow(steps);
     clock.mark(stages.shadow_ms);
-    passes_.thermal.dispatch_sun_only();
+    passes_.thermal.dispatch_sun_only(size_px);
     clock.mark(stages.thermal_ms);
   }
 }

@@ -32,7 +32,9 @@ class PerFrameStage final : public ThermalStage {
   const physics::Forcing& forcing_now() const noexcept override { return forcing_now_; }
   void upload() noexcept override;
   void bind() const noexcept override;
-  void draw(StageTimes& stages, StageClock& clock) noexcept override;
+  /// Obscurance comes from the pixels' neighbours.
+  [[nodiscard]] bool looks_around() const noexcept override { return true; }
+  void draw(const glm::uvec2& size_px, StageTimes& stages, StageClock& clock) noexcept override;
 
  private:
   static constexpr std::size_t kBlockAlignment = 256;  // GL guarantees that no driver asks for more

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "passes/picture_window.hpp"
+
 namespace emit::renderer {
 namespace {
 
@@ -122,12 +124,13 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::
 
 void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& lists,
                         const gl::Buffer& records, CommandRange single_sided,
-                        CommandRange double_sided, const glm::uvec2& size_px) const noexcept {
+                        CommandRange double_sided, const glm::uvec2& size_px,
+                        const glm::uvec4& window_px) const noexcept {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
-  const auto width_px = static_cast<GLsizei>(size_px.x);
-  const auto height_px = static_cast<GLsizei>(size_px.y);
-  glViewport(0, 0, width_px, height_px);
-  glScissor(0, 0, width_px, height_px);
+  glViewport(0, 0, static_cast<GLsizei>(size_px.x), static_cast<GLsizei>(size_px.y));
+  const glm::uvec2 part_px = window_size_px(window_px);
+  glScissor(static_cast<GLint>(window_px.x), static_cast<GLint>(window_px.y),
+            static_cast<GLsizei>(part_px.x), static_cast<GLsizei>(part_px.y));
   glEnable(GL_SCISSOR_TEST);      // what is not drawn need not be cleared
   const GLfloat far_away = 0.0F;  // reversed z
   if (sampled_) {

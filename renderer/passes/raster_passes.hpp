@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <glm/ext/vector_uint2.hpp>
+#include <glm/ext/vector_uint4.hpp>
 #include <span>
 
 #include "gl/objects.hpp"
@@ -33,10 +34,11 @@ class GeometryPass {
   /// `sampled`: the thermal state of the surface comes from its samples.
   [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
                                                             std::uint32_t height_px, bool sampled);
-  /// Draws two parts of what `lists` found in view; `records` holds its records.
+  /// Draws two parts of what `lists` found in view; `records` holds its records. Of the `size_px`
+  /// only the window is touched.
   void draw(const SceneVertexArrays& vertices, const DrawLists& lists, const gl::Buffer& records,
-            CommandRange single_sided, CommandRange double_sided,
-            const glm::uvec2& size_px) const noexcept;
+            CommandRange single_sided, CommandRange double_sided, const glm::uvec2& size_px,
+            const glm::uvec4& window_px) const noexcept;
   /// Binds what it drew to the texture units.
   void bind_textures() const noexcept;
 

@@ -36,10 +36,14 @@ int ReadbackRing::acquire() noexcept {
   return -1;
 }
 
-void ReadbackRing::copy_from(const gl::Buffer& source, std::uint32_t slot) noexcept {
+void ReadbackRing::copy_from(const gl::Buffer& source, std::uint32_t slot,
+                             std::span<const Range> parts) noexcept {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glCopyNamedBufferSubData(source.id(), slots_[slot].buffer.id(), 0, 0,
-                           static_cast<GLsizeiptr>(source.bytes()));
+  for (const Range& part : parts) {
+    const auto offset = static_cast<GLintptr>(part.offset_bytes);
+    glCopyNamedBufferSubData(source.id(), slots_[slot].buffer.id(), offset, offset,
+                             static_cast<GLsizeiptr>(part.bytes));
+  }
   glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
   if (slots_[slot].fence != nullptr) glDeleteSync(slots_[slot].fence);
   slots_[slot].fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);

@@ -24,8 +24,13 @@ class ReadbackRing {
 
   /// A free slot, taken; -1 when all are in use.
   [[nodiscard]] int acquire() noexcept;
-  /// Issues the copy of `source` into the slot, and a fence behind it.
-  void copy_from(const gl::Buffer& source, std::uint32_t slot) noexcept;
+  struct Range {
+    std::size_t offset_bytes = 0;
+    std::size_t bytes = 0;
+  };
+  /// Issues the copy of parts of `source` to their place in the slot, and a fence behind it.
+  void copy_from(const gl::Buffer& source, std::uint32_t slot,
+                 std::span<const Range> parts) noexcept;
   [[nodiscard]] bool ready(std::uint32_t slot) noexcept;
   /// Waits for the fence; false when the driver failed or hangs for ten minutes.
   [[nodiscard]] bool wait(std::uint32_t slot) noexcept;

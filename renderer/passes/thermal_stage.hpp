@@ -74,8 +74,10 @@ class ThermalStage {
 
   virtual void upload() noexcept = 0;
   virtual void bind() const noexcept = 0;
-  /// Everything between geometry and radiance.
-  virtual void draw(StageTimes& stages, StageClock& clock) noexcept = 0;
+  /// True when pixels within FrameParams::format_window_px depend on what is seen around it.
+  [[nodiscard]] virtual bool looks_around() const noexcept = 0;
+  /// Everything between geometry and radiance; `size_px`: of FrameParams::format_window_px.
+  virtual void draw(const glm::uvec2& size_px, StageTimes& stages, StageClock& clock) noexcept = 0;
 };
 
 /// Entries of SceneHistory::entities by object; -1: static.

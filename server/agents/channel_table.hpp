@@ -6,12 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "agents/frame_source.hpp"
+#include "agents/messages.hpp"
 #include "emit/scene/scene_desc.hpp"
 
 namespace emit::server {
 
-/// What clients subscribe to: one entry per channel (kind x band), each with its plane.
+/// What clients subscribe to: one entry per channel, each with its picture.
 struct Channel {
   std::uint16_t index = 0;
   std::string name;
@@ -21,22 +21,55 @@ struct Channel {
   double band_lo_um = 0.0;
   double band_hi_um = 0.0;
   std::vector<scene::ResponseSample> response;  ///< of the band; empty: a rectangle
-  std::uint32_t width_px = 0;
+  std::uint32_t width_px = 0;                   ///< of its frames
   std::uint32_t height_px = 0;
-  std::size_t plane = 0;  ///< index into FrameView::radiance_w_m2_sr
+  std::uint32_t window_x_px = 0;  ///< where they lie in the sensor's image
+  std::uint32_t window_y_px = 0;
+  std::uint32_t sensor_width_px = 0;
+  std::uint32_t sensor_height_px = 0;
+  std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
+  std::size_t picture = 0;      ///< index into Image::pictures
+};
+
+/// Pixels that channels of one band and window share.
+struct Picture {
+  std::size_t plane = 0;                   ///< index into FrameView::radiance_w_m2_sr
+  scene::PixelRect window_px;              ///< of the sensor's image
+  ChannelSet channels = 0;                 ///< that show it
+  std::vector<std::vector<float>> copies;  ///< by slot; empty where the rows lie in one piece
+};
+
+struct ChannelTable {
+  std::vector<Channel> channels;
+  std::vector<Picture> pictures;
 };
 
 [[nodiscard]] std::string_view to_string(scene::ChannelKind kind) noexcept;
 
-/// Channels of a scenario, or the one channel of canned frames without a scenario. The size is the
-/// source's. A scenario without channels gets an injection channel per band.
-/// Errors (config): a channel whose band the scenario lacks, more bands than fit.
-[[nodiscard]] physics::Result<std::vector<Channel>> make_channels(
+/// Channels of a scenario, or the one channel of canned frames without a scenario, with all memory
+/// that their pictures take. The sensor's size is the source's. A scenario without channels gets an
+/// injection channel per band.
+/// Errors (config): a channel whose band the scenario lacks or whose window the image, more bands,
+/// channels or pictures than fit.
+[[nodiscard]] physics::Result<ChannelTable> make_channels(
     const std::optional<scene::ScenarioDesc>& scenario, const SourceInfo& source);
 
 /// First channel that fits; empty fields fit anything. nullptr: none.
 [[nodiscard]] const Channel* find_channel(const std::vector<Channel>& channels,
-                                          std::string_view kind, std::string_view sensor,
-                                          std::string_view band) noexcept;
+                                          std::string_view name, std::string_view kind,
+                                          std::string_view sensor, std::string_view band) noexcept;
+
+/// Channels that show the frame of that number. RT-safe.
+[[nodiscard]] ChannelSet due_channels(const std::vector<Channel>& channels,
+                                      std::uint64_t frame_number) noexcept;
+
+/// The smallest window that holds those of some channels. RT-safe.
+[[nodiscard]] scene::PixelRect window_around(const std::vector<Channel>& channels,
+                                             ChannelSet of) noexcept;
+
+/// Pixels of a picture, row by row: in the source's memory where they lie in one piece there, else
+/// copied to the picture's memory for `slot`. RT-safe.
+[[nodiscard]] std::span<const float> cut_out(Picture& picture, const renderer::FrameView& view,
+                                             renderer::SlotIndex slot) noexcept;
 
 }  // namespace emit::server

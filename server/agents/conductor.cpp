@@ -219,6 +219,9 @@ void Conductor::issue_slotted() noexcept {
 
 void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
   job.request.frame_number = ++render_number_;
+  // Under what number it will go out, if it is in time.
+  job.channels = due_channels(context_.channels, frame_number_ + issued_count_ + 1);
+  job.request.window_px = window_around(context_.channels, job.channels);
   job.request.thermal_time_ns = control_.thermal_time_ns(job.request.sim_time_ns, is_step);
   last_sim_time_ns_ = job.request.sim_time_ns;
   issued_any_ = true;
@@ -359,8 +362,13 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   }
   shown_ = header;
   shown_thermal_ns_ = issued.thermal_time_ns;
-  shown_crc_ =
-      options_.first_plane < done.image.plane_count ? done.image.crc32c[options_.first_plane] : 0;
+  for (const Channel& channel : context_.channels) {
+    if ((done.image.channels >> channel.index & 1U) != 0) {
+      shown_channel_ = channel.index;
+      shown_crc_ = done.image.crc32c[channel.picture];
+      break;
+    }
+  }
   context_.published.commit();
   context_.frames_handed_over.fetch_add(1, std::memory_order_release);
   context_.bells.sender.ring();
@@ -379,6 +387,7 @@ bool Conductor::publish_repeat(std::int64_t now_ns) noexcept {
   }
   frame->repeat = true;
   frame->image = {};
+  frame->image.channels = due_channels(context_.channels, frame_number_ + 1);
   frame->header = shown_;
   frame->header.frame_number = ++frame_number_;
   frame->header.deadline_ns = slot_deadline_ns();
@@ -434,6 +443,7 @@ void Conductor::journal_frame(const FrameHeader& header, const Issued* issued,
   line.flags = header.flags;
   line.quality_rung = header.quality_rung;
   line.radiance_crc32c = shown_crc_;
+  line.radiance_channel = shown_channel_;
   line.rendered = issued != nullptr;
   line.trigger_number = header.trigger_number;
   line.slot_begin_ns = header.slot_begin_ns;

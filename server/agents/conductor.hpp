@@ -25,11 +25,9 @@ namespace emit::server {
 /// What it decides follows from inputs and clock alone.
 class Conductor final : public Agent {
  public:
-  /// `first_plane`: plane of the first channel, whose CRC goes into the journal.
   /// `canned`: frames carry kFlagCanned.
   struct Options {
     config::PacingConfig pacing;
-    std::size_t first_plane = 0;
     bool canned = false;
     bool tai_unset = false;
   };
@@ -174,7 +172,8 @@ class Conductor final : public Agent {
   std::size_t issued_count_ = 0;
   protocol::FrameHeader shown_;  // of the image published last
   std::int64_t shown_thermal_ns_ = 0;
-  std::uint32_t shown_crc_ = 0;
+  std::uint32_t shown_crc_ = 0;      // of the first channel that shows it
+  std::uint32_t shown_channel_ = 0;  // that channel
   bool journal_lossy_ = false;
 
   std::atomic<bool> draining_{false};

@@ -69,6 +69,7 @@ bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
   out.set_flags(line.flags);
   out.set_quality_rung(line.quality_rung);
   out.set_radiance_crc32c(line.radiance_crc32c);
+  out.set_radiance_channel(line.radiance_channel);
   out.set_rendered(line.rendered);
   out.set_trigger_number(line.trigger_number);
   out.set_slot_begin_ns(line.slot_begin_ns);

@@ -57,6 +57,7 @@ struct JournalFrame {
   std::uint32_t flags = 0;
   std::uint32_t quality_rung = 0;
   std::uint32_t radiance_crc32c = 0;
+  std::uint32_t radiance_channel = 0;
   bool rendered = false;
   std::uint64_t trigger_number = 0;
   std::int64_t slot_begin_ns = 0;

@@ -16,6 +16,12 @@ namespace emit::server {
 
 inline constexpr std::size_t kMaxPlanes = 16;
 inline constexpr std::size_t kMaxSlots = 16;
+inline constexpr std::size_t kMaxPictures = 16;
+
+/// Bit k: channel k.
+using ChannelSet = std::uint64_t;
+inline constexpr std::size_t kMaxChannels = 64;
+inline constexpr ChannelSet kAllChannels = ~ChannelSet{0};
 
 /// Connections are named by their place in the receiver's table and how often it was used.
 inline constexpr std::uint32_t kConnectionPlaceBits = 10;
@@ -85,21 +91,22 @@ inline constexpr std::size_t kMaxWeatherPerFrame = 32;
 struct RenderJob {
   enum class Kind : std::uint8_t { frame, reset };
   Kind kind = Kind::frame;
-  renderer::FrameRequest request;  ///< its rung is the render agent's choice
-  std::int64_t deadline_ns = 0;    ///< when the pixels are due; 0: whenever
+  renderer::FrameRequest request;      ///< its rung is the render agent's choice
+  std::int64_t deadline_ns = 0;        ///< when the pixels are due; 0: whenever
+  ChannelSet channels = kAllChannels;  ///< that the frame is for
   std::uint32_t weather_count = 0;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather;
   std::uint32_t entity_count = 0;
   std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
 };
 
-/// Pixels of one image, in memory of the source.
+/// Pixels of one image, in memory of the source or that of the pictures for the same slot.
 struct Image {
   FrameSource* source = nullptr;
   renderer::SlotIndex slot = 0;
-  std::uint32_t plane_count = 0;
-  std::array<std::span<const float>, kMaxPlanes> planes;
-  std::array<std::uint32_t, kMaxPlanes> crc32c{};
+  ChannelSet channels = kAllChannels;  ///< that show it; the pictures of others are not there
+  std::array<std::span<const float>, kMaxPictures> pictures;
+  std::array<std::uint32_t, kMaxPictures> crc32c{};
 };
 
 /// render agent -> conductor, in order of submission.
@@ -119,7 +126,9 @@ struct RenderDone {
 
 /// conductor -> sender. The header lacks what depends on channel and client.
 struct PublishFrame {
-  bool repeat = false;  ///< the image published last, again; `image` is not set
+  /// The image published last, again, for those of image.channels that it has pictures for; else
+  /// `image` is not set.
+  bool repeat = false;
   Image image;
   protocol::FrameHeader header;
 };

@@ -183,6 +183,11 @@ void fill(const Channel& channel, v1::ChannelInfo& out) {
   out.set_band_is_rectangle(channel.response.empty() && channel.band_hi_um > channel.band_lo_um);
   out.set_width_px(channel.width_px);
   out.set_height_px(channel.height_px);
+  out.set_every_nth(channel.every_nth);
+  out.set_window_x_px(channel.window_x_px);
+  out.set_window_y_px(channel.window_y_px);
+  out.set_sensor_width_px(channel.sensor_width_px);
+  out.set_sensor_height_px(channel.sensor_height_px);
 }
 
 }  // namespace
@@ -270,17 +275,19 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
     refuse(connection, StatusCode::not_allowed, "one subscription per connection");
     return;
   }
-  const Channel* channel = find_channel(context_.channels, subscribe.channel_kind(),
-                                        subscribe.sensor(), subscribe.band());
+  const Channel* channel =
+      find_channel(context_.channels, subscribe.channel_name(), subscribe.channel_kind(),
+                   subscribe.sensor(), subscribe.band());
   if (channel == nullptr) {
     std::string known;
     for (const Channel& each : context_.channels) {
-      known += fmt::format("{}{}/{}/{}", known.empty() ? "" : ", ", to_string(each.kind),
-                           each.sensor, each.band);
+      known += fmt::format("{}{} ({}/{}/{})", known.empty() ? "" : ", ", each.name,
+                           to_string(each.kind), each.sensor, each.band);
     }
     refuse(connection, StatusCode::unknown_channel,
-           fmt::format("no channel kind '{}' sensor '{}' band '{}'; there are {}",
-                       subscribe.channel_kind(), subscribe.sensor(), subscribe.band(), known));
+           fmt::format("no channel name '{}' kind '{}' sensor '{}' band '{}'; there are {}",
+                       subscribe.channel_name(), subscribe.channel_kind(), subscribe.sensor(),
+                       subscribe.band(), known));
     return;
   }
   if (subscribe.every_nth() > protocol::kMaxEveryNth) {
@@ -321,6 +328,8 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
     }
   } else {
     params.tcp_socket = &connection.socket;
+    params.compression =
+        config_.stream.compression && subscribe.compression() == v1::COMPRESSION_SHUFFLED_LZ4;
     connection.socket.set_send_buffer(config_.stream.tcp_send_buffer_bytes);
   }
   v1::ControlRecord answer;
@@ -332,7 +341,9 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
     granted.set_data_fragments(params.fec.data_fragments);
     granted.set_parity_fragments(params.fec.parity_fragments);
   }
-  answer.mutable_subscribed()->set_every_nth(params.every_nth);
+  answer.mutable_subscribed()->set_compression(params.compression ? v1::COMPRESSION_SHUFFLED_LZ4
+                                                                  : v1::COMPRESSION_NONE);
+  answer.mutable_subscribed()->set_every_nth(params.every_nth * channel->every_nth);
   const bool udp = params.udp;
   if (udp) {
     queue(connection, answer);

@@ -94,7 +94,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       starved_ = false;
       job_prepared_ = false;
       in_flight_[(first_ + count_) % kDepth] = {*slot, now_ns, expected_ms,
-                                                context_.clock.monotonic_ns()};
+                                                context_.clock.monotonic_ns(), job->channels};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;
@@ -192,22 +192,30 @@ bool RenderAgent::finish_oldest() noexcept {
   note_device(view);
   done->image.source = source_.get();
   done->image.slot = oldest.slot;
-  done->image.plane_count =
-      static_cast<std::uint32_t>(std::min(view.radiance_w_m2_sr.size(), kMaxPlanes));
-  for (std::size_t i = 0; i < done->image.plane_count; ++i) {
-    done->image.planes[i] = view.radiance_w_m2_sr[i];
-    // Planes that share memory (canned frames) are summed once.
-    const bool same =
-        i > 0 && view.radiance_w_m2_sr[i].data() == view.radiance_w_m2_sr[i - 1].data();
-    done->image.crc32c[i] = same ? done->image.crc32c[i - 1]
-                                 : protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[i]));
-  }
+  done->image.channels = oldest.channels;
+  take_pictures(view, done->image);
   context_.done.commit();
   context_.counters.add(Counter::frames_rendered);
   first_ = (first_ + 1) % kDepth;
   --count_;
   context_.bells.conductor.ring();
   return true;
+}
+
+void RenderAgent::take_pictures(const renderer::FrameView& view, Image& image) noexcept {
+  const std::span<Picture> pictures(context_.pictures);
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    if ((pictures[i].channels & image.channels) == 0) {
+      image.pictures[i] = {};
+      continue;
+    }
+    image.pictures[i] = cut_out(pictures[i], view, image.slot);
+    // Planes that share memory (canned frames) are summed once.
+    const bool same = i > 0 && image.pictures[i].data() == image.pictures[i - 1].data() &&
+                      image.pictures[i].size() == image.pictures[i - 1].size();
+    image.crc32c[i] =
+        same ? image.crc32c[i - 1] : protocol::crc32c(std::as_bytes(image.pictures[i]));
+  }
 }
 
 }  // namespace emit::server

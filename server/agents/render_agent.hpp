@@ -35,6 +35,7 @@ class RenderAgent final : public Agent {
     std::int64_t render_start_ns = 0;
     double expected_ms = 0.0;       ///< for its rung, by the ladder
     std::int64_t submitted_ns = 0;  ///< monotonic
+    ChannelSet channels = 0;
   };
   /// More than one in flight lets upload of the next overlap with read-back of the last.
   static constexpr std::size_t kDepth = 2;
@@ -45,6 +46,8 @@ class RenderAgent final : public Agent {
 
   bool take_job(std::int64_t now_ns) noexcept;
   bool finish_oldest() noexcept;
+  /// The pictures of image.channels, and their checksums.
+  void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
   /// Sets the job's rung; returns RungStats::frame_ms of it.
   double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;

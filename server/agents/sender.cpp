@@ -24,6 +24,17 @@ Sender::Sender(Context& context, std::uint32_t queue_frames, std::size_t max_cli
   }
 }
 
+void Sender::allow_compression() {
+  encoded_.reserve(window_.size() * context_.pictures.size());
+  for (std::size_t place = 0; place < window_.size(); ++place) {
+    for (const Picture& picture : context_.pictures) {
+      encoded_.push_back({protocol::PixelEncoder(std::size_t{picture.window_px.width_px} *
+                                                 picture.window_px.height_px * sizeof(float)),
+                          false});
+    }
+  }
+}
+
 bool Sender::on_start() noexcept {
   return static_cast<bool>(epoll_);
 }
@@ -106,6 +117,9 @@ int Sender::take_published() noexcept {
     added.header = published->header;
     // Frames are repeated only after one was published, and only where the last one is kept.
     added.image = published->repeat ? last_ : published->image;
+    if (published->repeat) {
+      added.image.channels &= published->image.channels;
+    }
     hold(added.image);
     if (keep_last_ && !published->repeat) {
       hold(added.image);
@@ -114,6 +128,9 @@ int Sender::take_published() noexcept {
       }
       last_ = added.image;
       have_last_ = true;
+    }
+    for (std::size_t i = 0; i < context_.pictures.size() && !encoded_.empty(); ++i) {
+      encoded_[end_ % window_.size() * context_.pictures.size() + i].begun = false;
     }
     ++end_;
     ++taken_;
@@ -151,13 +168,17 @@ void Sender::evict_oldest() noexcept {
       }
       ++client.next;  // what it does not want is passed over when the new publication is in
       client.gap = true;
-      context_.counters.add(Counter::frames_skipped);
-      if (ClientCounts* counts = counts_of(client)) {
-        counts->skipped.fetch_add(1, std::memory_order_relaxed);
-      }
+      count_skipped(client);
     }
   }
   drop_oldest();
+}
+
+void Sender::count_skipped(const SenderClient& client) noexcept {
+  context_.counters.add(Counter::frames_skipped);
+  if (ClientCounts* counts = counts_of(client)) {
+    counts->skipped.fetch_add(1, std::memory_order_relaxed);
+  }
 }
 
 void Sender::drop_oldest() noexcept {
@@ -169,9 +190,18 @@ void Sender::drop_oldest() noexcept {
 }
 
 void Sender::pass_over_unwanted(SenderClient& client) noexcept {
-  while (client.next < end_ && !client.wants(entry(client.next).header)) {
-    ++client.next;
-    context_.counters.add(&client == resident_ ? Counter::frames_unread : Counter::frames_left_out);
+  for (; client.next < end_; ++client.next) {
+    const Entry& next = entry(client.next);
+    if (client.wants(next.header, next.image.channels)) {
+      return;
+    }
+    if (client.misses(next.header, next.image.channels)) {
+      client.gap = true;
+      count_skipped(client);
+    } else {
+      context_.counters.add(&client == resident_ ? Counter::frames_unread
+                                                 : Counter::frames_left_out);
+    }
   }
 }
 
@@ -216,8 +246,29 @@ int Sender::take_writable() noexcept {
   return std::max(count, 0);
 }
 
+Sender::EncodedPicture& Sender::encoded_for(const SenderClient& client) noexcept {
+  const std::size_t picture = *client.waits_for_encoding();
+  const std::size_t place = client.in_transit % window_.size();
+  EncodedPicture& encoded = encoded_[place * context_.pictures.size() + picture];
+  if (!encoded.begun) {
+    encoded.begun = true;
+    encoded.encoder.begin(std::as_bytes(entry(client.in_transit).image.pictures[picture]));
+  }
+  return encoded;
+}
+
+bool Sender::take_encoded(SenderClient& client) noexcept {
+  const EncodedPicture& encoded = encoded_for(client);
+  if (!encoded.encoder.done()) {
+    return false;
+  }
+  client.take_encoded(encoded.encoder.bytes());
+  return true;
+}
+
 int Sender::send_all() noexcept {
   int work = 0;
+  SenderClient* waiting = nullptr;
   for (std::size_t i = clients_.size(); i-- > 0;) {
     SenderClient& client = *clients_[i];
     if (client.closing) {
@@ -225,9 +276,17 @@ int Sender::send_all() noexcept {
       ++work;
       continue;
     }
+    if (client.waits_for_encoding() && !take_encoded(client)) {
+      waiting = &client;
+      continue;
+    }
     if (!client.blocked && advance(client)) {
       ++work;
     }
+  }
+  if (work == 0 && waiting != nullptr) {
+    encoded_for(*waiting).encoder.encode_block();
+    ++work;
   }
   return work;
 }
@@ -242,6 +301,9 @@ bool Sender::advance(SenderClient& client) noexcept {
     client.in_transit = client.next++;
     pass_over_unwanted(client);
     client.begin(next.header, next.image, context_.clock.tai_ns());
+    if (client.waits_for_encoding()) {
+      return true;
+    }
   }
   switch (client.send(batch_, context_, turn)) {
     case SenderClient::Progress::idle:

@@ -8,6 +8,7 @@
 #include "agents/agent.hpp"
 #include "agents/sender_client.hpp"
 #include "app/context.hpp"
+#include "emit/protocol/pixel_codec.hpp"
 
 namespace emit::server {
 
@@ -18,6 +19,7 @@ namespace emit::server {
 /// publication leaves the window although a client has not had it yet, that client skips it: the
 /// next frame it gets carries kFlagGapBefore (newest-wins), or it is disconnected (every_frame).
 /// What a client asked not to get (every_nth) it is never waited for, and no gap.
+/// Pictures are compressed block by block when nobody else has anything to do.
 /// What such a client has half sent moves to its own memory. So the sender holds at most
 /// queue_frames + 1 images, whatever clients do, and a source with queue_frames + 3 slots always
 /// has one to render into.
@@ -27,6 +29,10 @@ class Sender final : public Agent {
   /// `resident`: a client that is served from start to end and belongs to no connection, or null.
   Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients, bool keep_last,
          SenderClient* resident = nullptr);
+
+  /// Takes the memory to compress for clients that want it. The pictures are fixed by then.
+  /// Not while running.
+  void allow_compression();
 
   [[nodiscard]] std::string_view name() const noexcept override { return "sender"; }
   [[nodiscard]] bool on_start() noexcept override;
@@ -46,6 +52,11 @@ class Sender final : public Agent {
     Image image;
     protocol::FrameHeader header;
   };
+  /// A picture of a publication, once for all clients.
+  struct EncodedPicture {
+    protocol::PixelEncoder encoder;
+    bool begun = false;
+  };
 
   int take_commands() noexcept;
   int take_resends() noexcept;
@@ -53,10 +64,15 @@ class Sender final : public Agent {
   int take_writable() noexcept;
   int send_all() noexcept;
   bool advance(SenderClient& client) noexcept;
+  /// Of the publication on its way to a client that waits for it.
+  [[nodiscard]] EncodedPicture& encoded_for(const SenderClient& client) noexcept;
+  /// Hands over what is encoded already. False: the client goes on waiting.
+  bool take_encoded(SenderClient& client) noexcept;
   /// Moves a client on to the next publication that it wants.
   void pass_over_unwanted(SenderClient& client) noexcept;
   [[nodiscard]] ClientCounts* counts_of(const SenderClient& client) const noexcept;
   void account(SenderClient& client) noexcept;
+  void count_skipped(const SenderClient& client) noexcept;
   void evict_oldest() noexcept;
   void drop_oldest() noexcept;
   void trim() noexcept;
@@ -76,8 +92,9 @@ class Sender final : public Agent {
   UdpBatch batch_;
   std::vector<SenderClient*> clients_;  // reserved at start
   std::vector<Entry> window_;
-  std::uint64_t first_ = 1;  // oldest publication in the window
-  std::uint64_t end_ = 1;    // one past the newest
+  std::vector<EncodedPicture> encoded_;  // of each place of the window, by picture
+  std::uint64_t first_ = 1;              // oldest publication in the window
+  std::uint64_t end_ = 1;                // one past the newest
   std::array<std::uint32_t, kMaxSlots> holds_{};
   bool have_last_ = false;
   Image last_;

@@ -29,8 +29,12 @@ protocol::FrameHeader SenderClient::header_for(const Channel& channel,
   out.height_px = channel.height_px;
   out.band_lo_um = static_cast<float>(channel.band_lo_um);
   out.band_hi_um = static_cast<float>(channel.band_hi_um);
-  out.payload_bytes = image.planes[channel.plane].size_bytes();
-  out.payload_crc32c = image.crc32c[channel.plane];
+  out.window_x_px = channel.window_x_px;
+  out.window_y_px = channel.window_y_px;
+  out.sensor_width_px = channel.sensor_width_px;
+  out.sensor_height_px = channel.sensor_height_px;
+  out.payload_bytes = image.pictures[channel.picture].size_bytes();
+  out.payload_crc32c = image.crc32c[channel.picture];
   return out;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "app/context.hpp"
 #include "emit/protocol/frame_header.hpp"
@@ -29,6 +30,13 @@ class SenderClient {
   enum class Turn : std::uint8_t { brief, full };
   /// Moves a bounded amount on. `finished`: the last byte went; call complete().
   [[nodiscard]] virtual Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept = 0;
+  /// Picture that is to be encoded before send() has anything to do; none: it has.
+  [[nodiscard]] virtual std::optional<std::size_t> waits_for_encoding() const noexcept {
+    return std::nullopt;
+  }
+  /// Ends that: the encoded picture, which stays until the publication leaves the window, or
+  /// nothing, where it did not become smaller. Precondition: waits_for_encoding().
+  virtual void take_encoded(std::span<const std::byte> /*bytes*/) noexcept {}
   /// Makes what is left of the publication on its way independent of the source's memory, so that
   /// the source gets its slot back however slow the client is. Precondition: busy().
   virtual void spill() noexcept = 0;
@@ -46,10 +54,16 @@ class SenderClient {
   [[nodiscard]] virtual std::uint32_t connection() const noexcept = 0;
   /// Would rather be disconnected than skip a publication.
   [[nodiscard]] virtual bool every_frame() const noexcept { return false; }
-  /// Wants frames 1, 1 + n, 1 + 2 n, ... of every run.
-  [[nodiscard]] virtual std::uint32_t every_nth() const noexcept { return 1; }
-  [[nodiscard]] virtual bool wants(const protocol::FrameHeader& header) const noexcept {
-    return protocol::is_every_nth(header.frame_number, every_nth());
+  /// Whether a publication that `channels` show is to be sent.
+  [[nodiscard]] virtual bool wants(const protocol::FrameHeader& /*header*/,
+                                   ChannelSet /*channels*/) const noexcept {
+    return true;
+  }
+  /// Whether one that is not wanted leaves a gap: it would have been, had it been ready for its
+  /// channel.
+  [[nodiscard]] virtual bool misses(const protocol::FrameHeader& /*header*/,
+                                    ChannelSet /*channels*/) const noexcept {
+    return false;
   }
   /// Turns writable when a blocked client can go on.
   [[nodiscard]] virtual int fd() const noexcept { return -1; }

@@ -24,12 +24,12 @@ physics::Result<std::unique_ptr<ShmClient>> ShmClient::create(const config::Stre
   params.slots = config.shm_slots;
   params.welcome = welcome;
   params.started_ns = now_ns;
-  std::vector<std::size_t> planes;
+  std::vector<std::size_t> pictures;
   for (const Channel& channel : channels) {
-    const auto known = std::find(planes.begin(), planes.end(), channel.plane);
-    params.plane_of_channel.push_back(static_cast<std::uint32_t>(known - planes.begin()));
-    if (known == planes.end()) {
-      planes.push_back(channel.plane);
+    const auto known = std::find(pictures.begin(), pictures.end(), channel.picture);
+    params.plane_of_channel.push_back(static_cast<std::uint32_t>(known - pictures.begin()));
+    if (known == pictures.end()) {
+      pictures.push_back(channel.picture);
       params.plane_bytes.push_back(std::uint64_t{channel.width_px} * channel.height_px *
                                    sizeof(float));
     }
@@ -39,7 +39,7 @@ physics::Result<std::unique_ptr<ShmClient>> ShmClient::create(const config::Stre
     return tl::unexpected<physics::Error>(std::move(object.error()));
   }
   std::unique_ptr<ShmClient> out(
-      new ShmClient(std::move(*object), params, channels, std::move(planes)));
+      new ShmClient(std::move(*object), params, channels, std::move(pictures)));
   if (auto named = out->object_.publish(config.shm); !named) {
     return tl::unexpected<physics::Error>(std::move(named.error()));
   }
@@ -47,11 +47,11 @@ physics::Result<std::unique_ptr<ShmClient>> ShmClient::create(const config::Stre
 }
 
 ShmClient::ShmClient(ShmObject object, const protocol::RingParams& params,
-                     const std::vector<Channel>& channels, std::vector<std::size_t> planes)
+                     const std::vector<Channel>& channels, std::vector<std::size_t> pictures)
     : object_(std::move(object)),
       ring_(object_.writable(), params),
       channels_(channels),
-      planes_(std::move(planes)) {}
+      pictures_(std::move(pictures)) {}
 
 ShmClient::~ShmClient() {
   ring_.end();
@@ -66,14 +66,19 @@ void ShmClient::begin(const protocol::FrameHeader& header, const Image& image,
   offset_ = 0;
   ring_.begin();
   for (const Channel& channel : channels_) {
-    protocol::encode(header_for(channel, image), ring_.header(channel.index));
+    const auto head = ring_.header(channel.index);
+    if ((image.channels >> channel.index & 1U) != 0) {
+      protocol::encode(header_for(channel, image), head);
+    } else {
+      std::ranges::fill(head, std::byte{0});  // nothing for this channel
+    }
   }
 }
 
 void ShmClient::copy(std::size_t budget_bytes) noexcept {
-  while (plane_ < planes_.size() && budget_bytes > 0) {
+  while (plane_ < pictures_.size() && budget_bytes > 0) {
     const std::span<std::byte> to = ring_.plane(plane_);
-    const std::span<const std::byte> from = std::as_bytes(image_.planes[planes_[plane_]]);
+    const std::span<const std::byte> from = std::as_bytes(image_.pictures[pictures_[plane_]]);
     const std::size_t whole = std::min(to.size(), from.size());
     const std::size_t bytes = std::min(whole - offset_, budget_bytes);
     std::memcpy(to.data() + offset_, from.data() + offset_, bytes);
@@ -91,7 +96,7 @@ SenderClient::Progress ShmClient::send(UdpBatch& /*batch*/, Context& context, Tu
     return Progress::idle;
   }
   copy(turn == Turn::brief ? kBriefBytes : kTurnBytes);
-  if (plane_ < planes_.size()) {
+  if (plane_ < pictures_.size()) {
     return Progress::more;
   }
   ring_.commit();

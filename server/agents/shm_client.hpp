@@ -33,21 +33,22 @@ class ShmClient final : public SenderClient {
   void spill() noexcept override;
   [[nodiscard]] std::uint32_t connection() const noexcept override { return 0; }
   /// Nothing is copied that nobody reads.
-  [[nodiscard]] bool wants(const protocol::FrameHeader& /*header*/) const noexcept override {
+  [[nodiscard]] bool wants(const protocol::FrameHeader& /*header*/,
+                           ChannelSet /*channels*/) const noexcept override {
     return object_.has_readers();
   }
 
  private:
   ShmClient(ShmObject object, const protocol::RingParams& params,
-            const std::vector<Channel>& channels, std::vector<std::size_t> planes);
+            const std::vector<Channel>& channels, std::vector<std::size_t> pictures);
   void copy(std::size_t budget_bytes) noexcept;
 
   ShmObject object_;
   protocol::RingWriter ring_;
   const std::vector<Channel>& channels_;
-  std::vector<std::size_t> planes_;  // image's plane of each plane of the ring
-  Image image_;                      // being copied
-  std::size_t plane_ = 0;            // where copying stands
+  std::vector<std::size_t> pictures_;  // of the image, by plane of the ring
+  Image image_;                        // being copied
+  std::size_t plane_ = 0;              // where copying stands
   std::size_t offset_ = 0;
 };
 

@@ -37,12 +37,13 @@ void SocketClient::begin(const protocol::FrameHeader& header, const Image& image
                          std::int64_t now_ns) noexcept {
   start(header, now_ns);
   const Channel& channel = *params_.channel;
-  pixels_ = std::as_bytes(image.planes[channel.plane]);
+  pixels_ = std::as_bytes(image.pictures[channel.picture]);
   sim_time_ns_ = header.sim_time_ns;
+  out_ = header_for(channel, image);
   const std::span head(head_);
-  protocol::encode(header_for(channel, image),
-                   head.subspan<protocol::kRecordHeaderBytes, protocol::kFrameHeaderBytes>());
   if (params_.udp) {
+    protocol::encode(out_,
+                     head.subspan<protocol::kRecordHeaderBytes, protocol::kFrameHeaderBytes>());
     make_fragments(frame_id_++);
     fragment_ = 0;
     parity_sent_ = 0;
@@ -55,12 +56,31 @@ void SocketClient::begin(const protocol::FrameHeader& header, const Image& image
                    pixels_);
     }
   } else {
-    protocol::encode_record_header(
-        protocol::RecordKind::frame,
-        static_cast<std::uint32_t>(protocol::kFrameHeaderBytes + pixels_.size()),
-        head.first<protocol::kRecordHeaderBytes>());
+    waits_ = params_.compression;
     offset_ = 0;
+    if (!waits_) {
+      make_record();
+    }
   }
+}
+
+void SocketClient::take_encoded(std::span<const std::byte> bytes) noexcept {
+  waits_ = false;
+  if (!bytes.empty()) {
+    pixels_ = bytes;
+    out_.encoding = protocol::PixelEncoding::shuffled_lz4;
+    out_.encoded_bytes = static_cast<std::uint32_t>(bytes.size());
+  }
+  make_record();
+}
+
+void SocketClient::make_record() noexcept {
+  const std::span head(head_);
+  protocol::encode(out_, head.subspan<protocol::kRecordHeaderBytes, protocol::kFrameHeaderBytes>());
+  protocol::encode_record_header(
+      protocol::RecordKind::frame,
+      static_cast<std::uint32_t>(protocol::kFrameHeaderBytes + pixels_.size()),
+      head.first<protocol::kRecordHeaderBytes>());
 }
 
 void SocketClient::make_fragments(std::uint32_t frame_id) noexcept {
@@ -197,6 +217,9 @@ void SocketClient::forget(std::uint64_t sequence) noexcept {
 }
 
 void SocketClient::spill() noexcept {
+  if (waits_) {
+    take_encoded({});  // the pixels leave before they are encoded
+  }
   const std::size_t length = std::min(pixels_.size(), spill_.size());
   std::memcpy(spill_.data(), pixels_.data(), length);
   const std::span<const std::byte> own(spill_.data(), length);

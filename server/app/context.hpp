@@ -122,6 +122,7 @@ struct Context {
   FrameTrace trace;
   Doorbells bells;
   std::vector<Channel> channels;  ///< fixed before the agents run
+  std::vector<Picture> pictures;  ///< likewise; their copies are the render agent's to fill
   std::atomic<std::uint64_t> run_id{0};
   std::atomic<bool> device_lost{false};               ///< set by render: no frame comes any more
   std::atomic<std::uint64_t> frames_handed_over{0};   ///< put on `published` by the conductor

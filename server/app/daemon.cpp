@@ -150,7 +150,8 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   if (!channels) {
     return tl::unexpected<Error>(std::move(channels.error()));
   }
-  context_.channels = std::move(*channels);
+  context_.channels = std::move(channels->channels);
+  context_.pictures = std::move(channels->pictures);
 
   const std::string software = fmt::format("emitd {} ({})", kVersion, kCommit);
   const std::string scenario_name = scenario_ ? scenario_->name : std::string();
@@ -187,9 +188,11 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   }
   sender_ =
       std::make_unique<Sender>(context_, window, config_.control.max_clients, slotted, shm_.get());
+  if (config_.stream.compression) {
+    sender_->allow_compression();
+  }
   Conductor::Options options;
   options.pacing = config_.pacing;
-  options.first_plane = context_.channels.front().plane;
   options.canned = source.canned;
   options.tai_unset = clock_.tai_offset_unset();
   conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers_.get());

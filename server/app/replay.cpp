@@ -36,8 +36,8 @@ struct JournalPlayer::PendingWeather {
   scene::WeatherSample sample;
 };
 
-JournalPlayer::JournalPlayer(FrameSource& source, std::size_t first_channel_plane)
-    : source_(source), plane_(first_channel_plane) {}
+JournalPlayer::JournalPlayer(FrameSource& source, ChannelTable channels)
+    : source_(source), channels_(std::move(channels)) {}
 
 JournalPlayer::~JournalPlayer() {
   release_shown();
@@ -146,10 +146,13 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
     }
     shown_ = static_cast<renderer::SlotIndex>(slot);
     view_ = &source_.collect(*shown_);
-    if (plane_ >= view_->radiance_w_m2_sr.size()) {
-      return fail(ErrorCode::internal, fmt::format("the source has no plane {}", plane_));
+    if (decision.radiance_channel() >= channels_.channels.size()) {
+      return fail(ErrorCode::protocol,
+                  fmt::format("the scenario has no channel {}", decision.radiance_channel()));
     }
-    view_crc_ = protocol::crc32c(std::as_bytes(view_->radiance_w_m2_sr[plane_]));
+    const Channel& channel = channels_.channels[decision.radiance_channel()];
+    view_crc_ = protocol::crc32c(
+        std::as_bytes(cut_out(channels_.pictures[channel.picture], *view_, *shown_)));
   } else if (view_ == nullptr) {
     return fail(ErrorCode::protocol, "repeats a frame, but none was rendered before");
   }
@@ -169,16 +172,6 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
   ++frames_;
   mismatches_ += frame.matches ? 0 : 1;
   return std::optional<ReplayedFrame>(frame);
-}
-
-std::size_t first_channel_plane(const scene::ScenarioDesc& scenario) noexcept {
-  if (scenario.channels.empty()) {
-    return 0;
-  }
-  const auto band =
-      std::find_if(scenario.bands.begin(), scenario.bands.end(),
-                   [&](const auto& each) { return each.name == scenario.channels.front().band; });
-  return band != scenario.bands.end() ? static_cast<std::size_t>(band - scenario.bands.begin()) : 0;
 }
 
 }  // namespace emit::server

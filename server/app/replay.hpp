@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "agents/channel_table.hpp"
 #include "agents/frame_source.hpp"
 #include "emit/physics/error.hpp"
 
@@ -27,14 +28,14 @@ struct ReplayedFrame {
   bool repeated = false;    ///< the previous image again: nothing was rendered
   /// Valid until the next apply(). Of a repeated frame: the image shown before it.
   const renderer::FrameView* view = nullptr;
-  std::uint32_t crc32c = 0;          ///< of the first channel, computed here
+  std::uint32_t crc32c = 0;          ///< of the first channel that showed it, computed here
   std::uint32_t journal_crc32c = 0;  ///< what the live run sent
   bool matches = false;              ///< crc32c == journal_crc32c
 };
 
 /// Re-renders a journal: hands the inputs to a FrameSource as the live run did, in the same order.
 ///
-///   auto player = JournalPlayer(*source, first_channel_plane);
+///   auto player = JournalPlayer(*source, *make_channels(scenario, source->info()));
 ///   while (read(entry)) {
 ///     auto frame = player.apply(entry);   // Result<optional<ReplayedFrame>>
 ///     if (frame && *frame) use(**frame);
@@ -43,9 +44,8 @@ struct ReplayedFrame {
 /// Thread: the one that owns the source. Real time: no.
 class JournalPlayer {
  public:
-  /// `first_channel_plane`: index into FrameView::radiance_w_m2_sr of the band of the scenario's
-  /// first channel, whose CRC the journal holds (see first_channel_plane()).
-  JournalPlayer(FrameSource& source, std::size_t first_channel_plane);
+  /// `channels`: as the live run had them. Frames are rendered whole, whatever windows were due.
+  JournalPlayer(FrameSource& source, ChannelTable channels);
   ~JournalPlayer();
   JournalPlayer(const JournalPlayer&) = delete;
   JournalPlayer& operator=(const JournalPlayer&) = delete;
@@ -69,7 +69,7 @@ class JournalPlayer {
       const v1::FrameDecision& decision, std::uint64_t sequence);
 
   FrameSource& source_;
-  std::size_t plane_;
+  ChannelTable channels_;
   std::uint64_t run_id_ = 0;
   std::uint64_t last_sequence_ = 0;
   bool started_ = false;
@@ -83,9 +83,6 @@ class JournalPlayer {
   std::string scenario_sha256_;
   std::string device_;
 };
-
-/// Plane of the scenario's first channel: index of its band. 0 for a scenario without channels.
-[[nodiscard]] std::size_t first_channel_plane(const scene::ScenarioDesc& scenario) noexcept;
 
 /// Identity of a resolved scenario as written into RunStart, hex SHA-256: over its resolved values
 /// (tables that it names are among them) and, by path relative to the scenario file, over its glTF

@@ -153,6 +153,7 @@ void Tool::add_scene_commands() {
         ->type_name("S");
     app.add_option("--min", o.min_value, "Lower limit of the colours, K or W m-2 sr-1");
     app.add_option("--max", o.max_value, "Upper limit of the colours, K or W m-2 sr-1");
+    app.add_option("--name", o.channel_name, "URL: channel")->type_name("NAME");
     app.add_option("--channel", o.channel_kind, "URL: channel kind")
         ->check(CLI::IsMember({"injection", "projector"}));
     app.add_option("--band", o.band, "Name of the band")->type_name("NAME");
@@ -204,6 +205,8 @@ void Tool::add_stream_commands() {
         app, "--out", o.out,
         "Folder for frame_NNNNNN.exr and .png (apparent temperature, by the band's response where "
         "the daemon tells it, else as of a rectangular band)");
+    app.add_option("--name", o.channel_name, "Channel; default: the first that fits")
+        ->type_name("NAME");
     app.add_option("--channel", o.channel_kind, "Channel kind; default: any")
         ->check(CLI::IsMember({"injection", "projector"}));
     app.add_option("--band", o.band, "Band; default: any")->type_name("NAME");
@@ -216,6 +219,8 @@ void Tool::add_stream_commands() {
     add_error_correction(app, "--fec", o.fec);
     app.add_flag("--resend", o.resend,
                  "UDP, daemon in host-step: ask for fragments that are missing");
+    app.add_flag("--compress", o.compress,
+                 "TCP: frames losslessly compressed (stream.compression of the daemon)");
     app.add_flag("--every-frame", o.every_frame, "TCP, shm: end rather than skip frames");
     app.add_option("--every", o.every_nth,
                    "Only frames 1, 1 + N, 1 + 2 N, ... of a run; those left out are no gap")

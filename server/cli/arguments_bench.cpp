@@ -82,10 +82,12 @@ void Tool::add_bench_commands() {
     app.add_option("--clients", o.clients, "Clients at the fixed rate")
         ->check(CLI::Range(1U, 8U))
         ->capture_default_str();
-    app.add_option("--transport", o.transports,
-                   "Transport at the fixed rate; repeatable; mixed: tcp, udp, shm in turn")
+    app.add_option(
+           "--transport", o.transports,
+           "Transport at the fixed rate; repeatable; mixed: tcp, udp, shm in turn; tcp-lz4: "
+           "compressed")
         ->allow_extra_args(false)
-        ->check(CLI::IsMember({"tcp", "udp", "shm", "mixed"}))
+        ->check(CLI::IsMember({"tcp", "tcp-lz4", "udp", "shm", "mixed"}))
         ->capture_default_str();
     app.add_option("--repeats", o.repeats,
                    "Interleaved measurements of throughput, medians of which count; 0: none")

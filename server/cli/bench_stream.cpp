@@ -100,6 +100,8 @@ struct PacedCounts {
   std::uint64_t unflagged_gaps = 0;
   std::uint64_t os_drops = 0;
   std::uint64_t repeated = 0;
+  std::uint64_t pixel_bytes = 0;
+  std::uint64_t sent_pixel_bytes = 0;
 };
 
 void add_delays(const Samples& from_ms, Samples& to_us) {
@@ -108,6 +110,7 @@ void add_delays(const Samples& from_ms, Samples& to_us) {
 
 Result<Row> StreamBench::paced(const std::string& transport) {
   const bool mixed = transport == "mixed";
+  const bool compressed = transport == "tcp-lz4";
   const std::string shm = mixed || transport == "shm" ? own_shm_name() : "";
   config::DaemonConfig config = canned_daemon(command_.width_px, command_.height_px, shm);
   config.pacing.mode = config::PacingMode::ig_clock;
@@ -117,10 +120,11 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   constexpr std::array<const char*, 3> kInTurn{"tcp", "udp", "shm"};
   std::vector<std::unique_ptr<StreamClient>> clients;
   for (std::uint32_t i = 0; i < command_.clients; ++i) {
-    const std::string scheme = mixed ? kInTurn[i % kInTurn.size()] : transport;
+    const std::string scheme = mixed ? kInTurn[i % kInTurn.size()] : compressed ? "tcp" : transport;
     StreamClient::Options options;
     options.url = scheme + "://" + (scheme == "shm" ? shm : daemon->control_address());
     options.subscribe.in_place = true;
+    options.subscribe.compression = compressed;
     auto client = StreamClient::start(options);
     if (!client) return tl::unexpected(client.error());
     clients.push_back(std::move(*client));
@@ -158,6 +162,8 @@ Result<Row> StreamBench::paced(const std::string& transport) {
     counts.crc_errors += counters.crc_errors;
     counts.os_drops += counters.os_drops;
     counts.repeated += counters.repeated;
+    counts.pixel_bytes += client->report().pixel_bytes();
+    counts.sent_pixel_bytes += client->report().sent_pixel_bytes();
     counts.unflagged_gaps += client->report().unflagged_gaps();
     add_delays(client->report().ready_to_received_ms(), row.delay_us);
     add_delays(client->report().ready_to_send_ms(), row.own_us);
@@ -179,6 +185,9 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   row.more.set("partial", counts.partial).set("gaps", counts.gaps).set("skipped", counts.skipped);
   row.more.set("unflagged_gaps", counts.unflagged_gaps).set("crc_errors", counts.crc_errors);
   row.more.set("os_drops", counts.os_drops).set("repeated", counts.repeated);
+  row.more.set("sent_frac",
+               static_cast<double>(counts.sent_pixel_bytes) /
+                   static_cast<double>(std::max<std::uint64_t>(counts.pixel_bytes, 1)));
   row.more.set("delay", "pixels ready in the daemon to last byte at the client");
   row.more.set("own", "pixels ready in the daemon to this client's first byte given away");
   return row;

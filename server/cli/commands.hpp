@@ -56,11 +56,13 @@ struct ReceiveCommand {
   std::uint64_t frames = 0;  ///< 0: until interrupted or the daemon ends
   std::optional<std::filesystem::path> out;
   std::optional<std::filesystem::path> json;
+  std::string channel_name;
   std::string channel_kind;
   std::string band;
   std::string sensor;
   std::string multicast_group;
   std::optional<protocol::FecParams> fec;  ///< absent: the daemon's choice
+  bool compress = false;
   bool resend = false;
   double timeout_s = 10.0;
   bool every_frame = false;
@@ -134,6 +136,7 @@ struct ViewCommand {
   std::optional<double> time_s;
   std::optional<double> min_value;
   std::optional<double> max_value;
+  std::string channel_name;
   std::string channel_kind;
   std::string band;
   std::uint64_t frames = 0;

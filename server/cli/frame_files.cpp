@@ -116,6 +116,12 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
     exr.attributes["missingPx"] =
         std::to_string(std::count(frame.valid.begin(), frame.valid.end(), 0.0F));
   }
+  if (frame.sensor_width_px > frame.width_px || frame.sensor_height_px > frame.height_px) {
+    exr.attributes["windowXPx"] = std::to_string(frame.window_px.x_px);
+    exr.attributes["windowYPx"] = std::to_string(frame.window_px.y_px);
+    exr.attributes["sensorWidthPx"] = std::to_string(frame.sensor_width_px);
+    exr.attributes["sensorHeightPx"] = std::to_string(frame.sensor_height_px);
+  }
   image::set_frame_metadata(exr, frame.metadata);
   return image::write_exr(file, exr);
 }

@@ -58,6 +58,10 @@ struct FramePlanes {
   /// costs a second or so. Callers of many frames set it.
   const ApparentTemperature* apparent = nullptr;
   image::FrameMetadata metadata;
+  /// Where the pixels lie in the sensor's image, if that is larger; sensor of size 0: not known.
+  scene::PixelRect window_px;
+  std::uint32_t sensor_width_px = 0;
+  std::uint32_t sensor_height_px = 0;
 };
 
 /// Limits of the false colours, with a colour bar beside the picture.

@@ -62,7 +62,9 @@ physics::Result<JournalReplaySummary> replay_journal(
   summary.device = (*source)->info().device;
   summary.setup_s = seconds_since(start);
 
-  server::JournalPlayer player(**source, server::first_channel_plane(scenario));
+  auto channels = server::make_channels(scenario, (*source)->info());
+  if (!channels) return tl::unexpected(channels.error());
+  server::JournalPlayer player(**source, std::move(*channels));
   ProgressBar progress("replay", options.expected_frames);
   start = Clock::now();
   std::int64_t first_wall_ns = 0;

@@ -29,6 +29,10 @@ physics::Result<void> save(const std::filesystem::path& directory,
   FramePlanes planes;
   planes.width_px = frame.header.width_px;
   planes.height_px = frame.header.height_px;
+  planes.window_px = {frame.header.window_x_px, frame.header.window_y_px, frame.header.width_px,
+                      frame.header.height_px};
+  planes.sensor_width_px = frame.header.sensor_width_px;
+  planes.sensor_height_px = frame.header.sensor_height_px;
   const bool temperature = frame.header.quantity == protocol::PixelQuantity::temperature_k;
   (temperature ? planes.temperature_k : planes.radiance_w_m2_sr) = frame.pixels;
   // The band of a channel does not change: one table serves every frame.
@@ -87,6 +91,7 @@ int run_receive(const ReceiveCommand& command) {
   }
   if (!(command.max_k > command.min_k)) return fail(kExitUsage, "--max-k must exceed --min-k");
   server::SubscribeOptions options;
+  options.channel_name = command.channel_name;
   options.channel_kind = command.channel_kind;
   options.sensor = command.sensor;
   options.band = command.band;
@@ -95,6 +100,7 @@ int run_receive(const ReceiveCommand& command) {
   options.multicast_group = command.multicast_group;
   options.fec = command.fec;
   options.resend = command.resend;
+  options.compression = command.compress;
   // Checks are made while the pixels are looked at first; writing files takes longer than the
   // daemon waits.
   options.in_place = !command.out;
@@ -125,13 +131,16 @@ int run_receive(const ReceiveCommand& command) {
         "resend is not granted: it needs udp:// without a group, a daemon in host-step, and "
         "stream.resend_max_frac above 0");
   }
+  if (command.compress && !terms.compression) {
+    warn("compression is not granted: it needs tcp:// and stream.compression of the daemon");
+  }
   if (command.fec && command.fec->on() && !terms.fec.on()) {
     warn("error correction needs udp:// and a daemon that knows it");
   }
 
   std::optional<ApparentTemperature> apparent;
   const InterruptGuard interrupt;
-  StreamReport report(command.every_nth);
+  StreamReport report(terms.every_nth);
   ProgressBar progress("frames", command.frames == 0 ? 1 : command.frames);
   const auto timeout =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(command.timeout_s));
@@ -185,6 +194,11 @@ int run_receive(const ReceiveCommand& command) {
   const server::FrameClient& client = stream.client();
   const server::ChannelDescription& channel = stream.channel();
   print_losses(text_stream(command.json), counters, report);
+  if (report.sent_pixel_bytes() < report.pixel_bytes()) {
+    fmt::print(
+        text_stream(command.json), "compressed: {:.2f} to 1\n",
+        static_cast<double>(report.pixel_bytes()) / static_cast<double>(report.sent_pixel_bytes()));
+  }
   if (stream.reconnects() > 0) {
     fmt::print(text_stream(command.json), "connected again {} times, {} runs of the daemon\n",
                stream.reconnects(), report.runs());
@@ -213,11 +227,19 @@ int run_receive(const ReceiveCommand& command) {
     json.set("url", command.url).set("device", client.server().device);
     json.set("scenario", client.server().scenario).set("channel", channel.name);
     json.set("band", channel.band).set("width", channel.width_px);
-    json.set("height", channel.height_px).set("frames", report.frames()).set("seconds", seconds);
+    json.set("height", channel.height_px);
+    json.set("window_x", channel.window_x_px).set("window_y", channel.window_y_px);
+    json.set("sensor_width", channel.sensor_width_px);
+    json.set("sensor_height", channel.sensor_height_px)
+        .set("frames", report.frames())
+        .set("seconds", seconds);
+    json.set("compression", terms.compression);
+    json.set("pixel_bytes", report.pixel_bytes())
+        .set("sent_pixel_bytes", report.sent_pixel_bytes());
     json.set("error_correction", to_string(terms.fec)).set("resend", terms.resend);
     json.set("counters", counters_json(counters)).set("flags", report.flags_json());
     json.set("unflagged_gaps", report.unflagged_gaps());
-    json.set("every_nth", command.every_nth).set("reconnects", stream.reconnects());
+    json.set("every_nth", terms.every_nth).set("reconnects", stream.reconnects());
     json.set("runs", report.runs());
     json.set("pose_to_received_ms", latency_json(report.pose_to_received_ms()));
     json.set("send_to_received_ms", latency_json(report.send_to_received_ms()));

@@ -37,7 +37,7 @@ int run_replay(const ReplayCommand& command) {
     if (auto made = make_directory(*command.out); !made) return fail(made.error());
   }
 
-  const std::size_t plane = server::first_channel_plane(*scenario);
+  constexpr std::size_t plane = 0;  // bands are in the order of the channels
   const scene::SpectralBand band =
       plane < scenario->bands.size() ? scenario->bands[plane] : scene::SpectralBand{};
   const ColorLimits limits{scenario->display.min_k, scenario->display.max_k};

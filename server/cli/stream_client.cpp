@@ -21,7 +21,7 @@ StreamClient::StreamClient(std::unique_ptr<server::FrameClient> client,
       channel_(std::move(channel)),
       keep_pixels_(options.keep_pixels),
       on_frame_(options.on_frame),
-      report_(options.subscribe.every_nth) {
+      report_(client_->terms().every_nth) {
   thread_ = std::thread([this] { run(); });
 }
 

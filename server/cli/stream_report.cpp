@@ -38,7 +38,8 @@ StreamReport::StreamReport(std::uint32_t every_nth) : every_nth_(every_nth) {
 void StreamReport::add(const server::ReceivedFrame& frame) {
   const protocol::FrameHeader& header = frame.header;
   const bool continues = last_run_ != 0 && header.run_id == last_run_;
-  if (continues && header.frame_number != last_number_ + every_nth_ &&
+  // One that came late for its number may stand anywhere between two others.
+  if (continues && header.frame_number - last_number_ - 1 >= every_nth_ &&
       (header.flags & protocol::kFlagGapBefore) == 0) {
     ++unflagged_gaps_;
   }
@@ -46,6 +47,8 @@ void StreamReport::add(const server::ReceivedFrame& frame) {
   newest_run_ = last_run_ = header.run_id;
   last_number_ = header.frame_number;
   ++frames_;
+  pixel_bytes_ += header.payload_bytes;
+  sent_pixel_bytes_ += frame.encoded_bytes != 0 ? frame.encoded_bytes : header.payload_bytes;
   for (std::size_t bit = 0; bit < flag_counts_.size(); ++bit) {
     flag_counts_[bit] += (header.flags >> bit) & 1U;
   }

@@ -29,6 +29,9 @@ class StreamReport {
   [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+  /// Of all frames, and what of it travelled: less where it was compressed.
+  [[nodiscard]] std::uint64_t pixel_bytes() const noexcept { return pixel_bytes_; }
+  [[nodiscard]] std::uint64_t sent_pixel_bytes() const noexcept { return sent_pixel_bytes_; }
   [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
   /// Frames that came without the flag although the numbers before them are missing.
   [[nodiscard]] std::uint64_t unflagged_gaps() const noexcept { return unflagged_gaps_; }
@@ -67,6 +70,8 @@ class StreamReport {
   std::int64_t last_byte_ns_ = 0;  // of the frame before, on this connection
   std::array<std::uint64_t, 32> flag_counts_{};
   std::uint64_t frames_ = 0;
+  std::uint64_t pixel_bytes_ = 0;
+  std::uint64_t sent_pixel_bytes_ = 0;
   std::uint64_t unflagged_gaps_ = 0;
   std::uint32_t every_nth_;
   std::uint64_t runs_ = 0;

@@ -59,6 +59,11 @@ struct ChannelDescription {
   std::uint32_t height_px = 0;
   /// Spectral response of the band; empty: a perfect rectangle; absent: the daemon does not say.
   std::optional<std::vector<physics::ResponsePoint>> response = std::nullopt;
+  std::uint32_t every_nth = 1;    ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
+  std::uint32_t window_x_px = 0;  ///< where its image lies in the sensor's
+  std::uint32_t window_y_px = 0;
+  std::uint32_t sensor_width_px = 0;  ///< 0: the daemon does not say
+  std::uint32_t sensor_height_px = 0;
 
   /// What radiances are converted with: where the response is not known, a rectangle. Absent for a
   /// channel of no band, or one that makes no sense.
@@ -76,14 +81,17 @@ struct ServerInfo {
   std::vector<ChannelDescription> channels;
 };
 
-/// Names a channel by any of the three; empty matches anything, the first match is taken.
+/// Names a channel by any of the four; empty matches anything, the first match is taken.
 struct SubscribeOptions {
+  std::string channel_name;
   std::string channel_kind;
   std::string sensor;
   std::string band;
   bool every_frame = false;  ///< the daemon disconnects this client rather than skip a frame
-  /// 1..kMaxEveryNth: frames 1, 1 + n, 1 + 2 n, ... of every run; what is left out is no gap.
+  /// 1..kMaxEveryNth: frames 1, 1 + n, 1 + 2 n, ... of every run; what is left out is no gap. Of a
+  /// channel that shows every m-th frame, n times m.
   std::uint32_t every_nth = 1;
+  bool compression = false;                  ///< TCP: lossless, where the daemon grants it
   std::uint32_t fragment_payload_bytes = 0;  ///< UDP; 0 = daemon's choice
   std::string multicast_group;               ///< UDP; empty = unicast
   std::uint16_t udp_port = 0;                ///< UDP; 0 = any free port
@@ -103,7 +111,9 @@ struct SubscribeOptions {
 struct StreamTerms {
   protocol::FecParams fec;
   bool resend = false;
-  std::uint16_t udp_port = 0;  ///< where this client receives; 0: not over UDP
+  bool compression = false;
+  std::uint32_t every_nth = 1;  ///< of the daemon's frames: the wish times the channel's own
+  std::uint16_t udp_port = 0;   ///< where this client receives; 0: not over UDP
 };
 
 /// Pixels stay valid until the next receive().
@@ -118,6 +128,7 @@ struct ReceivedFrame {
   bool header_known = true;
   std::uint32_t repaired_fragments = 0;  ///< brought back by error correction
   std::uint32_t resent_fragments = 0;    ///< that this client asked for again
+  std::uint64_t encoded_bytes = 0;       ///< of the pixels on their way; 0: raw
   std::int64_t first_byte_ns = 0;        ///< wall (TAI), when this client began to have it
   std::int64_t last_byte_ns = 0;
 };

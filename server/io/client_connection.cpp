@@ -54,6 +54,11 @@ ChannelDescription describe_channel(const v1::ChannelInfo& info) {
   ChannelDescription out{info.index(),      info.name(),     info.kind(),
                          info.sensor(),     info.band(),     info.band_lo_um(),
                          info.band_hi_um(), info.width_px(), info.height_px()};
+  out.every_nth = std::max(info.every_nth(), 1U);
+  out.window_x_px = info.window_x_px();
+  out.window_y_px = info.window_y_px();
+  out.sensor_width_px = info.sensor_width_px();
+  out.sensor_height_px = info.sensor_height_px();
   if (info.band_is_rectangle()) {
     out.response.emplace();
   } else if (info.response_um_size() > 0 && info.response_um_size() == info.response_frac_size()) {

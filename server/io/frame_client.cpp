@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "emit/protocol/convert.hpp"
+#include "emit/protocol/pixel_codec.hpp"
 #include "emit/protocol/resend.hpp"
 #include "emit/v1/control.pb.h"
 #include "io/client_connection.hpp"
@@ -56,6 +57,7 @@ class FrameClientImpl final : public FrameClient {
   void make_reassembler(std::uint64_t frame_bytes);
   physics::Result<void> ask_for_missing(std::int64_t now_ns, std::int64_t& wake_ns);
   std::span<const float> aligned(std::span<const std::byte> pixels);
+  physics::Result<void> take_pixels(const protocol::FrameView& view, std::uint32_t sent_crc32c);
   void take_control(std::span<const std::byte> body);
 
   ClientConnection connection_;
@@ -67,7 +69,8 @@ class FrameClientImpl final : public FrameClient {
   FrameAccount account_;
   std::vector<ServerStatus> statuses_;
   ReceivedFrame frame_;
-  std::vector<float> pixels_;  // tcp: where a record's pixels lie unaligned
+  std::vector<float> pixels_;  // tcp: where a record's pixels lie unaligned, or encoded
+  protocol::PixelDecoder decoder_;
   std::optional<UdpFrameReceiver> receiver_;
   std::optional<protocol::Reassembler> reassembler_;
   const protocol::ReceivedFrame* held_ = nullptr;
@@ -97,6 +100,7 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   }
   v1::ControlRecord request;
   v1::Subscribe& subscribe = *request.mutable_subscribe();
+  subscribe.set_channel_name(options.channel_name);
   subscribe.set_channel_kind(options.channel_kind);
   subscribe.set_sensor(options.sensor);
   subscribe.set_band(options.band);
@@ -122,6 +126,8 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
       wish.set_parity_fragments(options.fec->parity_fragments);
     }
   } else {
+    subscribe.set_compression(options.compression ? v1::COMPRESSION_SHUFFLED_LZ4
+                                                  : v1::COMPRESSION_NONE);
     connection_.allow_frames(static_cast<std::uint32_t>(largest + protocol::kFrameHeaderBytes));
     pixels_.resize(static_cast<std::size_t>(largest / sizeof(float)));
   }
@@ -148,12 +154,20 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
     if (answer.has_subscribed()) {
       channel_ = describe_channel(answer.subscribed().channel());
       stream_id_ = static_cast<std::uint16_t>(answer.subscribed().stream_id());
-      if (std::max(answer.subscribed().every_nth(), 1U) != options.every_nth) {
+      terms_.every_nth = std::max(answer.subscribed().every_nth(), 1U);
+      if (terms_.every_nth != std::uint64_t{options.every_nth} * channel_.every_nth) {
         return make_error(ErrorCode::protocol, "this daemon cannot leave frames out (every_nth)");
       }
-      account_.set_every_nth(options.every_nth);
+      if (!options.channel_name.empty() && channel_.name != options.channel_name) {
+        return make_error(ErrorCode::protocol,
+                          fmt::format("this daemon knows no channels by name: it offers '{}' for "
+                                      "'{}'",
+                                      channel_.name, options.channel_name));
+      }
+      account_.set_every_nth(terms_.every_nth);
       terms_.fec = {answer.subscribed().error_correction().data_fragments(),
                     answer.subscribed().error_correction().parity_fragments()};
+      terms_.compression = !udp_ && answer.subscribed().compression() != v1::COMPRESSION_NONE;
       terms_.resend = udp_ && answer.subscribed().resend();
       if (!udp_ || !terms_.fec.on()) {
         terms_.fec = {};
@@ -206,7 +220,10 @@ physics::Result<void> FrameClientImpl::ask_for_missing(std::int64_t now_ns, std:
     request.stream_id = stream_id_;
     request.frame_id = step.frame_id;
     request.count = static_cast<std::uint16_t>(
-        reassembler_->missing(stream_id_, step.frame_id, request.ranges));
+        reassembler_->missing(stream_id_, step.frame_id, step.tail, request.ranges));
+    if (request.count == 0) {
+      continue;
+    }
     std::array<std::byte, protocol::kRecordHeaderBytes + protocol::kMaxResendBytes> bytes;
     const std::span all(bytes);
     const std::size_t length = protocol::encode(
@@ -257,7 +274,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t 
     if (!view) {
       return tl::unexpected<physics::Error>(std::move(view.error()));
     }
-    if (view->pixels.size() > pixels_.size() * sizeof(float)) {
+    if (view->header.payload_bytes > pixels_.size() * sizeof(float)) {
       return make_error(ErrorCode::protocol, "a frame larger than its channel");
     }
     frame_.header = view->header;
@@ -267,11 +284,9 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t 
     frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
     burst_begin_ns_ = 0;
     frame_.missing_px = 0;
-    if (record.payload_crc32c != view->header.payload_crc32c) {
-      ++account_.counters.crc_errors;
-      frame_.header.flags |= protocol::kFlagCorrupt;
+    if (auto taken = take_pixels(*view, record.payload_crc32c); !taken) {
+      return tl::unexpected<physics::Error>(std::move(taken.error()));
     }
-    frame_.pixels = aligned(view->pixels);
     ++account_.counters.received;
     account_.take(frame_.header);
     return &frame_;
@@ -393,6 +408,33 @@ const ReceivedFrame* FrameClientImpl::pop_udp() {
     account_.take_unknown();
   }
   return &frame_;
+}
+
+/// `sent_crc32c`: of the bytes as they came.
+physics::Result<void> FrameClientImpl::take_pixels(const protocol::FrameView& view,
+                                                   std::uint32_t sent_crc32c) {
+  frame_.encoded_bytes = view.header.encoded_bytes;
+  std::uint32_t crc32c = sent_crc32c;
+  if (view.header.encoding == protocol::PixelEncoding::raw) {
+    frame_.encoded_bytes = 0;
+    frame_.pixels = aligned(view.pixels);
+  } else {
+    const auto pixels = std::span(pixels_).first(
+        static_cast<std::size_t>(view.header.payload_bytes / sizeof(float)));
+    if (!decoder_.decode(view.pixels, std::as_writable_bytes(pixels))) {
+      return make_error(
+          ErrorCode::protocol,
+          fmt::format("frame {}: {} encoded bytes do not make its {} bytes of pixels",
+                      view.header.frame_number, view.pixels.size(), view.header.payload_bytes));
+    }
+    crc32c = protocol::crc32c(std::as_bytes(pixels));
+    frame_.pixels = pixels;
+  }
+  if (crc32c != view.header.payload_crc32c) {
+    ++account_.counters.crc_errors;
+    frame_.header.flags |= protocol::kFlagCorrupt;
+  }
+  return {};
 }
 
 std::span<const float> FrameClientImpl::aligned(std::span<const std::byte> pixels) {

@@ -24,10 +24,11 @@ ResendPlanner::Step ResendPlanner::next(std::span<const protocol::Reassembler::O
     } else if (known->arrivals != frame.arrivals) {
       known->arrivals = frame.arrivals;
       known->changed_ns = now_ns;
+      known->asked = 0;
     }
     std::int64_t due_ns =
         known->changed_ns + (frame.end_seen ? params_.settle_ns : params_.quiet_ns);
-    if (known->asked > 0) {
+    if (known->asked_ns != 0) {
       due_ns = std::max(due_ns, known->asked_ns + params_.answer_ns);
     }
     if (now_ns < due_ns) {
@@ -35,11 +36,12 @@ ResendPlanner::Step ResendPlanner::next(std::span<const protocol::Reassembler::O
       continue;
     }
     if (known->asked == params_.requests) {
-      return {Step::Kind::give_up, frame.frame_id, 0};
+      return {Step::Kind::give_up, frame.frame_id, 0, false};
     }
+    const bool tail = frame.end_seen || known->asked > 0;
     ++known->asked;
     known->asked_ns = now_ns;
-    return {Step::Kind::ask, frame.frame_id, 0};
+    return {Step::Kind::ask, frame.frame_id, 0, tail};
   }
   return step;
 }

@@ -10,8 +10,9 @@
 namespace emit::server {
 
 /// When a receiver asks for what it is missing. A frame is asked for once nothing more came of it
-/// for a moment, which is short when its end or a newer frame has been seen and longer when not;
-/// again when the answer does not come; and is given up after some requests.
+/// for a moment, which is short when its end or a newer frame has been seen and longer when not:
+/// then first for the holes alone, because a sender that had to wait goes on. Again when the answer
+/// does not come; and is given up after some requests on which nothing came.
 /// The caller says what time it is. One owner; allocates nothing.
 class ResendPlanner {
  public:
@@ -19,7 +20,7 @@ class ResendPlanner {
     std::int64_t settle_ns = 500'000;  ///< reordered fragments and parity may still come
     std::int64_t quiet_ns = 3'000'000;
     std::int64_t answer_ns = 20'000'000;  ///< from a request to the next
-    std::uint32_t requests = 4;           ///< per frame at most
+    std::uint32_t requests = 4;           ///< per frame at most, without an answer
   };
   static constexpr std::size_t kMaxFrames = 8;
 
@@ -28,6 +29,7 @@ class ResendPlanner {
     Kind kind = Kind::wait;
     std::uint32_t frame_id = 0;  ///< of ask and give_up
     std::int64_t wake_ns = 0;    ///< of wait: when to look again; 0: no frame is open
+    bool tail = false;           ///< of ask: what is behind the last byte that came, too
   };
 
   ResendPlanner() = default;
@@ -44,7 +46,7 @@ class ResendPlanner {
     std::uint64_t arrivals = 0;
     std::int64_t changed_ns = 0;
     std::int64_t asked_ns = 0;
-    std::uint32_t asked = 0;
+    std::uint32_t asked = 0;  // since anything came of it
   };
   Params params_;
   std::array<Watched, kMaxFrames> watched_{};

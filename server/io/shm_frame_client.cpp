@@ -80,13 +80,15 @@ physics::Result<ChannelDescription> ShmFrameClient::subscribe(const SubscribeOpt
   };
   const auto found = std::find_if(
       info_.channels.begin(), info_.channels.end(), [&](const ChannelDescription& channel) {
-        return fits(options.channel_kind, channel.kind) && fits(options.sensor, channel.sensor) &&
+        return fits(options.channel_name, channel.name) &&
+               fits(options.channel_kind, channel.kind) && fits(options.sensor, channel.sensor) &&
                fits(options.band, channel.band);
       });
   if (found == info_.channels.end()) {
-    return make_error(ErrorCode::protocol,
-                      fmt::format("shm://{}: no channel kind '{}' sensor '{}' band '{}'", name_,
-                                  options.channel_kind, options.sensor, options.band));
+    return make_error(
+        ErrorCode::protocol,
+        fmt::format("shm://{}: no channel name '{}' kind '{}' sensor '{}' band '{}'", name_,
+                    options.channel_name, options.channel_kind, options.sensor, options.band));
   }
   options_ = options;
   channel_ = static_cast<std::size_t>(found - info_.channels.begin());
@@ -94,7 +96,11 @@ physics::Result<ChannelDescription> ShmFrameClient::subscribe(const SubscribeOpt
     pixels_.resize(static_cast<std::size_t>(ring_.pixel_bytes(channel_) / sizeof(float)));
   }
   publication_ = ring_.newest();
-  account_.set_every_nth(options.every_nth);
+  if (found->every_nth > protocol::kMaxEveryNth) {
+    return make_error(ErrorCode::protocol, every_nth_error(found->every_nth));
+  }
+  terms_.every_nth = options.every_nth * found->every_nth;
+  account_.set_every_nth(terms_.every_nth);
   subscribed_ = true;
   return *found;
 }
@@ -176,11 +182,17 @@ physics::Result<ShmFrameClient::Taken> ShmFrameClient::take(std::uint64_t public
   if (!ring_.intact(publication)) {
     return Taken::overwritten;
   }
+  constexpr std::array<std::byte, protocol::kFrameHeaderBytes> kNone{};
+  if (head == kNone) {  // nothing for this channel
+    publication_ = publication;
+    return Taken::left_out;
+  }
   auto header = protocol::decode_frame_header(head);
   if (!header) {
     return tl::unexpected<physics::Error>(std::move(header.error()));
   }
-  if (!protocol::is_every_nth(header->frame_number, options_.every_nth)) {
+  // A frame that was late for its number comes under another one.
+  if (options_.every_nth != 1 && !protocol::is_every_nth(header->frame_number, terms_.every_nth)) {
     publication_ = publication;
     return Taken::left_out;
   }
@@ -199,9 +211,10 @@ physics::Result<ShmFrameClient::Taken> ShmFrameClient::take(std::uint64_t public
   }
   publication_ = publication;
   frame_.header = *header;
-  // Among the publications that were overwritten there may be none that this reader wanted.
-  if (std::exchange(gap_, false) &&
-      (options_.every_nth == 1 || account_.missing_before(*header) > 0)) {
+  // Among the publications that were overwritten there may be none that this reader wanted. Nothing
+  // is lost on the way: what is missing was not ready for its channel.
+  if ((std::exchange(gap_, false) && terms_.every_nth == 1) ||
+      account_.missing_before(*header) > 0) {
     frame_.header.flags |= protocol::kFlagGapBefore;
   }
   // The ring keeps pixels aligned.

@@ -12,6 +12,7 @@
 #include "emit/image/exr_image.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/host_session.hpp"
+#include "emit/protocol/pixel_codec.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/resend.hpp"
 #include "emit/protocol/trigger.hpp"
@@ -75,6 +76,23 @@ Bytes frame_record(std::uint64_t number) {
   const test::Frame frame = test::make_frame(4, 3, number);
   Bytes body(frame.header_bytes.begin(), frame.header_bytes.end());
   append(body, frame.pixels);
+  return record(protocol::RecordKind::frame, body);
+}
+
+/// The same size, of one value, so that it shrinks.
+Bytes encoded_frame_record(std::uint64_t number) {
+  test::Frame frame = test::make_frame(4, 3, number);
+  for (std::size_t i = 4; i < frame.pixels.size(); ++i) frame.pixels[i] = frame.pixels[i - 4];
+  protocol::PixelEncoder encoder(frame.pixels.size());
+  encoder.begin(frame.pixels);
+  while (!encoder.encode_block()) {
+  }
+  frame.header.payload_crc32c = protocol::crc32c(frame.pixels);
+  frame.header.encoding = protocol::PixelEncoding::shuffled_lz4;
+  frame.header.encoded_bytes = static_cast<std::uint32_t>(encoder.bytes().size());
+  protocol::encode(frame.header, frame.header_bytes);
+  Bytes body(frame.header_bytes.begin(), frame.header_bytes.end());
+  append(body, encoder.bytes());
   return record(protocol::RecordKind::frame, body);
 }
 
@@ -206,6 +224,11 @@ void make_network_seeds() {
   write("frame_client", "two_frames",
         joined({tcp, record(welcome()), record(subscribed()), record(status()), frame_record(1),
                 frame_record(3)}));
+  v1::ControlRecord compressed = subscribed();
+  compressed.mutable_subscribed()->set_compression(v1::COMPRESSION_SHUFFLED_LZ4);
+  write("frame_client", "encoded",
+        joined({tcp, record(welcome()), record(compressed), encoded_frame_record(1),
+                frame_record(2), encoded_frame_record(3)}));
   write("frame_client", "udp",
         joined({udp, record(welcome()), record(subscribed()), record(status())}));
   v1::ControlRecord huge = subscribed();
@@ -297,185 +320,186 @@ void make_loss_seeds() {
   late[5] |= std::byte{protocol::kFragmentResent};
   append(waited, piece(20, late));
   write("fragments", "waiting", waited);
-  void make_session_seeds() {
-    // The target puts the MACs right, and knows key zero.
-    auto mac = std::move(*protocol::SessionMac::create());
-    const protocol::SharedKey shared = protocol::make_shared_key({}, mac);
-    const auto datagram = [&](protocol::SessionKind kind, std::uint64_t counter,
-                              const Bytes& body) {
-      Bytes out(protocol::kSessionHeaderBytes + body.size() + protocol::kSessionTagBytes);
-      std::copy(body.begin(), body.end(), out.begin() + protocol::kSessionHeaderBytes);
-      mac.set_key(shared.open_key);
-      static_cast<void>(mac.seal({kind, shared.id, 7, counter}, out, body.size()));
-      return out;
-    };
-    const Bytes open = datagram(protocol::SessionKind::open, 3, {});
-    const Bytes frame = datagram(protocol::SessionKind::host_frame, 1500, host_frame(1));
-    write("host_sessions", "openings", joined({piece(0, open), piece(2, open), piece(4, open)}));
-    write("host_sessions", "frames",
-          joined({piece(1, host_frame(0)), piece(1, host_frame(2)), piece(4, frame),
-                  piece(4, frame), piece(2, frame), piece(0, frame), piece(0, host_frame(0))}));
-    write("host_sessions", "answers",
-          joined({piece(2, datagram(protocol::SessionKind::challenge, 1, Bytes(17))), piece(1, {}),
-                  piece(4, datagram(protocol::SessionKind::answer, 1, host_frame(0)))}));
-  }
+}
 
-  void make_fragment_seeds() {
-    Bytes whole;
-    Bytes lossy;
-    for (std::uint32_t id = 1; id <= 2; ++id) {
-      const test::Frame frame = test::make_frame(16, 12, id);
-      protocol::Fragmenter::Params params;
-      params.stream_id = 1;
-      params.frame_id = id;
-      params.sim_time_ns = frame.header.sim_time_ns;
-      params.row_bytes = 64;
-      params.max_payload_bytes = 400;
-      const protocol::Fragmenter cut(params, frame.header_bytes, frame.pixels);
-      for (std::uint32_t i = 0; i < cut.fragment_count(); ++i) {
-        std::array<std::byte, protocol::kFragmentHeaderBytes> memory{};
-        const auto pieces = cut.pieces(i, memory);
-        Bytes datagram;
-        for (std::uint32_t k = 0; k < pieces.count; ++k) append(datagram, pieces.piece[k]);
-        const auto instructions = static_cast<std::uint8_t>(i == 0 ? 1 : 2);
-        append(whole, piece(instructions, datagram));
-        if (i != id) append(lossy, piece(static_cast<std::uint8_t>(instructions | 4), datagram));
-      }
-    }
-    write("fragments", "whole", whole);
-    make_loss_seeds();
-    write("fragments", "lossy", lossy);
-  }
-
-  void make_log_seeds() {
-    for (const auto& [name, chunk_bytes] :
-         {std::pair("chunks.mcap", 1024u), std::pair("plain.mcap", 0u)}) {
-      protocol::LogWriterOptions options;
-      options.chunk_bytes = chunk_bytes;
-      auto writer = protocol::LogWriter::create(seed("mcap_log", name), options);
-      if (!writer) std::abort();
-      const auto frame = test::make_host_frame(1);
-      for (std::uint64_t i = 1; i <= 2; ++i) {
-        frame->frame_number = i;
-        static_cast<void>(writer->write_host(*frame, static_cast<std::int64_t>(i) * 5'000'000));
-        static_cast<void>(writer->write_journal(decision()));
-      }
-      static_cast<void>(writer->close());
-    }
-  }
-
-  Bytes ipv4_udp(const Bytes& payload) {
-    const auto size = [](std::size_t bytes) { return static_cast<std::uint16_t>(bytes); };
-    Bytes out;
-    append_number(out, std::uint16_t{0x4500}, true);
-    append_number(out, size(28 + payload.size()), true);
-    append_number(out, std::uint32_t{0x00074000}, true);
-    append_number(out, std::uint32_t{0x40110000}, true);
-    append_number(out, std::uint32_t{0x7F000001}, true);
-    append_number(out, std::uint32_t{0x7F000001}, true);
-    append_number(out, std::uint16_t{40000}, true);
-    append_number(out, std::uint16_t{7001}, true);
-    append_number(out, size(8 + payload.size()), true);
-    append_number(out, std::uint16_t{0}, true);
-    append(out, payload);
+void make_session_seeds() {
+  // The target puts the MACs right, and knows key zero.
+  auto mac = std::move(*protocol::SessionMac::create());
+  const protocol::SharedKey shared = protocol::make_shared_key({}, mac);
+  const auto datagram = [&](protocol::SessionKind kind, std::uint64_t counter, const Bytes& body) {
+    Bytes out(protocol::kSessionHeaderBytes + body.size() + protocol::kSessionTagBytes);
+    std::copy(body.begin(), body.end(), out.begin() + protocol::kSessionHeaderBytes);
+    mac.set_key(shared.open_key);
+    static_cast<void>(mac.seal({kind, shared.id, 7, counter}, out, body.size()));
     return out;
+  };
+  const Bytes open = datagram(protocol::SessionKind::open, 3, {});
+  const Bytes frame = datagram(protocol::SessionKind::host_frame, 1500, host_frame(1));
+  write("host_sessions", "openings", joined({piece(0, open), piece(2, open), piece(4, open)}));
+  write("host_sessions", "frames",
+        joined({piece(1, host_frame(0)), piece(1, host_frame(2)), piece(4, frame), piece(4, frame),
+                piece(2, frame), piece(0, frame), piece(0, host_frame(0))}));
+  write("host_sessions", "answers",
+        joined({piece(2, datagram(protocol::SessionKind::challenge, 1, Bytes(17))), piece(1, {}),
+                piece(4, datagram(protocol::SessionKind::answer, 1, host_frame(0)))}));
+}
+
+void make_fragment_seeds() {
+  Bytes whole;
+  Bytes lossy;
+  for (std::uint32_t id = 1; id <= 2; ++id) {
+    const test::Frame frame = test::make_frame(16, 12, id);
+    protocol::Fragmenter::Params params;
+    params.stream_id = 1;
+    params.frame_id = id;
+    params.sim_time_ns = frame.header.sim_time_ns;
+    params.row_bytes = 64;
+    params.max_payload_bytes = 400;
+    const protocol::Fragmenter cut(params, frame.header_bytes, frame.pixels);
+    for (std::uint32_t i = 0; i < cut.fragment_count(); ++i) {
+      std::array<std::byte, protocol::kFragmentHeaderBytes> memory{};
+      const auto pieces = cut.pieces(i, memory);
+      Bytes datagram;
+      for (std::uint32_t k = 0; k < pieces.count; ++k) append(datagram, pieces.piece[k]);
+      const auto instructions = static_cast<std::uint8_t>(i == 0 ? 1 : 2);
+      append(whole, piece(instructions, datagram));
+      if (i != id) append(lossy, piece(static_cast<std::uint8_t>(instructions | 4), datagram));
+    }
   }
+  write("fragments", "whole", whole);
+  make_loss_seeds();
+  write("fragments", "lossy", lossy);
+}
 
-  void make_capture_seeds() {
-    const Bytes packet = ipv4_udp(host_frame(1));
-    Bytes pcap;
-    for (const std::uint32_t word : {0xA1B2C3D4u, 0x00040002u, 0u, 0u, 262144u, 101u}) {
-      append_number(pcap, word);
+void make_log_seeds() {
+  for (const auto& [name, chunk_bytes] :
+       {std::pair("chunks.mcap", 1024u), std::pair("plain.mcap", 0u)}) {
+    protocol::LogWriterOptions options;
+    options.chunk_bytes = chunk_bytes;
+    auto writer = protocol::LogWriter::create(seed("mcap_log", name), options);
+    if (!writer) std::abort();
+    const auto frame = test::make_host_frame(1);
+    for (std::uint64_t i = 1; i <= 2; ++i) {
+      frame->frame_number = i;
+      static_cast<void>(writer->write_host(*frame, static_cast<std::int64_t>(i) * 5'000'000));
+      static_cast<void>(writer->write_journal(decision()));
     }
-    for (std::uint32_t i = 0; i < 2; ++i) {
-      for (const std::uint32_t word : {1'700'000'000u, i, 0u, 0u}) append_number(pcap, word);
-      const auto bytes = static_cast<std::uint32_t>(packet.size());
-      std::memcpy(pcap.data() + pcap.size() - 8, &bytes, 4);
-      std::memcpy(pcap.data() + pcap.size() - 4, &bytes, 4);
-      append(pcap, packet);
-    }
-    write("pose_pcap", "raw.pcap", pcap);
+    static_cast<void>(writer->close());
+  }
+}
 
-    Bytes pcapng;
-    const auto block = [&pcapng](std::uint32_t type, Bytes content) {
-      content.resize((content.size() + 3) / 4 * 4);
-      const auto bytes = static_cast<std::uint32_t>(content.size() + 12);
-      append_number(pcapng, type);
-      append_number(pcapng, bytes);
-      append(pcapng, content);
-      append_number(pcapng, bytes);
-    };
-    const auto words = [](std::initializer_list<std::uint32_t> values) {
-      Bytes out;
-      for (const std::uint32_t value : values) append_number(out, value);
-      return out;
-    };
-    block(0x0A0D0D0A, words({0x1A2B3C4D, 1, ~0u, ~0u}));
-    block(1, words({101, 0}));
+Bytes ipv4_udp(const Bytes& payload) {
+  const auto size = [](std::size_t bytes) { return static_cast<std::uint16_t>(bytes); };
+  Bytes out;
+  append_number(out, std::uint16_t{0x4500}, true);
+  append_number(out, size(28 + payload.size()), true);
+  append_number(out, std::uint32_t{0x00074000}, true);
+  append_number(out, std::uint32_t{0x40110000}, true);
+  append_number(out, std::uint32_t{0x7F000001}, true);
+  append_number(out, std::uint32_t{0x7F000001}, true);
+  append_number(out, std::uint16_t{40000}, true);
+  append_number(out, std::uint16_t{7001}, true);
+  append_number(out, size(8 + payload.size()), true);
+  append_number(out, std::uint16_t{0}, true);
+  append(out, payload);
+  return out;
+}
+
+void make_capture_seeds() {
+  const Bytes packet = ipv4_udp(host_frame(1));
+  Bytes pcap;
+  for (const std::uint32_t word : {0xA1B2C3D4u, 0x00040002u, 0u, 0u, 262144u, 101u}) {
+    append_number(pcap, word);
+  }
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    for (const std::uint32_t word : {1'700'000'000u, i, 0u, 0u}) append_number(pcap, word);
     const auto bytes = static_cast<std::uint32_t>(packet.size());
-    block(6, joined({words({0, 0x50000, 0x1234, bytes, bytes}), packet}));
-    write("pose_pcap", "raw.pcapng", pcapng);
+    std::memcpy(pcap.data() + pcap.size() - 8, &bytes, 4);
+    std::memcpy(pcap.data() + pcap.size() - 4, &bytes, 4);
+    append(pcap, packet);
   }
+  write("pose_pcap", "raw.pcap", pcap);
 
-  void make_image_seeds() {
-    image::ExrImage picture;
-    picture.width_px = 8;
-    picture.height_px = 6;
-    std::vector<float> pixels(48);
-    for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<float>(i) * 0.25F;
-    picture.add(image::kRadianceChannel, pixels);
-    picture.add(image::kTemperatureChannel, pixels);
-    image::FrameMetadata metadata;
-    metadata.frame_number = 42;
-    metadata.band_name = "8-12";
-    metadata.band_lo_um = 8.0;
-    metadata.band_hi_um = 12.0;
-    metadata.band_response = {{8.0, 0.5}, {10.0, 1.0}, {12.0, 0.5}};
-    image::set_frame_metadata(picture, metadata);
-    if (!image::write_exr(seed("exr", "frame.exr"), picture)) std::abort();
-  }
+  Bytes pcapng;
+  const auto block = [&pcapng](std::uint32_t type, Bytes content) {
+    content.resize((content.size() + 3) / 4 * 4);
+    const auto bytes = static_cast<std::uint32_t>(content.size() + 12);
+    append_number(pcapng, type);
+    append_number(pcapng, bytes);
+    append(pcapng, content);
+    append_number(pcapng, bytes);
+  };
+  const auto words = [](std::initializer_list<std::uint32_t> values) {
+    Bytes out;
+    for (const std::uint32_t value : values) append_number(out, value);
+    return out;
+  };
+  block(0x0A0D0D0A, words({0x1A2B3C4D, 1, ~0u, ~0u}));
+  block(1, words({101, 0}));
+  const auto bytes = static_cast<std::uint32_t>(packet.size());
+  block(6, joined({words({0, 0x50000, 0x1234, bytes, bytes}), packet}));
+  write("pose_pcap", "raw.pcapng", pcapng);
+}
 
-  void make_scene_seeds() {
-    scenegen::GenerateOptions options;
-    options.kind = scenegen::SceneKind::box;
-    options.directory = seed("gltf", "");
-    if (!scenegen::generate(options)) std::abort();
-  }
+void make_image_seeds() {
+  image::ExrImage picture;
+  picture.width_px = 8;
+  picture.height_px = 6;
+  std::vector<float> pixels(48);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<float>(i) * 0.25F;
+  picture.add(image::kRadianceChannel, pixels);
+  picture.add(image::kTemperatureChannel, pixels);
+  image::FrameMetadata metadata;
+  metadata.frame_number = 42;
+  metadata.band_name = "8-12";
+  metadata.band_lo_um = 8.0;
+  metadata.band_hi_um = 12.0;
+  metadata.band_response = {{8.0, 0.5}, {10.0, 1.0}, {12.0, 0.5}};
+  image::set_frame_metadata(picture, metadata);
+  if (!image::write_exr(seed("exr", "frame.exr"), picture)) std::abort();
+}
 
-  void make_state_seeds() {
-    const scene::SceneGeometry geometry = fuzz::state_geometry();
-    renderer::SurfaceModel model;
-    renderer::SurfaceModelOptions options;
-    model.meshes.emplace_back(geometry.meshes[0], options.max_samples);
-    static_cast<void>(model.meshes[0].split(std::vector<std::uint32_t>{0, 3}));
-    model.drawn_samples = static_cast<std::uint32_t>(model.meshes[0].vertices().size());
-    model.first_sample = {0};
-    for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
-      renderer::SurfaceSample sample;
-      sample.material = i % 3;
-      sample.mover = static_cast<std::int32_t>(i % 3) - 1;
-      sample.first_seen = i;
-      sample.seen_count = 1;
-      model.samples.samples.push_back(sample);
-      model.samples.seen.push_back({model.drawn_samples - 1 - i, 0.5F});
-      model.states.emplace_back();
-      model.outputs.emplace_back();
-    }
-    if (!renderer::write_state(seed("state_file", "split.emitstate"), fuzz::state_key(), model)) {
-      std::abort();
-    }
-  }
+void make_scene_seeds() {
+  scenegen::GenerateOptions options;
+  options.kind = scenegen::SceneKind::box;
+  options.directory = seed("gltf", "");
+  if (!scenegen::generate(options)) std::abort();
+}
 
-  void make_trigger_seeds() {
-    for (const auto& [name, trigger] :
-         {std::pair("stamped",
-                    protocol::Trigger{0x1122334455667788, 1000, 1'800'000'000'000'000'005}),
-          std::pair("plain", protocol::Trigger{1, 1, 0})}) {
-      Bytes bytes(protocol::kTriggerBytes);
-      protocol::encode(trigger, std::span(bytes).first<protocol::kTriggerBytes>());
-      write("trigger", name, bytes);
-    }
+void make_state_seeds() {
+  const scene::SceneGeometry geometry = fuzz::state_geometry();
+  renderer::SurfaceModel model;
+  renderer::SurfaceModelOptions options;
+  model.meshes.emplace_back(geometry.meshes[0], options.max_samples);
+  static_cast<void>(model.meshes[0].split(std::vector<std::uint32_t>{0, 3}));
+  model.drawn_samples = static_cast<std::uint32_t>(model.meshes[0].vertices().size());
+  model.first_sample = {0};
+  for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
+    renderer::SurfaceSample sample;
+    sample.material = i % 3;
+    sample.mover = static_cast<std::int32_t>(i % 3) - 1;
+    sample.first_seen = i;
+    sample.seen_count = 1;
+    model.samples.samples.push_back(sample);
+    model.samples.seen.push_back({model.drawn_samples - 1 - i, 0.5F});
+    model.states.emplace_back();
+    model.outputs.emplace_back();
   }
+  if (!renderer::write_state(seed("state_file", "split.emitstate"), fuzz::state_key(), model)) {
+    std::abort();
+  }
+}
+
+void make_trigger_seeds() {
+  for (const auto& [name, trigger] :
+       {std::pair("stamped",
+                  protocol::Trigger{0x1122334455667788, 1000, 1'800'000'000'000'000'005}),
+        std::pair("plain", protocol::Trigger{1, 1, 0})}) {
+    Bytes bytes(protocol::kTriggerBytes);
+    protocol::encode(trigger, std::span(bytes).first<protocol::kTriggerBytes>());
+    write("trigger", name, bytes);
+  }
+}
 
 }  // namespace
 
@@ -486,6 +510,7 @@ int main(int argc, char** argv) {
   }
   root = argv[1];
   make_network_seeds();
+  make_loss_seeds();
   make_trigger_seeds();
   make_session_seeds();
   make_fragment_seeds();

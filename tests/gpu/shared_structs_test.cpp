@@ -42,7 +42,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, samples);
   EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, relworld_from_sensor);
   EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, ray);
-  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, format_px);
+  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, format_window_px);
   EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, obscurance);
   EXPECT_OFFSET(*radiance, "frame", gpu::FrameParams, bands);
   EXPECT_OFFSET(*radiance, "frame", gpu::FrameParams, sun_now);

@@ -21,9 +21,9 @@ constexpr std::string_view kGolden =
     "00f2052a0100000000f7c2ffffffffff0000b49376e2fa180100b49376e2fa180200b49376e2fa18"
     "0300b49376e2fa180400b49376e2fa180500b49376e2fa18f9ffffffffffffff40e2010000000000"
     "e603000000000000000000000000f83f00000000000002c00000000000408f40000000000000e03f"
-    "000000000000e0bf000000000000e03f000000000000e0bf04000000000000003412000000000000"
-    "ffffb39376e2fa184d000000000000000000003f0000803e09000000000000000000000000000000"
-    "000000000000000000000000000000000000000000000000000000000000000000000000a9faa438";
+    "000000000000e0bf000000000000e03f000000000000e0bf04010000000000003412000000000000"
+    "ffffb39376e2fa184d000000000000000000003f0000803e09000000020100004000000000050000"
+    "000400004523010000000000000000000000000000000000000000000000000000000000955c71ac";
 
 FrameHeader golden_header() {
   constexpr std::int64_t kWallNs = 1'800'000'000'000'000'000;
@@ -60,6 +60,12 @@ FrameHeader golden_header() {
   header.prediction_error_m = 0.5F;
   header.prediction_error_rad = 0.25F;
   header.predictions = 9;
+  header.window_x_px = 0x102;
+  header.window_y_px = 0x40;
+  header.sensor_width_px = 1280;
+  header.sensor_height_px = 1024;
+  header.encoding = PixelEncoding::shuffled_lz4;
+  header.encoded_bytes = 0x12345;
   header.pose.position_world_m = {1.5, -2.25, 1000.0};
   header.pose.world_from_body = {0.5, -0.5, 0.5, -0.5};
   header.payload_bytes = 640 * 512 * 4;
@@ -120,6 +126,12 @@ TEST(FrameHeader, DecodesEveryFieldOfTheGoldenBytes) {
   EXPECT_EQ(header->prediction_error_m, expected.prediction_error_m);
   EXPECT_EQ(header->prediction_error_rad, expected.prediction_error_rad);
   EXPECT_EQ(header->predictions, expected.predictions);
+  EXPECT_EQ(header->window_x_px, expected.window_x_px);
+  EXPECT_EQ(header->window_y_px, expected.window_y_px);
+  EXPECT_EQ(header->sensor_width_px, expected.sensor_width_px);
+  EXPECT_EQ(header->sensor_height_px, expected.sensor_height_px);
+  EXPECT_EQ(header->encoding, expected.encoding);
+  EXPECT_EQ(header->encoded_bytes, expected.encoded_bytes);
   // Whatever is not compared above would differ here.
   EXPECT_EQ(to_hex(encoded(*header)), kGolden);
 }
@@ -135,6 +147,10 @@ TEST(FrameHeader, RefusesWhatIsNotAHeaderAndSaysWhy) {
   EXPECT_THAT(error_of(forged(6, 0)), HasSubstr("pixel quantity 0"));
   EXPECT_THAT(error_of(forged(12, 0x81)), HasSubstr("for 641x512"));
   EXPECT_THAT(error_of(forged(48, 4)), HasSubstr("payload bytes"));
+  EXPECT_THAT(error_of(forged(225, 2)), HasSubstr("unknown pixel encoding 2"));
+  EXPECT_THAT(error_of(forged(271, 1)), HasSubstr("640x512 pixels at 16777474, 64 of a sensor of "
+                                                  "1280x1024"));
+  EXPECT_THAT(error_of(forged(277, 2)), HasSubstr("of a sensor of 512x1024"));
   auto flipped = good;
   flipped[200] ^= std::byte{1};
   EXPECT_THAT(error_of(flipped), HasSubstr("CRC"));
@@ -149,7 +165,7 @@ TEST(FrameHeader, RefusesSizesWhosePixelsOverflow64Bits) {
 }
 
 TEST(FrameHeader, IgnoresReservedBytesAndWhatFollows) {
-  auto bytes = forged(270, 0x55);
+  auto bytes = forged(300, 0x55);
   bytes.push_back(std::byte{1});
   EXPECT_EQ(error_of(bytes), "decoded");
 }

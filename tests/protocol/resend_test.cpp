@@ -61,6 +61,19 @@ TEST(Resend, RequestsGoThereAndBack) {
   EXPECT_FALSE(decode_resend(std::span(bytes).first(encode(request, bytes)), out));
 }
 
+TEST(Resend, WhatMayBeOnItsWayIsLeftOutUnlessAskedFor) {
+  Reassembler reassembler(params());
+  const auto sent = datagrams(1);
+  for (std::size_t i = 0; i + 2 < sent.size(); ++i) {
+    if (i != 1) reassembler.push(sent[i]);
+  }
+  std::array<ByteRange, 8> ranges;
+  ASSERT_EQ(reassembler.missing(1, 1, true, ranges), 2u);
+  EXPECT_GT(ranges[1].bytes, kPayload);
+  ASSERT_EQ(reassembler.missing(1, 1, false, ranges), 1u);
+  EXPECT_EQ(ranges[0], (ByteRange{kPayload, kPayload}));
+}
+
 TEST(Resend, WhatIsMissingIsToldFrontToBack) {
   Reassembler reassembler(params());
   const auto sent = datagrams(1);
@@ -68,12 +81,12 @@ TEST(Resend, WhatIsMissingIsToldFrontToBack) {
     if (i != 0 && i != 3 && i != 4) reassembler.push(sent[i]);
   }
   std::array<ByteRange, 8> ranges;
-  ASSERT_EQ(reassembler.missing(1, 1, ranges), 2u);
+  ASSERT_EQ(reassembler.missing(1, 1, true, ranges), 2u);
   EXPECT_EQ(ranges[0], (ByteRange{0, kPayload}));
   EXPECT_EQ(ranges[1], (ByteRange{3 * kPayload, 2 * kPayload}));
-  EXPECT_EQ(reassembler.missing(1, 1, std::span(ranges).first(1)), 1u);
-  EXPECT_EQ(reassembler.missing(1, 2, ranges), 0u);
-  EXPECT_EQ(reassembler.missing(2, 1, ranges), 0u);
+  EXPECT_EQ(reassembler.missing(1, 1, true, std::span(ranges).first(1)), 1u);
+  EXPECT_EQ(reassembler.missing(1, 2, true, ranges), 0u);
+  EXPECT_EQ(reassembler.missing(2, 1, true, ranges), 0u);
   std::array<Reassembler::OpenFrame, 4> open;
   ASSERT_EQ(reassembler.open_frames(1, open), 1u);
   EXPECT_EQ(open[0].frame_id, 1u);

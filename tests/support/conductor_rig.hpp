@@ -44,6 +44,9 @@ class ConductorRig {
         conductor_(context_, tracks_, options(pacing),
                    pacing.mode == config::PacingMode::trigger ? &triggers_ : nullptr) {
     EXPECT_TRUE(render_.on_start());
+    auto table = *server::make_channels(std::nullopt, *render_.source_info());
+    context_.channels = std::move(table.channels);
+    context_.pictures = std::move(table.pictures);
     EXPECT_TRUE(conductor_.on_start());
   }
   ~ConductorRig() { render_.on_stop(); }

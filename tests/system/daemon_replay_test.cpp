@@ -166,7 +166,7 @@ void drive(HostClient& host, FrameClient& frames) {
 struct Replay {
   SourceScript script;
   ScriptedSource source{script, 32, 16, 2};
-  JournalPlayer player{source, 0};
+  JournalPlayer player{source, *make_channels(std::nullopt, source.info())};
   std::uint64_t frames = 0;
   std::uint64_t rendered = 0;
 

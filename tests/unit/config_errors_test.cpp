@@ -110,6 +110,30 @@ const std::vector<Case>& cases() {
        "s.toml:6:19: use only one of 'trajectory' and 'trajectory_file'"},
       {"channel_band", "[[channel]]\nname = \"a\"\nband = \"9-12\"\n",
        "s.toml:4:8: there is no band '9-12' (known: 3-5, 3.4-4.1, 8-12, 7.7-9.3)"},
+      {"window_of_three_numbers",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nwindow_px = [1, 2, 3]\n",
+       "s.toml:5:13: 'window_px' must be an array of 4 integers: x, y, width, height"},
+      {"window_of_floats",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nwindow_px = [0, 0, 8.5, 8]\n",
+       "s.toml:5:20: 'window_px' must be an integer, not a float"},
+      {"window_empty", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nwindow_px = [0, 0, 8, 0]\n",
+       "s.toml:5:23: 'window_px' is 0, must be 1 .. 8192"},
+      {"window_outside",
+       "[sensor]\nwidth_px = 64\nheight_px = 48\n[[channel]]\nname = \"a\"\nband = \"3-5\"\n"
+       "window_px = [60, 40, 5, 8]\n",
+       "s.toml:8:13: 'window_px' reaches to column 65 and row 48; the sensor's image is 64 x 48"},
+      {"window_below",
+       "[sensor]\nwidth_px = 64\nheight_px = 48\n[[channel]]\nname = \"a\"\nband = \"3-5\"\n"
+       "window_px = [0, 40, 64, 9]\n",
+       "s.toml:8:13: 'window_px' reaches to column 64 and row 49; the sensor's image is 64 x 48"},
+      {"rate_zero", "[[channel]]\nname = \"a\"\nband = \"3-5\"\nevery_nth = 0\n",
+       "s.toml:5:13: 'every_nth' is 0, must be 1 .. 1000"},
+      {"no_channel_at_the_full_rate",
+       "[[channel]]\nname = \"a\"\nband = \"3-5\"\nevery_nth = 2\n"
+       "[[channel]]\nname = \"b\"\nband = \"3-5\"\nevery_nth = 4\n",
+       "s.toml:5:13: no channel shows every frame: the daemon's rate is that of its fastest "
+       "channel, "
+       "'every_nth' of one is 1"},
       {"channel_twice",
        "[[channel]]\nname = \"a\"\nband = \"3-5\"\n[[channel]]\nname = \"a\"\nband = \"8-12\"\n",
        "s.toml:6:8: channel 'a' is defined twice"},

@@ -93,6 +93,8 @@ band = "det"
 name = "b"
 kind = "injection"
 band = "7.7-9.3"
+window_px = [8, 16, 48, 32]
+every_nth = 4
 
 [[object]]
 name = "ground"
@@ -206,6 +208,10 @@ TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
   ASSERT_EQ(s.channels.size(), 2U);
   EXPECT_EQ(s.channels[0].kind, scene::ChannelKind::projector);
   EXPECT_EQ(s.channels[0].band, "det");
+  EXPECT_TRUE(s.channels[0].window_px.empty());
+  EXPECT_EQ(s.channels[0].every_nth, 1U);
+  EXPECT_EQ(s.channels[1].window_px, (scene::PixelRect{8, 16, 48, 32}));
+  EXPECT_EQ(s.channels[1].every_nth, 4U);
   ASSERT_EQ(s.objects.size(), 3U);
   EXPECT_EQ(s.objects[0].gltf, folder_ / "ground.glb");
   EXPECT_EQ(s.objects[0].material, "concrete");

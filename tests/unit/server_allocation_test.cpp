@@ -33,7 +33,9 @@ TEST(SteadyState, NoAgentOnTheFramePathAllocates) {
   RenderAgent render(context, [&] { return make_canned_source(source, 7, 1); });
   Conductor conductor(context, tracks, {});
   ASSERT_TRUE(render.on_start() && conductor.on_start());
-  context.channels = *make_channels(no_scenario, *render.source_info());
+  auto table = *make_channels(no_scenario, *render.source_info());
+  context.channels = std::move(table.channels);
+  context.pictures = std::move(table.pictures);
   config::StreamConfig stream;
   stream.shm = "test-allocation-" + std::to_string(::getpid());
   auto shm = ShmClient::create(stream, context.channels, {}, 1);

@@ -142,7 +142,29 @@ TEST(ResendPlanner, AFrameWhoseEndIsOutstandingIsGivenLongerTime) {
   const std::vector<OpenFrame> open{{7, 10, false}};
   EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);
   EXPECT_EQ(planner.next(open, 3999).kind, Kind::wait);
-  EXPECT_EQ(planner.next(open, 4000).kind, Kind::ask);
+  auto step = planner.next(open, 4000);
+  EXPECT_EQ(step.kind, Kind::ask);
+  EXPECT_FALSE(step.tail) << "what is not sent yet is not lost";
+  step = planner.next(open, 14'000);
+  EXPECT_EQ(step.kind, Kind::ask);
+  EXPECT_TRUE(step.tail) << "nothing came for long";
+}
+
+TEST(ResendPlanner, AnAnswerThatWasLostInPartIsFollowedUntilNothingComes) {
+  ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
+  std::vector<OpenFrame> open{{7, 10, true}};
+  EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);
+  std::int64_t now_ns = 1500;
+  for (int round = 0; round < 10; ++round, now_ns += 10'000) {
+    const auto step = planner.next(open, now_ns);
+    EXPECT_EQ(step.kind, Kind::ask) << round;
+    EXPECT_TRUE(step.tail);
+    ++open[0].arrivals;
+    EXPECT_EQ(planner.next(open, now_ns + 600).kind, Kind::wait) << "not more often than answers";
+  }
+  EXPECT_EQ(planner.next(open, now_ns).kind, Kind::ask);
+  EXPECT_EQ(planner.next(open, now_ns + 10'000).kind, Kind::ask);
+  EXPECT_EQ(planner.next(open, now_ns + 20'000).kind, Kind::give_up);
 }
 
 TEST(ResendPlanner, EveryFrameCountsForItself) {
@@ -303,8 +325,7 @@ class LossySender : public ::testing::Test {
     PublishFrame frame;
     frame.image.source = &source_;
     frame.image.slot = static_cast<std::uint32_t>(slot);
-    frame.image.plane_count = 1;
-    frame.image.planes[0] = view.radiance_w_m2_sr[0];
+    frame.image.pictures[0] = view.radiance_w_m2_sr[0];
     frame.image.crc32c[0] = protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[0]));
     frame.header.frame_number = number_;
     return context_.published.push(frame);
@@ -372,7 +393,7 @@ TEST_F(LossySender, RepairsAndResendsWithoutAllocating) {
     ASSERT_TRUE(publish());
     settle(loses);
     std::array<protocol::ByteRange, 16> ranges;
-    const std::size_t missing = reassembler_.missing(1, id, ranges);
+    const std::size_t missing = reassembler_.missing(1, id, true, ranges);
     ASSERT_EQ(missing, 3U) << "one of the four came back by parity";
     ask(id, std::span(ranges).first(missing));
     settle([](std::uint64_t) { return false; });

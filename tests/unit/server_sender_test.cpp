@@ -110,8 +110,7 @@ class Rig {
     PublishFrame frame;
     frame.image.source = &source_;
     frame.image.slot = static_cast<std::uint32_t>(slot);
-    frame.image.plane_count = 1;
-    frame.image.planes[0] = view.radiance_w_m2_sr[0];
+    frame.image.pictures[0] = view.radiance_w_m2_sr[0];
     frame.image.crc32c[0] = protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[0]));
     frame.header.frame_number = number_;
     EXPECT_TRUE(context_.published.push(frame));
@@ -248,8 +247,7 @@ TEST(Sender, ABriefTurnOfASocketIsShort) {
   channel.height_px = kHeightPx;
   const std::vector<float> pixels(kWidthPx * kHeightPx);
   Image image;
-  image.plane_count = 1;
-  image.planes[0] = pixels;
+  image.pictures[0] = pixels;
   UdpBatch batch;
   for (const bool udp : {false, true}) {
     SocketClient::Params params;

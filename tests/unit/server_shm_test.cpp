@@ -67,7 +67,7 @@ class Ring {
       channel.index = static_cast<std::uint16_t>(i);
       channel.width_px = width_px;
       channel.height_px = height_px;
-      channel.plane = i;
+      channel.picture = i;
       context_.channels.push_back(channel);
     }
     config::StreamConfig config;
@@ -82,12 +82,11 @@ class Ring {
   /// Begins the next frame. Every pixel of channel c holds number + c / 2.
   void begin() {
     ++number_;
-    image_.plane_count = 2;
     for (std::size_t i = 0; i < 2; ++i) {
       pixels_by_plane_[i].assign(pixels_.size(),
                                  static_cast<float>(number_) + 0.5F * static_cast<float>(i));
-      image_.planes[i] = pixels_by_plane_[i];
-      image_.crc32c[i] = protocol::crc32c(std::as_bytes(image_.planes[i]));
+      image_.pictures[i] = pixels_by_plane_[i];
+      image_.crc32c[i] = protocol::crc32c(std::as_bytes(image_.pictures[i]));
     }
     protocol::FrameHeader header;
     header.frame_number = number_;
@@ -531,8 +530,7 @@ TEST(Shm, TheSenderServesItAndKeepsItToItself) {
     PublishFrame frame;
     frame.image.source = &source;
     frame.image.slot = static_cast<std::uint32_t>(slot);
-    frame.image.plane_count = 1;
-    frame.image.planes[0] = view.radiance_w_m2_sr[0];
+    frame.image.pictures[0] = view.radiance_w_m2_sr[0];
     frame.image.crc32c[0] = protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[0]));
     frame.header.frame_number = number;
     ASSERT_TRUE(context.published.push(frame));

@@ -15,8 +15,8 @@ int scaled_index(ivec2 px, uint plane) {
 }
 
 void main() {
-  ivec2 px = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(px, ivec2(frame.picture_px.xy)))) return;
+  ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.picture_window_px.xy);
+  if (any(greaterThanEqual(px, ivec2(frame.picture_window_px.zw)))) return;
   ivec2 last = ivec2(frame.format_px.xy) - 1;
   vec2 place = (vec2(px) + 0.5) * vec2(frame.format_px.xy) / vec2(frame.picture_px.xy);
   vec2 way = clamp(place - 0.5, vec2(0.0), vec2(last));

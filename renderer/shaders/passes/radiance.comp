@@ -100,8 +100,8 @@ float leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
 }
 
 void main() {
-  ivec2 px = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(px, ivec2(frame.format_px.xy)))) return;
+  ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.format_window_px.xy);
+  if (any(greaterThanEqual(px, ivec2(frame.format_window_px.zw)))) return;
   uint pixel = uint(px.y) * frame.format_px.x + uint(px.x);
   uint plane_px = frame.format_px.z;
   Seen seen = seen_at(px);

@@ -10,6 +10,8 @@ struct FrameParams {
   vec4 ray;                   // tangents in the sensor's axes: xy = per pixel, zw = at the corner of pixel 0
   uvec4 format_px;            // rendered: width, height, pixels per plane
   uvec4 picture_px;           // what is sent: the same, larger where fewer pixels are rendered
+  uvec4 format_window_px;     // what is wanted of format_px: first column, first row, behind the last ones
+  uvec4 picture_window_px;    // likewise, of picture_px
   vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K;
                               // foster: z = tolerance of a step in K, w = nodes per axis of the spin-up table
   uvec4 bands;                // x = nodes of a band's table, y = place of the emissivities behind the tables

@@ -86,6 +86,7 @@ physics::Result<std::unique_ptr<FrameProvider>> make_stream_provider(const ViewC
       server::FrameClient::connect(command.source, server::kConnectTimeoutNs, command.security);
   if (!client) return tl::unexpected(client.error());
   server::SubscribeOptions options;
+  options.channel_name = command.channel_name;
   options.channel_kind = command.channel_kind;
   options.band = command.band;
   auto channel = (*client)->subscribe(options);

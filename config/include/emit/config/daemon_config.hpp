@@ -89,6 +89,7 @@ struct StreamConfig {
   std::uint32_t fec_parity_fragments = 0;  ///< likewise; 0 = no error correction
   double fec_max_parity_frac = 0.5;        ///< parity per data fragment that a client may ask for
   double resend_max_frac = 0.25;  ///< of a client's bytes, sent again on request; 0 = never
+  bool compression = true;        ///< for clients that ask for it
   std::string shm;                ///< frames in shared memory under this name; empty = off
   std::uint32_t shm_slots = 8;    ///< a reader in place has slots - 1 frame periods for a frame
   std::uint32_t shm_mode = 0600;

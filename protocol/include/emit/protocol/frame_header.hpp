@@ -18,6 +18,12 @@ inline constexpr std::size_t kFrameHeaderBytes = 320;
 enum class PixelFormat : std::uint8_t { float32 = 1 };
 enum class PixelQuantity : std::uint8_t { radiance_w_m2_sr = 1, temperature_k = 2 };
 
+/// How the pixels travel. Only clients that asked for another than raw get it.
+enum class PixelEncoding : std::uint8_t {
+  raw = 0,
+  shuffled_lz4 = 1,  ///< pixel_codec.hpp
+};
+
 /// Set on a frame whenever it is not simply right and on time. Names are part of the contract.
 enum FrameFlags : std::uint32_t {
   kFlagLate = 1u << 0,           ///< finished after its deadline
@@ -44,6 +50,11 @@ struct FrameHeader {
   std::uint16_t channel_index = 0;
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
+  // Where these pixels lie in the sensor's image. Size 0: an older daemon, all of it.
+  std::uint32_t window_x_px = 0;
+  std::uint32_t window_y_px = 0;
+  std::uint32_t sensor_width_px = 0;
+  std::uint32_t sensor_height_px = 0;
   float band_lo_um = 0.0F;
   float band_hi_um = 0.0F;
   std::uint32_t flags = 0;         ///< FrameFlags
@@ -74,8 +85,10 @@ struct FrameHeader {
   float prediction_error_rad = 0.0F;  ///< likewise
   std::uint32_t predictions = 0;      ///< predicted poses of this run whose truth has come
   physics::Pose pose;                 ///< of the sensor, as used
-  std::uint64_t payload_bytes = 0;
-  std::uint32_t payload_crc32c = 0;
+  std::uint64_t payload_bytes = 0;    ///< of the pixels, whatever the encoding
+  std::uint32_t payload_crc32c = 0;   ///< of the pixels, whatever the encoding
+  PixelEncoding encoding = PixelEncoding::raw;
+  std::uint32_t encoded_bytes = 0;  ///< that follow the header in their place; raw: 0
 };
 
 /// Most that a client may ask for as "every n-th frame".

@@ -20,7 +20,7 @@ inline constexpr std::uint32_t kDefaultMaxControlBytes = 1u << 20;
 /// What the body is. A receiver skips records of a kind that it does not know.
 enum class RecordKind : std::uint8_t {
   control = 1,  ///< Protobuf emit.v1.ControlRecord
-  frame = 2,    ///< frame header (320 bytes) + raw pixels
+  frame = 2,    ///< frame header (320 bytes) + pixels, encoded as it says
   host_frame =
       3,       ///< Protobuf emit.v1.HostFrame without the envelope: no allocation at the receiver
   resend = 4,  ///< resend.hpp: fragments that a client is missing; no allocation either
@@ -101,14 +101,15 @@ class RecordParser {
 /// Frame of a frame record or of a file: header and pixels, pointing into the body.
 struct FrameView {
   FrameHeader header;
-  std::span<const std::byte> pixels;  ///< header.payload_bytes bytes, unaligned
+  /// Unaligned: header.payload_bytes bytes or, encoded, header.encoded_bytes.
+  std::span<const std::byte> pixels;
 };
 
-/// Errors (protocol): as decode_frame_header, and a body whose length differs from
-/// 320 + payload_bytes. Does not check the payload CRC.
+/// Errors (protocol): as decode_frame_header, and a body whose length differs from 320 +
+/// payload_bytes or, encoded, encoded_bytes, which is less. Does not check the payload CRC.
 [[nodiscard]] physics::Result<FrameView> decode_frame_record(std::span<const std::byte> body);
 
-/// CRC-32C of the pixels equals the header's. RT-safe.
+/// CRC-32C of raw pixels equals the header's. RT-safe.
 [[nodiscard]] bool payload_crc_matches(const FrameView& frame) noexcept;
 
 }  // namespace emit::protocol

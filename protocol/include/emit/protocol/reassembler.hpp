@@ -136,8 +136,9 @@ class Reassembler {
   /// Frames of the stream in work and not complete, oldest first. Returns how many were written.
   [[nodiscard]] std::size_t open_frames(std::uint16_t stream_id,
                                         std::span<OpenFrame> out) const noexcept;
-  /// What is missing of one of them, front to back. Returns how many ranges were written.
-  [[nodiscard]] std::size_t missing(std::uint16_t stream_id, std::uint32_t frame_id,
+  /// What is missing of one of them, front to back; without `tail` only in front of what arrived:
+  /// the rest may be on its way. Returns how many ranges were written.
+  [[nodiscard]] std::size_t missing(std::uint16_t stream_id, std::uint32_t frame_id, bool tail,
                                     std::span<ByteRange> out) const noexcept;
   /// Hands the frame out as it is, and older ones before it.
   void give_up(std::uint16_t stream_id, std::uint32_t frame_id) noexcept;

@@ -58,6 +58,9 @@ struct FrameRequest {
   std::int64_t thermal_time_ns = 0;  ///< where the thermal clock stands; behind sim time in a hold
   physics::Pose sensor_pose;         ///< body frame of the seeker head, x along the boresight
   std::uint8_t rung = 0;  ///< of the quality ladder, 0 = full; one that does not exist: the last
+  /// The pixels that are wanted, which are those of the whole picture bit for bit; the others are
+  /// not drawn and hold nothing of meaning. Empty, or one that does not fit: all.
+  scene::PixelRect window_px;
 };
 
 /// Time per stage of Table 3; only with OutputOptions::stage_timing.
@@ -77,7 +80,8 @@ struct RungStats {
   double error_k = 0.0;  ///< as FrameView::estimated_error_k
 };
 
-/// Counted on the device for every frame: nothing is silently repaired.
+/// Counted on the device for every frame, of the pixels that are drawn: nothing is silently
+/// repaired.
 struct FrameStats {
   std::uint32_t nonfinite_px = 0;  ///< NaN or Inf pixels, written as 0
   std::uint32_t clamped_px = 0;    ///< model evaluations with an input outside the valid range

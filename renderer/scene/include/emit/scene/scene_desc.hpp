@@ -117,11 +117,23 @@ struct SensorDesc {
   Trajectory trajectory;  ///< used by offline rendering and by demos; host frames override it
 };
 
+/// A rectangle of an image, from the top left.
+struct PixelRect {
+  std::uint32_t x_px = 0;
+  std::uint32_t y_px = 0;
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+  [[nodiscard]] bool empty() const noexcept { return width_px == 0 || height_px == 0; }
+  [[nodiscard]] bool operator==(const PixelRect&) const = default;
+};
+
 enum class ChannelKind : std::uint8_t { injection, projector };
 struct ChannelDesc {
   std::string name;
   ChannelKind kind = ChannelKind::injection;
-  std::string band;  ///< name of a SpectralBand
+  std::string band;             ///< name of a SpectralBand
+  PixelRect window_px = {};     ///< of the sensor's image; empty: all of it
+  std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
 };
 
 /// Forcing at one instant. Linear between samples, constant outside.
