@@ -16,6 +16,9 @@ namespace {
 constexpr double kReachFrac = 0.05;
 /// Places along a known trajectory of the camera that the refinement looks from.
 constexpr std::size_t kEyes = 16;
+/// Places of the sun that tell what it comes to.
+constexpr std::size_t kSuns = 16;
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
 /// The camera may point that share of its field of view aside of where it was said to.
 constexpr double kFieldMarginFrac = 0.5;
 
@@ -64,6 +67,22 @@ RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& requ
   return view;
 }
 
+/// Where the sun stands from the history's start to the end of the camera's way; through a day
+/// where the way has no length.
+std::vector<glm::vec3> suns(const scene::ScenarioDesc& scenario, const Environment& environment) {
+  const std::int64_t begin_ns = scenario.thermal.history_start_ns;
+  const scene::Trajectory& keys = scenario.sensor.trajectory;
+  const std::int64_t end_ns =
+      keys.size() < 2 ? begin_ns + kDayNs : keys[keys.size() - 1].sim_time_ns;
+  std::vector<glm::vec3> out;
+  for (std::size_t i = 0; i <= kSuns; ++i) {
+    const auto way = static_cast<double>(end_ns - begin_ns) * static_cast<double>(i) / kSuns;
+    const physics::SunPosition sun = environment.sun_at(begin_ns + std::llround(way));
+    if (sun.elevation.value() > StepPlan::kMinSunElevationRad) out.emplace_back(sun.direction_enu);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineView::Eye> eyes,
@@ -98,8 +117,9 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     scene::SceneGeometry full = geometry;
     auto rays = CasterRays::create(full);
     if (!rays) return tl::unexpected(std::move(rays.error()));
-    geometry =
-        scene::simplified(std::move(geometry), errors, kept_facets(full, errors, *rays, view));
+    geometry = scene::simplified(
+        std::move(geometry), errors,
+        kept_facets(full, errors, *rays, view, suns(scenario, history.environment)));
     if (geometry.triangles < full.triangles) {
       detail.emplace(std::move(full), std::move(*rays), geometry);
     }

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include "surface/parallel.hpp"
+#include "surface/ray_offsets.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -64,13 +65,27 @@ bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const Eye> e
   });
 }
 
+/// Whether any of the directions is free.
+bool lit(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::vec3> to_suns,
+         float offset_m, const CasterRays& rays) {
+  const glm::vec3 across_m2 = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
+  const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
+  const glm::vec3 start_m = centre_m + offset_m * glm::normalize(across_m2);
+  return std::ranges::any_of(to_suns, [&](const glm::vec3& to_sun) {
+    const CasterRay ray{start_m, to_sun};
+    return glm::dot(across_m2, to_sun) > 0.0F && rays.blocked_static({&ray, 1}) == 0U;
+  });
+}
+
 }  // namespace
 
 std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
                                            std::span<const double> errors, const CasterRays& rays,
-                                           const scene::DetailView& view) {
+                                           const scene::DetailView& view,
+                                           std::span<const glm::vec3> to_suns) {
   const std::vector<Eye> eyes = some_eyes(view, rays.origin_world_m());
   const auto pixel_rad = static_cast<float>(view.pixel_rad);
+  const float offset_m = ray_offsets(geometry).sun_m;
   std::vector<std::vector<bool>> kept(geometry.meshes.size());
   std::vector<std::vector<std::uint8_t>> at_vertex(geometry.meshes.size());
   const auto corners = [](const scene::Mesh& mesh, std::size_t triangle) {
@@ -95,7 +110,9 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
           corners_m[k] = glm::vec3(to_rel * glm::vec4(mesh.positions_m[corner[k]], 1.0F));
         }
         if (mirrored) std::swap(corners_m[1], corners_m[2]);
-        if (seen_wide(corners_m, eyes, pixel_rad, rays)) keep[t] = 1;
+        const bool worth =
+            seen_wide(corners_m, eyes, pixel_rad, rays) && lit(corners_m, to_suns, offset_m, rays);
+        if (worth) keep[t] = 1;
       }
     });
     at_vertex[instance.mesh].resize(mesh.positions_m.size(), 0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <glm/ext/vector_float3.hpp>
 #include <span>
 #include <vector>
 
@@ -9,13 +10,14 @@
 namespace emit::renderer {
 
 /// Triangles that would only have to be halved again if a mesh lost them in simplification: they
-/// look wider than a pixel, some eye sees them, and the surface bends in them, so that the sun
-/// warms their corners unequally. Small gaps between them are closed. By mesh, one entry per
-/// triangle; empty where `errors`, of scene::simplify_errors(), is 0. `rays`: against `geometry`.
-/// Setup only: about a second per million triangles.
+/// look wider than a pixel, some eye sees them, the sun has come to them, and the surface bends in
+/// them, so that it warmed their corners unequally. Small gaps between them are closed. By mesh,
+/// one entry per triangle; empty where `errors`, of scene::simplify_errors(), is 0. `rays`: against
+/// `geometry`. `to_suns`: unit directions in world axes. Setup only: seconds per million triangles.
 [[nodiscard]] std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
                                                          std::span<const double> errors,
                                                          const CasterRays& rays,
-                                                         const scene::DetailView& view);
+                                                         const scene::DetailView& view,
+                                                         std::span<const glm::vec3> to_suns);
 
 }  // namespace emit::renderer

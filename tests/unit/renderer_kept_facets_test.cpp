@@ -35,12 +35,13 @@ struct Count {
   std::size_t east = 0;  ///< of those towards the eye
 };
 
-Count count_kept(const scene::SceneGeometry& geometry, double pixel_rad) {
+Count count_kept(const scene::SceneGeometry& geometry, double pixel_rad,
+                 const glm::vec3& to_sun = {0.0F, 0.0F, 1.0F}) {
   const scene::DetailView view{kEyes, pixel_rad};
   const std::vector<double> errors = scene::simplify_errors(geometry, view);
   EXPECT_GT(errors[0], 0.0);
   const CasterRays rays = CasterRays::create(geometry).value();
-  const auto kept = kept_facets(geometry, errors, rays, view);
+  const auto kept = kept_facets(geometry, errors, rays, view, {{to_sun}});
   EXPECT_EQ(kept.size(), geometry.meshes.size());
   const scene::Mesh& mesh = geometry.meshes[0];
   EXPECT_EQ(kept[0].size(), mesh.indices.size() / 3);
@@ -65,9 +66,17 @@ TEST(KeptFacets, are_what_the_eyes_see_of_a_surface_that_bends) {
   EXPECT_GT(kept.east, kept.towards_eye / 3);
 }
 
+TEST(KeptFacets, none_lies_where_the_sun_never_comes) {
+  scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
+  const Count west = count_kept(geometry, kPixelRad, glm::normalize(glm::vec3(-1.0F, 0.0F, 0.02F)));
+  EXPECT_GT(west.towards_eye, 0U);
+  EXPECT_EQ(west.east, 0U);
+  EXPECT_EQ(count_kept(geometry, kPixelRad, {0.0F, 0.0F, -1.0F}).towards_eye, 0U);
+}
+
 TEST(KeptFacets, none_hides_behind_something_else) {
   scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
-  // Hangs over its eastern half.
+  // Hangs over its eastern half, which the sun reaches below it.
   geometry.meshes.push_back(test::level_mesh({0.0F, -3.0F, 0.0F}, {3.0F, 3.0F, 0.0F}, 1.5F));
   scene::Instance plate;
   plate.mesh = 1;
@@ -76,9 +85,12 @@ TEST(KeptFacets, none_hides_behind_something_else) {
   geometry.instances.push_back(plate);
   geometry.static_bounds.add(plate.world_bounds);
   geometry.bounds.add(plate.world_bounds);
-  const Count kept = count_kept(geometry, kPixelRad);
+  const glm::vec3 to_sun = glm::normalize(glm::vec3(0.0F, 5.0F, 0.5F));
+  const Count kept = count_kept(geometry, kPixelRad, to_sun);
   EXPECT_GT(kept.towards_eye, 0U);
   EXPECT_EQ(kept.east, 0U);
+  geometry.instances[1].world_from_mesh = glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 9));
+  EXPECT_GT(count_kept(geometry, kPixelRad, to_sun).east, 0U);
 }
 
 TEST(KeptFacets, none_is_finer_than_a_pixel_or_part_of_a_plane) {
