@@ -17,7 +17,7 @@ constexpr float kBasePx = 32.0F;
 constexpr float kBaseAsidePx = 128.0F;
 constexpr float kBaseNeed = 1e6F;  ///< of triangles wider than that
 /// What needs less is left as it is: an error of a tolerance in a triangle of so many pixels.
-constexpr float kLeastNeed = 4.0F;
+constexpr float kLeastNeed = 3.0F;
 /// What the need of a triangle out of view counts.
 constexpr float kAsideFrac = 1.0F / 64.0F;
 /// What points between the corners may make of it, in tolerances.
