@@ -24,19 +24,15 @@ constexpr std::size_t kEyes = 8;
 constexpr float kSeenFrac = 0.999F;
 constexpr std::size_t kGrain = 256;
 
-struct Eye {
-  glm::vec3 rel_m{0.0F};
-};
-
-std::vector<Eye> some_eyes(const scene::DetailView& view, const glm::dvec3& origin_world_m) {
-  std::vector<Eye> eyes;
+std::vector<glm::vec3> some_eyes(const scene::DetailView& view, const glm::dvec3& origin_world_m) {
+  std::vector<glm::vec3> eyes_m;
   const std::size_t count = view.eyes_world_m.size();
   const std::size_t wanted = std::min(count, kEyes);
   for (std::size_t i = 0; i < wanted; ++i) {
     const std::size_t at = wanted > 1 ? i * (count - 1) / (wanted - 1) : 0;
-    eyes.push_back({glm::vec3(view.eyes_world_m[at] - origin_world_m)});
+    eyes_m.emplace_back(view.eyes_world_m[at] - origin_world_m);
   }
-  return eyes;
+  return eyes_m;
 }
 
 bool bends(const scene::Mesh& mesh, const std::array<std::uint32_t, 3>& corner) noexcept {
@@ -46,19 +42,19 @@ bool bends(const scene::Mesh& mesh, const std::array<std::uint32_t, 3>& corner) 
   return std::min({cosine(0, 1), cosine(1, 2), cosine(2, 0)}) < kEvenCos;
 }
 
-bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const Eye> eyes,
+bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::vec3> eyes_m,
                float pixel_rad, const CasterRays& rays) {
   const glm::vec3 across_m2 = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
   const float edge_m = std::sqrt(glm::length(across_m2) * 2.0F / std::sqrt(3.0F));
-  return std::ranges::any_of(eyes, [&](const Eye& eye) {
-    const glm::vec3 to_eye_m = eye.rel_m - centre_m;
+  return std::ranges::any_of(eyes_m, [&](const glm::vec3& eye_m) {
+    const glm::vec3 to_eye_m = eye_m - centre_m;
     const float distance_m = glm::length(to_eye_m);
     if (edge_m <= kLeastEdgePx * pixel_rad * distance_m ||
         !(glm::dot(across_m2, to_eye_m) > 0.0F)) {
       return false;
     }
-    const CasterRay ray{eye.rel_m, -to_eye_m / distance_m};
+    const CasterRay ray{eye_m, -to_eye_m / distance_m};
     std::array<CasterHit, 1> hit;
     return rays.first_hits({&ray, 1}, {true, {}}, hit) == 0U ||
            hit[0].distance_m > kSeenFrac * distance_m;
@@ -83,7 +79,7 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
                                            std::span<const double> errors, const CasterRays& rays,
                                            const scene::DetailView& view,
                                            std::span<const glm::vec3> to_suns) {
-  const std::vector<Eye> eyes = some_eyes(view, rays.origin_world_m());
+  const std::vector<glm::vec3> eyes_m = some_eyes(view, rays.origin_world_m());
   const auto pixel_rad = static_cast<float>(view.pixel_rad);
   const float offset_m = ray_offsets(geometry).sun_m;
   std::vector<std::vector<bool>> kept(geometry.meshes.size());
@@ -110,14 +106,14 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
           corners_m[k] = glm::vec3(to_rel * glm::vec4(mesh.positions_m[corner[k]], 1.0F));
         }
         if (mirrored) std::swap(corners_m[1], corners_m[2]);
-        const bool worth =
-            seen_wide(corners_m, eyes, pixel_rad, rays) && lit(corners_m, to_suns, offset_m, rays);
+        const bool worth = seen_wide(corners_m, eyes_m, pixel_rad, rays) &&
+                           lit(corners_m, to_suns, offset_m, rays);
         if (worth) keep[t] = 1;
       }
     });
-    at_vertex[instance.mesh].resize(mesh.positions_m.size(), 0);
     for (std::size_t t = 0; t < triangles; ++t) {
       if (keep[t] == 0) continue;
+      at_vertex[instance.mesh].resize(mesh.positions_m.size(), 0);
       for (const std::uint32_t v : corners(mesh, t)) at_vertex[instance.mesh][v] = 1;
     }
   }

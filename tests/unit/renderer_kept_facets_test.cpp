@@ -44,8 +44,11 @@ Count count_kept(const scene::SceneGeometry& geometry, double pixel_rad,
   const auto kept = kept_facets(geometry, errors, rays, view, {{to_sun}});
   EXPECT_EQ(kept.size(), geometry.meshes.size());
   const scene::Mesh& mesh = geometry.meshes[0];
-  EXPECT_EQ(kept[0].size(), mesh.indices.size() / 3);
   Count count;
+  // Not a list of nothing: simplification would hold the mesh's borders for it.
+  if (kept[0].empty()) return count;
+  EXPECT_EQ(kept[0].size(), mesh.indices.size() / 3);
+  EXPECT_NE(std::ranges::count(kept[0], true), 0);
   for (std::size_t t = 0; t < kept[0].size(); ++t) {
     if (!kept[0][t]) continue;
     const glm::vec3 at_m = mesh.positions_m[mesh.indices[3 * t]];
