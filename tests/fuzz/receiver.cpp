@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <memory>
 #include <vector>
 
@@ -25,6 +26,17 @@ void check(bool done, const char* what) {
   if (done) return;
   std::perror(what);
   std::exit(1);
+}
+
+/// A signal (the fuzzer's own alarm, a debugger) lets connect() return early; it goes on all the
+/// same.
+bool connected(int fd, const server::SocketAddress& to) {
+  if (::connect(fd, to.get(), to.length) == 0) return true;
+  pollfd writable{fd, POLLOUT, 0};
+  while (errno == EINTR) {
+    if (::poll(&writable, 1, -1) == 1) return (writable.revents & (POLLERR | POLLHUP)) == 0;
+  }
+  return false;
 }
 
 /// A receiver whose neighbours take everything and do nothing with it.
@@ -50,7 +62,7 @@ class Rig {
   void connect() {
     tcp_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const server::SocketAddress control = receiver_->control_address();
-    check(tcp_ >= 0 && ::connect(tcp_, control.get(), control.length) == 0, "connecting");
+    check(tcp_ >= 0 && connected(tcp_, control), "connecting");
     // Ends without a trace: thousands of connections a second would use up the ports.
     const linger abrupt{1, 0};
     ::setsockopt(tcp_, SOL_SOCKET, SO_LINGER, &abrupt, sizeof abrupt);
