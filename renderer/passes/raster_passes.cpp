@@ -95,6 +95,11 @@ physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
+  if (sampled) {
+    auto sky = gl::Program::graphics("passes/sky.vert", "passes/sky.frag");
+    if (!sky) return tl::unexpected(std::move(sky.error()));
+    pass.sky_program_ = std::move(*sky);
+  }
   const auto width = static_cast<GLsizei>(width_px);
   const auto height = static_cast<GLsizei>(height_px);
   pass.sampled_ = sampled;
@@ -133,10 +138,7 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
             static_cast<GLsizei>(part_px.x), static_cast<GLsizei>(part_px.y));
   glEnable(GL_SCISSOR_TEST);      // what is not drawn need not be cleared
   const GLfloat far_away = 0.0F;  // reversed z
-  if (sampled_) {
-    const GLuint sky[4] = {std::bit_cast<GLuint>(EMIT_SKY_DEPTH_M), 0, 0, 0};
-    glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 0, sky);
-  } else {
+  if (!sampled_) {
     const GLfloat sky[4] = {EMIT_SKY_DEPTH_M, 0.0F, 0.0F, 0.0F};
     const GLfloat zero[4] = {0.0F, 0.0F, 0.0F, 0.0F};
     const GLuint none[4] = {0, 0, 0, 0};
@@ -155,6 +157,12 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
   issue(lists.view_draws(single_sided), lists.view_ranges(), records);
   glDisable(GL_CULL_FACE);
   issue(lists.view_draws(double_sided), lists.view_ranges(), records);
+  if (sampled_) {
+    // Texels of 16 bytes take llvmpipe longer to clear than to draw where no surface is.
+    sky_program_.use();
+    glDepthFunc(GL_EQUAL);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
   glDisable(GL_SCISSOR_TEST);
 }
 

@@ -44,6 +44,7 @@ class GeometryPass {
 
  private:
   gl::Program program_;
+  gl::Program sky_program_;  ///< `sampled`: fills what no surface covers
   gl::Texture depth_m_;
   gl::Texture normal_;
   gl::Texture ids_;
