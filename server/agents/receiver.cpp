@@ -161,7 +161,14 @@ int Receiver::do_work(std::int64_t now_ns) noexcept {
             ++work;
           }
         }
-        if ((event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0 && connection.open()) {
+        if (!connection.open()) continue;
+        if (connection.waits()) {
+          // It hangs up for as long as it is looked at, however much of it is unread.
+          if ((event.events & (EPOLLHUP | EPOLLERR)) != 0) {
+            close(connection, "reset by the peer");
+            ++work;
+          }
+        } else if ((event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) {
           work += read(connection, now_ns);
         }
       }
@@ -213,11 +220,10 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
   if (connection.handshaking) {
     return handshake(connection, now_ns);
   }
-  if (connection.waits() || connection.closing || connection.flush_close) {
-    // Only the end of the stream is of interest; anything else is thrown away or waits.
+  if (connection.closing || connection.flush_close) {
+    // Only the end of the stream is of interest; anything else is thrown away.
     std::array<std::byte, 4096> trash;
-    const IoResult got =
-        connection.waits() ? connection.socket.peek(trash) : connection.socket.read_some(trash);
+    const IoResult got = connection.socket.read_some(trash);
     if (got.status == IoStatus::closed || got.status == IoStatus::failed) {
       close(connection, "closed by the peer");
     }

@@ -253,16 +253,6 @@ IoResult TcpSocket::read_some(std::span<std::byte> space) noexcept {
   return to_result(error, bytes);
 }
 
-IoResult TcpSocket::peek(std::span<std::byte> space) noexcept {
-  if (impl_->tls) {
-    return impl_->tls->peek(space);
-  }
-  error_code error;
-  const std::size_t bytes = impl_->socket.receive(asio::buffer(space.data(), space.size()),
-                                                  tcp::socket::message_peek, error);
-  return to_result(error, bytes);
-}
-
 IoResult TcpSocket::write_some(std::span<const std::byte> bytes) noexcept {
   if (impl_->tls) {
     return impl_->tls->write(std::span(&bytes, 1));

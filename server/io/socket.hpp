@@ -74,8 +74,6 @@ class TcpSocket {
   [[nodiscard]] bool has_buffered() const noexcept;
 
   [[nodiscard]] IoResult read_some(std::span<std::byte> space) noexcept;
-  /// Like read_some, but what is read stays in the socket.
-  [[nodiscard]] IoResult peek(std::span<std::byte> space) noexcept;
   [[nodiscard]] IoResult write_some(std::span<const std::byte> bytes) noexcept;
   /// Up to kMaxPieces pieces in one system call.
   [[nodiscard]] IoResult write_some(std::span<const std::span<const std::byte>> pieces) noexcept;

@@ -224,16 +224,6 @@ IoResult TlsSession::read(std::span<std::byte> space) noexcept {
   return returned == 1 ? IoResult{IoStatus::done, bytes, 0} : impl_->outcome(returned, false);
 }
 
-IoResult TlsSession::peek(std::span<std::byte> space) noexcept {
-  const std::unique_lock lock(impl_->mutex, std::try_to_lock);
-  if (!lock.owns_lock()) return {IoStatus::busy, 0, 0};
-  ERR_clear_error();
-  errno = 0;
-  std::size_t bytes = 0;
-  const int returned = SSL_peek_ex(impl_->ssl.get(), space.data(), space.size(), &bytes);
-  return returned == 1 ? IoResult{IoStatus::done, bytes, 0} : impl_->outcome(returned, false);
-}
-
 IoResult TlsSession::write(std::span<const std::span<const std::byte>> pieces) noexcept {
   PieceReader from(pieces);
   std::size_t total = 0;

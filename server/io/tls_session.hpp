@@ -62,7 +62,6 @@ class TlsSession {
   [[nodiscard]] std::string error() const;
 
   [[nodiscard]] IoResult read(std::span<std::byte> space) noexcept;
-  [[nodiscard]] IoResult peek(std::span<std::byte> space) noexcept;
   /// Up to a few records. After would_block or busy the bytes that did not count have to be offered
   /// again; pieces may be cut otherwise and lie elsewhere.
   [[nodiscard]] IoResult write(std::span<const std::span<const std::byte>> pieces) noexcept;
