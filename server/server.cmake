@@ -10,6 +10,7 @@ add_library(emit_client STATIC
   io/host_client.cpp
   io/http_get.cpp
   io/ip_address.cpp
+  io/key_file.cpp
   io/lent_socket.cpp
   io/recorder_client.cpp
   io/resend_planner.cpp

@@ -116,10 +116,12 @@ const KeyTable<HostConfig>& host_keys() {
   static const KeyTable<HostConfig> keys = {
       text<HostConfig>("udp", EMIT_FIELD(udp),
                        "`address:port` for host frames as datagrams; empty: off."),
-      path<HostConfig>("key_file", EMIT_FIELD(key_file),
-                       "Pre-shared keys, one per line as 64 hexadecimal digits, not readable by "
-                       "others. Datagrams must then carry a MAC by one of them, or by a key agreed "
-                       "over TLS (see `[tls]`); bare ones are dropped."),
+      path<HostConfig>(
+          "key_file", EMIT_FIELD(key_file),
+          "Pre-shared keys, one per line as 64 hexadecimal digits, not readable by "
+          "others. Datagrams must then carry a MAC by one of them, or by a key agreed "
+          "over TLS (see `[tls]`); bare ones are dropped. Triggers (`trigger.udp`) must "
+          "carry one by a key of this file and say their instant, a second old at most."),
   };
   return keys;
 }

@@ -65,6 +65,7 @@ void RecordParser::commit(std::size_t count) noexcept {
 
 ParseStatus RecordParser::next(Record& record) noexcept {
   if (error_ != ParseStatus::need_more) return error_;
+  missing_ = 0;
   if (end_ - begin_ < kRecordHeaderBytes) return ParseStatus::need_more;
   const std::span<const std::byte> held{buffer_.get() + begin_, end_ - begin_};
   offending_value_ = wire::get<std::uint32_t>(held, 0);
@@ -77,7 +78,10 @@ ParseStatus RecordParser::next(Record& record) noexcept {
   if (length > limit_of(kind)) return error_ = ParseStatus::oversize;
   offending_value_ = 0;
   sum(kind, length);
-  if (held.size() - kRecordHeaderBytes < length) return ParseStatus::need_more;
+  if (held.size() - kRecordHeaderBytes < length) {
+    missing_ = kRecordHeaderBytes + length - held.size();
+    return ParseStatus::need_more;
+  }
   record.kind = kind;
   record.body = held.subspan(kRecordHeaderBytes, length);
   record.payload_crc32c = std::exchange(payload_crc32c_, 0);
@@ -99,6 +103,7 @@ void RecordParser::sum(RecordKind kind, std::size_t body_bytes) noexcept {
 void RecordParser::reset() noexcept {
   begin_ = end_ = 0;
   summed_ = 0;
+  missing_ = 0;
   payload_crc32c_ = 0;
   error_ = ParseStatus::need_more;
   offending_value_ = 0;

@@ -90,6 +90,11 @@ std::span<const std::byte> SessionMac::seal(const SessionHeader& header, std::sp
   return space.first(covered + kSessionTagBytes);
 }
 
+bool SessionMac::tag(std::span<const std::byte> bytes,
+                     std::span<std::byte, kSessionTagBytes> out) noexcept {
+  return impl_->tag_of(bytes, out);
+}
+
 bool SessionMac::verify(std::span<const std::byte> datagram) noexcept {
   if (datagram.size() < kSessionHeaderBytes + kSessionTagBytes) return false;
   const std::size_t covered = datagram.size() - kSessionTagBytes;

@@ -147,6 +147,7 @@ class Conductor final : public Agent {
   TriggerGate trigger_;
   std::optional<ReceivedTrigger> pending_trigger_;  // passed the gate, its slot has not begun
   bool trigger_fault_ = false;                      // to be flagged on the next frame issued
+  std::int64_t stranger_told_ns_ = 0;
   bool trigger_silent_ = false;
 
   PoseTrack seeker_;

@@ -10,6 +10,8 @@ namespace {
 /// what is long past, and hold up those behind it.
 constexpr std::int64_t kStalePeriods = 4;
 constexpr std::int64_t kSilencePeriods = 10;
+/// Distinct warnings about triggers that nobody sealed: not for every one of a flood.
+constexpr std::int64_t kWarningGapNs = 100'000'000;
 /// Triggers that begin no slot, such as a source gone wild, take no more of a turn than this.
 constexpr int kMostPerTurn = 64;
 
@@ -49,6 +51,12 @@ void Conductor::poll_triggers(std::int64_t now_ns) noexcept {
       continue;
     }
     pending_trigger_ = received;
+  }
+  const std::string_view stranger = triggers_->take_unauthenticated();
+  if (!stranger.empty() && now_ns - stranger_told_ns_ >= kWarningGapNs) {
+    stranger_told_ns_ = now_ns;
+    context_.conductor_events.push(
+        EventKind::peer_refused, static_cast<std::uint64_t>(PeerRefusal::trigger_mac), 0, stranger);
   }
   watch_silence(now_ns);
 }

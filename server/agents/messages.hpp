@@ -159,7 +159,7 @@ enum class EventKind : std::uint8_t {
 };
 
 /// Why a peer is turned away before anything it says is looked at.
-enum class PeerRefusal : std::uint8_t { not_allowed, handshake, mac };
+enum class PeerRefusal : std::uint8_t { not_allowed, handshake, mac, trigger_mac };
 
 /// any agent -> housekeeping: what happened, as numbers; the text is put together there.
 struct Event {

@@ -7,6 +7,7 @@
 
 #include "agents/receiver_connection.hpp"
 #include "io/ip_address.hpp"
+#include "io/key_file.hpp"
 
 /// Who may connect: addresses, certificates, keys.
 namespace emit::server {
@@ -32,18 +33,11 @@ physics::Result<void> Receiver::open_security() {
   }
   std::vector<protocol::SessionKey> keys;
   if (!config_.host.key_file.empty()) {
-    const auto named = [&](physics::Error error) {
-      return tl::unexpected<physics::Error>(std::move(error).with_context("host.key_file"));
-    };
-    auto text = read_secret_file(config_.host.key_file);
-    if (!text) {
-      return named(std::move(text.error()));
+    auto read = read_key_file(config_.host.key_file);
+    if (!read) {
+      return tl::unexpected<physics::Error>(std::move(read.error()).with_context("host.key_file"));
     }
-    auto parsed = protocol::parse_key_file(*text);
-    if (!parsed) {
-      return named(std::move(parsed.error()).with_context(config_.host.key_file.string()));
-    }
-    keys = std::move(*parsed);
+    keys = std::move(*read);
   }
   auto sessions = HostSessions::create(keys, tls.enabled() ? config_.control.max_clients : 0);
   if (!sessions) {

@@ -12,6 +12,7 @@
 #include "app/privileges.hpp"
 #include "app/replay.hpp"
 #include "emit/version.hpp"
+#include "io/key_file.hpp"
 
 namespace emit::server {
 namespace {
@@ -255,8 +256,16 @@ physics::Result<void> DaemonImpl::open_clocks() {
     ptp_ = std::move(*ptp);
   }
   if (config_.pacing.mode == config::PacingMode::trigger) {
-    auto port =
-        TriggerPort::open(config_.trigger.udp, config_.trigger.peer, clock_, context_.counters);
+    std::vector<protocol::SessionKey> keys;
+    if (!config_.host.key_file.empty()) {
+      auto read = read_key_file(config_.host.key_file);
+      if (!read) {
+        return named(read.error(), "host.key_file");
+      }
+      keys = std::move(*read);
+    }
+    auto port = TriggerPort::open(config_.trigger.udp, config_.trigger.peer, keys, clock_,
+                                  context_.counters);
     if (!port) {
       return tl::unexpected<Error>(std::move(port.error()).with_context(config_.file.string()));
     }

@@ -56,6 +56,9 @@ void Tool::add_timing_commands() {
         ->capture_default_str();
     add_count(app, "--frames", o.frames, "Triggers to send; 0: until interrupted");
     app.add_flag("--stamp", o.stamp, "Say in each when it was sent, so that its delay is judged");
+    add_path(
+        app, "--key-file", o.key_file,
+        "A MAC in each by the file's first key, as in the daemon's host.key_file; implies --stamp");
     add_json(app, o.json);
   }
   {

@@ -249,17 +249,19 @@ Result<Row> StreamBench::bare_paced() {
   return row;
 }
 
-/// What is measured in turn, and beside which bare loop it is put.
+/// What is measured in turn, and beside what it is put.
 struct Contender {
   const char* name;
   const char* yardstick;  ///< null: is one
 };
-constexpr std::array<Contender, 7> kContenders{{{"bare-tcp", nullptr},
+constexpr std::array<Contender, 9> kContenders{{{"bare-tcp", nullptr},
                                                 {"tcp", "bare-tcp"},
+                                                {"tls", "tcp"},
                                                 {"bare-udp", nullptr},
                                                 {"udp", "bare-udp"},
                                                 {"shm", "bare-tcp"},
                                                 {"zeromq", nullptr},
+                                                {"zeromq-crc", nullptr},
                                                 {"iperf3", nullptr}}};
 
 /// All measurements of one contender.
@@ -283,20 +285,29 @@ Result<void> StreamBench::throughput() {
                  kLeastFrames, kMostFrames);
   const std::string shm = own_shm_name();
   // What the ring costs is the ring's: the others get a daemon without one.
-  const auto start = [&](const std::string& name) -> Result<StreamThroughput> {
-    const auto directory = work_ / (name.empty() ? "plain" : "shared");
+  const auto start = [&](const std::string& name,
+                         const server::Security& security) -> Result<StreamThroughput> {
+    const auto directory = work_ / (name + (security.tls() ? "-tls" : "-plain"));
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
-    return StreamThroughput::start(canned_daemon(command_.width_px, command_.height_px, name),
-                                   directory);
+    auto config = canned_daemon(command_.width_px, command_.height_px, name);
+    config.tls.certificate = security.tls_certificate;
+    config.tls.key = security.tls_key;
+    config.tls.client_ca = security.tls_ca;
+    return StreamThroughput::start(config, directory, security);
   };
-  auto plain = start("");
+  auto plain = start("", {});
   if (!plain) return tl::unexpected(plain.error());
-  auto shared = start(shm);
+  auto shared = start(shm, {});
   if (!shared) return tl::unexpected(shared.error());
+  const auto certificate = make_certificate(work_);
+  auto secured = certificate ? start("", *certificate)
+                             : Result<StreamThroughput>(tl::unexpected(certificate.error()));
+  if (certificate && !secured) return tl::unexpected(secured.error());
   const auto measure = [&](const std::string& name) -> Result<YardstickResult> {
     if (name == "bare-tcp") return measure_bare_tcp(yardstick_);
     if (name == "bare-udp") return measure_bare_udp(yardstick_);
-    if (name == "zeromq") return measure_zeromq(yardstick_);
+    if (name == "zeromq") return measure_zeromq(yardstick_, false);
+    if (name == "zeromq-crc") return measure_zeromq(yardstick_, true);
     if (name == "iperf3") {
       constexpr int kSeconds = 1;
       const auto gbit_s = measure_iperf3_gbit_s(work_, kSeconds);
@@ -307,7 +318,11 @@ Result<void> StreamBench::throughput() {
                                                  static_cast<double>(yardstick_.frame_bytes));
       return result;
     }
-    return (name == "shm" ? *shared : *plain).measure(name, yardstick_.frames, yardstick_.window);
+    if (name == "tls" && !secured) return tl::unexpected(secured.error());
+    return (name == "shm"   ? *shared
+            : name == "tls" ? *secured
+                            : *plain)
+        .measure(name, yardstick_.frames, yardstick_.window);
   };
   std::map<std::string, Series> series;
   ProgressBar progress("throughput", command_.repeats * kContenders.size());
@@ -341,8 +356,9 @@ Result<void> StreamBench::throughput() {
     }
   }
   progress.finish();
-  for (StreamThroughput* daemon : {&*plain, &*shared}) {
-    if (auto stopped = daemon->stop(); !stopped) return stopped;
+  for (auto* daemon : {&plain, &shared, &secured}) {
+    if (!*daemon) continue;
+    if (auto stopped = (*daemon)->stop(); !stopped) return stopped;
   }
   for (const Contender& contender : kContenders) {
     const Series& own = series[contender.name];

@@ -6,7 +6,8 @@
 namespace emit::cli {
 
 physics::Result<std::unique_ptr<StreamClient>> StreamClient::start(const Options& options) {
-  auto connected = server::FrameClient::connect(options.url);
+  auto connected =
+      server::FrameClient::connect(options.url, server::kConnectTimeoutNs, options.security);
   if (!connected) return tl::unexpected(connected.error());
   auto channel = (*connected)->subscribe(options.subscribe);
   if (!channel) return tl::unexpected(channel.error());

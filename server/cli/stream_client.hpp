@@ -26,6 +26,7 @@ class StreamClient {
   struct Options {
     std::string url;
     server::SubscribeOptions subscribe;
+    server::Security security;
     bool keep_pixels = false;  ///< of the newest frame, for last_frame()
     /// On the client's thread, behind each frame: how many have come.
     std::function<void(std::uint64_t)> on_frame;

@@ -11,6 +11,7 @@
 #include <mutex>
 
 #include "stream_client.hpp"
+#include "subprocess.hpp"
 
 namespace emit::cli {
 namespace {
@@ -43,13 +44,39 @@ std::string own_shm_name() {
   return fmt::format("bench-{}-{}", ::getpid(), count++);
 }
 
+Result<server::Security> make_certificate(const std::filesystem::path& directory) {
+  server::Security out;
+  out.tls_certificate = out.tls_ca = directory / "bench.pem";
+  out.tls_key = directory / "bench.key";
+  auto openssl =
+      Subprocess::start({"/usr/bin/env", "openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                         "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj",
+                         "/CN=emit bench", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout",
+                         out.tls_key.string(), "-out", out.tls_certificate.string()},
+                        directory / "openssl.log");
+  if (!openssl) return tl::unexpected(openssl.error());
+  const auto status = openssl->wait(std::chrono::seconds(30));
+  constexpr int kNotFound = 127;  // of env
+  if (status == kNotFound) {
+    return physics::make_error(physics::ErrorCode::not_found, "openssl is not installed");
+  }
+  if (status != 0) {
+    return physics::make_error(physics::ErrorCode::io, "openssl made no certificate");
+  }
+  return out;
+}
+
 Result<StreamThroughput> StreamThroughput::start(const config::DaemonConfig& config,
-                                                 const std::filesystem::path& directory) {
+                                                 const std::filesystem::path& directory,
+                                                 const server::Security& security) {
   auto daemon = DaemonProcess::start(config, {}, directory, std::chrono::seconds(60));
   if (!daemon) return tl::unexpected(daemon.error());
-  auto host = server::HostClient::connect("udp://" + daemon->host_udp_address());
+  server::Security of_host = security;
+  of_host.control = "tcp://" + daemon->control_address();
+  auto host = server::HostClient::connect("udp://" + daemon->host_udp_address(),
+                                          server::kConnectTimeoutNs, of_host);
   if (!host) return tl::unexpected(host.error());
-  return StreamThroughput(std::move(*daemon), std::move(*host), config.stream.shm);
+  return StreamThroughput(std::move(*daemon), std::move(*host), config.stream.shm, security);
 }
 
 Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std::uint64_t frames,
@@ -72,7 +99,9 @@ Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std
     while (sent && asked < std::min(frames, taken + window)) ask();
   };
   StreamClient::Options options;
-  options.url = scheme + "://" + (scheme == "shm" ? shm_ : daemon_.control_address());
+  options.url = (scheme == "tls" ? "tcp" : scheme) + "://" +
+                (scheme == "shm" ? shm_ : daemon_.control_address());
+  options.security = security_;
   options.subscribe.in_place = true;
   // At once where the frame is taken: another thread between the two would be no part of a stream.
   options.on_frame = [&](std::uint64_t count) {

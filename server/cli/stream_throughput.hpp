@@ -20,16 +20,23 @@ namespace emit::cli {
 /// A name for shared memory that no other process uses.
 [[nodiscard]] std::string own_shm_name();
 
+/// A certificate for 127.0.0.1 that is its own authority, and its key, made in `directory` by
+/// openssl(1): for both ends. Errors: not_found (no such program), io.
+[[nodiscard]] physics::Result<server::Security> make_certificate(
+    const std::filesystem::path& directory);
+
 /// As fast as one client takes frames: the host asks for the next one as soon as fewer than
 /// `window` are under way, so that nothing is ever skipped or dropped and every transport is held
 /// back by its client alone. Owns a daemon. One thread.
 class StreamThroughput {
  public:
+  /// `security`: of host and clients, where the daemon has certificates.
   /// Errors: those of DaemonProcess::start() and HostClient::connect().
   [[nodiscard]] static physics::Result<StreamThroughput> start(
-      const config::DaemonConfig& config, const std::filesystem::path& directory);
+      const config::DaemonConfig& config, const std::filesystem::path& directory,
+      const server::Security& security = {});
 
-  /// One measurement with a client of its own. `scheme`: tcp, udp or shm.
+  /// One measurement with a client of its own. `scheme`: tcp, tls, udp or shm.
   /// Errors: io (the stream ended or stood still).
   [[nodiscard]] physics::Result<YardstickResult> measure(const std::string& scheme,
                                                          std::uint64_t frames,
@@ -37,12 +44,17 @@ class StreamThroughput {
   [[nodiscard]] physics::Result<void> stop();
 
  private:
-  StreamThroughput(DaemonProcess daemon, std::unique_ptr<server::HostClient> host, std::string shm)
-      : daemon_(std::move(daemon)), host_(std::move(host)), shm_(std::move(shm)) {}
+  StreamThroughput(DaemonProcess daemon, std::unique_ptr<server::HostClient> host, std::string shm,
+                   server::Security security)
+      : daemon_(std::move(daemon)),
+        host_(std::move(host)),
+        shm_(std::move(shm)),
+        security_(std::move(security)) {}
 
   DaemonProcess daemon_;
   std::unique_ptr<server::HostClient> host_;
   std::string shm_;
+  server::Security security_;
   std::uint64_t last_host_frame_ = 0;
 };
 

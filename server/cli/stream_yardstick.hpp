@@ -8,8 +8,8 @@
 #include "statistics.hpp"
 
 /// What the machine moves over loopback without any service in between: the measure of what emitd
-/// streams. Each call is one measurement; sender and receiver are a thread each. Nothing is
-/// checked, summed or put together: bytes go out and come in.
+/// streams. Each call is one measurement; sender and receiver are a thread each. But
+/// where said, nothing is checked, summed or put together: bytes go out and come in.
 namespace emit::cli {
 
 struct YardstickOptions {
@@ -47,8 +47,10 @@ struct BareDelays {
 /// Gbit/s of `iperf3` over loopback TCP for `seconds`. Errors: not_found (no such program), io.
 [[nodiscard]] physics::Result<double> measure_iperf3_gbit_s(const std::filesystem::path& directory,
                                                             int seconds);
-/// ZeroMQ PUB and SUB over loopback TCP, zero-copy messages of a frame, `window` queued at most.
-/// Errors: unsupported (built without the library), io.
-[[nodiscard]] physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options);
+/// ZeroMQ PUB and SUB over loopback TCP, a context each, zero-copy messages of a frame, `window`
+/// queued at most. `sum`: a frame's CRC-32C goes before it and is compared, as emitd's and its
+/// client's is. Errors: unsupported (built without the library), io.
+[[nodiscard]] physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options,
+                                                              bool sum);
 
 }  // namespace emit::cli

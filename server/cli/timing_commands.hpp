@@ -30,6 +30,7 @@ struct TriggerCommand {
   double rate_hz = 100.0;
   std::uint64_t frames = 0;  ///< 0: until interrupted
   bool stamp = false;
+  std::filesystem::path key_file;  ///< empty: bare
   std::optional<std::filesystem::path> json;
 };
 int run_trigger(const TriggerCommand& command);

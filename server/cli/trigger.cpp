@@ -8,8 +8,10 @@
 
 #include "console.hpp"
 #include "emit/protocol/trigger.hpp"
+#include "emit/protocol/trigger_seal.hpp"
 #include "interrupt.hpp"
 #include "io/client.hpp"
+#include "io/key_file.hpp"
 #include "io/socket.hpp"
 #include "json.hpp"
 #include "rt/clock.hpp"
@@ -25,6 +27,14 @@ int run_trigger(const TriggerCommand& command) {
   }
   const auto address = server::resolve({url->host, url->port}, server::Transport::udp, false);
   if (!address) return fail(address.error());
+  std::optional<protocol::TriggerSeal> seal;
+  if (!command.key_file.empty()) {
+    const auto keys = server::read_key_file(command.key_file);
+    if (!keys) return fail(keys.error());
+    auto made = protocol::TriggerSeal::create(*keys);
+    if (!made) return fail(made.error());
+    seal = std::move(*made);
+  }
   const server::SocketContext context;
   auto socket = server::UdpSocket::open(context, *address);
   if (!socket) return fail(socket.error());
@@ -46,9 +56,15 @@ int run_trigger(const TriggerCommand& command) {
     // By an absolute timer: a late trigger does not delay those behind it.
     if (::clock_nanosleep(CLOCK_TAI, TIMER_ABSTIME, &due, nullptr) == EINTR) continue;
     ++trigger.number;
-    trigger.edge_ns = command.stamp ? clock.tai_ns() : 0;
-    std::array<std::byte, protocol::kTriggerBytes> bytes;
-    protocol::encode(trigger, bytes);
+    trigger.edge_ns = command.stamp || seal ? clock.tai_ns() : 0;
+    std::array<std::byte, protocol::kSealedTriggerBytes> space;
+    std::span<const std::byte> bytes(space);
+    if (!seal) {
+      protocol::encode(trigger, std::span(space).first<protocol::kTriggerBytes>());
+      bytes = bytes.first(protocol::kTriggerBytes);
+    } else if (!seal->seal(trigger, space)) {
+      return fail(kExitFailure, "the cryptographic library failed");
+    }
     if (socket->send_to(bytes, *address).status != server::IoStatus::done) ++failed;
     if (command.frames != 0) progress.advance_to(trigger.number);
   }

@@ -2,13 +2,18 @@
 #include "stream_yardstick.hpp"
 
 #if defined(EMIT_HAVE_ZEROMQ)
+#include <sys/resource.h>
 #include <zmq.h>
 
 #include <array>
 #include <chrono>
+#include <cstring>
 #include <memory>
+#include <span>
 #include <thread>
 #include <vector>
+
+#include "emit/protocol/frame_header.hpp"
 #endif
 
 namespace emit::cli {
@@ -37,13 +42,48 @@ tl::unexpected<physics::Error> zeromq_error(const char* what) {
 /// The memory lives longer than any message.
 void keep(void* /*data*/, void* /*hint*/) {}
 
+double process_cpu_s() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+/// One frame; with `sum`, its CRC-32C in a part before it. False: refused.
+bool send_frame(void* socket, std::vector<std::byte>& image, bool sum) {
+  if (sum) {
+    const std::uint32_t crc32c = protocol::crc32c(image);
+    if (zmq_send(socket, &crc32c, sizeof(crc32c), ZMQ_SNDMORE) < 0) return false;
+  }
+  zmq_msg_t message;
+  zmq_msg_init_data(&message, image.data(), image.size(), keep, nullptr);
+  if (zmq_msg_send(&message, socket, 0) >= 0) return true;
+  zmq_msg_close(&message);
+  return false;
+}
+
+/// False: nothing came, or with `sum` not what was sent.
+bool receive_frame(void* socket, zmq_msg_t& message, bool sum) {
+  std::uint32_t crc32c = 0;
+  if (sum && zmq_recv(socket, &crc32c, sizeof(crc32c), 0) < 0) return false;
+  if (zmq_msg_recv(&message, socket, 0) < 0) return false;
+  const std::span bytes(static_cast<const std::byte*>(zmq_msg_data(&message)),
+                        zmq_msg_size(&message));
+  return !sum || protocol::crc32c(bytes) == crc32c;
+}
+
 }  // namespace
 
-physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options) {
+physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options, bool sum) {
+  // One for each, as programs of their own have: one thread of the library that serves both ends
+  // would find everything it reads in its cache, and never wait for itself.
+  const Context sending_context(zmq_ctx_new());
   const Context context(zmq_ctx_new());
-  const Socket sender(zmq_socket(context.get(), ZMQ_XPUB));
+  const Socket sender(zmq_socket(sending_context.get(), ZMQ_XPUB));
   const Socket receiver(zmq_socket(context.get(), ZMQ_SUB));
-  const int window = static_cast<int>(options.window);
+  const int window = static_cast<int>(options.window) * (sum ? 2 : 1);  // parts
   const int on = 1;
   const int timeout_ms = 10'000;
   zmq_setsockopt(sender.get(), ZMQ_SNDHWM, &window, sizeof(window));
@@ -67,32 +107,28 @@ physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options)
   std::vector<std::vector<std::byte>> images(16, std::vector<std::byte>(options.frame_bytes));
   YardstickResult result;
   const auto start = std::chrono::steady_clock::now();
+  const double cpu_before_s = process_cpu_s();
   std::thread sending([&] {
     for (std::uint64_t i = 0; i < options.frames; ++i) {
-      auto& image = images[i % images.size()];
-      zmq_msg_t message;
-      zmq_msg_init_data(&message, image.data(), image.size(), keep, nullptr);
-      if (zmq_msg_send(&message, sender.get(), 0) < 0) {
-        zmq_msg_close(&message);
-        return;
-      }
+      if (!send_frame(sender.get(), images[i % images.size()], sum)) return;
     }
   });
   zmq_msg_t message;
   zmq_msg_init(&message);
-  while (result.frames < options.frames && zmq_msg_recv(&message, receiver.get(), 0) >= 0) {
+  while (result.frames < options.frames && receive_frame(receiver.get(), message, sum)) {
     ++result.frames;
   }
   zmq_msg_close(&message);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   sending.join();
+  result.cpu_s = process_cpu_s() - cpu_before_s;
   result.lost = options.frames - result.frames;
   return result;
 }
 
 #else
 
-physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& /*options*/) {
+physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& /*options*/, bool /*sum*/) {
   return make_error(ErrorCode::unsupported, "built without libzmq3-dev");
 }
 

@@ -246,6 +246,7 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
   for (;;) {
     const protocol::ParseStatus status = parser_.next(record);
     if (status == protocol::ParseStatus::record) {
+      wake_at(1);
       return true;
     }
     if (status != protocol::ParseStatus::need_more) {
@@ -272,11 +273,23 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
                           fmt::format("{}: {}", to_string(peer_), error_text(got.error)));
       case IoStatus::busy:
       case IoStatus::would_block:
+        // A record's rest wakes this thread in pieces, not with every segment: waking costs as much
+        // as copying tens of kilobytes. Larger pieces would stop a sender with a small buffer.
+        constexpr std::size_t kMostWaiting = 128u << 10;
+        wake_at(std::clamp<std::size_t>(parser_.missing_bytes(), 1, kMostWaiting));
         if (!wait_for(socket_.fd(), POLLIN, end_ns)) {
           return false;
         }
         break;
     }
+  }
+}
+
+/// Makes the socket readable once so much waits. Through TLS it would be bytes of another kind.
+void ClientConnection::wake_at(std::size_t bytes) noexcept {
+  if (bytes != low_water_bytes_ && socket_.tls() == nullptr) {
+    low_water_bytes_ = bytes;
+    socket_.set_receive_low_water(bytes);
   }
 }
 

@@ -67,6 +67,7 @@ class ClientConnection {
  private:
   ClientConnection(SocketContext context, TcpSocket socket, SocketAddress peer,
                    const protocol::RecordLimits& limits);
+  void wake_at(std::size_t bytes) noexcept;
 
   SocketContext context_;
   TcpSocket socket_;
@@ -76,6 +77,7 @@ class ClientConnection {
   ServerInfo info_;
   std::vector<std::byte> out_;
   bool closed_ = false;
+  std::size_t low_water_bytes_ = 1;
 };
 
 /// Why SubscribeOptions::every_nth is refused.

@@ -9,6 +9,7 @@
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
 #include "io/client_connection.hpp"
+#include "io/key_file.hpp"
 
 namespace emit::server {
 namespace {
@@ -120,18 +121,6 @@ class UdpHost final : public HostClient {
   protocol::HostFrameEncoder encoder_;
 };
 
-physics::Result<protocol::SessionKey> first_key(const std::filesystem::path& file) {
-  auto text = read_secret_file(file);
-  if (!text) {
-    return tl::unexpected<physics::Error>(std::move(text.error()));
-  }
-  auto keys = protocol::parse_key_file(*text);
-  if (!keys) {
-    return tl::unexpected<physics::Error>(std::move(keys.error()).with_context(file.string()));
-  }
-  return keys->front();
-}
-
 /// The key comes from the TLS session of a connection that stays open as long as the host does.
 physics::Result<std::unique_ptr<HostClient>> agree_and_connect(UdpSocket socket,
                                                                const SocketAddress& peer,
@@ -187,11 +176,11 @@ physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::stri
     return tl::unexpected<physics::Error>(std::move(connected.error()));
   }
   if (!security.key_file.empty()) {
-    const auto key = first_key(security.key_file);
-    if (!key) {
-      return tl::unexpected<physics::Error>(physics::Error(key.error()));
+    const auto keys = read_key_file(security.key_file);
+    if (!keys) {
+      return tl::unexpected<physics::Error>(physics::Error(keys.error()));
     }
-    return make_session_host(std::move(*socket), *address, *key, std::nullopt, timeout_ns);
+    return make_session_host(std::move(*socket), *address, keys->front(), std::nullopt, timeout_ns);
   }
   if (security.tls()) {
     return agree_and_connect(std::move(*socket), *address, timeout_ns, security);

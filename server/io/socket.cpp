@@ -240,6 +240,10 @@ void TcpSocket::set_send_buffer(std::uint64_t bytes) noexcept {
   }
 }
 
+void TcpSocket::set_receive_low_water(std::size_t bytes) noexcept {
+  wish(impl_->socket, tcp::socket::receive_low_watermark(buffer_size(bytes)));
+}
+
 IoResult TcpSocket::read_some(std::span<std::byte> space) noexcept {
   if (space.empty()) {
     return {IoStatus::failed, 0, ENOBUFS};  // Asio would report success without reading

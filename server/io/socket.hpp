@@ -64,6 +64,8 @@ class TcpSocket {
 
   /// A wish; 0: the system goes on choosing.
   void set_send_buffer(std::uint64_t bytes) noexcept;
+  /// Readable only when so much waits, or the end. A wish.
+  void set_receive_low_water(std::size_t bytes) noexcept;
 
   /// From here on all goes through TLS; the handshake is the caller's to drive (tls()). `name`: of
   /// the server, for clients. Errors: io.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/trigger_port.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <sys/socket.h>
 
@@ -20,10 +21,9 @@ constexpr int kMaxPerCall = 32;
 
 }  // namespace
 
-physics::Result<std::unique_ptr<TriggerPort>> TriggerPort::open(const std::string& udp,
-                                                                const std::string& peer,
-                                                                const Clock& clock,
-                                                                Counters& counters) {
+physics::Result<std::unique_ptr<TriggerPort>> TriggerPort::open(
+    const std::string& udp, const std::string& peer, std::span<const protocol::SessionKey> keys,
+    const Clock& clock, Counters& counters) {
   const auto named = [](const physics::Error& error, const char* key) {
     return tl::unexpected<physics::Error>(physics::Error(error).with_context(key));
   };
@@ -43,17 +43,67 @@ physics::Result<std::unique_ptr<TriggerPort>> TriggerPort::open(const std::strin
                                   "trigger.peer whose triggers are taken",
                                   to_string(*address)));
   }
+  std::optional<protocol::TriggerSeal> seal;
+  if (!keys.empty()) {
+    auto made = protocol::TriggerSeal::create(keys);
+    if (!made) return named(made.error(), "trigger.udp");
+    seal = std::move(*made);
+  }
   const SocketContext context;
   auto socket = UdpSocket::open_bound(context, *address);
   if (!socket) return named(socket.error(), "trigger.udp");
   socket->set_option(SOL_SOCKET, SO_TIMESTAMPNS, 1);
   socket->set_option(SOL_SOCKET, SO_RXQ_OVFL, 1);
-  return std::unique_ptr<TriggerPort>(new TriggerPort(std::move(*socket), from, clock, counters));
+  return std::unique_ptr<TriggerPort>(
+      new TriggerPort(std::move(*socket), from, std::move(seal), clock, counters));
+}
+
+std::string_view TriggerPort::take_unauthenticated() noexcept {
+  if (!unauthenticated_) return {};
+  const bool written =
+      ::inet_ntop(unauthenticated_->v4 ? AF_INET : AF_INET6, unauthenticated_->bytes.data(),
+                  text_.data(), static_cast<socklen_t>(text_.size())) != nullptr;
+  unauthenticated_.reset();
+  return written ? std::string_view(text_.data()) : std::string_view("?");
+}
+
+bool TriggerPort::accept(std::span<const std::byte> datagram, const config::IpAddress& from,
+                         ReceivedTrigger& out) noexcept {
+  using Verdict = protocol::TriggerSeal::Verdict;
+  if (peer_ && from != *peer_) {
+    counters_.add(Counter::triggers_refused);
+    return false;
+  }
+  const Verdict verdict =
+      seal_ ? seal_->open(datagram, out.trigger)
+      : protocol::decode_trigger(datagram, out.trigger) == protocol::TriggerFault::none
+          ? Verdict::genuine
+          : Verdict::malformed;
+  switch (verdict) {
+    case Verdict::genuine:
+      break;
+    case Verdict::bare:
+    case Verdict::unknown_key:
+    case Verdict::bad_mac:
+      counters_.add(Counter::triggers_unauthenticated);
+      unauthenticated_ = from;
+      return false;
+    case Verdict::malformed:
+      counters_.add(Counter::triggers_refused);
+      return false;
+  }
+  // Numbers protect within a run of this daemon; what was recorded in another one is too old.
+  const std::int64_t edge_ns = out.trigger.edge_ns;
+  if (seal_ && (edge_ns < out.received_ns - kMostAgeNs || edge_ns > out.received_ns + kMostAgeNs)) {
+    counters_.add(Counter::triggers_stale);
+    return false;
+  }
+  return true;
 }
 
 std::optional<ReceivedTrigger> TriggerPort::next() noexcept {
   for (int i = 0; i < kMaxPerCall; ++i) {
-    std::array<std::byte, protocol::kTriggerBytes + 1> bytes;
+    std::array<std::byte, protocol::kSealedTriggerBytes + 1> bytes;
     alignas(cmsghdr) std::array<char, 128> control;
     sockaddr_storage from{};
     iovec piece{bytes.data(), bytes.size()};
@@ -86,14 +136,7 @@ std::optional<ReceivedTrigger> TriggerPort::next() noexcept {
       }
     }
     counters_.add(Counter::triggers);
-    const bool wrong_sender = peer_ && ip_of(from) != *peer_;
-    const std::span<const std::byte> datagram(bytes.data(), static_cast<std::size_t>(size));
-    if (wrong_sender ||
-        protocol::decode_trigger(datagram, out.trigger) != protocol::TriggerFault::none) {
-      counters_.add(Counter::triggers_refused);
-      continue;
-    }
-    return out;
+    if (accept({bytes.data(), static_cast<std::size_t>(size)}, ip_of(from), out)) return out;
   }
   return std::nullopt;
 }

@@ -68,6 +68,8 @@ namespace emit::server {
   X(triggers, "trigger datagrams received on the trigger port")                      \
   X(triggers_used, "triggers that began a slot")                                     \
   X(triggers_refused, "trigger datagrams refused: malformed or of another sender")   \
+  X(triggers_unauthenticated, "trigger datagrams refused: no MAC by host.key_file")  \
+  X(triggers_stale, "trigger datagrams refused: of another time than their arrival") \
   X(triggers_missing, "trigger numbers that never arrived")                          \
   X(triggers_duplicate, "triggers refused: number already seen")                     \
   X(triggers_too_fast, "triggers refused: half a period or less after the last")     \

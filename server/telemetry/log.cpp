@@ -202,7 +202,8 @@ EventText describe(const Event& event) {
               false};
     case EventKind::peer_refused: {
       static constexpr std::array kWhy{"not in access.allow", "TLS handshake failed",
-                                       "host datagram without a valid MAC"};
+                                       "host datagram without a valid MAC",
+                                       "trigger without a valid MAC"};
       return {LogLevel::warn,
               fmt::format("event=peer_refused why=\"{}\" peer=\"{}\"",
                           event.a < kWhy.size() ? kWhy[event.a] : "?", text),

@@ -16,6 +16,7 @@
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/resend.hpp"
 #include "emit/protocol/trigger.hpp"
+#include "emit/protocol/trigger_seal.hpp"
 #include "emit/scenegen/generate.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/state_world.hpp"
@@ -499,6 +500,14 @@ void make_trigger_seeds() {
     protocol::encode(trigger, std::span(bytes).first<protocol::kTriggerBytes>());
     write("trigger", name, bytes);
   }
+  const protocol::SessionKey key{};  // the target's
+  auto seal = protocol::TriggerSeal::create(std::span(&key, 1));
+  Bytes sealed(protocol::kSealedTriggerBytes);
+  if (!seal || !seal->seal({2, 3, 1'800'000'000'000'000'005},
+                           std::span(sealed).first<protocol::kSealedTriggerBytes>())) {
+    std::abort();
+  }
+  write("trigger", "sealed", sealed);
 }
 
 }  // namespace

@@ -1,16 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
-// One datagram to the trigger port.
+// One datagram to the trigger port, bare and sealed.
 #include <algorithm>
 #include <array>
 
 #include "emit/protocol/trigger.hpp"
+#include "emit/protocol/trigger_seal.hpp"
 #include "fuzz/fuzz_input.hpp"
 
+namespace {
+
+using namespace emit;
+
+/// Of the datagrams whose bytes before the MAC are `bytes`, the genuine one is taken as what it
+/// holds, and any other refused.
+void check_sealed(std::span<const std::byte> bytes, protocol::TriggerFault inside) {
+  using Verdict = protocol::TriggerSeal::Verdict;
+  static const protocol::SessionKey key{};
+  static auto seal = std::move(*protocol::TriggerSeal::create(std::span(&key, 1)));
+  protocol::Trigger trigger{1, 2, 3};
+  fuzz::require(
+      seal.open(bytes, trigger) != Verdict::genuine || inside == protocol::TriggerFault::size,
+      "a bare trigger is not genuine");
+  if (bytes.size() < protocol::kTriggerBytes) return;
+  std::array<std::byte, protocol::kSealedTriggerBytes> sealed;
+  fuzz::require(seal.seal({7, 8, 9}, sealed), "sealing works");
+  fuzz::require(seal.open(sealed, trigger) == Verdict::genuine && trigger.number == 8,
+                "what was sealed is genuine");
+  std::ranges::copy(bytes.first(protocol::kTriggerBytes), sealed.begin());
+  const Verdict verdict = seal.open(sealed, trigger);
+  fuzz::require(verdict == Verdict::bad_mac || (verdict == Verdict::genuine && trigger.run_id == 7),
+                "no other trigger fits the MAC");
+}
+
+}  // namespace
+
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace emit;
   protocol::Trigger trigger{1, 2, 3};
   const auto bytes = fuzz::as_bytes(data, size);
-  if (protocol::decode_trigger(bytes, trigger) != protocol::TriggerFault::none) {
+  const protocol::TriggerFault fault = protocol::decode_trigger(bytes, trigger);
+  check_sealed(bytes, fault);
+  if (fault != protocol::TriggerFault::none) {
     fuzz::require(trigger.run_id == 1 && trigger.number == 2 && trigger.edge_ns == 3,
                   "what is refused changes nothing");
     return 0;

@@ -167,6 +167,29 @@ TEST(RecordParser, TellsThatAStreamEndedWithinARecord) {
   EXPECT_EQ(parser.pending_bytes(), 25u);
 }
 
+TEST(RecordParser, TellsWhatTheRecordBegunStillLacks) {
+  Bytes stream;
+  append_record(stream, RecordKind::control, Bytes(20));
+  append_record(stream, RecordKind::control, Bytes(7));
+  RecordParser parser({.max_control_bytes = 100, .max_frame_bytes = 0});
+  Record record;
+  EXPECT_EQ(parser.next(record), ParseStatus::need_more);
+  EXPECT_EQ(parser.missing_bytes(), 0u) << "nothing begun";
+  feed(parser, std::span(stream).first(11));
+  EXPECT_EQ(parser.next(record), ParseStatus::need_more);
+  EXPECT_EQ(parser.missing_bytes(), 0u) << "its length is not known";
+  feed(parser, std::span(stream).subspan(11, 14));
+  EXPECT_EQ(parser.next(record), ParseStatus::need_more);
+  EXPECT_EQ(parser.missing_bytes(), 7u);
+  feed(parser, std::span(stream).subspan(25, 20));
+  EXPECT_EQ(parser.next(record), ParseStatus::record);
+  EXPECT_EQ(parser.missing_bytes(), 0u);
+  EXPECT_EQ(parser.next(record), ParseStatus::need_more);
+  EXPECT_EQ(parser.missing_bytes(), 6u);
+  parser.reset();
+  EXPECT_EQ(parser.missing_bytes(), 0u);
+}
+
 TEST(FrameRecord, DecodesHeaderAndPixels) {
   const auto frame = test::make_frame(8, 4, 3);
   Bytes body(frame.header_bytes.begin(), frame.header_bytes.end());

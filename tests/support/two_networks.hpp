@@ -22,6 +22,16 @@ namespace emit::test {
 /// process to the one in which it was started. Needs no privileges where user namespaces are open.
 class TwoNetworks {
  public:
+  static constexpr int kSkippedExit = 77;
+
+  /// `obstacle_file`: where skip() leaves the reason.
+  explicit TwoNetworks(std::string obstacle_file) : obstacle_file_(std::move(obstacle_file)) {}
+
+  /// Ends the process: the test is skipped.
+  [[noreturn]] void skip(const std::string& reason) const {
+    std::ofstream(obstacle_file_) << reason;
+    ::_exit(kSkippedExit);
+  }
   /// Empty: ready. Else why this machine cannot do it. Changes the whole process: see
   /// in_two_networks().
   std::string setup() {
@@ -55,6 +65,13 @@ class TwoNetworks {
     enter_here();
     return done ? "" : "ip(8) cannot set up the other end of the cable";
   }
+  /// What leaves "here" goes through this queueing discipline of tc(8); skips where there is none.
+  void shape(const std::string& discipline) {
+    enter_here();
+    if (!run("tc qdisc add dev cable0 root " + discipline)) {
+      skip("tc(8) or this kernel has no '" + discipline + "'");
+    }
+  }
   void enter_here() { ::setns(here_, CLONE_NEWNET); }
   void enter_there() { ::setns(there_, CLONE_NEWNET); }
 
@@ -62,6 +79,7 @@ class TwoNetworks {
   static bool run(const std::string& command) {
     return std::system(("(" + command + ") 2>/dev/null").c_str()) == 0;
   }
+  std::string obstacle_file_;
   int here_ = -1;
   int there_ = -1;
 };
@@ -69,22 +87,18 @@ class TwoNetworks {
 /// Runs `body` in a process of its own, with the two networks. Its expectations count for the test;
 /// where there are no namespaces the test is skipped with the reason.
 inline void in_two_networks(const std::function<void(TwoNetworks&)>& body) {
-  constexpr int kSkipped = 77;
   const ScratchFolder folder;
   const pid_t child = ::fork();
   if (child == 0) {
-    TwoNetworks networks;
-    if (const std::string obstacle = networks.setup(); !obstacle.empty()) {
-      std::ofstream(folder.file("obstacle")) << obstacle;
-      ::_exit(kSkipped);
-    }
+    TwoNetworks networks(folder.file("obstacle"));
+    if (const std::string obstacle = networks.setup(); !obstacle.empty()) networks.skip(obstacle);
     body(networks);
     std::fflush(nullptr);
     ::_exit(::testing::Test::HasFailure() ? 1 : 0);
   }
   int status = 0;
   ::waitpid(child, &status, 0);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == kSkipped) {
+  if (WIFEXITED(status) && WEXITSTATUS(status) == TwoNetworks::kSkippedExit) {
     GTEST_SKIP() << folder.read("obstacle");
   }
   EXPECT_TRUE(WIFEXITED(status)) << "signal " << WTERMSIG(status);

@@ -99,17 +99,67 @@ TEST(CliLatency, SaysWhatCannotBeMeasured) {
   EXPECT_EQ(run_emit({"latency", "tcp://127.0.0.1:1"}).exit_code, 1);
 }
 
+/// What the daemon said when it was ready.
+std::string trigger_url(const ScratchFolder& folder) {
+  const std::string out = folder.read("stdout");
+  const std::size_t at = out.find("trigger=") + 8;
+  return "udp://" + out.substr(at, out.find_first_of(" \n", at) - at);
+}
+
+TEST(CliTrigger, NeedsTheMacThatTheKeyFileAsksFor) {
+  const ScratchFolder folder;
+  const auto key_file = [&](const std::string& name, char digit) {
+    const std::string file = folder.write(name, std::string(64, digit));
+    ::chmod(file.c_str(), 0600);
+    return file;
+  };
+  const std::string right = key_file("right.keys", '1');
+  const std::string wrong = key_file("wrong.keys", '2');
+  DaemonProcess daemon(
+      folder,
+      {"--config",
+       folder.write("emitd.toml", canned_config(64, 48, "mode = \"trigger\"\nrate_hz = 200.0",
+                                                kMetrics + "[trigger]\nudp = \"127.0.0.1:0\"\n")),
+       "--set", "host.key_file=" + right});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  const std::string url = trigger_url(folder);
+  EXPECT_EQ(run_emit({"trigger", url, "--rate", "200", "--frames", "4"}).exit_code, 0);
+  for (const std::string& key : {wrong, right}) {
+    EXPECT_EQ(
+        run_emit({"trigger", url, "--rate", "200", "--frames", "5", "--key-file", key}).exit_code,
+        0);
+  }
+  EXPECT_EQ(run_emit({"trigger", url, "--key-file", folder.file("none")}).exit_code, 78);
+  ProcessResult stat;
+  const auto counter = [&](const std::string& name) {
+    const std::size_t found = stat.out.find("\"emitd_" + name + "\"");
+    return found == std::string::npos ? -1.0 : number(stat.out.substr(found), "value");
+  };
+  const std::string told = "why=\"trigger without a valid MAC\" peer=\"127.0.0.1\"";
+  double accounted = 0.0;
+  for (int look = 0;
+       look < 100 && (accounted < 5.0 || folder.read("stderr").find(told) == std::string::npos);
+       ++look) {
+    stat = run_emit({"stat", "http://" + daemon.metrics(), "--once", "--json", "-"});
+    accounted = counter("triggers_used_total") + counter("triggers_too_fast_total") +
+                counter("slots_missed_total");
+  }
+  EXPECT_EQ(accounted, 5.0) << "those of the right key";
+  EXPECT_EQ(counter("triggers_unauthenticated_total"), 9.0);
+  EXPECT_EQ(counter("triggers_refused_total"), 0.0);
+  EXPECT_EQ(counter("triggers_stale_total"), 0.0);
+  EXPECT_THAT(folder.read("stderr"), HasSubstr(told));
+}
+
 TEST(CliTrigger, StartsFramesOfADaemonThatWaitsForThem) {
   Daemon daemon("mode = \"trigger\"\nrate_hz = 200.0", "[trigger]\nudp = \"127.0.0.1:0\"\n");
   ASSERT_TRUE(daemon.ready) << daemon.folder.read("stderr");
-  const std::string out = daemon.folder.read("stdout");
-  const std::size_t at = out.find("trigger=") + 8;
-  const std::string port = out.substr(at, out.find_first_of(" \n", at) - at);
+  const std::string url = trigger_url(daemon.folder);
   const ProcessResult sent =
-      run_emit({"trigger", "udp://" + port, "--rate", "200", "--frames", "50", "--stamp"});
+      run_emit({"trigger", url, "--rate", "200", "--frames", "50", "--stamp"});
   EXPECT_EQ(sent.exit_code, 0) << sent.err;
   EXPECT_THAT(sent.out, HasSubstr("50 triggers sent"));
-  EXPECT_EQ(run_emit({"trigger", "tcp://" + port}).exit_code, 2);
+  EXPECT_EQ(run_emit({"trigger", "tcp" + url.substr(3)}).exit_code, 2);
   // The last ones may still be on their way. A machine that stood still sends two at once; every
   // one is accounted for.
   ProcessResult stat;

@@ -4,12 +4,19 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <string>
 #include <vector>
+
+#include "emit/protocol/convert.hpp"
+#include "emit/protocol/framing.hpp"
+#include "emit/protocol/version.hpp"
+#include "emit/v1/control.pb.h"
+#include "io/client_connection.hpp"
 
 namespace emit::server {
 namespace {
@@ -72,6 +79,74 @@ TEST_F(TcpPair, PiecesArriveInOrder) {
   ASSERT_EQ(got.bytes, 13U);
   EXPECT_TRUE(std::ranges::equal(std::span(space).first(13), bytes_of("one two three")));
   EXPECT_EQ(server_.read_some(space).status, IoStatus::would_block);
+}
+
+TEST_F(TcpPair, IsReadableOnlyWhenAsMuchWaitsAsWasAskedFor) {
+  const auto readable_now = [&] {
+    pollfd wait{server_.fd(), POLLIN, 0};
+    return ::poll(&wait, 1, 0) == 1;
+  };
+  server_.set_receive_low_water(10);
+  ASSERT_EQ(client_.write_some(bytes_of("123456789")).bytes, 9U);
+  std::array<std::byte, 16> space{};
+  while (server_.peek(space).bytes < 9) {
+  }
+  EXPECT_FALSE(readable_now());
+  ASSERT_EQ(client_.write_some(bytes_of("0")).bytes, 1U);
+  EXPECT_TRUE(readable(server_.fd()));
+  ASSERT_EQ(server_.read_some(space).bytes, 10U);
+  ASSERT_EQ(client_.write_some(bytes_of("1")).bytes, 1U);
+  while (server_.peek(space).bytes < 1) {
+  }
+  EXPECT_FALSE(readable_now());
+  server_.set_receive_low_water(1);
+  EXPECT_TRUE(readable(server_.fd()));
+  server_.set_receive_low_water(10);
+  client_.shutdown_send();
+  EXPECT_TRUE(readable(server_.fd())) << "the end comes at once";
+}
+
+int low_water_of(int fd) {
+  int bytes = 0;
+  socklen_t length = sizeof bytes;
+  ::getsockopt(fd, SOL_SOCKET, SO_RCVLOWAT, &bytes, &length);
+  return bytes;
+}
+
+TEST_F(TcpPair, AClientIsWokenByPiecesOfARecordAndByTheFirstByteOfTheNext) {
+  std::vector<std::byte> welcome;
+  v1::ControlRecord answer;
+  answer.mutable_welcome()->set_protocol_version(protocol::kProtocolVersion);
+  protocol::append_control_record(answer, welcome);
+  ASSERT_EQ(server_.write_some(std::span<const std::byte>(welcome)).bytes, welcome.size());
+  const int fd = client_.fd();
+  auto connection = ClientConnection::greet(SocketContext(), std::move(client_), peer_,
+                                            ClientRole::client, monotonic_now_ns() + kLongNs);
+  ASSERT_TRUE(connection.has_value()) << connection.error().text;
+  constexpr std::uint32_t kBodyBytes = 400'000;
+  connection->allow_frames(kBodyBytes);
+  std::vector<std::byte> stream(protocol::kRecordHeaderBytes + kBodyBytes);
+  protocol::encode_record_header(protocol::RecordKind::frame, kBodyBytes,
+                                 std::span(stream).first<protocol::kRecordHeaderBytes>());
+  protocol::Record record;
+  std::size_t given = 0;
+  /// Gives up to `end` of the stream away; until the client waits for `low_water` bytes.
+  const auto arrive = [&](std::size_t end, int low_water) {
+    const std::int64_t end_ns = monotonic_now_ns() + kLongNs;
+    do {
+      given +=
+          server_.write_some(std::span<const std::byte>(stream).subspan(given, end - given)).bytes;
+      EXPECT_FALSE(connection->receive(record, monotonic_now_ns()).value());
+    } while ((given < end || low_water_of(fd) != low_water) && monotonic_now_ns() < end_ns);
+    EXPECT_EQ(low_water_of(fd), low_water);
+  };
+  arrive(5, 1);
+  arrive(1000, 128 << 10);
+  arrive(stream.size() - 900, 900);
+  ASSERT_EQ(server_.write_some(std::span<const std::byte>(stream).subspan(given)).bytes, 900U);
+  ASSERT_TRUE(connection->receive(record, monotonic_now_ns() + kLongNs).value());
+  EXPECT_EQ(record.body.size(), kBodyBytes);
+  EXPECT_EQ(low_water_of(fd), 1);
 }
 
 TEST_F(TcpPair, TheEndOfAStreamIsToldApartFromFailures) {

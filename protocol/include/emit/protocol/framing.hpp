@@ -80,6 +80,9 @@ class RecordParser {
   /// Bytes of an unfinished record held: not 0 at the end of a stream means it was cut.
   [[nodiscard]] std::size_t pending_bytes() const noexcept { return end_ - begin_; }
 
+  /// What the record begun still lacks; 0 while its header is not complete. As of the last next().
+  [[nodiscard]] std::size_t missing_bytes() const noexcept { return missing_; }
+
   /// Forgets everything, for a new connection.
   void reset() noexcept;
 
@@ -94,6 +97,7 @@ class RecordParser {
   std::size_t end_ = 0;     // behind the last byte held
   std::size_t summed_ = 0;  // bytes of the record at begin_ that payload_crc32c_ has passed
   std::uint32_t payload_crc32c_ = 0;
+  std::size_t missing_ = 0;
   ParseStatus error_ = ParseStatus::need_more;
   std::uint32_t offending_value_ = 0;
 };

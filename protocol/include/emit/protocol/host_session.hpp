@@ -74,6 +74,9 @@ class SessionMac {
   [[nodiscard]] std::span<const std::byte> seal(const SessionHeader& header,
                                                 std::span<std::byte> space,
                                                 std::size_t payload_bytes) noexcept;
+  /// The MAC of any bytes. False: the cryptographic library failed.
+  [[nodiscard]] bool tag(std::span<const std::byte> bytes,
+                         std::span<std::byte, kSessionTagBytes> out) noexcept;
   /// True when the datagram's last bytes are the MAC of all before them. In constant time.
   [[nodiscard]] bool verify(std::span<const std::byte> datagram) noexcept;
   /// A key for `purpose` from this one's and `context`.
