@@ -2,7 +2,6 @@
 #include "passes/raster_passes.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
