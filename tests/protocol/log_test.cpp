@@ -12,6 +12,8 @@
 #include <random>
 #include <vector>
 
+#include "../../protocol/src/crc.hpp"
+#include "../../protocol/src/wire_bytes.hpp"
 #include "emit/protocol/record/mcap_reader.hpp"
 #include "emit/protocol/record/mcap_writer.hpp"
 #include "emit/v1/control.pb.h"
@@ -200,6 +202,61 @@ TEST_F(LogFile, AFlippedBitInAChunkIsFoundByItsCrc) {
   const Counts counts = read_all();
   EXPECT_THAT(counts.error, HasSubstr("offset " + std::to_string(offset) + ": chunk CRC"));
   EXPECT_EQ(counts.host, 0u);
+}
+
+/// Enough chunks that their index leaves memory: the end of the file must lead to each of them.
+TEST_F(LogFile, TheIndexOfThousandsOfChunksPointsAtEachOfThem) {
+  constexpr std::uint32_t kMessages = 4000;
+  {
+    auto mcap = McapWriter::create(path_, {.chunk_bytes = 1});
+    ASSERT_TRUE(mcap) << mcap.error().text;
+    const auto schema = mcap->add_schema("pkg.Other", "protobuf", "");
+    const auto channel = mcap->add_channel(*schema, "camera", "protobuf");
+    ASSERT_TRUE(channel);
+    for (std::uint32_t i = 0; i < kMessages; ++i) {
+      ASSERT_TRUE(mcap->write(*channel, i, i, i, {}));
+    }
+    for (const auto& entry : std::filesystem::directory_iterator(path_.parent_path())) {
+      EXPECT_THAT(entry.path().string(), ::testing::Not(HasSubstr(path_.string() + ".")));
+    }
+    ASSERT_TRUE(mcap->close());
+  }
+  const std::string whole = content();
+  const auto bytes = std::as_bytes(std::span(whole));
+  const std::size_t footer = whole.size() - 8 - 29;
+  ASSERT_EQ(whole[footer], 2);
+  const auto summary = wire::get<std::uint64_t>(bytes, footer + 9);
+  const auto offsets = wire::get<std::uint64_t>(bytes, footer + 17);
+  EXPECT_EQ(wire::get<std::uint32_t>(bytes, footer + 25),
+            crc32(bytes.subspan(summary, footer + 25 - summary)));
+  const auto length_at = [&](std::size_t at) { return wire::get<std::uint64_t>(bytes, at + 1); };
+  std::uint32_t chunks = 0;
+  std::size_t first_index = 0;
+  for (std::size_t at = summary; at < offsets; at += 9 + length_at(at)) {
+    if (whole[at] != 8) continue;
+    if (chunks == 0) first_index = at;
+    EXPECT_EQ(wire::get<std::uint64_t>(bytes, at + 9), chunks) << "start";
+    EXPECT_EQ(wire::get<std::uint64_t>(bytes, at + 17), chunks) << "end";
+    const auto chunk = wire::get<std::uint64_t>(bytes, at + 25);
+    const auto record_bytes = wire::get<std::uint64_t>(bytes, at + 33);
+    ASSERT_LT(chunk + record_bytes, summary);
+    ASSERT_EQ(whole[chunk], 6);
+    EXPECT_EQ(9 + length_at(chunk), record_bytes);
+    EXPECT_EQ(wire::get<std::uint64_t>(bytes, chunk + 9), chunks);
+    ASSERT_EQ(wire::get<std::uint32_t>(bytes, at + 41), 10u) << "one channel";
+    const auto message_index = wire::get<std::uint64_t>(bytes, at + 45 + 2);
+    ASSERT_EQ(message_index, chunk + record_bytes);
+    ASSERT_EQ(whole[message_index], 7);
+    EXPECT_EQ(wire::get<std::uint64_t>(bytes, at + 55), 9 + length_at(message_index));
+    ++chunks;
+  }
+  EXPECT_EQ(chunks, kMessages);
+  // The last of the summary offsets is that of the chunk indexes.
+  std::size_t last = offsets;
+  while (last + 9 + length_at(last) < footer) last += 9 + length_at(last);
+  EXPECT_EQ(whole[last + 9], 8);
+  EXPECT_EQ(wire::get<std::uint64_t>(bytes, last + 10), first_index);
+  EXPECT_EQ(wire::get<std::uint64_t>(bytes, last + 18), offsets - first_index);
 }
 
 TEST_F(LogFile, OtherFilesAreRefusedByName) {

@@ -15,6 +15,7 @@
 
 #include "../crc.hpp"
 #include "mcap_format.hpp"
+#include "spill_file.hpp"
 
 namespace emit::protocol {
 namespace {
@@ -29,16 +30,6 @@ using physics::Result;
 struct IndexEntry {
   std::uint64_t log_time_ns;
   std::uint64_t offset;  // within the chunk's records
-};
-
-struct ChunkSummary {
-  std::uint64_t start_ns = 0;
-  std::uint64_t end_ns = 0;
-  std::uint64_t file_offset = 0;
-  std::uint64_t record_bytes = 0;  // of the chunk record with its prefix
-  std::uint64_t index_bytes = 0;   // of the message index records behind it
-  std::uint64_t data_bytes = 0;
-  std::map<std::uint16_t, std::uint64_t> index_offsets;
 };
 
 }  // namespace
@@ -61,13 +52,15 @@ struct McapWriter::Impl {
   std::uint64_t chunk_first_ns = 0;  // log time of its first message
   std::uint64_t chunk_start_ns = 0;
   std::uint64_t chunk_end_ns = 0;
-  std::vector<ChunkSummary> chunks;
+  std::uint32_t chunk_count = 0;
+  SpillFile chunk_indexes;  // records of the summary: a chunk's is written with the chunk
 
   std::uint64_t message_count = 0;
   std::uint64_t start_ns = 0;
   std::uint64_t end_ns = 0;
   std::map<std::uint16_t, std::uint64_t> channel_messages;
   Output scratch;
+  Output summary_scratch;
 
   Impl(std::filesystem::path file, McapWriterOptions settings)
       : path(std::move(file)), options(std::move(settings)) {}
@@ -115,11 +108,8 @@ struct McapWriter::Impl {
 
   Result<void> flush_chunk() {
     if (chunk.size() == 0) return {};
-    ChunkSummary summary;
-    summary.start_ns = chunk_start_ns;
-    summary.end_ns = chunk_end_ns;
-    summary.file_offset = file_bytes;
-    summary.data_bytes = chunk.size();
+    const std::uint64_t chunk_at = file_bytes;
+    const std::uint64_t data_bytes = chunk.size();
 
     scratch.clear();
     const auto record = scratch.begin_record(Opcode::chunk);
@@ -131,11 +121,20 @@ struct McapWriter::Impl {
     scratch.number(std::uint64_t{chunk.size()});
     scratch.raw(chunk.bytes());
     scratch.end_record(record);
-    summary.record_bytes = scratch.size();
+    const std::uint64_t record_bytes = scratch.size();
 
+    Output& index_record = summary_scratch;
+    index_record.clear();
+    const auto summary = index_record.begin_record(Opcode::chunk_index);
+    index_record.number(chunk_start_ns);
+    index_record.number(chunk_end_ns);
+    index_record.number(chunk_at);
+    index_record.number(record_bytes);
+    const auto offsets = index_record.begin_block<std::uint32_t>();
     for (auto& [channel_id, entries] : chunk_index) {
       std::ranges::stable_sort(entries, {}, &IndexEntry::log_time_ns);
-      summary.index_offsets[channel_id] = file_bytes + scratch.size();
+      index_record.number(channel_id);
+      index_record.number(chunk_at + scratch.size());
       const auto index = scratch.begin_record(Opcode::message_index);
       scratch.number(channel_id);
       const auto array = scratch.begin_block<std::uint32_t>();
@@ -146,11 +145,19 @@ struct McapWriter::Impl {
       scratch.end_block<std::uint32_t>(array);
       scratch.end_record(index);
     }
-    summary.index_bytes = scratch.size() - summary.record_bytes;
+    index_record.end_block<std::uint32_t>(offsets);
+    index_record.number(scratch.size() - record_bytes);
+    index_record.string("");
+    index_record.number(data_bytes);
+    index_record.number(data_bytes);
+    index_record.end_record(summary);
     chunk.clear();
     chunk_index.clear();
-    chunks.push_back(std::move(summary));
-    return put(scratch.bytes());
+    if (auto written = put(scratch.bytes()); !written) return written;
+    ++chunk_count;
+    auto kept = chunk_indexes.append(index_record.bytes());
+    if (!kept) failure = kept.error();
+    return kept;
   }
 
   void append_statistics(Output& out) const {
@@ -160,7 +167,7 @@ struct McapWriter::Impl {
     out.number(std::uint32_t{channel_count});
     out.number(std::uint32_t{0});  // attachments
     out.number(std::uint32_t{0});  // metadata
-    out.number(static_cast<std::uint32_t>(chunks.size()));
+    out.number(chunk_count);
     out.number(start_ns);
     out.number(end_ns);
     const auto map = out.begin_block<std::uint32_t>();
@@ -172,66 +179,71 @@ struct McapWriter::Impl {
     out.end_record(record);
   }
 
-  void append_chunk_indexes(Output& out) const {
-    for (const ChunkSummary& summary : chunks) {
-      const auto record = out.begin_record(Opcode::chunk_index);
-      out.number(summary.start_ns);
-      out.number(summary.end_ns);
-      out.number(summary.file_offset);
-      out.number(summary.record_bytes);
-      const auto map = out.begin_block<std::uint32_t>();
-      for (const auto& [channel_id, offset] : summary.index_offsets) {
-        out.number(channel_id);
-        out.number(offset);
-      }
-      out.end_block<std::uint32_t>(map);
-      out.number(summary.index_bytes);
-      out.string("");
-      out.number(summary.data_bytes);
-      out.number(summary.data_bytes);
-      out.end_record(record);
-    }
-  }
-
+  /// Writes the end of the file: data end, summary, summary offsets and footer, which holds the CRC
+  /// of everything between.
   Result<void> write_end() {
     Output out;
     const auto data_end = out.begin_record(Opcode::data_end);
     out.number(std::uint32_t{0});  // chunks carry the CRCs
     out.end_record(data_end);
+    if (auto written = put(out.bytes()); !written) return written;
+    out.clear();
 
-    const std::size_t summary_at = out.size();
+    const std::uint64_t summary_at = file_bytes;
     struct Group {
       Opcode opcode;
-      std::size_t begin;
-      std::size_t end;
+      std::uint64_t begin;
+      std::uint64_t bytes;
     };
     std::vector<Group> groups;
     auto group = [&](Opcode opcode, auto append) {
       const std::size_t begin = out.size();
       append();
-      if (out.size() != begin) groups.push_back({opcode, begin, out.size()});
+      if (out.size() != begin) groups.push_back({opcode, file_bytes + begin, out.size() - begin});
     };
     group(Opcode::schema, [&] { out.raw(schemas.bytes()); });
     group(Opcode::channel, [&] { out.raw(channels.bytes()); });
     group(Opcode::statistics, [&] { append_statistics(out); });
-    group(Opcode::chunk_index, [&] { append_chunk_indexes(out); });
+    std::uint32_t crc = crc32(out.bytes());
+    if (auto written = put(out.bytes()); !written) return written;
+    out.clear();
+    if (chunk_indexes.size() != 0) {
+      groups.push_back({Opcode::chunk_index, file_bytes, chunk_indexes.size()});
+      if (auto copied = copy_chunk_indexes(crc); !copied) return copied;
+    }
 
-    const std::size_t offsets_at = out.size();
+    const std::uint64_t offsets_at = file_bytes;
     for (const Group& entry : groups) {
       const auto record = out.begin_record(Opcode::summary_offset);
       out.number(static_cast<std::uint8_t>(entry.opcode));
-      out.number(file_bytes + entry.begin);
-      out.number(std::uint64_t{entry.end - entry.begin});
+      out.number(entry.begin);
+      out.number(entry.bytes);
       out.end_record(record);
     }
     // The length is fixed, so that the CRC can cover it.
     out.number(static_cast<std::uint8_t>(Opcode::footer));
     out.number(std::uint64_t{20});
-    out.number(file_bytes + summary_at);
-    out.number(file_bytes + offsets_at);
-    out.number(crc32(out.bytes().subspan(summary_at)));
+    out.number(summary_at);
+    out.number(offsets_at);
+    out.number(crc32(out.bytes(), crc));
     out.raw(mcap::kMagic);
     return put(out.bytes());
+  }
+
+  Result<void> copy_chunk_indexes(std::uint32_t& crc) {
+    std::vector<std::byte> block(SpillFile::kBlockBytes);
+    for (std::uint64_t at = 0; at < chunk_indexes.size();) {
+      const auto count = chunk_indexes.read(at, block);
+      if (!count) {
+        failure = count.error();
+        return tl::unexpected(*failure);
+      }
+      const auto piece = std::span(block).first(*count);
+      crc = crc32(piece, crc);
+      if (auto written = put(piece); !written) return written;
+      at += *count;
+    }
+    return {};
   }
 };
 
@@ -260,6 +272,7 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
   out.string(options.library);
   out.end_record(record);
   if (auto written = impl->put(out.bytes()); !written) return tl::unexpected(written.error());
+  if (auto opened = impl->chunk_indexes.open(path); !opened) return tl::unexpected(opened.error());
   return McapWriter(std::move(impl));
 }
 

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "spill_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <string>
+#include <system_error>
+
+namespace emit::protocol {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+Result<void> SpillFile::open(const std::filesystem::path& beside) {
+  block_.reserve(kBlockBytes);
+  std::error_code ignored;
+  const bool regular = std::filesystem::is_regular_file(beside, ignored);
+  name_ = (regular ? beside : std::filesystem::temp_directory_path(ignored) / beside.filename())
+              .string() +
+          ".index-XXXXXX";
+  std::string name = name_;
+  fd_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (fd_ < 0) return failed("create", errno);
+  ::unlink(name.c_str());
+  return {};
+}
+
+SpillFile::~SpillFile() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+Result<void> SpillFile::failed(const char* action, int error) const {
+  return make_error(ErrorCode::io,
+                    fmt::format("{}: offset {}: cannot {}: {}", name_, spilled_bytes_, action,
+                                std::generic_category().message(error)));
+}
+
+Result<void> SpillFile::append(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    if (block_.size() == kBlockBytes) {
+      if (auto spilled = spill(); !spilled) return spilled;
+    }
+    const auto piece = bytes.first(std::min(bytes.size(), kBlockBytes - block_.size()));
+    block_.insert(block_.end(), piece.begin(), piece.end());
+    bytes = bytes.subspan(piece.size());
+  }
+  return {};
+}
+
+Result<void> SpillFile::spill() {
+  std::span<const std::byte> rest = block_;
+  while (!rest.empty()) {
+    const ssize_t written = ::write(fd_, rest.data(), rest.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return failed("write", written < 0 ? errno : EIO);
+    rest = rest.subspan(static_cast<std::size_t>(written));
+  }
+  spilled_bytes_ += block_.size();
+  block_.clear();
+  return {};
+}
+
+Result<std::size_t> SpillFile::read(std::uint64_t offset, std::span<std::byte> into) const {
+  std::size_t count = 0;
+  while (count < into.size() && offset < spilled_bytes_) {
+    const auto wanted = std::min<std::uint64_t>(into.size() - count, spilled_bytes_ - offset);
+    const ssize_t got = ::pread(fd_, into.data() + count, wanted, static_cast<off_t>(offset));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) {
+      const auto error = failed("read", got < 0 ? errno : EIO);
+      return tl::unexpected(error.error());
+    }
+    count += static_cast<std::size_t>(got);
+    offset += static_cast<std::uint64_t>(got);
+  }
+  if (count < into.size() && offset < size()) {
+    const auto piece = std::span(block_).subspan(offset - spilled_bytes_);
+    const std::size_t copied = std::min(piece.size(), into.size() - count);
+    std::ranges::copy(piece.first(copied), into.begin() + static_cast<std::ptrdiff_t>(count));
+    count += copied;
+  }
+  return count;
+}
+
+}  // namespace emit::protocol

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::protocol {
+
+/// Bytes that wait for the end of a file: the last kBlockBytes in memory, what came before in a
+/// nameless file in the same folder, which the kernel removes however the process ends.
+///
+/// Errors (io) name the file. Thread: one owner.  Not RT-safe.
+class SpillFile {
+ public:
+  static constexpr std::size_t kBlockBytes = std::size_t{256} << 10;
+
+  /// Makes the nameless file at once, so that a folder that takes none is told at the start. What
+  /// is written to something else than a regular file (a pipe) waits in the folder for temporary
+  /// files.
+  [[nodiscard]] physics::Result<void> open(const std::filesystem::path& beside);
+  SpillFile() = default;
+  SpillFile(const SpillFile&) = delete;
+  SpillFile& operator=(const SpillFile&) = delete;
+  ~SpillFile();
+
+  [[nodiscard]] physics::Result<void> append(std::span<const std::byte> bytes);
+  [[nodiscard]] std::uint64_t size() const noexcept { return spilled_bytes_ + block_.size(); }
+
+  /// Copies up to `into.size()` bytes from `offset`; fewer at the end only.
+  [[nodiscard]] physics::Result<std::size_t> read(std::uint64_t offset,
+                                                  std::span<std::byte> into) const;
+
+ private:
+  [[nodiscard]] physics::Result<void> spill();
+  [[nodiscard]] physics::Result<void> failed(const char* action, int error) const;
+
+  std::string name_;  // for messages
+  std::vector<std::byte> block_;
+  std::uint64_t spilled_bytes_ = 0;
+  int fd_ = -1;
+};
+
+}  // namespace emit::protocol
