@@ -189,6 +189,7 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
 
 void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.samples = surface_->model().samples.samples.size();
+  stats.sample_bytes = surface_->sample_bytes();
   stats.samples_full = surface_->model().full;
 }
 

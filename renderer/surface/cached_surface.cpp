@@ -194,6 +194,16 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   return {};
 }
 
+std::uint64_t CachedSurface::sample_bytes() const noexcept {
+  const auto bytes = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
+  std::uint64_t sum = 0;
+  if (model_) sum = bytes(model_->samples.samples) + bytes(model_->samples.seen);
+  for (const Node& node : nodes_) {
+    sum += bytes(node.states) + bytes(node.outputs) + bytes(node.vertices);
+  }
+  return sum;
+}
+
 void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
                                    SurfaceHistory& history) noexcept {
   const Node& from = node(index);

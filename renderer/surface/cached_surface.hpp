@@ -100,6 +100,8 @@ class CachedSurface {
   [[nodiscard]] Range take_changes(std::size_t storage) noexcept;
 
   [[nodiscard]] const SurfaceModel& model() const noexcept { return *model_; }
+  /// Main memory that the samples take, without the meshes between them.
+  [[nodiscard]] std::uint64_t sample_bytes() const noexcept;
   /// The refined meshes as a scene whose instances are grouped by mesh.
   [[nodiscard]] SampledScene drawn_scene() const;
 

@@ -23,8 +23,6 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
 glm::dvec3 centre(const scene::Aabb& box) noexcept {
   return box.empty() ? glm::dvec3(0.0) : 0.5 * (box.min_m + box.max_m);
 }
@@ -174,10 +172,10 @@ std::optional<CasterHit> CasterRays::first_hit(
 }
 
 std::uint32_t CasterRays::first_hits(std::span<const CasterRay> rays,
-                                     const CasterSelection& selection,
-                                     std::span<CasterHit> hits) const noexcept {
+                                     const CasterSelection& selection, std::span<CasterHit> hits,
+                                     float within_m) const noexcept {
   std::array<float, kMaxRays> limits_m;
-  limits_m.fill(kInfinity);
+  limits_m.fill(within_m);
   std::uint32_t found = 0;
   const auto shorten = [&](std::uint32_t lanes) {
     found |= lanes;

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -100,9 +101,10 @@ class CasterRays {
       const CasterRay& ray, std::span<const MoverPlacement> movers) const noexcept;
   /// Hits of up to kMaxRays rays; hits.size() >= rays.size(). Bit i of the result is set where
   /// hits[i] was written. To stay in the axes of a body, select that mover alone with the default
-  /// placement and nothing fixed.
+  /// placement and nothing fixed. Faces `within_m` and farther are not met.
   std::uint32_t first_hits(std::span<const CasterRay> rays, const CasterSelection& selection,
-                           std::span<CasterHit> hits) const noexcept;
+                           std::span<CasterHit> hits,
+                           float within_m = std::numeric_limits<float>::infinity()) const noexcept;
 
  private:
   struct Impl;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "emit/physics/constants.hpp"
 #include "history/step_plan.hpp"
@@ -19,6 +20,9 @@ constexpr double kGolden = 0.6180339887498949;
 /// Entities farther than this many of their radii hide too little sky to matter (1/400).
 constexpr float kNearRadii = 10.0F;
 constexpr std::size_t kSkyRays = 16;
+static_assert(kSkyRays == kPacketRays);
+/// Room for float32 far from the origin.
+constexpr float kRoundingFrac = 1e-5F;
 
 double fraction_of(double x) noexcept {
   return x - std::floor(x);
@@ -91,6 +95,34 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
       any_mover_on_ = any_mover_on_ || state.on;
     }
   }
+  bound_packets();
+}
+
+void IntervalRays::bound_packets() noexcept {
+  const std::size_t movers = mover_radius_m_.size();
+  for (std::size_t packet = 0; packet < spread_sine_.size(); ++packet) {
+    const std::size_t first = packet * kPacketRays;
+    spread_sine_[packet] = 0.0F;
+    for (std::size_t i = first; i < first + kPacketRays; ++i) {
+      spread_sine_[packet] =
+          std::max(spread_sine_[packet], glm::distance(direction_[i], direction_[first]));
+    }
+    for (std::size_t m = 0; m < movers; ++m) {
+      Reach& ball = reaches_[packet * movers + m];
+      ball = {};
+      glm::vec3 low(std::numeric_limits<float>::infinity());
+      glm::vec3 high = -low;
+      for (std::size_t i = first; i < first + kPacketRays; ++i) {
+        if (!placed(m, i).on) continue;
+        low = glm::min(low, placed(m, i).position_m);
+        high = glm::max(high, placed(m, i).position_m);
+      }
+      if (!(low.x <= high.x)) continue;
+      ball.centre_m = 0.5F * (low + high);
+      ball.way_m = 0.5F * glm::distance(low, high);
+      ball.radius_m = ball.way_m + mover_radius_m_[m];
+    }
+  }
 }
 
 void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {
@@ -98,11 +130,28 @@ void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {
   any_mover_on_ = false;
   sun_up_ = to_sun.z > std::sin(StepPlan::kMinSunElevationRad);
   for (std::size_t i = 0; i < kSunRays; ++i) aim(i, 0, to_sun);
+  bound_packets();
 }
 
 glm::vec3 IntervalRays::normal(const SurfaceSample& sample) const noexcept {
   if (sample.mover < 0) return sample.normal;
   return placed(static_cast<std::size_t>(sample.mover), middle_ray_).rel_from_body * sample.normal;
+}
+
+bool IntervalRays::comes_near(const glm::vec3& start_m, float apart_m, std::size_t mover,
+                              std::size_t packet) const noexcept {
+  const Reach& ball = reach(mover, packet);
+  if (ball.radius_m < 0.0F) return false;
+  const glm::vec3& direction = direction_[packet * kPacketRays];
+  const glm::vec3 to_centre_m = ball.centre_m - start_m;
+  const float distance_m = glm::length(to_centre_m);
+  const float along_m = std::max(glm::dot(to_centre_m, direction), 0.0F);
+  // No farther along than that do its rays matter, and no more do they stray until there.
+  const float far_m = distance_m + ball.radius_m + apart_m;
+  const float stray_m = apart_m + spread_sine_[packet] * far_m + kRoundingFrac * far_m;
+  const glm::vec3 aside_m = to_centre_m - along_m * direction;
+  const float reach_m = ball.radius_m + stray_m;
+  return glm::dot(aside_m, aside_m) <= reach_m * reach_m;
 }
 
 IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSample& face,
@@ -128,13 +177,22 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
   }
   if (count == 0) return spots;
   std::uint32_t blocked = rays.blocked_static({sent.data(), count});
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t ray = first + start_of[i];
-    for (std::size_t m = 0;
-         any_mover_on_ && m < mover_radius_m_.size() && ((blocked >> i) & 1U) == 0U; ++m) {
-      const MoverPlacement& place = placed(m, ray);
+  const std::uint32_t all = (1U << count) - 1U;
+  float apart_m = 0.0F;
+  if (any_mover_on_) {
+    for (std::size_t i = 1; i < count; ++i) {
+      apart_m = std::max(apart_m, glm::distance(sent[i].origin_m, sent[0].origin_m));
+    }
+  }
+  for (std::size_t m = 0; any_mover_on_ && m < mover_radius_m_.size() && blocked != all; ++m) {
+    if (!comes_near(sent[0].origin_m, apart_m, m, first / kPacketRays)) continue;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (((blocked >> i) & 1U) != 0U) continue;
+      const MoverPlacement& place = placed(m, first + start_of[i]);
       if (place.on && rays.blocked_mover(m, place, {&sent[i], 1}) != 0U) blocked |= 1U << i;
     }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
     if (((blocked >> i) & 1U) == 0U) spots.lit |= 1U << start_of[i];
   }
   return spots;
@@ -182,10 +240,13 @@ float IntervalRays::hidden_sky_frac(const CasterRays& rays, const SurfaceSample&
   const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
   std::uint32_t hidden = 0;
   for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
+    const float reach_m = kNearRadii * mover_radius_m_[m];
+    const Reach& ball = reach(m, 0);
+    const float away_m = glm::distance(ball.centre_m, start_m) * (1.0F - kRoundingFrac);
+    if (ball.radius_m < 0.0F || away_m > reach_m + ball.way_m) continue;
     for (std::size_t i = 0; i < kSkyRays; ++i) {
       const MoverPlacement& place = placed(m, i);
       const glm::vec3 way = place.position_m - start_m;
-      const float reach_m = kNearRadii * mover_radius_m_[m];
       if (!place.on || glm::dot(way, way) > reach_m * reach_m) continue;
       const double share = (static_cast<double>(i) + 0.5) / kSkyRays;
       const double r = std::sqrt(sky_ == SkyMeasure::cosine ? share : share * (2.0 - share));

@@ -30,7 +30,8 @@ class IntervalRays {
   explicit IntervalRays(std::vector<float> mover_radius_m, SkyMeasure sky = SkyMeasure::cosine)
       : mover_radius_m_(std::move(mover_radius_m)),
         sky_(sky),
-        placements_(mover_radius_m_.size() * kSunRays) {}
+        placements_(mover_radius_m_.size() * kSunRays),
+        reaches_(mover_radius_m_.size() * kSunRays / kPacketRays) {}
 
   /// Directions and places for [begin_ns, end_ns]; `turn` varies the pattern between intervals.
   /// `entities` in the order of the radii. RT-safe.
@@ -81,15 +82,34 @@ class IntervalRays {
   /// Sends a ray to its place in the disc around `to_sun`.
   void aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to_sun) noexcept;
 
-  /// Sends ray `first` + k from start k.
+  /// False where no ray of the packet that starts within `apart_m` of `start_m` can meet the
+  /// entity.
+  [[nodiscard]] bool comes_near(const glm::vec3& start_m, float apart_m, std::size_t mover,
+                                std::size_t packet) const noexcept;
+
+  /// Sends ray `first` + k from start k; `first` begins a packet.
   [[nodiscard]] Spots send(const CasterRays& rays, const SurfaceSample& face,
                            std::span<const glm::vec3> starts_m, std::size_t first) const noexcept;
+
+  /// Ball that holds an entity wherever it stands while a packet is sent.
+  struct Reach {
+    glm::vec3 centre_m{0.0F};
+    float way_m = 0.0F;      ///< of its body's origin from the centre
+    float radius_m = -1.0F;  ///< negative: it is not there
+  };
+  [[nodiscard]] const Reach& reach(std::size_t mover, std::size_t packet) const noexcept {
+    return reaches_[packet * mover_radius_m_.size() + mover];
+  }
+  /// Gathers the balls and how far the directions of each packet spread.
+  void bound_packets() noexcept;
 
   std::vector<float> mover_radius_m_;
   SkyMeasure sky_ = SkyMeasure::cosine;
   std::vector<MoverPlacement> placements_;  ///< by ray, then entity
+  std::vector<Reach> reaches_;              ///< by packet, then entity
   std::array<glm::vec3, kSunRays> direction_{};
-  std::array<glm::vec2, kSunRays> spread_{};  ///< unit normal deviates
+  std::array<float, kSunRays / kPacketRays> spread_sine_{};  ///< from a packet's first direction
+  std::array<glm::vec2, kSunRays> spread_{};                 ///< unit normal deviates
   std::size_t middle_ray_ = 0;
   bool any_mover_on_ = false;
   bool sun_up_ = false;

@@ -103,26 +103,29 @@ std::vector<std::uint32_t> link_edges(std::span<const std::array<std::uint32_t, 
   return ring;
 }
 
-void find_inward(const RefinedMesh& mesh, std::vector<glm::vec3>& inward) {
+void find_inward(const RefinedMesh& mesh, std::uint32_t first, std::vector<glm::vec3>& inward) {
   const auto vertices = mesh.vertices();
-  inward.assign(vertices.size(), glm::vec3(0.0F));
+  inward.resize(vertices.size());
+  std::fill(inward.begin() + first, inward.end(), glm::vec3(0.0F));
   // Inside a surface each neighbour follows the vertex in one leaf and precedes it in another.
-  std::vector<std::uint64_t> open(vertices.size(), 0);
+  std::vector<std::uint64_t> open(vertices.size() - first, 0);
   for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
     const auto& leaf = mesh.leaf(slot);
+    if (std::max({leaf[0], leaf[1], leaf[2]}) < first) continue;
     glm::vec3 centre_m(0.0F);
     for (const std::uint32_t v : leaf) centre_m += vertices[v].position_m / 3.0F;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t v = leaf[k];
+      if (v < first) continue;
       const glm::vec3 way_m = centre_m - vertices[v].position_m;
       const float length_m = glm::length(way_m);
       if (length_m > 0.0F) inward[v] += way_m / length_m;
-      open[v] += scrambled(leaf[(k + 1) % 3]) - scrambled(leaf[(k + 2) % 3]);
+      open[v - first] += scrambled(leaf[(k + 1) % 3]) - scrambled(leaf[(k + 2) % 3]);
     }
   }
-  for (std::size_t v = 0; v < inward.size(); ++v) {
+  for (std::size_t v = first; v < inward.size(); ++v) {
     const float length = glm::length(inward[v]);
-    inward[v] = open[v] != 0 && length > 0.0F ? inward[v] / length : glm::vec3(0.0F);
+    inward[v] = open[v - first] != 0 && length > 0.0F ? inward[v] / length : glm::vec3(0.0F);
   }
 }
 

@@ -24,8 +24,8 @@ namespace emit::renderer {
 
 /// By vertex the mean direction into its leaves where it lies on a rim, a border of the surface or
 /// a crease with vertices of each side's own: unit length, axes of the mesh. Zero inside, however
-/// uneven the leaves are, and where the leaves' directions cancel. Replaces the contents of
-/// `inward`; O(n).
-void find_inward(const RefinedMesh& mesh, std::vector<glm::vec3>& inward);
+/// uneven the leaves are, and where the leaves' directions cancel. Fills `inward` from vertex
+/// `first` on; what stands before is of no use. O(n), mostly of those.
+void find_inward(const RefinedMesh& mesh, std::uint32_t first, std::vector<glm::vec3>& inward);
 
 }  // namespace emit::renderer

@@ -55,7 +55,6 @@ class Builder {
   /// Makes covered samples next to open ones copies of those: nobody sees them, but triangles that
   /// a foot cuts would show a mixture of both.
   void replace_covered();
-  [[nodiscard]] std::size_t sample_count() const noexcept;
   bool report(double frac) const { return !progress_ || progress_(frac); }
 
   const SurfaceInputs& in_;
@@ -66,7 +65,9 @@ class Builder {
   SurfaceRefinement refinement_;
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
-  // By vertex of the mesh at hand:
+  std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
+  std::size_t sample_count_ = 0;  ///< of all patches, by the vertices of their meshes
+  // By vertex of the mesh at hand, filled for those that have no sample yet:
   std::vector<glm::vec3> inward_;
   std::vector<glm::vec3> place_m_;  ///< of its samples
   std::vector<Job> jobs_;
@@ -76,6 +77,7 @@ class Builder {
 };
 
 void Builder::make_patches() {
+  patches_of_mesh_.resize(model_.meshes.size());
   for (const scene::Instance& instance : in_.geometry.instances) {
     SurfacePatch patch;
     patch.mesh = instance.mesh;
@@ -88,6 +90,8 @@ void Builder::make_patches() {
     }
     patch.rel_from_mesh = glm::mat4(rel_from_mesh);
     patch.normal_from_mesh = glm::mat3(glm::transpose(glm::inverse(glm::dmat3(rel_from_mesh))));
+    patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
+    sample_count_ += model_.meshes[patch.mesh].vertices().size();
     patches_.push_back(std::move(patch));
   }
 }
@@ -95,8 +99,8 @@ void Builder::make_patches() {
 void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
   RefinedMesh& refined = model_.meshes[mesh];
   const auto vertices = refined.vertices();
-  place_m_.clear();
-  for (const RefinedMesh::Vertex& vertex : vertices) place_m_.push_back(vertex.position_m);
+  place_m_.resize(vertices.size());
+  for (std::size_t v = first; v < vertices.size(); ++v) place_m_[v] = vertices[v].position_m;
   if (in_.detail == nullptr || !in_.detail->has(mesh)) return;
   run_parallel(vertices.size() - first, kGrain, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = first + from; i < first + to; ++i) {
@@ -122,12 +126,12 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
     const auto vertices = model_.meshes[mesh].vertices();
     bool looked = false;
-    for (std::uint32_t p = 0; p < patches_.size(); ++p) {
+    for (const std::uint32_t p : patches_of_mesh_[mesh]) {
       SurfacePatch& patch = patches_[p];
-      if (patch.mesh != mesh || patch.samples.size() == vertices.size()) continue;
+      if (patch.samples.size() == vertices.size()) continue;
       const auto first = static_cast<std::uint32_t>(patch.samples.size());
       if (!looked) {
-        find_inward(model_.meshes[mesh], inward_);
+        find_inward(model_.meshes[mesh], first, inward_);
         adopt_detail(mesh, first);
       }
       looked = true;
@@ -223,23 +227,15 @@ void Builder::replace_covered() {
   }
 }
 
-std::size_t Builder::sample_count() const noexcept {
-  std::size_t count = 0;
-  for (const SurfacePatch& patch : patches_) {
-    count += model_.meshes[patch.mesh].vertices().size();
-  }
-  return count;
-}
-
 void Builder::split(std::uint32_t mesh, float above) {
   refinement_.list(mesh, above, needs_);
   if (needs_.empty()) return;
   RefinedMesh& refined = model_.meshes[mesh];
-  const auto uses = static_cast<std::size_t>(
-      std::ranges::count(patches_, mesh, [](const SurfacePatch& patch) { return patch.mesh; }));
-  const std::size_t count = sample_count();
-  const std::size_t left = options_.max_samples > count ? options_.max_samples - count : 0;
-  refined.limit(refined.vertices().size() + left / uses);
+  const std::size_t uses = patches_of_mesh_[mesh].size();
+  const std::size_t left =
+      options_.max_samples > sample_count_ ? options_.max_samples - sample_count_ : 0;
+  const std::size_t vertices = refined.vertices().size();
+  refined.limit(vertices + left / uses);
   if (needs_.size() > left / uses) {
     std::ranges::sort(needs_, [](const auto& a, const auto& b) {
       return a.need != b.need ? a.need > b.need : a.slot < b.slot;
@@ -248,6 +244,7 @@ void Builder::split(std::uint32_t mesh, float above) {
   slots_.clear();
   for (const SurfaceRefinement::Need& need : needs_) slots_.push_back(need.slot);
   if (!refined.split(slots_)) model_.full = true;
+  sample_count_ += (refined.vertices().size() - vertices) * uses;
   refinement_.leave(mesh, refined, slots_);
 }
 
@@ -268,7 +265,8 @@ physics::Result<SurfaceModel> Builder::run() {
   for (std::uint32_t round = 0;; ++round) {
     SurfaceRefinement::Most most;
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
-      const auto here = refinement_.judge(mesh, model_.meshes[mesh], patches_);
+      const auto here =
+          refinement_.judge(mesh, model_.meshes[mesh], patches_, patches_of_mesh_[mesh]);
       most.need = std::max(most.need, here.need);
       most.in_view = std::max(most.in_view, here.in_view);
     }

@@ -19,6 +19,9 @@ constexpr float kUnderOffsets = 8.0F;
 /// What a share of sky may be wrong by, in tolerances; and what rays do not resolve anyway.
 constexpr float kAlikeFrac = 0.25F;
 constexpr float kSkyNoiseFrac = 0.002F;
+/// Farther along the surface nobody looks: rays that graze it are dear, and only edges half as long
+/// could take over a view that is free farther.
+constexpr float kFeelM = 20.0F;
 /// Nothing stands up within that many lengths of an edge whose middle takes over the view.
 constexpr float kFreeLengths = 2.0F;
 
@@ -159,10 +162,10 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
         static_cast<float>(2.0 * physics::kPi * (static_cast<double>(k) + 0.5) / kTangents);
     rays[k] = {base_m + 2.0F * offsets_.around_m * n, std::cos(angle) * u + std::sin(angle) * v};
   }
-  const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above);
+  const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above, kFeelM);
   for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offsets_.around_m * n;
-  const std::uint32_t met_below = in_.rays.first_hits(rays, selection, below);
-  sample.flat_m = 1e6F;
+  const std::uint32_t met_below = in_.rays.first_hits(rays, selection, below, kFeelM);
+  sample.flat_m = kFeelM;
   for (std::size_t k = 0; k < kTangents; ++k) {
     if (((met_above >> k) & 1U) != 0U) sample.flat_m = std::min(sample.flat_m, above[k].distance_m);
     if (((met_below >> k) & 1U) != 0U) sample.flat_m = std::min(sample.flat_m, below[k].distance_m);

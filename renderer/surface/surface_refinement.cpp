@@ -265,7 +265,8 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
 }
 
 SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const RefinedMesh& refined,
-                                                 std::span<const SurfacePatch> patches) {
+                                                 std::span<const SurfacePatch> patches,
+                                                 std::span<const std::uint32_t> of_mesh) {
   std::vector<Judged>& judged = judged_[mesh];
   judged.resize(refined.leaf_count());
   constexpr std::size_t kGrain = 256;
@@ -276,9 +277,8 @@ SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const Refin
       judged[i] = {refined.node(slot)};
       float squares = 0.0F;
       float uses = 0.0F;
-      for (const SurfacePatch& patch : patches) {
-        if (patch.mesh != mesh) continue;
-        const Judged here = need(refined, slot, patch);
+      for (const std::uint32_t p : of_mesh) {
+        const Judged here = need(refined, slot, patches[p]);
         squares += here.need * here.need;
         uses += 1.0F;
         judged[i].in_view = judged[i].in_view || here.in_view;

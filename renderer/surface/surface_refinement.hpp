@@ -37,9 +37,10 @@ class SurfaceRefinement {
     float need = 0.0F;
     float in_view = 0.0F;
   };
-  /// Looks at the leaves of `mesh` that are new since the last call. Patches of other meshes are
-  /// not looked at. Call it for each mesh in turn, after its vertices were sampled.
-  Most judge(std::uint32_t mesh, const RefinedMesh& refined, std::span<const SurfacePatch> patches);
+  /// Looks at the leaves of `mesh` that are new since the last call. `of_mesh`: the patches that
+  /// have it. Call it for each mesh in turn, after its vertices were sampled.
+  Most judge(std::uint32_t mesh, const RefinedMesh& refined, std::span<const SurfacePatch> patches,
+             std::span<const std::uint32_t> of_mesh);
 
   /// A leaf that is too coarse: the error there in tolerances times its width in pixels; a small
   /// share of that out of view. Wider ones than what is looked at everywhere come before all

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -54,14 +55,18 @@ glm::vec3 turned(const glm::vec3& local, const Tangents& tangents,
   return glm::normalize(local.x * tangents.u + local.y * tangents.v + local.z * normal);
 }
 
+constexpr std::uint32_t kNone = ~0U;
+
 /// Hits side by side in the sorted list that one entry stands for.
 struct Group {
   std::uint32_t first = 0;
   std::uint32_t count = 0;
   std::uint32_t instance = 0;
   bool front = true;
-  glm::vec3 direction{0.0F};  ///< sum over the group
-  glm::vec3 normal{0.0F};     ///< sum over the group
+  glm::vec3 direction{0.0F};     ///< sum over the group
+  glm::vec3 normal{0.0F};        ///< sum over the group
+  std::uint32_t before = kNone;  ///< neighbours in the list
+  std::uint32_t after = kNone;
 };
 
 /// Growth of the groups' spread by joining two (Ward's criterion), on the unit sphere of directions
@@ -77,11 +82,42 @@ float join_cost(const Group& a, const Group& b) noexcept {
   return spread * na * nb / (na + nb);
 }
 
+/// Costs of joining group i with the one after it; the least, and of equal ones the first, is found
+/// by blocks.
+class JoinCosts {
+ public:
+  /// All of `count` costs are infinite.
+  explicit JoinCosts(std::size_t count) noexcept : blocks_((count + kBlock - 1) / kBlock) {
+    std::fill_n(costs_.begin(), blocks_ * kBlock, kNever);
+    std::fill_n(least_.begin(), blocks_, kNever);
+  }
+  void set(std::size_t i, float cost) noexcept {
+    costs_[i] = cost;
+    const auto begin = costs_.begin() + static_cast<std::ptrdiff_t>(i / kBlock * kBlock);
+    least_[i / kBlock] = *std::min_element(begin, begin + kBlock);
+  }
+  void remove(std::size_t i) noexcept { set(i, kNever); }
+  [[nodiscard]] std::size_t least() const noexcept {
+    const auto block = static_cast<std::size_t>(
+        std::min_element(least_.data(), least_.data() + blocks_) - least_.data());
+    const float* begin = costs_.data() + block * kBlock;
+    return block * kBlock +
+           static_cast<std::size_t>(std::min_element(begin, begin + kBlock) - begin);
+  }
+
+ private:
+  static constexpr std::size_t kBlock = 16;
+  static constexpr float kNever = std::numeric_limits<float>::infinity();
+  static_assert(ViewSampler::kMaxRays % kBlock == 0);
+  std::array<float, ViewSampler::kMaxRays> costs_;
+  std::array<float, ViewSampler::kMaxRays / kBlock> least_;
+  std::size_t blocks_;
+};
+
 /// Sorted hits of one point and their groups.
 struct Hits {
   std::array<SeenFace, ViewSampler::kMaxRays> faces;
   std::array<Group, ViewSampler::kMaxRays> groups;
-  std::array<float, ViewSampler::kMaxRays> costs;  ///< of joining group i with i + 1
   std::size_t count = 0;
 };
 
@@ -101,17 +137,20 @@ void join_neighbours(Hits& hits) noexcept {
   for (std::size_t i = 0; i < hits.count; ++i) sorted[i] = hits.faces[order[i].second];
   hits.faces = sorted;
 
+  JoinCosts costs(hits.count);
   for (std::uint32_t i = 0; i < hits.count; ++i) {
     const SeenFace& face = hits.faces[i];
     hits.groups[i] = {i, 1, face.instance, face.front, face.direction, face.normal};
-    if (i > 0) hits.costs[i - 1] = join_cost(hits.groups[i - 1], hits.groups[i]);
+    if (i == 0) continue;
+    hits.groups[i].before = i - 1;
+    hits.groups[i - 1].after = i;
+    costs.set(i - 1, join_cost(hits.groups[i - 1], hits.groups[i]));
   }
-  while (hits.count > SurfaceView::kMaxSeen) {
-    const auto best = static_cast<std::size_t>(
-        std::min_element(hits.costs.data(), hits.costs.data() + (hits.count - 1)) -
-        hits.costs.data());
+  std::size_t left = hits.count;
+  for (; left > SurfaceView::kMaxSeen; --left) {
+    const auto best = static_cast<std::uint32_t>(costs.least());
     Group& group = hits.groups[best];
-    const Group& other = hits.groups[best + 1];
+    const Group& other = hits.groups[group.after];
     if (other.count > group.count) {
       group.instance = other.instance;
       group.front = other.front;
@@ -119,14 +158,23 @@ void join_neighbours(Hits& hits) noexcept {
     group.count += other.count;
     group.direction += other.direction;
     group.normal += other.normal;
-    for (std::size_t i = best + 1; i + 1 < hits.count; ++i) {
-      hits.groups[i] = hits.groups[i + 1];
-      hits.costs[i - 1] = hits.costs[i];
+    costs.remove(group.after);
+    group.after = other.after;
+    if (group.before != kNone) costs.set(group.before, join_cost(hits.groups[group.before], group));
+    if (group.after == kNone) {
+      costs.remove(best);
+      continue;
     }
-    --hits.count;
-    if (best > 0) hits.costs[best - 1] = join_cost(hits.groups[best - 1], group);
-    if (best + 1 < hits.count) hits.costs[best] = join_cost(group, hits.groups[best + 1]);
+    hits.groups[group.after].before = best;
+    costs.set(best, join_cost(group, hits.groups[group.after]));
   }
+  if (left == hits.count || hits.count == 0) return;
+  // The first of the list is never joined to another.
+  std::size_t to = 0;
+  for (std::uint32_t from = 0; from != kNone; from = hits.groups[from].after) {
+    hits.groups[to++] = hits.groups[from];
+  }
+  hits.count = left;
 }
 
 /// The hit of the group's object nearest to the middle of the group.

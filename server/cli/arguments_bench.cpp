@@ -209,6 +209,25 @@ void Tool::add_frame_time_benches(CLI::App& bench) {
     add_json(app, o.json);
   }
   {
+    auto [app, o] = add<BenchCrowdCommand>(
+        bench, "crowd",
+        "The airfield with and without ten thousand figures of a thousand triangles: frame time, "
+        "thermal samples and their memory",
+        "emit bench crowd --json crowd.json", run_bench_crowd);
+    add_set(app, o.set);
+    app.add_option("--instances", o.instances, "Figures")
+        ->check(CLI::Range(1U, 1'000'000U))
+        ->capture_default_str();
+    app.add_option("--triangles", o.triangles, "Of each figure, at least")
+        ->check(CLI::Range(1000U, 1'000'000U))
+        ->capture_default_str();
+    app.add_option("--pairs", o.pairs, "Frames of the two scenes that are shown in turn")
+        ->check(CLI::Range(15U, 100'000U))
+        ->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
     auto [app, o] = add<BenchTurnCommand>(
         bench, "turn",
         "Worst frame while the camera turns all round in a second, and after jumps to places that "

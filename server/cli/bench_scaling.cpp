@@ -16,7 +16,7 @@
 #include "emit/version.hpp"
 #include "interrupt.hpp"
 #include "json.hpp"
-#include "renderer_thread.hpp"
+#include "paired_frames.hpp"
 #include "scaling_axes.hpp"
 #include "scenario_input.hpp"
 #include "statistics.hpp"
@@ -25,11 +25,6 @@ namespace emit::cli {
 namespace {
 
 using physics::Result;
-
-/// Sim time goes on as at this rate, in real time.
-constexpr double kRateHz = 200.0;
-/// Untimed frames of a renderer before the others join.
-constexpr std::uint32_t kSettleFrames = 3;
 
 /// One line of the result.
 struct Row {
@@ -46,78 +41,19 @@ struct Row {
   std::optional<double> limit_ratio;
 };
 
-renderer::FrameRequest frame_of(const RendererThread& renderer, const scene::ScenarioDesc& scenario,
-                                std::uint32_t frame) {
-  renderer::FrameRequest request;
-  request.frame_number = frame;
-  request.sim_time_ns = observation_ns(scenario) + std::llround(1e9 * frame / kRateHz);
-  request.thermal_time_ns = request.sim_time_ns;
-  request.sensor_pose = renderer.scenario_pose_at(observation_ns(scenario));
-  return request;
-}
-
-/// A renderer of a case that has shown its first frames.
-struct Runner {
-  const scene::ScenarioDesc* scenario = nullptr;
-  std::unique_ptr<RendererThread> renderer;
-  double warm_up_s = 0.0;
-  std::uint32_t next_frame = 0;
-
-  Result<double> frame_ms() {
-    const auto frame = renderer->render(frame_of(*renderer, *scenario, next_frame++));
-    if (!frame) return tl::unexpected(frame.error());
-    return frame->frame_ms;
-  }
-};
-
-Result<Runner> start(const scene::ScenarioDesc& scenario, std::uint32_t settle_frames,
-                     int gpu_index) {
-  auto renderer = RendererThread::create(scenario, gpu_index);
-  if (!renderer) return tl::unexpected(std::move(renderer.error()));
-  Runner runner{&scenario, std::move(*renderer), 0.0, 0};
-  const auto warm_up_s = runner.renderer->warm_up(frame_of(*runner.renderer, scenario, 0));
-  if (!warm_up_s) return tl::unexpected(warm_up_s.error());
-  runner.warm_up_s = *warm_up_s;
-  for (std::uint32_t i = 0; i < settle_frames; ++i) {
-    const auto shown = runner.frame_ms();
-    if (!shown) return tl::unexpected(shown.error());
-  }
-  return runner;
-}
-
-/// Frame times of a, its twin and b, which take turns; who begins changes from round to round.
-using Rounds = std::array<std::vector<double>, 3>;
-Result<Rounds> take_turns(std::array<Runner*, 3> runners, std::uint32_t rounds) {
-  // All at the same sim times, whatever a has shown before.
-  const std::uint32_t first = std::ranges::max(runners, {}, [](const Runner* runner) {
-                                return runner->next_frame;
-                              })->next_frame;
-  for (Runner* runner : runners) runner->next_frame = first;
-  Rounds out;
-  for (std::uint32_t round = 0; round <= rounds; ++round) {
-    for (std::size_t turn = 0; turn < runners.size(); ++turn) {
-      const std::size_t who = (turn + round) % runners.size();
-      const auto frame_ms = runners[who]->frame_ms();
-      if (!frame_ms) return tl::unexpected(frame_ms.error());
-      if (round > 0) out[who].push_back(*frame_ms);  // the first may have to catch up
-    }
-  }
-  return out;
-}
-
 void add_all(Samples& samples, const std::vector<double>& values) {
   for (const double value : values) samples.add(value);
 }
 
 Row row_of(const ScalingAxis& axis, const ScalingCase& made, const char* method,
-           const Runner& runner) {
+           const SceneRunner& runner) {
   Row row;
   row.axis = axis.name;
   row.method = method;
   row.scenario = made.scenario;
-  row.stats = runner.renderer->stats();
-  row.device = runner.renderer->device();
-  row.warm_up_s = runner.warm_up_s;
+  row.stats = runner.stats();
+  row.device = runner.device();
+  row.warm_up_s = runner.warm_up_s();
   row.value = axis.name == "samples" ? static_cast<double>(row.stats.samples) : made.value;
   return row;
 }
@@ -125,13 +61,14 @@ Row row_of(const ScalingAxis& axis, const ScalingCase& made, const char* method,
 /// Each case against the one before, which runs twice: what differs then is the machine.
 Result<void> run_cached(const ScalingAxis& axis, const BenchScalingCommand& command,
                         ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
-  std::optional<Runner> before;
+  std::optional<SceneRunner> before;
   for (const ScalingCase& made : axis.cases) {
-    auto runner = start(made.scenario, kSettleFrames, command.gpu_index);
+    auto runner = SceneRunner::start(made.scenario, SceneRunner::kSettleFrames, command.gpu_index);
     if (!runner) return tl::unexpected(std::move(runner.error()));
     Row row = row_of(axis, made, "cached", *runner);
     if (before) {
-      auto twin = start(*before->scenario, kSettleFrames, command.gpu_index);
+      auto twin =
+          SceneRunner::start(before->scenario(), SceneRunner::kSettleFrames, command.gpu_index);
       if (!twin) return tl::unexpected(std::move(twin.error()));
       const auto rounds = take_turns({&*before, &*twin, &*runner}, command.pairs);
       if (!rounds) return tl::unexpected(rounds.error());
@@ -156,7 +93,7 @@ Result<void> run_per_frame(const ScalingAxis& axis, const BenchScalingCommand& c
   for (const ScalingCase& made : axis.cases) {
     scene::ScenarioDesc scenario = made.scenario;
     scenario.thermal.method = scene::ThermalMethod::per_frame;
-    auto runner = start(scenario, 1, command.gpu_index);
+    auto runner = SceneRunner::start(scenario, 1, command.gpu_index);
     if (!runner) return tl::unexpected(std::move(runner.error()));
     Row row = row_of(axis, made, "per-frame", *runner);
     for (std::uint32_t i = 0; i < command.per_frame_frames; ++i) {
@@ -196,7 +133,7 @@ Json row_json(const Row& row) {
   json.set("samples", cached ? Json(row.stats.samples) : Json(nullptr));
   json.set("samples_full", cached ? Json(row.stats.samples_full) : Json(nullptr));
   json.set("warm_up_s", cached ? Json(row.warm_up_s) : Json(nullptr));
-  json.set("rate_hz", kRateHz);
+  json.set("rate_hz", SceneRunner::kRateHz);
   return json;
 }
 

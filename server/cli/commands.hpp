@@ -312,6 +312,16 @@ struct BenchScalingCommand {
 };
 int run_bench_scaling(const BenchScalingCommand& command);
 
+struct BenchCrowdCommand {
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> set;
+  std::uint32_t instances = 10'000;
+  std::uint32_t triangles = 1000;  ///< of each, at least
+  std::uint32_t pairs = 45;
+  int gpu_index = -1;
+};
+int run_bench_crowd(const BenchCrowdCommand& command);
+
 struct BenchTurnCommand {
   std::optional<std::filesystem::path> json;
   std::string scene = "airfield";

@@ -126,7 +126,8 @@ int run_render(const RenderCommand& command) {
       command.out.string(), view.width_px, view.height_px, command.time_s, shown.name,
       renderer.scene_stats().triangles, setup_ms, warm_up_ms,
       renderer.scene_stats().samples > 0
-          ? fmt::format(" ({} thermal samples)", renderer.scene_stats().samples)
+          ? fmt::format(" ({} thermal samples, {:.0f} MiB)", renderer.scene_stats().samples,
+                        static_cast<double>(renderer.scene_stats().sample_bytes) / (1 << 20))
           : std::string(),
       frame_ms, renderer.device_name());
   if (renderer.scene_stats().samples_full) {
@@ -146,6 +147,7 @@ int run_render(const RenderCommand& command) {
     json.set("triangles", renderer.scene_stats().triangles);
     json.set("setup_ms", setup_ms).set("warm_up_ms", warm_up_ms).set("frame_ms", frame_ms);
     json.set("samples", renderer.scene_stats().samples);
+    json.set("sample_bytes", renderer.scene_stats().sample_bytes);
     json.set("nonfinite_px", view.stats.nonfinite_px);
     json.set("clamped_px", view.stats.clamped_px);
     json.set("radiance", plane_json(planes.radiance_w_m2_sr));

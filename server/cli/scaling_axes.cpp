@@ -11,7 +11,6 @@
 #include "emit/physics/frames.hpp"
 #include "emit/scenegen/generate.hpp"
 #include "scenario_input.hpp"
-#include "statistics.hpp"
 
 namespace emit::cli {
 namespace {
@@ -152,18 +151,6 @@ Result<void> add_samples(ScalingAxis& axis, bool quick) {
   return {};
 }
 
-std::vector<double> ratios(std::span<const double> over, std::span<const double> under) {
-  std::vector<double> out;
-  for (std::size_t i = 0; i < over.size(); ++i) out.push_back(over[i] / under[i]);
-  return out;
-}
-
-double median(std::span<const double> values) {
-  Samples samples;
-  for (const double value : values) samples.add(value);
-  return samples.median();
-}
-
 }  // namespace
 
 std::vector<std::string> scaling_axes() {
@@ -181,25 +168,6 @@ Result<ScalingAxis> make_scaling_axis(const std::string& name, bool quick, const
   if (name == "samples") made = add_samples(axis, quick);
   if (!made) return tl::unexpected(std::move(made.error()));
   return axis;
-}
-
-bool PairedRatio::within(double limit_ratio) const noexcept {
-  return ratio <= std::max(limit_ratio, 1.0 + self_spread);
-}
-
-PairedRatio paired_ratio(std::span<const double> a_ms, std::span<const double> twin_ms,
-                         std::span<const double> b_ms) {
-  PairedRatio out;
-  out.pairs = a_ms.size();
-  out.ratio = median(ratios(b_ms, a_ms));
-  const std::vector<double> self = ratios(twin_ms, a_ms);
-  out.self_ratio = median(self);
-  const std::size_t third = self.size() / 3;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const double part = median(std::span(self).subspan(i * third, third));
-    out.self_spread = std::max(out.self_spread, std::abs(part - 1.0));
-  }
-  return out;
 }
 
 }  // namespace emit::cli

@@ -64,6 +64,27 @@ TEST(CliBench, ScalingComparesEachCaseWithTheOneBefore) {
   EXPECT_GE(instances[13] - instances[12], 90.0);
 }
 
+TEST(CliBench, ACrowdIsMeasuredBesideTheSceneWithoutIt) {
+  const TemporaryFolder folder;
+  const ProcessResult run =
+      run_emit({"bench", "crowd", "--instances", "20", "--pairs", "15", "--set",
+                "thermal.tolerance_k=50", "--set", "thermal.steps=3", "--set", "sensor.width_px=64",
+                "--set", "sensor.height_px=48", "--json", folder.file("c.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string json = read_text(folder.file("c.json"));
+  EXPECT_EQ(json_value(json, "suite"), "\"crowd\"");
+  const std::vector<double> instances = numbers_of(json, "instances");
+  ASSERT_EQ(instances.size(), 2U);
+  EXPECT_EQ(instances[1] - instances[0], 20.0);
+  const std::vector<double> triangles = numbers_of(json, "triangles");
+  EXPECT_GE(triangles[1] - triangles[0], 20'000.0);
+  const std::vector<double> samples = numbers_of(json, "samples");
+  EXPECT_GT(samples[1], samples[0]);
+  for (const double mib : numbers_of(json, "sample_mib")) EXPECT_GT(mib, 0.0);
+  EXPECT_EQ(numbers_of(json, "ratio").size(), 1U);
+  EXPECT_EQ(numbers_of(json, "frame_ms_median").size(), 2U);
+}
+
 TEST(CliBench, LossyStreamsSayWhatCameAndNothingOfItIsWrong) {
   const TemporaryFolder folder;
   const ProcessResult run =

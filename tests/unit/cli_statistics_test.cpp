@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "console.hpp"
-#include "scaling_axes.hpp"
+#include "paired_frames.hpp"
 
 namespace emit::cli {
 namespace {

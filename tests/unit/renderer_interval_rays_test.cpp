@@ -146,5 +146,49 @@ TEST_F(IntervalRaysTest, NothingIsTracedAtNightOrBehindTheFace) {
   EXPECT_EQ(interval_.sun_frac(*rays_, down, kOffsetM, 0.0F), 0.0F);
 }
 
+/// Entities that no ray of a packet can meet are passed over; an exaggerated radius lets every ray
+/// be asked.
+TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
+  test::SurfaceScene scene;
+  scene.add_static(scene.add_mesh(test::level_mesh(glm::vec3(-900.0F, -900.0F, 0.0F),
+                                                   glm::vec3(900.0F, 900.0F, 0.0F), -1.0F)),
+                   glm::dmat4(1.0));
+  for (int i = 0; i < 2; ++i) {
+    scene.add_mover(test::box_mesh(glm::vec3(-2.0F, -1.0F, -1.5F), glm::vec3(2.0F, 1.0F, 1.5F)));
+  }
+  const auto rays = CasterRays::create(scene.geometry);
+  ASSERT_TRUE(rays.has_value());
+  // One crosses the field, one stands high above it and vanishes half-way.
+  std::vector<PoseHistory> entities;
+  for (int i = 0; i < 2; ++i) entities.emplace_back(scene::ObjectDesc{}, physics::Pose{});
+  const std::int64_t end_ns = kNoonNs + 60'000'000'000;
+  for (int k = 0; k <= 60; ++k) {
+    const std::int64_t at_ns = kNoonNs + std::int64_t{k} * 1'000'000'000;
+    const glm::dvec3 on_the_way(-30.0 + k, 5.0 * std::sin(0.2 * k), 2.0);
+    ASSERT_TRUE(
+        entities[0].append(at_ns, {on_the_way, physics::Pose{}.world_from_body}, true, false));
+    ASSERT_TRUE(entities[1].append(at_ns, {{0.0, 0.0, 150.0}, physics::Pose{}.world_from_body},
+                                   k < 30, false));
+  }
+  IntervalRays tight(std::vector<float>{2.7F, 2.7F});
+  IntervalRays wide(std::vector<float>{1e6F, 1e6F});
+  int partly = 0;
+  for (const std::int64_t begin_ns : {kNoonNs, kNoonNs + 20'000'000'000}) {
+    tight.update(begin_ns, end_ns, 3, environment_, entities, rays->origin_world_m());
+    wide.update(begin_ns, end_ns, 3, environment_, entities, rays->origin_world_m());
+    for (int y = -40; y <= 160; y += 2) {
+      for (int x = -60; x <= 60; x += 2) {
+        SurfaceSample sample;
+        sample.position_m = glm::vec3(glm::dvec3(x, y, -1.0) - rays->origin_world_m());
+        sample.normal = glm::vec3(0.0F, 0.0F, 1.0F);
+        const float found = tight.sun_frac(*rays, sample, kOffsetM, 0.3F);
+        ASSERT_EQ(found, wide.sun_frac(*rays, sample, kOffsetM, 0.3F)) << x << ' ' << y;
+        partly += found > 0.0F && found < 1.0F ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(partly, 100);
+}
+
 }  // namespace
 }  // namespace emit::renderer

@@ -309,7 +309,7 @@ scene::Mesh fan(std::initializer_list<double> angles_deg, bool closed) {
 TEST(FindInward, of_a_vertex_inside_is_nothing_however_uneven_its_leaves_are) {
   std::vector<glm::vec3> inward;
   // Four slim leaves to the east, two wide ones for the rest.
-  find_inward(RefinedMesh(fan({-20, -10, 0, 10, 20, 180}, true), kNoLimit), inward);
+  find_inward(RefinedMesh(fan({-20, -10, 0, 10, 20, 180}, true), kNoLimit), 0, inward);
   ASSERT_EQ(inward.size(), 7U);
   EXPECT_EQ(inward[0], glm::vec3(0.0F));
   for (std::size_t v = 1; v < inward.size(); ++v) EXPECT_NEAR(glm::length(inward[v]), 1.0F, 1e-5F);
@@ -319,12 +319,22 @@ TEST(FindInward, of_a_vertex_inside_is_nothing_however_uneven_its_leaves_are) {
 TEST(FindInward, of_a_vertex_on_the_rim_points_into_the_leaves_however_far_they_reach) {
   std::vector<glm::vec3> inward;
   // All but a gap of 20 degrees towards the west: directions nearly cancel.
-  find_inward(RefinedMesh(fan({-170, -90, 0, 90, 170}, false), kNoLimit), inward);
+  find_inward(RefinedMesh(fan({-170, -90, 0, 90, 170}, false), kNoLimit), 0, inward);
   EXPECT_GT(inward[0].x, 0.99F);
   // Where rims of two materials meet, both are on them.
-  find_inward(RefinedMesh(octahedron(), kNoLimit), inward);
+  find_inward(RefinedMesh(octahedron(), kNoLimit), 0, inward);
   EXPECT_EQ(inward[4], glm::vec3(0.0F));
   for (std::size_t v = 6; v < 10; ++v) EXPECT_GT(glm::length(inward[v]), 0.99F);
+}
+
+TEST(FindInward, from_a_vertex_on_gives_what_it_gives_from_the_first) {
+  const RefinedMesh mesh(fan({-170, -90, 0, 90, 170}, false), kNoLimit);
+  std::vector<glm::vec3> all;
+  find_inward(mesh, 0, all);
+  std::vector<glm::vec3> late(2, glm::vec3(7.0F));
+  find_inward(mesh, 3, late);
+  ASSERT_EQ(late.size(), all.size());
+  for (std::size_t v = 3; v < all.size(); ++v) EXPECT_EQ(late[v], all[v]) << v;
 }
 
 }  // namespace

@@ -128,7 +128,7 @@ TEST(Simplify, kept_triangles_stay_and_the_rest_meets_them) {
 
 TEST(Separated, near_instances_have_a_mesh_of_their_own_and_far_ones_share) {
   SceneGeometry geometry = scene_of(sphere(8, false));
-  for (const double x_m : {10.0, 1000.0, 1010.0}) {
+  for (const double x_m : {10.0, 1100.0, 1110.0}) {
     Instance instance = geometry.instances[0];
     instance.world_bounds.min_m.x += x_m;
     instance.world_bounds.max_m.x += x_m;
@@ -143,6 +143,43 @@ TEST(Separated, near_instances_have_a_mesh_of_their_own_and_far_ones_share) {
     EXPECT_EQ(own.meshes[instance.mesh].indices, geometry.meshes[0].indices);
   }
   EXPECT_EQ(separated(geometry, {{}, kPixelRad}).meshes.size(), 1U);
+}
+
+TEST(Separated, far_instances_share_with_those_whose_pixels_are_as_wide) {
+  SceneGeometry geometry = scene_of(sphere(8, false));
+  const Instance near = geometry.instances[0];
+  geometry.instances.clear();
+  // Too narrow for meshes of their own; two within an octave, one beyond, and one that moves.
+  for (const double x_m : {2100.0, 9000.0, 3900.0, 2200.0, 8500.0}) {
+    Instance instance = near;
+    instance.world_bounds.min_m.x += x_m;
+    instance.world_bounds.max_m.x += x_m;
+    instance.entity_id = x_m == 2200.0 ? 1 : 0;
+    geometry.instances.push_back(instance);
+  }
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0)};
+  const DetailView view{eyes, 1.0 / 1024.0};
+  const SceneGeometry shared = separated(geometry, view);
+  EXPECT_EQ(shared.instances[0].mesh, shared.instances[2].mesh);
+  EXPECT_EQ(shared.instances[1].mesh, shared.instances[4].mesh);
+  EXPECT_NE(shared.instances[0].mesh, shared.instances[1].mesh);
+  // What moves comes as close as it likes: nothing that shares with it could lose triangles.
+  EXPECT_EQ(shared.instances[3].mesh, 0U);
+  EXPECT_NE(shared.instances[0].mesh, 0U);
+  EXPECT_NE(shared.instances[1].mesh, 0U);
+  EXPECT_EQ(shared.meshes.size(), 3U);
+  const std::vector<double> errors = simplify_errors(
+      [&] {
+        SceneGeometry fine = separated(scene_of(sphere(200, false)), view);
+        fine.meshes.resize(3, fine.meshes[0]);
+        fine.instances = shared.instances;
+        return fine;
+      }(),
+      view);
+  EXPECT_EQ(errors[0], 0.0);
+  const double near_error = errors[shared.instances[0].mesh];
+  EXPECT_GT(near_error, 0.0);
+  EXPECT_GT(errors[shared.instances[1].mesh], 4.0 * near_error * 0.99);
 }
 
 TEST(Simplify, the_seam_between_two_materials_does_not_move) {

@@ -9,7 +9,9 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <map>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace emit::scene {
@@ -30,6 +32,15 @@ double greatest_scale(const glm::dmat4& m) {
                    glm::length(glm::dvec3(m[2]))});
 }
 
+/// On what lies in the box, seen from the nearest eye; infinite where an eye is inside.
+double pixels_per_m(const Aabb& box, const DetailView& view) {
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const glm::dvec3& eye_m : view.eyes_world_m) {
+    nearest_m = std::min(nearest_m, distance_m(box, eye_m));
+  }
+  return 1.0 / (view.pixel_rad * nearest_m);
+}
+
 /// Width of a pixel on the nearest instance of every mesh, in the mesh's own lengths; 0 where a
 /// mesh may come as close as it likes.
 std::vector<double> pixel_widths(const SceneGeometry& geometry, const DetailView& view) {
@@ -42,9 +53,7 @@ std::vector<double> pixel_widths(const SceneGeometry& geometry, const DetailView
     }
     if (instance.world_bounds.empty()) continue;
     const double scale = greatest_scale(instance.world_from_mesh);
-    for (const glm::dvec3& eye_m : view.eyes_world_m) {
-      width = std::min(width, view.pixel_rad * distance_m(instance.world_bounds, eye_m) / scale);
-    }
+    width = std::min(width, 1.0 / (pixels_per_m(instance.world_bounds, view) * scale));
   }
   return widths;
 }
@@ -119,26 +128,38 @@ double distance_m(const Aabb& box, const glm::dvec3& point_m) noexcept {
 }
 
 SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
+  if (view.eyes_world_m.empty()) return geometry;
   std::vector<std::uint32_t> uses(geometry.meshes.size(), 0);
-  for (const Instance& instance : geometry.instances) ++uses[instance.mesh];
+  std::vector<bool> taken(geometry.meshes.size(), false);  // the mesh as it is has its class
+  for (const Instance& instance : geometry.instances) {
+    ++uses[instance.mesh];
+    if (instance.entity_id != 0) taken[instance.mesh] = true;
+  }
+  const auto copy_of = [&geometry](std::uint32_t mesh) {
+    Mesh copy = geometry.meshes[mesh];
+    geometry.meshes.push_back(std::move(copy));
+    return static_cast<std::uint32_t>(geometry.meshes.size() - 1);
+  };
   std::size_t copied = 0;
+  std::map<std::pair<std::uint32_t, int>, std::uint32_t> classes;
   for (Instance& instance : geometry.instances) {
-    const std::size_t vertices = geometry.meshes[instance.mesh].positions_m.size();
-    if (instance.entity_id != 0 || instance.world_bounds.empty() || uses[instance.mesh] < 2 ||
-        copied + vertices > kMostCopied) {
+    const std::uint32_t mesh = instance.mesh;
+    if (instance.entity_id != 0 || instance.world_bounds.empty() || uses[mesh] < 2) continue;
+    const double px_per_m = pixels_per_m(instance.world_bounds, view);
+    const double width_m = glm::length(instance.world_bounds.max_m - instance.world_bounds.min_m);
+    const std::size_t vertices = geometry.meshes[mesh].positions_m.size();
+    if (width_m * px_per_m > kOwnMeshPx && copied + vertices <= kMostCopied) {
+      copied += vertices;
+      --uses[mesh];
+      instance.mesh = copy_of(mesh);
       continue;
     }
-    const double width_m = glm::length(instance.world_bounds.max_m - instance.world_bounds.min_m);
-    const bool wide = std::ranges::any_of(view.eyes_world_m, [&](const glm::dvec3& eye_m) {
-      return width_m > kOwnMeshPx * view.pixel_rad * distance_m(instance.world_bounds, eye_m);
-    });
-    if (!wide) continue;
-    copied += vertices;
-    --uses[instance.mesh];
-    Mesh own = geometry.meshes[instance.mesh];
-    instance.mesh = static_cast<std::uint32_t>(geometry.meshes.size());
-    geometry.meshes.push_back(std::move(own));
-    uses.push_back(1);
+    const double scale = greatest_scale(instance.world_from_mesh);
+    const int octave = std::ilogb(std::clamp(scale * px_per_m, 1e-9, 1e9));
+    const auto [own, is_new] = classes.try_emplace({mesh, octave}, mesh);
+    if (is_new && taken[mesh]) own->second = copy_of(mesh);
+    taken[mesh] = true;
+    instance.mesh = own->second;
   }
   return geometry;
 }

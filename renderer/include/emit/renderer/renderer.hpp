@@ -118,9 +118,10 @@ struct FrameView {
 struct SceneStats {
   std::uint64_t triangles = 0;  ///< drawn when everything is in view, instances counted
   std::uint32_t instances = 0;
-  /// thermal.method "cached", after warm_up(): thermal samples, and whether thermal.max_samples
-  /// stopped their refinement.
+  /// thermal.method "cached", after warm_up(): thermal samples, what they take of main memory, and
+  /// whether thermal.max_samples stopped their refinement.
   std::uint64_t samples = 0;
+  std::uint64_t sample_bytes = 0;
   bool samples_full = false;
   std::vector<std::string> warnings;  ///< unmapped materials and what else the loader could not map
 };

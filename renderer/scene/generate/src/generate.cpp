@@ -62,11 +62,11 @@ Result<void> check(const BoxOptions& o) {
 
 Result<void> check(const StatueOptions& o) {
   return first_error(
-      {require(o.min_triangles >= 2000 && o.min_triangles <= 20'000'000, "min_triangles",
-               o.min_triangles, "must be in [2000, 2e7]"),
+      {require(o.min_triangles >= 1000 && o.min_triangles <= 20'000'000, "min_triangles",
+               o.min_triangles, "must be in [1000, 2e7]"),
        require(in_range(o.height_m, 0.1, 100.0), "height_m", o.height_m, "must be in [0.1, 100]"),
-       require(o.plane_m > 2.0 * o.height_m && o.plane_m <= kMaxLengthM, "plane_m", o.plane_m,
-               "must exceed 2 height_m and be at most 1e5")});
+       require(o.plane_m == 0.0 || (o.plane_m > 2.0 * o.height_m && o.plane_m <= kMaxLengthM),
+               "plane_m", o.plane_m, "must be 0, or exceed 2 height_m and be at most 1e5")});
 }
 
 Result<void> check(const BlockOnRoadOptions& o) {

@@ -52,11 +52,13 @@ physics::Result<Scene> statue_scene(const StatueOptions& options) {
   part.indices = surface->indices;
 
   Scene scene;
-  MeshBuilder plane("plane");
-  const double half = 0.5 * options.plane_m;
-  plane.material("asphalt").grid_quad({-half, -half, 0.0}, {half, -half, 0.0}, {half, half, 0.0},
-                                      {-half, half, 0.0}, 8, 8);
-  scene.place(scene.add_mesh(plane.take()), "plane");
+  if (options.plane_m > 0.0) {
+    MeshBuilder plane("plane");
+    const double half = 0.5 * options.plane_m;
+    plane.material("asphalt").grid_quad({-half, -half, 0.0}, {half, -half, 0.0}, {half, half, 0.0},
+                                        {-half, half, 0.0}, 8, 8);
+    scene.place(scene.add_mesh(plane.take()), "plane");
+  }
   SceneMesh statue;
   statue.name = "statue";
   statue.parts.push_back(std::move(part));

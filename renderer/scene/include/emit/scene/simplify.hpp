@@ -18,8 +18,10 @@ struct DetailView {
 [[nodiscard]] double distance_m(const Aabb& box, const glm::dvec3& point_m) noexcept;
 
 /// Gives every static instance that looks wide from some eye a mesh of its own, so that each can be
-/// cut as finely as it needs; far ones go on sharing, and all do where the eyes are unknown or the
-/// copies would have more than some million vertices. Instances keep their order. Setup only.
+/// cut as finely as it needs, as long as the copies have no more than some million vertices. The
+/// others go on sharing with those on which a pixel is as wide to a factor of two, so that each
+/// class can lose what its pixels do not show. Where the eyes are unknown all share. Instances keep
+/// their order. Setup only.
 [[nodiscard]] SceneGeometry separated(SceneGeometry geometry, const DetailView& view);
 
 /// By mesh the distance that its surface may move when it is simplified, in the mesh's own lengths:

@@ -29,9 +29,9 @@ struct BoxOptions {
 
 /// Seated figure with folds on a plane: one closed surface. Materials: stone, asphalt.
 struct StatueOptions {
-  std::uint32_t min_triangles = 1'080'000;  ///< of the statue alone, 2'000 .. 20'000'000
+  std::uint32_t min_triangles = 1'080'000;  ///< of the statue alone, 1'000 .. 20'000'000
   double height_m = 2.6;                    ///< 0.1 .. 100
-  double plane_m = 40.0;                    ///< edge of the plane, > 2 height_m
+  double plane_m = 40.0;                    ///< edge of the plane, > 2 height_m; 0: none
 };
 
 /// Concrete block on an asphalt road. Road in x = east, y = north, centred on the block. Nodes:

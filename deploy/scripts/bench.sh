@@ -1,0 +1,105 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Installs the packages, builds the release preset, runs every benchmark of this machine's device and
+# writes bench.json (all results), bench.md (their tables, for a README) and one log a suite.
+# Usage: bench.sh [--quick] [--no-install] [--out DIR] [SUITE]...   default: out/bench, every suite
+# --quick: fewer frames and smaller scenes, to see that all is well; such figures are no measurement.
+# --no-install: the packages are there already (a machine without network). Exits 1 when a suite failed;
+# the others' results are written all the same.
+set -euo pipefail
+out=out/bench
+quick=false
+install=true
+suites=()
+while (($#)); do
+  case $1 in
+    --quick) quick=true ;;
+    --no-install) install=false ;;
+    --out)
+      out=${2:?bench.sh: --out needs a folder}
+      shift
+      ;;
+    --*)
+      echo "bench.sh: unknown option $1" >&2
+      exit 2
+      ;;
+    *) suites+=("$1") ;;
+  esac
+  shift
+done
+mkdir -p "$out"
+out=$(realpath "$out")
+cd "$(dirname "$0")/../.."
+known=(paper error-vs-time scaling crowd turn budget thermal-truth convergence stability stream isolation)
+if ((${#suites[@]} == 0)); then suites=("${known[@]}"); fi
+for suite in "${suites[@]}"; do
+  if [[ " ${known[*]} " != *" $suite "* ]]; then
+    echo "bench.sh: no suite '$suite': ${known[*]}" >&2
+    exit 2
+  fi
+done
+
+arguments() { # of a suite, when quick
+  case $1 in
+    paper) echo "--scene box --steps 27 --frames 2 --no-errors" ;;
+    error-vs-time) echo "--quick --scene ribbed --frames 1 --rays 64 --refine 0.5 --pixels 200" ;;
+    scaling) echo "--quick --pairs 15 --per-frame-frames 1" ;;
+    crowd) echo "--instances 100 --pairs 15 --set thermal.tolerance_k=5 --set thermal.steps=3" ;;
+    turn) echo "--runs 1 --frames 20 --set thermal.tolerance_k=5" ;;
+    budget) echo "--frames 30 --set thermal.tolerance_k=5" ;;
+    thermal-truth) echo "--method cached --width 64 --height 48 --steps 9" ;;
+    stability) echo "--cases 100000 --part equilibrium" ;;
+    stream) echo "--frames 300 --repeats 1" ;;
+    isolation) echo "--pairs 2" ;;
+  esac
+}
+
+if $install; then deploy/scripts/install_deps.sh; fi
+cmake --preset release
+cmake --build --preset release --target emit emitd config_data emit_scenes emit_logs
+failed=()
+for suite in "${suites[@]}"; do
+  more=()
+  if $quick; then read -r -a more <<<"$(arguments "$suite")"; fi
+  rm -f "$out/$suite.json"
+  echo "== bench $suite ${more[*]}"
+  if ! build/release/bin/emit bench "$suite" --json "$out/$suite.json" "${more[@]}" \
+    >"$out/$suite.txt" 2>"$out/$suite.log"; then
+    tail -n 5 "$out/$suite.log" >&2
+    failed+=("$suite")
+  fi
+done
+
+{
+  echo "# Benchmarks"
+  echo
+  for suite in "${suites[@]}"; do
+    echo "## emit bench $suite"
+    if [[ -s $out/$suite.txt ]]; then
+      printf '```\n%s\n```\n\n' "$(cat "$out/$suite.txt")"
+    else
+      printf 'no result\n\n'
+    fi
+  done
+} >"$out/bench.md"
+{
+  echo "{"
+  echo "  \"host\": \"$(uname -srm)\","
+  echo "  \"cores\": $(nproc),"
+  echo "  \"quick\": $quick,"
+  echo "  \"suites\": ["
+  separator=""
+  for suite in "${suites[@]}"; do
+    [[ -s $out/$suite.json ]] || continue
+    printf '%s' "$separator"
+    sed 's/^/    /' "$out/$suite.json"
+    separator=","
+  done
+  echo "  ]"
+  echo "}"
+} >"$out/bench.json"
+echo "written: $out/bench.json, $out/bench.md"
+if ((${#failed[@]})); then
+  echo "bench.sh: failed: ${failed[*]}" >&2
+  exit 1
+fi
