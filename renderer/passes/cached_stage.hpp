@@ -50,11 +50,12 @@ class CachedStage final : public ThermalStage {
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-              std::optional<CachedSurface::Saved> saved);
+              std::optional<CachedSurface::Saved> saved, bool visibly_simplified);
 
   scene::SensorDesc sensor_;
   scene::Aabb static_bounds_;
   std::vector<Eye> detail_eyes_;   ///< meshes were simplified for these
+  bool visibly_simplified_;        ///< for want of samples
   std::vector<Eye> refined_eyes_;  ///< triangles were cut for these
   std::vector<std::int32_t> history_of_object_;
   const SceneHistory& history_;

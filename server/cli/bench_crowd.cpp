@@ -29,12 +29,13 @@ using physics::Result;
 /// What a frame may take of what it takes without the crowd.
 constexpr double kLimitRatio = 3.0;
 constexpr double kFigureM = 2.0;
-constexpr double kApartM = 4.0;
-constexpr double kTurnRad = 0.65;  ///< from each figure to the next
-constexpr std::uint32_t kFiguresOfRow = 100;
-/// Western end of the first row: on the grass before the apron, where the seeker looks over it.
-constexpr double kFirstEastM = -200.0;
+/// All over the southern half of the field, from the western end of the row next to the apron on.
+constexpr double kApartEastM = 9.0;
+constexpr double kApartNorthM = 4.4;
+constexpr double kFirstEastM = -445.0;
 constexpr double kFirstNorthM = -60.0;
+constexpr std::uint32_t kFiguresOfRow = 100;
+constexpr double kTurnRad = 0.65;  ///< from each figure to the next
 
 /// One line of the result.
 struct Row {
@@ -60,8 +61,8 @@ Result<scene::ObjectDesc> crowd(const BenchCrowdCommand& command,
   object.gltf = files->files.front().path;
   for (std::uint32_t i = 0; i < command.instances; ++i) {
     physics::Pose pose;
-    pose.position_world_m = {kFirstEastM + kApartM * (i % kFiguresOfRow),
-                             kFirstNorthM - kApartM * (i / kFiguresOfRow), 0.0};
+    pose.position_world_m = {kFirstEastM + kApartEastM * (i % kFiguresOfRow),
+                             kFirstNorthM - kApartNorthM * (i / kFiguresOfRow), 0.0};
     pose.world_from_body = physics::world_from_body_heading_pitch_roll(kTurnRad * i, 0.0, 0.0);
     object.instances.push_back(pose);
   }

@@ -11,8 +11,9 @@ class Samples {
  public:
   Samples() = default;
   /// Keeps `most` samples at most, evenly spread over those that came: when there is no room, every
-  /// second goes. Number, sum and maximum stay exact. Precondition: most is even and not 0.
-  explicit Samples(std::size_t most) : most_(most) {}
+  /// second goes. Number, sum and maximum stay exact. Takes its memory at once. Precondition: most
+  /// is even and not 0.
+  explicit Samples(std::size_t most);
 
   void add(double value);
   void reserve(std::size_t count) { values_.reserve(count); }

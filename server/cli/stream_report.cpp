@@ -32,7 +32,7 @@ constexpr std::array<FlagName, 14> kFlagNames{{{protocol::kFlagLate, "late"},
 }  // namespace
 
 StreamReport::StreamReport(std::uint32_t every_nth) : every_nth_(every_nth) {
-  stages_.fill(Samples(kMostSamples));
+  for (Samples& stage : stages_) stage = Samples(kMostSamples);  // copies would lose their memory
 }
 
 void StreamReport::add(const server::ReceivedFrame& frame) {
