@@ -7,7 +7,7 @@
 
 #include "emit/scene/simplify.hpp"
 #include "passes/foster_setup.hpp"
-#include "surface/kept_facets.hpp"
+#include "surface/coarse_geometry.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -18,9 +18,6 @@ constexpr double kReachFrac = 0.05;
 constexpr std::size_t kEyes = 16;
 /// Places of the sun that tell what it comes to.
 constexpr std::size_t kSuns = 16;
-/// How often the errors of simplification are doubled, from a quarter of a pixel, where samples are
-/// scarce.
-constexpr std::uint32_t kMostCoarser = 3;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
 /// The camera may point that share of its field of view aside of where it was said to.
 constexpr double kFieldMarginFrac = 0.5;
@@ -86,51 +83,6 @@ std::vector<glm::vec3> suns(const scene::ScenarioDesc& scenario, const Environme
   return out;
 }
 
-/// Vertices of all instances: what sampling them as they are takes.
-std::size_t sampled_vertices(const scene::SceneGeometry& geometry) {
-  std::size_t count = 0;
-  for (const scene::Instance& instance : geometry.instances) {
-    count += geometry.meshes[instance.mesh].positions_m.size();
-  }
-  return count;
-}
-
-/// A scene with fewer triangles, and what it was.
-struct Simplified {
-  scene::SceneGeometry geometry;
-  std::optional<SurfaceDetail> detail;
-  bool visibly = false;  ///< more went than no pixel shows
-};
-
-/// What no pixel shows goes. Where the vertices that are left would still take more than half of
-/// the samples, more goes, up to errors of some pixels: the ground between many small things needs
-/// samples, too.
-physics::Result<Simplified> simplified(const scene::ScenarioDesc& scenario,
-                                       scene::SceneGeometry geometry, const scene::DetailView& view,
-                                       const Environment& environment) {
-  std::vector<double> errors = scene::simplify_errors(geometry, view);
-  if (std::ranges::none_of(errors, [](double error) { return error > 0.0; })) {
-    return Simplified{std::move(geometry), std::nullopt, false};
-  }
-  scene::SceneGeometry full = std::move(geometry);
-  auto rays = CasterRays::create(full);
-  if (!rays) return tl::unexpected(std::move(rays.error()));
-  Simplified out;
-  out.geometry = scene::simplified(
-      full, errors, kept_facets(full, errors, *rays, view, suns(scenario, environment)));
-  for (std::uint32_t times = 0;
-       times < kMostCoarser && sampled_vertices(out.geometry) > scenario.thermal.max_samples / 2;
-       ++times) {
-    out.visibly = true;
-    for (double& error : errors) error *= 2.0;
-    out.geometry = scene::simplified(full, errors);
-  }
-  if (out.geometry.triangles < full.triangles) {
-    out.detail.emplace(std::move(full), std::move(*rays), out.geometry);
-  }
-  return out;
-}
-
 }  // namespace
 
 std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineView::Eye> eyes,
@@ -159,7 +111,8 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   }
   const scene::DetailView view{eyes_world_m, pixel_rad(scenario.sensor)};
   geometry = scene::separated(std::move(geometry), view);
-  auto coarse = simplified(scenario, std::move(geometry), view, history.environment);
+  auto coarse = coarse_geometry(std::move(geometry), view, suns(scenario, history.environment),
+                                scenario.thermal.max_samples);
   if (!coarse) return tl::unexpected(std::move(coarse.error()));
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
   auto surface = CachedSurface::create(

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/coarse_geometry.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "scene_sphere.hpp"
+#include "surface_scene.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// Ten spheres that share their mesh, seen from so far that a pixel is 3 cm wide.
+scene::SceneGeometry many_spheres(scene::Mesh mesh) {
+  scene::SceneGeometry geometry;
+  for (int i = 0; i < 10; ++i) {
+    scene::Instance instance;
+    instance.object = static_cast<std::uint32_t>(i);
+    instance.world_bounds = mesh.bounds;
+    geometry.instances.push_back(instance);
+    geometry.triangles += mesh.indices.size() / 3;
+  }
+  geometry.static_bounds = geometry.bounds = mesh.bounds;
+  geometry.meshes.push_back(std::move(mesh));
+  geometry.materials.resize(3);
+  return geometry;
+}
+
+CoarseGeometry coarse(const scene::SceneGeometry& geometry, std::size_t max_samples) {
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
+  const std::array<glm::vec3, 1> to_suns{glm::vec3(0.0F, 0.0F, 1.0F)};
+  auto made = coarse_geometry(geometry, {eyes, 1e-3}, to_suns, max_samples);
+  EXPECT_TRUE(made.has_value());
+  return std::move(*made);
+}
+
+std::size_t vertices(const CoarseGeometry& made) {
+  return 10 * made.geometry.meshes[0].positions_m.size();
+}
+
+TEST(CoarseGeometry, what_no_pixel_shows_goes_unseen) {
+  const scene::SceneGeometry full = many_spheres(scene::sphere(60, false));
+  const CoarseGeometry made = coarse(full, 100'000'000);
+  EXPECT_FALSE(made.visibly);
+  EXPECT_LT(made.geometry.triangles, full.triangles / 2);
+  ASSERT_TRUE(made.detail.has_value());
+  EXPECT_TRUE(made.detail->has(0));
+}
+
+TEST(CoarseGeometry, more_goes_until_vertices_leave_half_of_the_samples) {
+  const scene::SceneGeometry full = many_spheres(scene::sphere(60, false));
+  const std::size_t unseen = vertices(coarse(full, 100'000'000));
+  EXPECT_FALSE(coarse(full, 2 * unseen).visibly);
+  const CoarseGeometry made = coarse(full, 2 * unseen - 1);
+  EXPECT_TRUE(made.visibly);
+  EXPECT_LT(vertices(made), unseen);
+  // No farther than to eight times the error: a sphere of a metre keeps its shape.
+  const CoarseGeometry least = coarse(full, 100);
+  EXPECT_TRUE(least.visibly);
+  EXPECT_LT(vertices(least), vertices(made));
+  EXPECT_GT(vertices(least), 10U * 40U);
+}
+
+TEST(CoarseGeometry, meshes_of_wide_triangles_stay_as_they_are) {
+  const scene::SceneGeometry full = many_spheres(scene::sphere(6, false));
+  const CoarseGeometry made = coarse(full, 100);
+  EXPECT_FALSE(made.visibly);
+  EXPECT_FALSE(made.detail.has_value());
+  EXPECT_EQ(made.geometry.meshes[0].indices, full.meshes[0].indices);
+}
+
+}  // namespace
+}  // namespace emit::renderer
