@@ -41,7 +41,7 @@ done
 
 arguments() { # of a suite, when quick
   case $1 in
-    paper) echo "--scene box --steps 27 --frames 2 --no-errors" ;;
+    paper) echo "--scene box --steps 27 --frames 5 --no-errors" ;;
     error-vs-time) echo "--quick --scene ribbed --frames 1 --rays 64 --refine 0.5 --pixels 200" ;;
     scaling) echo "--quick --pairs 15 --per-frame-frames 1" ;;
     crowd) echo "--instances 100 --pairs 15 --set thermal.tolerance_k=5 --set thermal.steps=3" ;;
