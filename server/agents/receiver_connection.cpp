@@ -7,7 +7,8 @@
 namespace emit::server {
 
 void Receiver::flush(Connection& connection) noexcept {
-  if (connection.write_lent) {
+  // A refusal that could not be written has ended the connection before its caller wants it ended.
+  if (connection.write_lent || !connection.open()) {
     return;
   }
   while (connection.out_sent < connection.out.size()) {
