@@ -41,7 +41,7 @@ struct CasterPart {
 /// that stand more than once are stored once and instanced.
 class CasterSet {
  public:
-  static constexpr std::uint64_t kFlatTriangles = std::uint64_t{1} << 24U;  ///< about 250 MB
+  static constexpr std::uint64_t kFlatTriangles = std::uint64_t{1} << 24U;  ///< about 2 GB
 
   CasterSet() = default;
   /// Errors: invalid_argument (an index out of range, more than 2^31 triangles, wider than 1e8 m),
