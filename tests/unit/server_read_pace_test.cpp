@@ -64,10 +64,12 @@ class FloodTest : public ::testing::Test {
   }
   void TearDown() override { receiver_->on_stop(); }
 
-  void connect() {
+  void connect(bool greeted = true) {
     peer_ = Fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
     const SocketAddress control = receiver_->control_address();
     ASSERT_EQ(::connect(peer_.get(), control.get(), control.length), 0);
+    settle();
+    if (!greeted) return;
     v1::ControlRecord hello;
     hello.mutable_hello()->set_protocol_version(1);
     hello.mutable_hello()->set_role(v1::Hello::ROLE_HOST);
@@ -75,6 +77,12 @@ class FloodTest : public ::testing::Test {
     protocol::append_control_record(hello, bytes);
     say(bytes);
     settle();
+  }
+  /// The receiver hears of it at its next write, or when it has read what was said before.
+  void reset_peer() {
+    const linger abrupt{1, 0};
+    ::setsockopt(peer_.get(), SOL_SOCKET, SO_LINGER, &abrupt, sizeof abrupt);
+    peer_.reset();
   }
   void say(std::span<const std::byte> bytes) {
     ASSERT_EQ(::send(peer_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL),
@@ -171,12 +179,32 @@ TEST_F(FloodTest, EndsWithItsPeerThoughItIsNotRead) {
     say_refused(records);
     settle();
     ASSERT_EQ(counted(Counter::reads_paused), paused + 1);
-    const linger abrupt{1, 0};
-    ::setsockopt(peer_.get(), SOL_SOCKET, SO_LINGER, &abrupt, sizeof abrupt);
-    peer_.reset();
+    reset_peer();
     settle();
     EXPECT_EQ(counted(Counter::connections_closed), closed + 1) << records;
     connect();
+  }
+}
+
+TEST_F(FloodTest, IsNotAnsweredOnceItsPeerIsGone) {
+  // Each is refused and ends its connection, here while the refusal itself cannot be written any
+  // more: read, refused and ended in one turn.
+  v1::ControlRecord wrong_version;
+  wrong_version.mutable_hello()->set_protocol_version(77);
+  std::vector<std::byte> unknown_hello;
+  protocol::append_control_record(wrong_version, unknown_hello);
+  const std::vector<std::byte> lost_framing(protocol::kRecordHeaderBytes, std::byte{0xff});
+  reset_peer();
+  settle();
+  for (const bool greeted : {false, true}) {
+    for (const auto& last_words : {lost_framing, unknown_hello}) {
+      const std::uint64_t closed = counted(Counter::connections_closed);
+      connect(greeted);
+      say(last_words);
+      reset_peer();
+      settle();
+      EXPECT_EQ(counted(Counter::connections_closed), closed + 1) << greeted;
+    }
   }
 }
 
