@@ -271,6 +271,9 @@ void make_network_seeds() {
         joined({piece(0, client), piece(0, record(help)),
                 piece(0, record(protocol::RecordKind::resend, body))}));
   write("receiver", "recorder", piece(0, record(hello(v1::Hello::ROLE_RECORDER))));
+  write("receiver", "reset",
+        joined({piece(8, record(welcome())), piece(0, host),
+                piece(8, record(protocol::RecordKind::host_frame, host))}));
   write("receiver", "datagrams", joined({piece(1, host_frame(0)), piece(1, host_frame(2))}));
 }
 

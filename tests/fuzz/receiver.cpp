@@ -3,7 +3,8 @@
 // host frames as they meet the receiver, stepped on one thread.
 // Input: pieces behind a byte of instructions and their length (u16). Bits of the byte: 1 a
 // datagram to the host port instead of bytes on the connection, 2 sender and recorder give back
-// first what they were lent, 4 the conductor takes nothing meanwhile.
+// first what they were lent, 4 the conductor takes nothing meanwhile, 8 the connection is reset
+// right behind the piece and another one opened.
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -83,6 +84,13 @@ class Rig {
     static_cast<void>(::send(tcp_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL));
     step();
   }
+  /// Its words are read and answered when it is gone already.
+  void say_and_reset(std::span<const std::byte> bytes) {
+    static_cast<void>(::send(tcp_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL));
+    ::close(tcp_);
+    step();
+    connect();
+  }
   void datagram(std::span<const std::byte> bytes) {
     static_cast<void>(::send(udp_, bytes.data(), bytes.size(), MSG_DONTWAIT));
     step();
@@ -161,6 +169,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     rig.let_conductor_sleep((instructions & 4u) != 0);
     if ((instructions & 1u) != 0) {
       rig.datagram(piece);
+    } else if ((instructions & 8u) != 0) {
+      rig.say_and_reset(piece);
     } else if (!piece.empty()) {
       rig.say(piece);
     }
