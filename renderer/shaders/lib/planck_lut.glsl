@@ -15,17 +15,11 @@
 // Radiance in W m-2 sr-1. Outside the table its nearest end is used and `clamped` is set (never
 // cleared). NaN counts as below the table.
 float planck_lut_radiance_w_m2_sr(float temperature_k, vec4 layout_lut, inout bool clamped) {
-  float place = (temperature_k - layout_lut.x) * layout_lut.y;
-  float t = temperature_k;
-  if (!(place >= 0.0)) {
-    clamped = true;
-    place = 0.0;
-    t = layout_lut.x;
-  } else if (place > layout_lut.z) {
-    clamped = true;
-    place = layout_lut.z;
-    t = layout_lut.x + layout_lut.z / layout_lut.y;
-  }
+  float wanted = (temperature_k - layout_lut.x) * layout_lut.y;
+  float place = wanted >= 0.0 ? min(wanted, layout_lut.z) : 0.0;
+  bool inside = place == wanted;
+  clamped = clamped || !inside;
+  float t = inside ? temperature_k : layout_lut.x + place / layout_lut.y;
   float node = min(floor(place), layout_lut.z - 1.0);
   int first = int(layout_lut.w) + int(node);
   float y = mix(EMIT_PLANCK_LUT(first), EMIT_PLANCK_LUT(first + 1), place - node);

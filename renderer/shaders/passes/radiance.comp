@@ -112,27 +112,27 @@ void main() {
   bool clamped = false;
   bool nonfinite = false;
 
+  // Chosen between rather than branched to, where both sides are cheap: software rasterisers run both anyway.
   for (uint i = 0u; i < EMIT_BANDS; ++i) {
-    float radiance_w_m2_sr = 0.0;
-    if (surface) {
-      radiance_w_m2_sr = leaving_w_m2_sr(i, seen, clamped);
-      if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
-        vec2 air = atmosphere_table_air(bands[i].atmosphere_table, seen.boresight_m * ray_length, sin_elevation, clamped);
-        radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
-      } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
+    bool off_table = false;
+    float leaving = leaving_w_m2_sr(i, seen, off_table);
+    clamped = clamped || (surface && off_table);
+    float radiance_w_m2_sr = surface ? leaving : 0.0;
+    if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
+      vec2 air = surface ? atmosphere_table_air(bands[i].atmosphere_table, seen.boresight_m * ray_length, sin_elevation, clamped)
+                         : atmosphere_table_out(bands[i].atmosphere_table, sin_elevation, clamped);
+      radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
+    } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
+      if (surface) {
         float tau = transmittance(i, seen.boresight_m * ray_length);
         radiance_w_m2_sr = tau * radiance_w_m2_sr + (1.0 - tau) * bands[i].air_radiance_w_m2_sr;
+      } else {
+        radiance_w_m2_sr = sky_radiance_w_m2_sr(i, sin_elevation);
       }
-    } else if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
-      radiance_w_m2_sr = atmosphere_table_out(bands[i].atmosphere_table, sin_elevation, clamped).y;
-    } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
-      radiance_w_m2_sr = sky_radiance_w_m2_sr(i, sin_elevation);
     }
-    if (isnan(radiance_w_m2_sr) || isinf(radiance_w_m2_sr)) {
-      nonfinite = true;
-      radiance_w_m2_sr = 0.0;
-    }
-    planes[i * plane_px + pixel] = radiance_w_m2_sr;
+    bool finite = !(isnan(radiance_w_m2_sr) || isinf(radiance_w_m2_sr));
+    nonfinite = nonfinite || !finite;
+    planes[i * plane_px + pixel] = finite ? radiance_w_m2_sr : 0.0;
   }
 
   uint plane = EMIT_BANDS;
