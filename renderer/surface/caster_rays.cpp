@@ -81,7 +81,8 @@ CasterRays& CasterRays::operator=(CasterRays&&) noexcept = default;
 CasterRays::~CasterRays() = default;
 
 Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
-                                      const std::optional<glm::dvec3>& origin_world_m) {
+                                      const std::optional<glm::dvec3>& origin_world_m,
+                                      std::uint64_t flat_triangles) {
   auto impl = std::make_unique<Impl>();
   impl->device.reset(rtcNewDevice(nullptr));
   if (!impl->device) {
@@ -112,12 +113,12 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
   impl->origin_world_m =
       origin_world_m ? *origin_world_m : centre(bounds_of(fixed.empty() ? everything : fixed));
 
-  auto set = CasterSet::create(impl->device.get(), fixed, impl->origin_world_m);
+  auto set = CasterSet::create(impl->device.get(), fixed, impl->origin_world_m, flat_triangles);
   if (!set) return tl::unexpected(std::move(set.error()).with_context("static geometry"));
   impl->fixed = std::move(*set);
   for (const auto& [object, parts] : moving) {
     Impl::Mover mover{object, centre(bounds_of(parts)), {}};
-    auto body = CasterSet::create(impl->device.get(), parts, mover.centre_body_m);
+    auto body = CasterSet::create(impl->device.get(), parts, mover.centre_body_m, flat_triangles);
     if (!body) {
       return tl::unexpected(std::move(body.error()).with_context(fmt::format("object {}", object)));
     }

@@ -60,16 +60,19 @@ struct CasterSelection {
 /// whatever the number of threads.
 class CasterRays {
  public:
-  static constexpr std::size_t kMaxRays = 16;  ///< of one call
+  static constexpr std::size_t kMaxRays = 16;                               ///< of one call
+  static constexpr std::uint64_t kFlatTriangles = std::uint64_t{1} << 24U;  ///< about 2 GB
 
   /// Takes instances with entity_id 0 by world_from_mesh and the others by body_from_mesh. Setup
   /// only; seconds for 1e7 triangles. `origin_world_m`: where another one's is the same; none: the
-  /// centre of the geometry.
+  /// centre of the geometry. `flat_triangles`: of larger rigid frames, meshes that stand more than
+  /// once are stored once, which is slower to trace.
   /// Errors: invalid_argument (an index out of range, more than 2^31 triangles or a scene wider
   /// than 1e8 m), internal (Embree ran out of memory).
   [[nodiscard]] static physics::Result<CasterRays> create(
       const scene::SceneGeometry& geometry,
-      const std::optional<glm::dvec3>& origin_world_m = std::nullopt);
+      const std::optional<glm::dvec3>& origin_world_m = std::nullopt,
+      std::uint64_t flat_triangles = kFlatTriangles);
   CasterRays(CasterRays&&) noexcept;
   CasterRays& operator=(CasterRays&&) noexcept;
   ~CasterRays();

@@ -234,7 +234,7 @@ Result<void> CasterSet::add_shared(RTCDeviceTy* device, std::span<const CasterPa
 }
 
 Result<CasterSet> CasterSet::create(RTCDeviceTy* device, std::span<const CasterPart> parts,
-                                    const glm::dvec3& origin_m) {
+                                    const glm::dvec3& origin_m, std::uint64_t flat_triangles) {
   CasterSet set;
   const scene::Aabb box = bounds_of(parts);
   if (box.empty()) return set;
@@ -258,7 +258,7 @@ Result<CasterSet> CasterSet::create(RTCDeviceTy* device, std::span<const CasterP
     const std::uint64_t count = triangle_count(*part.mesh);
     if (count == 0) continue;
     const bool share =
-        total > kFlatTriangles && uses[part.mesh] > 1 && count > kTrianglesOfInstance;
+        total > flat_triangles && uses[part.mesh] > 1 && count > kTrianglesOfInstance;
     (share ? shared : flat).push_back(part);
   }
   if (flat.empty() && shared.empty()) return set;

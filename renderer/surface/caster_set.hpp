@@ -37,18 +37,17 @@ struct CasterPart {
 
 /// Triangles of one rigid frame under one hierarchy, float32 around an origin in that frame.
 ///
-/// Small sets are one list of triangles, the fastest to trace. In sets above kFlatTriangles, meshes
-/// that stand more than once are stored once and instanced.
+/// Small sets are one list of triangles, the fastest to trace. In those of more than
+/// `flat_triangles`, meshes that stand more than once are stored once and instanced.
 class CasterSet {
  public:
-  static constexpr std::uint64_t kFlatTriangles = std::uint64_t{1} << 24U;  ///< about 2 GB
-
   CasterSet() = default;
   /// Errors: invalid_argument (an index out of range, more than 2^31 triangles, wider than 1e8 m),
   /// internal (Embree refused). Setup only.
   [[nodiscard]] static physics::Result<CasterSet> create(RTCDeviceTy* device,
                                                          std::span<const CasterPart> parts,
-                                                         const glm::dvec3& origin_m);
+                                                         const glm::dvec3& origin_m,
+                                                         std::uint64_t flat_triangles);
 
   /// Of a ball around the origin that holds every triangle.
   [[nodiscard]] float radius_m() const noexcept { return radius_m_; }

@@ -19,11 +19,12 @@ struct CoarseGeometry {
   bool visibly = false;  ///< for want of samples more went than no pixel shows
 };
 
-/// What no pixel shows goes, but for facets that would have to be cut again (kept_facets()). Where
-/// the vertices of all instances that are left would still take more than half of `max_samples`,
-/// those facets go, too, and errors double up to three times, to two pixels: what lies between many
-/// small things needs samples as well. `to_suns`: unit directions in world axes. Setup only:
-/// seconds per million triangles. Errors: those of CasterRays.
+/// What no pixel shows goes, but for facets that would have to be cut again (kept_facets()), which
+/// stay as long as the meshes' vertices leave half of `max_samples`: what lies between many small
+/// things needs samples as well. Where the vertices would take more without those facets, too,
+/// errors double up to three times, to two pixels, if that is of use. Only vertices of meshes that
+/// may change count. `to_suns`: unit directions in world axes. Setup only: seconds per million
+/// triangles. Errors: those of CasterRays.
 [[nodiscard]] physics::Result<CoarseGeometry> coarse_geometry(scene::SceneGeometry geometry,
                                                               const scene::DetailView& view,
                                                               std::span<const glm::vec3> to_suns,

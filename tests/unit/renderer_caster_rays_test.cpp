@@ -21,8 +21,9 @@ using test::SurfaceScene;
 constexpr glm::vec3 kUp{0.0F, 0.0F, 1.0F};
 constexpr glm::vec3 kDown{0.0F, 0.0F, -1.0F};
 
-CasterRays rays_of(const SurfaceScene& scene) {
-  auto rays = CasterRays::create(scene.geometry);
+CasterRays rays_of(const SurfaceScene& scene,
+                   std::uint64_t flat_triangles = CasterRays::kFlatTriangles) {
+  auto rays = CasterRays::create(scene.geometry, std::nullopt, flat_triangles);
   if (!rays) throw std::runtime_error(rays.error().text);
   return std::move(*rays);
 }
@@ -208,7 +209,8 @@ TEST(CasterRays, movers_come_in_the_order_of_their_objects) {
   EXPECT_EQ(casters.object_of_mover(1), 7U);
 }
 
-TEST(CasterRays, ten_thousand_instances_share_a_mesh) {
+/// Listed one by one, and as instances of one mesh.
+TEST(CasterRays, ten_thousand_instances_of_a_mesh) {
   SurfaceScene scene;
   const std::uint32_t ground =
       scene.add_static(test::level_mesh(glm::vec3(-1.0F), glm::vec3(201.0F), -4.0F));
@@ -218,28 +220,31 @@ TEST(CasterRays, ten_thousand_instances_share_a_mesh) {
     place = glm::rotate(place, 0.5, glm::dvec3(0.0, 1.0, 0.0));
     scene.add_static(mesh, glm::scale(place, glm::dvec3(1.0, 0.5, 3.0)));
   }
-  const CasterRays casters = rays_of(scene);
-  const glm::vec3 tilted(std::sin(0.5F), 0.0F, std::cos(0.5F));
-  for (const int i : {0, 99, 4711, 9999}) {
-    const scene::Instance& instance = scene.geometry.instances[static_cast<std::size_t>(i) + 1];
-    // The middle of the first triangle of cell (5, 3).
-    const glm::dvec4 place_mesh((5.0 + 2.0 / 3.0) / 16.0, (3.0 + 1.0 / 3.0) / 16.0, 0.0, 1.0);
-    const glm::vec3 place(glm::dvec3(instance.world_from_mesh * place_mesh) -
-                          casters.origin_world_m());
-    const auto hit = casters.first_hit({place + 5.0F * kUp, kDown}, {});
-    ASSERT_TRUE(hit.has_value());
-    EXPECT_EQ(hit->instance, static_cast<std::uint32_t>(i) + 1);
-    EXPECT_EQ(hit->triangle, 2U * (3U * 16U + 5U));
-    EXPECT_NEAR(hit->barycentric.x, 1.0F / 3.0F, 5e-3F);
-    EXPECT_NEAR(hit->barycentric.y, 1.0F / 3.0F, 5e-3F);
-    EXPECT_NEAR(hit->distance_m, 5.0F, 1e-4F);
-    EXPECT_LT(glm::distance(hit->normal, tilted), 1e-5F);
-    const std::array<CasterRay, 2> rays = {CasterRay{place - kUp, kUp},
-                                           CasterRay{place - glm::vec3(0.0F, 0.4F, 1.0F), kUp}};
-    EXPECT_EQ(casters.blocked_static(rays), 1U);
-    const auto below = casters.first_hit({place - 0.1F * kUp, kDown}, {});
-    ASSERT_TRUE(below.has_value());
-    EXPECT_EQ(below->instance, ground);
+  for (const std::uint64_t flat_triangles : {CasterRays::kFlatTriangles, std::uint64_t{1000}}) {
+    SCOPED_TRACE(flat_triangles);
+    const CasterRays casters = rays_of(scene, flat_triangles);
+    const glm::vec3 tilted(std::sin(0.5F), 0.0F, std::cos(0.5F));
+    for (const int i : {0, 99, 4711, 9999}) {
+      const scene::Instance& instance = scene.geometry.instances[static_cast<std::size_t>(i) + 1];
+      // The middle of the first triangle of cell (5, 3).
+      const glm::dvec4 place_mesh((5.0 + 2.0 / 3.0) / 16.0, (3.0 + 1.0 / 3.0) / 16.0, 0.0, 1.0);
+      const glm::vec3 place(glm::dvec3(instance.world_from_mesh * place_mesh) -
+                            casters.origin_world_m());
+      const auto hit = casters.first_hit({place + 5.0F * kUp, kDown}, {});
+      ASSERT_TRUE(hit.has_value());
+      EXPECT_EQ(hit->instance, static_cast<std::uint32_t>(i) + 1);
+      EXPECT_EQ(hit->triangle, 2U * (3U * 16U + 5U));
+      EXPECT_NEAR(hit->barycentric.x, 1.0F / 3.0F, 5e-3F);
+      EXPECT_NEAR(hit->barycentric.y, 1.0F / 3.0F, 5e-3F);
+      EXPECT_NEAR(hit->distance_m, 5.0F, 1e-4F);
+      EXPECT_LT(glm::distance(hit->normal, tilted), 1e-5F);
+      const std::array<CasterRay, 2> rays = {CasterRay{place - kUp, kUp},
+                                             CasterRay{place - glm::vec3(0.0F, 0.4F, 1.0F), kUp}};
+      EXPECT_EQ(casters.blocked_static(rays), 1U);
+      const auto below = casters.first_hit({place - 0.1F * kUp, kDown}, {});
+      ASSERT_TRUE(below.has_value());
+      EXPECT_EQ(below->instance, ground);
+    }
   }
 }
 

@@ -50,7 +50,13 @@ TEST(CoarseGeometry, what_no_pixel_shows_goes_unseen) {
 
 TEST(CoarseGeometry, more_goes_until_vertices_leave_half_of_the_samples) {
   const scene::SceneGeometry full = many_spheres(scene::sphere(60, false));
-  const std::size_t unseen = vertices(coarse(full, 100'000'000));
+  const CoarseGeometry with_kept = coarse(full, 100'000'000);
+  EXPECT_FALSE(coarse(full, 2 * vertices(with_kept)).visibly);
+  // Facets that are kept only to spare cuts go first, and nobody sees it.
+  const CoarseGeometry without = coarse(full, 2 * vertices(with_kept) - 1);
+  EXPECT_FALSE(without.visibly);
+  const std::size_t unseen = vertices(without);
+  ASSERT_LT(unseen, vertices(with_kept));
   EXPECT_FALSE(coarse(full, 2 * unseen).visibly);
   const CoarseGeometry made = coarse(full, 2 * unseen - 1);
   EXPECT_TRUE(made.visibly);
@@ -60,6 +66,39 @@ TEST(CoarseGeometry, more_goes_until_vertices_leave_half_of_the_samples) {
   EXPECT_TRUE(least.visibly);
   EXPECT_LT(vertices(least), vertices(made));
   EXPECT_GT(vertices(least), 10U * 40U);
+}
+
+TEST(CoarseGeometry, meshes_that_nothing_can_change_cost_the_others_nothing) {
+  scene::SceneGeometry full = many_spheres(scene::sphere(60, false));
+  const std::size_t samples = 2 * vertices(coarse(full, 100'000'000));
+  scene::Mesh ground = scene::sphere(240, false);
+  for (glm::vec3& p : ground.positions_m) p *= 100.0F;  // the eye is within
+  ground.bounds = {};
+  for (const glm::vec3& p : ground.positions_m) ground.bounds.add(glm::dvec3(p));
+  ASSERT_GT(ground.positions_m.size(), samples);
+  scene::Instance instance;
+  instance.mesh = 1;
+  instance.world_bounds = ground.bounds;
+  full.instances.push_back(instance);
+  full.triangles += ground.indices.size() / 3;
+  full.meshes.push_back(std::move(ground));
+  const CoarseGeometry made = coarse(full, samples);
+  EXPECT_FALSE(made.visibly);
+  EXPECT_EQ(made.geometry.meshes[1].indices, full.meshes[1].indices);
+}
+
+TEST(CoarseGeometry, what_would_hardly_spare_a_vertex_is_not_worth_being_seen) {
+  // Every triangle has vertices of its own, as bodies have them along hard edges.
+  scene::Mesh mesh = scene::sphere(60, false);
+  scene::Mesh hard = mesh;
+  hard.positions_m.clear();
+  hard.normals.clear();
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+    hard.positions_m.push_back(mesh.positions_m[mesh.indices[i]]);
+    hard.normals.push_back(mesh.normals[mesh.indices[i]]);
+    hard.indices[i] = static_cast<std::uint32_t>(i);
+  }
+  EXPECT_FALSE(coarse(many_spheres(std::move(hard)), 100).visibly);
 }
 
 TEST(CoarseGeometry, meshes_of_wide_triangles_stay_as_they_are) {

@@ -188,6 +188,21 @@ TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
     }
   }
   EXPECT_GT(partly, 100);
+  // Sky, too: it is looked for wherever the entity passes, here within five metres of it.
+  IntervalRays near(std::vector<float>{0.5F, 0.5F});
+  near.update(kNoonNs, end_ns, 3, environment_, entities, rays->origin_world_m());
+  std::array<float, 3> hidden_on_third{};
+  for (int k = 0; k < 60; ++k) {
+    SurfaceSample sample;
+    const glm::dvec3 beside(-30.0 + k, 5.0 * std::sin(0.2 * k), -1.0);
+    sample.position_m = glm::vec3(beside - rays->origin_world_m());
+    sample.normal = glm::vec3(0.0F, 0.0F, 1.0F);
+    hidden_on_third[static_cast<std::size_t>(k) / 20] +=
+        near.hidden_sky_frac(*rays, sample, kOffsetM);
+    sample.position_m.y += 100.0F;
+    EXPECT_EQ(near.hidden_sky_frac(*rays, sample, kOffsetM), 0.0F) << k;
+  }
+  for (const float hidden : hidden_on_third) EXPECT_GT(hidden, 0.2F);
 }
 
 }  // namespace

@@ -182,6 +182,22 @@ TEST(Separated, far_instances_share_with_those_whose_pixels_are_as_wide) {
   EXPECT_GT(errors[shared.instances[1].mesh], 4.0 * near_error * 0.99);
 }
 
+TEST(Separated, copies_have_a_limit) {
+  SceneGeometry geometry = scene_of(sphere(400, false));  // 320,000 vertices
+  const Instance first = geometry.instances[0];
+  for (int i = 1; i < 40; ++i) {
+    Instance instance = first;
+    instance.world_bounds.min_m.x += 1.5 * i * i * i;
+    instance.world_bounds.max_m.x += 1.5 * i * i * i;
+    geometry.instances.push_back(instance);
+  }
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
+  const SceneGeometry own = separated(geometry, {eyes, kPixelRad});
+  // Six of instances of their own, and the classes of six octaves.
+  EXPECT_LE(own.meshes.size(), 1U + 6U + 6U);
+  EXPECT_GT(own.meshes.size(), 1U + 6U);
+}
+
 TEST(Simplify, the_seam_between_two_materials_does_not_move) {
   const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
   const SceneGeometry coarse = simplified_for(scene_of(sphere(200, true)), {eyes, kPixelRad});

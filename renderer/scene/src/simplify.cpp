@@ -21,7 +21,7 @@ constexpr double kErrorPx = 0.25;
 /// Wider triangles than this, on average, are left alone: there is little to gain.
 constexpr double kLeastEdgePx = 6.0;
 /// Instances that look wider have their own mesh, as long as the copies have no more vertices than
-/// this.
+/// this. Those that classes share have as many again.
 constexpr double kOwnMeshPx = 16.0;
 constexpr std::size_t kMostCopied = 2'000'000;
 /// Below this the collapse itself is all rounding.
@@ -141,6 +141,7 @@ SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
     return static_cast<std::uint32_t>(geometry.meshes.size() - 1);
   };
   std::size_t copied = 0;
+  std::size_t shared = 0;
   std::map<std::pair<std::uint32_t, int>, std::uint32_t> classes;
   for (Instance& instance : geometry.instances) {
     const std::uint32_t mesh = instance.mesh;
@@ -157,7 +158,11 @@ SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
     const double scale = greatest_scale(instance.world_from_mesh);
     const int octave = std::ilogb(std::clamp(scale * px_per_m, 1e-9, 1e9));
     const auto [own, is_new] = classes.try_emplace({mesh, octave}, mesh);
-    if (is_new && taken[mesh]) own->second = copy_of(mesh);
+    // Beyond the limit classes share: the mesh stays as fine as the nearest of them needs.
+    if (is_new && taken[mesh] && shared + vertices <= kMostCopied) {
+      shared += vertices;
+      own->second = copy_of(mesh);
+    }
     taken[mesh] = true;
     instance.mesh = own->second;
   }

@@ -20,8 +20,8 @@ struct DetailView {
 /// Gives every static instance that looks wide from some eye a mesh of its own, so that each can be
 /// cut as finely as it needs, as long as the copies have no more than some million vertices. The
 /// others go on sharing with those on which a pixel is as wide to a factor of two, so that each
-/// class can lose what its pixels do not show. Where the eyes are unknown all share. Instances keep
-/// their order. Setup only.
+/// class can lose what its pixels do not show, with the same limit on copies. Where the eyes are
+/// unknown all share. Instances keep their order. Setup only.
 [[nodiscard]] SceneGeometry separated(SceneGeometry geometry, const DetailView& view);
 
 /// By mesh the distance that its surface may move when it is simplified, in the mesh's own lengths:
