@@ -182,7 +182,8 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
 void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.samples = surface_->model().samples.samples.size();
   stats.sample_bytes = surface_->sample_bytes();
-  stats.samples_full = surface_->model().full || visibly_simplified_;
+  stats.samples_full = surface_->model().full;
+  stats.coarse_meshes = visibly_simplified_;
 }
 
 void CachedStage::prepare(const FrameRequest& request, CameraSetup&,

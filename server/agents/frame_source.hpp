@@ -22,7 +22,8 @@ struct SourceInfo {
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::uint32_t slots = 0;
-  std::size_t planes = 0;  ///< FrameView::radiance_w_m2_sr.size() of every frame
+  std::size_t planes = 0;      ///< FrameView::radiance_w_m2_sr.size() of every frame
+  renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
 };
 
 /// Where frames come from. The same calls, in the same order, give the same pixels: the journal

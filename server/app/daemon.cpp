@@ -205,6 +205,7 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                   software, kCommit, source.device, scenario_ ? scenario_->file.string() : "",
                   pacing_name(config_.pacing.mode), context_.channels.size(), source.width_px,
                   source.height_px));
+  tell_scene(source.scene);
   if (!privileges_.empty()) {
     log_->write(LogLevel::info, privileges_);
   }
@@ -214,9 +215,9 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                             config_.stream.shm_slots, config_.stream.shm_mode));
   }
   if (clock_.tai_offset_unset()) {
-    log_->write(LogLevel::warn,
-                "event=tai_offset_unset effect=\"wall instants are UTC\" "
-                "remedy=\"let ntpd, chronyd or phc2sys set the kernel's TAI offset\"");
+    warn(
+        "event=tai_offset_unset effect=\"wall instants are UTC\" "
+        "remedy=\"let ntpd, chronyd or phc2sys set the kernel's TAI offset\"");
   }
   recorder_runner_ = std::make_unique<AgentRunner>(*recorder_, clock_);
   sender_runner_ = std::make_unique<AgentRunner>(*sender_, clock_);
@@ -284,11 +285,33 @@ physics::Result<void> DaemonImpl::check_realtime() {
                                fmt::format("{}: [realtime] is required, but the host refuses: {}",
                                            config_.file.string(), refused));
   }
-  log_->write(LogLevel::warn,
-              fmt::format("event=realtime_refused what=\"{}\" effect=\"timing is as the host "
-                          "schedules other programs\"",
-                          refused));
+  warn(
+      fmt::format("event=realtime_refused what=\"{}\" effect=\"timing is as the host "
+                  "schedules other programs\"",
+                  refused));
   return {};
+}
+
+void DaemonImpl::warn(const std::string& text) {
+  if (const std::string line = distinct_.note(text, clock_.tai_ns()); !line.empty()) {
+    log_->write(LogLevel::warn, line);
+  }
+  board_.set_warnings(LogLevel::warn, distinct_);
+}
+
+void DaemonImpl::tell_scene(const renderer::SceneStats& scene) {
+  if (scene.instances > 0) {
+    log_->write(LogLevel::info,
+                fmt::format("event=scene triangles={} instances={} samples={} sample_bytes={}",
+                            scene.triangles, scene.instances, scene.samples, scene.sample_bytes));
+  }
+  for (std::string text : scene.warnings) {
+    std::ranges::replace(text, '"', '\'');
+    warn(fmt::format("event=scene_warning text=\"{}\"", text));
+  }
+  for (const std::string& text : renderer::sampling_warnings(scene)) {
+    warn(fmt::format("event=scene_warning text=\"{}\"", text));
+  }
 }
 
 int DaemonImpl::run() {

@@ -84,6 +84,9 @@ class DaemonImpl final : public Daemon {
   void log_summary();
   [[nodiscard]] physics::Result<void> open_clocks();
   [[nodiscard]] physics::Result<void> check_realtime();
+  /// Written to the log, and kept among the warnings that the metrics tell. Setup only.
+  void warn(const std::string& text);
+  void tell_scene(const renderer::SceneStats& scene);
   void plan_realtime(AgentRunner& runner) const {
     runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
   }

@@ -56,9 +56,18 @@ physics::Result<JournalReplaySummary> replay_journal(
   output.temperature = output.depth = output.object = options.temperature;
   output.slots = 3;
   output.ladder = renderer::Ladder::replayed;
-  auto source = server::make_renderer_source(
-      scenario, renderer::DeviceOptions{options.gpu_index, false}, output);
+  auto source = [&] {
+    ProgressBar warm_up("warm-up", 1000);
+    return server::make_renderer_source(
+        scenario, renderer::DeviceOptions{options.gpu_index, false}, output, [&](double done_frac) {
+          warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
+          return !InterruptGuard::interrupted();
+        });
+  }();
   if (!source) return tl::unexpected(source.error());
+  const renderer::SceneStats& scene = (*source)->info().scene;
+  for (const std::string& text : scene.warnings) warn(text);
+  for (const std::string& text : renderer::sampling_warnings(scene)) warn(text);
   summary.device = (*source)->info().device;
   summary.setup_s = seconds_since(start);
 

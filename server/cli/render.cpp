@@ -130,9 +130,7 @@ int run_render(const RenderCommand& command) {
                         static_cast<double>(renderer.scene_stats().sample_bytes) / (1 << 20))
           : std::string(),
       frame_ms, renderer.device_name());
-  if (renderer.scene_stats().samples_full) {
-    warn("thermal.max_samples stopped the refinement: shadows are coarser than tolerance_k asks");
-  }
+  for (const std::string& text : renderer::sampling_warnings(renderer.scene_stats())) warn(text);
   if (view.stats.nonfinite_px > 0) {
     warn(fmt::format("{} pixels were not finite and are written as 0", view.stats.nonfinite_px));
   }

@@ -11,6 +11,7 @@
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
 #include "support/notify_socket.hpp"
+#include "unit/scene_gltf_builder.hpp"
 
 namespace emit::server {
 namespace {
@@ -108,6 +109,35 @@ TEST(DaemonService, RealtimeThatIsRefusedIsToldOrEndsTheStart) {
   EXPECT_NE(folder.read("stderr").find("the host refuses: cpus of sender: "), std::string::npos)
       << folder.read("stderr");
   EXPECT_EQ(folder.read("stdout"), "") << "it was never ready";
+}
+
+TEST(DaemonService, WhatASceneLacksIsLoggedAndCounted) {
+  ScratchFolder folder;
+  test::GltfText plate;
+  plate.buffer = test::packed<float>({0, 0, 0, 0, 0, 10, 10, 0, 0}) +
+                 test::packed<std::uint16_t>({0, 1, 2}) + std::string(2, '\0');
+  plate.primitive = R"({"attributes":{"POSITION":0},"indices":1,"material":0})";
+  plate.materials = R"({"name": "unobtainium"})";
+  folder.write("plate.gltf", plate.json());
+  folder.write("world.toml",
+               "[sensor]\nwidth_px = 32\nheight_px = 24\n[atmosphere]\nenabled = false\n"
+               "[[object]]\nname = \"plate\"\ngltf = \"plate.gltf\"\n");
+  DaemonProcess daemon(folder, {"--config", folder.write("emitd.toml",
+                                                         "scenario = \"world.toml\"\n"
+                                                         "[pacing]\nmode = \"host-step\"\n"
+                                                         "[host]\nudp = \"127.0.0.1:0\"\n"
+                                                         "[control]\ntcp = \"127.0.0.1:0\"\n" +
+                                                             kMetrics)});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  const auto answer = http_get("http://" + daemon.metrics() + "/metrics", kLongNs);
+  ASSERT_TRUE(answer.has_value()) << answer.error().text;
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+  const std::string log = folder.read("stderr");
+  EXPECT_NE(log.find("event=scene triangles=1 instances=1 samples="), std::string::npos) << log;
+  const std::string text = "plate.gltf: material 'unobtainium' maps to nothing in the library";
+  EXPECT_NE(log.find("event=scene_warning text=\"" + text), std::string::npos) << log;
+  EXPECT_NE(answer->body.find(text), std::string::npos) << answer->body;
 }
 
 TEST(DaemonService, TheLowLatencyProfileServesWhateverTheHostGrants) {

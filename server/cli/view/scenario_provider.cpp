@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 
+#include "console.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "scenario_input.hpp"
 #include "view/frame_provider.hpp"
@@ -69,7 +70,26 @@ class ScenarioProvider final : public FrameProvider {
       return;
     }
     made.set_value({});
+    if (auto ready = warm_up(**created); !ready) {
+      slot_.end(ready.error().text, true);
+      return;
+    }
     loop(**created);
+  }
+
+  physics::Result<void> warm_up(renderer::Renderer& renderer) {
+    for (const std::string& text : renderer.scene_stats().warnings) warn(text);
+    renderer::FrameRequest first;
+    first.sim_time_ns = first.thermal_time_ns = std::llround(sim_time_s_ * 1e9);
+    first.sensor_pose = renderer.scenario_sensor_pose_at(first.sim_time_ns);
+    ProgressBar bar("warm-up", 1000);
+    auto ready = renderer.warm_up(first, [&](double done_frac) {
+      bar.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
+      return !stop_.load();
+    });
+    bar.finish();
+    for (const std::string& text : renderer::sampling_warnings(renderer.scene_stats())) warn(text);
+    return ready;
   }
 
   void loop(renderer::Renderer& renderer) {

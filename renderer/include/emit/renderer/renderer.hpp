@@ -123,8 +123,13 @@ struct SceneStats {
   std::uint64_t samples = 0;
   std::uint64_t sample_bytes = 0;
   bool samples_full = false;
+  /// For want of samples meshes lost detail that pixels show (thermal.max_samples).
+  bool coarse_meshes = false;
   std::vector<std::string> warnings;  ///< unmapped materials and what else the loader could not map
 };
+
+/// What `thermal.max_samples` is too small for, a sentence each; none where it is enough.
+[[nodiscard]] std::vector<std::string> sampling_warnings(const SceneStats& stats);
 
 using SlotIndex = std::uint32_t;
 
