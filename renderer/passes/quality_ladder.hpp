@@ -19,8 +19,11 @@ struct QualityRung {
   LevelLimits limits;       ///< but for pixel_rad
 };
 
+/// Of triangles whose values do not matter: outlines alone keep them small.
+inline constexpr double kAnyPx = 1e6;
+
 /// Rung 0 is full quality. The numbers of the rungs are part of recordings: a replay renders them.
-inline constexpr std::array<QualityRung, 11> kQualityLadder = {{
+inline constexpr std::array<QualityRung, 12> kQualityLadder = {{
     {1.0, {0.0, 0.25, 4.0, 0.5, 0}},
     {1.0, {0.0, 0.5, 8.0, 1.0, 1}},
     {1.0, {0.0, 1.0, 16.0, 2.0, 2}},
@@ -32,6 +35,7 @@ inline constexpr std::array<QualityRung, 11> kQualityLadder = {{
     {0.5, {0.0, 2.0, 32.0, 4.0, 4}},
     {0.33, {0.0, 2.0, 32.0, 4.0, 4}},
     {0.25, {0.0, 4.0, 64.0, 8.0, 4}},
+    {0.25, {0.0, 4.0, kAnyPx, kAnyPx, 4}},
 }};
 /// Rungs that render another number of pixels need memory and a pass of their own.
 [[nodiscard]] constexpr bool is_scaled(const QualityRung& rung) noexcept {

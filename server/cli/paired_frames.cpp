@@ -2,6 +2,7 @@
 #include "paired_frames.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -44,9 +45,11 @@ Result<double> SceneRunner::frame_ms() {
 
 Result<SceneRunner> SceneRunner::start(const scene::ScenarioDesc& scenario,
                                        std::uint32_t settle_frames, int gpu_index) {
+  const auto start = std::chrono::steady_clock::now();
   auto renderer = RendererThread::create(scenario, gpu_index);
   if (!renderer) return tl::unexpected(std::move(renderer.error()));
   SceneRunner runner(scenario, std::move(*renderer));
+  runner.setup_s_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const auto warm_up_s = runner.renderer_->warm_up(runner.request(0));
   if (!warm_up_s) return tl::unexpected(warm_up_s.error());
   runner.warm_up_s_ = *warm_up_s;

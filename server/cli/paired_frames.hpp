@@ -37,6 +37,8 @@ class SceneRunner {
   [[nodiscard]] const scene::ScenarioDesc& scenario() const noexcept { return *scenario_; }
   [[nodiscard]] const renderer::SceneStats& stats() const noexcept { return renderer_->stats(); }
   [[nodiscard]] const std::string& device() const noexcept { return renderer_->device(); }
+  /// Loading and simplifying the scene; then the thermal state.
+  [[nodiscard]] double setup_s() const noexcept { return setup_s_; }
   [[nodiscard]] double warm_up_s() const noexcept { return warm_up_s_; }
 
  private:
@@ -46,6 +48,7 @@ class SceneRunner {
 
   const scene::ScenarioDesc* scenario_;
   std::unique_ptr<RendererThread> renderer_;
+  double setup_s_ = 0.0;
   double warm_up_s_ = 0.0;
   std::uint32_t next_frame_ = 0;
 };

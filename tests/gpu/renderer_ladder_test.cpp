@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kStartNs = 3600 * kSecondNs;
-constexpr std::uint8_t kRungs = 11;
+constexpr std::uint8_t kRungs = 12;
 constexpr std::size_t kMovedPx = 4;
 
 physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
