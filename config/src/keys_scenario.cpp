@@ -389,10 +389,9 @@ const KeyTable<ThermalOptions>& thermal_keys() {
                              "other."),
       integer<ThermalOptions>(
           "max_samples", "", 1000, 100000000, EMIT_FIELD(max_samples),
-          "cached: most thermal samples, about 1.5 kB each. Where the meshes' own vertices take "
-          "more than half, meshes lose detail up to two pixels wide, and frames are flagged "
-          "degraded; "
-          "what is left of them is always sampled."),
+          "cached: most thermal samples, 0.5 kB each and 1 kB for the surface between them. Where "
+          "meshes' own vertices would take more than half, they lose detail up to two pixels wide, "
+          "and frames are flagged degraded; what is left of them is always sampled."),
       boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
                               "cached, foster: heat is also conducted along the surface and across "
                               "convex edges. emit2014 conducts straight down."),

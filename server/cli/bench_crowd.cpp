@@ -141,8 +141,8 @@ int run_bench_crowd(const BenchCrowdCommand& command) {
   std::string device;
   const auto rows = run(command, device);
   if (!rows) return fail(rows.error());
-  TextTable table({"scene", "triangles", "instances", "samples", "MiB", "setup s", "warm-up s", "median ms",
-                   "max ms", "ratio", "limit", "met"});
+  TextTable table({"scene", "triangles", "instances", "samples", "MiB", "setup s", "warm-up s",
+                   "median ms", "max ms", "ratio", "limit", "met"});
   Json results = Json::array();
   for (const Row& row : *rows) {
     const std::string ratio = row.pairs ? fmt::format("{:.2f}", row.pairs->ratio) : "-";
@@ -150,7 +150,8 @@ int run_bench_crowd(const BenchCrowdCommand& command) {
     table.add({row.scene, fmt::format("{}", row.stats.triangles),
                fmt::format("{}", row.stats.instances), fmt::format("{}", row.stats.samples),
                fmt::format("{:.0f}", static_cast<double>(row.stats.sample_bytes) / (1 << 20)),
-               fmt::format("{:.1f}", row.setup_s), fmt::format("{:.1f}", row.warm_up_s), fmt::format("{:.2f}", row.frame_ms.median()),
+               fmt::format("{:.1f}", row.setup_s), fmt::format("{:.1f}", row.warm_up_s),
+               fmt::format("{:.2f}", row.frame_ms.median()),
                fmt::format("{:.2f}", row.frame_ms.max()), ratio,
                row.pairs ? fmt::format("{:.1f}", kLimitRatio) : "-", met});
     results.push(row_json(row));
