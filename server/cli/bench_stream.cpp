@@ -147,6 +147,7 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   row.cpu_frac = (daemon->cpu_seconds() - cpu_before_s) / seconds;
 
   PacedCounts counts;
+  std::uint64_t fewest_frames = command_.frames;
   std::string reason;
   std::string advice;
   for (const auto& client : clients) {
@@ -154,6 +155,7 @@ Result<Row> StreamBench::paced(const std::string& transport) {
     device_ = client->server().device;
     const auto& counters = client->counters();
     row.frames += client->report().frames();
+    fewest_frames = std::min(fewest_frames, client->report().frames());
     row.lost += counters.lost + counters.crc_errors + counters.partial;
     row.late += client->report().flagged(protocol::kFlagLate);
     counts.partial += counters.partial;
@@ -177,8 +179,8 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   if (!complete) {
     return physics::make_error(
         physics::ErrorCode::io,
-        fmt::format("{}: only {} of {} frames came{}{}", transport, row.frames,
-                    command_.frames * command_.clients, reason.empty() ? "" : ": ", reason));
+        fmt::format("{}: only {} of {} frames came to one of the clients{}{}", transport,
+                    fewest_frames, command_.frames, reason.empty() ? "" : ": ", reason));
   }
   if (!advice.empty()) warn(advice);
   row.gbit_s = 8e-9 * static_cast<double>(yardstick_.frame_bytes * row.frames) / seconds;
