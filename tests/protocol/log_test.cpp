@@ -5,10 +5,15 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/dynamic_message.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -216,9 +221,6 @@ TEST_F(LogFile, TheIndexOfThousandsOfChunksPointsAtEachOfThem) {
     for (std::uint32_t i = 0; i < kMessages; ++i) {
       ASSERT_TRUE(mcap->write(*channel, i, i, i, {}));
     }
-    for (const auto& entry : std::filesystem::directory_iterator(path_.parent_path())) {
-      EXPECT_THAT(entry.path().string(), ::testing::Not(HasSubstr(path_.string() + ".")));
-    }
     ASSERT_TRUE(mcap->close());
   }
   const std::string whole = content();
@@ -257,6 +259,87 @@ TEST_F(LogFile, TheIndexOfThousandsOfChunksPointsAtEachOfThem) {
   EXPECT_EQ(whole[last + 9], 8);
   EXPECT_EQ(wire::get<std::uint64_t>(bytes, last + 10), first_index);
   EXPECT_EQ(wire::get<std::uint64_t>(bytes, last + 18), offsets - first_index);
+}
+
+/// Folders of removed files that this process holds open.
+std::vector<std::string> folders_of_nameless_files() {
+  std::vector<std::string> folders;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;  // the descriptor of the iterator itself
+    const auto target = std::filesystem::read_symlink(entry.path(), gone);
+    if (target.string().ends_with(" (deleted)")) folders.push_back(target.parent_path().string());
+  }
+  return folders;
+}
+
+TEST_F(LogFile, TheIndexWaitsWithoutANameInTheFolderOfTheFileItself) {
+  const std::filesystem::path folder = path_.string() + ".folder";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder / "links");
+  // As long as a name may be, so that one beside it cannot be longer.
+  const auto target = folder / std::string(255, 'x');
+  const auto link = folder / "links" / "log.mcap";
+  std::filesystem::create_symlink(target, link);
+  for (const auto& path : {target, link}) {  // the first makes what the second leads to
+    auto writer = LogWriter::create(path);
+    ASSERT_TRUE(writer) << writer.error().text;
+    EXPECT_THAT(folders_of_nameless_files(),
+                ::testing::Contains(std::filesystem::canonical(folder).string()));
+    write_messages(*writer, 30);
+    ASSERT_TRUE(writer->close());
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 2) << "no other name";
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "links"), {}), 1);
+    std::filesystem::rename(target, path_);
+    EXPECT_EQ(read_all().host, 30u);
+    std::filesystem::rename(path_, target);
+  }
+  std::filesystem::remove_all(folder);
+}
+
+/// Sets TMPDIR for as long as it lives.
+class TemporaryFolder {
+ public:
+  explicit TemporaryFolder(const char* folder) {
+    if (const char* before = std::getenv("TMPDIR")) before_ = before;
+    ::setenv("TMPDIR", folder, 1);
+  }
+  ~TemporaryFolder() { before_ ? ::setenv("TMPDIR", before_->c_str(), 1) : ::unsetenv("TMPDIR"); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+ private:
+  std::optional<std::string> before_;
+};
+
+/// A file in memory has no folder that takes another one, whoever runs the test.
+TEST_F(LogFile, AFileWhoseFolderTakesNoIndexIsWrittenOrStaysAsItWas) {
+  const int fd = ::memfd_create("log", MFD_CLOEXEC);
+  ASSERT_GE(fd, 0);
+  ASSERT_EQ(::write(fd, "old log", 7), 7);
+  path_ = "/proc/self/fd/" + std::to_string(fd);
+  {
+    const TemporaryFolder missing("/no/such/folder");
+    const auto writer = LogWriter::create(path_);
+    ASSERT_FALSE(writer);
+    EXPECT_EQ(writer.error().code, physics::ErrorCode::io);
+    EXPECT_THAT(writer.error().text, HasSubstr(path_.string() + ": no folder takes the index"));
+    EXPECT_THAT(writer.error().text, HasSubstr("temporary folder: "));
+    EXPECT_EQ(content(), "old log");
+  }
+  {
+    const TemporaryFolder full("/proc");
+    const auto writer = LogWriter::create(path_);
+    ASSERT_FALSE(writer);
+    EXPECT_THAT(writer.error().text, HasSubstr("; /proc: "));
+    EXPECT_EQ(content(), "old log");
+  }
+  const TemporaryFolder takes(EMIT_TEST_BINARY_DIR);
+  auto writer = LogWriter::create(path_);
+  ASSERT_TRUE(writer) << writer.error().text;
+  write_messages(*writer, 30);
+  ASSERT_TRUE(writer->close());
+  EXPECT_EQ(read_all().host, 30u);
+  ::close(fd);
 }
 
 TEST_F(LogFile, OtherFilesAreRefusedByName) {

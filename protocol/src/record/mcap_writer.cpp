@@ -260,6 +260,8 @@ McapWriter::~McapWriter() {
 Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
                                       const McapWriterOptions& options) {
   auto impl = std::make_unique<Impl>(path, options);
+  // First: what fails here leaves an older log as it is.
+  if (auto opened = impl->chunk_indexes.open(path); !opened) return tl::unexpected(opened.error());
   impl->fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (impl->fd < 0) {
     return make_error(ErrorCode::io, fmt::format("{}: cannot create: {}", path.string(),
@@ -272,7 +274,6 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
   out.string(options.library);
   out.end_record(record);
   if (auto written = impl->put(out.bytes()); !written) return tl::unexpected(written.error());
-  if (auto opened = impl->chunk_indexes.open(path); !opened) return tl::unexpected(opened.error());
   return McapWriter(std::move(impl));
 }
 

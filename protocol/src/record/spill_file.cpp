@@ -17,18 +17,54 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
+namespace {
+
+/// Of the file that `path` leads to, through links too; empty where that has no folder (a pipe, a
+/// file that was removed).
+std::filesystem::path real_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto type = std::filesystem::status(path, error).type();
+  if (type != std::filesystem::file_type::regular &&
+      type != std::filesystem::file_type::not_found) {
+    return {};
+  }
+  const auto absolute = std::filesystem::absolute(path, error);
+  return std::filesystem::weakly_canonical(absolute, error).parent_path();
+}
+
+/// -1 and errno where the folder takes none.
+int open_nameless(const std::filesystem::path& folder) {
+  int fd = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (fd >= 0) return fd;
+  // Not every file system has O_TMPFILE.
+  std::string name = (folder / "emit-index-XXXXXX").string();
+  fd = ::mkostemp(name.data(), O_CLOEXEC);
+  if (fd >= 0 && ::unlink(name.c_str()) != 0) {
+    const int error = errno;
+    ::close(fd);
+    errno = error;
+    return -1;
+  }
+  return fd;
+}
+
+}  // namespace
+
 Result<void> SpillFile::open(const std::filesystem::path& beside) {
   block_.reserve(kBlockBytes);
-  std::error_code ignored;
-  const bool regular = std::filesystem::is_regular_file(beside, ignored);
-  name_ = (regular ? beside : std::filesystem::temp_directory_path(ignored) / beside.filename())
-              .string() +
-          ".index-XXXXXX";
-  std::string name = name_;
-  fd_ = ::mkostemp(name.data(), O_CLOEXEC);
-  if (fd_ < 0) return failed("create", errno);
-  ::unlink(name.c_str());
-  return {};
+  std::error_code no_temporary;
+  const auto temporary = std::filesystem::temp_directory_path(no_temporary);
+  std::string refusals;
+  for (const auto& folder : {real_folder(beside), temporary}) {
+    if (folder.empty()) continue;
+    name_ = fmt::format("{}: index in {}", beside.string(), folder.string());
+    fd_ = open_nameless(folder);
+    if (fd_ >= 0) return {};
+    refusals += fmt::format("; {}: {}", folder.string(), std::generic_category().message(errno));
+  }
+  if (no_temporary) refusals += "; temporary folder: " + no_temporary.message();
+  return make_error(ErrorCode::io, fmt::format("{}: no folder takes the index of the file{}",
+                                               beside.string(), refusals));
 }
 
 SpillFile::~SpillFile() {

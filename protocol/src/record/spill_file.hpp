@@ -12,15 +12,15 @@
 namespace emit::protocol {
 
 /// Bytes that wait for the end of a file: the last kBlockBytes in memory, what came before in a
-/// nameless file in the same folder, which the kernel removes however the process ends.
+/// nameless file, which the kernel removes however the process ends.
 ///
 /// Errors (io) name the file. Thread: one owner.  Not RT-safe.
 class SpillFile {
  public:
   static constexpr std::size_t kBlockBytes = std::size_t{256} << 10;
 
-  /// Makes the nameless file at once, so that a folder that takes none is told at the start. What
-  /// is written to something else than a regular file (a pipe) waits in the folder for temporary
+  /// Makes the nameless file at once, so that it is told at the start when no folder takes it: that
+  /// of the file itself, links followed, which need not exist yet; else the one for temporary
   /// files.
   [[nodiscard]] physics::Result<void> open(const std::filesystem::path& beside);
   SpillFile() = default;

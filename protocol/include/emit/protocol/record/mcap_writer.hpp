@@ -27,6 +27,8 @@ struct McapWriterOptions {
 /// one every call returns it again. Thread: one owner.  Not RT-safe.
 class McapWriter {
  public:
+  /// Errors (io): the file cannot be written; no folder takes its index until close(), and an older
+  /// file is as it was.
   [[nodiscard]] static physics::Result<McapWriter> create(const std::filesystem::path& path,
                                                           const McapWriterOptions& options);
   McapWriter(McapWriter&&) noexcept;
