@@ -128,7 +128,9 @@ void Receiver::on_stop() noexcept {
       if (!connection->write_lent) {
         flush(*connection);
       }
-      finish_close(*connection);
+      if (connection->open()) {  // unless the flush has ended it
+        finish_close(*connection);
+      }
     }
   }
 }

@@ -208,5 +208,26 @@ TEST_F(FloodTest, IsNotAnsweredOnceItsPeerIsGone) {
   }
 }
 
+TEST_F(FloodTest, IsClosedOnceThoughItsLastWriteFails) {
+  reset_peer();
+  settle();
+  // A welcome that the socket's buffers do not hold waits in the receiver until it stops.
+  context_.channels.resize(1);
+  context_.channels[0].name.assign(250'000, 'x');
+  for (int fd = 0; fd < 1024; ++fd) {
+    int listens = 0;
+    socklen_t length = sizeof listens;
+    const int smallest = 1;
+    if (::getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &listens, &length) == 0 && listens != 0) {
+      ::setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &smallest, sizeof smallest);  // of what it accepts
+    }
+  }
+  connect();
+  reset_peer();
+  const std::uint64_t closed = counted(Counter::connections_closed);
+  receiver_->on_stop();
+  EXPECT_EQ(counted(Counter::connections_closed), closed + 1);
+}
+
 }  // namespace
 }  // namespace emit::server
