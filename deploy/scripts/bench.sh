@@ -1,13 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Installs the packages, builds the release preset, runs every benchmark of this machine's device and
-# writes bench.json (all results), bench.md (their tables, for a README) and one log a suite.
-# Usage: bench.sh [--quick] [--no-install] [--out DIR] [SUITE]...   default: out/bench, every suite
+# writes into one folder bench.json (all results), bench.md (their tables, for a README), diagrams as SVG
+# and JSON, table and log of each suite.
+# Usage: bench.sh [--quick] [--no-install] [--out DIR] [SUITE]...
 # --quick: fewer frames and smaller scenes, to see that all is well; such figures are no measurement.
-# --no-install: the packages are there already (a machine without network). Exits 1 when a suite failed;
-# the others' results are written all the same.
+# --no-install: the packages are there already (a machine without network).
+# --out DIR: default out/bench in the repository, wherever this is called from.
+# SUITE: default all. Exits 1 when one failed: bench.json has it and its exit code under "failed",
+# bench.md in its heading; the others' results are written all the same. 130: interrupted.
 set -euo pipefail
-out=out/bench
+out=
 quick=false
 install=true
 suites=()
@@ -19,7 +22,11 @@ while (($#)); do
       out=${2:?bench.sh: --out needs a folder}
       shift
       ;;
-    --*)
+    --help | -h)
+      sed -n '3,13s/^# \{0,1\}//p' "$0"
+      exit 0
+      ;;
+    -*)
       echo "bench.sh: unknown option $1" >&2
       exit 2
       ;;
@@ -27,9 +34,9 @@ while (($#)); do
   esac
   shift
 done
-mkdir -p "$out"
-out=$(realpath "$out")
+if [[ -n $out ]]; then out=$(realpath -m "$out"); fi
 cd "$(dirname "$0")/../.."
+out=${out:-$PWD/out/bench}
 known=(paper error-vs-time scaling crowd turn budget thermal-truth convergence stability stream isolation)
 if ((${#suites[@]} == 0)); then suites=("${known[@]}"); fi
 for suite in "${suites[@]}"; do
@@ -57,16 +64,25 @@ arguments() { # of a suite, when quick
 if $install; then deploy/scripts/install_deps.sh; fi
 cmake --preset release
 cmake --build --preset release --target emit emitd config_data emit_scenes emit_logs
-failed=()
+mkdir -p "$out"
+rm -f "$out"/bench.{json,md} # of an earlier run: this one may be interrupted
+# Without it a suite that ends in good order on Ctrl-C is followed by the next.
+trap 'exit 130' INT TERM
+declare -A exit_codes=()
 for suite in "${suites[@]}"; do
   more=()
   if $quick; then read -r -a more <<<"$(arguments "$suite")"; fi
-  rm -f "$out/$suite.json"
+  case $suite in
+    error-vs-time | convergence) more+=(--plot "$out/$suite.svg") ;;
+  esac
+  rm -f "$out/$suite".{json,svg}
   echo "== bench $suite ${more[*]}"
-  if ! build/release/bin/emit bench "$suite" --json "$out/$suite.json" "${more[@]}" \
-    >"$out/$suite.txt" 2>"$out/$suite.log"; then
+  code=0
+  build/release/bin/emit bench "$suite" --json "$out/$suite.json" "${more[@]}" \
+    >"$out/$suite.txt" 2>"$out/$suite.log" || code=$?
+  if ((code)); then
     tail -n 5 "$out/$suite.log" >&2
-    failed+=("$suite")
+    exit_codes[$suite]=$code
   fi
 done
 
@@ -74,12 +90,14 @@ done
   echo "# Benchmarks"
   echo
   for suite in "${suites[@]}"; do
-    echo "## emit bench $suite"
+    code=${exit_codes[$suite]:-}
+    echo "## emit bench $suite${code:+ (failed: exit $code)}"
     if [[ -s $out/$suite.txt ]]; then
       printf '```\n%s\n```\n\n' "$(cat "$out/$suite.txt")"
     else
       printf 'no result\n\n'
     fi
+    if [[ -s $out/$suite.svg ]]; then printf '![%s](%s.svg)\n\n' "$suite" "$suite"; fi
   done
 } >"$out/bench.md"
 {
@@ -87,6 +105,14 @@ done
   echo "  \"host\": \"$(uname -srm)\","
   echo "  \"cores\": $(nproc),"
   echo "  \"quick\": $quick,"
+  printf '  "failed": ['
+  separator=""
+  for suite in "${suites[@]}"; do
+    [[ -v exit_codes[$suite] ]] || continue
+    printf '%s{"suite": "%s", "exit_code": %d}' "$separator" "$suite" "${exit_codes[$suite]}"
+    separator=", "
+  done
+  echo "],"
   echo "  \"suites\": ["
   separator=""
   for suite in "${suites[@]}"; do
@@ -99,7 +125,7 @@ done
   echo "}"
 } >"$out/bench.json"
 echo "written: $out/bench.json, $out/bench.md"
-if ((${#failed[@]})); then
-  echo "bench.sh: failed: ${failed[*]}" >&2
+if ((${#exit_codes[@]})); then
+  echo "bench.sh: failed: ${!exit_codes[*]}" >&2
   exit 1
 fi

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -177,6 +178,74 @@ TEST(CliBench, TurnFlagsJumpsToPlacesNobodyAnnounced) {
   EXPECT_EQ(shed[0] + shed[1], 0.0);
   EXPECT_EQ(numbers_of(json, "late_frames"), (std::vector<double>{0, 0, 16, 16}));
   for (const double ratio : numbers_of(json, "ratio")) EXPECT_GE(ratio, 1.0);
+}
+
+/// bench.sh in a tree of its own, where `emit bench SUITE` is a line of shell.
+class BenchScript {
+ public:
+  explicit BenchScript(const std::string& emit) {
+    namespace fs = std::filesystem;
+    for (const char* sub : {"deploy/scripts", "build/release/bin", "path"}) {
+      fs::create_directories(folder_.path() / sub);
+    }
+    fs::copy(EMIT_TEST_SOURCE_DIR "/../deploy/scripts/bench.sh",
+             folder_.path() / "deploy/scripts/bench.sh");
+    add_program("path/cmake", "exit 0");
+    add_program("build/release/bin/emit", emit);
+  }
+  [[nodiscard]] ProcessResult run(const std::vector<std::string>& arguments) const {
+    std::vector<std::string> command{"env", "PATH=" + folder_.file("path") + ":" + getenv("PATH"),
+                                     folder_.file("deploy/scripts/bench.sh"), "--no-install"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    return run_process(command);
+  }
+  [[nodiscard]] std::string result(const std::string& name) const {
+    return read_text(folder_.file("out/bench/" + name));
+  }
+
+ private:
+  void add_program(const std::string& name, const std::string& text) const {
+    write_text(folder_.file(name), "#!/bin/sh\n" + text + "\n");
+    std::filesystem::permissions(folder_.file(name), std::filesystem::perms::owner_all);
+  }
+  TemporaryFolder folder_;
+};
+
+TEST(BenchScript, SaysWhichSuitesFailedWithOrWithoutAResult) {
+  const BenchScript script(R"(suite=$2
+[ "$suite" = turn ] && echo 'turn: killed' >&2 && exit 75
+[ "$suite" = error-vs-time ] && [ "$5" = --plot ] && echo '<svg/>' > "$6"
+echo "table of $suite"
+echo "{\"suite\": \"$suite\"}" > "$4"
+[ "$suite" != budget ])");
+  const ProcessResult run = script.run({"turn", "error-vs-time", "budget"});
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.err.find("turn: killed"), std::string::npos);
+  const std::string json = script.result("bench.json");
+  EXPECT_NE(json.find(R"("failed": [{"suite": "turn", "exit_code": 75}, )"
+                      R"({"suite": "budget", "exit_code": 1}],)"),
+            std::string::npos)
+      << json;
+  EXPECT_NE(json.find(R"({"suite": "error-vs-time"})"), std::string::npos);
+  EXPECT_NE(json.find(R"({"suite": "budget"})"), std::string::npos);
+  const std::string table = script.result("bench.md");
+  EXPECT_NE(table.find("## emit bench turn (failed: exit 75)\nno result\n"), std::string::npos);
+  EXPECT_NE(table.find("## emit bench budget (failed: exit 1)\n```\ntable of budget\n"),
+            std::string::npos);
+  EXPECT_NE(table.find("## emit bench error-vs-time\n"), std::string::npos);
+  EXPECT_NE(table.find("![error-vs-time](error-vs-time.svg)"), std::string::npos);
+  EXPECT_EQ(script.result("error-vs-time.svg"), "<svg/>\n");
+
+  const ProcessResult whole = script.run({"stream"});
+  EXPECT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_NE(script.result("bench.json").find("\"failed\": [],"), std::string::npos);
+}
+
+TEST(BenchScript, EndsAsAWholeWhenItIsInterrupted) {
+  // The suite itself ends in good order.
+  const BenchScript script("echo \"$2\" >> \"$(dirname \"$4\")/began\"; kill -TERM $PPID");
+  EXPECT_EQ(script.run({"turn", "budget"}).exit_code, 130);
+  EXPECT_EQ(script.result("began"), "turn\n");
 }
 
 }  // namespace
