@@ -80,10 +80,9 @@ TEST(CliLatency, TellsTheShareOfTheSlotInIgClock) {
   ASSERT_TRUE(daemon.ready) << daemon.folder.read("stderr");
   const std::string json = latency(daemon, "tcp://" + daemon.process.control(), {"--frames", "40"});
   EXPECT_EQ(json_value(json, "frames"), "40");
-  // A machine that stalls skips slots, and the marker's change may fall into one; or a slot is
-  // drawn so late that it knows the pose, but lies before it in time.
-  EXPECT_FALSE(json_value(json, "missed").empty());
-  EXPECT_FALSE(json_value(json, "disagreed").empty());
+  EXPECT_EQ(json_value(json, "missed"), "0") << "the marker stays until it is changed again";
+  // Nothing about "disagreed": a slot that is drawn late knows of a pose that it lies before in
+  // time, as often as the machine is late. In lock step it is 0.
   EXPECT_THAT(json, HasSubstr("\"stage\": \"sampling\""));
   EXPECT_THAT(json, HasSubstr("\"pacing\": \"ig-clock\""));
 }
