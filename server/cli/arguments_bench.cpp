@@ -17,7 +17,7 @@ void Tool::add_bench_commands() {
     app.add_option("--steps", o.steps, "History steps; repeatable; default 27 and 90")
         ->allow_extra_args(false)
         ->check(CLI::PositiveNumber);
-    app.add_option("--frames", o.frames, "Frames per result, at least 5")
+    app.add_option("--frames", o.frames, "Frames per result, at least 5; cached takes at least 300")
         ->check(CLI::Range(5U, 100000U))
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
@@ -28,7 +28,9 @@ void Tool::add_bench_commands() {
         ->capture_default_str();
     app.add_option("--model", o.model, "Thermal model; default that of the scene")
         ->check(CLI::IsMember({"emit2014", "foster"}));
-    app.add_option("--pixels", o.pixels, "Surface pixels per picture whose error is computed")
+    app.add_option(
+           "--pixels", o.pixels,
+           "Surface pixels per picture whose error is computed; published figures: 20000 or more")
         ->check(CLI::Range(1U, 100'000'000U))
         ->capture_default_str();
     app.add_flag("--no-errors", o.no_errors, "Times only: spares the reference");

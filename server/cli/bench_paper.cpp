@@ -76,7 +76,7 @@ void set_errors(const Row& row, Json& json) {
   }
 }
 
-Json row_json(const Row& row) {
+Json row_json(const Row& row, bool asked_enough) {
   static constexpr std::array<const char*, 6> kStages{"geometry", "occlusion", "shadow",
                                                       "thermal",  "radiance",  "readback"};
   Json stages = Json::object();
@@ -110,7 +110,8 @@ Json row_json(const Row& row) {
   json.set("surface_fill_frac", row.fill.surface_frac);
   json.set("statue_fill_frac", statue ? Json(row.fill.figure_frac) : Json(nullptr));
   json.set("swept_ground_frac", row.fill.swept_ground_frac);
-  json.set("rules_met", broken_rules(row.fill, statue).empty() && !baseline_is_slow(row));
+  json.set("rules_met",
+           asked_enough && broken_rules(row.fill, statue).empty() && !baseline_is_slow(row));
   return json;
 }
 
@@ -203,6 +204,10 @@ int run_bench_paper(const BenchPaperCommand& command) {
       command.scenes.empty() ? std::vector<std::string>{"box", "statue"} : command.scenes;
   const std::vector<std::uint32_t> steps =
       command.steps.empty() ? std::vector<std::uint32_t>{27, 90} : command.steps;
+  const auto too_little =
+      broken_rules(command.width_px, command.height_px,
+                   command.no_errors ? std::nullopt : std::optional(command.pixels));
+  for (const std::string& text : too_little) warn(text);
   const InterruptGuard interrupt;
   std::uint64_t frames = 0;
   for (const PaperMethod& method : kPaperMethods) {
@@ -231,7 +236,7 @@ int run_bench_paper(const BenchPaperCommand& command) {
   Json results = Json::array();
   for (const Row& row : rows) {
     table.add(table_line(row));
-    results.push(row_json(row));
+    results.push(row_json(row, too_little.empty()));
   }
   if (command.json != std::filesystem::path("-")) {
     fmt::print("{}, commit {}, {}x{}\n{}", device, kCommit, command.width_px, command.height_px,

@@ -77,4 +77,18 @@ std::vector<std::string> broken_rules(const SceneFill& fill, bool statue) {
   return broken;
 }
 
+std::vector<std::string> broken_rules(std::uint32_t width_px, std::uint32_t height_px,
+                                      std::optional<std::uint32_t> error_pixels) {
+  std::vector<std::string> broken;
+  if (width_px < kLeastWidthPx || height_px < kLeastHeightPx) {
+    broken.push_back(fmt::format("pictures of {}x{}, the rule is {}x{} at least", width_px,
+                                 height_px, kLeastWidthPx, kLeastHeightPx));
+  }
+  if (error_pixels.value_or(kLeastErrorPixels) < kLeastErrorPixels) {
+    broken.push_back(fmt::format("errors of {} pixels, the rule is {} at least", *error_pixels,
+                                 kLeastErrorPixels));
+  }
+  return broken;
+}
+
 }  // namespace emit::cli

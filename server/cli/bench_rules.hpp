@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,6 +24,10 @@ struct SceneFill {
 inline constexpr double kLeastSurfaceFrac = 0.80;
 inline constexpr double kLeastFigureFrac = 0.25;
 inline constexpr double kLeastSweptFrac = 0.15;
+/// Of every picture, and of those whose error is computed.
+inline constexpr std::uint32_t kLeastWidthPx = 1024;
+inline constexpr std::uint32_t kLeastHeightPx = 768;
+inline constexpr std::uint32_t kLeastErrorPixels = 20'000;
 /// A per-frame picture may take this many times what Embree takes to trace its history's steps.
 inline constexpr double kMostEmbreeRatio = 6.0;
 
@@ -37,5 +42,8 @@ inline constexpr double kMostEmbreeRatio = 6.0;
 
 /// One line per rule that is not met; empty when all are.
 [[nodiscard]] std::vector<std::string> broken_rules(const SceneFill& fill, bool statue);
+/// Of what a run is asked for. `error_pixels` per picture; none where no error is computed.
+[[nodiscard]] std::vector<std::string> broken_rules(std::uint32_t width_px, std::uint32_t height_px,
+                                                    std::optional<std::uint32_t> error_pixels);
 
 }  // namespace emit::cli

@@ -208,9 +208,21 @@ TEST(CliBench, paper_fills_every_key) {
   EXPECT_GE(std::stod(json_value(json, "max_error_k")), std::stod(json_value(json, "p99_error_k")));
   EXPECT_NE(json_value(json, "reference").find("1440 uniform history steps"), std::string::npos);
   EXPECT_GT(std::stod(json_value(json, "embree_ratio")), 0.0);
+  EXPECT_NE(result.err.find("errors of 2000 pixels, the rule is 20000"), std::string::npos);
   const double serial_ms = std::stod(json_value(json, "frame_serial_ms"));
   EXPECT_GT(serial_ms, 0.0);
   EXPECT_NEAR(sum, serial_ms, 1e-9 * serial_ms);  // the same numbers in another order of rounding
+}
+
+TEST(CliBench, paper_meets_no_rules_with_small_pictures) {
+  const TemporaryFolder folder;
+  const ProcessResult result =
+      run_emit({"bench", "paper", "--scene", "box", "--steps", "14", "--width", "160", "--height",
+                "120", "--method", "cached", "--no-errors", "--json", folder.file("paper.json")});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(json_value(read_text(folder.file("paper.json")), "rules_met"), "false");
+  EXPECT_EQ(result.err, "emit: warning: pictures of 160x120, the rule is 1024x768 at least\n")
+      << "nothing else is wrong with them";
 }
 
 TEST(CliBench, paper_without_errors_leaves_them_null) {

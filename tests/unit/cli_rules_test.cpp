@@ -45,6 +45,16 @@ TEST(CliBenchRules, shares_are_counted_by_height_and_temperature) {
   EXPECT_EQ(broken_rules({0.7, 0.1, 0.1}, true).size(), 3U);
 }
 
+TEST(CliBenchRules, published_tables_ask_for_pictures_and_errors_of_a_size) {
+  EXPECT_TRUE(broken_rules(1024, 768, 20'000).empty());
+  EXPECT_TRUE(broken_rules(2048, 768, std::nullopt).empty()) << "errors are another run's";
+  EXPECT_EQ(broken_rules(1023, 768, 20'000).size(), 1U);
+  EXPECT_EQ(broken_rules(1024, 767, 20'000).size(), 1U);
+  ASSERT_EQ(broken_rules(1024, 768, 19'999).size(), 1U);
+  EXPECT_NE(broken_rules(1024, 768, 19'999)[0].find("19999"), std::string::npos);
+  EXPECT_EQ(broken_rules(64, 48, 1).size(), 2U);
+}
+
 TEST(CliDemoShortfalls, too_few_frames_and_no_frame_after_the_departure_fail) {
   DemoResults results;
   results.frames_written = 3;
