@@ -130,7 +130,7 @@ void Tool::add_bench_commands() {
     app.add_option("--clients", o.clients, "Clients that are watched: tcp, udp, shm in turn")
         ->check(CLI::Range(1U, 8U))
         ->capture_default_str();
-    app.add_option("--pairs", o.pairs, "Pairs of runs; medians count")
+    app.add_option("--pairs", o.pairs, "Pairs of runs; medians count; fewer than 15 are not judged")
         ->check(CLI::Range(1U, 1000U))
         ->capture_default_str();
     add_json(app, o.json);
