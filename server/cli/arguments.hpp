@@ -59,7 +59,9 @@ class Tool {
     app_.set_version_flag("--version", std::string("emit ") + kVersion + " (" + kCommit + ")");
     app_.require_subcommand(1);
     app_.footer(
-        "Exit codes: 0 success, 2 bad usage, 78 bad configuration, 1 any other failure.\n"
+        "Exit codes: 0 success, 2 bad usage, 78 bad configuration or scenario, 75 the device was "
+        "lost "
+        "(serve), 1 any other failure.\n"
         "Example: emit demo --out frames");
     add_scene_commands();
     add_stream_commands();

@@ -50,8 +50,10 @@ protocol::PoseRates rates_at(const scene::Trajectory& trajectory,
 
 physics::Result<scene::ScenarioDesc> load_scenario_choice(const ScenarioChoice& choice) {
   const auto file = config::resolve_scenario(choice.scenario);
-  if (!file) return tl::unexpected(file.error());
-  return config::load_scenario(*file, choice.set);
+  auto scenario = file ? config::load_scenario(*file, choice.set)
+                       : physics::Result<scene::ScenarioDesc>(tl::unexpect, file.error());
+  if (!scenario) scenario.error().code = ErrorCode::config;
+  return scenario;
 }
 
 std::vector<scene::Material> material_library() {

@@ -12,7 +12,7 @@
 
 namespace emit::cli {
 
-/// Shipped name or file, with the overrides applied. Setup only. Every error means exit code 78.
+/// Shipped name or file, with the overrides applied. Setup only. Errors: config.
 [[nodiscard]] physics::Result<scene::ScenarioDesc> load_scenario_choice(
     const ScenarioChoice& choice);
 

@@ -29,6 +29,7 @@ TEST(CliUsage, help_lists_the_exit_codes) {
   const ProcessResult result = run_emit({"--help"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_NE(result.out.find("78 bad configuration"), std::string::npos);
+  EXPECT_NE(result.out.find("75 the device was lost"), std::string::npos);
   EXPECT_NE(result.out.find("serve"), std::string::npos);
 }
 
@@ -100,6 +101,45 @@ TEST(CliBadConfiguration, an_unknown_override_exits_with_78) {
       run_emit({"render", "box", "--time-s", "0", "--out", "x.exr", "--set", "thermal.stepz=9"});
   EXPECT_EQ(result.exit_code, 78) << result.err;
   EXPECT_NE(result.err.find("stepz"), std::string::npos);
+}
+
+/// With a scenario whose glTF is no glTF, and with one that there is not.
+class CliBadScenario : public testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(CliBadScenario, exits_with_78) {
+  const TemporaryFolder folder;
+  write_text(folder.file("broken.glb"), "no glTF");
+  const auto run = [&](const std::string& scenario) {
+    std::vector<std::string> arguments = GetParam();
+    for (std::string& argument : arguments) {
+      if (argument == "SCENARIO") argument = scenario;
+      if (argument == "OUT") argument = folder.file("out");
+    }
+    if (scenario == "box") {
+      arguments.emplace_back("--set");
+      arguments.push_back("object[box].gltf=\"" + folder.file("broken.glb") + "\"");
+    }
+    return run_emit(arguments);
+  };
+  const ProcessResult broken = run("box");
+  EXPECT_EQ(broken.exit_code, 78) << broken.err;
+  EXPECT_NE(broken.err.find("broken.glb"), std::string::npos) << broken.err;
+  const ProcessResult unknown = run("no-such-scenario");
+  EXPECT_EQ(unknown.exit_code, 78) << unknown.err;
+  EXPECT_NE(unknown.err.find("no-such-scenario"), std::string::npos) << unknown.err;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Commands, CliBadScenario,
+    testing::Values(std::vector<std::string>{"render", "SCENARIO", "--time-s", "0", "--out", "OUT"},
+                    std::vector<std::string>{"solve", "SCENARIO", "--time-s", "0", "--out", "OUT"},
+                    std::vector<std::string>{"view", "SCENARIO"},
+                    std::vector<std::string>{"bench", "turn", "--scene", "SCENARIO"},
+                    std::vector<std::string>{"bench", "budget", "--scene", "SCENARIO"}));
+
+TEST(CliFailure, a_file_that_no_scenario_names_exits_with_1) {
+  const TemporaryFolder folder;
+  write_text(folder.file("broken.glb"), "no glTF");
+  EXPECT_EQ(run_emit({"inspect", folder.file("broken.glb")}).exit_code, 1);
 }
 
 TEST(CliFailure, a_refused_connection_exits_with_1) {

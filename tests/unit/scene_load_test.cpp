@@ -181,7 +181,7 @@ TEST(LoadScene, entities_need_one_placement_and_their_own_id) {
 TEST(LoadScene, broken_file_names_the_object) {
   const auto scene = load_scene(scenario_of("/nowhere/ghost.glb"));
   ASSERT_FALSE(scene);
-  EXPECT_EQ(scene.error().code, ErrorCode::not_found);
+  EXPECT_EQ(scene.error().code, ErrorCode::config) << "the scenario names it";
   EXPECT_THAT(scene.error().text, AllOf(HasSubstr("'thing'"), HasSubstr("ghost.glb")));
 }
 

@@ -120,8 +120,11 @@ class SceneLoader {
     }
     const Result<const GltfModel*> model = model_of(object.gltf);
     if (!model) {
-      return tl::unexpected(
-          physics::Error(model.error()).with_context(fmt::format("object '{}'", object.name)));
+      physics::Error error =
+          physics::Error(model.error()).with_context(fmt::format("object '{}'", object.name));
+      // What cannot be read now may be read later; any other fault is the scenario's own.
+      if (error.code != ErrorCode::io) error.code = ErrorCode::config;
+      return tl::unexpected(std::move(error));
     }
     const Result<std::vector<std::size_t>> materials = lookup_.resolve(object_index, **model);
     if (!materials) {

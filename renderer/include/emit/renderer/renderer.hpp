@@ -139,7 +139,7 @@ using WarmUpProgress = std::function<bool(double done_frac)>;
 class Renderer {
  public:
   /// Loads the scene, creates the GL context and takes all memory. Setup only.
-  /// Errors: gpu (no device, naming what was tried), not_found/parse (file and element), config.
+  /// Errors: gpu (no device, naming what was tried), those of scene::load_scene(), config.
   [[nodiscard]] static physics::Result<std::unique_ptr<Renderer>> create(
       const scene::ScenarioDesc& scenario, const DeviceOptions& device,
       const OutputOptions& output);

@@ -106,8 +106,9 @@ struct SceneGeometry {
 /// Loads every glTF file of the scenario and resolves its materials. A glTF material is looked up
 /// in the object's material_map, then the object's `material`, then the library by name, then the
 /// scenario's default_material (with a warning that names it). Setup only; any thread.
-/// Errors: not_found, io, parse (naming file and element), config (unknown library material, naming
-/// object and material; an entity without exactly one placement).
+/// Errors: io (a file cannot be read), config (a file that is missing or malformed, naming file and
+/// element; unknown library material, naming object and material; an entity without exactly one
+/// placement).
 [[nodiscard]] physics::Result<SceneGeometry> load_scene(const ScenarioDesc& scenario);
 
 }  // namespace emit::scene
