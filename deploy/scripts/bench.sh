@@ -54,7 +54,7 @@ arguments() { # of a suite, when quick
     crowd) echo "--instances 100 --pairs 15 --set thermal.tolerance_k=5 --set thermal.steps=3" ;;
     turn) echo "--runs 1 --frames 20 --set thermal.tolerance_k=5" ;;
     budget) echo "--frames 30 --set thermal.tolerance_k=5" ;;
-    thermal-truth) echo "--method cached --width 64 --height 48 --steps 9" ;;
+    thermal-truth) echo "--width 64 --height 48 --steps 9" ;;
     stability) echo "--cases 100000 --part equilibrium" ;;
     stream) echo "--frames 300 --repeats 1" ;;
     isolation) echo "--pairs 2" ;;

@@ -292,7 +292,7 @@ int run_bench_convergence(const BenchConvergenceCommand& command);
 
 struct BenchThermalTruthCommand {
   std::optional<std::filesystem::path> json;
-  std::string method = "per-frame";
+  std::string method = "cached";
   std::uint32_t steps = 90;
   std::uint32_t width_px = 320;
   std::uint32_t height_px = 256;

@@ -39,6 +39,11 @@ TEST(CliUsage, serve_help_is_the_daemons_own) {
   EXPECT_NE(result.out.find("--config"), std::string::npos) << result.out;
 }
 
+TEST(CliUsage, thermal_truth_judges_the_method_that_scenarios_use) {
+  const ProcessResult result = run_emit({"bench", "thermal-truth", "--help"});
+  EXPECT_NE(result.out.find("{per-frame,cached}=cached"), std::string::npos) << result.out;
+}
+
 class CliBadUsage : public testing::TestWithParam<std::vector<std::string>> {};
 
 TEST_P(CliBadUsage, exits_with_2) {
