@@ -100,7 +100,8 @@ void Tool::add_scene_commands() {
     add_count(app, "--pixels", o.pixels,
               "Only so many surface pixels, always the same ones, the rest NaN; 0: all");
     add_path(app, "--checkpoint", o.checkpoint,
-             "Folder to save the three-dimensional history in, and to go on from");
+             "Folder to save the three-dimensional history in, and to go on from")
+        ->type_name("DIR");
     app.add_option("--threads", o.threads, "Threads; 0: one per core")->capture_default_str();
     app.add_option("--band", o.band, "Band of the radiance channel; default: the first")
         ->type_name("NAME");
@@ -130,7 +131,7 @@ void Tool::add_scene_commands() {
         app_, "generate", "Write one of the shipped scenes, or all, as glTF",
         "emit generate block-on-road --out scenes --set block_size_m=1.5", run_generate);
     app.add_option("scene", o.scene, "Scene name, or all")->required()->type_name("SCENE");
-    add_path(app, "--out", o.out, "Folder to write into")->required();
+    add_path(app, "--out", o.out, "Folder to write into")->required()->type_name("DIR");
     add_set(app, o.set);
   }
   {
@@ -172,7 +173,9 @@ void Tool::add_stream_commands() {
         "The main job end to end on loopback: daemon, pose log over UDP and TCP, two clients, "
         "frames on disk, timing table, bit-exact replay",
         "emit demo --out frames", run_demo);
-    add_path(app, "--out", o.out, "Folder for the frames")->capture_default_str();
+    add_path(app, "--out", o.out, "Folder for the frames")
+        ->type_name("DIR")
+        ->default_str(o.out.string());
     app.add_option("--scenario", o.input.scenario, "Shipped scenario or .toml file")
         ->capture_default_str();
     add_set(app, o.input.set);
@@ -204,7 +207,8 @@ void Tool::add_stream_commands() {
     add_path(
         app, "--out", o.out,
         "Folder for frame_NNNNNN.exr and .png (apparent temperature, by the band's response where "
-        "the daemon tells it, else as of a rectangular band)");
+        "the daemon tells it, else as of a rectangular band)")
+        ->type_name("DIR");
     app.add_option("--name", o.channel_name, "Channel; default: the first that fits")
         ->type_name("NAME");
     app.add_option("--channel", o.channel_kind, "Channel kind; default: any")
@@ -312,7 +316,7 @@ void Tool::add_log_commands() {
         "emit replay run.mcap --scenario airfield --out frames", run_replay);
     add_path(app, "log", o.log, "MCAP log of emit record, or of the daemon's journal")->required();
     add_scenario(app, o.input, "--scenario");
-    add_path(app, "--out", o.out, "Folder for frame_NNNNNN.exr and .png");
+    add_path(app, "--out", o.out, "Folder for frame_NNNNNN.exr and .png")->type_name("DIR");
     app.add_option("--speed", o.speed, "Multiple of the recorded pace, or max")
         ->type_name("X")
         ->capture_default_str();

@@ -47,10 +47,11 @@ void Tool::add_bench_commands() {
                    "Scenario; repeatable; default block-on-road, ribbed, statue, airfield")
         ->allow_extra_args(false);
     app.add_flag("--quick", o.quick, "Models, spacings and two step counts only");
-    app.add_option("--csv", o.csv, "Write the results as CSV");
-    app.add_option("--plot", o.plot, "Write the diagrams as SVG");
-    app.add_option("--figures", o.figures,
-                   "Folder for pictures and profiles of reference and models");
+    add_path(app, "--csv", o.csv, "Write the results as CSV");
+    add_path(app, "--plot", o.plot, "Write the diagrams as SVG");
+    add_path(app, "--figures", o.figures,
+             "Folder for pictures and profiles of reference and models")
+        ->type_name("DIR");
     app.add_option("--frames", o.frames, "Frames timed per setting")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
@@ -162,7 +163,7 @@ void Tool::add_bench_commands() {
         *bench, "convergence",
         "How the error of the reference solvers falls with their cells and steps",
         "emit bench convergence --plot convergence.svg", run_bench_convergence);
-    app.add_option("--plot", o.plot, "Write the diagrams as SVG");
+    add_path(app, "--plot", o.plot, "Write the diagrams as SVG");
     add_json(app, o.json);
   }
   {

@@ -197,7 +197,7 @@ int run_fit(const FitCommand& command);
 
 struct GenerateCommand {
   std::string scene;
-  std::filesystem::path out = ".";
+  std::filesystem::path out;
   std::vector<std::string> set;
 };
 int run_generate(const GenerateCommand& command);

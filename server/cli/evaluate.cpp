@@ -108,7 +108,8 @@ int run_evaluate(const EvaluateCommand& command) {
 std::string evaluate_models_text() {
   std::string text;
   for (const auto& model : evaluate::models()) {
-    text += "  " + std::string(model.name) + ": " + std::string(model.meaning) + "\n      in  " +
+    text += "  " + std::string(model.name) + ": " + std::string(model.meaning) +
+            (model.float32 ? "" : "; on the cpu in float64 only") + "\n      in  " +
             std::string(model.inputs) + "\n      out " + std::string(model.outputs) + "\n";
   }
   return text;

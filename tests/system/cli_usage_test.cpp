@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "system/cli_process.hpp"
 
 namespace emit::test {
@@ -23,6 +25,28 @@ TEST(CliUsage, version_names_tool_and_number) {
   const ProcessResult result = run_emit({"--version"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.out.rfind("emit ", 0), 0U) << result.out;
+}
+
+TEST(CliUsage, folders_are_shown_as_folders) {
+  for (const auto& [command, option] :
+       {std::pair{"demo", "--out DIR=emit-demo "}, std::pair{"receive", "--out DIR "},
+        std::pair{"replay", "--out DIR "}, std::pair{"generate", "--out DIR REQUIRED"},
+        std::pair{"solve", "--checkpoint DIR "}}) {
+    EXPECT_NE(run_emit({command, "--help"}).out.find(option), std::string::npos) << command;
+  }
+}
+
+TEST(CliUsage, evaluate_says_which_models_are_double_on_the_cpu_only) {
+  const std::string help = run_emit({"evaluate", "--help"}).out;
+  const auto is_marked = [&](const std::string& model) {
+    const std::size_t at = help.find("\n  " + model + ": ");
+    return help.substr(at + 1, help.find('\n', at + 1) - at).find("on the cpu in float64 only") !=
+           std::string::npos;
+  };
+  EXPECT_TRUE(is_marked("conduction-slab"));
+  EXPECT_TRUE(is_marked("sun-position"));
+  EXPECT_FALSE(is_marked("equilibrium"));
+  EXPECT_FALSE(is_marked("sky-view"));
 }
 
 TEST(CliUsage, help_lists_the_exit_codes) {
