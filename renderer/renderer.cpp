@@ -470,7 +470,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   const bool cached = scenario.thermal.method == scene::ThermalMethod::cached;
-  auto geometry_pass = GeometryPass::create(width_px, height_px, cached);
+  auto geometry_pass = GeometryPass::create(*context, width_px, height_px, cached);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
   auto radiance_pass = RadiancePass::create(scenario.thermal, radiance_content(*bands, output));
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));

@@ -128,6 +128,7 @@ struct EglContext::Impl {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
   std::string device_name;
+  bool software = false;
 
   ~Impl() {
     if (context == EGL_NO_CONTEXT) return;
@@ -159,7 +160,9 @@ physics::Result<EglContext> EglContext::create(int gpu_index, bool debug) {
       return value == nullptr ? std::string("?")
                               : std::string(reinterpret_cast<const char*>(value));
     };
-    impl->device_name = fmt::format("{} / OpenGL {}", text(GL_RENDERER), text(GL_VERSION));
+    const std::string renderer = text(GL_RENDERER);
+    impl->device_name = fmt::format("{} / OpenGL {}", renderer, text(GL_VERSION));
+    impl->software = renderer.starts_with("llvmpipe") || renderer.starts_with("softpipe");
     return EglContext(std::move(impl));
   }
   return make_error(ErrorCode::gpu,
@@ -170,6 +173,10 @@ physics::Result<EglContext> EglContext::create(int gpu_index, bool debug) {
 
 const std::string& EglContext::device_name() const noexcept {
   return impl_->device_name;
+}
+
+bool EglContext::software() const noexcept {
+  return impl_->software;
 }
 
 }  // namespace emit::gl

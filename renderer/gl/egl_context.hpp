@@ -21,6 +21,8 @@ class EglContext {
 
   /// GL_RENDERER and GL_VERSION.
   [[nodiscard]] const std::string& device_name() const noexcept;
+  /// True: Mesa draws on the processor.
+  [[nodiscard]] bool software() const noexcept;
 
  private:
   struct Impl;

@@ -11,14 +11,31 @@
 namespace emit::renderer {
 namespace {
 
-void issue(std::span<const ViewDraw> draws, const ViewRanges& ranges,
-           const gl::Buffer& records) noexcept {
+/// Mesa sorts triangles into tiles on the caller's thread; others fill these meanwhile, but only
+/// with what was flushed.
+constexpr std::uint32_t kSoftwareBatchIndices = 30'000;
+
+void issue(std::span<const ViewDraw> draws, const ViewRanges& ranges, const gl::Buffer& records,
+           std::uint32_t batch_indices) noexcept {
+  std::uint32_t indices = 0;  // of the batch
   for (const ViewDraw& draw : draws) {
     records.bind_uniform(EMIT_BIND_DRAW, draw.record * sizeof(DrawRecord), sizeof(gpu::DrawParams));
-    glMultiDrawElementsBaseVertex(GL_TRIANGLES, ranges.index_count.data() + draw.first,
-                                  GL_UNSIGNED_INT, ranges.index_offset.data() + draw.first,
-                                  static_cast<GLsizei>(draw.count),
-                                  ranges.base_vertex.data() + draw.first);
+    const std::uint32_t end = draw.first + draw.count;
+    for (std::uint32_t first = draw.first; first < end;) {
+      std::uint32_t last = first;
+      while (last < end && indices < batch_indices) {
+        indices += static_cast<std::uint32_t>(ranges.index_count[last++]);
+      }
+      glMultiDrawElementsBaseVertex(GL_TRIANGLES, ranges.index_count.data() + first,
+                                    GL_UNSIGNED_INT, ranges.index_offset.data() + first,
+                                    static_cast<GLsizei>(last - first),
+                                    ranges.base_vertex.data() + first);
+      if (indices >= batch_indices) {
+        glFlush();
+        indices = 0;
+      }
+      first = last;
+    }
   }
 }
 
@@ -86,9 +103,11 @@ void SceneVertexArrays::read_nodes(const gl::Buffer& before,
   read(EMIT_ATTR_NODE_AFTER, 4, after);
 }
 
-physics::Result<GeometryPass> GeometryPass::create(std::uint32_t width_px, std::uint32_t height_px,
+physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context,
+                                                   std::uint32_t width_px, std::uint32_t height_px,
                                                    bool sampled) {
   GeometryPass pass;
+  if (context.software()) pass.batch_indices_ = kSoftwareBatchIndices;
   std::vector<gl::Define> defines;
   if (sampled) defines.push_back({"EMIT_CACHED", "1"});
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
@@ -153,9 +172,9 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
   program_.use();
   vertices.bind_view();
   glEnable(GL_CULL_FACE);
-  issue(lists.view_draws(single_sided), lists.view_ranges(), records);
+  issue(lists.view_draws(single_sided), lists.view_ranges(), records, batch_indices_);
   glDisable(GL_CULL_FACE);
-  issue(lists.view_draws(double_sided), lists.view_ranges(), records);
+  issue(lists.view_draws(double_sided), lists.view_ranges(), records, batch_indices_);
   if (sampled_) {
     // Texels of 16 bytes take llvmpipe longer to clear than to draw where no surface is.
     sky_program_.use();

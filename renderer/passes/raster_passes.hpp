@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <glm/ext/vector_uint2.hpp>
 #include <glm/ext/vector_uint4.hpp>
+#include <limits>
 #include <span>
 
+#include "gl/egl_context.hpp"
 #include "gl/objects.hpp"
 #include "gl/program.hpp"
 #include "passes/draw_lists.hpp"
@@ -32,7 +34,8 @@ class SceneVertexArrays {
 class GeometryPass {
  public:
   /// `sampled`: the thermal state of the surface comes from its samples.
-  [[nodiscard]] static physics::Result<GeometryPass> create(std::uint32_t width_px,
+  [[nodiscard]] static physics::Result<GeometryPass> create(const gl::EglContext& context,
+                                                            std::uint32_t width_px,
                                                             std::uint32_t height_px, bool sampled);
   /// Draws two parts of what `lists` found in view; `records` holds its records. Of the `size_px`
   /// only the window is touched.
@@ -52,6 +55,8 @@ class GeometryPass {
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
   bool sampled_ = false;
+  /// Drawn at least before what there is is handed to the device.
+  std::uint32_t batch_indices_ = std::numeric_limits<std::uint32_t>::max();
 };
 
 /// Paper part 3: depth seen from the sun, one layer per cascade, drawn anew for every step.
