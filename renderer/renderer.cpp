@@ -207,6 +207,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
   frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
                                        static_cast<float>(kReferenceK),
                                        static_cast<float>(scenario_.thermal.tolerance_k), 0.0F);
+  frame_params_.samples.y = static_cast<float>(scenario_.sensor.near_m);
   frame_params_.bands = glm::uvec4(bands_.nodes_per_band(), bands_.first_emissivity(), 0U, 0U);
   for (std::uint32_t slot = 0; slot < output_.slots; ++slot) {
     FrameView& view = views_[slot];
@@ -459,6 +460,11 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   if (auto ok = check_limits(scenario, output); !ok) return tl::unexpected(ok.error());
   auto geometry = scene::load_scene(scenario);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
+  if (geometry->materials.size() > EMIT_MAX_MATERIALS) {
+    return make_error(ErrorCode::config,
+                      fmt::format("{} materials: {} are possible", geometry->materials.size(),
+                                  EMIT_MAX_MATERIALS));
+  }
   auto bands = BandModel::build(scenario, geometry->materials);
   if (!bands) return tl::unexpected(std::move(bands.error()));
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
@@ -470,7 +476,11 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   const bool cached = scenario.thermal.method == scene::ThermalMethod::cached;
-  auto geometry_pass = GeometryPass::create(*context, width_px, height_px, cached);
+  using Content = GeometryPass::Content;
+  auto geometry_pass = GeometryPass::create(*context, width_px, height_px,
+                                            !cached         ? Content::normals
+                                            : output.object ? Content::samples_and_objects
+                                                            : Content::samples);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
   auto radiance_pass = RadiancePass::create(scenario.thermal, radiance_content(*bands, output));
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));

@@ -150,7 +150,8 @@ Result<std::unique_ptr<VisibilityProbe>> VisibilityProbe::create(
     const DeviceOptions& device) {
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
   if (!context) return tl::unexpected(std::move(context.error()));
-  auto geometry = GeometryPass::create(*context, sensor.width_px, sensor.height_px, false);
+  auto geometry = GeometryPass::create(*context, sensor.width_px, sensor.height_px,
+                                       GeometryPass::Content::normals);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
   auto occlusion = OcclusionPass::create(sensor.width_px, sensor.height_px);
   if (!occlusion) return tl::unexpected(std::move(occlusion.error()));

@@ -105,19 +105,17 @@ void SceneVertexArrays::read_nodes(const gl::Buffer& before,
 
 physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context,
                                                    std::uint32_t width_px, std::uint32_t height_px,
-                                                   bool sampled) {
+                                                   Content content) {
   GeometryPass pass;
   if (context.software()) pass.batch_indices_ = kSoftwareBatchIndices;
   std::vector<gl::Define> defines;
+  const bool sampled = content != Content::normals;
+  const bool objects = content == Content::samples_and_objects;
   if (sampled) defines.push_back({"EMIT_CACHED", "1"});
+  if (objects) defines.push_back({"EMIT_OBJECTS", "1"});
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
-  if (sampled) {
-    auto sky = gl::Program::graphics("passes/sky.vert", "passes/sky.frag");
-    if (!sky) return tl::unexpected(std::move(sky.error()));
-    pass.sky_program_ = std::move(*sky);
-  }
   const auto width = static_cast<GLsizei>(width_px);
   const auto height = static_cast<GLsizei>(height_px);
   pass.sampled_ = sampled;
@@ -126,9 +124,14 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
   const GLuint id = pass.framebuffer_.id();
   glNamedFramebufferTexture(id, GL_DEPTH_ATTACHMENT, pass.depth_buffer_.id(), 0);
   if (sampled) {
-    pass.surface_ = gl::Texture(GL_RGBA32UI, width, height);
+    pass.surface_ = gl::Texture(GL_RG32UI, width, height);
     glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.surface_.id(), 0);
-    glNamedFramebufferDrawBuffer(id, GL_COLOR_ATTACHMENT0);
+    if (objects) {
+      pass.ids_ = gl::Texture(GL_R16UI, width, height);
+      glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.ids_.id(), 0);
+    }
+    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+    glNamedFramebufferDrawBuffers(id, objects ? 2 : 1, targets);
   } else {
     pass.depth_m_ = gl::Texture(GL_R32F, width, height);
     pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
@@ -175,18 +178,14 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
   issue(lists.view_draws(single_sided), lists.view_ranges(), records, batch_indices_);
   glDisable(GL_CULL_FACE);
   issue(lists.view_draws(double_sided), lists.view_ranges(), records, batch_indices_);
-  if (sampled_) {
-    // Texels of 16 bytes take llvmpipe longer to clear than to draw where no surface is.
-    sky_program_.use();
-    glDepthFunc(GL_EQUAL);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-  }
   glDisable(GL_SCISSOR_TEST);
 }
 
 void GeometryPass::bind_textures() const noexcept {
   if (sampled_) {
+    depth_buffer_.bind(EMIT_TEX_DEPTH);
     surface_.bind(EMIT_TEX_SURFACE);
+    if (ids_.id() != 0) ids_.bind(EMIT_TEX_IDS);
     return;
   }
   depth_m_.bind(EMIT_TEX_DEPTH);

@@ -30,13 +30,19 @@ class SceneVertexArrays {
 };
 
 /// Paper part 1: linear depth, normal, material index and object id of the visible surface, in
-/// three textures; or, `sampled`, all that the radiance pass needs of it in one.
+/// three textures; or all that the radiance pass needs of its samples.
 class GeometryPass {
  public:
-  /// `sampled`: the thermal state of the surface comes from its samples.
+  /// What it keeps of the visible surface.
+  enum class Content {
+    normals,  ///< distance, normal, material and object
+    samples,  ///< depth, material and thermal state, which comes from the surface's samples
+    samples_and_objects,  ///< the object as well
+  };
   [[nodiscard]] static physics::Result<GeometryPass> create(const gl::EglContext& context,
                                                             std::uint32_t width_px,
-                                                            std::uint32_t height_px, bool sampled);
+                                                            std::uint32_t height_px,
+                                                            Content content);
   /// Draws two parts of what `lists` found in view; `records` holds its records. Of the `size_px`
   /// only the window is touched.
   void draw(const SceneVertexArrays& vertices, const DrawLists& lists, const gl::Buffer& records,
@@ -47,11 +53,10 @@ class GeometryPass {
 
  private:
   gl::Program program_;
-  gl::Program sky_program_;  ///< `sampled`: fills what no surface covers
   gl::Texture depth_m_;
   gl::Texture normal_;
   gl::Texture ids_;
-  gl::Texture surface_;  ///< instead of the three: passes/geometry.frag
+  gl::Texture surface_;  ///< of samples: passes/surface_texel.glsl
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
   bool sampled_ = false;

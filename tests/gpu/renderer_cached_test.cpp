@@ -401,5 +401,16 @@ TEST(RendererCached, FramesFromWhereNoOneSaidTheCameraWouldBeAreFlagged) {
   EXPECT_FALSE(coarse_at(eye));
 }
 
+TEST(RendererCachedSurface, PassesTemperaturesOnWithinAQuarterOfAMillikelvin) {
+  for (const double prescribed_k : {100.0, 301.23456, 5000.0}) {
+    auto scenario = cached_scenario(write_quads("plane", {ground(50.0, 50.0)}));
+    scenario.materials[0].prescribed_k = prescribed_k;
+    Session session(scenario);
+    const auto frame_k = session.frame_k(2 * kHourNs, looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0}));
+    const double floats_k = 3.0 * 1.2e-7 * prescribed_k;  // of interpolating in float32
+    for (const float k : frame_k) ASSERT_NEAR(k, prescribed_k, 0.5 / 2048.0 + floats_k);
+  }
+}
+
 }  // namespace
 }  // namespace emit::test

@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "shared/frame_params.glsl.h"
 #include "passes/octahedral.glsl"
+#include "passes/surface_texel.glsl"
 
 layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 
 #ifdef EMIT_CACHED
 in vec4 sample_state;
-// All that the radiance pass needs, so that it reads one texel (gbuffer.glsl unpacks it).
-layout(location = 0) out uvec4 surface;
+layout(location = 0) out uvec2 surface;
+#ifdef EMIT_OBJECTS
+layout(location = 1) out uint object;
+#endif
 
 void main() {
-  float boresight_m = 1.0 / gl_FragCoord.w;  // clip w is the distance along the boresight
   float cosine = gl_FrontFacing ? sample_state.w : -sample_state.w;
-  surface = uvec4(floatBitsToUint(boresight_m), floatBitsToUint(sample_state.x),
-                  packUnorm2x16(vec2(sample_state.y * max(cosine, 0.0), sample_state.z)),
-                  draw.ids.y << 16 | draw.ids.x);
+  surface = packed_surface_texel(sample_state.x, sample_state.y * max(cosine, 0.0), sample_state.z, draw.ids.x);
+#ifdef EMIT_OBJECTS
+  object = draw.ids.y;
+#endif
 }
 #else
 in vec3 normal_relworld;

@@ -13,7 +13,7 @@ layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 // Temperature offset in K and visible share of the sun, at the two nodes of time around now.
 layout(location = EMIT_ATTR_NODE_BEFORE) in vec2 node_before;
 layout(location = EMIT_ATTR_NODE_AFTER) in vec2 node_after;
-// Temperature offset in K, share of the sun, share of the sky, cosine of the sun's incidence on the front.
+// Temperature in K, share of the sun, share of the sky, cosine of the sun's incidence on the front.
 out vec4 sample_state;
 #else
 out vec3 normal_relworld;
@@ -24,7 +24,8 @@ void main() {
            draw.normal_from_mesh[2].xyz * normal_mesh.z;
 #ifdef EMIT_CACHED
   float cosine = dot(n, frame.sun_now.xyz) * inversesqrt(max(dot(n, n), 1e-30)) * frame.sun_now.w;
-  sample_state = vec4(mix(node_before, node_after, frame.samples.x), normal_mesh.w, cosine);
+  vec2 now = mix(node_before, node_after, frame.samples.x);
+  sample_state = vec4(frame.obscurance.y + now.x, now.y, normal_mesh.w, cosine);
 #else
   normal_relworld = n;
 #endif

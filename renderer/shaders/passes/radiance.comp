@@ -8,6 +8,7 @@
 //   EMIT_OUTPUTS    EMIT_OUTPUT_* planes
 #include "passes/gbuffer.glsl"
 #include "passes/tables.glsl"
+#include "passes/surface_texel.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(std140, binding = EMIT_BIND_BANDS) uniform Bands { BandParams bands[EMIT_MAX_BANDS]; };
@@ -35,10 +36,12 @@ struct Seen {
 layout(binding = EMIT_TEX_SURFACE) uniform usampler2D surface_texture;
 
 Seen seen_at(ivec2 px) {
-  uvec4 texel = texelFetch(surface_texture, px, 0);  // as passes/geometry.frag packs it
-  vec2 shares = unpackUnorm2x16(texel.z);
-  return Seen(uintBitsToFloat(texel.x), frame.obscurance.y + uintBitsToFloat(texel.y), shares.y,
-              shares.x, texel.w & 0xffffu, texel.w >> 16);
+  uvec2 texel = texelFetch(surface_texture, px, 0).rg;
+  // Reversed depth; where nothing was drawn it is 0, and the texel what it was.
+  float boresight_m = min(frame.samples.y / texelFetch(depth_texture, px, 0).r, EMIT_SKY_DEPTH_M);
+  uint object = (EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u ? texelFetch(ids_texture, px, 0).r : 0u;
+  return Seen(boresight_m, texel_temperature_k(texel), texel_open_frac(texel), texel_sun_cosine(texel),
+              texel_material(texel), object);
 }
 #else
 layout(binding = EMIT_TEX_OCCLUSION) uniform sampler2D occlusion_texture;

@@ -46,6 +46,7 @@
 #define EMIT_MAX_MODES 2
 #define EMIT_MAX_ATMOSPHERE_TERMS 4
 #define EMIT_MAX_TAPS 256
+#define EMIT_MAX_MATERIALS 16384  // passes/surface_texel.glsl
 
 // Boresight distance in the geometry buffer where no surface is seen.
 #define EMIT_SKY_DEPTH_M 1e30f

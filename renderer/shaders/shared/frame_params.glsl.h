@@ -15,7 +15,8 @@ struct FrameParams {
   vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K;
                               // foster: z = tolerance of a step in K, w = nodes per axis of the spin-up table
   uvec4 bands;                // x = nodes of a band's table, y = place of the emissivities behind the tables
-  vec4 samples;               // cached: x = way of now between the two nodes of the samples, 0..1
+  vec4 samples;               // cached: x = way of now between the two nodes of the samples, 0..1;
+                              // y = boresight distance where the depth buffer holds 1, m
   vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
 };
 
