@@ -38,7 +38,8 @@ layout(binding = EMIT_TEX_SURFACE) uniform usampler2D surface_texture;
 Seen seen_at(ivec2 px) {
   uvec2 texel = texelFetch(surface_texture, px, 0).rg;
   // Reversed depth; where nothing was drawn it is 0, and the texel what it was.
-  float boresight_m = min(frame.samples.y / texelFetch(depth_texture, px, 0).r, EMIT_SKY_DEPTH_M);
+  float depth = texelFetch(depth_texture, px, 0).r;
+  float boresight_m = depth > 0.0 ? frame.samples.y / depth : EMIT_SKY_DEPTH_M;
   uint object = (EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u ? texelFetch(ids_texture, px, 0).r : 0u;
   return Seen(boresight_m, texel_temperature_k(texel), texel_open_frac(texel), texel_sun_cosine(texel),
               texel_material(texel), object);
