@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "emit/scene/mesh.hpp"
+#include "emit/scene/sheets.hpp"
 #include "gl/egl_context.hpp"
 #include "history/pose_history.hpp"
 #include "passes/band_model.hpp"
@@ -460,6 +461,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   if (auto ok = check_limits(scenario, output); !ok) return tl::unexpected(ok.error());
   auto geometry = scene::load_scene(scenario);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
+  const bool cached = scenario.thermal.method == scene::ThermalMethod::cached;
+  if (cached) scene::adopt_sheets(*geometry);
   if (geometry->materials.size() > EMIT_MAX_MATERIALS) {
     return make_error(ErrorCode::config,
                       fmt::format("{} materials: {} are possible", geometry->materials.size(),
@@ -475,7 +478,6 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
 
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
-  const bool cached = scenario.thermal.method == scene::ThermalMethod::cached;
   using Content = GeometryPass::Content;
   auto geometry_pass = GeometryPass::create(*context, width_px, height_px,
                                             !cached         ? Content::normals

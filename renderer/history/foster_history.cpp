@@ -26,6 +26,8 @@ constexpr double kFirstSpinUpStepS = 300.0;
 constexpr double kFirstTailStepS = 300.0;
 // How well the surroundings are followed.
 constexpr double kSurroundingsToleranceK = 0.01;
+/// Behind the middle of a sheet: 50 K leave by 0.05 W/m2.
+constexpr double kInsulationM2kW = 1e3;
 
 double seconds(std::int64_t begin_ns, std::int64_t end_ns) noexcept {
   return static_cast<double>(end_ns - begin_ns) * 1e-9;
@@ -119,6 +121,17 @@ physics::Result<std::vector<FosterMaterial>> foster_materials(
     entry.initial_k = material.initial_k.value_or(options.initial_k);
     if (material.prescribed_k) {
       entry.prescribed_k = *material.prescribed_k;
+      out.push_back(entry);
+      continue;
+    }
+    if (material.sheet) {
+      entry.sheet = true;
+      double capacity_j_m2_k = 0.0;
+      for (const scene::Layer& layer : material.layers) {
+        capacity_j_m2_k += layer.thickness_m * layer.density_kg_m3 * layer.specific_heat_j_kg_k;
+      }
+      entry.network.modes[entry.network.count++] = {kInsulationM2kW * capacity_j_m2_k,
+                                                    kInsulationM2kW};
       out.push_back(entry);
       continue;
     }

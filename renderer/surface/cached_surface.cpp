@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <utility>
 
+#include "surface/sheet_sides.hpp"
 #include "surface/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -223,32 +224,50 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
   const SurfaceSamples& all = model_->samples;
   const std::uint32_t first = done_;
   if (last <= first) return;
+  const auto drive_of = [&](const SurfaceSample& sample) {
+    SampleDrive drive;
+    drive.sun_frac = interval_rays_->sun_frac(rays(), sample, offsets_.sun_m, 0.0F);
+    drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays(), sample, offsets_.around_m);
+    for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
+      const SeenSample& seen = all.seen[sample.first_seen + k];
+      const SampleOutput& other = from.outputs[seen.sample];
+      drive.longwave_begin_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
+      drive.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
+    }
+    // Neighbours change by hundredths of a kelvin in an interval: their start stands for it.
+    drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
+    for (std::size_t p = 0; p < kMaxPartners; ++p) {
+      const std::uint32_t partner = sample.partners[p].sample;
+      if (partner == kNoSample) continue;
+      drive.partner_begin_w_m2[p] = from.outputs[partner].flux_w_m2;
+      drive.partner_end_w_m2[p] = drive.partner_begin_w_m2[p];
+    }
+    return drive;
+  };
+  const auto keep = [&to](std::size_t i, const SampleState& state, const SampleOutput& output) {
+    to.states[i] = state;
+    to.outputs[i] = output;
+    if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
+  };
   workers_.run(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = first + begin; i < first + end; ++i) {
       const SurfaceSample& sample = all.samples[i];
-      SampleDrive drive;
-      drive.sun_frac = interval_rays_->sun_frac(rays(), sample, offsets_.sun_m, 0.0F);
-      drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays(), sample, offsets_.around_m);
-      for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
-        const SeenSample& seen = all.seen[sample.first_seen + k];
-        const SampleOutput& other = from.outputs[seen.sample];
-        drive.longwave_begin_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
-        drive.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
-      }
-      // Neighbours change by hundredths of a kelvin in an interval: their start stands for it.
-      drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
-      for (std::size_t p = 0; p < kMaxPartners; ++p) {
-        const std::uint32_t partner = sample.partners[p].sample;
-        if (partner == kNoSample) continue;
-        drive.partner_begin_w_m2[p] = from.outputs[partner].flux_w_m2;
-        drive.partner_end_w_m2[p] = drive.partner_begin_w_m2[p];
-      }
+      if (sample.other_side < i) continue;  // was computed with its other side
+      const SampleDrive drive = drive_of(sample);
+      const glm::vec3 normal = interval_rays_->normal(sample);
       SampleState state = from.states[i];
-      const SampleOutput output =
-          heat_.advance(sample, interval_rays_->normal(sample), interval_, drive, state);
-      to.states[i] = state;
-      to.outputs[i] = output;
-      if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
+      if (sample.other_side == kNoSample) {
+        const SampleOutput output = heat_.advance(sample, normal, interval_, drive, state);
+        keep(i, state, output);
+        continue;
+      }
+      const SurfaceSample& behind = all.samples[sample.other_side];
+      const SampleDrive back_drive = drive_of(behind);
+      const SheetBack back{behind, back_drive};
+      const SampleOutput output = heat_.advance(sample, normal, interval_, drive, state, &back);
+      keep(i, state, output);
+      keep(sample.other_side, state,
+           heat_.output(behind, -normal, interval_.forcing.end, back_drive, state));
     }
   });
   done_ = last;
@@ -312,6 +331,7 @@ SampledScene CachedSurface::drawn_scene() const {
       mesh.positions_m.push_back(vertex.position_m);
       mesh.normals.push_back(vertex.normal);
     }
+    add_backs(refined, materials_, mesh);
   }
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     scene.sky_frac.push_back(model_->samples.samples[i].sky_frac);

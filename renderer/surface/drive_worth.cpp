@@ -30,6 +30,10 @@ DriveWorth::DriveWorth(const SurfaceInputs& inputs) : intervals_(inputs.record.s
           (offset_k(sample, i, kHalf + kMore) - offset_k(sample, i, kHalf)) / kMore;
     }
     sample.normal = {1.0F, 0.0F, 0.0F};
+    // One face of a sheet is half of what drives it.
+    if (inputs.materials[m].sheet) {
+      for (std::size_t i = 0; i < intervals_; ++i) sun_k_[m * intervals_ + i] *= kHalf;
+    }
     const float before_k = offset_k(sample, intervals_, 0.0F);
     sample.sky_frac += kMore;
     sample.far_frac -= kMore;

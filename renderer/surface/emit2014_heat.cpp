@@ -51,7 +51,7 @@ SampleState Emit2014Heat::start_state(const SurfaceSample& sample) const noexcep
   return state;
 }
 
-double Emit2014Heat::equilibrium_k(const SurfaceSample& sample, const glm::vec3& normal,
+double Emit2014Heat::absorbed_w_m2(const SurfaceSample& sample, const glm::vec3& normal,
                                    const SurfaceForcing& forcing,
                                    const SampleDrive& drive) const noexcept {
   const Material& material = materials_[sample.material];
@@ -62,10 +62,19 @@ double Emit2014Heat::equilibrium_k(const SurfaceSample& sample, const glm::vec3&
   in.environment_w_m2 = material.exchange.emissivity_frac * forcing.environment_w_m2;
   in.longwave_w_m2 = 2.0 * forcing.longwave_w_m2 - forcing.environment_w_m2;
   in.sky_frac = sample.sphere_sky_frac * (1.0 - drive.hidden_sky_frac);
-  const double absorbed_w_m2 = physics::absorbed_flux_w_m2(in, material.solar_absorptance_frac,
-                                                           material.exchange.emissivity_frac);
-  return physics::solve_equilibrium(physics::surface_balance(absorbed_w_m2, material.exchange))
-      .temperature_k;
+  return physics::absorbed_flux_w_m2(in, material.solar_absorptance_frac,
+                                     material.exchange.emissivity_frac);
+}
+
+double Emit2014Heat::equilibrium_k(const SurfaceSample& sample, const glm::vec3& normal,
+                                   const SurfaceForcing& forcing, const SampleDrive& drive,
+                                   const SheetBack* back) const noexcept {
+  double flux_w_m2 = absorbed_w_m2(sample, normal, forcing, drive);
+  if (back != nullptr && !back->sample.covered) {
+    flux_w_m2 = 0.5 * (flux_w_m2 + absorbed_w_m2(back->sample, -normal, forcing, back->drive));
+  }
+  const physics::SurfaceExchange<double>& exchange = materials_[sample.material].exchange;
+  return physics::solve_equilibrium(physics::surface_balance(flux_w_m2, exchange)).temperature_k;
 }
 
 SampleOutput Emit2014Heat::output(const SurfaceSample& sample, const SampleDrive& drive,
@@ -87,12 +96,13 @@ SampleOutput Emit2014Heat::output(const SurfaceSample& sample, const SampleDrive
 
 SampleOutput Emit2014Heat::advance(const SurfaceSample& sample, const glm::vec3& normal,
                                    const HeatInterval& interval, const SampleDrive& drive,
-                                   SampleState& state) const noexcept {
+                                   SampleState& state, const SheetBack* back) const noexcept {
   const Material& material = materials_[sample.material];
   if (!material.prescribed_k) {
     const double begin_k =
-        equilibrium_k(sample, normal, interval.forcing.begin, drive) - reference_k_;
-    const double end_k = equilibrium_k(sample, normal, interval.forcing.end, drive) - reference_k_;
+        equilibrium_k(sample, normal, interval.forcing.begin, drive, back) - reference_k_;
+    const double end_k =
+        equilibrium_k(sample, normal, interval.forcing.end, drive, back) - reference_k_;
     for (std::size_t i = 0; i < material.mode_count; ++i) {
       state.modes_k[i] = physics::relax_linear(state.modes_k[i], begin_k, end_k,
                                                interval.relaxation[sample.material][i]);

@@ -30,8 +30,8 @@ class Emit2014Heat {
 
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
   SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
-                       const HeatInterval& interval, const SampleDrive& drive,
-                       SampleState& state) const noexcept;
+                       const HeatInterval& interval, const SampleDrive& drive, SampleState& state,
+                       const SheetBack* back) const noexcept;
   [[nodiscard]] SampleOutput output(const SurfaceSample& sample, const SampleDrive& drive,
                                     const SampleState& state) const noexcept;
 
@@ -44,10 +44,14 @@ class Emit2014Heat {
     double initial_k = 0.0;
     std::optional<double> prescribed_k;
   };
-  /// Eq. 1 and 4.
-  [[nodiscard]] double equilibrium_k(const SurfaceSample& sample, const glm::vec3& normal,
+  /// Eq. 1.
+  [[nodiscard]] double absorbed_w_m2(const SurfaceSample& sample, const glm::vec3& normal,
                                      const SurfaceForcing& forcing,
                                      const SampleDrive& drive) const noexcept;
+  /// Eq. 4, of a sheet by the mean of its two faces.
+  [[nodiscard]] double equilibrium_k(const SurfaceSample& sample, const glm::vec3& normal,
+                                     const SurfaceForcing& forcing, const SampleDrive& drive,
+                                     const SheetBack* back) const noexcept;
 
   std::vector<Material> materials_;
   double reference_k_ = 0.0;

@@ -82,6 +82,17 @@ FosterHeat::Incoming FosterHeat::incoming(const SurfaceSample& sample, const glm
               (hidden_frac + sample.far_frac) * forcing.environment_w_m2 + longwave_seen_w_m2};
 }
 
+FosterHeat::Incoming FosterHeat::into_body(const Incoming& own, const glm::vec3& normal,
+                                           const SurfaceForcing& forcing, const SheetBack* back,
+                                           double SampleDrive::*longwave_w_m2) const noexcept {
+  // What covers a face of a sheet keeps its heat: the other one alone decides.
+  if (back == nullptr || back->sample.covered) return own;
+  const Incoming other =
+      incoming(back->sample, -normal, forcing, back->drive, back->drive.*longwave_w_m2);
+  return {0.5 * (own.shortwave_w_m2 + other.shortwave_w_m2),
+          0.5 * (own.longwave_w_m2 + other.longwave_w_m2)};
+}
+
 FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const SurfaceForcing& forcing,
                                          const Incoming& in) const noexcept {
   return {.absorbed_w_m2 = materials_[material].solar_absorptance_frac * in.shortwave_w_m2 +
@@ -124,12 +135,16 @@ SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& no
 
 SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& normal,
                                  const HeatInterval& interval, const SampleDrive& drive,
-                                 SampleState& state) const noexcept {
+                                 SampleState& state, const SheetBack* back) const noexcept {
   const IntervalForcing& forcing = interval.forcing;
   const Incoming end = incoming(sample, normal, forcing.end, drive, drive.longwave_end_w_m2);
   if (!materials_[sample.material].prescribed()) {
     const Incoming begin =
         incoming(sample, normal, forcing.begin, drive, drive.longwave_begin_w_m2);
+    const Incoming body_begin =
+        into_body(begin, normal, forcing.begin, back, &SampleDrive::longwave_begin_w_m2);
+    const Incoming body_end =
+        into_body(end, normal, forcing.end, back, &SampleDrive::longwave_end_w_m2);
     const physics::FosterLadder& ladder = interval.ladders[sample.material];
     FosterSurface<double> surface = surfaces_[sample.material];
     for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
@@ -147,8 +162,8 @@ SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& n
     if (sample.covered) {
       relax(state.modes_k, surface, kWhole, 0.0, 0.0, ladder.level[0]);
     } else {
-      physics::foster_advance(state.modes_k, absorbed(sample.material, forcing.begin, begin),
-                              absorbed(sample.material, forcing.end, end), ladder, surface,
+      physics::foster_advance(state.modes_k, absorbed(sample.material, forcing.begin, body_begin),
+                              absorbed(sample.material, forcing.end, body_end), ladder, surface,
                               tolerance_k_);
     }
   }

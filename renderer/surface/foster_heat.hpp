@@ -29,12 +29,16 @@ class FosterHeat {
                                         const physics::FosterState<double>& before_k,
                                         std::span<const HeatInterval> tail) const noexcept;
 
-  /// Advances a sample over an interval; `normal` in world axes, in its middle.
+  /// As SampleHeat::advance().
   SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
-                       const HeatInterval& interval, const SampleDrive& drive,
-                       SampleState& state) const noexcept;
+                       const HeatInterval& interval, const SampleDrive& drive, SampleState& state,
+                       const SheetBack* back) const noexcept;
 
-  /// What a sample of that state sends out at the start of the history.
+  [[nodiscard]] bool is_sheet(std::uint32_t material) const noexcept {
+    return materials_[material].sheet;
+  }
+
+  /// As SampleHeat::output().
   SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
                       const SurfaceForcing& forcing, const SampleDrive& drive,
                       const SampleState& state) const noexcept;
@@ -52,6 +56,10 @@ class FosterHeat {
   [[nodiscard]] Incoming incoming(const SurfaceSample& sample, const glm::vec3& normal,
                                   const SurfaceForcing& forcing, const SampleDrive& drive,
                                   double longwave_seen_w_m2) const noexcept;
+  /// Of a sheet's two faces the mean.
+  [[nodiscard]] Incoming into_body(const Incoming& own, const glm::vec3& normal,
+                                   const SurfaceForcing& forcing, const SheetBack* back,
+                                   double SampleDrive::*longwave_w_m2) const noexcept;
   [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material,
                                                       const SurfaceForcing& forcing,
                                                       const Incoming& in) const noexcept;

@@ -27,6 +27,12 @@ struct SampleDrive {
   std::array<double, kMaxPartners> partner_end_w_m2{};
 };
 
+/// The other face of a sheet: its normal is opposite.
+struct SheetBack {
+  const SurfaceSample& sample;
+  const SampleDrive& drive;
+};
+
 /// The forcing of an interval and, by material, the gains of the thermal model's steps; those of
 /// the other model are empty.
 struct HeatInterval {

@@ -16,18 +16,28 @@ void SampleHeat::prepare(HeatInterval& interval) const noexcept {
 SampleState SampleHeat::start_state(const SurfaceSample& sample, const glm::vec3& normal,
                                     const SurfaceHistory& history,
                                     std::span<const HeatInterval> tail) const noexcept {
-  if (const auto* published = std::get_if<Emit2014Heat>(&model_)) {
-    return published->start_state(sample);
+  const auto* extended = std::get_if<FosterHeat>(&model_);
+  if (extended == nullptr) return std::get_if<Emit2014Heat>(&model_)->start_state(sample);
+  const auto facing = [&](const glm::vec3& direction) {
+    return extended->start_state(
+        sample, direction, history.start_states(sample.material, glm::dvec3(direction)), tail);
+  };
+  SampleState state = facing(normal);
+  if (!extended->is_sheet(sample.material)) return state;
+  const SampleState back = facing(-normal);
+  for (std::size_t i = 0; i < state.modes_k.size(); ++i) {
+    state.modes_k[i] = 0.5 * (state.modes_k[i] + back.modes_k[i]);
   }
-  return std::get_if<FosterHeat>(&model_)->start_state(
-      sample, normal, history.start_states(sample.material, glm::dvec3(normal)), tail);
+  return state;
 }
 
 SampleOutput SampleHeat::advance(const SurfaceSample& sample, const glm::vec3& normal,
                                  const HeatInterval& interval, const SampleDrive& drive,
-                                 SampleState& state) const noexcept {
+                                 SampleState& state, const SheetBack* back) const noexcept {
   return std::visit(
-      [&](const auto& model) { return model.advance(sample, normal, interval, drive, state); },
+      [&](const auto& model) {
+        return model.advance(sample, normal, interval, drive, state, back);
+      },
       model_);
 }
 

@@ -30,12 +30,13 @@ class SampleHeat {
                                         const SurfaceHistory& history,
                                         std::span<const HeatInterval> tail) const noexcept;
 
-  /// Advances a sample over an interval; `normal` in world axes, in its middle.
+  /// Advances a sample over an interval; `normal` in world axes, in its middle. A sheet is driven
+  /// by the mean of what it and its other face receive; both have its state.
   SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
-                       const HeatInterval& interval, const SampleDrive& drive,
-                       SampleState& state) const noexcept;
+                       const HeatInterval& interval, const SampleDrive& drive, SampleState& state,
+                       const SheetBack* back = nullptr) const noexcept;
 
-  /// What a sample of that state sends out at the start of the history.
+  /// What a sample of that state sends out at an instant, which `drive` begins with.
   [[nodiscard]] SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
                                     const SurfaceForcing& forcing, const SampleDrive& drive,
                                     const SampleState& state) const noexcept;

@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "surface/sheet_sides.hpp"
 #include "surface/state_bytes.hpp"
 
 namespace emit::renderer {
@@ -44,6 +45,7 @@ void visit_members(T& s, const Visit& visit) {
       visit(s.sphere_sky_frac);
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.covered);
   visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.partners);
+  visit(s.other_side);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SampleState>
@@ -108,11 +110,24 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
     return false;
   }
   for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
-    const auto vertices = model.meshes[geometry.instances[i].mesh].vertices();
-    if (model.first_sample[i] + vertices.size() > model.drawn_samples) return false;
+    const RefinedMesh& mesh = model.meshes[geometry.instances[i].mesh];
+    if (std::ranges::any_of(mesh.vertices(), [&](const RefinedMesh::Vertex& vertex) {
+          return vertex.material >= geometry.materials.size();
+        })) {
+      return false;
+    }
+    const std::size_t samples =
+        mesh.vertices().size() + back_vertices(mesh, geometry.materials).size();
+    if (model.first_sample[i] + samples > model.drawn_samples) return false;
   }
+  const auto& all = model.samples.samples;
+  const auto sides_fit = [&](const SurfaceSample& s) {
+    return s.other_side == kNoSample ||
+           (s.other_side < count && &all[s.other_side] != &s &&
+            all[s.other_side].other_side < count && &all[all[s.other_side].other_side] == &s);
+  };
   const auto sample_fits = [&](const SurfaceSample& s) {
-    return s.material < geometry.materials.size() && s.mover >= -1 &&
+    return sides_fit(s) && s.material < geometry.materials.size() && s.mover >= -1 &&
            s.mover < static_cast<std::int64_t>(movers) && s.first_seen <= seen &&
            s.seen_count <= seen - s.first_seen &&
            std::ranges::all_of(s.partners, [&](const Partner& partner) {

@@ -4,9 +4,11 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <memory>
 
 #include "surface/parallel.hpp"
 #include "surface/refined_mesh_edges.hpp"
+#include "surface/sheet_sides.hpp"
 #include "surface/surface_exchange.hpp"
 #include "surface/surface_model.hpp"
 #include "surface/surface_patch.hpp"
@@ -90,6 +92,12 @@ void Builder::make_patches() {
     }
     patch.rel_from_mesh = glm::mat4(rel_from_mesh);
     patch.normal_from_mesh = glm::mat3(glm::transpose(glm::inverse(glm::dmat3(rel_from_mesh))));
+    if (!back_vertices(model_.meshes[patch.mesh], in_.materials).empty()) {
+      patch.back = std::make_unique<SurfacePatch>();
+      patch.back->mesh = patch.mesh;
+      patch.back->object = patch.object;
+      patch.back->mover = patch.mover;
+    }
     patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
     sample_count_ += model_.meshes[patch.mesh].vertices().size();
     patches_.push_back(std::move(patch));
@@ -135,15 +143,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         adopt_detail(mesh, first);
       }
       looked = true;
-      patch.samples.resize(vertices.size());
-      patch.seen.resize(vertices.size());
-      patch.states.resize(vertices.size());
-      patch.outputs.resize(vertices.size());
-      patch.surplus_k.resize(vertices.size(), -1.0F);
-      patch.to_sky.resize(vertices.size());
-      patch.sky_surplus_frac.resize(vertices.size(), std::numeric_limits<float>::infinity());
-      patch.sun_frac.resize(vertices.size() * intervals);
-      if (movers) patch.hidden_sky_frac.resize(vertices.size() * intervals);
+      patch.grow(vertices.size(), intervals, movers);
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
         SurfaceSample& sample = patch.samples[v];
         const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
@@ -157,6 +157,12 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         sample.normal = glm::normalize(patch.normal_from_mesh * vertices[v].normal);
         sample.mover = patch.mover;
         sample.material = vertices[v].material;
+        if (in_.materials[sample.material].sheet) {
+          ++sample_count_;
+          SurfaceSample& back = patch.back->samples[v];
+          back = sample;
+          back.normal = -sample.normal;
+        }
         jobs_.push_back({p, v});
         const std::array<std::uint32_t, 2>& parent = vertices[v].parent;
         job_stand_.push_back({to_rel(vertices[v].position_m), unit_inward, std::nullopt});
@@ -183,15 +189,17 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
     const float mean_k = 0.5F * (patch.outputs[vertex.parent[0]].offset_k +
                                  patch.outputs[vertex.parent[1]].offset_k);
     patch.surplus_k[job.index] = std::abs(patch.outputs[job.index].offset_k - mean_k);
-    if (!std::isinf(patch.sky_surplus_frac[job.index])) continue;  // taken over
-    const auto off_mean = [&](float SurfaceSample::*share) {
-      const float mean =
-          0.5F * (patch.samples[vertex.parent[0]].*share + patch.samples[vertex.parent[1]].*share);
-      return std::abs(patch.samples[job.index].*share - mean);
-    };
-    patch.sky_surplus_frac[job.index] =
-        std::max({off_mean(&SurfaceSample::sky_frac), off_mean(&SurfaceSample::far_frac),
-                  off_mean(&SurfaceSample::sphere_sky_frac)});
+    for (SurfacePatch* side = &patch; side != nullptr; side = side->back.get()) {
+      if (!std::isinf(side->sky_surplus_frac[job.index])) continue;  // taken over
+      const auto off_mean = [&](float SurfaceSample::*share) {
+        const float mean = 0.5F * (side->samples[vertex.parent[0]].*share +
+                                   side->samples[vertex.parent[1]].*share);
+        return std::abs(side->samples[job.index].*share - mean);
+      };
+      side->sky_surplus_frac[job.index] =
+          std::max({off_mean(&SurfaceSample::sky_frac), off_mean(&SurfaceSample::far_frac),
+                    off_mean(&SurfaceSample::sphere_sky_frac)});
+    }
   }
   return true;
 }
@@ -208,7 +216,8 @@ void Builder::replace_covered() {
     };
     for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
       for (const std::uint32_t covered : mesh.leaf(slot)) {
-        if (!all.samples[first + covered].covered) continue;
+        const SurfaceSample& under = all.samples[first + covered];
+        if (!under.covered || under.other_side != kNoSample) continue;
         for (const std::uint32_t other : mesh.leaf(slot)) {
           if (all.samples[first + other].covered) continue;
           std::uint32_t& nearest = open[covered];
@@ -292,7 +301,7 @@ physics::Result<SurfaceModel> Builder::run() {
 }  // namespace
 
 double diffusivity_m2_s(const scene::Material& material) noexcept {
-  if (material.layers.empty() || material.prescribed_k) return 0.0;
+  if (material.layers.empty() || material.prescribed_k || material.sheet) return 0.0;
   const scene::Layer& layer = material.layers.front();
   return layer.conductivity_w_m_k / (layer.density_kg_m3 * layer.specific_heat_j_kg_k);
 }

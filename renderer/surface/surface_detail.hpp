@@ -30,6 +30,11 @@ class SurfaceDetail {
     return !instance_of_mesh_.empty() && instance_of_mesh_[mesh] != kNone;
   }
 
+  /// @pre has(mesh)
+  [[nodiscard]] const scene::Mesh& full_mesh(std::uint32_t mesh) const noexcept {
+    return full_.meshes[mesh];
+  }
+
   /// Where the full mesh lies next to a point of the coarse one, in axes of the mesh; none where
   /// the full surface is farther than `reach_m` along the coarse normal, faces elsewhere or is
   /// covered. @pre has(mesh)

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "surface/parallel.hpp"
+#include "surface/sheet_sides.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -188,20 +189,54 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
                     const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
                     SurfaceModel& model) {
   if (options.lateral) Partners(inputs, sampler, patches).add();
+  std::vector<std::vector<std::uint32_t>> backs;  // by mesh, vertices of sheets
+  for (const RefinedMesh& mesh : model.meshes) {
+    backs.push_back(back_vertices(mesh, inputs.materials));
+  }
   std::vector<std::uint32_t> first;
   std::uint32_t next = 0;
   for (const SurfacePatch& patch : patches) {
     first.push_back(next);
     next += static_cast<std::uint32_t>(patch.samples.size());
+    if (patch.back) next += static_cast<std::uint32_t>(backs[patch.mesh].size());
   }
+  // The sample of a vertex of an instance, on the side that is seen.
+  const auto sample_of = [&](std::uint32_t instance, std::uint32_t vertex, bool behind) {
+    const std::uint32_t mesh = inputs.geometry.instances[instance].mesh;
+    const auto back = std::ranges::lower_bound(backs[mesh], vertex);
+    if (!behind || back == backs[mesh].end() || *back != vertex) return first[instance] + vertex;
+    return first[instance] + static_cast<std::uint32_t>(model.meshes[mesh].vertices().size()) +
+           static_cast<std::uint32_t>(back - backs[mesh].begin());
+  };
   const std::size_t instances = inputs.geometry.instances.size();
   model.first_sample.assign(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(instances));
   model.drawn_samples = first.size() > instances ? first[instances] : next;
   model.samples.samples.reserve(next);
+  const auto number = [&](SurfacePatch& patch, std::size_t i, SurfaceSample sample) {
+    sample.first_seen = static_cast<std::uint32_t>(model.samples.seen.size());
+    if (!options.exchange) {
+      sample.far_frac = 1.0F - sample.sky_frac;
+      patch.seen[i].clear();
+    }
+    for (const SeenPlace& place : patch.seen[i]) {
+      const RefinedMesh& mesh = model.meshes[inputs.geometry.instances[place.instance].mesh];
+      const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
+      for (glm::length_t k = 0; k < 3; ++k) {
+        const float weight = place.weight_frac * at.weight[k];
+        if (weight > 0.0F) {
+          add_seen(sample_of(place.instance, at.vertex[static_cast<std::size_t>(k)], place.behind),
+                   weight, sample.first_seen, model.samples.seen);
+        }
+      }
+    }
+    sample.seen_count = static_cast<std::uint32_t>(model.samples.seen.size()) - sample.first_seen;
+    model.samples.samples.push_back(sample);
+  };
   for (std::size_t p = 0; p < patches.size(); ++p) {
+    SurfacePatch& patch = patches[p];
     const bool partners = p >= instances;
-    for (std::size_t i = 0; i < patches[p].samples.size(); ++i) {
-      SurfaceSample sample = patches[p].samples[i];
+    for (std::size_t i = 0; i < patch.samples.size(); ++i) {
+      SurfaceSample sample = patch.samples[i];
       if (partners) {
         sample.partners[0].sample += first[sample.first_seen];
       } else {
@@ -209,114 +244,188 @@ void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
           if (partner.sample != kNoSample) partner.sample += first[instances];
         }
       }
-      sample.first_seen = static_cast<std::uint32_t>(model.samples.seen.size());
-      if (!options.exchange) {
-        sample.far_frac = 1.0F - sample.sky_frac;
-        patches[p].seen[i].clear();
-      }
-      for (const SeenPlace& place : patches[p].seen[i]) {
-        const RefinedMesh& mesh = model.meshes[inputs.geometry.instances[place.instance].mesh];
-        const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
-        for (glm::length_t k = 0; k < 3; ++k) {
-          const float weight = place.weight_frac * at.weight[k];
-          if (weight > 0.0F) {
-            add_seen(first[place.instance] + at.vertex[static_cast<std::size_t>(k)], weight,
-                     sample.first_seen, model.samples.seen);
-          }
-        }
-      }
-      sample.seen_count = static_cast<std::uint32_t>(model.samples.seen.size()) - sample.first_seen;
-      model.samples.samples.push_back(sample);
+      number(patch, i, sample);
+    }
+    if (!patch.back) continue;
+    for (const std::uint32_t v : backs[patch.mesh]) {
+      SurfaceSample sample = patch.back->samples[v];
+      sample.other_side = first[p] + v;
+      model.samples.samples[sample.other_side].other_side =
+          static_cast<std::uint32_t>(model.samples.samples.size());
+      number(*patch.back, v, sample);
     }
   }
 }
 
+namespace {
+
+/// What a sample receives over the whole history, but for what its face itself has.
+struct Received {
+  std::vector<double> longwave_w_m2;   ///< nodes
+  std::vector<double> shortwave_w_m2;  ///< intervals
+
+  explicit Received(std::size_t intervals)
+      : longwave_w_m2(intervals + 1), shortwave_w_m2(intervals) {}
+  void gather(const SurfaceSamples& all, const SurfaceSample& sample, const Columns& sent) {
+    const std::size_t intervals = shortwave_w_m2.size();
+    const std::size_t nodes = intervals + 1;
+    std::ranges::fill(longwave_w_m2, 0.0);
+    std::ranges::fill(shortwave_w_m2, 0.0);
+    for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
+      const SeenSample& seen = all.seen[sample.first_seen + k];
+      const double weight = seen.weight_frac;
+      for (std::size_t j = 0; j < nodes; ++j) {
+        longwave_w_m2[j] += weight * sent.longwave_out_w_m2[seen.sample * nodes + j];
+      }
+      for (std::size_t j = 0; j < intervals; ++j) {
+        shortwave_w_m2[j] += weight * sent.shortwave_out_w_m2[seen.sample * intervals + j];
+      }
+    }
+  }
+  /// Of interval j; `i`: the vertex in its patch.
+  [[nodiscard]] SampleDrive drive(const SurfacePatch& patch, std::size_t i, std::size_t j) const {
+    const std::size_t intervals = shortwave_w_m2.size();
+    SampleDrive drive;
+    drive.sun_frac = patch.sun_frac[i * intervals + j];
+    if (!patch.hidden_sky_frac.empty()) {
+      drive.hidden_sky_frac = patch.hidden_sky_frac[i * intervals + j];
+    }
+    drive.longwave_begin_w_m2 = longwave_w_m2[j];
+    drive.longwave_end_w_m2 = longwave_w_m2[j + 1];
+    drive.shortwave_w_m2 = shortwave_w_m2[j];
+    return drive;
+  }
+};
+
+/// Carries samples over the whole history, from what the others sent in the sweep before.
+class Sweeper {
+ public:
+  Sweeper(const SurfaceInputs& inputs, const PatchSampler& sampler, SurfaceModel& model)
+      : in_(inputs),
+        sampler_(sampler),
+        model_(model),
+        intervals_(inputs.record.size()),
+        nodes_(intervals_ + 1),
+        start_(model.samples.samples.size()),
+        before_(start_.size(), intervals_),
+        after_(start_.size(), intervals_) {
+    model.states.resize(start_.size());
+    model.outputs.resize(start_.size());
+  }
+
+  /// The first one takes the surroundings for whatever is seen.
+  void sweep(const std::vector<SurfacePatch>& patches, bool first) {
+    for (std::size_t p = 0; p < patches.size(); ++p) {
+      const SurfacePatch& patch = patches[p];
+      const std::size_t offset =
+          p < model_.first_sample.size() ? model_.first_sample[p] : model_.drawn_samples;
+      run_parallel(patch.samples.size(), kGrain, [&, offset](std::size_t from, std::size_t to) {
+        Received front(intervals_);
+        Received back(intervals_);
+        for (std::size_t i = from; i < to; ++i) carry(patch, i, offset + i, first, front, back);
+      });
+    }
+    std::swap(before_, after_);
+  }
+
+ private:
+  void carry(const SurfacePatch& patch, std::size_t i, std::size_t s, bool first, Received& front,
+             Received& back);
+  [[nodiscard]] SurfaceSample sample_at(std::size_t s, bool first) const {
+    SurfaceSample sample = model_.samples.samples[s];
+    if (first) {
+      sample.far_frac = 1.0F - sample.sky_frac;
+      sample.seen_count = 0;
+      sample.partners = {};
+    }
+    return sample;
+  }
+  void keep_begin(std::size_t s, const SampleOutput& output) {
+    after_.longwave_out_w_m2[s * nodes_] = output.longwave_out_w_m2;
+    after_.flux_w_m2[s * nodes_] = output.flux_w_m2;
+  }
+  void keep_end(std::size_t s, std::size_t j, const SampleOutput& output) {
+    after_.longwave_out_w_m2[s * nodes_ + j + 1] = output.longwave_out_w_m2;
+    after_.flux_w_m2[s * nodes_ + j + 1] = output.flux_w_m2;
+    after_.shortwave_out_w_m2[s * intervals_ + j] = output.shortwave_out_w_m2;
+  }
+
+  const SurfaceInputs& in_;
+  const PatchSampler& sampler_;
+  SurfaceModel& model_;
+  std::size_t intervals_;
+  std::size_t nodes_;
+  std::vector<SampleState> start_;
+  Columns before_;
+  Columns after_;
+};
+
+void Sweeper::carry(const SurfacePatch& patch, std::size_t i, std::size_t s, bool first,
+                    Received& front, Received& back) {
+  const SurfaceSample sample = sample_at(s, first);
+  const std::uint32_t other = sample.other_side;
+  const bool sheet = other != kNoSample;
+  const SurfaceSample behind = sheet ? sample_at(other, first) : SurfaceSample{};
+  if (first) start_[s] = sampler_.start_state(sample);
+  front.gather(model_.samples, sample, before_);
+  if (sheet) back.gather(model_.samples, behind, before_);
+  SampleState state = start_[s];
+  // A partner's modes drive the same states here, scaled: so do those at the start.
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    const Partner& partner = sample.partners[p];
+    if (partner.sample == kNoSample) continue;
+    for (std::size_t m = 0; m < physics::kMaxFosterModes; ++m) {
+      state.partner_k[p][m] = partner.weight_frac[m] * start_[partner.sample].modes_k[m];
+    }
+  }
+  SampleOutput output;
+  SampleOutput back_output;
+  for (std::size_t j = 0; j < intervals_; ++j) {
+    const HeatInterval& interval = in_.record.intervals[j];
+    SampleDrive drive = front.drive(patch, i, j);
+    for (std::size_t p = 0; p < kMaxPartners; ++p) {
+      const std::uint32_t partner = sample.partners[p].sample;
+      if (partner == kNoSample) continue;
+      drive.partner_begin_w_m2[p] = before_.flux_w_m2[partner * nodes_ + j];
+      drive.partner_end_w_m2[p] = before_.flux_w_m2[partner * nodes_ + j + 1];
+    }
+    const glm::vec3 normal = in_.record.rays[j].normal(sample);
+    if (j == 0) {
+      keep_begin(s, in_.heat.output(sample, normal, interval.forcing.begin, drive, state));
+    }
+    if (!sheet) {
+      output = in_.heat.advance(sample, normal, interval, drive, state);
+    } else {
+      SampleDrive back_drive = back.drive(*patch.back, i, j);
+      const SheetBack face{behind, back_drive};
+      if (j == 0) {
+        keep_begin(other,
+                   in_.heat.output(behind, -normal, interval.forcing.begin, back_drive, state));
+      }
+      output = in_.heat.advance(sample, normal, interval, drive, state, &face);
+      back_drive.longwave_begin_w_m2 = back_drive.longwave_end_w_m2;
+      back_output = in_.heat.output(behind, -normal, interval.forcing.end, back_drive, state);
+      keep_end(other, j, back_output);
+    }
+    keep_end(s, j, output);
+  }
+  model_.states[s] = state;
+  model_.outputs[s] = output;
+  if (sheet) {
+    model_.states[other] = state;
+    model_.outputs[other] = back_output;
+  }
+}
+
+}  // namespace
+
 bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
               const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
               SurfaceModel& model, const SurfaceProgress& report) {
-  const HistoryRecord& record = inputs.record;
-  const std::size_t intervals = record.size();
-  const std::size_t nodes = intervals + 1;
-  const SurfaceSamples& all = model.samples;
-  const std::size_t count = all.samples.size();
-  std::vector<SampleState> start(count);
-  model.states.resize(count);
-  model.outputs.resize(count);
-  Columns before(count, intervals);
-  Columns after(count, intervals);
-  const auto sweep = [&](bool first) {
-    std::size_t offset = 0;
-    for (const SurfacePatch& patch : patches) {
-      run_parallel(patch.samples.size(), kGrain, [&, offset](std::size_t from, std::size_t to) {
-        std::vector<double> longwave(nodes);
-        std::vector<double> shortwave(intervals);
-        for (std::size_t i = from; i < to; ++i) {
-          const std::size_t s = offset + i;
-          SurfaceSample sample = all.samples[s];
-          std::ranges::fill(longwave, 0.0);
-          std::ranges::fill(shortwave, 0.0);
-          if (first) {
-            start[s] = sampler.start_state(sample);
-            sample.far_frac = 1.0F - sample.sky_frac;
-          }
-          for (std::uint32_t k = 0; !first && k < sample.seen_count; ++k) {
-            const SeenSample& seen = all.seen[sample.first_seen + k];
-            const double weight = seen.weight_frac;
-            for (std::size_t j = 0; j < nodes; ++j) {
-              longwave[j] += weight * before.longwave_out_w_m2[seen.sample * nodes + j];
-            }
-            for (std::size_t j = 0; j < intervals; ++j) {
-              shortwave[j] += weight * before.shortwave_out_w_m2[seen.sample * intervals + j];
-            }
-          }
-          SampleState state = start[s];
-          // A partner's modes drive the same states here, scaled: so do those at the start.
-          for (std::size_t p = 0; !first && p < kMaxPartners; ++p) {
-            const Partner& partner = sample.partners[p];
-            if (partner.sample == kNoSample) continue;
-            for (std::size_t m = 0; m < physics::kMaxFosterModes; ++m) {
-              state.partner_k[p][m] = partner.weight_frac[m] * start[partner.sample].modes_k[m];
-            }
-          }
-          SampleOutput output;
-          for (std::size_t j = 0; j < intervals; ++j) {
-            SampleDrive drive;
-            drive.sun_frac = patch.sun_frac[i * intervals + j];
-            if (!patch.hidden_sky_frac.empty()) {
-              drive.hidden_sky_frac = patch.hidden_sky_frac[i * intervals + j];
-            }
-            drive.longwave_begin_w_m2 = longwave[j];
-            drive.longwave_end_w_m2 = longwave[j + 1];
-            drive.shortwave_w_m2 = shortwave[j];
-            for (std::size_t p = 0; !first && p < kMaxPartners; ++p) {
-              const std::uint32_t partner = sample.partners[p].sample;
-              if (partner == kNoSample) continue;
-              drive.partner_begin_w_m2[p] = before.flux_w_m2[partner * nodes + j];
-              drive.partner_end_w_m2[p] = before.flux_w_m2[partner * nodes + j + 1];
-            }
-            const glm::vec3 normal = record.rays[j].normal(sample);
-            if (j == 0) {
-              output = inputs.heat.output(sample, normal, record.intervals[0].forcing.begin, drive,
-                                          state);
-              after.longwave_out_w_m2[s * nodes] = output.longwave_out_w_m2;
-              after.flux_w_m2[s * nodes] = output.flux_w_m2;
-            }
-            output = inputs.heat.advance(sample, normal, record.intervals[j], drive, state);
-            after.longwave_out_w_m2[s * nodes + j + 1] = output.longwave_out_w_m2;
-            after.flux_w_m2[s * nodes + j + 1] = output.flux_w_m2;
-            after.shortwave_out_w_m2[s * intervals + j] = output.shortwave_out_w_m2;
-          }
-          model.states[s] = state;
-          model.outputs[s] = output;
-        }
-      });
-      offset += patch.samples.size();
-    }
-    std::swap(before, after);
-  };
+  Sweeper sweeper(inputs, sampler, model);
   const std::uint32_t sweeps = options.exchange || options.lateral ? kSweeps : 0;
   for (std::uint32_t i = 0; i <= sweeps; ++i) {
-    sweep(i == 0);
+    sweeper.sweep(patches, i == 0);
     if (report && !report((i + 1.0) / (sweeps + 1.0))) return false;
   }
   return true;

@@ -38,9 +38,10 @@ struct SurfaceModelOptions {
 
 /// Everything a sample carries after the history.
 struct SurfaceModel {
-  std::vector<RefinedMesh> meshes;          ///< as SceneGeometry::meshes
-  std::vector<std::uint32_t> first_sample;  ///< by instance; its samples are the mesh's vertices
-  SurfaceSamples samples;                   ///< drawn ones first, then partners across edges
+  std::vector<RefinedMesh> meshes;  ///< as SceneGeometry::meshes
+  /// By instance; its samples are the mesh's vertices, then the backs of those on sheets.
+  std::vector<std::uint32_t> first_sample;
+  SurfaceSamples samples;  ///< drawn ones first, then partners across edges
   std::uint32_t drawn_samples = 0;
   std::vector<SampleState> states;    ///< at the end of the record
   std::vector<SampleOutput> outputs;  ///< at the end of the record
@@ -65,7 +66,8 @@ struct SurfaceInputs {
   const SurfaceDetail* detail = nullptr;  ///< null: no mesh has lost triangles
 };
 
-/// Of the outermost layer; 0 for a prescribed material.
+/// Of the outermost layer; 0 for a prescribed material, and for a sheet, whose layers carry heat
+/// sideways over centimetres only.
 [[nodiscard]] double diffusivity_m2_s(const scene::Material& material) noexcept;
 
 /// Places samples on every surface, integrates their history, and adds samples until linear

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 
 #include "emit/physics/constants.hpp"
 #include "surface/tangents.hpp"
@@ -122,8 +123,8 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
   if (open.sky_frac + open.far_frac == 0.0F) {
     const SurfaceView view = view_.view(in_.rays, point, selection);
     const std::span<const SeenFace> faces(view.seen.data(), view.seen_count);
-    const bool inside_a_body =
-        std::ranges::none_of(faces, [](const SeenFace& face) { return face.front; });
+    const bool inside_a_body = std::ranges::none_of(
+        faces, [&](const SeenFace& face) { return face.front || double_sided(face); });
     sample.covered = sample.covered || inside_a_body;
   }
   if (options_.exchange) look_at_faces(patch, index, drawn, selection);
@@ -138,7 +139,7 @@ void PatchSampler::look_at_faces(SurfacePatch& patch, std::uint32_t index, const
   float seen_frac = 0.0F;
   for (std::uint32_t i = 0; i < view.seen_count; ++i) {
     const SeenFace& face = view.seen[i];
-    seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac});
+    seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac, !face.front});
     seen_frac += face.weight_frac;
   }
   // The shares that are open know better how much is left for faces.
@@ -210,35 +211,97 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   }
 }
 
-void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
-                            const SampleStand& stand) const {
-  if (!inherit_view(patch, index, stand)) look_around(patch, index, stand);
-  SurfaceSample& sample = patch.samples[index];
+bool PatchSampler::double_sided(const SeenFace& face) const noexcept {
+  const std::uint32_t index = in_.geometry.instances[face.instance].mesh;
+  const scene::Mesh& mesh = in_.detail != nullptr && in_.detail->has(index)
+                                ? in_.detail->full_mesh(index)
+                                : in_.geometry.meshes[index];
+  return std::ranges::any_of(mesh.submeshes, [&](const scene::Submesh& submesh) {
+    return submesh.double_sided && 3 * face.triangle >= submesh.first_index &&
+           3 * face.triangle < submesh.first_index + submesh.index_count;
+  });
+}
+
+void PatchSampler::trace(SurfacePatch& patch, std::uint32_t index) const {
+  const SurfaceSample& sample = patch.samples[index];
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();
   const float max_blur_m =
       options_.lateral ? std::min(static_cast<float>(options_.max_blur_m), 0.5F * sample.flat_m)
                        : 0.0F;
-  // Before samples are numbered, what is seen counts as the surroundings.
-  SurfaceSample alone = sample;
-  alone.far_frac = 1.0F - sample.sky_frac;
-  SampleState state = start_state(sample);
-  SampleOutput output;
   for (std::size_t i = 0; i < count; ++i) {
     const IntervalRays& rays = record.rays[i];
     const float blur_m = std::min(
         max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
-    SampleDrive drive;
-    drive.sun_frac = rays.sun_frac(in_.rays, sample, offsets_.sun_m, blur_m);
-    drive.hidden_sky_frac = rays.hidden_sky_frac(in_.rays, sample, offsets_.around_m);
-    patch.sun_frac[index * count + i] = drive.sun_frac;
+    patch.sun_frac[index * count + i] = rays.sun_frac(in_.rays, sample, offsets_.sun_m, blur_m);
     if (!patch.hidden_sky_frac.empty()) {
-      patch.hidden_sky_frac[index * count + i] = drive.hidden_sky_frac;
+      patch.hidden_sky_frac[index * count + i] =
+          rays.hidden_sky_frac(in_.rays, sample, offsets_.around_m);
     }
-    output = in_.heat.advance(alone, rays.normal(sample), record.intervals[i], drive, state);
+  }
+}
+
+void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index) const {
+  const HistoryRecord& record = in_.record;
+  const std::size_t count = record.size();
+  // Before samples are numbered, what is seen counts as the surroundings.
+  const auto alone = [index](const SurfacePatch& side) {
+    SurfaceSample sample = side.samples[index];
+    sample.far_frac = 1.0F - sample.sky_frac;
+    return sample;
+  };
+  const auto drive_of = [&](const SurfacePatch& side, std::size_t i) {
+    SampleDrive drive;
+    drive.sun_frac = side.sun_frac[index * count + i];
+    if (!side.hidden_sky_frac.empty()) {
+      drive.hidden_sky_frac = side.hidden_sky_frac[index * count + i];
+    }
+    return drive;
+  };
+  const SurfaceSample front = alone(patch);
+  const bool sheet = patch.back && in_.materials[front.material].sheet;
+  const SurfaceSample back = sheet ? alone(*patch.back) : SurfaceSample{};
+  SampleState state = start_state(front);
+  SampleOutput output;
+  for (std::size_t i = 0; i < count; ++i) {
+    const SampleDrive drive = drive_of(patch, i);
+    const glm::vec3 normal = record.rays[i].normal(front);
+    if (sheet) {
+      const SampleDrive back_drive = drive_of(*patch.back, i);
+      const SheetBack other{back, back_drive};
+      output = in_.heat.advance(front, normal, record.intervals[i], drive, state, &other);
+    } else {
+      output = in_.heat.advance(front, normal, record.intervals[i], drive, state);
+    }
   }
   patch.states[index] = state;
   patch.outputs[index] = output;
+  if (sheet) patch.back->outputs[index] = output;
+}
+
+void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
+                            const SampleStand& stand) const {
+  const auto look = [&](SurfacePatch& side) {
+    if (!inherit_view(side, index, stand)) look_around(side, index, stand);
+    trace(side, index);
+  };
+  look(patch);
+  if (patch.back && in_.materials[patch.samples[index].material].sheet) look(*patch.back);
+  integrate(patch, index);
+}
+
+void SurfacePatch::grow(std::size_t vertices, std::size_t intervals, bool movers) {
+  constexpr float kUnknown = std::numeric_limits<float>::infinity();
+  samples.resize(vertices);
+  seen.resize(vertices);
+  states.resize(vertices);
+  outputs.resize(vertices);
+  surplus_k.resize(vertices, -1.0F);
+  to_sky.resize(vertices);
+  sky_surplus_frac.resize(vertices, kUnknown);
+  sun_frac.resize(vertices * intervals);
+  if (movers) hidden_sky_frac.resize(vertices * intervals);
+  if (back) back->grow(vertices, intervals, movers);
 }
 
 }  // namespace emit::renderer

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <glm/ext/matrix_float3x3.hpp>
 #include <glm/ext/matrix_float4x4.hpp>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct SeenPlace {
   std::uint32_t triangle = 0;
   glm::vec2 barycentric{0.0F};
   float weight_frac = 0.0F;
+  bool behind = false;  ///< from where the winding calls inside
 };
 
 /// The samples of one instance while its mesh is being refined; arrays by vertex of the mesh.
@@ -42,6 +44,11 @@ struct SurfacePatch {
   std::vector<float> sky_surplus_frac;
   std::vector<float> sun_frac;         ///< by vertex, then interval
   std::vector<float> hidden_sky_frac;  ///< likewise; empty without entities
+  /// The other faces of sheets, by the same vertices; null where the mesh has none.
+  std::unique_ptr<SurfacePatch> back;
+
+  /// Makes room for samples of `vertices` vertices over `intervals`.
+  void grow(std::size_t vertices, std::size_t intervals, bool movers);
 };
 
 /// Where a sample stands, beside its own place.
@@ -63,7 +70,7 @@ class PatchSampler {
   [[nodiscard]] float offset_m() const noexcept { return offsets_.around_m; }
 
   /// Fills everything of sample `index`, whose position, normal, material and mover stand in
-  /// patch.samples already. What it sees counts as the surroundings here.
+  /// patch.samples already, and of its other side. What it sees counts as the surroundings here.
   void evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
   /// State at the start of the record, as the thermal model has it.
@@ -73,6 +80,14 @@ class PatchSampler {
   /// Takes the view of its parents where theirs was what it would have been of their own; false,
   /// and nothing changed, where rays are needed.
   bool inherit_view(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
+
+  /// Shares of the sun's disc, and of the sky that entities hide, over the history.
+  void trace(SurfacePatch& patch, std::uint32_t index) const;
+  /// Temperature over the history.
+  void integrate(SurfacePatch& patch, std::uint32_t index) const;
+
+  /// Face of a double-sided part of the scene as loaded.
+  [[nodiscard]] bool double_sided(const SeenFace& face) const noexcept;
 
   void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 

@@ -256,8 +256,14 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
     error_k = std::max(error_k, tolerance_k_);
   }
   if (width.edge_px >= kEdgeSunPx) {
+    const bool sheet = in_.materials[vertices[leaf[0]].material].sheet;
+    const SurfacePatch* back = sheet ? patch.back.get() : nullptr;
     error_k = std::max(error_k, shadow_edge_k(refined, slot, patch));
+    if (back != nullptr) error_k = std::max(error_k, shadow_edge_k(refined, slot, *back));
     if (error_k == 0.0F) count_in(missed_shade_k(refined, slot, patch), kMissedFrac);
+    if (back != nullptr && error_k == 0.0F) {
+      count_in(missed_shade_k(refined, slot, *back), kMissedFrac);
+    }
   }
   const float weighed_px = std::max(width.in_view_px, kAsideFrac * width.anywhere_px);
   judged.need = error_k / tolerance_k_ * weighed_px;

@@ -50,6 +50,8 @@ struct SurfaceSample {
   /// days before.
   std::array<float, physics::kMaxFosterModes> open_frac{1.0F, 1.0F, 1.0F, 1.0F};
   std::array<float, physics::kMaxFosterModes> open_before_frac{1.0F, 1.0F, 1.0F, 1.0F};
+  /// Of a sheet: the sample of its other face at this place, which shares its state.
+  std::uint32_t other_side = kNoSample;
   float flat_m = 0.0F;  ///< the surface is a plane at least this far in all directions
   std::array<Partner, kMaxPartners> partners{};
 };

@@ -17,6 +17,7 @@
 #include "emit/reference/visibility.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "emit/scene/mesh.hpp"
+#include "emit/scene/sheets.hpp"
 #include "emit/version.hpp"
 #include "error_figures.hpp"
 #include "error_regions.hpp"
@@ -179,8 +180,9 @@ std::string describe(const reference::SolveReport& report, std::uint32_t rays) {
 
 Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::SolveView& view,
                           const BenchErrorCommand& command, const std::string& label) {
-  const auto geometry = scene::load_scene(scenario);
+  auto geometry = scene::load_scene(scenario);
   if (!geometry) return tl::unexpected(geometry.error());
+  scene::adopt_sheets(*geometry);
   Truth truth;
   ProgressBar progress("reference of " + label, 1000);
   reference::SolveOptions options;

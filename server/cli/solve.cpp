@@ -11,6 +11,7 @@
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "emit/scene/sheets.hpp"
 #include "emit/scene/trajectory.hpp"
 #include "frame_files.hpp"
 #include "interrupt.hpp"
@@ -42,8 +43,9 @@ int run_solve(const SolveCommand& command) {
   if (!std::isfinite(command.time_s) || std::abs(command.time_s) > 9e9) {
     return fail(kExitUsage, "--time-s: not a time");
   }
-  const auto geometry = scene::load_scene(*scenario);
+  auto geometry = scene::load_scene(*scenario);
   if (!geometry) return fail_config(geometry.error());
+  scene::adopt_sheets(*geometry);
   for (const std::string& text : geometry->warnings) warn(text);
 
   std::optional<tbb::global_control> threads;

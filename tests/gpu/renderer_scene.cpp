@@ -28,7 +28,8 @@ std::vector<Quad> box(const glm::dvec3& l, const glm::dvec3& h) {
           {{h.x, l.y, l.z}, {h.x, h.y, l.z}, {h.x, h.y, h.z}, {h.x, l.y, h.z}}};  // east
 }
 
-std::filesystem::path write_quads(const std::string& name, const std::vector<Quad>& quads) {
+std::filesystem::path write_quads(const std::string& name, const std::vector<Quad>& quads,
+                                  bool double_sided) {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "emit_renderer" /
                                        (std::string(info->test_suite_name()) + "." + info->name());
@@ -50,7 +51,8 @@ std::filesystem::path write_quads(const std::string& name, const std::vector<Qua
   std::ofstream json(folder / (name + ".gltf"));
   json
       << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-      << R"("materials":[{"name":"surface"}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},)"
+      << R"("materials":[{"name":"surface","doubleSided":)" << (double_sided ? "true" : "false")
+      << R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},)"
       << R"("material":0}]}],"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":)"
       << positions.size() / 3 << R"(}],"bufferViews":[{"buffer":0,"byteLength":)" << bytes
       << R"(}],"buffers":[{"byteLength":)" << bytes << R"(,"uri":")" << name << R"(.bin"}]})";

@@ -23,7 +23,8 @@ struct Quad {
 
 /// Writes the quads as `name`.gltf into a fresh folder of the running test.
 [[nodiscard]] std::filesystem::path write_quads(const std::string& name,
-                                                const std::vector<Quad>& quads);
+                                                const std::vector<Quad>& quads,
+                                                bool double_sided = false);
 
 /// A scenario around one static file: one material, no atmosphere, band 8-12, 21 June at 48.56 N.
 /// Sim time 0 is 06:00 UTC. The surface answers at once (time constants of a millisecond), so that

@@ -203,5 +203,21 @@ TEST(InspectGltf, sums_up_what_the_loader_sees) {
   EXPECT_THAT(to_json(*summary), HasSubstr(R"("gltf_material": "odd \"one\"")"));
 }
 
+TEST(InspectGltf, tells_which_faces_are_sheets) {
+  ScenarioDesc scenario =
+      one_triangle(R"({"name":"steel","doubleSided":true})", R"(,"material":0)");
+  const auto sheets = [&] {
+    const auto summary = inspect_gltf(scenario.objects[0].gltf, scenario.materials);
+    return summary ? summary->materials[0].sheet_triangles : 99U;
+  };
+  scenario.materials[2].layers = {{0.001, 50.0, 7850.0, 470.0}};
+  EXPECT_EQ(sheets(), 1U);
+  const auto summary = inspect_gltf(scenario.objects[0].gltf, scenario.materials);
+  EXPECT_THAT(to_text(*summary), HasSubstr("double sided: 1 triangles are sheets"));
+  EXPECT_THAT(to_json(*summary), HasSubstr(R"("sheet_triangles": 1)"));
+  scenario.materials[2].layers[0].conductivity_w_m_k = 0.1;
+  EXPECT_EQ(sheets(), 0U);
+}
+
 }  // namespace
 }  // namespace emit::scene

@@ -209,6 +209,49 @@ TEST(SurfaceClimate, NamesTheMaterialItLacks) {
   EXPECT_NE(empty.error().text.find("asphalt"), std::string::npos);
 }
 
+TEST(PointSolver, SheetIsDrivenByBothOfItsFaces) {
+  scene::ScenarioDesc scenario = summer_day();
+  scene::Material& material = scenario.materials[0];
+  constexpr double kHalfM = 0.0005;
+  material.layers = {{kHalfM, 50.0, 7850.0, 470.0}};
+  material.base_k = 400.0;                              // which it knows nothing of
+  const SurfaceClimate climate = climate_of(scenario);  // whose ground is a sheet's half as well
+  material.sheet = true;
+  const auto mesh = reference::material_mesh(material);
+  ASSERT_TRUE(mesh);
+  PointSolver solver(climate, *mesh, material, 292.0);
+  // The lower face lies in the shade; the upper one from 9 o'clock on.
+  const std::vector<ViewSample> up{{0, 1.0, 0.8}, {9 * kHourNs, 1.0, 0.8}, {9 * kHourNs, 0.0, 0.8}};
+  const std::vector<ViewSample> down{{0, 0.0, 0.1}};
+  const std::vector<std::int64_t> times{9 * kHourNs, 9 * kHourNs + 60'000'000'000, 11 * kHourNs};
+  std::vector<double> from_above(times.size());
+  std::vector<double> from_below(times.size());
+  solver.run(kUp, {up, down}, times, from_above);
+  solver.run(-kUp, {down, up}, times, from_below);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    EXPECT_NEAR(from_above[i], from_below[i], 1e-4);
+    // The balance of both faces, in steps of 0.1 s from an hour before.
+    const auto net = [&](double now_s, double k) {
+      const ClimateNode now = climate.at(static_cast<std::int64_t>(now_s * 1e9));
+      const double rho = climate.surroundings_reflectance_frac();
+      const ViewSample& lit = now_s < 9.0 * 3600.0 ? up[0] : up[2];
+      const FaceState top = face_state(
+          now, {kUp, material.solar_absorptance_frac, material.emissivity_frac}, lit, rho);
+      const FaceState bottom = face_state(
+          now, {-kUp, material.solar_absorptance_frac, material.emissivity_frac}, down[0], rho);
+      return top.absorbed_w_m2 + bottom.absorbed_w_m2 -
+             2.0 * material.emissivity_frac * sigma_t4(k) + 2.0 * now.film_w_m2_k * (now.air_k - k);
+    };
+    const double end_s = static_cast<double>(times[i]) * 1e-9;
+    double t_k = 300.0;
+    for (double now_s = end_s - 3600.0; now_s < end_s - 0.05; now_s += 0.1) {
+      t_k += 0.1 * net(now_s, t_k) / (2.0 * kHalfM * 7850.0 * 470.0);
+    }
+    EXPECT_NEAR(from_above[i], t_k, 0.02) << i;
+  }
+  EXPECT_LT(from_above[2], from_above[0] - 5.0);
+}
+
 TEST(PointSolver, PrescribedMaterialIsWhatItSays) {
   scene::ScenarioDesc scenario = summer_day();
   const SurfaceClimate climate = climate_of(scenario);

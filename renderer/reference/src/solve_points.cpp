@@ -198,8 +198,14 @@ Result<std::vector<double>> PointHistories::temperatures(
         const auto solver = mine.try_emplace(point.material, climate_, meshes.at(point.material),
                                              material, scenario_.thermal.initial_k)
                                 .first;
-        const std::vector<ViewSample> view = views(point, nodes_ns, instants, sim_time_ns);
-        solver->second.run(point.normal, view, std::span(&sim_time_ns, 1),
+        const std::vector<ViewSample> front = views(point, nodes_ns, instants, sim_time_ns);
+        std::vector<ViewSample> back;
+        if (material.sheet) {
+          SolvePoint behind = point;
+          behind.normal = -point.normal;
+          back = views(behind, nodes_ns, instants, sim_time_ns);
+        }
+        solver->second.run(point.normal, {front, back}, std::span(&sim_time_ns, 1),
                            std::span(&kelvin[i], 1));
       }
     });

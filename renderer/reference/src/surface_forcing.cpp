@@ -130,7 +130,8 @@ ViewSample open_view(const glm::dvec3& normal) noexcept {
 
 Result<LayerMesh> material_mesh(const scene::Material& material, const MeshOptions& options) {
   const auto layers = solid_layers(material.layers);
-  auto mesh = LayerMesh::build(layers, {BaseKind::fixed_temperature, material.base_k}, options);
+  const BaseKind base = material.sheet ? BaseKind::adiabatic : BaseKind::fixed_temperature;
+  auto mesh = LayerMesh::build(layers, {base, material.base_k}, options);
   if (!mesh) {
     return tl::unexpected(physics::Error{
         ErrorCode::config, fmt::format("material '{}': {}", material.name, mesh.error().text)});

@@ -61,25 +61,38 @@ PointSolver::PointSolver(const SurfaceClimate& climate, const LayerMesh& mesh,
       initial_k_(material.initial_k.value_or(initial_k)),
       solver_(mesh, steps),
       spin_up_k_(mesh.nodes()) {
-  start_profile_ = steady_profile(solid_layers(material.layers), initial_k_, material.base_k);
+  start_profile_ = steady_profile(solid_layers(material.layers), initial_k_,
+                                  material.sheet ? initial_k_ : material.base_k);
 }
 
 double PointSolver::seconds(std::int64_t time_ns) const noexcept {
   return static_cast<double>(time_ns - climate_->start_ns()) * 1e-9;
 }
 
-void PointSolver::advance(const SurfaceOptics& surface, std::span<const ViewSample> view,
+void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
                           std::int64_t until_ns) noexcept {
   const auto nodes = climate_->nodes();
+  SurfaceOptics behind = surface;
+  behind.normal = -surface.normal;
   while (now_ns_ < until_ns) {
     seek(nodes, now_ns_, climate_row_);
-    seek(view, now_ns_, view_row_);
-    const std::int64_t end_ns = std::min(
-        {until_ns, next_time(nodes, now_ns_, climate_row_), next_time(view, now_ns_, view_row_)});
+    seek(views.front, now_ns_, view_row_);
+    std::int64_t end_ns = std::min({until_ns, next_time(nodes, now_ns_, climate_row_),
+                                    next_time(views.front, now_ns_, view_row_)});
+    if (material_->sheet) {
+      seek(views.back, now_ns_, back_row_);
+      end_ns = std::min(end_ns, next_time(views.back, now_ns_, back_row_));
+    }
     const auto state = [&](std::int64_t time_ns) {
-      return face_state(value_at(nodes, time_ns, climate_row_), surface,
-                        value_at(view, time_ns, view_row_),
-                        climate_->surroundings_reflectance_frac());
+      const ClimateNode climate = value_at(nodes, time_ns, climate_row_);
+      const double reflectance_frac = climate_->surroundings_reflectance_frac();
+      FaceState face =
+          face_state(climate, surface, value_at(views.front, time_ns, view_row_), reflectance_frac);
+      if (!material_->sheet) return face;
+      const FaceState other =
+          face_state(climate, behind, value_at(views.back, time_ns, back_row_), reflectance_frac);
+      face.absorbed_w_m2 = 0.5 * (face.absorbed_w_m2 + other.absorbed_w_m2);
+      return face;
     };
     solver_.advance({solver_.time_s(), seconds(end_ns), state(now_ns_), state(end_ns)},
                     surface.emissivity_frac);
@@ -91,15 +104,17 @@ void PointSolver::spin_up(const SurfaceOptics& surface) {
   now_ns_ = climate_->start_ns();
   climate_row_ = 0;
   view_row_ = 0;
+  back_row_ = 0;
   solver_.start(start_profile_, 0.0);
   const ViewSample open = open_view(surface.normal);
-  advance(surface, std::span(&open, 1), climate_->history_start_ns());
+  const ViewSample open_behind = open_view(-surface.normal);
+  advance(surface, {std::span(&open, 1), std::span(&open_behind, 1)}, climate_->history_start_ns());
   solver_.copy_nodes_k(spin_up_k_);
   spin_up_normal_ = surface.normal;
   has_spin_up_ = true;
 }
 
-void PointSolver::run(const glm::dvec3& normal, std::span<const ViewSample> view,
+void PointSolver::run(const glm::dvec3& normal, const Views& views,
                       std::span<const std::int64_t> times_ns, std::span<double> out_k) {
   if (material_->prescribed_k) {
     std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
@@ -113,10 +128,13 @@ void PointSolver::run(const glm::dvec3& normal, std::span<const ViewSample> view
   now_ns_ = start_ns;
   climate_row_ = 0;
   view_row_ = 0;
+  back_row_ = 0;
   const ViewSample open = open_view(normal);
-  if (view.empty()) view = std::span(&open, 1);
+  const ViewSample open_behind = open_view(-normal);
+  const Views seen{views.front.empty() ? std::span(&open, 1) : views.front,
+                   views.back.empty() ? std::span(&open_behind, 1) : views.back};
   for (std::size_t i = 0; i < times_ns.size(); ++i) {
-    advance(surface, view, times_ns[i]);
+    advance(surface, seen, times_ns[i]);
     out_k[i] = solver_.face_k();
   }
 }
@@ -136,7 +154,7 @@ physics::Result<std::vector<double>> point_history(const SurfaceClimate& climate
   const auto mesh = material_mesh(material, mesh_options);
   if (!mesh) return tl::unexpected(mesh.error());
   PointSolver solver(climate, *mesh, material, initial_k, steps);
-  solver.run(normal, view, times_ns, out_k);
+  solver.run(normal, {view, {}}, times_ns, out_k);
   return out_k;
 }
 

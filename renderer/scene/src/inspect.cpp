@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/scene/inspect.hpp"
+#include "emit/scene/sheets.hpp"
 
 #include <fmt/format.h>
 
@@ -76,9 +77,17 @@ physics::Result<SceneSummary> inspect_gltf(const std::filesystem::path& file,
   std::vector<SceneSummary::MaterialRow> rows;
   for (const GltfMaterial& material : model->materials) {
     rows.push_back({material.name, in_library(material.name) ? material.name : "",
-                    material.double_sided, 0, 0.0});
+                    material.double_sided, 0, 0.0, 0});
   }
   rows.push_back({});
+  std::vector<char> thin;
+  for (const SceneSummary::MaterialRow& row : rows) {
+    thin.push_back(std::ranges::any_of(library, [&](const Material& m) {
+      return m.name == row.library_material && sheet_of(m).has_value();
+    }));
+  }
+  std::vector<char> open;
+  for (const Mesh& mesh : model->meshes) open.push_back(may_have_sheets(mesh));
   for (const GltfPlacement& placement : model->placements) {
     const Mesh& mesh = model->meshes[placement.mesh];
     const glm::dmat4 body_from_mesh = body_from_gltf() * placement.gltf_from_mesh;
@@ -86,8 +95,11 @@ physics::Result<SceneSummary> inspect_gltf(const std::filesystem::path& file,
     summary.triangles += mesh.indices.size() / 3;
     summary.bounds_body.add(transformed(mesh.bounds, body_from_mesh));
     for (const Submesh& submesh : mesh.submeshes) {
-      SceneSummary::MaterialRow& row =
-          rows[std::min<std::size_t>(submesh.material, rows.size() - 1)];
+      const std::size_t index = std::min<std::size_t>(submesh.material, rows.size() - 1);
+      SceneSummary::MaterialRow& row = rows[index];
+      if (submesh.double_sided && open[placement.mesh] != 0 && thin[index] != 0) {
+        row.sheet_triangles += submesh.index_count / 3;
+      }
       row.triangles += submesh.index_count / 3;
       row.area_m2 += area_m2(mesh, submesh, body_from_mesh);
     }
@@ -137,7 +149,10 @@ std::string to_text(const SceneSummary& summary) {
                    row.gltf_material.empty() ? "(none)" : row.gltf_material, row.triangles,
                    row.area_m2,
                    row.library_material.empty() ? "not in the library" : "in the library",
-                   row.double_sided ? ", double sided" : "");
+                   row.sheet_triangles > 0
+                       ? fmt::format(", double sided: {} triangles are sheets", row.sheet_triangles)
+                   : row.double_sided ? ", double sided"
+                                      : "");
   }
   for (const std::string& warning : summary.warnings) {
     fmt::format_to(put, "warning: {}\n", warning);
@@ -155,10 +170,10 @@ std::string to_json(const SceneSummary& summary) {
   std::vector<std::string> materials;
   for (const SceneSummary::MaterialRow& row : summary.materials) {
     materials.push_back(fmt::format(
-        R"({{"gltf_material": {}, "library_material": {}, "double_sided": {}, "triangles": {}, "area_m2": {:.9g}}})",
+        R"({{"gltf_material": {}, "library_material": {}, "double_sided": {}, "triangles": {}, "area_m2": {:.9g}, "sheet_triangles": {}}})",
         quoted(row.gltf_material),
         row.library_material.empty() ? "null" : quoted(row.library_material), row.double_sided,
-        row.triangles, row.area_m2));
+        row.triangles, row.area_m2, row.sheet_triangles));
   }
   std::vector<std::string> warnings;
   std::transform(summary.warnings.begin(), summary.warnings.end(), std::back_inserter(warnings),

@@ -48,6 +48,7 @@ struct FosterMaterial {
   double base_k = 0.0;
   double initial_k = 0.0;
   double prescribed_k = 0.0;
+  bool sheet = false;  ///< driven by the mean of what its two faces receive
 
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }
 };

@@ -95,8 +95,8 @@ struct SurfaceOptics {
 /// plane (N.L decides), (1 + cos tilt)/2 of the sky.
 [[nodiscard]] ViewSample open_view(const glm::dvec3& normal) noexcept;
 
-/// Mesh of a material's layers over its base. Errors: config naming the material (no layers, or a
-/// layer that is no body).
+/// Mesh of a material's layers over its base, or of a sheet's over its insulated middle. Errors:
+/// config naming the material (no layers, or a layer that is no body).
 [[nodiscard]] physics::Result<LayerMesh> material_mesh(const scene::Material& material,
                                                        const MeshOptions& options = {});
 
@@ -110,19 +110,24 @@ class PointSolver {
   PointSolver(const SurfaceClimate& climate, const LayerMesh& mesh, const scene::Material& material,
               double initial_k, const StepOptions& steps = {});
 
+  /// What the face sees, ascending, and what that of opposite normal sees, which counts where the
+  /// material is a sheet; empty: unshadowed throughout.
+  struct Views {
+    std::span<const ViewSample> front;
+    std::span<const ViewSample> back;
+  };
   /// Temperatures at `times_ns`, ascending, none before the history start (those answer as the
-  /// start). `view` is ascending; empty: unshadowed throughout. A prescribed material answers with
-  /// its prescription. @pre out has the size of times_ns.
-  void run(const glm::dvec3& normal, std::span<const ViewSample> view,
-           std::span<const std::int64_t> times_ns, std::span<double> out_k);
+  /// start). A prescribed material answers with its prescription. @pre out has the size of
+  /// times_ns.
+  void run(const glm::dvec3& normal, const Views& views, std::span<const std::int64_t> times_ns,
+           std::span<double> out_k);
 
   /// The solver after run(): profile, counters.
   [[nodiscard]] const LayerSolver& solver() const noexcept { return solver_; }
 
  private:
   void spin_up(const SurfaceOptics& surface);
-  void advance(const SurfaceOptics& surface, std::span<const ViewSample> view,
-               std::int64_t until_ns) noexcept;
+  void advance(const SurfaceOptics& surface, const Views& views, std::int64_t until_ns) noexcept;
   [[nodiscard]] double seconds(std::int64_t time_ns) const noexcept;
 
   const SurfaceClimate* climate_;
@@ -132,6 +137,7 @@ class PointSolver {
   std::int64_t now_ns_ = 0;
   std::size_t climate_row_ = 0;
   std::size_t view_row_ = 0;
+  std::size_t back_row_ = 0;
   bool has_spin_up_ = false;
   glm::dvec3 spin_up_normal_{0.0};
   std::vector<double> spin_up_k_;  ///< per node at the history start

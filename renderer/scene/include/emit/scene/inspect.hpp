@@ -26,6 +26,8 @@ struct SceneSummary {
     bool double_sided = false;
     std::uint64_t triangles = 0;  ///< placements counted
     double area_m2 = 0.0;         ///< placements counted
+    /// Of these, sheets with the library's material (sheets.hpp): one temperature for both faces.
+    std::uint64_t sheet_triangles = 0;
   };
   std::filesystem::path file;
   std::uint32_t nodes = 0;

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <optional>
+
+#include "emit/scene/mesh.hpp"
+
+/// Sheets: bodies so thin that both of their faces have one temperature, which is driven by what
+/// both receive. A symmetric body under the mean of both faces' fluxes is half of it over an
+/// insulated middle, and a thin one behaves like that under any fluxes.
+namespace emit::scene {
+
+/// Layers of a material in front of the air behind it: those up to the first gas (less than
+/// 10 kg/m3). A body's resistance up to which it can be a sheet: 20 W m-2 K-1 on either face then
+/// leave a difference of a twentieth of what they drive.
+inline constexpr double kMaxSheetResistanceM2kW = 5e-3;
+inline constexpr double kMaxGasKgM3 = 10.0;
+
+/// What a sheet of this material is made of: half of its body's layers, `sheet` set, no base. None
+/// where the material is prescribed, has no body, or one that is no sheet. Modes of emit2014 become
+/// one, rho c d / 2 over a film of 19 W m-2 K-1.
+[[nodiscard]] std::optional<Material> sheet_of(const Material& material);
+
+/// True where the mesh has double-sided faces and is not the surface of a closed body.
+[[nodiscard]] bool may_have_sheets(const Mesh& mesh);
+
+/// Gives double-sided faces of thin materials the material of a sheet, appended to
+/// SceneGeometry::materials. Not the faces of closed bodies: nothing gets to their other side.
+/// Setup only.
+void adopt_sheets(SceneGeometry& geometry);
+
+}  // namespace emit::scene
