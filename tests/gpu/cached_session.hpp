@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -88,9 +89,13 @@ struct Shade {
   double end_s = 0.0;
 };
 
-/// The same model in double on level ground that sees all of the sky and, but for `shade`, the sun.
+/// Changes what reaches the ground from the history's start on.
+using Screen = std::function<void(renderer::SurfaceForcing&)>;
+
+/// The same model in double on level ground that sees all of the sky and the sun, but for `shade`
+/// and `screen`.
 inline double open_ground_k(scene::ScenarioDesc s, std::int64_t now_ns,
-                            std::optional<Shade> shade = std::nullopt) {
+                            std::optional<Shade> shade = std::nullopt, const Screen& screen = {}) {
   s.thermal.tolerance_k = 1e-3;
   s.thermal.steps = 512;
   const renderer::Environment environment(s);
@@ -110,8 +115,11 @@ inline double open_ground_k(scene::ScenarioDesc s, std::int64_t now_ns,
                             unshadowed_drive(interval.end, material, up, kReferenceK),
                             physics::foster_ladder(interval.dt_s, material.network), surface, 1e-3);
   };
-  for (const auto& intervals : {history.tail(), history.intervals()}) {
-    for (const renderer::IntervalForcing& interval : intervals) advance(interval);
+  for (const renderer::IntervalForcing& interval : history.tail()) advance(interval);
+  for (renderer::IntervalForcing interval : history.intervals()) {
+    if (screen) screen(interval.begin);
+    if (screen) screen(interval.end);
+    advance(interval);
   }
   if (shade) {
     const std::int64_t lit_again_ns = std::llround(shade->end_s * 1e9);
