@@ -50,10 +50,8 @@ inline scene::ScenarioDesc cached_scenario(const std::filesystem::path& gltf) {
 /// One renderer at a time: each has its own context, current in this thread.
 class Session {
  public:
-  explicit Session(const scene::ScenarioDesc& scenario, bool with_objects = false) {
-    renderer::OutputOptions output;
+  explicit Session(const scene::ScenarioDesc& scenario, renderer::OutputOptions output = {}) {
     output.temperature = true;
-    output.object = with_objects;
     auto made = renderer::Renderer::create(scenario, {}, output);
     if (made) {
       renderer_ = std::move(*made);
@@ -61,8 +59,10 @@ class Session {
       ADD_FAILURE() << made.error().text;
     }
   }
-  [[nodiscard]] std::vector<float> frame_k(std::int64_t sim_time_ns, const physics::Pose& pose) {
+  [[nodiscard]] std::vector<float> frame_k(std::int64_t sim_time_ns, const physics::Pose& pose,
+                                           std::uint8_t rung = 0) {
     renderer::FrameRequest request;
+    request.rung = rung;
     request.sim_time_ns = request.thermal_time_ns = sim_time_ns;
     request.sensor_pose = pose;
     const int slot = renderer_->submit(request);
@@ -147,6 +147,21 @@ inline Difference difference(const std::vector<float>& a, const std::vector<floa
   std::ranges::sort(errors);
   if (errors.empty()) return {1e9, 1e9};
   return {errors[errors.size() - 1], errors[errors.size() * 99 / 100]};
+}
+
+/// Ground in squares: where they are small, shade that comes after the warm-up finds samples, too.
+inline std::vector<Quad> fine_ground(double half_m, double square_m) {
+  std::vector<Quad> quads;
+  const int squares = static_cast<int>(std::lround(2.0 * half_m / square_m));
+  const glm::dvec3 x(square_m, 0.0, 0.0);
+  const glm::dvec3 y(0.0, square_m, 0.0);
+  for (int i = 0; i < squares; ++i) {
+    for (int j = 0; j < squares; ++j) {
+      const glm::dvec3 low(square_m * i - half_m, square_m * j - half_m, 0.0);
+      quads.push_back({low, low + x, low + x + y, low + y});
+    }
+  }
+  return quads;
 }
 
 inline std::filesystem::path box_on_ground() {

@@ -25,21 +25,6 @@ glm::dvec3 to_sun(const scene::ScenarioDesc& scenario, double seconds) {
   return renderer::Environment(scenario).sun_at(std::llround(seconds * 1e9)).direction_enu;
 }
 
-/// Ground in squares so small that shade which comes after the warm-up finds samples, too.
-std::vector<Quad> fine_ground(double half_m, double square_m) {
-  std::vector<Quad> quads;
-  const int squares = static_cast<int>(std::lround(2.0 * half_m / square_m));
-  const glm::dvec3 x(square_m, 0.0, 0.0);
-  const glm::dvec3 y(0.0, square_m, 0.0);
-  for (int i = 0; i < squares; ++i) {
-    for (int j = 0; j < squares; ++j) {
-      const glm::dvec3 low(square_m * i - half_m, square_m * j - half_m, 0.0);
-      quads.push_back({low, low + x, low + x + y, low + y});
-    }
-  }
-  return quads;
-}
-
 /// Mean over the pixels that show something of what `shown` selects by pixel.
 template <class Shown>
 float mean_k(const std::vector<float>& frame, const Shown& shown) {
@@ -86,7 +71,7 @@ TEST(RendererCachedBreaks, InstancesOfOneMeshHaveTheirOwnTemperatures) {
     const auto drawn = scene::separated(std::move(*geometry), view);
     ASSERT_EQ(drawn.instances[0].mesh == drawn.instances[1].mesh, fineness == 1);
     const auto frame = [&](bool both) {
-      Session session(plates(both, fineness), true);
+      Session session(plates(both, fineness), {.object = true});
       auto picture = session.frame_k(2 * kHourNs, pose);
       return std::pair(std::move(picture), session.objects());
     };
@@ -225,7 +210,7 @@ TEST(RendererCachedBreaks, AnEventShowsNowhereButWhereItActs) {
   constexpr int kEvent = 42;
   const std::int64_t interval_ns = std::llround(scenario.thermal.first_step_s * 1e9);
   for (const bool vanishes : {false, true}) {
-    Session run(scenario, true);
+    Session run(scenario, {.object = true});
     std::int64_t now_ns = 2 * kHourNs + kStepNs / 2;
     auto last = run.frame_k(now_ns, pose);
     const auto shown = run.objects();
@@ -293,7 +278,7 @@ TEST(RendererCachedBreaks, GroundUnderAParkedBodySeesItsUnderside) {
     return scenario;
   };
   const auto under_k = [&](const scene::ScenarioDesc& scenario) {
-    Session run(scenario, true);
+    Session run(scenario, {.object = true});
     const auto frame = run.frame_k(now_ns, looking({0.0, -6.0, 0.3}, {0.0, 0.0, 0.0}));
     constexpr std::size_t kMiddle = kHeight / 2 * kWidth + kWidth / 2;
     EXPECT_EQ(run.objects()[kMiddle], 1.0F);
