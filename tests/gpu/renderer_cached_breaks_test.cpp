@@ -307,6 +307,30 @@ TEST(RendererCachedBreaks, GroundUnderAParkedBodySeesItsUnderside) {
   }
 }
 
+TEST(RendererCachedBreaks, CoveredGroundIsNotMixedIntoWhatLiesBeforeTheFoot) {
+  // Ground of two triangles under a body: what it covers never had the sun of this morning.
+  auto scenario = cached_scenario(write_quads("lot", {ground(14.0, 14.0)}));
+  scene::ObjectDesc body = scenario.objects.front();
+  body.name = "body";
+  body.gltf = write_quads("body", box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0}));
+  scenario.objects.push_back(body);
+  const std::int64_t now_ns = 4 * kHourNs;
+  const auto pose = looking({3.5, -0.4, 1.6}, {1.2, 0.0, 0.0});  // before its sunlit side
+  Session run(scenario, {.object = true});
+  const auto frame = run.frame_k(now_ns, pose);
+  const auto& objects = run.objects();
+  const double open_k = open_ground_k(scenario, now_ns);
+  // To the right lies its shadow.
+  int ground_px = 0;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    if (objects[i] != 1.0F || i % kWidth >= kWidth * 6 / 10) continue;
+    ++ground_px;
+    EXPECT_GT(frame[i], open_k - 0.5) << i % kWidth << ' ' << i / kWidth;
+    EXPECT_LT(frame[i], open_k + 5.0) << i % kWidth << ' ' << i / kWidth;
+  }
+  EXPECT_GT(ground_px, 2000);
+}
+
 TEST(RendererCachedBreaks, MoreMaterialsThanAPixelCanNameAreRefused) {
   constexpr std::size_t kMaterials = 16385;
   const auto file = write_quads("many", {ground(1.0, 1.0)});
