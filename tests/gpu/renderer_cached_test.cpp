@@ -5,122 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <vector>
 
-#include "emit/physics/foster.hpp"
+#include "gpu/cached_session.hpp"
 #include "gpu/renderer_scene.hpp"
-#include "history/foster_history.hpp"
 
 namespace emit::test {
 namespace {
-
-constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr std::int64_t kHourNs = 3600 * kSecondNs;
-constexpr double kReferenceK = 295.0;
-constexpr std::uint32_t kWidth = 96;
-constexpr std::uint32_t kHeight = 80;
-
-physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
-  return {from, physics::world_from_body_look_at(from, at)};
-}
-
-scene::ScenarioDesc cached_scenario(const std::filesystem::path& gltf) {
-  scene::ScenarioDesc s = instant_scenario(gltf);
-  s.weather.clear();
-  s.materials[0].layers = {{0.15, 0.7, 2120, 920}, {0.3, 1.5, 2000, 950}, {1.55, 1.2, 1900, 1158}};
-  s.materials[0].base_k = 286.15;
-  s.sensor.width_px = kWidth;
-  s.sensor.height_px = kHeight;
-  s.thermal.method = scene::ThermalMethod::cached;
-  s.thermal.model = scene::ThermalModel::foster;
-  s.thermal.spin_up_ns = 48 * kHourNs;
-  s.thermal.steps = 27;
-  s.thermal.spacing = scene::StepSpacing::geometric;
-  s.thermal.lateral = false;
-  return s;
-}
-
-/// One renderer at a time: each has its own context, current in this thread.
-class Session {
- public:
-  explicit Session(const scene::ScenarioDesc& scenario) {
-    renderer::OutputOptions output;
-    output.temperature = true;
-    auto made = renderer::Renderer::create(scenario, {}, output);
-    if (made) {
-      renderer_ = std::move(*made);
-    } else {
-      ADD_FAILURE() << made.error().text;
-    }
-  }
-  [[nodiscard]] std::vector<float> frame_k(std::int64_t sim_time_ns, const physics::Pose& pose) {
-    renderer::FrameRequest request;
-    request.sim_time_ns = request.thermal_time_ns = sim_time_ns;
-    request.sensor_pose = pose;
-    const int slot = renderer_->submit(request);
-    const auto& view = renderer_->collect(static_cast<renderer::SlotIndex>(slot));
-    EXPECT_FALSE(view.device_failed);
-    EXPECT_EQ(view.stats.nonfinite_px, 0U);
-    std::vector<float> out(view.temperature_k.begin(), view.temperature_k.end());
-    renderer_->release(static_cast<renderer::SlotIndex>(slot));
-    return out;
-  }
-  [[nodiscard]] renderer::Renderer& renderer() { return *renderer_; }
-
- private:
-  std::unique_ptr<renderer::Renderer> renderer_;
-};
-
-/// The same model in double on open, level ground.
-double open_ground_k(scene::ScenarioDesc s, std::int64_t now_ns) {
-  s.thermal.tolerance_k = 1e-3;
-  s.thermal.steps = 512;
-  const renderer::Environment environment(s);
-  const auto materials = renderer::foster_materials(s.materials, s.thermal);
-  const renderer::FosterMaterial material = materials->front();
-  renderer::FosterHistory history(s, *materials, material, environment, kReferenceK);
-  renderer::StepPlan plan(s.thermal);
-  plan.update(now_ns, environment, {});
-  history.update(plan, environment);
-  const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
-                                               material.base_k, kReferenceK);
-  const glm::dvec3 up(0.0, 0.0, 1.0);
-  physics::FosterState<double> x = history.spun_up(0, up);
-  for (const auto& intervals : {history.tail(), history.intervals()}) {
-    for (const renderer::IntervalForcing& interval : intervals) {
-      physics::foster_advance(x, unshadowed_drive(interval.begin, material, up, kReferenceK),
-                              unshadowed_drive(interval.end, material, up, kReferenceK),
-                              physics::foster_ladder(interval.dt_s, material.network), surface,
-                              1e-3);
-    }
-  }
-  return kReferenceK + physics::foster_offset_k(x, surface);
-}
-
-struct Difference {
-  double max_k = 0.0;
-  double p99_k = 0.0;
-};
-Difference difference(const std::vector<float>& a, const std::vector<float>& b) {
-  std::vector<double> errors;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (std::isnan(a[i]) != std::isnan(b[i])) {
-      errors.push_back(1e9);
-    } else if (!std::isnan(a[i])) {
-      errors.push_back(std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i])));
-    }
-  }
-  std::ranges::sort(errors);
-  if (errors.empty()) return {1e9, 1e9};
-  return {errors[errors.size() - 1], errors[errors.size() * 99 / 100]};
-}
-
-std::filesystem::path box_on_ground() {
-  auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
-  quads.push_back(ground(12.0, 12.0));
-  return write_quads("box", quads);
-}
 
 TEST(RendererCached, OpenGroundFollowsTheModelInDoubleAlsoBetweenTheNodes) {
   const auto scenario = cached_scenario(write_quads("plane", {ground(50.0, 50.0)}));
@@ -216,23 +107,6 @@ TEST(RendererCached, TheSameFramesInLargerStepsGiveTheSameTemperatures) {
   };
   const auto fine = last(40);
   EXPECT_EQ(difference(fine, last(1)).max_k, 0.0);
-}
-
-/// Ground and a box that stands on it until `leaves_ns`.
-scene::ScenarioDesc parking_lot(std::int64_t leaves_ns) {
-  scene::ScenarioDesc s = cached_scenario(write_quads("lot", {ground(14.0, 14.0)}));
-  scene::ObjectDesc vehicle = s.objects.front();
-  vehicle.name = "vehicle";
-  vehicle.gltf = write_quads("vehicle", box({-1.5, -1.0, 0.3}, {1.5, 1.0, 2.0}));
-  vehicle.entity_id = 7;
-  const physics::Pose parked = vehicle.instances.front();
-  physics::Pose away = parked;
-  away.position_world_m += glm::dvec3(300.0, 0.0, 0.0);
-  vehicle.trajectory = {{0, parked, true, false},
-                        {leaves_ns, parked, true, false},
-                        {leaves_ns + kSecondNs, away, true, true}};
-  s.objects.push_back(vehicle);
-  return s;
 }
 
 TEST(RendererCached, AVehicleThatLeftLeavesItsPrint) {

@@ -146,6 +146,50 @@ TEST_F(IntervalRaysTest, NothingIsTracedAtNightOrBehindTheFace) {
   EXPECT_EQ(interval_.sun_frac(*rays_, down, kOffsetM, 0.0F), 0.0F);
 }
 
+TEST_F(IntervalRaysTest, ABodyThatPassesHidesTheSunForTheTimeItTakes) {
+  test::SurfaceScene scene;
+  scene.add_static(scene.add_mesh(test::level_mesh(glm::vec3(-90.0F, -90.0F, 0.0F),
+                                                   glm::vec3(90.0F, 90.0F, 0.0F), -1.0F)),
+                   glm::dmat4(1.0));
+  constexpr double kHalfLengthM = 3.0;
+  scene.add_mover(test::box_mesh(glm::vec3(-kHalfLengthM, -2.0F, -0.01F),
+                                 glm::vec3(kHalfLengthM, 2.0F, 0.01F)));
+  const auto rays = CasterRays::create(scene.geometry);
+  ASSERT_TRUE(rays.has_value());
+  constexpr double kIntervalS = 20.0;
+  const auto end_ns = kNoonNs + std::llround(kIntervalS * 1e9);
+  const glm::dvec3 sun = environment_.sun_at((kNoonNs + end_ns) / 2).direction_enu;
+  IntervalRays interval(std::vector<float>{4.0F});
+  // In the interval's middle it stands between the sun and the place, 5 m above the ground.
+  const glm::dvec3 between_m = 5.0 / sun.z * sun + glm::dvec3(0.0, 0.0, -1.0);
+  for (const double speed_m_s : {0.8, 1.0, 2.0, 4.0, 16.0}) {
+    std::vector<PoseHistory> entities;
+    entities.emplace_back(scene::ObjectDesc{}, physics::Pose{});
+    for (const double side : {-1.0, 1.0}) {
+      physics::Pose pose;
+      pose.position_world_m = between_m + glm::dvec3(side * 0.5 * kIntervalS * speed_m_s, 0.0, 0.0);
+      ASSERT_TRUE(entities[0].append(side < 0.0 ? kNoonNs : end_ns, pose, true, false));
+    }
+    const double shaded_frac = 2.0 * kHalfLengthM / speed_m_s / kIntervalS;
+    // Wherever its way lies in the interval, as long as it passes wholly.
+    const double aside_m = 0.5 * (kIntervalS * speed_m_s - 2.0 * kHalfLengthM) - 0.2;
+    for (std::uint32_t turn = 0; turn < 4; ++turn) {
+      interval.update(kNoonNs, end_ns, turn, environment_, entities, rays->origin_world_m());
+      for (int k = -5; k <= 5; ++k) {
+        SurfaceSample sample;
+        sample.position_m =
+            glm::vec3(glm::dvec3(0.2 * k * aside_m, 0.0, -1.0) - rays->origin_world_m());
+        sample.normal = glm::vec3(0.0F, 0.0F, 1.0F);
+        const double found_frac = 1.0 - interval.sun_frac(*rays, sample, kOffsetM, 0.0F);
+        EXPECT_LT(found_frac, shaded_frac + 2.5 / kSunRays) << speed_m_s << " m/s, " << k;
+        // A first packet of 16 that agrees ends the search: less than its widest gap may be missed.
+        if (shaded_frac < 7.0 / kSunRays && found_frac == 0.0) continue;
+        EXPECT_GT(found_frac, shaded_frac - 2.5 / kSunRays) << speed_m_s << " m/s, " << k;
+      }
+    }
+  }
+}
+
 /// Entities that no ray of a packet can meet are passed over; an exaggerated radius lets every ray
 /// be asked.
 TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// How finely the thermal method "cached" samples what a camera sees, and that the pictures do not
+// tell: from near and far, and on the way between.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "gpu/cached_session.hpp"
+#include "gpu/renderer_scene.hpp"
+
+namespace emit::test {
+namespace {
+
+TEST(RendererCachedDetail, SamplesAreBoundedByThePixels) {
+  // However small the tolerance, triangles are not cut far below a pixel.
+  auto scenario = cached_scenario(box_on_ground());
+  const auto pose = looking({-6.0, -9.0, 7.0}, {-1.0, 0.0, 0.0});
+  scenario.sensor.trajectory = {{0, pose}};
+  scenario.thermal.tolerance_k = 0.001;
+  const auto samples = [&](std::uint32_t fineness) {
+    scenario.sensor.width_px = fineness * kWidth;
+    scenario.sensor.height_px = fineness * kHeight;
+    Session run(scenario);
+    (void)run.frame_k(2 * kHourNs, pose);
+    EXPECT_FALSE(run.renderer().scene_stats().samples_full);
+    return static_cast<double>(run.renderer().scene_stats().samples);
+  };
+  const double coarse = samples(1);
+  const double fine = samples(2);
+  EXPECT_LT(coarse, 3.0 * kWidth * kHeight);
+  EXPECT_GT(coarse, 0.5 * kWidth * kHeight);  // the limit is what stops it
+  EXPECT_LT(fine, 4.5 * coarse);
+}
+
+/// What a picture around its middle would be after moving away to `farther` times the distance of a
+/// plane that it looks down on: bilinear, one pixel inside the rim.
+std::vector<double> receded_k(const std::vector<float>& picture, std::uint32_t width_px,
+                              double farther) {
+  const std::size_t width = width_px;
+  const std::size_t height = picture.size() / width;
+  const auto part = [farther](std::size_t i, std::size_t count) {
+    const double middle = 0.5 * static_cast<double>(count);
+    const double at = (static_cast<double>(i) + 0.5 - middle) * farther + middle - 0.5;
+    return std::clamp(at, 0.0, static_cast<double>(count) - 1.001);
+  };
+  std::vector<double> out;
+  for (std::size_t row = 1; row + 1 < height; ++row) {
+    for (std::size_t column = 1; column + 1 < width; ++column) {
+      const double u = part(column, width);
+      const double v = part(row, height);
+      const auto left = static_cast<std::size_t>(u);
+      const auto top = static_cast<std::size_t>(v);
+      const auto at_row = [&](std::size_t y) {
+        return std::lerp(static_cast<double>(picture[y * width + left]),
+                         static_cast<double>(picture[y * width + left + 1]),
+                         u - static_cast<double>(left));
+      };
+      out.push_back(std::lerp(at_row(top), at_row(top + 1), v - static_cast<double>(top)));
+    }
+  }
+  return out;
+}
+
+TEST(RendererCachedDetail, LevelsChangeWithoutAPop) {
+  // The shade of a plate high above, with a soft edge that has wandered over the ground. The camera
+  // recedes to four times the distance.
+  constexpr double kUpM = 60.0;
+  constexpr double kNearM = 8.0;
+  constexpr int kFrames = 400;
+  const double farther = std::pow(4.0, 1.0 / kFrames);
+  const std::int64_t now_ns = 3 * kHourNs;
+  auto scenario = cached_scenario(write_quads("ground", {ground(14.0, 14.0)}));
+  const glm::dvec3 sun = renderer::Environment(scenario).sun_at(now_ns).direction_enu;
+  scene::ObjectDesc plate = scenario.objects.front();
+  plate.name = "plate";
+  plate.gltf = write_quads("plate", {ground(3.0, 3.0)});
+  plate.instances.front().position_world_m = kUpM / sun.z * sun;
+  scenario.objects.push_back(plate);
+  scenario.sensor.width_px = 4 * kWidth;
+  scenario.sensor.height_px = 4 * kHeight;
+  const auto at = [&](int frame) {
+    return looking({0.0, -0.01, kNearM * std::pow(farther, frame)}, {0.0, 0.0, 0.0});
+  };
+  for (int k = 0; k <= 20; ++k) {
+    scenario.sensor.trajectory.push_back({now_ns + k * kSecondNs, at(k * kFrames / 20)});
+  }
+  Session run(scenario, {.ladder = renderer::Ladder::replayed});
+  const std::size_t width = scenario.sensor.width_px;
+  const auto most_apart_k = [&](const std::vector<double>& a, const std::vector<float>& b) {
+    double most_k = 0.0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const std::size_t pixel = (i / (width - 2) + 1) * width + i % (width - 2) + 1;
+      most_k = std::max(most_k, std::abs(a[i] - static_cast<double>(b[pixel])));
+    }
+    return most_k;
+  };
+  std::vector<double> most_k;
+  auto last = run.frame_k(now_ns, at(0));
+  for (int frame = 1; frame <= kFrames; ++frame) {
+    auto next = run.frame_k(now_ns, at(frame));
+    most_k.push_back(most_apart_k(receded_k(last, scenario.sensor.width_px, farther), next));
+    last = std::move(next);
+  }
+  double over_k = 0.0;
+  for (std::size_t f = 5; f + 5 < most_k.size(); ++f) {
+    std::array<double, 11> around_k{};
+    std::copy_n(&most_k[f - 5], around_k.size(), around_k.begin());
+    std::ranges::sort(around_k);
+    over_k = std::max(over_k, most_k[f] - around_k[5]);
+  }
+  EXPECT_LT(over_k, scenario.thermal.tolerance_k);
+  // Coarser levels are there, and would be seen where they came in earlier.
+  const auto coarse = run.frame_k(now_ns, at(kFrames), 3);
+  EXPECT_GT(most_apart_k(receded_k(coarse, scenario.sensor.width_px, 1.0), last),
+            scenario.thermal.tolerance_k);
+}
+
+}  // namespace
+}  // namespace emit::test
