@@ -20,6 +20,8 @@ constexpr std::size_t kGrain = 32;
 constexpr float kSunK = 5.0F;
 /// Intervals that are made up for one by one after a jump of sim time.
 constexpr std::int64_t kMostIntervals = 16;
+/// Events that follow a node sooner belong to it.
+constexpr std::int64_t kSameNs = 1'000'000;
 
 std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size_t movers,
                                  std::span<const std::int32_t> mover_of_object) {
@@ -64,6 +66,7 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
       interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
+  event_counts_.resize(movers);
   interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
 }
 
@@ -107,10 +110,33 @@ bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
          now_ns > nodes_[storage(1)].at_ns + kMostIntervals * interval_ns_;
 }
 
-std::uint64_t CachedSurface::revision(const Inputs& inputs) const noexcept {
-  std::uint64_t revision = inputs.environment.revision();
-  for (const PoseHistory& entity : inputs.entities) revision += entity.events_ns().size();
-  return revision;
+std::int64_t CachedSurface::take_news(const Inputs& inputs) noexcept {
+  std::int64_t earliest_ns = kNoNews;
+  for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+    const std::span<const std::int64_t> events_ns = inputs.entities[m].events_ns();
+    const std::size_t known = std::exchange(event_counts_[m], events_ns.size());
+    if (events_ns.size() < known) return kForgotten;  // a reset: take it for the start of time
+    if (events_ns.size() > known) earliest_ns = std::min(earliest_ns, events_ns[known]);
+  }
+  if (std::exchange(revision_, inputs.environment.revision()) != inputs.environment.revision()) {
+    const std::span<const std::int64_t> changes_ns = inputs.environment.changes_ns();
+    earliest_ns = std::min(earliest_ns, changes_ns.empty() ? kForgotten : changes_ns.back());
+  }
+  return earliest_ns;
+}
+
+std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns,
+                                         const Inputs& inputs) const noexcept {
+  const std::int64_t into_ns = (from_ns - options_.history_start_ns) % interval_ns_;
+  std::int64_t next_ns = from_ns + interval_ns_ - into_ns;
+  if (next_ns - from_ns < interval_ns_ / 4) next_ns += interval_ns_;
+  const auto cut = [&](std::span<const std::int64_t> instants_ns) {
+    const auto after = std::ranges::lower_bound(instants_ns, from_ns + kSameNs);
+    if (after != instants_ns.end()) next_ns = std::min(next_ns, *after);
+  };
+  for (const PoseHistory& entity : inputs.entities) cut(entity.events_ns());
+  cut(inputs.environment.changes_ns());
+  return next_ns;
 }
 
 physics::Result<SurfaceModel> CachedSurface::make_model(const SurfaceInputs& surface,
@@ -167,6 +193,10 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   if (!model) return tl::unexpected(std::move(model.error()));
   offsets_ = ray_offsets(geometry_);
   model_ = std::move(*model);
+  if (options.exchange) {
+    glow_ = MoverGlow(*model_, geometry_, mover_of_object_);
+    faces_.assign(movers_now_.size(), {});
+  }
 
   const std::size_t count = model_->samples.samples.size();
   for (Node& node : nodes_) {
@@ -184,13 +214,11 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
   }
-  revision_ = revision(inputs);
+  (void)take_news(inputs);
   turn_ = static_cast<std::uint32_t>(record.size());
-  node(1).at_ns = start_ns + interval_ns_;
-  begin_interval(0, inputs, history);
+  begin_anew(0, inputs, history);
   compute(0, static_cast<std::uint32_t>(count));
-  node(2).at_ns = node(1).at_ns + interval_ns_;
-  begin_interval(1, inputs, history);
+  begin_anew(1, inputs, history);
   for (Node& node : nodes_) node.changes = {0, model_->drawn_samples};
   return {};
 }
@@ -215,6 +243,9 @@ void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
   heat_.prepare(interval_);
   interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment, inputs.entities,
                          rays().origin_world_m());
+  glow_.measure(
+      model_->samples, *interval_rays_,
+      [&from](std::size_t sample) { return from.outputs[sample].longwave_out_w_m2; }, faces_);
   done_ = 0;
 }
 
@@ -227,7 +258,15 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
   const auto drive_of = [&](const SurfaceSample& sample) {
     SampleDrive drive;
     drive.sun_frac = interval_rays_->sun_frac(rays(), sample, offsets_.sun_m, 0.0F);
-    drive.hidden_sky_frac = interval_rays_->hidden_sky_frac(rays(), sample, offsets_.around_m);
+    const HiddenSky hidden = interval_rays_->hidden_sky(rays(), sample, offsets_.around_m);
+    drive.hidden_sky_frac = hidden.frac;
+    if (hidden.frac > 0.0F && !faces_.empty()) {
+      const float sent_w_m2 = faces_[hidden.mover].towards_w_m2(sample.normal);
+      drive.hidden_is_seen = sent_w_m2 >= 0.0F;
+      if (drive.hidden_is_seen) {
+        drive.longwave_begin_w_m2 += sample.sky_frac * hidden.frac * sent_w_m2;
+      }
+    }
     for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
       const SeenSample& seen = all.seen[sample.first_seen + k];
       const SampleOutput& other = from.outputs[seen.sample];
@@ -277,23 +316,64 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
   to.changes = {std::min(low, high), high - std::min(low, high)};
 }
 
+void CachedSurface::cut_at(std::int64_t event_ns) noexcept {
+  Node& first = node(0);
+  const Node& second = node(1);
+  const double frac =
+      static_cast<double>(event_ns - first.at_ns) / static_cast<double>(second.at_ns - first.at_ns);
+  const auto between = [frac](auto a, auto b) {
+    return a + static_cast<decltype(a)>(frac) * (b - a);
+  };
+  const auto states_between = [&](physics::FosterState<double>& a,
+                                  const physics::FosterState<double>& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) a[i] = between(a[i], b[i]);
+  };
+  workers_.run(first.states.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      SampleState& state = first.states[i];
+      states_between(state.modes_k, second.states[i].modes_k);
+      for (std::size_t p = 0; p < kMaxPartners; ++p) {
+        states_between(state.partner_k[p], second.states[i].partner_k[p]);
+      }
+      SampleOutput& output = first.outputs[i];
+      for (float SampleOutput::*value :
+           {&SampleOutput::offset_k, &SampleOutput::sun_frac, &SampleOutput::longwave_out_w_m2,
+            &SampleOutput::shortwave_out_w_m2, &SampleOutput::flux_w_m2}) {
+        output.*value = between(output.*value, second.outputs[i].*value);
+      }
+      if (i < first.vertices.size()) first.vertices[i] = {output.offset_k, output.sun_frac};
+    }
+  });
+  states_between(first.surroundings, second.surroundings);
+  first.at_ns = event_ns;
+  first.changes = {0, static_cast<std::uint32_t>(first.vertices.size())};
+}
+
+void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
+                               SurfaceHistory& history) noexcept {
+  node(index + 1).at_ns = next_node_ns(node(index).at_ns, inputs);
+  begin_interval(index, inputs, history);
+}
+
 void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
                             SurfaceHistory& history) noexcept {
   const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
-  if (const std::uint64_t revision_now = revision(inputs); revision_now != revision_) {
+  if (const std::int64_t event_ns = take_news(inputs); event_ns < node(1).at_ns) {
     // The host has changed the weather, or an entity came, went, stopped or left: the interval of
-    // now was computed without that.
-    revision_ = revision_now;
-    begin_interval(0, inputs, history);
+    // now was computed without that. What came before is as it was.
+    if (event_ns >= node(0).at_ns + kSameNs) cut_at(event_ns);
+    begin_anew(0, inputs, history);
     compute(0, count);
-    begin_interval(1, inputs, history);
+    node(2).changes = {};
+    begin_anew(1, inputs, history);
+  } else if (event_ns < node(2).at_ns) {
+    begin_anew(1, inputs, history);
   }
   while (now_ns > node(1).at_ns) {
     compute(1, count);
     rotate();
-    node(2).at_ns = node(1).at_ns + interval_ns_;
     node(2).changes = {};
-    begin_interval(1, inputs, history);
+    begin_anew(1, inputs, history);
   }
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);

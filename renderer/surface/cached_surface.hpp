@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,6 +14,7 @@
 #include "history/pose_history.hpp"
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
+#include "surface/mover_glow.hpp"
 #include "surface/ray_offsets.hpp"
 #include "surface/state_file.hpp"
 #include "surface/surface_model.hpp"
@@ -37,9 +39,9 @@ struct SampledScene {
 };
 
 /// The thermal method `cached`: temperatures live on samples of the surface. Time goes in intervals
-/// of thermal.first_step_s. While frames interpolate between the two ends of the current one, the
-/// next is computed, as much per frame as sim time has moved: no frame does more than its share,
-/// and the result depends on the inputs alone.
+/// of thermal.first_step_s, cut where an entity or the weather changes. While frames interpolate
+/// between the two ends of the current one, the next is computed, as much per frame as sim time has
+/// moved: no frame does more than its share, and the result depends on the inputs alone.
 ///
 /// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
 /// nothing, on any thread; everything else is setup.
@@ -131,7 +133,17 @@ class CachedSurface {
   /// Advances the samples up to `last` from `node` to the next one.
   void compute(std::size_t node, std::uint32_t last) noexcept;
   void rotate() noexcept { ring_ = (ring_ + 1) % 3; }
-  [[nodiscard]] std::uint64_t revision(const Inputs& inputs) const noexcept;
+  /// begin_interval(), to the next node.
+  void begin_anew(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
+  /// The next instant of the grid, or an earlier one at which an entity or the weather changes.
+  [[nodiscard]] std::int64_t next_node_ns(std::int64_t from_ns,
+                                          const Inputs& inputs) const noexcept;
+  /// Makes node 0 what lies between it and node 1 at that instant.
+  void cut_at(std::int64_t event_ns) noexcept;
+  /// The earliest change by the host that was not known before; kNoNews: none.
+  [[nodiscard]] std::int64_t take_news(const Inputs& inputs) noexcept;
+  static constexpr std::int64_t kNoNews = std::numeric_limits<std::int64_t>::max();
+  static constexpr std::int64_t kForgotten = std::numeric_limits<std::int64_t>::min();
   /// What shades.
   [[nodiscard]] const CasterRays& rays() const noexcept {
     return detail_ ? detail_->rays() : places_;
@@ -152,13 +164,16 @@ class CachedSurface {
   RayOffsets offsets_;
   std::vector<MoverPlacement> movers_now_;
   std::optional<SurfaceModel> model_;
+  MoverGlow glow_;
+  std::vector<MoverFaces> faces_;  ///< by entity, at the node that an interval begins with
 
   std::array<Node, 3> nodes_;
   std::size_t ring_ = 0;
   std::uint32_t done_ = 0;  ///< samples of the newest node that are computed
   std::uint32_t turn_ = 0;
   std::int64_t interval_ns_ = 0;
-  std::uint64_t revision_ = 0;
+  std::uint64_t revision_ = 0;             ///< of the weather
+  std::vector<std::size_t> event_counts_;  ///< by entity, those that are known
   float fraction_ = 0.0F;
 };
 

@@ -74,7 +74,7 @@ FosterHeat::Incoming FosterHeat::incoming(const SurfaceSample& sample, const glm
                                           const SurfaceForcing& forcing, const SampleDrive& drive,
                                           double longwave_seen_w_m2) const noexcept {
   const double open_frac = sample.sky_frac * (1.0 - drive.hidden_sky_frac);
-  const double hidden_frac = sample.sky_frac * drive.hidden_sky_frac;
+  const double hidden_frac = drive.hidden_is_seen ? 0.0 : sample.sky_frac * drive.hidden_sky_frac;
   const double sun_w_m2 = std::max(0.0, glm::dot(glm::dvec3(normal), forcing.sun_w_m2));
   return {drive.sun_frac * sun_w_m2 + open_frac * forcing.diffuse_w_m2 +
               sample.far_frac * forcing.reflected_w_m2 + drive.shortwave_w_m2,

@@ -18,6 +18,9 @@ inline constexpr std::size_t kMaxRelaxationModes = 2;
 struct SampleDrive {
   float sun_frac = 0.0F;         ///< visible share of the disc, mean
   float hidden_sky_frac = 0.0F;  ///< share of the sample's sky behind entities, mean
+  /// What those entities send counts in the long wave below; else they send what the surroundings
+  /// do.
+  bool hidden_is_seen = false;
   /// From the samples it sees, their weights included.
   double longwave_begin_w_m2 = 0.0;
   double longwave_end_w_m2 = 0.0;

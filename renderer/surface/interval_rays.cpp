@@ -23,6 +23,8 @@ constexpr std::size_t kSkyRays = 16;
 static_assert(kSkyRays == kPacketRays);
 /// Room for float32 far from the origin.
 constexpr float kRoundingFrac = 1e-5F;
+/// No ray starts farther aside than that many standard deviations.
+constexpr float kMostDeviates = 3.5F;
 
 double fraction_of(double x) noexcept {
   return x - std::floor(x);
@@ -113,7 +115,11 @@ void IntervalRays::bound_packets() noexcept {
       glm::vec3 low(std::numeric_limits<float>::infinity());
       glm::vec3 high = -low;
       for (std::size_t i = first; i < first + kPacketRays; ++i) {
-        if (!placed(m, i).on) continue;
+        const MoverPlacement& place = placed(m, i);
+        ball.changes = ball.changes || place.on != placed(m, 0).on ||
+                       place.position_m != placed(m, 0).position_m ||
+                       place.rel_from_body != placed(m, 0).rel_from_body;
+        if (!place.on) continue;
         low = glm::min(low, placed(m, i).position_m);
         high = glm::max(high, placed(m, i).position_m);
       }
@@ -198,6 +204,25 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
   return spots;
 }
 
+bool IntervalRays::may_pass(const SurfaceSample& sample, const glm::vec3& start_m,
+                            float apart_m) const noexcept {
+  if (!any_mover_on_) return false;
+  for (std::size_t packet = 1; packet < kSunRays / kPacketRays; ++packet) {
+    glm::vec3 from_m = start_m;
+    if (sample.mover >= 0) {
+      const auto own = static_cast<std::size_t>(sample.mover);
+      const MoverPlacement& place = placed(own, packet * kPacketRays);
+      from_m = place.rel_from_body * from_m + place.position_m;
+      apart_m += 2.0F * reach(own, packet).way_m;
+    }
+    for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
+      if (static_cast<std::int64_t>(m) == sample.mover || !reach(m, packet).changes) continue;
+      if (comes_near(from_m, apart_m, m, packet)) return true;
+    }
+  }
+  return false;
+}
+
 float IntervalRays::sun_frac(const CasterRays& rays, const SurfaceSample& sample,
                              float start_offset_m, float blur_m) const noexcept {
   if (!sun_up_) return 0.0F;
@@ -208,7 +233,10 @@ float IntervalRays::sun_frac(const CasterRays& rays, const SurfaceSample& sample
   int faced = 0;
   int lit = 0;
   for (std::size_t first = 0; first < kSunRays; first += kPacketRays) {
-    if (first == kPacketRays && (lit == 0 || lit == faced)) break;
+    if (first == kPacketRays && (lit == 0 || lit == faced) &&
+        !may_pass(sample, start_m, kMostDeviates * blur_m)) {
+      break;
+    }
     std::array<glm::vec3, kPacketRays> starts_m;
     for (std::size_t k = 0; k < kPacketRays; ++k) {
       starts_m[k] = start_m + spread_[first + k].x * u_m + spread_[first + k].y * v_m;
@@ -232,18 +260,21 @@ IntervalRays::Spots IntervalRays::spots(const CasterRays& rays, const SurfaceSam
   return send(rays, face, {starts_m.data(), points_m.size()}, 0);
 }
 
-float IntervalRays::hidden_sky_frac(const CasterRays& rays, const SurfaceSample& sample,
-                                    float start_offset_m) const noexcept {
+HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& sample,
+                                   float start_offset_m) const noexcept {
   // An entity's own surfaces carry its hull in sky_frac, seen where it stood when they were made.
-  if (!any_mover_on_ || sample.mover >= 0) return 0.0F;
+  if (!any_mover_on_ || sample.mover >= 0) return {};
   const Tangents tangents = tangents_of(sample.normal);
   const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
   std::uint32_t hidden = 0;
+  HiddenSky most;
+  int by_most = 0;
   for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
     const float reach_m = kNearRadii * mover_radius_m_[m];
     const Reach& ball = reach(m, 0);
     const float away_m = glm::distance(ball.centre_m, start_m) * (1.0F - kRoundingFrac);
     if (ball.radius_m < 0.0F || away_m > reach_m + ball.way_m) continue;
+    const int by_others = std::popcount(hidden);
     for (std::size_t i = 0; i < kSkyRays; ++i) {
       const MoverPlacement& place = placed(m, i);
       const glm::vec3 way = place.position_m - start_m;
@@ -261,8 +292,13 @@ float IntervalRays::hidden_sky_frac(const CasterRays& rays, const SurfaceSample&
         hidden |= 1U << i;
       }
     }
+    if (const int by_this = std::popcount(hidden) - by_others; by_this > by_most) {
+      by_most = by_this;
+      most.mover = static_cast<std::uint32_t>(m);
+    }
   }
-  return static_cast<float>(std::popcount(hidden)) / kSkyRays;
+  most.frac = static_cast<float>(std::popcount(hidden)) / kSkyRays;
+  return most;
 }
 
 }  // namespace emit::renderer

@@ -20,6 +20,12 @@ namespace emit::renderer {
 inline constexpr std::size_t kPacketRays = CasterRays::kMaxRays;
 inline constexpr std::size_t kSunRays = 4 * kPacketRays;
 
+/// Share of a sample's sky behind entities, mean over an interval, and the one that hides most.
+struct HiddenSky {
+  float frac = 0.0F;
+  std::uint32_t mover = 0;
+};
+
 /// Where the sun and the entities stand when each ray of an interval is sent: instants, places in
 /// the sun's disc and lateral shifts are stratified together, the same for all samples, so that a
 /// penumbra comes out as a fine staircase and not as noise.
@@ -59,10 +65,10 @@ class IntervalRays {
                             std::span<const glm::vec3> points_m,
                             float start_offset_m) const noexcept;
 
-  /// Share of the sample's sky that entities hide, mean over the interval: rays of a fixed set that
-  /// are spread by the sky's measure. Zero where none is near. Any thread; RT-safe.
-  [[nodiscard]] float hidden_sky_frac(const CasterRays& rays, const SurfaceSample& sample,
-                                      float start_offset_m) const noexcept;
+  /// Rays of a fixed set that are spread by the sky's measure. Zero where no entity is near. Any
+  /// thread; RT-safe.
+  [[nodiscard]] HiddenSky hidden_sky(const CasterRays& rays, const SurfaceSample& sample,
+                                     float start_offset_m) const noexcept;
 
   [[nodiscard]] bool sun_up() const noexcept { return sun_up_; }
   /// Unit vector to the sun, of the first ray.
@@ -87,6 +93,11 @@ class IntervalRays {
   [[nodiscard]] bool comes_near(const glm::vec3& start_m, float apart_m, std::size_t mover,
                                 std::size_t packet) const noexcept;
 
+  /// True where an entity that moves or is not always there can meet a ray other than those of the
+  /// first packet.
+  [[nodiscard]] bool may_pass(const SurfaceSample& sample, const glm::vec3& start_m,
+                              float apart_m) const noexcept;
+
   /// Sends ray `first` + k from start k; `first` begins a packet.
   [[nodiscard]] Spots send(const CasterRays& rays, const SurfaceSample& face,
                            std::span<const glm::vec3> starts_m, std::size_t first) const noexcept;
@@ -96,6 +107,7 @@ class IntervalRays {
     glm::vec3 centre_m{0.0F};
     float way_m = 0.0F;      ///< of its body's origin from the centre
     float radius_m = -1.0F;  ///< negative: it is not there
+    bool changes = false;    ///< it moves, turns, or is not there for some of the interval
   };
   [[nodiscard]] const Reach& reach(std::size_t mover, std::size_t packet) const noexcept {
     return reaches_[packet * mover_radius_m_.size() + mover];

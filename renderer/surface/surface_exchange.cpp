@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "surface/mover_glow.hpp"
 #include "surface/parallel.hpp"
 #include "surface/sheet_sides.hpp"
 
@@ -160,7 +161,7 @@ void Partners::add() {
   partners.outputs.resize(count);
   partners.to_sky.resize(count);
   partners.sun_frac.resize(count * intervals);
-  if (!in_.movers_now.empty()) partners.hidden_sky_frac.resize(count * intervals);
+  if (!in_.movers_now.empty()) partners.hidden_sky.resize(count * intervals);
   run_parallel(count, kGrain, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {
       sampler_.evaluate(partners, static_cast<std::uint32_t>(i),
@@ -287,8 +288,8 @@ struct Received {
     const std::size_t intervals = shortwave_w_m2.size();
     SampleDrive drive;
     drive.sun_frac = patch.sun_frac[i * intervals + j];
-    if (!patch.hidden_sky_frac.empty()) {
-      drive.hidden_sky_frac = patch.hidden_sky_frac[i * intervals + j];
+    if (!patch.hidden_sky.empty()) {
+      drive.hidden_sky_frac = patch.hidden_sky[i * intervals + j].frac;
     }
     drive.longwave_begin_w_m2 = longwave_w_m2[j];
     drive.longwave_end_w_m2 = longwave_w_m2[j + 1];
@@ -300,7 +301,8 @@ struct Received {
 /// Carries samples over the whole history, from what the others sent in the sweep before.
 class Sweeper {
  public:
-  Sweeper(const SurfaceInputs& inputs, const PatchSampler& sampler, SurfaceModel& model)
+  Sweeper(const SurfaceInputs& inputs, const PatchSampler& sampler,
+          const SurfaceModelOptions& options, SurfaceModel& model)
       : in_(inputs),
         sampler_(sampler),
         model_(model),
@@ -309,6 +311,10 @@ class Sweeper {
         start_(model.samples.samples.size()),
         before_(start_.size(), intervals_),
         after_(start_.size(), intervals_) {
+    if (options.exchange && !inputs.movers_now.empty()) {
+      glow_ = MoverGlow(model, inputs.geometry, inputs.mover_of_object);
+      faces_.resize(inputs.movers_now.size() * nodes_);
+    }
     model.states.resize(start_.size());
     model.outputs.resize(start_.size());
   }
@@ -326,9 +332,20 @@ class Sweeper {
       });
     }
     std::swap(before_, after_);
+    const std::size_t movers = faces_.size() / nodes_;
+    for (std::size_t j = 0; j < nodes_ && movers > 0; ++j) {
+      glow_.measure(
+          model_.samples, in_.record.rays[std::min(j, intervals_ - 1)],
+          [&](std::size_t s) { return before_.longwave_out_w_m2[s * nodes_ + j]; },
+          std::span(faces_).subspan(j * movers, movers));
+    }
+    faces_known_ = movers > 0;
   }
 
  private:
+  /// Adds what the entities send that hide the sample's sky in interval j.
+  void add_glow(const SurfaceSample& sample, const glm::vec3& normal, const SurfacePatch& patch,
+                std::size_t i, std::size_t j, SampleDrive& drive) const;
   void carry(const SurfacePatch& patch, std::size_t i, std::size_t s, bool first, Received& front,
              Received& back);
   [[nodiscard]] SurfaceSample sample_at(std::size_t s, bool first) const {
@@ -358,7 +375,25 @@ class Sweeper {
   std::vector<SampleState> start_;
   Columns before_;
   Columns after_;
+  MoverGlow glow_;
+  std::vector<MoverFaces> faces_;  ///< by node, then entity
+  bool faces_known_ = false;
 };
+
+void Sweeper::add_glow(const SurfaceSample& sample, const glm::vec3& normal,
+                       const SurfacePatch& patch, std::size_t i, std::size_t j,
+                       SampleDrive& drive) const {
+  if (!faces_known_ || drive.hidden_sky_frac == 0.0F) return;
+  const std::size_t mover = patch.hidden_sky[i * intervals_ + j].mover;
+  const std::size_t movers = faces_.size() / nodes_;
+  const float begin_w_m2 = faces_[j * movers + mover].towards_w_m2(normal);
+  const float end_w_m2 = faces_[(j + 1) * movers + mover].towards_w_m2(normal);
+  if (begin_w_m2 < 0.0F || end_w_m2 < 0.0F) return;
+  const double hidden_frac = sample.sky_frac * drive.hidden_sky_frac;
+  drive.longwave_begin_w_m2 += hidden_frac * begin_w_m2;
+  drive.longwave_end_w_m2 += hidden_frac * end_w_m2;
+  drive.hidden_is_seen = true;
+}
 
 void Sweeper::carry(const SurfacePatch& patch, std::size_t i, std::size_t s, bool first,
                     Received& front, Received& back) {
@@ -390,6 +425,7 @@ void Sweeper::carry(const SurfacePatch& patch, std::size_t i, std::size_t s, boo
       drive.partner_end_w_m2[p] = before_.flux_w_m2[partner * nodes_ + j + 1];
     }
     const glm::vec3 normal = in_.record.rays[j].normal(sample);
+    add_glow(sample, normal, patch, i, j, drive);
     if (j == 0) {
       keep_begin(s, in_.heat.output(sample, normal, interval.forcing.begin, drive, state));
     }
@@ -397,6 +433,7 @@ void Sweeper::carry(const SurfacePatch& patch, std::size_t i, std::size_t s, boo
       output = in_.heat.advance(sample, normal, interval, drive, state);
     } else {
       SampleDrive back_drive = back.drive(*patch.back, i, j);
+      add_glow(behind, -normal, *patch.back, i, j, back_drive);
       const SheetBack face{behind, back_drive};
       if (j == 0) {
         keep_begin(other,
@@ -422,7 +459,7 @@ void Sweeper::carry(const SurfacePatch& patch, std::size_t i, std::size_t s, boo
 bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
               const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
               SurfaceModel& model, const SurfaceProgress& report) {
-  Sweeper sweeper(inputs, sampler, model);
+  Sweeper sweeper(inputs, sampler, options, model);
   const std::uint32_t sweeps = options.exchange || options.lateral ? kSweeps : 0;
   for (std::uint32_t i = 0; i <= sweeps; ++i) {
     sweeper.sweep(patches, i == 0);

@@ -234,9 +234,8 @@ void PatchSampler::trace(SurfacePatch& patch, std::uint32_t index) const {
     const float blur_m = std::min(
         max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
     patch.sun_frac[index * count + i] = rays.sun_frac(in_.rays, sample, offsets_.sun_m, blur_m);
-    if (!patch.hidden_sky_frac.empty()) {
-      patch.hidden_sky_frac[index * count + i] =
-          rays.hidden_sky_frac(in_.rays, sample, offsets_.around_m);
+    if (!patch.hidden_sky.empty()) {
+      patch.hidden_sky[index * count + i] = rays.hidden_sky(in_.rays, sample, offsets_.around_m);
     }
   }
 }
@@ -253,8 +252,8 @@ void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index) const {
   const auto drive_of = [&](const SurfacePatch& side, std::size_t i) {
     SampleDrive drive;
     drive.sun_frac = side.sun_frac[index * count + i];
-    if (!side.hidden_sky_frac.empty()) {
-      drive.hidden_sky_frac = side.hidden_sky_frac[index * count + i];
+    if (!side.hidden_sky.empty()) {
+      drive.hidden_sky_frac = side.hidden_sky[index * count + i].frac;
     }
     return drive;
   };
@@ -300,7 +299,7 @@ void SurfacePatch::grow(std::size_t vertices, std::size_t intervals, bool movers
   to_sky.resize(vertices);
   sky_surplus_frac.resize(vertices, kUnknown);
   sun_frac.resize(vertices * intervals);
-  if (movers) hidden_sky_frac.resize(vertices * intervals);
+  if (movers) hidden_sky.resize(vertices * intervals);
   if (back) back->grow(vertices, intervals, movers);
 }
 

@@ -42,8 +42,8 @@ struct SurfacePatch {
   /// How far its shares of the sky were from the mean of the vertex's parents; infinite where it
   /// has none, and until that is known.
   std::vector<float> sky_surplus_frac;
-  std::vector<float> sun_frac;         ///< by vertex, then interval
-  std::vector<float> hidden_sky_frac;  ///< likewise; empty without entities
+  std::vector<float> sun_frac;        ///< by vertex, then interval
+  std::vector<HiddenSky> hidden_sky;  ///< likewise; empty without entities
   /// The other faces of sheets, by the same vertices; null where the mesh has none.
   std::unique_ptr<SurfacePatch> back;
 

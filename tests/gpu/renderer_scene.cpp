@@ -51,7 +51,7 @@ std::filesystem::path write_quads(const std::string& name, const std::vector<Qua
   std::ofstream json(folder / (name + ".gltf"));
   json
       << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
-      << R"("materials":[{"name":"surface","doubleSided":)" << (double_sided ? "true" : "false")
+      << R"("materials":[{"name":"surface")" << (double_sided ? R"(,"doubleSided":true)" : "")
       << R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},)"
       << R"("material":0}]}],"accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":)"
       << positions.size() / 3 << R"(}],"bufferViews":[{"buffer":0,"byteLength":)" << bytes
