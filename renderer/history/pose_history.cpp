@@ -87,6 +87,7 @@ void PoseHistory::note_scripted_events() noexcept {
 void PoseHistory::note_event(std::int64_t sim_time_ns) noexcept {
   const auto place = std::lower_bound(events_ns_.begin(), events_ns_.end(), sim_time_ns);
   if (place != events_ns_.end() && *place == sim_time_ns) return;
+  ++events_revision_;
   if (events_ns_.size() < kMaxEvents) {
     events_ns_.insert(place, sim_time_ns);
   } else if (place != events_ns_.begin()) {
@@ -121,7 +122,10 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
   if (live_.empty()) {
     // What the script planned after this instant will not happen.
     const TrajectoryState planned = trajectory_at(scripted_, sim_time_ns);
-    while (!events_ns_.empty() && events_ns_.back() >= sim_time_ns) events_ns_.pop_back();
+    while (!events_ns_.empty() && events_ns_.back() >= sim_time_ns) {
+      events_ns_.pop_back();
+      ++events_revision_;
+    }
     if (planned.on != on || !close(planned.pose, pose)) note_event(sim_time_ns);
     live_.push_back(next);
     moving_ = false;
@@ -197,6 +201,7 @@ void PoseHistory::reset() noexcept {
   moving_ = false;
   // The script's own events may have been cut by live poses.
   events_ns_.clear();
+  ++events_revision_;
   note_scripted_events();
 }
 

@@ -38,8 +38,11 @@ class PoseHistory {
   /// Length of the way between two instants while switched on; jumps do not count.
   [[nodiscard]] double path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept;
 
-  /// Instants at which the entity appears, vanishes, starts or stops, ascending.
+  /// Instants at which the entity appears, vanishes, starts or stops, ascending: the latest
+  /// kMaxEvents.
   [[nodiscard]] std::span<const std::int64_t> events_ns() const noexcept { return events_ns_; }
+  /// Goes up whenever events_ns() changes.
+  [[nodiscard]] std::uint64_t events_revision() const noexcept { return events_revision_; }
 
   /// What the host sent and is kept, ascending.
   [[nodiscard]] std::span<const scene::Keyframe> live() const noexcept { return live_; }
@@ -58,6 +61,7 @@ class PoseHistory {
   scene::Trajectory scripted_;
   scene::Trajectory live_;
   std::vector<std::int64_t> events_ns_;
+  std::uint64_t events_revision_ = 0;
   // A live entity starts when it leaves the spot it rested on, and stops when it has stayed on one
   // for a while: jitter of the host is neither.
   bool moving_ = false;

@@ -66,7 +66,8 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
       interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
-  event_counts_.resize(movers);
+  known_events_.resize(movers);
+  for (KnownEvents& known : known_events_) known.instants_ns.reserve(PoseHistory::kMaxEvents);
   interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
 }
 
@@ -113,14 +114,32 @@ bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
 std::int64_t CachedSurface::take_news(const Inputs& inputs) noexcept {
   std::int64_t earliest_ns = kNoNews;
   for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
-    const std::span<const std::int64_t> events_ns = inputs.entities[m].events_ns();
-    const std::size_t known = std::exchange(event_counts_[m], events_ns.size());
-    if (events_ns.size() < known) return kForgotten;  // a reset: take it for the start of time
-    if (events_ns.size() > known) earliest_ns = std::min(earliest_ns, events_ns[known]);
+    const PoseHistory& entity = inputs.entities[m];
+    KnownEvents& known = known_events_[m];
+    if (std::exchange(known.revision, entity.events_revision()) == known.revision) continue;
+    // The earliest that came or went; those that went to make room for others are long past.
+    const std::span<const std::int64_t> now_ns = entity.events_ns();
+    auto old = known.instants_ns.begin();
+    for (auto each = now_ns.begin(); each != now_ns.end() || old != known.instants_ns.end();) {
+      if (old == known.instants_ns.end() || (each != now_ns.end() && *each < *old)) {
+        earliest_ns = std::min(earliest_ns, *each++);
+      } else if (each == now_ns.end() || *old < *each) {
+        const bool made_room = now_ns.size() == PoseHistory::kMaxEvents && *old < node(0).at_ns;
+        if (!made_room) earliest_ns = std::min(earliest_ns, std::max(*old, node(0).at_ns));
+        ++old;
+      } else {
+        ++each;
+        ++old;
+      }
+    }
+    known.instants_ns.assign(now_ns.begin(), now_ns.end());
   }
-  if (std::exchange(revision_, inputs.environment.revision()) != inputs.environment.revision()) {
+  const std::uint64_t revision = inputs.environment.revision();
+  if (const std::uint64_t changes = revision - std::exchange(revision_, revision); changes > 0) {
     const std::span<const std::int64_t> changes_ns = inputs.environment.changes_ns();
-    earliest_ns = std::min(earliest_ns, changes_ns.empty() ? kForgotten : changes_ns.back());
+    earliest_ns =
+        std::min(earliest_ns, changes <= changes_ns.size() ? changes_ns[changes_ns.size() - changes]
+                                                           : node(0).at_ns);
   }
   return earliest_ns;
 }

@@ -143,7 +143,6 @@ class CachedSurface {
   /// The earliest change by the host that was not known before; kNoNews: none.
   [[nodiscard]] std::int64_t take_news(const Inputs& inputs) noexcept;
   static constexpr std::int64_t kNoNews = std::numeric_limits<std::int64_t>::max();
-  static constexpr std::int64_t kForgotten = std::numeric_limits<std::int64_t>::min();
   /// What shades.
   [[nodiscard]] const CasterRays& rays() const noexcept {
     return detail_ ? detail_->rays() : places_;
@@ -172,8 +171,12 @@ class CachedSurface {
   std::uint32_t done_ = 0;  ///< samples of the newest node that are computed
   std::uint32_t turn_ = 0;
   std::int64_t interval_ns_ = 0;
-  std::uint64_t revision_ = 0;             ///< of the weather
-  std::vector<std::size_t> event_counts_;  ///< by entity, those that are known
+  std::uint64_t revision_ = 0;  ///< of the weather
+  struct KnownEvents {
+    std::uint64_t revision = 0;
+    std::vector<std::int64_t> instants_ns;
+  };
+  std::vector<KnownEvents> known_events_;  ///< by entity
   float fraction_ = 0.0F;
 };
 
