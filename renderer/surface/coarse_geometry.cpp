@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -49,7 +50,7 @@ physics::Result<CoarseGeometry> coarse_geometry(scene::SceneGeometry geometry,
                                                 const scene::DetailView& view,
                                                 std::span<const glm::vec3> to_suns,
                                                 std::size_t max_samples) {
-  const std::vector<double> errors = scene::simplify_errors(geometry, view);
+  std::vector<double> errors = scene::simplify_errors(geometry, view);
   CoarseGeometry out;
   if (std::ranges::none_of(errors, [](double error) { return error > 0.0; })) {
     out.geometry = std::move(geometry);
@@ -60,8 +61,15 @@ physics::Result<CoarseGeometry> coarse_geometry(scene::SceneGeometry geometry,
   if (!rays) return tl::unexpected(std::move(rays.error()));
   const std::size_t most = max_samples / 2;
   out.geometry = scene::simplified(full, errors);
-  const std::size_t unseen = sampled_vertices(out.geometry, errors);
+  std::size_t unseen = sampled_vertices(out.geometry, errors);
   if (unseen > most) {
+    // Outlines of small bodies go first.
+    auto by_pixels = scene::simplify_errors(full, view, std::numeric_limits<double>::infinity());
+    if (by_pixels != errors) {
+      errors = std::move(by_pixels);
+      out.geometry = scene::simplified(full, errors);
+      unseen = sampled_vertices(out.geometry, errors);
+    }
     if (auto less = visibly_simplified(full, errors, unseen, most)) {
       out.geometry = std::move(*less);
       out.visibly = true;

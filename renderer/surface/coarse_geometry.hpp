@@ -22,9 +22,10 @@ struct CoarseGeometry {
 /// What no pixel shows goes, but for facets that would have to be cut again (kept_facets()), which
 /// stay as long as the meshes' vertices leave half of `max_samples`: what lies between many small
 /// things needs samples as well. Where the vertices would take more without those facets, too,
-/// errors double up to three times, to two pixels, if that is of use. Only vertices of meshes that
-/// may change count. `to_suns`: unit directions in world axes. Setup only: seconds per million
-/// triangles. Errors: those of CasterRays.
+/// outlines of small bodies go (simplify_errors() by pixels alone), and then errors double up to
+/// three times, to two pixels, if that is of use. Only vertices of meshes that may change count.
+/// `to_suns`: unit directions in world axes. Setup only: seconds per million triangles. Errors:
+/// those of CasterRays.
 [[nodiscard]] physics::Result<CoarseGeometry> coarse_geometry(scene::SceneGeometry geometry,
                                                               const scene::DetailView& view,
                                                               std::span<const glm::vec3> to_suns,

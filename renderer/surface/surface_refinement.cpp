@@ -2,6 +2,7 @@
 #include "surface/surface_refinement.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -55,6 +56,22 @@ constexpr float kSharpBendFrac = 4.0F;
 /// error-vs-time).
 constexpr float kLeastEdgePx = 2.5F;
 constexpr float kLeastShadowEdgePx = 0.9F;
+/// Narrower bodies are cut as though they were so many pixels wide: what pixels show of them is a
+/// mean over all their faces. By so much at most, as what is far below a pixel hardly counts.
+constexpr float kLeastBodyPx = 16.0F;
+constexpr float kMostFiner = 12.0F;
+
+/// The middle one of a body's extents: of poles the thickness, of sheets not.
+float width_m(const scene::Aabb& box, const glm::dmat4& world_from_mesh) {
+  if (box.empty()) return 0.0F;
+  std::array<double, 3> extent_m{};
+  for (int i = 0; i < 3; ++i) {
+    extent_m[static_cast<std::size_t>(i)] =
+        (box.max_m[i] - box.min_m[i]) * glm::length(glm::dvec3(world_from_mesh[i]));
+  }
+  std::ranges::sort(extent_m);
+  return static_cast<float>(extent_m[1]);
+}
 
 }  // namespace
 
@@ -76,22 +93,28 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
     eyes_.push_back(
         {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
   }
+  for (const scene::Instance& instance : inputs.geometry.instances) {
+    body_m_.push_back(
+        width_m(inputs.geometry.meshes[instance.mesh].bounds, instance.world_from_mesh));
+  }
   const HistoryRecord& record = inputs.record;
   recent_ = record.size() - 1;
   while (recent_ > 0 && record.lag_s[recent_ - 1] < kRecentS) --recent_;
 }
 
 SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>& corners_m,
-                                                  float longest_m) const noexcept {
+                                                  float longest_m, float body_m) const noexcept {
   constexpr float kLeastM = 1e-6F;
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
   const glm::vec3 twice_area_m2 =
       glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   Width width;
+  float least_px_m = std::numeric_limits<float>::infinity();
   for (const Eye& eye : eyes_) {
     const glm::vec3 way_m = centre_m - eye.rel_m;
     const float distance_m = std::max(glm::length(way_m), kLeastM);
     const float px_m = std::max(pixel_rad_ * distance_m, kLeastM);
+    least_px_m = std::min(least_px_m, px_m);
     const glm::vec3 ahead = way_m / distance_m;
     const float looks_px =
         std::min(std::sqrt(std::abs(glm::dot(twice_area_m2, ahead))) / px_m, longest_m / px_m);
@@ -103,6 +126,7 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
                          std::acos(cosine) < field_rad_ + longest_m / distance_m;
     if (in_view) width.in_view_px = looks_px;
   }
+  width.finer = std::clamp(kLeastBodyPx * least_px_m / std::max(body_m, kLeastM), 1.0F, kMostFiner);
   return width;
 }
 
@@ -210,7 +234,7 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
 }
 
 SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, std::uint32_t slot,
-                                                  const SurfacePatch& patch) const {
+                                                  const SurfacePatch& patch, float body_m) const {
   const auto& leaf = refined.leaf(slot);
   const auto vertices = refined.vertices();
   std::array<glm::vec3, 3> corners_m;
@@ -225,18 +249,20 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
                                     glm::distance(corners_m[1], corners_m[2]),
                                     glm::distance(corners_m[2], corners_m[0])});
-  const Width width = this->width(corners_m, longest_m);
+  const Width width = this->width(corners_m, longest_m, body_m);
+  const float edge_px = width.finer * width.edge_px;
   Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
-  if (width.edge_px <= kLeastShadowEdgePx) return judged;
+  if (edge_px <= kLeastShadowEdgePx) return judged;
   if (in_.materials[vertices[leaf[0]].material].prescribed_k) return judged;
   const float over_base = std::max(width.in_view_px / kBasePx, width.anywhere_px / kBaseAsidePx);
   if (over_base > 1.0F) {
     judged.need = kBaseNeed * over_base;
+    judged.finer_need = judged.need;
     return judged;
   }
   if (!seen(corners_m, refined, slot, patch)) return judged;
 
-  const bool smooth = width.edge_px > kLeastEdgePx;
+  const bool smooth = edge_px > kLeastEdgePx;
   float error_k = 0.0F;
   const auto count_in = [&](float found_k, float limit_frac) {
     if (found_k > limit_frac * tolerance_k_) error_k = std::max(error_k, found_k);
@@ -255,7 +281,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
       std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
     error_k = std::max(error_k, tolerance_k_);
   }
-  if (width.edge_px >= kEdgeSunPx) {
+  if (edge_px >= kEdgeSunPx) {
     const bool sheet = in_.materials[vertices[leaf[0]].material].sheet;
     const SurfacePatch* back = sheet ? patch.back.get() : nullptr;
     error_k = std::max(error_k, shadow_edge_k(refined, slot, patch));
@@ -267,6 +293,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   }
   const float weighed_px = std::max(width.in_view_px, kAsideFrac * width.anywhere_px);
   judged.need = error_k / tolerance_k_ * weighed_px;
+  judged.finer_need = width.finer * judged.need;
   return judged;
 }
 
@@ -282,16 +309,18 @@ SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const Refin
       if (judged[i].node == refined.node(slot)) continue;
       judged[i] = {refined.node(slot)};
       float squares = 0.0F;
+      float finer_squares = 0.0F;
       float uses = 0.0F;
       for (const std::uint32_t p : of_mesh) {
-        const Judged here = need(refined, slot, patches[p]);
+        const Judged here = need(refined, slot, patches[p], body_m_[p]);
         squares += here.need * here.need;
+        finer_squares += here.finer_need * here.finer_need;
         uses += 1.0F;
         judged[i].in_view = judged[i].in_view || here.in_view;
       }
       // A vertex costs a sample on every instance: what one gains counts that much less.
-      const float mean_need = std::sqrt(squares / std::max(uses, 1.0F));
-      if (mean_need > kLeastNeed) judged[i].need = mean_need;
+      const auto mean = [uses](float sum) { return std::sqrt(sum / std::max(uses, 1.0F)); };
+      if (mean(finer_squares) > kLeastNeed) judged[i].need = mean(squares);
     }
   });
   Most most;

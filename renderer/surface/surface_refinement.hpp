@@ -24,7 +24,8 @@ namespace emit::renderer {
 /// - where sunlight fell on its corners unequally of late: an edge of a shadow runs through.
 /// It is never halved below some pixels at the nearest place of the camera (one pixel where an edge
 /// runs: of a shadow, or between temperatures far apart), and only for the first reason where no
-/// place of the camera sees it. What lies in the field of view comes first.
+/// place of the camera sees it. What lies in the field of view comes first. Small bodies are halved
+/// as though they were some pixels wide, lest they be wrong as a whole; that comes last.
 class SurfaceRefinement {
  public:
   /// `inputs` and `worth` must outlive it.
@@ -56,19 +57,22 @@ class SurfaceRefinement {
 
  private:
   struct Judged;
+  /// `body_m`: width of the whole body.
   [[nodiscard]] Judged need(const RefinedMesh& refined, std::uint32_t slot,
-                            const SurfacePatch& patch) const;
+                            const SurfacePatch& patch, float body_m) const;
   [[nodiscard]] bool seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
                           std::uint32_t slot, const SurfacePatch& patch) const;
   /// Widths in pixels where they are greatest: of the longest edge; of a square as large as the
-  /// triangle looks, from where the camera has it in view; and of that from anywhere.
+  /// triangle looks, from where the camera has it in view; and of that from anywhere. `finer`: by
+  /// so much smaller pixels are as many as a small body is taken for.
   struct Width {
     float edge_px = 0.0F;
     float in_view_px = 0.0F;
     float anywhere_px = 0.0F;
+    float finer = 1.0F;
   };
-  [[nodiscard]] Width width(const std::array<glm::vec3, 3>& corners_m,
-                            float longest_m) const noexcept;
+  [[nodiscard]] Width width(const std::array<glm::vec3, 3>& corners_m, float longest_m,
+                            float body_m) const noexcept;
   /// Range of temperature, K, where sunlight fell unequally on the corners of late; else 0.
   [[nodiscard]] float shadow_edge_k(const RefinedMesh& refined, std::uint32_t slot,
                                     const SurfacePatch& patch) const;
@@ -85,6 +89,7 @@ class SurfaceRefinement {
     glm::vec3 boresight{0.0F};
   };
   std::vector<Eye> eyes_;
+  std::vector<float> body_m_;  ///< by instance: its width
   float pixel_rad_ = 1e-3F;
   float field_rad_ = 0.0F;
   float tolerance_k_ = 0.1F;
@@ -97,6 +102,7 @@ class SurfaceRefinement {
     std::uint32_t node = 0xffffffffU;
     float need = 0.0F;
     bool in_view = false;
+    float finer_need = 0.0F;  ///< in the pixels that a small body is taken for
   };
   std::vector<std::vector<Judged>> judged_;
 };

@@ -6,11 +6,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "gpu/cached_session.hpp"
 #include "gpu/renderer_scene.hpp"
+#include "unit/scene_gltf_builder.hpp"
+#include "unit/scene_sphere.hpp"
 
 namespace emit::test {
 namespace {
@@ -117,6 +123,126 @@ TEST(RendererCachedDetail, LevelsChangeWithoutAPop) {
   const auto coarse = run.frame_k(now_ns, at(kFrames), 3);
   EXPECT_GT(most_apart_k(receded_k(coarse, scenario.sensor.width_px, 1.0), last),
             scenario.thermal.tolerance_k);
+}
+
+/// A ball of radius 1 m with smooth normals.
+std::filesystem::path write_ball(std::uint32_t rings) {
+  const scene::Mesh mesh = scene::sphere(rings, false);
+  GltfText text;
+  text.buffer.clear();
+  const auto view = [&text](const auto& values) {
+    const std::size_t bytes = values.size() * sizeof(values[0]);
+    const std::string at = std::to_string(text.buffer.size());
+    text.buffer.append(reinterpret_cast<const char*>(values.data()), bytes);
+    return R"({"buffer":0,"byteOffset":)" + at + R"(,"byteLength":)" + std::to_string(bytes) + "}";
+  };
+  text.views = view(mesh.positions_m);
+  text.views += "," + view(mesh.normals);
+  text.views += "," + view(mesh.indices);
+  const std::string vertices = std::to_string(mesh.positions_m.size());
+  text.accessors = R"({"bufferView":0,"componentType":5126,"type":"VEC3","count":)" + vertices +
+                   R"(},{"bufferView":1,"componentType":5126,"type":"VEC3","count":)" + vertices +
+                   R"(},{"bufferView":2,"componentType":5125,"type":"SCALAR","count":)" +
+                   std::to_string(mesh.indices.size()) + "}";
+  text.primitive = R"({"attributes":{"POSITION":0,"NORMAL":1},"indices":2,"material":0})";
+  text.materials = R"({"name":"surface"})";
+  return write_file(test_folder() / "ball.gltf", text.json());
+}
+
+/// A hull with a turret that shades it, each face in `parts` x `parts` squares.
+std::filesystem::path write_vehicle(int parts) {
+  auto faces = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 0.6});
+  const auto turret = box({-0.1, -0.4, 0.6}, {0.7, 0.4, 1.2});
+  faces.insert(faces.end(), turret.begin(), turret.end());
+  std::vector<Quad> squares;
+  for (const Quad& face : faces) {
+    const auto at = [&](int i, int j) {
+      return face.a + (face.b - face.a) * (static_cast<double>(i) / parts) +
+             (face.d - face.a) * (static_cast<double>(j) / parts);
+    };
+    for (int i = 0; i < parts; ++i) {
+      for (int j = 0; j < parts; ++j) {
+        squares.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
+      }
+    }
+  }
+  return write_quads("vehicle", squares);
+}
+
+/// What many pictures show of things.
+struct Shown {
+  double mean_k = 0.0;
+  double pixels = 0.0;
+};
+
+/// Nine things of 1 m in a row, the picture shifted by parts of a pixel; the camera may come near
+/// each of them later on.
+Shown shown_from_afar(const std::filesystem::path& gltf, double thing_px, const glm::dvec3& from,
+                      bool comes_near) {
+  constexpr double kThingM = 1.0;
+  constexpr double kApartM = 3.1;
+  constexpr int kOnEitherSide = 4;
+  constexpr int kShifts = 8;
+  auto scenario = cached_scenario(gltf);
+  scene::ObjectDesc& things = scenario.objects.front();
+  things.scale = 0.5 * kThingM;
+  const physics::Pose first = things.instances.front();
+  things.instances.clear();
+  std::vector<glm::dvec3> places_m;
+  for (int i = -kOnEitherSide; i <= kOnEitherSide; ++i) {
+    places_m.emplace_back(kApartM * i, 0.0, 2.0);
+    things.instances.push_back(first);
+    things.instances.back().position_world_m = places_m.back();
+  }
+  const double away_m =
+      kThingM / thing_px * kWidth / (2.0 * std::tan(0.5 * scenario.sensor.fov_h_rad));
+  const glm::dvec3 up = glm::normalize(glm::dvec3(0.0, -from.y * from.z, from.y * from.y));
+  const auto far = [&](int right, int above) {
+    const double step_m = kThingM / thing_px / kShifts;
+    const glm::dvec3 at =
+        places_m[kOnEitherSide] + step_m * right * glm::dvec3(1.0, 0.0, 0.0) + step_m * above * up;
+    return looking(at + away_m * from, at);
+  };
+  const std::int64_t now_ns = 2 * kHourNs;
+  scenario.sensor.trajectory = {{now_ns, far(0, 0)}};
+  for (std::size_t i = 0; comes_near && i < places_m.size(); ++i) {
+    const auto after_ns = static_cast<std::int64_t>(i + 1) * kSecondNs;
+    scenario.sensor.trajectory.push_back(
+        {now_ns + after_ns, looking(places_m[i] + 3.0 * from, places_m[i])});
+  }
+  Session run(scenario);
+  Shown shown;
+  for (int shift = 0; shift < kShifts * kShifts; ++shift) {
+    for (const float k : run.frame_k(now_ns, far(shift % kShifts, shift / kShifts))) {
+      if (std::isnan(k)) continue;
+      shown.mean_k += static_cast<double>(k);
+      shown.pixels += 1.0;
+    }
+  }
+  shown.mean_k /= shown.pixels;
+  return shown;
+}
+
+TEST(RendererCachedDetail, SmallThingsAreRightOnAverage) {
+  // Finely sampled, because the camera comes near them, or for their few pixels.
+  constexpr double kAreaFrac = 0.03;
+  const double most_k = 2.0 * scene::ScenarioDesc{}.thermal.tolerance_k;
+  const auto expect_alike = [&](const std::filesystem::path& gltf, double thing_px,
+                                const glm::dvec3& from) {
+    const Shown fine = shown_from_afar(gltf, thing_px, from, true);
+    const Shown small = shown_from_afar(gltf, thing_px, from, false);
+    ASSERT_GT(fine.pixels, 300.0);
+    EXPECT_NEAR(small.mean_k, fine.mean_k, most_k);
+    EXPECT_NEAR(small.pixels, fine.pixels, kAreaFrac * fine.pixels);
+  };
+  {
+    SCOPED_TRACE("ball of three pixels");
+    expect_alike(write_ball(40), 3.0, {0.0, 0.28, 0.96});
+  }
+  for (const double px : {3.0, 1.0}) {
+    SCOPED_TRACE("vehicle, pixels: " + std::to_string(px));
+    expect_alike(write_vehicle(16), px, {0.0, -0.96, 0.28});
+  }
 }
 
 }  // namespace

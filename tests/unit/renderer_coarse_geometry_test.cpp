@@ -27,8 +27,9 @@ scene::SceneGeometry many_spheres(scene::Mesh mesh) {
   return geometry;
 }
 
-CoarseGeometry coarse(const scene::SceneGeometry& geometry, std::size_t max_samples) {
-  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
+CoarseGeometry coarse(const scene::SceneGeometry& geometry, std::size_t max_samples,
+                      double away_m = 30.0) {
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 1.0 + away_m)};
   const std::array<glm::vec3, 1> to_suns{glm::vec3(0.0F, 0.0F, 1.0F)};
   auto made = coarse_geometry(geometry, {eyes, 1e-3}, to_suns, max_samples);
   EXPECT_TRUE(made.has_value());
@@ -66,6 +67,17 @@ TEST(CoarseGeometry, more_goes_until_vertices_leave_half_of_the_samples) {
   EXPECT_TRUE(least.visibly);
   EXPECT_LT(vertices(least), vertices(made));
   EXPECT_GT(vertices(least), 10U * 40U);
+}
+
+TEST(CoarseGeometry, outlines_of_small_bodies_stay_as_long_as_samples_are_left) {
+  // Three pixels wide.
+  const scene::SceneGeometry full = many_spheres(scene::sphere(60, false));
+  const CoarseGeometry made = coarse(full, 100'000'000, 667.0);
+  EXPECT_FALSE(made.visibly);
+  const CoarseGeometry less = coarse(full, 2 * vertices(made) - 1, 667.0);
+  EXPECT_FALSE(less.visibly);
+  EXPECT_LT(less.geometry.triangles, made.geometry.triangles / 2);
+  EXPECT_EQ(vertices(coarse(full, 2 * vertices(made), 667.0)), vertices(made));
 }
 
 TEST(CoarseGeometry, meshes_that_nothing_can_change_cost_the_others_nothing) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <map>
 #include <set>
 #include <utility>
@@ -77,6 +78,35 @@ TEST(Simplify, a_far_sphere_keeps_its_shape_to_half_a_pixel) {
   for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
     EXPECT_EQ(mesh.positions_m[v], mesh.normals[v]);
   }
+}
+
+TEST(Simplify, a_sphere_of_few_pixels_keeps_its_outline) {
+  // Three pixels wide, one, and a fifth.
+  std::vector<std::size_t> triangles;
+  for (const double away_m : {667.0, 2000.0, 10'000.0}) {
+    const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 1.0 + away_m)};
+    const SceneGeometry coarse = simplified_for(scene_of(sphere(60, false)), {eyes, kPixelRad});
+    EXPECT_LT(sag_m(coarse.meshes[0]), 2.0 * kMostBodyFrac);
+    triangles.push_back(coarse.triangles);
+  }
+  EXPECT_LT(triangles[0], 60U * 60U * 4U / 10U);
+  EXPECT_EQ(triangles[1], triangles[0]);
+  EXPECT_EQ(triangles[2], triangles[0]);
+}
+
+TEST(Simplify, the_thickness_of_a_pole_bounds_what_it_loses_but_not_that_of_a_sheet) {
+  const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 2000.0)};
+  const auto error = [&](const glm::vec3& stretch) {
+    Mesh mesh = sphere(60, false);
+    mesh.bounds = {};
+    for (glm::vec3& p : mesh.positions_m) {
+      p *= stretch;
+      mesh.bounds.add(glm::dvec3(p));
+    }
+    return simplify_errors(scene_of(std::move(mesh)), {eyes, kPixelRad})[0];
+  };
+  EXPECT_NEAR(error({0.5F, 20.0F, 0.5F}), 0.5 * kMostBodyFrac, 1e-6);
+  EXPECT_NEAR(error({20.0F, 0.01F, 20.0F}), 20.0 * kMostBodyFrac, 1e-5);
 }
 
 TEST(Simplify, nothing_changes_where_pixels_are_finer_or_the_distance_is_unknown) {
@@ -175,7 +205,7 @@ TEST(Separated, far_instances_share_with_those_whose_pixels_are_as_wide) {
         fine.instances = shared.instances;
         return fine;
       }(),
-      view);
+      view, std::numeric_limits<double>::infinity());
   EXPECT_EQ(errors[0], 0.0);
   const double near_error = errors[shared.instances[0].mesh];
   EXPECT_GT(near_error, 0.0);

@@ -58,6 +58,12 @@ std::vector<double> pixel_widths(const SceneGeometry& geometry, const DetailView
   return widths;
 }
 
+/// How wide a body looks at least from most sides; of poles their thickness, of sheets not.
+double middle_extent(const Aabb& box) {
+  const glm::dvec3 e = box.max_m - box.min_m;
+  return std::max(std::min(e.x, e.y), std::min(std::max(e.x, e.y), e.z));
+}
+
 /// Of an equilateral triangle of the mean area.
 double mean_edge(const Mesh& mesh) {
   double area = 0.0;
@@ -169,12 +175,14 @@ SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
   return geometry;
 }
 
-std::vector<double> simplify_errors(const SceneGeometry& geometry, const DetailView& view) {
+std::vector<double> simplify_errors(const SceneGeometry& geometry, const DetailView& view,
+                                    double most_body_frac) {
   const std::vector<double> widths = pixel_widths(geometry, view);
   std::vector<double> errors(widths.size(), 0.0);
   for (std::size_t m = 0; m < widths.size(); ++m) {
     const Mesh& mesh = geometry.meshes[m];
-    const double error = kErrorPx * widths[m];
+    const double error =
+        std::min(kErrorPx * widths[m], most_body_frac * 0.5 * middle_extent(mesh.bounds));
     if (!(error > kLeastErrorM) || !std::isfinite(error) || mesh.indices.empty()) continue;
     if (mean_edge(mesh) <= kLeastEdgePx * widths[m]) errors[m] = error;
   }

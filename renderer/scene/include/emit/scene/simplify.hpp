@@ -24,11 +24,17 @@ struct DetailView {
 /// unknown all share. Instances keep their order. Setup only.
 [[nodiscard]] SceneGeometry separated(SceneGeometry geometry, const DetailView& view);
 
+/// Of half the width of a body, so that its outline keeps its area to some percent however few
+/// pixels it covers.
+inline constexpr double kMostBodyFrac = 0.02;
+
 /// By mesh the distance that its surface may move when it is simplified, in the mesh's own lengths:
-/// a quarter of a pixel seen from the nearest eye. 0: the mesh stays as it is, because its
-/// triangles are wider than some pixels, an entity has it, or the eyes are unknown.
+/// a quarter of a pixel seen from the nearest eye, `most_body_frac` of half its own width at most.
+/// 0: the mesh stays as it is, because its triangles are wider than some pixels, an entity has it,
+/// or the eyes are unknown.
 [[nodiscard]] std::vector<double> simplify_errors(const SceneGeometry& geometry,
-                                                  const DetailView& view);
+                                                  const DetailView& view,
+                                                  double most_body_frac = kMostBodyFrac);
 
 /// Fewer triangles where a mesh has more than its pixels can show: edge collapses by quadric error
 /// (Garland and Heckbert 1997, SIGGRAPH), at most `errors` (of simplify_errors()); as that is a
