@@ -57,6 +57,11 @@ class Builder {
   /// Makes covered samples next to open ones copies of those: nobody sees them, but triangles that
   /// a foot cuts would show a mixture of both.
   void replace_covered();
+  /// Of each instance of a mesh.
+  [[nodiscard]] std::size_t samples_of(std::uint32_t mesh) const {
+    const RefinedMesh& refined = model_.meshes[mesh];
+    return refined.vertices().size() + back_vertices(refined, in_.materials).size();
+  }
   bool report(double frac) const { return !progress_ || progress_(frac); }
 
   const SurfaceInputs& in_;
@@ -68,7 +73,7 @@ class Builder {
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
   std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
-  std::size_t sample_count_ = 0;  ///< of all patches, by the vertices of their meshes
+  std::size_t sample_count_ = 0;  ///< of all patches
   // By vertex of the mesh at hand, filled for those that have no sample yet:
   std::vector<glm::vec3> inward_;
   std::vector<glm::vec3> place_m_;  ///< of its samples
@@ -99,7 +104,7 @@ void Builder::make_patches() {
       patch.back->mover = patch.mover;
     }
     patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
-    sample_count_ += model_.meshes[patch.mesh].vertices().size();
+    sample_count_ += samples_of(patch.mesh);
     patches_.push_back(std::move(patch));
   }
 }
@@ -158,7 +163,6 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         sample.mover = patch.mover;
         sample.material = vertices[v].material;
         if (in_.materials[sample.material].sheet) {
-          ++sample_count_;
           SurfaceSample& back = patch.back->samples[v];
           back = sample;
           back.normal = -sample.normal;
@@ -244,8 +248,11 @@ void Builder::split(std::uint32_t mesh, float above) {
   const std::size_t left =
       options_.max_samples > sample_count_ ? options_.max_samples - sample_count_ : 0;
   const std::size_t vertices = refined.vertices().size();
-  refined.limit(vertices + left / uses);
-  if (needs_.size() > left / uses) {
+  const std::size_t samples = samples_of(mesh);
+  // A vertex of a sheet has two samples.
+  const std::size_t most = left / (samples > vertices ? 2 * uses : uses);
+  refined.limit(vertices + most);
+  if (needs_.size() > most) {
     std::ranges::sort(needs_, [](const auto& a, const auto& b) {
       return a.need != b.need ? a.need > b.need : a.slot < b.slot;
     });
@@ -253,7 +260,7 @@ void Builder::split(std::uint32_t mesh, float above) {
   slots_.clear();
   for (const SurfaceRefinement::Need& need : needs_) slots_.push_back(need.slot);
   if (!refined.split(slots_)) model_.full = true;
-  sample_count_ += (refined.vertices().size() - vertices) * uses;
+  sample_count_ += (samples_of(mesh) - samples) * uses;
   refinement_.leave(mesh, refined, slots_);
 }
 

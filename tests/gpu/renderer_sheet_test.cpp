@@ -147,6 +147,20 @@ TEST(RendererSheet, ShadeOnOneFaceShowsOnTheOther) {
   EXPECT_NEAR(static_cast<double>(cool) / static_cast<double>(row.size()), 1.0 / seen_m, 0.02);
 }
 
+TEST(RendererSheet, BothFacesCountInTheLimitOfSamples) {
+  auto scenario = plate(true, scene::ThermalModel::foster,
+                        {{{-0.5, -9.0, kUpM + 1.0},
+                          {0.5, -9.0, kUpM + 1.0},
+                          {0.5, 9.0, kUpM + 1.0},
+                          {-0.5, 9.0, kUpM + 1.0}}});
+  scenario.thermal.max_samples = 400;
+  const auto run = renderer_of(scenario);
+  (void)seen_k(*run, {0.0, -3.0, kUpM + 4.0}, 2 * kHourNs);
+  EXPECT_LE(run->scene_stats().samples, 400U);
+  EXPECT_GT(run->scene_stats().samples, 350U);
+  EXPECT_TRUE(run->scene_stats().samples_full);
+}
+
 TEST(RendererSheet, OneThatIsNotThinKeepsItsBase) {
   auto scenario = plate(true, scene::ThermalModel::foster);
   scenario.materials[0].layers = {{0.05, 1.0, 2000.0, 900.0}};
