@@ -20,8 +20,10 @@ constexpr std::size_t kGrain = 32;
 constexpr float kSunK = 5.0F;
 /// Intervals that are made up for one by one after a jump of sim time.
 constexpr std::int64_t kMostIntervals = 16;
-/// Events that follow a node sooner belong to it.
+/// Events that follow a node sooner belong to it; those known before, in shares of an interval, so
+/// that many of them do not make for many intervals.
 constexpr std::int64_t kSameNs = 1'000'000;
+constexpr std::int64_t kSameFraction = 16;
 
 std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size_t movers,
                                  std::span<const std::int32_t> mover_of_object) {
@@ -150,7 +152,8 @@ std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns,
   std::int64_t next_ns = from_ns + interval_ns_ - into_ns;
   if (next_ns - from_ns < interval_ns_ / 4) next_ns += interval_ns_;
   const auto cut = [&](std::span<const std::int64_t> instants_ns) {
-    const auto after = std::ranges::lower_bound(instants_ns, from_ns + kSameNs);
+    const auto after = std::ranges::lower_bound(
+        instants_ns, from_ns + std::max(kSameNs, interval_ns_ / kSameFraction));
     if (after != instants_ns.end()) next_ns = std::min(next_ns, *after);
   };
   for (const PoseHistory& entity : inputs.entities) cut(entity.events_ns());
@@ -380,7 +383,8 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   if (const std::int64_t event_ns = take_news(inputs); event_ns < node(1).at_ns) {
     // The host has changed the weather, or an entity came, went, stopped or left: the interval of
     // now was computed without that. What came before is as it was.
-    if (event_ns >= node(0).at_ns + kSameNs) cut_at(event_ns);
+    // In a hold the clock stands, and news are of times to come.
+    if (event_ns >= node(0).at_ns + kSameNs && event_ns <= now_ns) cut_at(event_ns);
     begin_anew(0, inputs, history);
     compute(0, count);
     node(2).changes = {};
@@ -396,9 +400,10 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   }
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);
-  fraction_ = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
+  const double gone_frac = std::clamp(fraction, 0.0, 1.0);
+  fraction_ = static_cast<float>(gone_frac);
   // As much of the next interval as has gone by of this one.
-  compute(1, std::min(count, static_cast<std::uint32_t>(std::ceil(fraction * count))));
+  compute(1, std::min(count, static_cast<std::uint32_t>(std::ceil(gone_frac * count))));
 }
 
 CachedSurface::Range CachedSurface::take_changes(std::size_t storage) noexcept {

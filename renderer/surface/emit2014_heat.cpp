@@ -71,7 +71,8 @@ double Emit2014Heat::equilibrium_k(const SurfaceSample& sample, const glm::vec3&
                                    const SheetBack* back) const noexcept {
   double flux_w_m2 = absorbed_w_m2(sample, normal, forcing, drive);
   if (back != nullptr && !back->sample.covered) {
-    flux_w_m2 = 0.5 * (flux_w_m2 + absorbed_w_m2(back->sample, -normal, forcing, back->drive));
+    const double other_w_m2 = absorbed_w_m2(back->sample, -normal, forcing, back->drive);
+    flux_w_m2 = sample.covered ? other_w_m2 : 0.5 * (flux_w_m2 + other_w_m2);
   }
   const physics::SurfaceExchange<double>& exchange = materials_[sample.material].exchange;
   return physics::solve_equilibrium(physics::surface_balance(flux_w_m2, exchange)).temperature_k;

@@ -82,13 +82,15 @@ FosterHeat::Incoming FosterHeat::incoming(const SurfaceSample& sample, const glm
               (hidden_frac + sample.far_frac) * forcing.environment_w_m2 + longwave_seen_w_m2};
 }
 
-FosterHeat::Incoming FosterHeat::into_body(const Incoming& own, const glm::vec3& normal,
-                                           const SurfaceForcing& forcing, const SheetBack* back,
+FosterHeat::Incoming FosterHeat::into_body(const Incoming& own, bool own_covered,
+                                           const glm::vec3& normal, const SurfaceForcing& forcing,
+                                           const SheetBack* back,
                                            double SampleDrive::*longwave_w_m2) const noexcept {
   // What covers a face of a sheet keeps its heat: the other one alone decides.
   if (back == nullptr || back->sample.covered) return own;
   const Incoming other =
       incoming(back->sample, -normal, forcing, back->drive, back->drive.*longwave_w_m2);
+  if (own_covered) return other;
   return {0.5 * (own.shortwave_w_m2 + other.shortwave_w_m2),
           0.5 * (own.longwave_w_m2 + other.longwave_w_m2)};
 }
@@ -141,10 +143,10 @@ SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& n
   if (!materials_[sample.material].prescribed()) {
     const Incoming begin =
         incoming(sample, normal, forcing.begin, drive, drive.longwave_begin_w_m2);
-    const Incoming body_begin =
-        into_body(begin, normal, forcing.begin, back, &SampleDrive::longwave_begin_w_m2);
+    const Incoming body_begin = into_body(begin, sample.covered, normal, forcing.begin, back,
+                                          &SampleDrive::longwave_begin_w_m2);
     const Incoming body_end =
-        into_body(end, normal, forcing.end, back, &SampleDrive::longwave_end_w_m2);
+        into_body(end, sample.covered, normal, forcing.end, back, &SampleDrive::longwave_end_w_m2);
     const physics::FosterLadder& ladder = interval.ladders[sample.material];
     FosterSurface<double> surface = surfaces_[sample.material];
     for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
@@ -159,7 +161,7 @@ SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& n
             drive.partner_begin_w_m2[p], drive.partner_end_w_m2[p], ladder.level[0]);
       surface.base_offset_k += 0.5 * (before_k + sum(state.partner_k[p]));
     }
-    if (sample.covered) {
+    if (sample.covered && (back == nullptr || back->sample.covered)) {
       relax(state.modes_k, surface, kWhole, 0.0, 0.0, ladder.level[0]);
     } else {
       physics::foster_advance(state.modes_k, absorbed(sample.material, forcing.begin, body_begin),

@@ -57,7 +57,7 @@ class FosterHeat {
                                   const SurfaceForcing& forcing, const SampleDrive& drive,
                                   double longwave_seen_w_m2) const noexcept;
   /// Of a sheet's two faces the mean.
-  [[nodiscard]] Incoming into_body(const Incoming& own, const glm::vec3& normal,
+  [[nodiscard]] Incoming into_body(const Incoming& own, bool own_covered, const glm::vec3& normal,
                                    const SurfaceForcing& forcing, const SheetBack* back,
                                    double SampleDrive::*longwave_w_m2) const noexcept;
   [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material,

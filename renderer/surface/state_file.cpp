@@ -109,21 +109,37 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
       model.drawn_samples > count || model.first_sample.size() != geometry.instances.size()) {
     return false;
   }
-  for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
-    const RefinedMesh& mesh = model.meshes[geometry.instances[i].mesh];
-    if (std::ranges::any_of(mesh.vertices(), [&](const RefinedMesh::Vertex& vertex) {
-          return vertex.material >= geometry.materials.size();
-        })) {
-      return false;
+  for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {
+    const RefinedMesh& mesh = model.meshes[m];
+    for (const RefinedMesh::Vertex& vertex : mesh.vertices()) {
+      if (vertex.material >= geometry.materials.size()) return false;
     }
-    const std::size_t samples =
-        mesh.vertices().size() + back_vertices(mesh, geometry.materials).size();
-    if (model.first_sample[i] + samples > model.drawn_samples) return false;
+    for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
+      const std::uint32_t material = geometry.meshes[m].submeshes[mesh.submesh(slot)].material;
+      for (const std::uint32_t v : mesh.leaf(slot)) {
+        if (mesh.vertices()[v].material != material) return false;
+      }
+    }
   }
   const auto& all = model.samples.samples;
+  for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
+    const scene::Instance& instance = geometry.instances[i];
+    const RefinedMesh& mesh = model.meshes[instance.mesh];
+    const std::size_t first = model.first_sample[i];
+    const std::size_t samples =
+        mesh.vertices().size() + back_vertices(mesh, geometry.materials).size();
+    if (first + samples > model.drawn_samples) return false;
+    for (std::size_t k = first; k < first + samples; ++k) {
+      const std::uint32_t other = all[k].other_side;
+      if ((all[k].mover >= 0) != (instance.entity_id != 0) || all[k].mover != all[first].mover ||
+          (other != kNoSample && (other < first || other >= first + samples))) {
+        return false;
+      }
+    }
+  }
   const auto sides_fit = [&](const SurfaceSample& s) {
     return s.other_side == kNoSample ||
-           (s.other_side < count && &all[s.other_side] != &s &&
+           (s.other_side < model.drawn_samples && &all[s.other_side] != &s &&
             all[s.other_side].other_side < count && &all[all[s.other_side].other_side] == &s);
   };
   const auto sample_fits = [&](const SurfaceSample& s) {

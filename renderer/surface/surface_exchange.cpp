@@ -62,6 +62,7 @@ std::array<float, physics::kMaxFosterModes> Partners::weights(std::uint32_t mate
                                                               float distance_m) const {
   std::array<float, physics::kMaxFosterModes> out{};
   const double a = diffusivity_m2_s(in_.materials[material]);
+  if (!(a > 0.0)) return out;
   const physics::FosterNetwork& network = in_.history.network(material);
   for (std::size_t i = 0; i < network.count; ++i) {
     const double z = static_cast<double>(distance_m) / std::sqrt(a * network.modes[i].tau_s);

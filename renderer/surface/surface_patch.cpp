@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "emit/physics/constants.hpp"
+#include "emit/scene/sheets.hpp"
 #include "surface/tangents.hpp"
 
 namespace emit::renderer {
@@ -37,6 +38,11 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
       sphere_(kSampleViewRays),
       offsets_(ray_offsets(inputs.geometry)) {
   history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
+  for (std::uint32_t m = 0; m < inputs.geometry.meshes.size(); ++m) {
+    const bool full = inputs.detail != nullptr && inputs.detail->has(m);
+    open_sheets_.push_back(
+        scene::may_have_sheets(full ? inputs.detail->full_mesh(m) : inputs.geometry.meshes[m]));
+  }
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
   }
@@ -213,6 +219,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
 
 bool PatchSampler::double_sided(const SeenFace& face) const noexcept {
   const std::uint32_t index = in_.geometry.instances[face.instance].mesh;
+  if (open_sheets_[index] == 0) return false;
   const scene::Mesh& mesh = in_.detail != nullptr && in_.detail->has(index)
                                 ? in_.detail->full_mesh(index)
                                 : in_.geometry.meshes[index];

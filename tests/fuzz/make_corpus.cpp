@@ -481,7 +481,7 @@ void make_state_seeds() {
   for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
     renderer::SurfaceSample sample;
     sample.material = i % 3;
-    sample.mover = static_cast<std::int32_t>(i % 3) - 1;
+    sample.mover = -1;
     sample.first_seen = i;
     sample.seen_count = 1;
     model.samples.samples.push_back(sample);

@@ -238,6 +238,24 @@ TEST(RendererCachedBreaks, AnEventShowsNowhereButWhereItActs) {
   }
 }
 
+TEST(RendererCachedBreaks, WhatHappensInAHoldWaitsForTheClock) {
+  const auto scenario = parking_lot(20 * kHourNs);
+  const auto pose = looking({0.0, -0.01, 16.0}, {0.0, 0.0, 0.0});
+  const std::int64_t held_ns = 2 * kHourNs + 10 * kSecondNs;
+  Session run(scenario);
+  const auto before = run.frame_k(held_ns, pose);
+  const renderer::EntityUpdate gone{7, scenario.objects[1].instances.front(), false, false};
+  EXPECT_EQ(run.renderer().apply_entities(held_ns + 5 * kSecondNs, {&gone, 1}), 1U);
+  // The thermal clock stands: nothing changes, and nothing is sampled anew.
+  const auto samples = run.renderer().scene_stats().samples;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_LT(difference(before, run.frame_k(held_ns, pose)).max_k, 0.025) << i;
+  }
+  EXPECT_EQ(run.renderer().scene_stats().samples, samples);
+  const auto after = run.frame_k(held_ns + 25 * kSecondNs, pose);
+  EXPECT_GT(difference(before, after).max_k, 0.2);
+}
+
 TEST(RendererCachedBreaks, AScriptedEventActsFromItsInstantOn) {
   // In the middle of an interval of 20 s.
   const std::int64_t leaves_ns = 2 * kHourNs + 30 * kSecondNs;

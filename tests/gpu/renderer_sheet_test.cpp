@@ -121,7 +121,11 @@ TEST(RendererSheet, OfThePublishedModelFollowsBothFacesToo) {
     EXPECT_NEAR(below_k, above_k, 2e-3);
     return above_k;
   };
-  EXPECT_NEAR(at(true), at(false), 0.02);
+  const float up_k = at(true);
+  EXPECT_NEAR(up_k, at(false), 0.02);
+  // Between the sun on both faces and on none.
+  EXPECT_GT(up_k, 300.0F);
+  EXPECT_LT(up_k, 350.0F);
 }
 
 TEST(RendererSheet, ShadeOnOneFaceShowsOnTheOther) {
@@ -145,6 +149,27 @@ TEST(RendererSheet, ShadeOnOneFaceShowsOnTheOther) {
   const double seen_m = 2.0 * 6.0 * std::tan(0.5 * scenario.sensor.fov_h_rad);
   const auto cool = std::ranges::count_if(row, [&](float k) { return k < 0.5F * (low + high); });
   EXPECT_NEAR(static_cast<double>(cool) / static_cast<double>(row.size()), 1.0 / seen_m, 0.02);
+}
+
+TEST(RendererSheet, WhatCoversAFaceLeavesTheOtherToDecide) {
+  // A plate on the closed face of a block, its front to the block or away from it.
+  const auto on_block_k = [](bool faces_up) {
+    auto scenario = plate(faces_up, scene::ThermalModel::foster);
+    scene::ObjectDesc block = scenario.objects.front();
+    block.name = "block";
+    auto quads = box({-4.0, -4.0, kUpM - 2.0}, {4.0, 4.0, kUpM - 1e-4});
+    quads.push_back({{-4.0, -4.0, kUpM - 2.0},
+                     {-4.0, 4.0, kUpM - 2.0},
+                     {4.0, 4.0, kUpM - 2.0},
+                     {4.0, -4.0, kUpM - 2.0}});
+    block.gltf = write_quads("block", quads);
+    block.material = "soil";
+    scenario.objects.push_back(block);
+    return middle_k(seen_k(*renderer_of(scenario), {0.0, -3.0, kUpM + 4.0}, 2 * kHourNs));
+  };
+  const float front_up_k = on_block_k(true);
+  EXPECT_NEAR(front_up_k, on_block_k(false), 0.1);
+  EXPECT_GT(front_up_k, 310.0F);
 }
 
 TEST(RendererSheet, BothFacesCountInTheLimitOfSamples) {

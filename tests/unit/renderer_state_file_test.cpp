@@ -35,6 +35,7 @@ struct World {
     geometry.meshes.push_back(octahedron());
     geometry.materials.resize(3);
     geometry.instances.resize(1);
+    geometry.instances[0].entity_id = 7;
     model.meshes.emplace_back(geometry.meshes[0], options.max_samples);
     EXPECT_TRUE(model.meshes[0].split(std::vector<std::uint32_t>{0, 3, 5}));
     model.drawn_samples = static_cast<std::uint32_t>(model.meshes[0].vertices().size());
@@ -46,7 +47,7 @@ struct World {
       SurfaceSample sample;
       sample.position_m = {number(), number(), number()};
       sample.normal = {number(), number(), number()};
-      sample.mover = static_cast<std::int32_t>(i % 3) - 1;
+      sample.mover = i < model.drawn_samples ? 1 : static_cast<std::int32_t>(i % 3) - 1;
       sample.material = i % 3;
       sample.sky_frac = number();
       sample.sphere_sky_frac = number();
@@ -247,6 +248,27 @@ TEST_F(StateFile, huge_counts_and_indices_out_of_range_are_refused_though_the_ch
     for (const SeenSample& seen : got->samples.seen) ASSERT_LT(seen.sample, count);
   }
   EXPECT_GT(refused, 200U);
+}
+
+TEST_F(StateFile, samples_that_belong_to_something_else_are_refused) {
+  auto& samples = world_.model.samples.samples;
+  const auto refused = [this] {
+    write();
+    return !read();
+  };
+  samples[0].mover = -1;  // of an entity's instance
+  EXPECT_TRUE(refused());
+  samples[0].mover = samples[1].mover;
+  EXPECT_FALSE(refused());
+  samples[0].other_side = 3;  // which knows nothing of it
+  EXPECT_TRUE(refused());
+  samples[3].other_side = 0;
+  EXPECT_FALSE(refused());
+  const auto last = static_cast<std::uint32_t>(samples.size() - 1);  // not of the instance
+  samples[3].other_side = kNoSample;
+  samples[0].other_side = last;
+  samples[last].other_side = 0;
+  EXPECT_TRUE(refused());
 }
 
 TEST_F(StateFile, that_is_not_there_or_cannot_be_written_is_an_error_of_the_disk) {

@@ -32,10 +32,13 @@ TEST(SheetOf, is_half_of_the_body_without_what_lies_behind_it) {
   EXPECT_EQ(sheet->layers[0].thickness_m, 0.0005);
   EXPECT_EQ(sheet->layers[0].density_kg_m3, kSteel.density_kg_m3);
   EXPECT_EQ(sheet->emissivity_frac, 0.3);
-  EXPECT_EQ(sheet->core_conductance_w_m2_k, 0.0);
+  EXPECT_EQ(sheet->core_conductance_w_m2_k, 8.0);
   ASSERT_EQ(sheet->modes.size(), 1U);
   EXPECT_NEAR(sheet->modes[0].tau_s, 0.0005 * 7850.0 * 470.0 / 19.0, 1e-9);
   EXPECT_EQ(sheet->modes[0].weight_frac, 1.0);
+  Material no_film = material({kSteel, kAir});
+  no_film.core_conductance_w_m2_k.reset();
+  EXPECT_NEAR(*sheet_of(no_film)->core_conductance_w_m2_k, 0.16 / 0.02, 1e-9);
   EXPECT_TRUE(sheet->foster_modes.empty());
   EXPECT_FALSE(sheet->foster_fit);
 }

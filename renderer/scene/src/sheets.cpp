@@ -17,6 +17,15 @@ constexpr double kFilmW_m2_k = 19.0;
 std::optional<Material> sheet_of(const Material& material) {
   if (material.prescribed_k) return std::nullopt;
   Material sheet = material;
+  // emit2014 knows no other film than that to what lies behind.
+  if (!sheet.core_conductance_w_m2_k) {
+    double gas_m2k_w = 0.0;
+    for (const Layer& layer : material.layers) {
+      if (layer.density_kg_m3 < kMaxGasKgM3)
+        gas_m2k_w += layer.thickness_m / layer.conductivity_w_m_k;
+    }
+    sheet.core_conductance_w_m2_k = gas_m2k_w > 0.0 ? 1.0 / gas_m2k_w : 0.0;
+  }
   const auto gas = std::ranges::find_if(
       sheet.layers, [](const Layer& l) { return l.density_kg_m3 < kMaxGasKgM3; });
   sheet.layers.erase(gas, sheet.layers.end());
@@ -31,7 +40,6 @@ std::optional<Material> sheet_of(const Material& material) {
   if (resistance_m2k_w > kMaxSheetResistanceM2kW) return std::nullopt;
   sheet.sheet = true;
   sheet.name += " (sheet)";
-  sheet.core_conductance_w_m2_k = 0.0;
   sheet.modes = {{capacity_j_m2_k / kFilmW_m2_k, 1.0}};
   sheet.foster_modes.clear();
   sheet.foster_fit.reset();

@@ -15,9 +15,10 @@ namespace emit::scene {
 inline constexpr double kMaxSheetResistanceM2kW = 5e-3;
 inline constexpr double kMaxGasKgM3 = 10.0;
 
-/// What a sheet of this material is made of: half of its body's layers, `sheet` set, no base. None
-/// where the material is prescribed, has no body, or one that is no sheet. Modes of emit2014 become
-/// one, rho c d / 2 over a film of 19 W m-2 K-1.
+/// What a sheet of this material is made of: half of its body's layers, `sheet` set. None where the
+/// material is prescribed, has no body, or one that is no sheet. Modes of emit2014 become one, rho
+/// c d / 2 over a film of 19 W m-2 K-1; its conductance to the core, which that model has for want
+/// of convection, is that of the material or of the air behind.
 [[nodiscard]] std::optional<Material> sheet_of(const Material& material);
 
 /// True where the mesh has double-sided faces and is not the surface of a closed body.
