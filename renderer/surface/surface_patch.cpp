@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "emit/physics/constants.hpp"
-#include "emit/scene/sheets.hpp"
 #include "surface/tangents.hpp"
 
 namespace emit::renderer {
@@ -38,11 +37,6 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
       sphere_(kSampleViewRays),
       offsets_(ray_offsets(inputs.geometry)) {
   history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
-  for (std::uint32_t m = 0; m < inputs.geometry.meshes.size(); ++m) {
-    const bool full = inputs.detail != nullptr && inputs.detail->has(m);
-    open_sheets_.push_back(
-        scene::may_have_sheets(full ? inputs.detail->full_mesh(m) : inputs.geometry.meshes[m]));
-  }
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
   }
@@ -130,7 +124,7 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
     const SurfaceView view = view_.view(in_.rays, point, selection);
     const std::span<const SeenFace> faces(view.seen.data(), view.seen_count);
     const bool inside_a_body = std::ranges::none_of(
-        faces, [&](const SeenFace& face) { return face.front || double_sided(face); });
+        faces, [&](const SeenFace& face) { return face.front || of_a_sheet(face); });
     sample.covered = sample.covered || inside_a_body;
   }
   if (options_.exchange) look_at_faces(patch, index, drawn, selection);
@@ -217,14 +211,13 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   }
 }
 
-bool PatchSampler::double_sided(const SeenFace& face) const noexcept {
+bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
   const std::uint32_t index = in_.geometry.instances[face.instance].mesh;
-  if (open_sheets_[index] == 0) return false;
   const scene::Mesh& mesh = in_.detail != nullptr && in_.detail->has(index)
                                 ? in_.detail->full_mesh(index)
                                 : in_.geometry.meshes[index];
   return std::ranges::any_of(mesh.submeshes, [&](const scene::Submesh& submesh) {
-    return submesh.double_sided && 3 * face.triangle >= submesh.first_index &&
+    return in_.materials[submesh.material].sheet && 3 * face.triangle >= submesh.first_index &&
            3 * face.triangle < submesh.first_index + submesh.index_count;
   });
 }

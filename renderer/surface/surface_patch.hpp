@@ -86,8 +86,8 @@ class PatchSampler {
   /// Temperature over the history.
   void integrate(SurfacePatch& patch, std::uint32_t index) const;
 
-  /// Face of a double-sided part of the scene as loaded, whose other side can be seen.
-  [[nodiscard]] bool double_sided(const SeenFace& face) const noexcept;
+  /// A face of the scene as loaded that is a sheet's: who sees its back is in no body.
+  [[nodiscard]] bool of_a_sheet(const SeenFace& face) const noexcept;
 
   void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
@@ -107,7 +107,6 @@ class PatchSampler {
   SphereSampler sphere_;
   RayOffsets offsets_;
   double history_s_ = 0.0;
-  std::vector<char> open_sheets_;        ///< by mesh: scene::may_have_sheets()
   std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
   std::vector<float> sky_limit_frac_;    ///< by material: shares that differ less are alike
 };

@@ -257,6 +257,12 @@ TEST(RendererCached, GroundUnderABodyDoesNotShowThroughAtItsFoot) {
   expect_whole_foot(box_on_ground());
 }
 
+TEST(RendererCached, NorAtThatOfABodyWhoseFacesAreDoubleSided) {
+  auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
+  quads.push_back(ground(12.0, 12.0));
+  expect_whole_foot(write_quads("box", quads, true));
+}
+
 TEST(RendererCached, FramesFromWhereNoOneSaidTheCameraWouldBeAreFlagged) {
   auto scenario = cached_scenario(box_on_ground());
   const glm::dvec3 eye(3.0, -9.0, 6.0);
