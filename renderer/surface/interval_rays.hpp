@@ -16,7 +16,7 @@
 namespace emit::renderer {
 
 /// Rays of a sample towards the sun over an interval: one packet, and all of them where its rays
-/// disagree.
+/// disagree or an entity may pass.
 inline constexpr std::size_t kPacketRays = CasterRays::kMaxRays;
 inline constexpr std::size_t kSunRays = 4 * kPacketRays;
 
@@ -32,7 +32,7 @@ struct HiddenSky {
 class IntervalRays {
  public:
   /// By entity: the radius of its geometry around the body's origin, in m. `sky` says which
-  /// directions hidden_sky_frac() weighs.
+  /// directions hidden_sky() weighs.
   explicit IntervalRays(std::vector<float> mover_radius_m, SkyMeasure sky = SkyMeasure::cosine)
       : mover_radius_m_(std::move(mover_radius_m)),
         sky_(sky),

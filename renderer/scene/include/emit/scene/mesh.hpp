@@ -41,7 +41,7 @@ struct Submesh {
   std::uint32_t first_index = 0;
   std::uint32_t index_count = 0;  ///< multiple of 3
   std::uint32_t material = 0;     ///< index into SceneGeometry::materials
-  bool double_sided = false;      ///< a sheet: both sides are seen and lit
+  bool double_sided = false;      ///< both sides are seen and lit; thin ones are sheets
 };
 
 /// Indexed triangles, counter-clockwise seen from outside. positions_m and normals have equal size;

@@ -77,7 +77,7 @@ struct Material {
   /// A hot part or another emitter of given temperature: takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
   /// Both faces of a thin body, whose layers are half of it over an insulated middle (sheets.hpp);
-  /// base_k does not count.
+  /// base_k counts for emit2014 only.
   bool sheet = false;
   std::string source;       ///< where the numbers come from
   std::string uncertainty;  ///< what is known about their error

@@ -9,10 +9,10 @@
 /// insulated middle, and a thin one behaves like that under any fluxes.
 namespace emit::scene {
 
-/// Layers of a material in front of the air behind it: those up to the first gas (less than
-/// 10 kg/m3). A body's resistance up to which it can be a sheet: 20 W m-2 K-1 on either face then
-/// leave a difference of a twentieth of what they drive.
+/// Of a sheet's body: 20 W m-2 K-1 on either face leave a twentieth of what they drive as a
+/// difference.
 inline constexpr double kMaxSheetResistanceM2kW = 5e-3;
+/// A lighter layer is the air behind; a body is the layers in front of the first one.
 inline constexpr double kMaxGasKgM3 = 10.0;
 
 /// What a sheet of this material is made of: half of its body's layers, `sheet` set. None where the
