@@ -173,17 +173,7 @@ inline std::filesystem::path box_on_ground() {
 /// Ground and a box that stands on it until `leaves_ns`.
 inline scene::ScenarioDesc parking_lot(std::int64_t leaves_ns) {
   scene::ScenarioDesc s = cached_scenario(write_quads("lot", {ground(14.0, 14.0)}));
-  scene::ObjectDesc vehicle = s.objects.front();
-  vehicle.name = "vehicle";
-  vehicle.gltf = write_quads("vehicle", box({-1.5, -1.0, 0.3}, {1.5, 1.0, 2.0}));
-  vehicle.entity_id = 7;
-  const physics::Pose parked = vehicle.instances.front();
-  physics::Pose away = parked;
-  away.position_world_m += glm::dvec3(300.0, 0.0, 0.0);
-  vehicle.trajectory = {{0, parked, true, false},
-                        {leaves_ns, parked, true, false},
-                        {leaves_ns + kSecondNs, away, true, true}};
-  s.objects.push_back(vehicle);
+  park_vehicle(s, leaves_ns);
   return s;
 }
 

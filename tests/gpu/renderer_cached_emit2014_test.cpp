@@ -135,18 +135,8 @@ TEST(RendererCachedEmit2014, MoreStepsComeCloserToTheConvergedModel) {
 
 TEST(RendererCachedEmit2014, AVehicleThatLeftLeavesItsPrint) {
   scene::ScenarioDesc scenario = published_scenario(write_quads("lot", {ground(14.0, 14.0)}));
-  scene::ObjectDesc vehicle = scenario.objects.front();
-  vehicle.name = "vehicle";
-  vehicle.gltf = write_quads("vehicle", box({-1.5, -1.0, 0.3}, {1.5, 1.0, 2.0}));
-  vehicle.entity_id = 7;
-  const physics::Pose parked = vehicle.instances.front();
-  physics::Pose away = parked;
-  away.position_world_m += glm::dvec3(300.0, 0.0, 0.0);
   const std::int64_t leaves_ns = 3 * kHourNs;
-  vehicle.trajectory = {{0, parked, true, false},
-                        {leaves_ns, parked, true, false},
-                        {leaves_ns + kSecondNs, away, true, true}};
-  scenario.objects.push_back(vehicle);
+  park_vehicle(scenario, leaves_ns);
   const auto pose = looking({0.0, 0.1, 16.0}, {0.0, 0.0, 0.0});
   const std::vector<std::int64_t> times_ns{leaves_ns + 60 * kSecondNs};
   const auto frame = last_frame_k(scenario, pose, times_ns);

@@ -59,6 +59,20 @@ std::filesystem::path write_quads(const std::string& name, const std::vector<Qua
   return folder / (name + ".gltf");
 }
 
+void park_vehicle(scene::ScenarioDesc& scenario, std::int64_t leaves_ns) {
+  scene::ObjectDesc vehicle = scenario.objects.front();
+  vehicle.name = "vehicle";
+  vehicle.gltf = write_quads("vehicle", box({-1.5, -1.0, 0.3}, {1.5, 1.0, 2.0}));
+  vehicle.entity_id = 7;
+  const physics::Pose parked = vehicle.instances.front();
+  physics::Pose away = parked;
+  away.position_world_m += glm::dvec3(300.0, 0.0, 0.0);
+  vehicle.trajectory = {{0, parked, true, false},
+                        {leaves_ns, parked, true, false},
+                        {leaves_ns + 1'000'000'000, away, true, true}};
+  scenario.objects.push_back(vehicle);
+}
+
 scene::WeatherSample weather(double direct_w_m2, double diffuse_w_m2, double longwave_w_m2,
                              double environment_k) {
   scene::WeatherSample sample;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <glm/ext/vector_double3.hpp>
 #include <string>
@@ -30,6 +31,9 @@ struct Quad {
 /// Sim time 0 is 06:00 UTC. The surface answers at once (time constants of a millisecond), so that
 /// temperature is the equilibrium of the last interval.
 [[nodiscard]] scene::ScenarioDesc instant_scenario(const std::filesystem::path& gltf);
+
+/// Adds the entity 7, a box on wheels at the origin, which is gone a second after `leaves_ns`.
+void park_vehicle(scene::ScenarioDesc& scenario, std::int64_t leaves_ns);
 
 /// Constant weather from sim time 0.
 [[nodiscard]] scene::WeatherSample weather(double direct_w_m2, double diffuse_w_m2,
