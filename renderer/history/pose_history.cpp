@@ -87,7 +87,6 @@ void PoseHistory::note_scripted_events() noexcept {
 void PoseHistory::note_event(std::int64_t sim_time_ns) noexcept {
   const auto place = std::lower_bound(events_ns_.begin(), events_ns_.end(), sim_time_ns);
   if (place != events_ns_.end() && *place == sim_time_ns) return;
-  ++events_revision_;
   if (events_ns_.size() < kMaxEvents) {
     events_ns_.insert(place, sim_time_ns);
   } else if (place != events_ns_.begin()) {
@@ -124,7 +123,6 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
     const TrajectoryState planned = trajectory_at(scripted_, sim_time_ns);
     while (!events_ns_.empty() && events_ns_.back() >= sim_time_ns) {
       events_ns_.pop_back();
-      ++events_revision_;
     }
     if (planned.on != on || !close(planned.pose, pose)) note_event(sim_time_ns);
     live_.push_back(next);
@@ -201,7 +199,6 @@ void PoseHistory::reset() noexcept {
   moving_ = false;
   // The script's own events may have been cut by live poses.
   events_ns_.clear();
-  ++events_revision_;
   note_scripted_events();
 }
 
@@ -210,6 +207,35 @@ TrajectoryState PoseHistory::at(std::int64_t sim_time_ns) const noexcept {
     return trajectory_at(live_, sim_time_ns);
   }
   return trajectory_at(scripted_, sim_time_ns);
+}
+
+TrajectoryState PoseHistory::ahead(std::int64_t sim_time_ns) const noexcept {
+  TrajectoryState state = at(sim_time_ns);
+  if (!moving_ || live_.size() < 2 || sim_time_ns <= live_.back().sim_time_ns) return state;
+  const scene::Keyframe& before = live_[live_.size() - 2];
+  const scene::Keyframe& last = live_.back();
+  if (last.teleport || !last.on || last.sim_time_ns <= before.sim_time_ns) return state;
+  const double ways = static_cast<double>(std::min(sim_time_ns - last.sim_time_ns, kMostAheadNs)) /
+                      static_cast<double>(last.sim_time_ns - before.sim_time_ns);
+  state.pose.position_world_m += ways * (last.pose.position_world_m - before.pose.position_world_m);
+  return state;
+}
+
+PoseHistory::Known PoseHistory::known() const noexcept {
+  return live_.empty() ? Known{} : Known{true, live_.back()};
+}
+
+TrajectoryState PoseHistory::as_known(const Known& then, std::int64_t sim_time_ns) const noexcept {
+  if (!then.live) return trajectory_at(scripted_, sim_time_ns);
+  if (sim_time_ns >= then.newest.sim_time_ns) return {then.newest.pose, then.newest.on};
+  return at(sim_time_ns);
+}
+
+bool PoseHistory::departs(const Known& then, std::int64_t sim_time_ns) const noexcept {
+  if (live_.empty() && !then.live) return false;
+  const TrajectoryState now = at(sim_time_ns);
+  const TrajectoryState told = as_known(then, sim_time_ns);
+  return now.on != told.on || (now.on && !close(now.pose, told.pose));
 }
 
 double PoseHistory::path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {

@@ -193,18 +193,19 @@ void CachedStage::prepare(const FrameRequest& request, CameraSetup&,
   frame.samples.x = surface_->fraction();
   sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
   forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);
-  forcing_now_.environment_k =
-      surface_history_.surroundings_now_k().value_or(forcing_now_.environment_k);
+  forcing_now_.environment_k = surface_->surroundings_now_k().value_or(forcing_now_.environment_k);
 }
 
 void CachedStage::upload() noexcept {
   drawn_->upload();
   for (std::size_t node = 0; node < node_buffers_.size(); ++node) {
     const std::size_t storage = surface_->storage(node);
-    const CachedSurface::Range range = surface_->take_changes(storage);
-    node_buffers_[storage].upload(surface_->vertices(node).subspan(range.first, range.count),
-                                  range.first);
+    for (const ChangedRanges::Range& range : surface_->changes(storage)) {
+      node_buffers_[storage].upload(surface_->vertices(node).subspan(range.first, range.count),
+                                    range.first);
+    }
   }
+  surface_->forget_changes();
 }
 
 void CachedStage::bind() const noexcept {

@@ -68,8 +68,6 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
       interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
-  known_events_.resize(movers);
-  for (KnownEvents& known : known_events_) known.instants_ns.reserve(PoseHistory::kMaxEvents);
   interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
 }
 
@@ -113,37 +111,12 @@ bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
          now_ns > nodes_[storage(1)].at_ns + kMostIntervals * interval_ns_;
 }
 
-std::int64_t CachedSurface::take_news(const Inputs& inputs) noexcept {
-  std::int64_t earliest_ns = kNoNews;
-  for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
-    const PoseHistory& entity = inputs.entities[m];
-    KnownEvents& known = known_events_[m];
-    if (std::exchange(known.revision, entity.events_revision()) == known.revision) continue;
-    // The earliest that came or went; those that went to make room for others are long past.
-    const std::span<const std::int64_t> now_ns = entity.events_ns();
-    auto old = known.instants_ns.begin();
-    for (auto each = now_ns.begin(); each != now_ns.end() || old != known.instants_ns.end();) {
-      if (old == known.instants_ns.end() || (each != now_ns.end() && *each < *old)) {
-        earliest_ns = std::min(earliest_ns, *each++);
-      } else if (each == now_ns.end() || *old < *each) {
-        const bool made_room = now_ns.size() == PoseHistory::kMaxEvents && *old < node(0).at_ns;
-        if (!made_room) earliest_ns = std::min(earliest_ns, std::max(*old, node(0).at_ns));
-        ++old;
-      } else {
-        ++each;
-        ++old;
-      }
-    }
-    known.instants_ns.assign(now_ns.begin(), now_ns.end());
-  }
-  const std::uint64_t revision = inputs.environment.revision();
-  if (const std::uint64_t changes = revision - std::exchange(revision_, revision); changes > 0) {
-    const std::span<const std::int64_t> changes_ns = inputs.environment.changes_ns();
-    earliest_ns =
-        std::min(earliest_ns, changes <= changes_ns.size() ? changes_ns[changes_ns.size() - changes]
-                                                           : node(0).at_ns);
-  }
-  return earliest_ns;
+std::int64_t CachedSurface::take_news(const Environment& environment) noexcept {
+  const std::uint64_t revision = environment.revision();
+  const std::uint64_t changes = revision - std::exchange(revision_, revision);
+  if (changes == 0) return kNoNews;
+  const std::span<const std::int64_t> changes_ns = environment.changes_ns();
+  return changes <= changes_ns.size() ? changes_ns[changes_ns.size() - changes] : node(0).at_ns;
 }
 
 std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns,
@@ -221,27 +194,36 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   }
 
   const std::size_t count = model_->samples.samples.size();
-  for (Node& node : nodes_) {
+  for (SurfaceNode& node : nodes_) {
     node.states.assign(count, {});
     node.outputs.assign(count, {});
     node.vertices.assign(model_->drawn_samples, {});
   }
   // One interval before the first is shown: nodes 0 and 1 are complete, 2 is begun.
   ring_ = 0;
-  Node& first = node(0);
+  SurfaceNode& first = node(0);
   first.states = std::move(model_->states);
   first.outputs = std::move(model_->outputs);
   first.at_ns = start_ns;
   first.surroundings = history.surroundings();
+  first.surroundings_k = history.surroundings_now_k();
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
   }
-  (void)take_news(inputs);
+  (void)take_news(inputs.environment);
+  local_ =
+      LocalSteps(model_->samples,
+                 LocalSteps::Setup{options_.history_start_ns, interval_ns_, inputs.entities.size()},
+                 *interval_rays_, heat_.sized_interval());
+  local_->restart(start_ns);
   turn_ = static_cast<std::uint32_t>(record.size());
   begin_anew(0, inputs, history);
   compute(0, static_cast<std::uint32_t>(count));
   begin_anew(1, inputs, history);
-  for (Node& node : nodes_) node.changes = {0, model_->drawn_samples};
+  for (SurfaceNode& node : nodes_) {
+    node.changes.clear();
+    node.changes.add(0, model_->drawn_samples);
+  }
   return {};
 }
 
@@ -249,7 +231,7 @@ std::uint64_t CachedSurface::sample_bytes() const noexcept {
   const auto bytes = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
   std::uint64_t sum = 0;
   if (model_) sum = bytes(model_->samples.samples) + bytes(model_->samples.seen);
-  for (const Node& node : nodes_) {
+  for (const SurfaceNode& node : nodes_) {
     sum += bytes(node.states) + bytes(node.outputs) + bytes(node.vertices);
   }
   return sum;
@@ -257,14 +239,16 @@ std::uint64_t CachedSurface::sample_bytes() const noexcept {
 
 void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
                                    SurfaceHistory& history) noexcept {
-  const Node& from = node(index);
-  Node& to = node(index + 1);
+  const SurfaceNode& from = node(index);
+  SurfaceNode& to = node(index + 1);
   history.restore_surroundings(from.surroundings);
   interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
   to.surroundings = history.surroundings();
+  to.surroundings_k = history.surroundings_now_k();
   heat_.prepare(interval_);
-  interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment, inputs.entities,
-                         rays().origin_world_m());
+  interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment,
+                         EntityPoses(inputs.entities), rays().origin_world_m());
+  local_->send_rays(index, inputs.entities);
   glow_.measure(
       model_->samples, *interval_rays_,
       [&from](std::size_t sample) { return from.outputs[sample].longwave_out_w_m2; }, faces_);
@@ -272,103 +256,53 @@ void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
 }
 
 void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
-  const Node& from = node(index);
-  Node& to = node(index + 1);
-  const SurfaceSamples& all = model_->samples;
+  const SurfaceNode& from = node(index);
+  SurfaceNode& to = node(index + 1);
+  const SurfaceStep step = this->step();
   const std::uint32_t first = done_;
   if (last <= first) return;
-  const auto drive_of = [&](const SurfaceSample& sample) {
-    SampleDrive drive;
-    drive.sun_frac = interval_rays_->sun_frac(rays(), sample, offsets_.sun_m, 0.0F);
-    const HiddenSky hidden = interval_rays_->hidden_sky(rays(), sample, offsets_.around_m);
-    drive.hidden_sky_frac = hidden.frac;
-    if (hidden.frac > 0.0F && !faces_.empty()) {
-      const float sent_w_m2 = faces_[hidden.mover].towards_w_m2(sample.normal);
-      drive.hidden_is_seen = sent_w_m2 >= 0.0F;
-      if (drive.hidden_is_seen) {
-        drive.longwave_begin_w_m2 += sample.sky_frac * hidden.frac * sent_w_m2;
-      }
-    }
-    for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
-      const SeenSample& seen = all.seen[sample.first_seen + k];
-      const SampleOutput& other = from.outputs[seen.sample];
-      drive.longwave_begin_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
-      drive.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
-    }
-    // Neighbours change by hundredths of a kelvin in an interval: their start stands for it.
-    drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
-    for (std::size_t p = 0; p < kMaxPartners; ++p) {
-      const std::uint32_t partner = sample.partners[p].sample;
-      if (partner == kNoSample) continue;
-      drive.partner_begin_w_m2[p] = from.outputs[partner].flux_w_m2;
-      drive.partner_end_w_m2[p] = drive.partner_begin_w_m2[p];
-    }
-    return drive;
-  };
   const auto keep = [&to](std::size_t i, const SampleState& state, const SampleOutput& output) {
     to.states[i] = state;
     to.outputs[i] = output;
     if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
   };
   workers_.run(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = first + begin; i < first + end; ++i) {
-      const SurfaceSample& sample = all.samples[i];
-      if (sample.other_side < i) continue;  // was computed with its other side
-      const SampleDrive drive = drive_of(sample);
-      const glm::vec3 normal = interval_rays_->normal(sample);
-      SampleState state = from.states[i];
-      if (sample.other_side == kNoSample) {
-        const SampleOutput output = heat_.advance(sample, normal, interval_, drive, state);
-        keep(i, state, output);
-        continue;
-      }
-      const SurfaceSample& behind = all.samples[sample.other_side];
-      const SampleDrive back_drive = drive_of(behind);
-      const SheetBack back{behind, back_drive};
-      const SampleOutput output = heat_.advance(sample, normal, interval_, drive, state, &back);
-      keep(i, state, output);
-      keep(sample.other_side, state,
-           heat_.output(behind, -normal, interval_.forcing.end, back_drive, state));
+    SteppedSample stepped;
+    for (auto i = static_cast<std::uint32_t>(first + begin); i < first + end; ++i) {
+      if (!steps_itself(step.all, i)) continue;
+      stepped.state = from.states[i];
+      step_sample(step, *interval_rays_, interval_, from.outputs, i, stepped);
+      keep(i, stepped.state, stepped.output);
+      const std::uint32_t behind = step.all.samples[i].other_side;
+      if (behind != kNoSample) keep(behind, stepped.state, stepped.behind);
     }
   });
   done_ = last;
   const auto drawn = static_cast<std::uint32_t>(to.vertices.size());
-  const std::uint32_t low = to.changes.count > 0 ? std::min(to.changes.first, first) : first;
-  const std::uint32_t high = std::max(to.changes.first + to.changes.count, std::min(last, drawn));
-  to.changes = {std::min(low, high), high - std::min(low, high)};
+  to.changes.add(std::min(first, drawn), std::min(last, drawn) - std::min(first, drawn));
 }
 
 void CachedSurface::cut_at(std::int64_t event_ns) noexcept {
-  Node& first = node(0);
-  const Node& second = node(1);
+  SurfaceNode& first = node(0);
+  const SurfaceNode& second = node(1);
   const double frac =
       static_cast<double>(event_ns - first.at_ns) / static_cast<double>(second.at_ns - first.at_ns);
-  const auto between = [frac](auto a, auto b) {
-    return a + static_cast<decltype(a)>(frac) * (b - a);
-  };
-  const auto states_between = [&](physics::FosterState<double>& a,
-                                  const physics::FosterState<double>& b) {
-    for (std::size_t i = 0; i < a.size(); ++i) a[i] = between(a[i], b[i]);
-  };
   workers_.run(first.states.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      SampleState& state = first.states[i];
-      states_between(state.modes_k, second.states[i].modes_k);
-      for (std::size_t p = 0; p < kMaxPartners; ++p) {
-        states_between(state.partner_k[p], second.states[i].partner_k[p]);
-      }
+    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
       SampleOutput& output = first.outputs[i];
-      for (float SampleOutput::*value :
-           {&SampleOutput::offset_k, &SampleOutput::sun_frac, &SampleOutput::longwave_out_w_m2,
-            &SampleOutput::shortwave_out_w_m2, &SampleOutput::flux_w_m2}) {
-        output.*value = between(output.*value, second.outputs[i].*value);
+      if (!local_->has_own_clock(i)) {
+        first.states[i] = between(first.states[i], second.states[i], frac);
+        output = between(output, second.outputs[i], frac);
       }
       if (i < first.vertices.size()) first.vertices[i] = {output.offset_k, output.sun_frac};
     }
   });
-  states_between(first.surroundings, second.surroundings);
+  first.surroundings = between(first.surroundings, second.surroundings, frac);
+  if (first.surroundings_k && second.surroundings_k) {
+    first.surroundings_k = between(*first.surroundings_k, *second.surroundings_k, frac);
+  }
   first.at_ns = event_ns;
-  first.changes = {0, static_cast<std::uint32_t>(first.vertices.size())};
+  first.changes.add(0, static_cast<std::uint32_t>(first.vertices.size()));
 }
 
 void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
@@ -377,27 +311,43 @@ void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
   begin_interval(index, inputs, history);
 }
 
+void CachedSurface::change_weather(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
+                                   SurfaceHistory& history) noexcept {
+  const std::int64_t cut_ns = local_->active() > 0 ? now_ns : event_ns;
+  // What came before is as it was. In a hold the clock stands, and news are of times to come.
+  if (cut_ns >= node(0).at_ns + kSameNs && cut_ns <= now_ns) {
+    const SurfaceStep step = this->step();
+    local_->settle(cut_ns, window(), local_inputs(inputs, history, step));
+    cut_at(cut_ns);
+  }
+  local_->restart(now_ns);
+  begin_anew(0, inputs, history);
+  compute(0, static_cast<std::uint32_t>(model_->samples.samples.size()));
+  node(2).changes.clear();
+  begin_anew(1, inputs, history);
+}
+
 void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
                             SurfaceHistory& history) noexcept {
   const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
-  if (const std::int64_t event_ns = take_news(inputs); event_ns < node(1).at_ns) {
-    // The host has changed the weather, or an entity came, went, stopped or left: the interval of
-    // now was computed without that. What came before is as it was.
-    // In a hold the clock stands, and news are of times to come.
-    if (event_ns >= node(0).at_ns + kSameNs && event_ns <= now_ns) cut_at(event_ns);
-    begin_anew(0, inputs, history);
-    compute(0, count);
-    node(2).changes = {};
-    begin_anew(1, inputs, history);
+  const SurfaceStep step = this->step();
+  const LocalSteps::Inputs local = local_inputs(inputs, history, step);
+  if (const std::int64_t event_ns = take_news(inputs.environment); event_ns < node(1).at_ns) {
+    local_->run(std::min(now_ns, node(1).at_ns), window(), local);
+    change_weather(event_ns, now_ns, inputs, history);
   } else if (event_ns < node(2).at_ns) {
     begin_anew(1, inputs, history);
   }
   while (now_ns > node(1).at_ns) {
+    local_->run(node(1).at_ns, window(), local);
+    local_->rotate(window(), model_->samples);
     compute(1, count);
     rotate();
-    node(2).changes = {};
+    local_->rotated(window(), model_->samples);
+    node(2).changes.clear();
     begin_anew(1, inputs, history);
   }
+  local_->run(now_ns, window(), local);
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);
   const double gone_frac = std::clamp(fraction, 0.0, 1.0);
@@ -406,8 +356,15 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   compute(1, std::min(count, static_cast<std::uint32_t>(std::ceil(gone_frac * count))));
 }
 
-CachedSurface::Range CachedSurface::take_changes(std::size_t storage) noexcept {
-  return std::exchange(nodes_[storage].changes, {});
+std::optional<double> CachedSurface::surroundings_now_k() const noexcept {
+  const SurfaceNode& before = node(0);
+  const SurfaceNode& after = node(1);
+  if (!before.surroundings_k || !after.surroundings_k) return std::nullopt;
+  return between(*before.surroundings_k, *after.surroundings_k, static_cast<double>(fraction_));
+}
+
+void CachedSurface::forget_changes() noexcept {
+  for (SurfaceNode& node : nodes_) node.changes.clear();
 }
 
 SampledScene CachedSurface::drawn_scene() const {

@@ -14,19 +14,16 @@
 #include "history/pose_history.hpp"
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
+#include "surface/local_steps.hpp"
 #include "surface/mover_glow.hpp"
 #include "surface/ray_offsets.hpp"
 #include "surface/state_file.hpp"
 #include "surface/surface_model.hpp"
+#include "surface/surface_node.hpp"
+#include "surface/surface_step.hpp"
 #include "surface/worker_pool.hpp"
 
 namespace emit::renderer {
-
-/// What the device interpolates between, by sample and node of time.
-struct SampleVertex {
-  float offset_k = 0.0F;
-  float sun_frac = 0.0F;
-};
 
 /// A scene whose vertices are samples: every instance has its own.
 struct SampledScene {
@@ -39,9 +36,10 @@ struct SampledScene {
 };
 
 /// The thermal method `cached`: temperatures live on samples of the surface. Time goes in intervals
-/// of thermal.first_step_s, cut where an entity or the weather changes. While frames interpolate
-/// between the two ends of the current one, the next is computed, as much per frame as sim time has
-/// moved: no frame does more than its share, and the result depends on the inputs alone.
+/// of thermal.first_step_s, cut where the script moves an entity or the weather changes. While
+/// frames interpolate between the two ends of the current one, the next is computed, as much per
+/// frame as sim time has moved: no frame does more than its share, and the result depends on the
+/// inputs alone. What the host does with an entity meanwhile is carried by LocalSteps.
 ///
 /// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
 /// nothing, on any thread; everything else is setup.
@@ -50,11 +48,6 @@ class CachedSurface {
   struct Inputs {
     const Environment& environment;
     std::span<const PoseHistory> entities;
-  };
-  /// Part of the samples whose values at a node have changed.
-  struct Range {
-    std::uint32_t first = 0;
-    std::uint32_t count = 0;
   };
 
   /// `mover_of_object`: index of an object's PoseHistory, -1: static. `networks` by material, none
@@ -98,8 +91,15 @@ class CachedSurface {
   }
   /// Index of the storage that node (0..2) has: rotates when an interval ends.
   [[nodiscard]] std::size_t storage(std::size_t node) const noexcept { return (ring_ + node) % 3; }
-  /// What has changed in that storage since the last call.
-  [[nodiscard]] Range take_changes(std::size_t storage) noexcept;
+  /// What has changed in that storage since forget_changes().
+  [[nodiscard]] std::span<const ChangedRanges::Range> changes(std::size_t storage) const noexcept {
+    return nodes_[storage].changes.ranges();
+  }
+  void forget_changes() noexcept;
+  /// Temperature of the surroundings where the thermal model carries it.
+  [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept;
+  /// Blocks of samples that do not follow the intervals, because the host moves an entity.
+  [[nodiscard]] std::size_t local_blocks() const noexcept { return local_->active(); }
 
   [[nodiscard]] const SurfaceModel& model() const noexcept { return *model_; }
   /// Main memory that the samples take, without the meshes between them.
@@ -111,16 +111,6 @@ class CachedSurface {
   CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
                 std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
                 CasterRays places, std::optional<SurfaceDetail> detail, double reference_k);
-
-  /// What one node of time needs to go on from.
-  struct Node {
-    std::vector<SampleState> states;
-    std::vector<SampleOutput> outputs;
-    std::vector<SampleVertex> vertices;
-    Range changes;
-    std::int64_t at_ns = 0;
-    physics::FosterState<double> surroundings{};
-  };
 
   [[nodiscard]] physics::Result<SurfaceModel> make_model(const SurfaceInputs& surface,
                                                          const RefineView& view,
@@ -140,14 +130,31 @@ class CachedSurface {
                                           const Inputs& inputs) const noexcept;
   /// Makes node 0 what lies between it and node 1 at that instant.
   void cut_at(std::int64_t event_ns) noexcept;
-  /// The earliest change by the host that was not known before; kNoNews: none.
-  [[nodiscard]] std::int64_t take_news(const Inputs& inputs) noexcept;
+  /// The host has changed the weather from `event_ns` on: the interval of now was computed without
+  /// that.
+  void change_weather(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
+                      SurfaceHistory& history) noexcept;
+  /// The earliest change of the weather by the host that was not known before; kNoNews: none.
+  [[nodiscard]] std::int64_t take_news(const Environment& environment) noexcept;
   static constexpr std::int64_t kNoNews = std::numeric_limits<std::int64_t>::max();
   /// What shades.
   [[nodiscard]] const CasterRays& rays() const noexcept {
     return detail_ ? detail_->rays() : places_;
   }
-  [[nodiscard]] Node& node(std::size_t index) noexcept { return nodes_[storage(index)]; }
+  [[nodiscard]] SurfaceNode& node(std::size_t index) noexcept { return nodes_[storage(index)]; }
+  [[nodiscard]] const SurfaceNode& node(std::size_t index) const noexcept {
+    return nodes_[storage(index)];
+  }
+  [[nodiscard]] SurfaceStep step() const noexcept {
+    return {model_->samples, heat_, rays(), offsets_, faces_};
+  }
+  [[nodiscard]] LocalSteps::Inputs local_inputs(const Inputs& inputs, SurfaceHistory& history,
+                                                const SurfaceStep& step) noexcept {
+    return {inputs.environment, inputs.entities, history, step, workers_, rays().origin_world_m()};
+  }
+  [[nodiscard]] LocalSteps::Window window() noexcept {
+    return {node(0), node(1), node(2), done_, *interval_rays_, interval_};
+  }
 
   scene::SceneGeometry geometry_;
   std::vector<scene::Material> materials_;
@@ -166,17 +173,14 @@ class CachedSurface {
   MoverGlow glow_;
   std::vector<MoverFaces> faces_;  ///< by entity, at the node that an interval begins with
 
-  std::array<Node, 3> nodes_;
+  std::optional<LocalSteps> local_;
+
+  std::array<SurfaceNode, 3> nodes_;
   std::size_t ring_ = 0;
   std::uint32_t done_ = 0;  ///< samples of the newest node that are computed
   std::uint32_t turn_ = 0;
   std::int64_t interval_ns_ = 0;
   std::uint64_t revision_ = 0;  ///< of the weather
-  struct KnownEvents {
-    std::uint64_t revision = 0;
-    std::vector<std::int64_t> instants_ns;
-  };
-  std::vector<KnownEvents> known_events_;  ///< by entity
   float fraction_ = 0.0F;
 };
 

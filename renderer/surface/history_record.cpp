@@ -23,7 +23,7 @@ HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& hi
     record.intervals.push_back(heat_interval(history.intervals()[i]));
     IntervalRays& rays = record.rays.emplace_back(prototype);
     rays.update(interval.begin_ns, interval.end_ns, static_cast<std::uint32_t>(i), environment,
-                entities, origin_world_m);
+                EntityPoses(entities), origin_world_m);
     const std::int64_t middle_ns = interval.begin_ns + (interval.end_ns - interval.begin_ns) / 2;
     record.lag_s.push_back(static_cast<float>(static_cast<double>(now_ns - middle_ns) * 1e-9));
   }

@@ -19,6 +19,8 @@ namespace {
 constexpr double kGolden = 0.6180339887498949;
 /// Entities farther than this many of their radii hide too little sky to matter (1/400).
 constexpr float kNearRadii = 10.0F;
+/// From there on a ball hides 1/16 of the sky and less; on the ground it stands on, 1/64.
+constexpr float kSkyTouchRadii = 4.0F;
 constexpr std::size_t kSkyRays = 16;
 static_assert(kSkyRays == kPacketRays);
 /// Room for float32 far from the origin.
@@ -74,7 +76,7 @@ void IntervalRays::aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to
 }
 
 void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
-                          const Environment& environment, std::span<const PoseHistory> entities,
+                          const Environment& environment, const EntityPoses& poses,
                           const glm::dvec3& origin_world_m) noexcept {
   const std::size_t movers = mover_radius_m_.size();
   any_mover_on_ = false;
@@ -89,7 +91,7 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
     sun_up_ = sun_up_ || sun.elevation.value() > StepPlan::kMinSunElevationRad;
     aim(i, turn, sun.direction_enu);
     for (std::size_t m = 0; m < movers; ++m) {
-      const TrajectoryState state = entities[m].at(at_ns);
+      const TrajectoryState state = poses.at(m, at_ns);
       MoverPlacement& place = placements_[i * movers + m];
       place.rel_from_body = glm::mat3(glm::mat3_cast(state.pose.world_from_body));
       place.position_m = glm::vec3(state.pose.position_world_m - origin_world_m);
@@ -204,21 +206,38 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
   return spots;
 }
 
+IntervalRays::Carried IntervalRays::carried(const glm::vec3& at_body_m, std::int32_t mover,
+                                            std::size_t packet) const noexcept {
+  if (mover < 0) return {at_body_m, 0.0F};
+  const auto own = static_cast<std::size_t>(mover);
+  const MoverPlacement& place = placed(own, packet * kPacketRays);
+  return {place.rel_from_body * at_body_m + place.position_m, 2.0F * reach(own, packet).way_m};
+}
+
 bool IntervalRays::may_pass(const SurfaceSample& sample, const glm::vec3& start_m,
                             float apart_m) const noexcept {
   if (!any_mover_on_) return false;
   for (std::size_t packet = 1; packet < kSunRays / kPacketRays; ++packet) {
-    glm::vec3 from_m = start_m;
-    if (sample.mover >= 0) {
-      const auto own = static_cast<std::size_t>(sample.mover);
-      const MoverPlacement& place = placed(own, packet * kPacketRays);
-      from_m = place.rel_from_body * from_m + place.position_m;
-      apart_m += 2.0F * reach(own, packet).way_m;
-    }
+    const Carried from = carried(start_m, sample.mover, packet);
     for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
       if (static_cast<std::int64_t>(m) == sample.mover || !reach(m, packet).changes) continue;
-      if (comes_near(from_m, apart_m, m, packet)) return true;
+      if (comes_near(from.at_m, apart_m + from.way_m, m, packet)) return true;
     }
+  }
+  return false;
+}
+
+bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float radius_m,
+                           std::int32_t own) const noexcept {
+  for (std::size_t packet = 0; packet < kSunRays / kPacketRays; ++packet) {
+    const Reach& ball = reach(mover, packet);
+    if (ball.radius_m < 0.0F) continue;
+    const Carried from = carried(centre_m, own, packet);
+    const float apart_m = radius_m + from.way_m;
+    if (sun_up_ && comes_near(from.at_m, apart_m, mover, packet)) return true;
+    const float sky_m = kSkyTouchRadii * mover_radius_m_[mover] + ball.way_m + apart_m;
+    const glm::vec3 aside_m = ball.centre_m - from.at_m;
+    if (glm::dot(aside_m, aside_m) <= sky_m * sky_m) return true;
   }
   return false;
 }

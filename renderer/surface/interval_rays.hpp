@@ -40,9 +40,9 @@ class IntervalRays {
         reaches_(mover_radius_m_.size() * kSunRays / kPacketRays) {}
 
   /// Directions and places for [begin_ns, end_ns]; `turn` varies the pattern between intervals.
-  /// `entities` in the order of the radii. RT-safe.
+  /// `poses` in the order of the radii. RT-safe.
   void update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
-              const Environment& environment, std::span<const PoseHistory> entities,
+              const Environment& environment, const EntityPoses& poses,
               const glm::dvec3& origin_world_m) noexcept;
 
   /// The sun stands still in the direction of the unit vector `to_sun`, and no entity is there.
@@ -69,6 +69,11 @@ class IntervalRays {
   /// thread; RT-safe.
   [[nodiscard]] HiddenSky hidden_sky(const CasterRays& rays, const SurfaceSample& sample,
                                      float start_offset_m) const noexcept;
+
+  /// True where an entity may shade a sample in the ball around `centre_m`, or hide more than 1/16
+  /// of its sky. `own`: the entity in whose frame the ball is, or -1. RT-safe.
+  [[nodiscard]] bool touches(std::size_t mover, const glm::vec3& centre_m, float radius_m,
+                             std::int32_t own) const noexcept;
 
   [[nodiscard]] bool sun_up() const noexcept { return sun_up_; }
   /// Unit vector to the sun, of the first ray.
@@ -97,6 +102,15 @@ class IntervalRays {
   /// first packet.
   [[nodiscard]] bool may_pass(const SurfaceSample& sample, const glm::vec3& start_m,
                               float apart_m) const noexcept;
+
+  /// A place in an entity's frame while a packet is sent: the first instant's, and how far it may
+  /// lie from that at others.
+  struct Carried {
+    glm::vec3 at_m{0.0F};
+    float way_m = 0.0F;
+  };
+  [[nodiscard]] Carried carried(const glm::vec3& at_body_m, std::int32_t mover,
+                                std::size_t packet) const noexcept;
 
   /// Sends ray `first` + k from start k; `first` begins a packet.
   [[nodiscard]] Spots send(const CasterRays& rays, const SurfaceSample& face,

@@ -84,4 +84,9 @@ struct SurfaceSamples {
   std::vector<SeenSample> seen;
 };
 
+/// False for the side of a sheet that is carried on with its other one.
+[[nodiscard]] inline bool steps_itself(const SurfaceSamples& all, std::uint32_t index) noexcept {
+  return all.samples[index].other_side >= index;
+}
+
 }  // namespace emit::renderer

@@ -47,6 +47,11 @@ inline scene::ScenarioDesc cached_scenario(const std::filesystem::path& gltf) {
   return s;
 }
 
+/// Unit vector to the sun at a sim time.
+inline glm::dvec3 to_sun(const scene::ScenarioDesc& scenario, double seconds) {
+  return renderer::Environment(scenario).sun_at(std::llround(seconds * 1e9)).direction_enu;
+}
+
 /// One renderer at a time: each has its own context, current in this thread.
 class Session {
  public:

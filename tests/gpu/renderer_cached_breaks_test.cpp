@@ -21,10 +21,6 @@
 namespace emit::test {
 namespace {
 
-glm::dvec3 to_sun(const scene::ScenarioDesc& scenario, double seconds) {
-  return renderer::Environment(scenario).sun_at(std::llround(seconds * 1e9)).direction_enu;
-}
-
 TEST(RendererCachedBreaks, InstancesOfOneMeshHaveTheirOwnTemperatures) {
   // Two plates, one in the shade of a wall; a few pixels wide, where they share a mesh, and wider.
   const auto plate = write_quads("plate", {ground(1.0, 1.0)});

@@ -46,7 +46,7 @@ class IntervalRaysTest : public ::testing::Test {
     return sample;
   }
   void update(std::int64_t begin_ns, std::int64_t end_ns) {
-    interval_.update(begin_ns, end_ns, 3, environment_, {}, rays_->origin_world_m());
+    interval_.update(begin_ns, end_ns, 3, environment_, EntityPoses({}), rays_->origin_world_m());
   }
   /// Visible share of a uniform disc behind the edge.
   [[nodiscard]] double expected_frac(double x_m, std::int64_t now_ns) const {
@@ -90,7 +90,7 @@ TEST_F(IntervalRaysTest, AShadowIsNoShorterThanItsCaster) {
                    glm::dmat4(1.0));
   const auto rays = CasterRays::create(scene.geometry);
   ASSERT_TRUE(rays.has_value());
-  interval_.update(kNoonNs, kNoonNs, 3, environment_, {}, rays->origin_world_m());
+  interval_.update(kNoonNs, kNoonNs, 3, environment_, EntityPoses({}), rays->origin_world_m());
   const glm::dvec3 sun = environment_.sun_at(kNoonNs).direction_enu;
   const double middle_m = -kLowM * sun.x / sun.z;
   ASSERT_GT(std::abs(middle_m), 0.3 * kLowM);
@@ -174,7 +174,8 @@ TEST_F(IntervalRaysTest, ABodyThatPassesHidesTheSunForTheTimeItTakes) {
     // Wherever its way lies in the interval, as long as it passes wholly.
     const double aside_m = 0.5 * (kIntervalS * speed_m_s - 2.0 * kHalfLengthM) - 0.2;
     for (std::uint32_t turn = 0; turn < 4; ++turn) {
-      interval.update(kNoonNs, end_ns, turn, environment_, entities, rays->origin_world_m());
+      interval.update(kNoonNs, end_ns, turn, environment_, EntityPoses(entities),
+                      rays->origin_world_m());
       for (int k = -5; k <= 5; ++k) {
         SurfaceSample sample;
         sample.position_m =
@@ -216,8 +217,8 @@ TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
   IntervalRays wide(std::vector<float>{1e6F, 1e6F});
   int partly = 0;
   for (const std::int64_t begin_ns : {kNoonNs, kNoonNs + 20'000'000'000}) {
-    tight.update(begin_ns, end_ns, 3, environment_, entities, rays->origin_world_m());
-    wide.update(begin_ns, end_ns, 3, environment_, entities, rays->origin_world_m());
+    tight.update(begin_ns, end_ns, 3, environment_, EntityPoses(entities), rays->origin_world_m());
+    wide.update(begin_ns, end_ns, 3, environment_, EntityPoses(entities), rays->origin_world_m());
     for (int y = -40; y <= 160; y += 2) {
       for (int x = -60; x <= 60; x += 2) {
         SurfaceSample sample;
@@ -232,7 +233,7 @@ TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
   EXPECT_GT(partly, 100);
   // Sky, too: it is looked for wherever the entity passes, here within five metres of it.
   IntervalRays near(std::vector<float>{0.5F, 0.5F});
-  near.update(kNoonNs, end_ns, 3, environment_, entities, rays->origin_world_m());
+  near.update(kNoonNs, end_ns, 3, environment_, EntityPoses(entities), rays->origin_world_m());
   std::array<float, 3> hidden_on_third{};
   for (int k = 0; k < 60; ++k) {
     SurfaceSample sample;
