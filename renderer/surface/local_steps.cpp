@@ -124,7 +124,7 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
   bring(blocks, at_ns, window, inputs);
   // Right before an interval ends nothing is gained by going back to it.
   const bool may_leave = window.after.at_ns - at_ns > turn_ns_;
-  const auto leaving = std::ranges::stable_partition(
+  const auto leaving = std::ranges::partition(
       blocks, [&](std::uint32_t b) { return !may_leave || touched_ns_[b] >= window.before.at_ns; });
   const std::size_t stay = blocks.size() - leaving.size();
   show(std::span(blocks).first(stay), at_ns, window, inputs);

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <glm/ext/matrix_transform.hpp>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -63,38 +64,93 @@ class SteadyState : public ::testing::TestWithParam<scene::ThermalModel> {
     entities_.emplace_back(vehicle, from);
   }
 
+  void warm_up() {
+    auto networks = build_foster_materials(scenario_, scene_.geometry.materials);
+    ASSERT_TRUE(networks.has_value());
+    auto surface = CachedSurface::create(
+        scenario_, scene_.geometry, {-1, -1, 0},
+        std::span(*networks).first(networks->empty() ? 0 : networks->size() - 1), kReferenceK);
+    ASSERT_TRUE(surface.has_value()) << surface.error().text;
+    surface_ = std::move(*surface);
+    environment_.emplace(scenario_);
+    history_.emplace(scenario_.thermal.steps,
+                     make_foster(scenario_, std::move(*networks), *environment_, kReferenceK));
+    StepPlan plan(scenario_.thermal);
+    const RefineView view{{{{0.0, -12.0, 8.0}, {}}}, 2e-2};
+    ASSERT_TRUE(surface_->prepare(kStartNs, view, inputs(), plan, *history_, std::nullopt, {}));
+  }
+  [[nodiscard]] CachedSurface::Inputs inputs() const { return {*environment_, entities_}; }
+
   scene::ScenarioDesc scenario_;
   test::SurfaceScene scene_;
   std::vector<PoseHistory> entities_;
+  std::optional<Environment> environment_;
+  std::optional<SurfaceHistory> history_;
+  std::unique_ptr<CachedSurface> surface_;
 };
 
 TEST_P(SteadyState, IntervalsOfSamplesNeedNoHeap) {
-  const Environment environment(scenario_);
-  auto networks = build_foster_materials(scenario_, scene_.geometry.materials);
-  ASSERT_TRUE(networks.has_value());
-  auto surface = CachedSurface::create(
-      scenario_, scene_.geometry, {-1, -1, 0},
-      std::span(*networks).first(networks->empty() ? 0 : networks->size() - 1), kReferenceK);
-  ASSERT_TRUE(surface.has_value()) << surface.error().text;
-  SurfaceHistory history(scenario_.thermal.steps,
-                         make_foster(scenario_, std::move(*networks), environment, kReferenceK));
-  StepPlan plan(scenario_.thermal);
-  const CachedSurface::Inputs inputs{environment, entities_};
-  const RefineView view{{{{0.0, -12.0, 8.0}, {}}}, 2e-2};
-  ASSERT_TRUE((*surface)->prepare(kStartNs, view, inputs, plan, history, std::nullopt, {}));
-  ASSERT_GT((*surface)->model().samples.samples.size(), 500U);
+  ASSERT_NO_FATAL_FAILURE(warm_up());
+  ASSERT_GT(surface_->model().samples.samples.size(), 500U);
 
   const auto interval_ns =
       static_cast<std::int64_t>(scenario_.thermal.first_step_s * static_cast<double>(kSecondNs));
   constexpr std::int64_t kIntervals = 12;
   constexpr std::int64_t kFrames = 7;  // of an interval
-  const float before_k = (*surface)->vertices(0)[0].offset_k;
+  const float before_k = surface_->vertices(0)[0].offset_k;
   const std::uint64_t before = emit::test::heap_request_count();
   for (std::int64_t i = 1; i <= kIntervals * kFrames; ++i) {
-    (*surface)->advance(kStartNs + i * interval_ns / kFrames, inputs, history);
+    surface_->advance(kStartNs + i * interval_ns / kFrames, inputs(), *history_);
   }
   EXPECT_EQ(emit::test::heap_request_count() - before, 0U);
-  EXPECT_NE((*surface)->vertices(0)[0].offset_k, before_k);
+  EXPECT_NE(surface_->vertices(0)[0].offset_k, before_k);
+}
+
+TEST_P(SteadyState, NeitherDoesWhatTheHostTells) {
+  ASSERT_NO_FATAL_FAILURE(warm_up());
+
+  scene::WeatherSample dull;
+  dull.air_k = 285.0;
+  dull.longwave_down_w_m2 = 350.0;
+  physics::Pose pose = entities_[0].at(kStartNs).pose;
+  std::int64_t now_ns = kStartNs;
+  std::size_t most_blocks = 0;
+  const auto run = [&](int frames) {
+    for (int i = 0; i < frames; ++i) {
+      now_ns += kSecondNs / 4;
+      surface_->advance(now_ns, inputs(), *history_);
+      most_blocks = std::max(most_blocks, surface_->local_blocks());
+    }
+  };
+  const auto drive = [&](int frames, bool on, double m_per_frame) {
+    for (int i = 0; i < frames; ++i) {
+      pose.position_world_m.x += m_per_frame;
+      EXPECT_TRUE(entities_[0].append(now_ns + kSecondNs / 4, pose, on, false));
+      run(1);
+    }
+  };
+  const std::uint64_t before = emit::test::heap_request_count();
+  drive(200, true, 0.1);
+  dull.sim_time_ns = now_ns - 3 * kSecondNs;  // while blocks are on their own
+  EXPECT_TRUE(environment_->append(dull));
+  drive(90, true, -0.1);
+  drive(10, false, 0.0);
+  drive(10, true, 0.0);
+  EXPECT_GT(most_blocks, 0U);
+  run(300);
+  dull.sim_time_ns = now_ns - 3 * kSecondNs;
+  dull.air_k = 300.0;
+  EXPECT_TRUE(environment_->append(dull));
+  run(100);
+  EXPECT_EQ(emit::test::heap_request_count() - before, 0U);
+  // It stands where it was told to: all follow the intervals again.
+  EXPECT_EQ(surface_->local_blocks(), 0U);
+  for (std::size_t node = 0; node < 2; ++node) {
+    for (const SampleVertex& vertex : surface_->vertices(node)) {
+      ASSERT_GT(vertex.offset_k, -40.0F);
+      ASSERT_LT(vertex.offset_k, 60.0F);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(BothModels, SteadyState,
