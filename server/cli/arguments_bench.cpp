@@ -259,6 +259,31 @@ void Tool::add_frame_time_benches(CLI::App& bench) {
     add_json(app, o.json);
   }
   {
+    auto [app, o] = add<BenchLiveCommand>(
+        bench, "live",
+        "The scenario's entities driven by its script and by a host that tells the same poses: "
+        "frame times in turn, and temperatures beside those of the script in shorter intervals",
+        "emit bench live --seconds 60 --json live.json", run_bench_live);
+    app.add_option("--scene", o.scene, "Scenario whose entities move")->capture_default_str();
+    add_set(app, o.set);
+    app.add_option("--seconds", o.seconds, "Sim time, s")
+        ->check(CLI::Range(1.0, 86'400.0))
+        ->capture_default_str();
+    app.add_option("--rate", o.rate_hz, "Frames and host poses per second of sim time")
+        ->check(CLI::Range(0.1, 1000.0))
+        ->capture_default_str();
+    app.add_option("--every", o.every_s, "Sim time between pictures that are compared, s")
+        ->check(CLI::Range(0.001, 3600.0))
+        ->capture_default_str();
+    app.add_option("--finest", o.finest_s, "thermal.first_step_s of the reference, s")
+        ->check(CLI::Range(0.01, 3600.0))
+        ->capture_default_str();
+    app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
+    app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
+    add_gpu(app, o.gpu_index);
+    add_json(app, o.json);
+  }
+  {
     auto [app, o] = add<BenchBudgetCommand>(
         bench, "budget",
         "The scenario's flight within less time per frame than full quality takes: frames that "

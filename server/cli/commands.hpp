@@ -336,6 +336,20 @@ struct BenchTurnCommand {
 };
 int run_bench_turn(const BenchTurnCommand& command);
 
+struct BenchLiveCommand {
+  std::optional<std::filesystem::path> json;
+  std::string scene = "airfield";
+  std::vector<std::string> set;
+  double seconds = 60.0;  ///< of sim time
+  double rate_hz = 50.0;  ///< of frames and host poses, in sim time
+  double every_s = 2.0;   ///< between the pictures that are compared
+  double finest_s = 1.0;  ///< thermal.first_step_s of the reference
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  int gpu_index = -1;
+};
+int run_bench_live(const BenchLiveCommand& command);
+
 struct BenchBudgetCommand {
   std::optional<std::filesystem::path> json;
   std::string scene = "airfield";

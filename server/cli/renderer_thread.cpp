@@ -48,13 +48,15 @@ void RendererThread::call(const std::function<void()>& job) {
 
 Result<std::unique_ptr<RendererThread>> RendererThread::create(const scene::ScenarioDesc& scenario,
                                                                int gpu_index,
-                                                               renderer::Ladder ladder) {
+                                                               renderer::Ladder ladder,
+                                                               bool temperature) {
   std::unique_ptr<RendererThread> thread(new RendererThread());
   Result<void> made;
   thread->call([&] {
     renderer::OutputOptions output;
     output.slots = 2;
     output.ladder = ladder;
+    output.temperature = temperature;
     auto created = renderer::Renderer::create(scenario, {gpu_index, false}, output);
     if (created) {
       thread->renderer_ = std::move(*created);
@@ -77,7 +79,8 @@ Result<double> RendererThread::warm_up(const renderer::FrameRequest& first) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-Result<TimedFrame> RendererThread::timed(const std::function<int(Clock::time_point)>& submit) {
+Result<TimedFrame> RendererThread::timed(const std::function<int(Clock::time_point)>& submit,
+                                         std::vector<float>* temperature_k) {
   if (InterruptGuard::interrupted()) return make_error(ErrorCode::io, "interrupted");
   TimedFrame out;
   int slot = -1;
@@ -92,6 +95,9 @@ Result<TimedFrame> RendererThread::timed(const std::function<int(Clock::time_poi
     out.coarse = view.stats.coarse;
     out.rung = view.rung;
     failed = view.device_failed;
+    if (temperature_k != nullptr) {
+      temperature_k->assign(view.temperature_k.begin(), view.temperature_k.end());
+    }
     renderer_->release(index);
   });
   if (slot < 0) return make_error(ErrorCode::internal, "the renderer has no free slot");
@@ -99,8 +105,14 @@ Result<TimedFrame> RendererThread::timed(const std::function<int(Clock::time_poi
   return out;
 }
 
-Result<TimedFrame> RendererThread::render(const renderer::FrameRequest& request) {
-  return timed([&](Clock::time_point) { return renderer_->submit(request); });
+Result<TimedFrame> RendererThread::render(const renderer::FrameRequest& request,
+                                          std::vector<float>* temperature_k) {
+  return timed([&](Clock::time_point) { return renderer_->submit(request); }, temperature_k);
+}
+
+void RendererThread::apply_entities(std::int64_t sim_time_ns,
+                                    std::span<const renderer::EntityUpdate> updates) {
+  call([&] { renderer_->apply_entities(sim_time_ns, updates); });
 }
 
 Result<TimedFrame> RendererThread::render_within(renderer::FrameRequest request, double budget_ms) {

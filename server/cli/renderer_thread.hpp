@@ -6,7 +6,9 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <thread>
+#include <vector>
 
 #include "emit/physics/error.hpp"
 #include "emit/renderer/renderer.hpp"
@@ -27,21 +29,26 @@ struct TimedFrame {
 /// at a time when one thread calls. Setup class; the frames themselves are those of Renderer.
 class RendererThread {
  public:
-  /// Errors: those of Renderer::create().
+  /// `temperature`: frames carry that plane. Errors: those of Renderer::create().
   [[nodiscard]] static physics::Result<std::unique_ptr<RendererThread>> create(
       const scene::ScenarioDesc& scenario, int gpu_index,
-      renderer::Ladder ladder = renderer::Ladder::none);
+      renderer::Ladder ladder = renderer::Ladder::none, bool temperature = false);
   ~RendererThread();
   RendererThread(const RendererThread&) = delete;
   RendererThread& operator=(const RendererThread&) = delete;
 
   /// Renderer::warm_up(); returns the seconds it took. Stops with an error (io) on an interrupt.
   [[nodiscard]] physics::Result<double> warm_up(const renderer::FrameRequest& first);
-  /// Errors: io (interrupted), gpu (the device failed), internal.
-  [[nodiscard]] physics::Result<TimedFrame> render(const renderer::FrameRequest& request);
+  /// `temperature_k`: not null: gets that plane, which is not timed. Errors: io (interrupted), gpu
+  /// (the device failed), internal.
+  [[nodiscard]] physics::Result<TimedFrame> render(const renderer::FrameRequest& request,
+                                                   std::vector<float>* temperature_k = nullptr);
   /// As the daemon does with a deadline: the rung by server::QualityPolicy, its time included.
   [[nodiscard]] physics::Result<TimedFrame> render_within(renderer::FrameRequest request,
                                                           double budget_ms);
+
+  /// Renderer::apply_entities().
+  void apply_entities(std::int64_t sim_time_ns, std::span<const renderer::EntityUpdate> updates);
 
   [[nodiscard]] physics::Pose scenario_pose_at(std::int64_t sim_time_ns) const noexcept {
     return renderer_->scenario_sensor_pose_at(sim_time_ns);
@@ -56,7 +63,8 @@ class RendererThread {
   /// Runs `job` on the thread and waits for its end.
   void call(const std::function<void()>& job);
   [[nodiscard]] physics::Result<TimedFrame> timed(
-      const std::function<int(std::chrono::steady_clock::time_point start)>& submit);
+      const std::function<int(std::chrono::steady_clock::time_point start)>& submit,
+      std::vector<float>* temperature_k = nullptr);
   void loop();
 
   std::mutex mutex_;
