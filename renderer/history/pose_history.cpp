@@ -17,13 +17,8 @@ constexpr double kMovingMPerS = 0.05;
 constexpr double kSpotM = 0.02;
 constexpr std::int64_t kRestNs = 500'000'000;
 
-double angle_between_rad(const glm::dquat& a, const glm::dquat& b) noexcept {
-  return 2.0 * std::acos(std::min(1.0, std::abs(glm::dot(a, b))));
-}
-
 bool close(const physics::Pose& a, const physics::Pose& b) noexcept {
-  return glm::distance(a.position_world_m, b.position_world_m) < kThinPositionM &&
-         angle_between_rad(a.world_from_body, b.world_from_body) < kThinAngleRad;
+  return physics::close(a, b, kThinPositionM, kThinAngleRad);
 }
 
 double fraction(std::int64_t begin_ns, std::int64_t end_ns, std::int64_t at_ns) noexcept {

@@ -313,7 +313,7 @@ void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
 
 void CachedSurface::change_weather(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
                                    SurfaceHistory& history) noexcept {
-  const std::int64_t cut_ns = local_->active() > 0 ? now_ns : event_ns;
+  const std::int64_t cut_ns = local_->any_own_clock() ? now_ns : event_ns;
   // What came before is as it was. In a hold the clock stands, and news are of times to come.
   if (cut_ns >= node(0).at_ns + kSameNs && cut_ns <= now_ns) {
     const SurfaceStep step = this->step();

@@ -19,8 +19,8 @@ namespace {
 constexpr double kGolden = 0.6180339887498949;
 /// Entities farther than this many of their radii hide too little sky to matter (1/400).
 constexpr float kNearRadii = 10.0F;
-/// From there on a ball hides 1/16 of the sky and less; on the ground it stands on, 1/64.
-constexpr float kSkyTouchRadii = 4.0F;
+/// Share of the sky that may be hidden without being counted as touched.
+constexpr float kMostHiddenFrac = 1.0F / 16.0F;
 constexpr std::size_t kSkyRays = 16;
 static_assert(kSkyRays == kPacketRays);
 /// Room for float32 far from the origin.
@@ -216,7 +216,7 @@ IntervalRays::Carried IntervalRays::carried(const glm::vec3& at_body_m, std::int
 
 bool IntervalRays::may_pass(const SurfaceSample& sample, const glm::vec3& start_m,
                             float apart_m) const noexcept {
-  if (!any_mover_on_) return false;
+  if (short_ || !any_mover_on_) return false;
   for (std::size_t packet = 1; packet < kSunRays / kPacketRays; ++packet) {
     const Carried from = carried(start_m, sample.mover, packet);
     for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
@@ -227,17 +227,20 @@ bool IntervalRays::may_pass(const SurfaceSample& sample, const glm::vec3& start_
   return false;
 }
 
-bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float radius_m,
+bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float around_m,
                            std::int32_t own) const noexcept {
   for (std::size_t packet = 0; packet < kSunRays / kPacketRays; ++packet) {
     const Reach& ball = reach(mover, packet);
     if (ball.radius_m < 0.0F) continue;
     const Carried from = carried(centre_m, own, packet);
-    const float apart_m = radius_m + from.way_m;
+    const float apart_m = around_m + from.way_m;
     if (sun_up_ && comes_near(from.at_m, apart_m, mover, packet)) return true;
-    const float sky_m = kSkyTouchRadii * mover_radius_m_[mover] + ball.way_m + apart_m;
+    // Of the sky that level ground sees a ball hides (radius / distance)^2 * height / distance.
     const glm::vec3 aside_m = ball.centre_m - from.at_m;
-    if (glm::dot(aside_m, aside_m) <= sky_m * sky_m) return true;
+    const float away_m = std::max(glm::length(aside_m) - ball.way_m - apart_m, 0.0F);
+    const float radius_m = mover_radius_m_[mover];
+    const float height_m = std::abs(aside_m.z) + ball.way_m + apart_m + 0.5F * radius_m;
+    if (kMostHiddenFrac * away_m * away_m * away_m <= radius_m * radius_m * height_m) return true;
   }
   return false;
 }

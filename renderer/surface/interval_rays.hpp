@@ -45,6 +45,10 @@ class IntervalRays {
               const Environment& environment, const EntityPoses& poses,
               const glm::dvec3& origin_world_m) noexcept;
 
+  /// For intervals of about a second: an entity that none of a packet's rays meet passes too fast
+  /// to matter, and is not sought with the others.
+  void take_short() noexcept { short_ = true; }
+
   /// The sun stands still in the direction of the unit vector `to_sun`, and no entity is there.
   void hold(const glm::dvec3& to_sun) noexcept;
 
@@ -70,9 +74,9 @@ class IntervalRays {
   [[nodiscard]] HiddenSky hidden_sky(const CasterRays& rays, const SurfaceSample& sample,
                                      float start_offset_m) const noexcept;
 
-  /// True where an entity may shade a sample in the ball around `centre_m`, or hide more than 1/16
-  /// of its sky. `own`: the entity in whose frame the ball is, or -1. RT-safe.
-  [[nodiscard]] bool touches(std::size_t mover, const glm::vec3& centre_m, float radius_m,
+  /// True where an entity may shade a sample within `around_m` of `centre_m`, or hide more than
+  /// 1/16 of its sky. `own`: the entity in whose frame that is, or -1. RT-safe.
+  [[nodiscard]] bool touches(std::size_t mover, const glm::vec3& centre_m, float around_m,
                              std::int32_t own) const noexcept;
 
   [[nodiscard]] bool sun_up() const noexcept { return sun_up_; }
@@ -137,6 +141,7 @@ class IntervalRays {
   std::array<float, kSunRays / kPacketRays> spread_sine_{};  ///< from a packet's first direction
   std::array<glm::vec2, kSunRays> spread_{};                 ///< unit normal deviates
   std::size_t middle_ray_ = 0;
+  bool short_ = false;
   bool any_mover_on_ = false;
   bool sun_up_ = false;
 };

@@ -13,6 +13,9 @@ constexpr std::size_t kGrain = 32;
 constexpr std::int64_t kStepsPerInterval = 16;
 constexpr std::int64_t kLeastStepNs = 250'000'000;
 constexpr std::int64_t kMostStepNs = 1'250'000'000;
+/// Closer than that to where it was foreseen, an entity's shade is as it was taken to be.
+constexpr double kForeseenM = 0.05;
+constexpr double kForeseenRad = 5e-3;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
 double way_of(std::int64_t at_ns, const SurfaceNode& before, const SurfaceNode& after) noexcept {
@@ -52,8 +55,12 @@ LocalSteps::LocalSteps(const SurfaceSamples& all, const Setup& setup, const Inte
       state_(blocks_.blocks().size(), State::of_interval),
       at_ns_(blocks_.blocks().size(), kNever),
       touched_ns_(blocks_.blocks().size(), kNever),
+      foreseen_ns_(blocks_.blocks().size(), kNever),
+      known_found_(setup.entities, 0),
       own_clock_(all.samples.size(), 0) {
+  rays_.take_short();
   for (auto& known : known_) known.resize(setup.entities);
+  for (auto& entities : foreseen_) entities.resize(setup.entities);
   for (auto& turn : turns_) turn.reserve(state_.size() / kTurns + 1);
   chosen_.reserve(state_.size() / kTurns + 1);
   batch_.reserve(kBatch);
@@ -67,8 +74,12 @@ void LocalSteps::send_rays(std::size_t interval, std::span<const PoseHistory> en
 void LocalSteps::restart(std::int64_t now_ns) noexcept {
   for (auto& turn : turns_) turn.clear();
   std::ranges::fill(state_, State::of_interval);
+  std::ranges::fill(at_ns_, kNever);
   std::ranges::fill(touched_ns_, kNever);
+  std::ranges::fill(foreseen_ns_, kNever);
   std::ranges::fill(own_clock_, std::uint8_t{0});
+  any_own_clock_ = false;
+  std::ranges::fill(known_found_, std::uint8_t{0});
   next_turn_ = std::max<std::int64_t>(0, now_ns - start_ns_) / turn_ns_ + 1;
 }
 
@@ -89,31 +100,42 @@ void LocalSteps::run(std::int64_t until_ns, const Window& window, const Inputs& 
 
 void LocalSteps::look_around(std::int64_t at_ns, const Window& window,
                              const Inputs& inputs) noexcept {
-  bool any = false;
-  for (std::size_t m = 0; m < inputs.entities.size() && !any; ++m) {
-    any = inputs.entities[m].departs(known_[0][m], at_ns);
-  }
-  if (!any) return;
-  // A step ahead, so that blocks are on their own before what comes is there.
-  rays_.update(at_ns - turn_ns_, at_ns + step_ns_, 0, inputs.environment,
-               EntityPoses::ahead(inputs.entities), inputs.origin_world_m);
-  known_rays_.update(at_ns - turn_ns_, at_ns + step_ns_, 0, inputs.environment,
-                     EntityPoses::as_known(inputs.entities, known_[0]), inputs.origin_world_m);
+  const auto departs = [&](std::size_t m) {
+    return inputs.entities[m].departs(known_[0][m], at_ns);
+  };
+  bool ready = false;
   for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
-    if (!inputs.entities[m].departs(known_[0][m], at_ns)) continue;
-    for (std::uint32_t b = 0; b < state_.size(); ++b) {
-      if (touched_ns_[b] >= window.before.at_ns) continue;  // in this interval, already
-      const SampleBlocks::Block& block = blocks_.blocks()[b];
-      if (block.mover != static_cast<std::int32_t>(m) &&
-          !rays_.touches(m, block.centre_m, block.radius_m, block.mover) &&
-          !known_rays_.touches(m, block.centre_m, block.radius_m, block.mover)) {
-        continue;
-      }
-      touched_ns_[b] = at_ns;
-      if (state_[b] != State::of_interval) continue;
-      state_[b] = State::wanted;
-      turns_[b % kTurns].push_back(b);
+    if (!departs(m)) continue;
+    if (!std::exchange(ready, true)) {
+      // A step ahead, so that blocks are on their own before what comes is there.
+      rays_.update(at_ns - turn_ns_, at_ns + step_ns_, 0, inputs.environment,
+                   EntityPoses::ahead(inputs.entities), inputs.origin_world_m);
     }
+    want(m, rays_, at_ns);
+  }
+  ready = false;
+  for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+    if (known_found_[m] != 0 || !departs(m)) continue;
+    known_found_[m] = 1;
+    if (!std::exchange(ready, true)) {
+      known_rays_.update(at_ns - turn_ns_, window.after.at_ns, 0, inputs.environment,
+                         EntityPoses::as_known(inputs.entities, known_[0]), inputs.origin_world_m);
+    }
+    want(m, known_rays_, at_ns);
+  }
+}
+
+void LocalSteps::want(std::size_t entity, const IntervalRays& rays, std::int64_t at_ns) noexcept {
+  for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    const SampleBlocks::Block& block = blocks_.blocks()[b];
+    if (block.mover != static_cast<std::int32_t>(entity) &&
+        !rays.touches(entity, block.centre_m, block.radius_m, block.mover)) {
+      continue;
+    }
+    touched_ns_[b] = at_ns;
+    if (state_[b] != State::of_interval) continue;
+    state_[b] = State::wanted;
+    turns_[b % kTurns].push_back(b);
   }
 }
 
@@ -127,13 +149,18 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
   const auto leaving = std::ranges::partition(
       blocks, [&](std::uint32_t b) { return !may_leave || touched_ns_[b] >= window.before.at_ns; });
   const std::size_t stay = blocks.size() - leaving.size();
-  show(std::span(blocks).first(stay), at_ns, window, inputs);
+  show(std::span(blocks).first(stay), turn, at_ns, window, inputs);
   hand_back(std::span(blocks).subspan(stay), at_ns, window, inputs);
   blocks.resize(stay);
   inputs.history.restore_surroundings(window.next.surroundings);
 }
 
 void LocalSteps::settle(std::int64_t at_ns, const Window& window, const Inputs& inputs) noexcept {
+  for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    if (state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns) {
+      begin_alone(b, at_ns, window, inputs.step.all);
+    }
+  }
   for (const auto& turn : turns_) {
     if (!turn.empty()) bring(turn, at_ns, window, inputs);
   }
@@ -151,9 +178,13 @@ void LocalSteps::each_sample(std::uint32_t block, const SurfaceSamples& all,
 
 void LocalSteps::begin_alone(std::uint32_t block, std::int64_t at_ns, const Window& window,
                              const SurfaceSamples& all) noexcept {
+  // It may have come back to this interval: `before` holds it where it did.
+  const std::int64_t from_ns = std::max(at_ns_[block], window.before.at_ns);
   state_[block] = State::on_its_own;
-  at_ns_[block] = std::max(at_ns, window.before.at_ns);
-  const double frac = way_of(at_ns_[block], window.before, window.after);
+  any_own_clock_ = true;
+  at_ns_[block] = std::max(at_ns, from_ns);
+  const double frac = static_cast<double>(at_ns_[block] - from_ns) /
+                      static_cast<double>(window.after.at_ns - from_ns);
   each_sample(block, all, [&](std::uint32_t i) {
     own_clock_[i] = 1;
     window.before.states[i] = between(window.before.states[i], window.after.states[i], frac);
@@ -205,7 +236,17 @@ void LocalSteps::bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns
   for (const std::uint32_t b : blocks) {
     if (state_[b] == State::wanted) begin_alone(b, to_ns - step_ns_, window, inputs.step.all);
   }
-  // Nearly all of them stepped together before.
+  const bool as_foreseen =
+      came_true(static_cast<std::size_t>(blocks.front()) % kTurns, to_ns, inputs);
+  for (const std::uint32_t b : blocks) {
+    if (!as_foreseen || foreseen_ns_[b] != to_ns) continue;
+    each_sample(b, inputs.step.all, [&](std::uint32_t i) {
+      window.before.states[i] = window.after.states[i];
+      window.before.outputs[i] = window.after.outputs[i];
+    });
+    at_ns_[b] = to_ns;
+  }
+  // Nearly all of the others stepped together before.
   for (std::int64_t from_ns = kNever;;) {
     std::int64_t earliest_ns = to_ns;
     for (const std::uint32_t b : blocks) {
@@ -227,15 +268,34 @@ void LocalSteps::bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns
   }
 }
 
-void LocalSteps::show(std::span<const std::uint32_t> blocks, std::int64_t at_ns,
+void LocalSteps::show(std::span<const std::uint32_t> blocks, std::size_t turn, std::int64_t at_ns,
                       const Window& window, const Inputs& inputs) noexcept {
   if (blocks.empty()) return;
   const std::int64_t end_ns = at_ns + step_ns_;
   prepare(at_ns, end_ns, window, inputs);
   step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
-       [&](std::uint32_t i, const SampleState&, const SampleOutput& output) {
+       [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
          draw_line(i, at_ns, window.before.outputs[i].offset_k, end_ns, output, window);
+         window.after.states[i] = state;
+         window.after.outputs[i] = output;
        });
+  for (const std::uint32_t b : blocks) foreseen_ns_[b] = end_ns;
+  for (std::size_t m = 0; m < foreseen_[turn].size(); ++m) {
+    foreseen_[turn][m] = inputs.entities[m].ahead(end_ns);
+  }
+}
+
+bool LocalSteps::came_true(std::size_t turn, std::int64_t at_ns,
+                           const Inputs& inputs) const noexcept {
+  for (std::size_t m = 0; m < foreseen_[turn].size(); ++m) {
+    const TrajectoryState now = inputs.entities[m].at(at_ns);
+    const TrajectoryState& then = foreseen_[turn][m];
+    if (now.on != then.on ||
+        (now.on && !physics::close(now.pose, then.pose, kForeseenM, kForeseenRad))) {
+      return false;
+    }
+  }
+  return true;
 }
 
 void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t at_ns,
@@ -247,7 +307,6 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
          draw_line(i, at_ns, window.before.outputs[i].offset_k, window.after.at_ns, output, window);
          window.after.states[i] = state;
          window.after.outputs[i] = output;
-         own_clock_[i] = 0;
        });
   // What has been computed of the next interval began without that.
   step(blocks, window.done, window.after, window.next_rays, window.next_interval, inputs,
@@ -258,7 +317,10 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
          window.next.vertices[i] = {output.offset_k, output.sun_frac};
          window.next.changes.add(i, 1);
        });
-  for (const std::uint32_t b : blocks) state_[b] = State::of_interval;
+  for (const std::uint32_t b : blocks) {
+    state_[b] = State::of_interval;
+    foreseen_ns_[b] = kNever;
+  }
 }
 
 void LocalSteps::rotate(const Window& window, const SurfaceSamples& all) noexcept {
@@ -272,13 +334,21 @@ void LocalSteps::rotate(const Window& window, const SurfaceSamples& all) noexcep
 
 void LocalSteps::rotated(const Window& window, const SurfaceSamples& all) noexcept {
   std::swap(known_[0], known_[1]);
+  std::ranges::fill(known_found_, std::uint8_t{0});
   const SurfaceNode& old = window.next;  // the node before those two
   const auto ways =
       static_cast<float>(static_cast<double>(window.after.at_ns - window.before.at_ns) /
                          static_cast<double>(window.before.at_ns - old.at_ns));
+  for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    if (state_[b] != State::of_interval || at_ns_[b] < old.at_ns) continue;
+    each_sample(b, all, [&](std::uint32_t i) { own_clock_[i] = 0; });
+  }
+  any_own_clock_ = active() > 0;
   for (const auto& turn : turns_) {
     for (const std::uint32_t block : turn) {
       each_sample(block, all, [&](std::uint32_t i) {
+        window.after.states[i] = window.before.states[i];
+        window.after.outputs[i] = window.before.outputs[i];
         window.before.states[i] = old.states[i];
         window.before.outputs[i] = old.outputs[i];
         if (i >= window.before.vertices.size()) return;

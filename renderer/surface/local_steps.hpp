@@ -24,11 +24,13 @@ namespace emit::renderer {
 /// The rays of an interval are sent before it begins, with poses as they were known then. Where an
 /// entity departs from those, its own samples and those that it shades, or was to shade, leave the
 /// interval in blocks: every step of about a second they go on over what has passed, with the poses
-/// that came, and from there ahead over the next step for what frames show. They come back when
-/// their interval knew better. Blocks take turns, so that no frame carries all of them on.
+/// that came, and from there ahead over the next step for what frames show. Where poses came as was
+/// foreseen, that was the step. Blocks come back, over what is left of the interval, when no such
+/// entity is near any more. They take turns, so that no frame carries all of them on.
 ///
-/// While a block is on its own, node `before` holds its states at the end of its latest step, and
-/// the vertices of both nodes lie on the line that leads through that step.
+/// While a block is on its own, node `before` holds its states at the end of its latest step,
+/// `after` those foreseen at the end of the next, and the vertices of both nodes lie on the line
+/// that leads through the two.
 ///
 /// Owner: CachedSurface. Thread: the renderer's; computes on all cores. Real time: everything but
 /// the constructor is RT-safe.
@@ -79,10 +81,12 @@ class LocalSteps {
 
   /// Blocks on their own.
   [[nodiscard]] std::size_t active() const noexcept;
-  /// True for the samples of those.
+  /// True for the samples of those, and of blocks that were in this interval: `before` does not
+  /// hold them at its own instant.
   [[nodiscard]] bool has_own_clock(std::uint32_t sample) const noexcept {
     return own_clock_[sample] != 0;
   }
+  [[nodiscard]] bool any_own_clock() const noexcept { return any_own_clock_; }
 
  private:
   static constexpr std::size_t kTurns = 16;  ///< groups of blocks that step one after the other
@@ -90,17 +94,22 @@ class LocalSteps {
   static constexpr std::size_t kBatch = 4096;
   enum class State : std::uint8_t { of_interval, wanted, on_its_own };
 
-  /// Finds the blocks that the departure of an entity touches around `at_ns`.
+  /// Finds the blocks that the departure of an entity touches.
   void look_around(std::int64_t at_ns, const Window& window, const Inputs& inputs) noexcept;
   /// Carries a group on to `at_ns`, and shows where it goes or hands it back to its interval.
   void take_turn(std::size_t turn, std::int64_t at_ns, const Window& window,
                  const Inputs& inputs) noexcept;
   void begin_alone(std::uint32_t block, std::int64_t at_ns, const Window& window,
                    const SurfaceSamples& all) noexcept;
+  /// Wants the blocks that an entity touches in the time of `rays`, and those of its own.
+  void want(std::size_t entity, const IntervalRays& rays, std::int64_t at_ns) noexcept;
   void bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns, const Window& window,
              const Inputs& inputs) noexcept;
-  void show(std::span<const std::uint32_t> blocks, std::int64_t at_ns, const Window& window,
-            const Inputs& inputs) noexcept;
+  void show(std::span<const std::uint32_t> blocks, std::size_t turn, std::int64_t at_ns,
+            const Window& window, const Inputs& inputs) noexcept;
+  /// True where all entities are at `at_ns` where they were foreseen to be.
+  [[nodiscard]] bool came_true(std::size_t turn, std::int64_t at_ns,
+                               const Inputs& inputs) const noexcept;
   void hand_back(std::span<const std::uint32_t> blocks, std::int64_t at_ns, const Window& window,
                  const Inputs& inputs) noexcept;
   /// Forcing and rays of a step.
@@ -125,10 +134,15 @@ class LocalSteps {
   IntervalRays known_rays_;
   HeatInterval interval_;
 
-  std::vector<State> state_;              ///< by block
-  std::vector<std::int64_t> at_ns_;       ///< by block: end of its latest step
-  std::vector<std::int64_t> touched_ns_;  ///< by block: latest instant at which it was
-  std::vector<std::uint8_t> own_clock_;   ///< by sample
+  std::vector<State> state_;               ///< by block
+  std::vector<std::int64_t> at_ns_;        ///< by block: end of its latest step, while alone
+  std::vector<std::int64_t> touched_ns_;   ///< by block: latest instant at which it was
+  std::vector<std::int64_t> foreseen_ns_;  ///< by block: what `after` holds of it
+  /// By turn, then entity: where they were foreseen to be at the end of the turn's step.
+  std::array<std::vector<TrajectoryState>, kTurns> foreseen_;
+  std::vector<std::uint8_t> known_found_;  ///< by entity: in this interval
+  std::vector<std::uint8_t> own_clock_;    ///< by sample
+  bool any_own_clock_ = false;
   std::array<std::vector<std::uint32_t>, kTurns> turns_;  ///< blocks that are not of_interval
   std::vector<std::uint32_t> chosen_;
   std::vector<std::uint32_t> batch_;

@@ -68,4 +68,10 @@ Pose interpolate(const Pose& from, const Pose& to, double fraction) noexcept {
   return pose;
 }
 
+bool close(const Pose& a, const Pose& b, double distance_m, double angle_rad) noexcept {
+  if (!(glm::distance(a.position_world_m, b.position_world_m) < distance_m)) return false;
+  const double half_cos = std::min(1.0, std::abs(glm::dot(a.world_from_body, b.world_from_body)));
+  return 2.0 * std::acos(half_cos) < angle_rad;
+}
+
 }  // namespace emit::physics

@@ -38,4 +38,8 @@ struct Pose {
 /// Linear in position, spherical linear (shortest arc) in attitude; `fraction` is not clamped.
 [[nodiscard]] Pose interpolate(const Pose& from, const Pose& to, double fraction) noexcept;
 
+/// True when the poses lie less than that far apart, in position and in attitude.
+[[nodiscard]] bool close(const Pose& a, const Pose& b, double distance_m,
+                         double angle_rad) noexcept;
+
 }  // namespace emit::physics
