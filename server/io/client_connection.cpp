@@ -242,6 +242,20 @@ void ClientConnection::allow_frames(std::uint32_t max_frame_bytes) {
   parser_ = protocol::RecordParser(limits_);
 }
 
+namespace {
+
+/// How much to read at a time where a record lacks `missing` bytes; 0: none is begun. What follows
+/// a long record stays in the socket, so that frames come to lie where they stay.
+std::size_t piece_bytes(std::size_t missing) noexcept {
+  // Not more than the cache holds: the parser sums pixels behind every piece.
+  constexpr std::size_t kPieceBytes = 256u << 10;
+  // A rest this small comes with the piece before it.
+  constexpr std::size_t kCrumbBytes = 16u << 10;
+  return missing == 0 || missing > kPieceBytes + kCrumbBytes ? kPieceBytes : missing;
+}
+
+}  // namespace
+
 physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::int64_t end_ns) {
   for (;;) {
     const protocol::ParseStatus status = parser_.next(record);
@@ -254,11 +268,9 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
                         fmt::format("{}: stream broken: {} ({})", to_string(peer_),
                                     protocol::to_string(status), parser_.offending_value()));
     }
-    // Not more at a time than the cache holds: the parser sums pixels behind every piece.
-    constexpr std::size_t kPieceBytes = 256u << 10;
-    const std::span<std::byte> writable = parser_.writable();
-    const std::span<std::byte> space = writable.first(std::min(writable.size(), kPieceBytes));
-    const IoResult got = socket_.read_some(space);
+    const std::span<std::byte> space = parser_.writable();
+    const IoResult got = socket_.read_some(
+        space.first(std::min(space.size(), piece_bytes(parser_.missing_bytes()))));
     switch (got.status) {
       case IoStatus::done:
         parser_.commit(got.bytes);

@@ -118,21 +118,33 @@ int low_water_of(int fd) {
   return bytes;
 }
 
-TEST_F(TcpPair, AClientIsWokenByPiecesOfARecordAndByTheFirstByteOfTheNext) {
+/// The client's end, welcomed by what `server` writes.
+physics::Result<ClientConnection> greeted(TcpSocket& server, TcpSocket client,
+                                          const SocketAddress& peer) {
   std::vector<std::byte> welcome;
   v1::ControlRecord answer;
   answer.mutable_welcome()->set_protocol_version(protocol::kProtocolVersion);
   protocol::append_control_record(answer, welcome);
-  ASSERT_EQ(server_.write_some(std::span<const std::byte>(welcome)).bytes, welcome.size());
+  EXPECT_EQ(server.write_some(std::span<const std::byte>(welcome)).bytes, welcome.size());
+  return ClientConnection::greet(SocketContext(), std::move(client), peer, ClientRole::client,
+                                 monotonic_now_ns() + kLongNs);
+}
+
+/// A frame record with a body of zeros.
+std::vector<std::byte> frame_record(std::uint32_t body_bytes) {
+  std::vector<std::byte> out(protocol::kRecordHeaderBytes + body_bytes);
+  protocol::encode_record_header(protocol::RecordKind::frame, body_bytes,
+                                 std::span(out).first<protocol::kRecordHeaderBytes>());
+  return out;
+}
+
+TEST_F(TcpPair, AClientIsWokenByPiecesOfARecordAndByTheFirstByteOfTheNext) {
   const int fd = client_.fd();
-  auto connection = ClientConnection::greet(SocketContext(), std::move(client_), peer_,
-                                            ClientRole::client, monotonic_now_ns() + kLongNs);
+  auto connection = greeted(server_, std::move(client_), peer_);
   ASSERT_TRUE(connection.has_value()) << connection.error().text;
   constexpr std::uint32_t kBodyBytes = 400'000;
   connection->allow_frames(kBodyBytes);
-  std::vector<std::byte> stream(protocol::kRecordHeaderBytes + kBodyBytes);
-  protocol::encode_record_header(protocol::RecordKind::frame, kBodyBytes,
-                                 std::span(stream).first<protocol::kRecordHeaderBytes>());
+  const std::vector<std::byte> stream = frame_record(kBodyBytes);
   protocol::Record record;
   std::size_t given = 0;
   /// Gives up to `end` of the stream away; until the client waits for `low_water` bytes.
@@ -152,6 +164,36 @@ TEST_F(TcpPair, AClientIsWokenByPiecesOfARecordAndByTheFirstByteOfTheNext) {
   ASSERT_TRUE(connection->receive(record, monotonic_now_ns() + kLongNs).value());
   EXPECT_EQ(record.body.size(), kBodyBytes);
   EXPECT_EQ(low_water_of(fd), 1);
+}
+
+TEST_F(TcpPair, FramesComeToLieInOnePlaceHoweverManyWait) {
+  auto connection = greeted(server_, std::move(client_), peer_);
+  ASSERT_TRUE(connection.has_value()) << connection.error().text;
+  constexpr std::uint32_t kBodyBytes = 700'000;
+  constexpr int kFrames = 5;
+  connection->allow_frames(kBodyBytes);
+  std::vector<std::byte> stream;
+  for (int i = 0; i < kFrames; ++i) {
+    const std::vector<std::byte> record = frame_record(kBodyBytes);
+    stream.insert(stream.end(), record.begin(), record.end());
+  }
+  const std::byte* place = nullptr;
+  std::span<const std::byte> rest(stream);
+  for (int frames = 0; frames < kFrames;) {
+    // As much ahead of the client as the sockets hold.
+    while (!rest.empty()) {
+      const IoResult sent = server_.write_some(rest);
+      if (sent.status != IoStatus::done) break;
+      rest = rest.subspan(sent.bytes);
+    }
+    protocol::Record record;
+    const auto received = connection->receive(record, monotonic_now_ns());
+    ASSERT_TRUE(received.has_value()) << received.error().text;
+    if (!*received) continue;
+    ASSERT_EQ(record.body.size(), kBodyBytes);
+    if (frames++ == 0) place = record.body.data();
+    EXPECT_EQ(record.body.data(), place) << "nothing of it came with the frame before";
+  }
 }
 
 TEST_F(TcpPair, TheEndOfAStreamIsToldApartFromFailures) {
