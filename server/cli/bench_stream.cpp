@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -8,8 +9,10 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <system_error>
 #include <thread>
+#include <vector>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -40,9 +43,10 @@ struct Row {
   Samples own_us;  ///< paced: the daemon's share of it
   std::optional<double> gbit_s;
   std::optional<double> cpu_frac;
-  Json more = Json::object();  ///< beyond the common keys
-  bool lossy = false;          ///< lost frames were the question
-  bool wrong = false;          ///< lossy: something came that was not as it said
+  std::vector<std::string> ratios;  ///< to its yardsticks, to be read
+  Json more = Json::object();       ///< beyond the common keys
+  bool lossy = false;               ///< lost frames were the question
+  bool wrong = false;               ///< lossy: something came that was not as it said
 };
 
 class StreamBench {
@@ -254,24 +258,32 @@ Result<Row> StreamBench::bare_paced() {
 /// What is measured in turn, and beside what it is put.
 struct Contender {
   const char* name;
-  const char* yardstick;  ///< null: is one
+  /// The first is "the" yardstick; none: is one itself.
+  std::vector<const char*> yardsticks;
 };
-constexpr std::array<Contender, 9> kContenders{{{"bare-tcp", nullptr},
-                                                {"tcp", "bare-tcp"},
-                                                {"tls", "tcp"},
-                                                {"bare-udp", nullptr},
-                                                {"udp", "bare-udp"},
-                                                {"shm", "bare-tcp"},
-                                                {"zeromq", nullptr},
-                                                {"zeromq-crc", nullptr},
-                                                {"iperf3", nullptr}}};
+
+/// TCP and what it is put beside follow each other: the machine moves from second to second.
+const std::vector<Contender>& contenders() {
+  static const std::vector<Contender> all{
+      {"iperf3", {}},
+      {"bare-tcp", {}},
+      {"bare-tcp-crc", {}},
+      {"tcp", {"bare-tcp", "bare-tcp-crc", "iperf3", "zeromq", "zeromq-crc"}},
+      {"zeromq", {}},
+      {"zeromq-crc", {}},
+      {"tls", {"tcp"}},
+      {"bare-udp", {}},
+      {"udp", {"bare-udp"}},
+      {"shm", {"bare-tcp"}}};
+  return all;
+}
 
 /// All measurements of one contender.
 struct Series {
   Samples gbit_s;
   Samples cpu_frac;
   Samples cpu_s_per_gbit;  ///< holds still where other work on the machine takes its share
-  Samples ratio;           ///< to the yardstick of the same round
+  std::map<std::string, Samples> ratios;  ///< to the yardsticks of the same round
   std::uint64_t frames = 0;
   std::uint64_t lost = 0;
   std::string missing;  ///< why there is none
@@ -306,7 +318,8 @@ Result<void> StreamBench::throughput() {
                              : Result<StreamThroughput>(tl::unexpected(certificate.error()));
   if (certificate && !secured) return tl::unexpected(secured.error());
   const auto measure = [&](const std::string& name) -> Result<YardstickResult> {
-    if (name == "bare-tcp") return measure_bare_tcp(yardstick_);
+    if (name == "bare-tcp") return measure_bare_tcp(yardstick_, false);
+    if (name == "bare-tcp-crc") return measure_bare_tcp(yardstick_, true);
     if (name == "bare-udp") return measure_bare_udp(yardstick_);
     if (name == "zeromq") return measure_zeromq(yardstick_, false);
     if (name == "zeromq-crc") return measure_zeromq(yardstick_, true);
@@ -327,13 +340,13 @@ Result<void> StreamBench::throughput() {
         .measure(name, yardstick_.frames, yardstick_.window);
   };
   std::map<std::string, Series> series;
-  ProgressBar progress("throughput", command_.repeats * kContenders.size());
+  ProgressBar progress("throughput", command_.repeats * contenders().size());
   for (std::uint32_t round = 0; round < command_.repeats; ++round) {
     std::map<std::string, double> of_round;
-    for (std::size_t i = 0; i < kContenders.size(); ++i) {
-      const Contender& contender = kContenders[i];
+    for (std::size_t i = 0; i < contenders().size(); ++i) {
+      const Contender& contender = contenders()[i];
       Series& own = series[contender.name];
-      progress.advance_to(round * kContenders.size() + i);
+      progress.advance_to(round * contenders().size() + i);
       if (!own.missing.empty()) continue;
       const auto result = measure(contender.name);
       if (!result) {
@@ -354,7 +367,13 @@ Result<void> StreamBench::throughput() {
       }
       own.frames += result->frames;
       own.lost += result->lost;
-      if (contender.yardstick != nullptr) own.ratio.add(gbit_s / of_round[contender.yardstick]);
+    }
+    for (const Contender& contender : contenders()) {
+      for (const char* yardstick : contender.yardsticks) {
+        if (of_round.count(contender.name) == 0 || of_round.count(yardstick) == 0) continue;
+        series[contender.name].ratios[yardstick].add(of_round[contender.name] /
+                                                     of_round[yardstick]);
+      }
     }
   }
   progress.finish();
@@ -362,7 +381,7 @@ Result<void> StreamBench::throughput() {
     if (!*daemon) continue;
     if (auto stopped = (*daemon)->stop(); !stopped) return stopped;
   }
-  for (const Contender& contender : kContenders) {
+  for (const Contender& contender : contenders()) {
     const Series& own = series[contender.name];
     Row row;
     row.transport = contender.name;
@@ -379,9 +398,18 @@ Result<void> StreamBench::throughput() {
     } else {
       row.more.set("reason", own.missing);
     }
-    if (contender.yardstick != nullptr) {
-      row.more.set("yardstick", contender.yardstick).set("ratio", own.ratio.median());
+    Json ratios = Json::object();
+    for (const char* yardstick : contender.yardsticks) {
+      const auto found = own.ratios.find(yardstick);
+      if (found == own.ratios.end()) continue;
+      const double ratio = found->second.median();
+      row.ratios.push_back(fmt::format("{:.2f} of {}", ratio, yardstick));
+      ratios.set(yardstick, ratio);
+      if (yardstick == contender.yardsticks.front()) {
+        row.more.set("yardstick", yardstick).set("ratio", ratio);
+      }
     }
+    if (!row.ratios.empty()) row.more.set("ratios", std::move(ratios));
     row.more.set("cpu", "daemon and client, or sender and receiver; cores");
     rows_.push_back(std::move(row));
   }
@@ -435,6 +463,11 @@ void StreamBench::print(std::FILE* out) const {
                us(1.0), us_of(row.own_us, 0.999), number(row.gbit_s, 2), number(row.cpu_frac, 2)});
   }
   fmt::print(out, "{}x{}, loopback\n{}", command_.width_px, command_.height_px, table.to_string());
+  for (const Row& row : rows_) {
+    if (row.ratios.empty()) continue;
+    fmt::print(out, "{}: {} (medians of ratios of the same round)\n", row.transport,
+               fmt::join(row.ratios, ", "));
+  }
 }
 
 }  // namespace

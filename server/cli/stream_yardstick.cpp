@@ -107,27 +107,30 @@ physics::Result<TcpPair> tcp_pair() {
   return out;
 }
 
-bool send_all(int fd, std::span<const std::byte> bytes) {
+bool send_all(int fd, std::span<const std::byte> bytes, int flags = 0) {
   for (std::size_t at = 0; at < bytes.size();) {
-    const ssize_t sent = ::send(fd, bytes.data() + at, bytes.size() - at, MSG_NOSIGNAL);
+    const ssize_t sent = ::send(fd, bytes.data() + at, bytes.size() - at, MSG_NOSIGNAL | flags);
     if (sent <= 0) return false;
     at += static_cast<std::size_t>(sent);
   }
   return true;
 }
 
-bool receive_all(int fd, std::vector<std::byte>& bytes) {
+/// `crc32c`, where wanted: of the bytes, summed as they come, while the cache has them.
+bool receive_all(int fd, std::span<std::byte> bytes, std::uint32_t* crc32c = nullptr) {
   for (std::size_t at = 0; at < bytes.size();) {
     const ssize_t got = ::recv(fd, bytes.data() + at, bytes.size() - at, 0);
     if (got <= 0) return false;
-    at += static_cast<std::size_t>(got);
+    const auto count = static_cast<std::size_t>(got);
+    if (crc32c != nullptr) *crc32c = protocol::crc32c(bytes.subspan(at, count), *crc32c);
+    at += count;
   }
   return true;
 }
 
 }  // namespace
 
-physics::Result<YardstickResult> measure_bare_tcp(const YardstickOptions& options) {
+physics::Result<YardstickResult> measure_bare_tcp(const YardstickOptions& options, bool sum) {
   auto pair = tcp_pair();
   if (!pair) return tl::unexpected(pair.error());
   const auto images = make_images(options.frame_bytes);
@@ -138,11 +141,21 @@ physics::Result<YardstickResult> measure_bare_tcp(const YardstickOptions& option
   const double cpu_before_s = thread_cpu_s();
   std::thread sender([&] {
     for (std::uint64_t i = 0; i < options.frames; ++i) {
-      if (!send_all(pair->sender.get(), images[i % kImages])) break;
+      const std::vector<std::byte>& image = images[i % kImages];
+      const std::uint32_t crc32c = sum ? protocol::crc32c(image) : 0;
+      const auto head = std::as_bytes(std::span(&crc32c, 1));
+      if (sum && !send_all(pair->sender.get(), head, MSG_MORE)) break;
+      if (!send_all(pair->sender.get(), image)) break;
     }
     sender_cpu_s = thread_cpu_s();
   });
-  while (result.frames < options.frames && receive_all(pair->receiver.get(), frame)) {
+  while (result.frames < options.frames) {
+    std::uint32_t sent_crc32c = 0;
+    std::uint32_t crc32c = 0;
+    const int fd = pair->receiver.get();
+    if (sum && !receive_all(fd, std::as_writable_bytes(std::span(&sent_crc32c, 1)))) break;
+    if (!receive_all(fd, frame, sum ? &crc32c : nullptr)) break;
+    if (crc32c != sent_crc32c) ++result.lost;
     ++result.frames;
   }
   result.seconds = seconds_since(start);

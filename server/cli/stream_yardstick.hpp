@@ -28,8 +28,10 @@ struct YardstickResult {
 };
 
 /// send() and recv() of whole frames from and into memory as emitd has it: 16 images in turn, one
-/// buffer. Errors: io.
-[[nodiscard]] physics::Result<YardstickResult> measure_bare_tcp(const YardstickOptions& options);
+/// buffer. `sum`: a frame's CRC-32C goes before it and is compared, as emitd's and its client's is.
+/// Errors: io.
+[[nodiscard]] physics::Result<YardstickResult> measure_bare_tcp(const YardstickOptions& options,
+                                                                bool sum);
 /// sendmsg() with UDP_SEGMENT and recvmmsg() with UDP_GRO of datagrams as large and as many as
 /// emitd's. Errors: io.
 [[nodiscard]] physics::Result<YardstickResult> measure_bare_udp(const YardstickOptions& options);

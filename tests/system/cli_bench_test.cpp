@@ -124,21 +124,23 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   const std::string json = read_text(folder.file("s.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"stream\"");
   for (const char* transport : {"tcp", "udp", "shm", "tls", "mixed", "bare-tcp-paced", "bare-tcp",
-                                "bare-udp", "zeromq", "zeromq-crc", "iperf3"}) {
+                                "bare-tcp-crc", "bare-udp", "zeromq", "zeromq-crc", "iperf3"}) {
     EXPECT_NE(json.find("\"transport\": \"" + std::string(transport) + "\""), std::string::npos)
         << transport;
   }
   // Five at a fixed rate, then each alone; what is not installed has null and a reason.
   EXPECT_EQ(numbers_of(json, "clients"),
-            (std::vector<double>{4, 4, 4, 4, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
+            (std::vector<double>{4, 4, 4, 4, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
   EXPECT_EQ(numbers_of(json, "rate_hz"), std::vector<double>(5, 50));
-  EXPECT_EQ(numbers_of(json, "lost"), std::vector<double>(14, 0));
+  EXPECT_EQ(numbers_of(json, "lost"), std::vector<double>(15, 0));
   EXPECT_EQ(numbers_of(json, "unflagged_gaps"), std::vector<double>(4, 0));
   EXPECT_EQ(numbers_of(json, "crc_errors"), std::vector<double>(4, 0));
   EXPECT_EQ(numbers_of(json, "p999_us").size(), 5U);
   EXPECT_EQ(numbers_of(json, "own_p999_us").size(), 5U) << "the bare loop's beside the daemon's";
   EXPECT_EQ(numbers_of(json, "ratio").size(), 4U);
-  EXPECT_GE(numbers_of(json, "gbit_s").size(), 10U);
+  EXPECT_EQ(numbers_of(json, "bare-tcp-crc").size(), 1U) << "TCP beside a loop that sums too";
+  EXPECT_NE(run.out.find(" of bare-tcp-crc"), std::string::npos);
+  EXPECT_GE(numbers_of(json, "gbit_s").size(), 11U);
 }
 
 TEST(CliBench, IsolationComparesPairsOfRunsBesideARunAgainstItself) {
