@@ -37,7 +37,7 @@ done
 if [[ -n $out ]]; then out=$(realpath -m "$out"); fi
 cd "$(dirname "$0")/../.."
 out=${out:-$PWD/out/bench}
-known=(paper error-vs-time scaling crowd turn budget thermal-truth convergence stability stream isolation)
+known=(paper error-vs-time scaling crowd turn live budget thermal-truth convergence stability stream isolation)
 if ((${#suites[@]} == 0)); then suites=("${known[@]}"); fi
 for suite in "${suites[@]}"; do
   if [[ " ${known[*]} " != *" $suite "* ]]; then
@@ -53,6 +53,7 @@ arguments() { # of a suite, when quick
     scaling) echo "--quick --pairs 15 --per-frame-frames 1" ;;
     crowd) echo "--instances 100 --pairs 15 --set thermal.tolerance_k=5 --set thermal.steps=3" ;;
     turn) echo "--runs 1 --frames 20 --set thermal.tolerance_k=5" ;;
+    live) echo "--seconds 2 --rate 10 --every 1 --set thermal.tolerance_k=5" ;;
     budget) echo "--frames 30 --set thermal.tolerance_k=5" ;;
     thermal-truth) echo "--width 64 --height 48 --steps 9" ;;
     stability) echo "--cases 100000 --part equilibrium" ;;

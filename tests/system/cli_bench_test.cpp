@@ -183,6 +183,13 @@ TEST(CliBench, TurnFlagsJumpsToPlacesNobodyAnnounced) {
   for (const double ratio : numbers_of(json, "ratio")) EXPECT_GE(ratio, 1.0);
 }
 
+TEST(CliBench, LiveNeedsAnEntityThatMoves) {
+  const ProcessResult run = run_emit(
+      {"bench", "live", "--scene", "box", "--seconds", "1", "--width", "64", "--height", "48"});
+  EXPECT_EQ(run.exit_code, 78) << run.err;
+  EXPECT_NE(run.err.find("box: no entity moves"), std::string::npos) << run.err;
+}
+
 /// bench.sh in a tree of its own, where `emit bench SUITE` is a line of shell.
 class BenchScript {
  public:
