@@ -2,6 +2,7 @@
 #include "passes/cluster_view.hpp"
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -65,6 +66,13 @@ bool ClusterView::shows(const scene::Cluster& cluster, bool double_sided) const 
       (1.0F + kRounding) * cluster.radius_m + margin_m_ + kRounding * glm::length(cluster.centre_m);
   for (const Plane& plane : planes_) {
     if (glm::dot(plane.normal, cluster.centre_m) + plane.offset_m < -reach_m) return false;
+  }
+  const float box_margin_m = margin_m_ + kRounding * glm::length(cluster.box_centre_m);
+  for (const Plane& plane : planes_) {
+    // Not a number where the box is infinite: then it shows.
+    const float box_reach_m =
+        (1.0F + kRounding) * glm::dot(glm::abs(plane.normal), cluster.box_half_m) + box_margin_m;
+    if (glm::dot(plane.normal, cluster.box_centre_m) + plane.offset_m < -box_reach_m) return false;
   }
   if (double_sided || mirrored_ || cluster.cone_cutoff >= 1.0F) return true;
   const glm::vec3 way = cluster.cone_apex_m - eye_m_;

@@ -91,5 +91,56 @@ TEST(ClusterView, leaves_out_nothing_that_shows_and_much_that_does_not) {
   EXPECT_LT(shown, needed + all / 4);
 }
 
+TEST(ClusterView, of_ground_at_a_flat_angle_shows_little_beyond_the_picture) {
+  constexpr std::uint32_t kSide = 200;  // quads of a metre
+  scene::Mesh mesh;
+  for (std::uint32_t y = 0; y <= kSide; ++y) {
+    for (std::uint32_t x = 0; x <= kSide; ++x) mesh.positions_m.emplace_back(x, y, 0.0F);
+  }
+  for (std::uint32_t y = 0; y < kSide; ++y) {
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      const std::uint32_t v = y * (kSide + 1) + x;
+      for (const std::uint32_t i : {v, v + 1, v + kSide + 1, v + kSide + 1, v + 1, v + kSide + 2}) {
+        mesh.indices.push_back(i);
+      }
+    }
+  }
+  const std::vector<scene::Cluster> clusters =
+      scene::cut_into_clusters(mesh.positions_m, mesh.indices);
+  // From 20 m above the middle, 6 to 16 degrees down, wherever that looks.
+  std::size_t shown = 0;
+  std::size_t needed = 0;
+  for (int turn = 0; turn < 24; ++turn) {
+    const double yaw_rad = 0.26 * turn;
+    Look look;
+    const glm::dvec3 x(std::cos(yaw_rad), -std::sin(yaw_rad), 0.0);
+    const glm::dvec3 z =
+        glm::normalize(glm::dvec3(std::sin(yaw_rad), std::cos(yaw_rad), -std::tan(0.19)));
+    look.view.relworld_from_sensor = glm::dmat3(x, glm::cross(z, x), z);
+    look.view.tan_half_h = 0.1;
+    look.view.tan_half_v = 0.09;
+    look.relworld_from_mesh = glm::translate(glm::dmat4(1.0), glm::dvec3(-100.0, -100.0, -20.0));
+    const ClusterView view(look.view, look.relworld_from_mesh, {});
+    for (const scene::Cluster& cluster : clusters) {
+      bool any = false;
+      for (std::uint32_t i = 0; i < cluster.index_count && !any; i += 3) {
+        std::array<glm::dvec3, 3> corners_m{};
+        for (std::uint32_t k = 0; k < 3; ++k) {
+          const std::uint32_t v = mesh.indices[cluster.first_index + i + k];
+          corners_m[k] = glm::dvec3(look.relworld_from_mesh *
+                                    glm::dvec4(glm::dvec3(mesh.positions_m[v]), 1.0));
+        }
+        any = visible(look, corners_m, true);
+      }
+      const bool shows = view.shows(cluster, true);
+      EXPECT_TRUE(shows || !any) << "turn " << turn;
+      shown += shows ? 1 : 0;
+      needed += any ? 1 : 0;
+    }
+  }
+  EXPECT_GT(needed, 100U);
+  EXPECT_LT(shown, needed + needed / 4) << needed;
+}
+
 }  // namespace
 }  // namespace emit::renderer

@@ -110,6 +110,20 @@ TEST(Clusters, at_the_ends_of_float32_every_triangle_stays_and_is_always_drawn) 
   }
 }
 
+TEST(Clusters, the_box_of_a_cluster_is_the_smallest_around_it) {
+  Mesh mesh = sphere(60, false);
+  for (const Cluster& cluster : cut(mesh, mesh.submeshes[0])) {
+    glm::vec3 reach_m(0.0F);
+    for (std::uint32_t i = 0; i < cluster.index_count; ++i) {
+      const glm::vec3& at_m = mesh.positions_m[mesh.indices[cluster.first_index + i]];
+      reach_m = glm::max(reach_m, glm::abs(at_m - cluster.box_centre_m));
+    }
+    for (glm::length_t axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(reach_m[axis], cluster.box_half_m[axis], 1e-6F);
+    }
+  }
+}
+
 TEST(Clusters, a_cluster_lies_in_its_sphere_and_its_cone_tells_its_back) {
   Mesh mesh = sphere(60, false);
   std::size_t turned = 0;

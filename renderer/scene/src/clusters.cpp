@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <glm/common.hpp>
 #include <limits>
 
 namespace emit::scene {
@@ -24,8 +25,22 @@ bool is_finite(const Cluster& cluster) {
   const float sum = cluster.centre_m.x + cluster.centre_m.y + cluster.centre_m.z +
                     cluster.radius_m + cluster.cone_apex_m.x + cluster.cone_apex_m.y +
                     cluster.cone_apex_m.z + cluster.cone_axis.x + cluster.cone_axis.y +
-                    cluster.cone_axis.z + cluster.cone_cutoff;
+                    cluster.cone_axis.z + cluster.cone_cutoff + cluster.box_centre_m.x +
+                    cluster.box_centre_m.y + cluster.box_centre_m.z + cluster.box_half_m.x +
+                    cluster.box_half_m.y + cluster.box_half_m.z;
   return std::isfinite(sum);
+}
+
+void set_box(Cluster& cluster, std::span<const glm::vec3> positions_m,
+             std::span<const std::uint32_t> indices) {
+  glm::vec3 least_m(std::numeric_limits<float>::infinity());
+  glm::vec3 most_m = -least_m;
+  for (const std::uint32_t v : indices) {
+    least_m = glm::min(least_m, positions_m[v]);
+    most_m = glm::max(most_m, positions_m[v]);
+  }
+  cluster.box_centre_m = 0.5F * (least_m + most_m);
+  cluster.box_half_m = 0.5F * (most_m - least_m);
 }
 
 /// Where the library's arithmetic ends, at the extremes of float32, it leaves triangles out: then
@@ -37,6 +52,7 @@ void cut_in_order(std::uint32_t indices, std::vector<Cluster>& clusters) {
     cluster.first_index = at;
     cluster.index_count = std::min(indices - at, kIndices);
     cluster.radius_m = std::numeric_limits<float>::infinity();
+    cluster.box_half_m = glm::vec3(std::numeric_limits<float>::infinity());
     clusters.push_back(cluster);
   }
 }
@@ -78,6 +94,7 @@ std::vector<Cluster> cut_into_clusters(std::span<const glm::vec3> positions_m,
     cluster.cone_apex_m = vec3(bounds.cone_apex);
     cluster.cone_axis = vec3(bounds.cone_axis);
     cluster.cone_cutoff = bounds.cone_cutoff;
+    set_box(cluster, positions_m, part);
     finite = finite && is_finite(cluster);
     clusters.push_back(cluster);
     ordered.insert(ordered.end(), part.begin(), part.end());

@@ -14,6 +14,10 @@ struct Cluster {
   std::uint32_t index_count = 0;
   glm::vec3 centre_m{0.0F};  ///< of a sphere around all of them
   float radius_m = 0.0F;     ///< infinite: always drawn
+  /// Of a box along the mesh's axes around all of them: ground that is seen at a flat angle reaches
+  /// far less into a view pyramid than its sphere does. Infinite where the radius is.
+  glm::vec3 box_centre_m{0.0F};
+  glm::vec3 box_half_m{0.0F};
   /// All turn their backs to a point p where
   /// dot(normalize(cone_apex_m - p), cone_axis) >= cone_cutoff; never where cone_cutoff is 1.
   glm::vec3 cone_apex_m{0.0F};
