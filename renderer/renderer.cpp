@@ -164,6 +164,11 @@ RadianceContent radiance_content(const BandModel& bands, const OutputOptions& ou
                      (output.object ? EMIT_OUTPUT_OBJECT : 0U)};
 }
 
+bool has_entities(const scene::ScenarioDesc& scenario) {
+  return std::ranges::any_of(scenario.objects,
+                             [](const scene::ObjectDesc& object) { return object.entity_id != 0; });
+}
+
 std::size_t plane_count(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U);
@@ -479,10 +484,13 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   using Content = GeometryPass::Content;
-  auto geometry_pass = GeometryPass::create(*context, width_px, height_px,
-                                            !cached         ? Content::normals
-                                            : output.object ? Content::samples_and_objects
-                                                            : Content::samples);
+  auto geometry_pass =
+      GeometryPass::create(*context, width_px, height_px,
+                           !cached         ? Content::normals
+                           : output.object ? Content::samples_and_objects
+                                           : Content::samples,
+                           cached && has_entities(scenario) ? GeometryPass::Shade::of_entities
+                                                            : GeometryPass::Shade::none);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
   auto radiance_pass = RadiancePass::create(scenario.thermal, radiance_content(*bands, output));
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));

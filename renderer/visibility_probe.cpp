@@ -151,7 +151,7 @@ Result<std::unique_ptr<VisibilityProbe>> VisibilityProbe::create(
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
   if (!context) return tl::unexpected(std::move(context.error()));
   auto geometry = GeometryPass::create(*context, sensor.width_px, sensor.height_px,
-                                       GeometryPass::Content::normals);
+                                       GeometryPass::Content::normals, GeometryPass::Shade::none);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
   auto occlusion = OcclusionPass::create(sensor.width_px, sensor.height_px);
   if (!occlusion) return tl::unexpected(std::move(occlusion.error()));

@@ -38,6 +38,9 @@ class PoseHistory {
   /// pose.
   [[nodiscard]] TrajectoryState ahead(std::int64_t sim_time_ns) const noexcept;
 
+  /// The scenario's trajectory, ascending.
+  [[nodiscard]] std::span<const scene::Keyframe> script() const noexcept { return scripted_; }
+
   /// What is known of an entity at some time.
   struct Known {
     bool live = false;       ///< the host drives it

@@ -119,15 +119,22 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
       scenario, std::move(coarse->geometry), histories_of_objects(scenario),
       std::span(foster_materials).first(simulated), kReferenceK, std::move(coarse->detail));
   if (!surface) return tl::unexpected(std::move(surface.error()));
-  return std::unique_ptr<ThermalStage>(
-      new CachedStage(scenario, bounds, eyes_around(eyes, bounds), std::move(*surface),
-                      std::move(foster_materials), history, std::move(saved), coarse->visibly));
+  std::optional<ShadePass> shade_pass;
+  if (!history.entities.empty()) {
+    auto pass = ShadePass::create(history.entities.size());
+    if (!pass) return tl::unexpected(std::move(pass.error()));
+    shade_pass = std::move(*pass);
+  }
+  return std::unique_ptr<ThermalStage>(new CachedStage(
+      scenario, bounds, eyes_around(eyes, bounds), std::move(*surface), std::move(foster_materials),
+      history, std::move(saved), coarse->visibly, std::move(shade_pass)));
 }
 
 CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
                          std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-                         std::optional<CachedSurface::Saved> saved, bool visibly_simplified)
+                         std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
+                         std::optional<ShadePass> shade_pass)
     : sensor_(scenario.sensor),
       static_bounds_(static_bounds),
       detail_eyes_(std::move(detail_eyes)),
@@ -138,7 +145,8 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       surface_history_(scenario.thermal.steps, make_foster(scenario, std::move(foster_materials),
                                                            history.environment, kReferenceK)),
       surface_(std::move(surface)),
-      saved_(std::move(saved)) {}
+      saved_(std::move(saved)),
+      shade_pass_(std::move(shade_pass)) {}
 
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
@@ -154,6 +162,10 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
       std::make_unique<DrawnScene>(SceneBuffers(surface_->drawn_scene()), history_of_object_, 0);
   for (gl::Buffer& node : node_buffers_) {
     node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
+  }
+  if (shade_pass_) {
+    shade_pass_->begin(surface_->shade());
+    shade_buffer_ = gl::Buffer::dynamic(surface_->shade().vertices_k().size_bytes());
   }
   if (glGetError() != GL_NO_ERROR) {
     return physics::make_error(physics::ErrorCode::gpu,
@@ -175,7 +187,7 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   };
   // Without known eyes no mesh was simplified.
   return visibly_simplified_ || surface_->model().full_in_view ||
-         !stands_near(refined_eyes_, least_cos) ||
+         surface_->shade().short_of_pages() || !stands_near(refined_eyes_, least_cos) ||
          (!detail_eyes_.empty() && !stands_near(detail_eyes_, -2.0));
 }
 
@@ -186,10 +198,14 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.coarse_meshes = visibly_simplified_;
 }
 
-void CachedStage::prepare(const FrameRequest& request, CameraSetup&,
+void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
                           gpu::FrameParams& frame) noexcept {
-  surface_->advance(request.thermal_time_ns, {history_.environment, history_.entities},
-                    surface_history_);
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities};
+  surface_->advance(request.thermal_time_ns, inputs, surface_history_);
+  if (shade_pass_) {
+    surface_->look(request.sim_time_ns, request.thermal_time_ns, inputs);
+    shade_pass_->prepare(*surface_, request.sensor_pose.position_world_m, camera, frame);
+  }
   frame.samples.x = surface_->fraction();
   sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
   forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);
@@ -205,12 +221,26 @@ void CachedStage::upload() noexcept {
                                     range.first);
     }
   }
+  if (shade_pass_) {
+    for (const ChangedRanges::Range& range : surface_->shade().changes()) {
+      shade_buffer_.upload(surface_->shade().vertices_k().subspan(range.first, range.count),
+                           range.first);
+    }
+    shade_pass_->upload(*surface_);
+  }
   surface_->forget_changes();
+}
+
+void CachedStage::draw(const glm::uvec2&, StageTimes& stages, StageClock& clock) noexcept {
+  if (!shade_pass_) return;
+  shade_pass_->dispatch();
+  clock.mark(stages.thermal_ms);
 }
 
 void CachedStage::bind() const noexcept {
   drawn_->vertices.read_nodes(node_buffers_[surface_->storage(0)],
                               node_buffers_[surface_->storage(1)]);
+  if (shade_pass_) drawn_->vertices.read_shade(shade_buffer_);
 }
 
 }  // namespace emit::renderer

@@ -7,6 +7,7 @@
 
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
+#include "passes/shade_pass.hpp"
 #include "passes/thermal_stage.hpp"
 #include "surface/cached_surface.hpp"
 
@@ -36,7 +37,7 @@ class CachedStage final : public ThermalStage {
   void upload() noexcept override;
   void bind() const noexcept override;
   [[nodiscard]] bool looks_around() const noexcept override { return false; }
-  void draw(const glm::uvec2&, StageTimes&, StageClock&) noexcept override {}
+  void draw(const glm::uvec2& size_px, StageTimes& stages, StageClock& clock) noexcept override;
 
  private:
   /// A place the surface was prepared for, and how far around it that holds.
@@ -50,7 +51,8 @@ class CachedStage final : public ThermalStage {
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-              std::optional<CachedSurface::Saved> saved, bool visibly_simplified);
+              std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
+              std::optional<ShadePass> shade_pass);
 
   scene::SensorDesc sensor_;
   scene::Aabb static_bounds_;
@@ -68,6 +70,8 @@ class CachedStage final : public ThermalStage {
   physics::Forcing forcing_now_;
 
   std::array<gl::Buffer, 3> node_buffers_;  ///< by storage of CachedSurface
+  std::optional<ShadePass> shade_pass_;     ///< where there are entities
+  gl::Buffer shade_buffer_;
 };
 
 }  // namespace emit::renderer

@@ -11,7 +11,7 @@ namespace emit::renderer {
 namespace {
 
 DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& relworld_from_mesh,
-                     std::uint32_t object, std::uint32_t material) noexcept {
+                     std::uint32_t object, std::uint32_t material, bool moves) noexcept {
   DrawRecord record{};
   record.params.clip_from_mesh = glm::mat4(clip_from_relworld * relworld_from_mesh);
   const glm::dmat3 m(relworld_from_mesh);
@@ -20,7 +20,7 @@ DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& rel
   for (std::size_t column = 0; column < cofactors.size(); ++column) {
     record.params.normal_from_mesh[column] = glm::vec4(glm::vec3(cofactors[column]), 0.0F);
   }
-  record.params.ids = glm::uvec4(material, object + 1, 0U, 0U);
+  record.params.ids = glm::uvec4(material, object + 1, moves ? 1U : 0U, 0U);
   return record;
 }
 
@@ -215,7 +215,8 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
           if (count == 0) continue;
           view_draws_.push_back({static_cast<std::uint32_t>(records_.size()), first, count});
           records_.push_back(record_of(view.clip_from_relworld, matrix,
-                                       scene_.instances()[i].object, submesh.material));
+                                       scene_.instances()[i].object, submesh.material,
+                                       history_of_instance_[i] >= 0));
         }
       }
     }

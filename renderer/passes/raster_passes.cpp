@@ -103,9 +103,17 @@ void SceneVertexArrays::read_nodes(const gl::Buffer& before,
   read(EMIT_ATTR_NODE_AFTER, 4, after);
 }
 
+void SceneVertexArrays::read_shade(const gl::Buffer& shade) const noexcept {
+  constexpr GLuint kBinding = 5;
+  glVertexArrayVertexBuffer(view_.id(), kBinding, shade.id(), 0, sizeof(float));
+  glVertexArrayAttribFormat(view_.id(), EMIT_ATTR_SHADE, 1, GL_FLOAT, GL_FALSE, 0);
+  glVertexArrayAttribBinding(view_.id(), EMIT_ATTR_SHADE, kBinding);
+  glEnableVertexArrayAttrib(view_.id(), EMIT_ATTR_SHADE);
+}
+
 physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context,
                                                    std::uint32_t width_px, std::uint32_t height_px,
-                                                   Content content) {
+                                                   Content content, Shade shade) {
   GeometryPass pass;
   if (context.software()) pass.batch_indices_ = kSoftwareBatchIndices;
   std::vector<gl::Define> defines;
@@ -113,6 +121,7 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
   const bool objects = content == Content::samples_and_objects;
   if (sampled) defines.push_back({"EMIT_CACHED", "1"});
   if (objects) defines.push_back({"EMIT_OBJECTS", "1"});
+  if (shade == Shade::of_entities) defines.push_back({"EMIT_SHADE", "1"});
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
@@ -185,6 +194,7 @@ void GeometryPass::bind_textures() const noexcept {
   if (sampled_) {
     depth_buffer_.bind(EMIT_TEX_DEPTH);
     surface_.bind(EMIT_TEX_SURFACE);
+    glBindImageTexture(EMIT_IMG_SURFACE, surface_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
     if (ids_.id() != 0) ids_.bind(EMIT_TEX_IDS);
     return;
   }

@@ -23,6 +23,8 @@ class SceneVertexArrays {
   void bind_light() const noexcept { glBindVertexArray(light_.id()); }
   /// Where the camera's draws read the samples' two nodes of time from: two floats by vertex each.
   void read_nodes(const gl::Buffer& before, const gl::Buffer& after) const noexcept;
+  /// And what entities have shaded: a float by vertex.
+  void read_shade(const gl::Buffer& shade) const noexcept;
 
  private:
   gl::VertexArray view_;
@@ -39,16 +41,18 @@ class GeometryPass {
     samples,  ///< depth, material and thermal state, which comes from the surface's samples
     samples_and_objects,  ///< the object as well
   };
+  /// Vertices of samples come with what entities have shaded (SceneVertexArrays::read_shade).
+  enum class Shade : std::uint8_t { none, of_entities };
   [[nodiscard]] static physics::Result<GeometryPass> create(const gl::EglContext& context,
                                                             std::uint32_t width_px,
                                                             std::uint32_t height_px,
-                                                            Content content);
+                                                            Content content, Shade shade);
   /// Draws two parts of what `lists` found in view; `records` holds its records. Of the `size_px`
   /// only the window is touched.
   void draw(const SceneVertexArrays& vertices, const DrawLists& lists, const gl::Buffer& records,
             CommandRange single_sided, CommandRange double_sided, const glm::uvec2& size_px,
             const glm::uvec4& window_px) const noexcept;
-  /// Binds what it drew to the texture units.
+  /// Binds what it drew to the texture units, and samples to EMIT_IMG_SURFACE.
   void bind_textures() const noexcept;
 
  private:

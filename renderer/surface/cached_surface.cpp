@@ -25,6 +25,18 @@ constexpr std::int64_t kMostIntervals = 16;
 constexpr std::int64_t kSameNs = 1'000'000;
 constexpr std::int64_t kSameFraction = 16;
 
+std::vector<scene::Aabb> mover_boxes_m(const scene::SceneGeometry& geometry, std::size_t movers,
+                                       std::span<const std::int32_t> mover_of_object) {
+  std::vector<scene::Aabb> boxes(movers);
+  for (const scene::Instance& instance : geometry.instances) {
+    const std::int32_t mover = mover_of_object[instance.object];
+    if (mover < 0) continue;
+    boxes[static_cast<std::size_t>(mover)].add(
+        scene::transformed(geometry.meshes[instance.mesh].bounds, instance.body_from_mesh));
+  }
+  return boxes;
+}
+
 std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size_t movers,
                                  std::span<const std::int32_t> mover_of_object) {
   std::vector<float> radius_m(movers, 0.0F);
@@ -69,6 +81,7 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
   interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
+  silhouettes_ = Silhouettes(mover_boxes_m(geometry_, movers, mover_of_object_));
 }
 
 physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
@@ -101,6 +114,22 @@ void CachedSurface::place_movers(std::int64_t now_ns, std::span<const PoseHistor
     movers_now_[m] = {glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
                       glm::vec3(state.pose.position_world_m - rays().origin_world_m()), state.on};
   }
+}
+
+std::vector<std::vector<glm::vec3>> CachedSurface::ways_m(
+    std::int64_t from_ns, std::span<const PoseHistory> entities) const {
+  std::vector<std::vector<glm::vec3>> ways;
+  const auto rel_m = [&](const physics::Pose& pose) {
+    return glm::vec3(pose.position_world_m - rays().origin_world_m());
+  };
+  for (const PoseHistory& entity : entities) {
+    std::vector<glm::vec3>& way = ways.emplace_back();
+    way.push_back(rel_m(entity.at(from_ns).pose));
+    for (const scene::Keyframe& key : entity.script()) {
+      if (key.sim_time_ns > from_ns) way.push_back(rel_m(key.pose));
+    }
+  }
+  return ways;
 }
 
 bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
@@ -173,9 +202,11 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   const HistoryRecord record =
       make_history_record(plan, history, heat_, inputs.environment, inputs.entities,
                           *interval_rays_, rays().origin_world_m());
+  const std::vector<std::vector<glm::vec3>> ways_m = this->ways_m(start_ns, inputs.entities);
   const SurfaceInputs surface{
       geometry_, materials_, mover_of_object_, rays(),      places_,
-      heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr};
+      heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr,
+      ways_m};
   SurfaceModelOptions options;
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
@@ -219,12 +250,64 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   turn_ = static_cast<std::uint32_t>(record.size());
   begin_anew(0, inputs, history);
   compute(0, static_cast<std::uint32_t>(count));
+  // What the model says of the sun has the entities in it.
+  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
+    if (inputs.entities.empty() || model_->samples.samples[i].mover >= 0) continue;
+    first.outputs[i].sun_frac = node(1).outputs[i].sun_frac;
+    first.vertices[i].sun_frac = node(1).vertices[i].sun_frac;
+  }
   begin_anew(1, inputs, history);
   for (SurfaceNode& node : nodes_) {
     node.changes.clear();
     node.changes.add(0, model_->drawn_samples);
   }
+  begin_shade(start_ns, inputs);
   return {};
+}
+
+void CachedSurface::begin_shade(std::int64_t now_ns, const Inputs& inputs) {
+  const physics::Forcing forcing =
+      inputs.environment.forcing_at(now_ns, inputs.environment.sun_at(now_ns));
+  constexpr double kSunlitK = 10.0;  // above the air
+  shade_.emplace(
+      model_->samples, model_->drawn_samples,
+      ShadeResponse(heat_, materials_.size(), {forcing.film_w_m2_k, forcing.air_k + kSunlitK}),
+      inputs.entities.size(), options_.history_start_ns, static_cast<float>(options_.tolerance_k));
+  shade_->restart(now_ns);
+  shadows_.assign(inputs.entities.size(), {});
+}
+
+void CachedSurface::look(std::int64_t drawn_ns, std::int64_t sun_ns,
+                         const Inputs& inputs) noexcept {
+  place_movers(drawn_ns, inputs.entities);
+  if (movers_now_.empty()) return;
+  const physics::SunPosition sun = inputs.environment.sun_at(sun_ns);
+  const glm::vec3 to_sun(sun.direction_enu);
+  const bool up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
+  for (std::size_t m = 0; m < movers_now_.size(); ++m) {
+    const MoverPlacement& mover = movers_now_[m];
+    const float diagonal_m = silhouettes_.diagonal_m(m);
+    Shadow& shadow = shadows_[m];
+    shadow.on = up && mover.on && diagonal_m > 0.0F;
+    if (!shadow.on) continue;
+    silhouettes_.look(m, to_sun * mover.rel_from_body, rays(), workers_);
+    shadow.silhouette = silhouettes_.place(m, mover);
+    const auto corners_m = silhouettes_.corners_m(m, mover);
+    std::ranges::copy(corners_m, shadow.hull_m.begin());
+    // Down to the ground behind its middle, and to what lies a little lower.
+    const CasterRay behind{silhouettes_.middle_m(m, mover), -to_sun};
+    std::array<CasterHit, 1> hit;
+    const bool met = rays().first_hits({&behind, 1}, {true, {}}, hit) != 0;
+    constexpr float kFarDiagonals = 20.0F;
+    constexpr float kLowerDiagonals = 0.25F;
+    const float way_m = met ? hit[0].distance_m : kFarDiagonals * diagonal_m;
+    const float end_m = behind.origin_m.z - way_m * to_sun.z - kLowerDiagonals * diagonal_m;
+    const ShadedBox box = shaded_box(shadow.silhouette, end_m);
+    shadow.hull_m[8] = {box.low_m, end_m};
+    shadow.hull_m[9] = {box.high_m, end_m};
+    shadow.hull_m[10] = {box.low_m.x, box.high_m.y, end_m};
+    shadow.hull_m[11] = {box.high_m.x, box.low_m.y, end_m};
+  }
 }
 
 std::uint64_t CachedSurface::sample_bytes() const noexcept {
@@ -348,6 +431,8 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
     begin_anew(1, inputs, history);
   }
   local_->run(now_ns, window(), local);
+  shade_->run(now_ns, model_->samples,
+              {inputs.environment, inputs.entities, rays(), workers_, silhouettes_});
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);
   const double gone_frac = std::clamp(fraction, 0.0, 1.0);
@@ -364,6 +449,7 @@ std::optional<double> CachedSurface::surroundings_now_k() const noexcept {
 }
 
 void CachedSurface::forget_changes() noexcept {
+  shade_->forget_changes();
   for (SurfaceNode& node : nodes_) node.changes.clear();
 }
 

@@ -17,6 +17,8 @@
 #include "surface/local_steps.hpp"
 #include "surface/mover_glow.hpp"
 #include "surface/ray_offsets.hpp"
+#include "surface/shade_pages.hpp"
+#include "surface/silhouettes.hpp"
 #include "surface/state_file.hpp"
 #include "surface/surface_model.hpp"
 #include "surface/surface_node.hpp"
@@ -101,6 +103,25 @@ class CachedSurface {
   /// Blocks of samples that do not follow the intervals, because the host moves an entity.
   [[nodiscard]] std::size_t local_blocks() const noexcept { return local_->active(); }
 
+  /// What entities have shaded lately, finer than samples lie.
+  [[nodiscard]] const ShadePages& shade() const noexcept { return *shade_; }
+  /// Entities as the sun sees them, where they stand.
+  [[nodiscard]] const Silhouettes& silhouettes() const noexcept { return silhouettes_; }
+  /// The shadow of an entity, on static surfaces.
+  struct Shadow {
+    bool on = false;
+    PlacedSilhouette silhouette;
+    /// The convex hull of these, rel, holds what is shaded.
+    std::array<glm::vec3, 12> hull_m;
+  };
+  [[nodiscard]] std::span<const Shadow> shadows() const noexcept { return shadows_; }
+  /// Casts shadows() of the entities as they are drawn, under the sun of `sun_ns`.
+  void look(std::int64_t drawn_ns, std::int64_t sun_ns, const Inputs& inputs) noexcept;
+  /// Of rel axes.
+  [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept {
+    return rays().origin_world_m();
+  }
+
   [[nodiscard]] const SurfaceModel& model() const noexcept { return *model_; }
   /// Main memory that the samples take, without the meshes between them.
   [[nodiscard]] std::uint64_t sample_bytes() const noexcept;
@@ -118,6 +139,9 @@ class CachedSurface {
                                                          const std::optional<Saved>& saved,
                                                          const SurfaceProgress& progress) const;
   void place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities);
+  [[nodiscard]] std::vector<std::vector<glm::vec3>> ways_m(
+      std::int64_t from_ns, std::span<const PoseHistory> entities) const;
+  void begin_shade(std::int64_t now_ns, const Inputs& inputs);
   /// Forcing, gains and rays from `node` to the next one, which nothing has been computed of yet.
   void begin_interval(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
   /// Advances the samples up to `last` from `node` to the next one.
@@ -174,6 +198,9 @@ class CachedSurface {
   std::vector<MoverFaces> faces_;  ///< by entity, at the node that an interval begins with
 
   std::optional<LocalSteps> local_;
+  Silhouettes silhouettes_;
+  std::vector<Shadow> shadows_;
+  std::optional<ShadePages> shade_;
 
   std::array<SurfaceNode, 3> nodes_;
   std::size_t ring_ = 0;

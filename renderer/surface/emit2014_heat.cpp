@@ -2,8 +2,10 @@
 #include "surface/emit2014_heat.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/equilibrium.hpp"
 
 namespace emit::renderer {
@@ -30,6 +32,7 @@ Emit2014Heat::Emit2014Heat(std::span<const scene::Material> materials, double in
     std::copy_n(material.modes.begin(), own.mode_count, own.modes.begin());
     own.initial_k = material.initial_k.value_or(initial_k);
     own.prescribed_k = material.prescribed_k;
+    own.sheet = material.sheet;
   }
 }
 
@@ -110,6 +113,24 @@ SampleOutput Emit2014Heat::advance(const SurfaceSample& sample, const glm::vec3&
     }
   }
   return output(sample, drive, state);
+}
+
+void Emit2014Heat::step_response(std::uint32_t material, const ResponseConditions& around,
+                                 std::span<const double> times_s,
+                                 std::span<double> response_m2k_w) const noexcept {
+  const Material& m = materials_[material];
+  std::ranges::fill(response_m2k_w, 0.0);
+  if (m.prescribed_k || m.sheet) return;
+  const double t = around.surface_k;
+  const double h_w_m2_k =
+      m.exchange.core_conductance_w_m2_k +
+      4.0 * m.exchange.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t;
+  for (std::size_t j = 0; j < times_s.size(); ++j) {
+    for (std::size_t i = 0; i < m.mode_count; ++i) {
+      response_m2k_w[j] += m.modes[i].weight_frac * -std::expm1(-times_s[j] / m.modes[i].tau_s);
+    }
+    response_m2k_w[j] *= m.solar_absorptance_frac / h_w_m2_k;
+  }
 }
 
 }  // namespace emit::renderer

@@ -35,6 +35,11 @@ class Emit2014Heat {
   [[nodiscard]] SampleOutput output(const SurfaceSample& sample, const SampleDrive& drive,
                                     const SampleState& state) const noexcept;
 
+  /// As SampleHeat::step_response().
+  void step_response(std::uint32_t material, const ResponseConditions& around,
+                     std::span<const double> times_s,
+                     std::span<double> response_m2k_w) const noexcept;
+
  private:
   struct Material {
     double solar_absorptance_frac = 0.0;
@@ -43,6 +48,7 @@ class Emit2014Heat {
     std::size_t mode_count = 0;
     double initial_k = 0.0;
     std::optional<double> prescribed_k;
+    bool sheet = false;
   };
   /// Eq. 1.
   [[nodiscard]] double absorbed_w_m2(const SurfaceSample& sample, const glm::vec3& normal,

@@ -183,4 +183,38 @@ void FosterHeat::advance_unshadowed(std::uint32_t material, const glm::vec3& nor
                           interval.ladders[material], surfaces_[material], tolerance_k_);
 }
 
+void FosterHeat::step_response(std::uint32_t material, const ResponseConditions& around,
+                               std::span<const double> times_s,
+                               std::span<double> response_m2k_w) const noexcept {
+  const FosterMaterial& m = materials_[material];
+  std::ranges::fill(response_m2k_w, 0.0);
+  if (m.prescribed() || m.sheet) return;
+  const double t = around.surface_k;
+  const double h_w_m2_k =
+      around.film_w_m2_k + 4.0 * m.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t;
+  // Per unit of flux, tau x' = r q - x with q = 1 - h sum x, in implicit steps.
+  constexpr int kParts = 16;
+  FosterState<double> x{};
+  double now_s = 0.0;
+  for (std::size_t j = 0; j < times_s.size(); ++j) {
+    const double dt_s = (times_s[j] - now_s) / kParts;
+    for (int part = 0; part < kParts; ++part) {
+      double left = 0.0;
+      double driven = 0.0;
+      for (std::size_t i = 0; i < m.network.count; ++i) {
+        const physics::NetworkMode& mode = m.network.modes[i];
+        left += x[i] * mode.tau_s / (mode.tau_s + dt_s);
+        driven += mode.resistance_m2k_w * dt_s / (mode.tau_s + dt_s);
+      }
+      const double q = (1.0 - h_w_m2_k * left) / (1.0 + h_w_m2_k * driven);
+      for (std::size_t i = 0; i < m.network.count; ++i) {
+        const physics::NetworkMode& mode = m.network.modes[i];
+        x[i] = (x[i] * mode.tau_s + mode.resistance_m2k_w * q * dt_s) / (mode.tau_s + dt_s);
+      }
+    }
+    now_s = times_s[j];
+    response_m2k_w[j] = m.solar_absorptance_frac * sum(x);
+  }
+}
+
 }  // namespace emit::renderer

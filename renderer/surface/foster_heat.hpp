@@ -43,6 +43,11 @@ class FosterHeat {
                       const SurfaceForcing& forcing, const SampleDrive& drive,
                       const SampleState& state) const noexcept;
 
+  /// As SampleHeat::step_response().
+  void step_response(std::uint32_t material, const ResponseConditions& around,
+                     std::span<const double> times_s,
+                     std::span<double> response_m2k_w) const noexcept;
+
  private:
   /// Over an interval, for a face that sees sky and surroundings only.
   void advance_unshadowed(std::uint32_t material, const glm::vec3& normal,

@@ -30,6 +30,12 @@ struct SampleDrive {
   std::array<double, kMaxPartners> partner_end_w_m2{};
 };
 
+/// What a step response is linearised around.
+struct ResponseConditions {
+  double film_w_m2_k = 0.0;
+  double surface_k = 300.0;
+};
+
 /// The other face of a sheet: its normal is opposite.
 struct SheetBack {
   const SurfaceSample& sample;

@@ -185,6 +185,7 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
   }
   if (count == 0) return spots;
   std::uint32_t blocked = rays.blocked_static({sent.data(), count});
+  const std::uint32_t blocked_for_good = blocked;
   const std::uint32_t all = (1U << count) - 1U;
   float apart_m = 0.0F;
   if (any_mover_on_) {
@@ -202,6 +203,7 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (((blocked >> i) & 1U) == 0U) spots.lit |= 1U << start_of[i];
+    if (((blocked_for_good >> i) & 1U) == 0U) spots.open |= 1U << start_of[i];
   }
   return spots;
 }
@@ -245,15 +247,16 @@ bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float a
   return false;
 }
 
-float IntervalRays::sun_frac(const CasterRays& rays, const SurfaceSample& sample,
-                             float start_offset_m, float blur_m) const noexcept {
-  if (!sun_up_) return 0.0F;
+SunShare IntervalRays::sun_share(const CasterRays& rays, const SurfaceSample& sample,
+                                 float start_offset_m, float blur_m) const noexcept {
+  if (!sun_up_) return {};
   const Tangents tangents = tangents_of(sample.normal);
   const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
   const glm::vec3 u_m = blur_m * tangents.u;
   const glm::vec3 v_m = blur_m * tangents.v;
   int faced = 0;
   int lit = 0;
+  int open = 0;
   for (std::size_t first = 0; first < kSunRays; first += kPacketRays) {
     if (first == kPacketRays && (lit == 0 || lit == faced) &&
         !may_pass(sample, start_m, kMostDeviates * blur_m)) {
@@ -266,9 +269,11 @@ float IntervalRays::sun_frac(const CasterRays& rays, const SurfaceSample& sample
     const Spots spots = send(rays, sample, starts_m, first);
     faced += std::popcount(spots.faced);
     lit += std::popcount(spots.lit);
-    if (faced == 0) return 0.0F;
+    open += std::popcount(sample.mover < 0 ? spots.open : spots.lit);
+    if (faced == 0) return {};
   }
-  return static_cast<float>(lit) / static_cast<float>(faced);
+  return {static_cast<float>(lit) / static_cast<float>(faced),
+          static_cast<float>(open) / static_cast<float>(faced)};
 }
 
 IntervalRays::Spots IntervalRays::spots(const CasterRays& rays, const SurfaceSample& face,

@@ -26,6 +26,13 @@ struct HiddenSky {
   std::uint32_t mover = 0;
 };
 
+/// Visible share of the sun's disc, mean over an interval: by all that shades, and by what stands
+/// still; on an entity's own surfaces the same.
+struct SunShare {
+  float frac = 0.0F;
+  float fixed_frac = 0.0F;
+};
+
 /// Where the sun and the entities stand when each ray of an interval is sent: instants, places in
 /// the sun's disc and lateral shifts are stratified together, the same for all samples, so that a
 /// penumbra comes out as a fine staircase and not as noise.
@@ -55,13 +62,18 @@ class IntervalRays {
   /// Mean share of the sun's disc that the sample sees while the sun stands before its face; 0 if
   /// it never does. `blur_m`: standard deviation of the origin along the surface, which stands for
   /// the lateral conduction since then. Any thread; RT-safe.
+  [[nodiscard]] SunShare sun_share(const CasterRays& rays, const SurfaceSample& sample,
+                                   float start_offset_m, float blur_m) const noexcept;
   [[nodiscard]] float sun_frac(const CasterRays& rays, const SurfaceSample& sample,
-                               float start_offset_m, float blur_m) const noexcept;
+                               float start_offset_m, float blur_m) const noexcept {
+    return sun_share(rays, sample, start_offset_m, blur_m).frac;
+  }
 
   /// Points of a face by bits.
   struct Spots {
     std::uint32_t faced = 0;  ///< the sun stood before the face
     std::uint32_t lit = 0;    ///< and was not hidden
+    std::uint32_t open = 0;   ///< and was not hidden by what stands still
   };
   /// One ray of the interval for each of up to kPacketRays points. `face` gives their normal,
   /// material and entity; points in its frame. Any thread; RT-safe.

@@ -41,6 +41,14 @@ SampleOutput SampleHeat::advance(const SurfaceSample& sample, const glm::vec3& n
       model_);
 }
 
+void SampleHeat::step_response(std::uint32_t material, const ResponseConditions& around,
+                               std::span<const double> times_s,
+                               std::span<double> response_m2k_w) const noexcept {
+  std::visit(
+      [&](const auto& model) { model.step_response(material, around, times_s, response_m2k_w); },
+      model_);
+}
+
 SampleOutput SampleHeat::output(const SurfaceSample& sample, const glm::vec3& normal,
                                 const SurfaceForcing& forcing, const SampleDrive& drive,
                                 const SampleState& state) const noexcept {

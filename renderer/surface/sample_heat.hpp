@@ -41,6 +41,13 @@ class SampleHeat {
                                     const SurfaceForcing& forcing, const SampleDrive& drive,
                                     const SampleState& state) const noexcept;
 
+  /// What a face of open ground gains by each of `times_s` (ascending) after the sun has come out,
+  /// K per W/m2 of direct sunlight on it, to first order; zero for sheets and where the temperature
+  /// is prescribed. @pre equal lengths
+  void step_response(std::uint32_t material, const ResponseConditions& around,
+                     std::span<const double> times_s,
+                     std::span<double> response_m2k_w) const noexcept;
+
   /// Which sky a sample feels: every direction of the full sphere alike (emit2014), or by the
   /// cosine to its normal (foster).
   [[nodiscard]] SkyMeasure sky_measure() const noexcept {

@@ -64,6 +64,8 @@ struct SurfaceInputs {
   const HistoryRecord& record;
   std::span<const MoverPlacement> movers_now;
   const SurfaceDetail* detail = nullptr;  ///< null: no mesh has lost triangles
+  /// By entity: where it stands and where its script takes it, rel. None: it stays.
+  std::span<const std::vector<glm::vec3>> ways_m{};
 };
 
 /// Of the outermost layer; 0 for a prescribed material, and for a sheet, whose layers carry heat

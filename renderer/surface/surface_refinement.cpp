@@ -73,6 +73,24 @@ float width_m(const scene::Aabb& box, const glm::dmat4& world_from_mesh) {
   return static_cast<float>(extent_m[1]);
 }
 
+/// What an eye is to a body that still stands where its way begins, when it comes closest.
+glm::vec3 nearest(const glm::vec3& eye_m, std::span<const glm::vec3> way_m) {
+  glm::vec3 found_m = eye_m;
+  float least_m = std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < way_m.size(); ++i) {
+    const glm::vec3 to_m = i + 1 < way_m.size() ? way_m[i + 1] - way_m[i] : glm::vec3(0.0F);
+    const float length_m2 = glm::dot(to_m, to_m);
+    const float along = length_m2 > 0.0F
+                            ? std::clamp(glm::dot(eye_m - way_m[i], to_m) / length_m2, 0.0F, 1.0F)
+                            : 0.0F;
+    const glm::vec3 place_m = way_m[i] + along * to_m;
+    if (glm::distance(eye_m, place_m) >= least_m) continue;
+    least_m = glm::distance(eye_m, place_m);
+    found_m = eye_m - (place_m - way_m.front());
+  }
+  return found_m;
+}
+
 }  // namespace
 
 SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWorth& worth,
@@ -93,6 +111,25 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
     eyes_.push_back(
         {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
   }
+  std::vector<float> aims_m;  // by eye: to what it points at
+  for (const Eye& eye : eyes_) {
+    const CasterRay ray{eye.rel_m, eye.boresight};
+    std::array<CasterHit, 1> hit;
+    const bool met =
+        eye.boresight != glm::vec3(0.0F) && inputs.rays.first_hits({&ray, 1}, {true, {}}, hit) != 0;
+    aims_m.push_back(met ? hit[0].distance_m : std::numeric_limits<float>::infinity());
+  }
+  for (const std::vector<glm::vec3>& way_m : inputs.ways_m) {
+    std::vector<Eye>& eyes = eyes_of_mover_.emplace_back();
+    for (std::size_t i = 0; i < eyes_.size(); ++i) {
+      glm::vec3 eye_m = nearest(eyes_[i].rel_m, way_m);
+      // The host may drive it to where the camera points.
+      const glm::vec3 there_m = eye_m - way_m.front();
+      const float distance_m = glm::length(there_m);
+      if (aims_m[i] < distance_m) eye_m = way_m.front() + aims_m[i] / distance_m * there_m;
+      eyes.push_back({eye_m, glm::vec3(0.0F)});
+    }
+  }
   for (const scene::Instance& instance : inputs.geometry.instances) {
     body_m_.push_back(
         width_m(inputs.geometry.meshes[instance.mesh].bounds, instance.world_from_mesh));
@@ -103,14 +140,15 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
 }
 
 SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>& corners_m,
-                                                  float longest_m, float body_m) const noexcept {
+                                                  float longest_m, float body_m,
+                                                  std::span<const Eye> eyes) const noexcept {
   constexpr float kLeastM = 1e-6F;
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
   const glm::vec3 twice_area_m2 =
       glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   Width width;
   float least_px_m = std::numeric_limits<float>::infinity();
-  for (const Eye& eye : eyes_) {
+  for (const Eye& eye : eyes) {
     const glm::vec3 way_m = centre_m - eye.rel_m;
     const float distance_m = std::max(glm::length(way_m), kLeastM);
     const float px_m = std::max(pixel_rad_ * distance_m, kLeastM);
@@ -249,7 +287,10 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
                                     glm::distance(corners_m[1], corners_m[2]),
                                     glm::distance(corners_m[2], corners_m[0])});
-  const Width width = this->width(corners_m, longest_m, body_m);
+  const auto mover = static_cast<std::size_t>(patch.mover);
+  const bool goes = patch.mover >= 0 && mover < eyes_of_mover_.size();
+  const Width width =
+      this->width(corners_m, longest_m, body_m, goes ? eyes_of_mover_[mover] : eyes_);
   const float edge_px = width.finer * width.edge_px;
   Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
   if (edge_px <= kLeastShadowEdgePx) return judged;

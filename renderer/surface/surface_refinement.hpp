@@ -57,6 +57,10 @@ class SurfaceRefinement {
 
  private:
   struct Judged;
+  struct Eye {
+    glm::vec3 rel_m{0.0F};
+    glm::vec3 boresight{0.0F};
+  };
   /// `body_m`: width of the whole body.
   [[nodiscard]] Judged need(const RefinedMesh& refined, std::uint32_t slot,
                             const SurfacePatch& patch, float body_m) const;
@@ -72,7 +76,7 @@ class SurfaceRefinement {
     float finer = 1.0F;
   };
   [[nodiscard]] Width width(const std::array<glm::vec3, 3>& corners_m, float longest_m,
-                            float body_m) const noexcept;
+                            float body_m, std::span<const Eye> eyes) const noexcept;
   /// Range of temperature, K, where sunlight fell unequally on the corners of late; else 0.
   [[nodiscard]] float shadow_edge_k(const RefinedMesh& refined, std::uint32_t slot,
                                     const SurfacePatch& patch) const;
@@ -84,11 +88,11 @@ class SurfaceRefinement {
   const SurfaceInputs& in_;
   const DriveWorth& worth_;
   SurfaceBend bend_;
-  struct Eye {
-    glm::vec3 rel_m{0.0F};
-    glm::vec3 boresight{0.0F};
-  };
   std::vector<Eye> eyes_;
+  /// By entity: what they are to it where its script brings it closest, or as close as what they
+  /// point at, as though it stayed where it is; it is in view all the time, because the host may
+  /// drive it there.
+  std::vector<std::vector<Eye>> eyes_of_mover_;
   std::vector<float> body_m_;  ///< by instance: its width
   float pixel_rad_ = 1e-3F;
   float field_rad_ = 0.0F;

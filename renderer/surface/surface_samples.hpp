@@ -72,8 +72,10 @@ struct SampleState {
 
 /// What others and the device read of a sample at one node of time.
 struct SampleOutput {
-  float offset_k = 0.0F;            ///< temperature from the renderer's reference
-  float sun_frac = 0.0F;            ///< visible share of the sun's disc in the interval before
+  float offset_k = 0.0F;  ///< temperature from the renderer's reference
+  /// Visible share of the sun's disc in the interval before; in a step's output of static samples
+  /// by what stands still, because frames have their own shade of entities (ShadePages).
+  float sun_frac = 0.0F;
   float longwave_out_w_m2 = 0.0F;   ///< emitted and reflected
   float shortwave_out_w_m2 = 0.0F;  ///< reflected sunlight, mean of the interval before
   float flux_w_m2 = 0.0F;           ///< net, into the solid

@@ -7,9 +7,10 @@ namespace emit::renderer {
 namespace {
 
 SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
-                     std::span<const SampleOutput> begin, const SurfaceSample& sample) noexcept {
+                     std::span<const SampleOutput> begin, const SurfaceSample& sample,
+                     const SunShare& sun) noexcept {
   SampleDrive drive;
-  drive.sun_frac = interval_rays.sun_frac(step.rays, sample, step.offsets.sun_m, 0.0F);
+  drive.sun_frac = sun.frac;
   const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, step.offsets.around_m);
   drive.hidden_sky_frac = hidden.frac;
   if (hidden.frac > 0.0F && !step.faces.empty()) {
@@ -42,18 +43,26 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
                  const HeatInterval& interval, std::span<const SampleOutput> begin,
                  std::uint32_t index, SteppedSample& stepped) noexcept {
   const SurfaceSample& sample = step.all.samples[index];
-  const SampleDrive drive = drive_of(step, interval_rays, begin, sample);
+  const auto sun_of = [&](const SurfaceSample& side) {
+    return interval_rays.sun_share(step.rays, side, step.offsets.sun_m, 0.0F);
+  };
+  const SunShare sun = sun_of(sample);
+  const SampleDrive drive = drive_of(step, interval_rays, begin, sample, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
+    stepped.output.sun_frac = sun.fixed_frac;
     return;
   }
   const SurfaceSample& behind = step.all.samples[sample.other_side];
-  const SampleDrive back_drive = drive_of(step, interval_rays, begin, behind);
+  const SunShare sun_behind = sun_of(behind);
+  const SampleDrive back_drive = drive_of(step, interval_rays, begin, behind, sun_behind);
   const SheetBack back{behind, back_drive};
   stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
   stepped.behind =
       step.heat.output(behind, -normal, interval.forcing.end, back_drive, stepped.state);
+  stepped.output.sun_frac = sun.fixed_frac;
+  stepped.behind.sun_frac = sun_behind.fixed_frac;
 }
 
 }  // namespace emit::renderer

@@ -7,6 +7,7 @@
 #include "gl/egl_context.hpp"
 #include "gl/program.hpp"
 #include "shared/frame_params.glsl.h"
+#include "shared/shade_params.glsl.h"
 
 namespace emit::renderer {
 namespace {
@@ -36,6 +37,23 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto geometry = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", cached);
   ASSERT_TRUE(geometry) << geometry.error().text;
 
+  const gl::Define of_pages[] = {{"EMIT_PAGES", "1"}};
+  auto pages = gl::Program::compute("passes/shade.comp", of_pages);
+  ASSERT_TRUE(pages) << pages.error().text;
+  auto silhouettes = gl::Program::compute("passes/shade.comp");
+  ASSERT_TRUE(silhouettes) << silhouettes.error().text;
+
+  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, place);
+  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, sun);
+  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, left_frac);
+  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, lowest_m);
+  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, px);
+  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, column);
+  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, row);
+  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, depth_m);
+  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, penumbra);
+  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, taps[0]);
+  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, px);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, clip_from_mesh);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, normal_from_mesh[0]);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, ids);

@@ -14,7 +14,8 @@ layout(location = 1) out uint object;
 
 void main() {
   float cosine = gl_FrontFacing ? sample_state.w : -sample_state.w;
-  surface = packed_surface_texel(sample_state.x, sample_state.y * max(cosine, 0.0), sample_state.z, draw.ids.x);
+  surface = packed_surface_texel(sample_state.x, sample_state.y * max(cosine, 0.0), sample_state.z, draw.ids.x,
+                                 draw.ids.z != 0u);
 #ifdef EMIT_OBJECTS
   object = draw.ids.y;
 #endif

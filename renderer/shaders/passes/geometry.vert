@@ -13,6 +13,10 @@ layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 // Temperature offset in K and visible share of the sun, at the two nodes of time around now.
 layout(location = EMIT_ATTR_NODE_BEFORE) in vec2 node_before;
 layout(location = EMIT_ATTR_NODE_AFTER) in vec2 node_after;
+#ifdef EMIT_SHADE
+// What entities have taken off the temperature lately, in full sun, K: pixels have their own.
+layout(location = EMIT_ATTR_SHADE) in float shade_k;
+#endif
 // Temperature in K, share of the sun, share of the sky, cosine of the sun's incidence on the front.
 out vec4 sample_state;
 #else
@@ -25,6 +29,9 @@ void main() {
 #ifdef EMIT_CACHED
   float cosine = dot(n, frame.sun_now.xyz) * inversesqrt(max(dot(n, n), 1e-30)) * frame.sun_now.w;
   vec2 now = mix(node_before, node_after, frame.samples.x);
+#ifdef EMIT_SHADE
+  now.x += shade_k * now.y * max(cosine, 0.0);
+#endif
   sample_state = vec4(frame.obscurance.y + now.x, now.y, normal_mesh.w, cosine);
 #else
   normal_relworld = n;

@@ -8,6 +8,7 @@
 #define EMIT_BIND_BANDS 2
 #define EMIT_BIND_TAPS 3
 #define EMIT_BIND_DRAW 4
+#define EMIT_BIND_SHADE 5
 
 // Shader storage blocks: written.
 #define EMIT_BIND_OUTPUT 0
@@ -28,11 +29,14 @@
 #define EMIT_TEX_SPIN_UP 10
 #define EMIT_TEX_SURFACE 11
 #define EMIT_TEX_SCALED 12
+#define EMIT_TEX_SHADE 13
+#define EMIT_TEX_RESPONSE 14
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
 #define EMIT_IMG_STATE 1
 #define EMIT_IMG_SUN_NOW 2
+#define EMIT_IMG_SURFACE 3
 
 // Vertex attributes.
 #define EMIT_ATTR_POSITION 0
@@ -40,6 +44,7 @@
 #define EMIT_ATTR_ROW 2  // three of them
 #define EMIT_ATTR_NODE_BEFORE 5
 #define EMIT_ATTR_NODE_AFTER 6
+#define EMIT_ATTR_SHADE 7
 
 #define EMIT_MAX_CASCADES 4
 #define EMIT_MAX_BANDS 4

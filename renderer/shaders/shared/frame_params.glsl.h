@@ -24,7 +24,7 @@ struct FrameParams {
 struct DrawParams {
   mat4 clip_from_mesh;         // reversed z, infinite far plane; image row 0 at NDC y = -1
   vec4 normal_from_mesh[3];    // columns; xyz = cofactors of relworld_from_mesh: right for unequal scales too
-  uvec4 ids;                   // x = material, y = 1 + index of the scenario's object
+  uvec4 ids;                   // x = material, y = 1 + index of the scenario's object, z = 1 if that is an entity
 };
 
 // Three texels of the material table.

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/shade_pass.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <tuple>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr auto kPageSide = static_cast<GLsizei>(ShadePages::kSide);
+constexpr auto kSilhouetteSide = static_cast<GLsizei>(Silhouettes::kSide);
+
+/// Part of the window that holds the convex hull of points in relworld axes; first = end: none.
+glm::uvec4 part_of_window(std::span<const glm::dvec3> points_m, const CameraSetup& camera,
+                          const gpu::FrameParams& frame) noexcept {
+  const glm::dmat3 sensor_from_relworld = glm::transpose(camera.view.relworld_from_sensor);
+  glm::dvec2 low(std::numeric_limits<double>::infinity());
+  glm::dvec2 high = -low;
+  const glm::dvec4 ray(frame.ray);
+  const auto add = [&](const glm::dvec3& at) {
+    const glm::dvec2 px((at.x / at.z - ray.z) / ray.x - 0.5, (at.y / at.z - ray.w) / ray.y - 0.5);
+    low = glm::min(low, px);
+    high = glm::max(high, px);
+  };
+  const double near_m = camera.view.near_m;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    const glm::dvec3 at = sensor_from_relworld * points_m[i];
+    if (at.z >= near_m) add(at);
+    // Where a way between two of them leaves what lies before the camera.
+    for (std::size_t j = i + 1; j < points_m.size(); ++j) {
+      const glm::dvec3 other = sensor_from_relworld * points_m[j];
+      if ((at.z >= near_m) == (other.z >= near_m)) continue;
+      add(glm::mix(at, other, (near_m - at.z) / (other.z - at.z)));
+    }
+  }
+  const glm::uvec4& window_px = frame.format_window_px;
+  if (!(low.x <= high.x)) return {0U, 0U, 0U, 0U};
+  const auto clamped = [](double value, std::uint32_t least, std::uint32_t most) {
+    return static_cast<std::uint32_t>(
+        std::clamp(value, static_cast<double>(least), static_cast<double>(most)));
+  };
+  return {clamped(std::floor(low.x), window_px.x, window_px.z),
+          clamped(std::floor(low.y), window_px.y, window_px.w),
+          clamped(std::ceil(high.x) + 1.0, window_px.x, window_px.z),
+          clamped(std::ceil(high.y) + 1.0, window_px.y, window_px.w)};
+}
+
+bool is_empty(const glm::uvec4& px) noexcept {
+  return px.x >= px.z || px.y >= px.w;
+}
+
+void dispatch_part(const glm::uvec4& px) noexcept {
+  glDispatchCompute((px.z - px.x + 7) / 8, (px.w - px.y + 7) / 8, 1);
+  // The next part may overlap it.
+  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+}
+
+}  // namespace
+
+physics::Result<ShadePass> ShadePass::create(std::size_t entities) {
+  ShadePass pass;
+  const gl::Define pages{"EMIT_PAGES", "1"};
+  auto pages_program = gl::Program::compute("passes/shade.comp", {&pages, 1});
+  if (!pages_program) return tl::unexpected(std::move(pages_program.error()));
+  auto silhouettes_program = gl::Program::compute("passes/shade.comp");
+  if (!silhouettes_program) return tl::unexpected(std::move(silhouettes_program.error()));
+  pass.pages_program_ = std::move(*pages_program);
+  pass.silhouettes_program_ = std::move(*silhouettes_program);
+  pass.pages_ = gl::Texture(GL_RGBA32F, kPageSide, kPageSide, ShadePages::kPages);
+  pass.pages_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  pass.pages_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  pass.silhouettes_ =
+      gl::Texture(GL_R32F, kSilhouetteSide, kSilhouetteSide, static_cast<GLsizei>(entities));
+  pass.page_buffer_ = gl::Buffer::dynamic(ShadePages::kPages * sizeof(PageRecord));
+  pass.silhouette_buffer_ = gl::Buffer::dynamic(entities * sizeof(SilhouetteRecord));
+  pass.page_records_.reserve(ShadePages::kPages);
+  pass.silhouette_records_.reserve(entities);
+  pass.sent_.assign(entities, 0);
+  return pass;
+}
+
+void ShadePass::begin(const ShadePages& pages) {
+  response_ = gl::Buffer::from(pages.response().weights_k());
+  response_table_ = gl::BufferTexture(GL_RGBA32F, response_);
+}
+
+void ShadePass::prepare(const CachedSurface& surface, const glm::dvec3& camera_world_m,
+                        const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
+  page_records_.clear();
+  silhouette_records_.clear();
+  const glm::dvec3 relworld_from_rel_m = surface.origin_world_m() - camera_world_m;
+  prepare_pages(surface.shade(), relworld_from_rel_m, camera, frame);
+  prepare_silhouettes(surface, relworld_from_rel_m, camera, frame);
+}
+
+void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworld_from_rel_m,
+                              const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
+  const std::span<const ShadePages::Page> pages = shade.pages();
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    const ShadePages::Page& page = pages[p];
+    if (!page.used || page.fine) continue;
+    const glm::dvec3 first_m = glm::dvec3(page.first_m, page.plane_m) + relworld_from_rel_m;
+    const double side_m = page.texel_m * (ShadePages::kSide - 1);
+    std::array<glm::dvec3, 8> corners_m;
+    for (std::size_t i = 0; i < corners_m.size(); ++i) {
+      const double height_m = (i & 4U) != 0U ? page.reach_m : page.lowest_m;
+      corners_m[i] = first_m + glm::dvec3((i & 1U) != 0U ? side_m : 0.0,
+                                          (i & 2U) != 0U ? side_m : 0.0, height_m);
+      corners_m[i] += glm::dvec3(height_m * glm::dvec2(shade.slope()), 0.0);
+    }
+    const glm::uvec4 px = part_of_window(corners_m, camera, frame);
+    if (is_empty(px)) continue;
+    gpu::PageParams& params = page_records_.emplace_back().params;
+    params.place = glm::vec4(glm::vec3(first_m), 1.0F / page.texel_m);
+    params.sun = glm::vec4(shade.slope(), page.reach_m, static_cast<float>(p));
+    params.left_frac = page.left_frac;
+    params.lowest_m = glm::vec4(page.lowest_m, 0.0F, 0.0F, 0.0F);
+    params.px = px;
+  }
+}
+
+void ShadePass::prepare_silhouettes(const CachedSurface& surface,
+                                    const glm::dvec3& relworld_from_rel_m,
+                                    const CameraSetup& camera,
+                                    const gpu::FrameParams& frame) noexcept {
+  const std::span<const CachedSurface::Shadow> shadows = surface.shadows();
+  for (std::size_t m = 0; m < shadows.size(); ++m) {
+    const CachedSurface::Shadow& shadow = shadows[m];
+    if (!shadow.on) continue;
+    const PlacedSilhouette& placed = shadow.silhouette;
+    std::array<glm::dvec3, std::tuple_size_v<decltype(shadow.hull_m)>> corners_m;
+    for (std::size_t i = 0; i < corners_m.size(); ++i) {
+      corners_m[i] = glm::dvec3(shadow.hull_m[i]) + relworld_from_rel_m;
+    }
+    const glm::uvec4 px = part_of_window(corners_m, camera, frame);
+    if (is_empty(px)) continue;
+    gpu::SilhouetteParams& params = silhouette_records_.emplace_back().params;
+    const auto from_relworld = [&](const glm::vec4& line) {
+      const double shift = glm::dot(glm::dvec3(line), relworld_from_rel_m);
+      return glm::vec4(glm::vec3(line), static_cast<float>(static_cast<double>(line.w) - shift));
+    };
+    params.column = from_relworld(placed.column);
+    params.row = from_relworld(placed.row);
+    params.depth_m = from_relworld(placed.depth_m);
+    params.penumbra = glm::vec4(
+        placed.mean_m, static_cast<float>(std::tan(physics::kSunSemiAngleRad)) / placed.texel_m,
+        static_cast<float>(m), 0.0F);
+    for (std::uint32_t i = 0; i < EMIT_SHADE_TAPS; i += 2) {
+      const auto [x, y] = shade_tap(i);
+      const auto [next_x, next_y] = shade_tap(i + 1);
+      params.taps[i / 2] = glm::vec4(x, y, next_x, next_y);
+    }
+    params.px = px;
+  }
+}
+
+void ShadePass::upload(const CachedSurface& surface) noexcept {
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  const std::span<const ShadePages::Page> pages = surface.shade().pages();
+  for (std::size_t p = 0; p < pages.size(); ++p) {
+    if (!pages[p].used || !pages[p].changed) continue;
+    glTextureSubImage3D(pages_.id(), 0, 0, 0, static_cast<GLint>(p), kPageSide, kPageSide, 1,
+                        GL_RGBA, GL_FLOAT, pages[p].shade.data());
+  }
+  const Silhouettes& silhouettes = surface.silhouettes();
+  for (std::size_t m = 0; m < silhouettes.size(); ++m) {
+    if (sent_[m] == silhouettes.revision(m)) continue;
+    sent_[m] = silhouettes.revision(m);
+    glTextureSubImage3D(silhouettes_.id(), 0, 0, 0, static_cast<GLint>(m), kSilhouetteSide,
+                        kSilhouetteSide, 1, GL_RED, GL_FLOAT, silhouettes.depths_m(m).data());
+  }
+  page_buffer_.upload(std::span<const PageRecord>(page_records_));
+  silhouette_buffer_.upload(std::span<const SilhouetteRecord>(silhouette_records_));
+}
+
+void ShadePass::dispatch() const noexcept {
+  if (page_records_.empty() && silhouette_records_.empty()) return;
+  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
+  if (!page_records_.empty()) {
+    pages_program_.use();
+    pages_.bind(EMIT_TEX_SHADE);
+    response_table_.bind(EMIT_TEX_RESPONSE);
+    for (std::size_t i = 0; i < page_records_.size(); ++i) {
+      page_buffer_.bind_uniform(EMIT_BIND_SHADE, i * sizeof(PageRecord), sizeof(gpu::PageParams));
+      dispatch_part(page_records_[i].params.px);
+    }
+  }
+  // Temperatures go by the sun that what stands still leaves: this takes more of it away.
+  if (!silhouette_records_.empty()) {
+    silhouettes_program_.use();
+    silhouettes_.bind(EMIT_TEX_SHADE);
+    for (std::size_t i = 0; i < silhouette_records_.size(); ++i) {
+      silhouette_buffer_.bind_uniform(EMIT_BIND_SHADE, i * sizeof(SilhouetteRecord),
+                                      sizeof(gpu::SilhouetteParams));
+      dispatch_part(silhouette_records_[i].params.px);
+    }
+  }
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shade of entities, finer than samples lie: what C++ and GLSL must do alike.
+#pragma once
+#include "shared/bindings.glsl.h"
+#include "shared/cpp_glsl.glsl.h"
+
+// Places in the unit disc at which a silhouette is looked at.
+#define EMIT_SHADE_TAPS 16
+// What is shaded lies that much deeper than what shades.
+#define EMIT_SHADE_LIFT_M 0.01f
+// Texels of a page's side; the outermost ones are those of its neighbours as well.
+#define EMIT_PAGE_SIDE 128
+
+EMIT_SHARED_BEGIN
+
+// A page: level ground in squares, "relworld".
+struct PageParams {
+  vec4 place;      // xy = middle of the first texel, z = height of the plane, m; w = texels per m
+  vec4 sun;        // xy = way of a shadow per m of height, towards the sun; z = nothing higher above the plane
+                   // is shaded, m; w = layer
+  vec4 left_frac;  // by mode: share that is left of what the texels hold
+  vec4 lowest_m;   // x = nor what lies lower than that, negative
+  uvec4 px;        // part of the picture: first column, first row, behind the last ones
+};
+
+// A silhouette where its body stands now, "relworld".
+struct SilhouetteParams {
+  vec4 column;   // dot with (p, 1): texels from the first column
+  vec4 row;
+  vec4 depth_m;
+  vec4 penumbra; // x = mean depth of what shades, m; y = texels per m of the disc's radius per m of depth; z = layer
+  vec4 taps[EMIT_SHADE_TAPS / 2];  // places in the unit disc, two each
+  uvec4 px;      // as above
+};
+
+EMIT_SHARED_END
+
+#ifdef __cplusplus
+#include <cmath>
+#include <cstdint>
+#include <utility>
+namespace emit::renderer {
+/// Equal areas, golden angle.
+[[nodiscard]] inline std::pair<float, float> shade_tap(std::uint32_t index) noexcept {
+  const float radius = std::sqrt((static_cast<float>(index) + 0.5F) / EMIT_SHADE_TAPS);
+  const float angle = 2.39996323F * static_cast<float>(index);
+  return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+}  // namespace emit::renderer
+#endif

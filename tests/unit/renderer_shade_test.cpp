@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shade of entities: silhouettes, the response of materials, and pages of what was shaded.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <optional>
+#include <vector>
+
+#include "emit/physics/constants.hpp"
+#include "passes/foster_setup.hpp"
+#include "surface/shade_pages.hpp"
+#include "unit/surface_scene.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr std::int64_t kNoonNs = 4 * 3600 * kSecondNs;
+constexpr double kReferenceK = 295.0;
+constexpr float kHalfM = 2.0F;
+constexpr float kHeightM = 3.0F;
+
+scene::ScenarioDesc place() {
+  scene::ScenarioDesc s;
+  s.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
+  s.epoch_utc_ns = 1'403'330'400 * kSecondNs;  // 2014-06-21 06:00 UTC
+  scene::Material stone;
+  stone.name = "stone";
+  stone.layers = {{0.15, 0.7, 2120, 920}, {0.3, 1.5, 2000, 950}};
+  stone.solar_absorptance_frac = 0.8;
+  stone.emissivity_frac = 0.9;
+  stone.base_k = 286.15;
+  stone.modes = {{300.0, 0.5}, {5000.0, 0.5}};
+  scene::Material steel = stone;
+  steel.name = "steel";
+  steel.layers = {{0.003, 45.0, 7850, 480}, {0.05, 0.04, 30, 1000}};
+  scene::Material wood = stone;
+  wood.name = "wood";
+  wood.layers = {{0.03, 0.14, 600, 1700}};
+  s.materials = {stone, steel, wood};
+  s.default_material = "stone";
+  s.thermal.model = scene::ThermalModel::foster;
+  return s;
+}
+
+/// A level plate over level ground.
+class ShadeTest : public ::testing::Test {
+ protected:
+  ShadeTest() : scenario_(place()), environment_(scenario_) {
+    scene_.add_static(test::level_mesh(glm::vec3(-50.0F), glm::vec3(50.0F), 0.0F));
+    scene_.add_mover(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
+    auto rays = CasterRays::create(scene_.geometry);
+    EXPECT_TRUE(rays.has_value());
+    rays_.emplace(std::move(*rays));
+    const scene::Aabb box = scene_.geometry.meshes.back().bounds;
+    silhouettes_ = Silhouettes({&box, 1});
+    auto networks = build_foster_materials(scenario_, scenario_.materials);
+    EXPECT_TRUE(networks.has_value());
+    heat_.emplace(FosterHeat(std::span(*networks).first(3), kReferenceK, 0.02));
+    scene::ObjectDesc plate;
+    plate.entity_id = 7;
+    entities_.emplace_back(plate, pose_at(0.0, kHeightM));
+  }
+  [[nodiscard]] static physics::Pose pose_at(double east_m, double up_m) {
+    physics::Pose pose;
+    pose.position_world_m = {east_m, 0.0, up_m};
+    return pose;
+  }
+  [[nodiscard]] glm::dvec3 to_sun(std::int64_t now_ns) const {
+    return environment_.sun_at(now_ns).direction_enu;
+  }
+  [[nodiscard]] ShadePages::Inputs inputs() {
+    return {environment_, entities_, *rays_, workers_, silhouettes_};
+  }
+  /// Samples of the ground, a metre apart.
+  [[nodiscard]] static SurfaceSamples ground() {
+    SurfaceSamples all;
+    for (int y = -20; y <= 20; ++y) {
+      for (int x = -20; x <= 20; ++x) {
+        SurfaceSample& sample = all.samples.emplace_back();
+        sample.position_m = glm::vec3(x, y, 0.0F);
+        sample.normal = glm::vec3(0.0F, 0.0F, 1.0F);
+      }
+    }
+    return all;
+  }
+  [[nodiscard]] ShadePages pages(const SurfaceSamples& all, float tolerance_k = 0.1F) {
+    return {all,
+            static_cast<std::uint32_t>(all.samples.size()),
+            ShadeResponse(*heat_, scenario_.materials.size(), {12.0, 305.0}),
+            entities_.size(),
+            0,
+            tolerance_k};
+  }
+  /// How far within the plate's shade a point of the ground lies.
+  [[nodiscard]] double inside_m(const glm::vec3& point_m, double east_m,
+                                std::int64_t now_ns) const {
+    const glm::dvec3 sun = to_sun(now_ns);
+    const glm::dvec3 aside_m =
+        glm::dvec3(point_m) + kHeightM / sun.z * sun - glm::dvec3(east_m, 0.0, kHeightM);
+    return kHalfM - std::max(std::abs(aside_m.x), std::abs(aside_m.y));
+  }
+
+  scene::ScenarioDesc scenario_;
+  Environment environment_;
+  test::SurfaceScene scene_;
+  std::optional<CasterRays> rays_;
+  std::optional<SampleHeat> heat_;
+  WorkerPool workers_{2};
+  Silhouettes silhouettes_;
+  std::vector<PoseHistory> entities_;
+};
+
+TEST_F(ShadeTest, ASilhouetteIsDarkBehindItsBodyOnly) {
+  const glm::vec3 sun(to_sun(kNoonNs));
+  silhouettes_.look(0, sun, *rays_, workers_);
+  const MoverPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kHeightM}, true};
+  const PlacedSilhouette placed = silhouettes_.place(0, high);
+  const auto shaded_frac = [&](const glm::vec3& point_m) {
+    const glm::vec4 p(point_m, 1.0F);
+    const float depth_m = glm::dot(placed.depth_m, p);
+    return silhouettes_.shaded_frac(0, glm::dot(placed.column, p), glm::dot(placed.row, p), depth_m,
+                                    penumbra_texels(placed, depth_m));
+  };
+  int dark = 0;
+  for (float x = -8.0F; x <= 8.0F; x += 0.17F) {
+    for (float y = -8.0F; y <= 8.0F; y += 0.19F) {
+      const glm::vec3 point_m(x, y, 0.0F);
+      const double inside = inside_m(point_m, 0.0, kNoonNs);
+      if (std::abs(inside) < 0.12) continue;
+      EXPECT_EQ(shaded_frac(point_m), inside > 0.0 ? 1.0F : 0.0F) << x << ' ' << y;
+      dark += inside > 0.0 ? 1 : 0;
+      // The same line on the sun's side of the plate.
+      EXPECT_EQ(shaded_frac(point_m + (kHeightM / sun.z + 1.0F) * sun), 0.0F);
+    }
+  }
+  EXPECT_GT(dark, 300);
+  // On the edge half of the disc, however many looks are taken at a time.
+  const glm::vec3 edge_m = glm::vec3(kHalfM, 0.0F, kHeightM) - kHeightM / sun.z * sun;
+  EXPECT_NEAR(shaded_frac(edge_m), 0.5F, 0.35F);
+  const glm::vec4 p(edge_m, 1.0F);
+  float sum = 0.0F;
+  for (std::uint32_t first = 0; first < 5; ++first) {
+    sum += silhouettes_.shaded_frac(0, glm::dot(placed.column, p), glm::dot(placed.row, p),
+                                    glm::dot(placed.depth_m, p),
+                                    penumbra_texels(placed, glm::dot(placed.depth_m, p)), first, 5);
+  }
+  EXPECT_FLOAT_EQ(sum, shaded_frac(edge_m));
+}
+
+TEST_F(ShadeTest, ASilhouetteIsMadeAnewWhereTheBodyHasTurnedToTheSun) {
+  const glm::vec3 sun(to_sun(kNoonNs));
+  silhouettes_.look(0, sun, *rays_, workers_);
+  EXPECT_EQ(silhouettes_.revision(0), 1U);
+  silhouettes_.look(0, glm::normalize(sun + glm::vec3(1e-3F, 0.0F, 0.0F)), *rays_, workers_);
+  EXPECT_EQ(silhouettes_.revision(0), 1U);
+  silhouettes_.look(0, glm::normalize(sun + glm::vec3(1e-2F, 0.0F, 0.0F)), *rays_, workers_);
+  EXPECT_EQ(silhouettes_.revision(0), 2U);
+}
+
+TEST_F(ShadeTest, FourExponentialsFollowTheModel) {
+  const ResponseConditions around{12.0, 305.0};
+  const ShadeResponse response(*heat_, scenario_.materials.size(), around);
+  std::vector<double> times_s;
+  for (double t = 0.5; t < 3600.0; t *= 1.3) times_s.push_back(t);
+  std::vector<double> expected(times_s.size());
+  for (std::uint32_t m = 0; m < scenario_.materials.size(); ++m) {
+    heat_->step_response(m, around, times_s, expected);
+    ASSERT_GT(expected.back(), 1e-3);
+    for (std::size_t j = 0; j < times_s.size(); ++j) {
+      double sum_k = 0.0;
+      for (glm::length_t k = 0; k < 4; ++k) {
+        const float weight_k = response.weights_k()[m][k];
+        EXPECT_GE(weight_k, 0.0F);
+        sum_k -= static_cast<double>(weight_k) *
+                 std::expm1(-times_s[j] / ShadeResponse::kTauS[static_cast<std::size_t>(k)]);
+      }
+      EXPECT_NEAR(sum_k / ShadeResponse::kFullSunWM2, expected[j], 0.15 * expected[j])
+          << scenario_.materials[m].name << ' ' << times_s[j] << " s";
+    }
+  }
+}
+
+TEST_F(ShadeTest, TheStepResponseIsThatOfTheModelsOwnSteps) {
+  // A face in balance with its surroundings, and the same with some sun.
+  HeatInterval interval = heat_->sized_interval();
+  SurfaceForcing forcing;
+  constexpr double kAroundK = 300.0;
+  const double exitance = physics::kStefanBoltzmannWPerM2K4 * std::pow(kAroundK, 4.0);
+  forcing.longwave_w_m2 = forcing.environment_w_m2 = exitance;
+  forcing.film_w_m2_k = 12.0;
+  forcing.air_k = kAroundK;
+  constexpr double kSunWM2 = 20.0;
+  forcing.sun_w_m2 = {0.0, 0.0, kSunWM2};
+  interval.forcing = {forcing, forcing, 5.0};
+  heat_->prepare(interval);
+  SurfaceSample sample;
+  const glm::vec3 up(0.0F, 0.0F, 1.0F);
+  SampleState lit;
+  lit.modes_k[0] = 14.0;
+  SampleState dark = lit;
+  for (int i = 1; i <= 60; ++i) {
+    SampleDrive drive;
+    drive.sun_frac = 1.0F;
+    const float lit_k = heat_->advance(sample, up, interval, drive, lit).offset_k;
+    drive.sun_frac = 0.0F;
+    const float dark_k = heat_->advance(sample, up, interval, drive, dark).offset_k;
+    const double time_s = 5.0 * i;
+    double expected = 0.0;
+    heat_->step_response(0, {12.0, kAroundK}, {&time_s, 1}, {&expected, 1});
+    if (i % 10 != 0) continue;
+    EXPECT_NEAR((lit_k - dark_k) / kSunWM2, expected, 0.03 * expected) << time_s << " s";
+  }
+}
+
+TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
+  const SurfaceSamples all = ground();
+  ShadePages shade = pages(all);
+  shade.restart(kNoonNs);
+  constexpr std::int64_t kStaysNs = 30 * kSecondNs;
+  shade.run(kNoonNs + kStaysNs, all, inputs());
+  const auto mean_flux = [&](std::int64_t now_ns) {
+    return environment_.forcing_at(now_ns, environment_.sun_at(now_ns)).direct_normal_w_m2 /
+           ShadeResponse::kFullSunWM2;
+  };
+  const double flux_frac = mean_flux(kNoonNs);
+  const auto check = [&](double age_s) {
+    int inside = 0;
+    int used = 0;
+    for (const ShadePages::Page& page : shade.pages()) {
+      if (!page.used) continue;
+      ++used;
+      EXPECT_NEAR(page.plane_m, -rays_->origin_world_m().z, 1e-3);
+      for (std::uint32_t y = 0; y < ShadePages::kSide; y += 5) {
+        for (std::uint32_t x = 0; x < ShadePages::kSide; x += 5) {
+          const glm::vec3 at_m(page.first_m + page.texel_m * glm::vec2(x, y), page.plane_m);
+          const double inside_m =
+              this->inside_m(at_m + glm::vec3(rays_->origin_world_m()), 0.0, kNoonNs);
+          if (std::abs(inside_m) < 0.15) continue;
+          const glm::vec4 found = page.left_frac * page.shade[y * ShadePages::kSide + x];
+          for (glm::length_t k = 0; k < 4; ++k) {
+            const double tau_s = ShadeResponse::kTauS[static_cast<std::size_t>(k)];
+            // Pages take turns within a step.
+            const double early = -std::expm1(-30.2 / tau_s) * std::exp(-age_s / tau_s);
+            EXPECT_NEAR(found[k], inside_m > 0.0 ? flux_frac * early : 0.0, 0.012)
+                << at_m.x << ' ' << at_m.y << ", mode " << k;
+          }
+          inside += inside_m > 0.0 ? 1 : 0;
+        }
+      }
+    }
+    return std::pair(inside, used);
+  };
+  const auto [inside, used] = check(0.0);
+  EXPECT_GT(inside, 100);
+  EXPECT_GE(used, 2);
+  // Vertices have the same.
+  int vertices = 0;
+  for (std::size_t i = 0; i < all.samples.size(); ++i) {
+    const double inside_m = this->inside_m(
+        all.samples[i].position_m + glm::vec3(rays_->origin_world_m()), 0.0, kNoonNs);
+    if (std::abs(inside_m) < 0.15) continue;
+    double expected_k = 0.0;
+    for (glm::length_t k = 0; k < 4; ++k) {
+      expected_k -= static_cast<double>(shade.response().weights_k()[0][k]) * flux_frac *
+                    std::expm1(-30.1 / ShadeResponse::kTauS[static_cast<std::size_t>(k)]);
+    }
+    EXPECT_NEAR(shade.vertices_k()[i], inside_m > 0.0 ? expected_k : 0.0, 0.02 * expected_k);
+    vertices += inside_m > 0.0 ? 1 : 0;
+  }
+  EXPECT_GE(vertices, 9);
+  // It goes far away: what is left decays, and pages with nothing left are given back.
+  ASSERT_TRUE(entities_[0].append(kNoonNs + kStaysNs, pose_at(500.0, kHeightM), true, true));
+  shade.run(kNoonNs + kStaysNs + 20 * kSecondNs, all, inputs());
+  (void)check(20.0);
+  shade.run(kNoonNs + kStaysNs + 7200 * kSecondNs, all, inputs());
+  for (const ShadePages::Page& page : shade.pages()) EXPECT_FALSE(page.used);
+  for (const float vertex_k : shade.vertices_k()) EXPECT_NEAR(vertex_k, 0.0F, 1e-4F);
+  EXPECT_FALSE(shade.short_of_pages());
+}
+
+TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
+  // 4 m at 8 m/s: half a second.
+  const SurfaceSamples all = ground();
+  ShadePages shade = pages(all);
+  shade.restart(kNoonNs);
+  for (int i = 0; i <= 40; ++i) {
+    ASSERT_TRUE(entities_[0].append(kNoonNs + i * (kSecondNs / 10),
+                                    pose_at(-16.0 + 0.8 * i, kHeightM), true, false));
+  }
+  const std::int64_t end_ns = kNoonNs + 4 * kSecondNs;
+  shade.run(end_ns, all, inputs());
+  const double flux_frac =
+      environment_.forcing_at(end_ns, environment_.sun_at(end_ns)).direct_normal_w_m2 /
+      ShadeResponse::kFullSunWM2;
+  int met = 0;
+  for (const ShadePages::Page& page : shade.pages()) {
+    if (!page.used) continue;
+    for (std::uint32_t y = 3; y < ShadePages::kSide; y += 7) {
+      for (std::uint32_t x = 3; x < ShadePages::kSide; x += 7) {
+        const glm::vec3 at_m(page.first_m + page.texel_m * glm::vec2(x, y), page.plane_m);
+        const glm::vec3 world_m = at_m + glm::vec3(rays_->origin_world_m());
+        // Its middle passed at that place.
+        const glm::dvec3 sun = to_sun(kNoonNs + 2 * kSecondNs);
+        const double east_m = world_m.x + kHeightM / sun.z * sun.x;
+        const double north_m = world_m.y + kHeightM / sun.z * sun.y;
+        if (std::abs(north_m) > kHalfM - 0.15 || std::abs(east_m) > 11.0) continue;
+        // There it stood before it came from elsewhere.
+        if (std::abs(east_m) < kHalfM + 0.15) continue;
+        // Of the slowest mode hardly anything has been forgotten.
+        EXPECT_NEAR(page.left_frac.w * page.shade[y * ShadePages::kSide + x].w,
+                    flux_frac * 0.5 / ShadeResponse::kTauS[3], 0.1 * flux_frac * 0.5 / 1000.0)
+            << east_m << ' ' << north_m;
+        ++met;
+      }
+    }
+  }
+  EXPECT_GT(met, 100);
+}
+
+TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
+  // Here and there, too fast for anything to be forgotten.
+  const SurfaceSamples all = ground();
+  ShadePages shade = pages(all, 0.01F);
+  shade.restart(kNoonNs);
+  bool was_short = false;
+  for (int i = 1; i <= 60; ++i) {
+    const std::int64_t now_ns = kNoonNs + i * kSecondNs;
+    const double east_m = -40.0 + 8.0 * (i % 10);
+    physics::Pose pose = pose_at(east_m, kHeightM);
+    pose.position_world_m.y = -40.0 + 8.0 * (i / 10);
+    ASSERT_TRUE(entities_[0].append(now_ns, pose, true, true));
+    shade.run(now_ns, all, inputs());
+    was_short = was_short || shade.short_of_pages();
+    // What is in the shade now has pages all the same.
+    float most_k = 0.0F;
+    for (const float vertex_k : shade.vertices_k()) most_k = std::max(most_k, vertex_k);
+    if (std::abs(east_m) < 15.0 && std::abs(pose.position_world_m.y) < 15.0) {
+      EXPECT_GT(most_k, 0.1F);
+    }
+  }
+  EXPECT_TRUE(was_short);
+  shade.run(kNoonNs + 75 * kSecondNs, all, inputs());
+  EXPECT_FALSE(shade.short_of_pages());
+}
+
+TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {
+  const SurfaceSamples all = ground();
+  std::vector<float> first;
+  for (const unsigned int threads : {1U, 3U}) {
+    WorkerPool workers(threads);
+    Silhouettes silhouettes = silhouettes_;
+    ShadePages shade = pages(all);
+    shade.restart(kNoonNs);
+    shade.run(kNoonNs + 5 * kSecondNs, all,
+              {environment_, entities_, *rays_, workers, silhouettes});
+    const std::vector<float> found(shade.vertices_k().begin(), shade.vertices_k().end());
+    if (first.empty()) first = found;
+    EXPECT_EQ(found, first);
+  }
+}
+
+}  // namespace
+}  // namespace emit::renderer
