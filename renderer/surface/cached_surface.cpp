@@ -273,7 +273,7 @@ void CachedSurface::begin_shade(std::int64_t now_ns, const Inputs& inputs) {
       model_->samples, model_->drawn_samples,
       ShadeResponse(heat_, materials_.size(), {forcing.film_w_m2_k, forcing.air_k + kSunlitK}),
       inputs.entities.size(), options_.history_start_ns, static_cast<float>(options_.tolerance_k));
-  shade_->restart(now_ns);
+  shade_->restart(now_ns, inputs.entities);
   shadows_.assign(inputs.entities.size(), {});
 }
 

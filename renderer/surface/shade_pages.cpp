@@ -13,6 +13,9 @@
 namespace emit::renderer {
 namespace {
 
+/// Nearer to where it stood at the start an entity has not moved.
+constexpr double kStayedM = 0.05;
+constexpr double kStayedRad = 5e-3;
 /// Lower suns draw shadows too long for pages, and warm level ground little.
 constexpr double kLeastSunSine = 0.05;
 constexpr float kTexelsPerDiagonal = 128.0F;
@@ -42,7 +45,8 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
       start_ns_(start_ns),
       pages_(entities > 0 ? kPages : 0),
       places_(entities * kMostPlaces),
-      place_count_(entities, 0) {
+      place_count_(entities, 0),
+      at_start_(entities) {
   if (entities == 0) return;
   for (const glm::vec4& weights : response_.weights_k()) {
     most_weight_k_ = glm::max(most_weight_k_, weights);
@@ -89,7 +93,8 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
   }
 }
 
-void ShadePages::restart(std::int64_t now_ns) noexcept {
+void ShadePages::restart(std::int64_t now_ns, std::span<const PoseHistory> entities) noexcept {
+  for (std::size_t m = 0; m < entities.size(); ++m) at_start_[m] = entities[m].at(now_ns);
   for (Page& page : pages_) {
     if (page.used) give_back(page);
   }
@@ -126,14 +131,24 @@ void ShadePages::give_back(Page& page) noexcept {
   page.used = false;
 }
 
-ShadePages::Page* ShadePages::take_page(std::int64_t turn) noexcept {
+bool ShadePages::has_come(std::size_t mover, const PoseHistory& entity,
+                          std::int64_t at_ns) const noexcept {
+  const TrajectoryState& then = at_start_[mover];
+  const TrajectoryState now = entity.at(at_ns);
+  return now.on != then.on || !physics::close(now.pose, then.pose, kStayedM, kStayedRad);
+}
+
+ShadePages::Page* ShadePages::take_page(std::int64_t turn, bool come) noexcept {
   Page* least = nullptr;
   for (Page& page : pages_) {
     if (!page.used) return &page;
-    if (is_cast_on(page, turn)) continue;
+    if (!come || page.come_turn > turn - kTurns) continue;
     if (least == nullptr || worth_k(page) < worth_k(*least)) least = &page;
   }
-  if (least == nullptr || worth_k(*least) > tolerance_k_) short_turn_ = turn;
+  if (!come) return nullptr;
+  if (least == nullptr || (least->come_turn > kNever && worth_k(*least) > tolerance_k_)) {
+    short_turn_ = turn;
+  }
   if (least != nullptr) give_back(*least);
   return least;
 }
@@ -157,13 +172,14 @@ bool ShadePages::begin(Page& page, int level, const glm::ivec2& cell, float top_
   page.left_frac = glm::vec4(1.0F);
   page.most = glm::vec4(0.0F);
   page.members_ns = kNever;
+  page.come_turn = kNever;
   page.changed = true;
   std::ranges::fill(page.shade, glm::vec4(0.0F));
   page.marked.fill(0);
   return true;
 }
 
-void ShadePages::cast(std::size_t mover, std::int64_t turn, const glm::dvec3& to_sun,
+void ShadePages::cast(std::size_t mover, std::int64_t turn, bool come, const glm::dvec3& to_sun,
                       const Inputs& inputs) noexcept {
   const std::int64_t end_ns = start_ns_ + turn * kTurnNs;
   const std::int64_t begin_ns = end_ns - kStepNs;
@@ -200,12 +216,12 @@ void ShadePages::cast(std::size_t mover, std::int64_t turn, const glm::dvec3& to
     if (inputs.rays.first_hits({&behind, 1}, {true, {}}, hit) == 0) continue;
     const float ground_m = behind.origin_m.z - hit[0].distance_m * static_cast<float>(to_sun.z);
     const float top_m = placement.position_m.z + inputs.silhouettes.top_m(mover, placement);
-    find_pages(mover, turn, level, shaded_box(placed, ground_m), top_m, inputs.rays);
+    find_pages(mover, turn, come, level, shaded_box(placed, ground_m), top_m, inputs.rays);
   }
 }
 
-void ShadePages::find_pages(std::size_t mover, std::int64_t turn, int level, const ShadedBox& box,
-                            float top_m, const CasterRays& rays) noexcept {
+void ShadePages::find_pages(std::size_t mover, std::int64_t turn, bool come, int level,
+                            const ShadedBox& box, float top_m, const CasterRays& rays) noexcept {
   const float texel_m = std::ldexp(1.0F, level);
   const float own_m = texel_m * kOwnSide;
   const glm::ivec2 first = floor_of((box.low_m - texel_m) / own_m);
@@ -213,24 +229,25 @@ void ShadePages::find_pages(std::size_t mover, std::int64_t turn, int level, con
   const glm::ivec2 count = last - first + 1;
   constexpr auto kMost = static_cast<int>(kMostCasts);
   if (count.x > kMost || count.y > kMost || count.x * count.y > kMost) {
-    short_turn_ = turn;
+    if (come) short_turn_ = turn;
     return;
   }
   for (int y = first.y; y <= last.y; ++y) {
     for (int x = first.x; x <= last.x; ++x) {
       Page* page = page_at(level, {x, y});
       if (page == nullptr) {
-        page = take_page(turn);
+        page = take_page(turn, come);
         if (page == nullptr) return;
         if (!begin(*page, level, {x, y}, top_m, rays)) continue;
       }
       page->cast_turn = turn;
+      if (come) page->come_turn = turn;
       page->reach_m = std::max(page->reach_m, top_m - page->plane_m + kReachMarginM);
       const Cast cast{static_cast<std::uint32_t>(page - pages_.data()),
                       static_cast<std::uint32_t>(mover)};
       if (std::ranges::find(casts_, cast) != casts_.end()) continue;
       if (casts_.size() == casts_.capacity()) {
-        short_turn_ = turn;
+        if (come) short_turn_ = turn;
         return;
       }
       casts_.push_back(cast);
@@ -304,8 +321,12 @@ void ShadePages::take_turn(std::int64_t turn, const SurfaceSamples& all,
     flux_frac = static_cast<float>(forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) /
                                    ShadeResponse::kFullSunWM2);
     slope_ = glm::vec2(sun.direction_enu) / static_cast<float>(sun.direction_enu.z);
-    for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
-      cast(m, turn, sun.direction_enu, inputs);
+    for (const bool come : {true, false}) {
+      for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+        if (has_come(m, inputs.entities[m], end_ns) == come) {
+          cast(m, turn, come, sun.direction_enu, inputs);
+        }
+      }
     }
   }
   glm::vec4 left;

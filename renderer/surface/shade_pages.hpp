@@ -72,6 +72,7 @@ class ShadePages {
     glm::vec4 most{0.0F};  ///< of the texels
     std::int64_t members_ns = 0;
     std::int64_t cast_turn = 0;  ///< latest in which an entity cast on it
+    std::int64_t come_turn = 0;  ///< likewise, one that has come since the start
   };
   struct Inputs {
     const Environment& environment;
@@ -85,8 +86,9 @@ class ShadePages {
   ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResponse response,
              std::size_t entities, std::int64_t start_ns, float tolerance_k);
 
-  /// Nothing has been shaded before `now_ns`.
-  void restart(std::int64_t now_ns) noexcept;
+  /// Nothing has been shaded before `now_ns`; what the entities shade where they stand then, the
+  /// samples know.
+  void restart(std::int64_t now_ns, std::span<const PoseHistory> entities) noexcept;
   /// Does the steps up to `until_ns`.
   void run(std::int64_t until_ns, const SurfaceSamples& all, const Inputs& inputs) noexcept;
 
@@ -124,14 +126,17 @@ class ShadePages {
   static constexpr std::size_t kMostCasts = 24;  ///< pages of an entity at one place
 
   void take_turn(std::int64_t turn, const SurfaceSamples& all, const Inputs& inputs) noexcept;
-  void cast(std::size_t mover, std::int64_t turn, const glm::dvec3& to_sun,
+  void cast(std::size_t mover, std::int64_t turn, bool come, const glm::dvec3& to_sun,
             const Inputs& inputs) noexcept;
   /// Pages on which an entity casts from one place.
-  void find_pages(std::size_t mover, std::int64_t turn, int level, const ShadedBox& box,
+  void find_pages(std::size_t mover, std::int64_t turn, bool come, int level, const ShadedBox& box,
                   float top_m, const CasterRays& rays) noexcept;
   [[nodiscard]] Page* page_at(int level, const glm::ivec2& cell) noexcept;
-  /// One that is not used, or the one that matters least; null: all are cast on.
-  [[nodiscard]] Page* take_page(std::int64_t turn) noexcept;
+  /// One that is not used; for an entity that has `come` since the start, else the one that
+  /// matters least; null: there is none.
+  [[nodiscard]] Page* take_page(std::int64_t turn, bool come) noexcept;
+  [[nodiscard]] bool has_come(std::size_t mover, const PoseHistory& entity,
+                              std::int64_t at_ns) const noexcept;
   [[nodiscard]] bool is_cast_on(const Page& page, std::int64_t turn) const noexcept {
     return page.cast_turn > turn - kTurns;
   }
@@ -156,6 +161,7 @@ class ShadePages {
   std::vector<Cast> casts_;
   std::vector<Place> places_;               ///< by entity, then place
   std::vector<std::uint32_t> place_count_;  ///< by entity
+  std::vector<TrajectoryState> at_start_;   ///< by entity
   glm::vec2 slope_{0.0F};
   std::vector<float> vertices_k_;
   ChangedRanges changes_;

@@ -219,7 +219,7 @@ TEST_F(ShadeTest, TheStepResponseIsThatOfTheModelsOwnSteps) {
 TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
   const SurfaceSamples all = ground();
   ShadePages shade = pages(all);
-  shade.restart(kNoonNs);
+  shade.restart(kNoonNs, entities_);
   constexpr std::int64_t kStaysNs = 30 * kSecondNs;
   shade.run(kNoonNs + kStaysNs, all, inputs());
   const auto mean_flux = [&](std::int64_t now_ns) {
@@ -286,7 +286,7 @@ TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
   // 4 m at 8 m/s: half a second.
   const SurfaceSamples all = ground();
   ShadePages shade = pages(all);
-  shade.restart(kNoonNs);
+  shade.restart(kNoonNs, entities_);
   for (int i = 0; i <= 40; ++i) {
     ASSERT_TRUE(entities_[0].append(kNoonNs + i * (kSecondNs / 10),
                                     pose_at(-16.0 + 0.8 * i, kHeightM), true, false));
@@ -325,7 +325,7 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
   // Here and there, too fast for anything to be forgotten.
   const SurfaceSamples all = ground();
   ShadePages shade = pages(all, 0.01F);
-  shade.restart(kNoonNs);
+  shade.restart(kNoonNs, entities_);
   bool was_short = false;
   for (int i = 1; i <= 60; ++i) {
     const std::int64_t now_ns = kNoonNs + i * kSecondNs;
@@ -347,6 +347,39 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
   EXPECT_FALSE(shade.short_of_pages());
 }
 
+TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
+  // More parked vehicles than pages, and one that comes.
+  const SurfaceSamples all = ground();
+  constexpr int kParked = 40;
+  test::SurfaceScene scene;
+  scene.add_static(test::level_mesh(glm::vec3(-200.0F), glm::vec3(200.0F), 0.0F));
+  std::vector<scene::Aabb> boxes;
+  std::vector<PoseHistory> entities;
+  for (int i = 0; i <= kParked; ++i) {
+    scene.add_mover(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
+    boxes.push_back(scene.geometry.meshes.back().bounds);
+    scene::ObjectDesc plate;
+    plate.entity_id = static_cast<std::uint32_t>(7 + i);
+    physics::Pose pose = pose_at(-150.0 + 15.0 * (i % 8), kHeightM);
+    pose.position_world_m.y = -150.0 + 15.0 * (i / 8);
+    entities.emplace_back(plate, pose);
+  }
+  const auto rays = CasterRays::create(scene.geometry);
+  ASSERT_TRUE(rays.has_value());
+  Silhouettes silhouettes(boxes);
+  ShadePages shade(all, static_cast<std::uint32_t>(all.samples.size()),
+                   ShadeResponse(*heat_, scenario_.materials.size(), {12.0, 305.0}),
+                   entities.size(), 0, 0.1F);
+  shade.restart(kNoonNs, entities);
+  const ShadePages::Inputs inputs{environment_, entities, *rays, workers_, silhouettes};
+  shade.run(kNoonNs + 2 * kSecondNs, all, inputs);
+  EXPECT_FALSE(shade.short_of_pages());
+  ASSERT_TRUE(entities.back().append(kNoonNs + 2 * kSecondNs, pose_at(0.0, kHeightM), true, true));
+  shade.run(kNoonNs + 12 * kSecondNs, all, inputs);
+  const float most_k = *std::ranges::max_element(shade.vertices_k());
+  EXPECT_GT(most_k, 0.5F);
+}
+
 TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {
   const SurfaceSamples all = ground();
   std::vector<float> first;
@@ -354,7 +387,7 @@ TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {
     WorkerPool workers(threads);
     Silhouettes silhouettes = silhouettes_;
     ShadePages shade = pages(all);
-    shade.restart(kNoonNs);
+    shade.restart(kNoonNs, entities_);
     shade.run(kNoonNs + 5 * kSecondNs, all,
               {environment_, entities_, *rays_, workers, silhouettes});
     const std::vector<float> found(shade.vertices_k().begin(), shade.vertices_k().end());
