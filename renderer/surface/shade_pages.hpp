@@ -36,7 +36,7 @@ namespace emit::renderer {
 /// the constructor is RT-safe.
 class ShadePages {
  public:
-  static constexpr std::size_t kPages = 64;
+  static constexpr std::size_t kPages = 128;
   static constexpr std::uint32_t kSide = EMIT_PAGE_SIDE;
   /// Texels of a page's own; the rim is its neighbours'.
   static constexpr std::uint32_t kOwnSide = kSide - 2;
@@ -46,7 +46,7 @@ class ShadePages {
   static constexpr std::int64_t kTurnNs = kStepNs / kTurns;
   static constexpr std::int64_t kShortTurns = 10'000'000'000 / kTurnNs;
   /// A page of so many vertices is fine enough as it is.
-  static constexpr std::size_t kMostMembers = 12'288;
+  static constexpr std::size_t kMostMembers = 4096;
 
   struct Member {
     std::uint32_t sample = 0;

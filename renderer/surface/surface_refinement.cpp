@@ -73,22 +73,26 @@ float width_m(const scene::Aabb& box, const glm::dmat4& world_from_mesh) {
   return static_cast<float>(extent_m[1]);
 }
 
-/// What an eye is to a body that still stands where its way begins, when it comes closest.
-glm::vec3 nearest(const glm::vec3& eye_m, std::span<const glm::vec3> way_m) {
-  glm::vec3 found_m = eye_m;
-  float least_m = std::numeric_limits<float>::infinity();
+/// What an eye is to a body that still stands where its way begins, when the body comes closest to
+/// the middle of the picture.
+glm::vec3 when_in_view(const glm::vec3& eye_m, const glm::vec3& boresight,
+                       std::span<const glm::vec3> way_m) {
+  constexpr int kParts = 8;  // of a leg
+  glm::vec3 found_m = way_m.front();
+  float most = -std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < way_m.size(); ++i) {
-    const glm::vec3 to_m = i + 1 < way_m.size() ? way_m[i + 1] - way_m[i] : glm::vec3(0.0F);
-    const float length_m2 = glm::dot(to_m, to_m);
-    const float along = length_m2 > 0.0F
-                            ? std::clamp(glm::dot(eye_m - way_m[i], to_m) / length_m2, 0.0F, 1.0F)
-                            : 0.0F;
-    const glm::vec3 place_m = way_m[i] + along * to_m;
-    if (glm::distance(eye_m, place_m) >= least_m) continue;
-    least_m = glm::distance(eye_m, place_m);
-    found_m = eye_m - (place_m - way_m.front());
+    const glm::vec3& end_m = way_m[std::min(i + 1, way_m.size() - 1)];
+    for (int part = 0; part < kParts; ++part) {
+      const glm::vec3 place_m =
+          glm::mix(way_m[i], end_m, static_cast<float>(part) / static_cast<float>(kParts));
+      const glm::vec3 there_m = place_m - eye_m;
+      const float cosine = glm::dot(there_m, boresight) / std::max(glm::length(there_m), 1e-3F);
+      if (!(cosine > most)) continue;
+      most = cosine;
+      found_m = place_m;
+    }
   }
-  return found_m;
+  return eye_m - (found_m - way_m.front());
 }
 
 }  // namespace
@@ -111,23 +115,10 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
     eyes_.push_back(
         {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
   }
-  std::vector<float> aims_m;  // by eye: to what it points at
-  for (const Eye& eye : eyes_) {
-    const CasterRay ray{eye.rel_m, eye.boresight};
-    std::array<CasterHit, 1> hit;
-    const bool met =
-        eye.boresight != glm::vec3(0.0F) && inputs.rays.first_hits({&ray, 1}, {true, {}}, hit) != 0;
-    aims_m.push_back(met ? hit[0].distance_m : std::numeric_limits<float>::infinity());
-  }
   for (const std::vector<glm::vec3>& way_m : inputs.ways_m) {
     std::vector<Eye>& eyes = eyes_of_mover_.emplace_back();
-    for (std::size_t i = 0; i < eyes_.size(); ++i) {
-      glm::vec3 eye_m = nearest(eyes_[i].rel_m, way_m);
-      // The host may drive it to where the camera points.
-      const glm::vec3 there_m = eye_m - way_m.front();
-      const float distance_m = glm::length(there_m);
-      if (aims_m[i] < distance_m) eye_m = way_m.front() + aims_m[i] / distance_m * there_m;
-      eyes.push_back({eye_m, glm::vec3(0.0F)});
+    for (const Eye& eye : eyes_) {
+      eyes.push_back({when_in_view(eye.rel_m, eye.boresight, way_m), eye.boresight});
     }
   }
   for (const scene::Instance& instance : inputs.geometry.instances) {

@@ -89,9 +89,8 @@ class SurfaceRefinement {
   const DriveWorth& worth_;
   SurfaceBend bend_;
   std::vector<Eye> eyes_;
-  /// By entity: what they are to it where its script brings it closest, or as close as what they
-  /// point at, as though it stayed where it is; it is in view all the time, because the host may
-  /// drive it there.
+  /// By entity: what they are to it where its script brings it closest to the middle of their
+  /// picture, as though it stayed where it is.
   std::vector<std::vector<Eye>> eyes_of_mover_;
   std::vector<float> body_m_;  ///< by instance: its width
   float pixel_rad_ = 1e-3F;
