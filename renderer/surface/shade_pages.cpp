@@ -110,9 +110,22 @@ void ShadePages::forget_changes() noexcept {
 void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
                      const Inputs& inputs) noexcept {
   if (pages_.empty()) return;
+  const std::int64_t due = (until_ns - start_ns_) / kTurnNs - next_turn_ + 1;
+  if (due > kMostTurns) skip(due - kMostTurns);
   for (; start_ns_ + next_turn_ * kTurnNs <= until_ns; ++next_turn_) {
     take_turn(next_turn_, all, inputs);
   }
+}
+
+void ShadePages::skip(std::int64_t turns) noexcept {
+  const double seconds = 1e-9 * static_cast<double>(turns * kTurnNs);
+  for (Page& page : pages_) {
+    for (std::size_t k = 0; k < ShadeResponse::kModes; ++k) {
+      page.left_frac[static_cast<glm::length_t>(k)] *=
+          static_cast<float>(std::exp(-seconds / ShadeResponse::kTauS[k]));
+    }
+  }
+  next_turn_ += turns;
 }
 
 ShadePages::Page* ShadePages::page_at(int level, const glm::ivec2& cell) noexcept {

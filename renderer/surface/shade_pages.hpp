@@ -45,6 +45,8 @@ class ShadePages {
   static constexpr std::int64_t kTurns = 8;
   static constexpr std::int64_t kTurnNs = kStepNs / kTurns;
   static constexpr std::int64_t kShortTurns = 10'000'000'000 / kTurnNs;
+  /// After a jump of sim time shade is made up for over its last minute.
+  static constexpr std::int64_t kMostTurns = 60'000'000'000 / kTurnNs;
   /// A page of so many vertices is fine enough as it is.
   static constexpr std::size_t kMostMembers = 4096;
 
@@ -125,6 +127,8 @@ class ShadePages {
   static constexpr std::size_t kMostPlaces = 8;
   static constexpr std::size_t kMostCasts = 24;  ///< pages of an entity at one place
 
+  /// What pages hold grows older by that many turns.
+  void skip(std::int64_t turns) noexcept;
   void take_turn(std::int64_t turn, const SurfaceSamples& all, const Inputs& inputs) noexcept;
   void cast(std::size_t mover, std::int64_t turn, bool come, const glm::dvec3& to_sun,
             const Inputs& inputs) noexcept;

@@ -380,6 +380,29 @@ TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
   EXPECT_GT(most_k, 0.5F);
 }
 
+TEST_F(ShadeTest, AfterAJumpTheLastMinuteIsMadeUpForAndTheRestIsOlder) {
+  const SurfaceSamples all = ground();
+  const auto vertices_after = [&](std::int64_t seconds_at_a_time) {
+    std::vector<PoseHistory> entities{PoseHistory({}, pose_at(0.0, kHeightM))};
+    Silhouettes silhouettes = silhouettes_;
+    ShadePages shade = pages(all);
+    shade.restart(kNoonNs, entities);
+    const ShadePages::Inputs inputs{environment_, entities, *rays_, workers_, silhouettes};
+    shade.run(kNoonNs + 30 * kSecondNs, all, inputs);
+    EXPECT_TRUE(entities[0].append(kNoonNs + 30 * kSecondNs, pose_at(500.0, kHeightM), true, true));
+    for (std::int64_t s = 30; s < 330; s += seconds_at_a_time) {
+      shade.run(kNoonNs + (s + seconds_at_a_time) * kSecondNs, all, inputs);
+    }
+    return std::vector<float>(shade.vertices_k().begin(), shade.vertices_k().end());
+  };
+  const auto step_by_step = vertices_after(1);
+  const auto at_once = vertices_after(300);
+  EXPECT_GT(*std::ranges::max_element(step_by_step), 0.1F);
+  for (std::size_t i = 0; i < step_by_step.size(); ++i) {
+    EXPECT_NEAR(at_once[i], step_by_step[i], 2e-3F) << i;
+  }
+}
+
 TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {
   const SurfaceSamples all = ground();
   std::vector<float> first;
