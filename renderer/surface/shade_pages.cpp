@@ -18,7 +18,7 @@ constexpr double kStayedM = 0.05;
 constexpr double kStayedRad = 5e-3;
 /// Lower suns draw shadows too long for pages, and warm level ground little.
 constexpr double kLeastSunSine = 0.05;
-constexpr float kTexelsPerDiagonal = 128.0F;
+constexpr float kTexelsPerDiagonal = 64.0F;
 /// An entity that comes farther within a step casts from several places.
 constexpr float kPlaceTexels = 4.0F;
 /// Shadows of what does not move creep over vertices that were not there before.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
@@ -18,8 +20,11 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::uint32_t kMaxRounds = 400;
-/// What needs less than this share of the neediest waits for another round.
+/// What needs less than this share of the neediest waits for another round, unless few need more: a
+/// round takes a share of all, too, lest a single needy triangle after the other use them up.
 constexpr float kNeedStep = 4.0F;
+constexpr std::size_t kRoundShare = 8;
+constexpr std::size_t kLeastPerRound = 256;
 constexpr std::size_t kGrain = 64;
 /// The full surface is looked for within this share of the halved edge.
 constexpr float kDetailReachFrac = 0.5F;
@@ -49,6 +54,8 @@ class Builder {
   /// Halves the leaves of a mesh that need more than `above`, the neediest first, as far as samples
   /// are left.
   void split(std::uint32_t mesh, float above);
+  /// What the share of leaves that a round takes at least need more than.
+  [[nodiscard]] float need_of_neediest();
   /// Gives every vertex that has no sample yet one; false when stopped.
   bool sample_new_vertices(double begin_frac, double end_frac);
   /// Vertices from `first` on face as the surface did before it was simplified, and their samples
@@ -79,6 +86,7 @@ class Builder {
   std::vector<glm::vec3> place_m_;  ///< of its samples
   std::vector<Job> jobs_;
   std::vector<SurfaceRefinement::Need> needs_;
+  std::vector<float> ranked_;
   std::vector<std::uint32_t> slots_;
   std::vector<SampleStand> job_stand_;
 };
@@ -264,6 +272,19 @@ void Builder::split(std::uint32_t mesh, float above) {
   refinement_.leave(mesh, refined, slots_);
 }
 
+float Builder::need_of_neediest() {
+  ranked_.clear();
+  for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
+    refinement_.list(mesh, 0.0F, needs_);
+    for (const SurfaceRefinement::Need& need : needs_) ranked_.push_back(need.need);
+  }
+  const std::size_t taken = std::max(kLeastPerRound, ranked_.size() / kRoundShare);
+  if (ranked_.size() <= taken) return 0.0F;
+  const auto last = ranked_.begin() + static_cast<std::ptrdiff_t>(taken);
+  std::ranges::nth_element(ranked_, last, std::greater{});
+  return *last;
+}
+
 physics::Result<SurfaceModel> Builder::run() {
   const auto stopped = [] {
     return physics::make_error(physics::ErrorCode::internal, "stopped while sampling the surface");
@@ -292,7 +313,7 @@ physics::Result<SurfaceModel> Builder::run() {
       break;
     }
     if (most.need == 0.0F) break;
-    const float above = most.need / kNeedStep;
+    const float above = std::min(most.need / kNeedStep, need_of_neediest());
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
     done_frac = to_frac;
     to_frac = next_frac();
