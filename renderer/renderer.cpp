@@ -103,6 +103,7 @@ class GlRenderer final : public Renderer {
   const std::string& device_name() const noexcept override { return context_.device_name(); }
 
   [[nodiscard]] bool memory_mapped() const noexcept { return readback_.mapped(); }
+  [[nodiscard]] bool software() const noexcept { return context_.software(); }
 
  private:
   [[nodiscard]] Result<void> warm_up_stage(const FrameRequest& first,
@@ -315,7 +316,8 @@ void GlRenderer::prepare(const FrameRequest& request, const QualityRung& rung) n
   CameraSetup camera = place_camera(request, rung);
   LevelLimits limits = rung.limits;
   limits.pixel_rad = camera.pixel_rad;
-  stage_->drawn().lists.cull_view(camera.view, limits, view_single_sided_, view_double_sided_);
+  stage_->drawn().lists.cull_view(camera.view, limits, glm::uvec2(frame_params_.format_px),
+                                  view_single_sided_, view_double_sided_);
   stage_->prepare(request, camera, frame_params_);
   const physics::SunPosition& sun = stage_->sun_now();
   const bool sun_up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
@@ -405,7 +407,6 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
     readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot), {&all, 1});
     return slot;
   }
-  view.stats.coarse = stage_->coarse_from(request.sensor_pose);
   clock_.start();
 
   view.rung = passes_.enlarge ? std::min<std::uint8_t>(request.rung, kQualityLadder.size() - 1) : 0;
@@ -415,6 +416,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
                                           : std::numeric_limits<float>::quiet_NaN();
   const QualityRung& rung = kQualityLadder[view.rung];
   prepare(request, rung);
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose);
   bind_frame();
   const std::uint32_t zero = 0;
   glClearNamedBufferSubData(output_buffer_.id(), GL_R32UI, static_cast<GLintptr>(stats_offset_),
@@ -507,7 +509,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
                                                std::move(*bands), std::move(passes));
   auto stage = cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
-                                            renderer->history())
+                                            renderer->history(), renderer->software())
                       : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
                                               renderer->history());
   if (!stage) return tl::unexpected(std::move(stage.error()));

@@ -77,7 +77,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
                                                    double obscurance_radius_m) {
   const SceneBuffers scene(std::move(geometry));
   const std::array<std::int32_t, 1> no_history{-1};
-  DrawLists lists(scene, no_history, thermal_.max_cascades);
+  DrawLists lists(scene, no_history, thermal_.max_cascades, nullptr);
   lists.begin(sensor_pose.position_world_m, 0, {});
 
   sensor_.near_m = near_m;
@@ -94,7 +94,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
       std::max(2.0 * near_m, glm::length(glm::max(glm::abs(bounds.min_m), glm::abs(bounds.max_m))));
   CommandRange single_sided;
   CommandRange double_sided;
-  lists.cull_view(camera.view, {}, single_sided, double_sided);
+  lists.cull_view(camera.view, {}, size_px, single_sided, double_sided);
   frame.obscurance = glm::vec4(static_cast<float>(obscurance_radius_m), 0.0F, 0.0F, 0.0F);
 
   HistoryInterval now;

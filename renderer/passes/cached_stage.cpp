@@ -100,7 +100,7 @@ std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineVie
 
 physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-    std::vector<FosterMaterial> foster_materials, const SceneHistory& history) {
+    std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software) {
   const std::vector<RefineView::Eye> eyes = all_eyes(scenario.sensor.trajectory);
   std::vector<glm::dvec3> eyes_world_m;
   for (const RefineView::Eye& eye : eyes) eyes_world_m.push_back(eye.world_m);
@@ -127,15 +127,16 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   }
   return std::unique_ptr<ThermalStage>(new CachedStage(
       scenario, bounds, eyes_around(eyes, bounds), std::move(*surface), std::move(foster_materials),
-      history, std::move(saved), coarse->visibly, std::move(shade_pass)));
+      history, std::move(saved), coarse->visibly, std::move(shade_pass), software));
 }
 
 CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
                          std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
                          std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
-                         std::optional<ShadePass> shade_pass)
+                         std::optional<ShadePass> shade_pass, bool software)
     : sensor_(scenario.sensor),
+      software_(software),
       static_bounds_(static_bounds),
       detail_eyes_(std::move(detail_eyes)),
       visibly_simplified_(visibly_simplified),
@@ -158,8 +159,7 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   if (saved_) saved_->start = false;  // after a jump of sim time the start's state need not fit
   refined_eyes_ = eyes_around(view.eyes, static_bounds_);
   drawn_.reset();  // its device memory goes before that of the next one is taken
-  drawn_ =
-      std::make_unique<DrawnScene>(SceneBuffers(surface_->drawn_scene()), history_of_object_, 0);
+  drawn_ = std::make_unique<DrawnScene>(surface_->drawn_scene(), history_of_object_, software_);
   for (gl::Buffer& node : node_buffers_) {
     node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
   }
@@ -187,7 +187,8 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   };
   // Without known eyes no mesh was simplified.
   return visibly_simplified_ || surface_->model().full_in_view ||
-         surface_->shade().short_of_pages() || !stands_near(refined_eyes_, least_cos) ||
+         surface_->shade().short_of_pages() || surface_->stale_shadow() ||
+         !stands_near(refined_eyes_, least_cos) ||
          (!detail_eyes_.empty() && !stands_near(detail_eyes_, -2.0));
 }
 
@@ -203,7 +204,7 @@ void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
   surface_->advance(request.thermal_time_ns, inputs, surface_history_);
   if (shade_pass_) {
-    surface_->look(request.sim_time_ns, request.thermal_time_ns, inputs);
+    surface_->place_shadows(request.sim_time_ns, request.thermal_time_ns, inputs);
     shade_pass_->prepare(*surface_, request.sensor_pose.position_world_m, camera, frame);
   }
   frame.samples.x = surface_->fraction();

@@ -17,10 +17,10 @@ namespace emit::renderer {
 /// the refined meshes they sit on.
 class CachedStage final : public ThermalStage {
  public:
-  /// Errors: those of CachedSurface::create().
+  /// `software`: the device is. Errors: those of CachedSurface::create().
   [[nodiscard]] static physics::Result<std::unique_ptr<ThermalStage>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-      std::vector<FosterMaterial> foster_materials, const SceneHistory& history);
+      std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software);
 
   physics::Result<void> warm_up(const FrameRequest& request,
                                 const WarmUpProgress& progress) override;
@@ -52,9 +52,10 @@ class CachedStage final : public ThermalStage {
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
               std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
-              std::optional<ShadePass> shade_pass);
+              std::optional<ShadePass> shade_pass, bool software);
 
   scene::SensorDesc sensor_;
+  bool software_ = false;  ///< the device is
   scene::Aabb static_bounds_;
   std::vector<Eye> detail_eyes_;   ///< meshes were simplified for these
   bool visibly_simplified_;        ///< for want of samples

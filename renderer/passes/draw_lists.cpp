@@ -24,6 +24,11 @@ DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& rel
   return record;
 }
 
+/// GL takes a number of bytes in the guise of an address.
+const void* index_address(std::uint32_t first_index) noexcept {
+  return reinterpret_cast<const void*>(std::uintptr_t{first_index} * sizeof(std::uint32_t));
+}
+
 /// True when the box lies outside one plane of the pyramid.
 bool outside(std::span<const glm::dvec3> inward_normals, const glm::dvec3& centre_m,
              const glm::dvec3& half_m) noexcept {
@@ -51,8 +56,8 @@ scene::Aabb shifted(const scene::Aabb& box, const glm::dvec3& by_m) noexcept {
 }  // namespace
 
 DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-                     std::uint32_t max_passes)
-    : scene_(scene) {
+                     std::uint32_t max_passes, TriangleCull* cull)
+    : scene_(scene), cull_(cull) {
   const auto instances = scene.instances();
   std::size_t view_ranges = 0;
   std::size_t submesh_instances = 0;
@@ -124,15 +129,13 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
 
 void DrawLists::add_range(std::uint32_t first_index, std::uint32_t index_count,
                           std::int32_t base_vertex) noexcept {
-  const auto offset = std::uintptr_t{first_index} * sizeof(std::uint32_t);
   view_ranges_.index_count.push_back(static_cast<std::int32_t>(index_count));
-  // GL takes a number of bytes in the guise of an address.
-  view_ranges_.index_offset.push_back(reinterpret_cast<const void*>(offset));
+  view_ranges_.index_offset.push_back(index_address(first_index));
   view_ranges_.base_vertex.push_back(base_vertex);
 }
 
 void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
-                           const ClusterView& seen) noexcept {
+                           const ClusterView& seen, const glm::mat4& clip_from_mesh) noexcept {
   const std::int32_t base_vertex = scene_.base_vertex(instance);
   if (submesh.cluster_count == 0) {
     add_range(submesh.first_index, submesh.index_count, base_vertex);
@@ -144,6 +147,14 @@ void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange
        ++c) {
     const scene::Cluster& cluster = scene_.clusters()[c];
     if (!seen.fits(scene_.levels()[c]) || !seen.shows(cluster, submesh.double_sided)) continue;
+    const auto range = static_cast<std::uint32_t>(view_ranges_.index_count.size());
+    if (cull_ != nullptr && cull_->take(cluster, c, clip_from_mesh, !submesh.double_sided,
+                                        range + (index_count > 0 ? 1 : 0))) {
+      if (index_count > 0) add_range(first_index, index_count, base_vertex);
+      index_count = 0;
+      add_range(0, 0, base_vertex);  // what is left is known later
+      continue;
+    }
     if (index_count > 0 && cluster.first_index != first_index + index_count) {
       add_range(first_index, index_count, base_vertex);
       index_count = 0;
@@ -197,8 +208,10 @@ std::uint32_t DrawLists::indices_in_view(const SceneBuffers::DrawRange& submesh,
 }
 
 void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
-                          CommandRange& single_sided, CommandRange& double_sided) noexcept {
+                          const glm::uvec2& size_px, CommandRange& single_sided,
+                          CommandRange& double_sided) noexcept {
   find_in_view(view);
+  if (cull_ != nullptr) cull_->begin(size_px);
   for (const bool sheets : {false, true}) {
     CommandRange& range = sheets ? double_sided : single_sided;
     range.first = static_cast<std::uint32_t>(view_draws_.size());
@@ -210,17 +223,54 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
           if (!view_placed_[i].in_view) continue;
           const glm::dmat4 matrix = relworld_from_mesh(view_placed_[i]);
           const auto first = static_cast<std::uint32_t>(view_ranges_.index_count.size());
-          add_ranges(i, submesh, ClusterView(view, matrix, limits));
-          const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;
-          if (count == 0) continue;
-          view_draws_.push_back({static_cast<std::uint32_t>(records_.size()), first, count});
+          const auto record = static_cast<std::uint32_t>(records_.size());
           records_.push_back(record_of(view.clip_from_relworld, matrix,
                                        scene_.instances()[i].object, submesh.material,
                                        history_of_instance_[i] >= 0));
+          add_ranges(i, submesh, ClusterView(view, matrix, limits),
+                     records_.back().params.clip_from_mesh);
+          const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;
+          if (count == 0) {
+            records_.pop_back();
+            continue;
+          }
+          view_draws_.push_back({record, first, count});
         }
       }
     }
     range.count = static_cast<std::uint32_t>(view_draws_.size()) - range.first;
+  }
+  if (cull_ == nullptr) return;
+  cull_->run();
+  for (const TriangleCull::Part& part : cull_->parts()) {
+    view_ranges_.index_count[part.range] = static_cast<std::int32_t>(part.count);
+    view_ranges_.index_offset[part.range] = index_address(scene_.first_culled() + part.first);
+  }
+  join_ranges();
+}
+
+void DrawLists::join_ranges() noexcept {
+  std::uint32_t used = 0;
+  for (ViewDraw& draw : view_draws_) {
+    const std::uint32_t first = used;
+    const void* end = nullptr;  // of the range before
+    for (std::uint32_t i = draw.first; i < draw.first + draw.count; ++i) {
+      const std::int32_t count = view_ranges_.index_count[i];
+      const void* offset = view_ranges_.index_offset[i];
+      // Mesa leaves out what follows an empty one, too.
+      if (count == 0) continue;
+      if (used > first && offset == end) {
+        view_ranges_.index_count[used - 1] += count;
+      } else {
+        view_ranges_.index_count[used] = count;
+        view_ranges_.index_offset[used] = offset;
+        view_ranges_.base_vertex[used] = view_ranges_.base_vertex[i];
+        ++used;
+      }
+      end = static_cast<const std::uint32_t*>(offset) + count;
+    }
+    draw.first = first;
+    draw.count = used - first;
   }
 }
 

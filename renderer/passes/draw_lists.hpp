@@ -41,17 +41,18 @@ struct CommandRange {
 /// taken there).
 class DrawLists {
  public:
-  /// `max_passes`: most shadow passes (steps x cascades) of a frame.
+  /// `max_passes`: most shadow passes (steps x cascades) of a frame. `cull`: null, or what the
+  /// buffers were made with.
   DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
-            std::uint32_t max_passes);
+            std::uint32_t max_passes, TriangleCull* cull);
 
   /// Starts a frame: all instances at `sim_time_ns` around a camera at `camera_world_m`.
   void begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
              std::span<const PoseHistory> entities) noexcept;
-  /// Draws of the camera, in levels of detail that keep to `limits`; double-sided ones apart: parts
-  /// of view_draws().
-  void cull_view(const ViewVolume& view, const LevelLimits& limits, CommandRange& single_sided,
-                 CommandRange& double_sided) noexcept;
+  /// Draws of the camera into `size_px`, in levels of detail that keep to `limits`; double-sided
+  /// ones apart: parts of view_draws().
+  void cull_view(const ViewVolume& view, const LevelLimits& limits, const glm::uvec2& size_px,
+                 CommandRange& single_sided, CommandRange& double_sided) noexcept;
   /// Triangles that cull_view() would draw under each of `limits`. Precondition: equal lengths.
   void count_triangles(const ViewVolume& view, std::span<const LevelLimits> limits,
                        std::span<std::uint32_t> triangles) noexcept;
@@ -94,11 +95,14 @@ class DrawLists {
                                               const ClusterView& seen) const noexcept;
   /// Appends the index ranges of an instance's submesh that `seen` shows.
   void add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
-                  const ClusterView& seen) noexcept;
+                  const ClusterView& seen, const glm::mat4& clip_from_mesh) noexcept;
+  /// Leaves out empty ranges and makes one of those that follow each other.
+  void join_ranges() noexcept;
   void add_range(std::uint32_t first_index, std::uint32_t index_count,
                  std::int32_t base_vertex) noexcept;
 
   const SceneBuffers& scene_;
+  TriangleCull* cull_ = nullptr;
   std::vector<std::int32_t> history_of_instance_;  ///< -1: static
   std::vector<std::uint32_t> moving_;              ///< instances of entities
   std::vector<double> size_of_instance_m_;

@@ -53,7 +53,7 @@ PerFrameStage::PerFrameStage(const scene::ScenarioDesc& scenario, scene::SceneGe
       plan_(scenario.thermal),
       foster_(make_foster(scenario, std::move(foster_materials), history.environment, kReferenceK)),
       tail_steps_(foster_ ? static_cast<std::uint32_t>(foster_->tail().size()) : 0),
-      drawn_(SceneBuffers(std::move(geometry)), histories_of_objects(scenario),
+      drawn_(std::move(geometry), histories_of_objects(scenario),
              (scenario.thermal.steps + 1) * scenario.thermal.max_cascades),
       passes_(std::move(passes)),
       step_params_(scenario.thermal.steps + 1 + tail_steps_),

@@ -28,7 +28,7 @@ gl::Buffer storage(std::vector<T>& data) {
 
 }  // namespace
 
-void SceneBuffers::add_meshes(std::span<const scene::Mesh> meshes) {
+void SceneBuffers::add_meshes(std::span<const scene::Mesh> meshes, std::size_t room) {
   std::vector<std::uint32_t> indices;
   std::uint32_t next_instance = 0;
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
@@ -51,7 +51,13 @@ void SceneBuffers::add_meshes(std::span<const scene::Mesh> meshes) {
     meshes_.push_back(std::move(range));
     mesh_bounds_.push_back(mesh.bounds);
   }
-  indices_ = storage(indices);
+  if (room == 0) {
+    indices_ = storage(indices);
+    return;
+  }
+  first_culled_ = static_cast<std::uint32_t>(indices.size());
+  indices_ = gl::Buffer::dynamic((indices.size() + room) * sizeof(std::uint32_t));
+  indices_.upload(std::span<const std::uint32_t>(indices));
 }
 
 SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
@@ -70,10 +76,11 @@ SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
   }
   positions_ = storage(positions);
   normals_ = storage(normals);
-  add_meshes(geometry.meshes);
+  add_meshes(geometry.meshes, 0);
 }
 
-SceneBuffers::SceneBuffers(SampledScene scene) : instances_(std::move(scene.geometry.instances)) {
+SceneBuffers::SceneBuffers(SampledScene scene, TriangleCull* cull)
+    : instances_(std::move(scene.geometry.instances)) {
   std::vector<scene::Mesh>& meshes = scene.geometry.meshes;
   std::vector<ClusterLevels> levels;
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
@@ -85,10 +92,11 @@ SceneBuffers::SceneBuffers(SampledScene scene) : instances_(std::move(scene.geom
     }
     levels.push_back(build_cluster_levels(meshes[m], values));
   }
-  add_meshes(meshes);
+  add_meshes(meshes, cull != nullptr ? TriangleCull::kMostIndices : 0);
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     const std::uint32_t first_index = meshes_[m].whole.first_index;
     for (scene::Cluster& cluster : levels[m].clusters) cluster.first_index += first_index;
+    if (cull != nullptr) cull->add(meshes[m], levels[m].clusters, first_index);
     for (std::size_t k = 0; k < meshes_[m].submeshes.size(); ++k) {
       DrawRange& submesh = meshes_[m].submeshes[k];
       submesh.first_cluster =
@@ -98,6 +106,7 @@ SceneBuffers::SceneBuffers(SampledScene scene) : instances_(std::move(scene.geom
     clusters_.insert(clusters_.end(), levels[m].clusters.begin(), levels[m].clusters.end());
     levels_.insert(levels_.end(), levels[m].levels.begin(), levels[m].levels.end());
   }
+  if (cull != nullptr) cull->finish();
 
   std::vector<glm::vec3> positions(scene.sky_frac.size());
   std::vector<Normal> normals(scene.sky_frac.size());

@@ -8,6 +8,7 @@
 #include "emit/scene/clusters.hpp"
 #include "emit/scene/mesh.hpp"
 #include "gl/objects.hpp"
+#include "passes/triangle_cull.hpp"
 #include "shared/frame_params.glsl.h"
 #include "surface/cached_surface.hpp"
 #include "surface/cluster_levels.hpp"
@@ -36,7 +37,8 @@ class SceneBuffers {
   /// One set of vertices per mesh, drawn whole.
   explicit SceneBuffers(scene::SceneGeometry geometry);
   /// Vertex i of the buffers is sample i. Meshes are cut into clusters of several levels of detail.
-  explicit SceneBuffers(SampledScene scene);
+  /// `cull`: not null: gets to know them, and the index buffer has room behind for what it leaves.
+  explicit SceneBuffers(SampledScene scene, TriangleCull* cull = nullptr);
 
   [[nodiscard]] std::span<const MeshRange> meshes() const noexcept { return meshes_; }
   [[nodiscard]] std::span<const scene::Instance> instances() const noexcept { return instances_; }
@@ -51,12 +53,18 @@ class SceneBuffers {
   [[nodiscard]] std::span<const scene::Cluster> clusters() const noexcept { return clusters_; }
   /// By cluster.
   [[nodiscard]] std::span<const ClusterLevel> levels() const noexcept { return levels_; }
+  /// Sends what is left of a frame's clusters; their first index in the buffer.
+  void upload_culled(std::span<const std::uint32_t> indices) const noexcept {
+    indices_.upload(indices, first_culled_);
+  }
+  [[nodiscard]] std::uint32_t first_culled() const noexcept { return first_culled_; }
   [[nodiscard]] GLuint positions() const noexcept { return positions_.id(); }
   [[nodiscard]] GLuint normals() const noexcept { return normals_.id(); }
   [[nodiscard]] GLuint indices() const noexcept { return indices_.id(); }
 
  private:
-  void add_meshes(std::span<const scene::Mesh> meshes);
+  /// `room`: indices behind those of the meshes.
+  void add_meshes(std::span<const scene::Mesh> meshes, std::size_t room);
 
   std::vector<MeshRange> meshes_;
   std::vector<scene::Instance> instances_;
@@ -67,6 +75,7 @@ class SceneBuffers {
   gl::Buffer positions_;  ///< float32 x 3
   gl::Buffer normals_;    ///< snorm16 x 4; the fourth is the share of the sky, if sampled
   gl::Buffer indices_;    ///< uint32
+  std::uint32_t first_culled_ = 0;
 };
 
 /// One drawn instance as a uniform block: at offsets that every device allows.

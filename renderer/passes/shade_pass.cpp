@@ -77,6 +77,7 @@ physics::Result<ShadePass> ShadePass::create(std::size_t entities) {
   pass.pages_ = gl::Texture(GL_RGBA32F, kPageSide, kPageSide, ShadePages::kPages);
   pass.pages_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   pass.pages_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  pass.tops_ = gl::Texture(GL_R32F, kPageSide, kPageSide, ShadePages::kPages);
   pass.silhouettes_ =
       gl::Texture(GL_R32F, kSilhouetteSide, kSilhouetteSide, static_cast<GLsizei>(entities));
   pass.page_buffer_ = gl::Buffer::dynamic(ShadePages::kPages * sizeof(PageRecord));
@@ -92,7 +93,7 @@ void ShadePass::begin(const ShadePages& pages) {
   response_table_ = gl::BufferTexture(GL_RGBA32F, response_);
 }
 
-void ShadePass::prepare(const CachedSurface& surface, const glm::dvec3& camera_world_m,
+void ShadePass::prepare(CachedSurface& surface, const glm::dvec3& camera_world_m,
                         const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
   page_records_.clear();
   silhouette_records_.clear();
@@ -127,21 +128,20 @@ void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworl
   }
 }
 
-void ShadePass::prepare_silhouettes(const CachedSurface& surface,
-                                    const glm::dvec3& relworld_from_rel_m,
+void ShadePass::prepare_silhouettes(CachedSurface& surface, const glm::dvec3& relworld_from_rel_m,
                                     const CameraSetup& camera,
                                     const gpu::FrameParams& frame) noexcept {
   const std::span<const CachedSurface::Shadow> shadows = surface.shadows();
   for (std::size_t m = 0; m < shadows.size(); ++m) {
     const CachedSurface::Shadow& shadow = shadows[m];
     if (!shadow.on) continue;
-    const PlacedSilhouette& placed = shadow.silhouette;
     std::array<glm::dvec3, std::tuple_size_v<decltype(shadow.hull_m)>> corners_m;
-    for (std::size_t i = 0; i < corners_m.size(); ++i) {
-      corners_m[i] = glm::dvec3(shadow.hull_m[i]) + relworld_from_rel_m;
+    for (std::size_t k = 0; k < corners_m.size(); ++k) {
+      corners_m[k] = glm::dvec3(shadow.hull_m[k]) + relworld_from_rel_m;
     }
     const glm::uvec4 px = part_of_window(corners_m, camera, frame);
     if (is_empty(px)) continue;
+    const PlacedSilhouette placed = surface.cast_shadow(m);
     gpu::SilhouetteParams& params = silhouette_records_.emplace_back().params;
     const auto from_relworld = [&](const glm::vec4& line) {
       const double shift = glm::dot(glm::dvec3(line), relworld_from_rel_m);
@@ -153,10 +153,10 @@ void ShadePass::prepare_silhouettes(const CachedSurface& surface,
     params.penumbra = glm::vec4(
         placed.mean_m, static_cast<float>(std::tan(physics::kSunSemiAngleRad)) / placed.texel_m,
         static_cast<float>(m), 0.0F);
-    for (std::uint32_t i = 0; i < EMIT_SHADE_TAPS; i += 2) {
-      const auto [x, y] = shade_tap(i);
-      const auto [next_x, next_y] = shade_tap(i + 1);
-      params.taps[i / 2] = glm::vec4(x, y, next_x, next_y);
+    for (std::uint32_t tap = 0; tap < EMIT_SHADE_TAPS; tap += 2) {
+      const auto [x, y] = shade_tap(tap);
+      const auto [next_x, next_y] = shade_tap(tap + 1);
+      params.taps[tap / 2] = glm::vec4(x, y, next_x, next_y);
     }
     params.px = px;
   }
@@ -166,7 +166,12 @@ void ShadePass::upload(const CachedSurface& surface) noexcept {
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   const std::span<const ShadePages::Page> pages = surface.shade().pages();
   for (std::size_t p = 0; p < pages.size(); ++p) {
-    if (!pages[p].used || !pages[p].changed) continue;
+    if (!pages[p].used) continue;
+    if (pages[p].top_changed) {
+      glTextureSubImage3D(tops_.id(), 0, 0, 0, static_cast<GLint>(p), kPageSide, kPageSide, 1,
+                          GL_RED, GL_FLOAT, pages[p].top_m.data());
+    }
+    if (!pages[p].changed) continue;
     glTextureSubImage3D(pages_.id(), 0, 0, 0, static_cast<GLint>(p), kPageSide, kPageSide, 1,
                         GL_RGBA, GL_FLOAT, pages[p].shade.data());
   }
@@ -187,6 +192,7 @@ void ShadePass::dispatch() const noexcept {
   if (!page_records_.empty()) {
     pages_program_.use();
     pages_.bind(EMIT_TEX_SHADE);
+    tops_.bind(EMIT_TEX_SHADE_TOP);
     response_table_.bind(EMIT_TEX_RESPONSE);
     for (std::size_t i = 0; i < page_records_.size(); ++i) {
       page_buffer_.bind_uniform(EMIT_BIND_SHADE, i * sizeof(PageRecord), sizeof(gpu::PageParams));

@@ -24,8 +24,8 @@ class ShadePass {
   void begin(const ShadePages& pages);
 
   /// What a frame needs, from the surface as it is advanced to that.
-  void prepare(const CachedSurface& surface, const glm::dvec3& camera_world_m,
-               const CameraSetup& camera, const gpu::FrameParams& frame) noexcept;
+  void prepare(CachedSurface& surface, const glm::dvec3& camera_world_m, const CameraSetup& camera,
+               const gpu::FrameParams& frame) noexcept;
   void upload(const CachedSurface& surface) noexcept;
   void dispatch() const noexcept;
 
@@ -40,12 +40,13 @@ class ShadePass {
 
   void prepare_pages(const ShadePages& shade, const glm::dvec3& relworld_from_rel_m,
                      const CameraSetup& camera, const gpu::FrameParams& frame) noexcept;
-  void prepare_silhouettes(const CachedSurface& surface, const glm::dvec3& relworld_from_rel_m,
+  void prepare_silhouettes(CachedSurface& surface, const glm::dvec3& relworld_from_rel_m,
                            const CameraSetup& camera, const gpu::FrameParams& frame) noexcept;
 
   gl::Program pages_program_;
   gl::Program silhouettes_program_;
   gl::Texture pages_;        ///< RGBA32F, a layer each
+  gl::Texture tops_;         ///< R32F, a layer each
   gl::Texture silhouettes_;  ///< R32F, a layer each
   gl::Buffer response_;      ///< by material, 4 floats
   gl::BufferTexture response_table_;

@@ -110,13 +110,18 @@ class CachedSurface {
   /// The shadow of an entity, on static surfaces.
   struct Shadow {
     bool on = false;
-    PlacedSilhouette silhouette;
     /// The convex hull of these, rel, holds what is shaded.
     std::array<glm::vec3, 12> hull_m;
   };
   [[nodiscard]] std::span<const Shadow> shadows() const noexcept { return shadows_; }
-  /// Casts shadows() of the entities as they are drawn, under the sun of `sun_ns`.
-  void look(std::int64_t drawn_ns, std::int64_t sun_ns, const Inputs& inputs) noexcept;
+  /// Finds shadows() of the entities as they are drawn, under the sun of `sun_ns`.
+  void place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns, const Inputs& inputs) noexcept;
+  /// That of an entity, for those that show.
+  /// @pre place_shadows(); shadows()[mover].on
+  [[nodiscard]] PlacedSilhouette cast_shadow(std::size_t mover) noexcept;
+  /// Since place_shadows() too many bodies had turned to be looked at in one frame: a shadow has
+  /// the outline of a while ago.
+  [[nodiscard]] bool stale_shadow() const noexcept { return stale_shadow_; }
   /// Of rel axes.
   [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept {
     return rays().origin_world_m();
@@ -200,6 +205,8 @@ class CachedSurface {
   std::optional<LocalSteps> local_;
   Silhouettes silhouettes_;
   std::vector<Shadow> shadows_;
+  glm::vec3 to_sun_{0.0F, 0.0F, 1.0F};  ///< of shadows()
+  bool stale_shadow_ = false;
   std::optional<ShadePages> shade_;
 
   std::array<SurfaceNode, 3> nodes_;

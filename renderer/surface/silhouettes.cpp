@@ -15,7 +15,6 @@
 namespace emit::renderer {
 namespace {
 
-constexpr float kMostTurnRad = 2e-3F;
 /// Of a texel with open ones and others around it.
 constexpr float kMixedM = -1e30F;
 /// Empty texels around the body.
@@ -68,10 +67,14 @@ Silhouettes::Silhouettes(std::span<const scene::Aabb> bounds_m) : alone_(bounds_
   (void)taps();
 }
 
-void Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, const CasterRays& rays,
-                       WorkerPool& workers) noexcept {
+bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
+                       const CasterRays& rays, WorkerPool& workers) noexcept {
   Tile& tile = tiles_[mover];
-  if (tile.box_m.empty() || glm::distance(tile.to_sun, to_sun_body) < kMostTurnRad) return;
+  const float turned_rad = glm::distance(tile.to_sun, to_sun_body);
+  if (tile.box_m.empty() || turned_rad < most_turn_rad) return true;
+  constexpr float kStale = 10.0F;
+  if (looks_left_ == 0) return turned_rad < kStale * most_turn_rad;
+  --looks_left_;
   tile.to_sun = to_sun_body;
   ++tile.revision;
   const Tangents tangents = tangents_of(to_sun_body);
@@ -89,10 +92,11 @@ void Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, const Ca
   const glm::vec2 size_m = high_m - low_m;
   tile.texel_m = std::max({size_m.x, size_m.y, 1e-3F}) / (kSide - 2.0F * kRim);
   tile.corner_m = 0.5F * (low_m + high_m) - 0.5F * kSide * tile.texel_m;
+  tile.half = 0.5F * size_m / tile.texel_m + kRim;
 
   const float start_m = deepest_m + tile.texel_m;
   alone_[mover].on = true;
-  const CasterSelection only{false, alone_};
+  const CasterSelection only{false, std::span(alone_).first(mover + 1)};
   workers.run(kSide, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
       for (std::size_t first = 0; first < kSide; first += CasterRays::kMaxRays) {
@@ -122,6 +126,7 @@ void Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, const Ca
   }
   look_around(tile);
   tile.mean_m = count > 0 ? static_cast<float>(sum_m / static_cast<double>(count)) : 0.0F;
+  return true;
 }
 
 void Silhouettes::look_around(Tile& tile) noexcept {
@@ -150,17 +155,27 @@ void Silhouettes::look_around(Tile& tile) noexcept {
   }
 }
 
-PlacedSilhouette Silhouettes::place(std::size_t mover,
-                                    const MoverPlacement& placement) const noexcept {
+PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& placement,
+                                    const glm::vec3& to_sun) const noexcept {
   const Tile& tile = tiles_[mover];
   const auto line = [&](const glm::vec3& axis_body, float scale, float origin) {
     const glm::vec3 axis = placement.rel_from_body * axis_body;
     return glm::vec4(scale * axis, origin - scale * glm::dot(axis, placement.position_m));
   };
   const float per_m = 1.0F / tile.texel_m;
-  return {line(tile.across, per_m, -tile.corner_m.x * per_m),
-          line(tile.along, per_m, -tile.corner_m.y * per_m), line(-tile.to_sun, 1.0F, 0.0F),
-          tile.mean_m, tile.texel_m};
+  PlacedSilhouette placed{line(tile.across, per_m, -tile.corner_m.x * per_m),
+                          line(tile.along, per_m, -tile.corner_m.y * per_m),
+                          line(-tile.to_sun, 1.0F, 0.0F),
+                          tile.mean_m,
+                          tile.texel_m,
+                          tile.half};
+  // The body may have turned a little since: rays go to the sun all the same, through the place
+  // that they have in the depth of what shades.
+  const glm::vec4 aside = (placed.depth_m - glm::vec4(0.0F, 0.0F, 0.0F, tile.mean_m)) /
+                          glm::dot(glm::vec3(placed.depth_m), to_sun);
+  placed.column -= glm::dot(glm::vec3(placed.column), to_sun) * aside;
+  placed.row -= glm::dot(glm::vec3(placed.row), to_sun) * aside;
+  return placed;
 }
 
 float Silhouettes::shaded_frac(std::size_t mover, float column, float row, float depth_m,
@@ -194,9 +209,24 @@ float Silhouettes::shaded_frac(std::size_t mover, float column, float row, float
   return static_cast<float>(shaded) / EMIT_SHADE_TAPS;
 }
 
+float Silhouettes::caster_m(std::size_t mover, float column, float row) const noexcept {
+  const Tile& tile = tiles_[mover];
+  constexpr float kLast = static_cast<float>(kSide) - 1.0F;
+  const float depth_m =
+      tile.depth_m[static_cast<std::size_t>(std::clamp(row, 0.0F, kLast)) * kSide +
+                   static_cast<std::size_t>(std::clamp(column, 0.0F, kLast))];
+  return depth_m < kOpenM ? depth_m : tile.mean_m;
+}
+
 float Silhouettes::diagonal_m(std::size_t mover) const noexcept {
   const scene::Aabb& box_m = tiles_[mover].box_m;
   return box_m.empty() ? 0.0F : static_cast<float>(glm::distance(box_m.min_m, box_m.max_m));
+}
+
+float Silhouettes::rim_m(std::size_t mover, float way_m) const noexcept {
+  static const auto kTangent = static_cast<float>(std::tan(physics::kSunSemiAngleRad));
+  // Texels are no wider than the box's diagonal makes them, whichever way it is turned.
+  return way_m * kTangent + diagonal_m(mover) * (kRim + 1.0F) / kSide;
 }
 
 glm::vec3 Silhouettes::middle_m(std::size_t mover, const MoverPlacement& placement) const noexcept {
@@ -234,8 +264,9 @@ ShadedBox shaded_box(const PlacedSilhouette& silhouette, float plane_m) noexcept
   const float depth_m = glm::dot(silhouette.depth_m, glm::vec4(middle_m, plane_m, 1.0F));
   const float rim = penumbra_texels(silhouette, depth_m);
   ShadedBox box{middle_m, middle_m};
-  for (const float column : {-rim, kEnd + rim}) {
-    for (const float row : {-rim, kEnd + rim}) {
+  const glm::vec2 half = silhouette.half + rim;
+  for (const float column : {0.5F * kEnd - half.x, 0.5F * kEnd + half.x}) {
+    for (const float row : {0.5F * kEnd - half.y, 0.5F * kEnd + half.y}) {
       const glm::vec2 at_m = on_plane(silhouette, column, row, plane_m);
       box.low_m = glm::min(box.low_m, at_m);
       box.high_m = glm::max(box.high_m, at_m);

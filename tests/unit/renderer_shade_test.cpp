@@ -75,6 +75,15 @@ class ShadeTest : public ::testing::Test {
   [[nodiscard]] ShadePages::Inputs inputs() {
     return {environment_, entities_, *rays_, workers_, silhouettes_};
   }
+  /// As frames do it, ten a second.
+  void run_to(ShadePages& shade, std::int64_t from_ns, std::int64_t until_ns,
+              const SurfaceSamples& all, const ShadePages::Inputs& inputs) {
+    for (std::int64_t t = from_ns; t < until_ns;) {
+      t = std::min(t + kSecondNs / 10, until_ns);
+      inputs.silhouettes.begin_frame();
+      shade.run(t, all, inputs);
+    }
+  }
   /// Samples of the ground, a metre apart.
   [[nodiscard]] static SurfaceSamples ground() {
     SurfaceSamples all;
@@ -116,9 +125,9 @@ class ShadeTest : public ::testing::Test {
 
 TEST_F(ShadeTest, ASilhouetteIsDarkBehindItsBodyOnly) {
   const glm::vec3 sun(to_sun(kNoonNs));
-  silhouettes_.look(0, sun, *rays_, workers_);
+  (void)silhouettes_.look(0, sun, Silhouettes::kSharpRad, *rays_, workers_);
   const MoverPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kHeightM}, true};
-  const PlacedSilhouette placed = silhouettes_.place(0, high);
+  const PlacedSilhouette placed = silhouettes_.place(0, high, sun);
   const auto shaded_frac = [&](const glm::vec3& point_m) {
     const glm::vec4 p(point_m, 1.0F);
     const float depth_m = glm::dot(placed.depth_m, p);
@@ -153,12 +162,52 @@ TEST_F(ShadeTest, ASilhouetteIsDarkBehindItsBodyOnly) {
 
 TEST_F(ShadeTest, ASilhouetteIsMadeAnewWhereTheBodyHasTurnedToTheSun) {
   const glm::vec3 sun(to_sun(kNoonNs));
-  silhouettes_.look(0, sun, *rays_, workers_);
+  (void)silhouettes_.look(0, sun, Silhouettes::kSharpRad, *rays_, workers_);
   EXPECT_EQ(silhouettes_.revision(0), 1U);
-  silhouettes_.look(0, glm::normalize(sun + glm::vec3(1e-3F, 0.0F, 0.0F)), *rays_, workers_);
+  const auto turned = [&](float rad) { return glm::normalize(sun + glm::vec3(rad, 0.0F, 0.0F)); };
+  EXPECT_TRUE(silhouettes_.look(0, turned(3e-3F), Silhouettes::kSharpRad, *rays_, workers_));
   EXPECT_EQ(silhouettes_.revision(0), 1U);
-  silhouettes_.look(0, glm::normalize(sun + glm::vec3(1e-2F, 0.0F, 0.0F)), *rays_, workers_);
+  EXPECT_TRUE(silhouettes_.look(0, turned(1.5e-2F), Silhouettes::kSmearedRad, *rays_, workers_));
+  EXPECT_EQ(silhouettes_.revision(0), 1U);
+  EXPECT_TRUE(silhouettes_.look(0, turned(1.5e-2F), Silhouettes::kSharpRad, *rays_, workers_));
   EXPECT_EQ(silhouettes_.revision(0), 2U);
+  // So often per frame and no more; then what is nearly right will do.
+  for (int i = 2; i < Silhouettes::kLooksPerFrame; ++i) {
+    const float rad = 0.02F * static_cast<float>(i);
+    EXPECT_TRUE(silhouettes_.look(0, turned(rad), Silhouettes::kSharpRad, *rays_, workers_));
+  }
+  const auto looks = static_cast<std::uint32_t>(Silhouettes::kLooksPerFrame);
+  EXPECT_EQ(silhouettes_.revision(0), looks);
+  EXPECT_TRUE(silhouettes_.look(0, turned(0.15F), Silhouettes::kSharpRad, *rays_, workers_));
+  EXPECT_FALSE(silhouettes_.look(0, turned(0.5F), Silhouettes::kSharpRad, *rays_, workers_));
+  EXPECT_EQ(silhouettes_.revision(0), looks);
+  silhouettes_.begin_frame();
+  EXPECT_TRUE(silhouettes_.look(0, turned(0.5F), Silhouettes::kSharpRad, *rays_, workers_));
+  EXPECT_EQ(silhouettes_.revision(0), looks + 1);
+}
+
+TEST_F(ShadeTest, AShadowLiesInTheSunsDirectionWhateverTheOutlineIsOf) {
+  // From 300 m a turn of 15 mrad would put it 4 m aside.
+  constexpr float kFarM = 300.0F;
+  const glm::vec3 sun(to_sun(kNoonNs));
+  const glm::vec3 before = glm::normalize(sun + glm::vec3(1e-2F, 1e-2F, 0.0F));
+  (void)silhouettes_.look(0, before, Silhouettes::kSharpRad, *rays_, workers_);
+  const MoverPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kFarM}, true};
+  const PlacedSilhouette placed = silhouettes_.place(0, high, sun);
+  for (const float up_m : {kFarM - 1.0F, 0.5F * kFarM, 0.0F}) {
+    const glm::vec3 behind_m = high.position_m - (kFarM - up_m) / sun.z * sun;
+    for (const float aside : {-0.95F, 0.0F, 0.95F}) {
+      const glm::vec4 p(behind_m + aside * glm::vec3(kHalfM, 0.0F, 0.0F), 1.0F);
+      constexpr float kMiddle = 0.5F * Silhouettes::kSide;
+      const float at = glm::length(glm::vec2(glm::dot(placed.column, p) - kMiddle,
+                                             glm::dot(placed.row, p) - kMiddle)) *
+                       placed.texel_m;
+      const glm::vec3 across = glm::vec3(kHalfM, 0.0F, 0.0F);
+      const float expected_m = std::abs(aside) * glm::length(across - glm::dot(across, sun) * sun);
+      EXPECT_NEAR(at, expected_m, 0.05F) << up_m << ' ' << aside;
+      EXPECT_NEAR(glm::dot(placed.depth_m, p), (kFarM - up_m) / sun.z, 0.05F * kFarM);
+    }
+  }
 }
 
 TEST_F(ShadeTest, FourExponentialsFollowTheModel) {
@@ -292,7 +341,7 @@ TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
                                     pose_at(-16.0 + 0.8 * i, kHeightM), true, false));
   }
   const std::int64_t end_ns = kNoonNs + 4 * kSecondNs;
-  shade.run(end_ns, all, inputs());
+  run_to(shade, kNoonNs, end_ns, all, inputs());
   const double flux_frac =
       environment_.forcing_at(end_ns, environment_.sun_at(end_ns)).direct_normal_w_m2 /
       ShadeResponse::kFullSunWM2;
@@ -327,11 +376,12 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
   ShadePages shade = pages(all, 0.01F);
   shade.restart(kNoonNs, entities_);
   bool was_short = false;
-  for (int i = 1; i <= 60; ++i) {
-    const std::int64_t now_ns = kNoonNs + i * kSecondNs;
-    const double east_m = -40.0 + 8.0 * (i % 10);
+  constexpr int kAcross = 12;
+  for (int i = 0; i < kAcross * kAcross; ++i) {
+    const std::int64_t now_ns = kNoonNs + (i + 1) * kSecondNs;
+    const double east_m = -44.0 + 8.0 * (i % kAcross);
     physics::Pose pose = pose_at(east_m, kHeightM);
-    pose.position_world_m.y = -40.0 + 8.0 * (i / 10);
+    pose.position_world_m.y = -44.0 + 8.0 * (i / kAcross);
     ASSERT_TRUE(entities_[0].append(now_ns, pose, true, true));
     shade.run(now_ns, all, inputs());
     was_short = was_short || shade.short_of_pages();
@@ -343,7 +393,8 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
     }
   }
   EXPECT_TRUE(was_short);
-  shade.run(kNoonNs + 75 * kSecondNs, all, inputs());
+  shade.run(kNoonNs + (kAcross * kAcross + 15) * kSecondNs, all, inputs());
+  shade.run(kNoonNs + (kAcross * kAcross + 16) * kSecondNs, all, inputs());
   EXPECT_FALSE(shade.short_of_pages());
 }
 
@@ -372,10 +423,10 @@ TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
                    entities.size(), 0, 0.1F);
   shade.restart(kNoonNs, entities);
   const ShadePages::Inputs inputs{environment_, entities, *rays, workers_, silhouettes};
-  shade.run(kNoonNs + 2 * kSecondNs, all, inputs);
+  run_to(shade, kNoonNs, kNoonNs + 2 * kSecondNs, all, inputs);
   EXPECT_FALSE(shade.short_of_pages());
   ASSERT_TRUE(entities.back().append(kNoonNs + 2 * kSecondNs, pose_at(0.0, kHeightM), true, true));
-  shade.run(kNoonNs + 12 * kSecondNs, all, inputs);
+  run_to(shade, kNoonNs + 2 * kSecondNs, kNoonNs + 12 * kSecondNs, all, inputs);
   const float most_k = *std::ranges::max_element(shade.vertices_k());
   EXPECT_GT(most_k, 0.5F);
 }
@@ -401,6 +452,154 @@ TEST_F(ShadeTest, AfterAJumpTheLastMinuteIsMadeUpForAndTheRestIsOlder) {
   for (std::size_t i = 0; i < step_by_step.size(); ++i) {
     EXPECT_NEAR(at_once[i], step_by_step[i], 2e-3F) << i;
   }
+}
+
+TEST_F(ShadeTest, FasterSimTimeMakesNearlyTheSame) {
+  // It comes by at 2 m/s, stops for a while and goes on.
+  const SurfaceSamples all = ground();
+  const auto east_m = [](double s) {
+    return s < 8.0 ? -16.0 + 2.0 * s : s < 18.0 ? 0.0 : 2.0 * (s - 18.0);
+  };
+  const auto vertices_after = [&](std::int64_t step_ns) {
+    std::vector<PoseHistory> entities{PoseHistory({}, pose_at(east_m(0.0), kHeightM))};
+    for (int i = 0; i <= 260; ++i) {
+      EXPECT_TRUE(entities[0].append(kNoonNs + i * (kSecondNs / 10),
+                                     pose_at(east_m(0.1 * i), kHeightM), true, false));
+    }
+    Silhouettes silhouettes = silhouettes_;
+    ShadePages shade = pages(all);
+    shade.restart(kNoonNs, entities);
+    for (std::int64_t t = step_ns; t <= 26 * kSecondNs; t += step_ns) {
+      silhouettes.begin_frame();
+      shade.run(kNoonNs + t, all, {environment_, entities, *rays_, workers_, silhouettes});
+    }
+    EXPECT_FALSE(shade.short_of_pages());
+    return std::vector<float>(shade.vertices_k().begin(), shade.vertices_k().end());
+  };
+  const auto real_time = vertices_after(kSecondNs / 50);
+  const float most_k = *std::ranges::max_element(real_time);
+  EXPECT_GT(most_k, 1.0F);
+  for (const std::int64_t step_ns : {kSecondNs, 2 * kSecondNs}) {
+    const auto faster = vertices_after(step_ns);
+    double squares = 0.0;
+    for (std::size_t i = 0; i < faster.size(); ++i) {
+      EXPECT_NEAR(faster[i], real_time[i], 0.2F * most_k) << i;
+      squares += std::pow(static_cast<double>(faster[i] - real_time[i]), 2.0);
+    }
+    EXPECT_LT(std::sqrt(squares / static_cast<double>(faster.size())), 0.03 * most_k);
+  }
+}
+
+TEST_F(ShadeTest, WhatIsTooFastForItsPlacesIsLeftOutAndSaidWhereItMatters) {
+  const SurfaceSamples all = ground();
+  const auto vertices_at = [&](double speed_m_s) {
+    std::vector<PoseHistory> entities{PoseHistory({}, pose_at(-100.0, kHeightM))};
+    for (int i = 0; i <= 10; ++i) {
+      EXPECT_TRUE(entities[0].append(kNoonNs + i * (kSecondNs / 10),
+                                     pose_at(-100.0 + 0.1 * i * speed_m_s, kHeightM), true, false));
+    }
+    Silhouettes silhouettes = silhouettes_;
+    ShadePages shade = pages(all, 0.01F);
+    shade.restart(kNoonNs, entities);
+    shade.run(kNoonNs + kSecondNs / 5, all,
+              {environment_, entities, *rays_, workers_, silhouettes});
+    for (const ShadePages::Page& page : shade.pages()) EXPECT_FALSE(page.used);
+    return shade.short_of_pages();
+  };
+  EXPECT_TRUE(vertices_at(150.0));
+  EXPECT_FALSE(vertices_at(3e4));
+}
+
+TEST_F(ShadeTest, BackInTimePagesAreForgottenAndFramesSaySo) {
+  const SurfaceSamples all = ground();
+  ShadePages shade = pages(all);
+  shade.restart(kNoonNs, entities_);
+  ASSERT_TRUE(entities_[0].append(kNoonNs, pose_at(1.0, kHeightM), true, true));
+  shade.run(kNoonNs + 10 * kSecondNs, all, inputs());
+  EXPECT_GT(*std::ranges::max_element(shade.vertices_k()), 1.0F);
+  EXPECT_FALSE(shade.short_of_pages());
+  shade.run(kNoonNs + 5 * kSecondNs, all, inputs());
+  for (const float vertex_k : shade.vertices_k()) EXPECT_NEAR(vertex_k, 0.0F, 1e-4F);
+  EXPECT_TRUE(shade.short_of_pages());
+  // The same instant again is not back in time.
+  shade.run(kNoonNs + 8 * kSecondNs, all, inputs());
+  const float most_k = *std::ranges::max_element(shade.vertices_k());
+  EXPECT_GT(most_k, 0.3F);
+  shade.run(kNoonNs + 8 * kSecondNs, all, inputs());
+  EXPECT_EQ(*std::ranges::max_element(shade.vertices_k()), most_k);
+}
+
+TEST_F(ShadeTest, LongShadowsHavePagesToo) {
+  // In the evening the sun stands 8 degrees high.
+  const SurfaceSamples all = ground();
+  std::int64_t low_ns = kNoonNs;
+  while (to_sun(low_ns).z > 0.15) low_ns += 60 * kSecondNs;
+  ASSERT_GT(to_sun(low_ns).z, 0.1);
+  ShadePages shade = pages(all);
+  shade.restart(low_ns, entities_);
+  physics::Pose pose;
+  pose.position_world_m = kHeightM / to_sun(low_ns).z * to_sun(low_ns);
+  ASSERT_TRUE(entities_[0].append(low_ns, pose, true, true));
+  shade.run(low_ns + 10 * kSecondNs, all, inputs());
+  EXPECT_FALSE(shade.short_of_pages());
+  float found_k = 0.0F;
+  for (std::size_t i = 0; i < all.samples.size(); ++i) {
+    const glm::dvec2 at_m(all.samples[i].position_m + glm::vec3(rays_->origin_world_m()));
+    if (glm::length(at_m) < 1.0) {
+      found_k = std::max(found_k, shade.vertices_k()[i]);
+    }
+  }
+  EXPECT_GT(found_k, 0.05F);
+}
+
+TEST_F(ShadeTest, RaysBelongToOnePageEachOnSlopingGround) {
+  test::SurfaceScene scene;
+  scene::Mesh slope = test::level_mesh(glm::vec3(-50.0F), glm::vec3(50.0F), 0.0F);
+  for (glm::vec3& p : slope.positions_m) p.z = 0.02F * p.x;
+  slope.bounds = {};
+  for (const glm::vec3& p : slope.positions_m) slope.bounds.add(glm::dvec3(p));
+  scene.add_static(slope);
+  scene.add_mover(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
+  const auto rays = CasterRays::create(scene.geometry);
+  ASSERT_TRUE(rays.has_value());
+  const SurfaceSamples all = ground();
+  ShadePages shade = pages(all);
+  shade.restart(kNoonNs, entities_);
+  for (int i = 0; i <= 100; ++i) {
+    ASSERT_TRUE(entities_[0].append(kNoonNs + i * (kSecondNs / 10),
+                                    pose_at(-10.0 + 0.2 * i, kHeightM), true, false));
+  }
+  shade.run(kNoonNs + 10 * kSecondNs, all,
+            {environment_, entities_, *rays, workers_, silhouettes_});
+  std::vector<float> planes_m;
+  for (const ShadePages::Page& page : shade.pages()) {
+    if (page.used) planes_m.push_back(page.plane_m);
+  }
+  ASSERT_GE(planes_m.size(), 6U);
+  std::ranges::sort(planes_m);
+  // They would be 0.16 m apart, each with its own.
+  EXPECT_EQ(std::ranges::unique(planes_m).begin() - planes_m.begin(), 1);
+}
+
+TEST_F(ShadeTest, WhatStandsBetweenTheSunAndTheEntityIsNotInItsShade) {
+  SurfaceSamples all = ground();
+  const glm::vec3 sun(to_sun(kNoonNs));
+  const glm::vec3 plate_m(1.0F, 0.0F, kHeightM);
+  const glm::vec3 origin_m(rays_->origin_world_m());
+  // Along the ray through the plate's middle: below it, and above.
+  const std::size_t first = all.samples.size();
+  for (const float way_m : {-1.0F, -0.3F, 0.3F}) {
+    SurfaceSample& sample = all.samples.emplace_back();
+    sample.position_m = plate_m + way_m * sun - origin_m;
+    sample.normal = sun;
+  }
+  ShadePages shade = pages(all);
+  shade.restart(kNoonNs, entities_);
+  ASSERT_TRUE(entities_[0].append(kNoonNs, pose_at(1.0, kHeightM), true, true));
+  shade.run(kNoonNs + 10 * kSecondNs, all, inputs());
+  EXPECT_GT(shade.vertices_k()[first], 1.0F);
+  EXPECT_GT(shade.vertices_k()[first + 1], 1.0F);
+  EXPECT_EQ(shade.vertices_k()[first + 2], 0.0F);
 }
 
 TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {

@@ -13,6 +13,7 @@ layout(rg32ui, binding = EMIT_IMG_SURFACE) uniform uimage2D surface_image;
 layout(std140, binding = EMIT_BIND_SHADE) uniform Shade { PageParams shade; };
 layout(binding = EMIT_TEX_SHADE) uniform sampler2DArray pages_texture;
 layout(binding = EMIT_TEX_RESPONSE) uniform samplerBuffer response_table;
+layout(binding = EMIT_TEX_SHADE_TOP) uniform sampler2DArray tops_texture;
 #else
 layout(std140, binding = EMIT_BIND_SHADE) uniform Shade { SilhouetteParams shade; };
 layout(binding = EMIT_TEX_SHADE) uniform sampler2DArray silhouettes_texture;
@@ -34,7 +35,9 @@ void main() {
   if (any(lessThan(at, vec2(0.5))) || any(greaterThanEqual(at, vec2(float(EMIT_PAGE_SIDE) - 1.5)))) return;
   vec4 shaded = textureLod(pages_texture, vec3((at + 0.5) / float(EMIT_PAGE_SIDE), shade.sun.w), 0.0);
   vec4 weight_k = texelFetch(response_table, int(texel_material(texel)));
-  if (shaded == vec4(0.0) || sun_cosine == 0.0) return;
+  // What lies between the sun and the entity takes nothing of it.
+  float top_m = texelFetch(tops_texture, ivec3(ivec2(at + 0.5), int(shade.sun.w)), 0).r;
+  if (shaded == vec4(0.0) || sun_cosine == 0.0 || height_m > top_m) return;
   float cooler_k = sun_cosine * dot(weight_k, shade.left_frac * shaded);
   texel = packed_surface_texel(texel_temperature_k(texel) - cooler_k, sun_cosine, texel_open_frac(texel),
                                texel_material(texel), false);

@@ -31,6 +31,7 @@
 #define EMIT_TEX_SCALED 12
 #define EMIT_TEX_SHADE 13
 #define EMIT_TEX_RESPONSE 14
+#define EMIT_TEX_SHADE_TOP 15
 
 // Image units.
 #define EMIT_IMG_OCCLUSION 0
