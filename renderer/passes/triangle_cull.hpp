@@ -25,7 +25,6 @@ class TriangleCull {
   /// Of all clusters in one frame; what comes on top of that is drawn as it is.
   static constexpr std::size_t kMostIndices = std::size_t{3} << 18U;
 
-  /// `indices`: of all clusters, by mesh; `positions_m`: of which each counts from 0 for.
   TriangleCull() : workers_(WorkerPool::all_cores()) {}
   /// Adds the clusters of a mesh, whose indices start with number `first_index` of all: in the
   /// order of the clusters that are asked for.
