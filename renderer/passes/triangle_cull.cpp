@@ -18,6 +18,38 @@ constexpr float kDensePx = 128.0F;
 constexpr float kMarginPx = 1.0F / 64.0F;
 /// Beyond the picture's rim nothing has to be told apart.
 constexpr float kRimPx = 8.0F;
+/// Where a triangle's box holds no more, each is tested whether the triangle holds it, too.
+constexpr int kMostMiddles = 4;
+
+/// Positive on the inner side of an edge, and by the margin beyond it.
+struct Edge {
+  float a = 0.0F;
+  float b = 0.0F;
+  float c = 0.0F;
+  [[nodiscard]] bool holds(float x_px, float y_px) const noexcept {
+    return a * x_px + b * y_px + c >= 0.0F;
+  }
+};
+
+/// Corners in GL's window, `side` -1 for those that turn clockwise, else 1.
+Edge edge(float x0, float y0, float x1, float y1, float side) noexcept {
+  const float a = side * (y0 - y1);
+  const float b = side * (x1 - x0);
+  return {a, b, kMarginPx * (std::abs(a) + std::abs(b)) - a * x0 - b * y0};
+}
+
+/// Middles of pixels, (k + 0.5) px, between two places; k from kShift on.
+struct Middles {
+  static constexpr float kShift = 16.0F;  // what is cut off instead of rounded down is positive
+  Middles(float low_px, float high_px) noexcept
+      : first(static_cast<int>(low_px + (0.5F - kMarginPx + kShift))),
+        count(static_cast<int>(high_px + (kMarginPx - 0.5F + kShift)) - first + 1) {}
+  [[nodiscard]] float at_px(int i) const noexcept {
+    return static_cast<float>(first + i) + (0.5F - kShift);
+  }
+  int first;
+  int count;  ///< or less than 1
+};
 
 }  // namespace
 
@@ -111,12 +143,6 @@ std::uint32_t TriangleCull::cull(const Job& job, std::uint32_t* out) const noexc
     std::copy_n(from, job.cluster->index_count, out);
     return job.cluster->index_count;
   }
-  // True where a pixel's middle, k + 0.5, lies between two places.
-  const auto holds_middle = [](float low, float high) {
-    constexpr float kShift = 16.0F;  // what is cut off instead of rounded down must be positive
-    const int k = static_cast<int>(high + (kMarginPx - 0.5F + kShift));
-    return static_cast<float>(k) + (0.5F - kShift) >= low - kMarginPx;
-  };
   const std::uint8_t* corner = &corners_[job.cluster->first_index];
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < job.cluster->index_count; i += 3) {
@@ -138,7 +164,23 @@ std::uint32_t TriangleCull::cull(const Job& job, std::uint32_t* out) const noexc
                        high < 2.0F * half_y + kRimPx;
     const bool back =
         job.single_sided && whole && turn > 4.0F * kMarginPx * (around_px + kMarginPx);
-    const bool kept = !back && holds_middle(left, right) && holds_middle(low, high);
+    const Middles columns(left, right);
+    const Middles rows(low, high);
+    bool kept = !back && columns.count > 0 && rows.count > 0;
+    // Those of what reaches beyond the rim are more than that, or not in the picture.
+    static_assert(static_cast<float>(kMostMiddles) < kRimPx);
+    if (kept && columns.count * rows.count <= kMostMiddles) {
+      // Of the same rounded corners: needles, too, have their inside between their edges.
+      const float side = turn < 0.0F ? -1.0F : 1.0F;
+      const std::array<Edge, 3> edges = {edge(x0, y0, x1, y1, side), edge(x1, y1, x2, y2, side),
+                                         edge(x2, y2, x0, y0, side)};
+      kept = false;
+      for (int at = 0; at < columns.count * rows.count && !kept; ++at) {
+        const float x = columns.at_px(at % columns.count);
+        const float y = rows.at_px(at / columns.count);
+        kept = edges[0].holds(x, y) && edges[1].holds(x, y) && edges[2].holds(x, y);
+      }
+    }
     out[count] = from[i];
     out[count + 1] = from[i + 1];
     out[count + 2] = from[i + 2];
