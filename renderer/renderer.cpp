@@ -494,7 +494,8 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
                            cached && has_entities(scenario) ? GeometryPass::Shade::of_entities
                                                             : GeometryPass::Shade::none);
   if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
-  auto radiance_pass = RadiancePass::create(scenario.thermal, radiance_content(*bands, output));
+  auto radiance_pass =
+      RadiancePass::create(scenario.thermal, radiance_content(*bands, output), context->software());
   if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
   FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}};
   if (cached && output.ladder != Ladder::none) {

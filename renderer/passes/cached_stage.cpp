@@ -121,7 +121,7 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   if (!surface) return tl::unexpected(std::move(surface.error()));
   std::optional<ShadePass> shade_pass;
   if (!history.entities.empty()) {
-    auto pass = ShadePass::create(history.entities.size());
+    auto pass = ShadePass::create(history.entities.size(), software);
     if (!pass) return tl::unexpected(std::move(pass.error()));
     shade_pass = std::move(*pass);
   }

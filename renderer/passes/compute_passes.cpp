@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <string>
 #include <vector>
 
 #include "shared/bindings.glsl.h"
@@ -10,8 +11,11 @@
 namespace emit::renderer {
 namespace {
 
-void dispatch_pixels(const glm::uvec2& size_px) noexcept {
-  glDispatchCompute((size_px.x + 7) / 8, (size_px.y + 7) / 8, 1);
+/// Of a picture, that a group of EnlargePass does.
+constexpr glm::uvec2 kEnlargePx(64, 16);
+
+void dispatch_pixels(const glm::uvec2& size_px, std::uint32_t rows = 1) noexcept {
+  glDispatchCompute((size_px.x + 7) / 8, (size_px.y + 8 * rows - 1) / (8 * rows), 1);
 }
 
 gl::Texture make_texture(GLenum format, std::uint32_t width_px, std::uint32_t height_px) {
@@ -19,6 +23,10 @@ gl::Texture make_texture(GLenum format, std::uint32_t width_px, std::uint32_t he
 }
 
 }  // namespace
+
+gl::Define rows_define(std::uint32_t rows) {
+  return {"EMIT_ROWS", fmt::format("{}u", rows)};
+}
 
 physics::Result<OcclusionPass> OcclusionPass::create(std::uint32_t width_px,
                                                      std::uint32_t height_px) {
@@ -84,13 +92,15 @@ void ThermalPass::bind_textures() const noexcept {
 }
 
 physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& options,
-                                                   const RadianceContent& content) {
+                                                   const RadianceContent& content, bool software) {
   RadiancePass pass;
+  pass.rows_ = pixel_rows(software);
   std::vector<gl::Define> defines{{"EMIT_BANDS", fmt::format("{}u", content.bands)},
                                   {"EMIT_AIR_TERMS", fmt::format("{}u", content.air_terms)},
                                   {"EMIT_AIR_TABLE", fmt::format("{}u", content.air_table)},
                                   {"EMIT_TERMS", fmt::format("{}", content.terms)},
-                                  {"EMIT_OUTPUTS", fmt::format("{}u", content.outputs)}};
+                                  {"EMIT_OUTPUTS", fmt::format("{}u", content.outputs)},
+                                  rows_define(pass.rows_)};
   if (options.model == scene::ThermalModel::foster) defines.push_back({"EMIT_FOSTER", "1"});
   if (options.method == scene::ThermalMethod::cached) defines.push_back({"EMIT_CACHED", "1"});
   auto program = gl::Program::compute("passes/radiance.comp", defines);
@@ -101,14 +111,16 @@ physics::Result<RadiancePass> RadiancePass::create(const scene::ThermalOptions& 
 
 void RadiancePass::dispatch(const glm::uvec2& size_px) const noexcept {
   program_.use();
-  dispatch_pixels(size_px);
+  dispatch_pixels(size_px, rows_);
 }
 
 physics::Result<EnlargePass> EnlargePass::create(std::uint32_t bands, std::uint32_t planes,
                                                  std::size_t rendered_px) {
   EnlargePass pass;
   const std::vector<gl::Define> defines{{"EMIT_BANDS", fmt::format("{}u", bands)},
-                                        {"EMIT_PLANES", fmt::format("{}u", planes)}};
+                                        {"EMIT_PLANES", fmt::format("{}u", planes)},
+                                        {"EMIT_ENLARGE_WIDTH", std::to_string(kEnlargePx.x)},
+                                        {"EMIT_ENLARGE_HEIGHT", std::to_string(kEnlargePx.y)}};
   auto program = gl::Program::compute("passes/enlarge.comp", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
@@ -121,7 +133,8 @@ void EnlargePass::dispatch(const glm::uvec2& size_px) const noexcept {
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
   program_.use();
   view_.bind(EMIT_TEX_SCALED);
-  dispatch_pixels(size_px);
+  const glm::uvec2 groups = (size_px + kEnlargePx - 1U) / kEnlargePx;
+  glDispatchCompute(groups.x, groups.y, 1);
 }
 
 }  // namespace emit::renderer

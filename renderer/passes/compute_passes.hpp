@@ -13,6 +13,14 @@
 /// is in FrameParams, format_window_px and picture_window_px; how many they are, in the calls.
 namespace emit::renderer {
 
+/// Of groups of 8 x 8 pixels, one above the other, that one does in turn: on a CPU to begin a group
+/// takes as long as some of its pixels.
+[[nodiscard]] constexpr std::uint32_t pixel_rows(bool software) noexcept {
+  return software ? 4 : 1;
+}
+/// What shaders know these by.
+[[nodiscard]] gl::Define rows_define(std::uint32_t rows);
+
 class OcclusionPass {
  public:
   [[nodiscard]] static physics::Result<OcclusionPass> create(std::uint32_t width_px,
@@ -58,11 +66,13 @@ struct RadianceContent {
 class RadiancePass {
  public:
   [[nodiscard]] static physics::Result<RadiancePass> create(const scene::ThermalOptions& options,
-                                                            const RadianceContent& content);
+                                                            const RadianceContent& content,
+                                                            bool software);
   void dispatch(const glm::uvec2& size_px) const noexcept;
 
  private:
   gl::Program program_;
+  std::uint32_t rows_ = 1;  ///< pixel_rows()
 };
 
 /// Brings what was rendered with fewer pixels to the size of the picture.

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "emit/physics/constants.hpp"
+#include "passes/compute_passes.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -57,34 +58,42 @@ bool is_empty(const glm::uvec4& px) noexcept {
   return px.x >= px.z || px.y >= px.w;
 }
 
-void dispatch_part(const glm::uvec4& px) noexcept {
-  glDispatchCompute((px.z - px.x + 7) / 8, (px.w - px.y + 7) / 8, 1);
-  // The next part may overlap it.
-  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
-}
-
 }  // namespace
 
-physics::Result<ShadePass> ShadePass::create(std::size_t entities) {
-  ShadePass pass;
-  const gl::Define pages{"EMIT_PAGES", "1"};
-  auto pages_program = gl::Program::compute("passes/shade.comp", {&pages, 1});
-  if (!pages_program) return tl::unexpected(std::move(pages_program.error()));
-  auto silhouettes_program = gl::Program::compute("passes/shade.comp");
-  if (!silhouettes_program) return tl::unexpected(std::move(silhouettes_program.error()));
-  pass.pages_program_ = std::move(*pages_program);
-  pass.silhouettes_program_ = std::move(*silhouettes_program);
-  pass.pages_ = gl::Texture(GL_RGBA32F, kPageSide, kPageSide, ShadePages::kPages);
-  pass.pages_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  pass.pages_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  pass.tops_ = gl::Texture(GL_R32F, kPageSide, kPageSide, ShadePages::kPages);
-  pass.silhouettes_ =
-      gl::Texture(GL_R32F, kSilhouetteSide, kSilhouetteSide, static_cast<GLsizei>(entities));
-  pass.page_buffer_ = gl::Buffer::dynamic(ShadePages::kPages * sizeof(PageRecord));
-  pass.silhouette_buffer_ = gl::Buffer::dynamic(entities * sizeof(SilhouetteRecord));
-  pass.page_records_.reserve(ShadePages::kPages);
-  pass.silhouette_records_.reserve(entities);
-  pass.sent_.assign(entities, 0);
+ShadePass::ShadePass(std::size_t entities)
+    : pages_(GL_RGBA32F, kPageSide, kPageSide, ShadePages::kPages),
+      tops_(GL_R32F, kPageSide, kPageSide, ShadePages::kPages),
+      silhouettes_(GL_R32F, kSilhouetteSide, kSilhouetteSide, static_cast<GLsizei>(entities)),
+      tiles_(ShadePages::kPages + entities),
+      params_buffer_(gl::Buffer::dynamic(sizeof(gpu::ShadeParams))),
+      page_buffer_(gl::Buffer::dynamic(ShadePages::kPages * sizeof(gpu::PageParams))),
+      page_table_(GL_RGBA32F, page_buffer_),
+      silhouette_buffer_(gl::Buffer::dynamic(entities * sizeof(gpu::SilhouetteParams))),
+      silhouette_table_(GL_RGBA32F, silhouette_buffer_),
+      tile_buffer_(gl::Buffer::dynamic(ShadeTiles::kMostTiles * sizeof(gpu::ShadeTile))),
+      tile_table_(GL_RGBA32UI, tile_buffer_),
+      list_buffer_(
+          gl::Buffer::dynamic(ShadeTiles::most_entries(ShadePages::kPages + entities) * 2)),
+      list_table_(GL_R16UI, list_buffer_),
+      sent_(entities, 0) {
+  pages_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  pages_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  page_params_.reserve(ShadePages::kPages);
+  silhouette_params_.reserve(entities);
+  for (std::uint32_t tap = 0; tap < EMIT_SHADE_TAPS; tap += 2) {
+    const auto [x, y] = shade_tap(tap);
+    const auto [next_x, next_y] = shade_tap(tap + 1);
+    params_.taps[tap / 2] = glm::vec4(x, y, next_x, next_y);
+  }
+}
+
+physics::Result<ShadePass> ShadePass::create(std::size_t entities, bool software) {
+  ShadePass pass(entities);
+  pass.rows_ = software ? 2 : 1;
+  const gl::Define rows = rows_define(pass.rows_);
+  auto program = gl::Program::compute("passes/shade.comp", {&rows, 1});
+  if (!program) return tl::unexpected(std::move(program.error()));
+  pass.program_ = std::move(*program);
   return pass;
 }
 
@@ -95,11 +104,14 @@ void ShadePass::begin(const ShadePages& pages) {
 
 void ShadePass::prepare(CachedSurface& surface, const glm::dvec3& camera_world_m,
                         const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
-  page_records_.clear();
-  silhouette_records_.clear();
+  page_params_.clear();
+  silhouette_params_.clear();
+  params_.slope = glm::vec4(surface.shade().slope(), 0.0F, 0.0F);
+  tiles_.begin(frame.format_window_px);
   const glm::dvec3 relworld_from_rel_m = surface.origin_world_m() - camera_world_m;
   prepare_pages(surface.shade(), relworld_from_rel_m, camera, frame);
   prepare_silhouettes(surface, relworld_from_rel_m, camera, frame);
+  tiles_.sort();
 }
 
 void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworld_from_rel_m,
@@ -119,12 +131,11 @@ void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworl
     }
     const glm::uvec4 px = part_of_window(corners_m, camera, frame);
     if (is_empty(px)) continue;
-    gpu::PageParams& params = page_records_.emplace_back().params;
+    tiles_.add_page(px);
+    gpu::PageParams& params = page_params_.emplace_back();
     params.place = glm::vec4(glm::vec3(first_m), 1.0F / page.texel_m);
-    params.sun = glm::vec4(shade.slope(), page.reach_m, static_cast<float>(p));
+    params.range = glm::vec4(page.reach_m, page.lowest_m, static_cast<float>(p), 0.0F);
     params.left_frac = page.left_frac;
-    params.lowest_m = glm::vec4(page.lowest_m, 0.0F, 0.0F, 0.0F);
-    params.px = px;
   }
 }
 
@@ -142,7 +153,8 @@ void ShadePass::prepare_silhouettes(CachedSurface& surface, const glm::dvec3& re
     const glm::uvec4 px = part_of_window(corners_m, camera, frame);
     if (is_empty(px)) continue;
     const PlacedSilhouette placed = surface.cast_shadow(m);
-    gpu::SilhouetteParams& params = silhouette_records_.emplace_back().params;
+    tiles_.add_silhouette(px);
+    gpu::SilhouetteParams& params = silhouette_params_.emplace_back();
     const auto from_relworld = [&](const glm::vec4& line) {
       const double shift = glm::dot(glm::dvec3(line), relworld_from_rel_m);
       return glm::vec4(glm::vec3(line), static_cast<float>(static_cast<double>(line.w) - shift));
@@ -153,12 +165,6 @@ void ShadePass::prepare_silhouettes(CachedSurface& surface, const glm::dvec3& re
     params.penumbra = glm::vec4(
         placed.mean_m, static_cast<float>(std::tan(physics::kSunSemiAngleRad)) / placed.texel_m,
         static_cast<float>(m), 0.0F);
-    for (std::uint32_t tap = 0; tap < EMIT_SHADE_TAPS; tap += 2) {
-      const auto [x, y] = shade_tap(tap);
-      const auto [next_x, next_y] = shade_tap(tap + 1);
-      params.taps[tap / 2] = glm::vec4(x, y, next_x, next_y);
-    }
-    params.px = px;
   }
 }
 
@@ -182,33 +188,28 @@ void ShadePass::upload(const CachedSurface& surface) noexcept {
     glTextureSubImage3D(silhouettes_.id(), 0, 0, 0, static_cast<GLint>(m), kSilhouetteSide,
                         kSilhouetteSide, 1, GL_RED, GL_FLOAT, silhouettes.depths_m(m).data());
   }
-  page_buffer_.upload(std::span<const PageRecord>(page_records_));
-  silhouette_buffer_.upload(std::span<const SilhouetteRecord>(silhouette_records_));
+  params_buffer_.upload(std::span<const gpu::ShadeParams>(&params_, 1));
+  page_buffer_.upload(std::span<const gpu::PageParams>(page_params_));
+  silhouette_buffer_.upload(std::span<const gpu::SilhouetteParams>(silhouette_params_));
+  tile_buffer_.upload(tiles_.tiles());
+  list_buffer_.upload(tiles_.entries());
 }
 
 void ShadePass::dispatch() const noexcept {
-  if (page_records_.empty() && silhouette_records_.empty()) return;
+  if (tiles_.tiles().empty()) return;
+  program_.use();
+  params_buffer_.bind_uniform(EMIT_BIND_SHADE);
+  pages_.bind(EMIT_TEX_SHADE);
+  tops_.bind(EMIT_TEX_SHADE_TOP);
+  silhouettes_.bind(EMIT_TEX_SILHOUETTES);
+  response_table_.bind(EMIT_TEX_RESPONSE);
+  page_table_.bind(EMIT_TEX_PAGE_PARAMS);
+  silhouette_table_.bind(EMIT_TEX_SILHOUETTE_PARAMS);
+  tile_table_.bind(EMIT_TEX_SHADE_TILES);
+  list_table_.bind(EMIT_TEX_SHADE_LIST);
   glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
-  if (!page_records_.empty()) {
-    pages_program_.use();
-    pages_.bind(EMIT_TEX_SHADE);
-    tops_.bind(EMIT_TEX_SHADE_TOP);
-    response_table_.bind(EMIT_TEX_RESPONSE);
-    for (std::size_t i = 0; i < page_records_.size(); ++i) {
-      page_buffer_.bind_uniform(EMIT_BIND_SHADE, i * sizeof(PageRecord), sizeof(gpu::PageParams));
-      dispatch_part(page_records_[i].params.px);
-    }
-  }
-  // Temperatures go by the sun that what stands still leaves: this takes more of it away.
-  if (!silhouette_records_.empty()) {
-    silhouettes_program_.use();
-    silhouettes_.bind(EMIT_TEX_SHADE);
-    for (std::size_t i = 0; i < silhouette_records_.size(); ++i) {
-      silhouette_buffer_.bind_uniform(EMIT_BIND_SHADE, i * sizeof(SilhouetteRecord),
-                                      sizeof(gpu::SilhouetteParams));
-      dispatch_part(silhouette_records_[i].params.px);
-    }
-  }
+  glDispatchCompute(tiles_.tile_px() / 8, tiles_.tile_px() / (8 * rows_),
+                    static_cast<GLuint>(tiles_.tiles().size()));
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
 }
 

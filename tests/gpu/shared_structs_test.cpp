@@ -25,11 +25,9 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto foster = gl::Program::compute("passes/thermal_foster.comp", taps);
   ASSERT_TRUE(foster) << foster.error().text;
   // Bands of both kinds of air, so that nothing of BandParams is optimised away.
-  const gl::Define content[] = {{"EMIT_BANDS", "4u"},
-                                {"EMIT_AIR_TERMS", "5u"},
-                                {"EMIT_AIR_TABLE", "10u"},
-                                {"EMIT_TERMS", "4"},
-                                {"EMIT_OUTPUTS", "0u"}};
+  const gl::Define content[] = {{"EMIT_BANDS", "4u"},      {"EMIT_AIR_TERMS", "5u"},
+                                {"EMIT_AIR_TABLE", "10u"}, {"EMIT_TERMS", "4"},
+                                {"EMIT_OUTPUTS", "0u"},    {"EMIT_ROWS", "1u"}};
   auto radiance = gl::Program::compute("passes/radiance.comp", content);
   ASSERT_TRUE(radiance) << radiance.error().text;
 
@@ -37,23 +35,12 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   auto geometry = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", cached);
   ASSERT_TRUE(geometry) << geometry.error().text;
 
-  const gl::Define of_pages[] = {{"EMIT_PAGES", "1"}};
-  auto pages = gl::Program::compute("passes/shade.comp", of_pages);
-  ASSERT_TRUE(pages) << pages.error().text;
-  auto silhouettes = gl::Program::compute("passes/shade.comp");
-  ASSERT_TRUE(silhouettes) << silhouettes.error().text;
+  const gl::Define rows[] = {{"EMIT_ROWS", "1u"}};
+  auto shade = gl::Program::compute("passes/shade.comp", rows);
+  ASSERT_TRUE(shade) << shade.error().text;
 
-  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, place);
-  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, sun);
-  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, left_frac);
-  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, lowest_m);
-  EXPECT_OFFSET(*pages, "shade", gpu::PageParams, px);
-  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, column);
-  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, row);
-  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, depth_m);
-  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, penumbra);
-  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, taps[0]);
-  EXPECT_OFFSET(*silhouettes, "shade", gpu::SilhouetteParams, px);
+  EXPECT_OFFSET(*shade, "shade", gpu::ShadeParams, slope);
+  EXPECT_OFFSET(*shade, "shade", gpu::ShadeParams, taps[0]);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, clip_from_mesh);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, normal_from_mesh[0]);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, ids);

@@ -1,39 +1,55 @@
 // SPDX-License-Identifier: Apache-2.0
 // Brings planes that were rendered with fewer pixels to the size of the picture: radiance between the four nearest
 // pixels, other planes from the nearest one, as there is nothing between two objects.
+// Each invocation goes down a column: neighbours in it have most of what they are made of in common.
 //   EMIT_BANDS  number of planes of radiance, which come first
 //   EMIT_PLANES number of planes
 #include "shared/frame_params.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = EMIT_ENLARGE_WIDTH) in;
 layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
 layout(binding = EMIT_TEX_SCALED) uniform samplerBuffer scaled_planes;
 layout(std430, binding = EMIT_BIND_OUTPUT) writeonly buffer Planes { float planes[]; };
 
-int scaled_index(ivec2 px, uint plane) {
-  return int(plane * frame.format_px.z) + px.y * int(frame.format_px.x) + px.x;
-}
-
 void main() {
-  ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.picture_window_px.xy);
-  if (any(greaterThanEqual(px, ivec2(frame.picture_window_px.zw)))) return;
+  ivec2 px = ivec2(gl_WorkGroupID.xy * uvec2(EMIT_ENLARGE_WIDTH, EMIT_ENLARGE_HEIGHT) + frame.picture_window_px.xy);
+  px.x += int(gl_LocalInvocationID.x);
+  ivec2 behind = ivec2(frame.picture_window_px.zw);
+  if (px.x >= behind.x) return;
+  behind.y = min(behind.y, px.y + EMIT_ENLARGE_HEIGHT);
+  int width = int(frame.format_px.x);
   ivec2 last = ivec2(frame.format_px.xy) - 1;
-  vec2 place = (vec2(px) + 0.5) * vec2(frame.format_px.xy) / vec2(frame.picture_px.xy);
-  vec2 way = clamp(place - 0.5, vec2(0.0), vec2(last));
-  ivec2 low = ivec2(way);
-  ivec2 high = min(low + 1, last);
-  vec2 part = way - vec2(low);
-  ivec2 nearest = min(ivec2(place), last);
+  vec2 scale = vec2(frame.format_px.xy) / vec2(frame.picture_px.xy);
+  float place_x = (float(px.x) + 0.5) * scale.x;
+  float way_x = clamp(place_x - 0.5, 0.0, float(last.x));
+  int low_x = int(way_x);
+  int high_x = min(low_x + 1, last.x);
+  float part_x = way_x - float(low_x);
+  int nearest_x = min(int(place_x), last.x);
   uint pixel = uint(px.y) * frame.picture_px.x + uint(px.x);
-  for (uint i = 0u; i < EMIT_PLANES; ++i) {
-    float value;
-    if (i < EMIT_BANDS) {
-      float top = mix(texelFetch(scaled_planes, scaled_index(low, i)).r, texelFetch(scaled_planes, scaled_index(ivec2(high.x, low.y), i)).r, part.x);
-      float bottom = mix(texelFetch(scaled_planes, scaled_index(ivec2(low.x, high.y), i)).r, texelFetch(scaled_planes, scaled_index(high, i)).r, part.x);
-      value = mix(top, bottom, part.y);
-    } else {
-      value = texelFetch(scaled_planes, scaled_index(nearest, i)).r;
+  float top[EMIT_BANDS];
+  float bottom[EMIT_BANDS];
+  int row = -2;  // of `bottom`
+  for (int y = px.y; y < behind.y; ++y) {
+    float place_y = (float(y) + 0.5) * scale.y;
+    float way_y = clamp(place_y - 0.5, 0.0, float(last.y));
+    int low_y = int(way_y);
+    // A loop, as software rasterisers leave those that nobody is in.
+    for (row = max(row, low_y - 1); row <= low_y; ) {
+      int from = min(++row, last.y) * width;
+      for (uint i = 0u; i < EMIT_BANDS; ++i) {
+        top[i] = bottom[i];
+        bottom[i] = mix(texelFetch(scaled_planes, from + low_x).r, texelFetch(scaled_planes, from + high_x).r, part_x);
+        from += int(frame.format_px.z);
+      }
     }
-    planes[i * frame.picture_px.z + pixel] = value;
+    for (uint i = 0u; i < EMIT_BANDS; ++i) {
+      planes[i * frame.picture_px.z + pixel] = mix(top[i], bottom[i], way_y - float(low_y));
+    }
+    int nearest = min(int(place_y), last.y) * width + nearest_x;
+    for (uint i = EMIT_BANDS; i < EMIT_PLANES; ++i) {
+      planes[i * frame.picture_px.z + pixel] = texelFetch(scaled_planes, int(i * frame.format_px.z) + nearest).r;
+    }
+    pixel += frame.picture_px.x;
   }
 }

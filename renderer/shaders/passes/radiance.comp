@@ -6,6 +6,7 @@
 //   EMIT_AIR_TERMS  bit per band: exponential terms of the atmosphere, at most EMIT_TERMS of them
 //   EMIT_AIR_TABLE  bit per band: a table of the atmosphere in their place
 //   EMIT_OUTPUTS    EMIT_OUTPUT_* planes
+//   EMIT_ROWS       of 8 x 8 pixels that a group does, one above the other
 #include "passes/gbuffer.glsl"
 #include "passes/tables.glsl"
 #include "passes/surface_texel.glsl"
@@ -103,8 +104,7 @@ float leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
   return emitted + (1.0 - emissivity_frac) * incoming;
 }
 
-void main() {
-  ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.format_window_px.xy);
+void write_pixel(ivec2 px) {
   if (any(greaterThanEqual(px, ivec2(frame.format_window_px.zw)))) return;
   uint pixel = uint(px.y) * frame.format_px.x + uint(px.x);
   uint plane_px = frame.format_px.z;
@@ -148,4 +148,10 @@ void main() {
   }
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
   if (nonfinite || clamped) atomicAdd(stats.flagged_px[(nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0)], 1u);
+}
+
+void main() {
+  uvec2 first_px = gl_WorkGroupID.xy * uvec2(8u, 8u * EMIT_ROWS) + gl_LocalInvocationID.xy;
+  ivec2 px = ivec2(first_px + frame.format_window_px.xy);
+  for (uint row = 0u; row < EMIT_ROWS; ++row) write_pixel(px + ivec2(0, 8 * int(row)));
 }

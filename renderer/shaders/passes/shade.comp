@@ -1,67 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shade of entities on what stands still, where triangles are too large for it: changes the geometry buffer of
-// samples. With EMIT_PAGES the temperature, by what entities have shaded lately; else the sunlight, by where
-// they stand now.
+// samples. Pages change the temperature, by what entities have shaded lately; silhouettes the sunlight, by where
+// they stand now. Only squares of the picture that some of them may reach are looked at, each with those alone.
+//   EMIT_ROWS  of 8 x 8 pixels that a group does, one above the other
 #include "shared/shade_params.glsl.h"
 #include "passes/gbuffer.glsl"
 #include "passes/surface_texel.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(rg32ui, binding = EMIT_IMG_SURFACE) uniform uimage2D surface_image;
-
-#ifdef EMIT_PAGES
-layout(std140, binding = EMIT_BIND_SHADE) uniform Shade { PageParams shade; };
+layout(std140, binding = EMIT_BIND_SHADE) uniform Shade { ShadeParams shade; };
 layout(binding = EMIT_TEX_SHADE) uniform sampler2DArray pages_texture;
-layout(binding = EMIT_TEX_RESPONSE) uniform samplerBuffer response_table;
 layout(binding = EMIT_TEX_SHADE_TOP) uniform sampler2DArray tops_texture;
-#else
-layout(std140, binding = EMIT_BIND_SHADE) uniform Shade { SilhouetteParams shade; };
-layout(binding = EMIT_TEX_SHADE) uniform sampler2DArray silhouettes_texture;
-#endif
+layout(binding = EMIT_TEX_SILHOUETTES) uniform sampler2DArray silhouettes_texture;
+layout(binding = EMIT_TEX_RESPONSE) uniform samplerBuffer response_table;
+layout(binding = EMIT_TEX_PAGE_PARAMS) uniform samplerBuffer page_params;
+layout(binding = EMIT_TEX_SILHOUETTE_PARAMS) uniform samplerBuffer silhouette_params;
+layout(binding = EMIT_TEX_SHADE_TILES) uniform usamplerBuffer shade_tiles;
+layout(binding = EMIT_TEX_SHADE_LIST) uniform usamplerBuffer shade_list;
 
-void main() {
-  ivec2 px = ivec2(gl_GlobalInvocationID.xy + shade.px.xy);
-  if (any(greaterThanEqual(px, ivec2(shade.px.zw)))) return;
-  float depth = texelFetch(depth_texture, px, 0).r;
-  uvec2 texel = imageLoad(surface_image, px).rg;
-  if (!(depth > 0.0) || texel_moves(texel)) return;
-  vec3 p = view_ray(px) * (frame.samples.y / depth);
-  float sun_cosine = texel_sun_cosine(texel);
-#ifdef EMIT_PAGES
-  float height_m = p.z - shade.place.z;
-  if (height_m > shade.sun.z || height_m < shade.lowest_m.x) return;
-  vec2 at = (p.xy - height_m * shade.sun.xy - shade.place.xy) * shade.place.w;
+// Software rasterisers run both sides of a branch, but leave loops that nobody is in: those over one thing, too.
+
+// What entities have taken off the temperature of a surface that faces the sun.
+float cooler_k(vec3 p, uint material, int page) {
+  vec4 place = texelFetch(page_params, page * EMIT_PAGE_TEXELS);
+  float height_m = p.z - place.z;
+  vec2 at = (p.xy - height_m * shade.slope.xy - place.xy) * place.w;
   // Own texels end half way to those of the rim.
-  if (any(lessThan(at, vec2(0.5))) || any(greaterThanEqual(at, vec2(float(EMIT_PAGE_SIDE) - 1.5)))) return;
-  vec4 shaded = textureLod(pages_texture, vec3((at + 0.5) / float(EMIT_PAGE_SIDE), shade.sun.w), 0.0);
-  vec4 weight_k = texelFetch(response_table, int(texel_material(texel)));
-  // What lies between the sun and the entity takes nothing of it.
-  float top_m = texelFetch(tops_texture, ivec3(ivec2(at + 0.5), int(shade.sun.w)), 0).r;
-  if (shaded == vec4(0.0) || sun_cosine == 0.0 || height_m > top_m) return;
-  float cooler_k = sun_cosine * dot(weight_k, shade.left_frac * shaded);
-  texel = packed_surface_texel(texel_temperature_k(texel) - cooler_k, sun_cosine, texel_open_frac(texel),
-                               texel_material(texel), false);
-#else
+  bool inside = all(greaterThanEqual(at, vec2(0.5))) && all(lessThan(at, vec2(float(EMIT_PAGE_SIDE) - 1.5)));
+  float sum_k = 0.0;
+  for (int looks = inside ? 1 : 0; looks > 0; --looks) {
+    vec4 range = texelFetch(page_params, page * EMIT_PAGE_TEXELS + 1);
+    // What lies between the sun and the entity takes nothing of it.
+    float top_m = texelFetch(tops_texture, ivec3(ivec2(at + 0.5), int(range.z)), 0).r;
+    vec4 shaded = textureLod(pages_texture, vec3((at + 0.5) / float(EMIT_PAGE_SIDE), range.z), 0.0);
+    vec4 left_frac = texelFetch(page_params, page * EMIT_PAGE_TEXELS + 2);
+    vec4 weight_k = texelFetch(response_table, int(material));
+    bool reached = height_m <= min(range.x, top_m) && height_m >= range.y;
+    sum_k = reached ? dot(weight_k, left_frac * shaded) : 0.0;
+  }
+  return sum_k;
+}
+
+// Share of the sun's disc that a silhouette leaves.
+float lit_frac(vec3 p, int silhouette) {
+  int texel = silhouette * EMIT_SILHOUETTE_TEXELS;
   vec4 point = vec4(p, 1.0);
-  vec2 at = vec2(dot(shade.column, point), dot(shade.row, point));
-  float depth_m = dot(shade.depth_m, point);
-  float radius = max(0.5, (depth_m - shade.penumbra.x) * shade.penumbra.y);
+  vec2 at = vec2(dot(texelFetch(silhouette_params, texel), point), dot(texelFetch(silhouette_params, texel + 1), point));
+  float depth_m = dot(texelFetch(silhouette_params, texel + 2), point);
+  vec4 penumbra = texelFetch(silhouette_params, texel + 3);
+  float radius = max(0.5, (depth_m - penumbra.x) * penumbra.y);
   float side = float(textureSize(silhouettes_texture, 0).x);
   bool within = all(greaterThan(at, vec2(-radius))) && all(lessThan(at, vec2(side + radius)));
-  // Software rasterisers run what follows a return all the same, but leave loops that nobody is in.
-  int taps = within && sun_cosine > 0.0 ? EMIT_SHADE_TAPS : 0;
+  int taps = within ? EMIT_SHADE_TAPS : 0;
   float shaded = 0.0;
   for (int i = 0; i < taps; ++i) {
     vec4 both = shade.taps[i >> 1];
     vec2 place = floor(at + radius * ((i & 1) == 0 ? both.xy : both.zw));
     bool inside = all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, vec2(side)));
-    float caster_m = texelFetch(silhouettes_texture, ivec3(clamp(place, vec2(0.0), vec2(side - 1.0)), shade.penumbra.z), 0).r;
+    float caster_m = texelFetch(silhouettes_texture, ivec3(clamp(place, vec2(0.0), vec2(side - 1.0)), penumbra.z), 0).r;
     if (inside && depth_m > caster_m + EMIT_SHADE_LIFT_M) shaded += 1.0;
   }
-  if (shaded == 0.0) return;
-  float lit_frac = 1.0 - shaded / float(EMIT_SHADE_TAPS);
-  texel = packed_surface_texel(texel_temperature_k(texel), lit_frac * sun_cosine, texel_open_frac(texel),
-                               texel_material(texel), false);
-#endif
+  return 1.0 - shaded / float(EMIT_SHADE_TAPS);
+}
+
+void shade_pixel(ivec2 px, uvec4 tile) {
+  bool seen = all(lessThan(px, ivec2(frame.format_window_px.zw)));
+  float depth = seen ? texelFetch(depth_texture, px, 0).r : 0.0;
+  uvec2 texel = imageLoad(surface_image, px).rg;
+  vec3 p = view_ray(px) * (frame.samples.y / depth);
+  float sun_cosine = texel_sun_cosine(texel);
+  bool lit = depth > 0.0 && !texel_moves(texel) && sun_cosine > 0.0;
+  int first = int(tile.y);
+  int behind_pages = lit ? first + int(tile.z) : first;
+  int last = lit ? behind_pages + int(tile.w) : behind_pages;
+  float colder_k = 0.0;
+  for (int i = first; i < behind_pages; ++i) {
+    colder_k += cooler_k(p, texel_material(texel), int(texelFetch(shade_list, i).r));
+  }
+  // Temperatures go by the sun that what stands still leaves: this takes more of it away.
+  float left_frac = 1.0;
+  for (int i = behind_pages; i < last; ++i) left_frac *= lit_frac(p, int(texelFetch(shade_list, i).r));
+  if (colder_k == 0.0 && left_frac == 1.0) return;
+  texel = packed_surface_texel(texel_temperature_k(texel) - sun_cosine * colder_k, left_frac * sun_cosine,
+                               texel_open_frac(texel), texel_material(texel), false);
   imageStore(surface_image, px, uvec4(texel, 0u, 0u));
+}
+
+void main() {
+  uvec4 tile = texelFetch(shade_tiles, int(gl_WorkGroupID.z));
+  uvec2 first_px = uvec2(tile.x & 0xffffu, tile.x >> 16) + gl_WorkGroupID.xy * uvec2(8u, 8u * EMIT_ROWS);
+  ivec2 px = ivec2(first_px + gl_LocalInvocationID.xy);
+  for (int row = 0; row < int(EMIT_ROWS); ++row) shade_pixel(px + ivec2(0, 8 * row), tile);
 }
