@@ -24,8 +24,9 @@ pkg_check_modules(isal REQUIRED IMPORTED_TARGET libisal)
 pkg_check_modules(lz4 REQUIRED IMPORTED_TARGET liblz4)
 pkg_check_modules(tomlplusplus REQUIRED IMPORTED_TARGET tomlplusplus)
 
-# Optional: libzmq3-dev, a yardstick of `emit bench stream`.
+# Optional: libzmq3-dev and libiceoryx-posh-dev, yardsticks of `emit bench stream`.
 pkg_check_modules(zeromq IMPORTED_TARGET libzmq)
+find_package(iceoryx_posh QUIET)
 
 # Header-only packages without a usable config file.
 find_path(EMIT_TINYGLTF_DIR tiny_gltf.h REQUIRED)

@@ -62,7 +62,7 @@ arguments() { # of a suite, when quick
   esac
 }
 
-if $install; then deploy/scripts/install_deps.sh; fi
+if $install; then deploy/scripts/install_deps.sh --with-yardsticks; fi
 cmake --preset release
 cmake --build --preset release --target emit emitd config_data emit_scenes emit_logs
 mkdir -p "$out"

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian 12 packages that emitd needs to build, run and pass its tests.
 # Uses sudo when not root. Prints what it installs; installs nothing that is already there.
+# Usage: install_deps.sh [--with-checkers] [--with-yardsticks]: what checks the source tree; what `emit bench
+# stream` is put beside.
 set -euo pipefail
 
 build_tools=(g++ cmake ninja-build pkg-config git ca-certificates)
@@ -11,14 +13,19 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
            libceres-dev libmeshoptimizer-dev libisal-dev liblz4-dev libssl-dev libgtest-dev libgmock-dev)
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
 checkers=(clang-format clang-tidy clang libclang-rt-dev)
+yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
 
 packages=("${build_tools[@]}" "${libraries[@]}" "${runtime[@]}")
-if [[ "${1:-}" == "--with-checkers" ]]; then
-  packages+=("${checkers[@]}")
-elif [[ $# -gt 0 ]]; then
-  echo "usage: install_deps.sh [--with-checkers]" >&2
-  exit 2
-fi
+for option in "$@"; do
+  case $option in
+    --with-checkers) packages+=("${checkers[@]}") ;;
+    --with-yardsticks) packages+=("${yardsticks[@]}") ;;
+    *)
+      echo "usage: install_deps.sh [--with-checkers] [--with-yardsticks]" >&2
+      exit 2
+      ;;
+  esac
+done
 
 missing=()
 for package in "${packages[@]}"; do

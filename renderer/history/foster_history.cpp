@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/ext/vector_double2.hpp>
@@ -68,6 +69,42 @@ physics::FosterSurface<double> surface_of(const FosterMaterial& material,
                                  reference_k);
 }
 
+/// What weather that changes within the interval was over it: the line of least squares, which
+/// keeps the mean, as steep as leaves its ends among the values that there were.
+void fit_changes(HistoryInterval& interval, const Environment& environment) noexcept {
+  const auto changes_ns = environment.changes_ns();
+  const auto first = std::ranges::upper_bound(changes_ns, interval.begin_ns);
+  if (first == changes_ns.end() || *first >= interval.end_ns) return;
+  constexpr std::size_t kParts = 32;
+  std::array<physics::Forcing, kParts> parts;
+  for (std::size_t i = 0; i < kParts; ++i) {
+    const double way = (static_cast<double>(i) + 0.5) / kParts;
+    const auto at_ns = interval.begin_ns +
+                       std::llround(way * static_cast<double>(interval.end_ns - interval.begin_ns));
+    parts[i] = environment.forcing_at(at_ns, environment.sun_at(at_ns));
+  }
+  for (double physics::Forcing::*value :
+       {&physics::Forcing::direct_normal_w_m2, &physics::Forcing::diffuse_horizontal_w_m2,
+        &physics::Forcing::longwave_down_w_m2, &physics::Forcing::air_k,
+        &physics::Forcing::environment_k, &physics::Forcing::film_w_m2_k,
+        &physics::Forcing::wind_m_s, &physics::Forcing::cloud_frac}) {
+    double mean = 0.0;
+    double moment = 0.0;
+    double low = parts[0].*value;
+    double high = low;
+    for (std::size_t i = 0; i < kParts; ++i) {
+      mean += parts[i].*value / kParts;
+      moment += parts[i].*value * ((static_cast<double>(i) + 0.5) / kParts - 0.5) / kParts;
+      low = std::min(low, parts[i].*value);
+      high = std::max(high, parts[i].*value);
+    }
+    const double most = std::max(0.0, std::min(mean - low, high - mean));
+    const double half = std::clamp(6.0 * moment, -most, most);
+    interval.forcing_begin.*value = mean - half;
+    interval.forcing_end.*value = mean + half;
+  }
+}
+
 }  // namespace
 
 HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
@@ -81,6 +118,7 @@ HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
   // Weather that changes at the end of the interval has not acted in it.
   interval.forcing_end =
       environment.forcing_at(end_ns > begin_ns ? end_ns - 1 : end_ns, interval.sun_end);
+  fit_changes(interval, environment);
   return interval;
 }
 

@@ -21,7 +21,8 @@ namespace emit::renderer {
 /// Forcing at an instant but for what the surroundings send.
 [[nodiscard]] SurfaceForcing open_forcing(const physics::SunPosition& sun,
                                           const physics::Forcing& weather) noexcept;
-/// Sun and weather at both ends; weather that changes at the end has not acted. No sample instant.
+/// Sun and weather at both ends; weather that changes at the end has not acted. Where the host
+/// changes it in between, the line nearest to what it was, with its mean. No sample instant.
 [[nodiscard]] HistoryInterval interval_between(std::int64_t begin_ns, std::int64_t end_ns,
                                                const Environment& environment) noexcept;
 

@@ -187,7 +187,7 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   };
   // Without known eyes no mesh was simplified.
   return visibly_simplified_ || surface_->model().full_in_view ||
-         surface_->shade().short_of_pages() || surface_->stale_shadow() ||
+         surface_->shade().short_of_pages() || surface_->stale_shadow() || surface_->lags() ||
          !stands_near(refined_eyes_, least_cos) ||
          (!detail_eyes_.empty() && !stands_near(detail_eyes_, -2.0));
 }

@@ -25,6 +25,13 @@ constexpr std::int64_t kMostIntervals = 16;
 /// that many of them do not make for many intervals.
 constexpr std::int64_t kSameNs = 1'000'000;
 constexpr std::int64_t kSameFraction = 16;
+/// What the host's weather changes is computed anew over that share of an interval.
+constexpr std::int64_t kRenewalFraction = 8;
+/// What follows a change of the weather that matters is an interval as short as that share.
+constexpr std::int64_t kAnswerFraction = 4;
+/// Fluxes that change a surface by no more than the tolerance, times that, however thin it is: it
+/// radiates as much by itself.
+constexpr double kLeastNewsWM2K = 5.0;
 
 std::vector<scene::Aabb> mover_boxes_m(const scene::SceneGeometry& geometry, std::size_t movers,
                                        std::span<const std::int32_t> mover_of_object) {
@@ -149,14 +156,15 @@ std::int64_t CachedSurface::take_news(const Environment& environment) noexcept {
   return changes <= changes_ns.size() ? changes_ns[changes_ns.size() - changes] : node(0).at_ns;
 }
 
-std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns,
+std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns, std::int64_t now_ns,
                                          const Inputs& inputs) const noexcept {
   const std::int64_t into_ns = (from_ns - options_.history_start_ns) % interval_ns_;
   std::int64_t next_ns = from_ns + interval_ns_ - into_ns;
-  if (next_ns - from_ns < interval_ns_ / 4) next_ns += interval_ns_;
+  now_ns = std::clamp(now_ns, from_ns, next_ns);
+  if (next_ns - now_ns < interval_ns_ / 4) next_ns += interval_ns_;
   const auto cut = [&](std::span<const std::int64_t> instants_ns) {
     const auto after = std::ranges::lower_bound(
-        instants_ns, from_ns + std::max(kSameNs, interval_ns_ / kSameFraction));
+        instants_ns, now_ns + std::max(kSameNs, interval_ns_ / kSameFraction));
     if (after != instants_ns.end()) next_ns = std::min(next_ns, *after);
   };
   for (const PoseHistory& entity : inputs.entities) cut(entity.events_ns());
@@ -243,6 +251,9 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
     first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
   }
   (void)take_news(inputs.environment);
+  news_ns_ = kNoNews;
+  renewing_ = false;
+  lags_ = false;
   local_ =
       LocalSteps(model_->samples,
                  LocalSteps::Setup{options_.history_start_ns, interval_ns_, inputs.entities.size()},
@@ -258,6 +269,8 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
     first.vertices[i].sun_frac = node(1).vertices[i].sun_frac;
   }
   begin_anew(1, inputs, history);
+  share_begin_ns_ = node(0).at_ns;
+  share_end_ns_ = node(1).at_ns;
   for (SurfaceNode& node : nodes_) {
     node.changes.clear();
     node.changes.add(0, model_->drawn_samples);
@@ -388,7 +401,7 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
   workers_.run(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
     SteppedSample stepped;
     for (auto i = static_cast<std::uint32_t>(first + begin); i < first + end; ++i) {
-      if (!steps_itself(step.all, i)) continue;
+      if (!steps_itself(step.all, i) || (renewing_ && local_->has_own_clock(i))) continue;
       stepped.state = from.states[i];
       step_sample(step, *interval_rays_, interval_, from.outputs, i, stepped);
       keep(i, stepped.state, stepped.output);
@@ -401,19 +414,27 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
   to.changes.add(std::min(first, drawn), std::min(last, drawn) - std::min(first, drawn));
 }
 
-void CachedSurface::cut_at(std::int64_t event_ns) noexcept {
+void CachedSurface::cut_at(std::int64_t event_ns, std::int64_t end_ns) noexcept {
   SurfaceNode& first = node(0);
-  const SurfaceNode& second = node(1);
-  const double frac =
-      static_cast<double>(event_ns - first.at_ns) / static_cast<double>(second.at_ns - first.at_ns);
+  SurfaceNode& second = node(1);
+  const auto way_of = [&](std::int64_t at_ns) {
+    return static_cast<double>(at_ns - first.at_ns) /
+           static_cast<double>(second.at_ns - first.at_ns);
+  };
+  const double frac = way_of(event_ns);
+  const double end_frac = way_of(end_ns);
   workers_.run(first.states.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-      SampleOutput& output = first.outputs[i];
-      if (!local_->has_own_clock(i)) {
+      if (frac > 0.0 && !local_->has_own_clock(i)) {
         first.states[i] = between(first.states[i], second.states[i], frac);
-        output = between(output, second.outputs[i], frac);
+        first.outputs[i] = between(first.outputs[i], second.outputs[i], frac);
       }
-      if (i < first.vertices.size()) first.vertices[i] = {output.offset_k, output.sun_frac};
+      if (i >= first.vertices.size()) continue;
+      const SampleVertex from = first.vertices[i];
+      SampleVertex& to = second.vertices[i];
+      first.vertices[i] = {between(from.offset_k, to.offset_k, frac),
+                           between(from.sun_frac, to.sun_frac, frac)};
+      to.offset_k = between(from.offset_k, to.offset_k, end_frac);
     }
   });
   first.surroundings = between(first.surroundings, second.surroundings, frac);
@@ -421,29 +442,79 @@ void CachedSurface::cut_at(std::int64_t event_ns) noexcept {
     first.surroundings_k = between(*first.surroundings_k, *second.surroundings_k, frac);
   }
   first.at_ns = event_ns;
-  first.changes.add(0, static_cast<std::uint32_t>(first.vertices.size()));
+  second.at_ns = end_ns;
+  for (SurfaceNode* node : {&first, &second}) {
+    node->changes.add(0, static_cast<std::uint32_t>(node->vertices.size()));
+  }
 }
 
 void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
                                SurfaceHistory& history) noexcept {
-  node(index + 1).at_ns = next_node_ns(node(index).at_ns, inputs);
+  const std::int64_t from_ns = node(index).at_ns;
+  node(index + 1).at_ns = next_node_ns(from_ns, from_ns, inputs);
   begin_interval(index, inputs, history);
 }
 
-void CachedSurface::change_weather(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
-                                   SurfaceHistory& history) noexcept {
-  const std::int64_t cut_ns = local_->any_own_clock() ? now_ns : event_ns;
-  // What came before is as it was. In a hold the clock stands, and news are of times to come.
-  if (cut_ns >= node(0).at_ns + kSameNs && cut_ns <= now_ns) {
-    const SurfaceStep step = this->step();
-    local_->settle(cut_ns, window(), local_inputs(inputs, history, step));
-    cut_at(cut_ns);
-  }
-  local_->restart(now_ns);
-  begin_anew(0, inputs, history);
+void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
+                                  SurfaceHistory& history) noexcept {
+  if (event_ns < node(0).at_ns + kSameNs) event_ns = node(0).at_ns;
+  const physics::Forcing was =
+      inputs.environment.forcing_at(event_ns - 1, inputs.environment.sun_at(event_ns - 1));
+  const physics::Forcing is =
+      inputs.environment.forcing_at(now_ns, inputs.environment.sun_at(now_ns));
+  const double change_w_m2 = std::abs(is.direct_normal_w_m2 - was.direct_normal_w_m2) +
+                             std::abs(is.diffuse_horizontal_w_m2 - was.diffuse_horizontal_w_m2) +
+                             std::abs(is.longwave_down_w_m2 - was.longwave_down_w_m2) +
+                             is.film_w_m2_k * std::abs(is.air_k - was.air_k);
+  lags_ = change_w_m2 > kLeastNewsWM2K * options_.tolerance_k;
+  std::int64_t end_ns = next_node_ns(event_ns, now_ns, inputs);
+  // Surfaces answer like the root of time at first, which a line over a whole interval does not.
+  if (lags_) end_ns = std::min(end_ns, now_ns + interval_ns_ / kAnswerFraction);
+  local_->take_news(event_ns, window(), model_->samples);
+  cut_at(event_ns, end_ns);
+  begin_interval(0, inputs, history);
+  renewing_ = true;
+  share_begin_ns_ = now_ns;
+  share_end_ns_ = now_ns + std::min(interval_ns_ / kRenewalFraction, (end_ns - now_ns) / 2);
+}
+
+void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
+                                SurfaceHistory& history) noexcept {
   compute(0, static_cast<std::uint32_t>(model_->samples.samples.size()));
+  renewing_ = false;
+  lags_ = false;
   node(2).changes.clear();
   begin_anew(1, inputs, history);
+  share_begin_ns_ = now_ns;
+  share_end_ns_ = node(1).at_ns;
+}
+
+void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
+                                 SurfaceHistory& history) noexcept {
+  news_ns_ = std::min(news_ns_, take_news(inputs.environment));
+  if (news_ns_ == kNoNews || renewing_) return;
+  if (news_ns_ >= node(2).at_ns) {
+    news_ns_ = kNoNews;
+  } else if (news_ns_ >= node(1).at_ns) {
+    // Where the interval is about to end there is no time for that: it waits for the next one.
+    if (node(1).at_ns - now_ns < interval_ns_ / kRenewalFraction) return;
+    begin_anew(1, inputs, history);
+    share_begin_ns_ = now_ns;
+    share_end_ns_ = node(1).at_ns;
+    news_ns_ = kNoNews;
+  } else if (news_ns_ <= now_ns) {  // what is to come waits for its instant
+    const SurfaceStep step = this->step();
+    local_->run(std::min(now_ns, node(1).at_ns), window(), local_inputs(inputs, history, step));
+    begin_renewal(std::exchange(news_ns_, kNoNews), now_ns, inputs, history);
+  }
+}
+
+std::uint32_t CachedSurface::share_at(std::int64_t now_ns) const noexcept {
+  const auto count = static_cast<double>(model_->samples.samples.size());
+  const auto way_ns =
+      static_cast<double>(std::max<std::int64_t>(1, share_end_ns_ - share_begin_ns_));
+  const double gone_frac = static_cast<double>(now_ns - share_begin_ns_) / way_ns;
+  return static_cast<std::uint32_t>(std::ceil(std::clamp(gone_frac, 0.0, 1.0) * count));
 }
 
 void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
@@ -452,30 +523,33 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
   const SurfaceStep step = this->step();
   const LocalSteps::Inputs local = local_inputs(inputs, history, step);
-  if (const std::int64_t event_ns = take_news(inputs.environment); event_ns < node(1).at_ns) {
-    local_->run(std::min(now_ns, node(1).at_ns), window(), local);
-    change_weather(event_ns, now_ns, inputs, history);
-  } else if (event_ns < node(2).at_ns) {
-    begin_anew(1, inputs, history);
-  }
+  take_weather(now_ns, inputs, history);
   while (now_ns > node(1).at_ns) {
     local_->run(node(1).at_ns, window(), local);
+    if (renewing_) {
+      end_renewal(node(1).at_ns, inputs, history);
+      take_weather(now_ns, inputs, history);  // of meanwhile, which moves the node
+      continue;
+    }
     local_->rotate(window(), model_->samples);
     compute(1, count);
     rotate();
     local_->rotated(window(), model_->samples);
     node(2).changes.clear();
     begin_anew(1, inputs, history);
+    share_begin_ns_ = node(0).at_ns;
+    share_end_ns_ = node(1).at_ns;
+    take_weather(now_ns, inputs, history);  // what had waited for this interval
   }
   local_->run(now_ns, window(), local);
   shade_->run(now_ns, model_->samples,
               {inputs.environment, inputs.entities, rays(), workers_, silhouettes_});
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);
-  const double gone_frac = std::clamp(fraction, 0.0, 1.0);
-  fraction_ = static_cast<float>(gone_frac);
-  // As much of the next interval as has gone by of this one.
-  compute(1, std::min(count, static_cast<std::uint32_t>(std::ceil(gone_frac * count))));
+  fraction_ = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
+  // As much as has gone by of the time for it.
+  compute(renewing_ ? 0 : 1, share_at(now_ns));
+  if (renewing_ && done_ == count) end_renewal(now_ns, inputs, history);
 }
 
 std::optional<double> CachedSurface::surroundings_now_k() const noexcept {

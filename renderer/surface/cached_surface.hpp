@@ -41,7 +41,8 @@ struct SampledScene {
 /// of thermal.first_step_s, cut where the script moves an entity or the weather changes. While
 /// frames interpolate between the two ends of the current one, the next is computed, as much per
 /// frame as sim time has moved: no frame does more than its share, and the result depends on the
-/// inputs alone. What the host does with an entity meanwhile is carried by LocalSteps.
+/// inputs alone. What the host does with an entity meanwhile is carried by LocalSteps; after it has
+/// changed the weather, the current interval is computed anew, over frames, before the next one.
 ///
 /// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
 /// nothing, on any thread; everything else is setup.
@@ -100,6 +101,9 @@ class CachedSurface {
   void forget_changes() noexcept;
   /// Temperature of the surroundings where the thermal model carries it.
   [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept;
+  /// True while some samples do not know yet of weather that the host has changed by more than
+  /// matters.
+  [[nodiscard]] bool lags() const noexcept { return lags_; }
   /// Blocks of samples that do not follow the intervals, because the host moves an entity.
   [[nodiscard]] std::size_t local_blocks() const noexcept { return local_->active(); }
 
@@ -154,15 +158,22 @@ class CachedSurface {
   void rotate() noexcept { ring_ = (ring_ + 1) % 3; }
   /// begin_interval(), to the next node.
   void begin_anew(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
-  /// The next instant of the grid, or an earlier one at which an entity or the weather changes.
-  [[nodiscard]] std::int64_t next_node_ns(std::int64_t from_ns,
+  /// The next instant of the grid, or an earlier one after `now_ns` at which an entity or the
+  /// weather changes.
+  [[nodiscard]] std::int64_t next_node_ns(std::int64_t from_ns, std::int64_t now_ns,
                                           const Inputs& inputs) const noexcept;
-  /// Makes node 0 what lies between it and node 1 at that instant.
-  void cut_at(std::int64_t event_ns) noexcept;
-  /// The host has changed the weather from `event_ns` on: the interval of now was computed without
-  /// that.
-  void change_weather(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
-                      SurfaceHistory& history) noexcept;
+  /// Makes node 0 what lies between it and node 1 at `event_ns`, and node 1 the same line's point
+  /// at `end_ns`, but for what samples go on from.
+  void cut_at(std::int64_t event_ns, std::int64_t end_ns) noexcept;
+  /// Takes in what the host has changed of the weather.
+  void take_weather(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
+  /// The weather has changed at `event_ns`: node 1 was computed without that, and is computed anew
+  /// over the next frames.
+  void begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
+                     SurfaceHistory& history) noexcept;
+  void end_renewal(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
+  /// Samples that are to be computed by then.
+  [[nodiscard]] std::uint32_t share_at(std::int64_t now_ns) const noexcept;
   /// The earliest change of the weather by the host that was not known before; kNoNews: none.
   [[nodiscard]] std::int64_t take_news(const Environment& environment) noexcept;
   static constexpr std::int64_t kNoNews = std::numeric_limits<std::int64_t>::max();
@@ -182,7 +193,8 @@ class CachedSurface {
     return {inputs.environment, inputs.entities, history, step, workers_, rays().origin_world_m()};
   }
   [[nodiscard]] LocalSteps::Window window() noexcept {
-    return {node(0), node(1), node(2), done_, *interval_rays_, interval_};
+    return {node(0),   node(1),         node(2),  renewing_ ? 0U : done_,
+            renewing_, *interval_rays_, interval_};
   }
 
   scene::SceneGeometry geometry_;
@@ -211,7 +223,12 @@ class CachedSurface {
 
   std::array<SurfaceNode, 3> nodes_;
   std::size_t ring_ = 0;
-  std::uint32_t done_ = 0;  ///< samples of the newest node that are computed
+  std::uint32_t done_ = 0;           ///< samples of the node that is being computed which are
+  std::int64_t share_begin_ns_ = 0;  ///< time in which they are
+  std::int64_t share_end_ns_ = 0;
+  bool renewing_ = false;           ///< that node is node 1, because the weather has changed
+  bool lags_ = false;               ///< ... by more than the tolerance
+  std::int64_t news_ns_ = kNoNews;  ///< the earliest change of the weather that is not taken in
   std::uint32_t turn_ = 0;
   std::int64_t interval_ns_ = 0;
   std::uint64_t revision_ = 0;  ///< of the weather

@@ -78,7 +78,6 @@ void LocalSteps::restart(std::int64_t now_ns) noexcept {
   std::ranges::fill(touched_ns_, kNever);
   std::ranges::fill(foreseen_ns_, kNever);
   std::ranges::fill(own_clock_, std::uint8_t{0});
-  any_own_clock_ = false;
   std::ranges::fill(known_found_, std::uint8_t{0});
   next_turn_ = std::max<std::int64_t>(0, now_ns - start_ns_) / turn_ns_ + 1;
 }
@@ -155,16 +154,14 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
   inputs.history.restore_surroundings(window.next.surroundings);
 }
 
-void LocalSteps::settle(std::int64_t at_ns, const Window& window, const Inputs& inputs) noexcept {
+void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
+                           const SurfaceSamples& all) noexcept {
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
-    if (state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns) {
-      begin_alone(b, at_ns, window, inputs.step.all);
-    }
+    const bool came_back = state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns;
+    if (came_back) turns_[b % kTurns].push_back(b);
+    if (came_back || state_[b] == State::wanted) begin_alone(b, event_ns, window, all);
+    foreseen_ns_[b] = kNever;
   }
-  for (const auto& turn : turns_) {
-    if (!turn.empty()) bring(turn, at_ns, window, inputs);
-  }
-  inputs.history.restore_surroundings(window.next.surroundings);
 }
 
 template <class Visit>
@@ -181,8 +178,7 @@ void LocalSteps::begin_alone(std::uint32_t block, std::int64_t at_ns, const Wind
   // It may have come back to this interval: `before` holds it where it did.
   const std::int64_t from_ns = std::max(at_ns_[block], window.before.at_ns);
   state_[block] = State::on_its_own;
-  any_own_clock_ = true;
-  at_ns_[block] = std::max(at_ns, from_ns);
+  at_ns_[block] = window.renewing ? from_ns : std::max(at_ns, from_ns);
   const double frac = static_cast<double>(at_ns_[block] - from_ns) /
                       static_cast<double>(window.after.at_ns - from_ns);
   each_sample(block, all, [&](std::uint32_t i) {
@@ -343,7 +339,6 @@ void LocalSteps::rotated(const Window& window, const SurfaceSamples& all) noexce
     if (state_[b] != State::of_interval || at_ns_[b] < old.at_ns) continue;
     each_sample(b, all, [&](std::uint32_t i) { own_clock_[i] = 0; });
   }
-  any_own_clock_ = active() > 0;
   for (const auto& turn : turns_) {
     for (const std::uint32_t block : turn) {
       each_sample(block, all, [&](std::uint32_t i) {

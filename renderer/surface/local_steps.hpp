@@ -57,6 +57,8 @@ class LocalSteps {
     SurfaceNode& after;
     SurfaceNode& next;
     std::uint32_t done = 0;  ///< samples of `next` that are computed
+    /// `after` is being computed anew: what lies between it and `before` does not hold.
+    bool renewing = false;
     const IntervalRays& next_rays;
     const HeatInterval& next_interval;
   };
@@ -72,8 +74,10 @@ class LocalSteps {
 
   /// Does what is due up to `until_ns`, which lies in the current interval.
   void run(std::int64_t until_ns, const Window& window, const Inputs& inputs) noexcept;
-  /// Brings every block on its own to `at_ns` itself. @pre run(at_ns)
-  void settle(std::int64_t at_ns, const Window& window, const Inputs& inputs) noexcept;
+  /// The weather has changed from `event_ns` on, and `before` is about to be moved there: blocks
+  /// that were on their own in this interval are so from then on, and what was foreseen of them
+  /// does not come true. @pre run(); event_ns lies in the current interval
+  void take_news(std::int64_t event_ns, const Window& window, const SurfaceSamples& all) noexcept;
   /// The current interval is about to end. @pre run() to its end
   void rotate(const Window& window, const SurfaceSamples& all) noexcept;
   /// It has: what was `next` is `after` now, and what was `before` is `next`.
@@ -86,7 +90,6 @@ class LocalSteps {
   [[nodiscard]] bool has_own_clock(std::uint32_t sample) const noexcept {
     return own_clock_[sample] != 0;
   }
-  [[nodiscard]] bool any_own_clock() const noexcept { return any_own_clock_; }
 
  private:
   static constexpr std::size_t kTurns = 16;  ///< groups of blocks that step one after the other
@@ -140,9 +143,8 @@ class LocalSteps {
   std::vector<std::int64_t> foreseen_ns_;  ///< by block: what `after` holds of it
   /// By turn, then entity: where they were foreseen to be at the end of the turn's step.
   std::array<std::vector<TrajectoryState>, kTurns> foreseen_;
-  std::vector<std::uint8_t> known_found_;  ///< by entity: in this interval
-  std::vector<std::uint8_t> own_clock_;    ///< by sample
-  bool any_own_clock_ = false;
+  std::vector<std::uint8_t> known_found_;                 ///< by entity: in this interval
+  std::vector<std::uint8_t> own_clock_;                   ///< by sample
   std::array<std::vector<std::uint32_t>, kTurns> turns_;  ///< blocks that are not of_interval
   std::vector<std::uint32_t> chosen_;
   std::vector<std::uint32_t> batch_;

@@ -278,6 +278,11 @@ void Tool::add_frame_time_benches(CLI::App& bench) {
     app.add_option("--finest", o.finest_s, "thermal.first_step_s of the reference, s")
         ->check(CLI::Range(0.01, 3600.0))
         ->capture_default_str();
+    app.add_option("--weather-every", o.weather_every_s,
+                   "A cloud passes, of which the script knows and the host tells that often, s; "
+                   "0: clear sky")
+        ->check(CLI::Range(0.0, 3600.0))
+        ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
     add_gpu(app, o.gpu_index);

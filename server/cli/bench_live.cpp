@@ -5,12 +5,14 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "emit/physics/weather.hpp"
 #include "emit/scene/trajectory.hpp"
 #include "emit/version.hpp"
 #include "interrupt.hpp"
@@ -50,6 +52,65 @@ std::vector<Driven> take_scripts(scene::ScenarioDesc& scenario, std::int64_t sta
   }
   return out;
 }
+
+/// A scenario's clear sky, under which a cloud passes that leaves a fifth of the direct sun: it
+/// comes after a quarter of the time and goes after three quarters, in 5 s each.
+class CloudySky {
+ public:
+  CloudySky(const scene::ScenarioDesc& scenario, std::int64_t start_ns, double seconds)
+      : epoch_utc_ns_(scenario.epoch_utc_ns),
+        place_{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
+               physics::Metres(scenario.place.height_m)},
+        clear_{.linke_turbidity = scenario.clear_sky.linke_turbidity,
+               .air_mean_k = scenario.clear_sky.air_mean_k,
+               .air_amplitude_k = scenario.clear_sky.air_amplitude_k,
+               .dew_point_k = scenario.clear_sky.dew_point_k,
+               .wind_m_s = scenario.clear_sky.wind_m_s,
+               .cloud_frac = scenario.clear_sky.cloud_frac},
+        start_ns_(start_ns),
+        seconds_(seconds) {}
+
+  [[nodiscard]] scene::WeatherSample at(std::int64_t sim_time_ns) const {
+    const std::int64_t utc_ns = epoch_utc_ns_ + sim_time_ns;
+    const physics::Forcing clear = physics::forcing_from_clear_sky(
+        clear_, place_, physics::sun_position(utc_ns, place_), utc_ns);
+    constexpr double kEdgeS = 5.0;
+    constexpr double kTakenFrac = 0.8;
+    const double gone_s = 1e-9 * static_cast<double>(sim_time_ns - start_ns_);
+    const double in_s = std::min(gone_s - 0.25 * seconds_, 0.75 * seconds_ - gone_s);
+    const double left_frac = 1.0 - kTakenFrac * std::clamp(in_s / kEdgeS, 0.0, 1.0);
+    scene::WeatherSample out;
+    out.sim_time_ns = sim_time_ns;
+    out.direct_normal_w_m2 = left_frac * clear.direct_normal_w_m2;
+    out.diffuse_horizontal_w_m2 = clear.diffuse_horizontal_w_m2;
+    out.longwave_down_w_m2 = clear.longwave_down_w_m2;
+    out.air_k = clear.air_k;
+    out.wind_m_s = clear.wind_m_s;
+    return out;
+  }
+  /// From what the thermal history starts with up to `end_ns`.
+  [[nodiscard]] std::vector<scene::WeatherSample> table(const scene::ThermalOptions& thermal,
+                                                        std::int64_t end_ns) const {
+    constexpr std::int64_t kRowNs = 300'000'000'000;
+    constexpr std::int64_t kFineNs = 1'000'000'000;
+    std::vector<scene::WeatherSample> rows;
+    for (std::int64_t at_ns = thermal.history_start_ns - thermal.spin_up_ns;
+         at_ns < std::min(start_ns_, end_ns); at_ns += kRowNs) {
+      rows.push_back(at(at_ns));
+    }
+    for (std::int64_t at_ns = start_ns_; at_ns <= end_ns; at_ns += kFineNs) {
+      rows.push_back(at(at_ns));
+    }
+    return rows;
+  }
+
+ private:
+  std::int64_t epoch_utc_ns_;
+  physics::GeoPlace place_;
+  physics::ClearSky clear_;
+  std::int64_t start_ns_;
+  double seconds_;
+};
 
 /// Differences of a renderer's pictures from the reference's, of all pictures.
 struct Error {
@@ -95,6 +156,11 @@ class LiveBench {
       }
       out.eye_ = scenario->sensor.trajectory.back().pose;
       if (who == kHost) out.driven_ = take_scripts(*scenario, out.start_ns_);
+      if (command.weather_every_s > 0.0) {
+        out.sky_.emplace(*scenario, out.start_ns_, command.seconds);
+        const std::int64_t known_ns = who == kHost ? out.start_ns_ : out.end_ns();
+        scenario->weather = out.sky_->table(scenario->thermal, known_ns);
+      }
       scenario->sensor.width_px = command.width_px;
       scenario->sensor.height_px = command.height_px;
       // One place, so that what changes in a pixel is its temperature.
@@ -165,7 +231,21 @@ class LiveBench {
   [[nodiscard]] std::int64_t time_ns(std::uint64_t i) const {
     return start_ns_ + std::llround(1e9 * static_cast<double>(i) / command_.rate_hz);
   }
+  [[nodiscard]] std::int64_t end_ns() const {
+    return start_ns_ + std::llround(1e9 * (command_.seconds + command_.weather_every_s));
+  }
+  void tell_weather(std::uint64_t i) {
+    const auto period_ns = std::llround(1e9 * command_.weather_every_s);
+    const std::int64_t now_ns = time_ns(i);
+    if (now_ns < next_weather_ns_) return;
+    next_weather_ns_ = now_ns + period_ns;
+    // It holds until the next one.
+    scene::WeatherSample sample = sky_->at(now_ns + period_ns / 2);
+    sample.sim_time_ns = now_ns;
+    renderers_[kHost]->apply_weather(sample);
+  }
   void tell(std::uint64_t i) {
+    if (sky_ && i > 0) tell_weather(i);
     updates_.clear();
     for (const Driven& entity : driven_) {
       const scene::TrajectoryState state = scene::trajectory_at(entity.script, time_ns(i));
@@ -196,6 +276,8 @@ class LiveBench {
   physics::Pose eye_;
   std::vector<Driven> driven_;
   std::vector<renderer::EntityUpdate> updates_;
+  std::optional<CloudySky> sky_;  ///< weather_every_s > 0
+  std::int64_t next_weather_ns_ = 0;
   std::array<std::unique_ptr<RendererThread>, kCount> renderers_;
   std::array<std::vector<float>, kCount> shown_k_;
   std::array<std::vector<float>, kCount> first_k_;
@@ -227,6 +309,7 @@ int run_bench_live(const BenchLiveCommand& command) {
     json.set("frame_ms_p99", row.frame_ms.percentile(0.99)).set("frame_ms_max", row.frame_ms.max());
     json.set("frames", row.frame_ms.count()).set("sim_s", command.seconds);
     json.set("rate_hz", command.rate_hz).set("entities", bench->entities());
+    json.set("weather_every_s", command.weather_every_s);
     json.set("error_p99_k", p99_k).set("error_rms_k", rms_k).set("pixels", row.error.count);
     json.set("width", command.width_px).set("height", command.height_px);
     json.set("samples", bench->renderer(who).stats().samples).set("warm_up_s", row.warm_up_s);

@@ -274,7 +274,9 @@ const std::vector<Contender>& contenders() {
       {"tls", {"tcp"}},
       {"bare-udp", {}},
       {"udp", {"bare-udp"}},
-      {"shm", {"bare-tcp"}}};
+      {"shm", {"bare-tcp", "iceoryx", "iceoryx-crc"}},
+      {"iceoryx", {}},
+      {"iceoryx-crc", {}}};
   return all;
 }
 
@@ -323,6 +325,8 @@ Result<void> StreamBench::throughput() {
     if (name == "bare-udp") return measure_bare_udp(yardstick_);
     if (name == "zeromq") return measure_zeromq(yardstick_, false);
     if (name == "zeromq-crc") return measure_zeromq(yardstick_, true);
+    if (name == "iceoryx") return measure_iceoryx(yardstick_, work_, false);
+    if (name == "iceoryx-crc") return measure_iceoryx(yardstick_, work_, true);
     if (name == "iperf3") {
       constexpr int kSeconds = 1;
       const auto gbit_s = measure_iperf3_gbit_s(work_, kSeconds);

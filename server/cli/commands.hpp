@@ -344,6 +344,9 @@ struct BenchLiveCommand {
   double rate_hz = 50.0;  ///< of frames and host poses, in sim time
   double every_s = 2.0;   ///< between the pictures that are compared
   double finest_s = 1.0;  ///< thermal.first_step_s of the reference
+  /// A cloud passes: the host tells the weather that often, the script has it from the start; 0:
+  /// none.
+  double weather_every_s = 0.0;
   std::uint32_t width_px = 640;
   std::uint32_t height_px = 512;
   int gpu_index = -1;

@@ -115,6 +115,10 @@ void RendererThread::apply_entities(std::int64_t sim_time_ns,
   call([&] { renderer_->apply_entities(sim_time_ns, updates); });
 }
 
+void RendererThread::apply_weather(const scene::WeatherSample& sample) {
+  call([&] { renderer_->apply_weather(sample); });
+}
+
 Result<TimedFrame> RendererThread::render_within(renderer::FrameRequest request, double budget_ms) {
   double rung_ms = 0.0;
   const auto frame = timed([&](Clock::time_point start) {

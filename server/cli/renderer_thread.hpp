@@ -49,6 +49,8 @@ class RendererThread {
 
   /// Renderer::apply_entities().
   void apply_entities(std::int64_t sim_time_ns, std::span<const renderer::EntityUpdate> updates);
+  /// Renderer::apply_weather().
+  void apply_weather(const scene::WeatherSample& sample);
 
   [[nodiscard]] physics::Pose scenario_pose_at(std::int64_t sim_time_ns) const noexcept {
     return renderer_->scenario_sensor_pose_at(sim_time_ns);

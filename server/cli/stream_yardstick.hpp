@@ -54,5 +54,12 @@ struct BareDelays {
 /// client's is. Errors: unsupported (built without the library), io.
 [[nodiscard]] physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options,
                                                               bool sum);
+/// iceoryx publisher and subscriber: a frame is copied into a chunk that the subscriber, which
+/// sleeps in between, reads in place; `window` queued at most. `sum`: with its CRC-32C, as emitd's
+/// ring and its reader have it. Starts the library's daemon, until this process ends; its log goes
+/// to `directory`. Errors: unsupported (built without the library, no chunks of that size, another
+/// daemon runs), not_found (no daemon), io.
+[[nodiscard]] physics::Result<YardstickResult> measure_iceoryx(
+    const YardstickOptions& options, const std::filesystem::path& directory, bool sum);
 
 }  // namespace emit::cli

@@ -76,16 +76,20 @@ class Session {
     EXPECT_EQ(view.stats.nonfinite_px, 0U);
     std::vector<float> out(view.temperature_k.begin(), view.temperature_k.end());
     objects_.assign(view.object_id.begin(), view.object_id.end());
+    coarse_ = view.stats.coarse;
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
     return out;
   }
   /// Of the latest frame, by pixel: 1 + index of the object, 0 for sky.
   [[nodiscard]] const std::vector<float>& objects() const { return objects_; }
+  /// The latest frame is flagged degraded.
+  [[nodiscard]] bool coarse() const { return coarse_; }
   [[nodiscard]] renderer::Renderer& renderer() { return *renderer_; }
 
  private:
   std::unique_ptr<renderer::Renderer> renderer_;
   std::vector<float> objects_;
+  bool coarse_ = false;
 };
 
 /// While the sun does not shine.

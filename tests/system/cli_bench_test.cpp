@@ -123,16 +123,17 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
   const std::string json = read_text(folder.file("s.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"stream\"");
-  for (const char* transport : {"tcp", "udp", "shm", "tls", "mixed", "bare-tcp-paced", "bare-tcp",
-                                "bare-tcp-crc", "bare-udp", "zeromq", "zeromq-crc", "iperf3"}) {
+  for (const char* transport :
+       {"tcp", "udp", "shm", "tls", "mixed", "bare-tcp-paced", "bare-tcp", "bare-tcp-crc",
+        "bare-udp", "zeromq", "zeromq-crc", "iperf3", "iceoryx", "iceoryx-crc"}) {
     EXPECT_NE(json.find("\"transport\": \"" + std::string(transport) + "\""), std::string::npos)
         << transport;
   }
   // Five at a fixed rate, then each alone; what is not installed has null and a reason.
   EXPECT_EQ(numbers_of(json, "clients"),
-            (std::vector<double>{4, 4, 4, 4, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
+            (std::vector<double>{4, 4, 4, 4, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
   EXPECT_EQ(numbers_of(json, "rate_hz"), std::vector<double>(5, 50));
-  EXPECT_EQ(numbers_of(json, "lost"), std::vector<double>(15, 0));
+  EXPECT_EQ(numbers_of(json, "lost"), std::vector<double>(17, 0));
   EXPECT_EQ(numbers_of(json, "unflagged_gaps"), std::vector<double>(4, 0));
   EXPECT_EQ(numbers_of(json, "crc_errors"), std::vector<double>(4, 0));
   EXPECT_EQ(numbers_of(json, "p999_us").size(), 5U);

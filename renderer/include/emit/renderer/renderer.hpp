@@ -90,7 +90,7 @@ struct FrameStats {
   std::uint64_t dropped_poses = 0;
   /// thermal.method = "cached": the camera stands where no one said it would, or samples ran out
   /// before what it sees was fine enough: triangles may be wider than its pixels and shadows
-  /// coarser than thermal.tolerance_k.
+  /// coarser than thermal.tolerance_k. Or some surfaces do not know yet that the weather changed.
   bool coarse = false;
 };
 
