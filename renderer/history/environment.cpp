@@ -2,6 +2,7 @@
 #include "history/environment.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace emit::renderer {
 namespace {
@@ -41,6 +42,7 @@ Environment::Environment(const scene::ScenarioDesc& scenario)
   for (const scene::WeatherSample& sample : scenario.weather) table_.push_back(row_from(sample));
   live_.reserve(kMaxLiveSamples);
   changes_ns_.reserve(kMaxLiveSamples);
+  revisions_.reserve(kMaxLiveSamples);
 }
 
 bool Environment::append(const scene::WeatherSample& sample) noexcept {
@@ -50,7 +52,7 @@ bool Environment::append(const scene::WeatherSample& sample) noexcept {
     if (same_weather(row, live_.back())) return true;
     if (row.time_ns == live_.back().time_ns) {
       live_.back() = row;
-      ++revision_;
+      revisions_.back() = ++revision_;
       return true;
     }
   }
@@ -63,17 +65,27 @@ bool Environment::append(const scene::WeatherSample& sample) noexcept {
     };
     thin(live_);
     thin(changes_ns_);
+    thin(revisions_);
   }
   live_.push_back(row);
-  ++revision_;
+  revisions_.push_back(++revision_);
   changes_ns_.push_back(row.time_ns);
   return true;
 }
 
 void Environment::reset() noexcept {
-  if (!live_.empty()) ++revision_;
+  if (!live_.empty()) reset_revision_ = ++revision_;
   live_.clear();
   changes_ns_.clear();
+  revisions_.clear();
+}
+
+std::int64_t Environment::changed_since_ns(std::uint64_t revision) const noexcept {
+  using Limits = std::numeric_limits<std::int64_t>;
+  if (revision_ == revision) return Limits::max();
+  const auto first = std::ranges::upper_bound(revisions_, revision);
+  if (reset_revision_ > revision || first == revisions_.end()) return Limits::min();
+  return changes_ns_[static_cast<std::size_t>(first - revisions_.begin())];
 }
 
 physics::SunPosition Environment::sun_at(std::int64_t sim_time_ns) const noexcept {

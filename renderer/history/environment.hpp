@@ -29,6 +29,10 @@ class Environment {
   /// What the host sent and is kept, ascending.
   [[nodiscard]] std::span<const physics::WeatherRow> live() const noexcept { return live_; }
 
+  /// The earliest instant from which the weather is not what it was at that revision; the lowest
+  /// there is where it may be any, the highest where nothing has changed.
+  [[nodiscard]] std::int64_t changed_since_ns(std::uint64_t revision) const noexcept;
+
   /// Goes up with every change by the host.
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
@@ -43,7 +47,9 @@ class Environment {
   std::vector<physics::WeatherRow> table_;
   std::vector<physics::WeatherRow> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of live_
+  std::vector<std::uint64_t> revisions_;  ///< of live_, ascending
   std::uint64_t revision_ = 0;
+  std::uint64_t reset_revision_ = 0;
 };
 
 }  // namespace emit::renderer

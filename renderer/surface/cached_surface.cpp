@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <utility>
 
+#include "emit/physics/surface_balance.hpp"
+#include "history/foster_history.hpp"
 #include "surface/sheet_sides.hpp"
 #include "surface/surface_patch.hpp"
 
@@ -32,6 +35,10 @@ constexpr std::int64_t kAnswerFraction = 4;
 /// Fluxes that change a surface by no more than the tolerance, times that, however thin it is: it
 /// radiates as much by itself.
 constexpr double kLeastNewsWM2K = 5.0;
+/// What sunlit surfaces are warmer than the air by, more or less.
+constexpr double kFilmK = 20.0;
+/// In a hold, in which the clock stands.
+constexpr std::int64_t kHeldFrames = 64;
 
 std::vector<scene::Aabb> mover_boxes_m(const scene::SceneGeometry& geometry, std::size_t movers,
                                        std::span<const std::int32_t> mover_of_object) {
@@ -149,11 +156,7 @@ bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
 }
 
 std::int64_t CachedSurface::take_news(const Environment& environment) noexcept {
-  const std::uint64_t revision = environment.revision();
-  const std::uint64_t changes = revision - std::exchange(revision_, revision);
-  if (changes == 0) return kNoNews;
-  const std::span<const std::int64_t> changes_ns = environment.changes_ns();
-  return changes <= changes_ns.size() ? changes_ns[changes_ns.size() - changes] : node(0).at_ns;
+  return environment.changed_since_ns(std::exchange(revision_, environment.revision()));
 }
 
 std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns, std::int64_t now_ns,
@@ -254,6 +257,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   news_ns_ = kNoNews;
   renewing_ = false;
   lags_ = false;
+  last_now_ns_ = now_ns;
   local_ =
       LocalSteps(model_->samples,
                  LocalSteps::Setup{options_.history_start_ns, interval_ns_, inputs.entities.size()},
@@ -375,6 +379,7 @@ void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
   SurfaceNode& to = node(index + 1);
   history.restore_surroundings(from.surroundings);
   interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
+  to.forcing = interval_.forcing;
   to.surroundings = history.surroundings();
   to.surroundings_k = history.surroundings_now_k();
   heat_.prepare(interval_);
@@ -451,38 +456,58 @@ void CachedSurface::cut_at(std::int64_t event_ns, std::int64_t end_ns) noexcept 
 void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
                                SurfaceHistory& history) noexcept {
   const std::int64_t from_ns = node(index).at_ns;
-  node(index + 1).at_ns = next_node_ns(from_ns, from_ns, inputs);
+  std::int64_t end_ns = next_node_ns(from_ns, from_ns, inputs);
+  if (std::ranges::binary_search(inputs.environment.changes_ns(), from_ns)) {
+    end_ns = std::min(end_ns, from_ns + interval_ns_ / kAnswerFraction);
+  }
+  node(index + 1).at_ns = end_ns;
   begin_interval(index, inputs, history);
+}
+
+bool CachedSurface::matters(std::int64_t now_ns, const Environment& environment) const noexcept {
+  const physics::SunPosition sun = environment.sun_at(now_ns);
+  const physics::Forcing weather = environment.forcing_at(now_ns, sun);
+  const SurfaceForcing is = open_forcing(sun, weather);
+  const IntervalForcing& taken = node(1).forcing;
+  const double way = std::clamp(
+      1.0 - 1e-9 * static_cast<double>(node(1).at_ns - now_ns) / std::max(taken.dt_s, 1e-9), 0.0,
+      1.0);
+  const auto off = [&](double SurfaceForcing::*value) {
+    return std::abs(is.*value - between(taken.begin.*value, taken.end.*value, way));
+  };
+  double change_w_m2 =
+      glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
+      off(&SurfaceForcing::diffuse_w_m2) + off(&SurfaceForcing::longwave_w_m2) +
+      is.film_w_m2_k * off(&SurfaceForcing::air_k) + kFilmK * off(&SurfaceForcing::film_w_m2_k);
+  if (weather.environment_stated) {
+    change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
+                            between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
+  }
+  return change_w_m2 > kLeastNewsWM2K * options_.tolerance_k;
 }
 
 void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
                                   SurfaceHistory& history) noexcept {
   if (event_ns < node(0).at_ns + kSameNs) event_ns = node(0).at_ns;
-  const physics::Forcing was =
-      inputs.environment.forcing_at(event_ns - 1, inputs.environment.sun_at(event_ns - 1));
-  const physics::Forcing is =
-      inputs.environment.forcing_at(now_ns, inputs.environment.sun_at(now_ns));
-  const double change_w_m2 = std::abs(is.direct_normal_w_m2 - was.direct_normal_w_m2) +
-                             std::abs(is.diffuse_horizontal_w_m2 - was.diffuse_horizontal_w_m2) +
-                             std::abs(is.longwave_down_w_m2 - was.longwave_down_w_m2) +
-                             is.film_w_m2_k * std::abs(is.air_k - was.air_k);
-  lags_ = change_w_m2 > kLeastNewsWM2K * options_.tolerance_k;
+  lags_ = matters(now_ns, inputs.environment);
   std::int64_t end_ns = next_node_ns(event_ns, now_ns, inputs);
   // Surfaces answer like the root of time at first, which a line over a whole interval does not.
-  if (lags_) end_ns = std::min(end_ns, now_ns + interval_ns_ / kAnswerFraction);
+  if (lags_) end_ns = std::min(end_ns, std::max(event_ns, now_ns) + interval_ns_ / kAnswerFraction);
   local_->take_news(event_ns, window(), model_->samples);
   cut_at(event_ns, end_ns);
   begin_interval(0, inputs, history);
   renewing_ = true;
-  share_begin_ns_ = now_ns;
-  share_end_ns_ = now_ns + std::min(interval_ns_ / kRenewalFraction, (end_ns - now_ns) / 2);
+  // What sim time has left behind in one frame is made up for in that.
+  share_begin_ns_ = std::max(event_ns, last_now_ns_);
+  share_end_ns_ =
+      share_begin_ns_ + std::min(interval_ns_ / kRenewalFraction, (end_ns - now_ns) / 2);
 }
 
 void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
                                 SurfaceHistory& history) noexcept {
   compute(0, static_cast<std::uint32_t>(model_->samples.samples.size()));
   renewing_ = false;
-  lags_ = false;
+  lags_ = news_ns_ <= now_ns && matters(now_ns, inputs.environment);
   node(2).changes.clear();
   begin_anew(1, inputs, history);
   share_begin_ns_ = now_ns;
@@ -491,8 +516,14 @@ void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
 
 void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
                                  SurfaceHistory& history) noexcept {
-  news_ns_ = std::min(news_ns_, take_news(inputs.environment));
-  if (news_ns_ == kNoNews || renewing_) return;
+  const std::int64_t newest_ns = take_news(inputs.environment);
+  if (newest_ns != kNoNews) local_->doubt(newest_ns);
+  news_ns_ = std::min(news_ns_, newest_ns);
+  if (news_ns_ == kNoNews) return;
+  if (renewing_) {
+    lags_ = lags_ || (news_ns_ <= now_ns && matters(now_ns, inputs.environment));
+    return;
+  }
   if (news_ns_ >= node(2).at_ns) {
     news_ns_ = kNoNews;
   } else if (news_ns_ >= node(1).at_ns) {
@@ -547,6 +578,13 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);
   fraction_ = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
+  if (renewing_ && now_ns == last_now_ns_) {
+    // In a hold frames go on with what has been begun.
+    const std::int64_t step_ns = (share_end_ns_ - share_begin_ns_) / kHeldFrames;
+    share_begin_ns_ -= step_ns;
+    share_end_ns_ -= step_ns;
+  }
+  last_now_ns_ = now_ns;
   // As much as has gone by of the time for it.
   compute(renewing_ ? 0 : 1, share_at(now_ns));
   if (renewing_ && done_ == count) end_renewal(now_ns, inputs, history);

@@ -172,6 +172,9 @@ class CachedSurface {
   void begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
                      SurfaceHistory& history) noexcept;
   void end_renewal(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
+  /// True where the weather of `now_ns` is not what node 1 was computed with, by more than changes
+  /// nothing.
+  [[nodiscard]] bool matters(std::int64_t now_ns, const Environment& environment) const noexcept;
   /// Samples that are to be computed by then.
   [[nodiscard]] std::uint32_t share_at(std::int64_t now_ns) const noexcept;
   /// The earliest change of the weather by the host that was not known before; kNoNews: none.
@@ -226,6 +229,7 @@ class CachedSurface {
   std::uint32_t done_ = 0;           ///< samples of the node that is being computed which are
   std::int64_t share_begin_ns_ = 0;  ///< time in which they are
   std::int64_t share_end_ns_ = 0;
+  std::int64_t last_now_ns_ = 0;
   bool renewing_ = false;           ///< that node is node 1, because the weather has changed
   bool lags_ = false;               ///< ... by more than the tolerance
   std::int64_t news_ns_ = kNoNews;  ///< the earliest change of the weather that is not taken in

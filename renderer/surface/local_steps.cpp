@@ -160,7 +160,12 @@ void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
     const bool came_back = state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns;
     if (came_back) turns_[b % kTurns].push_back(b);
     if (came_back || state_[b] == State::wanted) begin_alone(b, event_ns, window, all);
-    foreseen_ns_[b] = kNever;
+  }
+}
+
+void LocalSteps::doubt(std::int64_t event_ns) noexcept {
+  for (std::int64_t& foreseen_ns : foreseen_ns_) {
+    if (foreseen_ns > event_ns) foreseen_ns = kNever;
   }
 }
 

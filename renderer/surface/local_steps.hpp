@@ -74,9 +74,10 @@ class LocalSteps {
 
   /// Does what is due up to `until_ns`, which lies in the current interval.
   void run(std::int64_t until_ns, const Window& window, const Inputs& inputs) noexcept;
-  /// The weather has changed from `event_ns` on, and `before` is about to be moved there: blocks
-  /// that were on their own in this interval are so from then on, and what was foreseen of them
-  /// does not come true. @pre run(); event_ns lies in the current interval
+  /// The weather changes from `event_ns` on: what is foreseen beyond does not come true.
+  void doubt(std::int64_t event_ns) noexcept;
+  /// `before` is about to be moved to `event_ns`: blocks that were on their own in this interval
+  /// are so from then on. @pre run(); event_ns lies in the current interval
   void take_news(std::int64_t event_ns, const Window& window, const SurfaceSamples& all) noexcept;
   /// The current interval is about to end. @pre run() to its end
   void rotate(const Window& window, const SurfaceSamples& all) noexcept;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/renderer/surface_forcing.hpp"
 #include "surface/surface_samples.hpp"
 
 namespace emit::renderer {
@@ -68,6 +69,7 @@ struct SurfaceNode {
   std::vector<SampleVertex> vertices;  ///< of the drawn samples
   ChangedRanges changes;               ///< of the vertices
   std::int64_t at_ns = 0;
+  IntervalForcing forcing;  ///< of the interval that ends there, as it was taken to be
   physics::FosterState<double> surroundings{};
   std::optional<double> surroundings_k;  ///< where the thermal model carries it
 };

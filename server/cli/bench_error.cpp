@@ -6,12 +6,16 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 
 #include "bench_rules.hpp"
 #include "commands.hpp"
 #include "console.hpp"
+#include "converged_history.hpp"
+#include "embree_yardstick.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/reference/solve.hpp"
 #include "emit/reference/visibility.hpp"
@@ -36,9 +40,13 @@ using physics::Result;
 /// Spin-up of the scenarios that do not state one, so that every model is judged by one truth.
 constexpr std::int64_t kSpinUpNs = 172'800'000'000'000;
 
+/// Who computes temperatures: the renderer by either method, or a ray tracer (Embree) anew for
+/// every frame, with one ray to the sun per pixel and step.
+enum class Method : std::uint8_t { per_frame, cached, embree };
+
 /// One point of the sweep.
 struct Setting {
-  scene::ThermalMethod method = scene::ThermalMethod::per_frame;
+  Method method = Method::per_frame;
   scene::ThermalModel model = scene::ThermalModel::foster;
   scene::StepSpacing spacing = scene::StepSpacing::geometric;
   std::uint32_t steps = 27;
@@ -53,8 +61,16 @@ struct Setting {
 std::string_view name_of(scene::ThermalModel model) {
   return model == scene::ThermalModel::foster ? "foster" : "emit2014";
 }
-std::string_view name_of(scene::ThermalMethod method) {
-  return method == scene::ThermalMethod::cached ? "cached" : "per-frame";
+std::string_view name_of(Method method) {
+  switch (method) {
+    case Method::per_frame:
+      return "per-frame";
+    case Method::cached:
+      return "cached";
+    case Method::embree:
+      break;
+  }
+  return "embree";
 }
 std::string_view name_of(scene::StepSpacing spacing) {
   return spacing == scene::StepSpacing::uniform ? "uniform" : "geometric";
@@ -64,7 +80,7 @@ std::vector<Setting> sweep(bool quick) {
   std::vector<Setting> settings;
   const auto cached = [&settings]() -> Setting& {
     Setting& setting = settings.emplace_back();
-    setting.method = scene::ThermalMethod::cached;
+    setting.method = Method::cached;
     return setting;
   };
   const std::vector<std::uint32_t> steps =
@@ -81,6 +97,15 @@ std::vector<Setting> sweep(bool quick) {
   }
   cached();
   cached().lateral = false;
+  for (const auto model : {scene::ThermalModel::emit2014, scene::ThermalModel::foster}) {
+    for (const std::uint32_t count : steps) {
+      Setting& setting = settings.emplace_back();
+      setting.method = Method::embree;
+      setting.model = model;
+      setting.spacing = scene::StepSpacing::uniform;
+      setting.steps = count;
+    }
+  }
   if (quick) return settings;
   for (const std::uint32_t count : {13U, 54U, 90U}) cached().steps = count;
   for (const double tolerance_k : {1.0, 0.3, 0.03}) cached().tolerance_k = tolerance_k;
@@ -99,16 +124,17 @@ std::vector<Setting> sweep(bool quick) {
 
 struct Shot {
   std::vector<float> temperature_k;
-  std::vector<float> radiance_w_m2_sr;
+  std::vector<float> radiance_w_m2_sr;  ///< none of a ray tracer
   double frame_ms = 0.0;
   double warm_up_ms = 0.0;
-  std::string device;
+  std::string device;  ///< empty: the CPU
 };
 
 Result<Shot> shoot(scene::ScenarioDesc scenario, const Setting& setting,
                    const reference::SolveView& view, const BenchErrorCommand& command) {
   scene::ThermalOptions& thermal = scenario.thermal;
-  thermal.method = setting.method;
+  thermal.method = setting.method == Method::cached ? scene::ThermalMethod::cached
+                                                    : scene::ThermalMethod::per_frame;
   thermal.model = setting.model;
   thermal.tolerance_k = setting.tolerance_k;
   thermal.lateral = setting.lateral;
@@ -160,6 +186,32 @@ Result<Shot> shoot(scene::ScenarioDesc scenario, const Setting& setting,
     renderer.release(static_cast<renderer::SlotIndex>(slot));
   }
   shot.frame_ms = times.median();
+  return shot;
+}
+
+/// The time is that of the sun's rays alone: what sky and models take comes on top.
+Result<Shot> trace(scene::ScenarioDesc scenario, const Setting& setting,
+                   const reference::SolveView& view) {
+  scenario.thermal.model = setting.model;
+  const auto yardstick = EmbreeYardstick::create(scenario, view);
+  if (!yardstick) return tl::unexpected(yardstick.error());
+  const auto history = ConvergedHistory::create(scenario);
+  if (!history) return tl::unexpected(history.error());
+  ConvergedOptions options;
+  options.pixels = view.width_px * view.height_px;
+  options.steps = setting.steps;
+  options.sun_rays = 1;
+  options.sky_rays = 256;
+  options.progress = [](double) { return !InterruptGuard::interrupted(); };
+  const auto pixels = history->picture(view, options);
+  if (!pixels) return tl::unexpected(pixels.error());
+  Shot shot;
+  shot.temperature_k.assign(options.pixels, std::numeric_limits<float>::quiet_NaN());
+  for (const ConvergedPixel& pixel : *pixels) {
+    shot.temperature_k[pixel.pixel] = pixel.temperature_k;
+  }
+  const Samples step_ms = yardstick->step_ms(setting.steps);
+  shot.frame_ms = std::accumulate(step_ms.values().begin(), step_ms.values().end(), 0.0);
   return shot;
 }
 
@@ -231,13 +283,16 @@ struct Row {
   bool pareto = false;
 };
 
-/// No other setting of the same scene and region is both faster and more accurate.
+/// No other setting of the same scene and region is both faster and more accurate. A ray tracer
+/// stands aside: its time lacks a part.
 void mark_pareto(std::vector<Row>& rows) {
+  const auto counts = [](const Row& row) {
+    return row.kelvin.pixels > 0 && row.setting.method != Method::embree;
+  };
   for (Row& row : rows) {
-    row.pareto = row.kelvin.pixels > 0 && std::ranges::none_of(rows, [&row](const Row& other) {
-                   return other.scene == row.scene && other.region == row.region &&
-                          other.kelvin.pixels > 0 && other.frame_ms <= row.frame_ms &&
-                          other.kelvin.rms <= row.kelvin.rms &&
+    row.pareto = counts(row) && std::ranges::none_of(rows, [&](const Row& other) {
+                   return other.scene == row.scene && other.region == row.region && counts(other) &&
+                          other.frame_ms <= row.frame_ms && other.kelvin.rms <= row.kelvin.rms &&
                           (other.frame_ms < row.frame_ms || other.kelvin.rms < row.kelvin.rms);
                  });
   }
@@ -256,9 +311,11 @@ Json row_json(const Row& row, const BenchErrorCommand& command, const std::strin
   Json json = Json::object();
   json.set("scene", row.scene).set("region", name_of(row.region)).set("method", name_of(s.method));
   json.set("model", name_of(s.model)).set("steps", s.steps).set("spacing", name_of(s.spacing));
-  json.set("map_size", s.shadow_map_px).set("taps", taps_text(s));
-  const bool cached = s.method == scene::ThermalMethod::cached;
-  json.set("occlusion", cached ? "rays" : "screen-space").set("lateral", cached && s.lateral);
+  const bool cached = s.method == Method::cached;
+  const bool maps = s.method == Method::per_frame;
+  json.set("map_size", maps ? Json(s.shadow_map_px) : Json(nullptr));
+  json.set("taps", maps ? Json(taps_text(s)) : Json(nullptr));
+  json.set("occlusion", maps ? "screen-space" : "rays").set("lateral", cached && s.lateral);
   json.set("warm_up_ms", row.warm_up_ms);
   const std::uint32_t modes = modes_of(s);
   json.set("modes", modes == 0 ? Json("material") : Json(modes));
@@ -269,9 +326,12 @@ Json row_json(const Row& row, const BenchErrorCommand& command, const std::strin
   const auto number = [known](double value) { return known ? Json(value) : Json(nullptr); };
   json.set("max_error_k", number(row.kelvin.max)).set("rms_error_k", number(row.kelvin.rms));
   json.set("p99_error_k", number(row.kelvin.p99)).set("mean_error_k", number(row.kelvin.mean));
-  json.set("max_error_frac", number(row.fraction.max));
-  json.set("rms_error_frac", number(row.fraction.rms));
-  json.set("p99_error_frac", number(row.fraction.p99)).set("pareto", row.pareto);
+  const auto share = [&](double value) {
+    return row.fraction.pixels > 0 ? Json(value) : Json(nullptr);
+  };
+  json.set("max_error_frac", share(row.fraction.max));
+  json.set("rms_error_frac", share(row.fraction.rms));
+  json.set("p99_error_frac", share(row.fraction.p99)).set("pareto", row.pareto);
   json.set("reference", reference).set("pixels_compared", row.kelvin.pixels);
   json.set("not_finite_px", row.kelvin.not_finite);
   json.set("width", command.width_px).set("height", command.height_px);
@@ -331,8 +391,9 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
       continue;
     }
     const std::string label =
-        s.method == scene::ThermalMethod::cached
-            ? std::string("cached foster")
+        s.method == Method::cached ? std::string("cached foster")
+        : s.method == Method::embree
+            ? fmt::format("Embree anew, {}, sun's rays", name_of(s.model))
             : fmt::format("per-frame {}, {}", name_of(s.model), name_of(s.spacing));
     PlotSeries& curve = curves[label];
     curve.label = label;
@@ -383,15 +444,15 @@ int run_bench_error(const BenchErrorCommand& command) {
     std::uint64_t done = 0;
     ErrorFigures figures(name, view, truth->image);
     for (const Setting& setting : settings) {
-      const auto shot = shoot(*scenario, setting, view, command);
+      const auto shot = setting.method == Method::embree ? trace(*scenario, setting, view)
+                                                         : shoot(*scenario, setting, view, command);
       if (!shot) return fail(shot.error());
-      device = shot->device;
+      if (!shot->device.empty()) device = shot->device;
       if (setting.steps == 27 && setting.spacing == scene::StepSpacing::geometric &&
           setting.shadow_map_px == 1024 && setting.filter_taps == 32 && setting.modes == 0 &&
           setting.tolerance_k == 0.1 && setting.lateral) {
-        figures.add(setting.method == scene::ThermalMethod::cached
-                        ? std::string(name_of(setting.method))
-                        : std::string(name_of(setting.model)),
+        figures.add(setting.method == Method::cached ? std::string(name_of(setting.method))
+                                                     : std::string(name_of(setting.model)),
                     shot->temperature_k);
       }
       for (std::size_t r = 0; r < kRegions.size(); ++r) {
@@ -403,8 +464,10 @@ int run_bench_error(const BenchErrorCommand& command) {
         row.warm_up_ms = shot->warm_up_ms;
         row.kelvin = summarize_error(shot->temperature_k, truth->image.temperature_k,
                                      truth->masks[r], false);
-        row.fraction = summarize_error(shot->radiance_w_m2_sr, truth->image.radiance_w_m2_sr[0],
-                                       truth->masks[r], true);
+        if (!shot->radiance_w_m2_sr.empty()) {
+          row.fraction = summarize_error(shot->radiance_w_m2_sr, truth->image.radiance_w_m2_sr[0],
+                                         truth->masks[r], true);
+        }
         rows.push_back(std::move(row));
       }
       progress.advance_to(++done);
@@ -423,11 +486,13 @@ int run_bench_error(const BenchErrorCommand& command) {
   for (std::size_t i = 0; i + kRegions.size() <= rows.size(); i += kRegions.size()) {
     const Row& all = rows[i];
     const auto k = [](double value) { return fmt::format("{:.3f}", value); };
-    const bool cached = all.setting.method == scene::ThermalMethod::cached;
+    const bool cached = all.setting.method == Method::cached;
+    const bool maps = all.setting.method == Method::per_frame;
     table.add({all.scene, std::string(name_of(all.setting.method)),
                std::string(name_of(all.setting.model)), std::string(name_of(all.setting.spacing)),
-               fmt::format("{}", all.setting.steps), fmt::format("{}", all.setting.shadow_map_px),
-               taps_text(all.setting), fmt::format("{:g}", all.setting.tolerance_k),
+               fmt::format("{}", all.setting.steps),
+               maps ? fmt::format("{}", all.setting.shadow_map_px) : "-",
+               maps ? taps_text(all.setting) : "-", fmt::format("{:g}", all.setting.tolerance_k),
                cached && all.setting.lateral ? "yes" : "no",
                fmt::format("{:.1f}{}", all.frame_ms, all.pareto ? " *" : "  "), k(all.kelvin.rms),
                k(all.kelvin.p99), k(all.kelvin.max), k(rows[i + 1].kelvin.max),

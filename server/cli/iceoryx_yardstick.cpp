@@ -82,7 +82,7 @@ class Runtime {
                           "iox-roudi does not start (is one running already?)");
       }
     }
-    runtime.emplace(Runtime(std::move(*daemon)));
+    runtime.emplace(std::move(*daemon));
     iox::log::LogManager::GetLogManager().SetDefaultLogLevel(
         iox::log::LogLevel::kError, iox::log::LogLevelOutput::kHideLogLevel);
     const std::string name = fmt::format("emit-bench-{}", ::getpid());
@@ -91,8 +91,7 @@ class Runtime {
     return {};
   }
 
-  Runtime(Runtime&&) = default;
-  Runtime& operator=(Runtime&&) = delete;
+  explicit Runtime(Subprocess daemon) : daemon_(std::move(daemon)) {}
   Runtime(const Runtime&) = delete;
   Runtime& operator=(const Runtime&) = delete;
   ~Runtime() {
@@ -101,12 +100,10 @@ class Runtime {
   }
 
  private:
-  explicit Runtime(Subprocess daemon) : daemon_(std::move(daemon)) {}
-
   Subprocess daemon_;
 };
 
-/// False: no chunk is large enough, or the receiver does not keep up.
+/// False: no chunk is left.
 bool send_frame(iox::popo::UntypedPublisher& publisher, std::span<const std::byte> image,
                 bool sum) {
   bool sent = false;
@@ -127,6 +124,13 @@ bool send_frame(iox::popo::UntypedPublisher& publisher, std::span<const std::byt
 
 Result<YardstickResult> measure_iceoryx(const YardstickOptions& options,
                                         const std::filesystem::path& directory, bool sum) {
+  // What is too large for any chunk ends the process.
+  constexpr std::size_t kLargestChunk = 4U << 20;
+  constexpr std::size_t kChunkHeader = 256;  // at most
+  if (options.frame_bytes + kPixelsAt + kChunkHeader > kLargestChunk) {
+    return make_error(ErrorCode::unsupported,
+                      "iox-roudi has no chunks as large as a frame in its default configuration");
+  }
   if (auto started = Runtime::start(directory); !started) return tl::unexpected(started.error());
   iox::popo::PublisherOptions of_publisher;
   of_publisher.subscriberTooSlowPolicy = iox::popo::ConsumerTooSlowPolicy::WAIT_FOR_CONSUMER;
@@ -160,9 +164,14 @@ Result<YardstickResult> measure_iceoryx(const YardstickOptions& options,
     }
   });
   std::uint64_t wrong = 0;
+  constexpr auto kPatience = std::chrono::seconds(10);
+  auto last = start;
   while (result.frames < options.frames) {
-    // In vain where the sender has given up.
-    if (waiting.timedWait(iox::units::Duration::fromSeconds(10)).empty()) break;
+    // It may wake for nothing; in vain where the sender has given up.
+    if (waiting.timedWait(iox::units::Duration::fromSeconds(1)).empty() &&
+        std::chrono::steady_clock::now() - last > kPatience) {
+      break;
+    }
     for (bool more = true; more;) {
       more = false;
       subscriber.take()
@@ -174,18 +183,17 @@ Result<YardstickResult> measure_iceoryx(const YardstickOptions& options,
             if (sum && protocol::crc32c(pixels) != header.crc32c) ++wrong;
             subscriber.release(chunk);
             ++result.frames;
+            last = std::chrono::steady_clock::now();
             more = true;
           })
           .or_else([](auto&) {});
     }
   }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (result.frames < options.frames) subscriber.unsubscribe();  // a sender that waits goes on
   sending.join();
   result.cpu_s = process_cpu_s() - cpu_before_s;
-  if (!complete) {
-    return make_error(ErrorCode::unsupported,
-                      "iox-roudi has no chunks as large as a frame in its default configuration");
-  }
+  if (!complete) return make_error(ErrorCode::io, "yardstick: iceoryx: no chunk is left");
   result.lost = options.frames - result.frames + wrong;
   return result;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -143,12 +144,14 @@ TEST(RendererCachedWeather, WhatIsToldEverySecondIsFollowed) {
 TEST(RendererCachedWeather, FramesSayWhileSomeSurfacesDoNotKnowYet) {
   const auto scenario = open_ground();
   const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
-  const auto flagged = [&](double sun_frac) {
+  const auto flagged = [&](double sun_frac, double cloud_frac, std::int64_t late_ns) {
     Session run(scenario);
     std::int64_t now_ns = 2 * kHourNs + 5 * kSecondNs;
     std::vector<bool> out;
     (void)run.frame_k(now_ns, pose);
-    EXPECT_TRUE(run.renderer().apply_weather(weather_at(scenario, now_ns + kFrameNs, sun_frac)));
+    auto told = weather_at(scenario, now_ns + kFrameNs - late_ns, sun_frac);
+    told.cloud_frac = cloud_frac;
+    EXPECT_TRUE(run.renderer().apply_weather(told));
     for (int f = 0; f < 20; ++f) {
       now_ns += kFrameNs;
       (void)run.frame_k(now_ns, pose);
@@ -156,12 +159,55 @@ TEST(RendererCachedWeather, FramesSayWhileSomeSurfacesDoNotKnowYet) {
     }
     return out;
   };
-  const auto dark = flagged(0.0);
-  EXPECT_TRUE(dark.front());
-  EXPECT_TRUE(dark[8]);
-  EXPECT_FALSE(dark[12]);  // after an eighth of 20 s
+  for (const auto& dark :
+       {flagged(0.0, 0.0, 0), flagged(1.0, 0.8, 0), flagged(0.0, 0.0, 60 * kSecondNs)}) {
+    EXPECT_TRUE(dark.front());
+    EXPECT_TRUE(dark[8]);
+    EXPECT_FALSE(dark[12]);  // after an eighth of 20 s
+  }
   // Weather that is as it was is no news.
-  EXPECT_EQ(std::ranges::count(flagged(1.0), true), 0);
+  EXPECT_EQ(std::ranges::count(flagged(1.0, 0.0, 0), true), 0);
+}
+
+TEST(RendererCachedWeather, WhatIsToldTwiceForOneInstantIsTheLatter) {
+  const auto scenario = open_ground();
+  const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
+  const std::int64_t event_ns = 2 * kHourNs + 15 * kSecondNs;
+  const std::vector told{weather_at(scenario, event_ns, 0.9), weather_at(scenario, event_ns, 0.0)};
+  Session run(scenario);
+  float before_k = 0.0F;
+  for (std::int64_t now_ns = 2 * kHourNs; now_ns < event_ns; now_ns += kFrameNs) {
+    before_k = run.frame_k(now_ns, pose)[kMiddle];
+  }
+  for (const auto& sample : told) {
+    ASSERT_TRUE(run.renderer().apply_weather(sample));
+  }
+  for (int f = 0; f <= 40; ++f) {
+    const std::int64_t now_ns = event_ns + f * kFrameNs;
+    const float is_k = run.frame_k(now_ns, pose)[kMiddle];
+    if (f == 0) {
+      EXPECT_NEAR(is_k, before_k, 0.02);
+    }
+    if (f % 10 == 0) {
+      EXPECT_NEAR(is_k, told_ground_k(scenario, std::span(told).last(1), now_ns), 0.06) << f;
+    }
+  }
+}
+
+TEST(RendererCachedWeather, AHoldDoesNotKeepItUp) {
+  const auto scenario = open_ground();
+  const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
+  const std::int64_t held_ns = 2 * kHourNs + 5 * kSecondNs;
+  Session run(scenario);
+  const float before_k = run.frame_k(held_ns, pose)[kMiddle];
+  ASSERT_TRUE(run.renderer().apply_weather(weather_at(scenario, held_ns, 0.0)));
+  for (int f = 0; f < 70; ++f) {
+    EXPECT_NEAR(run.frame_k(held_ns, pose)[kMiddle], before_k, 0.02);
+    if (f == 10) {
+      EXPECT_TRUE(run.coarse());
+    }
+  }
+  EXPECT_FALSE(run.coarse());
 }
 
 TEST(RendererCachedWeather, WhatIsToldAheadWaitsForItsInstant) {
@@ -213,7 +259,7 @@ TEST(RendererCachedWeather, BodiesThatTheHostMovesMeanwhileKeepTheirShade) {
       s.objects.back().trajectory = {{start_ns, at(start_ns)}, {end_ns, at(end_ns)}};
       s.thermal.first_step_s = 1.0;
     }
-    Session run(s);
+    Session run(s, {.object = true});
     const auto pose = looking({0.0, -0.01, 20.0}, {0.0, 0.0, 0.0});
     std::vector<std::vector<float>> out;
     int f = 0;
@@ -229,6 +275,9 @@ TEST(RendererCachedWeather, BodiesThatTheHostMovesMeanwhileKeepTheirShade) {
                                                                       : 1.0)));
       }
       auto frame = run.frame_k(now_ns, pose);
+      for (std::size_t i = 0; i < frame.size(); ++i) {
+        if (run.objects()[i] != 1.0F) frame[i] = std::numeric_limits<float>::quiet_NaN();
+      }
       if (f % 40 == 39) out.push_back(std::move(frame));
     }
     return out;
@@ -240,7 +289,9 @@ TEST(RendererCachedWeather, BodiesThatTheHostMovesMeanwhileKeepTheirShade) {
     EXPECT_LT(off.p99_k, 0.06) << i;
   }
   // The plate's shade is in the pictures.
-  const auto [coldest, warmest] = std::ranges::minmax(driven.back());
+  std::vector<float> ground_k = driven.back();
+  std::erase_if(ground_k, [](float k) { return std::isnan(k); });
+  const auto [coldest, warmest] = std::ranges::minmax(ground_k);
   EXPECT_GT(warmest - coldest, 0.5F);
 }
 

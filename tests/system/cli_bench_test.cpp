@@ -142,6 +142,9 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   EXPECT_EQ(numbers_of(json, "bare-tcp-crc").size(), 1U) << "TCP beside a loop that sums too";
   EXPECT_NE(run.out.find(" of bare-tcp-crc"), std::string::npos);
   EXPECT_GE(numbers_of(json, "gbit_s").size(), 11U);
+  // Where iceoryx is there, it is measured.
+  EXPECT_EQ(json.find("iox-roudi does not start"), std::string::npos);
+  EXPECT_EQ(json.find("iox-roudi has no chunks"), std::string::npos);
 }
 
 TEST(CliBench, IsolationComparesPairsOfRunsBesideARunAgainstItself) {
