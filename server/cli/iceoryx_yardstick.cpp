@@ -3,7 +3,6 @@
 
 #if defined(EMIT_HAVE_ICEORYX)
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -41,15 +40,6 @@ struct Header {
   std::uint32_t crc32c = 0;
 };
 constexpr std::uint32_t kPixelsAt = 64;  // bytes: a cache line
-
-double process_cpu_s() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 std::string text_of(const std::filesystem::path& file) {
   std::ifstream in(file);

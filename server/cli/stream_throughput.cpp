@@ -7,25 +7,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <ctime>
 #include <mutex>
 
 #include "stream_client.hpp"
 #include "subprocess.hpp"
 
 namespace emit::cli {
-namespace {
 
 using physics::Result;
-
-/// Of this process, all threads.
-double process_cpu_s() {
-  timespec t{};
-  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-}  // namespace
 
 config::DaemonConfig canned_daemon(std::uint32_t width_px, std::uint32_t height_px,
                                    const std::string& shm) {

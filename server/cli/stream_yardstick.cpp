@@ -14,6 +14,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <optional>
 #include <span>
@@ -352,6 +353,12 @@ physics::Result<BareDelays> measure_bare_delays(const YardstickOptions& options,
     for (std::size_t k = 0; k < times.size(); ++k) out.delay_us.add(us(times[k] - ready[k]));
   }
   return out;
+}
+
+double process_cpu_s() noexcept {
+  timespec t{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 namespace {

@@ -20,6 +20,9 @@ struct YardstickOptions {
   std::uint32_t datagram_bytes = 8932;  ///< UDP
 };
 
+/// CPU time of this process, all threads, system time included.
+[[nodiscard]] double process_cpu_s() noexcept;
+
 struct YardstickResult {
   std::uint64_t frames = 0;
   std::uint64_t lost = 0;

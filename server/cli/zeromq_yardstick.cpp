@@ -2,7 +2,6 @@
 #include "stream_yardstick.hpp"
 
 #if defined(EMIT_HAVE_ZEROMQ)
-#include <sys/resource.h>
 #include <zmq.h>
 
 #include <array>
@@ -41,15 +40,6 @@ tl::unexpected<physics::Error> zeromq_error(const char* what) {
 
 /// The memory lives longer than any message.
 void keep(void* /*data*/, void* /*hint*/) {}
-
-double process_cpu_s() {
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 /// One frame; with `sum`, its CRC-32C in a part before it. False: refused.
 bool send_frame(void* socket, std::vector<std::byte>& image, bool sum) {

@@ -199,6 +199,11 @@ void FrameClientImpl::make_reassembler(std::uint64_t frame_bytes) {
     params.max_open_per_stream = 4;
     params.buffers = 6;
   }
+  // A client that was busy elsewhere finds whole frames in the socket, and takes them at once.
+  constexpr std::uint64_t kMostFrames = 256;
+  params.buffers += static_cast<std::uint32_t>(
+      std::min(kMostFrames,
+               UdpFrameReceiver::kMostTakenBytes / std::max<std::uint64_t>(frame_bytes, 1) + 1));
   reassembler_.emplace(params);
 }
 

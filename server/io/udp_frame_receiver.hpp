@@ -33,6 +33,11 @@ class UdpFrameReceiver {
   /// Asks for room for `frames` frames of `frame_bytes`.
   void size_buffer(std::uint64_t frame_bytes);
 
+  static constexpr unsigned kBatch = 16;  ///< messages
+  static constexpr std::size_t kDatagramBytes = 65536;
+  /// By one take().
+  static constexpr std::uint64_t kMostTakenBytes = kBatch * kDatagramBytes;
+
   /// Takes what lies in the socket, at most one batch. Returns the datagrams taken.
   int take(protocol::Reassembler& reassembler, ReceiveCounters& counters);
   /// True when the last take() left nothing in the socket.
@@ -41,11 +46,9 @@ class UdpFrameReceiver {
   [[nodiscard]] std::uint64_t misplaced() const noexcept { return misplaced_; }
 
  private:
-  static constexpr unsigned kBatch = 16;
   // Of joined datagrams few are taken at a time, so that they are still in the cache when they are
   // put together.
   static constexpr unsigned kJoinedBatch = 4;
-  static constexpr std::size_t kDatagramBytes = 65536;
   static constexpr std::size_t kControlBytes = 64;
   static constexpr std::size_t kMaxSegments = 64;  // datagrams that the kernel joins
 

@@ -153,6 +153,31 @@ TEST(DaemonStream, AClientLearnsTheSpectralResponseOfItsBand) {
   EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
 }
 
+TEST(DaemonStream, AUdpClientThatWasBusyTakesAllTheFramesInItsSocket) {
+  // A fifth of a second: forty small frames, which wait there whole.
+  ScratchFolder folder;
+  const std::string config =
+      folder.write("emitd.toml", canned_config(64, 48, "mode = \"ig-clock\"\nrate_hz = 200.0"));
+  DaemonProcess daemon(folder, {"--config", config});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  Watcher watcher = Watcher::open("udp://" + daemon.control());
+  ASSERT_NE(watcher.client, nullptr);
+  // Before its first look, when it does not know yet how datagrams come.
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  ASSERT_TRUE(watcher.take(kLongNs));
+  const std::uint64_t first = watcher.newest;
+  while (watcher.newest < first + 200) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(watcher.newest % 50 == 0 ? 200 : 0));
+    ASSERT_TRUE(watcher.take(kLongNs));
+  }
+  const auto& counters = watcher.client->counters();
+  EXPECT_EQ(counters.bad_datagrams, 0U);
+  EXPECT_EQ(counters.lost, counters.os_drops > 0 ? counters.lost : 0U);
+  EXPECT_EQ(counters.received + counters.skipped + counters.lost, watcher.newest - first + 1);
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(), 0);
+}
+
 TEST(DaemonStream, AtItsOwn200HzNothingIsLostUnflagged) {
   ScratchFolder folder;
   const std::string config =
