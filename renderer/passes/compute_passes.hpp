@@ -13,10 +13,10 @@
 /// is in FrameParams, format_window_px and picture_window_px; how many they are, in the calls.
 namespace emit::renderer {
 
-/// Of groups of 8 x 8 pixels, one above the other, that one does in turn: on a CPU to begin a group
-/// takes as long as some of its pixels.
+/// Of groups of 8 x 8 pixels, one above the other, that one does in turn: on a CPU to begin a
+/// group, and to fetch its uniforms, takes as long as some of its pixels.
 [[nodiscard]] constexpr std::uint32_t pixel_rows(bool software) noexcept {
-  return software ? 4 : 1;
+  return software ? 8 : 1;
 }
 /// What shaders know these by.
 [[nodiscard]] gl::Define rows_define(std::uint32_t rows);

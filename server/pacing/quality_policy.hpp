@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "emit/renderer/renderer.hpp"
 
@@ -13,8 +14,9 @@ namespace emit::server {
 /// Which rung of the quality ladder a frame is rendered with, so that it is ready in time: the one
 /// with the least error among those whose expected time fits, else the fastest. A frame is expected
 /// to take what the ladder measured for its rung and camera, at the machine's present pace, plus
-/// what every frame takes beside it (both fitted to the latest frames), plus the most by which one
-/// of the latest frames took longer than expected. Pure. RT-safe.
+/// what every frame takes beside it (both fitted to the latest frames), plus what so few of the
+/// latest frames took longer than expected that it need not be kept free: at most one frame in
+/// 128 is late, if the next ones are like the latest. Pure. RT-safe.
 class QualityPolicy {
  public:
   /// `rungs`: what each costs and gets wrong in the frame that is next; not empty, [0] is full
@@ -35,15 +37,17 @@ class QualityPolicy {
   /// A frame was ready `work_ns` after its begin, with a rung of that RungStats::frame_ms.
   void finished(std::int64_t work_ns, double rung_ms) noexcept {
     const double work_ms = 1e-6 * static_cast<double>(work_ns);
-    excess_ms_[next_] = work_ms - expected_ms(rung_ms);
+    excess_ms_[next_] = static_cast<float>(work_ms - expected_ms(rung_ms));
     next_ = (next_ + 1) % excess_ms_.size();
     count_ = std::min(count_ + 1, excess_ms_.size());
     fit(work_ms, rung_ms);
   }
 
  private:
-  /// Of so many frames alike the next one takes longer than all with a chance of one in a hundred.
-  static constexpr std::size_t kRemembered = 100;
+  /// Enough to tell a disturbance that comes again and again from one that came once.
+  static constexpr std::size_t kRemembered = 512;
+  /// Of so many frames alike the next one takes longer than all with a chance of one in so many.
+  static constexpr std::size_t kFramesPerLate = 128;
   /// Of the time there is: costs are measured, and no better than this.
   static constexpr double kUsedFrac = 0.92;
   /// What a frame's share in the fit is worth one frame later.
@@ -58,10 +62,20 @@ class QualityPolicy {
     return pace_ * rung_ms + beside_ms_;
   }
 
+  /// What one remembered frame in kFramesPerLate exceeds; never negative.
   [[nodiscard]] double excess_ms() const noexcept {
-    double largest_ms = 0.0;
-    for (std::size_t i = 0; i < count_; ++i) largest_ms = std::max(largest_ms, excess_ms_[i]);
-    return largest_ms;
+    // The largest come first; the last of them is looked for. Until there are enough frames for
+    // more it is the largest of all.
+    constexpr std::size_t kMostOfThem = kRemembered / kFramesPerLate;
+    std::array<float, kMostOfThem> largest_ms{};
+    const std::size_t sought = std::max<std::size_t>(count_ / kFramesPerLate, 1);
+    for (std::size_t i = 0; i < count_; ++i) {
+      float ms = excess_ms_[i];
+      for (std::size_t place = 0; place < sought && ms > 0.0F; ++place) {
+        if (ms > largest_ms[place]) std::swap(ms, largest_ms[place]);
+      }
+    }
+    return largest_ms[sought - 1];
   }
 
   /// Least squares of work = pace * rung + beside, older frames fading, drawn towards pace 1.
@@ -81,7 +95,7 @@ class QualityPolicy {
     beside_ms_ = (w_ - pace_ * r_) / d;
   }
 
-  std::array<double, kRemembered> excess_ms_{};
+  std::array<float, kRemembered> excess_ms_{};
   std::size_t next_ = 0;
   std::size_t count_ = 0;
   double pace_ = 1.0;

@@ -45,12 +45,12 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, normal_from_mesh[0]);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, ids);
   EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, samples);
-  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, relworld_from_sensor);
-  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, ray);
-  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, format_window_px);
-  EXPECT_OFFSET(*thermal, "frame", gpu::FrameParams, obscurance);
-  EXPECT_OFFSET(*radiance, "frame", gpu::FrameParams, bands);
-  EXPECT_OFFSET(*radiance, "frame", gpu::FrameParams, sun_now);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, relworld_from_sensor);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, ray);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, format_window_px);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, obscurance);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, bands);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, sun_now);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].light_row0);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].drift);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[3].scale);
@@ -65,12 +65,12 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_EQ(thermal->uniform_offset("taps.filter_[0]"),
             static_cast<GLint>(offsetof(gpu::TapParams, filter_)));
   EXPECT_EQ(
-      radiance->uniform_offset("bands[1].sun_irradiance_w_m2"),
+      radiance->uniform_offset("band_uniforms[1].sun_irradiance_w_m2"),
       static_cast<GLint>(sizeof(gpu::BandParams) + offsetof(gpu::BandParams, sun_irradiance_w_m2)));
   EXPECT_EQ(
-      radiance->uniform_offset("bands[3].lut_last_node"),
+      radiance->uniform_offset("band_uniforms[3].lut_last_node"),
       static_cast<GLint>(3 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, lut_last_node)));
-  EXPECT_EQ(radiance->uniform_offset("bands[2].atmosphere_table"),
+  EXPECT_EQ(radiance->uniform_offset("band_uniforms[2].atmosphere_table"),
             static_cast<GLint>(2 * sizeof(gpu::BandParams) +
                                offsetof(gpu::BandParams, atmosphere_table)));
   // Tables fetched as texels of four floats.

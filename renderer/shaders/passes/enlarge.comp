@@ -27,6 +27,10 @@ void main() {
   float part_x = way_x - float(low_x);
   int nearest_x = min(int(place_x), last.x);
   uint pixel = uint(px.y) * frame.picture_px.x + uint(px.x);
+  // Not in the loops: software rasterisers fetch a uniform for every lane, each time.
+  int scaled_plane_px = int(frame.format_px.z);
+  uint plane_px = frame.picture_px.z;
+  uint stride_px = frame.picture_px.x;
   float top[EMIT_BANDS];
   float bottom[EMIT_BANDS];
   int row = -2;  // of `bottom`
@@ -40,16 +44,16 @@ void main() {
       for (uint i = 0u; i < EMIT_BANDS; ++i) {
         top[i] = bottom[i];
         bottom[i] = mix(texelFetch(scaled_planes, from + low_x).r, texelFetch(scaled_planes, from + high_x).r, part_x);
-        from += int(frame.format_px.z);
+        from += scaled_plane_px;
       }
     }
     for (uint i = 0u; i < EMIT_BANDS; ++i) {
-      planes[i * frame.picture_px.z + pixel] = mix(top[i], bottom[i], way_y - float(low_y));
+      planes[i * plane_px + pixel] = mix(top[i], bottom[i], way_y - float(low_y));
     }
     int nearest = min(int(place_y), last.y) * width + nearest_x;
     for (uint i = EMIT_BANDS; i < EMIT_PLANES; ++i) {
-      planes[i * frame.picture_px.z + pixel] = texelFetch(scaled_planes, int(i * frame.format_px.z) + nearest).r;
+      planes[i * plane_px + pixel] = texelFetch(scaled_planes, int(i) * scaled_plane_px + nearest).r;
     }
-    pixel += frame.picture_px.x;
+    pixel += stride_px;
   }
 }

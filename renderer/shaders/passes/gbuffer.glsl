@@ -3,10 +3,15 @@
 #include "shared/frame_params.glsl.h"
 #include "passes/octahedral.glsl"
 
-layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
+layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame_uniform; };
 layout(binding = EMIT_TEX_DEPTH) uniform sampler2D depth_texture;
 layout(binding = EMIT_TEX_NORMAL) uniform sampler2D normal_texture;
 layout(binding = EMIT_TEX_IDS) uniform usampler2D ids_texture;
+
+// Software rasterisers fetch a uniform for every lane, each time it is used: what is read before a loop over pixels
+// is not read again in it. To be called first.
+FrameParams frame;
+void read_frame() { frame = frame_uniform; }
 
 float gbuffer_depth_m(ivec2 px) { return texelFetch(depth_texture, px, 0).r; }
 

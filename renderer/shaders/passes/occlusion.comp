@@ -22,6 +22,7 @@ float open_length_m(ivec2 px, float centre_m, float half_m, float radius_m) {
 }
 
 void main() {
+  read_frame();
   ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.format_window_px.xy);
   if (any(greaterThanEqual(px, ivec2(frame.format_window_px.zw)))) return;
   float centre_m = gbuffer_depth_m(px);

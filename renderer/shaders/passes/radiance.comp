@@ -12,7 +12,8 @@
 #include "passes/surface_texel.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(std140, binding = EMIT_BIND_BANDS) uniform Bands { BandParams bands[EMIT_MAX_BANDS]; };
+layout(std140, binding = EMIT_BIND_BANDS) uniform Bands { BandParams band_uniforms[EMIT_MAX_BANDS]; };
+BandParams bands[EMIT_BANDS];  // read once, as the frame's
 layout(binding = EMIT_TEX_BAND_LUT) uniform samplerBuffer band_lut;
 layout(std430, binding = EMIT_BIND_OUTPUT) writeonly buffer Planes { float planes[]; };
 layout(std430, binding = EMIT_BIND_STATS) buffer Stats { FrameStatsGpu stats; };
@@ -151,6 +152,8 @@ void write_pixel(ivec2 px) {
 }
 
 void main() {
+  read_frame();
+  for (uint i = 0u; i < EMIT_BANDS; ++i) bands[i] = band_uniforms[i];
   uvec2 first_px = gl_WorkGroupID.xy * uvec2(8u, 8u * EMIT_ROWS) + gl_LocalInvocationID.xy;
   ivec2 px = ivec2(first_px + frame.format_window_px.xy);
   for (uint row = 0u; row < EMIT_ROWS; ++row) write_pixel(px + ivec2(0, 8 * int(row)));

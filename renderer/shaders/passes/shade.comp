@@ -88,6 +88,7 @@ void shade_pixel(ivec2 px, uvec4 tile) {
 }
 
 void main() {
+  read_frame();
   uvec4 tile = texelFetch(shade_tiles, int(gl_WorkGroupID.z));
   uvec2 first_px = uvec2(tile.x & 0xffffu, tile.x >> 16) + gl_WorkGroupID.xy * uvec2(8u, 8u * EMIT_ROWS);
   ivec2 px = ivec2(first_px + gl_LocalInvocationID.xy);

@@ -30,6 +30,7 @@ float equilibrium_offset_k(vec4 surface, vec3 n, vec4 sun, vec4 flux, float sun_
 #endif
 
 void main() {
+  read_frame();
   ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.format_window_px.xy);
   if (any(greaterThanEqual(px, ivec2(frame.format_window_px.zw)))) return;
   float boresight_m = gbuffer_depth_m(px);

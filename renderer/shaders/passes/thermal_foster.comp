@@ -35,6 +35,7 @@ float absorbed_indirect_w_m2(vec4 surface, vec4 flux, float sky_frac) {
 }
 
 void main() {
+  read_frame();
   ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.format_window_px.xy);
   if (any(greaterThanEqual(px, ivec2(frame.format_window_px.zw)))) return;
   float boresight_m = gbuffer_depth_m(px);
