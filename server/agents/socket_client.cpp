@@ -100,7 +100,8 @@ SocketClient::Progress SocketClient::send(UdpBatch& batch, Context& context, Tur
 SocketClient::Progress SocketClient::send_tcp(Context& context, Turn turn) noexcept {
   std::array<std::span<const std::byte>, 3> pieces;
   std::size_t count = 0;
-  std::size_t budget = turn == Turn::brief ? kTcpBriefBytes : kTcpTurnBytes;
+  const std::size_t turn_bytes = turn == Turn::brief ? kTcpBriefBytes : kTcpTurnBytes;
+  std::size_t budget = turn_bytes;
   const auto add = [&](std::span<const std::byte> bytes, std::size_t from) {
     if (from < bytes.size() && budget > 0) {
       const std::size_t length = std::min(bytes.size() - from, budget);
@@ -137,7 +138,9 @@ SocketClient::Progress SocketClient::send_tcp(Context& context, Turn turn) noexc
   if (busy_ && offset_ == head_.size() + pixels_.size()) {
     return Progress::finished;
   }
-  return Progress::more;
+  // A plain socket takes less than it is handed only when it is full: asking it again would say so.
+  const bool full = sent.bytes < turn_bytes - budget && params_.tcp_socket->tls() == nullptr;
+  return full ? Progress::blocked : Progress::more;
 }
 
 SocketClient::Progress SocketClient::send_udp(UdpBatch& batch, Context& context,

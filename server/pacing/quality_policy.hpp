@@ -62,20 +62,20 @@ class QualityPolicy {
     return pace_ * rung_ms + beside_ms_;
   }
 
-  /// What one remembered frame in kFramesPerLate exceeds; never negative.
+  /// What one remembered frame in kFramesPerLate exceeds, and no more than the most of the latest
+  /// kFramesPerLate, so that what came once is soon forgotten; never negative.
   [[nodiscard]] double excess_ms() const noexcept {
-    // The largest come first; the last of them is looked for. Until there are enough frames for
-    // more it is the largest of all.
-    constexpr std::size_t kMostOfThem = kRemembered / kFramesPerLate;
-    std::array<float, kMostOfThem> largest_ms{};
-    const std::size_t sought = std::max<std::size_t>(count_ / kFramesPerLate, 1);
-    for (std::size_t i = 0; i < count_; ++i) {
-      float ms = excess_ms_[i];
-      for (std::size_t place = 0; place < sought && ms > 0.0F; ++place) {
-        if (ms > largest_ms[place]) std::swap(ms, largest_ms[place]);
+    std::array<float, kRemembered / kFramesPerLate> largest_ms{};  // of all, in order
+    float latest_ms = 0.0F;
+    for (std::size_t age = 0; age < count_; ++age) {
+      float ms = excess_ms_[(next_ + kRemembered - 1 - age) % kRemembered];
+      if (age < kFramesPerLate) latest_ms = std::max(latest_ms, ms);
+      for (float& place_ms : largest_ms) {
+        if (ms > place_ms) std::swap(ms, place_ms);
       }
     }
-    return largest_ms[sought - 1];
+    const std::size_t sought = std::max<std::size_t>(count_ / kFramesPerLate, 1);
+    return std::min(latest_ms, largest_ms[sought - 1]);
   }
 
   /// Least squares of work = pace * rung + beside, older frames fading, drawn towards pace 1.

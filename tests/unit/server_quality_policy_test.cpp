@@ -93,11 +93,11 @@ TEST(QualityPolicy, keeps_room_for_what_disturbs_one_frame_in_fifty_until_that_i
   QualityPolicy policy;
   settle(policy, 10.0, 8.0);
   for (int i = 0; i < 500; ++i) policy.finished((i % 50 == 0 ? 12 : 8) * kMs, 10.0);
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 60; ++i) {
     EXPECT_NE(policy.choose(kRungs, 12 * kMs), 0U);
     policy.finished(8 * kMs, 10.0);
   }
-  settle(policy, 10.0, 8.0);
+  for (int i = 0; i < 70; ++i) policy.finished(8 * kMs, 10.0);
   EXPECT_EQ(policy.choose(kRungs, 12 * kMs), 0U);
 }
 
