@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -101,43 +102,76 @@ struct Shade {
 /// Changes what reaches the ground from the history's start on.
 using Screen = std::function<void(renderer::SurfaceForcing&)>;
 
-/// The same model in double on level ground that sees all of the sky and the sun, but for `shade`
-/// and `screen`.
-inline double open_ground_k(scene::ScenarioDesc s, std::int64_t now_ns,
-                            std::optional<Shade> shade = std::nullopt, const Screen& screen = {}) {
-  s.thermal.tolerance_k = 1e-3;
-  s.thermal.steps = 512;
-  const renderer::Environment environment(s);
-  const auto materials = renderer::foster_materials(s.materials, s.thermal);
-  const renderer::FosterMaterial material = materials->front();
-  renderer::FosterHistory history(s, *materials, material, environment, kReferenceK);
-  renderer::StepPlan plan(s.thermal);
-  const std::int64_t open_until_ns = shade ? std::llround(shade->begin_s * 1e9) : now_ns;
-  plan.update(open_until_ns, environment, {});
-  history.update(plan, environment);
-  const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
-                                               material.base_k, kReferenceK);
-  const glm::dvec3 up(0.0, 0.0, 1.0);
-  physics::FosterState<double> x = history.spun_up(0, up);
-  const auto advance = [&](const renderer::IntervalForcing& interval) {
-    physics::foster_advance(x, unshadowed_drive(interval.begin, material, up, kReferenceK),
-                            unshadowed_drive(interval.end, material, up, kReferenceK),
-                            physics::foster_ladder(interval.dt_s, material.network), surface, 1e-3);
-  };
-  for (const renderer::IntervalForcing& interval : history.tail()) advance(interval);
-  for (renderer::IntervalForcing interval : history.intervals()) {
+/// The same model in double on level ground that sees all of the sky and the sun, in steps that are
+/// short beside any change. At `begin_ns` at first; `screen` acts up to there.
+class OpenGround {
+ public:
+  OpenGround(scene::ScenarioDesc s, std::span<const scene::WeatherSample> told,
+             std::int64_t begin_ns, const Screen& screen = {})
+      : scenario_(finely(std::move(s))), environment_(scenario_), at_ns_(begin_ns) {
+    for (const scene::WeatherSample& sample : told) EXPECT_TRUE(environment_.append(sample));
+    renderer::StepPlan plan(scenario_.thermal);
+    plan.update(begin_ns, environment_, {});
+    history_.update(plan, environment_);
+    x_ = history_.spun_up(0, kUp);
+    for (const renderer::IntervalForcing& interval : history_.tail()) advance(interval);
+    for (renderer::IntervalForcing interval : history_.intervals()) {
+      if (screen) screen(interval.begin);
+      if (screen) screen(interval.end);
+      advance(interval);
+    }
+  }
+
+  /// In one interval.
+  void go_on(std::int64_t until_ns, const Screen& screen = {}) {
+    renderer::IntervalForcing interval = history_.extend(at_ns_, until_ns, environment_);
     if (screen) screen(interval.begin);
     if (screen) screen(interval.end);
     advance(interval);
+    at_ns_ = until_ns;
   }
+  [[nodiscard]] std::int64_t at_ns() const { return at_ns_; }
+  [[nodiscard]] double temperature_k() const {
+    return kReferenceK + physics::foster_offset_k(x_, surface_);
+  }
+
+ private:
+  static constexpr glm::dvec3 kUp{0.0, 0.0, 1.0};
+
+  static scene::ScenarioDesc finely(scene::ScenarioDesc s) {
+    s.thermal.tolerance_k = 1e-3;
+    s.thermal.steps = 512;
+    return s;
+  }
+  void advance(const renderer::IntervalForcing& interval) {
+    physics::foster_advance(x_, unshadowed_drive(interval.begin, material_, kUp, kReferenceK),
+                            unshadowed_drive(interval.end, material_, kUp, kReferenceK),
+                            physics::foster_ladder(interval.dt_s, material_.network), surface_,
+                            1e-3);
+  }
+
+  scene::ScenarioDesc scenario_;
+  renderer::Environment environment_;
+  std::vector<renderer::FosterMaterial> materials_ =
+      *renderer::foster_materials(scenario_.materials, scenario_.thermal);
+  renderer::FosterMaterial material_ = materials_.front();
+  renderer::FosterHistory history_{scenario_, materials_, material_, environment_, kReferenceK};
+  physics::FosterSurface<double> surface_ = physics::foster_surface(
+      material_.network, material_.emissivity_frac, material_.base_k, kReferenceK);
+  physics::FosterState<double> x_;
+  std::int64_t at_ns_ = 0;
+};
+
+/// Under the scenario's weather, but for `shade` and `screen`.
+inline double open_ground_k(const scene::ScenarioDesc& s, std::int64_t now_ns,
+                            std::optional<Shade> shade = std::nullopt, const Screen& screen = {}) {
+  OpenGround ground(s, {}, shade ? std::llround(shade->begin_s * 1e9) : now_ns, screen);
   if (shade) {
-    const std::int64_t lit_again_ns = std::llround(shade->end_s * 1e9);
-    renderer::IntervalForcing dark = history.extend(open_until_ns, lit_again_ns, environment);
-    dark.begin.sun_w_m2 = dark.end.sun_w_m2 = glm::dvec3(0.0);
-    advance(dark);
-    advance(history.extend(lit_again_ns, now_ns, environment));
+    ground.go_on(std::llround(shade->end_s * 1e9),
+                 [](renderer::SurfaceForcing& forcing) { forcing.sun_w_m2 = glm::dvec3(0.0); });
+    ground.go_on(now_ns);
   }
-  return kReferenceK + physics::foster_offset_k(x, surface);
+  return ground.temperature_k();
 }
 
 struct Difference {

@@ -34,36 +34,11 @@ scene::WeatherSample weather_at(const scene::ScenarioDesc& scenario, std::int64_
 }
 
 /// open_ground_k() under weather that is told, in steps that are short beside its changes.
-double told_ground_k(scene::ScenarioDesc s, std::span<const scene::WeatherSample> told,
+double told_ground_k(const scene::ScenarioDesc& s, std::span<const scene::WeatherSample> told,
                      std::int64_t now_ns) {
-  s.thermal.tolerance_k = 1e-3;
-  s.thermal.steps = 512;
-  renderer::Environment environment(s);
-  for (const scene::WeatherSample& sample : told) EXPECT_TRUE(environment.append(sample));
-  const auto materials = renderer::foster_materials(s.materials, s.thermal);
-  const renderer::FosterMaterial material = materials->front();
-  renderer::FosterHistory history(s, *materials, material, environment, kReferenceK);
-  renderer::StepPlan plan(s.thermal);
-  std::int64_t at_ns = told.front().sim_time_ns;
-  plan.update(at_ns, environment, {});
-  history.update(plan, environment);
-  const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
-                                               material.base_k, kReferenceK);
-  const glm::dvec3 up(0.0, 0.0, 1.0);
-  physics::FosterState<double> x = history.spun_up(0, up);
-  const auto advance = [&](const renderer::IntervalForcing& interval) {
-    physics::foster_advance(x, unshadowed_drive(interval.begin, material, up, kReferenceK),
-                            unshadowed_drive(interval.end, material, up, kReferenceK),
-                            physics::foster_ladder(interval.dt_s, material.network), surface, 1e-3);
-  };
-  for (const renderer::IntervalForcing& interval : history.tail()) advance(interval);
-  for (const renderer::IntervalForcing& interval : history.intervals()) advance(interval);
-  while (at_ns < now_ns) {
-    const std::int64_t next_ns = std::min(now_ns, at_ns + kFrameNs);
-    advance(history.extend(at_ns, next_ns, environment));
-    at_ns = next_ns;
-  }
-  return kReferenceK + physics::foster_offset_k(x, surface);
+  OpenGround ground(s, told, told.front().sim_time_ns);
+  while (ground.at_ns() < now_ns) ground.go_on(std::min(now_ns, ground.at_ns() + kFrameNs));
+  return ground.temperature_k();
 }
 
 scene::ScenarioDesc open_ground() {
