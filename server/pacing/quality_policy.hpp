@@ -15,8 +15,8 @@ namespace emit::server {
 /// with the least error among those whose expected time fits, else the fastest. A frame is expected
 /// to take what the ladder measured for its rung and camera, at the machine's present pace, plus
 /// what every frame takes beside it (both fitted to the latest frames), plus what so few of the
-/// latest frames took longer than expected that it need not be kept free: at most one frame in
-/// 128 is late, if the next ones are like the latest. Pure. RT-safe.
+/// latest frames took longer than expected that it need not be kept free: about one frame in 128
+/// is late, one in 64 at most, if the next ones are like the latest. Pure. RT-safe.
 class QualityPolicy {
  public:
   /// `rungs`: what each costs and gets wrong in the frame that is next; not empty, [0] is full
