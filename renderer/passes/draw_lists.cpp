@@ -147,12 +147,7 @@ void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange
        ++c) {
     const scene::Cluster& cluster = scene_.clusters()[c];
     if (!seen.fits(scene_.levels()[c]) || !seen.shows(cluster, submesh.double_sided)) continue;
-    const auto range = static_cast<std::uint32_t>(view_ranges_.index_count.size());
-    if (cull_ != nullptr && cull_->take(cluster, c, clip_from_mesh, !submesh.double_sided,
-                                        range + (index_count > 0 ? 1 : 0))) {
-      if (index_count > 0) add_range(first_index, index_count, base_vertex);
-      index_count = 0;
-      add_range(0, 0, base_vertex);  // what is left is known later
+    if (cull_ != nullptr && cull_->take(cluster, c, clip_from_mesh, !submesh.double_sided)) {
       continue;
     }
     if (index_count > 0 && cluster.first_index != first_index + index_count) {
@@ -163,6 +158,10 @@ void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange
     index_count += cluster.index_count;
   }
   if (index_count > 0) add_range(first_index, index_count, base_vertex);
+  const auto range = static_cast<std::uint32_t>(view_ranges_.index_count.size());
+  if (cull_ != nullptr && cull_->close(range)) {
+    add_range(0, 0, base_vertex);  // what is left is known later
+  }
 }
 
 void DrawLists::find_in_view(const ViewVolume& view) noexcept {
@@ -246,28 +245,19 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
     view_ranges_.index_count[part.range] = static_cast<std::int32_t>(part.count);
     view_ranges_.index_offset[part.range] = index_address(scene_.first_culled() + part.first);
   }
-  join_ranges();
+  drop_empty_ranges();
 }
 
-void DrawLists::join_ranges() noexcept {
+void DrawLists::drop_empty_ranges() noexcept {
   std::uint32_t used = 0;
   for (ViewDraw& draw : view_draws_) {
     const std::uint32_t first = used;
-    const void* end = nullptr;  // of the range before
     for (std::uint32_t i = draw.first; i < draw.first + draw.count; ++i) {
-      const std::int32_t count = view_ranges_.index_count[i];
-      const void* offset = view_ranges_.index_offset[i];
-      // Mesa leaves out what follows an empty one, too.
-      if (count == 0) continue;
-      if (used > first && offset == end) {
-        view_ranges_.index_count[used - 1] += count;
-      } else {
-        view_ranges_.index_count[used] = count;
-        view_ranges_.index_offset[used] = offset;
-        view_ranges_.base_vertex[used] = view_ranges_.base_vertex[i];
-        ++used;
-      }
-      end = static_cast<const std::uint32_t*>(offset) + count;
+      if (view_ranges_.index_count[i] == 0) continue;
+      view_ranges_.index_count[used] = view_ranges_.index_count[i];
+      view_ranges_.index_offset[used] = view_ranges_.index_offset[i];
+      view_ranges_.base_vertex[used] = view_ranges_.base_vertex[i];
+      ++used;
     }
     draw.first = first;
     draw.count = used - first;

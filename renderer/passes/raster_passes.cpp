@@ -13,28 +13,38 @@ namespace {
 
 /// Mesa sorts triangles into tiles on the caller's thread; others fill these meanwhile, but only
 /// with what was flushed.
-constexpr std::uint32_t kSoftwareBatchIndices = 30'000;
+constexpr std::int32_t kSoftwareBatchIndices = 12'000;
 
-void issue(std::span<const ViewDraw> draws, const ViewRanges& ranges, const gl::Buffer& records,
-           std::uint32_t batch_indices) noexcept {
-  std::uint32_t indices = 0;  // of the batch
+void issue_at_once(std::span<const ViewDraw> draws, const ViewRanges& ranges,
+                   const gl::Buffer& records) noexcept {
   for (const ViewDraw& draw : draws) {
     records.bind_uniform(EMIT_BIND_DRAW, draw.record * sizeof(DrawRecord), sizeof(gpu::DrawParams));
-    const std::uint32_t end = draw.first + draw.count;
-    for (std::uint32_t first = draw.first; first < end;) {
-      std::uint32_t last = first;
-      while (last < end && indices < batch_indices) {
-        indices += static_cast<std::uint32_t>(ranges.index_count[last++]);
-      }
-      glMultiDrawElementsBaseVertex(GL_TRIANGLES, ranges.index_count.data() + first,
-                                    GL_UNSIGNED_INT, ranges.index_offset.data() + first,
-                                    static_cast<GLsizei>(last - first),
-                                    ranges.base_vertex.data() + first);
-      if (indices >= batch_indices) {
+    glMultiDrawElementsBaseVertex(GL_TRIANGLES, ranges.index_count.data() + draw.first,
+                                  GL_UNSIGNED_INT, ranges.index_offset.data() + draw.first,
+                                  static_cast<GLsizei>(draw.count),
+                                  ranges.base_vertex.data() + draw.first);
+  }
+}
+
+/// The same, flushed every so often.
+void issue_in_batches(std::span<const ViewDraw> draws, const ViewRanges& ranges,
+                      const gl::Buffer& records) noexcept {
+  std::int32_t room = kSoftwareBatchIndices;
+  for (const ViewDraw& draw : draws) {
+    records.bind_uniform(EMIT_BIND_DRAW, draw.record * sizeof(DrawRecord), sizeof(gpu::DrawParams));
+    for (std::uint32_t range = draw.first; range < draw.first + draw.count; ++range) {
+      const auto* next = static_cast<const std::uint32_t*>(ranges.index_offset[range]);
+      for (std::int32_t left = ranges.index_count[range]; left > 0;) {
+        const std::int32_t count = std::min(left, room);
+        glDrawElementsBaseVertex(GL_TRIANGLES, count, GL_UNSIGNED_INT, next,
+                                 ranges.base_vertex[range]);
+        next += count;
+        left -= count;
+        room -= count;
+        if (room > 0) continue;
         glFlush();
-        indices = 0;
+        room = kSoftwareBatchIndices;
       }
-      first = last;
     }
   }
 }
@@ -115,7 +125,7 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
                                                    std::uint32_t width_px, std::uint32_t height_px,
                                                    Content content, Shade shade) {
   GeometryPass pass;
-  if (context.software()) pass.batch_indices_ = kSoftwareBatchIndices;
+  pass.software_ = context.software();
   std::vector<gl::Define> defines;
   const bool sampled = content != Content::normals;
   const bool objects = content == Content::samples_and_objects;
@@ -184,9 +194,10 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
   program_.use();
   vertices.bind_view();
   glEnable(GL_CULL_FACE);
-  issue(lists.view_draws(single_sided), lists.view_ranges(), records, batch_indices_);
+  const auto draw_all = software_ ? issue_in_batches : issue_at_once;
+  draw_all(lists.view_draws(single_sided), lists.view_ranges(), records);
   glDisable(GL_CULL_FACE);
-  issue(lists.view_draws(double_sided), lists.view_ranges(), records, batch_indices_);
+  draw_all(lists.view_draws(double_sided), lists.view_ranges(), records);
   glDisable(GL_SCISSOR_TEST);
 }
 

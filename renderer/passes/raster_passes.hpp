@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <glm/ext/vector_uint2.hpp>
 #include <glm/ext/vector_uint4.hpp>
-#include <limits>
 #include <span>
 
 #include "gl/egl_context.hpp"
@@ -64,8 +63,7 @@ class GeometryPass {
   gl::Texture depth_buffer_;
   gl::Framebuffer framebuffer_;
   bool sampled_ = false;
-  /// Drawn at least before what there is is handed to the device.
-  std::uint32_t batch_indices_ = std::numeric_limits<std::uint32_t>::max();
+  bool software_ = false;
 };
 
 /// Paper part 3: depth seen from the sun, one layer per cascade, drawn anew for every step.

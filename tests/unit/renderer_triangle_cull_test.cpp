@@ -52,14 +52,16 @@ struct Shown {
     const glm::dvec2 low = glm::min(px[0], glm::min(px[1], px[2]));
     const glm::dvec2 high = glm::max(px[0], glm::max(px[1], px[2]));
     back = single_sided && area_px2 > 0.0;
-    in_picture = high.x > 0.0 && high.y > 0.0 && low.x < kSizePx.x && low.y < kSizePx.y;
     for (int y = std::max(0, static_cast<int>(low.y) - 1); y <= static_cast<int>(high.y) + 1; ++y) {
       for (int x = std::max(0, static_cast<int>(low.x) - 1); x <= static_cast<int>(high.x) + 1;
            ++x) {
         const glm::dvec2 middle_px(x + 0.5, y + 0.5);
-        if (x >= static_cast<int>(kSizePx.x) || y >= static_cast<int>(kSizePx.y)) continue;
-        box_middles += glm::all(glm::lessThanEqual(low, middle_px)) &&
-                       glm::all(glm::lessThanEqual(middle_px, high));
+        if (x < 0 || x >= static_cast<int>(kSizePx.x) || y >= static_cast<int>(kSizePx.y)) continue;
+        if (glm::all(glm::lessThanEqual(low, middle_px)) &&
+            glm::all(glm::lessThanEqual(middle_px, high))) {
+          columns.insert(x);
+          rows.insert(y);
+        }
         bool inside = area_px2 != 0.0;
         for (std::size_t k = 0; k < 3; ++k) {
           inside &= around_px2(px[k], px[(k + 1) % 3], middle_px) * area_px2 >= 0.0;
@@ -69,9 +71,9 @@ struct Shown {
     }
   }
   bool back = false;
-  bool in_picture = false;
   bool holds_middle = false;
-  int box_middles = 0;
+  std::set<int> columns;  ///< of the picture, whose middles lie in its box
+  std::set<int> rows;
 };
 
 /// As it is, or with corners as rasterisers round them: to 1/256 pixel.
@@ -84,21 +86,22 @@ bool may_show(const std::array<glm::dvec2, 3>& px, bool single_sided) {
   });
 }
 
-/// A sphere's clusters under a matrix.
+/// Clusters under a matrix, each a part or all of them one.
 struct Culled {
   Culled(TriangleCull& cull, const scene::Mesh& mesh, const std::vector<scene::Cluster>& clusters,
-         const glm::mat4& matrix, bool single_sided) {
+         const glm::mat4& matrix, bool single_sided, bool apart = true) {
     cull.begin(kSizePx);
-    std::vector<std::uint32_t> taken_clusters;
     for (std::uint32_t c = 0; c < clusters.size(); ++c) {
-      if (cull.take(clusters[c], c, matrix, single_sided, c)) taken_clusters.push_back(c);
+      EXPECT_TRUE(cull.take(clusters[c], c, matrix, single_sided));
+      if (apart && !cull.close(c)) ADD_FAILURE() << "nothing in part " << c;
     }
+    EXPECT_EQ(cull.close(0), !apart);
     cull.run();
-    EXPECT_EQ(cull.parts().size(), taken_clusters.size());
+    EXPECT_EQ(cull.parts().size(), apart ? clusters.size() : 1);
     std::uint32_t next = 0;
-    for (std::size_t p = 0; p < cull.parts().size(); ++p) {
+    for (std::uint32_t p = 0; p < cull.parts().size(); ++p) {
       const TriangleCull::Part& part = cull.parts()[p];
-      EXPECT_EQ(part.range, taken_clusters[p]);
+      EXPECT_EQ(part.range, p);
       EXPECT_EQ(part.first, next);  // without gaps
       next += part.count;
       for (std::uint32_t i = part.first; i < part.first + part.count; i += 3) {
@@ -107,11 +110,8 @@ struct Culled {
       }
     }
     EXPECT_EQ(cull.indices().size(), next);
-    for (const std::uint32_t c : taken_clusters) {
-      for (std::uint32_t i = clusters[c].first_index;
-           i < clusters[c].first_index + clusters[c].index_count; i += 3) {
-        taken.push_back({mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]});
-      }
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      taken.push_back({mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]});
     }
   }
   std::vector<Corners> taken;
@@ -137,7 +137,7 @@ TEST_F(TriangleCullTest, WhatItLeavesOutHoldsNoPixelAndWhatItKeepsIsLittleMore) 
   std::size_t kept_for_nothing = 0;
   for (int round = 0; round < 400; ++round) {
     const bool single_sided = round % 3 != 2;
-    // Many reach over the rim, or far beyond it: one pixel to 20 a triangle.
+    // Many reach over the picture's edge, or lie far beyond it: one pixel to 20 a triangle.
     const double tan_half_h = 0.3 * std::pow(0.03, 0.5 + 0.5 * unit(random));
     const glm::dvec2 place(1.3 * unit(random), unit(random));
     const double distance_m = 5.0 + unit(random);
@@ -156,8 +156,8 @@ TEST_F(TriangleCullTest, WhatItLeavesOutHoldsNoPixelAndWhatItKeepsIsLittleMore) 
           << "round " << round << ": a front over a pixel's middle was left out";
       // But for the margins these could have been left out.
       kept_for_nothing +=
-          stays &&
-          (shown.back || (shown.in_picture && shown.box_middles <= 4 && !shown.holds_middle));
+          stays && (shown.back || (std::min(shown.columns.size(), shown.rows.size()) <= 2 &&
+                                   !shown.holds_middle));
     }
   }
   EXPECT_GT(taken, 100000U);
@@ -187,7 +187,6 @@ TEST(TriangleCull, KeepsWhatShowsHoweverThinItIsOrFarOverTheRim) {
     for (const bool single_sided : {true, false}) {
       const glm::mat4 matrix = clip_from_mesh({0.1, 0.0, 4.0}, tan_half_h, 0.0);
       const Culled culled(cull, mesh, clusters, matrix, single_sided);
-      ASSERT_GT(culled.taken.size(), mesh.indices.size() / 6);
       std::size_t shown_count = 0;
       for (const Corners& corners : culled.taken) {
         std::array<glm::dvec2, 3> px;
@@ -239,17 +238,51 @@ TEST(TriangleCull, KeepsSliversThatHaveNoAreaInSinglePrecision) {
   EXPECT_GT(shown, 2000U);
 }
 
-TEST_F(TriangleCullTest, LeavesAloneWhatIsLargeOrReachesBehindTheCamera) {
-  // Each triangle covers hundreds of pixels.
-  const Culled near(cull_, mesh_, clusters_, clip_from_mesh({0.0, 0.0, 1.5}, 0.002, 0.0), true);
-  EXPECT_TRUE(near.taken.empty());
+TEST_F(TriangleCullTest, KeepsWholeWhatReachesBehindTheCamera) {
   const glm::mat4 inside = clip_from_mesh({0.0, 0.0, 0.0}, 1.0, 0.0);
   const Culled around(cull_, mesh_, clusters_, inside, false);
-  EXPECT_FALSE(around.taken.empty());
+  std::size_t behind = 0;
   for (const Corners& corners : around.taken) {
-    for (const std::uint32_t v : corners) {
-      EXPECT_GT((inside * glm::vec4(mesh_.positions_m[v], 1.0F)).w, 0.0F);
+    const bool is_behind = std::ranges::any_of(corners, [&](std::uint32_t v) {
+      return (inside * glm::vec4(mesh_.positions_m[v], 1.0F)).w <= 0.0F;
+    });
+    behind += is_behind ? 1U : 0U;
+    EXPECT_TRUE(!is_behind || around.kept.contains(corners));
+  }
+  EXPECT_GT(behind, around.taken.size() / 3);
+}
+
+TEST_F(TriangleCullTest, KeepsLargeTrianglesOfThePictureAndNoneBesideIt) {
+  // Each covers hundreds of pixels.
+  const glm::mat4 matrix = clip_from_mesh({0.0, 0.0, 1.5}, 0.002, 0.0);
+  const Culled near(cull_, mesh_, clusters_, matrix, true);
+  EXPECT_GT(near.kept.size(), 0U);
+  for (const Corners& corners : near.taken) {
+    std::array<glm::dvec2, 3> px;
+    for (std::size_t k = 0; k < 3; ++k) px[k] = window_px(matrix, mesh_.positions_m[corners[k]]);
+    const Shown shown(px, true);
+    EXPECT_TRUE(near.kept.contains(corners) || !may_show(px, true));
+    EXPECT_TRUE(!near.kept.contains(corners) || !(shown.columns.empty() || shown.rows.empty()));
+  }
+  EXPECT_LT(near.kept.size(), near.taken.size() / 20);
+}
+
+TEST_F(TriangleCullTest, EveryPieceOfAPartHasSomeFromAllOfIt) {
+  const glm::mat4 matrix = clip_from_mesh({0.0, 0.0, 40.0}, 0.04, 0.0);
+  const Culled culled(cull_, mesh_, clusters_, matrix, false, false);
+  const auto indices = cull_.indices();
+  EXPECT_EQ(indices.size(), 3 * culled.kept.size());
+  // Quarters of the picture against quarters of what is drawn.
+  constexpr std::size_t kPieces = 4;
+  for (std::size_t piece = 0; piece < kPieces; ++piece) {
+    std::array<std::size_t, 4> in_quarter{};
+    const std::size_t first = indices.size() / 3 * piece / kPieces * 3;
+    const std::size_t last = indices.size() / 3 * (piece + 1) / kPieces * 3;
+    for (std::size_t i = first; i < last; i += 3) {
+      const glm::dvec2 px = window_px(matrix, mesh_.positions_m[indices[i]]);
+      ++in_quarter[(px.x > 0.5 * kSizePx.x ? 1U : 0U) + (px.y > 0.5 * kSizePx.y ? 2U : 0U)];
     }
+    for (const std::size_t count : in_quarter) EXPECT_GT(count, (last - first) / 3 / 12);
   }
 }
 
@@ -258,15 +291,17 @@ TEST_F(TriangleCullTest, TakesNoMoreThanAFrameHasMemoryFor) {
   cull_.begin(kSizePx);
   std::size_t indices = 0;
   bool full = false;
-  for (std::uint32_t range = 0; !full && range < 1'000'000; ++range) {
-    const std::uint32_t c = range % static_cast<std::uint32_t>(clusters_.size());
-    full = !cull_.take(clusters_[c], c, matrix, true, range);
+  for (std::uint32_t i = 0; !full && i < 1'000'000; ++i) {
+    const std::uint32_t c = i % static_cast<std::uint32_t>(clusters_.size());
+    full = !cull_.take(clusters_[c], c, matrix, true);
     if (!full) indices += clusters_[c].index_count;
   }
   EXPECT_TRUE(full);
   EXPECT_GT(indices, TriangleCull::kMostIndices - 3 * scene::kClusterTriangles);
   EXPECT_LE(indices, TriangleCull::kMostIndices);
+  EXPECT_TRUE(cull_.close(0));
   cull_.run();
+  EXPECT_GT(cull_.indices().size(), 0U);
   EXPECT_LT(cull_.indices().size(), indices / 2);
 }
 
