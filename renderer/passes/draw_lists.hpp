@@ -96,7 +96,7 @@ class DrawLists {
   /// Appends the index ranges of an instance's submesh that `seen` shows.
   void add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
                   const ClusterView& seen, const glm::mat4& clip_from_mesh) noexcept;
-  /// Mesa leaves out what follows an empty range, too.
+  /// Where one is empty Mesa leaves out what follows, too.
   void drop_empty_ranges() noexcept;
   void add_range(std::uint32_t first_index, std::uint32_t index_count,
                  std::int32_t base_vertex) noexcept;

@@ -84,70 +84,82 @@ float within(float value, float low, float high) noexcept {
   return above < high ? above : high;
 }
 
-/// Some triangles in a row, as vectors.
-struct Some {
+/// Corners in GL's window, pixels.
+struct Triangle {
+  float x0, x1, x2;
+  float y0, y1, y2;
+  [[nodiscard]] float left() const noexcept { return least(x0, x1, x2); }
+  [[nodiscard]] float right() const noexcept { return most(x0, x1, x2); }
+  [[nodiscard]] float low() const noexcept { return least(y0, y1, y2); }
+  [[nodiscard]] float high() const noexcept { return most(y0, y1, y2); }
+  /// Twice its area; front faces turn clockwise, less than 0: the window's first row is the
+  /// picture's.
+  [[nodiscard]] float turn_px2() const noexcept {
+    return (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
+  }
+  [[nodiscard]] Middles columns(const glm::ivec2& size_px) const noexcept {
+    return {left(), right(), size_px.x};
+  }
+  [[nodiscard]] Middles rows(const glm::ivec2& size_px) const noexcept {
+    return {low(), high(), size_px.y};
+  }
+};
+
+/// True when a triangle holds the middle of a pixel: by its rows or columns, of which there are
+/// fewer.
+bool holds_middle(const Triangle& t, const glm::ivec2& size_px) noexcept {
+  const float side = t.turn_px2() < 0.0F ? -1.0F : 1.0F;
+  // Of the same rounded corners: needles, too, have their inside between their edges.
+  const std::array<Edge, 3> edges = {edge(t.x0, t.y0, t.x1, t.y1, side),
+                                     edge(t.x1, t.y1, t.x2, t.y2, side),
+                                     edge(t.x2, t.y2, t.x0, t.y0, side)};
+  const Middles columns = t.columns(size_px);
+  const Middles rows = t.rows(size_px);
+  const bool by_row = rows.count <= columns.count;
+  const Middles& lines = by_row ? rows : columns;
+  for (int line = 0; line < lines.count; ++line) {
+    const float at_px = lines.at_px(line);
+    if (by_row ? hold_any<&Edge::a, &Edge::b>(edges, columns, at_px, size_px.x)
+               : hold_any<&Edge::b, &Edge::a>(edges, rows, at_px, size_px.y)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Triangles of a cluster that are judged together, as vectors.
+struct Block {
   static constexpr std::uint32_t kMost = 64;
   enum Verdict : std::uint32_t { kGone, kKept, kSmall };
   std::uint32_t count = 0;
   std::array<std::array<float, kMost>, 3> x_px;  ///< by corner
   std::array<std::array<float, kMost>, 3> y_px;
-  std::array<float, kMost> turn_px2;
   std::array<std::uint32_t, kMost> verdict;
 
+  [[nodiscard]] Triangle at(std::uint32_t t) const noexcept {
+    return {x_px[0][t], x_px[1][t], x_px[2][t], y_px[0][t], y_px[1][t], y_px[2][t]};
+  }
+  /// Without branches: compilers make vectors only of that.
   void judge(const glm::ivec2& size_px, bool single_sided) noexcept {
     const float most_x = static_cast<float>(size_px.x) + kRimPx;
     const float most_y = static_cast<float>(size_px.y) + kRimPx;
     for (std::uint32_t t = 0; t < count; ++t) {
-      const float x0 = x_px[0][t];
-      const float x1 = x_px[1][t];
-      const float x2 = x_px[2][t];
-      const float y0 = y_px[0][t];
-      const float y1 = y_px[1][t];
-      const float y2 = y_px[2][t];
-      const float left = least(x0, x1, x2);
-      const float right = most(x0, x1, x2);
-      const float low = least(y0, y1, y2);
-      const float high = most(y0, y1, y2);
-      // Front faces turn clockwise in GL's window, whose first row is the picture's.
-      const float turn = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
-      turn_px2[t] = turn;
+      const Triangle each = at(t);
+      const float left = each.left();
+      const float right = each.right();
+      const float low = each.low();
+      const float high = each.high();
       const float around_px = (right - left) + (high - low);
       // Of what reaches beyond the rim the corners are not where they belong.
       const bool whole = (left > -kRimPx) & (low > -kRimPx) & (right < most_x) & (high < most_y);
-      const bool back = single_sided & whole & (turn > 4.0F * kMarginPx * (around_px + kMarginPx));
-      const int columns = Middles(left, right, size_px.x).count;
-      const int rows = Middles(low, high, size_px.y).count;
+      const bool back =
+          single_sided & whole & (each.turn_px2() > 4.0F * kMarginPx * (around_px + kMarginPx));
+      const int columns = each.columns(size_px).count;
+      const int rows = each.rows(size_px).count;
       const bool gone = back | (columns < 1) | (rows < 1);
       const bool small = whole & (std::min(columns, rows) <= kMostLines);
       verdict[t] = gone ? kGone : small ? kSmall : kKept;
     }
-  }
-
-  /// True when a triangle holds the middle of a pixel: by its rows or columns, of which there are
-  /// fewer.
-  [[nodiscard]] bool holds_middle(std::uint32_t t, const glm::ivec2& size_px) const noexcept {
-    const float x0 = x_px[0][t];
-    const float x1 = x_px[1][t];
-    const float x2 = x_px[2][t];
-    const float y0 = y_px[0][t];
-    const float y1 = y_px[1][t];
-    const float y2 = y_px[2][t];
-    const float side = turn_px2[t] < 0.0F ? -1.0F : 1.0F;
-    // Of the same rounded corners: needles, too, have their inside between their edges.
-    const std::array<Edge, 3> edges = {edge(x0, y0, x1, y1, side), edge(x1, y1, x2, y2, side),
-                                       edge(x2, y2, x0, y0, side)};
-    const Middles columns(least(x0, x1, x2), most(x0, x1, x2), size_px.x);
-    const Middles rows(least(y0, y1, y2), most(y0, y1, y2), size_px.y);
-    const bool by_row = rows.count <= columns.count;
-    const Middles& lines = by_row ? rows : columns;
-    for (int line = 0; line < lines.count; ++line) {
-      const float at_px = lines.at_px(line);
-      if (by_row ? hold_any<&Edge::a, &Edge::b>(edges, columns, at_px, size_px.x)
-                 : hold_any<&Edge::b, &Edge::a>(edges, rows, at_px, size_px.y)) {
-        return true;
-      }
-    }
-    return false;
   }
 };
 
@@ -260,20 +272,20 @@ std::uint32_t TriangleCull::cull(const Job& job, std::uint32_t* out) const noexc
   const std::uint32_t triangles = job.cluster->index_count / 3;
   const glm::ivec2 size_px(size_px_);
   std::uint32_t count = 0;
-  for (std::uint32_t first = 0; first < triangles; first += Some::kMost) {
-    Some some;
-    some.count = std::min(Some::kMost, triangles - first);
-    for (std::uint32_t t = 0; t < some.count; ++t) {
+  for (std::uint32_t first = 0; first < triangles; first += Block::kMost) {
+    Block block;
+    block.count = std::min(Block::kMost, triangles - first);
+    for (std::uint32_t t = 0; t < block.count; ++t) {
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint8_t v = corner[3 * (first + t) + k];
-        some.x_px[k][t] = placed.x_px[v];
-        some.y_px[k][t] = placed.y_px[v];
+        block.x_px[k][t] = placed.x_px[v];
+        block.y_px[k][t] = placed.y_px[v];
       }
     }
-    some.judge(size_px, job.single_sided);
-    for (std::uint32_t t = 0; t < some.count; ++t) {
-      if (some.verdict[t] == Some::kGone) continue;
-      if (some.verdict[t] == Some::kSmall && !some.holds_middle(t, size_px)) continue;
+    block.judge(size_px, job.single_sided);
+    for (std::uint32_t t = 0; t < block.count; ++t) {
+      if (block.verdict[t] == Block::kGone) continue;
+      if (block.verdict[t] == Block::kSmall && !holds_middle(block.at(t), size_px)) continue;
       std::copy_n(from + 3 * (first + t), 3, out + count);
       count += 3;
     }
