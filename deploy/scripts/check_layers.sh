@@ -43,9 +43,10 @@ beside='(\.\./)?[a-z0-9_]+\.hpp"'
 check physics  renderer/physics  "emit/physics/|$beside"
 check image    renderer/image    "emit/image/|emit/physics/|$beside"
 check scene    renderer/scene    "emit/scene/|emit/scenegen/|emit/physics/|$beside"
-check gl       renderer/gl       "gl/|emit/physics/"
+check threads  renderer/threads  "threads/"
+check gl       renderer/gl       "gl/|threads/|emit/physics/"
 check renderer "renderer/passes renderer/history renderer/surface renderer/include renderer/renderer.cpp" \
-      "emit/(renderer|physics|scene|image)/|gl/|passes/|history/|surface/|shared/"
+      "emit/(renderer|physics|scene|image)/|gl/|threads/|passes/|history/|surface/|shared/"
 check reference renderer/reference "emit/(reference|physics)/|emit/scene/(scene_desc|mesh|trajectory)\.hpp|$beside"
 # The truth does not use the formulas that it judges (fitting compares the two, so it has both).
 formulas='equilibrium|surface_balance|relaxation|planck|band_radiance_lut|foster'
@@ -75,7 +76,7 @@ only Eigen    'Eigen/'            'renderer/reference/'
 only Ceres    'ceres/'            'renderer/reference/'
 only OpenSSL  'openssl/'          'protocol/src/|server/io/tls_'
 only CLI11    'CLI/'              'server/'
-only "the renderer's insides" 'gl/|passes/|history/|surface/' 'renderer/'
+only "the renderer's insides" 'gl/|threads/|passes/|history/|surface/' 'renderer/'
 
 missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.cmake' \
     '*CMakeLists.txt' '*.proto' | xargs grep -L 'SPDX-License-Identifier: Apache-2.0' || true)

@@ -75,6 +75,7 @@ std::vector<Candidate> list_candidates(int gpu_index, std::string& tried) {
 }
 
 EGLContext make_context(EGLDisplay display, bool debug, std::string& why) {
+  const threads::SoftwareThreads::Naming naming;  // of what the driver starts here
   EGLint major = 0;
   EGLint minor = 0;
   if (display == EGL_NO_DISPLAY || eglInitialize(display, &major, &minor) != EGL_TRUE) {
@@ -129,6 +130,7 @@ struct EglContext::Impl {
   EGLContext context = EGL_NO_CONTEXT;
   std::string device_name;
   bool software = false;
+  threads::SoftwareThreads threads;
 
   ~Impl() {
     if (context == EGL_NO_CONTEXT) return;
@@ -163,6 +165,7 @@ physics::Result<EglContext> EglContext::create(int gpu_index, bool debug) {
     const std::string renderer = text(GL_RENDERER);
     impl->device_name = fmt::format("{} / OpenGL {}", renderer, text(GL_VERSION));
     impl->software = renderer.starts_with("llvmpipe") || renderer.starts_with("softpipe");
+    if (impl->software) impl->threads = threads::SoftwareThreads::find();
     return EglContext(std::move(impl));
   }
   return make_error(ErrorCode::gpu,
@@ -177,6 +180,10 @@ const std::string& EglContext::device_name() const noexcept {
 
 bool EglContext::software() const noexcept {
   return impl_->software;
+}
+
+const threads::SoftwareThreads& EglContext::threads() const noexcept {
+  return impl_->threads;
 }
 
 }  // namespace emit::gl

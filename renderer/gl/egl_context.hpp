@@ -4,6 +4,7 @@
 #include <string>
 
 #include "emit/physics/error.hpp"
+#include "threads/software_threads.hpp"
 
 namespace emit::gl {
 
@@ -23,6 +24,8 @@ class EglContext {
   [[nodiscard]] const std::string& device_name() const noexcept;
   /// True: Mesa draws on the processor.
   [[nodiscard]] bool software() const noexcept;
+  /// On which it does; none of a graphics processor.
+  [[nodiscard]] const threads::SoftwareThreads& threads() const noexcept;
 
  private:
   struct Impl;

@@ -126,6 +126,7 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
                                                    Content content, Shade shade) {
   GeometryPass pass;
   pass.software_ = context.software();
+  pass.threads_ = context.threads();
   std::vector<gl::Define> defines;
   const bool sampled = content != Content::normals;
   const bool objects = content == Content::samples_and_objects;
@@ -194,10 +195,13 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
   program_.use();
   vertices.bind_view();
   glEnable(GL_CULL_FACE);
+  threads_.leave_core_to_caller();
   const auto draw_all = software_ ? issue_in_batches : issue_at_once;
   draw_all(lists.view_draws(single_sided), lists.view_ranges(), records);
   glDisable(GL_CULL_FACE);
   draw_all(lists.view_draws(double_sided), lists.view_ranges(), records);
+  if (software_) glFlush();
+  threads_.spread();
   glDisable(GL_SCISSOR_TEST);
 }
 

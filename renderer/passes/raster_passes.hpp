@@ -64,6 +64,7 @@ class GeometryPass {
   gl::Framebuffer framebuffer_;
   bool sampled_ = false;
   bool software_ = false;
+  threads::SoftwareThreads threads_;
 };
 
 /// Paper part 3: depth seen from the sun, one layer per cascade, drawn anew for every step.

@@ -11,7 +11,7 @@
 
 #include "emit/scene/clusters.hpp"
 #include "emit/scene/mesh.hpp"
-#include "surface/worker_pool.hpp"
+#include "threads/worker_pool.hpp"
 
 namespace emit::renderer {
 
@@ -27,7 +27,7 @@ class TriangleCull {
   /// Of all clusters in one frame; what comes on top of that is drawn as it is.
   static constexpr std::size_t kMostIndices = std::size_t{3} << 18U;
 
-  TriangleCull() : workers_(WorkerPool::all_cores()) {}
+  TriangleCull() : workers_(threads::WorkerPool::all_cores()) {}
   /// Adds the clusters of a mesh, whose indices start with number `first_index` of all: in the
   /// order of the clusters that are asked for.
   void add(const scene::Mesh& mesh, std::span<const scene::Cluster> clusters,
@@ -84,7 +84,7 @@ class TriangleCull {
   /// Writes the indices that are left of a cluster's; returns how many.
   [[nodiscard]] std::uint32_t cull(const Job& job, std::uint32_t* out) const noexcept;
 
-  WorkerPool workers_;
+  threads::WorkerPool workers_;
   std::vector<Local> locals_;  ///< by cluster
   std::vector<float> x_m_;     ///< by local vertex
   std::vector<float> y_m_;

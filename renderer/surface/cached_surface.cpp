@@ -90,7 +90,7 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
       extended_(scenario.thermal.model == scene::ThermalModel::foster),
       heat_(heat_of(scenario.thermal, materials_, networks, reference_k)),
       interval_(heat_.sized_interval()),
-      workers_(WorkerPool::all_cores()),
+      workers_(threads::WorkerPool::all_cores()),
       interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));

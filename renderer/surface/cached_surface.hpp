@@ -23,7 +23,7 @@
 #include "surface/surface_model.hpp"
 #include "surface/surface_node.hpp"
 #include "surface/surface_step.hpp"
-#include "surface/worker_pool.hpp"
+#include "threads/worker_pool.hpp"
 
 namespace emit::renderer {
 
@@ -210,7 +210,7 @@ class CachedSurface {
   SampleHeat heat_;
   std::optional<IntervalRays> interval_rays_;
   HeatInterval interval_;
-  WorkerPool workers_;
+  threads::WorkerPool workers_;
   RayOffsets offsets_;
   std::vector<MoverPlacement> movers_now_;
   std::optional<SurfaceModel> model_;

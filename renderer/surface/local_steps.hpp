@@ -15,7 +15,7 @@
 #include "surface/sample_blocks.hpp"
 #include "surface/surface_node.hpp"
 #include "surface/surface_step.hpp"
-#include "surface/worker_pool.hpp"
+#include "threads/worker_pool.hpp"
 
 namespace emit::renderer {
 
@@ -48,7 +48,7 @@ class LocalSteps {
     std::span<const PoseHistory> entities;
     SurfaceHistory& history;  ///< of the surroundings: left where it was to be for `next`
     const SurfaceStep& step;
-    WorkerPool& workers;
+    threads::WorkerPool& workers;
     glm::dvec3 origin_world_m;
   };
   /// The current interval, the node that is being computed, and how.

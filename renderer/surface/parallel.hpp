@@ -8,7 +8,7 @@
 
 namespace emit::renderer {
 
-/// For set-up: oneTBB allocates (frames have WorkerPool).
+/// For set-up: oneTBB allocates (frames have threads::WorkerPool).
 /// body(begin, end) over parts of [0, count) of at most `grain`, on all cores. What the caller
 /// wrote before is read by the bodies and the other way round, also in the eyes of race detectors,
 /// which cannot look into oneTBB. The parts differ from run to run: bodies must not depend on them.

@@ -89,7 +89,7 @@ class ShadePages {
     const Environment& environment;
     std::span<const PoseHistory> entities;
     const CasterRays& rays;
-    WorkerPool& workers;
+    threads::WorkerPool& workers;
     Silhouettes& silhouettes;
   };
 

@@ -68,7 +68,7 @@ Silhouettes::Silhouettes(std::span<const scene::Aabb> bounds_m) : alone_(bounds_
 }
 
 bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
-                       const CasterRays& rays, WorkerPool& workers) noexcept {
+                       const CasterRays& rays, threads::WorkerPool& workers) noexcept {
   Tile& tile = tiles_[mover];
   const float turned_rad = glm::distance(tile.to_sun, to_sun_body);
   if (tile.box_m.empty() || turned_rad < most_turn_rad) return true;

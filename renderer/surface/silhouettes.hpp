@@ -11,7 +11,7 @@
 
 #include "emit/scene/mesh.hpp"
 #include "surface/caster_rays.hpp"
-#include "surface/worker_pool.hpp"
+#include "threads/worker_pool.hpp"
 
 namespace emit::renderer {
 
@@ -58,7 +58,7 @@ class Silhouettes {
   /// unit vector `to_sun_body`, to `most_turn_rad`. False: not to ten times that, as too many
   /// others have turned.
   bool look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
-            const CasterRays& rays, WorkerPool& workers) noexcept;
+            const CasterRays& rays, threads::WorkerPool& workers) noexcept;
   /// Where the body casts it with the sun in the direction of the unit vector `to_sun`, rel axes.
   /// @pre look() for about this direction
   [[nodiscard]] PlacedSilhouette place(std::size_t mover, const MoverPlacement& placement,

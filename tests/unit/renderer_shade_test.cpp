@@ -118,7 +118,7 @@ class ShadeTest : public ::testing::Test {
   test::SurfaceScene scene_;
   std::optional<CasterRays> rays_;
   std::optional<SampleHeat> heat_;
-  WorkerPool workers_{2};
+  threads::WorkerPool workers_{2};
   Silhouettes silhouettes_;
   std::vector<PoseHistory> entities_;
 };
@@ -606,7 +606,7 @@ TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {
   const SurfaceSamples all = ground();
   std::vector<float> first;
   for (const unsigned int threads : {1U, 3U}) {
-    WorkerPool workers(threads);
+    threads::WorkerPool workers(threads);
     Silhouettes silhouettes = silhouettes_;
     ShadePages shade = pages(all);
     shade.restart(kNoonNs, entities_);

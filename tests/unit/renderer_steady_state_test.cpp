@@ -15,7 +15,7 @@
 #include "passes/foster_setup.hpp"
 #include "support/heap_counter.hpp"
 #include "surface/cached_surface.hpp"
-#include "surface/worker_pool.hpp"
+#include "threads/worker_pool.hpp"
 #include "unit/surface_scene.hpp"
 
 namespace emit::renderer {
@@ -170,7 +170,7 @@ TEST(HeapCounter, SeesRequestsOfEveryKind) {
 
 TEST(WorkerPool, EveryPartIsDoneOnceWhateverTheNumberOfThreads) {
   for (const unsigned int threads : {1U, 2U, 5U}) {
-    WorkerPool pool(threads);
+    threads::WorkerPool pool(threads);
     std::vector<int> visits(10'000, 0);
     for (int round = 1; round <= 200; ++round) {
       pool.run(visits.size(), 37, [&](std::size_t begin, std::size_t end) {
@@ -183,7 +183,7 @@ TEST(WorkerPool, EveryPartIsDoneOnceWhateverTheNumberOfThreads) {
 }
 
 TEST(WorkerPool, ThreadsShareTheWork) {
-  WorkerPool pool(2);
+  threads::WorkerPool pool(2);
   // Two parts that wait for each other.
   std::atomic<int> arrived{0};
   pool.run(2, 1, [&](std::size_t, std::size_t) {

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface/worker_pool.hpp"
+#include "threads/worker_pool.hpp"
 
 #include <sched.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <system_error>
 
-namespace emit::renderer {
+namespace emit::threads {
 
-WorkerPool::WorkerPool(unsigned int threads) {
+WorkerPool::WorkerPool(unsigned int threads) : cores_(CoreSet::of(0)) {
   threads_.reserve(threads);
+  ids_.reserve(threads);
   try {
     for (unsigned int i = 1; i < threads; ++i) threads_.emplace_back([this] { work(); });
   } catch (const std::system_error&) {
@@ -27,10 +29,8 @@ WorkerPool::~WorkerPool() {
 }
 
 unsigned int WorkerPool::all_cores() noexcept {
-  cpu_set_t cores;
-  if (sched_getaffinity(0, sizeof(cores), &cores) == 0) {
-    return static_cast<unsigned int>(std::max(1, CPU_COUNT(&cores)));
-  }
+  const int cores = CoreSet::of(0).count();
+  if (cores > 0) return static_cast<unsigned int>(cores);
   return std::max(1U, std::thread::hardware_concurrency());
 }
 
@@ -52,6 +52,7 @@ void WorkerPool::run_loop(const Loop& loop) noexcept {
   }
   {
     const std::lock_guard lock(mutex_);
+    leave_core_to_caller();
     next_.store(0, std::memory_order_relaxed);
     loop_ = loop;
     ++number_;
@@ -64,9 +65,20 @@ void WorkerPool::run_loop(const Loop& loop) noexcept {
   left_.wait(lock, [this] { return inside_ == 0; });
 }
 
+void WorkerPool::leave_core_to_caller() noexcept {
+  const int core = ::sched_getcpu();
+  if (threads_.size() >= static_cast<std::size_t>(cores_.count())) return;
+  if (core == left_core_ && ids_.size() == placed_) return;
+  const CoreSet others = cores_.without(core);
+  for (const pid_t id : ids_) others.give_to(id);
+  left_core_ = core;
+  placed_ = ids_.size();
+}
+
 void WorkerPool::work() noexcept {
   unsigned long long done = 0;
   std::unique_lock lock(mutex_);
+  ids_.push_back(::gettid());
   for (;;) {
     begun_.wait(lock, [&] { return stop_ || (open_ && number_ != done); });
     if (stop_) return;
@@ -80,4 +92,4 @@ void WorkerPool::work() noexcept {
   }
 }
 
-}  // namespace emit::renderer
+}  // namespace emit::threads

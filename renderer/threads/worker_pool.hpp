@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <sys/types.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <cstddef>
@@ -7,13 +9,18 @@
 #include <thread>
 #include <vector>
 
-namespace emit::renderer {
+#include "threads/core_set.hpp"
+
+namespace emit::threads {
 
 /// Threads that share loops with the one that calls: for work inside frames, where nothing may
 /// allocate. They sleep while there is none, and a call waits for no thread that has not begun.
+/// Where each can have a core of the constructing thread's they stay off the one that calls: the
+/// kernel may wake them there, to wait behind the caller.
 ///
 /// Owner: whoever calls run(), one thread at a time. Real time: run() allocates nothing, takes a
-/// lock that is held for an instant only, and wakes threads; construction is setup.
+/// lock that is held for an instant only, and wakes threads, which it moves when the caller has
+/// come to another core; construction is setup.
 class WorkerPool {
  public:
   /// `threads` in all, the caller among them; at least 1.
@@ -47,6 +54,7 @@ class WorkerPool {
   /// Takes parts of the open loop until none is left.
   void take_parts(const Loop& loop) noexcept;
   void work() noexcept;
+  void leave_core_to_caller() noexcept;
 
   std::mutex mutex_;
   std::condition_variable begun_;
@@ -57,7 +65,11 @@ class WorkerPool {
   unsigned int inside_ = 0;        ///< threads, the caller not counted
   bool stop_ = false;
   std::atomic<std::size_t> next_{0};  ///< first index of the next part
+  CoreSet cores_;
+  std::vector<pid_t> ids_;  ///< of the threads that have come up; guarded by mutex_
+  int left_core_ = -1;      ///< where `placed_` of them do not run
+  std::size_t placed_ = 0;
   std::vector<std::thread> threads_;
 };
 
-}  // namespace emit::renderer
+}  // namespace emit::threads
