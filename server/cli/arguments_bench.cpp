@@ -96,6 +96,9 @@ void Tool::add_bench_commands() {
                    "Interleaved measurements of throughput, medians of which count; 0: none")
         ->check(CLI::Range(0U, 1000U))
         ->capture_default_str();
+    app.add_option("--cpus", o.cpus,
+                   "Cores of the daemon's agents, as realtime.cpus has them, e.g. \"sender=0, "
+                   "render=1\"; default: wherever the kernel likes, like all yardsticks");
     app.add_option("--loss", o.losses,
                    "Nothing but this: frames over UDP through a network that loses this share of "
                    "the datagrams: without help, with resend, with error correction; repeatable")

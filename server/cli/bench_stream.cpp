@@ -117,6 +117,7 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   const bool compressed = transport == "tcp-lz4";
   const std::string shm = mixed || transport == "shm" ? own_shm_name() : "";
   config::DaemonConfig config = canned_daemon(command_.width_px, command_.height_px, shm);
+  config.realtime.cpus = command_.cpus;
   config.pacing.mode = config::PacingMode::ig_clock;
   config.pacing.rate_hz = command_.rate_hz;
   auto daemon = DaemonProcess::start(config, {}, work_, std::chrono::seconds(60));
@@ -306,6 +307,7 @@ Result<void> StreamBench::throughput() {
     const auto directory = work_ / (name + (security.tls() ? "-tls" : "-plain"));
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
     auto config = canned_daemon(command_.width_px, command_.height_px, name);
+    config.realtime.cpus = command_.cpus;
     config.tls.certificate = security.tls_certificate;
     config.tls.key = security.tls_key;
     config.tls.client_ca = security.tls_ca;
@@ -490,7 +492,7 @@ int run_bench_stream(const BenchStreamCommand& command) {
   if (command.json) {
     Json json = Json::object();
     json.set("device", bench.device()).set("commit", kCommit).set("suite", "stream");
-    json.set("cores", std::thread::hardware_concurrency());
+    json.set("cores", std::thread::hardware_concurrency()).set("cpus", command.cpus);
     json.set("results", bench.json());
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
