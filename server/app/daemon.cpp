@@ -214,6 +214,7 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                 fmt::format("event=shm url=shm://{} slots={} mode={:04o}", config_.stream.shm,
                             config_.stream.shm_slots, config_.stream.shm_mode));
   }
+  tell_congestion_control(receiver_->congestion_control());
   if (clock_.tai_offset_unset()) {
     warn(
         "event=tai_offset_unset effect=\"wall instants are UTC\" "
@@ -297,6 +298,16 @@ void DaemonImpl::warn(const std::string& text) {
     log_->write(LogLevel::warn, line);
   }
   board_.set_warnings(LogLevel::warn, distinct_);
+}
+
+void DaemonImpl::tell_congestion_control(const std::string& name) {
+  if (name.starts_with("bbr")) {
+    warn(fmt::format("event=tcp_paced congestion_control={} effect=\"frames over TCP come late\" "
+                     "remedy=\"sysctl net.ipv4.tcp_allowed_congestion_control='reno cubic'\"",
+                     name));
+  } else {
+    log_->write(LogLevel::info, fmt::format("event=tcp congestion_control={}", name));
+  }
 }
 
 void DaemonImpl::tell_scene(const renderer::SceneStats& scene) {

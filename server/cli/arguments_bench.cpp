@@ -96,6 +96,12 @@ void Tool::add_bench_commands() {
                    "Interleaved measurements of throughput, medians of which count; 0: none")
         ->check(CLI::Range(0U, 1000U))
         ->capture_default_str();
+    app.add_option("--only", o.only,
+                   "Of the throughput measurements only this one, e.g. tcp, and nothing at a fixed "
+                   "rate; repeatable; default: all")
+        ->allow_extra_args(false)
+        ->check(CLI::IsMember(stream_contenders()))
+        ->type_name("NAME");
     app.add_option("--cpus", o.cpus,
                    "Cores of the daemon's agents, as realtime.cpus has them, e.g. \"sender=0, "
                    "render=1\"; default: wherever the kernel likes, like all yardsticks");

@@ -82,6 +82,7 @@ class StreamBench {
 
 Result<void> StreamBench::run() {
   if (!command_.losses.empty()) return lossy();
+  if (!command_.only.empty()) return throughput();
   for (const std::string& transport : command_.transports) {
     auto row = paced(transport);
     if (!row) return tl::unexpected(row.error());
@@ -281,6 +282,16 @@ const std::vector<Contender>& contenders() {
   return all;
 }
 
+std::vector<Contender> contenders_of(const BenchStreamCommand& command) {
+  std::vector<Contender> out = contenders();
+  if (!command.only.empty()) {
+    std::erase_if(out, [&](const Contender& contender) {
+      return std::ranges::find(command.only, contender.name) == command.only.end();
+    });
+  }
+  return out;
+}
+
 /// All measurements of one contender.
 struct Series {
   Samples gbit_s;
@@ -345,14 +356,15 @@ Result<void> StreamBench::throughput() {
                             : *plain)
         .measure(name, yardstick_.frames, yardstick_.window);
   };
+  const std::vector<Contender> contenders = contenders_of(command_);
   std::map<std::string, Series> series;
-  ProgressBar progress("throughput", command_.repeats * contenders().size());
+  ProgressBar progress("throughput", command_.repeats * contenders.size());
   for (std::uint32_t round = 0; round < command_.repeats; ++round) {
     std::map<std::string, double> of_round;
-    for (std::size_t i = 0; i < contenders().size(); ++i) {
-      const Contender& contender = contenders()[i];
+    for (std::size_t i = 0; i < contenders.size(); ++i) {
+      const Contender& contender = contenders[i];
       Series& own = series[contender.name];
-      progress.advance_to(round * contenders().size() + i);
+      progress.advance_to(round * contenders.size() + i);
       if (!own.missing.empty()) continue;
       const auto result = measure(contender.name);
       if (!result) {
@@ -374,7 +386,7 @@ Result<void> StreamBench::throughput() {
       own.frames += result->frames;
       own.lost += result->lost;
     }
-    for (const Contender& contender : contenders()) {
+    for (const Contender& contender : contenders) {
       for (const char* yardstick : contender.yardsticks) {
         if (of_round.count(contender.name) == 0 || of_round.count(yardstick) == 0) continue;
         series[contender.name].ratios[yardstick].add(of_round[contender.name] /
@@ -385,9 +397,10 @@ Result<void> StreamBench::throughput() {
   progress.finish();
   for (auto* daemon : {&plain, &shared, &secured}) {
     if (!*daemon) continue;
+    if (device_.empty()) device_ = (*daemon)->device();
     if (auto stopped = (*daemon)->stop(); !stopped) return stopped;
   }
-  for (const Contender& contender : contenders()) {
+  for (const Contender& contender : contenders) {
     const Series& own = series[contender.name];
     Row row;
     row.transport = contender.name;
@@ -477,6 +490,12 @@ void StreamBench::print(std::FILE* out) const {
 }
 
 }  // namespace
+
+std::vector<std::string> stream_contenders() {
+  std::vector<std::string> names;
+  for (const Contender& contender : contenders()) names.emplace_back(contender.name);
+  return names;
+}
 
 int run_bench_stream(const BenchStreamCommand& command) {
   std::error_code error;

@@ -252,6 +252,7 @@ struct BenchStreamCommand {
   std::uint32_t clients = 4;
   std::vector<std::string> transports{"tcp", "udp", "shm", "mixed"};
   std::uint32_t repeats = 5;  ///< of the throughput measurements; 0: none
+  std::vector<std::string> only;  ///< of the throughput measurements; empty: all
   std::string cpus;           ///< realtime.cpus of the daemons
   /// Shares of datagrams lost on the way; not empty: nothing but lossy networks is measured.
   std::vector<double> losses;
@@ -261,6 +262,8 @@ struct BenchStreamCommand {
   std::uint64_t seed = 1;
 };
 int run_bench_stream(const BenchStreamCommand& command);
+/// What it measures the throughput of; what BenchStreamCommand::only may name.
+[[nodiscard]] std::vector<std::string> stream_contenders();
 
 struct BenchIsolationCommand {
   std::optional<std::filesystem::path> json;

@@ -101,6 +101,7 @@ Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std
   };
   auto client = StreamClient::start(options);
   if (!client) return tl::unexpected(client.error());
+  device_ = (*client)->server().device;
   // The first one shows that the subscription has reached the sender.
   do {
     const std::lock_guard lock(mutex);

@@ -42,6 +42,8 @@ class StreamThroughput {
                                                          std::uint64_t frames,
                                                          std::uint32_t window);
   [[nodiscard]] physics::Result<void> stop();
+  /// What the daemon shows; known once something has been measured.
+  [[nodiscard]] const std::string& device() const { return device_; }
 
  private:
   StreamThroughput(DaemonProcess daemon, std::unique_ptr<server::HostClient> host, std::string shm,
@@ -56,6 +58,7 @@ class StreamThroughput {
   std::string shm_;
   server::Security security_;
   std::uint64_t last_host_frame_ = 0;
+  std::string device_;
 };
 
 }  // namespace emit::cli

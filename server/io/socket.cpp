@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -17,6 +18,8 @@
 #include <chrono>
 #include <climits>
 #include <exception>
+#include <string>
+#include <string_view>
 
 #include "io/asio_endpoint.hpp"
 #include "io/tls_session.hpp"
@@ -86,6 +89,30 @@ void open_ours(Socket& socket, const Protocol& protocol, error_code& error) noex
   socket.open(protocol, error);
   if (!error) {
     make_ours(socket, error);
+  }
+}
+
+/// Name of what decides how fast a connection, or those of a listener, may send; empty: unknown.
+std::string congestion_control_of(int fd) {
+  std::array<char, 17> name{};  // TCP_CA_NAME_MAX and an end
+  socklen_t length = name.size() - 1;
+  return ::getsockopt(fd, IPPROTO_TCP, TCP_CONGESTION, name.data(), &length) == 0 ? name.data()
+                                                                                  : "";
+}
+
+/// BBR sends at the rate it has seen: frames that come in bursts are spread out, and every ten
+/// seconds it looks for a shorter path with four packets at a time (Cardwell et al., BBR:
+/// Congestion-Based Congestion Control, 2016). Before listen(): a connection that was paced once
+/// stays so.
+void avoid_pacing(int fd) noexcept {
+  if (!congestion_control_of(fd).starts_with("bbr")) {
+    return;
+  }
+  for (const std::string_view name : {"cubic", "reno"}) {  // not every user may have every one
+    if (::setsockopt(fd, IPPROTO_TCP, TCP_CONGESTION, name.data(),
+                     static_cast<socklen_t>(name.size())) == 0) {
+      return;
+    }
   }
 }
 
@@ -308,6 +335,7 @@ physics::Result<TcpListener> TcpListener::open(const SocketContext& context,
       return failure("", address, "socket: " + error_text(error.value()));
     }
     wish(impl->acceptor, tcp::acceptor::reuse_address(true));
+    avoid_pacing(impl->acceptor.native_handle());
     impl->acceptor.bind(endpoint, error);
     if (!error) {
       impl->acceptor.listen(kBacklog, error);
@@ -325,6 +353,10 @@ int TcpListener::fd() const noexcept {
 
 SocketAddress TcpListener::local_address() const noexcept {
   return impl_ ? local_address_of(impl_->acceptor) : SocketAddress{};
+}
+
+std::string TcpListener::congestion_control() const {
+  return congestion_control_of(fd());
 }
 
 TcpSocket TcpListener::accept(SocketAddress& peer) {

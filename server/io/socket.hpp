@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "emit/physics/error.hpp"
 #include "io/io_result.hpp"
@@ -102,11 +103,15 @@ class TcpListener {
   TcpListener& operator=(TcpListener&& other) noexcept;
   ~TcpListener();
 
+  /// Its connections send as fast as the path takes what they have: where the system's congestion
+  /// control paces (bbr), they have cubic, or reno where cubic is not allowed.
   /// Errors (io): address in use and so on, naming the address.
   [[nodiscard]] static physics::Result<TcpListener> open(const SocketContext& context,
                                                          const SocketAddress& address);
   [[nodiscard]] int fd() const noexcept;
   [[nodiscard]] SocketAddress local_address() const noexcept;
+  /// Of its connections, as the kernel names it; empty: unknown.
+  [[nodiscard]] std::string congestion_control() const;
   /// Next connection; closed when there is none now. Throws std::bad_alloc.
   [[nodiscard]] TcpSocket accept(SocketAddress& peer);
 

@@ -2,15 +2,21 @@
 #include "io/socket.hpp"
 
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
+#include <sched.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <fstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "emit/protocol/convert.hpp"
@@ -54,6 +60,50 @@ class TcpPair : public ::testing::Test {
   TcpSocket server_;
   SocketAddress peer_;
 };
+
+std::string congestion_control_of(int fd) {
+  std::array<char, 17> name{};
+  socklen_t length = 16;
+  return ::getsockopt(fd, IPPROTO_TCP, TCP_CONGESTION, name.data(), &length) == 0 ? name.data()
+                                                                                  : "?";
+}
+
+TEST_F(TcpPair, AcceptedSocketsHaveTheCongestionControlOfTheirListener) {
+  EXPECT_EQ(congestion_control_of(server_.fd()), listener_.congestion_control());
+  EXPECT_FALSE(listener_.congestion_control().starts_with("bbr"));
+}
+
+TEST(TcpListenerOfASystem, KeepsItsCongestionControlUnlessThatPaces) {
+  // In a network of its own the system's choice is this thread's to make.
+  std::string skipped;
+  std::thread([&] {
+    if (::unshare(CLONE_NEWNET) != 0) {
+      skipped = "no right to a network of its own";
+      return;
+    }
+    int tried = 0;
+    for (const std::string system : {"reno", "cubic", "bbr"}) {
+      std::ofstream("/proc/sys/net/ipv4/tcp_congestion_control") << system << std::flush;
+      std::string chosen;
+      std::ifstream("/proc/sys/net/ipv4/tcp_congestion_control") >> chosen;
+      if (chosen != system) {
+        continue;  // this kernel does not have it
+      }
+      ++tried;
+      auto listener = TcpListener::open(SocketContext(), numeric_address("0.0.0.0", 0));
+      ASSERT_TRUE(listener.has_value()) << listener.error().text;
+      if (system == "bbr") {
+        EXPECT_THAT(listener->congestion_control(), ::testing::AnyOf("cubic", "reno"));
+      } else {
+        EXPECT_EQ(listener->congestion_control(), system);
+      }
+    }
+    skipped = tried == 0 ? "the system's congestion control cannot be set" : "";
+  }).join();
+  if (!skipped.empty()) {
+    GTEST_SKIP() << skipped;
+  }
+}
 
 TEST_F(TcpPair, AcceptedAndConnectedSocketsNeitherBlockNorReachChildProcesses) {
   for (const int fd : {listener_.fd(), client_.fd(), server_.fd()}) {

@@ -82,7 +82,7 @@ struct ControlConfig {
 struct StreamConfig {
   std::uint32_t queue_frames = 4;  ///< per client, bounded; slots = queue + 3
   std::uint32_t udp_fragment_payload_bytes = 8900;
-  std::uint32_t tcp_send_buffer_bytes = 256u << 10;  ///< 0 = the system's choice
+  std::uint32_t tcp_send_buffer_bytes = 512u << 10;  ///< 0 = the system's choice
   std::uint32_t udp_send_buffer_bytes = 8u << 20;
   std::uint8_t multicast_ttl = 1;
   std::uint32_t fec_data_fragments = 48;   ///< of a group, for clients that do not say
