@@ -73,6 +73,20 @@ for name in rmem_max wmem_max; do
   fi
 done
 
+# Who sends over TCP: bbr paces, emitd's streams take another then.
+system=$(read_file /proc/sys/net/ipv4/tcp_congestion_control)
+allowed=$(read_file /proc/sys/net/ipv4/tcp_allowed_congestion_control)
+case $system in
+  "") row warn "TCP congestion control" "not visible here" "look in the host's own network namespace" ;;
+  bbr*)
+    if is_root || [[ " $allowed " == *" reno "* || " $allowed " == *" cubic "* ]]; then
+      row pass "TCP congestion control" "$system (emitd: not paced)" ""
+    else
+      row warn "TCP congestion control" "$system, which paces frames" "sysctl -w net.ipv4.tcp_allowed_congestion_control='reno cubic'"
+    fi ;;
+  *) row pass "TCP congestion control" "$system" "" ;;
+esac
+
 # Processor.
 governors=$(cat /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor 2>/dev/null | sort -u | tr '\n' ' ')
 governors=${governors% }

@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -465,6 +466,13 @@ Json StreamBench::json() const {
   return results;
 }
 
+/// The system's choice, which the yardsticks have; empty: not to be seen here.
+std::string system_congestion_control() {
+  std::string name;
+  std::ifstream("/proc/sys/net/ipv4/tcp_congestion_control") >> name;
+  return name;
+}
+
 void StreamBench::print(std::FILE* out) const {
   TextTable table({"transport", "clients", "rate Hz", "frames", "lost", "late", "p50 us", "p99 us",
                    "p99.9 us", "max us", "own p99.9", "Gbit/s", "CPU"});
@@ -481,7 +489,9 @@ void StreamBench::print(std::FILE* out) const {
                count(row.frames), count(row.lost), count(row.late), us(0.5), us(0.99), us(0.999),
                us(1.0), us_of(row.own_us, 0.999), number(row.gbit_s, 2), number(row.cpu_frac, 2)});
   }
-  fmt::print(out, "{}x{}, loopback\n{}", command_.width_px, command_.height_px, table.to_string());
+  fmt::print(out, "{}x{}, loopback; congestion control of the yardsticks: {}\n{}",
+             command_.width_px, command_.height_px, system_congestion_control(),
+             table.to_string());
   for (const Row& row : rows_) {
     if (row.ratios.empty()) continue;
     fmt::print(out, "{}: {} (medians of ratios of the same round)\n", row.transport,
@@ -512,6 +522,7 @@ int run_bench_stream(const BenchStreamCommand& command) {
     Json json = Json::object();
     json.set("device", bench.device()).set("commit", kCommit).set("suite", "stream");
     json.set("cores", std::thread::hardware_concurrency()).set("cpus", command.cpus);
+    json.set("yardstick_congestion_control", system_congestion_control());
     json.set("results", bench.json());
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }

@@ -123,6 +123,7 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
   const std::string json = read_text(folder.file("s.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"stream\"");
+  EXPECT_GT(json_value(json, "yardstick_congestion_control").size(), 2U);
   for (const char* transport :
        {"tcp", "udp", "shm", "tls", "mixed", "bare-tcp-paced", "bare-tcp", "bare-tcp-crc",
         "bare-udp", "zeromq", "zeromq-crc", "iperf3", "iceoryx", "iceoryx-crc"}) {
@@ -145,6 +146,22 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   // Where iceoryx is there, it is measured.
   EXPECT_EQ(json.find("iox-roudi does not start"), std::string::npos);
   EXPECT_EQ(json.find("iox-roudi has no chunks"), std::string::npos);
+}
+
+TEST(CliBench, StreamMeasuresOnlyWhatIsNamed) {
+  const TemporaryFolder folder;
+  const ProcessResult run =
+      run_emit({"bench", "stream", "--only", "tcp", "--only", "bare-tcp", "--width", "64",
+                "--height", "48", "--repeats", "2", "--json", folder.file("s.json")});
+  ASSERT_EQ(run.exit_code, 0) << run.err << run.out;
+  const std::string json = read_text(folder.file("s.json"));
+  EXPECT_EQ(json_value(json, "device"), "\"canned: test pattern\"");
+  EXPECT_EQ(numbers_of(json, "clients"), (std::vector<double>{1, 1}));
+  EXPECT_NE(json.find("\"transport\": \"tcp\""), std::string::npos);
+  EXPECT_NE(json.find("\"transport\": \"bare-tcp\""), std::string::npos);
+  EXPECT_EQ(numbers_of(json, "ratio").size(), 1U);
+  EXPECT_EQ(json.find("zeromq"), std::string::npos) << "not even as something to compare with";
+  EXPECT_EQ(run_emit({"bench", "stream", "--only", "pigeon"}).exit_code, 2);
 }
 
 TEST(CliBench, IsolationComparesPairsOfRunsBesideARunAgainstItself) {
