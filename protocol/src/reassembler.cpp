@@ -352,11 +352,12 @@ void Reassembler::finish(Slot& slot) noexcept {
   const std::size_t pixel_count = pixel_bytes / kWordBytes;
   frame.header = header;
   // These are this side's to say.
-  frame.header.flags &= ~std::uint32_t{kFlagPartial | kFlagCorrupt};
+  frame.header.flags &= ~kReceiverFlags;
   frame.header_known = known;
   frame.repaired_fragments = slot.repaired;
   frame.resent_fragments = slot.resent;
   if (stream.has_delivered) frame.frames_lost_before = slot.frame_id - stream.delivered_id - 1;
+  if (frame.frames_lost_before > 0) frame.header.flags |= kFlagLostBefore;
   stream.has_delivered = true;
   stream.delivered_id = slot.frame_id;
   if (!slot.all_received()) {

@@ -14,7 +14,7 @@ struct FlagName {
   protocol::FrameFlags flag;
   const char* name;
 };
-constexpr std::array<FlagName, 14> kFlagNames{{{protocol::kFlagLate, "late"},
+constexpr std::array<FlagName, 15> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagRepeated, "repeated"},
                                                {protocol::kFlagStale, "stale"},
                                                {protocol::kFlagDegraded, "degraded"},
@@ -27,7 +27,8 @@ constexpr std::array<FlagName, 14> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagCanned, "canned"},
                                                {protocol::kFlagTimeUnset, "time_unset"},
                                                {protocol::kFlagTriggerFault, "trigger_fault"},
-                                               {protocol::kFlagCorrupt, "corrupt"}}};
+                                               {protocol::kFlagCorrupt, "corrupt"},
+                                               {protocol::kFlagLostBefore, "lost_before"}}};
 
 }  // namespace
 
@@ -40,7 +41,7 @@ void StreamReport::add(const server::ReceivedFrame& frame) {
   const bool continues = last_run_ != 0 && header.run_id == last_run_;
   // One that came late for its number may stand anywhere between two others.
   if (continues && header.frame_number - last_number_ - 1 >= every_nth_ &&
-      (header.flags & protocol::kFlagGapBefore) == 0) {
+      (header.flags & (protocol::kFlagGapBefore | protocol::kFlagLostBefore)) == 0) {
     ++unflagged_gaps_;
   }
   runs_ += header.run_id != newest_run_ ? 1U : 0U;

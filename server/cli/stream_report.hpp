@@ -33,7 +33,7 @@ class StreamReport {
   [[nodiscard]] std::uint64_t pixel_bytes() const noexcept { return pixel_bytes_; }
   [[nodiscard]] std::uint64_t sent_pixel_bytes() const noexcept { return sent_pixel_bytes_; }
   [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
-  /// Frames that came without the flag although the numbers before them are missing.
+  /// Frames that say neither gap_before nor lost_before although numbers before them are missing.
   [[nodiscard]] std::uint64_t unflagged_gaps() const noexcept { return unflagged_gaps_; }
 
   /// Pose received to last byte of the frame here, ms; frames without a pose are left out.

@@ -118,8 +118,8 @@ struct StreamTerms {
 
 /// Pixels stay valid until the next receive().
 struct ReceivedFrame {
-  /// kFlagPartial is set here when fragments are missing, kFlagCorrupt when none is but the
-  /// checksum is wrong.
+  /// Set here: kFlagPartial when fragments are missing, kFlagCorrupt when none is but the checksum
+  /// is wrong, kFlagLostBefore when of frames before this one nothing came (UDP).
   protocol::FrameHeader header;
   std::span<const float> pixels;     ///< width_px * height_px; missing pixels are 0
   std::uint64_t missing_px = 0;      ///< of a partial frame

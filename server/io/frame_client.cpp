@@ -284,7 +284,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_tcp(std::int64_t 
     }
     frame_.header = view->header;
     // These are this side's to say.
-    frame_.header.flags &= ~std::uint32_t{protocol::kFlagPartial | protocol::kFlagCorrupt};
+    frame_.header.flags &= ~protocol::kReceiverFlags;
     frame_.last_byte_ns = clock_.tai_ns();
     frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
     burst_begin_ns_ = 0;

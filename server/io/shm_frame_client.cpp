@@ -211,6 +211,7 @@ physics::Result<ShmFrameClient::Taken> ShmFrameClient::take(std::uint64_t public
   }
   publication_ = publication;
   frame_.header = *header;
+  frame_.header.flags &= ~protocol::kReceiverFlags;
   // Among the publications that were overwritten there may be none that this reader wanted. Nothing
   // is lost on the way: what is missing was not ready for its channel.
   if ((std::exchange(gap_, false) && terms_.every_nth == 1) ||

@@ -71,7 +71,7 @@ TEST(Reassembler, GivesACompleteFrameFromFragmentsInAnyOrder) {
 
 TEST(Reassembler, AFrameIsPartialByWhatArrivedWhateverItsHeaderClaims) {
   Frame frame = test::make_frame(kWidthPx, kHeightPx, 7);
-  frame.header.flags = kFlagPartial | kFlagLate;
+  frame.header.flags = kReceiverFlags | kFlagLate;
   encode(frame.header, frame.header_bytes);
   Reassembler reassembler(params());
   for (const Datagram& datagram : test::datagrams_of(frame, kPayload, 1)) {
@@ -243,6 +243,7 @@ TEST(Reassembler, CountsFramesOfWhichNothingArrivedAcrossTheWrapOfTheId) {
     const ReceivedFrame* received = reassembler.pop();
     ASSERT_NE(received, nullptr);
     lost += received->frames_lost_before;
+    EXPECT_EQ(received->header.flags & kFlagLostBefore, id == 2u ? kFlagLostBefore : 0u) << id;
     reassembler.release(received);
   }
   EXPECT_EQ(lost, 2u);

@@ -40,6 +40,8 @@ struct Outcome {
   std::uint64_t wrong_in_partial = 0;
   std::uint64_t unflagged_missing = 0;
   std::uint64_t out_of_order = 0;
+  std::uint64_t lost_before = 0;  ///< frames that say so
+  std::uint64_t untold_gaps = 0;  ///< frames after missing numbers that do not
   ReceiveCounters counters;
   FaultInjector::Counts network;
   std::uint64_t relay_drops = 0;
@@ -77,6 +79,7 @@ void play(const Setup& setup, Outcome& out) {
   ASSERT_TRUE(host.has_value()) << host.error().text;
 
   std::uint64_t newest = 0;
+  std::uint64_t nameless = 0;  // since then: came without a number
   const auto look = [&](const ReceivedFrame& frame) {
     ++out.came;
     const bool partial = (frame.header.flags & protocol::kFlagPartial) != 0;
@@ -87,8 +90,16 @@ void play(const Setup& setup, Outcome& out) {
     ASSERT_EQ(frame.pixels.size(), images[0].size());
     if (!frame.header_known) {
       ASSERT_TRUE(partial || corrupt);
+      ++nameless;
       return;
     }
+    const bool told = (frame.header.flags &
+                       (protocol::kFlagLostBefore | protocol::kFlagGapBefore)) != 0;
+    out.lost_before += (frame.header.flags & protocol::kFlagLostBefore) != 0 ? 1 : 0;
+    // Of what was lost before the first one nobody knows.
+    out.untold_gaps +=
+        newest > 0 && frame.header.frame_number > newest + nameless + 1 && !told ? 1 : 0;
+    nameless = 0;
     out.out_of_order += frame.header.frame_number <= newest ? 1 : 0;
     newest = std::max(newest, frame.header.frame_number);
     const auto& image = images[(frame.header.frame_number + images.size() - 1) % images.size()];
@@ -153,6 +164,8 @@ TEST(DaemonLossy, WithoutItEveryPartialFrameIsFlaggedAndItsValidPixelsAreRight) 
   EXPECT_GT(out.partial, kFrames / 3);
   EXPECT_EQ(out.whole + out.partial, out.came);
   EXPECT_GE(out.came, kFrames - 2) << "partial frames are handed out, not dropped";
+  EXPECT_LE(out.lost_before, 2U);
+  EXPECT_EQ(out.untold_gaps, 0U);
   EXPECT_EQ(out.counters.partial, out.partial);
   EXPECT_EQ(out.wrong_unflagged + out.wrong_in_partial + out.unflagged_missing, 0U);
   EXPECT_EQ(out.counters.repaired + out.counters.resent, 0U);
@@ -179,6 +192,21 @@ TEST(DaemonLossy, BurstsOfLossesAreSpreadOverTheGroups) {
   ASSERT_FALSE(HasFatalFailure());
   EXPECT_GE(static_cast<double>(out.whole), 0.98 * kFrames) << out.partial << " partial";
   EXPECT_GT(out.counters.repaired, 0U);
+  EXPECT_EQ(out.wrong_unflagged + out.wrong_in_partial + out.unflagged_missing, 0U);
+}
+
+TEST(DaemonLossy, FramesOfWhichNothingCameAreToldByTheNextOne) {
+  Outcome out;
+  constexpr std::uint64_t kFrames = 300;
+  NetworkFaults faults = one_percent();
+  faults.loss_frac = 0.2;
+  faults.burst_mean = 150.0;  // a frame has 95 datagrams
+  play({faults, {}, false, kFrames, 6}, out);
+  ASSERT_FALSE(HasFatalFailure());
+  EXPECT_LT(out.came, kFrames - 5);
+  EXPECT_GT(out.lost_before, 5U);
+  EXPECT_LE(out.lost_before, kFrames - out.came) << "each for one that is missing, at least";
+  EXPECT_EQ(out.untold_gaps, 0U);
   EXPECT_EQ(out.wrong_unflagged + out.wrong_in_partial + out.unflagged_missing, 0U);
 }
 
