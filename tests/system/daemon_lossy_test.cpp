@@ -93,8 +93,8 @@ void play(const Setup& setup, Outcome& out) {
       ++nameless;
       return;
     }
-    const bool told = (frame.header.flags &
-                       (protocol::kFlagLostBefore | protocol::kFlagGapBefore)) != 0;
+    const bool told =
+        (frame.header.flags & (protocol::kFlagLostBefore | protocol::kFlagGapBefore)) != 0;
     out.lost_before += (frame.header.flags & protocol::kFlagLostBefore) != 0 ? 1 : 0;
     // Of what was lost before the first one nobody knows.
     out.untold_gaps +=
