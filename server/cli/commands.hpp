@@ -251,9 +251,9 @@ struct BenchStreamCommand {
   std::uint32_t height_px = 512;
   std::uint32_t clients = 4;
   std::vector<std::string> transports{"tcp", "udp", "shm", "mixed"};
-  std::uint32_t repeats = 5;  ///< of the throughput measurements; 0: none
+  std::uint32_t repeats = 5;      ///< of the throughput measurements; 0: none
   std::vector<std::string> only;  ///< of the throughput measurements; empty: all
-  std::string cpus;           ///< realtime.cpus of the daemons
+  std::string cpus;               ///< realtime.cpus of the daemons
   /// Shares of datagrams lost on the way; not empty: nothing but lossy networks is measured.
   std::vector<double> losses;
   double burst_mean = 1.0;  ///< datagrams lost in a row
