@@ -302,9 +302,10 @@ void DaemonImpl::warn(const std::string& text) {
 
 void DaemonImpl::tell_congestion_control(const std::string& name) {
   if (name.starts_with("bbr")) {
-    warn(fmt::format("event=tcp_paced congestion_control={} effect=\"frames over TCP come late\" "
-                     "remedy=\"sysctl net.ipv4.tcp_allowed_congestion_control='reno cubic'\"",
-                     name));
+    warn(
+        fmt::format("event=tcp_paced congestion_control={} effect=\"frames over TCP come late\" "
+                    "remedy=\"sysctl net.ipv4.tcp_allowed_congestion_control='reno cubic'\"",
+                    name));
   } else {
     log_->write(LogLevel::info, fmt::format("event=tcp congestion_control={}", name));
   }

@@ -490,8 +490,7 @@ void StreamBench::print(std::FILE* out) const {
                us(1.0), us_of(row.own_us, 0.999), number(row.gbit_s, 2), number(row.cpu_frac, 2)});
   }
   fmt::print(out, "{}x{}, loopback; congestion control of the yardsticks: {}\n{}",
-             command_.width_px, command_.height_px, system_congestion_control(),
-             table.to_string());
+             command_.width_px, command_.height_px, system_congestion_control(), table.to_string());
   for (const Row& row : rows_) {
     if (row.ratios.empty()) continue;
     fmt::print(out, "{}: {} (medians of ratios of the same round)\n", row.transport,
