@@ -152,9 +152,10 @@ const KeyTable<StreamConfig>& stream_keys() {
                             "1400 fits any Ethernet."),
       integer<StreamConfig>("tcp_send_buffer_bytes", "bytes", 0, 1073741824,
                             EMIT_FIELD(tcp_send_buffer_bytes),
-                            "What a TCP client may leave in its socket: what waits there is late, "
-                            "and skipped no more. Over long links at least rate x round trip; 0: "
-                            "the system's choice, up to megabytes."),
+                            "What a TCP client may leave in its socket, at most "
+                            "net.core.wmem_max: what waits there is late, and skipped no more. "
+                            "Over long links at least rate x round trip; 0: the system's choice, "
+                            "up to megabytes."),
       integer<StreamConfig>("udp_send_buffer_bytes", "bytes", 65536, 1073741824,
                             EMIT_FIELD(udp_send_buffer_bytes), "Socket send buffer."),
       integer<StreamConfig>("fec_data_fragments", "", 1, 128, EMIT_FIELD(fec_data_fragments),

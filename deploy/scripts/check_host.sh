@@ -73,16 +73,26 @@ for name in rmem_max wmem_max; do
   fi
 done
 
-# Who sends over TCP: bbr paces, emitd's streams take another then.
+# BBR spreads frames out: emitd's TCP clients have cubic or reno where it may choose.
 system=$(read_file /proc/sys/net/ipv4/tcp_congestion_control)
-allowed=$(read_file /proc/sys/net/ipv4/tcp_allowed_congestion_control)
+instead=$(python3 - 2>/dev/null <<'PY'
+import socket
+for name in (b"cubic", b"reno"):
+    try:
+        socket.socket().setsockopt(socket.IPPROTO_TCP, socket.TCP_CONGESTION, name)
+    except OSError:
+        continue
+    print(name.decode())
+    break
+PY
+)
 case $system in
   "") row warn "TCP congestion control" "not visible here" "look in the host's own network namespace" ;;
   bbr*)
-    if is_root || [[ " $allowed " == *" reno "* || " $allowed " == *" cubic "* ]]; then
-      row pass "TCP congestion control" "$system (emitd: not paced)" ""
+    if [[ -n $instead ]]; then
+      row pass "TCP congestion control" "$system (emitd's clients: $instead)" ""
     else
-      row warn "TCP congestion control" "$system, which paces frames" "sysctl -w net.ipv4.tcp_allowed_congestion_control='reno cubic'"
+      row warn "TCP congestion control" "$system" "sysctl -w net.ipv4.tcp_allowed_congestion_control=\"\$(sysctl -n net.ipv4.tcp_allowed_congestion_control) reno\""
     fi ;;
   *) row pass "TCP congestion control" "$system" "" ;;
 esac

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <new>
@@ -87,7 +88,7 @@ RingWriter::RingWriter(std::span<std::byte> memory, const RingParams& params)
   }
   std::memcpy(memory_ + layout.channels_offset, channels_.data(),
               channels_.size() * sizeof(RingChannelEntry));
-  std::memcpy(memory_ + layout.welcome_offset, params.welcome.data(), params.welcome.size());
+  std::ranges::copy(params.welcome, memory_ + layout.welcome_offset);  // may be empty
   for (std::uint32_t i = 0; i < params.slots; ++i) {
     new (memory_ + layout.slots_offset + i * layout.slot_bytes) RingSlotHead{};
   }

@@ -55,7 +55,9 @@ class Receiver final : public Agent {
   [[nodiscard]] std::vector<std::byte> welcome() const;
   [[nodiscard]] SocketAddress control_address() const noexcept;
   /// Of TCP clients, see TcpListener. After open().
-  [[nodiscard]] std::string congestion_control() const { return listener_.congestion_control(); }
+  [[nodiscard]] CongestionControl congestion_control() const {
+    return listener_.congestion_control();
+  }
   /// length 0: no host port.
   [[nodiscard]] SocketAddress host_address() const noexcept;
 

@@ -300,15 +300,18 @@ void DaemonImpl::warn(const std::string& text) {
   board_.set_warnings(LogLevel::warn, distinct_);
 }
 
-void DaemonImpl::tell_congestion_control(const std::string& name) {
-  if (name.starts_with("bbr")) {
+void DaemonImpl::tell_congestion_control(const CongestionControl& tcp) {
+  if (tcp.chosen.starts_with("bbr")) {
     warn(
-        fmt::format("event=tcp_paced congestion_control={} effect=\"frames over TCP come late\" "
-                    "remedy=\"sysctl net.ipv4.tcp_allowed_congestion_control='reno cubic'\"",
-                    name));
-  } else {
-    log_->write(LogLevel::info, fmt::format("event=tcp congestion_control={}", name));
+        fmt::format("event=bbr_kept congestion_control={} effect=\"frames over TCP are spread out "
+                    "and may come late\" remedy=\"allow reno: "
+                    "net.ipv4.tcp_allowed_congestion_control\"",
+                    tcp.chosen));
+    return;
   }
+  log_->write(LogLevel::info,
+              fmt::format("event=tcp congestion_control={}{}", tcp.chosen,
+                          tcp.chosen == tcp.system ? "" : " instead_of=" + tcp.system));
 }
 
 void DaemonImpl::tell_scene(const renderer::SceneStats& scene) {

@@ -86,7 +86,7 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] physics::Result<void> check_realtime();
   /// Written to the log, and kept among the warnings that the metrics tell. Setup only.
   void warn(const std::string& text);
-  void tell_congestion_control(const std::string& name);
+  void tell_congestion_control(const CongestionControl& tcp);
   void tell_scene(const renderer::SceneStats& scene);
   void plan_realtime(AgentRunner& runner) const {
     runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));

@@ -85,23 +85,26 @@ void Tool::add_bench_commands() {
     app.add_option("--clients", o.clients, "Clients at the fixed rate")
         ->check(CLI::Range(1U, 8U))
         ->capture_default_str();
-    app.add_option(
-           "--transport", o.transports,
-           "Transport at the fixed rate; repeatable; mixed: tcp, udp, shm in turn; tcp-lz4: "
-           "compressed")
-        ->allow_extra_args(false)
-        ->check(CLI::IsMember({"tcp", "tcp-lz4", "udp", "shm", "mixed"}))
-        ->capture_default_str();
+    CLI::Option* transport =
+        app.add_option(
+               "--transport", o.transports,
+               "Transport at the fixed rate; repeatable; mixed: tcp, udp, shm in turn; tcp-lz4: "
+               "compressed")
+            ->allow_extra_args(false)
+            ->check(CLI::IsMember({"tcp", "tcp-lz4", "udp", "shm", "mixed"}))
+            ->capture_default_str();
     app.add_option("--repeats", o.repeats,
                    "Interleaved measurements of throughput, medians of which count; 0: none")
         ->check(CLI::Range(0U, 1000U))
         ->capture_default_str();
-    app.add_option("--only", o.only,
-                   "Of the throughput measurements only this one, e.g. tcp, and nothing at a fixed "
-                   "rate; repeatable; default: all")
-        ->allow_extra_args(false)
-        ->check(CLI::IsMember(stream_contenders()))
-        ->type_name("NAME");
+    CLI::Option* only =
+        app.add_option("--only", o.only,
+                       "Of the throughput measurements only this one, e.g. tcp, and nothing at a "
+                       "fixed rate; repeatable; default: all")
+            ->allow_extra_args(false)
+            ->check(CLI::IsMember(stream_contenders()))
+            ->type_name("NAME")
+            ->excludes(transport);
     app.add_option("--cpus", o.cpus,
                    "Cores of the daemon's agents, as realtime.cpus has them, e.g. \"sender=0, "
                    "render=1\"; default: wherever the kernel likes, like all yardsticks");
@@ -110,7 +113,8 @@ void Tool::add_bench_commands() {
                    "the datagrams: without help, with resend, with error correction; repeatable")
         ->allow_extra_args(false)
         ->check(CLI::Range(0.0, 0.9))
-        ->type_name("FRAC");
+        ->type_name("FRAC")
+        ->excludes(only);
     app.add_option("--burst", o.burst_mean, "--loss: datagrams lost in a row, mean")
         ->check(CLI::Range(1.0, 1000.0))
         ->capture_default_str();

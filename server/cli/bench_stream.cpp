@@ -6,7 +6,6 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,6 +19,7 @@
 #include "daemon_process.hpp"
 #include "emit/version.hpp"
 #include "frame_files.hpp"
+#include "io/socket.hpp"
 #include "json.hpp"
 #include "statistics.hpp"
 #include "stream_client.hpp"
@@ -466,11 +466,9 @@ Json StreamBench::json() const {
   return results;
 }
 
-/// The system's choice, which the yardsticks have; empty: not to be seen here.
-std::string system_congestion_control() {
-  std::string name;
-  std::ifstream("/proc/sys/net/ipv4/tcp_congestion_control") >> name;
-  return name;
+std::string yardstick_congestion_control() {
+  const std::string name = server::system_congestion_control();
+  return name.empty() ? "unknown" : name;
 }
 
 void StreamBench::print(std::FILE* out) const {
@@ -490,7 +488,8 @@ void StreamBench::print(std::FILE* out) const {
                us(1.0), us_of(row.own_us, 0.999), number(row.gbit_s, 2), number(row.cpu_frac, 2)});
   }
   fmt::print(out, "{}x{}, loopback; congestion control of the yardsticks: {}\n{}",
-             command_.width_px, command_.height_px, system_congestion_control(), table.to_string());
+             command_.width_px, command_.height_px, yardstick_congestion_control(),
+             table.to_string());
   for (const Row& row : rows_) {
     if (row.ratios.empty()) continue;
     fmt::print(out, "{}: {} (medians of ratios of the same round)\n", row.transport,
@@ -507,6 +506,9 @@ std::vector<std::string> stream_contenders() {
 }
 
 int run_bench_stream(const BenchStreamCommand& command) {
+  if (!command.only.empty() && command.repeats == 0) {
+    return fail(kExitUsage, "--only names what --repeats 0 leaves out");
+  }
   std::error_code error;
   const auto work =
       std::filesystem::temp_directory_path(error) /
@@ -519,9 +521,11 @@ int run_bench_stream(const BenchStreamCommand& command) {
   bench.print(text_stream(command.json));
   if (command.json) {
     Json json = Json::object();
-    json.set("device", bench.device()).set("commit", kCommit).set("suite", "stream");
+    json.set("device", bench.device().empty() ? Json() : Json(bench.device()))
+        .set("commit", kCommit)
+        .set("suite", "stream");
     json.set("cores", std::thread::hardware_concurrency()).set("cpus", command.cpus);
-    json.set("yardstick_congestion_control", system_congestion_control());
+    json.set("yardstick_congestion_control", yardstick_congestion_control());
     json.set("results", bench.json());
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }

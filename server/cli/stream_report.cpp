@@ -40,8 +40,9 @@ void StreamReport::add(const server::ReceivedFrame& frame) {
   const protocol::FrameHeader& header = frame.header;
   const bool continues = last_run_ != 0 && header.run_id == last_run_;
   // One that came late for its number may stand anywhere between two others.
-  if (continues && header.frame_number - last_number_ - 1 >= every_nth_ &&
-      (header.flags & (protocol::kFlagGapBefore | protocol::kFlagLostBefore)) == 0) {
+  const std::uint64_t missing = (header.frame_number - last_number_ - 1) / every_nth_;
+  if (continues && missing > frame.frames_lost_before &&
+      (header.flags & protocol::kFlagGapBefore) == 0) {
     ++unflagged_gaps_;
   }
   runs_ += header.run_id != newest_run_ ? 1U : 0U;

@@ -33,7 +33,7 @@ class StreamReport {
   [[nodiscard]] std::uint64_t pixel_bytes() const noexcept { return pixel_bytes_; }
   [[nodiscard]] std::uint64_t sent_pixel_bytes() const noexcept { return sent_pixel_bytes_; }
   [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
-  /// Frames that say neither gap_before nor lost_before although numbers before them are missing.
+  /// Frames before which more numbers are missing than were lost on the way, without gap_before.
   [[nodiscard]] std::uint64_t unflagged_gaps() const noexcept { return unflagged_gaps_; }
 
   /// Pose received to last byte of the frame here, ms; frames without a pose are left out.

@@ -119,7 +119,7 @@ struct StreamTerms {
 /// Pixels stay valid until the next receive().
 struct ReceivedFrame {
   /// Set here: kFlagPartial when fragments are missing, kFlagCorrupt when none is but the checksum
-  /// is wrong, kFlagLostBefore when of frames before this one nothing came (UDP).
+  /// is wrong, kFlagLostBefore with frames_lost_before.
   protocol::FrameHeader header;
   std::span<const float> pixels;     ///< width_px * height_px; missing pixels are 0
   std::uint64_t missing_px = 0;      ///< of a partial frame
@@ -128,17 +128,19 @@ struct ReceivedFrame {
   bool header_known = true;
   std::uint32_t repaired_fragments = 0;  ///< brought back by error correction
   std::uint32_t resent_fragments = 0;    ///< that this client asked for again
-  std::uint64_t encoded_bytes = 0;       ///< of the pixels on their way; 0: raw
-  std::int64_t first_byte_ns = 0;        ///< wall (TAI), when this client began to have it
+  /// UDP: sent between the frame handed out before and this one, and lost or unusable.
+  std::uint32_t frames_lost_before = 0;
+  std::uint64_t encoded_bytes = 0;  ///< of the pixels on their way; 0: raw
+  std::int64_t first_byte_ns = 0;   ///< wall (TAI), when this client began to have it
   std::int64_t last_byte_ns = 0;
 };
 
 struct ReceiveCounters {
   std::uint64_t received = 0;  ///< complete frames
   std::uint64_t partial = 0;   ///< delivered with missing pixels
-  std::uint64_t lost = 0;      ///< frame numbers never seen and not announced by kFlagGapBefore
+  std::uint64_t lost = 0;      ///< frames that did not come and were not announced as skipped
   std::uint64_t gaps = 0;      ///< announced skips (frames with kFlagGapBefore)
-  std::uint64_t skipped = 0;   ///< frame numbers missing at announced skips
+  std::uint64_t skipped = 0;   ///< frame numbers missing at announced skips, less what was lost
   std::uint64_t crc_errors = 0;
   std::uint64_t os_drops = 0;  ///< datagrams the kernel dropped for want of buffer space
   std::uint64_t bad_datagrams = 0;

@@ -393,6 +393,7 @@ const ReceivedFrame* FrameClientImpl::pop_udp() {
   frame_.header_known = held_->header_known;
   frame_.repaired_fragments = held_->repaired_fragments;
   frame_.resent_fragments = held_->resent_fragments;
+  frame_.frames_lost_before = held_->frames_lost_before;
   frame_.last_byte_ns = clock_.tai_ns();
   frame_.first_byte_ns = burst_begin_ns_ != 0 ? burst_begin_ns_ : frame_.last_byte_ns;
   burst_begin_ns_ = 0;
@@ -408,9 +409,9 @@ const ReceivedFrame* FrameClientImpl::pop_udp() {
   account_.counters.unrepairable = work.groups_unrepairable;
   account_.counters.resent = work.fragments_resent;
   if (held_->header_known) {
-    account_.take(frame_.header);
+    account_.take(frame_.header, frame_.frames_lost_before);
   } else {
-    account_.take_unknown();
+    account_.take_unknown(frame_.frames_lost_before);
   }
   return &frame_;
 }

@@ -6,6 +6,7 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -102,15 +103,16 @@ std::string congestion_control_of(int fd) {
 
 /// BBR sends at the rate it has seen: frames that come in bursts are spread out, and every ten
 /// seconds it looks for a shorter path with four packets at a time (Cardwell et al., BBR:
-/// Congestion-Based Congestion Control, 2016). Before listen(): a connection that was paced once
-/// stays so.
-void avoid_pacing(int fd) noexcept {
-  if (!congestion_control_of(fd).starts_with("bbr")) {
-    return;
-  }
-  for (const std::string_view name : {"cubic", "reno"}) {  // not every user may have every one
+/// Congestion-Based Congestion Control, 2016). Before listen(): a connection that BBR paced once
+/// stays so. Others are set as well, to what they are: accepted sockets have only what was set,
+/// else the system's choice of then.
+void choose_congestion_control(int fd, const std::string& system) noexcept {
+  const bool bbr = system.starts_with("bbr");
+  const std::array<std::string_view, 2> wanted{bbr ? "cubic" : std::string_view(system), "reno"};
+  for (const std::string_view name : wanted) {  // not every user may have every one
     if (::setsockopt(fd, IPPROTO_TCP, TCP_CONGESTION, name.data(),
-                     static_cast<socklen_t>(name.size())) == 0) {
+                     static_cast<socklen_t>(name.size())) == 0 ||
+        !bbr) {
       return;
     }
   }
@@ -311,11 +313,21 @@ IoResult TcpSocket::write_some(std::span<const std::span<const std::byte>> piece
 
 // TcpListener
 
+std::string system_congestion_control() {
+  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  std::string name = congestion_control_of(fd);
+  if (fd >= 0) {
+    ::close(fd);
+  }
+  return name;
+}
+
 struct TcpListener::Impl {
   explicit Impl(std::shared_ptr<asio::io_context> shared)
       : context(std::move(shared)), acceptor(*context) {}
   std::shared_ptr<asio::io_context> context;  // outlives the acceptor
   tcp::acceptor acceptor;
+  std::string system_congestion_control;
 };
 
 TcpListener::TcpListener() noexcept = default;
@@ -335,7 +347,8 @@ physics::Result<TcpListener> TcpListener::open(const SocketContext& context,
       return failure("", address, "socket: " + error_text(error.value()));
     }
     wish(impl->acceptor, tcp::acceptor::reuse_address(true));
-    avoid_pacing(impl->acceptor.native_handle());
+    impl->system_congestion_control = congestion_control_of(impl->acceptor.native_handle());
+    choose_congestion_control(impl->acceptor.native_handle(), impl->system_congestion_control);
     impl->acceptor.bind(endpoint, error);
     if (!error) {
       impl->acceptor.listen(kBacklog, error);
@@ -355,8 +368,8 @@ SocketAddress TcpListener::local_address() const noexcept {
   return impl_ ? local_address_of(impl_->acceptor) : SocketAddress{};
 }
 
-std::string TcpListener::congestion_control() const {
-  return congestion_control_of(fd());
+CongestionControl TcpListener::congestion_control() const {
+  return {congestion_control_of(fd()), impl_ ? impl_->system_congestion_control : std::string()};
 }
 
 TcpSocket TcpListener::accept(SocketAddress& peer) {

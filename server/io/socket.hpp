@@ -95,6 +95,14 @@ class TcpSocket {
                                   std::span<const std::span<const std::byte>> pieces) noexcept;
 inline constexpr std::size_t kMaxLentPieces = 64;
 
+/// Who decides how fast TCP sends, as the kernel names it; empty: unknown.
+struct CongestionControl {
+  std::string chosen;
+  std::string system;  ///< what it would have been
+};
+/// What new sockets have. Empty: unknown.
+[[nodiscard]] std::string system_congestion_control();
+
 /// Thread: one owner.
 class TcpListener {
  public:
@@ -103,15 +111,15 @@ class TcpListener {
   TcpListener& operator=(TcpListener&& other) noexcept;
   ~TcpListener();
 
-  /// Its connections send as fast as the path takes what they have: where the system's congestion
-  /// control paces (bbr), they have cubic, or reno where cubic is not allowed.
+  /// Its connections have the congestion control that the system has now; where that is BBR, which
+  /// paces, cubic, or reno where cubic is not allowed. A route's own (`congctl`) goes before both.
   /// Errors (io): address in use and so on, naming the address.
   [[nodiscard]] static physics::Result<TcpListener> open(const SocketContext& context,
                                                          const SocketAddress& address);
   [[nodiscard]] int fd() const noexcept;
   [[nodiscard]] SocketAddress local_address() const noexcept;
-  /// Of its connections, as the kernel names it; empty: unknown.
-  [[nodiscard]] std::string congestion_control() const;
+  /// Of its connections.
+  [[nodiscard]] CongestionControl congestion_control() const;
   /// Next connection; closed when there is none now. Throws std::bad_alloc.
   [[nodiscard]] TcpSocket accept(SocketAddress& peer);
 

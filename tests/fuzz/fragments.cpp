@@ -32,6 +32,8 @@ void check(const protocol::ReceivedFrame& frame) {
   fuzz::require(frame.complete == (missing == 0), "complete: nothing is missing");
   fuzz::require(((header.flags & protocol::kFlagPartial) != 0) == !frame.complete,
                 "partial frames are flagged");
+  fuzz::require(((header.flags & protocol::kFlagLostBefore) != 0) == (frame.frames_lost_before > 0),
+                "frames after lost ones are flagged");
   fuzz::require(frame.complete || !frame.crc_ok, "only complete frames have a checksum");
   fuzz::require(frame.validity.all(0, frame.pixels.size()) == frame.complete,
                 "rows tell the same as pixels");

@@ -162,6 +162,9 @@ TEST(CliBench, StreamMeasuresOnlyWhatIsNamed) {
   EXPECT_EQ(numbers_of(json, "ratio").size(), 1U);
   EXPECT_EQ(json.find("zeromq"), std::string::npos) << "not even as something to compare with";
   EXPECT_EQ(run_emit({"bench", "stream", "--only", "pigeon"}).exit_code, 2);
+  EXPECT_EQ(run_emit({"bench", "stream", "--only", "tcp", "--repeats", "0"}).exit_code, 2);
+  EXPECT_EQ(run_emit({"bench", "stream", "--only", "tcp", "--loss", "0.01"}).exit_code, 2);
+  EXPECT_EQ(run_emit({"bench", "stream", "--only", "tcp", "--transport", "udp"}).exit_code, 2);
 }
 
 TEST(CliBench, IsolationComparesPairsOfRunsBesideARunAgainstItself) {

@@ -40,8 +40,9 @@ struct Outcome {
   std::uint64_t wrong_in_partial = 0;
   std::uint64_t unflagged_missing = 0;
   std::uint64_t out_of_order = 0;
-  std::uint64_t lost_before = 0;  ///< frames that say so
-  std::uint64_t untold_gaps = 0;  ///< frames after missing numbers that do not
+  std::uint64_t lost_before = 0;     ///< frames that say so
+  std::uint64_t unflagged_lost = 0;  ///< frames_lost_before without the flag, or the other way
+  std::uint64_t untold_gaps = 0;     ///< frames before which more is missing than they say
   ReceiveCounters counters;
   FaultInjector::Counts network;
   std::uint64_t relay_drops = 0;
@@ -52,8 +53,9 @@ void play(const Setup& setup, Outcome& out) {
   const ScratchFolder folder;
   DaemonProcess daemon(
       folder,
-      {"--config", folder.write("emitd.toml",
-                                test::canned_config(kWidthPx, kHeightPx, "mode = \"host-step\""))});
+      {"--config",
+       folder.write("emitd.toml", test::canned_config(kWidthPx, kHeightPx, "mode = \"host-step\"",
+                                                      "[stream]\nqueue_frames = 13"))});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
   config::SourceConfig pattern;
   pattern.canned_width_px = kWidthPx;
@@ -79,7 +81,8 @@ void play(const Setup& setup, Outcome& out) {
   ASSERT_TRUE(host.has_value()) << host.error().text;
 
   std::uint64_t newest = 0;
-  std::uint64_t nameless = 0;  // since then: came without a number
+  std::uint64_t nameless = 0;         // since then: came without a number
+  std::uint64_t lost_on_the_way = 0;  // since then
   const auto look = [&](const ReceivedFrame& frame) {
     ++out.came;
     const bool partial = (frame.header.flags & protocol::kFlagPartial) != 0;
@@ -87,18 +90,22 @@ void play(const Setup& setup, Outcome& out) {
     out.partial += partial ? 1 : 0;
     out.corrupt += corrupt ? 1 : 0;
     out.unflagged_missing += partial != (frame.missing_px > 0) ? 1 : 0;
+    const bool lost_before = (frame.header.flags & protocol::kFlagLostBefore) != 0;
+    out.lost_before += lost_before ? 1 : 0;
+    out.unflagged_lost += lost_before != (frame.frames_lost_before > 0) ? 1 : 0;
+    lost_on_the_way += frame.frames_lost_before;
     ASSERT_EQ(frame.pixels.size(), images[0].size());
     if (!frame.header_known) {
       ASSERT_TRUE(partial || corrupt);
       ++nameless;
       return;
     }
-    const bool told =
-        (frame.header.flags & (protocol::kFlagLostBefore | protocol::kFlagGapBefore)) != 0;
-    out.lost_before += (frame.header.flags & protocol::kFlagLostBefore) != 0 ? 1 : 0;
     // Of what was lost before the first one nobody knows.
-    out.untold_gaps +=
-        newest > 0 && frame.header.frame_number > newest + nameless + 1 && !told ? 1 : 0;
+    if (newest > 0 && frame.header.frame_number > newest) {
+      const std::uint64_t missing = frame.header.frame_number - newest - 1;
+      out.untold_gaps += missing > nameless + lost_on_the_way ? 1 : 0;
+    }
+    lost_on_the_way = 0;
     nameless = 0;
     out.out_of_order += frame.header.frame_number <= newest ? 1 : 0;
     newest = std::max(newest, frame.header.frame_number);
@@ -165,7 +172,7 @@ TEST(DaemonLossy, WithoutItEveryPartialFrameIsFlaggedAndItsValidPixelsAreRight) 
   EXPECT_EQ(out.whole + out.partial, out.came);
   EXPECT_GE(out.came, kFrames - 2) << "partial frames are handed out, not dropped";
   EXPECT_LE(out.lost_before, 2U);
-  EXPECT_EQ(out.untold_gaps, 0U);
+  EXPECT_EQ(out.untold_gaps + out.unflagged_lost, 0U);
   EXPECT_EQ(out.counters.partial, out.partial);
   EXPECT_EQ(out.wrong_unflagged + out.wrong_in_partial + out.unflagged_missing, 0U);
   EXPECT_EQ(out.counters.repaired + out.counters.resent, 0U);
@@ -206,7 +213,11 @@ TEST(DaemonLossy, FramesOfWhichNothingCameAreToldByTheNextOne) {
   EXPECT_LT(out.came, kFrames - 5);
   EXPECT_GT(out.lost_before, 5U);
   EXPECT_LE(out.lost_before, kFrames - out.came) << "each for one that is missing, at least";
-  EXPECT_EQ(out.untold_gaps, 0U);
+  EXPECT_EQ(out.untold_gaps + out.unflagged_lost, 0U);
+  // But for the last ones, after which nothing came.
+  EXPECT_LE(out.counters.lost, kFrames - out.came);
+  EXPECT_GE(out.counters.lost + 12, kFrames - out.came);
+  EXPECT_EQ(out.counters.skipped, 0U);
   EXPECT_EQ(out.wrong_unflagged + out.wrong_in_partial + out.unflagged_missing, 0U);
 }
 

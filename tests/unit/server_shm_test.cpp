@@ -90,6 +90,7 @@ class Ring {
     }
     protocol::FrameHeader header;
     header.frame_number = number_;
+    header.flags = protocol::kReceiverFlags;  // not a sender's to say: readers drop them
     client_->begin(header, image_, clock_.tai_ns());
   }
   [[nodiscard]] SenderClient::Progress send(SenderClient::Turn turn = SenderClient::Turn::full) {

@@ -40,7 +40,7 @@ enum FrameFlags : std::uint32_t {
   kFlagTimeUnset = 1u << 11,     ///< kernel TAI offset unknown: wall instants are UTC
   kFlagTriggerFault = 1u << 12,  ///< trigger late, or others before it missing or refused
   kFlagCorrupt = 1u << 13,     ///< set by a receiver: nothing is missing, but the checksum is wrong
-  kFlagLostBefore = 1u << 14,  ///< set by a receiver: frames before this one were lost on the way
+  kFlagLostBefore = 1u << 14,  ///< set by a receiver: frames before it were lost on the way
 };
 /// What a receiver alone can say: it drops these where a sender claims them.
 inline constexpr std::uint32_t kReceiverFlags = kFlagPartial | kFlagCorrupt | kFlagLostBefore;

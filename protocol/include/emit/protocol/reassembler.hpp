@@ -31,7 +31,7 @@ class PixelValidity {
 
 /// A frame put together from fragments; valid until it is released.
 struct ReceivedFrame {
-  FrameHeader header;  ///< kFlagPartial set when pixels are missing
+  FrameHeader header;  ///< kFlagPartial: pixels are missing; kFlagLostBefore: frames_lost_before
   std::uint16_t stream_id = 0;
   std::uint32_t frame_id = 0;
   /// False: both copies of the header were lost. Size, format, band and channel are then those of
