@@ -59,9 +59,9 @@ class SlowClient final : public SenderClient {
 };
 
 TEST(Compression, IsForWhenNobodyElseHasAnythingToSend) {
+  SlowClient slow;  // the sender lets go of it last
   ChannelClients rig;
   rig.sender().allow_compression();
-  SlowClient slow;
   const auto& peer = rig.connect(kAll, 1, true);
   rig.add(slow);
   rig.publish(1);
