@@ -311,8 +311,6 @@ IoResult TcpSocket::write_some(std::span<const std::span<const std::byte>> piece
   return to_result(error, sent);
 }
 
-// TcpListener
-
 std::string system_congestion_control() {
   const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   std::string name = congestion_control_of(fd);
@@ -321,6 +319,8 @@ std::string system_congestion_control() {
   }
   return name;
 }
+
+// TcpListener
 
 struct TcpListener::Impl {
   explicit Impl(std::shared_ptr<asio::io_context> shared)
