@@ -270,5 +270,66 @@ TEST(RendererCachedWeather, BodiesThatTheHostMovesMeanwhileKeepTheirShade) {
   EXPECT_GT(warmest - coldest, 0.5F);
 }
 
+TEST(RendererCachedWeather, GroundThatAPlateHasJustLeftStartsFromItsOwnState) {
+  // The host holds a plate over the ground and takes it away right before an interval of 20 s
+  // ends; the ground is of the next one again when, within it, the sun goes. Beside a plate that
+  // flies by script, in intervals of a second.
+  auto scenario = cached_scenario(write_quads("ground", fine_ground(12.0, 0.5)));
+  scene::ObjectDesc plate = scenario.objects.front();
+  plate.name = "plate";
+  plate.gltf = write_quads("plate", {ground(3.0, 3.0)});
+  plate.entity_id = 7;
+  const std::int64_t start_ns = 2 * kHourNs;
+  const std::int64_t comes_ns = start_ns + 28 * kSecondNs;
+  const std::int64_t goes_ns = start_ns + 39 * kSecondNs;
+  const std::int64_t event_ns = start_ns + 48 * kSecondNs;
+  const std::int64_t end_ns = start_ns + 70 * kSecondNs;
+  const auto placed = [&](double x_m) {
+    physics::Pose pose = plate.instances.front();
+    pose.position_world_m = {x_m, 0.0, 3.0};
+    return pose;
+  };
+  const auto away = placed(300.0);
+  const auto there = placed(0.0);
+  plate.instances = {away};
+  const auto run_with = [&](bool host) {
+    auto s = scenario;
+    s.objects.push_back(plate);
+    if (!host) {
+      s.objects.back().trajectory = {{start_ns, away},     {comes_ns - 1, away}, {comes_ns, there},
+                                     {goes_ns - 1, there}, {goes_ns, away},      {end_ns, away}};
+      s.thermal.first_step_s = 1.0;
+    }
+    Session run(s);
+    const auto pose = looking({0.0, -0.01, 20.0}, {0.0, 0.0, 0.0});
+    std::vector<std::vector<float>> out;
+    for (std::int64_t now_ns = start_ns; now_ns < end_ns; now_ns += kFrameNs) {
+      if (host) {
+        const bool is_there = now_ns >= comes_ns && now_ns < goes_ns;
+        const renderer::EntityUpdate update{7, is_there ? there : away, true, false};
+        EXPECT_EQ(run.renderer().apply_entities(now_ns, {&update, 1}), 1U);
+      }
+      if (now_ns == event_ns) {
+        EXPECT_TRUE(run.renderer().apply_weather(weather_at(scenario, now_ns, 0.0)));
+      }
+      auto frame = run.frame_k(now_ns, pose);
+      if (now_ns >= goes_ns && (now_ns - goes_ns) % (5 * kSecondNs) == 0) {
+        out.push_back(std::move(frame));
+      }
+    }
+    return out;
+  };
+  const auto driven = run_with(true);
+  const auto scripted = run_with(false);
+  const auto [coldest, warmest] = std::ranges::minmax(driven.front());
+  EXPECT_GT(warmest - coldest, 0.5F);  // the print is in the pictures
+  for (std::size_t i = 1; i < driven.size(); ++i) {
+    const Difference off = difference(driven[i], scripted[i]);
+    // Right after the event it is taken in, over frames.
+    const bool settles = i == 2;
+    EXPECT_LT(off.p99_k, settles ? 0.12 : 0.06) << i;
+  }
+}
+
 }  // namespace
 }  // namespace emit::test
