@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 namespace emit::threads {
@@ -48,6 +50,26 @@ SoftwareThreads::Naming::~Naming() {
 SoftwareThreads SoftwareThreads::find() {
   SoftwareThreads found;
   found.cores_ = CoreSet::of(0);
+  const auto cores = static_cast<std::size_t>(found.cores_.count());
+  if (cores < 2) return found;
+  // Those that draw name themselves when they first run, as do others of Mesa, which on a busy host
+  // is later than this.
+  constexpr int kMostLooks = 500;
+  const auto fit = [&] { return found.raster_.size() == cores && found.compute_.size() == cores; };
+  for (int look = 0; look < kMostLooks; ++look) {
+    found.look_for_them();
+    if (fit() || found.raster_.size() + found.compute_.size() < 2 * cores) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  if (found.raster_.size() != cores) found.raster_.clear();
+  if (found.compute_.size() != cores) found.compute_.clear();
+  spread_over(found.cores_, found.compute_);
+  return found;
+}
+
+void SoftwareThreads::look_for_them() {
+  raster_.clear();
+  compute_.clear();
   std::vector<std::pair<int, pid_t>> raster;  // number, thread
   std::error_code error;
   for (std::filesystem::directory_iterator task("/proc/self/task", error), end;
@@ -55,22 +77,13 @@ SoftwareThreads SoftwareThreads::find() {
     const pid_t thread = number_in(task->path().filename().string());
     std::string name;
     if (thread <= 0 || !std::getline(std::ifstream(task->path() / "comm"), name)) continue;
-    if (name == kComputeName) found.compute_.push_back(thread);
+    if (name == kComputeName) compute_.push_back(thread);
     if (!name.starts_with(kRasterName)) continue;
     raster.emplace_back(number_in(std::string_view(name).substr(kRasterName.size())), thread);
   }
   std::ranges::sort(raster);
-  for (const auto& [number, thread] : raster) found.raster_.push_back(thread);
-  std::ranges::sort(found.compute_);
-
-  const auto cores = static_cast<std::size_t>(found.cores_.count());
-  const auto fits = [cores](const std::vector<pid_t>& threads) {
-    return cores > 1 && threads.size() == cores;
-  };
-  if (!fits(found.raster_)) found.raster_.clear();
-  if (!fits(found.compute_)) found.compute_.clear();
-  spread_over(found.cores_, found.compute_);
-  return found;
+  for (const auto& [number, thread] : raster) raster_.push_back(thread);
+  std::ranges::sort(compute_);
 }
 
 void SoftwareThreads::leave_core_to_caller() const noexcept {

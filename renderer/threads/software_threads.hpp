@@ -31,7 +31,8 @@ class SoftwareThreads {
 
   SoftwareThreads() = default;
   /// Those of this process that Mesa started under a Naming; none unless there are as many as the
-  /// caller has cores, at least two. Gives each compute thread its core.
+  /// caller has cores, at least two. Gives each compute thread its core. Waits until they have
+  /// their names, half a second at most.
   [[nodiscard]] static SoftwareThreads find();
 
   /// Around draws: while the caller submits them, tiles are filled on the other cores; while it
@@ -43,6 +44,8 @@ class SoftwareThreads {
   [[nodiscard]] const std::vector<pid_t>& compute() const noexcept { return compute_; }
 
  private:
+  void look_for_them();
+
   CoreSet cores_;
   std::vector<pid_t> raster_;   ///< in the order of their numbers
   std::vector<pid_t> compute_;  ///< ascending
