@@ -46,6 +46,7 @@ add_library(emit_server STATIC
   agents/receiver_access.cpp agents/receiver_connection.cpp
   agents/receiver_session.cpp
   agents/receiver_udp.cpp
+  agents/older_journal.cpp
   agents/recorder.cpp
   agents/render_agent.cpp
   agents/renderer_source.cpp

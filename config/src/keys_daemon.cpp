@@ -203,8 +203,10 @@ const KeyTable<MetricsConfig>& metrics_keys() {
 
 const KeyTable<JournalConfig>& journal_keys() {
   static const KeyTable<JournalConfig> keys = {
-      path<JournalConfig>("file", EMIT_FIELD(file),
-                          "Journal written while running; absent: only for a recorder that asks."),
+      path<JournalConfig>(
+          "file", EMIT_FIELD(file),
+          "Journal written while running; one of an earlier process is kept under another name. "
+          "Absent: only for a recorder that asks."),
       integer<JournalConfig>("ring_entries", "", 64, 1048576, EMIT_FIELD(ring_entries),
                              "Entries between the frame loop and the journal's writer."),
   };

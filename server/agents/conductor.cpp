@@ -125,6 +125,7 @@ bool Conductor::can_issue() noexcept {
 Conductor::Issued& Conductor::next_issued() noexcept {
   Issued& issued = issued_[(issued_first_ + issued_count_) % kMaxIssued];
   issued.header = {};
+  issued.entities_behind = false;
   issued.entity_count = 0;
   return issued;
 }
@@ -161,6 +162,7 @@ void Conductor::issue_host_step(bool is_step, std::int64_t received_ns) noexcept
     add_update(job, *found, newest.pose, newest.sim_time_ns);
   }
   touched_.erase(touched_.begin(), touched_.begin() + static_cast<std::ptrdiff_t>(applied));
+  issued.entities_behind = !touched_.empty();
   issued.header.pose_sim_time_ns = host_sim_time_ns_;
   issued.header.host_received_ns = received_ns;
   if (options_.pacing.budget_ns > 0) {
@@ -211,7 +213,8 @@ void Conductor::issue_slotted() noexcept {
       const PoseSample placed = body.track.sample(sample.shown_ns, options_.pacing.horizon_ns);
       add_update(job, body, placed.pose, placed.base_ns);
     }
-    next_entity_ = count < entities_.size() ? (next_entity_ + count) % entities_.size() : 0;
+    issued.entities_behind = count < entities_.size();
+    next_entity_ = issued.entities_behind ? (next_entity_ + count) % entities_.size() : 0;
   }
   slots_.issued();
   issue(job, issued, control_.step_pending());
@@ -236,7 +239,7 @@ void Conductor::issue(RenderJob& job, Issued& issued, bool is_step) noexcept {
   header.predictions = prediction_.measured();
   header.flags |= (control_.held() ? protocol::kFlagHold : 0U) |
                   (options_.canned ? protocol::kFlagCanned : 0U) |
-                  (options_.tai_unset ? protocol::kFlagTimeUnset : 0U);
+                  (context_.clock.tai_offset_unset() ? protocol::kFlagTimeUnset : 0U);
   job.deadline_ns = header.deadline_ns;
   issued.thermal_time_ns = job.request.thermal_time_ns;
   issued.entity_count = job.entity_count;
@@ -344,8 +347,12 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
     header.estimated_error_k = done.estimated_error_k;
     context_.counters.add(Counter::frames_shed);
   }
-  if (done.dropped_poses > 0 || done.coarse) {
-    // How much the coarser past, or surface, matters depends on what it shaded: nobody knows.
+  if (issued.entities_behind) {
+    context_.counters.add(Counter::frames_entities_behind);
+  }
+  if (done.dropped_poses > 0 || done.coarse || issued.entities_behind) {
+    // How much the coarser past or surface, or an entity that stands where it was a frame ago,
+    // matters depends on what it shaded: nobody knows.
     header.flags |= protocol::kFlagDegraded;
     header.estimated_error_k = std::numeric_limits<float>::quiet_NaN();
   }

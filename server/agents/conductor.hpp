@@ -29,7 +29,6 @@ class Conductor final : public Agent {
   struct Options {
     config::PacingConfig pacing;
     bool canned = false;
-    bool tai_unset = false;
   };
   /// `triggers`: of pacing mode trigger, which needs them; read on the agent's thread.
   Conductor(Context& context, const ScenarioTracks& scenario, const Options& options,
@@ -54,6 +53,7 @@ class Conductor final : public Agent {
   struct Issued {
     protocol::FrameHeader header;
     std::int64_t thermal_time_ns = 0;
+    bool entities_behind = false;  ///< there were more than one frame takes
     std::uint32_t entity_count = 0;
     std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
   };

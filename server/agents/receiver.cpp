@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cstring>
 #include <exception>
 #include <new>
 
@@ -17,6 +18,8 @@ namespace {
 constexpr std::uint64_t kListenerKey = ~std::uint64_t{0};
 constexpr std::uint64_t kUdpKey = ~std::uint64_t{0} - 1;
 constexpr std::int64_t kHelloTimeoutNs = 5'000'000'000;
+/// Before the listener is asked again.
+constexpr std::int64_t kAcceptPauseNs = 100'000'000;
 /// What a peer may leave unread of our answers.
 constexpr std::size_t kMaxQueuedBytes = 256u << 10;
 constexpr std::uint32_t kMaxMisbehaved = 1000;
@@ -107,18 +110,24 @@ SocketAddress Receiver::host_address() const noexcept {
 }
 
 bool Receiver::on_start() noexcept {
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.u64 = kListenerKey;
-  if (!epoll_ || ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, listener_.fd(), &event) != 0) {
+  if (!epoll_ || !watch_listener()) {
     return false;
   }
   if (udp_) {
+    epoll_event event{};
+    event.events = EPOLLIN;
     event.data.u64 = kUdpKey;
     udp_watched_ = ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, udp_.fd(), &event) == 0;
     return udp_watched_;
   }
   return true;
+}
+
+bool Receiver::watch_listener() noexcept {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = kListenerKey;
+  return ::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, listener_.fd(), &event) == 0;
 }
 
 void Receiver::on_stop() noexcept {
@@ -142,6 +151,7 @@ int Receiver::do_work(std::int64_t now_ns) noexcept {
   try {
     work += take_released();
     work += take_replies();
+    resume_accepting(now_ns);
     std::array<epoll_event, 32> events{};
     const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
     for (int i = 0; i < count; ++i) {
@@ -209,13 +219,41 @@ int Receiver::accept_connections(std::int64_t now_ns) {
   constexpr int kMaxPerTurn = 8;
   for (; work < kMaxPerTurn; ++work) {
     SocketAddress peer;
-    TcpSocket socket = listener_.accept(peer);
+    int error = 0;
+    TcpSocket socket = listener_.accept(peer, error);
+    if (error != 0) {
+      pause_accepting(now_ns, error);
+    }
     if (!socket) {
       break;
     }
-    static_cast<void>(admit(std::move(socket), peer, now_ns));
+    static_cast<void>(admit(std::move(socket), peer));
   }
   return work;
+}
+
+/// Out of descriptors or memory: whoever knocks waits in the kernel, and the listener, which stays
+/// readable, must not keep this agent turning.
+void Receiver::pause_accepting(std::int64_t now_ns, int error) noexcept {
+  ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, listener_.fd(), nullptr);
+  accept_again_ns_ = context_.clock.monotonic_ns() + kAcceptPauseNs;
+  wake_at_ns_ = std::min(wake_at_ns_, now_ns + kAcceptPauseNs);
+  context_.receiver_events.push(
+      EventKind::refused, static_cast<std::uint64_t>(StatusCode::overloaded),
+      context_.counters.add(Counter::refused_overloaded), std::strerror(error));
+}
+
+void Receiver::resume_accepting(std::int64_t now_ns) noexcept {
+  if (accept_again_ns_ == 0) {
+    return;
+  }
+  const std::int64_t wait_ns = accept_again_ns_ - context_.clock.monotonic_ns();
+  if (wait_ns > 0 || !watch_listener()) {
+    wake_at_ns_ = std::min(wake_at_ns_,
+                           now_ns + std::clamp(wait_ns, std::int64_t{1'000'000}, kAcceptPauseNs));
+    return;
+  }
+  accept_again_ns_ = 0;
 }
 
 int Receiver::read(Connection& connection, std::int64_t now_ns) {
@@ -345,15 +383,16 @@ void Receiver::check_timeouts(std::int64_t now_ns) noexcept {
       wake_at_ns_ = std::min(wake_at_ns_, now_ns + std::max<std::int64_t>(wait_ns, 0));
     }
     if (!connection->welcomed || connection->flush_close) {
-      const std::int64_t end_ns = connection->since_ns + kHelloTimeoutNs;
-      if (now_ns >= end_ns) {
+      const std::int64_t left_ns =
+          connection->since_ns + kHelloTimeoutNs - context_.clock.monotonic_ns();
+      if (left_ns <= 0) {
         if (connection->handshaking) {
           context_.counters.add(Counter::handshakes_failed);
         }
         close(*connection, connection->handshaking ? "TLS handshake not done within 5 s"
                                                    : "no hello within 5 s");
       } else {
-        wake_at_ns_ = std::min(wake_at_ns_, end_ns);
+        wake_at_ns_ = std::min(wake_at_ns_, now_ns + left_ns);
       }
     }
   }

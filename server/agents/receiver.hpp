@@ -96,6 +96,9 @@ class Receiver final : public Agent {
                        std::uint64_t count, const std::string& text) noexcept;
 
   // TCP (receiver.cpp, receiver_session.cpp).
+  [[nodiscard]] bool watch_listener() noexcept;
+  void pause_accepting(std::int64_t now_ns, int error) noexcept;
+  void resume_accepting(std::int64_t now_ns) noexcept;
   int accept_connections(std::int64_t now_ns);
   int read(Connection& connection, std::int64_t now_ns);
   int parse(Connection& connection, std::int64_t now_ns);
@@ -110,7 +113,7 @@ class Receiver final : public Agent {
                                                               Transport transport,
                                                               config::Port port) const;
   /// True when the connection was taken into the table.
-  bool admit(TcpSocket socket, const SocketAddress& peer, std::int64_t now_ns);
+  bool admit(TcpSocket socket, const SocketAddress& peer);
   void fill_welcome(v1::Welcome& welcome) const;
   void take_hello(Connection& connection, const v1::ControlRecord& record);
   void take_subscribe(Connection& connection, const v1::ControlRecord& record);
@@ -143,6 +146,7 @@ class Receiver final : public Agent {
   UdpSocket udp_;
   std::unique_ptr<UdpMemory> udp_memory_;
   bool udp_watched_ = false;
+  std::int64_t accept_again_ns_ = 0;  // monotonic; 0: the listener is watched
   std::uint32_t os_drops_seen_ = 0;
   std::optional<TlsContext> tls_;
   std::unique_ptr<HostSessions> sessions_;  // null: bare datagrams are taken

@@ -76,7 +76,7 @@ std::size_t Receiver::handshakes() const noexcept {
       [](const auto& connection) { return connection->open() && connection->handshaking; }));
 }
 
-bool Receiver::admit(TcpSocket socket, const SocketAddress& peer, std::int64_t now_ns) {
+bool Receiver::admit(TcpSocket socket, const SocketAddress& peer) {
   const config::IpAddress ip = ip_of(peer);
   if (!may_connect(ip)) {
     turn_away(PeerRefusal::not_allowed, Counter::peers_refused, ip);
@@ -140,7 +140,7 @@ bool Receiver::admit(TcpSocket socket, const SocketAddress& peer, std::int64_t n
   connection.misbehaved = 0;
   connection.pace =
       ReadPace(config_.access.max_host_frames_hz + config_.access.max_control_records_hz);
-  connection.since_ns = now_ns;
+  connection.since_ns = context_.clock.monotonic_ns();
   connection.out.clear();
   connection.out_sent = 0;
   epoll_event event{};

@@ -31,7 +31,7 @@ struct Receiver::Connection {
   bool agreed_key = false;   ///< sessions_ knows the key of this connection
   std::uint32_t misbehaved = 0;
   ReadPace pace;
-  std::int64_t since_ns = 0;
+  std::int64_t since_ns = 0;                     ///< monotonic
   std::optional<protocol::RecordParser> parser;  ///< taken on connecting: a large buffer
   std::vector<std::byte> out;
   std::size_t out_sent = 0;

@@ -345,6 +345,15 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
                                                                   : v1::COMPRESSION_NONE);
   answer.mutable_subscribed()->set_every_nth(params.every_nth * channel->every_nth);
   const bool udp = params.udp;
+  if (!udp) {
+    // From here on the sender writes: what is still queued goes first.
+    params.first_bytes.assign(
+        connection.out.begin() + static_cast<std::ptrdiff_t>(connection.out_sent),
+        connection.out.end());
+    protocol::append_control_record(answer, params.first_bytes);
+  }
+  // Before anything is said or marked: there may be no memory for it.
+  auto client = std::make_unique<SocketClient>(std::move(params));
   if (udp) {
     queue(connection, answer);
     flush(connection);
@@ -352,18 +361,13 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
       return;
     }
   } else {
-    // From here on the sender writes: what is still queued goes first.
-    params.first_bytes.assign(
-        connection.out.begin() + static_cast<std::ptrdiff_t>(connection.out_sent),
-        connection.out.end());
-    protocol::append_control_record(answer, params.first_bytes);
     connection.out.clear();
     connection.out_sent = 0;
     connection.write_lent = true;
     connection.dirty = true;
   }
   connection.lent = true;
-  connection.client = std::make_unique<SocketClient>(std::move(params));
+  connection.client = std::move(client);
   static_cast<void>(context_.to_sender.push(
       {ClientCommand::Kind::add, connection.key(), connection.client.get()}));
   context_.bells.sender.ring();
@@ -464,6 +468,17 @@ physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connec
     if (const int error = socket->set_multicast_interface(target, interface); error != 0) {
       return physics::make_error(ErrorCode::protocol,
                                  fmt::format("group {}: {}", group, error_text(error)));
+    }
+  }
+  // From the address that the client knows: it takes frames from no other.
+  SocketAddress from = connection.socket.local_address();
+  if (from.storage.ss_family != target.storage.ss_family) {
+    from = numeric_address(config::to_string(ip_of(from)), 0);
+  }
+  if (from.storage.ss_family == target.storage.ss_family) {
+    from.set_port(0);
+    if (auto bound = socket->bind(from); !bound) {
+      return tl::unexpected<physics::Error>(std::move(bound.error()));
     }
   }
   if (auto connected = socket->connect(target); !connected) {

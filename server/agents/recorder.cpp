@@ -9,6 +9,7 @@
 
 #include "agents/journal_encode.hpp"
 #include "agents/journal_ring.hpp"
+#include "agents/older_journal.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
 #include "io/socket.hpp"
@@ -23,9 +24,13 @@ Recorder::Recorder(Context& context, config::JournalConfig config, std::size_t m
   peers_.reserve(max_peers);
 }
 
-physics::Result<void> Recorder::open() {
+physics::Result<std::filesystem::path> Recorder::open() {
   if (config_.file.empty()) {
-    return {};
+    return std::filesystem::path();
+  }
+  auto kept = keep_older_journal(config_.file);
+  if (!kept) {
+    return kept;
   }
   protocol::LogWriterOptions options;
   options.software = identity_.software;
@@ -34,7 +39,7 @@ physics::Result<void> Recorder::open() {
     return tl::unexpected<physics::Error>(std::move(writer.error()));
   }
   file_ = std::move(*writer);
-  return {};
+  return kept;
 }
 
 bool Recorder::on_start() noexcept {

@@ -35,8 +35,9 @@ class Recorder final : public Agent {
 
   /// Before start.
   void set_identity(Identity identity) { identity_ = std::move(identity); }
-  /// Opens the journal file, if one is configured. Before start. Errors (io).
-  [[nodiscard]] physics::Result<void> open();
+  /// Opens the journal file, if one is configured. Before start. Returns the name under which that
+  /// of an earlier process is kept, if there was one. Errors (io).
+  [[nodiscard]] physics::Result<std::filesystem::path> open();
 
   [[nodiscard]] std::string_view name() const noexcept override { return "recorder"; }
   [[nodiscard]] bool on_start() noexcept override;

@@ -47,7 +47,7 @@ int RenderAgent::do_work(std::int64_t now_ns) noexcept {
   if (work == 0 && count_ > 0) {
     // The device does not ring; looking again after 50 us costs little beside a frame.
     wake_at_ns_ = now_ns + 50'000;
-    if (context_.clock.monotonic_ns() - in_flight_[first_].submitted_ns > kLongestFrameNs) {
+    if (context_.clock.monotonic_ns() - in_flight_[first_].begun_ns > kLongestFrameNs) {
       lose_device("a frame is not done within 60 s");
     }
   }
@@ -69,6 +69,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       if (count_ == kDepth) {
         return false;
       }
+      const std::int64_t begun_ns = context_.clock.monotonic_ns();
       if (!job_prepared_) {
         apply_weather(*job);
         source_->apply_entities(job->request.sim_time_ns,
@@ -93,8 +94,8 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       }
       starved_ = false;
       job_prepared_ = false;
-      in_flight_[(first_ + count_) % kDepth] = {*slot, now_ns, expected_ms,
-                                                context_.clock.monotonic_ns(), job->channels};
+      in_flight_[(first_ + count_) % kDepth] = {*slot, now_ns, expected_ms, begun_ns,
+                                                job->channels};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;
@@ -187,7 +188,8 @@ bool RenderAgent::finish_oldest() noexcept {
   }
   done->rung = view.rung;
   done->estimated_error_k = view.estimated_error_k;
-  quality_.finished(done->readback_end_ns - oldest.render_start_ns, oldest.expected_ms);
+  // A wall clock that is set must not be taken for a slow device.
+  quality_.finished(context_.clock.monotonic_ns() - oldest.begun_ns, oldest.expected_ms);
   done->device_failed = view.device_failed;
   note_device(view);
   done->image.source = source_.get();

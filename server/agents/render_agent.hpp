@@ -33,8 +33,8 @@ class RenderAgent final : public Agent {
   struct InFlight {
     renderer::SlotIndex slot = 0;
     std::int64_t render_start_ns = 0;
-    double expected_ms = 0.0;       ///< for its rung, by the ladder
-    std::int64_t submitted_ns = 0;  ///< monotonic
+    double expected_ms = 0.0;   ///< for its rung, by the ladder
+    std::int64_t begun_ns = 0;  ///< monotonic; render_start_ns is TAI
     ChannelSet channels = 0;
   };
   /// More than one in flight lets upload of the next overlap with read-back of the last.

@@ -299,8 +299,9 @@ bool Sender::advance(SenderClient& client) noexcept {
     client.next = std::max(client.next, first_);
     const Entry& next = entry(client.next);
     client.in_transit = client.next++;
-    pass_over_unwanted(client);
     client.begin(next.header, next.image, context_.clock.tai_ns());
+    // Behind it: a gap there is for the frame that comes next to tell.
+    pass_over_unwanted(client);
     if (client.waits_for_encoding()) {
       return true;
     }

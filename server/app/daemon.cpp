@@ -171,8 +171,12 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   }
   recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
   recorder_->set_identity(std::move(identity));
-  if (auto opened = recorder_->open(); !opened) {
-    return tl::unexpected<Error>(std::move(opened.error()).with_context("journal.file"));
+  const auto older = recorder_->open();
+  if (!older) {
+    return tl::unexpected<Error>(Error(older.error()).with_context("journal.file"));
+  }
+  if (!older->empty()) {
+    log_->write(LogLevel::info, fmt::format("event=journal_kept file={}", older->string()));
   }
   receiver_->set_identity(
       {software, scenario_name, std::string(pacing_name(config_.pacing.mode)), source.device});
@@ -195,7 +199,6 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   Conductor::Options options;
   options.pacing = config_.pacing;
   options.canned = source.canned;
-  options.tai_unset = clock_.tai_offset_unset();
   conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers_.get());
 
   log_->write(

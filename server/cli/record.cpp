@@ -40,6 +40,7 @@ int run_record(const RecordCommand& command) {
   std::uint64_t host_frames = 0;
   std::uint64_t lost_entries = 0;
   std::uint64_t last_sequence = 0;
+  bool from_the_start = true;
   std::string broken;
   // A killed process loses no more than what came in this time and in one poll.
   constexpr auto kFlushAfter = std::chrono::milliseconds(50);
@@ -66,6 +67,13 @@ int run_record(const RecordCommand& command) {
     if (entries > 0 && entry.sequence() != last_sequence + 1) {
       lost_entries += entry.sequence() - last_sequence - 1;
     }
+    if (entries == 0 && !entry.has_run_start()) {
+      // The daemon keeps some 64 MiB of a run for recorders that come later.
+      from_the_start = false;
+      warn(
+          "the run began longer ago than the daemon remembers: the log does not replay until the "
+          "next run begins");
+    }
     last_sequence = entry.sequence();
     ++entries;
     if (entry.has_frame()) ++frames;
@@ -82,13 +90,16 @@ int run_record(const RecordCommand& command) {
   if (command.json) {
     Json json = Json::object();
     json.set("entries", entries).set("host_frames", host_frames).set("frames", frames);
-    json.set("lost_entries", lost_entries);
+    json.set("lost_entries", lost_entries).set("from_the_start", from_the_start);
     if (auto done = write_json(*command.json, json); !done) return fail(done.error());
   }
   if (!broken.empty()) return fail(kExitFailure, broken);
   if (lost_entries > 0) {
     return fail(kExitFailure,
                 fmt::format("{} journal entries were lost: the log does not replay", lost_entries));
+  }
+  if (!from_the_start) {
+    return fail(kExitFailure, "the log begins in the middle of a run, which does not replay");
   }
   return kExitOk;
 }

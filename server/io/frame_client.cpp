@@ -189,9 +189,10 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
 }
 
 void FrameClientImpl::make_reassembler(std::uint64_t frame_bytes) {
+  receiver_->expect_stream(stream_id_);
   protocol::Reassembler::Params params;
   params.max_payload_bytes = static_cast<std::uint32_t>(frame_bytes);
-  params.max_streams = 2;
+  params.max_streams = 1;
   params.fec = terms_.fec;
   if (terms_.resend) {
     // Frames wait for an older one while it is asked for.
@@ -374,17 +375,9 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
 }
 
 const ReceivedFrame* FrameClientImpl::pop_udp() {
-  for (;;) {
-    held_ = reassembler_->pop();
-    if (held_ == nullptr) {
-      return nullptr;
-    }
-    if (held_->stream_id == stream_id_) {
-      break;
-    }
-    // Somebody else's frames on this port.
-    ++account_.counters.bad_datagrams;
-    reassembler_->release(held_);
+  held_ = reassembler_->pop();
+  if (held_ == nullptr) {
+    return nullptr;
   }
   frame_.header = held_->header;
   frame_.pixels = held_->pixels;

@@ -118,6 +118,23 @@ void choose_congestion_control(int fd, const std::string& system) noexcept {
   }
 }
 
+/// A peer whose machine is gone, or whose network, says nothing: where nothing is under way to it
+/// the kernel asks, and gives up after 25 s. (What is under way is sent again as often as
+/// net.ipv4.tcp_retries2 says. TCP_USER_TIMEOUT would end that sooner, but also the connections of
+/// living peers that do not read.)
+void notice_silence(int fd) noexcept {
+  constexpr int kFirstS = 10;
+  constexpr int kNextS = 5;
+  constexpr int kCount = 3;
+  const auto set = [fd](int level, int name, int value) {
+    static_cast<void>(::setsockopt(fd, level, name, &value, sizeof value));
+  };
+  set(IPPROTO_TCP, TCP_KEEPIDLE, kFirstS);
+  set(IPPROTO_TCP, TCP_KEEPINTVL, kNextS);
+  set(IPPROTO_TCP, TCP_KEEPCNT, kCount);
+  set(SOL_SOCKET, SO_KEEPALIVE, 1);
+}
+
 IoResult to_result(const error_code& error, std::size_t bytes) noexcept {
   if (!error) {
     return {IoStatus::done, bytes, 0};
@@ -205,6 +222,7 @@ physics::Result<TcpSocket> TcpSocket::connect(const SocketContext& context,
       return failure("tcp ", address, error_text(error.value()));
     }
     wish(impl->socket, tcp::no_delay(true));
+    notice_silence(impl->socket.native_handle());
     return TcpSocket(std::move(impl));
   });
 }
@@ -372,7 +390,8 @@ CongestionControl TcpListener::congestion_control() const {
   return {congestion_control_of(fd()), impl_ ? impl_->system_congestion_control : std::string()};
 }
 
-TcpSocket TcpListener::accept(SocketAddress& peer) {
+TcpSocket TcpListener::accept(SocketAddress& peer, int& error_number) {
+  error_number = 0;
   auto accepted = std::make_unique<TcpSocket::Impl>(impl_->context);
   tcp::endpoint endpoint;
   error_code error;
@@ -381,9 +400,15 @@ TcpSocket TcpListener::accept(SocketAddress& peer) {
     make_ours(accepted->socket, error);
   }
   if (error) {
+    // A peer that went while it waited is nobody's fault.
+    const bool harmless = error == asio::error::would_block || error == asio::error::try_again ||
+                          error == asio::error::interrupted ||
+                          error == asio::error::connection_aborted;
+    error_number = harmless ? 0 : error.value();
     return {};
   }
   wish(accepted->socket, tcp::no_delay(true));
+  notice_silence(accepted->socket.native_handle());
   peer = from_endpoint(endpoint);
   return TcpSocket(std::move(accepted));
 }

@@ -120,8 +120,9 @@ class TcpListener {
   [[nodiscard]] SocketAddress local_address() const noexcept;
   /// Of its connections.
   [[nodiscard]] CongestionControl congestion_control() const;
-  /// Next connection; closed when there is none now. Throws std::bad_alloc.
-  [[nodiscard]] TcpSocket accept(SocketAddress& peer);
+  /// Next connection; closed when there is none now, or one cannot be taken: `error_number`, else
+  /// 0. It waits in the kernel then, and the listener stays readable. Throws std::bad_alloc.
+  [[nodiscard]] TcpSocket accept(SocketAddress& peer, int& error_number);
 
  private:
   struct Impl;

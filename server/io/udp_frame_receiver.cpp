@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "io/ip_address.hpp"
+
 namespace emit::server {
 namespace {
 
@@ -21,11 +23,13 @@ using physics::make_error;
 
 }  // namespace
 
-UdpFrameReceiver::UdpFrameReceiver(UdpSocket socket)
+UdpFrameReceiver::UdpFrameReceiver(UdpSocket socket, const SocketAddress& peer)
     : socket_(std::move(socket)),
+      peer_(ip_of(peer)),
       data_(kBatch * kDatagramBytes),
       control_(kBatch * kControlBytes),
       messages_(kBatch),
+      sources_(kBatch),
       headers_(kBatch) {}
 
 physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketContext& context,
@@ -61,7 +65,7 @@ physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const SocketContext& co
   }
   socket->set_option(SOL_SOCKET, SO_RXQ_OVFL, 1);
   socket->set_option(SOL_UDP, UDP_GRO, 1);
-  return UdpFrameReceiver(std::move(*socket));
+  return UdpFrameReceiver(std::move(*socket), peer);
 }
 
 void UdpFrameReceiver::size_buffer(std::uint64_t frame_bytes) {
@@ -93,6 +97,8 @@ std::size_t UdpFrameReceiver::plan(std::size_t index, const Expected& expected,
   add(data(index) + bytes, kDatagramBytes - bytes);
   msghdr& header = headers_[index].msg_hdr;
   header = {};
+  header.msg_name = &sources_[index];
+  header.msg_namelen = sizeof(sockaddr_storage);
   header.msg_iov = message.iov.data();
   header.msg_iovlen = pieces;
   header.msg_control = control_.data() + index * kControlBytes;
@@ -131,7 +137,8 @@ bool UdpFrameReceiver::as_planned(const Message& message, const Expected& expect
     if (datagram != protocol::kFragmentHeaderBytes + payload ||
         protocol::decode_fragment_header(message.headers[i], payload, header) !=
             protocol::FragmentStatus::accepted ||
-        header.stream_id != expected.next.stream_id || header.frame_id != expected.next.frame_id ||
+        header.stream_id != stream_id_ || header.stream_id != expected.next.stream_id ||
+        header.frame_id != expected.next.frame_id ||
         header.byte_offset != expected.next.byte_offset + from) {
       return false;
     }
@@ -151,6 +158,12 @@ void UdpFrameReceiver::bring_together(std::size_t index) noexcept {
     at += length;
   }
   message.planned = 0;
+}
+
+bool UdpFrameReceiver::from_peer(std::size_t index) const noexcept {
+  // A stream to a group may be of another family than the control connection.
+  const config::IpAddress source = ip_of(sources_[index]);
+  return source == peer_ || source.v4 != peer_.v4;
 }
 
 void UdpFrameReceiver::count(protocol::FragmentStatus status, ReceiveCounters& counters) noexcept {
@@ -184,7 +197,16 @@ void UdpFrameReceiver::push_data(std::size_t index, protocol::Reassembler& reass
   do {
     const auto datagram = rest.first(std::min(message.segment_bytes, rest.size()));
     rest = rest.subspan(datagram.size());
-    count(reassembler.push(datagram), counters);
+    // Somebody else's frames on this port must not take the reassembler's places.
+    protocol::FragmentHeader header;
+    const auto status = protocol::decode_fragment_header(datagram, header);
+    if (status != protocol::FragmentStatus::accepted) {
+      count(status, counters);
+    } else if (header.stream_id != stream_id_ || !from_peer(index)) {
+      ++counters.bad_datagrams;
+    } else {
+      count(reassembler.push(datagram), counters);
+    }
   } while (!rest.empty());
 }
 
@@ -207,7 +229,7 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
   }
   drained_ = taken < batch;
   std::size_t in_place = 0;
-  while (in_place < taken && messages_[in_place].planned > 0 &&
+  while (in_place < taken && messages_[in_place].planned > 0 && from_peer(in_place) &&
          as_planned(messages_[in_place], expected, from[in_place])) {
     ++in_place;
   }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "emit/config/network.hpp"
 #include "emit/protocol/reassembler.hpp"
 #include "io/client.hpp"
 #include "io/socket.hpp"
@@ -20,7 +21,8 @@ namespace emit::server {
 /// brought together and pushed in the ordinary way.
 class UdpFrameReceiver {
  public:
-  /// `local`: this side's address of the control connection; a group is joined on its interface.
+  /// `peer`: the daemon's address of the control connection; of its family, datagrams from others
+  /// are bad, whatever their port. `local`: this side's; a group is joined on its interface.
   /// Errors (io, invalid_argument).
   [[nodiscard]] static physics::Result<UdpFrameReceiver> open(const SocketContext& context,
                                                               const SocketAddress& peer,
@@ -32,6 +34,8 @@ class UdpFrameReceiver {
   [[nodiscard]] std::uint64_t buffer_bytes() const noexcept { return buffer_bytes_; }
   /// Asks for room for `frames` frames of `frame_bytes`.
   void size_buffer(std::uint64_t frame_bytes);
+  /// Fragments of other streams are bad. Before the first take().
+  void expect_stream(std::uint16_t stream_id) noexcept { stream_id_ = stream_id; }
 
   static constexpr unsigned kBatch = 16;  ///< messages
   static constexpr std::size_t kDatagramBytes = 65536;
@@ -62,7 +66,7 @@ class UdpFrameReceiver {
   };
   using Expected = protocol::Reassembler::Expected;
 
-  explicit UdpFrameReceiver(UdpSocket socket);
+  UdpFrameReceiver(UdpSocket socket, const SocketAddress& peer);
   [[nodiscard]] std::byte* data(std::size_t index) noexcept {
     return data_.data() + index * kDatagramBytes;
   }
@@ -71,12 +75,15 @@ class UdpFrameReceiver {
   [[nodiscard]] bool as_planned(const Message& message, const Expected& expected,
                                 std::size_t from) const noexcept;
   void bring_together(std::size_t index) noexcept;
+  [[nodiscard]] bool from_peer(std::size_t index) const noexcept;
   static void count(protocol::FragmentStatus status, ReceiveCounters& counters) noexcept;
   void push_planned(const Message& message, protocol::Reassembler& reassembler,
                     ReceiveCounters& counters);
   void push_data(std::size_t index, protocol::Reassembler& reassembler, ReceiveCounters& counters);
 
   UdpSocket socket_;
+  config::IpAddress peer_;
+  std::uint16_t stream_id_ = 0;
   bool drained_ = true;
   std::uint64_t misplaced_ = 0;
   std::size_t segments_ = 1;  // joined in the messages before
@@ -85,6 +92,7 @@ class UdpFrameReceiver {
   std::vector<std::byte> data_;
   std::vector<std::byte> control_;
   std::vector<Message> messages_;
+  std::vector<sockaddr_storage> sources_;
   std::vector<mmsghdr> headers_;
 };
 

@@ -22,6 +22,7 @@ namespace emit::server {
   X(device_failures, "frames during which the driver reported an error")             \
   X(clock_steps, "steps of the wall clock of more than 1 ms")                        \
   X(frames_coarse, "frames whose camera stood where the surface was not prepared")   \
+  X(frames_entities_behind, "frames with entities of an older one: more than 128 moved") \
   X(frames_shed, "frames of less than full quality, to be ready in time")            \
   X(poses_dropped, "poses the histories forgot for want of room")                    \
   X(commands, "control commands taken")                                              \

@@ -18,24 +18,42 @@ constexpr std::size_t kQueueLines = 8192;
 
 class SpdLog final : public Log {
  public:
-  SpdLog(std::shared_ptr<spdlog::details::thread_pool> pool,
-         std::shared_ptr<spdlog::async_logger> logger)
-      : pool_(std::move(pool)), logger_(std::move(logger)) {}
-  ~SpdLog() override {
-    flush();
-    // The pool's thread ends here, its queue written; only then does the logger its lines refer to.
-    pool_.reset();
+  /// Throws where there is no memory or thread for it.
+  SpdLog(spdlog::sink_ptr sink, const std::string& level)
+      : sink_(std::move(sink)), level_(spdlog::level::from_str(level)) {
+    begin();
   }
+  // The pool's thread ends, its queue written; only then does the logger its lines refer to.
+  ~SpdLog() override { pool_.reset(); }
 
   void write(LogLevel level, const std::string& text) override {
     static constexpr std::array kLevels{spdlog::level::err, spdlog::level::warn,
                                         spdlog::level::info, spdlog::level::debug};
     logger_->log(kLevels[static_cast<std::size_t>(level)], text);
   }
-  // Lines are written by the pool's thread; ending it writes what is queued.
-  void flush() override { logger_->flush(); }
+  // Lines are written by the pool's thread, and asking the logger only queues one more; ending the
+  // pool waits until they are.
+  void flush() override {
+    pool_.reset();
+    try {
+      begin();
+    } catch (const std::exception&) {
+      logger_->set_level(spdlog::level::off);
+    }
+  }
 
  private:
+  void begin() {
+    pool_ = std::make_shared<spdlog::details::thread_pool>(kQueueLines, 1);
+    logger_ = std::make_shared<spdlog::async_logger>("emitd", sink_, pool_,
+                                                     spdlog::async_overflow_policy::overrun_oldest);
+    logger_->set_level(level_);
+    logger_->set_pattern("%Y-%m-%dT%H:%M:%S.%f%z %l %v");
+    logger_->flush_on(spdlog::level::info);
+  }
+
+  spdlog::sink_ptr sink_;
+  spdlog::level::level_enum level_;
   std::shared_ptr<spdlog::details::thread_pool> pool_;  ///< the logger refers to it weakly
   std::shared_ptr<spdlog::async_logger> logger_;
 };
@@ -54,19 +72,13 @@ class FunctionLog final : public Log {
 
 physics::Result<std::unique_ptr<Log>> make_log(const config::LogConfig& config) {
   try {
-    auto pool = std::make_shared<spdlog::details::thread_pool>(kQueueLines, 1);
     spdlog::sink_ptr sink;
     if (config.file.empty()) {
       sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
     } else {
       sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(config.file.string());
     }
-    auto logger = std::make_shared<spdlog::async_logger>(
-        "emitd", std::move(sink), pool, spdlog::async_overflow_policy::overrun_oldest);
-    logger->set_level(spdlog::level::from_str(config.level));
-    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%f%z %l %v");
-    logger->flush_on(spdlog::level::info);
-    return std::make_unique<SpdLog>(std::move(pool), std::move(logger));
+    return std::make_unique<SpdLog>(std::move(sink), config.level);
   } catch (const std::exception& error) {
     return physics::make_error(physics::ErrorCode::io,
                                fmt::format("log {}: {}", config.file.string(), error.what()));

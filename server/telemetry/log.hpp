@@ -30,6 +30,7 @@ class Log {
   virtual ~Log() = default;
   virtual void write(LogLevel level, const std::string& text) = 0;
   /// Hands over everything written so far; for the end of the program.
+  /// Waits until all lines are written.
   virtual void flush() = 0;
 
  protected:

@@ -3,6 +3,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
@@ -116,10 +117,18 @@ struct MetricsServer::Impl {
   void accept() {
     acceptor.async_accept([this](const error_code& error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error && sessions < kMaxConnections && admits(socket)) {
+      if (error) {
+        // Out of descriptors, and who knocks still waits: asked again after a while.
+        retry.expires_after(kRetry);
+        retry.async_wait([this](const error_code& ended) {
+          if (!ended) accept();
+        });
+        return;
+      }
+      accept();  // first: for this connection there may be no memory
+      if (sessions < kMaxConnections && admits(socket)) {
         std::make_shared<Session>(std::move(socket), answers, sessions)->run();
       }
-      accept();
     });
   }
 
@@ -143,10 +152,13 @@ struct MetricsServer::Impl {
     }
   }
 
+  static constexpr std::chrono::milliseconds kRetry{100};
+
   const Answers answers;
   int sessions = 0;
   asio::io_context context{1};
   tcp::acceptor acceptor{context};
+  asio::steady_timer retry{context};
   SocketAddress bound;
   std::thread thread;
 };

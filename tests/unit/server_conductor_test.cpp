@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include <cmath>
 #include <string>
 
 #include "support/conductor_rig.hpp"
@@ -110,6 +112,49 @@ TEST(RenderAgent, CountsForgottenPosesAndTheirFramesAreDegraded) {
   rig.send(2, 2);
   rig.settle();
   EXPECT_EQ(rig.count(Counter::poses_dropped), 5010U);
+}
+
+TEST(Conductor, SaysWhichFramesHaveEntitiesOfAnOlderOne) {
+  for (const auto mode : {config::PacingMode::ig_clock, config::PacingMode::host_step}) {
+    for (const int moving : {60, 100}) {  // by each of two host frames
+      SCOPED_TRACE(moving);
+      config::PacingConfig pacing;
+      pacing.mode = mode;
+      pacing.rate_hz = 100.0;
+      pacing.horizon_ns = 1000 * test::kMs;
+      test::ConductorRig rig(pacing);
+      rig.settle();
+      const bool stepped = mode == config::PacingMode::host_step;
+      if (stepped) {
+        rig.command(CommandKind::stop);  // what comes piles up
+      }
+      for (std::uint64_t half = 0; half < 2; ++half) {
+        rig.with([&](protocol::HostFrameData& frame) {
+          frame.entity_count = static_cast<std::uint32_t>(moving);
+          for (std::uint32_t i = 0; i < frame.entity_count; ++i) {
+            protocol::EntityStateData& state = frame.entities[i];
+            state = {};
+            state.entity_id = 1 + static_cast<std::uint32_t>(half) * 100 + i;
+            state.on = state.has_pose = true;
+          }
+        });
+        rig.send(1 + half, 0);
+        rig.settle();
+      }
+      if (stepped) {
+        rig.command(CommandKind::step);
+        rig.settle();
+      } else {
+        rig.next_slot();
+      }
+      ASSERT_FALSE(rig.frames.empty());
+      const bool behind = moving == 100;
+      const auto& header = rig.frames.back().header;
+      EXPECT_EQ((header.flags & protocol::kFlagDegraded) != 0, behind);
+      EXPECT_EQ(std::isnan(header.estimated_error_k), behind);
+      EXPECT_EQ(rig.count(Counter::frames_entities_behind), behind ? 1U : 0U);
+    }
+  }
 }
 
 }  // namespace

@@ -3,15 +3,29 @@
 // step.
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 
+#include "agents/older_journal.hpp"
 #include "agents/render_agent.hpp"
 #include "app/daemon.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
+#include "emit/v1/host.pb.h"
+#include "emit/v1/status.pb.h"
+#include "io/client.hpp"
+#include "io/socket.hpp"
 #include "support/conductor_rig.hpp"
 #include "support/daemon_process.hpp"
+#include "telemetry/log.hpp"
 
 namespace emit::server {
 namespace {
@@ -86,6 +100,162 @@ TEST(Journal, AWallClockThatIsSetBackDoesNotStretchTheTimeItCollects) {
   stepped.clock.advance(50 * kMs);
   stepped.settle();
   EXPECT_EQ(entries_of(file), 1U);
+}
+
+TEST(Journal, OfAnEarlierProcessIsKept) {
+  ScratchFolder folder;
+  const std::string file = folder.file("journal.mcap");
+  for (int process = 0; process < 3; ++process) {
+    SteppedDaemon stepped(file);
+    stepped.settle();
+    EXPECT_EQ(stepped.log.find("event=journal_kept") != std::string::npos, process == 2)
+        << "of the first there is nothing, of the second only the start of a run";
+    if (process == 2) {
+      break;
+    }
+    stepped.clock.advance(50 * kMs);
+    stepped.settle();
+    if (process == 1) {
+      auto host =
+          HostClient::connect("udp://127.0.0.1:" + std::to_string(stepped.daemon->host_udp_port()));
+      ASSERT_TRUE(host.has_value()) << host.error().text;
+      protocol::HostFrameData pose;
+      pose.run_id = pose.frame_number = 1;
+      ASSERT_TRUE((*host)->send(pose).has_value());
+      for (int turn = 0; turn < 1000 && entries_of(file) < 3; ++turn) {
+        stepped.settle();
+        stepped.clock.advance(50 * kMs);
+      }
+      ASSERT_GE(entries_of(file), 3U);
+    }
+  }
+  std::size_t kept = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    if (entry.path() == file) {
+      continue;
+    }
+    ++kept;
+    const std::string name = entry.path().filename().string();
+    EXPECT_TRUE(name.starts_with("journal.2") && name.ends_with("Z.mcap")) << name;
+    EXPECT_GE(entries_of(entry.path()), 3U);
+  }
+  EXPECT_EQ(kept, 1U);
+}
+
+TEST(Journal, WhatIsNoLogIsKeptAsWell) {
+  ScratchFolder folder;
+  const std::filesystem::path file = folder.write("notes.txt", "not to be lost\n");
+  const auto first = keep_older_journal(file);
+  ASSERT_TRUE(first.has_value()) << first.error().text;
+  EXPECT_FALSE(std::filesystem::exists(file));
+  // Another one of the same second.
+  std::filesystem::copy_file(*first, file);
+  std::filesystem::last_write_time(file, std::filesystem::last_write_time(*first));
+  const auto second = keep_older_journal(file);
+  ASSERT_TRUE(second.has_value()) << second.error().text;
+  EXPECT_EQ(second->filename(), first->stem().string() + "-2.txt");
+  EXPECT_EQ(*keep_older_journal(folder.file("none")), "");
+  EXPECT_EQ(*keep_older_journal("/dev/null"), "");
+}
+
+TEST(Listener, OutOfDescriptorsIsToldAndAskedAgainAfterAWhile) {
+  SteppedDaemon stepped;
+  stepped.settle();
+  SocketContext sockets;
+  auto waiting = TcpSocket::connect(
+      sockets, numeric_address("127.0.0.1", stepped.daemon->control_port()), 20'000'000'000);
+  ASSERT_TRUE(waiting.has_value()) << waiting.error().text;
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const int next = ::dup(0);
+  ASSERT_GE(next, 0);
+  ::close(next);
+  const rlimit none{static_cast<rlim_t>(next), before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const auto refused = [&] { return stepped.daemon->counter(Counter::refused_overloaded); };
+  for (int turn = 0; turn < 5; ++turn) {
+    stepped.settle();
+    EXPECT_EQ(refused(), 1U) << "not asked while nothing can have changed";
+  }
+  stepped.clock.advance(100 * kMs);
+  stepped.settle();
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_EQ(refused(), 2U);
+  EXPECT_NE(stepped.log.find("Too many open files"), std::string::npos) << stepped.log;
+  stepped.clock.advance(100 * kMs);
+  stepped.settle();
+  EXPECT_EQ(refused(), 2U);
+  // It is served now: without a hello it has to go.
+  stepped.clock.advance(5000 * kMs);
+  stepped.settle();
+  EXPECT_NE(stepped.log.find("no hello within 5 s"), std::string::npos) << stepped.log;
+}
+
+TEST(HostPort, AnswersNobodysAnswers) {
+  SteppedDaemon stepped;
+  stepped.settle();
+  SocketContext sockets;
+  auto socket = UdpSocket::open_bound(sockets, numeric_address("127.0.0.1", 0));
+  ASSERT_TRUE(socket.has_value()) << socket.error().text;
+  ASSERT_TRUE(
+      socket->connect(numeric_address("127.0.0.1", stepped.daemon->host_udp_port())).has_value());
+  const auto answered = [&](const std::string& said) {
+    EXPECT_EQ(socket->send(std::as_bytes(std::span(said))).status, IoStatus::done);
+    stepped.settle();
+    std::array<char, 1024> answer{};
+    return ::recv(socket->fd(), answer.data(), answer.size(), MSG_DONTWAIT) > 0;
+  };
+  EXPECT_TRUE(answered("x"));
+  for (int code = 1; code <= v1::Status::Code_MAX; ++code) {
+    v1::Status status;
+    status.set_code(static_cast<v1::Status::Code>(code));
+    status.set_text("malformed message");
+    status.set_host_frame_number(code % 2 == 0 ? 12 : 0);
+    status.set_count(3);
+    // One that says ok is never sent unasked.
+    EXPECT_EQ(answered(status.SerializeAsString()), code == v1::Status::CODE_OK) << code;
+  }
+  v1::HostFrame newer;
+  newer.set_protocol_version(2);
+  newer.set_frame_number(1);
+  EXPECT_TRUE(answered(newer.SerializeAsString()));
+}
+
+TEST(Log, IsWrittenWhenFlushReturns) {
+  ScratchFolder folder;
+  config::LogConfig config;
+  config.file = folder.file("log");
+  auto log = make_log(config);
+  ASSERT_TRUE(log.has_value()) << log.error().text;
+  constexpr std::ptrdiff_t kLines = 2000;
+  for (int round = 1; round <= 3; ++round) {
+    for (std::ptrdiff_t i = 0; i < kLines; ++i) {
+      (*log)->write(LogLevel::info, "event=test");
+    }
+    (*log)->flush();
+    EXPECT_EQ(std::ranges::count(folder.read("log"), '\n'), round * kLines);
+  }
+}
+
+TEST(ClockSteps, CostNoQuality) {
+  test::ConductorRig rig([] {
+    config::PacingConfig pacing;
+    pacing.budget_ns = 12 * kMs;
+    return pacing;
+  }());
+  rig.script.rungs = {{8.0, 0.0}, {3.0, 0.2}};
+  for (std::uint64_t n = 1; n <= 60; ++n) {
+    rig.script.ready = false;
+    rig.send(n, static_cast<std::int64_t>(n) * kMs);
+    rig.settle();
+    if (n == 20) rig.clock.step_wall(1000 * kMs);
+    if (n == 40) rig.clock.step_wall(-1000 * kMs);
+    rig.clock.advance(8 * kMs);
+    rig.script.ready = true;
+    rig.settle();
+    ASSERT_EQ(rig.frames.size(), n);
+    EXPECT_EQ(rig.frames.back().header.quality_rung, 0U) << n;
+  }
 }
 
 TEST(ClockSteps, AreCountedAndToldWithTheirSize) {

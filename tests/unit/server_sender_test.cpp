@@ -99,7 +99,7 @@ class Rig {
   }
 
   /// False: every slot is held.
-  bool publish() {
+  bool publish(ChannelSet channels = kAllChannels) {
     renderer::FrameRequest request;
     request.frame_number = ++number_;
     const int slot = source_.submit(request);
@@ -110,6 +110,7 @@ class Rig {
     PublishFrame frame;
     frame.image.source = &source_;
     frame.image.slot = static_cast<std::uint32_t>(slot);
+    frame.image.channels = channels;
     frame.image.pictures[0] = view.radiance_w_m2_sr[0];
     frame.image.crc32c[0] = protocol::crc32c(std::as_bytes(view.radiance_w_m2_sr[0]));
     frame.header.frame_number = number_;
@@ -317,6 +318,25 @@ TEST(Sender, WhatAClientDoesNotWantIsNeitherSentNorWaitedForNorAGap) {
   EXPECT_EQ(rig.script().held.load(), 0) << "nobody waits for what nobody wants";
 }
 
+TEST(Sender, AGapIsToldByTheFrameBehindItHoweverFarBehindTheClientIs) {
+  for (const bool stopped : {false, true}) {
+    SCOPED_TRACE(stopped);
+    Rig rig;
+    Rig::Peer* peer = rig.connect();
+    for (int i = 1; i <= 4; ++i) {
+      // The third has nothing to show for this channel, which would have wanted it.
+      ASSERT_TRUE(rig.publish(i == 3 ? ChannelSet{0} : kAllChannels));
+      rig.settle(stopped ? std::vector<Rig::Peer*>{} : std::vector{peer});
+    }
+    rig.settle({peer});
+    ASSERT_GE(peer->frames.size(), 2U);
+    for (const auto& frame : peer->frames) {
+      EXPECT_EQ((frame.flags & protocol::kFlagGapBefore) != 0, frame.frame_number == 4)
+          << frame.frame_number;
+    }
+  }
+}
+
 TEST(Sender, AStoppedClientThatWantsEveryThirdFrameSkipsOnlyWhatItWanted) {
   Rig rig;
   Rig::Peer* stopped = rig.connect(false, 3);
@@ -438,16 +458,20 @@ class UdpInPlace : public ::testing::Test {
     ASSERT_TRUE(receiver.has_value()) << receiver.error().text;
     receiver_.emplace(std::move(*receiver));
     receiver_->size_buffer(4u << 20);
+    receiver_->expect_stream(1);
     auto sender = UdpSocket::open(sockets_, any);
     ASSERT_TRUE(sender.has_value());
     sender_ = std::move(*sender);
     ASSERT_TRUE(sender_.connect(numeric_address("127.0.0.1", receiver_->port())).has_value());
   }
   /// Datagrams of frame `id`, whose pixels are all different.
-  std::vector<std::vector<std::byte>> datagrams(std::uint32_t id, std::uint32_t payload_bytes) {
+  static std::vector<std::vector<std::byte>> datagrams(std::uint32_t id,
+                                                       std::uint32_t payload_bytes,
+                                                       std::uint16_t stream_id = 1,
+                                                       std::uint32_t more = 0) {
     std::vector<float> pixels(kWidthPx * kHeightPx);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
-      pixels[i] = static_cast<float>(i + 1 + id);
+      pixels[i] = static_cast<float>(i + 1 + id + more);
     }
     protocol::FrameHeader header;
     header.frame_number = id;
@@ -457,7 +481,7 @@ class UdpInPlace : public ::testing::Test {
     header.payload_crc32c = protocol::crc32c(std::as_bytes(std::span<const float>(pixels)));
     std::array<std::byte, protocol::kFrameHeaderBytes> head{};
     protocol::encode(header, head);
-    const protocol::Fragmenter fragments({1, id, 0, kWidthPx * 4, payload_bytes}, head,
+    const protocol::Fragmenter fragments({stream_id, id, 0, kWidthPx * 4, payload_bytes}, head,
                                          std::as_bytes(std::span<const float>(pixels)));
     std::vector<std::vector<std::byte>> out;
     for (std::uint32_t i = 0; i < fragments.fragment_count(); ++i) {
@@ -567,6 +591,42 @@ TEST_F(UdpInPlace, WhatWasNotExpectedComesOutRightAllTheSame) {
     expect_frame(id);
   }
   EXPECT_EQ(counters_.bad_datagrams, 30U) << "the strangers";
+}
+
+TEST_F(UdpInPlace, OtherStreamsAndOtherMachinesTakeNobodysPlace) {
+  UdpSocket stranger;
+  {
+    const auto elsewhere = numeric_address("127.0.0.2", 0);
+    auto opened = UdpSocket::open_bound(sockets_, elsewhere);
+    ASSERT_TRUE(opened.has_value()) << opened.error().text;
+    stranger = std::move(*opened);
+    ASSERT_TRUE(stranger.connect(numeric_address("127.0.0.1", receiver_->port())).has_value());
+  }
+  std::uint64_t strange = 0;
+  for (const std::uint16_t stream : {std::uint16_t{7}, std::uint16_t{8}, std::uint16_t{9}}) {
+    for (const auto& datagram : datagrams(50, 8900, stream)) {
+      send(datagram);
+      ++strange;
+    }
+    take();
+  }
+  for (std::uint32_t id = 1; id <= 4; ++id) {
+    // Before and between: the same stream and frame from another machine, and other pixels.
+    const auto wanted = datagrams(id, 1440);
+    const auto forged = datagrams(id, 1440, 1, 1000);
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      ASSERT_EQ(stranger.send(forged[i]).status, IoStatus::done);
+      ++strange;
+      send(wanted[i]);
+      if (i % 7 == 0) {
+        take();
+      }
+    }
+    take();
+    expect_frame(id);
+  }
+  EXPECT_EQ(counters_.bad_datagrams, strange);
+  EXPECT_EQ(reassembler_.pop(), nullptr);
 }
 
 TEST_F(UdpInPlace, PixelsOfALostDatagramAreZero) {

@@ -53,7 +53,8 @@ class TcpPair : public ::testing::Test {
     ASSERT_TRUE(client.has_value()) << client.error().text;
     client_ = std::move(*client);
     ASSERT_TRUE(readable(listener_.fd()));
-    server_ = listener_.accept(peer_);
+    int error = 0;
+    server_ = listener_.accept(peer_, error);
     ASSERT_TRUE(static_cast<bool>(server_));
   }
 
@@ -117,7 +118,8 @@ std::string accepted_congestion_control(const std::string& at_open, const std::s
   EXPECT_TRUE(client.has_value()) << client.error().text;
   EXPECT_TRUE(readable(listener->fd()));
   SocketAddress peer;
-  const TcpSocket server = listener->accept(peer);
+  int accept_error = 0;
+  const TcpSocket server = listener->accept(peer, accept_error);
   return server ? congestion_control_of(server.fd()) : "none";
 }
 
@@ -159,8 +161,25 @@ TEST_F(TcpPair, AcceptedAndConnectedSocketsNeitherBlockNorReachChildProcesses) {
     EXPECT_NE(::fcntl(fd, F_GETFD) & FD_CLOEXEC, 0);
   }
   SocketAddress nobody;
-  EXPECT_FALSE(static_cast<bool>(listener_.accept(nobody)));
+  int error = -1;
+  EXPECT_FALSE(static_cast<bool>(listener_.accept(nobody, error)));
+  EXPECT_EQ(error, 0);
   EXPECT_EQ(to_string(peer_).substr(0, 10), "127.0.0.1:");
+}
+
+TEST_F(TcpPair, BothSidesAskWhetherTheOtherIsStillThere) {
+  for (const TcpSocket* socket : {&client_, &server_}) {
+    const auto option = [&](int level, int name) {
+      int value = 0;
+      socklen_t length = sizeof value;
+      EXPECT_EQ(::getsockopt(socket->fd(), level, name, &value, &length), 0);
+      return value;
+    };
+    EXPECT_EQ(option(SOL_SOCKET, SO_KEEPALIVE), 1);
+    EXPECT_EQ(option(IPPROTO_TCP, TCP_KEEPIDLE) +
+                  option(IPPROTO_TCP, TCP_KEEPCNT) * option(IPPROTO_TCP, TCP_KEEPINTVL),
+              25);
+  }
 }
 
 TEST_F(TcpPair, PiecesArriveInOrder) {

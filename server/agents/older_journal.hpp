@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::server {
+
+/// A journal that an earlier process left at `file` is renamed to NAME.YYYYMMDDThhmmssZ.EXT, the
+/// time of its last change (-2, -3 ... behind it where that exists), so that a restart does not
+/// write over the run that crashed. One that holds no frame and no host's word is left to be
+/// written over: a daemon that cannot start tries every second. What is no regular file is left.
+/// @return the new name; empty: nothing was renamed. Errors (io), naming the file.
+[[nodiscard]] physics::Result<std::filesystem::path> keep_older_journal(
+    const std::filesystem::path& file);
+
+}  // namespace emit::server
