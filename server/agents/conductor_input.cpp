@@ -21,9 +21,8 @@ int Conductor::take_inputs(std::int64_t now_ns) noexcept {
     if (!taken) {
       break;  // waits for frames in work; the inputs behind it keep their order
     }
-    const bool was_full = context_.host_inputs.size() == context_.host_inputs.capacity();
     context_.host_inputs.pop();
-    if (was_full) {
+    if (context_.of_inputs.end()) {
       context_.bells.receiver.ring();
     }
     ++work;

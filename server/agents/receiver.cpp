@@ -303,7 +303,7 @@ int Receiver::read(Connection& connection, std::int64_t now_ns) {
 }
 
 bool Receiver::may_go_on(const Connection& connection) noexcept {
-  return (!connection.stuck || context_.host_inputs.claim() != nullptr) &&
+  return (!connection.stuck || room_for_inputs() > 0) &&
          (!connection.paused || connection.pace.wait_ns(context_.clock.monotonic_ns()) <= 0);
 }
 
@@ -318,7 +318,7 @@ int Receiver::parse(Connection& connection, std::int64_t now_ns) {
       break;
     }
     if (connection.role == Role::host && !draining_.load(std::memory_order_acquire) &&
-        context_.host_inputs.claim() == nullptr) {
+        room_for_inputs() == 0) {
       connection.stuck = true;
       connection.dirty = true;
       break;
@@ -363,6 +363,15 @@ int Receiver::take_replies() {
     context_.replies.pop();
   }
   return work;
+}
+
+std::size_t Receiver::room_for_inputs() noexcept {
+  return context_.of_inputs
+      .look([this] {
+        const std::size_t room = context_.host_inputs.free();
+        return room > 0 ? std::optional(room) : std::nullopt;
+      })
+      .value_or(0);
 }
 
 void Receiver::check_timeouts(std::int64_t now_ns) noexcept {

@@ -134,6 +134,8 @@ class Receiver final : public Agent {
   void finish_close(Connection& connection) noexcept;
   int take_replies();
   int take_released() noexcept;
+  /// 0: the conductor rings when there is some.
+  [[nodiscard]] std::size_t room_for_inputs() noexcept;
   void check_timeouts(std::int64_t now_ns) noexcept;
   void watch(Connection& connection) noexcept;
 

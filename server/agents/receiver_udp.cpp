@@ -21,7 +21,7 @@ constexpr std::int64_t kStatusWindowNs = 100'000'000;
 
 int Receiver::receive_datagrams(std::int64_t now_ns) noexcept {
   UdpMemory& memory = *udp_memory_;
-  const std::size_t room = context_.host_inputs.free();
+  const std::size_t room = room_for_inputs();
   const bool reading = room > 0 && !draining_.load(std::memory_order_acquire);
   if (reading != udp_watched_) {
     epoll_event event{};

@@ -140,8 +140,9 @@ struct Context {
   SpscRing<RecorderCommand> to_recorder;     // receiver -> recorder
   SpscRing<RecorderReleased> from_recorder;  // recorder -> receiver
 
-  Shortage of_room;   ///< on `published`: the conductor waits for the sender
-  Shortage of_slots;  ///< of the source: render waits for whoever releases one
+  Shortage of_room;    ///< on `published`: the conductor waits for the sender
+  Shortage of_slots;   ///< of the source: render waits for whoever releases one
+  Shortage of_inputs;  ///< on `host_inputs`: the receiver waits for the conductor
 
   EventLog conductor_events{256, counters};
   EventLog receiver_events{256, counters};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <csignal>
@@ -141,6 +142,12 @@ int serve(const Arguments& arguments, const char* program) {
   if (arguments.check) {
     fmt::print("{}: ok\n", arguments.config_file);
     return 0;
+  }
+  // Two descriptors per client at most, of up to 1024; the usual 1024 is for programs with
+  // select().
+  if (rlimit files{}; ::getrlimit(RLIMIT_NOFILE, &files) == 0) {
+    files.rlim_cur = files.rlim_max;
+    ::setrlimit(RLIMIT_NOFILE, &files);
   }
   const ServiceNotifier notifier = ServiceNotifier::from_environment();
   DaemonOptions options;
