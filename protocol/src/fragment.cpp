@@ -71,6 +71,14 @@ void encode(const FragmentHeader& header, std::span<std::byte, kFragmentHeaderBy
   wire::put(out, 24, header.sim_time_ns);
 }
 
+std::optional<std::uint16_t> stream_of_fragment(std::span<const std::byte> datagram) noexcept {
+  if (datagram.size() < kFragmentHeaderBytes ||
+      wire::get<std::uint32_t>(datagram, 0) != kFragmentMagic) {
+    return std::nullopt;
+  }
+  return wire::get<std::uint16_t>(datagram, 6);
+}
+
 FragmentStatus decode_fragment_header(std::span<const std::byte> datagram,
                                       FragmentHeader& out) noexcept {
   const std::size_t header_bytes = std::min(datagram.size(), kFragmentHeaderBytes);

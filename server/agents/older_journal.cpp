@@ -3,6 +3,7 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 
 #include <fcntl.h>
@@ -16,6 +17,7 @@
 
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
+#include "rt/fd.hpp"
 
 namespace emit::server {
 namespace {
@@ -48,8 +50,16 @@ bool holds_a_run(const std::filesystem::path& file, std::uint64_t bytes) {
 
 physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem::path& file) {
   struct stat status {};
-  if (::stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode) || status.st_size == 0 ||
-      !holds_a_run(file, static_cast<std::uint64_t>(status.st_size))) {
+  const Fd opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!opened || ::fstat(opened.get(), &status) != 0 || !S_ISREG(status.st_mode)) {
+    return std::filesystem::path();
+  }
+  // Whoever writes a log holds it locked.
+  if (::flock(opened.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    return physics::make_error(physics::ErrorCode::io,
+                               file.string() + ": another process writes it");
+  }
+  if (status.st_size == 0 || !holds_a_run(file, static_cast<std::uint64_t>(status.st_size))) {
     return std::filesystem::path();
   }
   std::tm changed{};

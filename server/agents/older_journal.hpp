@@ -10,7 +10,8 @@ namespace emit::server {
 /// time of its last change (-2, -3 ... behind it where that exists), so that a restart does not
 /// write over the run that crashed. One that holds no frame and no host's word is left to be
 /// written over: a daemon that cannot start tries every second. What is no regular file is left.
-/// @return the new name; empty: nothing was renamed. Errors (io), naming the file.
+/// @return the new name; empty: nothing was renamed. Errors (io), naming the file: also one that
+/// another process is writing.
 [[nodiscard]] physics::Result<std::filesystem::path> keep_older_journal(
     const std::filesystem::path& file);
 

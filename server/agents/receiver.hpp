@@ -164,4 +164,7 @@ class Receiver final : public Agent {
   std::atomic<bool> draining_{false};
 };
 
+/// Certificates and keys of files that `config` names. Errors as a start would have them.
+[[nodiscard]] physics::Result<void> check_security(const config::DaemonConfig& config);
+
 }  // namespace emit::server

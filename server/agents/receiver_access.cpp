@@ -17,29 +17,56 @@ namespace {
 /// Distinct warnings about datagrams that are dropped unread: not for every one of a flood.
 constexpr std::int64_t kWarningGapNs = 100'000'000;
 
+/// Empty: no TLS.
+physics::Result<std::optional<TlsContext>> load_tls(const config::TlsConfig& tls) {
+  if (!tls.enabled()) {
+    return std::nullopt;
+  }
+  auto context = TlsContext::server({tls.client_ca, tls.certificate, tls.key});
+  if (!context) {
+    return tl::unexpected<physics::Error>(std::move(context.error()).with_context("tls"));
+  }
+  return std::optional(std::move(*context));
+}
+
+/// Empty: no file is named.
+physics::Result<std::vector<protocol::SessionKey>> load_keys(const config::DaemonConfig& config) {
+  if (config.host.key_file.empty()) {
+    return std::vector<protocol::SessionKey>();
+  }
+  auto keys = read_key_file(config.host.key_file);
+  if (!keys) {
+    return tl::unexpected<physics::Error>(std::move(keys.error()).with_context("host.key_file"));
+  }
+  return keys;
+}
+
 }  // namespace
 
-physics::Result<void> Receiver::open_security() {
-  const config::TlsConfig& tls = config_.tls;
-  if (tls.enabled()) {
-    auto context = TlsContext::server({tls.client_ca, tls.certificate, tls.key});
-    if (!context) {
-      return tl::unexpected<physics::Error>(std::move(context.error()).with_context("tls"));
-    }
-    tls_ = std::move(*context);
+physics::Result<void> check_security(const config::DaemonConfig& config) {
+  if (auto tls = load_tls(config.tls); !tls) {
+    return tl::unexpected<physics::Error>(std::move(tls.error()));
   }
+  if (auto keys = load_keys(config); !keys) {
+    return tl::unexpected<physics::Error>(std::move(keys.error()));
+  }
+  return {};
+}
+
+physics::Result<void> Receiver::open_security() {
+  auto tls = load_tls(config_.tls);
+  if (!tls) {
+    return tl::unexpected<physics::Error>(std::move(tls.error()));
+  }
+  tls_ = std::move(*tls);
   if (config_.host.udp.empty() || !config_.authenticated_host()) {
     return {};
   }
-  std::vector<protocol::SessionKey> keys;
-  if (!config_.host.key_file.empty()) {
-    auto read = read_key_file(config_.host.key_file);
-    if (!read) {
-      return tl::unexpected<physics::Error>(std::move(read.error()).with_context("host.key_file"));
-    }
-    keys = std::move(*read);
+  auto keys = load_keys(config_);
+  if (!keys) {
+    return tl::unexpected<physics::Error>(std::move(keys.error()));
   }
-  auto sessions = HostSessions::create(keys, tls.enabled() ? config_.control.max_clients : 0);
+  auto sessions = HostSessions::create(*keys, tls_ ? config_.control.max_clients : 0);
   if (!sessions) {
     return tl::unexpected<physics::Error>(std::move(sessions.error()).with_context("host.udp"));
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
@@ -11,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "agents/receiver.hpp"
 #include "app/daemon.hpp"
 #include "app/service_notifier.hpp"
 #include "emit/config/load.hpp"
@@ -29,7 +31,19 @@ static_assert(std::atomic<Daemon*>::is_always_lock_free);
 extern "C" void emit_on_stop_signal(int /*signal*/) {
   if (Daemon* daemon = g_daemon.load()) {
     daemon->request_stop();
+    return;
   }
+  // Loading or warming up: nobody is served yet, and a driver may be busy for long.
+  constexpr std::string_view kText = "emitd: stopped before it was ready\n";
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kText.data(), kText.size());
+  ::_exit(0);
+}
+
+void handle_stop_signals() {
+  struct sigaction action {};
+  action.sa_handler = emit_on_stop_signal;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
 }
 
 struct Arguments {
@@ -39,17 +53,19 @@ struct Arguments {
 };
 
 void print_usage(std::FILE* out, const char* program) {
-  fmt::print(out,
-             "usage: {} --config FILE [--set key=value]... [--check]\n"
-             "       {} --version | --help\n"
-             "\n"
-             "  --config FILE    daemon configuration (TOML); config/README.md lists the keys\n"
-             "  --set key=value  overrides a key of the configuration or of the scenario\n"
-             "  --check          load configuration and scenario, say what is wrong, and exit\n"
-             "\n"
-             "exit: 0 after SIGTERM or SIGINT, 2 usage, 75 the device was lost (start it again),\n"
-             "      78 bad configuration, 1 otherwise\n",
-             program, program);
+  fmt::print(
+      out,
+      "usage: {} --config FILE [--set key=value]... [--check]\n"
+      "       {} --version | --help\n"
+      "\n"
+      "  --config FILE    daemon configuration (TOML); config/README.md lists the keys\n"
+      "  --set key=value  overrides a key of the configuration or of the scenario\n"
+      "  --check          load configuration, scenario, certificates and keys, say what is wrong,\n"
+      "                   and exit; ports, folders and the device are not tried\n"
+      "\n"
+      "exit: 0 after SIGTERM or SIGINT, 2 usage, 75 the device was lost (start it again),\n"
+      "      78 bad configuration, 1 otherwise\n",
+      program, program);
 }
 
 /// Returns an exit code, or -1 to go on.
@@ -140,6 +156,10 @@ int serve(const Arguments& arguments, const char* program) {
     return kExitConfig;
   }
   if (arguments.check) {
+    if (const auto checked = check_security(*daemon_config); !checked) {
+      fail(program, physics::Error(checked.error()).with_context(arguments.config_file));
+      return kExitConfig;
+    }
     fmt::print("{}: ok\n", arguments.config_file);
     return 0;
   }
@@ -153,16 +173,13 @@ int serve(const Arguments& arguments, const char* program) {
   DaemonOptions options;
   options.notifier = &notifier;
   options.drop_privileges = true;
+  handle_stop_signals();
   auto daemon = Daemon::create(*daemon_config, std::move(scenario), std::move(options));
   if (!daemon) {
     return fail(program, daemon.error());
   }
 
   g_daemon.store(daemon->get());
-  struct sigaction action {};
-  action.sa_handler = emit_on_stop_signal;
-  sigaction(SIGTERM, &action, nullptr);
-  sigaction(SIGINT, &action, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files ends the journal, not the frames
 

@@ -76,6 +76,7 @@ void Tool::add_bench_commands() {
         "then as fast as they go, beside bare sockets in the same run",
         "emit bench stream --json stream.json --frames 1000 --rate 200", run_bench_stream);
     add_count(app, "--frames", o.frames, "Frames per client at the fixed rate")
+        ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--rate", o.rate_hz, "Frames a second")
         ->check(CLI::PositiveNumber)

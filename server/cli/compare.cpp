@@ -55,6 +55,13 @@ int run_compare(const CompareCommand& command) {
   image::KelvinPerRadiance conversion;
   std::string conversion_note;
   if (const auto metadata = image::frame_metadata(*b)) {
+    if (const auto other = image::frame_metadata(*a);
+        other &&
+        (other->band_lo_um != metadata->band_lo_um || other->band_hi_um != metadata->band_hi_um)) {
+      warn(fmt::format("radiance of different bands: {:g}-{:g} um and {:g}-{:g} um",
+                       other->band_lo_um, other->band_hi_um, metadata->band_lo_um,
+                       metadata->band_hi_um));
+    }
     if (const auto band = spectral_band(*metadata)) {
       conversion = [table = ApparentTemperature(*band)](double radiance) {
         return table.kelvin_per_radiance(radiance);

@@ -214,6 +214,8 @@ int run_receive(const ReceiveCommand& command) {
   if (!ended.empty() && (command.frames != 0 || report.frames() == 0)) {
     exit_code = fail(kExitFailure, fmt::format("{} of {} frames received: {}", report.frames(),
                                                command.frames, ended));
+  } else if (!ended.empty()) {
+    warn(ended);
   }
   if (counters.lost > 0 || report.unflagged_gaps() > 0 || counters.crc_errors > 0 ||
       counters.partial > 0) {

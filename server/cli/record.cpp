@@ -41,6 +41,7 @@ int run_record(const RecordCommand& command) {
   std::uint64_t lost_entries = 0;
   std::uint64_t last_sequence = 0;
   bool from_the_start = true;
+  bool closed = false;
   std::string broken;
   // A killed process loses no more than what came in this time and in one poll.
   constexpr auto kFlushAfter = std::chrono::milliseconds(50);
@@ -58,10 +59,12 @@ int run_record(const RecordCommand& command) {
     const auto received = recorder.receive(entry, kPollNs);
     if (!received) {
       if (!recorder.closed()) broken = received.error().text;
+      closed = recorder.closed();
       break;
     }
     if (!*received) {
-      if (recorder.closed()) break;
+      closed = recorder.closed();
+      if (closed) break;
       continue;
     }
     if (entries > 0 && entry.sequence() != last_sequence + 1) {
@@ -84,7 +87,8 @@ int run_record(const RecordCommand& command) {
     if (command.frames != 0) progress.advance_to(frames);
   }
   progress.finish();
-  if (auto closed = writer->close(); !closed) return fail(closed.error());
+  if (closed) warn("the daemon closed the connection: the log ends there");
+  if (auto done = writer->close(); !done) return fail(done.error());
   fmt::print(text_stream(command.json), "{}: {} entries, {} host frames, {} frames\n",
              command.out.string(), entries, host_frames, frames);
   if (command.json) {

@@ -221,18 +221,19 @@ int Viewer::run() {
     if (fresh) ++shown_;
     if (frame_.temperature_k.empty() && !show_radiance_) handle(Key::quantity);
     const bool last = command_.frames > 0 && shown_ >= command_.frames;
-    image::RgbImage picture;
-    draw(last && command_.screenshot ? &picture : nullptr);
-    if (last) {
-      if (command_.screenshot) {
-        if (auto done = image::write_png(*command_.screenshot, picture); !done) {
-          return fail(done.error());
-        }
-      }
-      break;
-    }
+    if (last) break;
+    draw(nullptr);
     // Also redrawn without a new frame: the value under the cursor moves with it.
     if (!fresh) std::this_thread::sleep_for(std::chrono::milliseconds(15));
+  }
+  if (have_frame) {
+    image::RgbImage picture;
+    draw(command_.screenshot ? &picture : nullptr);
+    if (command_.screenshot) {
+      if (auto done = image::write_png(*command_.screenshot, picture); !done) {
+        return fail(done.error());
+      }
+    }
   }
   fmt::print("{} frames shown\n", shown_);
   return kExitOk;

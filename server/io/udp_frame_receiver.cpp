@@ -198,14 +198,10 @@ void UdpFrameReceiver::push_data(std::size_t index, protocol::Reassembler& reass
     const auto datagram = rest.first(std::min(message.segment_bytes, rest.size()));
     rest = rest.subspan(datagram.size());
     // Somebody else's frames on this port must not take the reassembler's places.
-    protocol::FragmentHeader header;
-    const auto status = protocol::decode_fragment_header(datagram, header);
-    if (status != protocol::FragmentStatus::accepted) {
-      count(status, counters);
-    } else if (header.stream_id != stream_id_ || !from_peer(index)) {
-      ++counters.bad_datagrams;
-    } else {
+    if (protocol::stream_of_fragment(datagram) == stream_id_ && from_peer(index)) {
       count(reassembler.push(datagram), counters);
+    } else {
+      ++counters.bad_datagrams;
     }
   } while (!rest.empty());
 }

@@ -3,6 +3,8 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -262,9 +264,19 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
   auto impl = std::make_unique<Impl>(path, options);
   // First: what fails here leaves an older log as it is.
   if (auto opened = impl->chunk_indexes.open(path); !opened) return tl::unexpected(opened.error());
-  impl->fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  impl->fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (impl->fd < 0) {
     return make_error(ErrorCode::io, fmt::format("{}: cannot create: {}", path.string(),
+                                                 std::generic_category().message(errno)));
+  }
+  // Two writers would make one log of two, which reads like neither.
+  if (::flock(impl->fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    return make_error(ErrorCode::io, path.string() + ": another process writes it");
+  }
+  struct stat status {};
+  if (::fstat(impl->fd, &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0 &&
+      ::ftruncate(impl->fd, 0) != 0) {
+    return make_error(ErrorCode::io, fmt::format("{}: cannot be written over: {}", path.string(),
                                                  std::generic_category().message(errno)));
   }
   Output out;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 
@@ -70,6 +71,10 @@ void encode(const FragmentHeader& header, std::span<std::byte, kFragmentHeaderBy
 [[nodiscard]] FragmentStatus decode_fragment_header(std::span<const std::byte> header,
                                                     std::size_t payload_bytes,
                                                     FragmentHeader& out) noexcept;
+/// Whose stream a fragment, also one of parity, says that it is of; empty where it is none. The
+/// rest is not looked at. RT-safe.
+[[nodiscard]] std::optional<std::uint16_t> stream_of_fragment(
+    std::span<const std::byte> datagram) noexcept;
 
 /// Cuts a frame into fragments without copying pixels.
 ///
