@@ -124,6 +124,13 @@ TEST(DaemonProcess, CheckAndVersionExitZeroWithoutServing) {
     DaemonProcess daemon(folder, {"--config", config, "--check"});
     EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
   }
+  {
+    // What it names is read as well.
+    DaemonProcess daemon(folder, {"--config", config, "--check", "--set",
+                                  "host.key_file=" + folder.file("no.keys")});
+    EXPECT_EQ(daemon.wait(), 78);
+    EXPECT_NE(folder.read("stderr").find("no.keys"), std::string::npos) << folder.read("stderr");
+  }
   DaemonProcess daemon(folder, {"--version"});
   EXPECT_EQ(daemon.wait(), 0);
   EXPECT_EQ(folder.read("stdout").find("emitd "), 0U);

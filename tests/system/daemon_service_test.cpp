@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "io/http_get.hpp"
 #include "support/daemon_process.hpp"
@@ -58,6 +61,46 @@ TEST(DaemonService, TellsTheManagerOfItsLifeFromStartToStop) {
   daemon.signal(SIGTERM);
   EXPECT_NE(manager.until("STOPPING=1", kLongMs), "");
   EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
+}
+
+TEST(DaemonService, AStopDuringTheStartIsNoCrash) {
+  for (const int signal : {SIGTERM, SIGINT}) {
+    ScratchFolder folder;
+    const NotifySocket manager(folder.file("notify"));
+    const Variable socket("NOTIFY_SOCKET", folder.file("notify"));
+    // Its pictures take seconds to paint.
+    DaemonProcess daemon(
+        folder, {"--config",
+                 folder.write("emitd.toml", canned_config(4096, 4096, "mode = \"host-step\""))});
+    ASSERT_NE(manager.until("STATUS=loading", kLongMs), "") << folder.read("stderr");
+    daemon.signal(signal);
+    EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
+    EXPECT_EQ(folder.read("stdout"), "") << "it was not ready";
+    EXPECT_NE(folder.read("stderr").find("stopped before it was ready"), std::string::npos);
+  }
+}
+
+TEST(DaemonService, AJournalHasOneWriter) {
+  ScratchFolder folder;
+  const std::string config = folder.write(
+      "emitd.toml", canned_config(32, 24, "mode = \"ig-clock\"\nrate_hz = 100",
+                                  "[journal]\nfile = \"" + folder.file("journal.mcap") + "\"\n"));
+  DaemonProcess first(folder, {"--config", config});
+  ASSERT_TRUE(first.wait_ready()) << folder.read("stderr");
+  const auto bytes = [&] { return std::filesystem::file_size(folder.file("journal.mcap")); };
+  for (int i = 0; i < 6000 && bytes() == 0; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  const auto before = bytes();
+  ScratchFolder other;
+  DaemonProcess second(other, {"--config", config});
+  EXPECT_EQ(second.wait(), 1);
+  EXPECT_NE(other.read("stderr").find("journal.mcap: another process writes it"), std::string::npos)
+      << other.read("stderr");
+  EXPECT_GE(bytes(), before);
+  first.signal(SIGTERM);
+  EXPECT_EQ(first.wait(), 0);
+  EXPECT_GT(bytes(), before) << "it went on in the same file";
 }
 
 TEST(DaemonService, AWatchdogOfAnotherProcessIsNotFed) {
