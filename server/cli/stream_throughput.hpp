@@ -25,8 +25,8 @@ namespace emit::cli {
 [[nodiscard]] physics::Result<server::Security> make_certificate(
     const std::filesystem::path& directory);
 
-/// As fast as one client takes frames: the host asks for the next one as soon as fewer than
-/// `window` are under way, so that nothing is ever skipped or dropped and every transport is held
+/// As fast as one client takes frames: the host asks for the next ones as soon as half of `window`
+/// are under way, up to all of it, so that nothing is ever skipped or dropped and every transport is held
 /// back by its client alone. Owns a daemon. One thread.
 class StreamThroughput {
  public:
