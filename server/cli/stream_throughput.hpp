@@ -26,8 +26,8 @@ namespace emit::cli {
     const std::filesystem::path& directory);
 
 /// As fast as one client takes frames: the host asks for the next ones as soon as half of `window`
-/// are under way, up to all of it, so that nothing is ever skipped or dropped and every transport is held
-/// back by its client alone. Owns a daemon. One thread.
+/// are under way, up to all of it, so that nothing is ever skipped or dropped and every transport
+/// is held back by its client alone. Owns a daemon. One thread.
 class StreamThroughput {
  public:
   /// `security`: of host and clients, where the daemon has certificates.
