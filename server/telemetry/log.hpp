@@ -29,8 +29,7 @@ class Log {
   Log& operator=(const Log&) = delete;
   virtual ~Log() = default;
   virtual void write(LogLevel level, const std::string& text) = 0;
-  /// Hands over everything written so far; for the end of the program.
-  /// Waits until all lines are written.
+  /// Waits until everything is written; for the end of the program. Nobody may write() meanwhile.
   virtual void flush() = 0;
 
  protected:
