@@ -8,6 +8,7 @@
 
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/host.pb.h"
+#include "emit/v1/status.pb.h"
 #include "wire_bytes.hpp"
 
 namespace emit::protocol {
@@ -99,6 +100,17 @@ bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameD
 }
 
 }  // namespace
+
+bool looks_like_status(std::span<const std::byte> bytes) noexcept {
+  std::size_t at = 0;
+  std::uint64_t tag = 0;
+  std::uint64_t value = 0;
+  constexpr auto kVarintTag = [](std::uint64_t field) { return field << 3; };
+  constexpr auto kDelimitedTag = [](std::uint64_t field) { return (field << 3) | 2U; };
+  return read_varint(bytes, at, tag) && tag == kVarintTag(v1::Status::kCodeFieldNumber) &&
+         read_varint(bytes, at, value) && read_varint(bytes, at, tag) &&
+         tag == kDelimitedTag(v1::Status::kTextFieldNumber);
+}
 
 std::string_view to_string(DecodeStatus status) noexcept {
   switch (status) {

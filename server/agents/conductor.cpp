@@ -144,6 +144,32 @@ void Conductor::add_update(RenderJob& job, Entity& entity, const physics::Pose& 
   }
 }
 
+bool Conductor::add_updates(RenderJob& job, std::int64_t shown_ns) noexcept {
+  // What changed goes first: of more than a frame takes, those that stand where they were can wait.
+  const auto from_next = [this](std::size_t i) { return (next_entity_ + i) % entities_.size(); };
+  for (Entity& body : entities_) {
+    body.placed = body.track.sample(shown_ns, options_.pacing.horizon_ns);
+    body.changed = !body.shown || body.teleport_pending || body.shown->on != body.on ||
+                   body.shown->pose.position_world_m != body.placed.pose.position_world_m ||
+                   body.shown->pose.world_from_body != body.placed.pose.world_from_body;
+  }
+  for (const bool changed : {true, false}) {
+    for (std::size_t i = 0; i < entities_.size(); ++i) {
+      Entity& body = entities_[from_next(i)];
+      if (body.changed != changed) {
+        continue;
+      }
+      if (job.entity_count == job.entities.size()) {
+        next_entity_ = from_next(i);
+        return !changed;
+      }
+      body.shown = {body.placed.pose, body.on};
+      add_update(job, body, body.placed.pose, body.placed.base_ns);
+    }
+  }
+  return true;
+}
+
 void Conductor::issue_host_step(bool is_step, std::int64_t received_ns) noexcept {
   RenderJob& job = context_.jobs.claim_reserved();
   Issued& issued = next_issued();
@@ -207,14 +233,7 @@ void Conductor::issue_slotted() noexcept {
     issued.header.pose_sim_time_ns = sample.newest_ns;
     issued.header.flags |= (sample.extrapolated ? protocol::kFlagExtrapolated : 0U) |
                            (sample.stale ? protocol::kFlagStale : 0U);
-    const std::size_t count = std::min(entities_.size(), job.entities.size());
-    for (std::size_t i = 0; i < count; ++i) {
-      Entity& body = entities_[(next_entity_ + i) % entities_.size()];
-      const PoseSample placed = body.track.sample(sample.shown_ns, options_.pacing.horizon_ns);
-      add_update(job, body, placed.pose, placed.base_ns);
-    }
-    issued.entities_behind = count < entities_.size();
-    next_entity_ = issued.entities_behind ? (next_entity_ + count) % entities_.size() : 0;
+    issued.entities_behind = !add_updates(job, sample.shown_ns);
   }
   slots_.issued();
   issue(job, issued, control_.step_pending());

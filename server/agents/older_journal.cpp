@@ -8,6 +8,7 @@
 
 #include <fcntl.h>
 #include <stdio.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstdint>
@@ -46,44 +47,71 @@ bool holds_a_run(const std::filesystem::path& file, std::uint64_t bytes) {
   }
 }
 
+/// Not over another file, as rename() would. 0 or errno.
+int rename_to_new(const std::filesystem::path& from, const std::filesystem::path& to) noexcept {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) {
+    return 0;
+  }
+  if (errno != EINVAL && errno != ENOSYS) {
+    return errno;
+  }
+  // Network file systems have no such rename.
+  if (::link(from.c_str(), to.c_str()) != 0 || ::unlink(from.c_str()) != 0) {
+    return errno;
+  }
+  return 0;
+}
+
 }  // namespace
 
 physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem::path& file) {
+  const auto failure = [&](const std::string& what) {
+    return physics::make_error(physics::ErrorCode::io, fmt::format("{}: {}", file.string(), what));
+  };
   struct stat status {};
-  const Fd opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!opened || ::fstat(opened.get(), &status) != 0 || !S_ISREG(status.st_mode)) {
+  if (::stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) {
     return std::filesystem::path();
   }
-  // Whoever writes a log holds it locked.
-  if (::flock(opened.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-    return physics::make_error(physics::ErrorCode::io,
-                               file.string() + ": another process writes it");
+  const Fd opened(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!opened || ::fstat(opened.get(), &status) != 0) {
+    return errno == ENOENT ? physics::Result<std::filesystem::path>()
+                           : failure("an older journal that cannot be read, so not written over: " +
+                                     std::generic_category().message(errno));
+  }
+  // Whoever writes a log holds it locked. Shared: some file systems lock no other for a reader.
+  if (::flock(opened.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    return failure("another process writes it");
   }
   if (status.st_size == 0 || !holds_a_run(file, static_cast<std::uint64_t>(status.st_size))) {
     return std::filesystem::path();
   }
   std::tm changed{};
   ::gmtime_r(&status.st_mtime, &changed);
-  const std::string stem = file.stem().string();
+  // The log itself, not a link to it: the new one goes where the old one is.
+  std::error_code unresolved;
+  const std::filesystem::path real = std::filesystem::canonical(file, unresolved);
+  if (unresolved) {
+    return failure("cannot be kept: " + unresolved.message());
+  }
+  const std::string stem = real.stem().string();
   constexpr int kMostOfASecond = 1000;
   for (int i = 1; i <= kMostOfASecond; ++i) {
     const std::filesystem::path kept =
-        file.parent_path() / fmt::format("{}.{:%Y%m%dT%H%M%S}Z{}{}", stem, changed,
+        real.parent_path() / fmt::format("{}.{:%Y%m%dT%H%M%S}Z{}{}", stem, changed,
                                          i == 1 ? std::string() : fmt::format("-{}", i),
-                                         file.extension().string());
-    // Never over another one, as rename() would.
-    if (::renameat2(AT_FDCWD, file.c_str(), AT_FDCWD, kept.c_str(), RENAME_NOREPLACE) == 0) {
+                                         real.extension().string());
+    const int error = rename_to_new(real, kept);
+    if (error == 0) {
       return kept;
     }
-    if (errno != EEXIST) {
-      return physics::make_error(
-          physics::ErrorCode::io,
-          fmt::format("{}: cannot be kept as {}: {}", file.string(), kept.string(),
-                      std::generic_category().message(errno)));
+    if (error != EEXIST) {
+      return failure(fmt::format(
+          "an older journal that cannot be kept as {}: {}; move it away, or give journal.file a "
+          "folder of its own that emitd may write to",
+          kept.string(), std::generic_category().message(error)));
     }
   }
-  return physics::make_error(physics::ErrorCode::io,
-                             file.string() + ": cannot be kept: all names are taken");
+  return failure("cannot be kept: all names are taken");
 }
 
 }  // namespace emit::server

@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -220,7 +221,12 @@ int Receiver::accept_connections(std::int64_t now_ns) {
   for (; work < kMaxPerTurn; ++work) {
     SocketAddress peer;
     int error = 0;
-    TcpSocket socket = listener_.accept(peer, error);
+    TcpSocket socket;
+    try {
+      socket = listener_.accept(peer, error);
+    } catch (const std::bad_alloc&) {
+      error = ENOMEM;
+    }
     if (error != 0) {
       pause_accepting(now_ns, error);
     }

@@ -471,11 +471,12 @@ physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connec
     }
   }
   // From the address that the client knows: it takes frames from no other.
-  SocketAddress from = connection.socket.local_address();
-  if (from.storage.ss_family != target.storage.ss_family) {
-    from = numeric_address(config::to_string(ip_of(from)), 0);
-  }
-  if (from.storage.ss_family == target.storage.ss_family) {
+  const config::IpAddress own = ip_of(connection.socket.local_address());
+  if (own.v4 == ip_of(target).v4) {
+    SocketAddress from = connection.socket.local_address();
+    if (from.storage.ss_family != target.storage.ss_family) {
+      from = numeric_address(config::to_string(own), 0);
+    }
     from.set_port(0);
     if (auto bound = socket->bind(from); !bound) {
       return tl::unexpected<physics::Error>(std::move(bound.error()));

@@ -116,10 +116,9 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
     const std::uint64_t count = context_.counters.add(counter_of(code));
     context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
                                   protocol::to_string(decoded));
-    // A Status reads like this: two daemons must not answer each other's answers.
-    const protocol::HostFrameData& frame = input->frame;
-    if (decoded == protocol::DecodeStatus::wrong_version && frame.frame_number == 0 &&
-        frame.sim_time_ns == 0 && frame.run_id == 0) {
+    // Two daemons must not answer each other's answers.
+    if (protocol::looks_like_status(datagram)) {
+      context_.counters.add(Counter::statuses_suppressed);
       return;
     }
     send_udp_status(origin, code, input->frame.frame_number, count,

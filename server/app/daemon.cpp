@@ -27,6 +27,7 @@ constexpr std::int64_t kClientsDrainNs = 2'000'000'000;
 constexpr std::int64_t kJournalDrainNs = 5'000'000'000;
 /// After the device was lost a new process is wanted soon.
 constexpr std::int64_t kLostDrainNs = 300'000'000;
+constexpr std::int64_t kLogEndNs = 2'000'000'000;
 
 std::uint32_t slot_count(const config::DaemonConfig& config) {
   return std::clamp<std::uint32_t>(config.stream.queue_frames + 3, 4, kMaxSlots);
@@ -384,7 +385,7 @@ int DaemonImpl::run() {
       LogLevel::info,
       fmt::format("event=stopped frames={} clients={} journal={}", frames ? "drained" : "given_up",
                   clients ? "drained" : "given_up", journal ? "drained" : "given_up"));
-  log_->flush();
+  static_cast<void>(log_->finish(kLogEndNs));
   return 0;
 }
 
@@ -405,7 +406,7 @@ int DaemonImpl::end_without_device() {
   }
   housekeep();
   log_summary();
-  log_->flush();
+  static_cast<void>(log_->finish(kLostDrainNs));
   return kExitDeviceLost;
 }
 

@@ -136,6 +136,9 @@ int fail(const char* program, const physics::Error& error) {
 }
 
 int serve(const Arguments& arguments, const char* program) {
+  if (!arguments.check) {
+    handle_stop_signals();
+  }
   const config::SplitOverrides overrides = config::split_overrides(arguments.overrides);
   const auto daemon_config = config::load_daemon(arguments.config_file, overrides.daemon);
   if (!daemon_config) {
@@ -173,7 +176,6 @@ int serve(const Arguments& arguments, const char* program) {
   DaemonOptions options;
   options.notifier = &notifier;
   options.drop_privileges = true;
-  handle_stop_signals();
   auto daemon = Daemon::create(*daemon_config, std::move(scenario), std::move(options));
   if (!daemon) {
     return fail(program, daemon.error());
@@ -186,10 +188,14 @@ int serve(const Arguments& arguments, const char* program) {
   fmt::print("{}\n", (*daemon)->ready_line());
   std::fflush(stdout);
   const int code = (*daemon)->run();
+  // What comes now comes too late to change how it ended.
+  std::signal(SIGTERM, SIG_IGN);
+  std::signal(SIGINT, SIG_IGN);
   g_daemon.store(nullptr);
   if (code == kExitDeviceLost) {
-    std::fflush(nullptr);
-    std::_Exit(code);  // taking the context down may hang in the driver
+    // Taking the context down may hang in the driver, and flushing all streams behind a log that
+    // nobody reads.
+    std::_Exit(code);
   }
   return code;
 }

@@ -62,9 +62,9 @@ physics::Result<void> save(const std::filesystem::path& directory,
 void print_losses(std::FILE* out, const server::ReceiveCounters& c, const StreamReport& report) {
   fmt::print(out,
              "frames: {} complete, {} partial, {} lost, {} announced gaps ({} frames skipped), "
-             "{} CRC errors, {} datagrams dropped by the kernel, {} bad datagrams\n",
+             "{} CRC errors, {} datagrams dropped by the kernel, {} bad, {} of others\n",
              c.received, c.partial, c.lost, c.gaps, c.skipped, c.crc_errors, c.os_drops,
-             c.bad_datagrams);
+             c.bad_datagrams, c.foreign_datagrams);
   if (c.repaired + c.unrepairable + c.resend_requests > 0) {
     fmt::print(out,
                "repair: {} fragments brought back by error correction ({} frames whole by it, {} "

@@ -123,6 +123,7 @@ Json counters_json(const server::ReceiveCounters& c) {
   json.set("received", c.received).set("partial", c.partial).set("lost", c.lost);
   json.set("gaps", c.gaps).set("skipped", c.skipped).set("crc_errors", c.crc_errors);
   json.set("os_drops", c.os_drops).set("bad_datagrams", c.bad_datagrams);
+  json.set("foreign_datagrams", c.foreign_datagrams);
   json.set("late", c.late).set("repeated", c.repeated);
   json.set("repaired", c.repaired).set("repaired_frames", c.repaired_frames);
   json.set("unrepairable", c.unrepairable).set("resent", c.resent);

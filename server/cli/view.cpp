@@ -202,18 +202,20 @@ void Viewer::draw(image::RgbImage* read_back) {
 int Viewer::run() {
   const auto start = std::chrono::steady_clock::now();
   bool have_frame = false;
+  std::string failure;
   while (!close_ && !InterruptGuard::interrupted()) {
     handle(window_.poll());
     const bool fresh = provider_.take(frame_);
     if (const auto end = provider_.ended(); !fresh && end) {
-      if (!end->failure && have_frame && command_.frames == 0) break;
-      return fail(kExitFailure, end->reason);
+      if (end->failure || !have_frame || command_.frames > 0) failure = end->reason;
+      break;
     }
     have_frame = have_frame || fresh;
     if (!have_frame) {
       constexpr auto kFirstFrame = std::chrono::seconds(60);
       if (command_.frames > 0 && std::chrono::steady_clock::now() - start > kFirstFrame) {
-        return fail(kExitFailure, "no frame within 60 s");
+        failure = "no frame within 60 s";
+        break;
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       continue;
@@ -234,6 +236,10 @@ int Viewer::run() {
         return fail(done.error());
       }
     }
+  }
+  if (!failure.empty()) return fail(kExitFailure, failure);
+  if (command_.screenshot && !have_frame) {
+    return fail(kExitFailure, command_.screenshot->string() + ": not written: no frame came");
   }
   fmt::print("{} frames shown\n", shown_);
   return kExitOk;

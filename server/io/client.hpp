@@ -144,11 +144,12 @@ struct ReceiveCounters {
   std::uint64_t crc_errors = 0;
   std::uint64_t os_drops = 0;  ///< datagrams the kernel dropped for want of buffer space
   std::uint64_t bad_datagrams = 0;
-  std::uint64_t late = 0;             ///< frames with kFlagLate
-  std::uint64_t repeated = 0;         ///< frames with kFlagRepeated
-  std::uint64_t repaired = 0;         ///< fragments brought back by error correction
-  std::uint64_t repaired_frames = 0;  ///< complete frames among whose fragments those were
-  std::uint64_t unrepairable = 0;     ///< groups of fragments that lost more than their parity
+  std::uint64_t foreign_datagrams = 0;  ///< of other streams, or not from the daemon's address
+  std::uint64_t late = 0;               ///< frames with kFlagLate
+  std::uint64_t repeated = 0;           ///< frames with kFlagRepeated
+  std::uint64_t repaired = 0;           ///< fragments brought back by error correction
+  std::uint64_t repaired_frames = 0;    ///< complete frames among whose fragments those were
+  std::uint64_t unrepairable = 0;       ///< groups of fragments that lost more than their parity
   std::uint64_t resend_requests = 0;
   std::uint64_t resent = 0;  ///< fragments that came because they were asked for
 

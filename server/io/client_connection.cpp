@@ -190,7 +190,9 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
       return tl::unexpected<physics::Error>(std::move(secured.error()));
     }
   }
-  return greet(std::move(context), std::move(*socket), *address, role, end_ns);
+  // Frames by UDP come from the address that the connection leads to.
+  const SocketAddress peer = socket->peer_address();
+  return greet(std::move(context), std::move(*socket), peer, role, end_ns);
 }
 
 physics::Result<ClientConnection> ClientConnection::greet(SocketContext context, TcpSocket socket,

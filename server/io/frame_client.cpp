@@ -479,6 +479,7 @@ ReceiveCounters& ReceiveCounters::operator+=(const ReceiveCounters& other) noexc
   crc_errors += other.crc_errors;
   os_drops += other.os_drops;
   bad_datagrams += other.bad_datagrams;
+  foreign_datagrams += other.foreign_datagrams;
   late += other.late;
   repeated += other.repeated;
   repaired += other.repaired;

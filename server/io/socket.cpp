@@ -252,6 +252,12 @@ SocketAddress TcpSocket::local_address() const noexcept {
   return impl_ ? local_address_of(impl_->socket) : SocketAddress{};
 }
 
+SocketAddress TcpSocket::peer_address() const noexcept {
+  error_code error;
+  const auto endpoint = impl_ ? impl_->socket.remote_endpoint(error) : tcp::endpoint();
+  return error || !impl_ ? SocketAddress{} : from_endpoint(endpoint);
+}
+
 void TcpSocket::close() noexcept {
   impl_.reset();
 }

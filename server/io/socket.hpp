@@ -60,6 +60,8 @@ class TcpSocket {
   /// -1 when closed.
   [[nodiscard]] int fd() const noexcept;
   [[nodiscard]] SocketAddress local_address() const noexcept;
+  /// Of the other end; not what was asked for where that was "any address".
+  [[nodiscard]] SocketAddress peer_address() const noexcept;
   void close() noexcept;
   void shutdown_send() noexcept;
 

@@ -198,10 +198,11 @@ void UdpFrameReceiver::push_data(std::size_t index, protocol::Reassembler& reass
     const auto datagram = rest.first(std::min(message.segment_bytes, rest.size()));
     rest = rest.subspan(datagram.size());
     // Somebody else's frames on this port must not take the reassembler's places.
-    if (protocol::stream_of_fragment(datagram) == stream_id_ && from_peer(index)) {
-      count(reassembler.push(datagram), counters);
+    const auto stream = protocol::stream_of_fragment(datagram);
+    if (!from_peer(index) || (stream && *stream != stream_id_)) {
+      ++counters.foreign_datagrams;
     } else {
-      ++counters.bad_datagrams;
+      count(reassembler.push(datagram), counters);
     }
   } while (!rest.empty());
 }

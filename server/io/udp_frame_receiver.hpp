@@ -34,7 +34,7 @@ class UdpFrameReceiver {
   [[nodiscard]] std::uint64_t buffer_bytes() const noexcept { return buffer_bytes_; }
   /// Asks for room for `frames` frames of `frame_bytes`.
   void size_buffer(std::uint64_t frame_bytes);
-  /// Fragments of other streams are bad. Before the first take().
+  /// Fragments of other streams are foreign. Before the first take().
   void expect_stream(std::uint16_t stream_id) noexcept { stream_id_ = stream_id; }
 
   static constexpr unsigned kBatch = 16;  ///< messages

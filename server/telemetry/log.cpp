@@ -8,6 +8,10 @@
 #include <spdlog/spdlog.h>
 
 #include <array>
+#include <chrono>
+#include <future>
+#include <thread>
+#include <utility>
 
 #include "agents/receiver_connection.hpp"
 
@@ -20,8 +24,12 @@ class SpdLog final : public Log {
  public:
   /// Throws where there is no memory or thread for it.
   SpdLog(spdlog::sink_ptr sink, const std::string& level)
-      : sink_(std::move(sink)), level_(spdlog::level::from_str(level)) {
-    begin();
+      : pool_(std::make_shared<spdlog::details::thread_pool>(kQueueLines, 1)),
+        logger_(std::make_shared<spdlog::async_logger>(
+            "emitd", std::move(sink), pool_, spdlog::async_overflow_policy::overrun_oldest)) {
+    logger_->set_level(spdlog::level::from_str(level));
+    logger_->set_pattern("%Y-%m-%dT%H:%M:%S.%f%z %l %v");
+    logger_->flush_on(spdlog::level::info);
   }
   // The pool's thread ends, its queue written; only then does the logger its lines refer to.
   ~SpdLog() override { pool_.reset(); }
@@ -32,28 +40,27 @@ class SpdLog final : public Log {
     logger_->log(kLevels[static_cast<std::size_t>(level)], text);
   }
   // Lines are written by the pool's thread, and asking the logger only queues one more; ending the
-  // pool waits until they are.
-  void flush() override {
-    pool_.reset();
+  // pool waits until they are. A thread of its own waits, because a terminal or pipe that nobody
+  // reads lets it wait for ever.
+  bool finish(std::int64_t limit_ns) override {
+    logger_->set_level(spdlog::level::off);
+    if (!pool_) {
+      return true;
+    }
     try {
-      begin();
+      auto written = std::make_shared<std::promise<void>>();
+      const auto end = written->get_future();
+      std::thread([pool = std::move(pool_), written]() mutable {
+        pool.reset();
+        written->set_value();
+      }).detach();
+      return end.wait_for(std::chrono::nanoseconds(limit_ns)) == std::future_status::ready;
     } catch (const std::exception&) {
-      logger_->set_level(spdlog::level::off);
+      return false;
     }
   }
 
  private:
-  void begin() {
-    pool_ = std::make_shared<spdlog::details::thread_pool>(kQueueLines, 1);
-    logger_ = std::make_shared<spdlog::async_logger>("emitd", sink_, pool_,
-                                                     spdlog::async_overflow_policy::overrun_oldest);
-    logger_->set_level(level_);
-    logger_->set_pattern("%Y-%m-%dT%H:%M:%S.%f%z %l %v");
-    logger_->flush_on(spdlog::level::info);
-  }
-
-  spdlog::sink_ptr sink_;
-  spdlog::level::level_enum level_;
   std::shared_ptr<spdlog::details::thread_pool> pool_;  ///< the logger refers to it weakly
   std::shared_ptr<spdlog::async_logger> logger_;
 };
@@ -62,7 +69,7 @@ class FunctionLog final : public Log {
  public:
   explicit FunctionLog(std::function<void(const std::string&)> sink) : sink_(std::move(sink)) {}
   void write(LogLevel /*level*/, const std::string& text) override { sink_(text); }
-  void flush() override {}
+  bool finish(std::int64_t /*limit_ns*/) override { return true; }
 
  private:
   std::function<void(const std::string&)> sink_;

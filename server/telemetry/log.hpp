@@ -29,8 +29,10 @@ class Log {
   Log& operator=(const Log&) = delete;
   virtual ~Log() = default;
   virtual void write(LogLevel level, const std::string& text) = 0;
-  /// Waits until everything is written; for the end of the program. Nobody may write() meanwhile.
-  virtual void flush() = 0;
+  /// For the end of the program: waits, within the limit, until everything is written; what is
+  /// write()d afterwards is not. Nobody may write() meanwhile.
+  /// @return false: nobody took the lines, as with a stopped terminal
+  virtual bool finish(std::int64_t limit_ns) = 0;
 
  protected:
   Log() = default;

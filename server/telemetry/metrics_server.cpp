@@ -116,13 +116,16 @@ struct MetricsServer::Impl {
 
   void accept() {
     acceptor.async_accept([this](const error_code& error, tcp::socket socket) {
+      accepting = false;
       if (error == asio::error::operation_aborted) return;
       if (error) {
         // Out of descriptors, and who knocks still waits: asked again after a while.
         retry.expires_after(kRetry);
         retry.async_wait([this](const error_code& ended) {
+          accepting = false;
           if (!ended) accept();
         });
+        accepting = true;
         return;
       }
       accept();  // first: for this connection there may be no memory
@@ -130,6 +133,7 @@ struct MetricsServer::Impl {
         std::make_shared<Session>(std::move(socket), answers, sessions)->run();
       }
     });
+    accepting = true;
   }
 
   bool admits(const tcp::socket& socket) const {
@@ -145,6 +149,9 @@ struct MetricsServer::Impl {
     // A request that there is no memory for ends; the next one gets its chance.
     while (!context.stopped()) {
       try {
+        if (!accepting) {
+          accept();
+        }
         context.run();
       } catch (const std::exception&) {
         continue;
@@ -156,6 +163,7 @@ struct MetricsServer::Impl {
 
   const Answers answers;
   int sessions = 0;
+  bool accepting = false;  ///< or about to, after a while: something will call accept()
   asio::io_context context{1};
   tcp::acceptor acceptor{context};
   asio::steady_timer retry{context};

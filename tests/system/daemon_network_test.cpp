@@ -109,6 +109,11 @@ std::string allowed(std::string host) {
   return "[access]\nallow = [\"" + host + "\"]\n";
 }
 
+/// ":7000" of "address:7000".
+std::string port_of(const std::string& address) {
+  return address.substr(address.rfind(':'));
+}
+
 /// Takes frames until kFrames came; all complete, none lost.
 void expect_frames(FrameClient& client) {
   std::uint64_t newest = 0;
@@ -122,6 +127,7 @@ void expect_frames(FrameClient& client) {
   }
   EXPECT_EQ(client.counters().crc_errors, 0U);
   EXPECT_EQ(client.counters().bad_datagrams, 0U);
+  EXPECT_EQ(client.counters().foreign_datagrams, 0U);
 }
 
 TEST(DaemonNetwork, HostAndClientsReachItOverIpv6) {
@@ -162,16 +168,38 @@ TEST(DaemonNetwork, HostAndClientsReachItOverIpv6) {
   EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
 }
 
+TEST(DaemonNetwork, FramesByUdpFromAnyAddressAreThoseOfTheAddressItLedTo) {
+  for (const std::string any : {"0.0.0.0", "[::]"}) {
+    SCOPED_TRACE(any);
+    if (const auto why = any == "[::]" ? obstacle("::1", "") : std::nullopt) {
+      GTEST_SKIP() << "no IPv6 loopback here: " << *why;
+    }
+    ScratchFolder folder;
+    DaemonProcess daemon(
+        folder, {"--config",
+                 folder.write("emitd.toml", config_at(any, "mode = \"ig-clock\"\nrate_hz = 50.0") +
+                                                "[access]\nallow = [\"127.0.0.1\", \"::1\"]\n")});
+    ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+    auto client = FrameClient::connect("udp://" + any + port_of(daemon.control()));
+    ASSERT_TRUE(client.has_value()) << client.error().text;
+    ASSERT_TRUE((*client)->subscribe({}).has_value());
+    expect_frames(**client);
+  }
+}
+
 struct GroupCase {
   const char* name;
   bool v6_control;
   const char* group;
+  const char* listens = nullptr;  ///< elsewhere than where it is reached
 };
 constexpr GroupCase kGroups[] = {
     {"V4", false, "239.255.77.41"},
     {"V6", true, "ff15::4d49:5445"},
     {"V6GroupByV4Control", false, "ff15::4d49:5446"},
     {"V4GroupByV6Control", true, "239.255.77.42"},
+    {"V6GroupByV4ControlOnBothFamilies", false, "ff15::4d49:5447", "[::]"},
+    {"V4GroupByV4ControlOnBothFamilies", false, "239.255.77.43", "[::]"},
 };
 
 class DaemonMulticast : public ::testing::TestWithParam<GroupCase> {};
@@ -194,10 +222,11 @@ TEST_P(DaemonMulticast, FramesArriveByTheGroupOfTheSubscription) {
   ScratchFolder folder;
   DaemonProcess daemon(
       folder, {"--config",
-               folder.write("emitd.toml", config_at(host, "mode = \"ig-clock\"\nrate_hz = 50.0") +
+               folder.write("emitd.toml", config_at(test.listens != nullptr ? test.listens : host,
+                                                    "mode = \"ig-clock\"\nrate_hz = 50.0") +
                                               "[stream]\nmulticast_ttl = 0\n" + allowed(host))});
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
-  auto client = FrameClient::connect("udp://" + daemon.control());
+  auto client = FrameClient::connect("udp://" + host + port_of(daemon.control()));
   ASSERT_TRUE(client.has_value()) << client.error().text;
   SubscribeOptions options;
   options.multicast_group = test.group;

@@ -3,8 +3,11 @@
 // step.
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
+#include <poll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,6 +26,7 @@
 #include "emit/v1/status.pb.h"
 #include "io/client.hpp"
 #include "io/socket.hpp"
+#include "rt/fd.hpp"
 #include "support/conductor_rig.hpp"
 #include "support/daemon_process.hpp"
 #include "telemetry/log.hpp"
@@ -154,6 +158,17 @@ TEST(Journal, WhatIsNoLogIsKeptAsWell) {
   const auto second = keep_older_journal(file);
   ASSERT_TRUE(second.has_value()) << second.error().text;
   EXPECT_EQ(second->filename(), first->stem().string() + "-2.txt");
+  // By a link: its target, beside which the next one will be written.
+  const std::string link = folder.file("link.txt");
+  std::filesystem::create_directory(folder.file("target"));
+  folder.write("target/notes.txt", "nor this\n");
+  std::filesystem::create_symlink("target/notes.txt", link);
+  const auto third = keep_older_journal(link);
+  ASSERT_TRUE(third.has_value()) << third.error().text;
+  EXPECT_EQ(third->parent_path().filename(), "target");
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_FALSE(std::filesystem::exists(link));
+  EXPECT_EQ(*keep_older_journal(link), "");
   EXPECT_EQ(*keep_older_journal(folder.file("none")), "");
   EXPECT_EQ(*keep_older_journal("/dev/null"), "");
 }
@@ -206,35 +221,71 @@ TEST(HostPort, AnswersNobodysAnswers) {
     return ::recv(socket->fd(), answer.data(), answer.size(), MSG_DONTWAIT) > 0;
   };
   EXPECT_TRUE(answered("x"));
+  EXPECT_TRUE(answered(v1::HostFrame().SerializeAsString())) << "nothing filled in";
   for (int code = 1; code <= v1::Status::Code_MAX; ++code) {
     v1::Status status;
     status.set_code(static_cast<v1::Status::Code>(code));
     status.set_text("malformed message");
     status.set_host_frame_number(code % 2 == 0 ? 12 : 0);
     status.set_count(3);
-    // One that says ok is never sent unasked.
-    EXPECT_EQ(answered(status.SerializeAsString()), code == v1::Status::CODE_OK) << code;
+    EXPECT_FALSE(answered(status.SerializeAsString())) << code;
   }
+  EXPECT_EQ(stepped.daemon->counter(Counter::statuses_suppressed),
+            static_cast<std::uint64_t>(v1::Status::Code_MAX));
   v1::HostFrame newer;
   newer.set_protocol_version(2);
   newer.set_frame_number(1);
   EXPECT_TRUE(answered(newer.SerializeAsString()));
 }
 
-TEST(Log, IsWrittenWhenFlushReturns) {
-  ScratchFolder folder;
+std::unique_ptr<Log> log_to(const std::string& file) {
   config::LogConfig config;
-  config.file = folder.file("log");
+  config.file = file;
   auto log = make_log(config);
-  ASSERT_TRUE(log.has_value()) << log.error().text;
+  EXPECT_TRUE(log.has_value()) << log.error().text;
+  return log ? std::move(*log) : nullptr;
+}
+
+TEST(Log, IsWrittenWhenItIsFinished) {
+  ScratchFolder folder;
+  const auto log = log_to(folder.file("log"));
+  ASSERT_NE(log, nullptr);
   constexpr std::ptrdiff_t kLines = 2000;
-  for (int round = 1; round <= 3; ++round) {
-    for (std::ptrdiff_t i = 0; i < kLines; ++i) {
-      (*log)->write(LogLevel::info, "event=test");
-    }
-    (*log)->flush();
-    EXPECT_EQ(std::ranges::count(folder.read("log"), '\n'), round * kLines);
+  for (std::ptrdiff_t i = 0; i < kLines; ++i) {
+    log->write(LogLevel::info, "event=test");
   }
+  EXPECT_TRUE(log->finish(60'000 * kMs));
+  EXPECT_EQ(std::ranges::count(folder.read("log"), '\n'), kLines);
+  log->write(LogLevel::info, "event=late");
+  EXPECT_TRUE(log->finish(0));
+  EXPECT_EQ(std::ranges::count(folder.read("log"), '\n'), kLines);
+}
+
+TEST(Log, ThatNobodyReadsKeepsNobody) {
+  ScratchFolder folder;
+  const std::string pipe = folder.file("pipe");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const Fd reader(::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  ASSERT_TRUE(reader);
+  auto log = log_to(pipe);
+  ASSERT_NE(log, nullptr);
+  constexpr std::ptrdiff_t kLines = 100;
+  for (std::ptrdiff_t i = 0; i < kLines; ++i) {
+    log->write(LogLevel::info, std::string(4096, '.'));  // the pipe holds 64 KiB
+  }
+  EXPECT_FALSE(log->finish(10 * kMs));
+  // Its thread, which goes on, is let go: read until it closes the pipe.
+  log.reset();
+  std::array<char, 65536> bytes{};
+  std::ptrdiff_t lines = 0;
+  for (ssize_t count = 1; count > 0;) {
+    pollfd wait{reader.get(), POLLIN, 0};
+    ASSERT_EQ(::poll(&wait, 1, 20'000), 1);
+    count = ::read(reader.get(), bytes.data(), bytes.size());
+    ASSERT_GE(count, 0);
+    lines += std::count(bytes.begin(), bytes.begin() + count, '\n');
+  }
+  EXPECT_EQ(lines, kLines);
 }
 
 TEST(ClockSteps, CostNoQuality) {

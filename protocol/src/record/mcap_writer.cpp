@@ -269,13 +269,14 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
     return make_error(ErrorCode::io, fmt::format("{}: cannot create: {}", path.string(),
                                                  std::generic_category().message(errno)));
   }
-  // Two writers would make one log of two, which reads like neither.
-  if (::flock(impl->fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+  struct stat status {};
+  const bool regular = ::fstat(impl->fd, &status) == 0 && S_ISREG(status.st_mode);
+  // Two writers would make one log of two, which reads like neither. (Pipes and /dev/null may have
+  // any number.)
+  if (regular && ::flock(impl->fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return make_error(ErrorCode::io, path.string() + ": another process writes it");
   }
-  struct stat status {};
-  if (::fstat(impl->fd, &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0 &&
-      ::ftruncate(impl->fd, 0) != 0) {
+  if (regular && status.st_size > 0 && ::ftruncate(impl->fd, 0) != 0) {
     return make_error(ErrorCode::io, fmt::format("{}: cannot be written over: {}", path.string(),
                                                  std::generic_category().message(errno)));
   }

@@ -55,6 +55,10 @@ class HostFrameDecoder {
                                              HostFrameDecoder& decoder,
                                              HostFrameData& out) noexcept;
 
+/// True for an emit.v1.Status with a text, as emitd sends: no HostFrame of this version begins like
+/// one. RT-safe.
+[[nodiscard]] bool looks_like_status(std::span<const std::byte> bytes) noexcept;
+
 /// Body of a control record that holds nothing but a HostFrame: the HostFrame's bytes, without
 /// parsing it. Empty when it is anything else. RT-safe.
 [[nodiscard]] std::span<const std::byte> host_frame_in_control_record(
