@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arguments.hpp"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
 namespace emit::cli {
 
 using std::filesystem::path;
@@ -95,7 +99,7 @@ void Tool::add_scene_commands() {
         ->capture_default_str();
     app.add_option("--tolerance-k", o.tolerance_k,
                    "Three dimensions: error of a step at refine 1, K")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     add_count(app, "--pixels", o.pixels,
               "Only so many surface pixels, always the same ones, the rest NaN; 0: all");
@@ -185,7 +189,7 @@ void Tool::add_stream_commands() {
     app.add_flag("--all", o.all, "Play every pose of the log, however long it takes");
     app.add_flag("--keep", o.keep, "Keep the recording, the daemon's configuration and its log");
     add_seconds(app, "--budget-s", o.budget_s, "Time that the chosen poses may take")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     add_json(app, o.json);
   }
@@ -218,7 +222,7 @@ void Tool::add_stream_commands() {
     app.add_option("--multicast", o.multicast_group, "UDP: group to join instead of unicast")
         ->type_name("ADDRESS");
     add_seconds(app, "--timeout-s", o.timeout_s, "Give up when no frame comes for this long")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     add_error_correction(app, "--fec", o.fec);
     app.add_flag("--resend", o.resend,
@@ -266,11 +270,10 @@ void Tool::add_stream_commands() {
         ->type_name("URL");
     app.add_option("--rate", o.rate_hz, "Poses a second; default: as the log's sim times say")
         ->type_name("HZ")
-        ->check(CLI::PositiveNumber);
+        ->check(positive());
     app.add_flag("--step", o.step, "Wait until the daemon has sent the frame before the next pose");
     add_count(app, "--frames", o.frames, "Send at most this many poses; 0: all");
-    add_count(app, "--every", o.every, "Send every Nth pose, numbered anew")
-        ->check(CLI::PositiveNumber);
+    add_count(app, "--every", o.every, "Send every Nth pose, numbered anew")->check(positive());
     app.add_option("--control", o.control,
                    "With udp: control port to watch the frames (--step) and to agree on a key over "
                    "TLS (--tls-*), tcp://host:port")
@@ -287,9 +290,9 @@ void Tool::add_stream_commands() {
                    "Host run id, not 0; another run in the log counts up. Default: from the clock, "
                    "so that a run that follows another needs no reset")
         ->type_name("N")
-        ->check(CLI::PositiveNumber);
+        ->check(positive());
     add_seconds(app, "--timeout-s", o.timeout_s, "With --step: longest wait for a frame")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     add_json(app, o.json);
   }
@@ -329,12 +332,12 @@ void Tool::add_log_commands() {
         "emit make-log airfield --rate-hz 200 --duration-s 20 --out airfield.mcap", run_make_log);
     add_scenario(app, o.input, "scenario");
     app.add_option("--rate-hz", o.rate_hz, "Poses a second")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--start-s", o.start_s,
                    "Simulated time of the first pose; default: the sensor trajectory's first node");
     add_seconds(app, "--duration-s", o.duration_s, "Length")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     add_path(app, "--out", o.out, "MCAP log to write")->required();
   }
@@ -418,6 +421,31 @@ void Tool::add_model_commands() {
     add_path(fit, "--out", f.out, "Library to write: the same with the fitted modes");
     add_json(fit, f.json);
   }
+}
+
+std::optional<std::string> Tool::unknown_command(int argc, char** argv) const {
+  std::string path;
+  const CLI::App* app = &app_;
+  for (int i = 1; i < argc && app->get_require_subcommand_min() > 0; ++i) {
+    const std::string name = argv[i];
+    if (name.starts_with('-')) return std::nullopt;
+    path += (path.empty() ? "" : " ") + name;
+    const auto known =
+        app->get_subcommands([&](const CLI::App* each) { return each->check_name(name); });
+    if (known.empty()) return path;
+    app = known.front();
+  }
+  return std::nullopt;
+}
+
+CLI::Validator positive() {
+  return {[](std::string& text) -> std::string {
+            double value = 0.0;
+            const bool number = CLI::detail::lexical_cast(text, value);
+            if (number && value > 0.0 && std::isfinite(value)) return {};
+            return fmt::format("{} is not a number above 0", text);
+          },
+          "POSITIVE"};
 }
 
 int run_tool(int argc, char** argv) {

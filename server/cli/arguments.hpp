@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
@@ -34,6 +36,9 @@ CLI::Option* add_count(CLI::App& app, const std::string& name, std::uint64_t& ta
                        const std::string& text);
 CLI::Option* add_seconds(CLI::App& app, const std::string& name, double& target,
                          const std::string& text);
+
+/// For numbers above 0.
+[[nodiscard]] CLI::Validator positive();
 
 /// K+M, groups of up to K fragments with M of parity, or off.
 template <class Target>
@@ -75,6 +80,10 @@ class Tool {
     try {
       app_.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
+      if (const auto unknown = unknown_command(argc, argv)) {
+        return fail(kExitUsage,
+                    fmt::format("there is no command '{}'; `emit --help` lists them", *unknown));
+      }
       return app_.exit(error) == 0 ? kExitOk : kExitUsage;
     }
     for (const auto& [command, action] : actions_) {
@@ -84,6 +93,9 @@ class Tool {
   }
 
  private:
+  /// Empty: it is something else that cannot be parsed.
+  [[nodiscard]] std::optional<std::string> unknown_command(int argc, char** argv) const;
+
   template <class Options>
   struct Entry {
     CLI::App& app;

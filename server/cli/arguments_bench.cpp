@@ -16,7 +16,7 @@ void Tool::add_bench_commands() {
         ->allow_extra_args(false);
     app.add_option("--steps", o.steps, "History steps; repeatable; default 27 and 90")
         ->allow_extra_args(false)
-        ->check(CLI::PositiveNumber);
+        ->check(positive());
     app.add_option("--frames", o.frames, "Frames per result, at least 5; cached takes at least 300")
         ->check(CLI::Range(5U, 100000U))
         ->capture_default_str();
@@ -53,15 +53,15 @@ void Tool::add_bench_commands() {
              "Folder for pictures and profiles of reference and models")
         ->type_name("DIR");
     app.add_option("--frames", o.frames, "Frames timed per setting")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
     app.add_option("--rays", o.rays, "Rays per face or pixel of the reference")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--refine", o.refine, "Refinement of the three-dimensional reference")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--pixels", o.pixels,
                    "Surface pixels the reference solves (published figures: 20000 or more); 0: all")
@@ -76,10 +76,10 @@ void Tool::add_bench_commands() {
         "then as fast as they go, beside bare sockets in the same run",
         "emit bench stream --json stream.json --frames 1000 --rate 200", run_bench_stream);
     add_count(app, "--frames", o.frames, "Frames per client at the fixed rate")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--rate", o.rate_hz, "Frames a second")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
@@ -138,7 +138,7 @@ void Tool::add_bench_commands() {
         ->check(CLI::Range(10U, 1'000'000U))
         ->capture_default_str();
     app.add_option("--rate", o.rate_hz, "Frames a second")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--width", o.width_px, "Image width, px")->capture_default_str();
     app.add_option("--height", o.height_px, "Image height, px")->capture_default_str();
@@ -313,7 +313,7 @@ void Tool::add_frame_time_benches(CLI::App& bench) {
     app.add_option("--budget", o.budgets,
                    "Time per frame, as a part of the median at full quality; repeatable")
         ->allow_extra_args(false)
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--frames", o.frames, "Frames of the flight")
         ->check(CLI::Range(2U, 1'000'000U))

@@ -24,7 +24,7 @@ void Tool::add_timing_commands() {
                    "Poses: udp://host:port (host port) or tcp://host:port (control port); "
                    "default: TCP to where the frames come from")
         ->type_name("URL");
-    add_count(app, "--frames", o.frames, "Poses to measure")->check(CLI::PositiveNumber);
+    add_count(app, "--frames", o.frames, "Poses to measure")->check(positive());
     app.add_option("--rate", o.rate_hz,
                    "Poses a second at most, at random distances; the next one waits for the frame "
                    "of the last")
@@ -37,7 +37,7 @@ void Tool::add_timing_commands() {
     add_seconds(app, "--time-s", o.time_s, "Simulated time of the first pose")
         ->capture_default_str();
     add_seconds(app, "--timeout-s", o.timeout_s, "A pose not shown for this long is missed")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->capture_default_str();
     app.add_option("--seed", o.seed, "Of the distances between poses")->capture_default_str();
     add_path(app, "--key-file", o.security.key_file,

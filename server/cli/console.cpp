@@ -15,7 +15,14 @@ int fail(int code, std::string_view text) {
 }
 
 int fail(const physics::Error& error) {
-  return fail(error.code == physics::ErrorCode::config ? kExitConfig : kExitFailure, error.text);
+  switch (error.code) {
+    case physics::ErrorCode::config:
+      return fail(kExitConfig, error.text);
+    case physics::ErrorCode::invalid_argument:
+      return fail(kExitUsage, error.text);
+    default:
+      return fail(kExitFailure, error.text);
+  }
 }
 
 int fail_config(const physics::Error& error) {

@@ -23,7 +23,7 @@ enum ExitCode : int {
 
 /// Prints "emit: error: ..." to standard error; `code` goes back to the caller.
 int fail(int code, std::string_view text);
-/// Exit code by the kind of error: config is 78, everything else 1.
+/// Exit code by the kind of error: config is 78, invalid_argument 2, everything else 1.
 int fail(const physics::Error& error);
 /// For errors met while reading a scenario or daemon configuration: always 78.
 int fail_config(const physics::Error& error);

@@ -469,7 +469,7 @@ int Demo::run() {
   for (const Step step :
        {&Demo::prepare, &Demo::start, &Demo::play, &Demo::finish, &Demo::replay}) {
     if (auto done = (this->*step)(); !done) {
-      work_.keep();
+      if (!InterruptGuard::interrupted()) work_.keep();  // to see what went wrong
       const int code = fail(done.error());
       if (work_.kept()) {
         fmt::print(stderr, "emit: configuration and log of the daemon are kept in {}\n",

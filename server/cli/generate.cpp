@@ -7,9 +7,7 @@ namespace emit::cli {
 
 int run_generate(const GenerateCommand& command) {
   const auto done = generate_scenes(command.scene, command.out, command.set);
-  if (done) return kExitOk;
-  const bool usage = done.error().code == physics::ErrorCode::invalid_argument;
-  return fail(usage ? kExitUsage : kExitFailure, done.error().text);
+  return done ? kExitOk : fail(done.error());
 }
 
 }  // namespace emit::cli

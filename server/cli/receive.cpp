@@ -13,6 +13,7 @@
 #include "frame_files.hpp"
 #include "interrupt.hpp"
 #include "io/client.hpp"
+#include "io/socket_address.hpp"
 #include "json.hpp"
 #include "stream_report.hpp"
 #include "stream_subscription.hpp"
@@ -88,6 +89,11 @@ int run_receive(const ReceiveCommand& command) {
   }
   if (const auto url = server::parse_frame_url(command.url); !url) {
     return fail(kExitUsage, url.error().text);
+  }
+  if (!command.multicast_group.empty() &&
+      !server::numeric_address(command.multicast_group, 0).is_multicast()) {
+    return fail(kExitUsage,
+                fmt::format("--multicast: '{}' is not a group", command.multicast_group));
   }
   if (!(command.max_k > command.min_k)) return fail(kExitUsage, "--max-k must exceed --min-k");
   server::SubscribeOptions options;

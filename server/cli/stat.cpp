@@ -175,9 +175,6 @@ int run_stat(const StatCommand& command) {
   const bool live = ::isatty(STDOUT_FILENO) != 0 && !command.once;
   while (!InterruptGuard::interrupted()) {
     auto now = read(command.url);
-    if (!now && now.error().code == physics::ErrorCode::invalid_argument) {
-      return fail(kExitUsage, now.error().text);
-    }
     if (!now) return fail(now.error());
     if (command.json) {
       if (auto written = write_json(*command.json, to_json(now->samples)); !written) {

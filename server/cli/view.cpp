@@ -251,10 +251,7 @@ int run_view(const ViewCommand& command) {
   const bool stream = command.source.find("://") != std::string::npos;
   auto provider =
       stream ? view::make_stream_provider(command) : view::make_scenario_provider(command);
-  if (!provider) {
-    const bool usage = provider.error().code == physics::ErrorCode::invalid_argument;
-    return usage ? fail(kExitUsage, provider.error().text) : fail(provider.error());
-  }
+  if (!provider) return fail(provider.error());
   constexpr std::uint32_t kWidth = 1056;  // 1.5 times 640 and the colour bar
   constexpr std::uint32_t kHeight = 768;
   auto window = view::Window::create("emit view", kWidth, kHeight);

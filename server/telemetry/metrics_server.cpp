@@ -77,7 +77,8 @@ class Session : public std::enable_shared_from_this<Session> {
     stream_.expires_after(std::chrono::nanoseconds(MetricsServer::kTimeoutNs));
     http::async_read(stream_, buffer_, parser_,
                      [self = shared_from_this()](const error_code& error, std::size_t) {
-                       if (!error) self->answer();
+                       // Bodies are not read, but who sends one is answered.
+                       if (!error || error == http::error::body_limit) self->answer();
                      });
   }
 

@@ -310,6 +310,7 @@ void make_loss_seeds() {
   }
   write("fragments", "parity", repaired);
   write("fragments", "parity_too_little", beyond);
+  write("udp_frames", "parity", repaired);
 
   Bytes waited;
   for (std::uint32_t id = 1; id <= 3; ++id) {
@@ -351,6 +352,7 @@ void make_session_seeds() {
 void make_fragment_seeds() {
   Bytes whole;
   Bytes lossy;
+  Bytes in_messages;  // two by two, with strangers between and taken now and then
   for (std::uint32_t id = 1; id <= 2; ++id) {
     const test::Frame frame = test::make_frame(16, 12, id);
     protocol::Fragmenter::Params params;
@@ -367,11 +369,17 @@ void make_fragment_seeds() {
       for (std::uint32_t k = 0; k < pieces.count; ++k) append(datagram, pieces.piece[k]);
       const auto instructions = static_cast<std::uint8_t>(i == 0 ? 1 : 2);
       append(whole, piece(instructions, datagram));
+      append(in_messages,
+             piece(static_cast<std::uint8_t>(instructions | (i % 2 == 1 ? 68 : 0)), datagram));
+      if (i == 1)
+        append(in_messages, piece(static_cast<std::uint8_t>(instructions | 128), datagram));
       if (i != id) append(lossy, piece(static_cast<std::uint8_t>(instructions | 4), datagram));
     }
   }
   write("fragments", "whole", whole);
   make_loss_seeds();
+  write("udp_frames", "in_messages", in_messages);
+  write("udp_frames", "lossy", lossy);
   write("fragments", "lossy", lossy);
 }
 

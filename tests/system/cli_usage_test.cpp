@@ -89,6 +89,8 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"receive", "tcp://localhost"},
         std::vector<std::string>{"receive", "tcp://localhost:1", "--every", "0"},
         std::vector<std::string>{"receive", "tcp://localhost:1", "--every", "1001"},
+        std::vector<std::string>{"receive", "udp://localhost:1", "--multicast", "8.8.8.8"},
+        std::vector<std::string>{"record", "--from", "udp://localhost:1", "--out", "x.mcap"},
         std::vector<std::string>{"stat", "tcp://localhost:7002"},
         std::vector<std::string>{"stat", "http://localhost"},
         std::vector<std::string>{"send", "x.mcap", "--to", "nowhere"},
@@ -99,6 +101,20 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"generate", "castle", "--out", "."},
         std::vector<std::string>{"bench"}, std::vector<std::string>{"bench", "speed"},
         std::vector<std::string>{"bench", "paper", "--frames", "1"}));
+
+TEST(CliUsage, what_is_wrong_is_named) {
+  EXPECT_NE(run_emit({"recieve", "tcp://localhost:1"}).err.find("no command 'recieve'"),
+            std::string::npos);
+  EXPECT_NE(run_emit({"bench", "speed", "--quick"}).err.find("no command 'bench speed'"),
+            std::string::npos);
+  for (const char* rate : {"0", "-1", "nan", "inf", "fast"}) {
+    const ProcessResult result =
+        run_emit({"send", "x.mcap", "--to", "udp://localhost:1", "--rate", rate});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find(std::string(rate) + " is not a number above 0"), std::string::npos)
+        << result.err;
+  }
+}
 
 TEST(CliBadConfiguration, an_unknown_scenario_exits_with_78) {
   const ProcessResult result =

@@ -116,6 +116,8 @@ TEST_F(DaemonMetrics, AnswerOtherRequestsByTheBook) {
   EXPECT_EQ(get("/nothing").status, 404);
   EXPECT_TRUE(answer_to("POST /metrics HTTP/1.1\r\nHost: x\r\nContent-Length: 0\r\n\r\n")
                   .starts_with("HTTP/1.1 405"));
+  EXPECT_TRUE(answer_to("POST /metrics HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n\r\nab")
+                  .starts_with("HTTP/1.1 405"));
   const std::string head = answer_to("HEAD /healthz HTTP/1.1\r\nHost: x\r\n\r\n");
   EXPECT_TRUE(head.starts_with("HTTP/1.1 200")) << head;
   EXPECT_TRUE(head.ends_with("\r\n\r\n")) << head;
