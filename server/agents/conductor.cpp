@@ -2,11 +2,30 @@
 #include "agents/conductor.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace emit::server {
 
 using protocol::FrameHeader;
+
+namespace {
+
+/// An entity that stands is told again so often that its pose history sees it at rest.
+constexpr std::int64_t kStandsForNs = 250'000'000;
+
+/// Ends of one interpolation differ by rounding though the body stands.
+bool same_place(const physics::Pose& a, const physics::Pose& b) noexcept {
+  constexpr double kSameM = 1e-6;
+  constexpr double kSameRad = 1e-9;
+  const glm::dvec3 moved_m = glm::abs(a.position_world_m - b.position_world_m);
+  const glm::dquat turned = a.world_from_body - b.world_from_body;
+  return std::max({moved_m.x, moved_m.y, moved_m.z}) <= kSameM &&
+         std::max({std::abs(turned.w), std::abs(turned.x), std::abs(turned.y),
+                   std::abs(turned.z)}) <= kSameRad;
+}
+
+}  // namespace
 
 Conductor::Conductor(Context& context, const ScenarioTracks& scenario, const Options& options,
                      TriggerInput* triggers)
@@ -150,8 +169,8 @@ bool Conductor::add_updates(RenderJob& job, std::int64_t shown_ns) noexcept {
   for (Entity& body : entities_) {
     body.placed = body.track.sample(shown_ns, options_.pacing.horizon_ns);
     body.changed = !body.shown || body.teleport_pending || body.shown->on != body.on ||
-                   body.shown->pose.position_world_m != body.placed.pose.position_world_m ||
-                   body.shown->pose.world_from_body != body.placed.pose.world_from_body;
+                   shown_ns - body.shown->sim_time_ns >= kStandsForNs ||
+                   !same_place(body.shown->pose, body.placed.pose);
   }
   for (const bool changed : {true, false}) {
     for (std::size_t i = 0; i < entities_.size(); ++i) {
@@ -163,7 +182,7 @@ bool Conductor::add_updates(RenderJob& job, std::int64_t shown_ns) noexcept {
         next_entity_ = from_next(i);
         return !changed;
       }
-      body.shown = {body.placed.pose, body.on};
+      body.shown = {body.placed.pose, shown_ns, body.on};
       add_update(job, body, body.placed.pose, body.placed.base_ns);
     }
   }

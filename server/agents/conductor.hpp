@@ -68,6 +68,7 @@ class Conductor final : public Agent {
     // Of slotted frames:
     struct Shown {
       physics::Pose pose;
+      std::int64_t sim_time_ns = 0;
       bool on = true;
     };
     std::optional<Shown> shown;  // by its last update

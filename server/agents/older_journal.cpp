@@ -56,8 +56,13 @@ int rename_to_new(const std::filesystem::path& from, const std::filesystem::path
     return errno;
   }
   // Network file systems have no such rename.
-  if (::link(from.c_str(), to.c_str()) != 0 || ::unlink(from.c_str()) != 0) {
+  if (::link(from.c_str(), to.c_str()) != 0) {
     return errno;
+  }
+  if (::unlink(from.c_str()) != 0) {
+    const int error = errno;
+    ::unlink(to.c_str());
+    return error;
   }
   return 0;
 }
@@ -78,8 +83,11 @@ physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem:
                            : failure("an older journal that cannot be read, so not written over: " +
                                      std::generic_category().message(errno));
   }
-  // Whoever writes a log holds it locked. Shared: some file systems lock no other for a reader.
-  if (::flock(opened.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+  // Whoever writes a log holds it locked, and whoever keeps one meanwhile. Network file systems
+  // give a reader no lock but a shared one.
+  if (::flock(opened.get(), LOCK_EX | LOCK_NB) != 0 &&
+      (errno == EWOULDBLOCK ||
+       (errno == EBADF && ::flock(opened.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK))) {
     return failure("another process writes it");
   }
   if (status.st_size == 0 || !holds_a_run(file, static_cast<std::uint64_t>(status.st_size))) {
@@ -90,6 +98,11 @@ physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem:
   // The log itself, not a link to it: the new one goes where the old one is.
   std::error_code unresolved;
   const std::filesystem::path real = std::filesystem::canonical(file, unresolved);
+  struct stat now {};
+  if (!unresolved && ::stat(real.c_str(), &now) == 0 &&
+      (now.st_dev != status.st_dev || now.st_ino != status.st_ino)) {
+    return failure("another process has just begun it");
+  }
   if (unresolved) {
     return failure("cannot be kept: " + unresolved.message());
   }

@@ -102,11 +102,20 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
     }
     datagram = *frame;
   }
+  const auto answer = [&](StatusCode code, std::uint64_t host_frame_number, std::uint64_t count,
+                          const std::string& text) {
+    // Two daemons must not answer each other's answers.
+    if (protocol::looks_like_status(datagram)) {
+      context_.counters.add(Counter::statuses_suppressed);
+    } else {
+      send_udp_status(origin, code, host_frame_number, count, text);
+    }
+  };
   if (!limits_.take_host_frame(peer, address_of(origin).port(), context_.clock.monotonic_ns())) {
     context_.counters.add(Counter::host_frames_over_rate);
     const std::uint64_t count = context_.counters.add(Counter::refused_overloaded);
-    send_udp_status(origin, StatusCode::overloaded, 0, count,
-                    "more host frames a second than access.max_host_frames_hz");
+    answer(StatusCode::overloaded, 0, count,
+           "more host frames a second than access.max_host_frames_hz");
     return;
   }
   const protocol::DecodeStatus decoded =
@@ -116,13 +125,7 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
     const std::uint64_t count = context_.counters.add(counter_of(code));
     context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
                                   protocol::to_string(decoded));
-    // Two daemons must not answer each other's answers.
-    if (protocol::looks_like_status(datagram)) {
-      context_.counters.add(Counter::statuses_suppressed);
-      return;
-    }
-    send_udp_status(origin, code, input->frame.frame_number, count,
-                    std::string(protocol::to_string(decoded)));
+    answer(code, input->frame.frame_number, count, std::string(protocol::to_string(decoded)));
     return;
   }
   input->kind = HostInput::Kind::frame;

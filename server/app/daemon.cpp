@@ -385,7 +385,7 @@ int DaemonImpl::run() {
       LogLevel::info,
       fmt::format("event=stopped frames={} clients={} journal={}", frames ? "drained" : "given_up",
                   clients ? "drained" : "given_up", journal ? "drained" : "given_up"));
-  static_cast<void>(log_->finish(kLogEndNs));
+  log_taken_ = log_->finish(kLogEndNs);
   return 0;
 }
 
@@ -406,7 +406,7 @@ int DaemonImpl::end_without_device() {
   }
   housekeep();
   log_summary();
-  static_cast<void>(log_->finish(kLostDrainNs));
+  log_taken_ = log_->finish(kLostDrainNs);
   return kExitDeviceLost;
 }
 

@@ -58,6 +58,8 @@ class Daemon {
   /// the render thread may hang in the driver, and with it this object's destructor; a process
   /// leaves by std::_Exit. Once per daemon.
   [[nodiscard]] virtual int run() = 0;
+  /// After run(): false where nobody took its last lines, on which exit() would wait.
+  [[nodiscard]] virtual bool log_taken() const noexcept = 0;
   /// Any thread, and signal handlers.
   virtual void request_stop() noexcept = 0;
 

@@ -46,6 +46,7 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] physics::Result<void> setup();
 
   int run() override;
+  bool log_taken() const noexcept override { return log_taken_; }
   void request_stop() noexcept override {
     stop_.store(true, std::memory_order_release);
     const std::uint64_t one = 1;
@@ -100,6 +101,7 @@ class DaemonImpl final : public Daemon {
   ScenarioTracks tracks_;
   Context context_;
   std::unique_ptr<Log> log_;
+  bool log_taken_ = true;
   std::string privileges_;  ///< what was given up, for the log
   DistinctTable distinct_;
   DistinctTable errors_;

@@ -26,17 +26,22 @@ constexpr int kExitUsage = 2;
 constexpr int kExitConfig = 78;  // EX_CONFIG of sysexits.h
 
 std::atomic<Daemon*> g_daemon{nullptr};
-static_assert(std::atomic<Daemon*>::is_always_lock_free);
+std::atomic<bool> g_ran{false};
+std::atomic<int> g_exit_code{0};  ///< of run()
+static_assert(std::atomic<Daemon*>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
 
 extern "C" void emit_on_stop_signal(int /*signal*/) {
   if (Daemon* daemon = g_daemon.load()) {
     daemon->request_stop();
     return;
   }
-  // Loading or warming up: nobody is served yet, and a driver may be busy for long.
-  constexpr std::string_view kText = "emitd: stopped before it was ready\n";
-  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kText.data(), kText.size());
-  ::_exit(0);
+  // Before: loading or warming up, nobody is served yet, and a driver may be busy for long. Behind:
+  // it is asked for once more, and taking down takes too long.
+  if (!g_ran.load()) {
+    constexpr std::string_view kText = "emitd: stopped before it was ready\n";
+    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kText.data(), kText.size());
+  }
+  ::_exit(g_exit_code.load());
 }
 
 void handle_stop_signals() {
@@ -188,14 +193,17 @@ int serve(const Arguments& arguments, const char* program) {
   fmt::print("{}\n", (*daemon)->ready_line());
   std::fflush(stdout);
   const int code = (*daemon)->run();
-  // What comes now comes too late to change how it ended.
-  std::signal(SIGTERM, SIG_IGN);
-  std::signal(SIGINT, SIG_IGN);
+  g_exit_code.store(code);
+  g_ran.store(true);
   g_daemon.store(nullptr);
   if (code == kExitDeviceLost) {
     // Taking the context down may hang in the driver, and flushing all streams behind a log that
     // nobody reads.
     std::_Exit(code);
+  }
+  if (!(*daemon)->log_taken()) {
+    daemon->reset();
+    std::_Exit(code);  // exit() would wait for whoever does not read the log
   }
   return code;
 }

@@ -423,16 +423,17 @@ void Tool::add_model_commands() {
   }
 }
 
-std::optional<std::string> Tool::unknown_command(int argc, char** argv) const {
-  std::string path;
+std::optional<Tool::UnknownCommand> Tool::unknown_command(int argc, char** argv) const {
+  UnknownCommand out{app_.get_name(), ""};
   const CLI::App* app = &app_;
   for (int i = 1; i < argc && app->get_require_subcommand_min() > 0; ++i) {
     const std::string name = argv[i];
     if (name.starts_with('-')) return std::nullopt;
-    path += (path.empty() ? "" : " ") + name;
+    out.command += (i == 1 ? "" : " ") + name;
     const auto known =
         app->get_subcommands([&](const CLI::App* each) { return each->check_name(name); });
-    if (known.empty()) return path;
+    if (known.empty()) return out;
+    out.parent += " " + name;
     app = known.front();
   }
   return std::nullopt;

@@ -81,8 +81,8 @@ class Tool {
       app_.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
       if (const auto unknown = unknown_command(argc, argv)) {
-        return fail(kExitUsage,
-                    fmt::format("there is no command '{}'; `emit --help` lists them", *unknown));
+        return fail(kExitUsage, fmt::format("there is no command '{}'; `{} --help` lists them",
+                                            unknown->command, unknown->parent));
       }
       return app_.exit(error) == 0 ? kExitOk : kExitUsage;
     }
@@ -93,8 +93,12 @@ class Tool {
   }
 
  private:
+  struct UnknownCommand {
+    std::string parent;   ///< with the tool's name
+    std::string command;  ///< all of it, without
+  };
   /// Empty: it is something else that cannot be parsed.
-  [[nodiscard]] std::optional<std::string> unknown_command(int argc, char** argv) const;
+  [[nodiscard]] std::optional<UnknownCommand> unknown_command(int argc, char** argv) const;
 
   template <class Options>
   struct Entry {

@@ -15,14 +15,12 @@ int fail(int code, std::string_view text) {
 }
 
 int fail(const physics::Error& error) {
-  switch (error.code) {
-    case physics::ErrorCode::config:
-      return fail(kExitConfig, error.text);
-    case physics::ErrorCode::invalid_argument:
-      return fail(kExitUsage, error.text);
-    default:
-      return fail(kExitFailure, error.text);
-  }
+  return fail(error.code == physics::ErrorCode::config ? kExitConfig : kExitFailure, error.text);
+}
+
+int fail_call(const physics::Error& error) {
+  return error.code == physics::ErrorCode::invalid_argument ? fail(kExitUsage, error.text)
+                                                            : fail(error);
 }
 
 int fail_config(const physics::Error& error) {

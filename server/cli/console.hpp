@@ -23,8 +23,10 @@ enum ExitCode : int {
 
 /// Prints "emit: error: ..." to standard error; `code` goes back to the caller.
 int fail(int code, std::string_view text);
-/// Exit code by the kind of error: config is 78, invalid_argument 2, everything else 1.
+/// Exit code by the kind of error: config is 78, everything else 1.
 int fail(const physics::Error& error);
+/// The same of something that judges what the command was called with: invalid_argument is 2.
+int fail_call(const physics::Error& error);
 /// For errors met while reading a scenario or daemon configuration: always 78.
 int fail_config(const physics::Error& error);
 void warn(std::string_view text);

@@ -92,10 +92,10 @@ int run_evaluate(const EvaluateCommand& command) {
   request.gpu_index = command.gpu_index;
   request.refine = command.refine;
   auto history = history_options(command);
-  if (!history) return fail(history.error());
+  if (!history) return fail_call(history.error());
   request.history = std::move(*history);
   const auto result = evaluate::evaluate(request);
-  if (!result) return fail(result.error());
+  if (!result) return fail_call(result.error());
   // Nothing but the result goes to standard output.
   const bool written = std::fwrite(result->data(), 1, result->size(), stdout) == result->size() &&
                        std::fflush(stdout) == 0;

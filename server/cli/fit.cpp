@@ -175,7 +175,7 @@ int run_fit(const FitCommand& command) {
   options.spin_up_s = command.spin_up_s;
   if (curve_input) {
     auto read = read_curve(command.input.scenario);
-    if (!read) return fail(read.error());
+    if (!read) return fail_call(read.error());
     curve = std::move(*read);
   } else {
     constexpr double kForcingStepS = 60.0;
@@ -194,7 +194,7 @@ int run_fit(const FitCommand& command) {
                                                            scenario->thermal.initial_k, options);
     if (!fit) {
       bar.finish();
-      return fail(fit.error());
+      return fail_call(fit.error());
     }
     bar.advance_to(i + 1);
     table.add({material.name + (material.dry_layers_valid ? "" : " (dry layers not valid)"),

@@ -7,7 +7,7 @@ namespace emit::cli {
 
 int run_generate(const GenerateCommand& command) {
   const auto done = generate_scenes(command.scene, command.out, command.set);
-  return done ? kExitOk : fail(done.error());
+  return done ? kExitOk : fail_call(done.error());
 }
 
 }  // namespace emit::cli

@@ -19,7 +19,7 @@ int run_record(const RecordCommand& command) {
   if (!url) return fail(kExitUsage, url.error().text);
   auto connected =
       server::RecorderClient::connect(command.from, server::kConnectTimeoutNs, command.security);
-  if (!connected) return fail(connected.error());
+  if (!connected) return fail_call(connected.error());
   server::RecorderClient& recorder = **connected;
   protocol::LogWriterOptions options;
   options.software = fmt::format("emit {} record", kVersion);

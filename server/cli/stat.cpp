@@ -175,7 +175,7 @@ int run_stat(const StatCommand& command) {
   const bool live = ::isatty(STDOUT_FILENO) != 0 && !command.once;
   while (!InterruptGuard::interrupted()) {
     auto now = read(command.url);
-    if (!now) return fail(now.error());
+    if (!now) return fail_call(now.error());
     if (command.json) {
       if (auto written = write_json(*command.json, to_json(now->samples)); !written) {
         return fail(written.error());

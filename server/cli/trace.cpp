@@ -15,7 +15,7 @@ int run_trace(const TraceCommand& command) {
   while (url.ends_with('/')) url.pop_back();
   if (!url.ends_with("/trace")) url += "/trace";
   const auto answer = server::http_get(url, kTimeoutNs);
-  if (!answer) return fail(answer.error());
+  if (!answer) return fail_call(answer.error());
   if (answer->status != 200) {
     return fail(kExitFailure, fmt::format("{}: answer {}", url, answer->status));
   }

@@ -233,6 +233,7 @@ int Viewer::run() {
     draw(command_.screenshot ? &picture : nullptr);
     if (command_.screenshot) {
       if (auto done = image::write_png(*command_.screenshot, picture); !done) {
+        if (!failure.empty()) fail(kExitFailure, failure);
         return fail(done.error());
       }
     }
@@ -251,7 +252,7 @@ int run_view(const ViewCommand& command) {
   const bool stream = command.source.find("://") != std::string::npos;
   auto provider =
       stream ? view::make_stream_provider(command) : view::make_scenario_provider(command);
-  if (!provider) return fail(provider.error());
+  if (!provider) return fail_call(provider.error());
   constexpr std::uint32_t kWidth = 1056;  // 1.5 times 640 and the colour bar
   constexpr std::uint32_t kHeight = 768;
   auto window = view::Window::create("emit view", kWidth, kHeight);

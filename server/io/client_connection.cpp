@@ -191,7 +191,10 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, ClientR
     }
   }
   // Frames by UDP come from the address that the connection leads to.
-  const SocketAddress peer = socket->peer_address();
+  SocketAddress peer = socket->peer_address();
+  if (peer.length == 0) {
+    peer = *address;  // broken already, as will be seen
+  }
   return greet(std::move(context), std::move(*socket), peer, role, end_ns);
 }
 

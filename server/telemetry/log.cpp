@@ -47,15 +47,17 @@ class SpdLog final : public Log {
     if (!pool_) {
       return true;
     }
+    const auto pool = std::make_shared<decltype(pool_)>(std::move(pool_));
     try {
       auto written = std::make_shared<std::promise<void>>();
       const auto end = written->get_future();
-      std::thread([pool = std::move(pool_), written]() mutable {
-        pool.reset();
+      std::thread([pool, written] {
+        pool->reset();
         written->set_value();
       }).detach();
       return end.wait_for(std::chrono::nanoseconds(limit_ns)) == std::future_status::ready;
     } catch (const std::exception&) {
+      pool_ = std::move(*pool);  // no thread: the destructor waits
       return false;
     }
   }

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-
-#include <cmath>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "support/conductor_rig.hpp"
 #include "telemetry/log.hpp"
@@ -163,6 +163,51 @@ TEST(Conductor, SaysWhichFramesHaveEntitiesOfAnOlderOne) {
       EXPECT_EQ(rig.count(Counter::frames_entities_behind), behind ? 1U : 0U);
     }
   }
+}
+
+TEST(Conductor, OfMoreEntitiesThanAFrameTakesThoseThatStandAreToldNowAndThen) {
+  config::PacingConfig pacing;
+  pacing.mode = config::PacingMode::ig_clock;
+  pacing.rate_hz = 100.0;
+  pacing.horizon_ns = 1000 * test::kMs;
+  test::ConductorRig rig(pacing);
+  rig.settle();
+  constexpr std::uint32_t kStanding = 500;  // ids of two that stand askew
+  constexpr std::uint64_t kSlots = 100;
+  for (std::uint64_t slot = 1; slot <= kSlots; ++slot) {
+    const bool placing = slot == 1;
+    rig.with([&](protocol::HostFrameData& frame) {
+      frame.entity_count = placing ? 2 : protocol::kMaxEntitiesPerFrame;
+      for (std::uint32_t i = 0; i < frame.entity_count; ++i) {
+        protocol::EntityStateData& state = frame.entities[i];
+        state = {};
+        state.entity_id = placing ? kStanding + i : 1 + i;
+        state.on = state.has_pose = true;
+        state.pose.position_world_m = {placing ? 3.0 : 0.1 * static_cast<double>(slot), i, 0.0};
+        state.pose.world_from_body =
+            physics::world_from_body_heading_pitch_roll(0.65 + 0.1 * i, 0.02, 0.01);
+      }
+    });
+    rig.send(slot, static_cast<std::int64_t>(slot) * 10 * test::kMs);
+    rig.settle();
+    rig.next_slot();
+  }
+  std::map<std::uint32_t, std::vector<std::int64_t>> told_ns;
+  for (const auto& [sim_time_ns, updates] : rig.script.entities) {
+    for (const auto& update : updates) told_ns[update.entity_id].push_back(sim_time_ns);
+  }
+  ASSERT_EQ(told_ns.size(), 2U + protocol::kMaxEntitiesPerFrame);
+  for (const auto& [id, times] : told_ns) {
+    const bool stands = id >= kStanding;
+    const std::int64_t longest_ns = (stands ? 270 : 30) * test::kMs;
+    for (std::size_t i = 1; i < times.size(); ++i) {
+      EXPECT_LE(times[i] - times[i - 1], longest_ns) << id;
+    }
+    EXPECT_LE(rig.script.entities.back().first - times.back(), longest_ns) << id;
+  }
+  // Each of those takes the place of one that moved, which is behind for a frame.
+  EXPECT_GE(rig.count(Counter::frames_entities_behind), 3U);
+  EXPECT_LE(rig.count(Counter::frames_entities_behind), 10U);
 }
 
 }  // namespace

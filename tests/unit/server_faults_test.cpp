@@ -269,9 +269,9 @@ TEST(Log, ThatNobodyReadsKeepsNobody) {
   ASSERT_TRUE(reader);
   auto log = log_to(pipe);
   ASSERT_NE(log, nullptr);
-  constexpr std::ptrdiff_t kLines = 100;
+  constexpr std::ptrdiff_t kLines = 1000;
   for (std::ptrdiff_t i = 0; i < kLines; ++i) {
-    log->write(LogLevel::info, std::string(4096, '.'));  // the pipe holds 64 KiB
+    log->write(LogLevel::info, std::string(4096, '.'));  // a pipe holds 1 MiB at most
   }
   EXPECT_FALSE(log->finish(10 * kMs));
   // Its thread, which goes on, is let go: read until it closes the pipe.
