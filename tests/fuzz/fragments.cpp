@@ -82,15 +82,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::uint64_t pushed = 0;
   while (!input.empty()) {
     const auto instructions = input.number<std::uint8_t>();
-    const auto piece = input.bytes(input.number<std::uint16_t>());
-    std::vector<std::byte> datagram(piece.begin(), piece.end());
-    const std::span<std::byte> bytes(datagram);
-    if ((instructions & 1u) != 0 && bytes.size() > protocol::kFragmentHeaderBytes) {
-      fuzz::seal_frame_header(bytes.subspan(protocol::kFragmentHeaderBytes));
-    }
-    if ((instructions & 2u) != 0 && bytes.size() > protocol::kFrameHeaderBytes) {
-      fuzz::seal_frame_header(bytes.last(protocol::kFrameHeaderBytes));
-    }
+    const std::vector<std::byte> datagram = fuzz::read_datagram(input, instructions);
     static_cast<void>(reassembler.push(datagram));
     ++pushed;
     if ((instructions & 8u) != 0) reassembler.flush();

@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "emit/protocol/fragment.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "fuzz/fuzz_input.hpp"
 
@@ -18,6 +19,22 @@ inline void seal_frame_header(std::span<std::byte> bytes) {
   constexpr std::size_t kCrcAt = protocol::kFrameHeaderBytes - sizeof(std::uint32_t);
   const std::uint32_t crc = protocol::crc32c(bytes.first(kCrcAt));
   std::memcpy(bytes.data() + kCrcAt, &crc, sizeof crc);
+}
+
+/// A datagram of fragments behind its length (u16). Bits of `instructions`: 1 seal the frame header
+/// behind the fragment's, 2 seal the one at the end.
+[[nodiscard]] inline std::vector<std::byte> read_datagram(InputReader& input,
+                                                          std::uint8_t instructions) {
+  const auto piece = input.bytes(input.number<std::uint16_t>());
+  std::vector<std::byte> datagram(piece.begin(), piece.end());
+  const std::span<std::byte> bytes(datagram);
+  if ((instructions & 1u) != 0 && bytes.size() > protocol::kFragmentHeaderBytes) {
+    seal_frame_header(bytes.subspan(protocol::kFragmentHeaderBytes));
+  }
+  if ((instructions & 2u) != 0 && bytes.size() > protocol::kFrameHeaderBytes) {
+    seal_frame_header(bytes.last(protocol::kFrameHeaderBytes));
+  }
+  return datagram;
 }
 
 }  // namespace emit::fuzz

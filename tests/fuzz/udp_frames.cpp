@@ -164,15 +164,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::size_t waiting = 0;
   while (!input.empty()) {
     const auto instructions = input.number<std::uint8_t>();
-    const auto piece = input.bytes(input.number<std::uint16_t>());
-    std::vector<std::byte> datagram(piece.begin(), piece.end());
-    const std::span<std::byte> bytes(datagram);
-    if ((instructions & 1u) != 0 && bytes.size() > protocol::kFragmentHeaderBytes) {
-      fuzz::seal_frame_header(bytes.subspan(protocol::kFragmentHeaderBytes));
-    }
-    if ((instructions & 2u) != 0 && bytes.size() > protocol::kFrameHeaderBytes) {
-      fuzz::seal_frame_header(bytes.last(protocol::kFrameHeaderBytes));
-    }
+    const std::vector<std::byte> datagram = fuzz::read_datagram(input, instructions);
     if ((instructions & 128u) != 0) {
       send();
       if (datagram.size() <= kMostJoinedBytes) {
