@@ -103,6 +103,7 @@ void Conductor::start_run(std::int64_t now_ns) noexcept {
   entities_.clear();
   touched_.clear();
   next_entity_ = 0;
+  next_standing_ = 0;
   have_host_frame_ = false;
   host_frame_number_ = 0;
   host_sim_time_ns_ = 0;
@@ -164,29 +165,43 @@ void Conductor::add_update(RenderJob& job, Entity& entity, const physics::Pose& 
 }
 
 bool Conductor::add_updates(RenderJob& job, std::int64_t shown_ns) noexcept {
-  // What changed goes first: of more than a frame takes, those that stand where they were can wait.
-  const auto from_next = [this](std::size_t i) { return (next_entity_ + i) % entities_.size(); };
   for (Entity& body : entities_) {
     body.placed = body.track.sample(shown_ns, options_.pacing.horizon_ns);
-    body.changed = !body.shown || body.teleport_pending || body.shown->on != body.on ||
-                   shown_ns - body.shown->sim_time_ns >= kStandsForNs ||
-                   !same_place(body.shown->pose, body.placed.pose);
+    body.moved = !body.shown || body.teleport_pending || body.shown->on != body.on ||
+                 !same_place(body.shown->pose, body.placed.pose);
+    body.told = false;
   }
-  for (const bool changed : {true, false}) {
-    for (std::size_t i = 0; i < entities_.size(); ++i) {
-      Entity& body = entities_[from_next(i)];
-      if (body.changed != changed) {
+  // From `next` on, at most so many; false and the next one in `next` where that left one out.
+  const auto tell = [&](std::size_t& next, std::size_t most, const auto& wanted) {
+    for (std::size_t i = 0, first = next; i < entities_.size(); ++i) {
+      const std::size_t at = (first + i) % entities_.size();
+      Entity& body = entities_[at];
+      if (body.told || !wanted(body)) {
         continue;
       }
-      if (job.entity_count == job.entities.size()) {
-        next_entity_ = from_next(i);
-        return !changed;
+      if (most == 0 || job.entity_count == job.entities.size()) {
+        next = at;
+        return false;
       }
+      --most;
+      body.told = true;
       body.shown = {body.placed.pose, shown_ns, body.on};
       add_update(job, body, body.placed.pose, body.placed.base_ns);
     }
-  }
-  return true;
+    return true;
+  };
+  const auto moved = [](const Entity& body) { return body.moved; };
+  const auto overdue = [&](const Entity& body) {
+    return !body.moved && shown_ns - body.shown->sim_time_ns >= kStandsForNs;
+  };
+  constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+  // Of more than a frame takes, those that stand where they were can wait, but not for ever.
+  constexpr std::size_t kMostOverdue = 8;
+  static_cast<void>(tell(next_standing_, kMostOverdue, overdue));
+  const bool up_to_date = tell(next_entity_, kAll, moved);
+  static_cast<void>(tell(next_standing_, kAll, overdue) &&
+                    tell(next_standing_, kAll, [](const Entity&) { return true; }));
+  return up_to_date;
 }
 
 void Conductor::issue_host_step(bool is_step, std::int64_t received_ns) noexcept {

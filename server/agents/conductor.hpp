@@ -73,7 +73,8 @@ class Conductor final : public Agent {
     };
     std::optional<Shown> shown;  // by its last update
     PoseSample placed;           // in the frame that is made up
-    bool changed = false;        // there, beside `shown`
+    bool moved = false;          // there, since `shown`
+    bool told = false;           // of that frame
   };
   static constexpr std::size_t kMaxIssued = 8;
   static constexpr std::size_t kMaxTracked = 1024;
@@ -114,7 +115,7 @@ class Conductor final : public Agent {
   /// `base_ns`: time stamp of the received pose that `pose` starts from (PoseSample).
   void add_update(RenderJob& job, Entity& entity, const physics::Pose& pose,
                   std::int64_t base_ns) noexcept;
-  /// Of all entities, where they are at that instant. False: not all that changed had room.
+  /// Of all entities, where they are at that instant. False: not all that moved had room.
   [[nodiscard]] bool add_updates(RenderJob& job, std::int64_t shown_ns) noexcept;
   void begin_slot() noexcept;
   [[nodiscard]] std::int64_t slot_begin_ns() const noexcept {
@@ -172,7 +173,9 @@ class Conductor final : public Agent {
   bool issued_any_ = false;
   bool reset_pending_ = false;          // waits for the frames in work
   std::vector<std::uint32_t> touched_;  // host-step: entities to apply with the next frames
-  std::size_t next_entity_ = 0;         // slotted: where the next frame goes on, if not all fit
+  // Slotted: where the next frame goes on, if not all fit.
+  std::size_t next_entity_ = 0;
+  std::size_t next_standing_ = 0;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather_;  // goes with the next frame
   std::size_t weather_count_ = 0;
 

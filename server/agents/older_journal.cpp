@@ -59,7 +59,8 @@ int rename_to_new(const std::filesystem::path& from, const std::filesystem::path
   if (::link(from.c_str(), to.c_str()) != 0) {
     return errno;
   }
-  if (::unlink(from.c_str()) != 0) {
+  // Gone: a network file system may answer so when it asked twice.
+  if (::unlink(from.c_str()) != 0 && errno != ENOENT) {
     const int error = errno;
     ::unlink(to.c_str());
     return error;

@@ -340,6 +340,7 @@ int DaemonImpl::run() {
       log_->write(LogLevel::error,
                   fmt::format("event=agent_failed agent={}", runner->agent().name()));
       stop_agents();
+      log_taken_ = log_->finish(kLogEndNs);
       return 1;
     }
   }

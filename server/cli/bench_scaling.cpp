@@ -197,8 +197,8 @@ int run_bench_scaling(const BenchScalingCommand& command) {
     results.push(row_json(row));
   }
   if (rows.empty()) {
-    return fail(physics::Error{physics::ErrorCode::invalid_argument,
-                               "no such axis for that method: per-frame has no samples"});
+    return fail_call(physics::Error{physics::ErrorCode::invalid_argument,
+                                    "no such axis for that method: per-frame has no samples"});
   }
   fmt::print(text_stream(command.json), "{}, commit {}\n{}", rows[0].device, kCommit,
              table.to_string());

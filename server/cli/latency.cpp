@@ -234,7 +234,7 @@ int run_latency(const LatencyCommand& command) {
   if (url->scheme != server::Url::Scheme::shm) security.control = url_text("tcp", *url);
   auto connected =
       server::FrameClient::connect(command.url, server::kConnectTimeoutNs, command.security);
-  if (!connected) return fail(connected.error());
+  if (!connected) return fail_call(connected.error());
   server::FrameClient& client = **connected;
   if (const auto channel = client.subscribe({}); !channel) return fail(channel.error());
   if (client.server().tai_offset_unset) {

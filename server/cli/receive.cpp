@@ -111,7 +111,7 @@ int run_receive(const ReceiveCommand& command) {
   // daemon waits.
   options.in_place = !command.out;
   auto opened = StreamSubscription::open(command.url, options, command.security);
-  if (!opened) return fail(opened.error());
+  if (!opened) return fail_call(opened.error());
   StreamSubscription& stream = *opened;
   const auto greet = [&] {
     const server::FrameClient& client = stream.client();

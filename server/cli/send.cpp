@@ -113,14 +113,14 @@ int run_send(const SendCommand& command) {
     auto connected =
         server::FrameClient::connect(command.control.empty() ? command.to : command.control,
                                      server::kConnectTimeoutNs, command.security);
-    if (!connected) return fail(connected.error());
+    if (!connected) return fail_call(connected.error());
     watcher = std::move(*connected);
     if (auto subscribed = watcher->subscribe({}); !subscribed) return fail(subscribed.error());
   }
   server::Security security = command.security;
   security.control = command.control;
   auto connected = server::HostClient::connect(command.to, server::kConnectTimeoutNs, security);
-  if (!connected) return fail(connected.error());
+  if (!connected) return fail_call(connected.error());
   server::HostClient& host = **connected;
 
   const InterruptGuard interrupt;

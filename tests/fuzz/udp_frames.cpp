@@ -9,6 +9,7 @@
 #include <sys/uio.h>
 
 #include <array>
+#include <cerrno>
 #include <cstring>
 #include <memory>
 #include <vector>
@@ -136,7 +137,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     };
     constexpr int kLongMs = 10'000;
     pollfd wait{ends.receiver->fd(), POLLIN, 0};
-    while (taken() < sent && ::poll(&wait, 1, kLongMs) == 1) {
+    while (taken() < sent && (::poll(&wait, 1, kLongMs) == 1 || errno == EINTR)) {
       ends.receiver->take(received, counters);
     }
     fuzz::require(taken() == sent && counters.os_drops == 0, "nothing is lost on the way");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
@@ -208,6 +209,64 @@ TEST(Conductor, OfMoreEntitiesThanAFrameTakesThoseThatStandAreToldNowAndThen) {
   // Each of those takes the place of one that moved, which is behind for a frame.
   EXPECT_GE(rig.count(Counter::frames_entities_behind), 3U);
   EXPECT_LE(rig.count(Counter::frames_entities_behind), 10U);
+}
+
+TEST(Conductor, WhatMovesIsInEveryFrameHoweverManyStand) {
+  struct Case {
+    double rate_hz;
+    std::uint32_t moving;
+    std::uint32_t standing;
+  };
+  for (const Case& test : {Case{2.0, 1, 200}, Case{25.0, 60, 700}}) {
+    SCOPED_TRACE(test.standing);
+    config::PacingConfig pacing;
+    pacing.mode = config::PacingMode::ig_clock;
+    pacing.rate_hz = test.rate_hz;
+    pacing.horizon_ns = 10'000 * test::kMs;
+    test::ConductorRig rig(pacing);
+    rig.settle();
+    std::uint64_t number = 0;
+    const auto slot_ns = static_cast<std::int64_t>(1e9 / test.rate_hz);
+    const auto say = [&](std::int64_t sim_time_ns, std::uint32_t first_id, std::uint32_t count,
+                         double x_m) {
+      rig.with([&](protocol::HostFrameData& frame) {
+        frame.entity_count = count;
+        for (std::uint32_t i = 0; i < count; ++i) {
+          protocol::EntityStateData& state = frame.entities[i];
+          state = {};
+          state.entity_id = first_id + i;
+          state.on = state.has_pose = true;
+          state.pose.position_world_m = {x_m, i, 0.0};
+        }
+      });
+      rig.send(++number, sim_time_ns);
+      rig.settle();
+    };
+    constexpr std::uint32_t kStanding = 1000;
+    for (std::uint32_t first = 0; first < test.standing; first += 100) {
+      say(0, kStanding + first, 100, 3.0);
+    }
+    constexpr int kFirst = 10;
+    for (int slot = 0; slot < kFirst; ++slot) rig.next_slot();  // all are told where they stand
+    const std::uint64_t behind = rig.count(Counter::frames_entities_behind);
+    const std::size_t before = rig.script.entities.size();
+    constexpr int kSlots = 30;
+    for (int slot = 1; slot <= kSlots; ++slot) {
+      say((kFirst + slot) * slot_ns, 1, test.moving, slot);
+      rig.next_slot();
+    }
+    EXPECT_EQ(rig.count(Counter::frames_entities_behind), behind);
+    ASSERT_EQ(rig.script.entities.size(), before + kSlots);
+    std::map<std::uint32_t, int> told;
+    for (std::size_t i = before; i < rig.script.entities.size(); ++i) {
+      const auto& updates = rig.script.entities[i].second;
+      const auto moving = std::ranges::count_if(
+          updates, [](const auto& update) { return update.entity_id < kStanding; });
+      EXPECT_EQ(moving, test.moving) << i - before;
+      for (const auto& update : updates) ++told[update.entity_id];
+    }
+    EXPECT_EQ(told.size(), test.moving + test.standing) << "the others take turns";
+  }
 }
 
 }  // namespace
