@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include "resolve.hpp"
+#include "resolve/resolve.hpp"
 
 /// What the daemon's configuration has to say before other hosts may reach a port.
 namespace emit::config {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <charconv>
 
-#include "data_files.hpp"
+#include "keys/data_files.hpp"
 #include "overrides.hpp"
-#include "resolve.hpp"
+#include "resolve/resolve.hpp"
 
 namespace emit::config {
 

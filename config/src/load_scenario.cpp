@@ -5,7 +5,7 @@
 
 #include "emit/physics/constants.hpp"
 #include "overrides.hpp"
-#include "resolve.hpp"
+#include "resolve/resolve.hpp"
 
 namespace emit::config {
 

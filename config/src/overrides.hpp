@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "emit/config/load.hpp"
-#include "keys.hpp"
+#include "keys/keys.hpp"
 
 namespace emit::config {
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "node.hpp"
+#include "keys/node.hpp"
 
 namespace emit::config {
 

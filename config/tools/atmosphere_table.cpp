@@ -7,7 +7,7 @@
 
 #include "emit/physics/constants.hpp"
 #include "emit/physics/planck.hpp"
-#include "resolve.hpp"
+#include "resolve/resolve.hpp"
 
 namespace {
 

@@ -8,6 +8,15 @@ include(ProcessorCount)
 add_library(emit_test_options INTERFACE)
 target_compile_options(emit_test_options INTERFACE -Wno-null-dereference)
 
+# Paths that tests read by: the source tree, the build tree, the programs and the shipped data.
+add_library(emit_test_paths INTERFACE)
+target_include_directories(emit_test_paths INTERFACE ${PROJECT_SOURCE_DIR}/tests)
+target_compile_definitions(emit_test_paths INTERFACE
+  EMIT_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}/tests"
+  EMIT_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
+  EMIT_TEST_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}"
+  EMIT_TEST_SHARE_DIR="${EMIT_SHARE_DIR}")
+
 # emit_test(NAME name LABEL label SOURCES ... LIBS ... [SERIAL] [TIMEOUT seconds])
 # One GoogleTest executable; each TEST becomes a CTest case carrying the label.
 function(emit_test)
@@ -16,13 +25,7 @@ function(emit_test)
     set(arg_TIMEOUT 300)
   endif()
   add_executable(${arg_NAME} ${arg_SOURCES})
-  target_link_libraries(${arg_NAME} PRIVATE emit_options emit_test_options ${arg_LIBS} GTest::gmock GTest::gtest_main)
-  target_include_directories(${arg_NAME} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
-  target_compile_definitions(${arg_NAME} PRIVATE
-    EMIT_TEST_SOURCE_DIR="${PROJECT_SOURCE_DIR}/tests"
-    EMIT_TEST_BINARY_DIR="${PROJECT_BINARY_DIR}"
-    EMIT_TEST_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}"
-    EMIT_TEST_SHARE_DIR="${EMIT_SHARE_DIR}")
+  target_link_libraries(${arg_NAME} PRIVATE emit_options emit_test_options emit_test_paths ${arg_LIBS} GTest::gmock GTest::gtest_main)
   set_target_properties(${arg_NAME} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
   set(properties LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
   if(arg_SERIAL)

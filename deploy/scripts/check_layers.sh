@@ -1,29 +1,150 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Shows that the include arrows of the architecture hold: folder = layer, arrows point down.
-#   physics -> nothing; image, protocol, config -> physics; scene -> physics;
-#   reference -> physics and the plain scene description; renderer -> physics, scene, image;
-#   server -> all. Besides, config may read the plain header
-#   emit/scene/scene_desc.hpp, because it fills those structs.
-# Third-party libraries stay in the one folder that wraps them.
+# Shows that the include arrows of the architecture hold. A folder is a layer. The table below has a row for every
+# folder of sources, lowest first. A row names the folders that its files may include besides their own. Each of them
+# stands in a row above, so that no circle of folders can be written down.
+# The script also checks that third-party libraries stay in the one folder that wraps them, that no folder holds more
+# than 30 source files, and that every source file has its licence line.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 violations=0
 
-# check NAME "folders" "allowed include prefixes (extended regex)" ["excluded path regex"]
-# Looks at the project's own includes: "emit/...", "gl/...", "passes/..." and so on.
-check() {
-  local name=$1 folders=$2 allowed=$3 excluded=${4:-^$}
-  local lines
-  # shellcheck disable=SC2086
-  lines=$(grep -rnE '^#include "' $folders --include='*.hpp' --include='*.cpp' --include='*.h' 2>/dev/null |
-    grep -vE "$excluded" | grep -vE "#include \"($allowed)" || true)
-  if [[ -n $lines ]]; then
-    echo "layer $name includes what it may not:"
-    echo "$lines" | sed 's/^/  /'
-    violations=$((violations + $(echo "$lines" | wc -l)))
-  fi
+layers='
+renderer/physics:
+renderer/image: renderer/physics
+renderer/scene: renderer/physics
+renderer/scene/generate: renderer/physics
+renderer/threads:
+renderer/reference: renderer/physics renderer/scene
+renderer/reference/src/rays: renderer/reference renderer/physics renderer/scene renderer/threads
+renderer/reference/src/conduction: renderer/reference renderer/reference/src/rays renderer/physics renderer/scene renderer/threads
+renderer/reference/src: renderer/reference renderer/reference/src/rays renderer/reference/src/conduction renderer/physics renderer/scene renderer/threads
+renderer/shaders/shared:
+renderer/gl: renderer/physics renderer/threads
+renderer/include: renderer/physics renderer/scene
+renderer/history: renderer/include renderer/physics renderer/scene
+renderer/surface/heat: renderer/history renderer/include renderer/physics renderer/scene
+renderer/surface/mesh: renderer/scene renderer/threads
+renderer/surface/rays: renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh
+renderer/surface/model: renderer/history renderer/scene renderer/surface/heat renderer/surface/mesh renderer/surface/rays
+renderer/surface/shade: renderer/history renderer/physics renderer/scene renderer/threads renderer/shaders/shared renderer/surface/heat renderer/surface/mesh renderer/surface/rays
+renderer/surface/state: renderer/history renderer/physics renderer/scene renderer/surface/mesh renderer/surface/model
+renderer/surface/warm_up: renderer/physics renderer/threads renderer/surface/mesh renderer/surface/model renderer/surface/rays
+renderer/surface/run: renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh renderer/surface/model renderer/surface/rays renderer/surface/shade renderer/surface/state renderer/surface/warm_up
+renderer/draw: renderer/gl renderer/history renderer/physics renderer/scene renderer/shaders/shared renderer/threads renderer/surface/mesh renderer/surface/run
+renderer/passes: renderer/draw renderer/gl renderer/physics renderer/scene renderer/shaders/shared renderer/surface/run
+renderer/stages: renderer/draw renderer/gl renderer/history renderer/include renderer/passes renderer/physics renderer/scene renderer/shaders/shared renderer/surface/rays renderer/surface/run
+renderer/budget: renderer/include renderer/physics renderer/scene renderer/surface/mesh
+renderer/src: renderer/budget renderer/draw renderer/gl renderer/history renderer/include renderer/passes renderer/physics renderer/scene renderer/stages renderer/surface/rays
+renderer/verify: renderer/physics
+renderer/verify/src: renderer/verify renderer/gl renderer/physics
+renderer/verify/src/visibility: renderer/verify renderer/verify/src renderer/include renderer/physics renderer/reference renderer/scene renderer/threads
+renderer/verify/src/stability: renderer/verify renderer/verify/src renderer/gl renderer/physics renderer/shaders/shared
+renderer/verify/src/models: renderer/verify renderer/verify/src renderer/verify/src/visibility renderer/physics renderer/reference
+protocol: renderer/physics
+config/include: renderer/physics renderer/scene
+config/src/keys: config/include renderer/physics renderer/scene
+config/src/tables: config/include config/src/keys renderer/physics renderer/scene
+config/src/resolve: config/include config/src/keys config/src/tables renderer/physics renderer/scene
+config/src: config/include config/src/keys config/src/tables config/src/resolve renderer/physics renderer/scene
+config/tools: config/include config/src config/src/keys config/src/resolve renderer/physics renderer/scene
+server/rt: config/include renderer/physics
+server/net: server/rt config/include protocol renderer/physics
+server/client: server/net server/rt config/include protocol renderer/physics
+server/pacing: protocol renderer/include renderer/physics renderer/scene
+server/telemetry: server/net server/rt config/include protocol renderer/physics
+server/agents: server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
+server/agents/receiver: server/agents server/agents/sender server/net server/rt config/include protocol renderer/physics
+server/agents/conductor: server/agents server/net server/pacing server/rt config/include protocol renderer/physics
+server/agents/recorder: server/agents server/net server/rt config/include protocol renderer/physics
+server/agents/render: server/agents server/pacing renderer/image renderer/physics
+server/app: server/agents server/agents/conductor server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/tool/support: server/app server/pacing config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
+server/tool/streams: server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
+server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
+server/bench/stability: server/tool/support renderer/image renderer/include renderer/physics renderer/scene renderer/verify
+server/bench/accuracy: server/tool/support server/bench/stability renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/threads renderer/verify
+server/bench/frame_time: server/tool/support server/bench/accuracy server/bench/stability server/pacing renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
+server/bench/stream: server/tool/support server/tool/streams server/agents server/client server/net server/rt config/include protocol renderer/physics
+server/tool/commands: server/tool/support server/tool/streams server/tool/view server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/verify
+server/tool: server/tool/commands server/tool/support
+'
+
+# Every include of a project header as FILE:LINE:HEADER.
+includes() {
+  grep -rnE '^#include "' renderer protocol config server --include='*.hpp' --include='*.cpp' --include='*.h' |
+    sed -E 's/^([^:]*:[0-9]*):#include "([^"]*)".*/\1:\2/' |
+    grep -vE ':emit/(v1/|version\.hpp$)'
 }
+
+# The folder of a file as the table names it: the sources and public headers of a small module are one folder.
+arrows=$(includes | awk -F: -v layers="$layers" '
+  function folder(path,   f) {
+    f = path
+    if (!sub(/\/[^\/]*$/, "", f)) f = ""
+    if (f ~ /^renderer\/include/) return "renderer/include"
+    if (f ~ /^config\/include/) return "config/include"
+    if (f ~ /^(renderer\/(physics|image|scene|scene\/generate)|protocol)\/(include|src)/) sub(/\/(include|src).*/, "", f)
+    sub(/\/include\/emit\/.*/, "", f)
+    return f
+  }
+  BEGIN {
+    owner["physics"] = "renderer/physics"; owner["image"] = "renderer/image"; owner["scene"] = "renderer/scene"
+    owner["scenegen"] = "renderer/scene/generate"; owner["threads"] = "renderer/threads"
+    owner["reference"] = "renderer/reference"; owner["renderer"] = "renderer/include"; owner["verify"] = "renderer/verify"
+    owner["protocol"] = "protocol"; owner["config"] = "config/include"; owner["client"] = "server/client"
+    count = split(layers, line, "\n")
+    for (i = 1; i <= count; ++i) {
+      if (line[i] == "") continue
+      split(line[i], part, ":")
+      number = split(part[2], used, " ")
+      for (u = 1; u <= number; ++u) {
+        dep = used[u]
+        if (!(dep in row))
+          print "row " part[1] " names " dep ", which has no row above it"
+        allowed[part[1] "|" dep] = 1
+      }
+      row[part[1]] = 1
+    }
+  }
+  {
+    from = folder($1)
+    if (!(from in row)) {
+      if (!(from in reported)) print "folder " from " has no row in the table"
+      reported[from] = 1
+      next
+    }
+    header = $3
+    if (match(header, /^emit\/[a-z]+\//)) {
+      split(header, word, "/")
+      to = owner[word[2]]
+    } else if (header ~ /^\.\.\// || header !~ /\//) {
+      to = from
+    } else if (from ~ /^(config|renderer\/reference|renderer\/verify)\/src/) {
+      root = from; sub(/\/src.*/, "/src", root); to = header ~ /^shared\// ? "renderer/shaders/shared" : \
+          header ~ /^(gl|threads)\// ? "renderer/" folder(header) : root "/" folder(header)
+    } else if (from ~ /^protocol/) {
+      to = "protocol"
+    } else if (from ~ /^config\/tools/) {
+      to = "config/src/" folder(header)
+    } else {
+      to = (header ~ /^shared\// ? "renderer/shaders/" : from ~ /^server/ ? "server/" : "renderer/") folder(header)
+    }
+    if (to == from || (from "|" to) in allowed) next
+    print $1 ":" $2 ": " from " may not include " to " (\"" header "\")"
+  }')
+if [[ -n $arrows ]]; then
+  echo "$arrows"
+  violations=$((violations + $(echo "$arrows" | wc -l)))
+fi
+
+crowded=$(git ls-files -co --exclude-standard -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' |
+  sed -E 's#/[^/]*$##' | sort | uniq -c | awk '$1 > 30 {print "folder " $2 " holds " $1 " source files"}')
+if [[ -n $crowded ]]; then
+  echo "$crowded"
+  violations=$((violations + $(echo "$crowded" | wc -l)))
+fi
 
 # only NAME "include regex" "folders that may" : a library is included nowhere else.
 only() {
@@ -38,16 +159,6 @@ only() {
   fi
 }
 
-# Headers without a folder stand beside their file: private to the layer.
-beside='(\.\./)?[a-z0-9_]+\.hpp"'
-check physics  renderer/physics  "emit/physics/|$beside"
-check image    renderer/image    "emit/image/|emit/physics/|$beside"
-check scene    renderer/scene    "emit/scene/|emit/scenegen/|emit/physics/|$beside"
-check threads  renderer/threads  "threads/"
-check gl       renderer/gl       "gl/|threads/|emit/physics/"
-check renderer "renderer/passes renderer/history renderer/surface renderer/include renderer/renderer.cpp" \
-      "emit/(renderer|physics|scene|image)/|gl/|threads/|passes/|history/|surface/|shared/"
-check reference renderer/reference "emit/(reference|physics)/|emit/scene/(scene_desc|mesh|trajectory)\.hpp|$beside"
 # The truth does not use the formulas that it judges (fitting compares the two, so it has both).
 formulas='equilibrium|surface_balance|relaxation|planck|band_radiance_lut|foster'
 judged=$(grep -rnE "^#include \"emit/physics/($formulas)\.hpp\"" renderer/reference \
@@ -57,12 +168,8 @@ if [[ -n $judged ]]; then
   echo "$judged" | sed 's/^/  /'
   violations=$((violations + $(echo "$judged" | wc -l)))
 fi
-check evaluate renderer/evaluate "emit/(evaluate|physics|reference|renderer|scene)/|gl/|shared/|$beside"
-check protocol protocol          "emit/(protocol|physics)/|emit/v1/|record/|$beside"
-check config   config            "emit/(config|physics)/|emit/scene/scene_desc\.hpp|$beside"
-
-only OpenGL   'epoxy/|GL/'        'renderer/gl/|renderer/passes/|renderer/evaluate/|server/cli/view'
-only GLFW     'GLFW/'             'server/cli/view'
+only OpenGL   'epoxy/|GL/'        'renderer/gl/|renderer/draw/|renderer/passes/|renderer/stages/|renderer/verify/|server/tool/view'
+only GLFW     'GLFW/'             'server/tool/view'
 only OpenEXR  'Imf|OpenEXR/'      'renderer/image/'
 only tinygltf 'tiny_gltf'         'renderer/scene/'
 only meshoptimizer 'meshoptimizer' 'renderer/scene/'
@@ -71,12 +178,11 @@ only Boost    'boost/'            'server/'
 only ISA-L    'isa-l'             'protocol/src/erasure_code'
 only Protobuf 'google/protobuf/'  'protocol/|server/'
 only spdlog   'spdlog/'           'server/'
-only Embree   'embree3/'          'renderer/reference/|renderer/surface/caster_'
+only Embree   'embree3/'          'renderer/reference/|renderer/surface/rays/caster_'
 only Eigen    'Eigen/'            'renderer/reference/'
 only Ceres    'ceres/'            'renderer/reference/'
-only OpenSSL  'openssl/'          'protocol/src/|server/io/tls_'
+only OpenSSL  'openssl/'          'protocol/src/|server/net/tls_'
 only CLI11    'CLI/'              'server/'
-only "the renderer's insides" 'gl/|threads/|passes/|history/|surface/' 'renderer/'
 
 missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.cmake' \
     '*CMakeLists.txt' '*.proto' | xargs grep -L 'SPDX-License-Identifier: Apache-2.0' || true)

@@ -6,7 +6,7 @@
 #include "history/environment.hpp"
 #include "history/foster_history.hpp"
 #include "history/surface_history.hpp"
-#include "passes/foster_setup.hpp"
+#include "history/foster_setup.hpp"
 
 namespace emit::renderer {
 namespace {

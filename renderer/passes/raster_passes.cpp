@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "passes/picture_window.hpp"
+#include "draw/picture_window.hpp"
 
 namespace emit::renderer {
 namespace {

@@ -8,8 +8,8 @@
 #include "gl/egl_context.hpp"
 #include "gl/objects.hpp"
 #include "gl/program.hpp"
-#include "passes/draw_lists.hpp"
-#include "passes/scene_buffers.hpp"
+#include "draw/draw_lists.hpp"
+#include "draw/scene_buffers.hpp"
 
 namespace emit::renderer {
 

@@ -9,10 +9,10 @@
 
 #include "gl/objects.hpp"
 #include "gl/program.hpp"
-#include "passes/frame_setup.hpp"
+#include "draw/camera_setup.hpp"
 #include "passes/shade_tiles.hpp"
 #include "shared/shade_params.glsl.h"
-#include "surface/cached_surface.hpp"
+#include "surface/run/cached_surface.hpp"
 
 namespace emit::renderer {
 

@@ -4,12 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 
 #include "agents/frame_source.hpp"
+#include "emit/protocol/control.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "pacing/run_control.hpp"
+#include "rt/connection_key.hpp"
 
 /// Plain structs on the rings between agents; docs/threading.md shows who sends what to whom.
 namespace emit::server {
@@ -23,34 +24,7 @@ using ChannelSet = std::uint64_t;
 inline constexpr std::size_t kMaxChannels = 64;
 inline constexpr ChannelSet kAllChannels = ~ChannelSet{0};
 
-/// Connections are named by their place in the receiver's table and how often it was used.
-inline constexpr std::uint32_t kConnectionPlaceBits = 10;
-inline constexpr std::uint32_t kMaxConnections = 1u << kConnectionPlaceBits;
-[[nodiscard]] constexpr std::uint32_t connection_place(std::uint64_t key) noexcept {
-  return static_cast<std::uint32_t>(key) & (kMaxConnections - 1);
-}
-
-/// "PLACE.USE", as the log names a connection.
-[[nodiscard]] inline std::string connection_name(std::uint64_t key) {
-  return std::to_string(connection_place(key)) + "." + std::to_string(key >> kConnectionPlaceBits);
-}
-
-/// Values of emit.v1.Status.Code.
-enum class StatusCode : std::uint8_t {
-  ok = 1,
-  wrong_version = 2,
-  oversize = 3,
-  malformed = 4,
-  unknown_entity = 5,
-  invalid_pose = 6,
-  time_backwards = 7,
-  duplicate_frame = 8,
-  unknown_channel = 9,
-  not_allowed = 10,
-  overloaded = 11,
-  internal = 12,
-  invalid_environment = 13,
-};
+using protocol::StatusCode;
 
 /// Whom an answer goes to.
 struct Origin {
@@ -70,9 +44,6 @@ struct HostInput {
   Origin origin;
   protocol::HostFrameData frame;
 };
-
-/// StatusReply::detail of not_allowed: a host frame of a run that another one has replaced.
-inline constexpr std::uint64_t kDetailOldRun = 1u << 16;
 
 /// conductor -> receiver: an answer to send.
 struct StatusReply {
@@ -131,42 +102,6 @@ struct PublishFrame {
   bool repeat = false;
   Image image;
   protocol::FrameHeader header;
-};
-
-enum class EventKind : std::uint8_t {
-  run_started,      ///< a = run id
-  host_epoch,       ///< a = host's run id
-  command,          ///< a = CommandKind
-  refused,          ///< a = StatusCode, b = count
-  connected,        ///< a = connection, text = peer
-  disconnected,     ///< a = connection, text = why
-  hello,            ///< a = connection, b = role, text = software
-  subscribed,       ///< a = connection, b = channel, text = transport
-  client_failed,    ///< a = connection, text = why
-  client_slow,      ///< a = connection
-  no_gso,           ///< a = connection, text = why
-  source_failed,    ///< text = why
-  device_lost,      ///< text = why; the daemon ends
-  journal_failed,   ///< text = why
-  journal_overrun,  ///< a = first sequence lost
-  slots_missed,     ///< a = how many
-  weather_lost,     ///< a = sim time of the sample, ns
-  poses_dropped,    ///< a = how many
-  trigger_silent,   ///< a = number of the last one
-  peer_refused,     ///< text = address, a = PeerRefusal
-  secured,          ///< a = connection, text = names in the peer's certificate
-  host_session,     ///< text = address
-};
-
-/// Why a peer is turned away before anything it says is looked at.
-enum class PeerRefusal : std::uint8_t { not_allowed, handshake, mac, trigger_mac };
-
-/// any agent -> housekeeping: what happened, as numbers; the text is put together there.
-struct Event {
-  EventKind kind = EventKind::run_started;
-  std::uint64_t a = 0;
-  std::uint64_t b = 0;
-  std::array<char, 104> text{};
 };
 
 }  // namespace emit::server

@@ -12,7 +12,7 @@
 #include "app/privileges.hpp"
 #include "app/replay.hpp"
 #include "emit/version.hpp"
-#include "io/key_file.hpp"
+#include "net/key_file.hpp"
 
 namespace emit::server {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "app/daemon_impl.hpp"
 #include "emit/version.hpp"
-#include "io/ip_address.hpp"
+#include "net/ip_address.hpp"
 
 /// What the daemon tells about itself: metrics over HTTP, the log, the state of the clocks.
 namespace emit::server {

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "agents/receiver.hpp"
+#include "agents/receiver/receiver.hpp"
 #include "app/daemon.hpp"
 #include "app/service_notifier.hpp"
 #include "emit/config/load.hpp"

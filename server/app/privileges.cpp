@@ -12,7 +12,8 @@
 #include <cerrno>
 #include <cstdint>
 
-#include "io/socket_address.hpp"
+#include "net/socket_address.hpp"
+#include "rt/error_text.hpp"
 
 namespace emit::server {
 namespace {

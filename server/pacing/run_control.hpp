@@ -3,10 +3,11 @@
 #include <cstdint>
 #include <optional>
 
+#include "emit/protocol/control.hpp"
+
 namespace emit::server {
 
-/// Values of emit.v1.Command.Kind.
-enum class CommandKind : std::uint8_t { start = 1, stop = 2, hold = 3, step = 4, reset = 5 };
+using protocol::CommandKind;
 
 /// Start, stop, hold and step; reset is the conductor's. Pure. RT-safe.
 ///

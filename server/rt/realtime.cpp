@@ -17,7 +17,7 @@
 #include <cstring>
 #include <thread>
 
-#include "io/socket_address.hpp"
+#include "rt/error_text.hpp"
 
 namespace emit::server {
 namespace {

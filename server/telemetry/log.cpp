@@ -13,7 +13,9 @@
 #include <thread>
 #include <utility>
 
-#include "agents/receiver_connection.hpp"
+#include "emit/protocol/control.hpp"
+#include "rt/connection_key.hpp"
+#include "rt/error_text.hpp"
 
 namespace emit::server {
 namespace {
@@ -150,7 +152,7 @@ EventText describe(const Event& event) {
     case EventKind::refused:
       return {LogLevel::warn,
               fmt::format("event=refused status={} text=\"{}\"", event.a,
-                          text.empty() ? status_text(static_cast<StatusCode>(event.a), 0) : text),
+                          text.empty() ? protocol::status_text(static_cast<protocol::StatusCode>(event.a), 0) : text),
               true};
     case EventKind::connected:
       return {LogLevel::info,

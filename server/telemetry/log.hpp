@@ -7,9 +7,9 @@
 #include <string>
 #include <string_view>
 
-#include "agents/messages.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/physics/error.hpp"
+#include "telemetry/event.hpp"
 
 namespace emit::server {
 

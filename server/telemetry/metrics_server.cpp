@@ -17,6 +17,8 @@
 #include <thread>
 #include <utility>
 
+#include "rt/error_text.hpp"
+
 namespace emit::server {
 namespace {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "emit/physics/error.hpp"
-#include "io/socket_address.hpp"
+#include "net/socket_address.hpp"
 
 namespace emit::server {
 

@@ -9,7 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
-#include "io/socket_address.hpp"
+#include "net/socket_address.hpp"
+#include "rt/error_text.hpp"
 
 namespace emit::server {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "agents/messages.hpp"
+#include "telemetry/event.hpp"
 #include "telemetry/log.hpp"
 
 namespace emit::server {

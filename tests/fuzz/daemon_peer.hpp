@@ -13,7 +13,7 @@
 #include "emit/protocol/framing.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/fuzz_input.hpp"
-#include "io/client_connection.hpp"
+#include "client/client_connection.hpp"
 
 /// A daemon at the other end of a client's connection that says what the input holds and hangs up.
 namespace emit::fuzz {
@@ -24,8 +24,8 @@ inline constexpr std::size_t kMaxSaidBytes = 64u << 10;
 inline constexpr protocol::RecordLimits kLimits{8192, 0};
 
 /// The client after the welcome; empty when it did not like it.
-[[nodiscard]] inline std::optional<server::ClientConnection> connect_to(
-    std::span<const std::byte> said, server::ClientRole role) {
+[[nodiscard]] inline std::optional<client::ClientConnection> connect_to(
+    std::span<const std::byte> said, protocol::PeerRole role) {
   static const server::SocketContext context;
   int pair[2] = {-1, -1};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0) std::abort();
@@ -40,17 +40,17 @@ inline constexpr protocol::RecordLimits kLimits{8192, 0};
   held = pair[1];
   auto socket = server::TcpSocket::adopt(context, pair[0]);
   if (!socket) std::abort();
-  auto connection = server::ClientConnection::greet(context, std::move(*socket), {}, role,
-                                                    server::monotonic_now_ns(), kLimits);
+  auto connection = client::ClientConnection::greet(context, std::move(*socket), {}, role,
+                                                    client::monotonic_now_ns(), kLimits);
   if (!connection) return std::nullopt;
   return std::move(*connection);
 }
 
 /// True when every channel of the welcome is small: the client takes memory for frames of the size
 /// that the daemon announces, which is its right and says nothing about the decoder.
-[[nodiscard]] inline bool announces_small_frames(const server::ServerInfo& info) {
+[[nodiscard]] inline bool announces_small_frames(const client::ServerInfo& info) {
   constexpr std::uint32_t kMaxPx = 64;
-  return std::ranges::all_of(info.channels, [](const server::ChannelDescription& channel) {
+  return std::ranges::all_of(info.channels, [](const client::ChannelDescription& channel) {
     return channel.width_px <= kMaxPx && channel.height_px <= kMaxPx;
   });
 }

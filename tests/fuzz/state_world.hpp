@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "surface/state_file.hpp"
+#include "surface/state/state_file.hpp"
 
 /// The scene that the state files of the corpus belong to.
 namespace emit::fuzz {

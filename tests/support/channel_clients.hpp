@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "agents/sender.hpp"
-#include "agents/socket_client.hpp"
+#include "agents/sender/sender.hpp"
+#include "agents/sender/socket_client.hpp"
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/pixel_codec.hpp"
 #include "rt/fd.hpp"

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "agents/conductor.hpp"
-#include "agents/render_agent.hpp"
+#include "agents/conductor/conductor.hpp"
+#include "agents/render/render_agent.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"
 

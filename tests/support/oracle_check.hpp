@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "csv_table.hpp"
-#include "emit/evaluate/evaluate.hpp"
+#include "emit/verify/evaluate.hpp"
 
 /// Runs a model over a table of exact values and hands back both, column by column.
 namespace emit::test {
@@ -18,8 +18,8 @@ inline std::filesystem::path oracle_file(const std::string& name) {
 }
 
 struct OracleRun {
-  evaluate::CsvTable expected;
-  evaluate::CsvTable got;
+  verify::CsvTable expected;
+  verify::CsvTable got;
 
   struct Pair {
     std::vector<double> expected;
@@ -36,18 +36,18 @@ struct OracleRun {
 };
 
 inline OracleRun run_oracle(const std::string& model, const std::string& table,
-                            evaluate::Precision precision, evaluate::Device device) {
-  evaluate::EvaluateRequest request;
+                            verify::Precision precision, verify::Device device) {
+  verify::EvaluateRequest request;
   request.model = model;
   request.table = oracle_file(table);
   request.cases = oracle_file("relax_cases.csv");
   request.nodes = oracle_file("relax_nodes.csv");
   request.precision = precision;
   request.device = device;
-  auto result = evaluate::evaluate(request);
+  auto result = verify::evaluate(request);
   EXPECT_TRUE(result.has_value()) << result.error().text;
-  auto expected = evaluate::CsvTable::read(request.table);
-  auto got = evaluate::CsvTable::parse(result.value_or("empty\n"), "result");
+  auto expected = verify::CsvTable::read(request.table);
+  auto got = verify::CsvTable::parse(result.value_or("empty\n"), "result");
   EXPECT_TRUE(expected.has_value() && got.has_value());
   return {std::move(*expected), std::move(*got)};
 }

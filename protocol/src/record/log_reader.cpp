@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "../quiet_protobuf.hpp"
+#include "quiet_protobuf.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/record/mcap_reader.hpp"
 #include "emit/v1/control.pb.h"

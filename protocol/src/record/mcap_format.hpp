@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "../wire_bytes.hpp"
+#include "wire_bytes.hpp"
 
 /// Building blocks of the MCAP format: little endian, strings and arrays with a u32 byte length.
 namespace emit::protocol::mcap {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "../crc.hpp"
+#include "crc.hpp"
 #include "mcap_format.hpp"
 
 namespace emit::protocol {

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "../crc.hpp"
+#include "crc.hpp"
 #include "mcap_format.hpp"
 #include "spill_file.hpp"
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "../quiet_protobuf.hpp"
+#include "quiet_protobuf.hpp"
 #include "captured_datagram.hpp"
 #include "emit/protocol/codec.hpp"
 #include "pcap_file.hpp"

@@ -11,7 +11,7 @@
 #include <tuple>
 
 #include "emit/physics/constants.hpp"
-#include "emit/reference/parallel.hpp"
+#include "emit/threads/parallel.hpp"
 
 namespace emit::reference {
 namespace {
@@ -23,7 +23,7 @@ constexpr int kBounces = 8;
 
 template <class Body>
 void for_range(std::size_t n, std::size_t grain, const Body& body) {
-  run_parallel(tbb::blocked_range<std::size_t>(0, n, grain), [&](const auto& range) {
+  threads::parallel_ranges(tbb::blocked_range<std::size_t>(0, n, grain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) body(i);
   });
 }

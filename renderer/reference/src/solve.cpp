@@ -13,7 +13,7 @@
 #include <numeric>
 #include <optional>
 
-#include "emit/reference/parallel.hpp"
+#include "emit/threads/parallel.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
 #include "solve_checkpoint.hpp"
@@ -221,7 +221,7 @@ Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, Solv
                                        glm::transpose(physics::sensor_from_body());
   const SceneInstant instant = rays->at(view.sim_time_ns);
   std::vector<std::optional<PixelHit>> found(pixels);
-  run_parallel(std::uint32_t{0}, view.height_px, [&](std::uint32_t y) {
+  threads::parallel_indices(std::uint32_t{0}, view.height_px, [&](std::uint32_t y) {
     for (std::uint32_t x = 0; x < view.width_px; ++x) {
       const glm::dvec3 sensor_ray((x + 0.5 - 0.5 * view.width_px) / focal_px,
                                   (y + 0.5 - 0.5 * view.height_px) / focal_px, 1.0);
@@ -275,7 +275,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
     if (solid) {
       // What a patch sends to others: its emission, and the surroundings mirrored once.
       std::vector<double> leaving(face_k.size());
-      run_parallel(std::size_t{0}, face_k.size(), [&](std::size_t f) {
+      threads::parallel_indices(std::size_t{0}, face_k.size(), [&](std::size_t f) {
         const double e = band.emissivity(geometry.materials[solid->material_of(f)]);
         const double sky = solid->exchange().sky_frac(f);
         leaving[f] =
@@ -284,7 +284,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
       patch = solid->exchange().patch_means(leaving);
     }
     std::vector<float>& plane = image.radiance_w_m2_sr[b];
-    run_parallel(std::size_t{0}, hits.size(), [&](std::size_t i) {
+    threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
       const PixelHit& hit = hits[i];
       const double e = band.emissivity(geometry.materials[hit.point.material]);
       double incoming = hit.sky_frac * band.sky_mean() + hit.ground_frac * around +
@@ -353,7 +353,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
     });
     if (!solved) return tl::unexpected(std::move(solved.error()));
     kelvin = std::move(*solved);
-    run_parallel(std::size_t{0}, hits.size(), [&](std::size_t i) {
+    threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
       hits[i].sky_frac = instant
                              .sky_view({hits[i].point.position_world_m, hits[i].point.normal, 1e-9},
                                        d.options.rays)
@@ -362,7 +362,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
     });
   }
   if (now.direct_normal_w_m2 > 0.0) {
-    run_parallel(std::size_t{0}, hits.size(), [&](std::size_t i) {
+    threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
       hits[i].sun_frac =
           instant
               .sun_visible_frac_clipped(

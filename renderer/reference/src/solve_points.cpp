@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "solve_points.hpp"
-#include "emit/reference/parallel.hpp"
+#include "emit/threads/parallel.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -186,7 +186,7 @@ Result<std::vector<double>> PointHistories::temperatures(
   const std::size_t portion = std::max<std::size_t>(64, points.size() / 100);
   for (std::size_t begin = 0; begin < points.size(); begin += portion) {
     const std::size_t end = std::min(points.size(), begin + portion);
-    run_parallel(tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
+    threads::parallel_ranges(tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
       for (std::size_t i = range.begin(); i != range.end(); ++i) {
         const SolvePoint& point = points[i];
         const scene::Material& material = geometry_.materials[point.material];

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cstdint>
 #define EMIT_STABILITY_BEGIN                                                    \
-  namespace emit::evaluate::inputs {                                            \
+  namespace emit::verify::inputs {                                            \
   using uint = std::uint32_t;                                                   \
   inline float uintBitsToFloat(uint bits) { return std::bit_cast<float>(bits); } \
   inline uint floatBitsToUint(float value) { return std::bit_cast<uint>(value); }

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+#include "csv.hpp"
+#include "emit/physics/constants.hpp"
+#include "tables.hpp"
+
+/// Atmospheres from CSV: a table by range and elevation, or the terms of a sum of exponentials.
+namespace emit::config {
+
+using physics::ErrorCode;
+using physics::Result;
+using scene::BandAtmosphere;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+tl::unexpected<physics::Error> fault(const fs::path& file, std::uint32_t line,
+                                     const std::string& text) {
+  return physics::make_error(ErrorCode::config,
+                             fmt::format("{}:{}: {}", file.string(), line, text));
+}
+
+/// First line that is neither blank nor a comment; empty where there is none.
+std::string header_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string line;
+  while (std::getline(stream, line)) {
+    if (line.find_first_not_of(" \t\r") != std::string::npos && line[0] != '#') {
+      return line;
+    }
+  }
+  return {};
+}
+
+Result<void> check_band(const fs::path& file, const CsvRow& row,
+                        const std::vector<std::string>& known_bands) {
+  if (std::find(known_bands.begin(), known_bands.end(), row.texts[0]) != known_bands.end()) {
+    return {};
+  }
+  std::string listed;
+  for (const std::string& name : known_bands) {
+    listed += (listed.empty() ? "" : ", ") + name;
+  }
+  return fault(file, row.line,
+               fmt::format("there is no band '{}' (known: {})", row.texts[0], listed));
+}
+
+Result<std::vector<BandAtmosphere>> load_terms(const fs::path& file,
+                                               const std::vector<std::string>& known_bands) {
+  const Result<std::vector<CsvRow>> rows =
+      read_csv(file, {{"band", true, any_number(), true},
+                      {"amplitude_frac", true, between(0, 1)},
+                      {"extinction_per_km", true, at_least(0)},
+                      {"vertical_transmittance_frac", true, between(0, 1)}});
+  if (!rows) {
+    return tl::unexpected<physics::Error>(rows.error());
+  }
+  std::vector<BandAtmosphere> out;
+  std::vector<std::uint32_t> first_line;
+  for (const CsvRow& row : *rows) {
+    std::size_t index = 0;
+    while (index < out.size() && out[index].band != row.texts[0]) {
+      ++index;
+    }
+    if (index == out.size()) {
+      if (auto known = check_band(file, row, known_bands); !known) {
+        return tl::unexpected<physics::Error>(known.error());
+      }
+      BandAtmosphere entry;
+      entry.band = row.texts[0];
+      entry.vertical_transmittance_frac = *row.numbers[3];
+      out.push_back(std::move(entry));
+      first_line.push_back(row.line);
+    }
+    if (out[index].vertical_transmittance_frac != *row.numbers[3]) {
+      return fault(file, row.line, "'vertical_transmittance_frac' differs within one band");
+    }
+    out[index].terms.push_back({*row.numbers[1], *row.numbers[2]});
+  }
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    double sum = 0.0;
+    for (const scene::AtmosphereTerm& term : out[i].terms) {
+      sum += term.amplitude_frac;
+    }
+    if (std::abs(sum - 1.0) > 1e-3 || out[i].terms.size() > 4) {
+      return fault(file, first_line[i],
+                   fmt::format("the amplitudes of band '{}' add up to {} over {} rows, "
+                               "must be 1 over at most 4",
+                               out[i].band, sum, out[i].terms.size()));
+    }
+  }
+  return out;
+}
+
+/// One row of a table, and where it stands.
+struct Point {
+  double range_m = 0.0;
+  double transmittance_frac = 0.0;
+  double path_radiance_w_m2_sr = 0.0;
+  std::uint32_t line = 0;
+};
+
+struct BandRows {
+  std::string name;
+  std::map<double, std::vector<Point>> by_elevation_deg;
+};
+
+/// Rows may come in any order of bands and elevations; along one line of sight ranges ascend.
+Result<void> add_row(const fs::path& file, const CsvRow& row, BandRows& band) {
+  const double elevation_deg = *row.numbers[2];
+  const Point point{*row.numbers[1], *row.numbers[3], *row.numbers[4], row.line};
+  std::vector<Point>& points = band.by_elevation_deg[elevation_deg];
+  for (const Point& other : points) {
+    if (other.range_m == point.range_m) {
+      return fault(file, row.line,
+                   fmt::format("band '{}', elevation {} deg, range {} m stands already in line {}",
+                               band.name, elevation_deg, point.range_m, other.line));
+    }
+  }
+  if (!points.empty() && point.range_m < points.back().range_m) {
+    return fault(file, row.line,
+                 fmt::format("'range_m' ({}) is below that of line {} ({}) of the same band and "
+                             "elevation: ranges must ascend",
+                             point.range_m, points.back().line, points.back().range_m));
+  }
+  if (point.range_m == 0.0 &&
+      (point.transmittance_frac != 1.0 || point.path_radiance_w_m2_sr != 0.0)) {
+    return fault(file, row.line, "at range 0 transmittance must be 1 and path radiance 0");
+  }
+  if (!points.empty() && point.transmittance_frac > points.back().transmittance_frac) {
+    return fault(file, row.line,
+                 fmt::format("'transmittance_frac' ({}) rises with range: line {} has {}",
+                             point.transmittance_frac, points.back().line,
+                             points.back().transmittance_frac));
+  }
+  points.push_back(point);
+  return {};
+}
+
+/// Every elevation has the ranges of the lowest one.
+Result<BandAtmosphere> grid_of(const fs::path& file, const BandRows& band) {
+  BandAtmosphere out;
+  out.band = band.name;
+  const auto& [first_deg, first] = *band.by_elevation_deg.begin();
+  for (const Point& point : first) {
+    out.table.range_m.push_back(point.range_m);
+  }
+  if (first.size() == 1 && first[0].range_m == 0.0) {
+    return fault(file, first[0].line, fmt::format("band '{}' has no range beyond 0 m", band.name));
+  }
+  for (const auto& [elevation_deg, points] : band.by_elevation_deg) {
+    for (std::size_t i = 0; i < std::max(points.size(), first.size()); ++i) {
+      if (i < points.size() && i < first.size() && points[i].range_m == first[i].range_m) {
+        continue;
+      }
+      // The smaller of the two is what the other line of sight lacks.
+      const bool lacking =
+          i == points.size() || (i < first.size() && first[i].range_m < points[i].range_m);
+      if (lacking) {
+        return fault(
+            file, points.back().line,
+            fmt::format("band '{}': elevation {} deg has no row of range {} m, which "
+                        "elevation {} deg has in line {}; all elevations of a band need "
+                        "the same ranges",
+                        band.name, elevation_deg, first[i].range_m, first_deg, first[i].line));
+      }
+      return fault(file, points[i].line,
+                   fmt::format("band '{}': elevation {} deg has no row of range {} m, which "
+                               "elevation {} deg has here; all elevations of a band need the same "
+                               "ranges",
+                               band.name, first_deg, points[i].range_m, elevation_deg));
+    }
+    out.table.elevation_rad.push_back(elevation_deg * physics::kDegree);
+    for (const Point& point : points) {
+      out.table.transmittance_frac.push_back(point.transmittance_frac);
+      out.table.path_radiance_w_m2_sr.push_back(point.path_radiance_w_m2_sr);
+    }
+  }
+  if (auto valid = physics::validate(out.table); !valid) {
+    return fault(file, first[0].line, fmt::format("band '{}': {}", band.name, valid.error().text));
+  }
+  return out;
+}
+
+Result<std::vector<BandAtmosphere>> load_table(const fs::path& file,
+                                               const std::vector<std::string>& known_bands) {
+  const Result<std::vector<CsvRow>> rows =
+      read_csv(file, {{"band", true, any_number(), true},
+                      {"range_m", true, between(0, 1e7)},
+                      {"elevation_deg", true, between(-90, 90)},
+                      {"transmittance_frac", true, between(0, 1)},
+                      {"path_radiance_w_m2_sr", true, between(0, 1e6)}});
+  if (!rows) {
+    return tl::unexpected<physics::Error>(rows.error());
+  }
+  std::vector<BandRows> bands;
+  for (const CsvRow& row : *rows) {
+    auto band = std::find_if(bands.begin(), bands.end(),
+                             [&row](const BandRows& other) { return other.name == row.texts[0]; });
+    if (band == bands.end()) {
+      if (auto known = check_band(file, row, known_bands); !known) {
+        return tl::unexpected<physics::Error>(known.error());
+      }
+      bands.push_back({row.texts[0], {}});
+      band = bands.end() - 1;
+    }
+    if (auto added = add_row(file, row, *band); !added) {
+      return tl::unexpected<physics::Error>(added.error());
+    }
+  }
+  std::vector<BandAtmosphere> out;
+  for (const BandRows& band : bands) {
+    auto grid = grid_of(file, band);
+    if (!grid) {
+      return tl::unexpected<physics::Error>(grid.error());
+    }
+    out.push_back(std::move(*grid));
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<std::vector<BandAtmosphere>> load_atmosphere_csv(
+    const fs::path& file, const std::vector<std::string>& known_bands) {
+  const std::string header = header_of(file);
+  const auto names = [&header](std::string_view column) {
+    return header.find(column) != std::string::npos;
+  };
+  const bool terms =
+      names("amplitude_frac") || names("extinction_per_km") || names("vertical_transmittance_frac");
+  return terms ? load_terms(file, known_bands) : load_table(file, known_bands);
+}
+
+}  // namespace emit::config

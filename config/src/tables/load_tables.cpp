@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include "csv.hpp"
+#include "emit/physics/constants.hpp"
+#include "tables.hpp"
+
+namespace emit::config {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+namespace {
+
+std::int64_t nanoseconds_of(double seconds) {
+  return std::llround(seconds * 1e9);
+}
+
+std::string at_line(const std::filesystem::path& file, const CsvRow& row, std::string_view text) {
+  return fmt::format("{}:{}: {}", file.string(), row.line, text);
+}
+
+const Range kTime = between(-1e9, 1e9);
+
+}  // namespace
+
+Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem::path& file) {
+  const Result<std::vector<CsvRow>> rows =
+      read_csv(file, {{"time_s", true, kTime},
+                      {"dni_w_m2", true, between(0, 2000)},
+                      {"dhi_w_m2", true, between(0, 1500)},
+                      {"longwave_down_w_m2", true, between(0, 1000)},
+                      {"air_k", true, between(180, 340)},
+                      {"wind_m_s", true, between(0, 100)},
+                      {"cloud_frac", true, between(0, 1)},
+                      {"environment_k", false, between(100, 400)},
+                      {"film_w_m2_k", false, between(0, 1000)}});
+  if (!rows) {
+    return tl::unexpected<physics::Error>(rows.error());
+  }
+  std::vector<scene::WeatherSample> out;
+  for (const CsvRow& row : *rows) {
+    scene::WeatherSample sample;
+    sample.sim_time_ns = nanoseconds_of(*row.numbers[0]);
+    sample.direct_normal_w_m2 = *row.numbers[1];
+    sample.diffuse_horizontal_w_m2 = *row.numbers[2];
+    sample.longwave_down_w_m2 = *row.numbers[3];
+    sample.air_k = *row.numbers[4];
+    sample.wind_m_s = *row.numbers[5];
+    sample.cloud_frac = *row.numbers[6];
+    sample.environment_k = row.numbers[7];
+    sample.film_w_m2_k = row.numbers[8];
+    if (!out.empty() && sample.sim_time_ns <= out.back().sim_time_ns) {
+      return make_error(ErrorCode::config,
+                        at_line(file, row, "'time_s' is not later than in the row before"));
+    }
+    out.push_back(sample);
+  }
+  return out;
+}
+
+Result<scene::Trajectory> load_trajectory_csv(const std::filesystem::path& file) {
+  const Result<std::vector<CsvRow>> rows =
+      read_csv(file, {{"time_s", true, kTime},
+                      {"x_m", true, any_number()},
+                      {"y_m", true, any_number()},
+                      {"z_m", true, any_number()},
+                      {"heading_deg", true, between(-360, 360)},
+                      {"pitch_deg", true, between(-90, 90)},
+                      {"roll_deg", true, between(-360, 360)},
+                      {"on", false, between(0, 1)}});
+  if (!rows) {
+    return tl::unexpected<physics::Error>(rows.error());
+  }
+  scene::Trajectory out;
+  for (const CsvRow& row : *rows) {
+    scene::Keyframe keyframe;
+    keyframe.sim_time_ns = nanoseconds_of(*row.numbers[0]);
+    keyframe.pose.position_world_m = glm::dvec3(*row.numbers[1], *row.numbers[2], *row.numbers[3]);
+    keyframe.pose.world_from_body = physics::world_from_body_heading_pitch_roll(
+        *row.numbers[4] * physics::kDegree, *row.numbers[5] * physics::kDegree,
+        *row.numbers[6] * physics::kDegree);
+    const double on = row.numbers[7].value_or(1.0);
+    if (on != 0.0 && on != 1.0) {
+      return make_error(ErrorCode::config, at_line(file, row, "'on' must be 0 or 1"));
+    }
+    keyframe.on = on == 1.0;
+    if (!out.empty() && keyframe.sim_time_ns <= out.back().sim_time_ns) {
+      return make_error(ErrorCode::config,
+                        at_line(file, row, "'time_s' is not later than in the row before"));
+    }
+    out.push_back(keyframe);
+  }
+  return out;
+}
+
+Result<std::vector<scene::ResponseSample>> load_response_csv(const std::filesystem::path& file) {
+  const Result<std::vector<CsvRow>> rows = read_csv(
+      file, {{"wavelength_um", true, between(0.2, 100)}, {"response_frac", true, between(0, 1)}});
+  if (!rows) {
+    return tl::unexpected<physics::Error>(rows.error());
+  }
+  std::vector<scene::ResponseSample> out;
+  for (const CsvRow& row : *rows) {
+    if (!out.empty() && *row.numbers[0] <= out.back().wavelength_um) {
+      return make_error(ErrorCode::config,
+                        at_line(file, row, "'wavelength_um' is not above the row before"));
+    }
+    out.push_back({*row.numbers[0], *row.numbers[1]});
+  }
+  return out;
+}
+
+}  // namespace emit::config

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <string>
+
+/// Enumerations of the control connection, with the values of the Protobuf messages in
+/// proto/emit/v1. Every program that speaks the protocol uses these.
+namespace emit::protocol {
+
+/// Role of a peer, with the values of emit.v1.Hello.Role.
+enum class PeerRole : std::uint8_t { none = 0, host = 1, client = 2, recorder = 3 };
+
+/// Command of a host, with the values of emit.v1.Command.Kind.
+enum class CommandKind : std::uint8_t { start = 1, stop = 2, hold = 3, step = 4, reset = 5 };
+
+/// Answer to a message of a peer, with the values of emit.v1.Status.Code.
+enum class StatusCode : std::uint8_t {
+  ok = 1,
+  wrong_version = 2,
+  oversize = 3,
+  malformed = 4,
+  unknown_entity = 5,
+  invalid_pose = 6,
+  time_backwards = 7,
+  duplicate_frame = 8,
+  unknown_channel = 9,
+  not_allowed = 10,
+  overloaded = 11,
+  internal = 12,
+  invalid_environment = 13,
+};
+
+/// The detail of a `not_allowed` status for a host frame whose run another host has replaced.
+inline constexpr std::uint64_t kDetailOldRun = 1U << 16;
+
+/// Returns the English text of a status.
+/// @param detail  unknown_entity, overloaded: the entity's id; not_allowed: the command's kind or
+///                kDetailOldRun; other codes ignore it.
+[[nodiscard]] std::string status_text(StatusCode code, std::uint64_t detail);
+
+}  // namespace emit::protocol

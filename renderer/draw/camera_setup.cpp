@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "draw/camera_setup.hpp"
+
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
+
+namespace emit::renderer {
+
+CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pose,
+                       gpu::FrameParams& params) noexcept {
+  CameraSetup camera;
+  ViewVolume& view = camera.view;
+  const glm::dmat3 sensor_from_world =
+      physics::sensor_from_body() * glm::transpose(glm::mat3_cast(pose.world_from_body));
+  view.relworld_from_sensor = glm::transpose(sensor_from_world);
+  view.tan_half_h = std::tan(0.5 * sensor.fov_h_rad);
+  view.tan_half_v = view.tan_half_h * sensor.height_px / sensor.width_px;
+  view.near_m = sensor.near_m;
+  camera.pixel_rad = 2.0 * view.tan_half_h / params.format_px.x;
+
+  // Reversed depth near/z with an infinite far plane; w is the distance along the boresight.
+  const glm::dmat4 clip_from_sensor{{1.0 / view.tan_half_h, 0.0, 0.0, 0.0},
+                                    {0.0, 1.0 / view.tan_half_v, 0.0, 0.0},
+                                    {0.0, 0.0, 0.0, 1.0},
+                                    {0.0, 0.0, sensor.near_m, 0.0}};
+  view.clip_from_relworld = clip_from_sensor * glm::dmat4(sensor_from_world);
+  params.relworld_from_sensor = glm::mat4(glm::dmat4(view.relworld_from_sensor));
+  params.ray =
+      glm::vec4(static_cast<float>(2.0 * view.tan_half_h / params.format_px.x),
+                static_cast<float>(2.0 * view.tan_half_v / params.format_px.y),
+                static_cast<float>(-view.tan_half_h), static_cast<float>(-view.tan_half_v));
+  return camera;
+}
+
+}  // namespace emit::renderer

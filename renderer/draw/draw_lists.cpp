@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "draw/draw_lists.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <array>
+
+namespace emit::renderer {
+namespace {
+
+DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& relworld_from_mesh,
+                     std::uint32_t object, std::uint32_t material, bool moves) noexcept {
+  DrawRecord record{};
+  record.params.clip_from_mesh = glm::mat4(clip_from_relworld * relworld_from_mesh);
+  const glm::dmat3 m(relworld_from_mesh);
+  const std::array<glm::dvec3, 3> cofactors = {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]),
+                                               glm::cross(m[0], m[1])};
+  for (std::size_t column = 0; column < cofactors.size(); ++column) {
+    record.params.normal_from_mesh[column] = glm::vec4(glm::vec3(cofactors[column]), 0.0F);
+  }
+  record.params.ids = glm::uvec4(material, object + 1, moves ? 1U : 0U, 0U);
+  return record;
+}
+
+/// GL takes a number of bytes in the guise of an address.
+const void* index_address(std::uint32_t first_index) noexcept {
+  return reinterpret_cast<const void*>(std::uintptr_t{first_index} * sizeof(std::uint32_t));
+}
+
+/// True when the box lies outside one plane of the pyramid.
+bool outside(std::span<const glm::dvec3> inward_normals, const glm::dvec3& centre_m,
+             const glm::dvec3& half_m) noexcept {
+  for (const glm::dvec3& n : inward_normals) {
+    if (glm::dot(n, centre_m) + glm::dot(glm::abs(n), half_m) < 0.0) return true;
+  }
+  return false;
+}
+
+bool outside(const LightFrustum& frustum, const glm::dvec3& centre_m,
+             const glm::dvec3& half_m) noexcept {
+  for (glm::length_t axis = 0; axis < 2; ++axis) {
+    const glm::dvec3& a = frustum.axes[static_cast<std::size_t>(axis)];
+    const double middle_m = glm::dot(a, centre_m) + frustum.offset_m[axis];
+    const double reach_m = glm::dot(glm::abs(a), half_m);
+    if (middle_m + reach_m < 0.0 || middle_m - reach_m > frustum.extent_m[axis]) return true;
+  }
+  return false;
+}
+
+scene::Aabb shifted(const scene::Aabb& box, const glm::dvec3& by_m) noexcept {
+  return box.empty() ? box : scene::Aabb{box.min_m + by_m, box.max_m + by_m};
+}
+
+}  // namespace
+
+DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
+                     std::uint32_t max_passes, TriangleCull* cull)
+    : scene_(scene), cull_(cull) {
+  const auto instances = scene.instances();
+  std::size_t view_ranges = 0;
+  std::size_t submesh_instances = 0;
+  for (const SceneBuffers::MeshRange& mesh : scene.meshes()) {
+    submesh_instances += mesh.submeshes.size() * mesh.instance_count;
+    for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
+      // Every cluster alone, at worst.
+      view_ranges += mesh.instance_count * (1 + submesh.cluster_count);
+    }
+  }
+  for (std::uint32_t i = 0; i < instances.size(); ++i) {
+    const std::int32_t history = history_of_object[instances[i].object];
+    history_of_instance_.push_back(history);
+    const glm::dvec3 size = instances[i].world_bounds.empty()
+                                ? glm::dvec3(0.0)
+                                : instances[i].world_bounds.max_m - instances[i].world_bounds.min_m;
+    size_of_instance_m_.push_back(std::max({size.x, size.y, size.z}));
+    view_placed_.push_back(place(i, instances[i].world_from_mesh, history < 0));
+    if (history >= 0) {
+      moving_.push_back(i);
+    } else {
+      static_bounds_world_.add(view_placed_.back().box_world);
+    }
+  }
+  light_placed_ = view_placed_;
+  records_.reserve(std::max<std::size_t>(1, submesh_instances));
+  light_records_.reserve(std::max<std::size_t>(1, instances.size() * max_passes));
+  view_draws_.reserve(submesh_instances);
+  view_ranges_.index_count.reserve(view_ranges);
+  view_ranges_.index_offset.reserve(view_ranges);
+  view_ranges_.base_vertex.reserve(view_ranges);
+  light_commands_.reserve(instances.size() * max_passes);
+}
+
+DrawLists::Placed DrawLists::place(std::uint32_t instance, const glm::dmat4& world_from_mesh,
+                                   bool on) const noexcept {
+  const std::uint32_t mesh = scene_.instances()[instance].mesh;
+  const scene::Aabb box = scene::transformed(scene_.mesh_bounds(mesh), world_from_mesh);
+  return {world_from_mesh, box, on && !box.empty(), false};
+}
+
+glm::dmat4 DrawLists::relworld_from_mesh(const Placed& placed) const noexcept {
+  glm::dmat4 matrix = placed.world_from_mesh;
+  matrix[3] -= glm::dvec4(camera_world_m_, 0.0);
+  return matrix;
+}
+
+void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
+                      std::span<const PoseHistory> entities) noexcept {
+  camera_world_m_ = camera_world_m;
+  records_.clear();
+  light_records_.clear();
+  view_draws_.clear();
+  view_ranges_.index_count.clear();
+  view_ranges_.index_offset.clear();
+  view_ranges_.base_vertex.clear();
+  light_commands_.clear();
+  bounds_ = shifted(static_bounds_world_, -camera_world_m);
+  const auto instances = scene_.instances();
+  for (const std::uint32_t i : moving_) {
+    const PoseHistory& entity = entities[static_cast<std::size_t>(history_of_instance_[i])];
+    const TrajectoryState state = entity.at(sim_time_ns);
+    view_placed_[i] =
+        place(i, scene::world_from_body_matrix(state.pose) * instances[i].body_from_mesh, state.on);
+    light_placed_[i] = view_placed_[i];
+    if (state.on) bounds_.add(shifted(view_placed_[i].box_world, -camera_world_m));
+  }
+}
+
+void DrawLists::add_range(std::uint32_t first_index, std::uint32_t index_count,
+                          std::int32_t base_vertex) noexcept {
+  view_ranges_.index_count.push_back(static_cast<std::int32_t>(index_count));
+  view_ranges_.index_offset.push_back(index_address(first_index));
+  view_ranges_.base_vertex.push_back(base_vertex);
+}
+
+void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange& submesh,
+                           const ClusterView& seen, const glm::mat4& clip_from_mesh) noexcept {
+  const std::int32_t base_vertex = scene_.base_vertex(instance);
+  if (submesh.cluster_count == 0) {
+    add_range(submesh.first_index, submesh.index_count, base_vertex);
+    return;
+  }
+  std::uint32_t first_index = 0;
+  std::uint32_t index_count = 0;  // of clusters in a row
+  for (std::uint32_t c = submesh.first_cluster; c < submesh.first_cluster + submesh.cluster_count;
+       ++c) {
+    const scene::Cluster& cluster = scene_.clusters()[c];
+    if (!seen.fits(scene_.levels()[c]) || !seen.shows(cluster, submesh.double_sided)) continue;
+    if (cull_ != nullptr && cull_->take(cluster, c, clip_from_mesh, !submesh.double_sided)) {
+      continue;
+    }
+    if (index_count > 0 && cluster.first_index != first_index + index_count) {
+      add_range(first_index, index_count, base_vertex);
+      index_count = 0;
+    }
+    if (index_count == 0) first_index = cluster.first_index;
+    index_count += cluster.index_count;
+  }
+  if (index_count > 0) add_range(first_index, index_count, base_vertex);
+  const auto range = static_cast<std::uint32_t>(view_ranges_.index_count.size());
+  if (cull_ != nullptr && cull_->close(range)) {
+    add_range(0, 0, base_vertex);  // what is left is known later
+  }
+}
+
+void DrawLists::find_in_view(const ViewVolume& view) noexcept {
+  const std::array<glm::dvec3, 5> planes = view_planes(view);
+  for (Placed& placed : view_placed_) {
+    const scene::Aabb& box = placed.box_world;
+    placed.in_view = placed.on && !outside(planes, 0.5 * (box.min_m + box.max_m) - camera_world_m_,
+                                           0.5 * (box.max_m - box.min_m));
+  }
+}
+
+void DrawLists::count_triangles(const ViewVolume& view, std::span<const LevelLimits> limits,
+                                std::span<std::uint32_t> triangles) noexcept {
+  std::ranges::fill(triangles, 0U);
+  find_in_view(view);
+  for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
+    for (std::uint32_t i = mesh.first_instance; i < mesh.first_instance + mesh.instance_count;
+         ++i) {
+      if (!view_placed_[i].in_view) continue;
+      ClusterView seen(view, relworld_from_mesh(view_placed_[i]), limits[0]);
+      for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
+        for (std::size_t l = 0; l < limits.size(); ++l) {
+          seen.set_limits(limits[l]);
+          triangles[l] += indices_in_view(submesh, seen) / 3;
+        }
+      }
+    }
+  }
+}
+
+std::uint32_t DrawLists::indices_in_view(const SceneBuffers::DrawRange& submesh,
+                                         const ClusterView& seen) const noexcept {
+  if (submesh.cluster_count == 0) return submesh.index_count;
+  std::uint32_t indices = 0;
+  for (std::uint32_t c = submesh.first_cluster; c < submesh.first_cluster + submesh.cluster_count;
+       ++c) {
+    const scene::Cluster& cluster = scene_.clusters()[c];
+    if (seen.fits(scene_.levels()[c]) && seen.shows(cluster, submesh.double_sided)) {
+      indices += cluster.index_count;
+    }
+  }
+  return indices;
+}
+
+void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
+                          const glm::uvec2& size_px, CommandRange& single_sided,
+                          CommandRange& double_sided) noexcept {
+  find_in_view(view);
+  if (cull_ != nullptr) cull_->begin(size_px);
+  for (const bool sheets : {false, true}) {
+    CommandRange& range = sheets ? double_sided : single_sided;
+    range.first = static_cast<std::uint32_t>(view_draws_.size());
+    for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
+      for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
+        if (submesh.double_sided != sheets || submesh.index_count == 0) continue;
+        for (std::uint32_t i = mesh.first_instance; i < mesh.first_instance + mesh.instance_count;
+             ++i) {
+          if (!view_placed_[i].in_view) continue;
+          const glm::dmat4 matrix = relworld_from_mesh(view_placed_[i]);
+          const auto first = static_cast<std::uint32_t>(view_ranges_.index_count.size());
+          const auto record = static_cast<std::uint32_t>(records_.size());
+          records_.push_back(record_of(view.clip_from_relworld, matrix,
+                                       scene_.instances()[i].object, submesh.material,
+                                       history_of_instance_[i] >= 0));
+          add_ranges(i, submesh, ClusterView(view, matrix, limits),
+                     records_.back().params.clip_from_mesh);
+          const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;
+          if (count == 0) {
+            records_.pop_back();
+            continue;
+          }
+          view_draws_.push_back({record, first, count});
+        }
+      }
+    }
+    range.count = static_cast<std::uint32_t>(view_draws_.size()) - range.first;
+  }
+  if (cull_ == nullptr) return;
+  cull_->run();
+  for (const TriangleCull::Part& part : cull_->parts()) {
+    view_ranges_.index_count[part.range] = static_cast<std::int32_t>(part.count);
+    view_ranges_.index_offset[part.range] = index_address(scene_.first_culled() + part.first);
+  }
+  drop_empty_ranges();
+}
+
+void DrawLists::drop_empty_ranges() noexcept {
+  std::uint32_t used = 0;
+  for (ViewDraw& draw : view_draws_) {
+    const std::uint32_t first = used;
+    for (std::uint32_t i = draw.first; i < draw.first + draw.count; ++i) {
+      if (view_ranges_.index_count[i] == 0) continue;
+      view_ranges_.index_count[used] = view_ranges_.index_count[i];
+      view_ranges_.index_offset[used] = view_ranges_.index_offset[i];
+      view_ranges_.base_vertex[used] = view_ranges_.base_vertex[i];
+      ++used;
+    }
+    draw.first = first;
+    draw.count = used - first;
+  }
+}
+
+scene::Aabb DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_ns,
+                                    std::int64_t end_ns,
+                                    std::span<const PoseHistory> entities) noexcept {
+  scene::Aabb box;
+  for (const std::uint32_t i : moving_) {
+    const PoseHistory& entity = entities[static_cast<std::size_t>(history_of_instance_[i])];
+    const TrajectoryState state = entity.at(sample_ns);
+    const bool passing = entity.path_m(begin_ns, end_ns) > size_of_instance_m_[i];
+    light_placed_[i] =
+        place(i, scene::world_from_body_matrix(state.pose) * scene_.instances()[i].body_from_mesh,
+              state.on && !passing);
+    if (light_placed_[i].on) box.add(shifted(light_placed_[i].box_world, -camera_world_m_));
+  }
+  return box;
+}
+
+CommandRange DrawLists::cull_light(const LightFrustum& frustum) noexcept {
+  // Rows of clip_from_relworld: light metres scaled to -1..1 across the map and 0..1 in depth.
+  glm::dvec4 clip_rows[3];
+  for (glm::length_t axis = 0; axis < 3; ++axis) {
+    const double scale = (axis < 2 ? 2.0 : 1.0) / frustum.extent_m[axis];
+    clip_rows[axis] = glm::dvec4(frustum.axes[static_cast<std::size_t>(axis)] * scale,
+                                 frustum.offset_m[axis] * scale - (axis < 2 ? 1.0 : 0.0));
+  }
+  CommandRange range{static_cast<std::uint32_t>(light_commands_.size()), 0};
+  for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
+    const auto first = static_cast<std::uint32_t>(light_records_.size());
+    for (std::uint32_t i = mesh.first_instance; i < mesh.first_instance + mesh.instance_count;
+         ++i) {
+      const Placed& placed = light_placed_[i];
+      const scene::Aabb& box = placed.box_world;
+      if (!placed.on || outside(frustum, 0.5 * (box.min_m + box.max_m) - camera_world_m_,
+                                0.5 * (box.max_m - box.min_m))) {
+        continue;
+      }
+      const glm::dmat4 matrix = relworld_from_mesh(placed);
+      LightRecord& record = light_records_.emplace_back();
+      for (int row = 0; row < 3; ++row) {
+        record.clip_from_mesh_row[row] = glm::vec4(clip_rows[row] * matrix);
+      }
+    }
+    const auto count = static_cast<std::uint32_t>(light_records_.size()) - first;
+    if (count > 0) {
+      light_commands_.push_back(
+          {mesh.whole, scene_.base_vertex(mesh.first_instance), first, count});
+    }
+  }
+  range.count = static_cast<std::uint32_t>(light_commands_.size()) - range.first;
+  return range;
+}
+
+}  // namespace emit::renderer

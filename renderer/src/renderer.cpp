@@ -1,0 +1,524 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/renderer/renderer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
+
+#include "emit/scene/mesh.hpp"
+#include "emit/scene/sheets.hpp"
+#include "gl/egl_context.hpp"
+#include "history/pose_history.hpp"
+#include "stages/band_model.hpp"
+#include "stages/cached_stage.hpp"
+#include "passes/compute_passes.hpp"
+#include "history/foster_setup.hpp"
+#include "stages/frame_setup.hpp"
+#include "budget/ladder_survey.hpp"
+#include "stages/per_frame_stage.hpp"
+#include "draw/picture_window.hpp"
+#include "budget/quality_ladder.hpp"
+#include "passes/raster_passes.hpp"
+#include "passes/readback_ring.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+constexpr std::size_t kBlockAlignment = 256;  // GL guarantees that no driver asks for more
+constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 3;  // temperature, depth, object
+
+Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
+  const scene::ThermalOptions& thermal = scenario.thermal;
+  const auto fail = [](std::string text) { return make_error(ErrorCode::config, std::move(text)); };
+  if (scenario.sensor.width_px == 0 || scenario.sensor.width_px > 8192 ||
+      scenario.sensor.height_px == 0 || scenario.sensor.height_px > 8192) {
+    return fail(fmt::format("sensor format {} x {}: 1 to 8192 pixels are possible",
+                            scenario.sensor.width_px, scenario.sensor.height_px));
+  }
+  if (!(scenario.sensor.fov_h_rad > 0.0 && scenario.sensor.fov_h_rad < 0.95 * physics::kPi)) {
+    return fail("sensor field of view must lie between 0 and 171 degrees");
+  }
+  if (thermal.steps < 1 || thermal.steps > 4096) {
+    return fail(fmt::format("thermal steps {}: 1 to 4096 are possible", thermal.steps));
+  }
+  if (thermal.max_cascades < 1 || thermal.max_cascades > EMIT_MAX_CASCADES) {
+    return fail(
+        fmt::format("{} cascades: 1 to {} are possible", thermal.max_cascades, EMIT_MAX_CASCADES));
+  }
+  if (thermal.shadow_map_px < 16 || thermal.shadow_map_px > 16384) {
+    return fail(
+        fmt::format("shadow map of {} px: 16 to 16384 are possible", thermal.shadow_map_px));
+  }
+  if (thermal.blocker_taps < 1 || thermal.blocker_taps > EMIT_MAX_TAPS || thermal.filter_taps < 1 ||
+      thermal.filter_taps > EMIT_MAX_TAPS) {
+    return fail(fmt::format("shadow taps {} + {}: 1 to {} each are possible", thermal.blocker_taps,
+                            thermal.filter_taps, EMIT_MAX_TAPS));
+  }
+  if (output.slots < 2 || output.slots > ReadbackRing::kMaxSlots) {
+    return fail(fmt::format("{} read-back slots: 2 to {} are possible", output.slots,
+                            ReadbackRing::kMaxSlots));
+  }
+  if (scenario.objects.size() > 65534) return fail("more than 65534 objects");
+  return {};
+}
+
+/// What every method has on the device.
+struct FramePasses {
+  GeometryPass geometry;
+  RadiancePass radiance;
+  std::optional<EnlargePass> enlarge;  ///< with a quality ladder
+};
+
+class GlRenderer final : public Renderer {
+ public:
+  GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
+             const scene::SceneGeometry& geometry, const OutputOptions& output, BandModel bands,
+             FramePasses passes);
+  /// Before anything else: the method, which reads history().
+  void set_stage(std::unique_ptr<ThermalStage> stage) { stage_ = std::move(stage); }
+  [[nodiscard]] const SceneHistory& history() const noexcept { return history_; }
+
+  std::size_t apply_entities(std::int64_t sim_time_ns,
+                             std::span<const EntityUpdate> updates) noexcept override;
+  bool apply_weather(const scene::WeatherSample& sample) noexcept override {
+    return history_.environment.append(sample);
+  }
+  void reset() noexcept override;
+  Result<void> warm_up(const FrameRequest& first, const WarmUpProgress& progress) override;
+  int submit(const FrameRequest& request) noexcept override;
+  bool poll(SlotIndex slot) noexcept override { return readback_.ready(slot); }
+  const FrameView& collect(SlotIndex slot) noexcept override;
+  void release(SlotIndex slot) noexcept override { readback_.release(slot); }
+  std::span<const RungStats> expected_rungs(const FrameRequest& request) noexcept override;
+  physics::Pose scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept override;
+  const SceneStats& scene_stats() const noexcept override { return scene_stats_; }
+  const std::string& device_name() const noexcept override { return context_.device_name(); }
+
+  [[nodiscard]] bool memory_mapped() const noexcept { return readback_.mapped(); }
+  [[nodiscard]] bool software() const noexcept { return context_.software(); }
+
+ private:
+  [[nodiscard]] Result<void> warm_up_stage(const FrameRequest& first,
+                                           const WarmUpProgress& progress) {
+    auto ready = stage_->warm_up(first, progress);
+    if (ready) stage_->describe(scene_stats_);
+    return ready;
+  }
+  [[nodiscard]] glm::uvec2 picture_px() const noexcept {
+    return glm::uvec2(frame_params_.picture_px);
+  }
+  /// Instances at the frame's instant around its camera; starts the draw lists anew.
+  [[nodiscard]] CameraSetup place_camera(const FrameRequest& request,
+                                         const QualityRung& rung) noexcept;
+  [[nodiscard]] TrianglesOfRungs count_triangles(const FrameRequest& request) noexcept;
+  void prepare(const FrameRequest& request, const QualityRung& rung) noexcept;
+  void upload_frame() noexcept;
+  void bind_frame() const noexcept;
+  /// Of every plane the rows of the window, and the counters.
+  void read_back(std::uint32_t slot) noexcept;
+  [[nodiscard]] int find_entity(std::uint32_t entity_id) const noexcept;
+
+  scene::ScenarioDesc scenario_;
+  OutputOptions output_;
+  gl::EglContext context_;  // before everything that owns GL objects
+  SceneStats scene_stats_;
+  SceneHistory history_;
+  std::vector<std::uint32_t> entity_ids_;
+  BandModel bands_;
+  FramePasses passes_;
+  std::unique_ptr<ThermalStage> stage_;
+
+  gpu::FrameParams frame_params_{};
+  CommandRange view_single_sided_;
+  CommandRange view_double_sided_;
+
+  gl::Buffer frame_buffer_;
+  gl::Buffer band_buffer_;
+  gl::Buffer table_buffer_;
+  gl::BufferTexture band_table_;
+  gl::Buffer output_buffer_;  ///< planes, then counters
+  std::size_t planes_ = 0;
+  std::size_t stats_offset_ = 0;
+  ReadbackRing readback_;
+  std::vector<FrameView> views_;
+  StageClock clock_;
+  LadderMap ladder_;
+  FrameCost frame_cost_;
+  LadderMap::OfRungs expected_rungs_{};  ///< scratch of expected_rungs()
+};
+
+RadianceContent radiance_content(const BandModel& bands, const OutputOptions& output) {
+  return {.bands = static_cast<std::uint32_t>(bands.params().size()),
+          .air_terms = bands.air_terms(),
+          .air_table = bands.air_table(),
+          .terms = bands.max_terms(),
+          .outputs = (output.temperature ? EMIT_OUTPUT_TEMPERATURE : 0U) |
+                     (output.depth ? EMIT_OUTPUT_DEPTH : 0U) |
+                     (output.object ? EMIT_OUTPUT_OBJECT : 0U)};
+}
+
+bool has_entities(const scene::ScenarioDesc& scenario) {
+  return std::ranges::any_of(scenario.objects,
+                             [](const scene::ObjectDesc& object) { return object.entity_id != 0; });
+}
+
+std::size_t plane_count(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
+  return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
+         (output.object ? 1U : 0U);
+}
+
+std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
+  const std::size_t bytes = plane_count(scenario, output) * scenario.sensor.width_px *
+                            scenario.sensor.height_px * sizeof(float);
+  return (bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
+}
+
+GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
+                       const scene::SceneGeometry& geometry, const OutputOptions& output,
+                       BandModel bands, FramePasses passes)
+    : scenario_(scenario),
+      output_(output),
+      context_(std::move(context)),
+      scene_stats_{.triangles = geometry.triangles,
+                   .instances = static_cast<std::uint32_t>(geometry.instances.size()),
+                   .warnings = geometry.warnings},
+      history_{Environment(scenario), {}},
+      bands_(std::move(bands)),
+      passes_(std::move(passes)),
+      frame_buffer_(gl::Buffer::dynamic(sizeof(gpu::FrameParams))),
+      band_buffer_(gl::Buffer::dynamic(EMIT_MAX_BANDS * sizeof(gpu::BandParams))),
+      table_buffer_(gl::Buffer::from(bands_.tables())),
+      band_table_(GL_R32F, table_buffer_),
+      output_buffer_(planes_bytes(scenario, output) + sizeof(gpu::FrameStatsGpu), nullptr, 0),
+      planes_(plane_count(scenario, output)),
+      stats_offset_(planes_bytes(scenario, output)),
+      readback_(output.slots, output_buffer_.bytes()),
+      views_(output.slots),
+      clock_(output.stage_timing) {
+  for (const scene::ObjectDesc& object : scenario_.objects) {
+    if (object.entity_id == 0) continue;
+    entity_ids_.push_back(object.entity_id);
+    history_.entities.emplace_back(object, object.instances.front());
+  }
+  const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
+  frame_params_.picture_px = glm::uvec4(scenario_.sensor.width_px, scenario_.sensor.height_px,
+                                        static_cast<std::uint32_t>(plane_px), 0U);
+  frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
+                                       static_cast<float>(kReferenceK),
+                                       static_cast<float>(scenario_.thermal.tolerance_k), 0.0F);
+  frame_params_.samples.y = static_cast<float>(scenario_.sensor.near_m);
+  frame_params_.bands = glm::uvec4(bands_.nodes_per_band(), bands_.first_emissivity(), 0U, 0U);
+  for (std::uint32_t slot = 0; slot < output_.slots; ++slot) {
+    FrameView& view = views_[slot];
+    view.width_px = scenario_.sensor.width_px;
+    view.height_px = scenario_.sensor.height_px;
+    const auto* planes = reinterpret_cast<const float*>(readback_.data(slot));
+    std::size_t plane = 0;
+    const auto next_plane = [&] {
+      return std::span<const float>(planes + plane++ * plane_px, plane_px);
+    };
+    for (std::size_t b = 0; b < scenario_.bands.size(); ++b) {
+      view.radiance_w_m2_sr.push_back(next_plane());
+    }
+    if (output_.temperature) view.temperature_k = next_plane();
+    if (output_.depth) view.depth_m = next_plane();
+    if (output_.object) view.object_id = next_plane();
+  }
+  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+}
+
+int GlRenderer::find_entity(std::uint32_t entity_id) const noexcept {
+  const auto found = std::find(entity_ids_.begin(), entity_ids_.end(), entity_id);
+  return found == entity_ids_.end() ? -1 : static_cast<int>(found - entity_ids_.begin());
+}
+
+std::size_t GlRenderer::apply_entities(std::int64_t sim_time_ns,
+                                       std::span<const EntityUpdate> updates) noexcept {
+  std::size_t applied = 0;
+  for (const EntityUpdate& update : updates) {
+    const int index = find_entity(update.entity_id);
+    if (index < 0 || !physics::is_valid(update.pose)) continue;
+    if (history_.entities[static_cast<std::size_t>(index)].append(sim_time_ns, update.pose,
+                                                                  update.on, update.teleport)) {
+      ++applied;
+    }
+  }
+  return applied;
+}
+
+void GlRenderer::reset() noexcept {
+  for (PoseHistory& history : history_.entities) history.reset();
+  history_.environment.reset();
+}
+
+physics::Pose GlRenderer::scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept {
+  if (scenario_.sensor.trajectory.empty()) return {};
+  return trajectory_at(scenario_.sensor.trajectory, sim_time_ns).pose;
+}
+
+Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress& progress) {
+  if (auto ready = warm_up_stage(first, progress); !ready) return ready;
+  if (output_.ladder != Ladder::live || !passes_.enlarge) {
+    // Drivers compile when something is drawn for the first time.
+    if (const int slot = submit(first); slot >= 0) {
+      (void)collect(static_cast<SlotIndex>(slot));
+      release(static_cast<SlotIndex>(slot));
+    }
+    return {};
+  }
+  auto survey =
+      survey_ladder({*this, scenario_.sensor, bands_.apparent_temperatures(), picture_px(),
+                     [this](const FrameRequest& request) { return count_triangles(request); }},
+                    first, progress);
+  if (!survey) return tl::unexpected(std::move(survey.error()));
+  ladder_ = std::move(survey->map);
+  frame_cost_ = std::move(survey->cost);
+  return {};
+}
+
+CameraSetup GlRenderer::place_camera(const FrameRequest& request,
+                                     const QualityRung& rung) noexcept {
+  const glm::uvec2 size_px = rendered_px(rung, picture_px());
+  const glm::uvec4 window_px = window_of(request.window_px, picture_px());
+  frame_params_.format_px = glm::uvec4(size_px, size_px.x * size_px.y, 0U);
+  frame_params_.picture_window_px = window_px;
+  frame_params_.format_window_px = rendered_window(window_px, picture_px(), size_px);
+  DrawLists& lists = stage_->drawn().lists;
+  lists.begin(request.sensor_pose.position_world_m, request.sim_time_ns, history_.entities);
+  CameraSetup camera = set_camera(scenario_.sensor, request.sensor_pose, frame_params_);
+  if (!stage_->looks_around() && window_size_px(window_px) != picture_px()) {
+    // A pixel more on every side: what touches the window's outermost ones.
+    const glm::dvec4 px(glm::dvec4(frame_params_.format_window_px) +
+                        glm::dvec4(-1.0, -1.0, 1.0, 1.0));
+    const glm::dvec4 ray(frame_params_.ray);
+    camera.view.drawn_tan = glm::dvec4(ray.z + ray.x * px.x, ray.w + ray.y * px.y,
+                                       ray.z + ray.x * px.z, ray.w + ray.y * px.w);
+  }
+  const scene::Aabb& bounds = lists.bounds();
+  if (!bounds.empty()) {
+    camera.view.scene_min_m = bounds.min_m;
+    camera.view.scene_max_m = bounds.max_m;
+    const glm::dvec3 farthest = glm::max(glm::abs(bounds.min_m), glm::abs(bounds.max_m));
+    camera.view.far_m = std::max(2.0 * camera.view.near_m, glm::length(farthest));
+  }
+  return camera;
+}
+
+void GlRenderer::prepare(const FrameRequest& request, const QualityRung& rung) noexcept {
+  CameraSetup camera = place_camera(request, rung);
+  LevelLimits limits = rung.limits;
+  limits.pixel_rad = camera.pixel_rad;
+  stage_->drawn().lists.cull_view(camera.view, limits, glm::uvec2(frame_params_.format_px),
+                                  view_single_sided_, view_double_sided_);
+  stage_->prepare(request, camera, frame_params_);
+  const physics::SunPosition& sun = stage_->sun_now();
+  const bool sun_up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
+  frame_params_.sun_now =
+      glm::vec4(static_cast<float>(sun.direction_enu.x), static_cast<float>(sun.direction_enu.y),
+                static_cast<float>(sun.direction_enu.z), sun_up ? 1.0F : 0.0F);
+  bands_.update(stage_->forcing_now(), sun);
+  upload_frame();
+}
+
+void GlRenderer::upload_frame() noexcept {
+  frame_buffer_.upload(std::span<const gpu::FrameParams>(&frame_params_, 1));
+  band_buffer_.upload(bands_.params());
+  stage_->upload();
+}
+
+void GlRenderer::bind_frame() const noexcept {
+  frame_buffer_.bind_uniform(EMIT_BIND_FRAME);
+  band_buffer_.bind_uniform(EMIT_BIND_BANDS);
+  band_table_.bind(EMIT_TEX_BAND_LUT);
+  output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
+  output_buffer_.bind_storage(EMIT_BIND_STATS, stats_offset_, sizeof(gpu::FrameStatsGpu));
+  passes_.geometry.bind_textures();
+  stage_->bind();
+}
+
+void GlRenderer::read_back(std::uint32_t slot) noexcept {
+  const glm::uvec4& window_px = frame_params_.picture_window_px;
+  const std::size_t row_bytes = frame_params_.picture_px.x * sizeof(float);
+  const std::size_t plane_bytes = frame_params_.picture_px.z * sizeof(float);
+  std::array<ReadbackRing::Range, kMaxPlanes + 1> parts;
+  for (std::size_t plane = 0; plane < planes_; ++plane) {
+    parts[plane] = {plane * plane_bytes + window_px.y * row_bytes,
+                    window_size_px(window_px).y * row_bytes};
+  }
+  parts[planes_] = {stats_offset_, sizeof(gpu::FrameStatsGpu)};
+  readback_.copy_from(output_buffer_, slot, std::span(parts).first(planes_ + 1));
+}
+
+std::span<const RungStats> GlRenderer::expected_rungs(const FrameRequest& request) noexcept {
+  static constexpr std::array<RungStats, 1> kFullOnly{};
+  if (ladder_.empty()) return kFullOnly;
+  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
+  // What was measured are whole pictures.
+  const glm::uvec2 window_px = window_size_px(window_of(request.window_px, picture_px()));
+  if (!known || window_px != picture_px()) {
+    const TrianglesOfRungs triangles = count_triangles(request);
+    for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
+      expected_rungs_[r].frame_ms =
+          frame_cost_.frame_ms(triangles[r], rendered_pixels(kQualityLadder[r], window_px));
+    }
+  }
+  return expected_rungs_;
+}
+
+TrianglesOfRungs GlRenderer::count_triangles(const FrameRequest& request) noexcept {
+  const CameraSetup camera = place_camera(request, kQualityLadder[0]);
+  std::array<LevelLimits, kQualityLadder.size()> limits;
+  for (std::size_t r = 0; r < limits.size(); ++r) {
+    limits[r] = kQualityLadder[r].limits;
+    limits[r].pixel_rad =
+        camera.pixel_rad * picture_px().x / rendered_px(kQualityLadder[r], picture_px()).x;
+  }
+  TrianglesOfRungs triangles{};
+  stage_->drawn().lists.count_triangles(camera.view, limits, triangles);
+  return triangles;
+}
+
+int GlRenderer::submit(const FrameRequest& request) noexcept {
+  const int slot = readback_.acquire();
+  if (slot < 0) return -1;
+  FrameView& view = views_[static_cast<std::size_t>(slot)];
+  view.frame_number = request.frame_number;
+  view.sim_time_ns = request.sim_time_ns;
+  view.sensor_pose = request.sensor_pose;
+  view.stats.dropped_poses = 0;
+  for (const PoseHistory& history : history_.entities) {
+    view.stats.dropped_poses += history.dropped();
+  }
+  view.stages_ms = {};
+  view.rung = 0;
+  view.estimated_error_k = 0.0F;
+  StageTimes& stages = view.stages_ms;
+  view.device_failed = stage_->cold(request) && !warm_up_stage(request, {});
+  if (view.device_failed) {  // nothing can be drawn: what the planes held goes out, flagged
+    const ReadbackRing::Range all{0, output_buffer_.bytes()};
+    readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot), {&all, 1});
+    return slot;
+  }
+  clock_.start();
+
+  view.rung = passes_.enlarge ? std::min<std::uint8_t>(request.rung, kQualityLadder.size() - 1) : 0;
+  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
+  view.estimated_error_k = view.rung == 0 ? 0.0F
+                           : known        ? static_cast<float>(expected_rungs_[view.rung].error_k)
+                                          : std::numeric_limits<float>::quiet_NaN();
+  const QualityRung& rung = kQualityLadder[view.rung];
+  prepare(request, rung);
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose);
+  bind_frame();
+  const std::uint32_t zero = 0;
+  glClearNamedBufferSubData(output_buffer_.id(), GL_R32UI, static_cast<GLintptr>(stats_offset_),
+                            sizeof(gpu::FrameStatsGpu), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+
+  const DrawnScene& drawn = stage_->drawn();
+  const glm::uvec2 size_px(frame_params_.format_px);
+  const glm::uvec4& window_px = frame_params_.format_window_px;
+  passes_.geometry.draw(drawn.vertices, drawn.lists, drawn.record_buffer, view_single_sided_,
+                        view_double_sided_, size_px,
+                        stage_->looks_around() ? window_of({}, size_px) : window_px);
+  clock_.mark(stages.geometry_ms);
+  stage_->draw(window_size_px(window_px), stages, clock_);
+  if (is_scaled(rung)) {
+    passes_.enlarge->planes().bind_storage(EMIT_BIND_OUTPUT);
+    passes_.radiance.dispatch(window_size_px(window_px));
+    output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
+    passes_.enlarge->dispatch(window_size_px(frame_params_.picture_window_px));
+  } else {
+    passes_.radiance.dispatch(window_size_px(window_px));
+  }
+  clock_.mark(stages.radiance_ms);
+  read_back(static_cast<std::uint32_t>(slot));
+  clock_.mark(stages.readback_ms);
+  return slot;
+}
+
+const FrameView& GlRenderer::collect(SlotIndex slot) noexcept {
+  FrameView& view = views_[slot];
+  view.device_failed = !readback_.wait(slot) || glGetError() != GL_NO_ERROR || view.device_failed;
+  view.device_lost = glGetGraphicsResetStatus() != GL_NO_ERROR;
+  view.device_failed = view.device_failed || view.device_lost;
+  gpu::FrameStatsGpu stats{};
+  std::copy_n(readback_.data(slot) + stats_offset_, sizeof(stats),
+              reinterpret_cast<std::byte*>(&stats));
+  const auto* flagged_px = stats.flagged_px;
+  view.stats.nonfinite_px =
+      flagged_px[EMIT_FLAG_NONFINITE] + flagged_px[EMIT_FLAG_NONFINITE + EMIT_FLAG_CLAMPED];
+  view.stats.clamped_px =
+      flagged_px[EMIT_FLAG_CLAMPED] + flagged_px[EMIT_FLAG_NONFINITE + EMIT_FLAG_CLAMPED];
+  return view;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& scenario,
+                                                   const DeviceOptions& device,
+                                                   const OutputOptions& output) {
+  if (auto ok = check_limits(scenario, output); !ok) return tl::unexpected(ok.error());
+  auto geometry = scene::load_scene(scenario);
+  if (!geometry) return tl::unexpected(std::move(geometry.error()));
+  const bool cached = scenario.thermal.method == scene::ThermalMethod::cached;
+  if (cached) scene::adopt_sheets(*geometry);
+  if (geometry->materials.size() > EMIT_MAX_MATERIALS) {
+    return make_error(ErrorCode::config,
+                      fmt::format("{} materials: {} are possible", geometry->materials.size(),
+                                  EMIT_MAX_MATERIALS));
+  }
+  auto bands = BandModel::build(scenario, geometry->materials);
+  if (!bands) return tl::unexpected(std::move(bands.error()));
+  auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
+  if (!context) return tl::unexpected(std::move(context.error()));
+
+  auto foster = build_foster_materials(scenario, geometry->materials);
+  if (!foster) return tl::unexpected(std::move(foster.error()));
+
+  const std::uint32_t width_px = scenario.sensor.width_px;
+  const std::uint32_t height_px = scenario.sensor.height_px;
+  using Content = GeometryPass::Content;
+  auto geometry_pass =
+      GeometryPass::create(*context, width_px, height_px,
+                           !cached         ? Content::normals
+                           : output.object ? Content::samples_and_objects
+                                           : Content::samples,
+                           cached && has_entities(scenario) ? GeometryPass::Shade::of_entities
+                                                            : GeometryPass::Shade::none);
+  if (!geometry_pass) return tl::unexpected(std::move(geometry_pass.error()));
+  auto radiance_pass =
+      RadiancePass::create(scenario.thermal, radiance_content(*bands, output), context->software());
+  if (!radiance_pass) return tl::unexpected(std::move(radiance_pass.error()));
+  FramePasses passes{std::move(*geometry_pass), std::move(*radiance_pass), {}};
+  if (cached && output.ladder != Ladder::none) {
+    auto enlarge_pass =
+        EnlargePass::create(static_cast<std::uint32_t>(scenario.bands.size()),
+                            static_cast<std::uint32_t>(plane_count(scenario, output)),
+                            std::size_t{width_px} * height_px);
+    if (!enlarge_pass) return tl::unexpected(std::move(enlarge_pass.error()));
+    passes.enlarge = std::move(*enlarge_pass);
+  }
+
+  auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
+                                               std::move(*bands), std::move(passes));
+  auto stage = cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                            renderer->history(), renderer->software())
+                      : PerFrameStage::create(scenario, std::move(*geometry), std::move(*foster),
+                                              renderer->history());
+  if (!stage) return tl::unexpected(std::move(stage.error()));
+  renderer->set_stage(std::move(*stage));
+  if (glGetError() != GL_NO_ERROR || !renderer->memory_mapped()) {
+    return make_error(ErrorCode::gpu, "the device cannot provide the buffers of this scenario");
+  }
+  return renderer;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stages/band_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "emit/physics/band_radiance_lut.hpp"
+#include "emit/physics/clear_sky.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+
+// Least texels of a buffer texture that OpenGL 4.5 allows (GL_MAX_TEXTURE_BUFFER_SIZE).
+constexpr std::size_t kMaxTableFloats = 65536;
+
+physics::Band band_from(const scene::SpectralBand& desc) {
+  physics::Band band{desc.lo_um, desc.hi_um, {}};
+  for (const scene::ResponseSample& sample : desc.response) {
+    band.response.push_back({sample.wavelength_um, sample.response_frac});
+  }
+  return band;
+}
+
+/// Cosine-weighted mean over the sky of 1 - tau^m(elevation), by the midpoint rule in sin^2.
+double sky_hemisphere_frac(double vertical_transmittance_frac) {
+  constexpr int kRings = 256;
+  double sum = 0.0;
+  for (int i = 0; i < kRings; ++i) {
+    const double sin_elevation = std::sqrt((i + 0.5) / kRings);
+    const double mass = physics::relative_air_mass(physics::Radians(std::asin(sin_elevation)));
+    sum += 1.0 - std::pow(vertical_transmittance_frac, mass);
+  }
+  return sum / kRings;
+}
+
+const scene::BandAtmosphere* atmosphere_of(const scene::ScenarioDesc& scenario,
+                                           const std::string& band) {
+  if (!scenario.atmosphere.enabled) return nullptr;
+  for (const scene::BandAtmosphere& entry : scenario.atmosphere.bands) {
+    if (entry.band == band) return &entry;
+  }
+  return nullptr;
+}
+
+double band_emissivity_frac(const scene::Material& material, const std::string& band) {
+  for (const scene::BandEmissivity& entry : material.band_emissivity) {
+    if (entry.band == band) return entry.emissivity_frac;
+  }
+  return material.emissivity_frac;
+}
+
+}  // namespace
+
+physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
+                                            std::span<const scene::Material> materials) {
+  if (scenario.bands.empty() || scenario.bands.size() > EMIT_MAX_BANDS) {
+    return make_error(ErrorCode::config, fmt::format("{} bands: 1 to {} are possible",
+                                                     scenario.bands.size(), EMIT_MAX_BANDS));
+  }
+  BandModel model;
+  for (const scene::SpectralBand& desc : scenario.bands) {
+    Entry entry{.band = band_from(desc)};
+    const auto lut = physics::BandRadianceLut::build(entry.band);
+    if (!lut) {
+      return make_error(ErrorCode::config,
+                        fmt::format("band '{}': {}", desc.name, lut.error().text));
+    }
+    gpu::BandParams params{};
+    const auto layout = lut->shader_layout(0);
+    params.lut_first_k = layout[0];
+    params.lut_nodes_per_k = layout[1];
+    params.lut_last_node = layout[2];
+    params.vertical_transmittance_frac = 1.0F;
+    const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name);
+    if (atmosphere != nullptr && !atmosphere->table.empty()) {
+      auto air = physics::AtmosphereTable::build(atmosphere->table);
+      if (!air) {
+        return make_error(ErrorCode::config,
+                          fmt::format("band '{}': {}", desc.name, air.error().text));
+      }
+      model.air_table_ |= 1U << model.params_.size();
+      entry.air_hemisphere_w_m2_sr = air->sky_hemisphere_w_m2_sr();
+      entry.air = std::move(*air);
+    } else if (atmosphere != nullptr) {
+      if (atmosphere->terms.size() > EMIT_MAX_ATMOSPHERE_TERMS) {
+        return make_error(
+            ErrorCode::config,
+            fmt::format("atmosphere of band '{}': {} terms, {} are possible", desc.name,
+                        atmosphere->terms.size(), EMIT_MAX_ATMOSPHERE_TERMS));
+      }
+      model.max_terms_ =
+          std::max(model.max_terms_, static_cast<std::uint32_t>(atmosphere->terms.size()));
+      model.air_terms_ |= 1U << model.params_.size();
+      params.terms_amplitude_frac = glm::vec4(0.0F);
+      for (std::size_t i = 0; i < atmosphere->terms.size(); ++i) {
+        const auto k = static_cast<glm::length_t>(i);
+        params.terms_amplitude_frac[k] = static_cast<float>(atmosphere->terms[i].amplitude_frac);
+        params.terms_extinction_per_m[k] =
+            static_cast<float>(atmosphere->terms[i].extinction_per_km * 1e-3);
+      }
+      entry.vertical_transmittance_frac = atmosphere->vertical_transmittance_frac;
+      params.vertical_transmittance_frac =
+          static_cast<float>(atmosphere->vertical_transmittance_frac);
+    }
+    entry.sun_radiance_w_m2_sr =
+        physics::band_radiance(entry.band, physics::Kelvin(physics::kSunTemperatureK))
+            .radiance_w_m2_sr;
+    entry.sky_hemisphere_frac = sky_hemisphere_frac(entry.vertical_transmittance_frac);
+    model.nodes_per_band_ = static_cast<std::uint32_t>(lut->nodes().size());
+    model.tables_.insert(model.tables_.end(), lut->nodes().begin(), lut->nodes().end());
+    model.params_.push_back(params);
+    model.entries_.push_back(std::move(entry));
+  }
+  for (std::size_t i = 0; i < model.entries_.size(); ++i) {
+    if (!model.entries_[i].air) continue;
+    const physics::AtmosphereTable& air = *model.entries_[i].air;
+    model.params_[i].atmosphere_table = glm::uvec4(
+        static_cast<std::uint32_t>(model.tables_.size()), static_cast<std::uint32_t>(air.ranges()),
+        static_cast<std::uint32_t>(air.elevations()), 0U);
+    const std::vector<float> nodes = air.shader_nodes();
+    model.tables_.insert(model.tables_.end(), nodes.begin(), nodes.end());
+    if (model.tables_.size() > kMaxTableFloats) {
+      return make_error(ErrorCode::config,
+                        fmt::format("band '{}': the atmosphere tables have more points than a "
+                                    "device is sure to take ({} numbers, {} are possible)",
+                                    scenario.bands[i].name, model.tables_.size(), kMaxTableFloats));
+    }
+  }
+  model.first_emissivity_ = static_cast<std::uint32_t>(model.tables_.size());
+  for (const scene::Material& material : materials) {
+    for (const scene::SpectralBand& band : scenario.bands) {
+      model.tables_.push_back(static_cast<float>(band_emissivity_frac(material, band.name)));
+    }
+  }
+  if (model.tables_.size() > kMaxTableFloats) {
+    return make_error(ErrorCode::config,
+                      fmt::format("{} materials in {} bands: their emissivities are more than a "
+                                  "device is sure to take",
+                                  materials.size(), scenario.bands.size()));
+  }
+  return model;
+}
+
+std::vector<physics::ApparentTemperature> BandModel::apparent_temperatures() const {
+  std::vector<physics::ApparentTemperature> out;
+  for (const Entry& entry : entries_) out.emplace_back(entry.band);
+  return out;
+}
+
+void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept {
+  const double disc_sr_projected = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
+  const double air_mass = physics::relative_air_mass(sun.elevation);
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Entry& entry = entries_[i];
+    gpu::BandParams& params = params_[i];
+    const double air_w_m2_sr =
+        physics::band_radiance(entry.band, physics::Kelvin(forcing.air_k)).radiance_w_m2_sr;
+    params.air_radiance_w_m2_sr = static_cast<float>(air_w_m2_sr);
+    params.surroundings_radiance_w_m2_sr = static_cast<float>(
+        physics::band_radiance(entry.band, physics::Kelvin(forcing.environment_k))
+            .radiance_w_m2_sr);
+    params.sky_hemisphere_w_m2_sr = static_cast<float>(
+        entry.air ? entry.air_hemisphere_w_m2_sr : air_w_m2_sr * entry.sky_hemisphere_frac);
+    // Without direct sun in the forcing (overcast) none is reflected either.
+    const bool sun_shines =
+        forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) > 0.0 && air_mass > 0.0;
+    const double sun_transmittance_frac =
+        entry.air ? entry.air->out(std::sin(sun.elevation.value())).transmittance_frac
+                  : std::pow(entry.vertical_transmittance_frac, air_mass);
+    params.sun_irradiance_w_m2 =
+        sun_shines ? static_cast<float>(entry.sun_radiance_w_m2_sr * disc_sr_projected *
+                                        (1.0 - forcing.cloud_frac) * sun_transmittance_frac)
+                   : 0.0F;
+  }
+}
+
+std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material> materials,
+                                                 const scene::ScenarioDesc& scenario,
+                                                 double reference_k) {
+  std::vector<gpu::MaterialParams> out;
+  out.reserve(materials.size());
+  for (const scene::Material& material : materials) {
+    gpu::MaterialParams params{};
+    params.solar_absorptance_frac = static_cast<float>(material.solar_absorptance_frac);
+    params.emissivity_frac = static_cast<float>(material.emissivity_frac);
+    if (material.core_conductance_w_m2_k) {
+      params.conductance_w_m2_k = static_cast<float>(*material.core_conductance_w_m2_k);
+    } else if (!material.layers.empty()) {
+      params.conductance_w_m2_k = static_cast<float>(material.layers[0].conductivity_w_m_k /
+                                                     material.layers[0].thickness_m);
+    }
+    params.base_k = static_cast<float>(material.base_k);
+    params.base_offset_k = static_cast<float>(material.base_k - reference_k);
+    params.initial_offset_k =
+        static_cast<float>(material.initial_k.value_or(scenario.thermal.initial_k) - reference_k);
+    if (material.prescribed_k) {
+      params.prescribed = 1.0F;
+      params.prescribed_offset_k = static_cast<float>(*material.prescribed_k - reference_k);
+    }
+    out.push_back(params);
+  }
+  return out;
+}
+
+}  // namespace emit::renderer

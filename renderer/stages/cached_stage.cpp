@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stages/cached_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "emit/scene/simplify.hpp"
+#include "history/foster_setup.hpp"
+#include "surface/rays/coarse_geometry.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// A place stands for those around it, up to this share of its distance from the scene.
+constexpr double kReachFrac = 0.05;
+/// Places along a known trajectory of the camera that the refinement looks from.
+constexpr std::size_t kEyes = 16;
+/// Places of the sun that tell what it comes to.
+constexpr std::size_t kSuns = 16;
+constexpr std::int64_t kDayNs = 86'400'000'000'000;
+/// The camera may point that share of its field of view aside of where it was said to.
+constexpr double kFieldMarginFrac = 0.5;
+
+double pixel_rad(const scene::SensorDesc& sensor) {
+  return 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
+}
+
+/// From the boresight to a corner of the picture.
+double half_diagonal_rad(const scene::SensorDesc& sensor) {
+  const double corner_px = std::hypot(sensor.width_px, sensor.height_px);
+  return std::atan(std::tan(0.5 * sensor.fov_h_rad) * corner_px / sensor.width_px);
+}
+
+RefineView::Eye eye_of(const physics::Pose& pose) {
+  return {pose.position_world_m, pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0)};
+}
+
+/// Every place of the camera that the scenario tells.
+std::vector<RefineView::Eye> all_eyes(const scene::Trajectory& keys) {
+  std::vector<RefineView::Eye> eyes;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    eyes.push_back(eye_of(keys[i].pose));
+    if (i + 1 == keys.size()) break;
+    const std::int64_t length_ns = keys[i + 1].sim_time_ns - keys[i].sim_time_ns;
+    for (std::size_t part = 1; part < kEyes; ++part) {
+      const auto way = static_cast<double>(length_ns) * static_cast<double>(part) / kEyes;
+      eyes.push_back(eye_of(trajectory_at(keys, keys[i].sim_time_ns + std::llround(way)).pose));
+    }
+  }
+  return eyes;
+}
+
+RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& request) {
+  RefineView view;
+  view.pixel_rad = pixel_rad(sensor);
+  view.field_rad = (1.0 + kFieldMarginFrac) * half_diagonal_rad(sensor);
+  view.eyes.push_back(eye_of(request.sensor_pose));
+  const scene::Trajectory& keys = sensor.trajectory;
+  if (keys.size() < 2) return view;
+  const std::int64_t end_ns = keys[keys.size() - 1].sim_time_ns;
+  for (std::size_t i = 1; i <= kEyes && request.sim_time_ns < end_ns; ++i) {
+    const auto way = static_cast<double>(end_ns - request.sim_time_ns) * static_cast<double>(i);
+    const std::int64_t at_ns = request.sim_time_ns + std::llround(way / kEyes);
+    view.eyes.push_back(eye_of(trajectory_at(keys, at_ns).pose));
+  }
+  return view;
+}
+
+/// Where the sun stands from the history's start to the end of the camera's way; through a day
+/// where the way has no length.
+std::vector<glm::vec3> suns(const scene::ScenarioDesc& scenario, const Environment& environment) {
+  const std::int64_t begin_ns = scenario.thermal.history_start_ns;
+  const scene::Trajectory& keys = scenario.sensor.trajectory;
+  const std::int64_t end_ns =
+      keys.size() < 2 ? begin_ns + kDayNs : keys[keys.size() - 1].sim_time_ns;
+  std::vector<glm::vec3> out;
+  for (std::size_t i = 0; i <= kSuns; ++i) {
+    const auto way = static_cast<double>(end_ns - begin_ns) * static_cast<double>(i) / kSuns;
+    const physics::SunPosition sun = environment.sun_at(begin_ns + std::llround(way));
+    if (sun.elevation.value() > StepPlan::kMinSunElevationRad) out.emplace_back(sun.direction_enu);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineView::Eye> eyes,
+                                                       const scene::Aabb& static_bounds) {
+  std::vector<Eye> out;
+  for (std::size_t i = 0; i < eyes.size(); ++i) {
+    // On the way to the next place, too.
+    const double way_m =
+        i + 1 < eyes.size() ? glm::distance(eyes[i].world_m, eyes[i + 1].world_m) : 0.0;
+    const double around_m = kReachFrac * scene::distance_m(static_bounds, eyes[i].world_m);
+    out.push_back({eyes[i], std::max(way_m, around_m)});
+  }
+  return out;
+}
+
+physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
+    const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+    std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software) {
+  const std::vector<RefineView::Eye> eyes = all_eyes(scenario.sensor.trajectory);
+  std::vector<glm::dvec3> eyes_world_m;
+  for (const RefineView::Eye& eye : eyes) eyes_world_m.push_back(eye.world_m);
+  const scene::Aabb bounds = geometry.static_bounds;
+  std::optional<CachedSurface::Saved> saved;
+  if (!scenario.thermal.state_file.empty()) {
+    saved = {scenario.thermal.state_file, scenario_key(scenario, geometry), true};
+  }
+  const scene::DetailView view{eyes_world_m, pixel_rad(scenario.sensor)};
+  geometry = scene::separated(std::move(geometry), view);
+  auto coarse = coarse_geometry(std::move(geometry), view, suns(scenario, history.environment),
+                                scenario.thermal.max_samples);
+  if (!coarse) return tl::unexpected(std::move(coarse.error()));
+  const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
+  auto surface = CachedSurface::create(
+      scenario, std::move(coarse->geometry), histories_of_objects(scenario),
+      std::span(foster_materials).first(simulated), kReferenceK, std::move(coarse->detail));
+  if (!surface) return tl::unexpected(std::move(surface.error()));
+  std::optional<ShadePass> shade_pass;
+  if (!history.entities.empty()) {
+    auto pass = ShadePass::create(history.entities.size(), software);
+    if (!pass) return tl::unexpected(std::move(pass.error()));
+    shade_pass = std::move(*pass);
+  }
+  return std::unique_ptr<ThermalStage>(new CachedStage(
+      scenario, bounds, eyes_around(eyes, bounds), std::move(*surface), std::move(foster_materials),
+      history, std::move(saved), coarse->visibly, std::move(shade_pass), software));
+}
+
+CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
+                         std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
+                         std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
+                         std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
+                         std::optional<ShadePass> shade_pass, bool software)
+    : sensor_(scenario.sensor),
+      software_(software),
+      static_bounds_(static_bounds),
+      detail_eyes_(std::move(detail_eyes)),
+      visibly_simplified_(visibly_simplified),
+      history_of_object_(histories_of_objects(scenario)),
+      history_(history),
+      plan_(scenario.thermal),
+      surface_history_(scenario.thermal.steps, make_foster(scenario, std::move(foster_materials),
+                                                           history.environment, kReferenceK)),
+      surface_(std::move(surface)),
+      saved_(std::move(saved)),
+      shade_pass_(std::move(shade_pass)) {}
+
+physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
+                                           const WarmUpProgress& progress) {
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities};
+  const RefineView view = refine_view(sensor_, request);
+  auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, surface_history_,
+                                 saved_, progress);
+  if (!ready) return ready;
+  if (saved_) saved_->start = false;  // after a jump of sim time the start's state need not fit
+  refined_eyes_ = eyes_around(view.eyes, static_bounds_);
+  drawn_.reset();  // its device memory goes before that of the next one is taken
+  drawn_ = std::make_unique<DrawnScene>(surface_->drawn_scene(), history_of_object_, software_);
+  for (gl::Buffer& node : node_buffers_) {
+    node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
+  }
+  if (shade_pass_) {
+    shade_pass_->begin(surface_->shade());
+    shade_buffer_ = gl::Buffer::dynamic(surface_->shade().vertices_k().size_bytes());
+  }
+  if (glGetError() != GL_NO_ERROR) {
+    return physics::make_error(physics::ErrorCode::gpu,
+                               "the device cannot hold the samples of this scenario");
+  }
+  return {};
+}
+
+bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
+  const RefineView::Eye here = eye_of(camera);
+  // Where samples ran out, they went to what was said to be in view.
+  const double least_cos =
+      surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : -2.0;
+  const auto stands_near = [&](const std::vector<Eye>& eyes, double cos_at_least) {
+    return std::ranges::any_of(eyes, [&](const Eye& each) {
+      return glm::distance(each.eye.world_m, here.world_m) <= each.reach_m &&
+             glm::dot(each.eye.boresight, here.boresight) >= cos_at_least;
+    });
+  };
+  // Without known eyes no mesh was simplified.
+  return visibly_simplified_ || surface_->model().full_in_view ||
+         surface_->shade().short_of_pages() || surface_->stale_shadow() || surface_->lags() ||
+         !stands_near(refined_eyes_, least_cos) ||
+         (!detail_eyes_.empty() && !stands_near(detail_eyes_, -2.0));
+}
+
+void CachedStage::describe(SceneStats& stats) const noexcept {
+  stats.samples = surface_->model().samples.samples.size();
+  stats.sample_bytes = surface_->sample_bytes();
+  stats.samples_full = surface_->model().full;
+  stats.coarse_meshes = visibly_simplified_;
+}
+
+void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
+                          gpu::FrameParams& frame) noexcept {
+  const CachedSurface::Inputs inputs{history_.environment, history_.entities};
+  surface_->advance(request.thermal_time_ns, inputs, surface_history_);
+  if (shade_pass_) {
+    surface_->place_shadows(request.sim_time_ns, request.thermal_time_ns, inputs);
+    shade_pass_->prepare(*surface_, request.sensor_pose.position_world_m, camera, frame);
+  }
+  frame.samples.x = surface_->fraction();
+  sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
+  forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);
+  forcing_now_.environment_k = surface_->surroundings_now_k().value_or(forcing_now_.environment_k);
+}
+
+void CachedStage::upload() noexcept {
+  drawn_->upload();
+  for (std::size_t node = 0; node < node_buffers_.size(); ++node) {
+    const std::size_t storage = surface_->storage(node);
+    for (const ChangedRanges::Range& range : surface_->changes(storage)) {
+      node_buffers_[storage].upload(surface_->vertices(node).subspan(range.first, range.count),
+                                    range.first);
+    }
+  }
+  if (shade_pass_) {
+    for (const ChangedRanges::Range& range : surface_->shade().changes()) {
+      shade_buffer_.upload(surface_->shade().vertices_k().subspan(range.first, range.count),
+                           range.first);
+    }
+    shade_pass_->upload(*surface_);
+  }
+  surface_->forget_changes();
+}
+
+void CachedStage::draw(const glm::uvec2&, StageTimes& stages, StageClock& clock) noexcept {
+  if (!shade_pass_) return;
+  shade_pass_->dispatch();
+  clock.mark(stages.thermal_ms);
+}
+
+void CachedStage::bind() const noexcept {
+  drawn_->vertices.read_nodes(node_buffers_[surface_->storage(0)],
+                              node_buffers_[surface_->storage(1)]);
+  if (shade_pass_) drawn_->vertices.read_shade(shade_buffer_);
+}
+
+}  // namespace emit::renderer

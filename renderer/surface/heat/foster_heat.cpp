@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/heat/foster_heat.hpp"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using physics::FosterDrive;
+using physics::FosterState;
+using physics::FosterSurface;
+
+constexpr std::array<float, physics::kMaxFosterModes> kWhole{1.0F, 1.0F, 1.0F, 1.0F};
+
+double sum(const FosterState<double>& x) noexcept {
+  return (x[0] + x[1]) + (x[2] + x[3]);
+}
+
+double exitance_w_m2(double temperature_k) noexcept {
+  const double t2 = temperature_k * temperature_k;
+  return physics::kStefanBoltzmannWPerM2K4 * t2 * t2;
+}
+
+/// States under a flux that goes linearly from `begin` to `end`: exact.
+void relax(FosterState<double>& x, const FosterSurface<double>& surface,
+           const std::array<float, physics::kMaxFosterModes>& weight_frac, double begin_w_m2,
+           double end_w_m2, const physics::FosterGains<double>& gains) noexcept {
+  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+    const double r = surface.resistance_m2k_w[i] * weight_frac[i];
+    x[i] +=
+        (r * begin_w_m2 - x[i]) * gains.start_frac[i] + (r * end_w_m2 - x[i]) * gains.end_frac[i];
+  }
+}
+
+}  // namespace
+
+FosterHeat::FosterHeat(std::span<const FosterMaterial> materials, double reference_k,
+                       double tolerance_k)
+    : materials_(materials.begin(), materials.end()),
+      reference_k_(reference_k),
+      tolerance_k_(tolerance_k) {
+  for (const FosterMaterial& material : materials_) {
+    surfaces_.push_back(physics::foster_surface(material.network, material.emissivity_frac,
+                                                material.base_k, reference_k));
+  }
+}
+
+void FosterHeat::prepare(HeatInterval& interval) const noexcept {
+  for (std::size_t m = 0; m < materials_.size(); ++m) {
+    if (materials_[m].prescribed()) continue;
+    interval.ladders[m] = physics::foster_ladder(interval.forcing.dt_s, materials_[m].network);
+  }
+}
+
+SampleState FosterHeat::start_state(const SurfaceSample& sample, const glm::vec3& normal,
+                                    const FosterState<double>& before_k,
+                                    std::span<const HeatInterval> tail) const noexcept {
+  SampleState state;
+  state.modes_k = before_k;
+  for (const HeatInterval& interval : tail) {
+    advance_unshadowed(sample.material, normal, interval, state.modes_k);
+  }
+  // What covers part of the ground did so before the history as well.
+  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+    state.modes_k[i] *= sample.open_before_frac[i];
+  }
+  return state;
+}
+
+FosterHeat::Incoming FosterHeat::incoming(const SurfaceSample& sample, const glm::vec3& normal,
+                                          const SurfaceForcing& forcing, const SampleDrive& drive,
+                                          double longwave_seen_w_m2) const noexcept {
+  const double open_frac = sample.sky_frac * (1.0 - drive.hidden_sky_frac);
+  const double hidden_frac = drive.hidden_is_seen ? 0.0 : sample.sky_frac * drive.hidden_sky_frac;
+  const double sun_w_m2 = std::max(0.0, glm::dot(glm::dvec3(normal), forcing.sun_w_m2));
+  return {drive.sun_frac * sun_w_m2 + open_frac * forcing.diffuse_w_m2 +
+              sample.far_frac * forcing.reflected_w_m2 + drive.shortwave_w_m2,
+          open_frac * forcing.longwave_w_m2 +
+              (hidden_frac + sample.far_frac) * forcing.environment_w_m2 + longwave_seen_w_m2};
+}
+
+FosterHeat::Incoming FosterHeat::into_body(const Incoming& own, bool own_covered,
+                                           const glm::vec3& normal, const SurfaceForcing& forcing,
+                                           const SheetBack* back,
+                                           double SampleDrive::*longwave_w_m2) const noexcept {
+  // What covers a face of a sheet keeps its heat: the other one alone decides.
+  if (back == nullptr || back->sample.covered) return own;
+  const Incoming other =
+      incoming(back->sample, -normal, forcing, back->drive, back->drive.*longwave_w_m2);
+  if (own_covered) return other;
+  return {0.5 * (own.shortwave_w_m2 + other.shortwave_w_m2),
+          0.5 * (own.longwave_w_m2 + other.longwave_w_m2)};
+}
+
+FosterDrive<double> FosterHeat::absorbed(std::uint32_t material, const SurfaceForcing& forcing,
+                                         const Incoming& in) const noexcept {
+  return {.absorbed_w_m2 = materials_[material].solar_absorptance_frac * in.shortwave_w_m2 +
+                           materials_[material].emissivity_frac * in.longwave_w_m2,
+          .film_w_m2_k = forcing.film_w_m2_k,
+          .air_offset_k = forcing.air_k - reference_k_};
+}
+
+SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const SurfaceForcing& forcing,
+                                   const Incoming& in, const SampleDrive& drive,
+                                   double offset_k) const noexcept {
+  const FosterMaterial& m = materials_[sample.material];
+  SampleOutput out;
+  out.offset_k = static_cast<float>(offset_k);
+  out.sun_frac = drive.sun_frac;
+  out.longwave_out_w_m2 =
+      static_cast<float>(m.emissivity_frac * exitance_w_m2(reference_k_ + offset_k) +
+                         (1.0 - m.emissivity_frac) * in.longwave_w_m2);
+  out.shortwave_out_w_m2 = static_cast<float>((1.0 - m.solar_absorptance_frac) * in.shortwave_w_m2);
+  if (!m.prescribed() && !sample.covered) {
+    out.flux_w_m2 = static_cast<float>(physics::foster_flux_w_m2(
+        offset_k, absorbed(sample.material, forcing, in), surfaces_[sample.material]));
+  }
+  return out;
+}
+
+double FosterHeat::offset_k(std::uint32_t material, const SampleState& state) const noexcept {
+  if (materials_[material].prescribed()) return materials_[material].prescribed_k - reference_k_;
+  double offset_k = physics::foster_offset_k(state.modes_k, surfaces_[material]);
+  for (const FosterState<double>& partner : state.partner_k) offset_k += sum(partner);
+  return offset_k;
+}
+
+SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& normal,
+                                const SurfaceForcing& forcing, const SampleDrive& drive,
+                                const SampleState& state) const noexcept {
+  const Incoming in = incoming(sample, normal, forcing, drive, drive.longwave_begin_w_m2);
+  return output_of(sample, forcing, in, drive, offset_k(sample.material, state));
+}
+
+SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& normal,
+                                 const HeatInterval& interval, const SampleDrive& drive,
+                                 SampleState& state, const SheetBack* back) const noexcept {
+  const IntervalForcing& forcing = interval.forcing;
+  const Incoming end = incoming(sample, normal, forcing.end, drive, drive.longwave_end_w_m2);
+  if (!materials_[sample.material].prescribed()) {
+    const Incoming begin =
+        incoming(sample, normal, forcing.begin, drive, drive.longwave_begin_w_m2);
+    const Incoming body_begin = into_body(begin, sample.covered, normal, forcing.begin, back,
+                                          &SampleDrive::longwave_begin_w_m2);
+    const Incoming body_end =
+        into_body(end, sample.covered, normal, forcing.end, back, &SampleDrive::longwave_end_w_m2);
+    const physics::FosterLadder& ladder = interval.ladders[sample.material];
+    FosterSurface<double> surface = surfaces_[sample.material];
+    for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+      surface.resistance_m2k_w[i] *= sample.open_frac[i];
+    }
+    // What the partners conduct shifts the temperature under which the own flux flows: its mean
+    // over the interval does.
+    for (std::size_t p = 0; p < kMaxPartners; ++p) {
+      if (sample.partners[p].sample == kNoSample) continue;
+      const double before_k = sum(state.partner_k[p]);
+      relax(state.partner_k[p], surface, sample.partners[p].weight_frac,
+            drive.partner_begin_w_m2[p], drive.partner_end_w_m2[p], ladder.level[0]);
+      surface.base_offset_k += 0.5 * (before_k + sum(state.partner_k[p]));
+    }
+    if (sample.covered && (back == nullptr || back->sample.covered)) {
+      relax(state.modes_k, surface, kWhole, 0.0, 0.0, ladder.level[0]);
+    } else {
+      physics::foster_advance(state.modes_k, absorbed(sample.material, forcing.begin, body_begin),
+                              absorbed(sample.material, forcing.end, body_end), ladder, surface,
+                              tolerance_k_);
+    }
+  }
+  return output_of(sample, forcing.end, end, drive, offset_k(sample.material, state));
+}
+
+void FosterHeat::advance_unshadowed(std::uint32_t material, const glm::vec3& normal,
+                                    const HeatInterval& interval,
+                                    FosterState<double>& modes_k) const noexcept {
+  if (materials_[material].prescribed()) return;
+  const auto drive = [&](const SurfaceForcing& forcing) {
+    return unshadowed_drive(forcing, materials_[material], glm::dvec3(normal), reference_k_);
+  };
+  physics::foster_advance(modes_k, drive(interval.forcing.begin), drive(interval.forcing.end),
+                          interval.ladders[material], surfaces_[material], tolerance_k_);
+}
+
+void FosterHeat::step_response(std::uint32_t material, const ResponseConditions& around,
+                               std::span<const double> times_s,
+                               std::span<double> response_m2k_w) const noexcept {
+  const FosterMaterial& m = materials_[material];
+  std::ranges::fill(response_m2k_w, 0.0);
+  if (m.prescribed() || m.sheet) return;
+  const double t = around.surface_k;
+  const double h_w_m2_k =
+      around.film_w_m2_k + 4.0 * m.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t;
+  // Per unit of flux, tau x' = r q - x with q = 1 - h sum x, in implicit steps.
+  constexpr int kParts = 16;
+  FosterState<double> x{};
+  double now_s = 0.0;
+  for (std::size_t j = 0; j < times_s.size(); ++j) {
+    const double dt_s = (times_s[j] - now_s) / kParts;
+    for (int part = 0; part < kParts; ++part) {
+      double left = 0.0;
+      double driven = 0.0;
+      for (std::size_t i = 0; i < m.network.count; ++i) {
+        const physics::NetworkMode& mode = m.network.modes[i];
+        left += x[i] * mode.tau_s / (mode.tau_s + dt_s);
+        driven += mode.resistance_m2k_w * dt_s / (mode.tau_s + dt_s);
+      }
+      const double q = (1.0 - h_w_m2_k * left) / (1.0 + h_w_m2_k * driven);
+      for (std::size_t i = 0; i < m.network.count; ++i) {
+        const physics::NetworkMode& mode = m.network.modes[i];
+        x[i] = (x[i] * mode.tau_s + mode.resistance_m2k_w * q * dt_s) / (mode.tau_s + dt_s);
+      }
+    }
+    now_s = times_s[j];
+    response_m2k_w[j] = m.solar_absorptance_frac * sum(x);
+  }
+}
+
+}  // namespace emit::renderer

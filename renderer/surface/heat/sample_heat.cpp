@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/heat/sample_heat.hpp"
+
+namespace emit::renderer {
+
+HeatInterval SampleHeat::sized_interval() const {
+  HeatInterval interval;
+  std::visit([&](const auto& model) { model.size(interval); }, model_);
+  return interval;
+}
+
+void SampleHeat::prepare(HeatInterval& interval) const noexcept {
+  std::visit([&](const auto& model) { model.prepare(interval); }, model_);
+}
+
+SampleState SampleHeat::start_state(const SurfaceSample& sample, const glm::vec3& normal,
+                                    const SurfaceHistory& history,
+                                    std::span<const HeatInterval> tail) const noexcept {
+  const auto* extended = std::get_if<FosterHeat>(&model_);
+  if (extended == nullptr) return std::get_if<Emit2014Heat>(&model_)->start_state(sample);
+  const auto facing = [&](const glm::vec3& direction) {
+    return extended->start_state(
+        sample, direction, history.start_states(sample.material, glm::dvec3(direction)), tail);
+  };
+  SampleState state = facing(normal);
+  if (!extended->is_sheet(sample.material)) return state;
+  const SampleState back = facing(-normal);
+  for (std::size_t i = 0; i < state.modes_k.size(); ++i) {
+    state.modes_k[i] = 0.5 * (state.modes_k[i] + back.modes_k[i]);
+  }
+  return state;
+}
+
+SampleOutput SampleHeat::advance(const SurfaceSample& sample, const glm::vec3& normal,
+                                 const HeatInterval& interval, const SampleDrive& drive,
+                                 SampleState& state, const SheetBack* back) const noexcept {
+  return std::visit(
+      [&](const auto& model) {
+        return model.advance(sample, normal, interval, drive, state, back);
+      },
+      model_);
+}
+
+void SampleHeat::step_response(std::uint32_t material, const ResponseConditions& around,
+                               std::span<const double> times_s,
+                               std::span<double> response_m2k_w) const noexcept {
+  std::visit(
+      [&](const auto& model) { model.step_response(material, around, times_s, response_m2k_w); },
+      model_);
+}
+
+SampleOutput SampleHeat::output(const SurfaceSample& sample, const glm::vec3& normal,
+                                const SurfaceForcing& forcing, const SampleDrive& drive,
+                                const SampleState& state) const noexcept {
+  if (const auto* published = std::get_if<Emit2014Heat>(&model_)) {
+    return published->output(sample, drive, state);
+  }
+  return std::get_if<FosterHeat>(&model_)->output(sample, normal, forcing, drive, state);
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "emit/renderer/surface_forcing.hpp"
+#include "surface/heat/surface_samples.hpp"
+
+namespace emit::renderer {
+
+/// What the device interpolates between, by sample and node of time.
+struct SampleVertex {
+  float offset_k = 0.0F;
+  float sun_frac = 0.0F;
+};
+
+/// Parts of a list that have changed: a bounded number of ranges that together hold them.
+/// Real time: everything but the constructor is RT-safe.
+class ChangedRanges {
+ public:
+  struct Range {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+  };
+  static constexpr std::size_t kMaxRanges = 1024;
+  /// What lies between two parts so close to each other is sent along: a call costs as much.
+  static constexpr std::uint32_t kGap = 64;
+
+  ChangedRanges() { ranges_.reserve(kMaxRanges); }
+
+  /// Cheapest in ascending order.
+  void add(std::uint32_t first, std::uint32_t count) noexcept {
+    if (count == 0) return;
+    if (!ranges_.empty()) {
+      Range& last = ranges_.back();
+      if (first >= last.first && first <= last.first + last.count + kGap) {
+        last.count = std::max(last.count, first + count - last.first);
+        return;
+      }
+    }
+    if (ranges_.size() == kMaxRanges) cover();
+    ranges_.push_back({first, count});
+  }
+  void clear() noexcept { ranges_.clear(); }
+  [[nodiscard]] std::span<const Range> ranges() const noexcept { return ranges_; }
+
+ private:
+  void cover() noexcept {
+    std::uint32_t low = ranges_.front().first;
+    std::uint32_t high = low;
+    for (const Range& range : ranges_) {
+      low = std::min(low, range.first);
+      high = std::max(high, range.first + range.count);
+    }
+    ranges_.clear();
+    ranges_.push_back({low, high - low});
+  }
+
+  std::vector<Range> ranges_;
+};
+
+/// All samples at one node of time: what is needed to go on from there.
+struct SurfaceNode {
+  std::vector<SampleState> states;
+  std::vector<SampleOutput> outputs;
+  std::vector<SampleVertex> vertices;  ///< of the drawn samples
+  ChangedRanges changes;               ///< of the vertices
+  std::int64_t at_ns = 0;
+  IntervalForcing forcing;  ///< of the interval that ends there, as it was taken to be
+  physics::FosterState<double> surroundings{};
+  std::optional<double> surroundings_k;  ///< where the thermal model carries it
+};
+
+/// Value on the way from a to b.
+template <class T>
+[[nodiscard]] T between(T a, T b, double frac) noexcept {
+  return a + static_cast<T>(frac) * (b - a);
+}
+[[nodiscard]] inline physics::FosterState<double> between(const physics::FosterState<double>& a,
+                                                          const physics::FosterState<double>& b,
+                                                          double frac) noexcept {
+  physics::FosterState<double> out;
+  for (std::size_t i = 0; i < a.size(); ++i) out[i] = between(a[i], b[i], frac);
+  return out;
+}
+[[nodiscard]] inline SampleState between(const SampleState& a, const SampleState& b,
+                                         double frac) noexcept {
+  SampleState out;
+  out.modes_k = between(a.modes_k, b.modes_k, frac);
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    out.partner_k[p] = between(a.partner_k[p], b.partner_k[p], frac);
+  }
+  return out;
+}
+[[nodiscard]] inline SampleOutput between(const SampleOutput& a, const SampleOutput& b,
+                                          double frac) noexcept {
+  SampleOutput out;
+  for (float SampleOutput::*value :
+       {&SampleOutput::offset_k, &SampleOutput::sun_frac, &SampleOutput::longwave_out_w_m2,
+        &SampleOutput::shortwave_out_w_m2, &SampleOutput::flux_w_m2}) {
+    out.*value = between(a.*value, b.*value, frac);
+  }
+  return out;
+}
+
+}  // namespace emit::renderer

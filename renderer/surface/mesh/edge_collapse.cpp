@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/mesh/edge_collapse.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <queue>
+#include <utility>
+
+#include "surface/mesh/nearest_triangle.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// A place that lies off the surface counts from where this share of a pixel is as wide.
+constexpr float kDeviationPx = 0.25F;
+/// A triangle that shows another value counts from where its longest edge is as wide.
+constexpr float kEdgePx = 0.5F;
+/// Where nothing is missed a triangle counts from where its longest edge is as wide.
+constexpr float kSizePx = 4.0F;
+/// Cosine of the angle that a triangle may turn by.
+constexpr float kLeastTurnCosine = 0.25F;
+
+/// Neighbours that a place may be collapsed into: the nearest.
+constexpr std::size_t kTried = 4;
+
+constexpr float kNever = std::numeric_limits<float>::infinity();
+
+using Corners = std::array<std::uint32_t, 3>;
+
+struct Candidate {
+  float cost_m = kNever;  ///< width of a pixel from which on nobody sees it
+  std::uint32_t from = 0;
+  std::uint32_t to = 0;
+  std::uint32_t stamp = 0;
+  bool operator<(const Candidate& other) const noexcept {  // the cheapest on top of a heap
+    return std::pair(cost_m, from) > std::pair(other.cost_m, other.from);
+  }
+};
+
+class Collapse {
+ public:
+  explicit Collapse(const CollapseInput& input);
+  std::vector<std::uint32_t> run(std::size_t triangles);
+
+ private:
+  [[nodiscard]] std::uint32_t place(std::uint32_t vertex) const noexcept {
+    return in_.place[vertex];
+  }
+  [[nodiscard]] bool has(std::uint32_t triangle, std::uint32_t at) const noexcept {
+    const Corners& c = corners_[triangle];
+    return place(c[0]) == at || place(c[1]) == at || place(c[2]) == at;
+  }
+  void lock_rims();
+  void gather_ring(std::uint32_t at, std::vector<std::uint32_t>& ring) const;
+  /// Which vertex of `to` takes over from each one of `from`; false: not all have one.
+  [[nodiscard]] bool pair_up(std::uint32_t from, std::uint32_t to);
+  [[nodiscard]] std::uint32_t partner(std::uint32_t vertex) const noexcept;
+  [[nodiscard]] float cost_m(std::uint32_t from, std::uint32_t to);
+  void offer(std::uint32_t from);
+  void collapse(std::uint32_t from, std::uint32_t to);
+
+  const CollapseInput& in_;
+  std::vector<Corners> corners_;
+  std::vector<bool> alive_;
+  std::size_t left_ = 0;
+  std::vector<std::vector<std::uint32_t>> star_;  ///< by place: its triangles
+  std::vector<bool> locked_;                      ///< by place
+  std::vector<std::uint32_t> stamp_;              ///< by place
+  std::priority_queue<Candidate> queue_;
+  // Scratch.
+  std::vector<std::uint32_t> ring_;
+  std::vector<std::uint32_t> other_ring_;
+  std::vector<std::pair<float, std::uint32_t>> nearest_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> partners_;
+  struct Turned {
+    std::array<glm::vec3, 3> at_m;
+    Corners corners;
+    std::uint32_t moved = 0;  ///< vertex that was there before
+  };
+  std::vector<Turned> turned_;
+};
+
+Collapse::Collapse(const CollapseInput& input)
+    : in_(input),
+      corners_(input.indices.size() / 3),
+      alive_(corners_.size(), true),
+      left_(corners_.size()),
+      star_(input.positions_m.size()),
+      locked_(input.positions_m.size(), false),
+      stamp_(input.positions_m.size(), 0) {
+  for (std::uint32_t t = 0; t < corners_.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners_[t][k] = input.indices[3 * std::size_t{t} + k];
+      star_[place(corners_[t][k])].push_back(t);
+    }
+  }
+  lock_rims();
+}
+
+void Collapse::lock_rims() {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
+  for (const Corners& c : corners_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      edges.emplace_back(std::minmax(place(c[k]), place(c[(k + 1) % 3])));
+    }
+  }
+  std::ranges::sort(edges);
+  for (std::size_t first = 0; first < edges.size();) {
+    std::size_t end = first;
+    while (end < edges.size() && edges[end] == edges[first]) ++end;
+    if (end - first != 2 || edges[first].first == edges[first].second) {
+      locked_[edges[first].first] = true;
+      locked_[edges[first].second] = true;
+    }
+    first = end;
+  }
+}
+
+void Collapse::gather_ring(std::uint32_t at, std::vector<std::uint32_t>& ring) const {
+  ring.clear();
+  for (const std::uint32_t t : star_[at]) {
+    for (const std::uint32_t v : corners_[t]) {
+      if (place(v) != at) ring.push_back(place(v));
+    }
+  }
+  std::ranges::sort(ring);
+  ring.erase(std::ranges::unique(ring).begin(), ring.end());
+}
+
+bool Collapse::pair_up(std::uint32_t from, std::uint32_t to) {
+  partners_.clear();
+  for (const std::uint32_t t : star_[from]) {
+    for (const std::uint32_t v : corners_[t]) {
+      if (place(v) != from) continue;
+      auto known = std::ranges::find(partners_, v, &std::pair<std::uint32_t, std::uint32_t>::first);
+      if (known == partners_.end()) {
+        partners_.emplace_back(v, v);
+        known = partners_.end() - 1;
+      }
+      for (const std::uint32_t u : corners_[t]) {
+        if (place(u) != to) continue;
+        if (known->second != v && known->second != u) return false;
+        known->second = u;
+      }
+    }
+  }
+  return std::ranges::all_of(partners_, [](const auto& pair) { return pair.first != pair.second; });
+}
+
+std::uint32_t Collapse::partner(std::uint32_t vertex) const noexcept {
+  for (const auto& [from, to] : partners_) {
+    if (from == vertex) return to;
+  }
+  return vertex;
+}
+
+float Collapse::cost_m(std::uint32_t from, std::uint32_t to) {
+  if (!pair_up(from, to)) return kNever;
+  gather_ring(to, other_ring_);
+  std::size_t common = 0;
+  for (const std::uint32_t at : ring_) {
+    common += std::ranges::binary_search(other_ring_, at) ? 1U : 0U;
+  }
+  if (common != 2) return kNever;  // the surface would branch
+  turned_.clear();
+  for (const std::uint32_t t : star_[from]) {
+    if (has(t, to)) continue;
+    Turned turned;
+    std::array<glm::vec3, 3> before_m;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = corners_[t][k];
+      before_m[k] = in_.positions_m[v];
+      if (place(v) == from) turned.moved = v;
+      turned.corners[k] = place(v) == from ? partner(v) : v;
+      turned.at_m[k] = in_.positions_m[turned.corners[k]];
+    }
+    const auto normal = [](const std::array<glm::vec3, 3>& p) {
+      return glm::cross(p[1] - p[0], p[2] - p[0]);
+    };
+    const glm::vec3 old_normal = normal(before_m);
+    const glm::vec3 new_normal = normal(turned.at_m);
+    if (!(glm::dot(old_normal, new_normal) >
+          kLeastTurnCosine * glm::length(old_normal) * glm::length(new_normal))) {
+      return kNever;
+    }
+    turned_.push_back(turned);
+  }
+  float cost_m = 0.0F;
+  for (const auto& [vertex, heir] : partners_) {
+    const glm::vec3& at_m = in_.positions_m[vertex];
+    float best_m = kNever;
+    float longest_m = glm::distance(at_m, in_.positions_m[heir]);
+    float difference_k = 0.0F;
+    for (const Turned& turned : turned_) {
+      if (turned.moved != vertex) continue;
+      const glm::vec3 weight = nearest_weight(turned.at_m, at_m);
+      glm::vec3 there_m(0.0F);
+      for (glm::length_t k = 0; k < 3; ++k) {
+        there_m += weight[k] * turned.at_m[static_cast<std::size_t>(k)];
+      }
+      const float distance_m = glm::distance(there_m, at_m);
+      if (distance_m >= best_m) continue;
+      best_m = distance_m;
+      difference_k = 0.0F;
+      for (const std::span<const float> value_k : in_.values_k) {
+        float there_k = 0.0F;
+        for (glm::length_t k = 0; k < 3; ++k) {
+          there_k += weight[k] * value_k[turned.corners[static_cast<std::size_t>(k)]];
+        }
+        difference_k = std::max(difference_k, std::abs(there_k - value_k[vertex]));
+      }
+      for (std::size_t k = 0; k < 3; ++k) {
+        longest_m = std::max(longest_m, glm::distance(turned.at_m[k], turned.at_m[(k + 1) % 3]));
+      }
+    }
+    if (best_m == kNever) best_m = longest_m;  // all of its side vanishes
+    const float share = std::min(1.0F, difference_k / in_.tolerance_k);
+    cost_m =
+        std::max({cost_m, best_m / kDeviationPx, share * longest_m / kEdgePx, longest_m / kSizePx});
+  }
+  return cost_m;
+}
+
+void Collapse::offer(std::uint32_t from) {
+  ++stamp_[from];
+  if (locked_[from] || star_[from].empty()) return;
+  gather_ring(from, ring_);
+  nearest_.clear();
+  for (const std::uint32_t to : ring_) {
+    nearest_.emplace_back(glm::distance(in_.positions_m[from], in_.positions_m[to]), to);
+  }
+  const auto tried = static_cast<std::ptrdiff_t>(std::min(kTried, nearest_.size()));
+  std::ranges::partial_sort(nearest_, nearest_.begin() + tried);
+  nearest_.resize(static_cast<std::size_t>(tried));
+  Candidate best;
+  best.from = from;
+  best.stamp = stamp_[from];
+  for (const auto& [distance_m, to] : nearest_) {
+    const float cost = cost_m(from, to);
+    if (cost < best.cost_m) {
+      best.cost_m = cost;
+      best.to = to;
+    }
+  }
+  if (best.cost_m < kNever) queue_.push(best);
+}
+
+void Collapse::collapse(std::uint32_t from, std::uint32_t to) {
+  // The copies were paired when this was offered, and nothing around has changed since.
+  (void)pair_up(from, to);
+  for (const std::uint32_t t : star_[from]) {
+    if (has(t, to)) {
+      alive_[t] = false;
+      --left_;
+      for (const std::uint32_t v : corners_[t]) {
+        if (place(v) != from) std::erase(star_[place(v)], t);
+      }
+      continue;
+    }
+    for (std::uint32_t& v : corners_[t]) v = partner(v);
+    star_[to].push_back(t);
+  }
+  star_[from].clear();
+}
+
+std::vector<std::uint32_t> Collapse::run(std::size_t triangles) {
+  for (std::uint32_t at = 0; at < star_.size(); ++at) {
+    if (!star_[at].empty()) offer(at);
+  }
+  std::vector<std::uint32_t> changed;
+  while (left_ > triangles && !queue_.empty()) {
+    const Candidate next = queue_.top();
+    queue_.pop();
+    if (next.stamp != stamp_[next.from]) continue;
+    collapse(next.from, next.to);
+    gather_ring(next.to, changed);
+    changed.push_back(next.to);
+    for (const std::uint32_t at : changed) offer(at);
+  }
+  std::vector<std::uint32_t> indices;
+  indices.reserve(3 * left_);
+  for (std::size_t t = 0; t < corners_.size(); ++t) {
+    if (alive_[t]) indices.insert(indices.end(), corners_[t].begin(), corners_[t].end());
+  }
+  return indices;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> collapse_edges(const CollapseInput& input, std::size_t triangles) {
+  return Collapse(input).run(triangles);
+}
+
+}  // namespace emit::renderer

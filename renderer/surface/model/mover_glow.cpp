@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/model/mover_glow.hpp"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "surface/mesh/sheet_sides.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// A face that looks that little along an axis is not seen from there.
+constexpr float kLeastCos = 0.3F;
+
+std::size_t face_of(glm::length_t axis, bool positive) noexcept {
+  return 2 * static_cast<std::size_t>(axis) + (positive ? 0U : 1U);
+}
+
+}  // namespace
+
+MoverGlow::MoverGlow(const SurfaceModel& model, const scene::SceneGeometry& geometry,
+                     std::span<const std::int32_t> mover_of_object) {
+  for (std::size_t p = 0; p < geometry.instances.size(); ++p) {
+    const scene::Instance& instance = geometry.instances[p];
+    if (mover_of_object[instance.object] < 0) continue;
+    const RefinedMesh& mesh = model.meshes[instance.mesh];
+    std::vector<float> area_m2(mesh.vertices().size());
+    for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
+      std::array<glm::dvec3, 3> corner_m;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const glm::vec3& at_m = mesh.vertices()[mesh.leaf(slot)[k]].position_m;
+        corner_m[k] = glm::dvec3(instance.body_from_mesh * glm::dvec4(glm::dvec3(at_m), 1.0));
+      }
+      const double twice_m2 =
+          glm::length(glm::cross(corner_m[1] - corner_m[0], corner_m[2] - corner_m[0]));
+      for (const std::uint32_t v : mesh.leaf(slot)) {
+        area_m2[v] += static_cast<float>(twice_m2 / 6.0);
+      }
+    }
+    const std::uint32_t first = model.first_sample[p];
+    for (std::uint32_t v = 0; v < area_m2.size(); ++v) {
+      // What lies inside is not seen.
+      const SurfaceSample& sample = model.samples.samples[first + v];
+      if (sample.covered || !(area_m2[v] > 0.0F)) continue;
+      parts_.push_back({first + v, area_m2[v]});
+      if (sample.other_side != kNoSample) parts_.push_back({sample.other_side, area_m2[v]});
+    }
+  }
+}
+
+void MoverGlow::add(const glm::vec3& normal, float area_m2, float sent_w_m2,
+                    MoverFaces& faces) noexcept {
+  for (glm::length_t axis = 0; axis < 3; ++axis) {
+    const float cosine = std::abs(normal[axis]);
+    if (cosine < kLeastCos) continue;
+    const std::size_t face = face_of(axis, normal[axis] > 0.0F);
+    faces.area_m2[face] += cosine * area_m2;
+    faces.sent_w[face] += cosine * area_m2 * sent_w_m2;
+  }
+}
+
+float MoverFaces::towards_w_m2(const glm::vec3& normal) const noexcept {
+  float weight = 0.0F;
+  float sum_w_m2 = 0.0F;
+  for (glm::length_t axis = 0; axis < 3; ++axis) {
+    const std::size_t face = face_of(axis, normal[axis] < 0.0F);
+    if (!(area_m2[face] > 0.0F)) continue;
+    const float share = normal[axis] * normal[axis];
+    weight += share;
+    sum_w_m2 += share * sent_w[face] / area_m2[face];
+  }
+  return weight > 0.0F ? sum_w_m2 / weight : -1.0F;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/rays/caster_rays.hpp"
+
+#include <embree3/rtcore.h>
+#include <fmt/format.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "surface/rays/caster_set.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+glm::dvec3 centre(const scene::Aabb& box) noexcept {
+  return box.empty() ? glm::dvec3(0.0) : 0.5 * (box.min_m + box.max_m);
+}
+
+constexpr std::uint32_t all_of(std::span<const CasterRay> rays) noexcept {
+  return (1U << rays.size()) - 1U;
+}
+
+using Packet = std::array<CasterRay, CasterRays::kMaxRays>;
+
+}  // namespace
+
+struct CasterRays::Impl {
+  struct Mover {
+    std::uint32_t object = 0;
+    glm::dvec3 centre_body_m{0.0};  ///< origin of the set
+    CasterSet set;
+  };
+
+  EmbreeDevice device;
+  glm::dvec3 origin_world_m{0.0};
+  CasterSet fixed;
+  std::vector<Mover> movers;
+
+  /// Rays that come near the mover, moved to the axes and the origin of its set.
+  [[nodiscard]] std::uint32_t enter(const Mover& mover, const MoverPlacement& placement,
+                                    std::span<const CasterRay> rays, Packet& inside) const noexcept;
+};
+
+std::uint32_t CasterRays::Impl::enter(const Mover& mover, const MoverPlacement& placement,
+                                      std::span<const CasterRay> rays,
+                                      Packet& inside) const noexcept {
+  if (!placement.on) return 0;
+  std::uint32_t near = 0;
+  const glm::vec3 centre_m(mover.centre_body_m);
+  const glm::vec3 centre_rel_m = placement.rel_from_body * centre_m + placement.position_m;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const CasterRay& ray = rays[i];
+    const glm::vec3 to_centre = centre_rel_m - ray.origin_m;
+    const float along_m = std::max(glm::dot(to_centre, ray.direction), 0.0F);
+    const glm::vec3 aside = to_centre - along_m * ray.direction;
+    // Room for the rounding of far-off origins.
+    const float reach_m = mover.set.radius_m() + 1e-6F * (along_m + glm::length(to_centre));
+    if (glm::dot(aside, aside) > reach_m * reach_m) continue;
+    near |= 1U << i;
+    // vector * matrix is the transposed, that is the inverse, rotation.
+    inside[i] = {(ray.origin_m - placement.position_m) * placement.rel_from_body - centre_m,
+                 ray.direction * placement.rel_from_body};
+  }
+  return near;
+}
+
+CasterRays::CasterRays(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+CasterRays::CasterRays(CasterRays&&) noexcept = default;
+CasterRays& CasterRays::operator=(CasterRays&&) noexcept = default;
+CasterRays::~CasterRays() = default;
+
+Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
+                                      const std::optional<glm::dvec3>& origin_world_m,
+                                      std::uint64_t flat_triangles) {
+  auto impl = std::make_unique<Impl>();
+  impl->device.reset(rtcNewDevice(nullptr));
+  if (!impl->device) {
+    return make_error(ErrorCode::internal,
+                      fmt::format("Embree gave no device, error {}",
+                                  static_cast<int>(rtcGetDeviceError(nullptr))));
+  }
+  std::vector<CasterPart> fixed;
+  std::vector<CasterPart> everything;  // at the placements of the scenario
+  std::map<std::uint32_t, std::vector<CasterPart>> moving;
+  for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
+    const scene::Instance& instance = geometry.instances[i];
+    if (instance.mesh >= geometry.meshes.size()) {
+      return make_error(
+          ErrorCode::invalid_argument,
+          fmt::format("instance {}: mesh {} of {}", i, instance.mesh, geometry.meshes.size()));
+    }
+    CasterPart part{static_cast<std::uint32_t>(i), &geometry.meshes[instance.mesh],
+                    instance.world_from_mesh};
+    everything.push_back(part);
+    if (instance.entity_id == 0) {
+      fixed.push_back(part);
+    } else {
+      part.frame_from_mesh = instance.body_from_mesh;
+      moving[instance.object].push_back(part);
+    }
+  }
+  impl->origin_world_m =
+      origin_world_m ? *origin_world_m : centre(bounds_of(fixed.empty() ? everything : fixed));
+
+  auto set = CasterSet::create(impl->device.get(), fixed, impl->origin_world_m, flat_triangles);
+  if (!set) return tl::unexpected(std::move(set.error()).with_context("static geometry"));
+  impl->fixed = std::move(*set);
+  for (const auto& [object, parts] : moving) {
+    Impl::Mover mover{object, centre(bounds_of(parts)), {}};
+    auto body = CasterSet::create(impl->device.get(), parts, mover.centre_body_m, flat_triangles);
+    if (!body) {
+      return tl::unexpected(std::move(body.error()).with_context(fmt::format("object {}", object)));
+    }
+    mover.set = std::move(*body);
+    impl->movers.push_back(std::move(mover));
+  }
+  return CasterRays(std::move(impl));
+}
+
+const glm::dvec3& CasterRays::origin_world_m() const noexcept {
+  return impl_->origin_world_m;
+}
+std::size_t CasterRays::movers() const noexcept {
+  return impl_->movers.size();
+}
+std::uint32_t CasterRays::object_of_mover(std::size_t mover) const noexcept {
+  return impl_->movers[mover].object;
+}
+
+std::uint32_t CasterRays::blocked_static(std::span<const CasterRay> rays) const noexcept {
+  return impl_->fixed.occluded(rays, all_of(rays));
+}
+
+std::uint32_t CasterRays::blocked_mover(std::size_t mover, const MoverPlacement& placement,
+                                        std::span<const CasterRay> rays) const noexcept {
+  Packet inside;
+  const Impl::Mover& body = impl_->movers[mover];
+  const std::uint32_t near = impl_->enter(body, placement, rays, inside);
+  return near == 0 ? 0 : body.set.occluded({inside.data(), rays.size()}, near);
+}
+
+std::uint32_t CasterRays::blocked_in_body(std::size_t mover,
+                                          std::span<const CasterRay> rays) const noexcept {
+  return blocked_mover(mover, MoverPlacement{}, rays);
+}
+
+std::uint32_t CasterRays::blocked(std::span<const CasterRay> rays,
+                                  const CasterSelection& selection) const noexcept {
+  std::uint32_t blocked = selection.fixed ? blocked_static(rays) : 0;
+  const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
+  for (std::size_t m = 0; m < count && blocked != all_of(rays); ++m) {
+    blocked |= blocked_mover(m, selection.movers[m], rays);
+  }
+  return blocked;
+}
+
+std::optional<CasterHit> CasterRays::first_hit(
+    const CasterRay& ray, std::span<const MoverPlacement> movers) const noexcept {
+  CasterHit hit;
+  if (first_hits({&ray, 1}, {true, movers}, {&hit, 1}) == 0) return std::nullopt;
+  return hit;
+}
+
+std::uint32_t CasterRays::first_hits(std::span<const CasterRay> rays,
+                                     const CasterSelection& selection, std::span<CasterHit> hits,
+                                     float within_m) const noexcept {
+  std::array<float, kMaxRays> limits_m;
+  limits_m.fill(within_m);
+  std::uint32_t found = 0;
+  const auto shorten = [&](std::uint32_t lanes) {
+    found |= lanes;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (((lanes >> i) & 1U) != 0U) limits_m[i] = hits[i].distance_m;
+    }
+  };
+  if (selection.fixed) shorten(impl_->fixed.nearest(rays, all_of(rays), limits_m, hits));
+  const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
+  for (std::size_t m = 0; m < count; ++m) {
+    Packet inside;
+    const MoverPlacement& placement = selection.movers[m];
+    const std::uint32_t near = impl_->enter(impl_->movers[m], placement, rays, inside);
+    if (near == 0) continue;
+    const std::uint32_t nearer =
+        impl_->movers[m].set.nearest({inside.data(), rays.size()}, near, limits_m, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (((nearer >> i) & 1U) != 0U) hits[i].normal = placement.rel_from_body * hits[i].normal;
+    }
+    shorten(nearer);
+  }
+  return found;
+}
+
+}  // namespace emit::renderer

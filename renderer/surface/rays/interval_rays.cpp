@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/rays/interval_rays.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "emit/physics/constants.hpp"
+#include "history/step_plan.hpp"
+#include "surface/mesh/tangents.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr double kGolden = 0.6180339887498949;
+/// Entities farther than this many of their radii hide too little sky to matter (1/400).
+constexpr float kNearRadii = 10.0F;
+/// Share of the sky that may be hidden without being counted as touched.
+constexpr float kMostHiddenFrac = 1.0F / 16.0F;
+constexpr std::size_t kSkyRays = 16;
+static_assert(kSkyRays == kPacketRays);
+/// Room for float32 far from the origin.
+constexpr float kRoundingFrac = 1e-5F;
+/// No ray starts farther aside than that many standard deviations.
+constexpr float kMostDeviates = 3.5F;
+
+double fraction_of(double x) noexcept {
+  return x - std::floor(x);
+}
+
+/// Inverse of the normal distribution.
+double normal_deviate(double u) noexcept {
+  // Bisection on erf: exact to double, set-up cost only.
+  double low = -6.0;
+  double high = 6.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (0.5 * (1.0 + std::erf(middle / std::sqrt(2.0))) < u ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// From the disc's rim inwards: if the first packet agrees, so does next to all of the disc.
+constexpr std::size_t place_in_disc(std::size_t ray) noexcept {
+  return kSunRays - 1 - ray;
+}
+
+std::array<double, kSunRays> normal_deviates() noexcept {
+  std::array<double, kSunRays> out{};
+  for (std::size_t i = 0; i < kSunRays; ++i)
+    out[i] = normal_deviate((static_cast<double>(i) + 0.5) / kSunRays);
+  return out;
+}
+
+}  // namespace
+
+void IntervalRays::aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to_sun) noexcept {
+  static const std::array<double, kSunRays> deviates = normal_deviates();
+  const std::size_t place = place_in_disc(ray);
+  const double radius = std::tan(physics::kSunSemiAngleRad) *
+                        std::sqrt((static_cast<double>(place) + 0.5) / kSunRays);
+  // The golden ratio moves the pattern from turn to turn.
+  const double angle =
+      2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(place) + 0.5) + 0.37 * turn);
+  const glm::dvec3 u = glm::normalize(glm::cross(
+      std::abs(to_sun.z) < 0.9 ? glm::dvec3(0.0, 0.0, 1.0) : glm::dvec3(1.0, 0.0, 0.0), to_sun));
+  const glm::dvec3 v = glm::cross(to_sun, u);
+  direction_[ray] =
+      glm::vec3(glm::normalize(to_sun + radius * (std::cos(angle) * u + std::sin(angle) * v)));
+  spread_[ray] = glm::vec2(static_cast<float>(deviates[(place * 23 + turn * 3) % kSunRays]),
+                           static_cast<float>(deviates[(place * 45 + 5 + turn * 9) % kSunRays]));
+}
+
+void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
+                          const Environment& environment, const EntityPoses& poses,
+                          const glm::dvec3& origin_world_m) noexcept {
+  const std::size_t movers = mover_radius_m_.size();
+  any_mover_on_ = false;
+  sun_up_ = false;
+  for (std::size_t i = 0; i < kSunRays; ++i) {
+    // Odd multipliers permute the strata of time.
+    const std::size_t stratum = (place_in_disc(i) * 27 + turn * 5) % kSunRays;
+    if (stratum == kSunRays / 2) middle_ray_ = i;
+    const double t = (static_cast<double>(stratum) + 0.5) / kSunRays;
+    const auto at_ns = begin_ns + std::llround(t * static_cast<double>(end_ns - begin_ns));
+    const physics::SunPosition sun = environment.sun_at(at_ns);
+    sun_up_ = sun_up_ || sun.elevation.value() > StepPlan::kMinSunElevationRad;
+    aim(i, turn, sun.direction_enu);
+    for (std::size_t m = 0; m < movers; ++m) {
+      const TrajectoryState state = poses.at(m, at_ns);
+      MoverPlacement& place = placements_[i * movers + m];
+      place.rel_from_body = glm::mat3(glm::mat3_cast(state.pose.world_from_body));
+      place.position_m = glm::vec3(state.pose.position_world_m - origin_world_m);
+      place.on = state.on;
+      any_mover_on_ = any_mover_on_ || state.on;
+    }
+  }
+  bound_packets();
+}
+
+void IntervalRays::bound_packets() noexcept {
+  const std::size_t movers = mover_radius_m_.size();
+  for (std::size_t packet = 0; packet < spread_sine_.size(); ++packet) {
+    const std::size_t first = packet * kPacketRays;
+    spread_sine_[packet] = 0.0F;
+    for (std::size_t i = first; i < first + kPacketRays; ++i) {
+      spread_sine_[packet] =
+          std::max(spread_sine_[packet], glm::distance(direction_[i], direction_[first]));
+    }
+    for (std::size_t m = 0; m < movers; ++m) {
+      Reach& ball = reaches_[packet * movers + m];
+      ball = {};
+      glm::vec3 low(std::numeric_limits<float>::infinity());
+      glm::vec3 high = -low;
+      for (std::size_t i = first; i < first + kPacketRays; ++i) {
+        const MoverPlacement& place = placed(m, i);
+        ball.changes = ball.changes || place.on != placed(m, 0).on ||
+                       place.position_m != placed(m, 0).position_m ||
+                       place.rel_from_body != placed(m, 0).rel_from_body;
+        if (!place.on) continue;
+        low = glm::min(low, placed(m, i).position_m);
+        high = glm::max(high, placed(m, i).position_m);
+      }
+      if (!(low.x <= high.x)) continue;
+      ball.centre_m = 0.5F * (low + high);
+      ball.way_m = 0.5F * glm::distance(low, high);
+      ball.radius_m = ball.way_m + mover_radius_m_[m];
+    }
+  }
+}
+
+void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {
+  for (MoverPlacement& place : placements_) place.on = false;
+  any_mover_on_ = false;
+  sun_up_ = to_sun.z > std::sin(StepPlan::kMinSunElevationRad);
+  for (std::size_t i = 0; i < kSunRays; ++i) aim(i, 0, to_sun);
+  bound_packets();
+}
+
+glm::vec3 IntervalRays::normal(const SurfaceSample& sample) const noexcept {
+  if (sample.mover < 0) return sample.normal;
+  return placed(static_cast<std::size_t>(sample.mover), middle_ray_).rel_from_body * sample.normal;
+}
+
+bool IntervalRays::comes_near(const glm::vec3& start_m, float apart_m, std::size_t mover,
+                              std::size_t packet) const noexcept {
+  const Reach& ball = reach(mover, packet);
+  if (ball.radius_m < 0.0F) return false;
+  const glm::vec3& direction = direction_[packet * kPacketRays];
+  const glm::vec3 to_centre_m = ball.centre_m - start_m;
+  const float distance_m = glm::length(to_centre_m);
+  const float along_m = std::max(glm::dot(to_centre_m, direction), 0.0F);
+  // No farther along than that do its rays matter, and no more do they stray until there.
+  const float far_m = distance_m + ball.radius_m + apart_m;
+  const float stray_m = apart_m + spread_sine_[packet] * far_m + kRoundingFrac * far_m;
+  const glm::vec3 aside_m = to_centre_m - along_m * direction;
+  const float reach_m = ball.radius_m + stray_m;
+  return glm::dot(aside_m, aside_m) <= reach_m * reach_m;
+}
+
+IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSample& face,
+                                       std::span<const glm::vec3> starts_m,
+                                       std::size_t first) const noexcept {
+  std::array<CasterRay, kPacketRays> sent;
+  std::array<std::uint8_t, kPacketRays> start_of{};
+  std::uint32_t count = 0;
+  Spots spots;
+  for (std::size_t k = 0; k < starts_m.size(); ++k) {
+    const std::size_t ray = first + k;
+    glm::vec3 n = face.normal;
+    glm::vec3 start_m = starts_m[k];
+    if (face.mover >= 0) {
+      const MoverPlacement& place = placed(static_cast<std::size_t>(face.mover), ray);
+      n = place.rel_from_body * n;
+      start_m = place.rel_from_body * start_m + place.position_m;
+    }
+    if (!(glm::dot(n, direction_[ray]) > 0.0F)) continue;
+    spots.faced |= 1U << k;
+    start_of[count] = static_cast<std::uint8_t>(k);
+    sent[count++] = {start_m, direction_[ray]};
+  }
+  if (count == 0) return spots;
+  std::uint32_t blocked = rays.blocked_static({sent.data(), count});
+  const std::uint32_t blocked_for_good = blocked;
+  const std::uint32_t all = (1U << count) - 1U;
+  float apart_m = 0.0F;
+  if (any_mover_on_) {
+    for (std::size_t i = 1; i < count; ++i) {
+      apart_m = std::max(apart_m, glm::distance(sent[i].origin_m, sent[0].origin_m));
+    }
+  }
+  for (std::size_t m = 0; any_mover_on_ && m < mover_radius_m_.size() && blocked != all; ++m) {
+    if (!comes_near(sent[0].origin_m, apart_m, m, first / kPacketRays)) continue;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (((blocked >> i) & 1U) != 0U) continue;
+      const MoverPlacement& place = placed(m, first + start_of[i]);
+      if (place.on && rays.blocked_mover(m, place, {&sent[i], 1}) != 0U) blocked |= 1U << i;
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (((blocked >> i) & 1U) == 0U) spots.lit |= 1U << start_of[i];
+    if (((blocked_for_good >> i) & 1U) == 0U) spots.open |= 1U << start_of[i];
+  }
+  return spots;
+}
+
+IntervalRays::Carried IntervalRays::carried(const glm::vec3& at_body_m, std::int32_t mover,
+                                            std::size_t packet) const noexcept {
+  if (mover < 0) return {at_body_m, 0.0F};
+  const auto own = static_cast<std::size_t>(mover);
+  const MoverPlacement& place = placed(own, packet * kPacketRays);
+  return {place.rel_from_body * at_body_m + place.position_m, 2.0F * reach(own, packet).way_m};
+}
+
+bool IntervalRays::may_pass(const SurfaceSample& sample, const glm::vec3& start_m,
+                            float apart_m) const noexcept {
+  if (short_ || !any_mover_on_) return false;
+  for (std::size_t packet = 1; packet < kSunRays / kPacketRays; ++packet) {
+    const Carried from = carried(start_m, sample.mover, packet);
+    for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
+      if (static_cast<std::int64_t>(m) == sample.mover || !reach(m, packet).changes) continue;
+      if (comes_near(from.at_m, apart_m + from.way_m, m, packet)) return true;
+    }
+  }
+  return false;
+}
+
+bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float around_m,
+                           std::int32_t own) const noexcept {
+  for (std::size_t packet = 0; packet < kSunRays / kPacketRays; ++packet) {
+    const Reach& ball = reach(mover, packet);
+    if (ball.radius_m < 0.0F) continue;
+    const Carried from = carried(centre_m, own, packet);
+    const float apart_m = around_m + from.way_m;
+    if (sun_up_ && comes_near(from.at_m, apart_m, mover, packet)) return true;
+    // Of the sky that level ground sees a ball hides (radius / distance)^2 * height / distance.
+    const glm::vec3 aside_m = ball.centre_m - from.at_m;
+    const float away_m = std::max(glm::length(aside_m) - ball.way_m - apart_m, 0.0F);
+    const float radius_m = mover_radius_m_[mover];
+    const float height_m = std::abs(aside_m.z) + ball.way_m + apart_m + 0.5F * radius_m;
+    if (kMostHiddenFrac * away_m * away_m * away_m <= radius_m * radius_m * height_m) return true;
+  }
+  return false;
+}
+
+SunShare IntervalRays::sun_share(const CasterRays& rays, const SurfaceSample& sample,
+                                 float start_offset_m, float blur_m) const noexcept {
+  if (!sun_up_) return {};
+  const Tangents tangents = tangents_of(sample.normal);
+  const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
+  const glm::vec3 u_m = blur_m * tangents.u;
+  const glm::vec3 v_m = blur_m * tangents.v;
+  int faced = 0;
+  int lit = 0;
+  int open = 0;
+  for (std::size_t first = 0; first < kSunRays; first += kPacketRays) {
+    if (first == kPacketRays && (lit == 0 || lit == faced) &&
+        !may_pass(sample, start_m, kMostDeviates * blur_m)) {
+      break;
+    }
+    std::array<glm::vec3, kPacketRays> starts_m;
+    for (std::size_t k = 0; k < kPacketRays; ++k) {
+      starts_m[k] = start_m + spread_[first + k].x * u_m + spread_[first + k].y * v_m;
+    }
+    const Spots spots = send(rays, sample, starts_m, first);
+    faced += std::popcount(spots.faced);
+    lit += std::popcount(spots.lit);
+    open += std::popcount(sample.mover < 0 ? spots.open : spots.lit);
+    if (faced == 0) return {};
+  }
+  return {static_cast<float>(lit) / static_cast<float>(faced),
+          static_cast<float>(open) / static_cast<float>(faced)};
+}
+
+IntervalRays::Spots IntervalRays::spots(const CasterRays& rays, const SurfaceSample& face,
+                                        std::span<const glm::vec3> points_m,
+                                        float start_offset_m) const noexcept {
+  if (!sun_up_) return {};
+  std::array<glm::vec3, kPacketRays> starts_m;
+  for (std::size_t k = 0; k < points_m.size(); ++k) {
+    starts_m[k] = points_m[k] + start_offset_m * face.normal;
+  }
+  return send(rays, face, {starts_m.data(), points_m.size()}, 0);
+}
+
+HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& sample,
+                                   float start_offset_m) const noexcept {
+  // An entity's own surfaces carry its hull in sky_frac, seen where it stood when they were made.
+  if (!any_mover_on_ || sample.mover >= 0) return {};
+  const Tangents tangents = tangents_of(sample.normal);
+  const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
+  std::uint32_t hidden = 0;
+  HiddenSky most;
+  int by_most = 0;
+  for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
+    const float reach_m = kNearRadii * mover_radius_m_[m];
+    const Reach& ball = reach(m, 0);
+    const float away_m = glm::distance(ball.centre_m, start_m) * (1.0F - kRoundingFrac);
+    if (ball.radius_m < 0.0F || away_m > reach_m + ball.way_m) continue;
+    const int by_others = std::popcount(hidden);
+    for (std::size_t i = 0; i < kSkyRays; ++i) {
+      const MoverPlacement& place = placed(m, i);
+      const glm::vec3 way = place.position_m - start_m;
+      if (!place.on || glm::dot(way, way) > reach_m * reach_m) continue;
+      const double share = (static_cast<double>(i) + 0.5) / kSkyRays;
+      const double r = std::sqrt(sky_ == SkyMeasure::cosine ? share : share * (2.0 - share));
+      const double angle =
+          2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(i) + 0.5));
+      const glm::vec3 direction = static_cast<float>(r * std::cos(angle)) * tangents.u +
+                                  static_cast<float>(r * std::sin(angle)) * tangents.v +
+                                  static_cast<float>(std::sqrt(1.0 - r * r)) * sample.normal;
+      const CasterRay ray{start_m, direction};
+      if (((hidden >> i) & 1U) == 0U && direction.z > 0.0F &&
+          rays.blocked_mover(m, place, {&ray, 1}) != 0U) {
+        hidden |= 1U << i;
+      }
+    }
+    if (const int by_this = std::popcount(hidden) - by_others; by_this > by_most) {
+      by_most = by_this;
+      most.mover = static_cast<std::uint32_t>(m);
+    }
+  }
+  most.frac = static_cast<float>(std::popcount(hidden)) / kSkyRays;
+  return most;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/rays/surface_view.hpp"
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <tuple>
+#include <utility>
+
+#include "emit/physics/constants.hpp"
+#include "surface/mesh/tangents.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kPacket = CasterRays::kMaxRays;
+
+/// Place along Hilbert's curve through a 32 x 32 grid over [-1, 1]^2.
+std::uint32_t hilbert_order(double px, double py) noexcept {
+  constexpr std::uint32_t kSide = 32;
+  const auto cell = [](double p) {
+    return std::min(static_cast<std::uint32_t>((p + 1.0) * (0.5 * kSide)), kSide - 1);
+  };
+  std::uint32_t x = cell(px);
+  std::uint32_t y = cell(py);
+  std::uint32_t order = 0;
+  for (std::uint32_t half = kSide / 2; half != 0; half /= 2) {
+    const bool right = (x & half) != 0;
+    const bool upper = (y & half) != 0;
+    order += half * half * ((right ? 3U : 0U) ^ (upper ? 1U : 0U));
+    if (upper) continue;  // the lower quarters run turned
+    if (right) {
+      x = kSide - 1 - x;
+      y = kSide - 1 - y;
+    }
+    std::swap(x, y);
+  }
+  return order;
+}
+
+/// Which of the six axis directions the normal is closest to.
+std::uint32_t side_of(const glm::vec3& normal) noexcept {
+  const glm::vec3 size = glm::abs(normal);
+  const glm::length_t axis =
+      size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+  return 2U * static_cast<std::uint32_t>(axis) + (normal[axis] < 0.0F ? 1U : 0U);
+}
+
+/// From (tangent, bitangent, normal) to the axes of those.
+glm::vec3 turned(const glm::vec3& local, const Tangents& tangents,
+                 const glm::vec3& normal) noexcept {
+  return glm::normalize(local.x * tangents.u + local.y * tangents.v + local.z * normal);
+}
+
+constexpr std::uint32_t kNone = ~0U;
+
+/// Hits side by side in the sorted list that one entry stands for.
+struct Group {
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+  std::uint32_t instance = 0;
+  bool front = true;
+  glm::vec3 direction{0.0F};     ///< sum over the group
+  glm::vec3 normal{0.0F};        ///< sum over the group
+  std::uint32_t before = kNone;  ///< neighbours in the list
+  std::uint32_t after = kNone;
+};
+
+/// Growth of the groups' spread by joining two (Ward's criterion), on the unit sphere of directions
+/// and of normals; other objects and the other side last.
+float join_cost(const Group& a, const Group& b) noexcept {
+  const auto mean = [](const glm::vec3& sum) { return sum / std::max(glm::length(sum), 1e-6F); };
+  const glm::vec3 aside = mean(a.direction) - mean(b.direction);
+  float spread = glm::dot(aside, aside) + 1.0F - glm::dot(mean(a.normal), mean(b.normal));
+  if (a.instance != b.instance) spread += 8.0F;
+  if (a.front != b.front) spread += 4.0F;
+  const auto na = static_cast<float>(a.count);
+  const auto nb = static_cast<float>(b.count);
+  return spread * na * nb / (na + nb);
+}
+
+/// Costs of joining group i with the one after it; the least, and of equal ones the first, is found
+/// by blocks.
+class JoinCosts {
+ public:
+  /// All of `count` costs are infinite.
+  explicit JoinCosts(std::size_t count) noexcept : blocks_((count + kBlock - 1) / kBlock) {
+    std::fill_n(costs_.begin(), blocks_ * kBlock, kNever);
+    std::fill_n(least_.begin(), blocks_, kNever);
+  }
+  void set(std::size_t i, float cost) noexcept {
+    costs_[i] = cost;
+    const auto begin = costs_.begin() + static_cast<std::ptrdiff_t>(i / kBlock * kBlock);
+    least_[i / kBlock] = *std::min_element(begin, begin + kBlock);
+  }
+  void remove(std::size_t i) noexcept { set(i, kNever); }
+  [[nodiscard]] std::size_t least() const noexcept {
+    const auto block = static_cast<std::size_t>(
+        std::min_element(least_.data(), least_.data() + blocks_) - least_.data());
+    const float* begin = costs_.data() + block * kBlock;
+    return block * kBlock +
+           static_cast<std::size_t>(std::min_element(begin, begin + kBlock) - begin);
+  }
+
+ private:
+  static constexpr std::size_t kBlock = 16;
+  static constexpr float kNever = std::numeric_limits<float>::infinity();
+  static_assert(ViewSampler::kMaxRays % kBlock == 0);
+  std::array<float, ViewSampler::kMaxRays> costs_;
+  std::array<float, ViewSampler::kMaxRays / kBlock> least_;
+  std::size_t blocks_;
+};
+
+/// Sorted hits of one point and their groups.
+struct Hits {
+  std::array<SeenFace, ViewSampler::kMaxRays> faces;
+  std::array<Group, ViewSampler::kMaxRays> groups;
+  std::size_t count = 0;
+};
+
+void join_neighbours(Hits& hits) noexcept {
+  // Hits come in the order of the rays, which the index keeps among equals.
+  std::array<std::pair<std::uint32_t, std::uint32_t>, ViewSampler::kMaxRays> order;
+  for (std::uint32_t i = 0; i < hits.count; ++i) {
+    order[i] = {2U * side_of(hits.faces[i].normal) + (hits.faces[i].front ? 1U : 0U), i};
+  }
+  const std::span<const SeenFace> unsorted(hits.faces.data(), hits.count);
+  std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(hits.count),
+            [&](const auto& a, const auto& b) {
+              return std::tie(unsorted[a.second].instance, a.first, a.second) <
+                     std::tie(unsorted[b.second].instance, b.first, b.second);
+            });
+  std::array<SeenFace, ViewSampler::kMaxRays> sorted;
+  for (std::size_t i = 0; i < hits.count; ++i) sorted[i] = hits.faces[order[i].second];
+  hits.faces = sorted;
+
+  JoinCosts costs(hits.count);
+  for (std::uint32_t i = 0; i < hits.count; ++i) {
+    const SeenFace& face = hits.faces[i];
+    hits.groups[i] = {i, 1, face.instance, face.front, face.direction, face.normal};
+    if (i == 0) continue;
+    hits.groups[i].before = i - 1;
+    hits.groups[i - 1].after = i;
+    costs.set(i - 1, join_cost(hits.groups[i - 1], hits.groups[i]));
+  }
+  std::size_t left = hits.count;
+  for (; left > SurfaceView::kMaxSeen; --left) {
+    const auto best = static_cast<std::uint32_t>(costs.least());
+    Group& group = hits.groups[best];
+    const Group& other = hits.groups[group.after];
+    if (other.count > group.count) {
+      group.instance = other.instance;
+      group.front = other.front;
+    }
+    group.count += other.count;
+    group.direction += other.direction;
+    group.normal += other.normal;
+    costs.remove(group.after);
+    group.after = other.after;
+    if (group.before != kNone) costs.set(group.before, join_cost(hits.groups[group.before], group));
+    if (group.after == kNone) {
+      costs.remove(best);
+      continue;
+    }
+    hits.groups[group.after].before = best;
+    costs.set(best, join_cost(group, hits.groups[group.after]));
+  }
+  if (left == hits.count || hits.count == 0) return;
+  // The first of the list is never joined to another.
+  std::size_t to = 0;
+  for (std::uint32_t from = 0; from != kNone; from = hits.groups[from].after) {
+    hits.groups[to++] = hits.groups[from];
+  }
+  hits.count = left;
+}
+
+/// The hit of the group's object nearest to the middle of the group.
+const SeenFace& middle_of(const Group& group, std::span<const SeenFace> faces) noexcept {
+  std::uint32_t best = group.first;
+  float best_along = -2.0F * static_cast<float>(group.count);
+  for (std::uint32_t i = group.first; i < group.first + group.count; ++i) {
+    const float along = glm::dot(faces[i].direction, group.direction);
+    if (faces[i].instance == group.instance && along > best_along) {
+      best = i;
+      best_along = along;
+    }
+  }
+  return faces[best];
+}
+
+}  // namespace
+
+ViewSampler::ViewSampler(std::uint32_t rays) {
+  rays = std::max((rays + 15U) / 16U * 16U, 16U);
+  struct Point {
+    std::uint32_t order;
+    std::uint32_t index;
+    glm::dvec2 disc;
+  };
+  std::vector<Point> points;
+  // Golden angle: equal areas, no two points ever close (Vogel 1979, "A better way to construct the
+  // sunflower head").
+  const double turn_rad = physics::kPi * (3.0 - std::sqrt(5.0));
+  for (std::uint32_t i = 0; i < rays; ++i) {
+    const double radius = std::sqrt((i + 0.5) / rays);
+    const glm::dvec2 disc{radius * std::cos(i * turn_rad), radius * std::sin(i * turn_rad)};
+    points.push_back({hilbert_order(disc.x, disc.y), i, disc});
+  }
+  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
+    return std::tie(a.order, a.index) < std::tie(b.order, b.index);
+  });
+  for (const Point& point : points) {
+    directions_.emplace_back(glm::vec2(point.disc),
+                             std::sqrt(1.0 - glm::dot(point.disc, point.disc)));
+  }
+}
+
+bool ViewSampler::nothing_near(const CasterRays& casters, const ViewPoint& point,
+                               const CasterSelection& selection) const noexcept {
+  constexpr std::size_t kStride = 4;  // neighbours in the list are neighbours in direction
+  if (directions_.size() % (kStride * kPacket) != 0) return false;
+  const Tangents tangents = tangents_of(point.normal);
+  const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
+  for (std::size_t begin = 0; begin < directions_.size(); begin += kStride * kPacket) {
+    std::array<CasterRay, kPacket> rays;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      rays[i] = {start_m, turned(directions_[begin + kStride * i], tangents, point.normal)};
+    }
+    if (casters.blocked(rays, selection) != 0U) return false;
+  }
+  return true;
+}
+
+ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point,
+                               const CasterSelection& selection) const noexcept {
+  const bool open = nothing_near(casters, point, selection);
+  const Tangents tangents = tangents_of(point.normal);
+  const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
+  std::uint32_t sky = 0;
+  std::uint32_t far = 0;
+  glm::vec3 to_sky(0.0F);
+  for (std::size_t begin = 0; begin < directions_.size(); begin += kPacket) {
+    std::array<CasterRay, kPacket> rays;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      rays[i] = {start_m, turned(directions_[begin + i], tangents, point.normal)};
+    }
+    const std::uint32_t blocked = open ? 0U : casters.blocked(rays, selection);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      if (((blocked >> i) & 1U) != 0U) continue;
+      const bool up = rays[i].direction.z >= 0.0F;
+      ++(up ? sky : far);
+      if (up) to_sky += rays[i].direction / directions_[begin + i].z;
+    }
+  }
+  const float weight_frac = 1.0F / static_cast<float>(directions_.size());
+  return {static_cast<float>(sky) * weight_frac, static_cast<float>(far) * weight_frac,
+          weight_frac * to_sky};
+}
+
+SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
+                              const CasterSelection& selection) const noexcept {
+  const Tangents tangents = tangents_of(point.normal);
+  const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
+  Hits hits;
+  std::uint32_t sky = 0;
+  std::uint32_t far = 0;
+  for (std::size_t begin = 0; begin < directions_.size(); begin += kPacket) {
+    std::array<CasterRay, kPacket> rays;
+    std::array<CasterHit, kPacket> found;
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      rays[i] = {start_m, turned(directions_[begin + i], tangents, point.normal)};
+    }
+    const std::uint32_t hit_lanes = casters.first_hits(rays, selection, found);
+    for (std::size_t i = 0; i < kPacket; ++i) {
+      const glm::vec3& direction = rays[i].direction;
+      if (((hit_lanes >> i) & 1U) == 0U) {
+        ++(direction.z >= 0.0F ? sky : far);
+        continue;
+      }
+      const CasterHit& hit = found[i];
+      hits.faces[hits.count++] = {hit.instance,   hit.triangle, hit.barycentric, 0.0F,
+                                  hit.distance_m, hit.front,    hit.normal,      direction};
+    }
+  }
+  SurfaceView view;
+  const float weight_frac = 1.0F / static_cast<float>(directions_.size());
+  view.sky_frac = static_cast<float>(sky) * weight_frac;
+  view.far_frac = static_cast<float>(far) * weight_frac;
+  join_neighbours(hits);
+  view.seen_count = static_cast<std::uint32_t>(hits.count);
+  for (std::size_t i = 0; i < hits.count; ++i) {
+    view.seen[i] = middle_of(hits.groups[i], hits.faces);
+    view.seen[i].weight_frac = static_cast<float>(hits.groups[i].count) * weight_frac;
+  }
+  return view;
+}
+
+AdjacentFaces adjacent_faces(const CasterRays& casters, const ViewPoint& point, float reach_m,
+                             const CasterSelection& selection) noexcept {
+  constexpr std::size_t kTangents = 8;
+  constexpr float kCosOwnFace = 0.5F;     // 60 degrees
+  constexpr float kCosSameFace = 0.766F;  // 40 degrees
+  const Tangents tangents = tangents_of(point.normal);
+  const glm::vec3 start_offset_m = point.offset_m * (point.inward - point.normal);
+  std::array<CasterRay, kTangents> rays;
+  std::array<CasterHit, kTangents> hits;
+  for (std::size_t i = 0; i < kTangents; ++i) {
+    const float angle_rad = static_cast<float>(2.0 * physics::kPi) * static_cast<float>(i) /
+                            static_cast<float>(kTangents);
+    rays[i] = {point.position_m + start_offset_m,
+               std::cos(angle_rad) * tangents.u + std::sin(angle_rad) * tangents.v};
+  }
+  const std::uint32_t lanes = casters.first_hits(rays, selection, hits);
+
+  std::array<AdjacentFace, kTangents> found;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < kTangents; ++i) {
+    const CasterHit& hit = hits[i];
+    if (((lanes >> i) & 1U) == 0U || hit.front) continue;
+    if (glm::dot(hit.normal, point.normal) > kCosOwnFace) continue;
+    const float distance_m =
+        glm::dot(hit.normal, start_offset_m + hit.distance_m * rays[i].direction);
+    if (distance_m > reach_m) continue;
+    found[count++] = {hit.normal, std::max(distance_m, 0.0F)};
+  }
+  // Equal distances keep the order of the tangents; eight entries need no better method.
+  for (std::size_t i = 1; i < count; ++i) {
+    for (std::size_t k = i; k > 0 && found[k].distance_m < found[k - 1].distance_m; --k) {
+      std::swap(found[k], found[k - 1]);
+    }
+  }
+  AdjacentFaces out;
+  for (std::size_t i = 0; i < count && out.count < out.faces.size(); ++i) {
+    const bool known = std::any_of(out.faces.begin(), out.faces.begin() + out.count,
+                                   [&](const AdjacentFace& face) {
+                                     return glm::dot(face.normal, found[i].normal) > kCosSameFace;
+                                   });
+    if (!known) out.faces[out.count++] = found[i];
+  }
+  return out;
+}
+
+}  // namespace emit::renderer

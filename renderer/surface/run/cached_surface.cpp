@@ -1,0 +1,559 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/run/cached_surface.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <utility>
+
+#include "emit/physics/surface_balance.hpp"
+#include "history/foster_history.hpp"
+#include "surface/mesh/sheet_sides.hpp"
+#include "surface/warm_up/surface_patch.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kGrain = 32;
+/// What a tenth of the sun's light, reflected, is worth between 3 and 5 um on a surface of 300 K.
+constexpr float kSunK = 5.0F;
+/// Intervals that are made up for one by one after a jump of sim time.
+constexpr std::int64_t kMostIntervals = 16;
+/// Events that follow a node sooner belong to it; those known before, in shares of an interval, so
+/// that many of them do not make for many intervals.
+constexpr std::int64_t kSameNs = 1'000'000;
+constexpr std::int64_t kSameFraction = 16;
+/// What the host's weather changes is computed anew over that share of an interval.
+constexpr std::int64_t kRenewalFraction = 8;
+/// What follows a change of the weather that matters is an interval as short as that share.
+constexpr std::int64_t kAnswerFraction = 4;
+/// Fluxes that change a surface by no more than the tolerance, times that, however thin it is: it
+/// radiates as much by itself.
+constexpr double kLeastNewsWM2K = 5.0;
+/// What sunlit surfaces are warmer than the air by, more or less.
+constexpr double kFilmK = 20.0;
+/// In a hold, in which the clock stands.
+constexpr std::int64_t kHeldFrames = 64;
+
+std::vector<scene::Aabb> mover_boxes_m(const scene::SceneGeometry& geometry, std::size_t movers,
+                                       std::span<const std::int32_t> mover_of_object) {
+  std::vector<scene::Aabb> boxes(movers);
+  for (const scene::Instance& instance : geometry.instances) {
+    const std::int32_t mover = mover_of_object[instance.object];
+    if (mover < 0) continue;
+    boxes[static_cast<std::size_t>(mover)].add(
+        scene::transformed(geometry.meshes[instance.mesh].bounds, instance.body_from_mesh));
+  }
+  return boxes;
+}
+
+std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size_t movers,
+                                 std::span<const std::int32_t> mover_of_object) {
+  std::vector<float> radius_m(movers, 0.0F);
+  for (const scene::Instance& instance : geometry.instances) {
+    const std::int32_t mover = mover_of_object[instance.object];
+    if (mover < 0) continue;
+    const scene::Aabb box =
+        scene::transformed(geometry.meshes[instance.mesh].bounds, instance.body_from_mesh);
+    if (box.empty()) continue;
+    const glm::dvec3 farthest = glm::max(glm::abs(box.min_m), glm::abs(box.max_m));
+    float& radius = radius_m[static_cast<std::size_t>(mover)];
+    radius = std::max(radius, static_cast<float>(glm::length(farthest)));
+  }
+  return radius_m;
+}
+
+SampleHeat heat_of(const scene::ThermalOptions& options, std::span<const scene::Material> materials,
+                   std::span<const FosterMaterial> networks, double reference_k) {
+  if (options.model == scene::ThermalModel::emit2014) {
+    return SampleHeat(Emit2014Heat(materials, options.initial_k, reference_k));
+  }
+  return SampleHeat(FosterHeat(networks, reference_k, std::min(0.02, 0.2 * options.tolerance_k)));
+}
+
+}  // namespace
+
+CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+                             std::vector<std::int32_t> mover_of_object,
+                             std::span<const FosterMaterial> networks, CasterRays places,
+                             std::optional<SurfaceDetail> detail, double reference_k)
+    : geometry_(std::move(geometry)),
+      materials_(geometry_.materials),
+      options_(scenario.thermal),
+      mover_of_object_(std::move(mover_of_object)),
+      places_(std::move(places)),
+      detail_(std::move(detail)),
+      extended_(scenario.thermal.model == scene::ThermalModel::foster),
+      heat_(heat_of(scenario.thermal, materials_, networks, reference_k)),
+      interval_(heat_.sized_interval()),
+      workers_(threads::WorkerPool::all_cores()),
+      interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
+  const auto movers = static_cast<std::size_t>(
+      std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
+  interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
+  silhouettes_ = Silhouettes(mover_boxes_m(geometry_, movers, mover_of_object_));
+}
+
+physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
+    const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
+    std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
+    double reference_k, std::optional<SurfaceDetail> detail) {
+  auto rays = CasterRays::create(
+      geometry, detail ? std::optional(detail->rays().origin_world_m()) : std::nullopt);
+  if (!rays) return tl::unexpected(std::move(rays.error()));
+  // Entities and what shades must be numbered alike.
+  std::size_t mover = 0;
+  for (std::size_t object = 0; object < scenario.objects.size(); ++object) {
+    if (scenario.objects[object].entity_id == 0) continue;
+    if (mover >= rays->movers() || rays->object_of_mover(mover) != object) {
+      return physics::make_error(
+          physics::ErrorCode::config,
+          fmt::format("entity object '{}' has no triangles", scenario.objects[object].name));
+    }
+    ++mover;
+  }
+  return std::unique_ptr<CachedSurface>(
+      new CachedSurface(scenario, std::move(geometry), std::move(mover_of_object), networks,
+                        std::move(*rays), std::move(detail), reference_k));
+}
+
+void CachedSurface::place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities) {
+  movers_now_.resize(entities.size());
+  for (std::size_t m = 0; m < entities.size(); ++m) {
+    const TrajectoryState state = entities[m].at(now_ns);
+    movers_now_[m] = {glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
+                      glm::vec3(state.pose.position_world_m - rays().origin_world_m()), state.on};
+  }
+}
+
+std::vector<std::vector<glm::vec3>> CachedSurface::ways_m(
+    std::int64_t from_ns, std::span<const PoseHistory> entities) const {
+  std::vector<std::vector<glm::vec3>> ways;
+  const auto rel_m = [&](const physics::Pose& pose) {
+    return glm::vec3(pose.position_world_m - rays().origin_world_m());
+  };
+  for (const PoseHistory& entity : entities) {
+    std::vector<glm::vec3>& way = ways.emplace_back();
+    way.push_back(rel_m(entity.at(from_ns).pose));
+    for (const scene::Keyframe& key : entity.script()) {
+      if (key.sim_time_ns > from_ns) way.push_back(rel_m(key.pose));
+    }
+  }
+  return ways;
+}
+
+bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
+  if (!model_) return true;
+  // Before the history starts nothing changes: its first interval stands for it.
+  const std::int64_t begin_ns = nodes_[storage(0)].at_ns;
+  return (now_ns < begin_ns && begin_ns > options_.history_start_ns) ||
+         now_ns > nodes_[storage(1)].at_ns + kMostIntervals * interval_ns_;
+}
+
+std::int64_t CachedSurface::take_news(const Environment& environment) noexcept {
+  return environment.changed_since_ns(std::exchange(revision_, environment.revision()));
+}
+
+std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns, std::int64_t now_ns,
+                                         const Inputs& inputs) const noexcept {
+  const std::int64_t into_ns = (from_ns - options_.history_start_ns) % interval_ns_;
+  std::int64_t next_ns = from_ns + interval_ns_ - into_ns;
+  now_ns = std::clamp(now_ns, from_ns, next_ns);
+  if (next_ns - now_ns < interval_ns_ / 4) next_ns += interval_ns_;
+  const auto cut = [&](std::span<const std::int64_t> instants_ns) {
+    const auto after = std::ranges::lower_bound(
+        instants_ns, now_ns + std::max(kSameNs, interval_ns_ / kSameFraction));
+    if (after != instants_ns.end()) next_ns = std::min(next_ns, *after);
+  };
+  for (const PoseHistory& entity : inputs.entities) cut(entity.events_ns());
+  cut(inputs.environment.changes_ns());
+  return next_ns;
+}
+
+physics::Result<SurfaceModel> CachedSurface::make_model(const SurfaceInputs& surface,
+                                                        const RefineView& view,
+                                                        const SurfaceModelOptions& options,
+                                                        const std::optional<Saved>& saved,
+                                                        const SurfaceProgress& progress) const {
+  // Whatever is in the way of looking is told by read_state().
+  std::error_code error;
+  if (saved && (std::filesystem::exists(saved->file, error) || error)) {
+    auto read = read_state(saved->file, saved->key, geometry_, surface.movers_now.size(), options);
+    if (read || saved->start) return read;
+  }
+  const bool writes = saved && saved->start;
+  if (writes) {  // before the work, not after it
+    if (auto writable = check_state_writable(saved->file); !writable) {
+      return tl::unexpected(std::move(writable.error()));
+    }
+  }
+  auto model = build_surface_model(surface, view, options, progress);
+  if (!model || !writes) return model;
+  if (auto written = write_state(saved->file, saved->key, *model); !written) {
+    return tl::unexpected(std::move(written.error()));
+  }
+  return model;
+}
+
+physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineView& view,
+                                             const Inputs& inputs, StepPlan& plan,
+                                             SurfaceHistory& history,
+                                             const std::optional<Saved>& saved,
+                                             const SurfaceProgress& progress) {
+  const std::int64_t start_ns =
+      options_.history_start_ns +
+      std::max<std::int64_t>(0, now_ns - options_.history_start_ns) / interval_ns_ * interval_ns_;
+  place_movers(start_ns, inputs.entities);
+  plan.update(start_ns, inputs.environment, inputs.entities);
+  history.update(plan, inputs.environment);
+  const HistoryRecord record =
+      make_history_record(plan, history, heat_, inputs.environment, inputs.entities,
+                          *interval_rays_, rays().origin_world_m());
+  const std::vector<std::vector<glm::vec3>> ways_m = this->ways_m(start_ns, inputs.entities);
+  const SurfaceInputs surface{
+      geometry_, materials_, mover_of_object_, rays(),      places_,
+      heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr,
+      ways_m};
+  SurfaceModelOptions options;
+  options.tolerance_k = options_.tolerance_k;
+  options.max_samples = options_.max_samples;
+  // The published model conducts straight down and knows no other surface.
+  options.lateral = extended_ && options_.lateral;
+  options.exchange = extended_ && options_.exchange;
+  std::optional<Saved> here = saved;
+  if (here) add_first_frame(here->key, start_ns, view, inputs.environment, inputs.entities);
+  auto model = make_model(surface, view, options, here, progress);
+  if (!model) return tl::unexpected(std::move(model.error()));
+  offsets_ = ray_offsets(geometry_);
+  model_ = std::move(*model);
+  if (options.exchange) {
+    glow_ = MoverGlow(*model_, geometry_, mover_of_object_);
+    faces_.assign(movers_now_.size(), {});
+  }
+
+  const std::size_t count = model_->samples.samples.size();
+  for (SurfaceNode& node : nodes_) {
+    node.states.assign(count, {});
+    node.outputs.assign(count, {});
+    node.vertices.assign(model_->drawn_samples, {});
+  }
+  // One interval before the first is shown: nodes 0 and 1 are complete, 2 is begun.
+  ring_ = 0;
+  SurfaceNode& first = node(0);
+  first.states = std::move(model_->states);
+  first.outputs = std::move(model_->outputs);
+  first.at_ns = start_ns;
+  first.surroundings = history.surroundings();
+  first.surroundings_k = history.surroundings_now_k();
+  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
+    first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
+  }
+  (void)take_news(inputs.environment);
+  news_ns_ = kNoNews;
+  renewing_ = false;
+  lags_ = false;
+  last_now_ns_ = now_ns;
+  local_ =
+      LocalSteps(model_->samples,
+                 LocalSteps::Setup{options_.history_start_ns, interval_ns_, inputs.entities.size()},
+                 *interval_rays_, heat_.sized_interval());
+  local_->restart(start_ns);
+  turn_ = static_cast<std::uint32_t>(record.size());
+  begin_anew(0, inputs, history);
+  compute(0, static_cast<std::uint32_t>(count));
+  // What the model says of the sun has the entities in it.
+  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
+    if (inputs.entities.empty() || model_->samples.samples[i].mover >= 0) continue;
+    first.outputs[i].sun_frac = node(1).outputs[i].sun_frac;
+    first.vertices[i].sun_frac = node(1).vertices[i].sun_frac;
+  }
+  begin_anew(1, inputs, history);
+  share_begin_ns_ = node(0).at_ns;
+  share_end_ns_ = node(1).at_ns;
+  for (SurfaceNode& node : nodes_) {
+    node.changes.clear();
+    node.changes.add(0, model_->drawn_samples);
+  }
+  begin_shade(start_ns, inputs);
+  return {};
+}
+
+std::uint64_t CachedSurface::sample_bytes() const noexcept {
+  const auto bytes = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
+  std::uint64_t sum = 0;
+  if (model_) sum = bytes(model_->samples.samples) + bytes(model_->samples.seen);
+  for (const SurfaceNode& node : nodes_) {
+    sum += bytes(node.states) + bytes(node.outputs) + bytes(node.vertices);
+  }
+  return sum;
+}
+
+void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
+                                   SurfaceHistory& history) noexcept {
+  const SurfaceNode& from = node(index);
+  SurfaceNode& to = node(index + 1);
+  history.restore_surroundings(from.surroundings);
+  interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
+  to.forcing = interval_.forcing;
+  to.surroundings = history.surroundings();
+  to.surroundings_k = history.surroundings_now_k();
+  heat_.prepare(interval_);
+  interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment,
+                         EntityPoses(inputs.entities), rays().origin_world_m());
+  local_->send_rays(index, inputs.entities);
+  glow_.measure(
+      model_->samples, *interval_rays_,
+      [&from](std::size_t sample) { return from.outputs[sample].longwave_out_w_m2; }, faces_);
+  done_ = 0;
+}
+
+void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
+  const SurfaceNode& from = node(index);
+  SurfaceNode& to = node(index + 1);
+  const SurfaceStep step = this->step();
+  const std::uint32_t first = done_;
+  if (last <= first) return;
+  const auto keep = [&to](std::size_t i, const SampleState& state, const SampleOutput& output) {
+    to.states[i] = state;
+    to.outputs[i] = output;
+    if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
+  };
+  workers_.run(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
+    SteppedSample stepped;
+    for (auto i = static_cast<std::uint32_t>(first + begin); i < first + end; ++i) {
+      if (!steps_itself(step.all, i) || (renewing_ && local_->has_own_clock(i))) continue;
+      stepped.state = from.states[i];
+      step_sample(step, *interval_rays_, interval_, from.outputs, i, stepped);
+      keep(i, stepped.state, stepped.output);
+      const std::uint32_t behind = step.all.samples[i].other_side;
+      if (behind != kNoSample) keep(behind, stepped.state, stepped.behind);
+    }
+  });
+  done_ = last;
+  const auto drawn = static_cast<std::uint32_t>(to.vertices.size());
+  to.changes.add(std::min(first, drawn), std::min(last, drawn) - std::min(first, drawn));
+}
+
+void CachedSurface::cut_at(std::int64_t event_ns, std::int64_t end_ns) noexcept {
+  SurfaceNode& first = node(0);
+  SurfaceNode& second = node(1);
+  const auto way_of = [&](std::int64_t at_ns) {
+    return static_cast<double>(at_ns - first.at_ns) /
+           static_cast<double>(second.at_ns - first.at_ns);
+  };
+  const double frac = way_of(event_ns);
+  const double end_frac = way_of(end_ns);
+  workers_.run(first.states.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
+      if (frac > 0.0 && !local_->has_own_clock(i)) {
+        first.states[i] = between(first.states[i], second.states[i], frac);
+        first.outputs[i] = between(first.outputs[i], second.outputs[i], frac);
+      }
+      if (i >= first.vertices.size()) continue;
+      const SampleVertex from = first.vertices[i];
+      SampleVertex& to = second.vertices[i];
+      first.vertices[i] = {between(from.offset_k, to.offset_k, frac),
+                           between(from.sun_frac, to.sun_frac, frac)};
+      to.offset_k = between(from.offset_k, to.offset_k, end_frac);
+    }
+  });
+  first.surroundings = between(first.surroundings, second.surroundings, frac);
+  if (first.surroundings_k && second.surroundings_k) {
+    first.surroundings_k = between(*first.surroundings_k, *second.surroundings_k, frac);
+  }
+  first.at_ns = event_ns;
+  second.at_ns = end_ns;
+  for (SurfaceNode* node : {&first, &second}) {
+    node->changes.add(0, static_cast<std::uint32_t>(node->vertices.size()));
+  }
+}
+
+void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
+                               SurfaceHistory& history) noexcept {
+  const std::int64_t from_ns = node(index).at_ns;
+  std::int64_t end_ns = next_node_ns(from_ns, from_ns, inputs);
+  if (std::ranges::binary_search(inputs.environment.changes_ns(), from_ns)) {
+    end_ns = std::min(end_ns, from_ns + interval_ns_ / kAnswerFraction);
+  }
+  node(index + 1).at_ns = end_ns;
+  begin_interval(index, inputs, history);
+}
+
+bool CachedSurface::matters(std::int64_t now_ns, const Environment& environment) const noexcept {
+  const physics::SunPosition sun = environment.sun_at(now_ns);
+  const physics::Forcing weather = environment.forcing_at(now_ns, sun);
+  const SurfaceForcing is = open_forcing(sun, weather);
+  const IntervalForcing& taken = node(1).forcing;
+  const double way = std::clamp(
+      1.0 - 1e-9 * static_cast<double>(node(1).at_ns - now_ns) / std::max(taken.dt_s, 1e-9), 0.0,
+      1.0);
+  const auto off = [&](double SurfaceForcing::*value) {
+    return std::abs(is.*value - between(taken.begin.*value, taken.end.*value, way));
+  };
+  double change_w_m2 =
+      glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
+      off(&SurfaceForcing::diffuse_w_m2) + off(&SurfaceForcing::longwave_w_m2) +
+      is.film_w_m2_k * off(&SurfaceForcing::air_k) + kFilmK * off(&SurfaceForcing::film_w_m2_k);
+  if (weather.environment_stated) {
+    change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
+                            between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
+  }
+  return change_w_m2 > kLeastNewsWM2K * options_.tolerance_k;
+}
+
+void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
+                                  SurfaceHistory& history) noexcept {
+  if (event_ns < node(0).at_ns + kSameNs) event_ns = node(0).at_ns;
+  lags_ = matters(now_ns, inputs.environment);
+  std::int64_t end_ns = next_node_ns(event_ns, now_ns, inputs);
+  // Surfaces answer like the root of time at first, which a line over a whole interval does not.
+  if (lags_) end_ns = std::min(end_ns, std::max(event_ns, now_ns) + interval_ns_ / kAnswerFraction);
+  local_->take_news(event_ns, window(), model_->samples);
+  cut_at(event_ns, end_ns);
+  begin_interval(0, inputs, history);
+  renewing_ = true;
+  // What sim time has left behind in one frame is made up for in that.
+  share_begin_ns_ = std::max(event_ns, last_now_ns_);
+  share_end_ns_ =
+      share_begin_ns_ + std::min(interval_ns_ / kRenewalFraction, (end_ns - now_ns) / 2);
+}
+
+void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
+                                SurfaceHistory& history) noexcept {
+  compute(0, static_cast<std::uint32_t>(model_->samples.samples.size()));
+  renewing_ = false;
+  lags_ = news_ns_ <= now_ns && matters(now_ns, inputs.environment);
+  node(2).changes.clear();
+  begin_anew(1, inputs, history);
+  share_begin_ns_ = now_ns;
+  share_end_ns_ = node(1).at_ns;
+}
+
+void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
+                                 SurfaceHistory& history) noexcept {
+  const std::int64_t newest_ns = take_news(inputs.environment);
+  if (newest_ns != kNoNews) local_->doubt(newest_ns);
+  news_ns_ = std::min(news_ns_, newest_ns);
+  if (news_ns_ == kNoNews) return;
+  if (renewing_) {
+    lags_ = lags_ || (news_ns_ <= now_ns && matters(now_ns, inputs.environment));
+    return;
+  }
+  if (news_ns_ >= node(2).at_ns) {
+    news_ns_ = kNoNews;
+  } else if (news_ns_ >= node(1).at_ns) {
+    // Where the interval is about to end there is no time for that: it waits for the next one.
+    if (node(1).at_ns - now_ns < interval_ns_ / kRenewalFraction) return;
+    begin_anew(1, inputs, history);
+    share_begin_ns_ = now_ns;
+    share_end_ns_ = node(1).at_ns;
+    news_ns_ = kNoNews;
+  } else if (news_ns_ <= now_ns) {  // what is to come waits for its instant
+    const SurfaceStep step = this->step();
+    local_->run(std::min(now_ns, node(1).at_ns), window(), local_inputs(inputs, history, step));
+    begin_renewal(std::exchange(news_ns_, kNoNews), now_ns, inputs, history);
+  }
+}
+
+std::uint32_t CachedSurface::share_at(std::int64_t now_ns) const noexcept {
+  const auto count = static_cast<double>(model_->samples.samples.size());
+  const auto way_ns =
+      static_cast<double>(std::max<std::int64_t>(1, share_end_ns_ - share_begin_ns_));
+  const double gone_frac = static_cast<double>(now_ns - share_begin_ns_) / way_ns;
+  return static_cast<std::uint32_t>(std::ceil(std::clamp(gone_frac, 0.0, 1.0) * count));
+}
+
+void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
+                            SurfaceHistory& history) noexcept {
+  silhouettes_.begin_frame();
+  const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
+  const SurfaceStep step = this->step();
+  const LocalSteps::Inputs local = local_inputs(inputs, history, step);
+  take_weather(now_ns, inputs, history);
+  while (now_ns > node(1).at_ns) {
+    local_->run(node(1).at_ns, window(), local);
+    if (renewing_) {
+      end_renewal(node(1).at_ns, inputs, history);
+      take_weather(now_ns, inputs, history);  // of meanwhile, which moves the node
+      continue;
+    }
+    local_->rotate(window(), model_->samples);
+    compute(1, count);
+    rotate();
+    local_->rotated(window(), model_->samples);
+    node(2).changes.clear();
+    begin_anew(1, inputs, history);
+    share_begin_ns_ = node(0).at_ns;
+    share_end_ns_ = node(1).at_ns;
+    take_weather(now_ns, inputs, history);  // what had waited for this interval
+  }
+  local_->run(now_ns, window(), local);
+  shade_->run(now_ns, model_->samples,
+              {inputs.environment, inputs.entities, rays(), workers_, silhouettes_});
+  const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
+                          static_cast<double>(node(1).at_ns - node(0).at_ns);
+  fraction_ = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
+  if (renewing_ && now_ns == last_now_ns_) {
+    // In a hold frames go on with what has been begun.
+    const std::int64_t step_ns = (share_end_ns_ - share_begin_ns_) / kHeldFrames;
+    share_begin_ns_ -= step_ns;
+    share_end_ns_ -= step_ns;
+  }
+  last_now_ns_ = now_ns;
+  // As much as has gone by of the time for it.
+  compute(renewing_ ? 0 : 1, share_at(now_ns));
+  if (renewing_ && done_ == count) end_renewal(now_ns, inputs, history);
+}
+
+std::optional<double> CachedSurface::surroundings_now_k() const noexcept {
+  const SurfaceNode& before = node(0);
+  const SurfaceNode& after = node(1);
+  if (!before.surroundings_k || !after.surroundings_k) return std::nullopt;
+  return between(*before.surroundings_k, *after.surroundings_k, static_cast<double>(fraction_));
+}
+
+void CachedSurface::forget_changes() noexcept {
+  shade_->forget_changes();
+  for (SurfaceNode& node : nodes_) node.changes.clear();
+}
+
+SampledScene CachedSurface::drawn_scene() const {
+  SampledScene scene{geometry_, {}, {}, {}};
+  scene::SceneGeometry& out = scene.geometry;
+  std::vector<std::uint32_t> order(out.instances.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return out.instances[i].mesh; });
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    out.instances[i] = geometry_.instances[order[i]];
+    scene.first_sample.push_back(model_->first_sample[order[i]]);
+  }
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges;
+  for (std::size_t m = 0; m < out.meshes.size(); ++m) {
+    scene::Mesh& mesh = out.meshes[m];
+    const RefinedMesh& refined = model_->meshes[m];
+    refined.write_indices(mesh.indices, ranges);
+    for (std::size_t k = 0; k < mesh.submeshes.size(); ++k) {
+      mesh.submeshes[k].first_index = ranges[k].first;
+      mesh.submeshes[k].index_count = ranges[k].second;
+    }
+    mesh.positions_m.clear();
+    mesh.normals.clear();
+    for (const RefinedMesh::Vertex& vertex : refined.vertices()) {
+      mesh.positions_m.push_back(vertex.position_m);
+      mesh.normals.push_back(vertex.normal);
+    }
+    add_backs(refined, materials_, mesh);
+  }
+  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
+    scene.sky_frac.push_back(model_->samples.samples[i].sky_frac);
+    const SampleVertex& vertex = nodes_[storage(0)].vertices[i];
+    scene.value_k.push_back(vertex.offset_k + kSunK * vertex.sun_frac);
+  }
+  return scene;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/run/local_steps.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kGrain = 32;
+/// Steps are that share of an interval, within these bounds.
+constexpr std::int64_t kStepsPerInterval = 16;
+constexpr std::int64_t kLeastStepNs = 250'000'000;
+constexpr std::int64_t kMostStepNs = 1'250'000'000;
+/// Closer than that to where it was foreseen, an entity's shade is as it was taken to be.
+constexpr double kForeseenM = 0.05;
+constexpr double kForeseenRad = 5e-3;
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+
+double way_of(std::int64_t at_ns, const SurfaceNode& before, const SurfaceNode& after) noexcept {
+  return static_cast<double>(at_ns - before.at_ns) /
+         static_cast<double>(after.at_ns - before.at_ns);
+}
+
+/// Vertices at both nodes such that the line between them leads through `offset_k` at `at_ns` and
+/// through `end` at `end_ns`.
+void draw_line(std::uint32_t sample, std::int64_t at_ns, float offset_k, std::int64_t end_ns,
+               const SampleOutput& end, const LocalSteps::Window& window) noexcept {
+  if (sample >= window.before.vertices.size()) return;
+  const double slope_k_ns = (static_cast<double>(end.offset_k) - static_cast<double>(offset_k)) /
+                            static_cast<double>(end_ns - at_ns);
+  const auto at_node = [&](const SurfaceNode& node) {
+    return SampleVertex{static_cast<float>(static_cast<double>(offset_k) +
+                                           slope_k_ns * static_cast<double>(node.at_ns - at_ns)),
+                        end.sun_frac};
+  };
+  window.before.vertices[sample] = at_node(window.before);
+  window.after.vertices[sample] = at_node(window.after);
+  window.before.changes.add(sample, 1);
+  window.after.changes.add(sample, 1);
+}
+
+}  // namespace
+
+LocalSteps::LocalSteps(const SurfaceSamples& all, const Setup& setup, const IntervalRays& rays,
+                       HeatInterval interval)
+    : blocks_(all),
+      start_ns_(setup.start_ns),
+      step_ns_(std::clamp(setup.interval_ns / kStepsPerInterval, kLeastStepNs, kMostStepNs)),
+      turn_ns_(step_ns_ / static_cast<std::int64_t>(kTurns)),
+      rays_(rays),
+      known_rays_(rays),
+      interval_(std::move(interval)),
+      state_(blocks_.blocks().size(), State::of_interval),
+      at_ns_(blocks_.blocks().size(), kNever),
+      touched_ns_(blocks_.blocks().size(), kNever),
+      foreseen_ns_(blocks_.blocks().size(), kNever),
+      known_found_(setup.entities, 0),
+      own_clock_(all.samples.size(), 0) {
+  rays_.take_short();
+  for (auto& known : known_) known.resize(setup.entities);
+  for (auto& entities : foreseen_) entities.resize(setup.entities);
+  for (auto& turn : turns_) turn.reserve(state_.size() / kTurns + 1);
+  chosen_.reserve(state_.size() / kTurns + 1);
+  batch_.reserve(kBatch);
+  stepped_.resize(kBatch);
+}
+
+void LocalSteps::send_rays(std::size_t interval, std::span<const PoseHistory> entities) noexcept {
+  for (std::size_t m = 0; m < entities.size(); ++m) known_[interval][m] = entities[m].known();
+}
+
+void LocalSteps::restart(std::int64_t now_ns) noexcept {
+  for (auto& turn : turns_) turn.clear();
+  std::ranges::fill(state_, State::of_interval);
+  std::ranges::fill(at_ns_, kNever);
+  std::ranges::fill(touched_ns_, kNever);
+  std::ranges::fill(foreseen_ns_, kNever);
+  std::ranges::fill(own_clock_, std::uint8_t{0});
+  std::ranges::fill(known_found_, std::uint8_t{0});
+  next_turn_ = std::max<std::int64_t>(0, now_ns - start_ns_) / turn_ns_ + 1;
+}
+
+std::size_t LocalSteps::active() const noexcept {
+  std::size_t sum = 0;
+  for (const auto& turn : turns_) sum += turn.size();
+  return sum;
+}
+
+void LocalSteps::run(std::int64_t until_ns, const Window& window, const Inputs& inputs) noexcept {
+  for (;; ++next_turn_) {
+    const std::int64_t at_ns = start_ns_ + next_turn_ * turn_ns_;
+    if (at_ns > until_ns) return;
+    look_around(at_ns, window, inputs);
+    take_turn(static_cast<std::size_t>(next_turn_) % kTurns, at_ns, window, inputs);
+  }
+}
+
+void LocalSteps::look_around(std::int64_t at_ns, const Window& window,
+                             const Inputs& inputs) noexcept {
+  const auto departs = [&](std::size_t m) {
+    return inputs.entities[m].departs(known_[0][m], at_ns);
+  };
+  bool ready = false;
+  for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+    if (!departs(m)) continue;
+    if (!std::exchange(ready, true)) {
+      // A step ahead, so that blocks are on their own before what comes is there.
+      rays_.update(at_ns - turn_ns_, at_ns + step_ns_, 0, inputs.environment,
+                   EntityPoses::ahead(inputs.entities), inputs.origin_world_m);
+    }
+    want(m, rays_, at_ns);
+  }
+  ready = false;
+  for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+    if (known_found_[m] != 0 || !departs(m)) continue;
+    known_found_[m] = 1;
+    if (!std::exchange(ready, true)) {
+      known_rays_.update(at_ns - turn_ns_, window.after.at_ns, 0, inputs.environment,
+                         EntityPoses::as_known(inputs.entities, known_[0]), inputs.origin_world_m);
+    }
+    want(m, known_rays_, at_ns);
+  }
+}
+
+void LocalSteps::want(std::size_t entity, const IntervalRays& rays, std::int64_t at_ns) noexcept {
+  for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    const SampleBlocks::Block& block = blocks_.blocks()[b];
+    if (block.mover != static_cast<std::int32_t>(entity) &&
+        !rays.touches(entity, block.centre_m, block.radius_m, block.mover)) {
+      continue;
+    }
+    touched_ns_[b] = at_ns;
+    if (state_[b] != State::of_interval) continue;
+    state_[b] = State::wanted;
+    turns_[b % kTurns].push_back(b);
+  }
+}
+
+void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& window,
+                           const Inputs& inputs) noexcept {
+  std::vector<std::uint32_t>& blocks = turns_[turn];
+  if (blocks.empty()) return;
+  bring(blocks, at_ns, window, inputs);
+  // Right before an interval ends nothing is gained by going back to it.
+  const bool may_leave = window.after.at_ns - at_ns > turn_ns_;
+  const auto leaving = std::ranges::partition(
+      blocks, [&](std::uint32_t b) { return !may_leave || touched_ns_[b] >= window.before.at_ns; });
+  const std::size_t stay = blocks.size() - leaving.size();
+  show(std::span(blocks).first(stay), turn, at_ns, window, inputs);
+  hand_back(std::span(blocks).subspan(stay), at_ns, window, inputs);
+  blocks.resize(stay);
+  inputs.history.restore_surroundings(window.next.surroundings);
+}
+
+void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
+                           const SurfaceSamples& all) noexcept {
+  for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    const bool came_back = state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns;
+    if (came_back) turns_[b % kTurns].push_back(b);
+    if (came_back || state_[b] == State::wanted) begin_alone(b, event_ns, window, all);
+  }
+}
+
+void LocalSteps::doubt(std::int64_t event_ns) noexcept {
+  for (std::int64_t& foreseen_ns : foreseen_ns_) {
+    if (foreseen_ns > event_ns) foreseen_ns = kNever;
+  }
+}
+
+template <class Visit>
+void LocalSteps::each_sample(std::uint32_t block, const SurfaceSamples& all,
+                             const Visit& visit) noexcept {
+  for (const std::uint32_t i : blocks_.samples(block)) {
+    visit(i);
+    if (all.samples[i].other_side != kNoSample) visit(all.samples[i].other_side);
+  }
+}
+
+void LocalSteps::begin_alone(std::uint32_t block, std::int64_t at_ns, const Window& window,
+                             const SurfaceSamples& all) noexcept {
+  // It may have come back to this interval: `before` holds it where it did.
+  const std::int64_t from_ns = std::max(at_ns_[block], window.before.at_ns);
+  state_[block] = State::on_its_own;
+  at_ns_[block] = window.renewing ? from_ns : std::max(at_ns, from_ns);
+  const double frac = static_cast<double>(at_ns_[block] - from_ns) /
+                      static_cast<double>(window.after.at_ns - from_ns);
+  each_sample(block, all, [&](std::uint32_t i) {
+    own_clock_[i] = 1;
+    window.before.states[i] = between(window.before.states[i], window.after.states[i], frac);
+    window.before.outputs[i] = between(window.before.outputs[i], window.after.outputs[i], frac);
+  });
+}
+
+void LocalSteps::prepare(std::int64_t begin_ns, std::int64_t end_ns, const Window& window,
+                         const Inputs& inputs) noexcept {
+  inputs.history.restore_surroundings(between(window.before.surroundings, window.after.surroundings,
+                                              way_of(begin_ns, window.before, window.after)));
+  interval_.forcing = inputs.history.extend(begin_ns, end_ns, inputs.environment);
+  inputs.step.heat.prepare(interval_);
+  rays_.update(begin_ns, end_ns, static_cast<std::uint32_t>(end_ns / step_ns_), inputs.environment,
+               EntityPoses::ahead(inputs.entities), inputs.origin_world_m);
+}
+
+template <class Keep>
+void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
+                      const SurfaceNode& from, const IntervalRays& rays,
+                      const HeatInterval& interval, const Inputs& inputs,
+                      const Keep& keep) noexcept {
+  const auto flush = [&] {
+    inputs.workers.run(batch_.size(), kGrain, [&](std::size_t begin, std::size_t stop) {
+      for (std::size_t k = begin; k < stop; ++k) {
+        stepped_[k].state = from.states[batch_[k]];
+        step_sample(inputs.step, rays, interval, from.outputs, batch_[k], stepped_[k]);
+      }
+    });
+    for (std::size_t k = 0; k < batch_.size(); ++k) {
+      const std::uint32_t behind = inputs.step.all.samples[batch_[k]].other_side;
+      keep(batch_[k], stepped_[k].state, stepped_[k].output);
+      if (behind != kNoSample) keep(behind, stepped_[k].state, stepped_[k].behind);
+    }
+    batch_.clear();
+  };
+  for (const std::uint32_t block : blocks) {
+    const auto samples = blocks_.samples(block);
+    if (batch_.size() + samples.size() > kBatch) flush();
+    for (const std::uint32_t i : samples) {
+      if (i < end) batch_.push_back(i);
+    }
+  }
+  flush();
+}
+
+void LocalSteps::bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns,
+                       const Window& window, const Inputs& inputs) noexcept {
+  for (const std::uint32_t b : blocks) {
+    if (state_[b] == State::wanted) begin_alone(b, to_ns - step_ns_, window, inputs.step.all);
+  }
+  const bool as_foreseen =
+      came_true(static_cast<std::size_t>(blocks.front()) % kTurns, to_ns, inputs);
+  for (const std::uint32_t b : blocks) {
+    if (!as_foreseen || foreseen_ns_[b] != to_ns) continue;
+    each_sample(b, inputs.step.all, [&](std::uint32_t i) {
+      window.before.states[i] = window.after.states[i];
+      window.before.outputs[i] = window.after.outputs[i];
+    });
+    at_ns_[b] = to_ns;
+  }
+  // Nearly all of the others stepped together before.
+  for (std::int64_t from_ns = kNever;;) {
+    std::int64_t earliest_ns = to_ns;
+    for (const std::uint32_t b : blocks) {
+      if (at_ns_[b] > from_ns) earliest_ns = std::min(earliest_ns, at_ns_[b]);
+    }
+    if (earliest_ns == to_ns) return;
+    from_ns = earliest_ns;
+    chosen_.clear();
+    for (const std::uint32_t b : blocks) {
+      if (at_ns_[b] == from_ns) chosen_.push_back(b);
+    }
+    prepare(from_ns, to_ns, window, inputs);
+    step(chosen_, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_,
+         inputs, [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
+           window.before.states[i] = state;
+           window.before.outputs[i] = output;
+         });
+    for (const std::uint32_t b : chosen_) at_ns_[b] = to_ns;
+  }
+}
+
+void LocalSteps::show(std::span<const std::uint32_t> blocks, std::size_t turn, std::int64_t at_ns,
+                      const Window& window, const Inputs& inputs) noexcept {
+  if (blocks.empty()) return;
+  const std::int64_t end_ns = at_ns + step_ns_;
+  prepare(at_ns, end_ns, window, inputs);
+  step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
+       [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
+         draw_line(i, at_ns, window.before.outputs[i].offset_k, end_ns, output, window);
+         window.after.states[i] = state;
+         window.after.outputs[i] = output;
+       });
+  for (const std::uint32_t b : blocks) foreseen_ns_[b] = end_ns;
+  for (std::size_t m = 0; m < foreseen_[turn].size(); ++m) {
+    foreseen_[turn][m] = inputs.entities[m].ahead(end_ns);
+  }
+}
+
+bool LocalSteps::came_true(std::size_t turn, std::int64_t at_ns,
+                           const Inputs& inputs) const noexcept {
+  for (std::size_t m = 0; m < foreseen_[turn].size(); ++m) {
+    const TrajectoryState now = inputs.entities[m].at(at_ns);
+    const TrajectoryState& then = foreseen_[turn][m];
+    if (now.on != then.on ||
+        (now.on && !physics::close(now.pose, then.pose, kForeseenM, kForeseenRad))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t at_ns,
+                           const Window& window, const Inputs& inputs) noexcept {
+  if (blocks.empty()) return;
+  prepare(at_ns, window.after.at_ns, window, inputs);
+  step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
+       [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
+         draw_line(i, at_ns, window.before.outputs[i].offset_k, window.after.at_ns, output, window);
+         window.after.states[i] = state;
+         window.after.outputs[i] = output;
+       });
+  // What has been computed of the next interval began without that.
+  step(blocks, window.done, window.after, window.next_rays, window.next_interval, inputs,
+       [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
+         window.next.states[i] = state;
+         window.next.outputs[i] = output;
+         if (i >= window.next.vertices.size()) return;
+         window.next.vertices[i] = {output.offset_k, output.sun_frac};
+         window.next.changes.add(i, 1);
+       });
+  for (const std::uint32_t b : blocks) {
+    state_[b] = State::of_interval;
+    foreseen_ns_[b] = kNever;
+  }
+}
+
+void LocalSteps::rotate(const Window& window, const SurfaceSamples& all) noexcept {
+  // Where those begin must still lie between the two nodes.
+  for (const auto& turn : turns_) {
+    for (const std::uint32_t b : turn) {
+      if (state_[b] == State::wanted) begin_alone(b, window.after.at_ns - step_ns_, window, all);
+    }
+  }
+}
+
+void LocalSteps::rotated(const Window& window, const SurfaceSamples& all) noexcept {
+  std::swap(known_[0], known_[1]);
+  std::ranges::fill(known_found_, std::uint8_t{0});
+  const SurfaceNode& old = window.next;  // the node before those two
+  const auto ways =
+      static_cast<float>(static_cast<double>(window.after.at_ns - window.before.at_ns) /
+                         static_cast<double>(window.before.at_ns - old.at_ns));
+  for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    if (state_[b] != State::of_interval || at_ns_[b] < old.at_ns) continue;
+    each_sample(b, all, [&](std::uint32_t i) { own_clock_[i] = 0; });
+  }
+  for (const auto& turn : turns_) {
+    for (const std::uint32_t block : turn) {
+      each_sample(block, all, [&](std::uint32_t i) {
+        window.after.states[i] = window.before.states[i];
+        window.after.outputs[i] = window.before.outputs[i];
+        window.before.states[i] = old.states[i];
+        window.before.outputs[i] = old.outputs[i];
+        if (i >= window.before.vertices.size()) return;
+        const SampleVertex& now = window.before.vertices[i];
+        window.after.vertices[i] = {now.offset_k + ways * (now.offset_k - old.vertices[i].offset_k),
+                                    now.sun_frac};
+        window.after.changes.add(i, 1);
+      });
+    }
+  }
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/run/surface_step.hpp"
+
+#include <cstddef>
+
+namespace emit::renderer {
+namespace {
+
+SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
+                     std::span<const SampleOutput> begin, const SurfaceSample& sample,
+                     const SunShare& sun) noexcept {
+  SampleDrive drive;
+  drive.sun_frac = sun.frac;
+  const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, step.offsets.around_m);
+  drive.hidden_sky_frac = hidden.frac;
+  if (hidden.frac > 0.0F && !step.faces.empty()) {
+    const float sent_w_m2 = step.faces[hidden.mover].towards_w_m2(sample.normal);
+    drive.hidden_is_seen = sent_w_m2 >= 0.0F;
+    if (drive.hidden_is_seen) {
+      drive.longwave_begin_w_m2 += sample.sky_frac * hidden.frac * sent_w_m2;
+    }
+  }
+  for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
+    const SeenSample& seen = step.all.seen[sample.first_seen + k];
+    const SampleOutput& other = begin[seen.sample];
+    drive.longwave_begin_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
+    drive.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
+  }
+  // Neighbours change by hundredths of a kelvin in an interval: their start stands for it.
+  drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    const std::uint32_t partner = sample.partners[p].sample;
+    if (partner == kNoSample) continue;
+    drive.partner_begin_w_m2[p] = begin[partner].flux_w_m2;
+    drive.partner_end_w_m2[p] = drive.partner_begin_w_m2[p];
+  }
+  return drive;
+}
+
+}  // namespace
+
+void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
+                 const HeatInterval& interval, std::span<const SampleOutput> begin,
+                 std::uint32_t index, SteppedSample& stepped) noexcept {
+  const SurfaceSample& sample = step.all.samples[index];
+  const auto sun_of = [&](const SurfaceSample& side) {
+    return interval_rays.sun_share(step.rays, side, step.offsets.sun_m, 0.0F);
+  };
+  const SunShare sun = sun_of(sample);
+  const SampleDrive drive = drive_of(step, interval_rays, begin, sample, sun);
+  const glm::vec3 normal = interval_rays.normal(sample);
+  if (sample.other_side == kNoSample) {
+    stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
+    stepped.output.sun_frac = sun.fixed_frac;
+    return;
+  }
+  const SurfaceSample& behind = step.all.samples[sample.other_side];
+  const SunShare sun_behind = sun_of(behind);
+  const SampleDrive back_drive = drive_of(step, interval_rays, begin, behind, sun_behind);
+  const SheetBack back{behind, back_drive};
+  stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
+  stepped.behind =
+      step.heat.output(behind, -normal, interval.forcing.end, back_drive, stepped.state);
+  stepped.output.sun_frac = sun.fixed_frac;
+  stepped.behind.sun_frac = sun_behind.fixed_frac;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,601 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/shade/shade_pages.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vector_relational.hpp>
+#include <limits>
+#include <utility>
+
+namespace emit::renderer {
+namespace {
+
+/// Nearer to where it stood at the start an entity has not moved.
+constexpr double kStayedM = 0.05;
+constexpr double kStayedRad = 5e-3;
+/// Lower suns draw shadows too long for pages, and warm level ground little.
+constexpr double kLeastSunSine = 0.05;
+constexpr float kTexelsPerDiagonal = 64.0F;
+constexpr int kFinestLevel = -8;
+constexpr int kCoarsestLevel = 10;
+/// Levels that a long shadow may be coarser than its body's diagonal asks.
+constexpr int kMostCoarser = 4;
+/// Places farther apart than that share of the diagonal leave gaps.
+constexpr float kMostGapFrac = 0.5F;
+/// By less the tops of what is shaded do not change.
+constexpr float kTopStepM = 0.02F;
+/// Vertices are told no smaller changes.
+constexpr float kLeastChangeK = 5e-5F;
+/// An entity that comes farther within a step casts from several places.
+constexpr float kPlaceTexels = 4.0F;
+/// Shadows of what does not move creep over vertices that were not there before.
+constexpr std::int64_t kGatherNs = 10'000'000'000;
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min() / 2;
+constexpr float kReachMarginM = 0.5F;
+/// Ground that falls by more within a page, in sides of it, is not the page's.
+constexpr float kLowestFrac = 0.25F;
+constexpr float kLeastSquareM = 4.0F;
+constexpr int kMostSquares = 1024;
+/// A page that is worth less, in tolerances, is given back.
+constexpr float kLeastWorthFrac = 0.5F;
+
+/// By mode: what is left of shade that is so much older.
+glm::vec4 left_after(std::int64_t turns) noexcept {
+  const double seconds = 1e-9 * static_cast<double>(turns * ShadePages::kTurnNs);
+  glm::vec4 left;
+  for (std::size_t k = 0; k < ShadeResponse::kModes; ++k) {
+    left[static_cast<glm::length_t>(k)] =
+        static_cast<float>(std::exp(-seconds / ShadeResponse::kTauS[k]));
+  }
+  return left;
+}
+
+int level_of(float diagonal_m) noexcept {
+  return std::clamp(static_cast<int>(std::floor(std::log2(diagonal_m / kTexelsPerDiagonal))),
+                    kFinestLevel, kCoarsestLevel);
+}
+
+glm::ivec2 floor_of(const glm::vec2& v) noexcept {
+  return {static_cast<int>(std::floor(v.x)), static_cast<int>(std::floor(v.y))};
+}
+
+}  // namespace
+
+ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResponse response,
+                       std::size_t entities, std::int64_t start_ns, float tolerance_k)
+    : response_(std::move(response)),
+      tolerance_k_(tolerance_k),
+      start_ns_(start_ns),
+      pages_(entities > 0 ? kPages : 0),
+      places_(entities * kMostPlaces),
+      place_count_(entities, 0),
+      at_start_(entities) {
+  if (entities == 0) return;
+  for (const glm::vec4& weights : response_.weights_k()) {
+    most_weight_k_ = glm::max(most_weight_k_, weights);
+  }
+  for (Page& page : pages_) {
+    page.shade.assign(std::size_t{kSide} * kSide, glm::vec4(0.0F));
+    page.target.assign(std::size_t{kSide} * kSide, 0.0F);
+    page.top_m.assign(std::size_t{kSide} * kSide, 0.0F);
+    page.members.reserve(kMostMembers);
+  }
+  casts_.reserve(entities * kMostCasts);
+  vertices_k_.assign(drawn, 0.0F);
+  changes_.add(0, drawn);
+
+  glm::vec3 low_m(std::numeric_limits<float>::infinity());
+  glm::vec3 high_m = -low_m;
+  const auto counts = [&](std::uint32_t i) { return all.samples[i].mover < 0; };
+  for (std::uint32_t i = 0; i < drawn; ++i) {
+    if (!counts(i)) continue;
+    low_m = glm::min(low_m, all.samples[i].position_m);
+    high_m = glm::max(high_m, all.samples[i].position_m);
+  }
+  if (!(low_m.x <= high_m.x)) return;
+  lowest_m_ = low_m.z;
+  highest_m_ = high_m.z;
+  squares_m_ = glm::vec2(low_m);
+  square_m_ = std::max(
+      {kLeastSquareM, (high_m.x - low_m.x) / kMostSquares, (high_m.y - low_m.y) / kMostSquares});
+  squares_ = floor_of(glm::vec2(high_m - low_m) / square_m_) + 1;
+  const auto square_of = [&](std::uint32_t i) {
+    const glm::ivec2 at = floor_of((glm::vec2(all.samples[i].position_m) - squares_m_) / square_m_);
+    return static_cast<std::size_t>(at.y) * static_cast<std::size_t>(squares_.x) +
+           static_cast<std::size_t>(at.x);
+  };
+  first_of_square_.assign(
+      static_cast<std::size_t>(squares_.x) * static_cast<std::size_t>(squares_.y) + 1, 0);
+  for (std::uint32_t i = 0; i < drawn; ++i) {
+    if (counts(i)) ++first_of_square_[square_of(i) + 1];
+  }
+  for (std::size_t s = 1; s < first_of_square_.size(); ++s) {
+    first_of_square_[s] += first_of_square_[s - 1];
+  }
+  of_square_.resize(first_of_square_.back());
+  std::vector<std::uint32_t> next(first_of_square_.begin(), first_of_square_.end() - 1);
+  for (std::uint32_t i = 0; i < drawn; ++i) {
+    if (counts(i)) of_square_[next[square_of(i)]++] = i;
+  }
+}
+
+void ShadePages::restart(std::int64_t now_ns, std::span<const PoseHistory> entities) noexcept {
+  for (std::size_t m = 0; m < entities.size(); ++m) at_start_[m] = entities[m].at(now_ns);
+  for (Page& page : pages_) {
+    if (page.used) give_back(page);
+  }
+  next_turn_ = std::max<std::int64_t>(0, now_ns - start_ns_) / kTurnNs + 1;
+  first_turn_ = next_turn_;
+  short_turn_ = next_turn_ - kShortTurns;
+}
+
+void ShadePages::forget_changes() noexcept {
+  changes_.clear();
+  for (Page& page : pages_) page.changed = page.top_changed = false;
+}
+
+void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
+                     const Inputs& inputs) noexcept {
+  if (pages_.empty()) return;
+  first_turn_ = next_turn_;
+  const std::int64_t end = std::max<std::int64_t>(0, until_ns - start_ns_) / kTurnNs + 1;
+  if (end < next_turn_) {
+    restart(until_ns, inputs.entities);
+    short_turn_ = next_turn_;
+    return;
+  }
+  if (end - next_turn_ <= kTurnsPerFrame) {
+    for (; next_turn_ < end; ++next_turn_) take_turn(next_turn_, kTurns, all, inputs);
+    return;
+  }
+  if (end - next_turn_ > kMostWindows * kMostWindowTurns) {
+    next_turn_ = end - kMostWindows * kMostWindowTurns;
+    for (Page& page : pages_) {
+      page.left_frac *= left_after(next_turn_ - 1 - page.at_turn);
+      page.at_turn = next_turn_ - 1;
+    }
+  }
+  const std::int64_t due = end - next_turn_;
+  const std::int64_t windows = std::min(kMostWindows, due / kTurns);
+  for (std::int64_t w = windows; w > 0; --w) {
+    const std::int64_t turns = (end - next_turn_) / w;
+    next_turn_ += turns;
+    take_turn(next_turn_ - 1, turns, all, inputs);
+  }
+}
+
+ShadePages::Page* ShadePages::page_at(int level, const glm::ivec2& cell) noexcept {
+  for (std::size_t p = 0; p < keys_.size(); ++p) {
+    if (keys_[p].level == level && keys_[p].cell == cell) return &pages_[p];
+  }
+  return nullptr;
+}
+
+float ShadePages::worth_k(const Page& page) const noexcept {
+  return glm::dot(most_weight_k_, page.left_frac * page.most);
+}
+
+float ShadePages::passing_k(float seconds) const noexcept {
+  float sum_k = 0.0F;
+  for (std::size_t k = 0; k < ShadeResponse::kModes; ++k) {
+    sum_k -= most_weight_k_[static_cast<glm::length_t>(k)] *
+             std::expm1(-seconds / static_cast<float>(ShadeResponse::kTauS[k]));
+  }
+  return sum_k;
+}
+
+void ShadePages::give_back(Page& page) noexcept {
+  hide_vertices(page);
+  page.used = false;
+  keys_[static_cast<std::size_t>(&page - pages_.data())].level = kNoLevel;
+}
+
+bool ShadePages::has_come(std::size_t mover, const PoseHistory& entity,
+                          std::int64_t at_ns) const noexcept {
+  const TrajectoryState& then = at_start_[mover];
+  const TrajectoryState now = entity.at(at_ns);
+  return now.on != then.on || !physics::close(now.pose, then.pose, kStayedM, kStayedRad);
+}
+
+ShadePages::Page* ShadePages::take_page(std::int64_t turn, bool come) noexcept {
+  Page* least = nullptr;
+  const auto unused = std::ranges::find(keys_, kNoLevel, &Key::level);
+  if (unused != keys_.end()) return &pages_[static_cast<std::size_t>(unused - keys_.begin())];
+  for (Page& page : pages_) {
+    if (!come || page.come_turn > turn - kTurns) continue;
+    if (least == nullptr || worth_k(page) < worth_k(*least)) least = &page;
+  }
+  if (!come) return nullptr;
+  if (least == nullptr || (least->come_turn > kNever && worth_k(*least) > tolerance_k_)) {
+    short_turn_ = turn;
+  }
+  if (least != nullptr) give_back(*least);
+  return least;
+}
+
+std::optional<float> ShadePages::plane_of(int level, const glm::ivec2& cell, float top_m,
+                                          const CasterRays& rays) const noexcept {
+  const float own_m = std::ldexp(1.0F, level) * kOwnSide;
+  const glm::vec2 middle_m = own_m * (glm::vec2(cell) + 0.5F);
+  std::array<CasterRay, 5> down;
+  for (std::size_t i = 0; i < down.size(); ++i) {
+    const glm::vec2 aside((i & 1U) != 0U ? 0.25F : -0.25F, (i & 2U) != 0U ? 0.25F : -0.25F);
+    down[i] = {{middle_m + (i < 4 ? own_m * aside : glm::vec2(0.0F)), top_m}, {0.0F, 0.0F, -1.0F}};
+  }
+  std::array<CasterHit, down.size()> hits;
+  const std::uint32_t met = rays.first_hits(down, {true, {}}, hits);
+  if (met == 0) return std::nullopt;
+  // What stands on the ground takes shade along the same rays.
+  float plane_m = std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < down.size(); ++i) {
+    if (((met >> i) & 1U) != 0) plane_m = std::min(plane_m, top_m - hits[i].distance_m);
+  }
+  // Rays belong to one page each where neighbours have one plane.
+  float nearest_m = 0.5F * kLowestFrac * own_m;
+  std::optional<float> neighbours_m;
+  for (const Page& page : pages_) {
+    if (!page.used || page.level != level ||
+        glm::any(glm::greaterThan(glm::abs(page.cell - cell), glm::ivec2(1)))) {
+      continue;
+    }
+    if (std::abs(page.plane_m - plane_m) > nearest_m) continue;
+    nearest_m = std::abs(page.plane_m - plane_m);
+    neighbours_m = page.plane_m;
+  }
+  return neighbours_m.value_or(plane_m);
+}
+
+bool ShadePages::begin(Page& page, int level, const glm::ivec2& cell, float top_m,
+                       const CasterRays& rays) const noexcept {
+  const std::optional<float> plane_m = plane_of(level, cell, top_m, rays);
+  if (!plane_m) return false;
+  const float texel_m = std::ldexp(1.0F, level);
+  const float own_m = texel_m * kOwnSide;
+  page.used = true;
+  page.level = level;
+  page.cell = cell;
+  page.texel_m = texel_m;
+  page.first_m = own_m * glm::vec2(cell) - 0.5F * texel_m;
+  page.plane_m = *plane_m;
+  page.reach_m = 0.0F;
+  page.lowest_m = std::max(-kLowestFrac * own_m, lowest_m_ - *plane_m - kReachMarginM);
+  page.left_frac = glm::vec4(1.0F);
+  page.most = glm::vec4(0.0F);
+  page.members_ns = kNever;
+  page.come_turn = kNever;
+  page.changed = page.top_changed = true;
+  std::ranges::fill(page.shade, glm::vec4(0.0F));
+  std::ranges::fill(page.top_m, kReachMarginM);
+  page.marked.fill(0);
+  return true;
+}
+
+void ShadePages::cast(std::size_t mover, std::int64_t turn, std::int64_t turns, bool come,
+                      const glm::dvec3& to_sun, const Inputs& inputs) noexcept {
+  const std::int64_t end_ns = start_ns_ + turn * kTurnNs;
+  const std::int64_t begin_ns = end_ns - turns * kTurnNs;
+  const PoseHistory& entity = inputs.entities[mover];
+  const glm::dvec3& origin_m = inputs.rays.origin_world_m();
+  const auto placement_at = [&](std::int64_t at_ns) {
+    const TrajectoryState state = entity.at(at_ns);
+    return MoverPlacement{glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
+                          glm::vec3(state.pose.position_world_m - origin_m), state.on};
+  };
+  place_count_[mover] = 0;
+  const MoverPlacement middle = placement_at(begin_ns + (end_ns - begin_ns) / 2);
+  const float diagonal_m = inputs.silhouettes.diagonal_m(mover);
+  if (!middle.on || !(diagonal_m > 0.0F)) return;
+  const float way_m =
+      glm::distance(placement_at(begin_ns).position_m, placement_at(end_ns).position_m);
+  if (way_m > kMostGapFrac * diagonal_m * kMostPlaces) {
+    const auto window_s = static_cast<float>(1e-9 * static_cast<double>(end_ns - begin_ns));
+    if (come && passing_k(window_s * diagonal_m / way_m) > tolerance_k_) short_turn_ = turn;
+    return;
+  }
+  const glm::vec3 sun(to_sun);
+  const bool sharp = inputs.silhouettes.look(mover, sun * middle.rel_from_body,
+                                             Silhouettes::kSmearedRad, inputs.rays, inputs.workers);
+  if (!sharp && come) short_turn_ = turn;
+  const float texel_m = std::ldexp(1.0F, level_of(diagonal_m));
+  std::uint32_t places = 1;
+  while (places < kMostPlaces && way_m > kPlaceTexels * texel_m * static_cast<float>(places)) {
+    places *= 2;
+  }
+  cast_on_.reset();
+  for (std::uint32_t i = 0; i < places; ++i) {
+    const MoverPlacement placement =
+        placement_at(begin_ns + (end_ns - begin_ns) * (2 * i + 1) / (2 * places));
+    if (!placement.on) continue;
+    const PlacedSilhouette placed = inputs.silhouettes.place(mover, placement, sun);
+    places_[mover * kMostPlaces + place_count_[mover]++] = {placed, i, places};
+    // The ground behind it.
+    const CasterRay behind{inputs.silhouettes.middle_m(mover, placement), -sun};
+    std::array<CasterHit, 1> hit;
+    if (inputs.rays.first_hits({&behind, 1}, {true, {}}, hit) == 0) continue;
+    const float ground_m = behind.origin_m.z - hit[0].distance_m * sun.z;
+    const float top_m = placement.position_m.z + inputs.silhouettes.top_m(mover, placement);
+    find_pages(mover, turn, turns, come, placed, ground_m, top_m, inputs);
+  }
+}
+
+void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t turns, bool come,
+                            const PlacedSilhouette& placed, float ground_m, float top_m,
+                            const Inputs& inputs) noexcept {
+  const ShadedBox box = shaded_box(placed, ground_m);
+  int level = level_of(inputs.silhouettes.diagonal_m(mover));
+  float texel_m = std::ldexp(1.0F, level);
+  glm::ivec2 first(0);
+  glm::ivec2 last(-1);
+  // Long shadows have wider texels.
+  for (int coarser = 0;; ++coarser) {
+    const float own_m = texel_m * kOwnSide;
+    const glm::vec2 size = (box.high_m - box.low_m) / own_m;
+    if (std::max(size.x, size.y) < static_cast<float>(kMostCells)) {
+      first = floor_of((box.low_m - texel_m) / own_m);
+      last = floor_of((box.high_m + texel_m) / own_m);
+      const glm::ivec2 count = last - first + 1;
+      if (count.x * count.y <= static_cast<int>(kMostCells)) break;
+    }
+    if (coarser == kMostCoarser) {
+      if (come) short_turn_ = turn;
+      return;
+    }
+    ++level;
+    texel_m *= 2.0F;
+  }
+  for (int y = first.y; y <= last.y; ++y) {
+    for (int x = first.x; x <= last.x; ++x) {
+      if (!meets(placed, texel_m, {x, y}, ground_m)) continue;
+      Page* page = page_at(level, {x, y});
+      if (page == nullptr) {
+        page = take_page(turn, come);
+        if (page == nullptr || !begin(*page, level, {x, y}, top_m, inputs.rays)) continue;
+        keys_[static_cast<std::size_t>(page - pages_.data())] = {level, {x, y}};
+        // Its first turn will be of as much time as any.
+        const auto group = static_cast<std::int64_t>(page - pages_.data()) % kTurns;
+        const std::int64_t wait = turns == kTurns ? (group - turn % kTurns + kTurns) % kTurns : 0;
+        page->at_turn = turn + wait - turns;
+      }
+      page->cast_turn = turn;
+      if (come) page->come_turn = turn;
+      page->reach_m =
+          std::max(page->reach_m, std::min(top_m, highest_m_) - page->plane_m + kReachMarginM);
+      const auto index = static_cast<std::size_t>(page - pages_.data());
+      if (cast_on_[index]) continue;
+      if (casts_.size() == casts_.capacity()) {
+        if (come) short_turn_ = turn;
+        return;
+      }
+      cast_on_[index] = true;
+      casts_.push_back({static_cast<std::uint32_t>(index), static_cast<std::uint32_t>(mover)});
+    }
+  }
+}
+
+bool ShadePages::meets(const PlacedSilhouette& placed, float texel_m, const glm::ivec2& cell,
+                       float plane_m) noexcept {
+  const float own_m = texel_m * kOwnSide;
+  glm::vec2 low(std::numeric_limits<float>::infinity());
+  glm::vec2 high = -low;
+  float depth_m = 0.0F;
+  for (int i = 0; i < 4; ++i) {
+    const glm::vec2 corner((i & 1) != 0 ? 1.0F : 0.0F, (i & 2) != 0 ? 1.0F : 0.0F);
+    const glm::vec2 rim_m = texel_m * (2.0F * corner - 1.0F);
+    const glm::vec4 p(own_m * (glm::vec2(cell) + corner) + rim_m, plane_m, 1.0F);
+    const glm::vec2 at(glm::dot(placed.column, p), glm::dot(placed.row, p));
+    low = glm::min(low, at);
+    high = glm::max(high, at);
+    depth_m = std::max(depth_m, glm::dot(placed.depth_m, p));
+  }
+  constexpr float kMiddle = 0.5F * Silhouettes::kSide;
+  const glm::vec2 half = placed.half + penumbra_texels(placed, depth_m);
+  return glm::all(glm::lessThanEqual(low, kMiddle + half)) &&
+         glm::all(glm::greaterThanEqual(high, kMiddle - half));
+}
+
+void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const glm::vec4& gain,
+                       const Silhouettes& silhouettes) noexcept {
+  constexpr auto kLast = static_cast<int>(kSide) - 1;
+  for (const Cast& cast : casts_) {
+    if (cast.page != index) continue;
+    const std::uint32_t places = place_count_[cast.mover];
+    for (std::uint32_t p = 0; p < places; ++p) {
+      const auto& [placed, number, of] = places_[cast.mover * kMostPlaces + p];
+      const ShadedBox box = shaded_box(placed, page.plane_m);
+      constexpr auto kEnd = static_cast<float>(kSide);
+      const auto texel_of = [&](const glm::vec2& at_m, float aside) {
+        return glm::clamp((at_m - page.first_m) / page.texel_m + aside, -1.0F, kEnd);
+      };
+      const glm::ivec2 first = glm::max(floor_of(texel_of(box.low_m, -1.0F)), 0);
+      const glm::ivec2 last = glm::min(floor_of(texel_of(box.high_m, 1.0F)), kLast);
+      const auto line = [&](const glm::vec4& axis) {
+        return glm::dot(axis, glm::vec4(page.first_m, page.plane_m, 1.0F));
+      };
+      const glm::vec3 origin(line(placed.column), line(placed.row), line(placed.depth_m));
+      const glm::vec3 right =
+          page.texel_m * glm::vec3(placed.column.x, placed.row.x, placed.depth_m.x);
+      const glm::vec3 up =
+          page.texel_m * glm::vec3(placed.column.y, placed.row.y, placed.depth_m.y);
+      for (int y = first.y; y <= last.y; ++y) {
+        float* row = &page.target[static_cast<std::size_t>(y) * kSide];
+        const float* tops_m = &page.top_m[static_cast<std::size_t>(y) * kSide];
+        float found = 0.0F;
+        for (int x = first.x; x <= last.x; ++x) {
+          const glm::vec3 at = origin + static_cast<float>(x) * right + static_cast<float>(y) * up;
+          const float frac = silhouettes.shaded_frac(cast.mover, at.x, at.y, at.z,
+                                                     penumbra_texels(placed, at.z), number, of);
+          if (frac == 0.0F) continue;
+          row[x] += frac;
+          found += frac;
+          // Whatever lies deeper along this ray is in the shade.
+          const float top_m =
+              (silhouettes.caster_m(cast.mover, at.x, at.y) - at.z) * placed.depth_m.z;
+          if (top_m > tops_m[x] + kTopStepM) raise(page, x, y, top_m);
+        }
+        if (found > 0.0F) page.marked[static_cast<std::size_t>(y)] = 1;
+      }
+    }
+  }
+  glm::vec4 most(0.0F);
+  for (std::size_t y = 0; y < kSide; ++y) {
+    if (page.marked[y] == 0) continue;
+    glm::vec4* shade = &page.shade[y * kSide];
+    float* target = &page.target[y * kSide];
+    for (std::size_t x = 0; x < kSide; ++x) {
+      const glm::vec4 before = page.left_frac * shade[x];
+      shade[x] = before + gain * (flux_frac * std::min(target[x], 1.0F) - before);
+      most = glm::max(most, shade[x]);
+      target[x] = 0.0F;
+    }
+  }
+  page.most = most;
+  page.left_frac = glm::vec4(1.0F);
+  page.changed = true;
+}
+
+void ShadePages::raise(Page& page, int x, int y, float top_m) noexcept {
+  // Neighbours too: between texels shade is that of both.
+  constexpr auto kLast = static_cast<int>(kSide) - 1;
+  for (int row = std::max(0, y - 1); row <= std::min(kLast, y + 1); ++row) {
+    for (int column = std::max(0, x - 1); column <= std::min(kLast, x + 1); ++column) {
+      float& here_m =
+          page.top_m[static_cast<std::size_t>(row) * kSide + static_cast<std::size_t>(column)];
+      here_m = std::max(here_m, top_m);
+    }
+  }
+  page.top_changed = true;
+}
+
+void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, const SurfaceSamples& all,
+                           const Inputs& inputs) noexcept {
+  const std::int64_t end_ns = start_ns_ + turn * kTurnNs;
+  const std::int64_t middle_ns = end_ns - turns * kTurnNs / 2;
+  const physics::SunPosition sun = inputs.environment.sun_at(middle_ns);
+  casts_.clear();
+  float flux_frac = 0.0F;
+  if (sun.direction_enu.z > kLeastSunSine) {
+    const physics::Forcing forcing = inputs.environment.forcing_at(middle_ns, sun);
+    flux_frac = static_cast<float>(forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) /
+                                   ShadeResponse::kFullSunWM2);
+    slope_ = glm::vec2(sun.direction_enu) / static_cast<float>(sun.direction_enu.z);
+    for (const bool come : {true, false}) {
+      for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
+        if (has_come(m, inputs.entities[m], end_ns) == come) {
+          cast(m, turn, turns, come, sun.direction_enu, inputs);
+        }
+      }
+    }
+  }
+  // Within a frame's time pages take turns.
+  const std::size_t stride = turns == kTurns ? kTurns : 1;
+  const std::size_t first = static_cast<std::size_t>(turn) % stride;
+  inputs.workers.run(pages_.size() / stride, 1, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const std::size_t p = first + i * stride;
+      Page& page = pages_[p];
+      if (!page.used) continue;
+      const glm::vec4 left = left_after(turn - page.at_turn);
+      page.at_turn = turn;
+      if (page.cast_turn > turn - turns) {
+        shade(page, static_cast<std::uint32_t>(p), flux_frac, 1.0F - left, inputs.silhouettes);
+      } else {
+        page.left_frac *= left;
+      }
+    }
+  });
+  for (std::size_t p = first; p < pages_.size(); p += stride) {
+    Page& page = pages_[p];
+    if (!page.used) continue;
+    if (page.cast_turn <= turn - turns && worth_k(page) < kLeastWorthFrac * tolerance_k_) {
+      give_back(page);
+    } else {
+      show_vertices(page, all, end_ns);
+    }
+  }
+}
+
+glm::vec4 ShadePages::at(const Page& page, const glm::vec3& position_m) const noexcept {
+  const float height_m = position_m.z - page.plane_m;
+  const glm::vec2 at = (glm::vec2(position_m) - height_m * slope_ - page.first_m) / page.texel_m;
+  constexpr float kLast = kSide - 1.001F;
+  const glm::vec2 inside = glm::clamp(at, 0.0F, kLast);
+  const glm::ivec2 first = floor_of(inside);
+  const glm::vec2 way = inside - glm::vec2(first);
+  const std::size_t i =
+      static_cast<std::size_t>(first.y) * kSide + static_cast<std::size_t>(first.x);
+  const std::size_t nearest = i + (way.x < 0.5F ? 0U : 1U) + (way.y < 0.5F ? 0U : kSide);
+  if (height_m > page.top_m[nearest]) return glm::vec4(0.0F);
+  return glm::mix(glm::mix(page.shade[i], page.shade[i + 1], way.x),
+                  glm::mix(page.shade[i + kSide], page.shade[i + kSide + 1], way.x), way.y);
+}
+
+void ShadePages::gather(Page& page, const SurfaceSamples& all, std::int64_t at_ns) const noexcept {
+  page.members_ns = at_ns;
+  page.members.clear();
+  page.fine = false;
+  if (of_square_.empty()) return;
+  const float own_m = page.texel_m * kOwnSide;
+  const glm::vec2 low_m = own_m * glm::vec2(page.cell);
+  const glm::vec2 high_m = low_m + own_m;
+  const glm::vec2 reach_m = std::max(page.reach_m, -page.lowest_m) * glm::abs(slope_);
+  const auto square_at = [&](const glm::vec2& at_m) {
+    return glm::clamp(floor_of((at_m - squares_m_) / square_m_), glm::ivec2(0), squares_ - 1);
+  };
+  const glm::ivec2 first = square_at(low_m - reach_m);
+  const glm::ivec2 last = square_at(high_m + reach_m);
+  for (int y = first.y; y <= last.y; ++y) {
+    for (int x = first.x; x <= last.x; ++x) {
+      const std::size_t square =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(squares_.x) +
+          static_cast<std::size_t>(x);
+      for (std::uint32_t k = first_of_square_[square]; k < first_of_square_[square + 1]; ++k) {
+        const glm::vec3& position_m = all.samples[of_square_[k]].position_m;
+        const float height_m = position_m.z - page.plane_m;
+        if (height_m > page.reach_m || height_m < page.lowest_m) continue;
+        const glm::vec2 at_m = glm::vec2(position_m) - height_m * slope_;
+        if (glm::any(glm::lessThan(at_m, low_m)) || glm::any(glm::greaterThanEqual(at_m, high_m))) {
+          continue;
+        }
+        if (page.members.size() == kMostMembers) {
+          page.members.clear();
+          page.fine = true;
+          return;
+        }
+        page.members.push_back({of_square_[k], at(page, position_m)});
+      }
+    }
+  }
+  // Neighbours in memory go to the device together.
+  std::ranges::sort(page.members, {}, &Member::sample);
+}
+
+void ShadePages::hide_vertices(Page& page) noexcept {
+  for (const Member& member : page.members) {
+    vertices_k_[member.sample] -= member.shown_k;
+    changes_.add(member.sample, 1);
+  }
+  page.members.clear();
+}
+
+void ShadePages::show_vertices(Page& page, const SurfaceSamples& all,
+                               std::int64_t now_ns) noexcept {
+  if (page.members_ns <= now_ns - kGatherNs) {
+    hide_vertices(page);
+    gather(page, all, now_ns);
+  }
+  for (Member& member : page.members) {
+    const SurfaceSample& sample = all.samples[member.sample];
+    if (page.changed) member.shade = at(page, sample.position_m);
+    const float shown_k =
+        glm::dot(response_.weights_k()[sample.material], page.left_frac * member.shade);
+    if (std::abs(shown_k - member.shown_k) < kLeastChangeK) continue;
+    vertices_k_[member.sample] += shown_k - member.shown_k;
+    member.shown_k = shown_k;
+    changes_.add(member.sample, 1);
+  }
+}
+
+}  // namespace emit::renderer

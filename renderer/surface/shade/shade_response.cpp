@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/shade/shade_response.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kTimes = 48;
+constexpr std::size_t kModes = ShadeResponse::kModes;
+using Weights = std::array<double, kModes>;
+using Normal = std::array<std::array<double, kModes>, kModes>;
+
+/// Solves the normal equations of the chosen unknowns, the others being zero.
+Weights solve(Normal a, Weights b, std::uint32_t chosen) noexcept {
+  const auto free = [chosen](std::size_t i) { return ((chosen >> i) & 1U) != 0U; };
+  for (std::size_t i = 0; i < kModes; ++i) {
+    if (!free(i)) continue;
+    for (std::size_t row = i + 1; row < kModes; ++row) {
+      if (!free(row)) continue;
+      const double factor = a[row][i] / a[i][i];
+      for (std::size_t column = i; column < kModes; ++column) {
+        a[row][column] -= factor * a[i][column];
+      }
+      b[row] -= factor * b[i];
+    }
+  }
+  Weights x{};
+  for (std::size_t i = kModes; i-- > 0;) {
+    if (!free(i)) continue;
+    double sum = b[i];
+    for (std::size_t column = i + 1; column < kModes; ++column) sum -= a[i][column] * x[column];
+    x[i] = sum / a[i][i];
+  }
+  return x;
+}
+
+/// Least squares of the relative error without negative weights: the best of all sets of modes.
+Weights fitted(std::span<const double> times_s, std::span<const double> response) noexcept {
+  Normal a{};
+  Weights b{};
+  const double most = response.back();
+  if (!(most > 0.0)) return {};
+  for (std::size_t j = 0; j < times_s.size(); ++j) {
+    const double scale = 1.0 / std::max(response[j], 1e-3 * most);
+    Weights term;
+    for (std::size_t k = 0; k < kModes; ++k) {
+      term[k] = -std::expm1(-times_s[j] / ShadeResponse::kTauS[k]) * scale;
+    }
+    for (std::size_t k = 0; k < kModes; ++k) {
+      b[k] += term[k] * response[j] * scale;
+      for (std::size_t l = 0; l < kModes; ++l) a[k][l] += term[k] * term[l];
+    }
+  }
+  Weights best{};
+  double least = std::numeric_limits<double>::infinity();
+  for (std::uint32_t chosen = 1; chosen < 1U << kModes; ++chosen) {
+    const Weights x = solve(a, b, chosen);
+    if (std::ranges::any_of(x, [](double value) { return !(value >= 0.0); })) continue;
+    double error = 0.0;  // but for a constant
+    for (std::size_t k = 0; k < kModes; ++k) {
+      error -= 2.0 * x[k] * b[k];
+      for (std::size_t l = 0; l < kModes; ++l) error += x[k] * a[k][l] * x[l];
+    }
+    if (error < least) {
+      least = error;
+      best = x;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+ShadeResponse::ShadeResponse(const SampleHeat& heat, std::size_t materials,
+                             const ResponseConditions& around) {
+  std::array<double, kTimes> times_s;
+  for (std::size_t j = 0; j < kTimes; ++j) {
+    times_s[j] = kFirstS * std::pow(kLastS / kFirstS, static_cast<double>(j) / (kTimes - 1));
+  }
+  std::array<double, kTimes> response;
+  for (std::size_t m = 0; m < materials; ++m) {
+    heat.step_response(static_cast<std::uint32_t>(m), around, times_s, response);
+    const Weights weights = fitted(times_s, response);
+    glm::vec4& out = weights_k_.emplace_back();
+    for (std::size_t k = 0; k < kModes; ++k) {
+      out[static_cast<glm::length_t>(k)] = static_cast<float>(kFullSunWM2 * weights[k]);
+    }
+  }
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/shade/silhouettes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "emit/physics/constants.hpp"
+#include "shared/shade_params.glsl.h"
+#include "surface/mesh/tangents.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// Of a texel with open ones and others around it.
+constexpr float kMixedM = -1e30F;
+/// Empty texels around the body.
+constexpr float kRim = 2.0F;
+
+std::array<glm::vec3, 8> corners(const scene::Aabb& box) noexcept {
+  std::array<glm::vec3, 8> out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = glm::vec3((i & 1U) != 0U ? box.max_m.x : box.min_m.x,
+                       (i & 2U) != 0U ? box.max_m.y : box.min_m.y,
+                       (i & 4U) != 0U ? box.max_m.z : box.min_m.z);
+  }
+  return out;
+}
+
+const std::array<glm::vec2, EMIT_SHADE_TAPS>& taps() noexcept {
+  static const auto kTaps = [] {
+    std::array<glm::vec2, EMIT_SHADE_TAPS> out;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const auto [x, y] = shade_tap(static_cast<std::uint32_t>(i));
+      out[i] = {x, y};
+    }
+    return out;
+  }();
+  return kTaps;
+}
+
+/// Where the line through a place of a silhouette meets the level plane.
+glm::vec2 on_plane(const PlacedSilhouette& silhouette, float column, float row,
+                   float plane_m) noexcept {
+  const glm::vec4& c = silhouette.column;
+  const glm::vec4& r = silhouette.row;
+  const float right_c = column - c.z * plane_m - c.w;
+  const float right_r = row - r.z * plane_m - r.w;
+  const float determinant = c.x * r.y - c.y * r.x;
+  return {(right_c * r.y - c.y * right_r) / determinant,
+          (c.x * right_r - right_c * r.x) / determinant};
+}
+
+}  // namespace
+
+Silhouettes::Silhouettes(std::span<const scene::Aabb> bounds_m) : alone_(bounds_m.size()) {
+  for (MoverPlacement& placement : alone_) placement.on = false;
+  for (const scene::Aabb& box : bounds_m) {
+    Tile& tile = tiles_.emplace_back();
+    tile.box_m = box;
+    tile.depth_m.assign(std::size_t{kSide} * kSide, kOpenM);
+    tile.around_m.assign(std::size_t{kSide} * kSide, kOpenM);
+  }
+  (void)taps();
+}
+
+bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
+                       const CasterRays& rays, threads::WorkerPool& workers) noexcept {
+  Tile& tile = tiles_[mover];
+  const float turned_rad = glm::distance(tile.to_sun, to_sun_body);
+  if (tile.box_m.empty() || turned_rad < most_turn_rad) return true;
+  constexpr float kStale = 10.0F;
+  if (looks_left_ == 0) return turned_rad < kStale * most_turn_rad;
+  --looks_left_;
+  tile.to_sun = to_sun_body;
+  ++tile.revision;
+  const Tangents tangents = tangents_of(to_sun_body);
+  tile.across = tangents.u;
+  tile.along = tangents.v;
+  glm::vec2 low_m(std::numeric_limits<float>::infinity());
+  glm::vec2 high_m = -low_m;
+  float deepest_m = -std::numeric_limits<float>::infinity();
+  for (const glm::vec3& corner_m : corners(tile.box_m)) {
+    const glm::vec2 at_m(glm::dot(tile.across, corner_m), glm::dot(tile.along, corner_m));
+    low_m = glm::min(low_m, at_m);
+    high_m = glm::max(high_m, at_m);
+    deepest_m = std::max(deepest_m, -glm::dot(to_sun_body, corner_m));
+  }
+  const glm::vec2 size_m = high_m - low_m;
+  tile.texel_m = std::max({size_m.x, size_m.y, 1e-3F}) / (kSide - 2.0F * kRim);
+  tile.corner_m = 0.5F * (low_m + high_m) - 0.5F * kSide * tile.texel_m;
+  tile.half = 0.5F * size_m / tile.texel_m + kRim;
+
+  const float start_m = deepest_m + tile.texel_m;
+  alone_[mover].on = true;
+  const CasterSelection only{false, std::span(alone_).first(mover + 1)};
+  workers.run(kSide, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      for (std::size_t first = 0; first < kSide; first += CasterRays::kMaxRays) {
+        std::array<CasterRay, CasterRays::kMaxRays> sent;
+        std::array<CasterHit, CasterRays::kMaxRays> hits;
+        for (std::size_t k = 0; k < sent.size(); ++k) {
+          const glm::vec2 at_m =
+              tile.corner_m + tile.texel_m * (glm::vec2(first + k, row) + glm::vec2(0.5F));
+          sent[k] = {at_m.x * tile.across + at_m.y * tile.along - start_m * to_sun_body,
+                     to_sun_body};
+        }
+        const std::uint32_t hit = rays.first_hits(sent, only, hits);
+        for (std::size_t k = 0; k < sent.size(); ++k) {
+          tile.depth_m[row * kSide + first + k] =
+              ((hit >> k) & 1U) != 0U ? start_m - hits[k].distance_m : kOpenM;
+        }
+      }
+    }
+  });
+  alone_[mover].on = false;
+  double sum_m = 0.0;
+  std::size_t count = 0;
+  for (const float depth_m : tile.depth_m) {
+    if (depth_m >= kOpenM) continue;
+    sum_m += static_cast<double>(depth_m);
+    ++count;
+  }
+  look_around(tile);
+  tile.mean_m = count > 0 ? static_cast<float>(sum_m / static_cast<double>(count)) : 0.0F;
+  return true;
+}
+
+void Silhouettes::look_around(Tile& tile) noexcept {
+  constexpr auto kEnd = static_cast<int>(kSide);
+  for (int y = 0; y < kEnd; ++y) {
+    for (int x = 0; x < kEnd; ++x) {
+      int open = 0;
+      float deepest_m = -kOpenM;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          const int column = x + dx;
+          const int row = y + dy;
+          const bool inside = column >= 0 && row >= 0 && column < kEnd && row < kEnd;
+          const float depth_m =
+              inside ? tile.depth_m[static_cast<std::size_t>(row * kEnd + column)] : kOpenM;
+          if (depth_m >= kOpenM) {
+            ++open;
+          } else {
+            deepest_m = std::max(deepest_m, depth_m);
+          }
+        }
+      }
+      float& around_m = tile.around_m[static_cast<std::size_t>(y * kEnd + x)];
+      around_m = open == 9 ? kOpenM : open > 0 ? kMixedM : deepest_m;
+    }
+  }
+}
+
+PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& placement,
+                                    const glm::vec3& to_sun) const noexcept {
+  const Tile& tile = tiles_[mover];
+  const auto line = [&](const glm::vec3& axis_body, float scale, float origin) {
+    const glm::vec3 axis = placement.rel_from_body * axis_body;
+    return glm::vec4(scale * axis, origin - scale * glm::dot(axis, placement.position_m));
+  };
+  const float per_m = 1.0F / tile.texel_m;
+  PlacedSilhouette placed{line(tile.across, per_m, -tile.corner_m.x * per_m),
+                          line(tile.along, per_m, -tile.corner_m.y * per_m),
+                          line(-tile.to_sun, 1.0F, 0.0F),
+                          tile.mean_m,
+                          tile.texel_m,
+                          tile.half};
+  // The body may have turned a little since: rays go to the sun all the same, through the place
+  // that they have in the depth of what shades.
+  const glm::vec4 aside = (placed.depth_m - glm::vec4(0.0F, 0.0F, 0.0F, tile.mean_m)) /
+                          glm::dot(glm::vec3(placed.depth_m), to_sun);
+  placed.column -= glm::dot(glm::vec3(placed.column), to_sun) * aside;
+  placed.row -= glm::dot(glm::vec3(placed.row), to_sun) * aside;
+  return placed;
+}
+
+float Silhouettes::shaded_frac(std::size_t mover, float column, float row, float depth_m,
+                               float radius_texels, std::uint32_t first,
+                               std::uint32_t stride) const noexcept {
+  const std::vector<float>& depths_m = tiles_[mover].depth_m;
+  constexpr auto kWidth = static_cast<float>(kSide);
+  if (column < -radius_texels || row < -radius_texels || column >= kWidth + radius_texels ||
+      row >= kWidth + radius_texels) {
+    return 0.0F;
+  }
+  if (radius_texels <= kAround && column >= 0.0F && row >= 0.0F && column < kWidth &&
+      row < kWidth) {
+    const float around_m =
+        tiles_[mover]
+            .around_m[static_cast<std::size_t>(row) * kSide + static_cast<std::size_t>(column)];
+    if (around_m >= kOpenM) return 0.0F;
+    if (around_m > kMixedM && depth_m > around_m + EMIT_SHADE_LIFT_M) {
+      return 1.0F / static_cast<float>(stride);
+    }
+  }
+  int shaded = 0;
+  for (std::size_t i = first; i < EMIT_SHADE_TAPS; i += stride) {
+    const glm::vec2& tap = taps()[i];
+    const auto x = static_cast<int>(std::floor(column + radius_texels * tap.x));
+    const auto y = static_cast<int>(std::floor(row + radius_texels * tap.y));
+    constexpr auto kEnd = static_cast<int>(kSide);
+    if (x < 0 || y < 0 || x >= kEnd || y >= kEnd) continue;
+    if (depth_m > depths_m[static_cast<std::size_t>(y * kEnd + x)] + EMIT_SHADE_LIFT_M) ++shaded;
+  }
+  return static_cast<float>(shaded) / EMIT_SHADE_TAPS;
+}
+
+float Silhouettes::caster_m(std::size_t mover, float column, float row) const noexcept {
+  const Tile& tile = tiles_[mover];
+  constexpr float kLast = static_cast<float>(kSide) - 1.0F;
+  const float depth_m =
+      tile.depth_m[static_cast<std::size_t>(std::clamp(row, 0.0F, kLast)) * kSide +
+                   static_cast<std::size_t>(std::clamp(column, 0.0F, kLast))];
+  return depth_m < kOpenM ? depth_m : tile.mean_m;
+}
+
+float Silhouettes::diagonal_m(std::size_t mover) const noexcept {
+  const scene::Aabb& box_m = tiles_[mover].box_m;
+  return box_m.empty() ? 0.0F : static_cast<float>(glm::distance(box_m.min_m, box_m.max_m));
+}
+
+float Silhouettes::rim_m(std::size_t mover, float way_m) const noexcept {
+  static const auto kTangent = static_cast<float>(std::tan(physics::kSunSemiAngleRad));
+  // Texels are no wider than the box's diagonal makes them, whichever way it is turned.
+  return way_m * kTangent + diagonal_m(mover) * (kRim + 1.0F) / kSide;
+}
+
+glm::vec3 Silhouettes::middle_m(std::size_t mover, const MoverPlacement& placement) const noexcept {
+  const scene::Aabb& box_m = tiles_[mover].box_m;
+  return placement.rel_from_body * glm::vec3(0.5 * (box_m.min_m + box_m.max_m)) +
+         placement.position_m;
+}
+
+std::array<glm::vec3, 8> Silhouettes::corners_m(std::size_t mover,
+                                                const MoverPlacement& placement) const noexcept {
+  std::array<glm::vec3, 8> out = corners(tiles_[mover].box_m);
+  for (glm::vec3& corner_m : out) {
+    corner_m = placement.rel_from_body * corner_m + placement.position_m;
+  }
+  return out;
+}
+
+float Silhouettes::top_m(std::size_t mover, const MoverPlacement& placement) const noexcept {
+  float top_m = -std::numeric_limits<float>::infinity();
+  for (const glm::vec3& corner_m : corners(tiles_[mover].box_m)) {
+    top_m = std::max(top_m, (placement.rel_from_body * corner_m).z);
+  }
+  return top_m;
+}
+
+float penumbra_texels(const PlacedSilhouette& silhouette, float depth_m) noexcept {
+  static const auto kTangent = static_cast<float>(std::tan(physics::kSunSemiAngleRad));
+  constexpr float kLeast = 0.5F;
+  return std::max(kLeast, (depth_m - silhouette.mean_m) * kTangent / silhouette.texel_m);
+}
+
+ShadedBox shaded_box(const PlacedSilhouette& silhouette, float plane_m) noexcept {
+  constexpr auto kEnd = static_cast<float>(Silhouettes::kSide);
+  const glm::vec2 middle_m = on_plane(silhouette, 0.5F * kEnd, 0.5F * kEnd, plane_m);
+  const float depth_m = glm::dot(silhouette.depth_m, glm::vec4(middle_m, plane_m, 1.0F));
+  const float rim = penumbra_texels(silhouette, depth_m);
+  ShadedBox box{middle_m, middle_m};
+  const glm::vec2 half = silhouette.half + rim;
+  for (const float column : {0.5F * kEnd - half.x, 0.5F * kEnd + half.x}) {
+    for (const float row : {0.5F * kEnd - half.y, 0.5F * kEnd + half.y}) {
+      const glm::vec2 at_m = on_plane(silhouette, column, row, plane_m);
+      box.low_m = glm::min(box.low_m, at_m);
+      box.high_m = glm::max(box.high_m, at_m);
+    }
+  }
+  return box;
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/state/state_file.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "surface/mesh/sheet_sides.hpp"
+#include "surface/state/state_bytes.hpp"
+
+namespace emit::renderer {
+
+// Members of what a file holds, in its order. Beside put_value(), so that it finds them.
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, RefinedMesh::Vertex>
+void visit_members(T& v, const Visit& visit) {
+  visit(v.position_m), visit(v.normal), visit(v.material), visit(v.sheet), visit(v.parent);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, RefinedMesh::Parts>
+void visit_members(T& p, const Visit& visit) {
+  visit(p.vertices), visit(p.leaves), visit(p.leaf_submesh), visit(p.leaf_node), visit(p.nodes);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, Partner>
+void visit_members(T& p, const Visit& visit) {
+  visit(p.sample), visit(p.distance_m), visit(p.weight_frac);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, SeenSample>
+void visit_members(T& s, const Visit& visit) {
+  visit(s.sample), visit(s.weight_frac);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, SurfaceSample>
+void visit_members(T& s, const Visit& visit) {
+  visit(s.position_m), visit(s.normal), visit(s.mover), visit(s.material), visit(s.sky_frac),
+      visit(s.sphere_sky_frac);
+  visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.covered);
+  visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.partners);
+  visit(s.other_side);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, SampleState>
+void visit_members(T& s, const Visit& visit) {
+  visit(s.modes_k), visit(s.partner_k);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, SampleOutput>
+void visit_members(T& o, const Visit& visit) {
+  visit(o.offset_k), visit(o.sun_frac), visit(o.longwave_out_w_m2), visit(o.shortwave_out_w_m2);
+  visit(o.flux_w_m2);
+}
+
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+constexpr std::array<char, 8> kMagic{'E', 'M', 'I', 'T', 'S', 'T', 'A', 'T'};
+constexpr std::size_t kHeaderBytes =
+    kMagic.size() + 2 * sizeof(std::uint32_t) + sizeof(StateKey) + sizeof(std::uint64_t);
+constexpr std::size_t kHashBytes = sizeof(std::uint64_t);
+
+template <class Sink>
+void put_model(Sink& sink, const SurfaceModel& model) {
+  put_value(sink, static_cast<std::uint64_t>(model.meshes.size()));
+  for (const RefinedMesh& mesh : model.meshes) put_value(sink, mesh.parts());
+  put_value(sink, model.first_sample);
+  put_value(sink, model.samples.samples);
+  put_value(sink, model.samples.seen);
+  put_value(sink, model.drawn_samples);
+  put_value(sink, model.states);
+  put_value(sink, model.outputs);
+  put_value(sink, model.full);
+  put_value(sink, model.full_in_view);
+}
+
+bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::size_t max_vertices,
+                 SurfaceModel& model) {
+  std::uint64_t meshes = 0;
+  take_value(source, meshes);
+  if (meshes != geometry.meshes.size()) return false;
+  for (const scene::Mesh& mesh : geometry.meshes) {
+    RefinedMesh::Parts parts;
+    take_value(source, parts);
+    if (!source.ok()) return false;
+    auto refined = RefinedMesh::from(mesh, max_vertices, std::move(parts));
+    if (!refined) return false;
+    model.meshes.push_back(std::move(*refined));
+  }
+  return true;
+}
+
+/// No index leads out of its array.
+bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
+                std::size_t movers) {
+  const std::size_t count = model.samples.samples.size();
+  const std::size_t seen = model.samples.seen.size();
+  if (model.states.size() != count || model.outputs.size() != count ||
+      model.drawn_samples > count || model.first_sample.size() != geometry.instances.size()) {
+    return false;
+  }
+  for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {
+    const RefinedMesh& mesh = model.meshes[m];
+    for (const RefinedMesh::Vertex& vertex : mesh.vertices()) {
+      if (vertex.material >= geometry.materials.size()) return false;
+    }
+    for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
+      const std::uint32_t material = geometry.meshes[m].submeshes[mesh.submesh(slot)].material;
+      for (const std::uint32_t v : mesh.leaf(slot)) {
+        if (mesh.vertices()[v].material != material) return false;
+      }
+    }
+  }
+  const auto& all = model.samples.samples;
+  for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
+    const scene::Instance& instance = geometry.instances[i];
+    const RefinedMesh& mesh = model.meshes[instance.mesh];
+    const std::size_t first = model.first_sample[i];
+    const std::size_t samples =
+        mesh.vertices().size() + back_vertices(mesh, geometry.materials).size();
+    if (first + samples > model.drawn_samples) return false;
+    for (std::size_t k = first; k < first + samples; ++k) {
+      const std::uint32_t other = all[k].other_side;
+      if ((all[k].mover >= 0) != (instance.entity_id != 0) || all[k].mover != all[first].mover ||
+          (other != kNoSample && (other < first || other >= first + samples))) {
+        return false;
+      }
+    }
+  }
+  const auto sides_fit = [&](const SurfaceSample& s) {
+    return s.other_side == kNoSample ||
+           (s.other_side < model.drawn_samples && &all[s.other_side] != &s &&
+            all[s.other_side].other_side < count && &all[all[s.other_side].other_side] == &s);
+  };
+  const auto sample_fits = [&](const SurfaceSample& s) {
+    return sides_fit(s) && s.material < geometry.materials.size() && s.mover >= -1 &&
+           s.mover < static_cast<std::int64_t>(movers) && s.first_seen <= seen &&
+           s.seen_count <= seen - s.first_seen &&
+           std::ranges::all_of(s.partners, [&](const Partner& partner) {
+             return partner.sample == kNoSample || partner.sample < count;
+           });
+  };
+  return std::ranges::all_of(model.samples.samples, sample_fits) &&
+         std::ranges::all_of(model.samples.seen,
+                             [&](const SeenSample& s) { return s.sample < count; });
+}
+
+/// The first `most` bytes of a file, or all of them.
+Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file, std::uintmax_t most) {
+  const auto unreadable = [&file] {
+    return make_error(ErrorCode::io,
+                      fmt::format("thermal.state_file {}: cannot be read", file.string()));
+  };
+  std::error_code error;
+  const std::uintmax_t size = std::min(std::filesystem::file_size(file, error), most);
+  std::ifstream in(file, std::ios::binary);
+  if (error || !in) return unreadable();
+  std::vector<std::byte> bytes(size);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  if (in.gcount() != static_cast<std::streamsize>(size)) return unreadable();
+  return bytes;
+}
+
+std::filesystem::path temporary_beside(const std::filesystem::path& file) {
+  std::filesystem::path temporary = file;
+  temporary += fmt::format(".{}.tmp", ::getpid());
+  return temporary;
+}
+
+std::error_code write_bytes(const std::filesystem::path& file, std::span<const std::byte> bytes) {
+  errno = 0;
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out.write(reinterpret_cast<const char*>(bytes.data()),
+            static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (out) return {};
+  return {errno != 0 ? errno : EIO, std::generic_category()};
+}
+
+tl::unexpected<physics::Error> cannot_write(const std::filesystem::path& file,
+                                            const std::error_code& error) {
+  return make_error(ErrorCode::io, fmt::format("thermal.state_file {}: cannot be written: {}",
+                                               file.string(), error.message()));
+}
+
+/// What stands before the body.
+struct Header {
+  std::array<char, 8> magic{};
+  std::uint32_t version = 0;
+  std::uint32_t parts = 0;
+  StateKey key{};
+  std::uint64_t body_bytes = 0;
+};
+
+std::string different_parts(const StateKey& a, const StateKey& b) {
+  std::string text;
+  for (std::size_t i = 0; i < kStateParts; ++i) {
+    if (a[i] == b[i]) continue;
+    text += fmt::format("{}{}", text.empty() ? "" : "; ", describe(static_cast<StatePart>(i)));
+  }
+  return text;
+}
+
+/// Why a file of that size whose first bytes, or all, are these is no state for the key; empty when
+/// nothing speaks against it.
+std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_bytes,
+                      const StateKey& key) {
+  Header header;
+  ByteSource source(bytes.first(std::min(bytes.size(), kHeaderBytes)));
+  take_value(source, header.magic);
+  if (!source.ok() || header.magic != kMagic) return "not a state of the thermal simulation";
+  take_value(source, header.version);
+  if (source.ok() && header.version != kStateVersion) {
+    return fmt::format("version {} of the format, this program reads {}", header.version,
+                       kStateVersion);
+  }
+  take_value(source, header.parts);
+  take_value(source, header.key);
+  take_value(source, header.body_bytes);
+  if (!source.ok() || header.parts != kStateParts || file_bytes < kHeaderBytes + kHashBytes ||
+      header.body_bytes != file_bytes - kHeaderBytes - kHashBytes) {
+    return "truncated or damaged";
+  }
+  if (bytes.size() < file_bytes) return {};
+  Fnv64 hash;
+  hash.put(bytes.data(), bytes.size() - kHashBytes);
+  std::uint64_t stored = 0;
+  ByteSource tail(bytes.last(kHashBytes));
+  take_value(tail, stored);
+  if (stored != hash.value()) return "damaged: the checksum is wrong";
+  const std::string parts = different_parts(header.key, key);
+  return parts.empty() ? "" : "made for another scenario, different in: " + parts;
+}
+
+}  // namespace
+
+Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
+                         const SurfaceModel& model) {
+  ByteCount body;
+  put_model(body, model);
+  ByteStore store(kHeaderBytes + body.count() + kHashBytes);
+  put_value(store, kMagic);
+  put_value(store, kStateVersion);
+  put_value(store, static_cast<std::uint32_t>(kStateParts));
+  put_value(store, key);
+  put_value(store, static_cast<std::uint64_t>(body.count()));
+  put_model(store, model);
+  Fnv64 hash;
+  hash.put(store.bytes().data(), store.bytes().size());
+  put_value(store, hash.value());
+
+  const std::filesystem::path temporary = temporary_beside(file);
+  std::error_code error = write_bytes(temporary, store.bytes());
+  if (!error) std::filesystem::rename(temporary, file, error);
+  if (!error) return {};
+  std::error_code ignored;
+  std::filesystem::remove(temporary, ignored);
+  return cannot_write(file, error);
+}
+
+Result<void> check_state_writable(const std::filesystem::path& file) {
+  const std::filesystem::path temporary = temporary_beside(file);
+  const std::error_code error = write_bytes(temporary, {});
+  std::error_code ignored;
+  std::filesystem::remove(temporary, ignored);
+  if (error) return cannot_write(file, error);
+  return {};
+}
+
+Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateKey& key,
+                                const scene::SceneGeometry& geometry, std::size_t movers,
+                                const SurfaceModelOptions& options) {
+  const auto refuse = [&file](const std::string& why) {
+    return make_error(ErrorCode::config,
+                      fmt::format("thermal.state_file {}: {}. Remove it to have it made anew",
+                                  file.string(), why));
+  };
+  // What is no state at all is not read whole.
+  const auto head = read_bytes(file, kHeaderBytes);
+  if (!head) return tl::unexpected(head.error());
+  std::error_code error;
+  std::string why = objection(*head, std::filesystem::file_size(file, error), key);
+  if (!why.empty()) return refuse(why);
+  const auto bytes = read_bytes(file, std::numeric_limits<std::uintmax_t>::max());
+  if (!bytes) return tl::unexpected(bytes.error());
+  why = objection(*bytes, bytes->size(), key);
+  if (!why.empty()) return refuse(why);
+  const std::span<const std::byte> all(*bytes);
+  ByteSource source(all.subspan(kHeaderBytes, all.size() - kHeaderBytes - kHashBytes));
+  SurfaceModel model;
+  if (!take_meshes(source, geometry, options.max_samples, model)) {
+    return refuse("damaged: its meshes are not those of the scene");
+  }
+  take_value(source, model.first_sample);
+  take_value(source, model.samples.samples);
+  take_value(source, model.samples.seen);
+  take_value(source, model.drawn_samples);
+  take_value(source, model.states);
+  take_value(source, model.outputs);
+  take_value(source, model.full);
+  take_value(source, model.full_in_view);
+  if (!source.ok() || !source.at_end() || !consistent(model, geometry, movers)) {
+    return refuse("damaged: its contents contradict each other");
+  }
+  return model;
+}
+
+}  // namespace emit::renderer

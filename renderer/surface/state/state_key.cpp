@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a saved state hangs on, part by part.
+#include <algorithm>
+
+#include "surface/state/state_bytes.hpp"
+#include "surface/state/state_file.hpp"
+
+namespace emit::renderer {
+namespace {
+
+template <class... Values>
+void add(Fnv64& hash, const Values&... values) {
+  (put_value(hash, values), ...);
+}
+
+void add_optional(Fnv64& hash, const std::optional<double>& value) {
+  add(hash, value.has_value(), value.value_or(0.0));
+}
+
+/// A row of the scenario's or of the host's.
+template <class Row>
+void add_weather(Fnv64& hash, std::int64_t time_ns, const Row& row) {
+  add(hash, time_ns, row.direct_normal_w_m2, row.diffuse_horizontal_w_m2, row.longwave_down_w_m2,
+      row.air_k, row.wind_m_s, row.cloud_frac);
+  add_optional(hash, row.environment_k);
+  add_optional(hash, row.film_w_m2_k);
+}
+
+void add_pose(Fnv64& hash, const physics::Pose& pose) {
+  add(hash, pose.position_world_m, pose.world_from_body);
+}
+
+void add_keys(Fnv64& hash, std::span<const scene::Keyframe> keys) {
+  add(hash, keys.size());
+  for (const scene::Keyframe& key : keys) {
+    add(hash, key.sim_time_ns, key.on, key.teleport);
+    add_pose(hash, key.pose);
+  }
+}
+
+std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
+                         const scene::SceneGeometry& geometry) {
+  Fnv64 hash;
+  for (const scene::Mesh& mesh : geometry.meshes) {
+    add(hash, mesh.positions_m, mesh.normals, mesh.indices, mesh.submeshes.size(), mesh.closed);
+    for (const scene::Submesh& submesh : mesh.submeshes) {
+      add(hash, submesh.first_index, submesh.index_count, submesh.material, submesh.double_sided);
+    }
+  }
+  for (const scene::Instance& instance : geometry.instances) {
+    add(hash, instance.mesh, instance.object, instance.body_from_mesh, instance.world_from_mesh);
+  }
+  for (const scene::ObjectDesc& object : scenario.objects) {
+    add(hash, object.entity_id, object.on);
+    add_keys(hash, object.trajectory);
+  }
+  return hash.value();
+}
+
+void add_material(Fnv64& hash, const scene::Material& material) {
+  add(hash, material.solar_absorptance_frac, material.emissivity_frac, material.base_k,
+      material.layers.size(), material.foster_modes.size(), material.modes.size());
+  for (const scene::Layer& layer : material.layers) {
+    add(hash, layer.thickness_m, layer.conductivity_w_m_k, layer.density_kg_m3,
+        layer.specific_heat_j_kg_k);
+  }
+  for (const scene::FosterMode& mode : material.foster_modes) {
+    add(hash, mode.tau_s, mode.resistance_m2k_w);
+  }
+  for (const scene::RelaxationMode& mode : material.modes) {
+    add(hash, mode.tau_s, mode.weight_frac);
+  }
+  add_optional(hash, material.core_conductance_w_m2_k);
+  add_optional(hash, material.initial_k);
+  add_optional(hash, material.prescribed_k);
+}
+
+std::uint64_t materials_hash(const scene::ScenarioDesc& scenario,
+                             const scene::SceneGeometry& geometry) {
+  Fnv64 hash;
+  for (const scene::Material& material : geometry.materials) add_material(hash, material);
+  const std::string& surroundings = scenario.thermal.surroundings_material.empty()
+                                        ? scenario.default_material
+                                        : scenario.thermal.surroundings_material;
+  const auto found = std::ranges::find(scenario.materials, surroundings, &scene::Material::name);
+  if (found != scenario.materials.end()) add_material(hash, *found);
+  return hash.value();
+}
+
+std::uint64_t place_hash(const scene::ScenarioDesc& scenario) {
+  Fnv64 hash;
+  add(hash, scenario.place.lat_rad, scenario.place.lon_rad, scenario.place.height_m,
+      scenario.epoch_utc_ns);
+  return hash.value();
+}
+
+std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
+  Fnv64 hash;
+  for (const scene::WeatherSample& sample : scenario.weather) {
+    add_weather(hash, sample.sim_time_ns, sample);
+  }
+  const scene::ClearSkyDesc& sky = scenario.clear_sky;
+  add(hash, sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k, sky.dew_point_k, sky.wind_m_s,
+      sky.cloud_frac);
+  return hash.value();
+}
+
+/// Those that the method "cached" reads.
+std::uint64_t thermal_hash(const scene::ThermalOptions& o) {
+  Fnv64 hash;
+  add(hash, o.model, o.tolerance_k, o.initial_k, o.history_start_ns, o.spin_up_ns, o.foster_modes,
+      o.steps, o.spacing, o.first_step_s, o.max_samples, o.lateral, o.exchange);
+  return hash.value();
+}
+
+std::uint64_t camera_hash(const scene::SensorDesc& sensor) {
+  Fnv64 hash;
+  add(hash, sensor.width_px, sensor.height_px, sensor.fov_h_rad);
+  add_keys(hash, sensor.trajectory);
+  return hash.value();
+}
+
+std::uint64_t& at(StateKey& key, StatePart part) {
+  return key[static_cast<std::size_t>(part)];
+}
+
+}  // namespace
+
+std::string_view describe(StatePart part) noexcept {
+  switch (part) {
+    case StatePart::scene:
+      return "scene geometry";
+    case StatePart::materials:
+      return "materials";
+    case StatePart::place:
+      return "place or date";
+    case StatePart::weather:
+      return "weather";
+    case StatePart::thermal:
+      return "thermal options";
+    case StatePart::camera:
+      return "sensor format, field of view or trajectory";
+    case StatePart::first_time:
+      return "time of the first frame";
+    case StatePart::first_camera:
+      return "camera of the first frame";
+    case StatePart::live:
+      return "input of the host before the first frame";
+  }
+  return "?";
+}
+
+StateKey scenario_key(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry) {
+  StateKey key{};
+  at(key, StatePart::scene) = scene_hash(scenario, geometry);
+  at(key, StatePart::materials) = materials_hash(scenario, geometry);
+  at(key, StatePart::place) = place_hash(scenario);
+  at(key, StatePart::weather) = weather_hash(scenario);
+  at(key, StatePart::thermal) = thermal_hash(scenario.thermal);
+  at(key, StatePart::camera) = camera_hash(scenario.sensor);
+  return key;
+}
+
+void add_first_frame(StateKey& key, std::int64_t start_ns, const RefineView& view,
+                     const Environment& environment, std::span<const PoseHistory> entities) {
+  Fnv64 time;
+  add(time, start_ns);
+  at(key, StatePart::first_time) = time.value();
+  Fnv64 camera;
+  for (const RefineView::Eye& eye : view.eyes) {
+    add(camera, eye.world_m);
+    add(camera, eye.boresight);
+  }
+  at(key, StatePart::first_camera) = camera.value();
+  Fnv64 live;
+  for (const PoseHistory& entity : entities) add_keys(live, entity.live());
+  for (const physics::WeatherRow& row : environment.live()) add_weather(live, row.time_ns, row);
+  at(key, StatePart::live) = live.value();
+}
+
+}  // namespace emit::renderer

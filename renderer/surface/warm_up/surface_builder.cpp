@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <memory>
+
+#include "emit/threads/parallel.hpp"
+#include "surface/mesh/refined_mesh_edges.hpp"
+#include "surface/mesh/sheet_sides.hpp"
+#include "surface/warm_up/surface_exchange.hpp"
+#include "surface/model/surface_model.hpp"
+#include "surface/warm_up/surface_patch.hpp"
+#include "surface/warm_up/surface_refinement.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::uint32_t kMaxRounds = 400;
+/// What needs less than this share of the neediest waits for another round, unless few need more: a
+/// round takes a share of all, too, lest a single needy triangle after the other use them up.
+constexpr float kNeedStep = 4.0F;
+constexpr std::size_t kRoundShare = 8;
+constexpr std::size_t kLeastPerRound = 256;
+constexpr std::size_t kGrain = 64;
+/// The full surface is looked for within this share of the halved edge.
+constexpr float kDetailReachFrac = 0.5F;
+constexpr float kOffCreaseFrac = 0.02F;
+
+/// A sample to be evaluated.
+struct Job {
+  std::uint32_t patch = 0;
+  std::uint32_t index = 0;
+};
+
+class Builder {
+ public:
+  Builder(const SurfaceInputs& inputs, const RefineView& view, const SurfaceModelOptions& options,
+          const SurfaceProgress& progress)
+      : in_(inputs),
+        options_(options),
+        progress_(progress),
+        worth_(inputs),
+        sampler_(inputs, worth_, options),
+        refinement_(inputs, worth_, view, options) {}
+
+  physics::Result<SurfaceModel> run();
+
+ private:
+  void make_patches();
+  /// Halves the leaves of a mesh that need more than `above`, the neediest first, as far as samples
+  /// are left.
+  void split(std::uint32_t mesh, float above);
+  /// What the share of leaves that a round takes at least need more than.
+  [[nodiscard]] float need_of_neediest();
+  /// Gives every vertex that has no sample yet one; false when stopped.
+  bool sample_new_vertices(double begin_frac, double end_frac);
+  /// Vertices from `first` on face as the surface did before it was simplified, and their samples
+  /// lie on it.
+  void adopt_detail(std::uint32_t mesh, std::uint32_t first);
+  /// Makes covered samples next to open ones copies of those: nobody sees them, but triangles that
+  /// a foot cuts would show a mixture of both.
+  void replace_covered();
+  /// Of each instance of a mesh.
+  [[nodiscard]] std::size_t samples_of(std::uint32_t mesh) const {
+    const RefinedMesh& refined = model_.meshes[mesh];
+    return refined.vertices().size() + back_vertices(refined, in_.materials).size();
+  }
+  bool report(double frac) const { return !progress_ || progress_(frac); }
+
+  const SurfaceInputs& in_;
+  SurfaceModelOptions options_;
+  const SurfaceProgress& progress_;
+  DriveWorth worth_;
+  PatchSampler sampler_;
+  SurfaceRefinement refinement_;
+  SurfaceModel model_;
+  std::vector<SurfacePatch> patches_;
+  std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
+  std::size_t sample_count_ = 0;  ///< of all patches
+  // By vertex of the mesh at hand, filled for those that have no sample yet:
+  std::vector<glm::vec3> inward_;
+  std::vector<glm::vec3> place_m_;  ///< of its samples
+  std::vector<Job> jobs_;
+  std::vector<SurfaceRefinement::Need> needs_;
+  std::vector<float> ranked_;
+  std::vector<std::uint32_t> slots_;
+  std::vector<SampleStand> job_stand_;
+};
+
+void Builder::make_patches() {
+  patches_of_mesh_.resize(model_.meshes.size());
+  for (const scene::Instance& instance : in_.geometry.instances) {
+    SurfacePatch patch;
+    patch.mesh = instance.mesh;
+    patch.object = instance.object;
+    patch.mover = in_.mover_of_object[instance.object];
+    glm::dmat4 rel_from_mesh = instance.body_from_mesh;
+    if (patch.mover < 0) {
+      rel_from_mesh = instance.world_from_mesh;
+      rel_from_mesh[3] -= glm::dvec4(in_.rays.origin_world_m(), 0.0);
+    }
+    patch.rel_from_mesh = glm::mat4(rel_from_mesh);
+    patch.normal_from_mesh = glm::mat3(glm::transpose(glm::inverse(glm::dmat3(rel_from_mesh))));
+    if (!back_vertices(model_.meshes[patch.mesh], in_.materials).empty()) {
+      patch.back = std::make_unique<SurfacePatch>();
+      patch.back->mesh = patch.mesh;
+      patch.back->object = patch.object;
+      patch.back->mover = patch.mover;
+    }
+    patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
+    sample_count_ += samples_of(patch.mesh);
+    patches_.push_back(std::move(patch));
+  }
+}
+
+void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
+  RefinedMesh& refined = model_.meshes[mesh];
+  const auto vertices = refined.vertices();
+  place_m_.resize(vertices.size());
+  for (std::size_t v = first; v < vertices.size(); ++v) place_m_[v] = vertices[v].position_m;
+  if (in_.detail == nullptr || !in_.detail->has(mesh)) return;
+  threads::parallel_parts(vertices.size() - first, kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = first + from; i < first + to; ++i) {
+      const RefinedMesh::Vertex& vertex = vertices[i];
+      if (vertex.parent[0] == i) continue;
+      const float edge_m = glm::distance(vertices[vertex.parent[0]].position_m,
+                                         vertices[vertex.parent[1]].position_m);
+      // On a crease, of the face that the vertex belongs to.
+      const glm::vec3 place_m = vertex.position_m + kOffCreaseFrac * edge_m * inward_[i];
+      const auto full = in_.detail->place(mesh, place_m, vertex.normal, kDetailReachFrac * edge_m);
+      if (!full) continue;
+      refined.set_normal(static_cast<std::uint32_t>(i), full->normal);
+      place_m_[i] = full->position_m;
+    }
+  });
+}
+
+bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
+  jobs_.clear();
+  job_stand_.clear();
+  const std::size_t intervals = in_.record.size();
+  const bool movers = !in_.movers_now.empty();
+  for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
+    const auto vertices = model_.meshes[mesh].vertices();
+    bool looked = false;
+    for (const std::uint32_t p : patches_of_mesh_[mesh]) {
+      SurfacePatch& patch = patches_[p];
+      if (patch.samples.size() == vertices.size()) continue;
+      const auto first = static_cast<std::uint32_t>(patch.samples.size());
+      if (!looked) {
+        find_inward(model_.meshes[mesh], first, inward_);
+        adopt_detail(mesh, first);
+      }
+      looked = true;
+      patch.grow(vertices.size(), intervals, movers);
+      for (std::uint32_t v = first; v < vertices.size(); ++v) {
+        SurfaceSample& sample = patch.samples[v];
+        const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
+        const float length = glm::length(inward);
+        const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
+        const glm::vec3 off_edge_m = sampler_.offset_m() * unit_inward;
+        const auto to_rel = [&](const glm::vec3& at_m) {
+          return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
+        };
+        sample.position_m = to_rel(place_m_[v]);
+        sample.normal = glm::normalize(patch.normal_from_mesh * vertices[v].normal);
+        sample.mover = patch.mover;
+        sample.material = vertices[v].material;
+        if (in_.materials[sample.material].sheet) {
+          SurfaceSample& back = patch.back->samples[v];
+          back = sample;
+          back.normal = -sample.normal;
+        }
+        jobs_.push_back({p, v});
+        const std::array<std::uint32_t, 2>& parent = vertices[v].parent;
+        job_stand_.push_back({to_rel(vertices[v].position_m), unit_inward, std::nullopt});
+        if (parent[0] < first && parent[1] < first) job_stand_.back().parents = parent;
+      }
+    }
+  }
+  // In slices, so that the progress moves and a stop is heard.
+  constexpr std::size_t kSlice = 16384;
+  for (std::size_t begin = 0; begin < jobs_.size(); begin += kSlice) {
+    const std::size_t end = std::min(jobs_.size(), begin + kSlice);
+    threads::parallel_parts(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
+      for (std::size_t j = begin + from; j < begin + to; ++j) {
+        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_stand_[j]);
+      }
+    });
+    const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());
+    if (!report(begin_frac + (end_frac - begin_frac) * done)) return false;
+  }
+  for (const Job& job : jobs_) {
+    SurfacePatch& patch = patches_[job.patch];
+    const RefinedMesh::Vertex& vertex = model_.meshes[patch.mesh].vertices()[job.index];
+    if (vertex.parent[0] == job.index) continue;
+    const float mean_k = 0.5F * (patch.outputs[vertex.parent[0]].offset_k +
+                                 patch.outputs[vertex.parent[1]].offset_k);
+    patch.surplus_k[job.index] = std::abs(patch.outputs[job.index].offset_k - mean_k);
+    for (SurfacePatch* side = &patch; side != nullptr; side = side->back.get()) {
+      if (!std::isinf(side->sky_surplus_frac[job.index])) continue;  // taken over
+      const auto off_mean = [&](float SurfaceSample::*share) {
+        const float mean = 0.5F * (side->samples[vertex.parent[0]].*share +
+                                   side->samples[vertex.parent[1]].*share);
+        return std::abs(side->samples[job.index].*share - mean);
+      };
+      side->sky_surplus_frac[job.index] =
+          std::max({off_mean(&SurfaceSample::sky_frac), off_mean(&SurfaceSample::far_frac),
+                    off_mean(&SurfaceSample::sphere_sky_frac)});
+    }
+  }
+  return true;
+}
+
+void Builder::replace_covered() {
+  SurfaceSamples& all = model_.samples;
+  for (std::size_t p = 0; p < in_.geometry.instances.size(); ++p) {
+    const RefinedMesh& mesh = model_.meshes[patches_[p].mesh];
+    const std::uint32_t first = model_.first_sample[p];
+    const auto vertices = mesh.vertices();
+    std::vector<std::uint32_t> open(vertices.size(), kNoSample);
+    const auto apart_m = [&](std::uint32_t a, std::uint32_t b) {
+      return glm::distance(vertices[a].position_m, vertices[b].position_m);
+    };
+    for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
+      for (const std::uint32_t covered : mesh.leaf(slot)) {
+        const SurfaceSample& under = all.samples[first + covered];
+        if (!under.covered || under.other_side != kNoSample) continue;
+        for (const std::uint32_t other : mesh.leaf(slot)) {
+          if (all.samples[first + other].covered) continue;
+          std::uint32_t& nearest = open[covered];
+          if (nearest == kNoSample || apart_m(covered, other) < apart_m(covered, nearest)) {
+            nearest = other;
+          }
+        }
+      }
+    }
+    for (std::uint32_t v = 0; v < open.size(); ++v) {
+      if (open[v] == kNoSample) continue;
+      all.samples[first + v] = all.samples[first + open[v]];
+      model_.states[first + v] = model_.states[first + open[v]];
+      model_.outputs[first + v] = model_.outputs[first + open[v]];
+    }
+  }
+}
+
+void Builder::split(std::uint32_t mesh, float above) {
+  refinement_.list(mesh, above, needs_);
+  if (needs_.empty()) return;
+  RefinedMesh& refined = model_.meshes[mesh];
+  const std::size_t uses = patches_of_mesh_[mesh].size();
+  const std::size_t left =
+      options_.max_samples > sample_count_ ? options_.max_samples - sample_count_ : 0;
+  const std::size_t vertices = refined.vertices().size();
+  const std::size_t samples = samples_of(mesh);
+  // A vertex of a sheet has two samples.
+  const std::size_t most = left / (samples > vertices ? 2 * uses : uses);
+  refined.limit(vertices + most);
+  if (needs_.size() > most) {
+    std::ranges::sort(needs_, [](const auto& a, const auto& b) {
+      return a.need != b.need ? a.need > b.need : a.slot < b.slot;
+    });
+  }
+  slots_.clear();
+  for (const SurfaceRefinement::Need& need : needs_) slots_.push_back(need.slot);
+  if (!refined.split(slots_)) model_.full = true;
+  sample_count_ += (samples_of(mesh) - samples) * uses;
+  refinement_.leave(mesh, refined, slots_);
+}
+
+float Builder::need_of_neediest() {
+  ranked_.clear();
+  for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
+    refinement_.list(mesh, 0.0F, needs_);
+    for (const SurfaceRefinement::Need& need : needs_) ranked_.push_back(need.need);
+  }
+  const std::size_t taken = std::max(kLeastPerRound, ranked_.size() / kRoundShare);
+  if (ranked_.size() <= taken) return 0.0F;
+  const auto last = ranked_.begin() + static_cast<std::ptrdiff_t>(taken);
+  std::ranges::nth_element(ranked_, last, std::greater{});
+  return *last;
+}
+
+physics::Result<SurfaceModel> Builder::run() {
+  const auto stopped = [] {
+    return physics::make_error(physics::ErrorCode::internal, "stopped while sampling the surface");
+  };
+  for (const scene::Mesh& mesh : in_.geometry.meshes) {
+    model_.meshes.emplace_back(mesh, options_.max_samples);
+  }
+  make_patches();
+  // How far refinement will go is not known: each round takes a share of what is left.
+  double done_frac = 0.0;
+  const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
+  double to_frac = next_frac();
+  if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+  // Where need is greatest first: when samples run out, what is left matters least.
+  for (std::uint32_t round = 0;; ++round) {
+    SurfaceRefinement::Most most;
+    for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
+      const auto here =
+          refinement_.judge(mesh, model_.meshes[mesh], patches_, patches_of_mesh_[mesh]);
+      most.need = std::max(most.need, here.need);
+      most.in_view = std::max(most.in_view, here.in_view);
+    }
+    if (model_.full || round == kMaxRounds) {
+      model_.full = true;
+      model_.full_in_view = most.in_view > 0.0F;
+      break;
+    }
+    if (most.need == 0.0F) break;
+    const float above = std::min(most.need / kNeedStep, need_of_neediest());
+    for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
+    done_frac = to_frac;
+    to_frac = next_frac();
+    if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+  }
+  number_samples(in_, sampler_, options_, patches_, model_);
+  const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
+  if (!exchange(in_, sampler_, options_, patches_, model_, exchanged)) return stopped();
+  replace_covered();
+  return std::move(model_);
+}
+
+}  // namespace
+
+double diffusivity_m2_s(const scene::Material& material) noexcept {
+  if (material.layers.empty() || material.prescribed_k || material.sheet) return 0.0;
+  const scene::Layer& layer = material.layers.front();
+  return layer.conductivity_w_m_k / (layer.density_kg_m3 * layer.specific_heat_j_kg_k);
+}
+
+physics::Result<SurfaceModel> build_surface_model(const SurfaceInputs& inputs,
+                                                  const RefineView& view,
+                                                  const SurfaceModelOptions& options,
+                                                  const SurfaceProgress& progress) {
+  return Builder(inputs, view, options, progress).run();
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/warm_up/surface_patch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "emit/physics/constants.hpp"
+#include "surface/mesh/tangents.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kTangents = CasterRays::kMaxRays;
+/// A face stands upright on another when the cosine between their normals is smaller.
+constexpr float kWallCos = 0.3F;
+constexpr float kMaxFootM = 3.0F;
+constexpr float kUnderOffsets = 8.0F;
+/// What a share of sky may be wrong by, in tolerances; and what rays do not resolve anyway.
+constexpr float kAlikeFrac = 0.25F;
+constexpr float kSkyNoiseFrac = 0.002F;
+/// Farther along the surface nobody looks: rays that graze it are dear, and only edges half as long
+/// could take over a view that is free farther.
+constexpr float kFeelM = 20.0F;
+/// Nothing stands up within that many lengths of an edge whose middle takes over the view.
+constexpr float kFreeLengths = 2.0F;
+
+}  // namespace
+
+PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
+                           const SurfaceModelOptions& options)
+    : in_(inputs),
+      options_(options),
+      view_(kSampleViewRays),
+      sky_(inputs.heat.sky_measure() == SkyMeasure::cosine ? kSampleSkyRays : kSampleViewRays),
+      sphere_(kSampleViewRays),
+      offsets_(ray_offsets(inputs.geometry)) {
+  history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
+  for (const scene::Material& material : inputs.materials) {
+    diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+  }
+  for (std::uint32_t m = 0; m < inputs.materials.size(); ++m) {
+    const auto alike_k = kAlikeFrac * static_cast<float>(options.tolerance_k);
+    sky_limit_frac_.push_back(
+        std::max(kSkyNoiseFrac, alike_k / std::max(std::abs(worth.sky_k(m)), 1e-3F)));
+  }
+}
+
+SampleState PatchSampler::start_state(const SurfaceSample& sample) const noexcept {
+  return in_.heat.start_state(sample, in_.record.rays.front().normal(sample), in_.history,
+                              in_.record.tail);
+}
+
+bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
+                                const SampleStand& stand) const {
+  if (!stand.parents) return false;
+  const auto [a, b] = *stand.parents;
+  SurfaceSample& sample = patch.samples[index];
+  const SurfaceSample& low = patch.samples[a];
+  const SurfaceSample& high = patch.samples[b];
+  const float limit_frac = sky_limit_frac_[sample.material];
+  const float surplus_frac = std::max(patch.sky_surplus_frac[a], patch.sky_surplus_frac[b]);
+  if (surplus_frac > limit_frac || low.covered || high.covered) return false;
+  const float edge_m = glm::distance(low.position_m, high.position_m);
+  if (kFreeLengths * edge_m > std::min(low.flat_m, high.flat_m)) return false;
+  const glm::vec3 to_sky = 0.5F * (patch.to_sky[a] + patch.to_sky[b]);
+  const glm::vec3 turn = sample.normal - 0.5F * (low.normal + high.normal);
+  if (std::abs(glm::dot(to_sky, turn)) > limit_frac) return false;
+
+  const auto mean = [](float x, float y) { return 0.5F * (x + y); };
+  sample.sky_frac = mean(low.sky_frac, high.sky_frac);
+  sample.far_frac = mean(low.far_frac, high.far_frac);
+  sample.sphere_sky_frac = mean(low.sphere_sky_frac, high.sphere_sky_frac);
+  for (std::size_t i = 0; i < sample.open_frac.size(); ++i) {
+    sample.open_frac[i] = mean(low.open_frac[i], high.open_frac[i]);
+    sample.open_before_frac[i] = mean(low.open_before_frac[i], high.open_before_frac[i]);
+  }
+  // What is free around a point is free around its neighbour but for the way there.
+  sample.flat_m = std::max(low.flat_m, high.flat_m) - 0.5F * edge_m;
+  patch.to_sky[index] = to_sky;
+  patch.sky_surplus_frac[index] = surplus_frac;
+  if (options_.exchange) {
+    // Of the faces they see either's will do; weights fill what is not open.
+    std::vector<SeenPlace>& seen = patch.seen[index];
+    seen = patch.seen[patch.seen[a].empty() ? b : a];
+    float seen_frac = 0.0F;
+    for (const SeenPlace& place : seen) seen_frac += place.weight_frac;
+    const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
+    for (SeenPlace& place : seen) place.weight_frac *= left_frac / seen_frac;
+    if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
+  }
+  return true;
+}
+
+void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
+                               const SampleStand& stand) const {
+  SurfaceSample& sample = patch.samples[index];
+  ViewPoint point{sample.position_m, sample.normal, stand.inward, offsets_.around_m};
+  ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offsets_.around_m};
+  std::array<MoverPlacement, 1> self;
+  CasterSelection selection{true, {}};
+  std::vector<MoverPlacement> placed;
+  if (sample.mover >= 0) {
+    // An entity sees the world from where it stands now, and its own hull always.
+    placed.assign(in_.movers_now.begin(), in_.movers_now.end());
+    MoverPlacement& own = placed[static_cast<std::size_t>(sample.mover)];
+    own.on = true;
+    for (ViewPoint* each : {&point, &drawn}) {
+      each->position_m = own.rel_from_body * each->position_m + own.position_m;
+      each->normal = own.rel_from_body * each->normal;
+      each->inward = own.rel_from_body * each->inward;
+    }
+    selection.movers = placed;
+  }
+  const ViewShares open = sky_.shares(in_.rays, point, selection);
+  sample.sky_frac = open.sky_frac;
+  sample.far_frac = open.far_frac;
+  patch.to_sky[index] = open.to_sky;
+  if (in_.heat.sky_measure() == SkyMeasure::sphere) {
+    sample.sphere_sky_frac = sphere_.of_face(in_.rays, point, selection).sky_frac;
+  }
+  if (open.sky_frac + open.far_frac == 0.0F) {
+    const SurfaceView view = view_.view(in_.rays, point, selection);
+    const std::span<const SeenFace> faces(view.seen.data(), view.seen_count);
+    const bool inside_a_body = std::ranges::none_of(
+        faces, [&](const SeenFace& face) { return face.front || of_a_sheet(face); });
+    sample.covered = sample.covered || inside_a_body;
+  }
+  if (options_.exchange) look_at_faces(patch, index, drawn, selection);
+  feel_along(patch, index, point, selection);
+}
+
+void PatchSampler::look_at_faces(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                                 const CasterSelection& selection) const {
+  const SurfaceView view = view_.view(in_.places, point, selection);
+  std::vector<SeenPlace>& seen = patch.seen[index];
+  seen.clear();
+  float seen_frac = 0.0F;
+  for (std::uint32_t i = 0; i < view.seen_count; ++i) {
+    const SeenFace& face = view.seen[i];
+    seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac, !face.front});
+    seen_frac += face.weight_frac;
+  }
+  // The shares that are open know better how much is left for faces.
+  SurfaceSample& sample = patch.samples[index];
+  if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
+  const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
+  for (SeenPlace& place : seen) place.weight_frac *= left_frac / seen_frac;
+}
+
+void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
+                              const CasterSelection& selection) const {
+  SurfaceSample& sample = patch.samples[index];
+  const glm::vec3& n = point.normal;
+  const auto [u, v] = tangents_of(n);
+  const glm::vec3 base_m = point.position_m + offsets_.around_m * point.inward;
+  std::array<CasterRay, kTangents> rays;
+  std::array<CasterHit, kTangents> above;
+  std::array<CasterHit, kTangents> below;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    const auto angle =
+        static_cast<float>(2.0 * physics::kPi * (static_cast<double>(k) + 0.5) / kTangents);
+    rays[k] = {base_m + 2.0F * offsets_.around_m * n, std::cos(angle) * u + std::sin(angle) * v};
+  }
+  const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above, kFeelM);
+  for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offsets_.around_m * n;
+  const std::uint32_t met_below = in_.rays.first_hits(rays, selection, below, kFeelM);
+  sample.flat_m = kFeelM;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    if (((met_above >> k) & 1U) != 0U) sample.flat_m = std::min(sample.flat_m, above[k].distance_m);
+    if (((met_below >> k) & 1U) != 0U) sample.flat_m = std::min(sample.flat_m, below[k].distance_m);
+  }
+  if (!options_.lateral) return;
+
+  // Walls that stand on the surface: where it goes on under them, nothing reaches it.
+  std::array<float, kTangents> wall_m;
+  wall_m.fill(-1.0F);
+  bool any = false;
+  for (std::size_t k = 0; k < kTangents; ++k) {
+    if (((met_above >> k) & 1U) == 0U || above[k].distance_m > kMaxFootM || !above[k].front ||
+        std::abs(glm::dot(above[k].normal, n)) > kWallCos) {
+      continue;
+    }
+    const CasterRay down{
+        rays[k].origin_m + 4.0F * offsets_.around_m * n +
+            (above[k].distance_m + kUnderOffsets * offsets_.around_m) * rays[k].direction,
+        -n};
+    std::array<CasterHit, 1> under;
+    if (in_.rays.first_hits({&down, 1}, selection, under) != 0U &&
+        under[0].distance_m < kUnderOffsets * offsets_.around_m) {
+      wall_m[k] = above[k].distance_m;
+      any = true;
+    }
+  }
+  if (!any) return;
+  const physics::FosterNetwork& network = in_.history.network(sample.material);
+  const auto open = [&](double memory_s) {
+    const double depth_m =
+        std::sqrt(static_cast<double>(diffusivity_m2_s_[sample.material]) * memory_s);
+    double covered = 0.0;
+    for (const float distance_m : wall_m) {
+      if (distance_m < 0.0F) continue;
+      covered += std::exp(-static_cast<double>(distance_m) / std::max(depth_m, 1e-6)) / kTangents;
+    }
+    return static_cast<float>(1.0 - covered);
+  };
+  for (std::size_t i = 0; i < network.count; ++i) {
+    sample.open_frac[i] = open(std::min(network.modes[i].tau_s, history_s_));
+    sample.open_before_frac[i] = open(network.modes[i].tau_s);
+  }
+}
+
+bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
+  const std::uint32_t index = in_.geometry.instances[face.instance].mesh;
+  const scene::Mesh& mesh = in_.detail != nullptr && in_.detail->has(index)
+                                ? in_.detail->full_mesh(index)
+                                : in_.geometry.meshes[index];
+  return std::ranges::any_of(mesh.submeshes, [&](const scene::Submesh& submesh) {
+    return in_.materials[submesh.material].sheet && 3 * face.triangle >= submesh.first_index &&
+           3 * face.triangle < submesh.first_index + submesh.index_count;
+  });
+}
+
+void PatchSampler::trace(SurfacePatch& patch, std::uint32_t index) const {
+  const SurfaceSample& sample = patch.samples[index];
+  const HistoryRecord& record = in_.record;
+  const std::size_t count = record.size();
+  const float max_blur_m =
+      options_.lateral ? std::min(static_cast<float>(options_.max_blur_m), 0.5F * sample.flat_m)
+                       : 0.0F;
+  for (std::size_t i = 0; i < count; ++i) {
+    const IntervalRays& rays = record.rays[i];
+    const float blur_m = std::min(
+        max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
+    patch.sun_frac[index * count + i] = rays.sun_frac(in_.rays, sample, offsets_.sun_m, blur_m);
+    if (!patch.hidden_sky.empty()) {
+      patch.hidden_sky[index * count + i] = rays.hidden_sky(in_.rays, sample, offsets_.around_m);
+    }
+  }
+}
+
+void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index) const {
+  const HistoryRecord& record = in_.record;
+  const std::size_t count = record.size();
+  // Before samples are numbered, what is seen counts as the surroundings.
+  const auto alone = [index](const SurfacePatch& side) {
+    SurfaceSample sample = side.samples[index];
+    sample.far_frac = 1.0F - sample.sky_frac;
+    return sample;
+  };
+  const auto drive_of = [&](const SurfacePatch& side, std::size_t i) {
+    SampleDrive drive;
+    drive.sun_frac = side.sun_frac[index * count + i];
+    if (!side.hidden_sky.empty()) {
+      drive.hidden_sky_frac = side.hidden_sky[index * count + i].frac;
+    }
+    return drive;
+  };
+  const SurfaceSample front = alone(patch);
+  const bool sheet = patch.back && in_.materials[front.material].sheet;
+  const SurfaceSample back = sheet ? alone(*patch.back) : SurfaceSample{};
+  SampleState state = start_state(front);
+  SampleOutput output;
+  for (std::size_t i = 0; i < count; ++i) {
+    const SampleDrive drive = drive_of(patch, i);
+    const glm::vec3 normal = record.rays[i].normal(front);
+    if (sheet) {
+      const SampleDrive back_drive = drive_of(*patch.back, i);
+      const SheetBack other{back, back_drive};
+      output = in_.heat.advance(front, normal, record.intervals[i], drive, state, &other);
+    } else {
+      output = in_.heat.advance(front, normal, record.intervals[i], drive, state);
+    }
+  }
+  patch.states[index] = state;
+  patch.outputs[index] = output;
+  if (sheet) patch.back->outputs[index] = output;
+}
+
+void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
+                            const SampleStand& stand) const {
+  const auto look = [&](SurfacePatch& side) {
+    if (!inherit_view(side, index, stand)) look_around(side, index, stand);
+    trace(side, index);
+  };
+  look(patch);
+  if (patch.back && in_.materials[patch.samples[index].material].sheet) look(*patch.back);
+  integrate(patch, index);
+}
+
+void SurfacePatch::grow(std::size_t vertices, std::size_t intervals, bool movers) {
+  constexpr float kUnknown = std::numeric_limits<float>::infinity();
+  samples.resize(vertices);
+  seen.resize(vertices);
+  states.resize(vertices);
+  outputs.resize(vertices);
+  surplus_k.resize(vertices, -1.0F);
+  to_sky.resize(vertices);
+  sky_surplus_frac.resize(vertices, kUnknown);
+  sun_frac.resize(vertices * intervals);
+  if (movers) hidden_sky.resize(vertices * intervals);
+  if (back) back->grow(vertices, intervals, movers);
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/warm_up/surface_refinement.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "emit/threads/parallel.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// No triangle is wider, whether anything is known to lie in it or not: in view, and elsewhere. In
+/// pixels.
+constexpr float kBasePx = 32.0F;
+constexpr float kBaseAsidePx = 128.0F;
+constexpr float kBaseNeed = 1e6F;  ///< of triangles wider than that
+/// What needs less is left as it is: an error of a tolerance in a triangle of so many pixels.
+constexpr float kLeastNeed = 3.0F;
+/// What the need of a triangle out of view counts.
+constexpr float kAsideFrac = 1.0F / 64.0F;
+/// What points between the corners may make of it, in tolerances.
+constexpr float kMissedFrac = 2.0F;
+/// Edges of shadows this young are still sharp.
+constexpr float kRecentS = 900.0F;
+/// Corners on which that much more of the sun's flux falls than on others have the edge of a shadow
+/// between them.
+constexpr float kEdgeSunFrac = 0.2F;
+/// Down to so many pixels that alone is reason to cut; finer, only what interpolation gets wrong.
+constexpr float kEdgeSunPx = 4.0F;
+/// Corners of which more or less of the sun's disc was visible do not agree on it.
+constexpr float kAgreeFrac = 1e-3F;
+/// A triangle that turns its back to an eye by more than this sine is not seen from there, whatever
+/// curvature its vertices' normals stand for.
+constexpr float kBackSine = 0.2F;
+/// Share of the way to a point that must be free.
+constexpr float kSeenFrac = 0.999F;
+/// How far the newest vertex may lie from what its parents interpolate to, in tolerances: a
+/// triangle's own error is about half of that. Where triangles are large, and where they are down
+/// to some pixels.
+constexpr float kSurplusFrac = 1.2F;
+constexpr float kSharpSurplusFrac = 8.0F;
+/// What a foot in the middle of a triangle counts, in tolerances.
+constexpr float kFootFrac = 30.0F;
+/// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
+constexpr float kCreaseS = 1000.0F;
+constexpr float kCreaseDepths = 3.0F;
+/// What facing elsewhere may cost in the middle of a triangle or of an edge, in tolerances: where
+/// triangles are large, and where they are down to some pixels.
+constexpr float kBendFrac = 1.0F;
+constexpr float kSharpBendFrac = 4.0F;
+/// The shortest edges that are halved, in pixels: where temperature is smooth, and where an edge
+/// runs (finer ones change no pixel by more than a tenth of a kelvin, emit bench
+/// error-vs-time).
+constexpr float kLeastEdgePx = 2.5F;
+constexpr float kLeastShadowEdgePx = 0.9F;
+/// Narrower bodies are cut as though they were so many pixels wide: what pixels show of them is a
+/// mean over all their faces. By so much at most, as what is far below a pixel hardly counts.
+constexpr float kLeastBodyPx = 16.0F;
+constexpr float kMostFiner = 12.0F;
+
+/// The middle one of a body's extents: of poles the thickness, of sheets not.
+float width_m(const scene::Aabb& box, const glm::dmat4& world_from_mesh) {
+  if (box.empty()) return 0.0F;
+  std::array<double, 3> extent_m{};
+  for (int i = 0; i < 3; ++i) {
+    extent_m[static_cast<std::size_t>(i)] =
+        (box.max_m[i] - box.min_m[i]) * glm::length(glm::dvec3(world_from_mesh[i]));
+  }
+  std::ranges::sort(extent_m);
+  return static_cast<float>(extent_m[1]);
+}
+
+/// What an eye is to a body that still stands where its way begins, when the body comes closest to
+/// the middle of the picture.
+glm::vec3 when_in_view(const glm::vec3& eye_m, const glm::vec3& boresight,
+                       std::span<const glm::vec3> way_m) {
+  constexpr int kParts = 8;  // of a leg
+  glm::vec3 found_m = way_m.front();
+  float most = -std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < way_m.size(); ++i) {
+    const glm::vec3& end_m = way_m[std::min(i + 1, way_m.size() - 1)];
+    for (int part = 0; part < kParts; ++part) {
+      const glm::vec3 place_m =
+          glm::mix(way_m[i], end_m, static_cast<float>(part) / static_cast<float>(kParts));
+      const glm::vec3 there_m = place_m - eye_m;
+      const float cosine = glm::dot(there_m, boresight) / std::max(glm::length(there_m), 1e-3F);
+      if (!(cosine > most)) continue;
+      most = cosine;
+      found_m = place_m;
+    }
+  }
+  return eye_m - (found_m - way_m.front());
+}
+
+}  // namespace
+
+SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWorth& worth,
+                                     const RefineView& view, const SurfaceModelOptions& options)
+    : in_(inputs),
+      worth_(worth),
+      bend_(inputs, worth_),
+      pixel_rad_(static_cast<float>(view.pixel_rad)),
+      field_rad_(static_cast<float>(view.field_rad)),
+      tolerance_k_(static_cast<float>(options.tolerance_k)),
+      sun_offset_m_(ray_offsets(inputs.geometry).sun_m),
+      lateral_(options.lateral),
+      judged_(inputs.geometry.meshes.size()) {
+  for (const scene::Material& material : inputs.materials) {
+    diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+  }
+  for (const RefineView::Eye& eye : view.eyes) {
+    eyes_.push_back(
+        {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
+  }
+  for (const std::vector<glm::vec3>& way_m : inputs.ways_m) {
+    std::vector<Eye>& eyes = eyes_of_mover_.emplace_back();
+    for (const Eye& eye : eyes_) {
+      eyes.push_back({when_in_view(eye.rel_m, eye.boresight, way_m), eye.boresight});
+    }
+  }
+  for (const scene::Instance& instance : inputs.geometry.instances) {
+    body_m_.push_back(
+        width_m(inputs.geometry.meshes[instance.mesh].bounds, instance.world_from_mesh));
+  }
+  const HistoryRecord& record = inputs.record;
+  recent_ = record.size() - 1;
+  while (recent_ > 0 && record.lag_s[recent_ - 1] < kRecentS) --recent_;
+}
+
+SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>& corners_m,
+                                                  float longest_m, float body_m,
+                                                  std::span<const Eye> eyes) const noexcept {
+  constexpr float kLeastM = 1e-6F;
+  const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
+  const glm::vec3 twice_area_m2 =
+      glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
+  Width width;
+  float least_px_m = std::numeric_limits<float>::infinity();
+  for (const Eye& eye : eyes) {
+    const glm::vec3 way_m = centre_m - eye.rel_m;
+    const float distance_m = std::max(glm::length(way_m), kLeastM);
+    const float px_m = std::max(pixel_rad_ * distance_m, kLeastM);
+    least_px_m = std::min(least_px_m, px_m);
+    const glm::vec3 ahead = way_m / distance_m;
+    const float looks_px =
+        std::min(std::sqrt(std::abs(glm::dot(twice_area_m2, ahead))) / px_m, longest_m / px_m);
+    width.edge_px = std::max(width.edge_px, longest_m / px_m);
+    width.anywhere_px = std::max(width.anywhere_px, looks_px);
+    if (looks_px <= width.in_view_px) continue;
+    const float cosine = std::clamp(glm::dot(ahead, eye.boresight), -1.0F, 1.0F);
+    const bool in_view = eye.boresight == glm::vec3(0.0F) || distance_m < longest_m ||
+                         std::acos(cosine) < field_rad_ + longest_m / distance_m;
+    if (in_view) width.in_view_px = looks_px;
+  }
+  width.finer = std::clamp(kLeastBodyPx * least_px_m / std::max(body_m, kLeastM), 1.0F, kMostFiner);
+  return width;
+}
+
+bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
+                             std::uint32_t slot, const SurfacePatch& patch) const {
+  if (patch.mover >= 0) return true;
+  const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
+  const glm::vec3 across = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
+  const float area = glm::length(across);
+  if (!(area > 0.0F)) return false;
+  const glm::vec3 normal = across / area;
+  const bool sheet = refined.vertices()[refined.leaf(slot)[0]].sheet;
+  for (const Eye& eye : eyes_) {
+    const glm::vec3& eye_m = eye.rel_m;
+    const glm::vec3 to_eye = eye_m - centre_m;
+    const float sine = glm::dot(normal, to_eye) / std::max(glm::length(to_eye), 1e-6F);
+    if (!sheet && sine < -kBackSine) continue;
+    std::array<CasterRay, 4> rays;
+    std::array<float, 4> distance_m{};
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      // Corners a little towards the middle, lest a neighbour across an edge hides them.
+      const glm::vec3 point_m = i < 3 ? glm::mix(corners_m[i], centre_m, 0.1F) : centre_m;
+      distance_m[i] = glm::distance(eye_m, point_m);
+      rays[i] = {eye_m, (point_m - eye_m) / std::max(distance_m[i], 1e-6F)};
+    }
+    std::array<CasterHit, 4> hits;
+    const std::uint32_t hit = in_.rays.first_hits(rays, {true, {}}, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if ((hit >> i & 1U) == 0 || hits[i].distance_m > kSeenFrac * distance_m[i]) return true;
+    }
+  }
+  return false;
+}
+
+float SurfaceRefinement::shadow_edge_k(const RefinedMesh& refined, std::uint32_t slot,
+                                       const SurfacePatch& patch) const {
+  const auto& leaf = refined.leaf(slot);
+  const std::size_t count = in_.record.size();
+  const auto offset_k = [&](std::size_t i) { return patch.outputs[leaf[i]].offset_k; };
+  const float range_k = std::max({offset_k(0), offset_k(1), offset_k(2)}) -
+                        std::min({offset_k(0), offset_k(1), offset_k(2)});
+  if (range_k < tolerance_k_) return 0.0F;
+  for (std::size_t i = recent_; i < count; ++i) {
+    const auto sun = [&](std::size_t corner) {
+      const glm::vec3 normal = in_.record.rays[i].normal(patch.samples[leaf[corner]]);
+      return patch.sun_frac[leaf[corner] * count + i] *
+             std::max(0.0F, glm::dot(normal, in_.record.rays[i].to_sun()));
+    };
+    const float high = std::max({sun(0), sun(1), sun(2)});
+    const float low = std::min({sun(0), sun(1), sun(2)});
+    if (high - low > kEdgeSunFrac) return range_k;
+  }
+  return 0.0F;
+}
+
+float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_t slot,
+                                        const SurfacePatch& patch) const {
+  const auto& leaf = refined.leaf(slot);
+  const std::size_t count = in_.record.size();
+  const SurfaceSample& a = patch.samples[leaf[0]];
+  const SurfaceSample& b = patch.samples[leaf[1]];
+  const SurfaceSample& c = patch.samples[leaf[2]];
+  SurfaceSample face;
+  const glm::vec3 normal = a.normal + b.normal + c.normal;
+  const float length = glm::length(normal);
+  if (!(length > 0.0F)) return 0.0F;
+  face.normal = normal / length;
+  face.mover = patch.mover;
+  face.material = a.material;
+  // Spread evenly (R2 sequence, Roberts 2018), from leaf to leaf at other places.
+  constexpr float kStepU = 0.7548776662F;
+  constexpr float kStepV = 0.5698402910F;
+  std::array<glm::vec3, kPacketRays> points_m;
+  for (std::size_t k = 0; k < points_m.size(); ++k) {
+    const auto turn = static_cast<float>((leaf[0] * 7U + leaf[1] * 5U + leaf[2] * 3U) % 1021U +
+                                         static_cast<std::uint32_t>(k) + 1U);
+    float u = turn * kStepU - std::floor(turn * kStepU);
+    float v = turn * kStepV - std::floor(turn * kStepV);
+    if (u + v > 1.0F) {
+      u = 1.0F - u;
+      v = 1.0F - v;
+    }
+    points_m[k] = (1.0F - u - v) * a.position_m + u * b.position_m + v * c.position_m;
+  }
+  std::array<float, kPacketRays> missed_k{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const IntervalRays& rays = in_.record.rays[i];
+    if (!rays.sun_up()) continue;
+    const auto frac = [&](std::size_t corner) { return patch.sun_frac[leaf[corner] * count + i]; };
+    const float low = std::min({frac(0), frac(1), frac(2)});
+    const float high = std::max({frac(0), frac(1), frac(2)});
+    const bool lit = low > 1.0F - kAgreeFrac;
+    if (!lit && high > kAgreeFrac) continue;
+    const float worth_k =
+        worth_.sun_k(face.material, i) * std::max(0.0F, glm::dot(rays.normal(face), rays.to_sun()));
+    const IntervalRays::Spots spots = rays.spots(in_.rays, face, points_m, sun_offset_m_);
+    const std::uint32_t odd = spots.faced & (lit ? ~spots.lit : spots.lit);
+    for (std::size_t k = 0; k < points_m.size(); ++k) {
+      if (((odd >> k) & 1U) != 0U) missed_k[k] += lit ? -worth_k : worth_k;
+    }
+  }
+  float most_k = 0.0F;
+  for (const float k : missed_k) most_k = std::max(most_k, std::abs(k));
+  return most_k;
+}
+
+SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, std::uint32_t slot,
+                                                  const SurfacePatch& patch, float body_m) const {
+  const auto& leaf = refined.leaf(slot);
+  const auto vertices = refined.vertices();
+  std::array<glm::vec3, 3> corners_m;
+  for (std::size_t i = 0; i < 3; ++i) {
+    // Not the samples' own places: those are moved off edges.
+    corners_m[i] = glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[leaf[i]].position_m, 1.0F));
+    if (patch.mover >= 0) {
+      const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(patch.mover)];
+      corners_m[i] = place.rel_from_body * corners_m[i] + place.position_m;
+    }
+  }
+  const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
+                                    glm::distance(corners_m[1], corners_m[2]),
+                                    glm::distance(corners_m[2], corners_m[0])});
+  const auto mover = static_cast<std::size_t>(patch.mover);
+  const bool goes = patch.mover >= 0 && mover < eyes_of_mover_.size();
+  const Width width =
+      this->width(corners_m, longest_m, body_m, goes ? eyes_of_mover_[mover] : eyes_);
+  const float edge_px = width.finer * width.edge_px;
+  Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
+  if (edge_px <= kLeastShadowEdgePx) return judged;
+  if (in_.materials[vertices[leaf[0]].material].prescribed_k) return judged;
+  const float over_base = std::max(width.in_view_px / kBasePx, width.anywhere_px / kBaseAsidePx);
+  if (over_base > 1.0F) {
+    judged.need = kBaseNeed * over_base;
+    judged.finer_need = judged.need;
+    return judged;
+  }
+  if (!seen(corners_m, refined, slot, patch)) return judged;
+
+  const bool smooth = edge_px > kLeastEdgePx;
+  float error_k = 0.0F;
+  const auto count_in = [&](float found_k, float limit_frac) {
+    if (found_k > limit_frac * tolerance_k_) error_k = std::max(error_k, found_k);
+  };
+  const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
+  count_in(patch.surplus_k[newest], smooth ? kSurplusFrac : kSharpSurplusFrac);
+  count_in(bend_.cost_k(refined, slot, patch), smooth ? kBendFrac : kSharpBendFrac);
+  // Where a foot runs through, covered corners will take the values of others.
+  const auto covered = [&](std::size_t i) { return patch.samples[leaf[i]].covered ? 1 : 0; };
+  const int under = covered(0) + covered(1) + covered(2);
+  if (smooth && under > 0 && under < 3) error_k = std::max(error_k, kFootFrac * tolerance_k_);
+  // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
+  const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
+  const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
+  if (smooth && lateral_ && longest_m > depth_m &&
+      std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
+    error_k = std::max(error_k, tolerance_k_);
+  }
+  if (edge_px >= kEdgeSunPx) {
+    const bool sheet = in_.materials[vertices[leaf[0]].material].sheet;
+    const SurfacePatch* back = sheet ? patch.back.get() : nullptr;
+    error_k = std::max(error_k, shadow_edge_k(refined, slot, patch));
+    if (back != nullptr) error_k = std::max(error_k, shadow_edge_k(refined, slot, *back));
+    if (error_k == 0.0F) count_in(missed_shade_k(refined, slot, patch), kMissedFrac);
+    if (back != nullptr && error_k == 0.0F) {
+      count_in(missed_shade_k(refined, slot, *back), kMissedFrac);
+    }
+  }
+  const float weighed_px = std::max(width.in_view_px, kAsideFrac * width.anywhere_px);
+  judged.need = error_k / tolerance_k_ * weighed_px;
+  judged.finer_need = width.finer * judged.need;
+  return judged;
+}
+
+SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const RefinedMesh& refined,
+                                                 std::span<const SurfacePatch> patches,
+                                                 std::span<const std::uint32_t> of_mesh) {
+  std::vector<Judged>& judged = judged_[mesh];
+  judged.resize(refined.leaf_count());
+  constexpr std::size_t kGrain = 256;
+  threads::parallel_parts(judged.size(), kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+      const auto slot = static_cast<std::uint32_t>(i);
+      if (judged[i].node == refined.node(slot)) continue;
+      judged[i] = {refined.node(slot)};
+      float squares = 0.0F;
+      float finer_squares = 0.0F;
+      float uses = 0.0F;
+      for (const std::uint32_t p : of_mesh) {
+        const Judged here = need(refined, slot, patches[p], body_m_[p]);
+        squares += here.need * here.need;
+        finer_squares += here.finer_need * here.finer_need;
+        uses += 1.0F;
+        judged[i].in_view = judged[i].in_view || here.in_view;
+      }
+      // A vertex costs a sample on every instance: what one gains counts that much less.
+      const auto mean = [uses](float sum) { return std::sqrt(sum / std::max(uses, 1.0F)); };
+      if (mean(finer_squares) > kLeastNeed) judged[i].need = mean(squares);
+    }
+  });
+  Most most;
+  for (const Judged& leaf : judged) {
+    most.need = std::max(most.need, leaf.need);
+    if (leaf.in_view) most.in_view = std::max(most.in_view, leaf.need);
+  }
+  return most;
+}
+
+void SurfaceRefinement::list(std::uint32_t mesh, float above, std::vector<Need>& needs) const {
+  needs.clear();
+  const std::vector<Judged>& judged = judged_[mesh];
+  for (std::uint32_t slot = 0; slot < judged.size(); ++slot) {
+    if (judged[slot].need > above) needs.push_back({slot, judged[slot].need});
+  }
+}
+
+void SurfaceRefinement::leave(std::uint32_t mesh, const RefinedMesh& refined,
+                              std::span<const std::uint32_t> slots) {
+  for (const std::uint32_t slot : slots) {
+    Judged& leaf = judged_[mesh][slot];
+    if (leaf.node == refined.node(slot)) leaf.need = 0.0F;
+  }
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <functional>
+
+#include "csv_table.hpp"
+#include "emit/verify/evaluate.hpp"
+#include "emit/reference/visibility.hpp"
+#include "visibility_rows.hpp"
+
+namespace emit::verify {
+
+/// Rays per row and measure where --rays is not given: below 2e-3 on every kind of geometry.
+inline constexpr std::uint32_t kSunRays = 16384;
+inline constexpr std::uint32_t kSkyRays = 16384;
+
+/// Builds the geometry of each row and asks it, rows split over the cores. `make` and `ask` run on
+/// several threads at once. Errors name file and line of the first bad row.
+[[nodiscard]] physics::Result<void> for_each_row(
+    const CsvTable& table, const std::function<physics::Result<VisibilityRow>(std::size_t)>& make,
+    const std::function<void(std::size_t, const VisibilityRow&, const reference::SceneInstant&)>&
+        ask);
+
+[[nodiscard]] inline reference::SurfacePoint surface_point(const VisibilityRow& row) {
+  return {.position_world_m = row.point_m, .normal = row.normal};
+}
+
+/// --precision float32 is the GPU's; --method belongs to it as well. --rays to the CPU.
+[[nodiscard]] physics::Result<void> check_visibility_options(const EvaluateRequest& request);
+
+}  // namespace emit::verify

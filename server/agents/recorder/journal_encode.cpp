@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/recorder/journal_encode.hpp"
+
+#include <cstring>
+#include <vector>
+
+#include "agents/journal_ring.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/protocol/version.hpp"
+#include "emit/v1/control.pb.h"
+
+namespace emit::server {
+namespace {
+
+template <class Line>
+bool read(std::span<const std::byte> bytes, Line& line) {
+  if (bytes.size() < sizeof(Line)) {
+    return false;
+  }
+  std::memcpy(&line, bytes.data(), sizeof(Line));
+  return true;
+}
+
+/// The elements behind a line; false when the line does not hold as many as it says.
+template <class Line, class Element>
+bool read_elements(std::span<const std::byte> bytes, std::uint32_t count, Element* out) {
+  if (count > protocol::kMaxEntitiesPerFrame ||
+      bytes.size() != sizeof(Line) + count * sizeof(Element)) {
+    return false;
+  }
+  if (count > 0) {
+    std::memcpy(out, bytes.data() + sizeof(Line), count * sizeof(Element));
+  }
+  return true;
+}
+
+bool host_frame(std::span<const std::byte> bytes, v1::HostFrame& out) {
+  JournalHostFrame line;
+  protocol::HostFrameData frame;
+  if (!read(bytes, line) ||
+      !read_elements<JournalHostFrame>(bytes, line.entity_count, frame.entities.data())) {
+    return false;
+  }
+  frame.frame_number = line.frame_number;
+  frame.sim_time_ns = line.sim_time_ns;
+  frame.run_id = line.run_id;
+  frame.received_ns = line.received_ns;
+  frame.seeker = line.seeker;
+  frame.seeker_rates = line.seeker_rates;
+  frame.environment = line.environment;
+  frame.entity_count = line.entity_count;
+  protocol::to_proto(frame, out);
+  return true;
+}
+
+bool decision(std::span<const std::byte> bytes, v1::FrameDecision& out) {
+  JournalFrame line;
+  std::vector<renderer::EntityUpdate> entities(protocol::kMaxEntitiesPerFrame);
+  if (!read(bytes, line) ||
+      !read_elements<JournalFrame>(bytes, line.entity_count, entities.data())) {
+    return false;
+  }
+  out.set_frame_number(line.frame_number);
+  out.set_host_frame_number(line.host_frame_number);
+  out.set_sim_time_ns(line.sim_time_ns);
+  out.set_pose_sim_time_ns(line.pose_sim_time_ns);
+  out.set_thermal_time_ns(line.thermal_time_ns);
+  protocol::to_proto(line.sensor_pose, std::nullopt, *out.mutable_sensor_pose());
+  out.set_flags(line.flags);
+  out.set_quality_rung(line.quality_rung);
+  out.set_radiance_crc32c(line.radiance_crc32c);
+  out.set_radiance_channel(line.radiance_channel);
+  out.set_rendered(line.rendered);
+  out.set_trigger_number(line.trigger_number);
+  out.set_slot_begin_ns(line.slot_begin_ns);
+  for (std::uint32_t i = 0; i < line.entity_count; ++i) {
+    protocol::EntityStateData state;
+    state.entity_id = entities[i].entity_id;
+    state.pose = entities[i].pose;
+    state.has_pose = true;
+    state.on = entities[i].on;
+    state.teleport = entities[i].teleport;
+    protocol::to_proto(state, *out.add_entities());
+  }
+  return true;
+}
+
+}  // namespace
+
+bool to_journal_entry(std::span<const std::byte> line, const Recorder::Identity& identity,
+                      v1::JournalEntry& out) {
+  JournalHead head;
+  if (!read(line, head)) {
+    return false;
+  }
+  out.Clear();
+  out.set_sequence(head.sequence);
+  out.set_wall_time_ns(head.wall_time_ns);
+  switch (head.kind) {
+    case JournalKind::run_start: {
+      JournalRunStart start;
+      if (!read(line, start)) {
+        return false;
+      }
+      auto& message = *out.mutable_run_start();
+      message.set_run_id(start.run_id);
+      message.set_scenario_name(identity.scenario_name);
+      message.set_scenario_sha256(identity.scenario_sha256);
+      message.set_software(identity.software);
+      message.set_device(identity.device);
+      message.set_pacing(identity.pacing);
+      return true;
+    }
+    case JournalKind::host_frame:
+      return host_frame(line, *out.mutable_host_frame());
+    case JournalKind::command: {
+      JournalCommand command;
+      if (!read(line, command)) {
+        return false;
+      }
+      out.mutable_command()->set_kind(static_cast<v1::Command::Kind>(command.command));
+      return true;
+    }
+    case JournalKind::frame:
+      return decision(line, *out.mutable_frame());
+  }
+  return false;
+}
+
+}  // namespace emit::server

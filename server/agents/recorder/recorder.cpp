@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/recorder/recorder.hpp"
+
+#include <sys/epoll.h>
+
+#include <algorithm>
+#include <array>
+#include <exception>
+
+#include "agents/recorder/journal_encode.hpp"
+#include "agents/journal_ring.hpp"
+#include "agents/recorder/older_journal.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/v1/control.pb.h"
+#include "net/socket.hpp"
+
+namespace emit::server {
+
+Recorder::Recorder(Context& context, config::JournalConfig config, std::size_t max_peers)
+    : Agent(context.bells.recorder),
+      context_(context),
+      config_(std::move(config)),
+      epoll_(::epoll_create1(EPOLL_CLOEXEC)) {
+  peers_.reserve(max_peers);
+}
+
+physics::Result<std::filesystem::path> Recorder::open() {
+  if (config_.file.empty()) {
+    return std::filesystem::path();
+  }
+  auto kept = keep_older_journal(config_.file);
+  if (!kept) {
+    return kept;
+  }
+  protocol::LogWriterOptions options;
+  options.software = identity_.software;
+  auto writer = protocol::LogWriter::create(config_.file, options);
+  if (!writer) {
+    return tl::unexpected<physics::Error>(std::move(writer.error()));
+  }
+  file_ = std::move(*writer);
+  return kept;
+}
+
+bool Recorder::on_start() noexcept {
+  return static_cast<bool>(epoll_);
+}
+
+int Recorder::do_work(std::int64_t now_ns) noexcept {
+  wake_at_ns_ = kNeverNs;
+  // Memory may run out while lines are kept or encoded: the journal ends then, the frames do not.
+  try {
+    int work = take_commands();
+    work += take_lines();
+    flush_when_due(now_ns);
+    work += take_writable();
+    work += send_all();
+    discard_old();
+    const std::uint64_t end = kept_first_ + kept_.size();
+    if (std::all_of(peers_.begin(), peers_.end(),
+                    [end](const Peer& peer) { return peer.next == end; })) {
+      finished_.store(taken_, std::memory_order_release);
+    }
+    return work;
+  } catch (const std::exception& error) {
+    file_failed({physics::ErrorCode::internal, error.what()});
+    return 0;
+  }
+}
+
+void Recorder::on_stop() noexcept {
+  try {
+    while (take_lines() > 0) {
+    }
+    while (send_all() > 0) {
+    }
+  } catch (const std::exception& error) {
+    file_failed({physics::ErrorCode::internal, error.what()});
+  }
+  while (!peers_.empty()) {
+    remove(peers_.size() - 1);
+  }
+  if (file_) {
+    const auto closed = file_->close();
+    if (!closed) {
+      file_failed(closed.error());
+    }
+    file_.reset();
+  }
+}
+
+int Recorder::take_commands() {
+  int work = 0;
+  while (const RecorderCommand* command = context_.to_recorder.front()) {
+    if (command->kind == ClientCommand::Kind::add) {
+      Peer peer;
+      peer.connection = command->connection;
+      peer.fd = command->fd;
+      peer.socket = command->socket;
+      peer.next = std::max(run_first_, kept_first_);
+      peers_.push_back(peer);
+    } else {
+      const auto found = std::find_if(peers_.begin(), peers_.end(), [&](const Peer& peer) {
+        return peer.connection == command->connection;
+      });
+      if (found != peers_.end()) {
+        remove(static_cast<std::size_t>(found - peers_.begin()));
+      }
+    }
+    context_.to_recorder.pop();
+    ++work;
+  }
+  return work;
+}
+
+int Recorder::take_lines() {
+  int work = 0;
+  constexpr int kMaxPerTurn = 256;
+  for (auto line = context_.journal.front(); !line.empty() && work < kMaxPerTurn;
+       line = context_.journal.front()) {
+    add_record(line);
+    context_.journal.pop();
+    ++taken_;
+    ++work;
+  }
+  return work;
+}
+
+void Recorder::add_record(std::span<const std::byte> line) {
+  v1::ControlRecord record;
+  v1::JournalEntry& entry = *record.mutable_journal();
+  if (!to_journal_entry(line, identity_, entry)) {
+    context_.counters.add(Counter::journal_errors);
+    return;
+  }
+  context_.counters.add(Counter::journal_entries);
+  if (entry.has_run_start()) {
+    run_first_ = kept_first_ + kept_.size();
+  }
+  if (file_) {
+    const auto written = file_->write_journal(entry);
+    if (!written) {
+      file_failed(written.error());
+    } else if (unflushed_since_ns_ == 0) {
+      unflushed_since_ns_ = context_.clock.monotonic_ns();
+    }
+  }
+  std::vector<std::byte> framed;
+  protocol::append_control_record(record, framed);
+  kept_bytes_ += framed.size();
+  kept_.push_back(std::move(framed));
+}
+
+void Recorder::flush_when_due(std::int64_t now_ns) {
+  if (!file_ || unflushed_since_ns_ == 0) {
+    return;
+  }
+  // Steps of the wall clock must not stretch it.
+  const std::int64_t age_ns = context_.clock.monotonic_ns() - unflushed_since_ns_;
+  if (age_ns < kFlushAfterNs) {
+    wake_at_ns_ = now_ns + kFlushAfterNs - age_ns;
+    return;
+  }
+  unflushed_since_ns_ = 0;
+  if (const auto flushed = file_->flush(); !flushed) {
+    file_failed(flushed.error());
+  }
+}
+
+void Recorder::file_failed(const physics::Error& error) noexcept {
+  context_.counters.add(Counter::journal_errors);
+  context_.recorder_events.push(EventKind::journal_failed, 0, 0, error.text);
+  // A journal with a hole is worth nothing; the part so far stays readable.
+  file_.reset();
+}
+
+void Recorder::discard_old() {
+  // Records of runs gone by stay only while a peer is still being sent them.
+  std::uint64_t needed = run_first_;
+  for (const Peer& peer : peers_) {
+    needed = std::min(needed, peer.next);
+  }
+  const auto drop_front = [this] {
+    kept_bytes_ -= kept_.front().size();
+    kept_.pop_front();
+    ++kept_first_;
+  };
+  while (kept_first_ < needed) {
+    drop_front();
+  }
+  while (kept_bytes_ > kKeptBytes) {
+    drop_front();
+    for (std::size_t i = peers_.size(); i-- > 0;) {
+      if (peers_[i].next < kept_first_) {
+        context_.counters.add(Counter::recorders_disconnected_slow);
+        context_.recorder_events.push(EventKind::client_slow, peers_[i].connection);
+        remove(i);
+      }
+    }
+  }
+}
+
+int Recorder::take_writable() noexcept {
+  std::array<epoll_event, 8> events{};
+  if (std::none_of(peers_.begin(), peers_.end(), [](const Peer& peer) { return peer.blocked; })) {
+    return 0;
+  }
+  const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
+  for (int i = 0; i < count; ++i) {
+    for (Peer& peer : peers_) {
+      if (peer.connection == events[static_cast<std::size_t>(i)].data.u32) {
+        peer.blocked = false;
+      }
+    }
+  }
+  return std::max(count, 0);
+}
+
+int Recorder::send_all() noexcept {
+  int work = 0;
+  for (std::size_t i = peers_.size(); i-- > 0;) {
+    bool failed = false;
+    if (!peers_[i].blocked && send_some(peers_[i], failed)) {
+      ++work;
+    }
+    if (failed) {
+      remove(i);
+    }
+  }
+  return work;
+}
+
+bool Recorder::send_some(Peer& peer, bool& failed) noexcept {
+  std::array<std::span<const std::byte>, kMaxLentPieces> pieces;
+  std::size_t count = 0;
+  const std::uint64_t end = kept_first_ + kept_.size();
+  for (std::uint64_t index = peer.next; index < end && count < pieces.size(); ++index) {
+    const std::span<const std::byte> bytes(kept_[static_cast<std::size_t>(index - kept_first_)]);
+    pieces[count++] = bytes.subspan(index == peer.next ? peer.offset : 0);
+  }
+  if (count == 0) {
+    return false;
+  }
+  const IoResult sent = write_lent(*peer.socket, std::span(pieces).first(count));
+  if (sent.status == IoStatus::failed || sent.status == IoStatus::closed) {
+    failed = true;
+    return false;
+  }
+  if (sent.status == IoStatus::busy) {
+    return true;  // the receiver is inside for microseconds
+  }
+  if (sent.status == IoStatus::would_block) {
+    peer.blocked = true;
+    epoll_event event{};
+    event.events = EPOLLOUT | EPOLLONESHOT;
+    event.data.u32 = peer.connection;
+    ::epoll_ctl(epoll_.get(), peer.registered ? EPOLL_CTL_MOD : EPOLL_CTL_ADD, peer.fd, &event);
+    peer.registered = true;
+    return false;
+  }
+  std::size_t left = sent.bytes;
+  for (std::size_t i = 0; i < count && left > 0; ++i) {
+    if (left < pieces[i].size()) {
+      peer.offset += left;
+      return true;
+    }
+    left -= pieces[i].size();
+    ++peer.next;
+    peer.offset = 0;
+  }
+  return true;
+}
+
+void Recorder::remove(std::size_t index) noexcept {
+  const Peer peer = peers_[index];
+  if (peer.registered) {
+    ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, peer.fd, nullptr);
+  }
+  peers_.erase(peers_.begin() + static_cast<std::ptrdiff_t>(index));
+  static_cast<void>(context_.from_recorder.push({peer.connection}));
+  context_.bells.receiver.ring();
+}
+
+}  // namespace emit::server

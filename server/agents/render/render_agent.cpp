@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/render/render_agent.hpp"
+
+#include <algorithm>
+#include <span>
+
+namespace emit::server {
+
+RenderAgent::~RenderAgent() = default;
+
+bool RenderAgent::on_start() noexcept {
+  auto source = factory_();
+  if (!source) {
+    info_ = tl::unexpected<physics::Error>(std::move(source.error()));
+    return false;
+  }
+  source_ = std::move(*source);
+  info_ = source_->info();
+  return true;
+}
+
+void RenderAgent::on_stop() noexcept {
+  while (count_ > 0) {
+    const auto slot = in_flight_[first_].slot;
+    if (!lost_) {  // a device that is gone might be waited for for ever
+      static_cast<void>(source_->collect(slot));
+    }
+    source_->release(slot);
+    first_ = (first_ + 1) % kDepth;
+    --count_;
+  }
+  source_.reset();
+}
+
+int RenderAgent::do_work(std::int64_t now_ns) noexcept {
+  int work = 0;
+  wake_at_ns_ = kNeverNs;
+  if (lost_) {
+    return 0;
+  }
+  if (finish_oldest()) {
+    ++work;
+  }
+  if (take_job(now_ns)) {
+    ++work;
+  }
+  if (work == 0 && count_ > 0) {
+    // The device does not ring; looking again after 50 us costs little beside a frame.
+    wake_at_ns_ = now_ns + 50'000;
+    if (context_.clock.monotonic_ns() - in_flight_[first_].begun_ns > kLongestFrameNs) {
+      lose_device("a frame is not done within 60 s");
+    }
+  }
+  return work;
+}
+
+bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
+  RenderJob* job = context_.jobs.front();
+  if (job == nullptr) {
+    return false;
+  }
+  switch (job->kind) {
+    case RenderJob::Kind::reset:
+      source_->reset();
+      weather_lost_ = false;
+      dropped_poses_ = 0;
+      break;
+    case RenderJob::Kind::frame: {
+      if (count_ == kDepth) {
+        return false;
+      }
+      const std::int64_t begun_ns = context_.clock.monotonic_ns();
+      if (!job_prepared_) {
+        apply_weather(*job);
+        source_->apply_entities(job->request.sim_time_ns,
+                                std::span(job->entities.data(), job->entity_count));
+        job_prepared_ = true;
+      }
+      const double expected_ms = choose_rung(*job, now_ns);
+      const auto slot = context_.of_slots.look([&]() -> std::optional<renderer::SlotIndex> {
+        const int free = source_->submit(job->request);
+        if (free < 0) {
+          return std::nullopt;
+        }
+        return static_cast<renderer::SlotIndex>(free);
+      });
+      if (!slot) {
+        // Whoever is done with one rings.
+        if (!starved_) {
+          context_.counters.add(Counter::no_free_slot);
+          starved_ = true;
+        }
+        return false;
+      }
+      starved_ = false;
+      job_prepared_ = false;
+      in_flight_[(first_ + count_) % kDepth] = {*slot, now_ns, expected_ms, begun_ns,
+                                                job->channels};
+      ++count_;
+      context_.counters.add(Counter::frames_submitted);
+      break;
+    }
+  }
+  context_.jobs.pop();
+  return true;
+}
+
+double RenderAgent::choose_rung(RenderJob& job, std::int64_t now_ns) noexcept {
+  job.request.rung = 0;
+  if (job.deadline_ns == 0) {
+    return 0.0;
+  }
+  const auto rungs = source_->expected_rungs(job.request);
+  const std::size_t rung = quality_.choose(rungs, job.deadline_ns - now_ns);
+  job.request.rung = static_cast<std::uint8_t>(rung);
+  return rungs[rung].frame_ms;
+}
+
+void RenderAgent::apply_weather(const RenderJob& job) noexcept {
+  for (std::uint32_t i = 0; i < job.weather_count; ++i) {
+    if (source_->apply_weather(job.weather[i])) {
+      continue;
+    }
+    context_.counters.add(Counter::weather_lost);
+    if (!weather_lost_) {
+      // Once per run: from here on its weather stands still.
+      weather_lost_ = true;
+      context_.render_events.push(EventKind::weather_lost,
+                                  static_cast<std::uint64_t>(job.weather[i].sim_time_ns));
+    }
+  }
+}
+
+void RenderAgent::note_dropped_poses(std::uint64_t in_run) noexcept {
+  if (in_run <= dropped_poses_) {
+    return;
+  }
+  context_.counters.add(Counter::poses_dropped, in_run - dropped_poses_);
+  if (dropped_poses_ == 0) {
+    context_.render_events.push(EventKind::poses_dropped, in_run);
+  }
+  dropped_poses_ = in_run;
+}
+
+void RenderAgent::note_device(const renderer::FrameView& view) noexcept {
+  if (!view.device_failed) {
+    failures_ = 0;
+    return;
+  }
+  context_.counters.add(Counter::device_failures);
+  context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");
+  if (view.device_lost) {
+    lose_device("the driver reset the context");
+  } else if (++failures_ >= kMostFailures) {
+    lose_device("the device reported errors for 30 frames in a row");
+  }
+}
+
+void RenderAgent::lose_device(std::string_view why) noexcept {
+  lost_ = true;
+  context_.render_events.push(EventKind::device_lost, 0, 0, why);
+  context_.device_lost.store(true, std::memory_order_release);
+}
+
+bool RenderAgent::finish_oldest() noexcept {
+  if (count_ == 0) {
+    return false;
+  }
+  const InFlight& oldest = in_flight_[first_];
+  if (!source_->poll(oldest.slot)) {
+    return false;
+  }
+  RenderDone* done = context_.done.claim();
+  if (done == nullptr) {
+    return false;
+  }
+  done->render_start_ns = oldest.render_start_ns;
+  done->render_end_ns = context_.clock.tai_ns();
+  const renderer::FrameView& view = source_->collect(oldest.slot);
+  done->readback_end_ns = context_.clock.tai_ns();
+  done->nonfinite_px = view.stats.nonfinite_px;
+  done->clamped_px = view.stats.clamped_px;
+  done->dropped_poses = view.stats.dropped_poses;
+  note_dropped_poses(view.stats.dropped_poses);
+  done->coarse = view.stats.coarse;
+  if (view.stats.coarse) {
+    context_.counters.add(Counter::frames_coarse);
+  }
+  done->rung = view.rung;
+  done->estimated_error_k = view.estimated_error_k;
+  // A wall clock that is set must not be taken for a slow device.
+  quality_.finished(context_.clock.monotonic_ns() - oldest.begun_ns, oldest.expected_ms);
+  done->device_failed = view.device_failed;
+  note_device(view);
+  done->image.source = source_.get();
+  done->image.slot = oldest.slot;
+  done->image.channels = oldest.channels;
+  take_pictures(view, done->image);
+  context_.done.commit();
+  context_.counters.add(Counter::frames_rendered);
+  first_ = (first_ + 1) % kDepth;
+  --count_;
+  context_.bells.conductor.ring();
+  return true;
+}
+
+void RenderAgent::take_pictures(const renderer::FrameView& view, Image& image) noexcept {
+  const std::span<Picture> pictures(context_.pictures);
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    if ((pictures[i].channels & image.channels) == 0) {
+      image.pictures[i] = {};
+      continue;
+    }
+    image.pictures[i] = cut_out(pictures[i], view, image.slot);
+    // Planes that share memory (canned frames) are summed once.
+    const bool same = i > 0 && image.pictures[i].data() == image.pictures[i - 1].data() &&
+                      image.pictures[i].size() == image.pictures[i - 1].size();
+    image.crc32c[i] =
+        same ? image.crc32c[i - 1] : protocol::crc32c(std::as_bytes(image.pictures[i]));
+  }
+}
+
+}  // namespace emit::server

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <atomic>
+#include <memory>
+#include <optional>
+
+#include "agents/agent.hpp"
+#include "agents/frame_source.hpp"
+#include "agents/context.hpp"
+#include "pacing/quality_policy.hpp"
+
+namespace emit::server {
+
+/// Owns the frame source from its making to its end, carries out render jobs in order and hands
+/// finished images to the conductor. A frame is always collected before a later one.
+class RenderAgent final : public Agent {
+ public:
+  RenderAgent(Context& context, FrameSourceFactory factory)
+      : Agent(context.bells.render), context_(context), factory_(std::move(factory)) {}
+  ~RenderAgent() override;
+
+  [[nodiscard]] std::string_view name() const noexcept override { return "render"; }
+  [[nodiscard]] bool on_start() noexcept override;
+  int do_work(std::int64_t now_ns) noexcept override;
+  void on_stop() noexcept override;
+  [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
+
+  /// After on_start: the source's description, or why there is none. Not while running.
+  [[nodiscard]] const physics::Result<SourceInfo>& source_info() const noexcept { return info_; }
+
+ private:
+  struct InFlight {
+    renderer::SlotIndex slot = 0;
+    std::int64_t render_start_ns = 0;
+    double expected_ms = 0.0;   ///< for its rung, by the ladder
+    std::int64_t begun_ns = 0;  ///< monotonic; render_start_ns is TAI
+    ChannelSet channels = 0;
+  };
+  /// More than one in flight lets upload of the next overlap with read-back of the last.
+  static constexpr std::size_t kDepth = 2;
+  /// Frames in a row with an error of the driver, and how long one may be in work, before the
+  /// device counts as lost. A software renderer may take seconds for a frame.
+  static constexpr std::uint32_t kMostFailures = 30;
+  static constexpr std::int64_t kLongestFrameNs = 60'000'000'000;
+
+  bool take_job(std::int64_t now_ns) noexcept;
+  bool finish_oldest() noexcept;
+  /// The pictures of image.channels, and their checksums.
+  void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
+  /// Sets the job's rung; returns RungStats::frame_ms of it.
+  double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
+  void apply_weather(const RenderJob& job) noexcept;
+  void note_dropped_poses(std::uint64_t in_run) noexcept;
+  void note_device(const renderer::FrameView& view) noexcept;
+  /// No frame comes any more: the daemon is told, and ends.
+  void lose_device(std::string_view why) noexcept;
+
+  Context& context_;
+  FrameSourceFactory factory_;
+  std::unique_ptr<FrameSource> source_;
+  physics::Result<SourceInfo> info_ =
+      physics::make_error(physics::ErrorCode::internal, "the frame source was not started");
+  std::array<InFlight, kDepth> in_flight_{};
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+  QualityPolicy quality_;
+  std::int64_t wake_at_ns_ = kNeverNs;
+  std::uint32_t failures_ = 0;  // of the device, in a row
+  bool lost_ = false;
+  bool starved_ = false;
+  bool weather_lost_ = false;        // said so for this run
+  std::uint64_t dropped_poses_ = 0;  // counted in this run
+  bool job_prepared_ = false;  // entities of the job in front are applied; only submit is missing
+};
+
+}  // namespace emit::server

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/sender/sender_client.hpp"
+
+#include <cstdlib>
+
+namespace emit::server {
+
+void SenderClient::start(const protocol::FrameHeader& header, std::int64_t now_ns) noexcept {
+  header_ = header;
+  if (gap) {
+    header_.flags |= protocol::kFlagGapBefore;
+    gap = false;
+  }
+  header_.send_start_ns = now_ns;
+  header_.previous_age_ns = previous_age_ns_;
+  header_.previous_delay_ns = previous_delay_ns_;
+  header_.previous_frame_number = previous_frame_number_;
+  header_.previous_jitter_ns = static_cast<std::int64_t>(jitter_ns_);
+  busy_ = true;
+  spilled_ = false;
+}
+
+protocol::FrameHeader SenderClient::header_for(const Channel& channel,
+                                               const Image& image) const noexcept {
+  protocol::FrameHeader out = header_;
+  out.channel_kind = static_cast<std::uint8_t>(channel.kind);
+  out.channel_index = channel.index;
+  out.width_px = channel.width_px;
+  out.height_px = channel.height_px;
+  out.band_lo_um = static_cast<float>(channel.band_lo_um);
+  out.band_hi_um = static_cast<float>(channel.band_hi_um);
+  out.window_x_px = channel.window_x_px;
+  out.window_y_px = channel.window_y_px;
+  out.sensor_width_px = channel.sensor_width_px;
+  out.sensor_height_px = channel.sensor_height_px;
+  out.payload_bytes = image.pictures[channel.picture].size_bytes();
+  out.payload_crc32c = image.crc32c[channel.picture];
+  return out;
+}
+
+void SenderClient::complete(std::int64_t now_ns) noexcept {
+  busy_ = false;
+  spilled_ = false;
+  previous_frame_number_ = header_.frame_number;
+  delay_change_ns_.reset();
+  if (header_.host_received_ns != 0) {
+    const std::int64_t delay_ns = now_ns - header_.host_received_ns;
+    if (have_delay_) {
+      delay_change_ns_ = std::abs(delay_ns - previous_delay_ns_);
+      jitter_ns_ += (static_cast<double>(*delay_change_ns_) - jitter_ns_) / 16.0;
+    }
+    have_delay_ = true;
+    previous_delay_ns_ = delay_ns;
+    previous_age_ns_ = previous_delay_ns_ - (header_.sim_time_ns - header_.pose_sim_time_ns);
+  }
+}
+
+}  // namespace emit::server

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "agents/sender/sender_client.hpp"
+#include "emit/config/daemon_config.hpp"
+#include "emit/protocol/shared_ring.hpp"
+#include "net/shm_object.hpp"
+
+namespace emit::server {
+
+/// Writes every publication, with all channels, while somebody reads, into a ring of shared memory,
+/// for clients on this host. Readers map it read-only: no reader, dead or alive, can delay or
+/// disturb anybody.
+///
+/// Owner: the daemon. Thread: the sender's between construction and destruction.
+class ShmClient final : public SenderClient {
+ public:
+  /// Takes the memory and gives it its name. `welcome`: serialised emit.v1.Welcome.
+  /// Errors (io): the name is in use, no room.
+  [[nodiscard]] static physics::Result<std::unique_ptr<ShmClient>> create(
+      const config::StreamConfig& config, const std::vector<Channel>& channels,
+      std::span<const std::byte> welcome, std::int64_t now_ns);
+  /// Tells the readers that nothing more comes.
+  ~ShmClient() override;
+
+  void begin(const protocol::FrameHeader& header, const Image& image,
+             std::int64_t now_ns) noexcept override;
+  [[nodiscard]] Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept override;
+  /// Copies the rest now: that is all the source has to wait for.
+  void spill() noexcept override;
+  [[nodiscard]] std::uint32_t connection() const noexcept override { return 0; }
+  /// Nothing is copied that nobody reads.
+  [[nodiscard]] bool wants(const protocol::FrameHeader& /*header*/,
+                           ChannelSet /*channels*/) const noexcept override {
+    return object_.has_readers();
+  }
+
+ private:
+  ShmClient(ShmObject object, const protocol::RingParams& params,
+            const std::vector<Channel>& channels, std::vector<std::size_t> pictures);
+  void copy(std::size_t budget_bytes) noexcept;
+
+  ShmObject object_;
+  protocol::RingWriter ring_;
+  const std::vector<Channel>& channels_;
+  std::vector<std::size_t> pictures_;  // of the image, by plane of the ring
+  Image image_;                        // being copied
+  std::size_t plane_ = 0;              // where copying stands
+  std::size_t offset_ = 0;
+};
+
+}  // namespace emit::server

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bench/accuracy/bench_rules.hpp"
+#include "tool/commands/commands.hpp"
+#include "emit/physics/error.hpp"
+#include "emit/reference/solve.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "bench/frame_time/paper_errors.hpp"
+#include "tool/support/statistics.hpp"
+
+namespace emit::tool {
+
+/// Horizontal motion of the picture's centre per frame, px; elsewhere in the picture it is more.
+inline constexpr double kPaperPanPx = 2.5;
+/// Closings of the newest history interval that a run crosses.
+inline constexpr double kPaperClosings = 3.2;
+
+/// A method of the thermal simulation as `emit bench paper` runs it.
+struct PaperMethod {
+  scene::ThermalMethod method = scene::ThermalMethod::per_frame;
+  const char* name = "per-frame";
+  std::uint32_t least_frames = 5;
+  /// False: what a frame shows does not hang on the frames before it.
+  bool carries_state = false;
+};
+inline constexpr std::array kPaperMethods{
+    PaperMethod{}, PaperMethod{scene::ThermalMethod::cached, "cached", 300, true}};
+
+/// Frames of one scene, method and number of steps: a camera that pans to and fro and a clock that
+/// goes on.
+struct PaperRun {
+  scene::ScenarioDesc scenario;
+  PaperMethod method;
+  std::int64_t start_ns = 0;
+  std::int64_t advance_ns = 0;
+  std::uint32_t frames = 0;
+  int gpu_index = -1;
+};
+[[nodiscard]] PaperRun make_paper_run(scene::ScenarioDesc scenario, const PaperMethod& method,
+                                      std::uint32_t steps, const BenchPaperCommand& command);
+
+struct PaperTimes {
+  Samples frame_ms;
+  std::array<Samples, 6> stages_ms;
+  std::string device;
+  std::uint64_t triangles = 0;
+};
+
+/// Called after every frame.
+using PaperProgress = std::function<void()>;
+
+/// One pass over the frames of a run after a warm-up frame. With `stages` the device is waited for
+/// after each stage, so that the stages can be told apart. Errors: gpu, io (interrupted), those of
+/// Renderer::create().
+[[nodiscard]] physics::Result<PaperTimes> time_frames(const PaperRun& run, bool stages,
+                                                      const PaperProgress& progress);
+
+/// Shares of the picture over the run's first frame and the one after half a pan: not timed, so
+/// that the planes it needs cost the measured frames nothing.
+[[nodiscard]] physics::Result<SceneFill> check_fill(const PaperRun& run);
+
+/// Temperatures of the run's first and last frame, not timed either. A method that carries state
+/// renders every frame in between as well.
+[[nodiscard]] physics::Result<std::vector<JudgedFrame>> judged_frames(const PaperRun& run);
+
+/// What the first frame looks at.
+[[nodiscard]] physics::Result<reference::SolveView> first_view(const PaperRun& run);
+
+}  // namespace emit::tool

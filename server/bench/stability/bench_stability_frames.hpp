@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::tool {
+
+/// Whole frames under hostile scenes, through the renderer's public interface: geometry,
+/// obscurance, soft shadows, thermal history and radiance together.
+struct HostileFrameOptions {
+  std::uint32_t width_px = 160;
+  std::uint32_t height_px = 128;
+  int gpu_index = -1;
+  std::vector<std::string> only;      ///< names of tests; empty: all
+  std::filesystem::path picture_dir;  ///< every frame's temperature as PNG; empty: none
+  /// Share done, 0..1; false stops with an error.
+  std::function<bool(double)> progress;
+};
+
+/// What a test found over all its frames. An error is the distance to the temperature that the
+/// test's note names; NaN where no temperature is judged.
+struct HostileFrameResult {
+  std::string test;
+  std::string device;
+  std::uint64_t frames = 0;
+  std::uint64_t cases = 0;      ///< pixels judged
+  std::uint64_t nan_count = 0;  ///< radiance values, and temperatures of surfaces
+  std::uint64_t inf_count = 0;
+  std::uint64_t nonfinite_px = 0;  ///< counted by the renderer, which writes 0 there
+  std::uint64_t clamped_count = 0;
+  double max_error_k = 0.0;
+  double p99_error_k = 0.0;
+  std::string worst_input;
+  std::string note;
+};
+
+[[nodiscard]] std::vector<std::string> hostile_frame_tests();
+
+/// Errors: gpu, io, invalid_argument for a test that does not exist.
+[[nodiscard]] physics::Result<std::vector<HostileFrameResult>> run_hostile_frames(
+    const HostileFrameOptions& options);
+
+}  // namespace emit::tool

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/reference/fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
+#include "emit/config/load.hpp"
+#include "tool/support/json.hpp"
+#include "tool/support/library_edit.hpp"
+#include "tool/support/scenario_input.hpp"
+
+namespace emit::tool {
+namespace {
+
+using physics::ErrorCode;
+using physics::make_error;
+using physics::Result;
+
+constexpr const char* kColumns[] = {"time_s", "absorbed_w_m2", "film_w_m2_k", "air_k",
+                                    "temperature_k"};
+
+std::vector<std::string> cells_of(std::string line) {
+  while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+  std::vector<std::string> cells;
+  std::stringstream stream(line);
+  for (std::string cell; std::getline(stream, cell, ',');) {
+    const auto first = cell.find_first_not_of(" \t");
+    const auto last = cell.find_last_not_of(" \t");
+    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+  }
+  return cells;
+}
+
+/// CSV with a header row; columns in any order, others are ignored.
+Result<std::vector<reference::CurvePoint>> read_curve(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream)
+    return make_error(ErrorCode::not_found, fmt::format("{}: cannot open", file.string()));
+  std::vector<reference::CurvePoint> curve;
+  std::vector<std::size_t> column;
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    if (line.empty() || line[0] == '#' || line == "\r") continue;
+    const std::vector<std::string> cells = cells_of(line);
+    if (column.empty()) {
+      for (const char* name : kColumns) {
+        const auto found = std::find(cells.begin(), cells.end(), name);
+        if (found == cells.end()) {
+          return make_error(ErrorCode::invalid_argument,
+                            fmt::format("{}: there is no column '{}'", file.string(), name));
+        }
+        column.push_back(static_cast<std::size_t>(found - cells.begin()));
+      }
+      continue;
+    }
+    double value[std::size(kColumns)] = {};
+    for (std::size_t i = 0; i < std::size(kColumns); ++i) {
+      const std::string text = column[i] < cells.size() ? cells[column[i]] : "";
+      const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value[i]);
+      if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value[i])) {
+        return make_error(ErrorCode::invalid_argument,
+                          fmt::format("{}:{}: '{}' in column '{}' is not a number", file.string(),
+                                      number, text, kColumns[i]));
+      }
+    }
+    curve.push_back({value[0], value[1], value[2], value[3], value[4]});
+  }
+  return curve;
+}
+
+Json json_of(const reference::FitResult& fit, const scene::Material& material,
+             reference::FitModel model) {
+  Json out = Json::object();
+  out.set("material", fit.material);
+  out.set("model", model == reference::FitModel::foster ? "foster" : "emit2014");
+  out.set("rms_k", fit.rms_k).set("max_k", fit.max_k).set("horizon_s", fit.horizon_s);
+  if (model == reference::FitModel::foster) {
+    out.set("derived_rms_k", fit.derived_rms_k).set("derived_max_k", fit.derived_max_k);
+  }
+  out.set("dry_layers_valid", material.dry_layers_valid);
+  out.set("converged", fit.converged).set("iterations", std::uint64_t{fit.iterations});
+  Json modes = Json::array();
+  for (std::size_t i = 0; i < fit.network.count; ++i) {
+    modes.push(Json::object()
+                   .set("tau_s", fit.network.modes[i].tau_s)
+                   .set("resistance_m2k_w", fit.network.modes[i].resistance_m2k_w));
+  }
+  for (const scene::RelaxationMode& mode : fit.modes) {
+    modes.push(Json::object().set("tau_s", mode.tau_s).set("weight_frac", mode.weight_frac));
+  }
+  out.set("modes", std::move(modes));
+  Json residuals = Json::array();
+  for (const reference::FitResidual& r : fit.residuals) {
+    residuals.push(Json::object()
+                       .set("history", r.history)
+                       .set("rms_k", r.rms_k)
+                       .set("max_k", r.max_k)
+                       .set("judged", r.judged));
+  }
+  out.set("residuals", std::move(residuals));
+  return out;
+}
+
+std::string modes_text(const reference::FitResult& fit) {
+  std::string text;
+  for (std::size_t i = 0; i < fit.network.count; ++i) {
+    text += fmt::format("{}{:.4g} s {:.4g}", i > 0 ? ", " : "", fit.network.modes[i].tau_s,
+                        fit.network.modes[i].resistance_m2k_w);
+  }
+  for (std::size_t i = 0; i < fit.modes.size(); ++i) {
+    text += fmt::format("{}{:.4g} s {:.3f}", i > 0 ? ", " : "", fit.modes[i].tau_s,
+                        fit.modes[i].weight_frac);
+  }
+  return text;
+}
+
+bool is_curve(const std::string& input) {
+  return std::filesystem::path(input).extension() == ".csv";
+}
+
+/// What a curve's material is looked up in: the shipped library.
+Result<scene::ScenarioDesc> library_scenario(const std::vector<std::string>& set) {
+  auto file = config::resolve_scenario("block-on-road");
+  if (!file) return tl::unexpected(std::move(file.error()));
+  config::LoadOptions options;
+  options.require_scene_files = false;
+  return config::load_scenario(*file, set, options);
+}
+
+}  // namespace
+
+int run_fit(const FitCommand& command) {
+  reference::FitOptions options;
+  options.model =
+      command.model == "emit2014" ? reference::FitModel::emit2014 : reference::FitModel::foster;
+  const bool foster = options.model == reference::FitModel::foster;
+  options.modes = command.modes.value_or(foster ? 4U : 2U);
+  if (!foster && options.modes > 2) return fail(kExitUsage, "emit2014 has at most 2 modes");
+
+  const bool curve_input = is_curve(command.input.scenario);
+  if (curve_input && command.materials.size() != 1) {
+    return fail(kExitUsage, "a curve belongs to one material: name it with --material");
+  }
+  auto scenario =
+      curve_input ? library_scenario(command.input.set) : load_scenario_choice(command.input);
+  if (!scenario) return fail_config(scenario.error());
+
+  std::vector<const scene::Material*> materials;
+  for (const std::string& name : command.materials) {
+    const auto found = std::find_if(scenario->materials.begin(), scenario->materials.end(),
+                                    [&](const scene::Material& m) { return m.name == name; });
+    if (found == scenario->materials.end()) {
+      return fail(kExitUsage, fmt::format("there is no material '{}'", name));
+    }
+    materials.push_back(&*found);
+  }
+  if (command.materials.empty()) {
+    for (const scene::Material& material : scenario->materials) {
+      if (!material.prescribed_k) materials.push_back(&material);
+    }
+  }
+
+  std::vector<reference::CurvePoint> curve;
+  std::vector<reference::GroundForcing> forcing;
+  const double start_s = static_cast<double>(scenario->thermal.history_start_ns) * 1e-9;
+  options.history_s = command.history_s;
+  options.spin_up_s = command.spin_up_s;
+  if (curve_input) {
+    auto read = read_curve(command.input.scenario);
+    if (!read) return fail_call(read.error());
+    curve = std::move(*read);
+  } else {
+    constexpr double kForcingStepS = 60.0;
+    forcing = reference::ground_forcing(*scenario, start_s - options.spin_up_s,
+                                        start_s + options.history_s, kForcingStepS);
+  }
+
+  TextTable table({"material", "rms K", "max K", "derived rms K", "max K", "modes"});
+  Json results = Json::array();
+  std::vector<LibraryEntry> entries;
+  ProgressBar bar("fitting", materials.size());
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    const scene::Material& material = *materials[i];
+    const auto fit = curve_input ? reference::fit_curve(material, curve, options)
+                                 : reference::fit_material(material, forcing, start_s,
+                                                           scenario->thermal.initial_k, options);
+    if (!fit) {
+      bar.finish();
+      return fail_call(fit.error());
+    }
+    bar.advance_to(i + 1);
+    table.add({material.name + (material.dry_layers_valid ? "" : " (dry layers not valid)"),
+               fmt::format("{:.3f}", fit->rms_k), fmt::format("{:.3f}", fit->max_k),
+               foster ? fmt::format("{:.3f}", fit->derived_rms_k) : "-",
+               foster ? fmt::format("{:.3f}", fit->derived_max_k) : "-", modes_text(*fit)});
+    results.push(json_of(*fit, material, options.model));
+    entries.push_back({*fit, foster});
+  }
+  bar.finish();
+  std::FILE* text = text_stream(command.json);
+  fmt::print(text, "{}", table.to_string());
+  if (!curve_input) {
+    fmt::print(text,
+               "worst of five histories of {:.0f} s from {:.0f} s on, after {:.0f} s of "
+               "spin-up; reference within {:.0e} K a step\n",
+               options.history_s, start_s, options.spin_up_s, options.reference_tolerance_k);
+  }
+  if (command.out) {
+    if (auto ok = write_library(command.library, entries, *command.out); !ok) {
+      return fail(ok.error());
+    }
+  }
+  if (command.json) {
+    Json json = Json::object();
+    json.set("scenario", command.input.scenario).set("results", std::move(results));
+    if (auto ok = write_json(*command.json, json); !ok) return fail(ok.error());
+  }
+  return kExitOk;
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
+#include "emit/protocol/record/log.hpp"
+#include "emit/version.hpp"
+#include "tool/support/scenario_input.hpp"
+
+namespace emit::tool {
+
+int run_make_log(const MakeLogCommand& command) {
+  const auto scenario = load_scenario_choice(command.input);
+  if (!scenario) return fail_config(scenario.error());
+  if (auto fits = check_entities_fit(*scenario); !fits) return fail_config(fits.error());
+  if (scenario->sensor.trajectory.empty()) {
+    return fail(kExitConfig,
+                fmt::format("{}: the sensor has no trajectory", scenario->file.string()));
+  }
+  const std::int64_t start_ns =
+      command.start_s ? std::llround(*command.start_s * 1e9) : trajectory_start_ns(*scenario);
+  if (start_ns < 0) return fail(kExitUsage, "--start-s: a log starts at or after the epoch");
+
+  protocol::LogWriterOptions options;
+  options.software = fmt::format("emit {} make-log", kVersion);
+  auto writer = protocol::LogWriter::create(command.out, options);
+  if (!writer) return fail(writer.error());
+  const auto count =
+      static_cast<std::uint64_t>(std::floor(command.duration_s * command.rate_hz + 1e-9)) + 1;
+  ProgressBar progress("poses", count);
+  const auto frame = std::make_unique<protocol::HostFrameData>();
+  for (std::uint64_t i = 0; i < count; ++i) {
+    make_host_frame(*scenario, start_ns, command.rate_hz, i, *frame);
+    if (auto done = writer->write_host(*frame, frame->sim_time_ns); !done)
+      return fail(done.error());
+    progress.advance_to(i + 1);
+  }
+  progress.finish();
+  if (auto done = writer->close(); !done) return fail(done.error());
+  fmt::print("{}: {} poses, {:g} Hz, sim time {:.3f} to {:.3f} s, {} entities\n",
+             command.out.string(), count, command.rate_hz, 1e-9 * static_cast<double>(start_ns),
+             1e-9 * static_cast<double>(frame->sim_time_ns), frame->entity_count);
+  return kExitOk;
+}
+
+}  // namespace emit::tool

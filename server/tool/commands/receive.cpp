@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
+#include "tool/streams/error_correction.hpp"
+#include "tool/support/frame_files.hpp"
+#include "tool/support/interrupt.hpp"
+#include "emit/client/client.hpp"
+#include "net/socket_address.hpp"
+#include "tool/support/json.hpp"
+#include "tool/streams/stream_report.hpp"
+#include "tool/streams/stream_subscription.hpp"
+
+namespace emit::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+physics::Result<void> save(const std::filesystem::path& directory,
+                           const client::ReceivedFrame& frame,
+                           const client::ChannelDescription& channel, const ColorLimits& limits,
+                           std::optional<ApparentTemperature>& apparent) {
+  FramePlanes planes;
+  planes.width_px = frame.header.width_px;
+  planes.height_px = frame.header.height_px;
+  planes.window_px = {frame.header.window_x_px, frame.header.window_y_px, frame.header.width_px,
+                      frame.header.height_px};
+  planes.sensor_width_px = frame.header.sensor_width_px;
+  planes.sensor_height_px = frame.header.sensor_height_px;
+  const bool temperature = frame.header.quantity == protocol::PixelQuantity::temperature_k;
+  (temperature ? planes.temperature_k : planes.radiance_w_m2_sr) = frame.pixels;
+  // The band of a channel does not change: one table serves every frame.
+  if (!temperature && !apparent) {
+    if (const auto band = channel.spectral_band()) apparent.emplace(*band);
+  }
+  std::vector<float> valid;
+  if (frame.missing_px > 0) {
+    valid.resize(frame.pixels.size());
+    for (std::size_t i = 0; i < valid.size(); ++i) {
+      valid[i] = frame.validity.pixel(i) ? 1.0F : 0.0F;
+    }
+    planes.valid = valid;
+  }
+  planes.apparent = apparent ? &*apparent : nullptr;
+  planes.metadata = {frame.header.sim_time_ns,
+                     frame.header.frame_number,
+                     frame.header.pose,
+                     channel.band,
+                     channel.band_lo_um,
+                     channel.band_hi_um,
+                     temperature ? "K" : "W m-2 sr-1",
+                     channel.response};
+  return write_frame_files(directory, planes, limits);
+}
+
+void print_losses(std::FILE* out, const client::ReceiveCounters& c, const StreamReport& report) {
+  fmt::print(out,
+             "frames: {} complete, {} partial, {} lost, {} announced gaps ({} frames skipped), "
+             "{} CRC errors, {} datagrams dropped by the kernel, {} bad, {} of others\n",
+             c.received, c.partial, c.lost, c.gaps, c.skipped, c.crc_errors, c.os_drops,
+             c.bad_datagrams, c.foreign_datagrams);
+  if (c.repaired + c.unrepairable + c.resend_requests > 0) {
+    fmt::print(out,
+               "repair: {} fragments brought back by error correction ({} frames whole by it, {} "
+               "groups beyond it), {} resent on {} requests\n",
+               c.repaired, c.repaired_frames, c.unrepairable, c.resent, c.resend_requests);
+  }
+  fmt::print(out,
+             "flags: {} late, {} repeated, {} stale, {} degraded, {} extrapolated, {} nonfinite, "
+             "{} clamped\n",
+             report.flagged(protocol::kFlagLate), report.flagged(protocol::kFlagRepeated),
+             report.flagged(protocol::kFlagStale), report.flagged(protocol::kFlagDegraded),
+             report.flagged(protocol::kFlagExtrapolated), report.flagged(protocol::kFlagNonFinite),
+             report.flagged(protocol::kFlagClamped));
+}
+
+}  // namespace
+
+int run_receive(const ReceiveCommand& command) {
+  if (command.out) {
+    if (auto made = make_directory(*command.out); !made) return fail(made.error());
+  }
+  if (const auto url = client::parse_frame_url(command.url); !url) {
+    return fail(kExitUsage, url.error().text);
+  }
+  if (!command.multicast_group.empty() &&
+      !server::numeric_address(command.multicast_group, 0).is_multicast()) {
+    return fail(kExitUsage,
+                fmt::format("--multicast: '{}' is not a group", command.multicast_group));
+  }
+  if (!(command.max_k > command.min_k)) return fail(kExitUsage, "--max-k must exceed --min-k");
+  client::SubscribeOptions options;
+  options.channel_name = command.channel_name;
+  options.channel_kind = command.channel_kind;
+  options.sensor = command.sensor;
+  options.band = command.band;
+  options.every_frame = command.every_frame;
+  options.every_nth = command.every_nth;
+  options.multicast_group = command.multicast_group;
+  options.fec = command.fec;
+  options.resend = command.resend;
+  options.compression = command.compress;
+  // Checks are made while the pixels are looked at first; writing files takes longer than the
+  // daemon waits.
+  options.in_place = !command.out;
+  auto opened = StreamSubscription::open(command.url, options, command.security);
+  if (!opened) return fail_call(opened.error());
+  StreamSubscription& stream = *opened;
+  const auto greet = [&] {
+    const client::FrameClient& client = stream.client();
+    fmt::print(stderr, "emit: {} ({}), scenario {}, {}\n", client.server().software,
+               client.server().device, client.server().scenario, channel_text(stream.channel()));
+    if (const auto band = stream.channel().spectral_band(); band && command.out) {
+      fmt::print(stderr, "emit: colours show apparent temperature, {}\n",
+                 conversion_text(*band, stream.channel().response.has_value()));
+    }
+    if (client.server().tai_offset_unset) {
+      warn("the daemon's kernel has no TAI offset: its instants are UTC");
+    }
+    if (const std::string advice = client.receive_buffer_advice(); !advice.empty()) warn(advice);
+  };
+  greet();
+  const client::StreamTerms terms = stream.client().terms();
+  if (terms.udp_port != 0) {
+    fmt::print(stderr, "emit: error correction {}, resend {}\n", to_string(terms.fec),
+               terms.resend ? "on" : "off");
+  }
+  if (command.resend && !terms.resend) {
+    warn(
+        "resend is not granted: it needs udp:// without a group, a daemon in host-step, and "
+        "stream.resend_max_frac above 0");
+  }
+  if (command.compress && !terms.compression) {
+    warn("compression is not granted: it needs tcp:// and stream.compression of the daemon");
+  }
+  if (command.fec && command.fec->on() && !terms.fec.on()) {
+    warn("error correction needs udp:// and a daemon that knows it");
+  }
+
+  std::optional<ApparentTemperature> apparent;
+  const InterruptGuard interrupt;
+  StreamReport report(terms.every_nth);
+  ProgressBar progress("frames", command.frames == 0 ? 1 : command.frames);
+  const auto timeout =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(command.timeout_s));
+  auto last_frame = Clock::now();
+  const auto start = last_frame;
+  std::string ended;
+  int exit_code = kExitOk;
+  while (!InterruptGuard::interrupted() &&
+         (command.frames == 0 || report.frames() < command.frames)) {
+    constexpr std::int64_t kPollNs = 200'000'000;
+    const auto received = stream.client().receive(kPollNs);
+    for (const auto& status : stream.client().take_statuses()) {
+      if (!status.ok()) warn(fmt::format("daemon: {}", status.text));
+    }
+    if (!received) {
+      ended = received.error().text;
+      if (!command.reconnect) break;
+      warn(ended + "; connecting again");
+      const auto again = stream.reopen(
+          [&] { return !InterruptGuard::interrupted() && Clock::now() - last_frame < timeout; });
+      if (!again) {
+        ended += fmt::format("; not connected again: {}", again.error().text);
+        break;
+      }
+      ended.clear();
+      report.begin_connection();
+      apparent.reset();
+      greet();
+      continue;
+    }
+    if (*received == nullptr) {
+      if (Clock::now() - last_frame > timeout) {
+        ended = fmt::format("no frame for {:g} s", command.timeout_s);
+        break;
+      }
+      continue;
+    }
+    last_frame = Clock::now();
+    report.add(**received);
+    if (command.out) {
+      const auto saved = save(*command.out, **received, stream.channel(),
+                              {command.min_k, command.max_k}, apparent);
+      if (!saved) return fail(saved.error());
+    }
+    if (command.frames != 0) progress.advance_to(report.frames());
+  }
+  progress.finish();
+  const double seconds = std::chrono::duration<double>(last_frame - start).count();
+
+  const client::ReceiveCounters counters = stream.counters();
+  const client::FrameClient& client = stream.client();
+  const client::ChannelDescription& channel = stream.channel();
+  print_losses(text_stream(command.json), counters, report);
+  if (report.sent_pixel_bytes() < report.pixel_bytes()) {
+    fmt::print(
+        text_stream(command.json), "compressed: {:.2f} to 1\n",
+        static_cast<double>(report.pixel_bytes()) / static_cast<double>(report.sent_pixel_bytes()));
+  }
+  if (stream.reconnects() > 0) {
+    fmt::print(text_stream(command.json), "connected again {} times, {} runs of the daemon\n",
+               stream.reconnects(), report.runs());
+  }
+  fmt::print(text_stream(command.json), "{}{}{}{}",
+             latency_line("pose received -> frame received", report.pose_to_received_ms()),
+             latency_line("send start -> frame received", report.send_to_received_ms()),
+             report.stage_table(),
+             histogram_text(report.pose_to_received_ms().empty() ? report.send_to_received_ms()
+                                                                 : report.pose_to_received_ms(),
+                            "ms"));
+  // Without --frames the end of the stream is the expected end.
+  if (!ended.empty() && (command.frames != 0 || report.frames() == 0)) {
+    exit_code = fail(kExitFailure, fmt::format("{} of {} frames received: {}", report.frames(),
+                                               command.frames, ended));
+  } else if (!ended.empty()) {
+    warn(ended);
+  }
+  if (counters.lost > 0 || report.unflagged_gaps() > 0 || counters.crc_errors > 0 ||
+      counters.partial > 0) {
+    exit_code = fail(
+        kExitFailure,
+        fmt::format("{} frames lost, {} gaps not flagged, {} partial, {} CRC errors", counters.lost,
+                    report.unflagged_gaps(), counters.partial, counters.crc_errors));
+  }
+  if (command.json) {
+    Json json = Json::object();
+    json.set("url", command.url).set("device", client.server().device);
+    json.set("scenario", client.server().scenario).set("channel", channel.name);
+    json.set("band", channel.band).set("width", channel.width_px);
+    json.set("height", channel.height_px);
+    json.set("window_x", channel.window_x_px).set("window_y", channel.window_y_px);
+    json.set("sensor_width", channel.sensor_width_px);
+    json.set("sensor_height", channel.sensor_height_px)
+        .set("frames", report.frames())
+        .set("seconds", seconds);
+    json.set("compression", terms.compression);
+    json.set("pixel_bytes", report.pixel_bytes())
+        .set("sent_pixel_bytes", report.sent_pixel_bytes());
+    json.set("error_correction", to_string(terms.fec)).set("resend", terms.resend);
+    json.set("counters", counters_json(counters)).set("flags", report.flags_json());
+    json.set("unflagged_gaps", report.unflagged_gaps());
+    json.set("every_nth", terms.every_nth).set("reconnects", stream.reconnects());
+    json.set("runs", report.runs());
+    json.set("pose_to_received_ms", latency_json(report.pose_to_received_ms()));
+    json.set("send_to_received_ms", latency_json(report.send_to_received_ms()));
+    json.set("interval_ms", latency_json(report.interval_ms()));
+    json.set("stages", report.stages_json());
+    json.set("receive_buffer_bytes", client.receive_buffer_bytes());
+    json.set("receive_buffer_advice", client.receive_buffer_advice());
+    if (auto done = write_json(*command.json, json); !done) return fail(done.error());
+  }
+  return exit_code;
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/frame_files.hpp"
+#include "tool/support/interrupt.hpp"
+#include "tool/streams/journal_replay.hpp"
+#include "tool/support/json.hpp"
+#include "tool/support/scenario_input.hpp"
+
+namespace emit::tool {
+namespace {
+
+/// 0 stands for "max". Empty: not a speed.
+std::optional<double> parse_speed(const std::string& text) {
+  if (text == "max") return 0.0;
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  if (!std::isfinite(value) || value <= 0.0) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+int run_replay(const ReplayCommand& command) {
+  const auto speed = parse_speed(command.speed);
+  if (!speed) return fail(kExitUsage, "--speed: a positive number or max");
+  const auto scenario = load_scenario_choice(command.input);
+  if (!scenario) return fail_config(scenario.error());
+  if (command.out) {
+    if (auto made = make_directory(*command.out); !made) return fail(made.error());
+  }
+
+  constexpr std::size_t plane = 0;  // bands are in the order of the channels
+  const scene::SpectralBand band =
+      plane < scenario->bands.size() ? scenario->bands[plane] : scene::SpectralBand{};
+  const ColorLimits limits{scenario->display.min_k, scenario->display.max_k};
+  JournalReplayOptions options;
+  options.log = command.log;
+  options.speed = *speed;
+  options.gpu_index = command.gpu_index;
+  options.temperature = command.out.has_value();
+  const InterruptGuard interrupt;
+  const auto summary = replay_journal(
+      *scenario, options, [&](const server::ReplayedFrame& frame) -> physics::Result<void> {
+        if (!frame.matches) {
+          warn(fmt::format("frame {}: CRC {:08x}, recorded {:08x}", frame.frame_number,
+                           frame.crc32c, frame.journal_crc32c));
+        }
+        if (!command.out || frame.view == nullptr) return {};
+        FramePlanes planes;
+        planes.width_px = frame.view->width_px;
+        planes.height_px = frame.view->height_px;
+        planes.radiance_w_m2_sr = frame.view->radiance_w_m2_sr[plane];
+        planes.temperature_k = frame.view->temperature_k;
+        planes.depth_m = frame.view->depth_m;
+        planes.object_id = frame.view->object_id;
+        planes.metadata = {frame.sim_time_ns, frame.frame_number, frame.view->sensor_pose,
+                           band.name,         band.lo_um,         band.hi_um,
+                           "W m-2 sr-1",      response_of(band)};
+        return write_frame_files(*command.out, planes, limits);
+      });
+  if (!summary) return fail(summary.error());
+
+  fmt::print(text_stream(command.json),
+             "{} frames replayed ({} rendered) in {:.2f} s, {} differ from the recording: {}\n",
+             summary->frames, summary->rendered, summary->play_s, summary->mismatches,
+             summary->mismatches == 0 ? "bit-identical" : "NOT identical");
+  if (command.json) {
+    Json json = Json::object();
+    json.set("device", summary->device).set("recorded_device", summary->journal_device);
+    json.set("frames", summary->frames).set("rendered", summary->rendered);
+    json.set("mismatches", summary->mismatches).set("seconds", summary->play_s);
+    json.set("bit_identical", summary->mismatches == 0);
+    if (auto done = write_json(*command.json, json); !done) return fail(done.error());
+  }
+  if (summary->mismatches > 0) {
+    return fail(kExitFailure,
+                fmt::format("{} of {} frames differ, the first is frame {}", summary->mismatches,
+                            summary->frames, summary->first_mismatch));
+  }
+  return kExitOk;
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/streams/journal_replay.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tool/support/console.hpp"
+#include "emit/protocol/record/log.hpp"
+#include "emit/protocol/record/pose_pcap.hpp"
+#include "emit/v1/control.pb.h"
+#include "tool/support/interrupt.hpp"
+
+namespace emit::tool {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void warn_of_differences(const server::JournalPlayer& player, const std::string& scenario_hash,
+                         const std::string& device) {
+  if (player.scenario_sha256() != scenario_hash) {
+    warn("the journal was recorded with another scenario, or its files have changed since");
+  }
+  if (player.device() != device) {
+    warn(fmt::format("the journal was recorded on '{}', this is '{}': frames may differ",
+                     player.device(), device));
+  }
+}
+
+}  // namespace
+
+physics::Result<JournalReplaySummary> replay_journal(
+    const scene::ScenarioDesc& scenario, const JournalReplayOptions& options,
+    const std::function<physics::Result<void>(const server::ReplayedFrame&)>& on_frame) {
+  if (protocol::PosePcapReader::is_capture(options.log)) {
+    return physics::make_error(
+        physics::ErrorCode::unsupported,
+        fmt::format(
+            "{}: a network capture holds the host's poses, not the daemon's decisions: play "
+            "it with emit send and record the journal",
+            options.log.string()));
+  }
+  auto log = protocol::LogReader::open(options.log);
+  if (!log) return tl::unexpected(log.error());
+  const auto scenario_hash = server::scenario_sha256(scenario);
+  if (!scenario_hash) return tl::unexpected(scenario_hash.error());
+
+  JournalReplaySummary summary;
+  auto start = Clock::now();
+  renderer::OutputOptions output;
+  output.temperature = output.depth = output.object = options.temperature;
+  output.slots = 3;
+  output.ladder = renderer::Ladder::replayed;
+  auto source = [&] {
+    ProgressBar warm_up("warm-up", 1000);
+    return server::make_renderer_source(
+        scenario, renderer::DeviceOptions{options.gpu_index, false}, output, [&](double done_frac) {
+          warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
+          return !InterruptGuard::interrupted();
+        });
+  }();
+  if (!source) return tl::unexpected(source.error());
+  const renderer::SceneStats& scene = (*source)->info().scene;
+  for (const std::string& text : scene.warnings) warn(text);
+  for (const std::string& text : renderer::sampling_warnings(scene)) warn(text);
+  summary.device = (*source)->info().device;
+  summary.setup_s = seconds_since(start);
+
+  auto channels = server::make_channels(scenario, (*source)->info());
+  if (!channels) return tl::unexpected(channels.error());
+  server::JournalPlayer player(**source, std::move(*channels));
+  ProgressBar progress("replay", options.expected_frames);
+  start = Clock::now();
+  std::int64_t first_wall_ns = 0;
+  bool compared_run = false;
+  while (!InterruptGuard::interrupted()) {
+    const auto more = log->next();
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) break;
+    if (log->topic() != protocol::LogTopic::journal) continue;
+    const v1::JournalEntry& entry = log->journal();
+    if (options.speed > 0.0 && entry.has_frame()) {
+      if (first_wall_ns == 0) first_wall_ns = entry.wall_time_ns();
+      const double offset_s =
+          1e-9 * static_cast<double>(entry.wall_time_ns() - first_wall_ns) / options.speed;
+      std::this_thread::sleep_until(start + std::chrono::duration_cast<Clock::duration>(
+                                                std::chrono::duration<double>(offset_s)));
+    }
+    const auto applied = player.apply(entry);
+    if (!applied) return tl::unexpected(applied.error());
+    if (entry.has_run_start() && !compared_run) {
+      compared_run = true;
+      summary.journal_device = player.device();
+      warn_of_differences(player, *scenario_hash, summary.device);
+    }
+    if (!*applied) continue;
+    const server::ReplayedFrame& frame = **applied;
+    if (frame.view != nullptr && frame.view->device_failed) {
+      return physics::make_error(
+          physics::ErrorCode::gpu,
+          fmt::format("frame {}: the device reported an error", frame.frame_number));
+    }
+    if (!frame.repeated) ++summary.rendered;
+    if (!frame.matches && summary.first_mismatch == 0) summary.first_mismatch = frame.frame_number;
+    if (on_frame) {
+      if (auto handled = on_frame(frame); !handled) return tl::unexpected(handled.error());
+    }
+    progress.advance_to(player.frames());
+  }
+  progress.finish();
+  if (log->truncation()) warn(*log->truncation());
+  summary.frames = player.frames();
+  summary.mismatches = player.mismatches();
+  summary.play_s = seconds_since(start);
+  if (summary.frames == 0) {
+    return physics::make_error(
+        physics::ErrorCode::parse,
+        fmt::format("{}: the log holds no journalled frame", options.log.string()));
+  }
+  return summary;
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "emit/physics/error.hpp"
+#include "emit/protocol/host_frame.hpp"
+#include "emit/protocol/record/log.hpp"
+#include "emit/protocol/record/pose_csv.hpp"
+#include "emit/protocol/record/pose_pcap.hpp"
+
+namespace emit::tool {
+
+/// Host frames of a log in file order: CSV where the name ends in .csv, a network capture where the
+/// file starts like one, else MCAP. One owner.
+class PoseLog {
+ public:
+  /// @param host_port  of captures: where the host sent its datagrams to.
+  /// Errors: those of the open() of protocol::LogReader, PoseCsvReader and PosePcapReader.
+  [[nodiscard]] static physics::Result<PoseLog> open(
+      const std::filesystem::path& file, std::uint16_t host_port = protocol::kDefaultHostPort);
+
+  /// Moves to the next host frame; false at the end. Errors: those of the reader.
+  [[nodiscard]] physics::Result<bool> next();
+  [[nodiscard]] const protocol::HostFrameData& host() const noexcept;
+  /// At the end: what is missing of a log that was cut off, what of a capture was passed over.
+  [[nodiscard]] std::optional<std::string> notes() const;
+
+ private:
+  using Reader =
+      std::variant<protocol::LogReader, protocol::PoseCsvReader, protocol::PosePcapReader>;
+  explicit PoseLog(Reader reader) : reader_(std::move(reader)) {}
+  Reader reader_;
+};
+
+}  // namespace emit::tool

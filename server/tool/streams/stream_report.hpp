@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "emit/client/client.hpp"
+#include "tool/support/json.hpp"
+#include "tool/support/statistics.hpp"
+
+namespace emit::tool {
+
+/// What the headers of one client's frames say: stage times, total delays, flags. The header's
+/// instants and this machine's are both TAI; across machines the delays hold only as far as the
+/// clocks agree. One thread.
+class StreamReport {
+ public:
+  /// @param every_nth  which frames were asked for: the others are no gap.
+  explicit StreamReport(std::uint32_t every_nth = 1);
+
+  void add(const client::ReceivedFrame& frame);
+  /// What comes next comes over another connection: numbers missing in between are no gap, the
+  /// client was not there.
+  void begin_connection() noexcept {
+    last_run_ = 0;
+    last_byte_ns_ = 0;
+  }
+  /// Runs of the daemon that frames came from, one after the other.
+  [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
+
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+  /// Of all frames, and what of it travelled: less where it was compressed.
+  [[nodiscard]] std::uint64_t pixel_bytes() const noexcept { return pixel_bytes_; }
+  [[nodiscard]] std::uint64_t sent_pixel_bytes() const noexcept { return sent_pixel_bytes_; }
+  [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
+  /// Frames before which more numbers are missing than were lost on the way, without gap_before.
+  [[nodiscard]] std::uint64_t unflagged_gaps() const noexcept { return unflagged_gaps_; }
+
+  /// Pose received to last byte of the frame here, ms; frames without a pose are left out.
+  [[nodiscard]] const Samples& pose_to_received_ms() const noexcept { return stages_[kTotal]; }
+  /// First byte given to the kernel to last byte here, ms.
+  [[nodiscard]] const Samples& send_to_received_ms() const noexcept { return stages_[kTransport]; }
+  /// Pixels in CPU memory to this client's turn, ms: the daemon's own share.
+  [[nodiscard]] const Samples& ready_to_send_ms() const noexcept { return stages_[kHandOver]; }
+  /// Pixels in CPU memory to last byte here, ms: what the daemon and the wire add to a render.
+  [[nodiscard]] const Samples& ready_to_received_ms() const noexcept { return ready_ms_; }
+
+  /// Last byte of one frame to last byte of the next, ms.
+  [[nodiscard]] const Samples& interval_ms() const noexcept { return interval_ms_; }
+
+  /// Table of stages: median, p99 and largest, ms.
+  [[nodiscard]] std::string stage_table() const;
+  [[nodiscard]] Json stages_json() const;
+  [[nodiscard]] Json flags_json() const;
+
+ private:
+  enum Stage : std::size_t { kQueue, kRender, kReadback, kHandOver, kTransport, kTotal, kStages };
+  static constexpr std::array<const char*, kStages> kNames{
+      "pose received -> render start", "render start -> render end", "render end -> read back",
+      "read back -> send start",       "send start -> received",     "pose received -> received"};
+  static constexpr std::array<const char*, kStages> kKeys{
+      "queue_ms", "render_ms", "readback_ms", "hand_over_ms", "transport_ms", "total_ms"};
+
+  /// A client may run for weeks.
+  static constexpr std::size_t kMostSamples = 1u << 18;
+
+  std::array<Samples, kStages> stages_;
+  Samples ready_ms_{kMostSamples};
+  Samples interval_ms_{kMostSamples};
+  std::int64_t last_byte_ns_ = 0;  // of the frame before, on this connection
+  std::array<std::uint64_t, 32> flag_counts_{};
+  std::uint64_t frames_ = 0;
+  std::uint64_t pixel_bytes_ = 0;
+  std::uint64_t sent_pixel_bytes_ = 0;
+  std::uint64_t unflagged_gaps_ = 0;
+  std::uint32_t every_nth_;
+  std::uint64_t runs_ = 0;
+  std::uint64_t newest_run_ = 0;
+  std::uint64_t last_run_ = 0;  // on this connection; 0: none yet
+  std::uint64_t last_number_ = 0;
+};
+
+[[nodiscard]] Json latency_json(const Samples& samples_ms);
+[[nodiscard]] std::string latency_line(const std::string& name, const Samples& samples_ms);
+[[nodiscard]] Json counters_json(const client::ReceiveCounters& counters);
+[[nodiscard]] std::string channel_text(const client::ChannelDescription& channel);
+
+}  // namespace emit::tool

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "emit/image/exr_image.hpp"
+#include "emit/image/false_color.hpp"
+#include "emit/physics/error.hpp"
+#include "emit/physics/planck.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+namespace emit::tool {
+
+/// In-band radiance to the temperature of a blackbody of the same radiance, by a table of 0.05 K
+/// over 150..1500 K; outside it the end of the table. Setup only to build; lookup any thread.
+class ApparentTemperature {
+ public:
+  /// Of a band with its response. Precondition: physics::validate().
+  explicit ApparentTemperature(const physics::Band& band);
+  /// Of a rectangular band. Precondition: 0 < lo_um < hi_um.
+  ApparentTemperature(double lo_um, double hi_um);
+  [[nodiscard]] double kelvin(double radiance_w_m2_sr) const noexcept;
+  /// dT/dL there, K per W m-2 sr-1.
+  [[nodiscard]] double kelvin_per_radiance(double radiance_w_m2_sr) const noexcept;
+  [[nodiscard]] std::vector<float> kelvin(std::span<const float> radiance_w_m2_sr) const;
+
+ private:
+  [[nodiscard]] std::size_t interval(double radiance_w_m2_sr) const noexcept;
+  std::vector<double> radiance_;  ///< ascending
+};
+
+/// The scenario's band as the radiometry takes it, response included.
+[[nodiscard]] physics::Band spectral_band(const scene::SpectralBand& band);
+
+/// The band of a frame's attributes; where they do not give the response, a rectangle. Absent for a
+/// frame of no band, or of one that fails physics::validate().
+[[nodiscard]] std::optional<physics::Band> spectral_band(const image::FrameMetadata& metadata);
+/// The response for a frame's attributes.
+[[nodiscard]] std::vector<physics::ResponsePoint> response_of(const scene::SpectralBand& band);
+/// How radiances become kelvins, for the user: "band 3-5 um by its response of 12 points".
+[[nodiscard]] std::string conversion_text(const physics::Band& band, bool response_known);
+
+/// Planes of one frame on their way to disk; empty planes are left out.
+struct FramePlanes {
+  std::uint32_t width_px = 0;
+  std::uint32_t height_px = 0;
+  std::span<const float> radiance_w_m2_sr;
+  std::span<const float> temperature_k;
+  std::span<const float> depth_m;
+  std::span<const float> object_id;
+  /// 1 where a pixel arrived, else 0; not empty: the frame is marked as partial.
+  std::span<const float> valid;
+  /// For pictures of frames without temperature; absent: built from the metadata's band, which
+  /// costs a second or so. Callers of many frames set it.
+  const ApparentTemperature* apparent = nullptr;
+  image::FrameMetadata metadata;
+  /// Where the pixels lie in the sensor's image, if that is larger; sensor of size 0: not known.
+  scene::PixelRect window_px;
+  std::uint32_t sensor_width_px = 0;
+  std::uint32_t sensor_height_px = 0;
+};
+
+/// Limits of the false colours, with a colour bar beside the picture.
+struct ColorLimits {
+  double min_k = 280.0;
+  double max_k = 330.0;
+};
+
+[[nodiscard]] physics::Result<void> write_frame_exr(const std::filesystem::path& file,
+                                                    const FramePlanes& frame);
+/// Surface temperature where the frame has it, else the apparent temperature of the radiance; for a
+/// frame of no band, radiance between its 1st and 99th percentile.
+[[nodiscard]] physics::Result<void> write_frame_png(const std::filesystem::path& file,
+                                                    const FramePlanes& frame,
+                                                    const ColorLimits& limits);
+/// frame_NNNNNN.exr and .png in `directory`, numbered by the metadata's frame number.
+[[nodiscard]] physics::Result<void> write_frame_files(const std::filesystem::path& directory,
+                                                      const FramePlanes& frame,
+                                                      const ColorLimits& limits);
+
+/// Creates a folder and its parents. Errors: io.
+[[nodiscard]] physics::Result<void> make_directory(const std::filesystem::path& directory);
+
+}  // namespace emit::tool

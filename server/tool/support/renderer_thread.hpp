@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <thread>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+#include "emit/renderer/renderer.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "pacing/quality_policy.hpp"
+
+namespace emit::tool {
+
+/// A frame from submit() until its pixels are there.
+struct TimedFrame {
+  double frame_ms = 0.0;
+  bool coarse = false;  ///< renderer::FrameStats::coarse
+  std::uint8_t rung = 0;
+};
+
+/// A renderer on a thread of its own, so that several, each with its own GL context, are alive at
+/// once and render in turn. Calls block until the thread has done them: at most one renderer works
+/// at a time when one thread calls. Setup class; the frames themselves are those of Renderer.
+class RendererThread {
+ public:
+  /// `temperature`: frames carry that plane. Errors: those of Renderer::create().
+  [[nodiscard]] static physics::Result<std::unique_ptr<RendererThread>> create(
+      const scene::ScenarioDesc& scenario, int gpu_index,
+      renderer::Ladder ladder = renderer::Ladder::none, bool temperature = false);
+  ~RendererThread();
+  RendererThread(const RendererThread&) = delete;
+  RendererThread& operator=(const RendererThread&) = delete;
+
+  /// Renderer::warm_up(); returns the seconds it took. Stops with an error (io) on an interrupt.
+  [[nodiscard]] physics::Result<double> warm_up(const renderer::FrameRequest& first);
+  /// `temperature_k`: not null: gets that plane, which is not timed. Errors: io (interrupted), gpu
+  /// (the device failed), internal.
+  [[nodiscard]] physics::Result<TimedFrame> render(const renderer::FrameRequest& request,
+                                                   std::vector<float>* temperature_k = nullptr);
+  /// As the daemon does with a deadline: the rung by server::QualityPolicy, its time included.
+  [[nodiscard]] physics::Result<TimedFrame> render_within(renderer::FrameRequest request,
+                                                          double budget_ms);
+
+  /// Renderer::apply_entities().
+  void apply_entities(std::int64_t sim_time_ns, std::span<const renderer::EntityUpdate> updates);
+  /// Renderer::apply_weather().
+  void apply_weather(const scene::WeatherSample& sample);
+
+  [[nodiscard]] physics::Pose scenario_pose_at(std::int64_t sim_time_ns) const noexcept {
+    return renderer_->scenario_sensor_pose_at(sim_time_ns);
+  }
+  [[nodiscard]] const renderer::SceneStats& stats() const noexcept {
+    return renderer_->scene_stats();
+  }
+  [[nodiscard]] const std::string& device() const noexcept { return renderer_->device_name(); }
+
+ private:
+  RendererThread();
+  /// Runs `job` on the thread and waits for its end.
+  void call(const std::function<void()>& job);
+  [[nodiscard]] physics::Result<TimedFrame> timed(
+      const std::function<int(std::chrono::steady_clock::time_point start)>& submit,
+      std::vector<float>* temperature_k = nullptr);
+  void loop();
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  const std::function<void()>* job_ = nullptr;
+  bool ends_ = false;
+  server::QualityPolicy policy_;
+  std::unique_ptr<renderer::Renderer> renderer_;  ///< made, used and destroyed on the thread
+  std::thread thread_;
+};
+
+}  // namespace emit::tool

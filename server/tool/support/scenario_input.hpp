@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tool/commands/commands.hpp"
+#include "emit/physics/error.hpp"
+#include "emit/protocol/host_frame.hpp"
+#include "emit/scene/scene_desc.hpp"
+
+namespace emit::tool {
+
+/// Shipped name or file, with the overrides applied. Setup only. Errors: config.
+[[nodiscard]] physics::Result<scene::ScenarioDesc> load_scenario_choice(
+    const ScenarioChoice& choice);
+
+/// Shipped material library for commands that look at geometry alone; empty when none is found.
+[[nodiscard]] std::vector<scene::Material> material_library();
+
+/// Index of a band by name; "" is the first. Errors: invalid_argument, naming the bands there are.
+[[nodiscard]] physics::Result<std::size_t> find_band(const scene::ScenarioDesc& scenario,
+                                                     std::string_view name);
+
+/// The band that a channel kind shows; falls back to the first channel, then to the first band.
+[[nodiscard]] std::size_t band_of_channel(const scene::ScenarioDesc& scenario,
+                                          scene::ChannelKind kind) noexcept;
+
+/// Pose, on state and rates of a trajectory at an instant, by the rules of scene::Trajectory.
+struct TrajectorySample {
+  physics::Pose pose;
+  protocol::PoseRates rates;
+  bool on = true;
+  bool teleport = false;  ///< a jump lies in (previous_ns, sim_time_ns]
+};
+/// Precondition: the trajectory is not empty.
+[[nodiscard]] TrajectorySample sample_trajectory(const scene::Trajectory& trajectory,
+                                                 std::int64_t sim_time_ns,
+                                                 std::int64_t previous_ns) noexcept;
+
+/// First instant of the sensor's trajectory; the history start when it has none.
+[[nodiscard]] std::int64_t trajectory_start_ns(const scene::ScenarioDesc& scenario) noexcept;
+
+/// The instant at which benchmarks look at a scenario: where its camera's trajectory starts, or,
+/// where that is (nearly) the start of the history, three and a half hours later.
+[[nodiscard]] std::int64_t observation_ns(const scene::ScenarioDesc& scenario) noexcept;
+
+/// Host frame as a simulation host would send it for the scenario's own trajectories, with rates.
+/// `index` counts from 0, frame numbers from 1. Precondition: check_entities_fit().
+void make_host_frame(const scene::ScenarioDesc& scenario, std::int64_t start_ns, double rate_hz,
+                     std::uint64_t index, protocol::HostFrameData& out);
+/// Errors: config when more entities move than a host frame holds.
+[[nodiscard]] physics::Result<void> check_entities_fit(const scene::ScenarioDesc& scenario);
+
+}  // namespace emit::tool

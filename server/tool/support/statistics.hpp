@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace emit::tool {
+
+/// Samples of one quantity; percentiles by nearest rank on the sorted samples. Setup only.
+class Samples {
+ public:
+  Samples() = default;
+  /// Keeps `most` samples at most, evenly spread over those that came: when there is no room, every
+  /// second goes. Number, sum and maximum stay exact. Takes its memory at once. Precondition: most
+  /// is even and not 0.
+  explicit Samples(std::size_t most);
+
+  void add(double value);
+  void reserve(std::size_t count) { values_.reserve(count); }
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+  [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
+  /// `frac` in [0, 1]: the smallest sample that at least this share does not exceed. NaN when
+  /// empty.
+  [[nodiscard]] double percentile(double frac) const;
+  [[nodiscard]] double median() const;  ///< mean of the two middle samples for an even count
+  [[nodiscard]] double mean() const;
+  [[nodiscard]] double max() const;
+  [[nodiscard]] double sum() const;
+  /// Those kept, in the order in which they came.
+  [[nodiscard]] const std::vector<double>& values() const noexcept { return values_; }
+
+ private:
+  std::vector<double> values_;
+  std::size_t most_ = 0;    // 0: no limit
+  std::size_t stride_ = 1;  // one of so many is kept
+  std::size_t count_ = 0;
+  double sum_ = 0.0;
+  double max_ = 0.0;
+};
+
+/// Histogram as text, logarithmic bins of the 1-2-5 series; `unit` follows the bin limits.
+[[nodiscard]] std::string histogram_text(const Samples& samples, const std::string& unit);
+
+}  // namespace emit::tool

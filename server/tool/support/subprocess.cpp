@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/support/subprocess.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <cstring>
+#include <system_error>
+#include <thread>
+
+extern char** environ;
+
+namespace emit::tool {
+
+using physics::ErrorCode;
+using physics::make_error;
+
+physics::Result<Subprocess> Subprocess::start(const std::vector<std::string>& arguments,
+                                              const std::filesystem::path& log) {
+  std::vector<char*> argv;
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 1, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  posix_spawn_file_actions_adddup2(&actions, 1, 2);
+  pid_t pid = -1;
+  const int error = posix_spawn(&pid, argv[0], &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) {
+    return make_error(error == ENOENT ? ErrorCode::not_found : ErrorCode::io,
+                      fmt::format("{}: cannot start: {}", arguments.front(), std::strerror(error)));
+  }
+  return Subprocess(pid);
+}
+
+Subprocess::Subprocess(Subprocess&& other) noexcept : pid_(other.pid_), status_(other.status_) {
+  other.pid_ = -1;
+}
+
+Subprocess::~Subprocess() {
+  if (pid_ > 0 && !status_) {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+}
+
+std::optional<int> Subprocess::poll() {
+  if (status_ || pid_ <= 0) return status_;
+  int status = 0;
+  if (::waitpid(pid_, &status, WNOHANG) == pid_) {
+    status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  return status_;
+}
+
+std::optional<int> Subprocess::wait(std::chrono::milliseconds timeout) {
+  const auto end = std::chrono::steady_clock::now() + timeout;
+  while (!poll() && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return status_;
+}
+
+void Subprocess::send_signal(int signal_number) noexcept {
+  if (pid_ > 0 && !status_) ::kill(pid_, signal_number);
+}
+
+physics::Result<std::filesystem::path> executable_dir() {
+  std::error_code error;
+  const auto path = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (error) {
+    return make_error(ErrorCode::io,
+                      "/proc/self/exe: cannot find the executable's folder: " + error.message());
+  }
+  return path.parent_path();
+}
+
+}  // namespace emit::tool

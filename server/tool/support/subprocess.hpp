@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <sys/types.h>
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::tool {
+
+/// A child process whose standard output and error go to a file. Single thread, setup only.
+/// The destructor kills and reaps a child that still runs.
+class Subprocess {
+ public:
+  /// Errors: not_found (no such executable), io. `log` receives both output streams.
+  [[nodiscard]] static physics::Result<Subprocess> start(const std::vector<std::string>& arguments,
+                                                         const std::filesystem::path& log);
+  Subprocess(Subprocess&& other) noexcept;
+  Subprocess& operator=(Subprocess&&) = delete;
+  Subprocess(const Subprocess&) = delete;
+  Subprocess& operator=(const Subprocess&) = delete;
+  ~Subprocess();
+
+  /// Exit status once it has ended: 0..255, or 128 + signal. Does not wait.
+  [[nodiscard]] std::optional<int> poll();
+  /// Waits at most `timeout`; nothing when it still runs.
+  [[nodiscard]] std::optional<int> wait(std::chrono::milliseconds timeout);
+  void send_signal(int signal_number) noexcept;
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }
+
+ private:
+  explicit Subprocess(pid_t pid) : pid_(pid) {}
+  pid_t pid_ = -1;
+  std::optional<int> status_;
+};
+
+/// Folder of the running executable. Errors: io.
+[[nodiscard]] physics::Result<std::filesystem::path> executable_dir();
+
+}  // namespace emit::tool

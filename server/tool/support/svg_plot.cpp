@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/support/svg_plot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+namespace emit::tool {
+namespace {
+
+constexpr double kWidth = 560.0;
+constexpr double kHeight = 420.0;
+constexpr double kLeft = 68.0;
+constexpr double kRight = 16.0;
+constexpr double kTop = 34.0;
+constexpr double kBottom = 58.0;
+constexpr double kLegendLine = 15.0;
+
+/// Okabe and Ito's palette: told apart with any colour vision.
+constexpr std::array<const char*, 7> kColors{"#0072b2", "#e69f00", "#009e73", "#cc79a7",
+                                             "#56b4e9", "#d55e00", "#8c6d1f"};
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+/// Maps values to pixels and knows where its ticks stand.
+class Scale {
+ public:
+  Scale(PlotScale kind, double from_px, double to_px)
+      : kind_(kind), from_px_(from_px), to_px_(to_px) {}
+
+  [[nodiscard]] bool shows(double value) const {
+    return std::isfinite(value) && (kind_ == PlotScale::linear || value > 0.0);
+  }
+  void include(double value) {
+    if (!shows(value)) return;
+    low_ = std::min(low_, inner(value));
+    high_ = std::max(high_, inner(value));
+  }
+  void settle() {
+    if (!(low_ <= high_)) {
+      low_ = kind_ == PlotScale::linear ? 0.0 : -1.0;
+      high_ = 1.0;
+    }
+    const double margin = std::max(0.04 * (high_ - low_), kind_ == PlotScale::linear ? 1e-9 : 0.05);
+    low_ -= margin;
+    high_ += margin;
+  }
+  [[nodiscard]] double px(double value) const {
+    return from_px_ + (inner(value) - low_) / (high_ - low_) * (to_px_ - from_px_);
+  }
+
+  struct Tick {
+    double value = 0.0;
+    bool labelled = true;
+  };
+  [[nodiscard]] std::vector<Tick> ticks() const {
+    std::vector<Tick> ticks;
+    if (kind_ == PlotScale::logarithmic) {
+      const bool dense = high_ - low_ < 1.3;
+      for (int decade = static_cast<int>(std::floor(low_));
+           decade <= static_cast<int>(std::ceil(high_)); ++decade) {
+        for (const int digit : {1, 2, 3, 4, 5, 6, 7, 8, 9}) {
+          const double value = digit * std::pow(10.0, decade);
+          const double at = std::log10(value);
+          if (at < low_ || at > high_) continue;
+          ticks.push_back({value, digit == 1 || (dense && (digit == 2 || digit == 5))});
+        }
+      }
+      return ticks;
+    }
+    const double rough = (high_ - low_) / 6.0;
+    const double decade = std::pow(10.0, std::floor(std::log10(rough)));
+    double step = decade;
+    for (const double factor : {2.0, 5.0, 10.0}) {
+      if (step < rough) step = factor * decade;
+    }
+    for (double value = std::ceil(low_ / step) * step; value <= high_; value += step) {
+      ticks.push_back({std::abs(value) < 1e-9 * step ? 0.0 : value, true});
+    }
+    return ticks;
+  }
+
+ private:
+  [[nodiscard]] double inner(double value) const {
+    return kind_ == PlotScale::linear ? value : std::log10(value);
+  }
+  PlotScale kind_;
+  double from_px_;
+  double to_px_;
+  double low_ = std::numeric_limits<double>::infinity();
+  double high_ = -std::numeric_limits<double>::infinity();
+};
+
+class PlotWriter {
+ public:
+  PlotWriter(const Plot& plot, std::string& out)
+      : plot_(plot),
+        out_(out),
+        x_(plot.x.scale, kLeft, kWidth - kRight),
+        y_(plot.y.scale, kHeight - kBottom, kTop) {
+    for (const PlotSeries& series : plot.series) {
+      for (const PlotPoint& point : series.points) {
+        if (!x_.shows(point.x) || !y_.shows(point.y)) {
+          ++left_out_;
+          continue;
+        }
+        x_.include(point.x);
+        y_.include(point.y);
+      }
+    }
+    x_.settle();
+    y_.settle();
+  }
+
+  void write() {
+    write_frame();
+    std::size_t color = 0;
+    const Corner corner = emptiest_corner();
+    double legend_y = corner.top ? kTop + 16.0 : kHeight - kBottom + 6.0 - legend_height();
+    for (const PlotSeries& series : plot_.series) {
+      const std::string ink = series.emphasis ? "#111111" : kColors[color++ % kColors.size()];
+      write_series(series, ink);
+      if (series.label.empty()) continue;
+      // A white rim keeps the text legible over lines.
+      append(R"(<circle cx="{:.1f}" cy="{:.1f}" r="4" fill="{}"/>)",
+             corner.left ? kLeft + 10.0 : kWidth - kRight - 10.0, legend_y - 4.0, ink);
+      append(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" class="legend">{}</text>)",
+             corner.left ? kLeft + 20.0 : kWidth - kRight - 20.0, legend_y,
+             corner.left ? "start" : "end", escaped(series.label));
+      legend_y += kLegendLine;
+    }
+    if (left_out_ > 0) {
+      append(R"(<text x="{}" y="{}" class="note">{} points have no place on these axes</text>)",
+             kLeft, kHeight - 6.0, left_out_);
+    }
+  }
+
+ private:
+  struct Corner {
+    bool left = false;
+    bool top = true;
+  };
+  [[nodiscard]] double legend_height() const {
+    const auto named = std::ranges::count_if(
+        plot_.series, [](const PlotSeries& series) { return !series.label.empty(); });
+    return kLegendLine * static_cast<double>(named);
+  }
+  /// Where the legend hides the fewest points; the first of equals.
+  [[nodiscard]] Corner emptiest_corner() const {
+    constexpr double kCharPx = 6.5;
+    std::size_t longest = 0;
+    for (const PlotSeries& series : plot_.series) longest = std::max(longest, series.label.size());
+    const double width = 32.0 + kCharPx * static_cast<double>(longest);
+    const double height = legend_height() + 8.0;
+    Corner best;
+    std::size_t fewest = std::numeric_limits<std::size_t>::max();
+    for (const Corner corner :
+         {Corner{false, true}, Corner{true, true}, Corner{false, false}, Corner{true, false}}) {
+      std::size_t hidden = 0;
+      for (const PlotSeries& series : plot_.series) {
+        for (const PlotPoint& point : series.points) {
+          const double x = x_.px(point.x);
+          const double y = y_.px(point.y);
+          if ((corner.left ? x < kLeft + width : x > kWidth - kRight - width) &&
+              (corner.top ? y < kTop + height : y > kHeight - kBottom - height)) {
+            ++hidden;
+          }
+        }
+      }
+      if (hidden < fewest) {
+        fewest = hidden;
+        best = corner;
+      }
+    }
+    return best;
+  }
+
+  template <class... Args>
+  void append(fmt::format_string<Args...> text, Args&&... args) {
+    fmt::format_to(std::back_inserter(out_), text, std::forward<Args>(args)...);
+    out_ += '\n';
+  }
+
+  void write_frame() {
+    append(R"(<text x="{:.1f}" y="20" text-anchor="middle" class="title">{}</text>)",
+           0.5 * (kLeft + kWidth - kRight), escaped(plot_.title));
+    for (const Scale::Tick& tick : x_.ticks()) {
+      const double at = x_.px(tick.value);
+      append(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}" class="{3}"/>)", at, kTop,
+             kHeight - kBottom, tick.labelled ? "grid" : "fine");
+      if (tick.labelled) {
+        append(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{:g}</text>)", at,
+               kHeight - kBottom + 16.0, tick.value);
+      }
+    }
+    for (const Scale::Tick& tick : y_.ticks()) {
+      const double at = y_.px(tick.value);
+      append(R"(<line x1="{}" x2="{}" y1="{:.1f}" y2="{:.1f}" class="{}"/>)", kLeft,
+             kWidth - kRight, at, at, tick.labelled ? "grid" : "fine");
+      if (tick.labelled) {
+        append(R"(<text x="{}" y="{:.1f}" text-anchor="end">{:g}</text>)", kLeft - 6.0, at + 4.0,
+               tick.value);
+      }
+    }
+    append(R"(<rect x="{}" y="{}" width="{}" height="{}" class="frame"/>)", kLeft, kTop,
+           kWidth - kLeft - kRight, kHeight - kTop - kBottom);
+    append(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{}</text>)",
+           0.5 * (kLeft + kWidth - kRight), kHeight - 22.0, escaped(plot_.x.label));
+    append(
+        R"svg(<text transform="translate(16 {:.1f}) rotate(-90)" text-anchor="middle">{}</text>)svg",
+        0.5 * (kTop + kHeight - kBottom), escaped(plot_.y.label));
+  }
+
+  void write_series(const PlotSeries& series, const std::string& ink) {
+    std::string path;
+    for (const PlotPoint& point : series.points) {
+      if (!x_.shows(point.x) || !y_.shows(point.y)) continue;
+      path += fmt::format("{:.1f},{:.1f} ", x_.px(point.x), y_.px(point.y));
+    }
+    if (series.line && !path.empty()) {
+      append(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="{}"/>)", path, ink,
+             series.emphasis ? 2.5 : 1.5);
+    }
+    if (!series.markers) return;
+    for (const PlotPoint& point : series.points) {
+      if (!x_.shows(point.x) || !y_.shows(point.y)) continue;
+      append(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{}" fill="{}"><title>{}</title></circle>)",
+             x_.px(point.x), y_.px(point.y), series.emphasis ? 4.5 : 3.5, ink,
+             escaped(point.title));
+    }
+  }
+
+  const Plot& plot_;
+  std::string& out_;
+  Scale x_;
+  Scale y_;
+  std::size_t left_out_ = 0;
+};
+
+}  // namespace
+
+std::string svg_document(const std::vector<Plot>& plots, std::size_t columns) {
+  columns = std::clamp<std::size_t>(columns, 1, std::max<std::size_t>(1, plots.size()));
+  const std::size_t rows = (plots.size() + columns - 1) / columns;
+  const double width = kWidth * static_cast<double>(columns);
+  const double height = kHeight * static_cast<double>(std::max<std::size_t>(rows, 1));
+  std::string out = fmt::format(
+      R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}">
+<style>
+text {{ font: 12px sans-serif; fill: #222; }}
+.title {{ font-weight: bold; font-size: 14px; }}
+.legend {{ paint-order: stroke; stroke: #fff; stroke-width: 3px; }}
+.note {{ font-size: 10px; fill: #666; }}
+.grid {{ stroke: #d0d0d0; stroke-width: 1; }}
+.fine {{ stroke: #ececec; stroke-width: 1; }}
+.frame {{ fill: none; stroke: #444; stroke-width: 1; }}
+</style>
+<rect width="100%" height="100%" fill="#fff"/>
+)",
+      width, height);
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    fmt::format_to(std::back_inserter(out), "<g transform=\"translate({} {})\">\n",
+                   kWidth * static_cast<double>(i % columns),
+                   kHeight * static_cast<double>(i / columns));
+    PlotWriter(plots[i], out).write();
+    out += "</g>\n";
+  }
+  out += "</svg>\n";
+  return out;
+}
+
+physics::Result<void> write_svg(const std::filesystem::path& file, const std::vector<Plot>& plots,
+                                std::size_t columns) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << svg_document(plots, columns);
+  stream.flush();
+  if (!stream) {
+    return physics::make_error(physics::ErrorCode::io,
+                               fmt::format("{}: cannot be written", file.string()));
+  }
+  return {};
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "emit/physics/error.hpp"
+
+namespace emit::tool {
+
+enum class PlotScale : unsigned char { linear, logarithmic };
+
+struct PlotAxis {
+  std::string label;  ///< with the unit
+  PlotScale scale = PlotScale::linear;
+};
+
+struct PlotPoint {
+  double x = 0.0;
+  double y = 0.0;
+  std::string title;  ///< shown by a viewer under the pointer; may be empty
+};
+
+struct PlotSeries {
+  std::string label;  ///< legend entry; empty: none
+  std::vector<PlotPoint> points;
+  bool line = false;      ///< joined in the order given
+  bool markers = true;    ///< a dot at every point
+  bool emphasis = false;  ///< thick and dark, for what the reader should see first
+};
+
+/// One diagram. Points that an axis cannot show (NaN, or not positive on a logarithmic axis) are
+/// left out and counted below the diagram.
+struct Plot {
+  std::string title;
+  PlotAxis x;
+  PlotAxis y;
+  std::vector<PlotSeries> series;
+};
+
+/// Diagrams side by side as one SVG document, `columns` in a row. Setup only; any thread.
+[[nodiscard]] std::string svg_document(const std::vector<Plot>& plots, std::size_t columns = 2);
+
+/// Errors: io, naming the file.
+[[nodiscard]] physics::Result<void> write_svg(const std::filesystem::path& file,
+                                              const std::vector<Plot>& plots,
+                                              std::size_t columns = 2);
+
+}  // namespace emit::tool

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <glm/ext/vector_double3.hpp>
+
+#include "emit/physics/frames.hpp"
+
+namespace emit::tool::view {
+
+/// What the user asks of the camera and the clock; streams ignore it.
+struct ViewControl {
+  double yaw_rad = 0.0;    ///< added to the scenario's heading, clockwise
+  double pitch_rad = 0.0;  ///< added to its elevation, up
+  bool paused = false;
+
+  /// Once, not a state: the provider consumes what follows.
+  double jump_s = 0.0;     ///< seconds to add to the simulated time
+  double forward_m = 0.0;  ///< steps along the view's boresight as it is turned now
+  double right_m = 0.0;    ///< to its right
+  double up_m = 0.0;       ///< world
+  bool home = false;       ///< forget earlier steps
+};
+
+/// The scenario's attitude turned: yaw about the world's vertical, clockwise seen from above, pitch
+/// about the body's y axis.
+[[nodiscard]] physics::Pose turned_pose(const physics::Pose& base,
+                                        const ViewControl& control) noexcept;
+
+/// World metres of the control's steps, taken in the turned attitude.
+[[nodiscard]] glm::dvec3 step_world_m(const physics::Pose& base,
+                                      const ViewControl& control) noexcept;
+
+}  // namespace emit::tool::view

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <sstream>
+
+#include "config/config_support.hpp"
+#include "emit/config/slab_modes.hpp"
+#include "emit/physics/constants.hpp"
+
+namespace emit::config::testing {
+namespace {
+
+using physics::kDegree;
+
+/// Every key of the table that does not exclude another one, with a value unlike its default.
+const std::string kFull = R"(
+name = "full"
+epoch_utc = 2020-02-29T13:14:15.250+02:00
+default_material = "hot"
+
+[place]
+lat_deg = -33.8568
+lon_deg = 151.2153
+height_m = 12.5
+
+[weather]
+linke_turbidity = 4.25
+air_mean_k = 281.5
+air_amplitude_k = 3.75
+dew_point_k = 275.25
+wind_m_s = 7.5
+cloud_frac = 0.4
+
+[atmosphere]
+enabled = false
+model = "tropical"
+[[atmosphere.band]]
+band = "det"
+terms = [[0.25, 0.5], [0.75, 0.0625]]
+vertical_transmittance_frac = 0.55
+
+[thermal]
+model = "foster"
+method = "per-frame"
+tolerance_k = 0.25
+initial_k = 288.5
+history_start_s = -1800.5
+spin_up_s = 90000.5
+surroundings_material = "deep"
+foster_modes = 3
+steps = 90
+spacing = "uniform"
+first_step_s = 12.5
+shadow_map_px = 512
+max_cascades = 3
+blocker_taps = 4
+filter_taps = 16
+obscurance_radius_m = 0.75
+state_file = "warm.emitstate"
+
+[sensor]
+name = "cam"
+width_px = 320
+height_px = 256
+fov_h_deg = 12.3
+near_m = 0.25
+[[sensor.trajectory]]
+time_s = 0.0
+position_m = [1.0, 2.0, 3.0]
+look_at_m = [10.0, 5.0, 0.0]
+[[sensor.trajectory]]
+time_s = 2.5
+position_m = [1.5, 2.5, 3.5]
+heading_deg = 33.0
+pitch_deg = -7.0
+roll_deg = 2.0
+teleport = true
+
+[display]
+min_k = 270.5
+max_k = 350.5
+
+[[band]]
+name = "det"
+lo_um = 3.2
+hi_um = 4.9
+response = [[3.0, 0.0], [4.0, 1.0], [5.0, 0.5]]
+
+[[channel]]
+name = "a"
+kind = "projector"
+band = "det"
+[[channel]]
+name = "b"
+kind = "injection"
+band = "7.7-9.3"
+window_px = [8, 16, 48, 32]
+every_nth = 4
+
+[[object]]
+name = "ground"
+gltf = "ground.glb"
+material = "concrete"
+scale = 2.5
+instances = [
+  { position_m = [1.0, 2.0, 3.0], heading_deg = 45.0 },
+  { position_m = [4.0, 5.0, 6.0], attitude_wxyz = [0.5, 0.5, 0.5, 0.5] },
+]
+[[object]]
+name = "truck"
+gltf = "truck.gltf"
+entity_id = 11
+on = false
+position_m = [7.0, 8.0, 9.0]
+heading_deg = 123.4
+pitch_deg = 5.0
+roll_deg = -6.0
+material_map = { body = "hot", "wheel left" = "concrete" }
+[[object]]
+name = "jet"
+gltf = "jet.glb"
+entity_id = 12
+trajectory = [
+  { time_s = -1.0, position_m = [0.0, 0.0, 100.0], heading_deg = 90.0, on = false },
+  { time_s = 4.0, position_m = [50.0, 0.0, 100.0], heading_deg = 100.0, teleport = true },
+]
+
+[[material]]
+name = "hot"
+solar_absorptance_frac = 0.7
+emissivity_frac = 0.85
+band_emissivity_frac = { det = 0.8, "3-5" = 0.75 }
+prescribed_k = 450.5
+source = "s \"quoted\""
+uncertainty = "u"
+[[material]]
+name = "deep"
+solar_absorptance_frac = 0.3
+emissivity_frac = 0.95
+base_k = 285.5
+initial_k = 287.25
+core_conductance_w_m2_k = 7.5
+modes = [{ tau_s = 100.5, weight_frac = 0.375 }, { tau_s = 2000.0, weight_frac = 0.625 }]
+foster_modes = [{ tau_s = 50.5, resistance_m2k_w = 0.0714 }, { tau_s = 9000.0, resistance_m2k_w = 0.25 }]
+foster_fit = { horizon_s = 99000.0, rms_k = 0.125, max_k = 0.75 }
+dry_layers_valid = false
+layers = [
+  { thickness_m = 0.05, conductivity_w_m_k = 0.7, density_kg_m3 = 2120.0, specific_heat_j_kg_k = 920.0 },
+  { thickness_m = 0.5, conductivity_w_m_k = 2.0, density_kg_m3 = 1900.0, specific_heat_j_kg_k = 850.0 },
+]
+)";
+
+TEST_F(ConfigTest, every_scenario_key_reaches_its_field) {
+  const auto loaded = scenario(kFull);
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  const scene::ScenarioDesc& s = *loaded;
+  EXPECT_EQ(s.name, "full");
+  EXPECT_EQ(s.file, folder_ / "s.toml");
+  EXPECT_EQ(s.epoch_utc_ns, 1'582'974'855'250'000'000);
+  EXPECT_EQ(s.default_material, "hot");
+  EXPECT_EQ(s.place.lat_rad, -33.8568 * kDegree);
+  EXPECT_EQ(s.place.lon_rad, 151.2153 * kDegree);
+  EXPECT_EQ(s.place.height_m, 12.5);
+  EXPECT_TRUE(s.weather.empty());
+  EXPECT_EQ(s.clear_sky.linke_turbidity, 4.25);
+  EXPECT_EQ(s.clear_sky.air_mean_k, 281.5);
+  EXPECT_EQ(s.clear_sky.air_amplitude_k, 3.75);
+  EXPECT_EQ(s.clear_sky.dew_point_k, 275.25);
+  EXPECT_EQ(s.clear_sky.wind_m_s, 7.5);
+  EXPECT_EQ(s.clear_sky.cloud_frac, 0.4);
+  EXPECT_FALSE(s.atmosphere.enabled);
+  ASSERT_EQ(s.atmosphere.bands.size(), 2U);
+  EXPECT_EQ(s.atmosphere.bands[0].terms[1].amplitude_frac, 0.75);
+  EXPECT_EQ(s.atmosphere.bands[0].vertical_transmittance_frac, 0.55);
+  EXPECT_NEAR(s.atmosphere.bands[1].terms[0].amplitude_frac, 0.53535, 1e-5);  // tropical
+  EXPECT_EQ(s.thermal.tolerance_k, 0.25);
+  EXPECT_EQ(s.thermal.initial_k, 288.5);
+  EXPECT_EQ(s.thermal.history_start_ns, -1'800'500'000'000);
+  EXPECT_EQ(s.thermal.model, scene::ThermalModel::foster);
+  EXPECT_EQ(s.thermal.spin_up_ns, 90'000'500'000'000);
+  EXPECT_EQ(s.thermal.surroundings_material, "deep");
+  EXPECT_EQ(s.thermal.foster_modes, 3U);
+  EXPECT_EQ(s.thermal.steps, 90U);
+  EXPECT_EQ(s.thermal.spacing, scene::StepSpacing::uniform);
+  EXPECT_EQ(s.thermal.first_step_s, 12.5);
+  EXPECT_EQ(s.thermal.shadow_map_px, 512U);
+  EXPECT_EQ(s.thermal.max_cascades, 3U);
+  EXPECT_EQ(s.thermal.blocker_taps, 4U);
+  EXPECT_EQ(s.thermal.filter_taps, 16U);
+  EXPECT_EQ(s.thermal.obscurance_radius_m, 0.75);
+  EXPECT_EQ(s.thermal.state_file, s.file.parent_path() / "warm.emitstate");
+  EXPECT_EQ(s.sensor.name, "cam");
+  EXPECT_EQ(s.sensor.width_px, 320U);
+  EXPECT_EQ(s.sensor.height_px, 256U);
+  EXPECT_EQ(s.sensor.fov_h_rad, 12.3 * kDegree);
+  EXPECT_EQ(s.sensor.near_m, 0.25);
+  ASSERT_EQ(s.sensor.trajectory.size(), 2U);
+  EXPECT_EQ(s.sensor.trajectory[1].sim_time_ns, 2'500'000'000);
+  EXPECT_TRUE(s.sensor.trajectory[1].teleport);
+  EXPECT_EQ(s.display.min_k, 270.5);
+  EXPECT_EQ(s.display.max_k, 350.5);
+  ASSERT_EQ(s.bands.size(), 2U);
+  EXPECT_EQ(s.bands[0].name, "det");
+  EXPECT_EQ(s.bands[0].lo_um, 3.2);
+  EXPECT_EQ(s.bands[0].hi_um, 4.9);
+  EXPECT_EQ(s.bands[0].response.size(), 3U);
+  EXPECT_EQ(s.bands[1].name, "7.7-9.3");
+  EXPECT_EQ(s.bands[1].lo_um, 7.7);
+  ASSERT_EQ(s.channels.size(), 2U);
+  EXPECT_EQ(s.channels[0].kind, scene::ChannelKind::projector);
+  EXPECT_EQ(s.channels[0].band, "det");
+  EXPECT_TRUE(s.channels[0].window_px.empty());
+  EXPECT_EQ(s.channels[0].every_nth, 1U);
+  EXPECT_EQ(s.channels[1].window_px, (scene::PixelRect{8, 16, 48, 32}));
+  EXPECT_EQ(s.channels[1].every_nth, 4U);
+  ASSERT_EQ(s.objects.size(), 3U);
+  EXPECT_EQ(s.objects[0].gltf, folder_ / "ground.glb");
+  EXPECT_EQ(s.objects[0].material, "concrete");
+  EXPECT_EQ(s.objects[0].scale, 2.5);
+  ASSERT_EQ(s.objects[0].instances.size(), 2U);
+  EXPECT_EQ(s.objects[0].instances[1].position_world_m, glm::dvec3(4, 5, 6));
+  EXPECT_EQ(s.objects[0].instances[1].world_from_body.z, 0.5);
+  EXPECT_EQ(s.objects[1].entity_id, 11U);
+  EXPECT_FALSE(s.objects[1].on);
+  EXPECT_EQ(s.objects[1].material_map.at("wheel left"), "concrete");
+  ASSERT_EQ(s.objects[2].trajectory.size(), 2U);
+  EXPECT_FALSE(s.objects[2].trajectory[0].on);
+  EXPECT_TRUE(s.objects[2].trajectory[1].teleport);
+  ASSERT_EQ(s.materials.size(), 3U);  // the library's concrete first
+  EXPECT_EQ(s.materials[1].prescribed_k, 450.5);
+  EXPECT_EQ(s.materials[1].source, "s \"quoted\"");
+  ASSERT_EQ(s.materials[1].band_emissivity.size(), 2U);
+  EXPECT_EQ(s.materials[2].initial_k, 287.25);
+  EXPECT_EQ(s.materials[2].base_k, 285.5);
+  EXPECT_EQ(s.materials[2].layers[1].density_kg_m3, 1900.0);
+  EXPECT_EQ(s.materials[2].modes[1].weight_frac, 0.625);
+  EXPECT_EQ(s.materials[2].core_conductance_w_m2_k, 7.5);
+  ASSERT_EQ(s.materials[2].foster_modes.size(), 2U);
+  EXPECT_EQ(s.materials[2].foster_modes[1].tau_s, 9000.0);
+  EXPECT_EQ(s.materials[2].foster_modes[1].resistance_m2k_w, 0.25);
+  ASSERT_TRUE(s.materials[2].foster_fit.has_value());
+  EXPECT_EQ(s.materials[2].foster_fit->max_k, 0.75);
+  EXPECT_FALSE(s.materials[2].dry_layers_valid);
+  EXPECT_TRUE(s.materials[1].dry_layers_valid);
+}
+
+TEST_F(ConfigTest, the_extended_model_spins_up_for_two_days_unless_told_otherwise) {
+  const std::string object = "[[object]]\ngltf = \"a.glb\"\n";
+  EXPECT_EQ(scenario(object)->thermal.spin_up_ns, 0);
+  EXPECT_EQ(scenario(object, {"thermal.model=foster"})->thermal.spin_up_ns, 172'800'000'000'000);
+  const auto none = scenario(object, {"thermal.model=foster", "thermal.spin_up_s=0"});
+  EXPECT_EQ(none->thermal.spin_up_ns, 0);
+}
+
+TEST_F(ConfigTest, attitudes_point_where_the_keys_say) {
+  const auto loaded = scenario(kFull);
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  const physics::Pose& looking = loaded->sensor.trajectory[0].pose;
+  const glm::dvec3 axis = looking.world_from_body * glm::dvec3(1, 0, 0);
+  const glm::dvec3 wanted = glm::normalize(glm::dvec3(9, 3, -3));
+  EXPECT_NEAR(glm::distance(axis, wanted), 0.0, 1e-12);
+  const glm::dvec3 nose = loaded->objects[1].instances[0].world_from_body * glm::dvec3(1, 0, 0);
+  EXPECT_NEAR(nose.x, std::sin(123.4 * kDegree) * std::cos(5.0 * kDegree), 1e-12);
+  EXPECT_NEAR(nose.y, std::cos(123.4 * kDegree) * std::cos(5.0 * kDegree), 1e-12);
+  EXPECT_NEAR(nose.z, std::sin(5.0 * kDegree), 1e-12);
+}
+
+TEST_F(ConfigTest, a_printed_scenario_loads_to_the_same_values) {
+  const auto first = scenario(kFull);
+  ASSERT_TRUE(first.has_value()) << first.error().text;
+  const std::string printed = print_scenario(*first);
+  const auto second = load_scenario(write("printed.toml", printed), {}, options_);
+  ASSERT_TRUE(second.has_value()) << second.error().text << "\n" << printed;
+  EXPECT_EQ(print_scenario(*second), printed);
+  EXPECT_EQ(second->place.lat_rad, first->place.lat_rad);
+  EXPECT_EQ(second->place.lon_rad, first->place.lon_rad);
+  EXPECT_EQ(second->sensor.fov_h_rad, first->sensor.fov_h_rad);
+  EXPECT_EQ(second->epoch_utc_ns, first->epoch_utc_ns);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(second->sensor.trajectory[i].pose.world_from_body,
+              first->sensor.trajectory[i].pose.world_from_body);
+  }
+  EXPECT_EQ(second->materials.size(), first->materials.size());
+  EXPECT_EQ(second->materials[0].modes[0].tau_s, first->materials[0].modes[0].tau_s);
+}
+
+TEST_F(ConfigTest, a_printed_weather_table_loads_to_the_same_values) {
+  write("w.csv",
+        "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac,environment_k,"
+        "film_w_m2_k\n0.1,800.7,100,330,290.15,2,0,,\n60,0,1,2,300,3,0.5,280.3,13.3\n");
+  const auto first = scenario("[weather]\nfile = \"w.csv\"\n");
+  ASSERT_TRUE(first.has_value()) << first.error().text;
+  const std::string printed = print_scenario(*first);
+  const auto second = load_scenario(write("printed.toml", printed), {}, options_);
+  ASSERT_TRUE(second.has_value()) << second.error().text;
+  ASSERT_EQ(second->weather.size(), 2U);
+  EXPECT_EQ(second->weather[0].sim_time_ns, 100'000'000);
+  EXPECT_EQ(second->weather[0].direct_normal_w_m2, 800.7);
+  EXPECT_FALSE(second->weather[0].film_w_m2_k.has_value());
+  EXPECT_EQ(second->weather[1].environment_k, 280.3);
+  EXPECT_EQ(second->weather[1].film_w_m2_k, 13.3);
+}
+
+TEST_F(ConfigTest, a_minimal_scenario_has_sensible_defaults) {
+  const auto loaded = scenario("[[object]]\ngltf = \"a.glb\"\n[[object]]\ngltf = \"a.glb\"\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  EXPECT_EQ(loaded->name, "s");
+  EXPECT_EQ(loaded->objects[0].name, "a");
+  EXPECT_EQ(loaded->objects[1].name, "a_2");
+  EXPECT_EQ(loaded->default_material, "concrete");
+  ASSERT_EQ(loaded->channels.size(), 2U);
+  EXPECT_EQ(loaded->bands[0].name, "8-12");
+  EXPECT_EQ(loaded->bands[1].name, "3-5");
+  EXPECT_TRUE(loaded->sensor.trajectory.empty());
+  EXPECT_GT(loaded->sensor.fov_h_rad, 0.0);
+  // Level, heading north.
+  const glm::dvec3 nose = loaded->objects[0].instances[0].world_from_body * glm::dvec3(1, 0, 0);
+  EXPECT_NEAR(nose.y, 1.0, 1e-15);
+}
+
+TEST_F(ConfigTest, overrides_reach_array_elements_and_library_materials) {
+  const auto loaded = scenario(
+      "[[object]]\nname = \"a\"\ngltf = \"a.glb\"\n[[channel]]\nname = \"c\"\nband = \"8-12\"\n",
+      {"thermal.steps=90", "object[a].scale=2", "object[0].position_m=[1,2,3]",
+       "channel[c].band=3-5", "material[concrete].base_k=300", "sensor.name=7",
+       "name = \"quoted\""});
+  ASSERT_FALSE(loaded.has_value());  // "name " with a blank is no key
+  const auto again = scenario(
+      "[[object]]\nname = \"a\"\ngltf = \"a.glb\"\n[[channel]]\nname = \"c\"\nband = \"8-12\"\n",
+      {"thermal.steps=90", "object[a].scale=2", "object[0].position_m=[1,2,3]",
+       "channel[c].band=3-5", "material[concrete].base_k=300", "sensor.name=7", "name=\"quoted\""});
+  ASSERT_TRUE(again.has_value()) << again.error().text;
+  EXPECT_EQ(again->thermal.steps, 90U);
+  EXPECT_EQ(again->objects[0].scale, 2.0);
+  EXPECT_EQ(again->objects[0].instances[0].position_world_m, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(again->channels[0].band, "3-5");
+  EXPECT_EQ(again->materials[0].base_k, 300.0);
+  EXPECT_EQ(again->sensor.name, "7");
+  EXPECT_EQ(again->name, "quoted");
+  EXPECT_EQ(scenario_error("", {"object[x].scale=2"}),
+            "--set object[x].scale=2: there is no object[x]");
+  EXPECT_EQ(scenario_error("", {"material[gold].base_k=2"}),
+            "--set material[gold].base_k=2: there is no material[gold]");
+}
+
+TEST_F(ConfigTest, the_environment_reaches_nested_scalars) {
+  options_.environment = {"EMIT_THERMAL_STEPS=13", "EMIT_SENSOR_POSITION_M=[1, 2, 3]",
+                          "EMIT_EPOCH_UTC=2015-01-01T00:00:00Z"};
+  const auto loaded = scenario("[thermal]\nsteps = 27\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  EXPECT_EQ(loaded->thermal.steps, 13U);
+  EXPECT_EQ(loaded->epoch_utc_ns, 1'420'070'400'000'000'000);
+  ASSERT_EQ(loaded->sensor.trajectory.size(), 1U);
+  EXPECT_EQ(loaded->sensor.trajectory[0].pose.position_world_m, glm::dvec3(1, 2, 3));
+}
+
+TEST_F(ConfigTest, a_scenario_material_replaces_the_library_one) {
+  const auto loaded = scenario(
+      "[[material]]\nname = \"concrete\"\nsolar_absorptance_frac = 0.1\nemissivity_frac = "
+      "0.5\nprescribed_k = 310\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_EQ(loaded->materials.size(), 1U);
+  EXPECT_EQ(loaded->materials[0].solar_absorptance_frac, 0.1);
+}
+
+/// Share of each mode and its time constant as published with the slab formula; tolerance: the
+/// digits given.
+TEST(SlabModes, agree_with_the_tabulated_roots) {
+  const auto asphalt = slab_modes({0.15, 0.7, 1950.0, 1000.0}, 19.0, 16);
+  ASSERT_EQ(asphalt.size(), 16U);
+  EXPECT_NEAR(asphalt[15].tau_s, 9438.0, 5.0);
+  EXPECT_NEAR(asphalt[14].tau_s, 2181.0, 2.0);
+  EXPECT_NEAR(asphalt[14].weight_frac / asphalt[15].weight_frac, 0.205 / 0.372, 0.003);
+  const auto concrete = slab_modes({0.10, 1.28, 2020.0, 1000.0}, 19.0, 2);
+  ASSERT_EQ(concrete.size(), 2U);
+  EXPECT_NEAR(concrete[1].tau_s, 3356.0, 8.0);
+  EXPECT_NEAR(concrete[0].tau_s, 632.0, 2.0);
+  EXPECT_NEAR(concrete[0].weight_frac + concrete[1].weight_frac, 1.0, 1e-15);
+  EXPECT_NEAR(concrete[1].weight_frac, 0.592 / (0.592 + 0.173), 0.002);
+}
+
+/// Thin or well conducting: one mode of tau = rho c d / (film + lambda / d), the lumped sheet, up
+/// to pi^2/4 where the film does not matter.
+TEST(SlabModes, of_an_insulated_slab_tend_to_the_diffusive_limit) {
+  const auto modes = slab_modes({0.1, 50.0, 7800.0, 500.0}, 1e-3, 1);
+  const double diffusive_s = 4.0 * 0.01 * 7800.0 * 500.0 / 50.0 / (physics::kPi * physics::kPi);
+  EXPECT_NEAR(modes[0].tau_s / diffusive_s, 1.0, 1e-4);
+}
+
+}  // namespace
+}  // namespace emit::config::testing

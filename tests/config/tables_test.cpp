@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+
+#include "config/config_support.hpp"
+#include "emit/physics/constants.hpp"
+
+namespace emit::config::testing {
+namespace {
+
+constexpr const char* kWeather = "[weather]\nfile = \"w.csv\"\n";
+constexpr const char* kHeader =
+    "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n";
+
+TEST_F(ConfigTest, weather_is_read_with_columns_in_any_order) {
+  write("w.csv",
+        "# measured\r\nair_k, time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,wind_m_s,cloud_frac,"
+        "environment_k\r\n290,0,800,100,330,2,0,\r\n\r\n291.5,60.5,810,101,331,2.5,0.1,288\r\n");
+  const auto loaded = scenario(kWeather);
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_EQ(loaded->weather.size(), 2U);
+  EXPECT_EQ(loaded->weather[0].air_k, 290.0);
+  EXPECT_FALSE(loaded->weather[0].environment_k.has_value());
+  EXPECT_EQ(loaded->weather[1].sim_time_ns, 60'500'000'000);
+  EXPECT_EQ(loaded->weather[1].direct_normal_w_m2, 810.0);
+  EXPECT_EQ(loaded->weather[1].diffuse_horizontal_w_m2, 101.0);
+  EXPECT_EQ(loaded->weather[1].longwave_down_w_m2, 331.0);
+  EXPECT_EQ(loaded->weather[1].wind_m_s, 2.5);
+  EXPECT_EQ(loaded->weather[1].cloud_frac, 0.1);
+  EXPECT_EQ(loaded->weather[1].environment_k, 288.0);
+  EXPECT_FALSE(loaded->weather[1].film_w_m2_k.has_value());
+}
+
+struct CsvCase {
+  const char* name;
+  std::string text;
+  std::string error;
+};
+
+const std::vector<CsvCase>& csv_cases() {
+  static const std::vector<CsvCase> all = {
+      {"missing_column", "time_s,dni_w_m2\n0,1\n", "w.csv:1:1: column 'dhi_w_m2' is missing"},
+      {"unknown_column", "time_s,dni_wm2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n",
+       "w.csv:1:8: unknown column 'dni_wm2', did you mean 'dni_w_m2'?"},
+      {"column_twice",
+       "time_s,time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n",
+       "w.csv:1:8: column 'time_s' appears twice"},
+      {"not_a_number", std::string(kHeader) + "0,8x0,100,330,290,2,0\n",
+       "w.csv:2:3: 'dni_w_m2' is '8x0', which is not a number"},
+      {"empty_value", std::string(kHeader) + "0,,100,330,290,2,0\n",
+       "w.csv:2:3: 'dni_w_m2' is empty"},
+      {"out_of_range", std::string(kHeader) + "0,800,100,330,20,2,0\n",
+       "w.csv:2:15: 'air_k' is 20, must be 180 .. 340"},
+      {"nan", std::string(kHeader) + "0,nan,100,330,290,2,0\n",
+       "w.csv:2:3: 'dni_w_m2' is nan, must be 0 .. 2000"},
+      {"too_few_values", std::string(kHeader) + "# c\n0,800,100\n",
+       "w.csv:3:1: 3 values, the header has 7"},
+      {"time_stands_still", std::string(kHeader) + "0,1,1,300,290,2,0\n0,1,1,300,290,2,0\n",
+       "w.csv:3: 'time_s' is not later than in the row before"},
+      {"empty_file", "", "w.csv: the file has no header row"},
+      {"header_alone", kHeader, "w.csv: the file has no rows"},
+  };
+  return all;
+}
+
+class CsvError : public ConfigTest, public ::testing::WithParamInterface<std::size_t> {};
+
+TEST_P(CsvError, names_file_and_line) {
+  const CsvCase& test = csv_cases()[GetParam()];
+  write("w.csv", test.text);
+  EXPECT_THAT(scenario_error(kWeather), ::testing::StartsWith("s.toml:3:8: 'file': " + test.error));
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, CsvError, ::testing::Range<std::size_t>(0, csv_cases().size()),
+                         [](const auto& each) {
+                           return std::string(csv_cases()[each.param].name);
+                         });
+
+TEST_F(ConfigTest, a_missing_weather_file_is_reported_where_it_is_named) {
+  EXPECT_EQ(scenario_error(kWeather), "s.toml:3:8: 'file': w.csv: no such file");
+}
+
+TEST_F(ConfigTest, clear_sky_options_beside_a_table_are_refused) {
+  write("w.csv", std::string(kHeader) + "0,800,100,330,290,2,0\n");
+  EXPECT_EQ(scenario_error(std::string(kWeather) + "cloud_frac = 0.5\n"),
+            "s.toml:4:1: 'cloud_frac' has no effect: the weather comes from a file");
+}
+
+TEST_F(ConfigTest, trajectories_come_from_csv) {
+  write("t.csv",
+        "time_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg,on\n0,1,2,3,0,0,0,1\n1.5,4,5,6,90,0,0,"
+        "0\n");
+  const auto loaded =
+      scenario("[[object]]\ngltf = \"a.glb\"\nentity_id = 4\ntrajectory_file = \"t.csv\"\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  const scene::Trajectory& trajectory = loaded->objects[0].trajectory;
+  ASSERT_EQ(trajectory.size(), 2U);
+  EXPECT_EQ(trajectory[0].pose.position_world_m, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(trajectory[1].sim_time_ns, 1'500'000'000);
+  EXPECT_FALSE(trajectory[1].on);
+  // Heading 90 deg: the nose (body x) points east.
+  const glm::dvec3 nose = trajectory[1].pose.world_from_body * glm::dvec3(1, 0, 0);
+  EXPECT_NEAR(nose.x, 1.0, 1e-12);
+  ASSERT_EQ(loaded->objects[0].instances.size(), 1U);
+  EXPECT_EQ(loaded->objects[0].instances[0].position_world_m, glm::dvec3(1, 2, 3));
+}
+
+TEST_F(ConfigTest, trajectory_csv_faults_name_the_line) {
+  write("t.csv", "time_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg,on\n0,1,2,3,0,0,0,0.5\n");
+  EXPECT_EQ(scenario_error("[sensor]\ntrajectory_file = \"t.csv\"\n"),
+            "s.toml:3:19: 'trajectory_file': t.csv:2: 'on' must be 0 or 1");
+}
+
+TEST_F(ConfigTest, responses_come_from_csv) {
+  write("r.csv", "wavelength_um,response_frac\n3.0,0\n4,1\n5.5,0.25\n");
+  const auto loaded = scenario(
+      "[[band]]\nname = \"det\"\nresponse_file = \"r.csv\"\n[[channel]]\nname = \"c\"\nband = "
+      "\"det\"\n[[atmosphere.band]]\nband = \"det\"\nterms = [[1, 0.2]]\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_EQ(loaded->bands.size(), 1U);
+  EXPECT_EQ(loaded->bands[0].lo_um, 3.0);
+  EXPECT_EQ(loaded->bands[0].hi_um, 5.5);
+  ASSERT_EQ(loaded->bands[0].response.size(), 3U);
+  EXPECT_EQ(loaded->bands[0].response[2].response_frac, 0.25);
+  ASSERT_EQ(loaded->atmosphere.bands.size(), 1U);
+  EXPECT_EQ(loaded->atmosphere.bands[0].terms[0].extinction_per_km, 0.2);
+}
+
+TEST_F(ConfigTest, a_band_that_no_channel_shows_is_not_handed_over) {
+  const auto loaded = scenario(
+      "[[band]]\nname = \"spare\"\nlo_um = 4\nhi_um = 5\n"
+      "[[channel]]\nname = \"c\"\nband = \"3-5\"\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_EQ(loaded->bands.size(), 1U);
+  EXPECT_EQ(loaded->bands[0].name, "3-5");
+}
+
+TEST_F(ConfigTest, atmosphere_terms_come_from_csv_for_its_bands_only) {
+  write("a.csv",
+        "band,amplitude_frac,extinction_per_km,vertical_transmittance_frac\n"
+        "8-12,0.75,0.1,0.6\n8-12,0.25,1.0,0.6\n");
+  const auto loaded = scenario("[atmosphere]\nfile = \"a.csv\"\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  ASSERT_EQ(loaded->atmosphere.bands.size(), 2U);
+  EXPECT_EQ(loaded->atmosphere.bands[0].band, "8-12");
+  EXPECT_EQ(loaded->atmosphere.bands[0].terms.size(), 2U);
+  EXPECT_EQ(loaded->atmosphere.bands[0].vertical_transmittance_frac, 0.6);
+  EXPECT_EQ(loaded->atmosphere.bands[1].band, "3-5");
+  EXPECT_EQ(loaded->atmosphere.bands[1].terms.size(), 3U);
+}
+
+TEST_F(ConfigTest, atmosphere_csv_amplitudes_must_add_up) {
+  write("a.csv",
+        "band,amplitude_frac,extinction_per_km,vertical_transmittance_frac\n8-12,0.75,0.1,0.6\n");
+  EXPECT_EQ(
+      scenario_error("[atmosphere]\nfile = \"a.csv\"\n"),
+      "s.toml:3:8: 'file': a.csv:2: the amplitudes of band '8-12' add up to 0.75 over 1 rows, "
+      "must be 1 over at most 4");
+}
+
+/// LOWTRAN7 horizontal transmittances of the mid-latitude summer, 23 km; tolerance: the fit's
+/// stated largest error.
+TEST_F(ConfigTest, built_in_atmosphere_meets_the_tabulated_transmittance) {
+  const auto loaded = scenario("");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  const auto tau = [](const scene::BandAtmosphere& band, double range_km) {
+    double sum = 0.0;
+    for (const scene::AtmosphereTerm& term : band.terms) {
+      sum += term.amplitude_frac * std::exp(-term.extinction_per_km * range_km);
+    }
+    return sum;
+  };
+  ASSERT_EQ(loaded->atmosphere.bands.size(), 2U);
+  const scene::BandAtmosphere& lwir = loaded->atmosphere.bands[0];
+  const scene::BandAtmosphere& mwir = loaded->atmosphere.bands[1];
+  EXPECT_DOUBLE_EQ(tau(lwir, 0.0), 1.0);
+  EXPECT_NEAR(tau(lwir, 1.0), 0.733, 0.004);
+  EXPECT_NEAR(tau(lwir, 5.0), 0.294, 0.004);
+  EXPECT_NEAR(tau(lwir, 10.0), 0.105, 0.004);
+  EXPECT_NEAR(tau(mwir, 1.0), 0.483, 0.017);
+  EXPECT_NEAR(tau(mwir, 5.0), 0.208, 0.017);
+}
+
+}  // namespace
+}  // namespace emit::config::testing

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// Spectral responses of bands.
+#include "fuzz/fuzz_input.hpp"
+#include "fuzz/memory_file.hpp"
+#include "resolve/resolve.hpp"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace emit;
+  const auto table = config::load_response_csv(fuzz::file_of(fuzz::as_bytes(data, size)));
+  for (std::size_t i = 1; table && i < table->size(); ++i) {
+    fuzz::require((*table)[i - 1].wavelength_um < (*table)[i].wavelength_um, "rows go up");
+  }
+  return 0;
+}

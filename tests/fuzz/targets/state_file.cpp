@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Saved thermal states. The input is the file, sealed: sizes in the header and the checksum at the
+// end are made right, so that inputs get past them; its first byte, if it is not 'E', is dropped
+// and the rest taken as it stands.
+#include "surface/state/state_file.hpp"
+
+#include <vector>
+
+#include "fuzz/fuzz_input.hpp"
+#include "fuzz/memory_file.hpp"
+#include "fuzz/state_world.hpp"
+#include "surface/state/state_bytes.hpp"
+
+namespace {
+
+using namespace emit;
+
+constexpr std::size_t kBodySizeAt = 8 + 4 + 4 + sizeof(renderer::StateKey);
+constexpr std::size_t kBodyAt = kBodySizeAt + 8;
+
+void seal(std::vector<std::byte>& file) {
+  if (file.size() < kBodyAt + 8) return;
+  const std::uint64_t body_bytes = file.size() - kBodyAt - 8;
+  std::memcpy(file.data() + kBodySizeAt, &body_bytes, sizeof body_bytes);
+  renderer::Fnv64 hash;
+  hash.put(file.data(), file.size() - 8);
+  const std::uint64_t value = hash.value();
+  std::memcpy(file.data() + file.size() - 8, &value, sizeof value);
+}
+
+}  // namespace
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const scene::SceneGeometry geometry = fuzz::state_geometry();
+  const auto input = fuzz::as_bytes(data, size);
+  std::vector<std::byte> file(input.begin(), input.end());
+  if (!file.empty() && file.front() != std::byte{'E'}) {
+    file.erase(file.begin());
+  } else {
+    seal(file);
+  }
+  renderer::SurfaceModelOptions options;
+  options.max_samples = 1000;
+  const auto model = renderer::read_state(fuzz::file_of(file), fuzz::state_key(), geometry,
+                                          fuzz::kMovers, options);
+  if (!model) return 0;
+  fuzz::require(model->meshes.size() == geometry.meshes.size(), "a mesh for every mesh");
+  for (const renderer::RefinedMesh& mesh : model->meshes) {
+    for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        fuzz::require(mesh.leaf(slot)[corner] < mesh.vertices().size(), "leaves name vertices");
+      }
+    }
+  }
+  // What frames do with it shows whether its tree hangs together.
+  const renderer::RefinedMesh& mesh = model->meshes[0];
+  for (std::uint32_t triangle = 0; triangle < geometry.meshes[0].indices.size() / 3; ++triangle) {
+    for (const glm::vec2 place : {glm::vec2(0.0F), glm::vec2(0.2F, 0.7F), glm::vec2(1.0F, 0.0F)}) {
+      for (const std::uint32_t vertex : mesh.locate(triangle, place).vertex) {
+        fuzz::require(vertex < mesh.vertices().size(), "places name vertices");
+      }
+    }
+  }
+  std::vector<std::uint32_t> indices;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges;
+  mesh.write_indices(indices, ranges);
+  fuzz::require(indices.size() == 3 * std::size_t{mesh.leaf_count()}, "every leaf is drawn");
+  return 0;
+}

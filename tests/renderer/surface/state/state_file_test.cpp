@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/state/state_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "renderer/surface/mesh/refined_mesh_support.hpp"
+#include "surface/state/state_bytes.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kMovers = 2;
+/// Magic, version, number of parts, hashes, size of the body.
+constexpr std::size_t kBodyAt = 8 + 4 + 4 + 8 * kStateParts + 8;
+
+StateKey some_key() {
+  StateKey key{};
+  for (std::size_t i = 0; i < key.size(); ++i) key[i] = 0x0123456789abcdefULL * (i + 3);
+  return key;
+}
+
+/// An octahedron of which some leaves are halved, and samples without two equal members.
+struct World {
+  scene::SceneGeometry geometry;
+  SurfaceModel model;
+  SurfaceModelOptions options;
+
+  World() {
+    geometry.meshes.push_back(octahedron());
+    geometry.materials.resize(3);
+    geometry.instances.resize(1);
+    geometry.instances[0].entity_id = 7;
+    model.meshes.emplace_back(geometry.meshes[0], options.max_samples);
+    EXPECT_TRUE(model.meshes[0].split(std::vector<std::uint32_t>{0, 3, 5}));
+    model.drawn_samples = static_cast<std::uint32_t>(model.meshes[0].vertices().size());
+    const std::uint32_t count = model.drawn_samples + 2;
+    model.first_sample = {0};
+    float next = 0.25F;
+    const auto number = [&next] { return next += 0.5F; };
+    for (std::uint32_t i = 0; i < count; ++i) {
+      SurfaceSample sample;
+      sample.position_m = {number(), number(), number()};
+      sample.normal = {number(), number(), number()};
+      sample.mover = i < model.drawn_samples ? 1 : static_cast<std::int32_t>(i % 3) - 1;
+      sample.material = i % 3;
+      sample.sky_frac = number();
+      sample.sphere_sky_frac = number();
+      sample.far_frac = number();
+      sample.first_seen = i;
+      sample.seen_count = 1;
+      sample.covered = i % 2 == 0;
+      sample.open_frac[2] = number();
+      sample.open_before_frac[3] = number();
+      sample.flat_m = number();
+      sample.partners[1] = {i, number(), {number(), number(), number(), number()}};
+      model.samples.samples.push_back(sample);
+      model.samples.seen.push_back({count - 1 - i, number()});
+      SampleState state;
+      state.modes_k[1] = number();
+      state.partner_k[1][3] = number();
+      model.states.push_back(state);
+      model.outputs.push_back({number(), number(), number(), number(), number()});
+    }
+    model.full = true;
+  }
+};
+
+class StateFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    file_ = folder_ / "x.emitstate";
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] std::string bytes() const {
+    std::ifstream in(file_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void put(const std::string& bytes) const {
+    std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes;
+  }
+  /// With the checksum that belongs to them.
+  void put_signed(std::string bytes) const {
+    Fnv64 hash;
+    hash.put(bytes.data(), bytes.size() - 8);
+    const std::uint64_t value = hash.value();
+    std::memcpy(bytes.data() + bytes.size() - 8, &value, 8);
+    put(bytes);
+  }
+  [[nodiscard]] physics::Result<SurfaceModel> read(const StateKey& key = some_key()) const {
+    return read_state(file_, key, world_.geometry, kMovers, world_.options);
+  }
+  /// Text of the refusal; empty when the file was taken.
+  [[nodiscard]] std::string refusal(const StateKey& key = some_key()) const {
+    const auto got = read(key);
+    if (got) return "";
+    EXPECT_EQ(got.error().code, physics::ErrorCode::config);
+    EXPECT_NE(got.error().text.find(file_.string()), std::string::npos) << got.error().text;
+    return got.error().text;
+  }
+  void write() const { ASSERT_TRUE(write_state(file_, some_key(), world_.model)); }
+
+  World world_;
+  std::filesystem::path folder_;
+  std::filesystem::path file_;
+};
+
+TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
+  write();
+  const auto files = std::distance(std::filesystem::directory_iterator(folder_), {});
+  EXPECT_EQ(files, 1);
+  const std::string first = bytes();
+  auto got = read();
+  ASSERT_TRUE(got) << got.error().text;
+  ASSERT_TRUE(write_state(file_, some_key(), *got));
+  EXPECT_EQ(bytes(), first);  // every member is in the file
+
+  const SurfaceModel& model = world_.model;
+  EXPECT_TRUE(got->full);
+  EXPECT_EQ(got->drawn_samples, model.drawn_samples);
+  for (std::size_t i = 0; i < model.states.size(); ++i) {
+    const SurfaceSample& a = got->samples.samples[i];
+    const SurfaceSample& b = model.samples.samples[i];
+    EXPECT_EQ(a.position_m, b.position_m);
+    EXPECT_EQ(a.normal, b.normal);
+    EXPECT_EQ(a.mover, b.mover);
+    EXPECT_EQ(a.covered, b.covered);
+    EXPECT_EQ(a.open_frac, b.open_frac);
+    EXPECT_EQ(a.open_before_frac, b.open_before_frac);
+    EXPECT_EQ(a.material, b.material);
+    EXPECT_EQ(a.sky_frac, b.sky_frac);
+    EXPECT_EQ(a.sphere_sky_frac, b.sphere_sky_frac);
+    EXPECT_EQ(a.far_frac, b.far_frac);
+    EXPECT_EQ(a.first_seen, b.first_seen);
+    EXPECT_EQ(a.seen_count, b.seen_count);
+    EXPECT_EQ(a.flat_m, b.flat_m);
+    EXPECT_EQ(a.partners[0].sample, kNoSample);
+    EXPECT_EQ(a.partners[1].sample, b.partners[1].sample);
+    EXPECT_EQ(a.partners[1].distance_m, b.partners[1].distance_m);
+    EXPECT_EQ(a.partners[1].weight_frac, b.partners[1].weight_frac);
+    EXPECT_EQ(got->states[i].modes_k, model.states[i].modes_k);
+    EXPECT_EQ(got->states[i].partner_k, model.states[i].partner_k);
+    EXPECT_EQ(got->outputs[i].offset_k, model.outputs[i].offset_k);
+    EXPECT_EQ(got->outputs[i].sun_frac, model.outputs[i].sun_frac);
+    EXPECT_EQ(got->outputs[i].longwave_out_w_m2, model.outputs[i].longwave_out_w_m2);
+    EXPECT_EQ(got->outputs[i].shortwave_out_w_m2, model.outputs[i].shortwave_out_w_m2);
+    EXPECT_EQ(got->outputs[i].flux_w_m2, model.outputs[i].flux_w_m2);
+    EXPECT_EQ(got->samples.seen[i].sample, model.samples.seen[i].sample);
+    EXPECT_EQ(got->samples.seen[i].weight_frac, model.samples.seen[i].weight_frac);
+  }
+  std::vector<std::uint32_t> indices[2];
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges[2];
+  got->meshes[0].write_indices(indices[0], ranges[0]);
+  model.meshes[0].write_indices(indices[1], ranges[1]);
+  EXPECT_EQ(indices[0], indices[1]);
+  EXPECT_EQ(ranges[0], ranges[1]);
+}
+
+TEST_F(StateFile, a_mesh_from_a_file_goes_on_being_refined_as_the_one_that_was_kept) {
+  write();
+  auto got = read();
+  ASSERT_TRUE(got);
+  const std::vector<std::uint32_t> more{1, 4, 7};
+  EXPECT_TRUE(got->meshes[0].split(more));
+  EXPECT_TRUE(world_.model.meshes[0].split(more));
+  EXPECT_EQ(got->meshes[0].parts().leaves, world_.model.meshes[0].parts().leaves);
+  EXPECT_EQ(got->meshes[0].parts().nodes, world_.model.meshes[0].parts().nodes);
+}
+
+TEST_F(StateFile, cut_short_anywhere_it_is_refused) {
+  write();
+  const std::string whole = bytes();
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    put(whole.substr(0, size));
+    ASSERT_NE(refusal(), "") << size;
+  }
+  put(whole + "x");
+  EXPECT_NE(refusal().find("truncated or damaged"), std::string::npos);
+}
+
+TEST_F(StateFile, with_any_byte_changed_it_is_refused) {
+  write();
+  const std::string whole = bytes();
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    std::string changed = whole;
+    changed[i] = static_cast<char>(changed[i] ^ 0x10);
+    put(changed);
+    ASSERT_NE(refusal(), "") << i;
+  }
+}
+
+TEST_F(StateFile, made_for_something_else_it_says_what_differs) {
+  write();
+  for (std::size_t i = 0; i < kStateParts; ++i) {
+    StateKey other = some_key();
+    ++other[i];
+    const std::string text = refusal(other);
+    for (std::size_t j = 0; j < kStateParts; ++j) {
+      EXPECT_EQ(text.find(describe(static_cast<StatePart>(j))) != std::string::npos, i == j)
+          << text;
+    }
+  }
+}
+
+TEST_F(StateFile, of_another_kind_or_version_it_says_so) {
+  write();
+  std::string other = bytes();
+  other[8] = 99;
+  put_signed(other);
+  EXPECT_NE(refusal().find("version 99"), std::string::npos);
+  put("[thermal]\nsteps = 27\n");
+  EXPECT_NE(refusal().find("not a state"), std::string::npos);
+}
+
+TEST_F(StateFile, huge_counts_and_indices_out_of_range_are_refused_though_the_checksum_holds) {
+  write();
+  const std::string whole = bytes();
+  // Any eight bytes of the body as a count or as indices of 2^60 and more. What is taken all the
+  // same must be free of indices that lead anywhere else: reading them all shows it.
+  std::size_t refused = 0;
+  for (std::size_t at = kBodyAt; at + 16 <= whole.size(); at += 4) {
+    std::string changed = whole;
+    std::memset(changed.data() + at, 0x7f, 8);
+    put_signed(changed);
+    const auto got = read();
+    if (!got) {
+      ++refused;
+      continue;
+    }
+    const std::size_t count = got->samples.samples.size();
+    for (const SurfaceSample& sample : got->samples.samples) {
+      ASSERT_LE(sample.first_seen + sample.seen_count, got->samples.seen.size());
+      ASSERT_LT(sample.mover, static_cast<std::int32_t>(kMovers));
+      for (const Partner& partner : sample.partners) {
+        ASSERT_TRUE(partner.sample == kNoSample || partner.sample < count);
+      }
+    }
+    for (const SeenSample& seen : got->samples.seen) ASSERT_LT(seen.sample, count);
+  }
+  EXPECT_GT(refused, 200U);
+}
+
+TEST_F(StateFile, samples_that_belong_to_something_else_are_refused) {
+  auto& samples = world_.model.samples.samples;
+  const auto refused = [this] {
+    write();
+    return !read();
+  };
+  samples[0].mover = -1;  // of an entity's instance
+  EXPECT_TRUE(refused());
+  samples[0].mover = samples[1].mover;
+  EXPECT_FALSE(refused());
+  samples[0].other_side = 3;  // which knows nothing of it
+  EXPECT_TRUE(refused());
+  samples[3].other_side = 0;
+  EXPECT_FALSE(refused());
+  const auto last = static_cast<std::uint32_t>(samples.size() - 1);  // not of the instance
+  samples[3].other_side = kNoSample;
+  samples[0].other_side = last;
+  samples[last].other_side = 0;
+  EXPECT_TRUE(refused());
+}
+
+TEST_F(StateFile, that_is_not_there_or_cannot_be_written_is_an_error_of_the_disk) {
+  const auto missing = read();
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().code, physics::ErrorCode::io);
+  const auto nowhere = folder_ / "no-such-folder" / "x.emitstate";
+  for (const auto& got :
+       {write_state(nowhere, some_key(), world_.model), check_state_writable(nowhere)}) {
+    ASSERT_FALSE(got);
+    EXPECT_EQ(got.error().code, physics::ErrorCode::io);
+    EXPECT_NE(got.error().text.find(nowhere.string()), std::string::npos);
+  }
+  EXPECT_TRUE(check_state_writable(file_));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST(RefinedMesh, parts_that_contradict_each_other_make_no_mesh) {
+  const scene::Mesh source = octahedron();
+  RefinedMesh mesh(source, kNoLimit);
+  ASSERT_TRUE(mesh.split(std::vector<std::uint32_t>{0, 3, 5}));
+  const auto broken = [&](auto&& change) {
+    RefinedMesh::Parts parts = mesh.parts();
+    change(parts);
+    return !RefinedMesh::from(source, kNoLimit, std::move(parts)).has_value();
+  };
+  using Parts = RefinedMesh::Parts;
+  EXPECT_FALSE(broken([](Parts&) {}));
+  EXPECT_TRUE(broken([](Parts& p) { p.leaves[2][1] = 1000; }));
+  EXPECT_TRUE(broken([](Parts& p) { p.leaf_submesh[1] = 2; }));
+  EXPECT_TRUE(broken([](Parts& p) { p.vertices[3].parent[0] = 4; }));
+  EXPECT_TRUE(broken([](Parts& p) { p.vertices[3].position_m.x += 1.0F; }));
+  EXPECT_TRUE(broken([](Parts& p) { p.leaf_node[0] = 1; }));
+  EXPECT_TRUE(broken([](Parts& p) { p.nodes.pop_back(); }));
+  EXPECT_TRUE(broken([](Parts& p) { p.nodes[0] = 0; }));           // its own child
+  EXPECT_TRUE(broken([](Parts& p) { p.nodes[3] = p.nodes[0]; }));  // two parents
+  EXPECT_TRUE(broken([](Parts& p) { p.leaves.pop_back(); }));
+}
+
+}  // namespace
+}  // namespace emit::renderer

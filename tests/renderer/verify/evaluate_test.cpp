@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "csv_table.hpp"
+#include "emit/verify/evaluate.hpp"
+#include "result_writer.hpp"
+
+namespace emit::verify {
+namespace {
+
+using physics::ErrorCode;
+using testing::HasSubstr;
+
+CsvTable parse(const std::string& text) {
+  auto table = CsvTable::parse(text, "t.csv");
+  EXPECT_TRUE(table.has_value()) << table.error().text;
+  return std::move(*table);
+}
+
+physics::Error parse_error(const std::string& text) {
+  auto table = CsvTable::parse(text, "t.csv");
+  EXPECT_FALSE(table.has_value());
+  return table ? physics::Error{} : table.error();
+}
+
+TEST(CsvTable, ReadsColumnsByNameWithEitherLineEndCommentsAndBlanks) {
+  const CsvTable table =
+      parse("# a comment\r\n\r\nb, a,name\r\n1.5 ,-2e3,x\r\n#2,3,y\n\nnan,+4,z z");
+  ASSERT_EQ(table.rows(), 2U);
+  EXPECT_THAT(*table.numbers("a"), testing::ElementsAre(-2000.0, 4.0));
+  EXPECT_THAT(*table.numbers("b"), testing::ElementsAre(1.5, testing::IsNan()));
+  EXPECT_THAT(*table.texts("name"), testing::ElementsAre("x", "z z"));
+  EXPECT_EQ(table.line_of(0), 4U);
+  EXPECT_EQ(table.line_of(1), 7U);
+}
+
+TEST(CsvTable, KeepsItsCellsWhenMoved) {
+  CsvTable table = parse("a\n7\n");
+  const CsvTable moved = std::move(table);
+  EXPECT_THAT(*moved.texts("a"), testing::ElementsAre("7"));
+}
+
+TEST(CsvTable, NumbersOutsideDoubleBecomeZeroOrInfinity) {
+  EXPECT_THAT(*parse("a\n1e-400\n-1e400\n").numbers("a"),
+              testing::ElementsAre(0.0, -std::numeric_limits<double>::infinity()));
+}
+
+TEST(CsvTable, AMissingColumnIsBadUsageAndNamed) {
+  const auto result = parse("a,b\n1,2\n").numbers("lambda");
+  ASSERT_FALSE(result.has_value());
+  EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(result.error().text, HasSubstr("missing column 'lambda'"));
+}
+
+TEST(CsvTable, MalformedTablesNameFileAndLine) {
+  EXPECT_THAT(parse_error("a,b\n1,2\n3\n").text, HasSubstr("t.csv:3: 1 cells"));
+  EXPECT_THAT(parse_error("a,a\n").text, HasSubstr("column 'a' appears twice"));
+  EXPECT_THAT(parse_error("a,,b\n").text, HasSubstr("empty column name"));
+  EXPECT_THAT(parse_error("# only comments\n").text, HasSubstr("no header row"));
+  EXPECT_THAT(parse_error("").text, HasSubstr("no header row"));
+  for (const std::string bad : {"x", "1x", "", "0x10", "1 2", "--1"}) {
+    const auto result = parse("a,b\n" + bad + ",1\n").numbers("a");
+    ASSERT_FALSE(result.has_value()) << bad;
+    EXPECT_EQ(result.error().code, ErrorCode::parse);
+    EXPECT_THAT(result.error().text, HasSubstr("t.csv:2: column 'a'"));
+  }
+  EXPECT_EQ(CsvTable::read("/nonexistent/t.csv").error().code, ErrorCode::not_found);
+  EXPECT_EQ(CsvTable::read("/").error().code, ErrorCode::io);
+}
+
+TEST(ResultWriter, DigitsRoundTripAndNanHasNoSign) {
+  const std::vector<double> exact[] = {{0.1, -std::numeric_limits<double>::quiet_NaN()}};
+  EXPECT_EQ(write_csv("T", exact), "T\n0.10000000000000001\nnan\n");
+  const std::vector<float> single[] = {{0.1F}, {std::numeric_limits<float>::infinity()}};
+  EXPECT_EQ(write_csv("a,b", single), "a,b\n0.100000001,inf\n");
+}
+
+class Evaluate : public testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& name, const std::string& text) {
+    const auto folder = std::filesystem::path(EMIT_TEST_BINARY_DIR) / "evaluate_test" /
+                        testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::filesystem::create_directories(folder);
+    std::ofstream(folder / name, std::ios::binary) << text;
+    return folder / name;
+  }
+  EvaluateRequest request(const std::string& model, const std::string& table) {
+    EvaluateRequest r;
+    r.model = model;
+    r.table = write("in.csv", table);
+    return r;
+  }
+};
+
+TEST_F(Evaluate, ListsItsModels) {
+  std::vector<std::string_view> names;
+  for (const ModelInfo& model : models()) names.push_back(model.name);
+  EXPECT_THAT(names, testing::UnorderedElementsAre("equilibrium", "balance", "band-radiance",
+                                                   "relaxation", "sun-position", "sun-disc",
+                                                   "wall-shadow", "sky-view", "conduction-slab",
+                                                   "conduction-semi-infinite", "conduction-layered",
+                                                   "conduction-lateral", "surface-history"));
+}
+
+TEST_F(Evaluate, RowsKeepTheirOrderAndExtraColumnsAreIgnored) {
+  const auto result =
+      evaluate(request("equilibrium",
+                       "note,Tair,hc,Tc,Ta,eps,d,lambda\r\nhot,300,0,300,300,1,1,1\r\n"
+                       "cold,300,0,250,250,0.5,0.1,2\r\n"));
+  ASSERT_TRUE(result.has_value()) << result.error().text;
+  EXPECT_EQ(*result, "Ts\n300\n250\n");
+}
+
+TEST_F(Evaluate, UndefinedRowsAreNanAndTheOthersAreNot) {
+  const std::string header = "lambda,d,eps,Ta,Tc,hc,Tair\n";
+  const auto result = evaluate(request(
+      "equilibrium", header + "1,0,1,300,300,0,300\n1,1,1,nan,300,0,300\n1,1,1,0,-50,0,300\n"
+                              "1,1,1,300,300,0,300\n1,1,1,300,300,nan,300\n0,1,1,300,300,0,300\n"));
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(*result, "Ts\nnan\nnan\nnan\n300\nnan\n300\n");
+}
+
+TEST_F(Evaluate, BalanceReadsBothSensesOfTheAlbedoColumn) {
+  const std::string header =
+      "S_d,S_i,R_e,R_LW,alb,alb_reading,beta,f_d,f_i,eps,lambda,d,Tc,hc,Tair\n";
+  const auto result = evaluate(
+      request("balance", header + "1000,0,0,0,0.75,albedo,0.5,0.5,0.5,0.9,1,0.1,300,0,300\n"
+                                  "1000,0,0,0,0.75,absorptivity,0.5,0.5,0.5,0.9,1,0.1,300,0,300\n"
+                                  "0,0,-4000,0,0.75,albedo,0,0,0,0.9,1,0.1,300,20,300\n"));
+  ASSERT_TRUE(result.has_value()) << result.error().text;
+  EXPECT_THAT(*result, testing::StartsWith("E_abs,Ta,Ts,Ts_conv\n62.5,"));
+  EXPECT_THAT(*result, HasSubstr("\n187.5,"));
+  // Emits more than conduction can bring: no radiative and no plain equilibrium temperature.
+  EXPECT_THAT(*result, HasSubstr("\n-4000,nan,nan,"));
+  EXPECT_THAT(*result, testing::Not(testing::EndsWith("nan\n")));
+
+  const auto bad = evaluate(request("balance", header + "1,0,0,0,0.75,maybe,0,1,1,1,1,1,1,1,1\n"));
+  ASSERT_FALSE(bad.has_value());
+  EXPECT_THAT(bad.error().text, HasSubstr("in.csv:2: column 'alb_reading': 'maybe'"));
+}
+
+TEST_F(Evaluate, BandRadianceIsZeroAtZeroAndNanBelow) {
+  auto r = request("band-radiance", "T_K\n0\n-1\nnan\n");
+  EXPECT_EQ(*evaluate(r),
+            "L_3_5,L_3.4_4.1,L_8_12,L_7.7_9.3\n0,0,0,0\nnan,nan,nan,nan\nnan,nan,nan,nan\n");
+  r.precision = Precision::float32;
+  EXPECT_EQ(*evaluate(r),
+            "L_3_5,L_3.4_4.1,L_8_12,L_7.7_9.3\n0,0,0,0\nnan,nan,nan,nan\nnan,nan,nan,nan\n");
+}
+
+const char* const kCaseHeader = "case,kind,n,tau1,tau2,tau3,w1,w2,w3,x0_1,x0_2,x0_3\n";
+
+TEST_F(Evaluate, RelaxationHoldsTheDriveOutsideItsNodes) {
+  // tau so short that the state is the drive: this shows which drive is used when.
+  auto r = request("relaxation",
+                   "t_s,case\n5,c\n15,c\n25,c\n99,c\n5,l\n15,l\n20,l\n99,l\n-1,l\n0,l\nnan,l\n");
+  r.cases = write("cases.csv", std::string(kCaseHeader) +
+                                   "c,const,1,1e-3,1,1,1,0,0,250,0,0\n"
+                                   "l,linear,1,1e-3,1,1,1,0,0,250,0,0\n");
+  r.nodes = write("nodes.csv", "case,t_s,u_K\nc,10,300\nl,20,320\nc,20,310\nl,10,300\nother,0,1\n");
+  const auto result = evaluate(r);
+  ASSERT_TRUE(result.has_value()) << result.error().text;
+  auto lines = CsvTable::parse(*result, "out");
+  const auto t = *lines->numbers("T_K");
+  ASSERT_EQ(t.size(), 11U);
+  EXPECT_NEAR(t[0], 300.0, 1e-9);  // before the first node its drive holds
+  EXPECT_NEAR(t[1], 300.0, 1e-9);  // constant from node to node
+  EXPECT_NEAR(t[2], 310.0, 1e-9);
+  EXPECT_NEAR(t[3], 310.0, 1e-9);  // and after the last
+  EXPECT_NEAR(t[4], 300.0, 1e-9);
+  EXPECT_NEAR(t[5], 310.0 - 0.002, 1e-9);  // a ramp is followed one tau behind
+  EXPECT_NEAR(t[6], 320.0 - 0.002, 1e-9);
+  EXPECT_NEAR(t[7], 320.0, 1e-9);
+  EXPECT_TRUE(std::isnan(t[8]));  // before the state is given
+  EXPECT_EQ(t[9], 250.0);
+  EXPECT_TRUE(std::isnan(t[10]));
+}
+
+TEST_F(Evaluate, RelaxationTakesTwoNodesAtOneInstantAsAJump) {
+  auto r = request("relaxation", "case,t_s\na,9.999\na,10.5\n");
+  r.cases = write("cases.csv", std::string(kCaseHeader) + "a,linear,1,1e-3,1,1,1,0,0,300,0,0\n");
+  r.nodes = write("nodes.csv", "case,t_s,u_K\na,0,300\na,10,300\na,10,320\na,20,320\n");
+  const auto t = *CsvTable::parse(*evaluate(r), "out")->numbers("T_K");
+  EXPECT_NEAR(t[0], 300.0, 1e-9);
+  EXPECT_NEAR(t[1], 320.0, 1e-9);
+}
+
+TEST_F(Evaluate, RelaxationErrorsNameFileLineAndCase) {
+  auto r = request("relaxation", "case,t_s\nx,1\n");
+  EXPECT_EQ(evaluate(r).error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(evaluate(r).error().text, HasSubstr("--cases"));
+  r.nodes = write("nodes.csv", "case,t_s,u_K\n");
+  const auto with_case = [&](const std::string& line) {
+    r.cases = write("cases.csv", kCaseHeader + line);
+    return evaluate(r).error().text;
+  };
+  EXPECT_THAT(with_case("a,const,1,1,1,1,1,0,0,300,0,0\n"),
+              HasSubstr("in.csv:2: case 'x' is not in"));
+  EXPECT_THAT(with_case("x,const,1,1,1,1,1,0,0,300,0,0\n"), HasSubstr("nodes.csv"));
+  EXPECT_THAT(with_case("x,step,1,1,1,1,1,0,0,300,0,0\n"), HasSubstr("cases.csv:2: column 'kind'"));
+  EXPECT_THAT(with_case("x,const,4,1,1,1,1,0,0,300,0,0\n"), HasSubstr("column 'n'"));
+  EXPECT_THAT(with_case("x,const,2,1,0,1,1,0,0,300,0,0\n"), HasSubstr("column 'tau2'"));
+}
+
+TEST_F(Evaluate, BadUsageIsTold) {
+  auto unknown = request("warp", "a\n1\n");
+  EXPECT_EQ(evaluate(unknown).error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(evaluate(unknown).error().text, HasSubstr("equilibrium, balance"));
+
+  auto doubled = request("band-radiance", "T_K\n300\n");
+  doubled.device = Device::gpu;
+  EXPECT_EQ(evaluate(doubled).error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(evaluate(doubled).error().text, HasSubstr("--precision float32 --device gpu"));
+
+  auto sun = request("sun-position", "year\n2026\n");
+  sun.precision = Precision::float32;
+  EXPECT_EQ(evaluate(sun).error().code, ErrorCode::invalid_argument);
+
+  auto missing = request("band-radiance", "T\n300\n");
+  EXPECT_EQ(evaluate(missing).error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(evaluate(missing).error().text, HasSubstr("missing column 'T_K'"));
+  missing.table = "/nonexistent.csv";
+  EXPECT_EQ(evaluate(missing).error().code, ErrorCode::not_found);
+}
+
+TEST_F(Evaluate, EmptyTablesGiveAHeaderOnly) {
+  EXPECT_EQ(*evaluate(request("band-radiance", "T_K\n")), "L_3_5,L_3.4_4.1,L_8_12,L_7.7_9.3\n");
+}
+
+}  // namespace
+}  // namespace emit::verify

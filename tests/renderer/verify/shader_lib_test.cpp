@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// The GLSL physics functions on the device, against double on the CPU.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "emit/physics/equilibrium.hpp"
+#include "emit/physics/surface_balance.hpp"
+#include "gpu_rows.hpp"
+#include "support/oracle_check.hpp"
+
+namespace emit {
+namespace {
+
+using verify::Device;
+using verify::Precision;
+using test::run_oracle;
+
+TEST(ShaderLib, EquilibriumTemperatureOfEveryRowWithinAMillikelvin) {
+  const auto run = run_oracle("equilibrium", "quartic_roots.csv", Precision::float32, Device::gpu);
+  const auto t = run.column("Ts");
+  for (std::size_t i = 0; i < t.got.size(); ++i) {
+    EXPECT_NEAR(t.got[i], t.expected[i], 1e-3) << "row " << i;
+  }
+}
+
+TEST(ShaderLib, BalanceOfTheWorkedExampleWithinAMillikelvin) {
+  const auto run = run_oracle("balance", "golden_example.csv", Precision::float32, Device::gpu);
+  for (const char* name : {"E_abs", "Ta", "Ts", "Ts_conv"}) {
+    const auto c = run.column(name);
+    for (std::size_t i = 0; i < c.got.size(); ++i) {
+      EXPECT_NEAR(c.got[i], c.expected[i], 1e-3) << name << " row " << i;
+    }
+  }
+}
+
+TEST(ShaderLib, BandRadianceWithinOneInTenThousandFrom200KelvinUp) {
+  const auto run =
+      run_oracle("band-radiance", "planck_inband.csv", Precision::float32, Device::gpu);
+  const auto temperature = *run.expected.numbers("T_K");
+  for (const char* name : {"L_3_5", "L_3.4_4.1", "L_8_12", "L_7.7_9.3"}) {
+    const auto c = run.column(name);
+    for (std::size_t i = 0; i < c.got.size(); ++i) {
+      if (temperature[i] >= 200.0) {
+        EXPECT_NEAR(c.got[i] / c.expected[i], 1.0, 1e-4)
+            << name << " at " << temperature[i] << " K";
+      } else {
+        // Colder than any scene: the table is coarser there, the radiance next to nothing.
+        EXPECT_NEAR(c.got[i], c.expected[i], 1e-3 * c.expected[i] + 1e-30)
+            << name << " at " << temperature[i] << " K";
+      }
+    }
+  }
+}
+
+TEST(ShaderLib, RelaxationAtEveryQueryWithinTwoMillikelvin) {
+  const auto run = run_oracle("relaxation", "relax_queries.csv", Precision::float32, Device::gpu);
+  const auto t = run.column("T_K");
+  for (std::size_t i = 0; i < t.got.size(); ++i) {
+    EXPECT_NEAR(t.got[i], t.expected[i], 2e-3) << "row " << i;
+  }
+}
+
+TEST(ShaderLib, EquilibriumOfAMillionRandomSurfacesIsFiniteAndWithinAMillikelvin) {
+  // lambda 0.02..400, d 1e-4..1, eps 0.02..1, Ta 0..1000, Tc 200..400; one in four draws on an
+  // edge.
+  constexpr std::size_t kRows = 1000000;
+  constexpr std::size_t kStride = 7;
+  std::mt19937_64 random(20260621);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto draw = [&] {
+    const double u = unit(random);
+    return u < 0.125 ? 0.0 : u > 0.875 ? 1.0 : (u - 0.125) / 0.75;
+  };
+  const auto logarithmic = [&](double lo, double hi) { return lo * std::pow(hi / lo, draw()); };
+  std::vector<float> rows;
+  rows.reserve(kRows * kStride);
+  for (std::size_t i = 0; i < kRows; ++i) {
+    const bool film = i % 4 == 0;
+    for (const double v :
+         {logarithmic(0.02, 400.0), logarithmic(1e-4, 1.0), logarithmic(0.02, 1.0), 1000.0 * draw(),
+          200.0 + 200.0 * draw(), film ? 100.0 * draw() : 0.0, 230.0 + 100.0 * draw()}) {
+      rows.push_back(static_cast<float>(v));
+    }
+  }
+  verify::GpuRows job;
+  job.shader = "passes/evaluate_equilibrium.comp";
+  job.inputs = rows;
+  job.input_stride = kStride;
+  job.output_stride = 2;
+  const auto got = verify::run_gpu_rows(job);
+  ASSERT_TRUE(got.has_value()) << got.error().text;
+  ASSERT_EQ(got->size(), 2 * kRows);
+
+  double worst_k = 0.0;
+  std::size_t worst_row = 0;
+  std::size_t not_finite = 0;
+  for (std::size_t i = 0; i < kRows; ++i) {
+    const auto at = [&](std::size_t column) {
+      return static_cast<double>(rows[i * kStride + column]);
+    };
+    const auto balance = physics::surface_balance(
+        physics::environment_input_w_m2(at(2), at(3)),
+        physics::SurfaceExchange<double>{at(2), at(0) / at(1), at(4), at(5), at(6)});
+    const float t = (*got)[2 * i];
+    if (!std::isfinite(t)) {
+      ++not_finite;
+      continue;
+    }
+    const double miss =
+        std::abs(static_cast<double>(t) - physics::solve_equilibrium(balance).temperature_k);
+    if (miss > worst_k) {
+      worst_k = miss;
+      worst_row = i;
+    }
+  }
+  EXPECT_EQ(not_finite, 0U);
+  EXPECT_LE(worst_k, 1e-3) << "row " << worst_row;
+}
+
+TEST(ShaderLib, SourcesThatGiveNoTemperatureStayFinite) {
+  // Columns lambda, d, eps, Ta, Tc, hc, Tair: no emission, no source, a negative source, foil.
+  const std::vector<float> rows = {1,   1,     0, 300, 300, 0, 0,  //
+                                   1,   1,     1, 0,   0,   0, 0,  //
+                                   1,   1,     1, 0,   -90, 0, 0,  //
+                                   400, 1e-4F, 0, 0,   0,   0, 0};
+  verify::GpuRows job;
+  job.shader = "passes/evaluate_equilibrium.comp";
+  job.inputs = rows;
+  job.input_stride = 7;
+  job.output_stride = 2;
+  const auto got = verify::run_gpu_rows(job);
+  ASSERT_TRUE(got.has_value()) << got.error().text;
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_TRUE(std::isfinite((*got)[2 * i])) << i;
+    EXPECT_GE((*got)[2 * i], 0.0F) << i;
+  }
+  EXPECT_NEAR((*got)[0], 300.0F, 0.01F);
+}
+
+}  // namespace
+}  // namespace emit

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "app/daemon.hpp"
+#include "app/replay.hpp"
+#include "emit/protocol/record/log.hpp"
+#include "emit/protocol/trigger.hpp"
+#include "emit/v1/control.pb.h"
+#include "emit/client/client.hpp"
+#include "net/socket.hpp"
+#include "support/daemon_process.hpp"
+#include "support/scripted_source.hpp"
+
+namespace emit::server {
+namespace {
+
+using test::ScratchFolder;
+using test::ScriptedSource;
+using test::SourceScript;
+
+constexpr std::int64_t kLongNs = 30'000'000'000;
+
+FrameSourceFactory scripted(SourceScript& script) {
+  return [&script] {
+    return physics::Result<std::unique_ptr<FrameSource>>(
+        std::make_unique<ScriptedSource>(script, 32, 16, 7));
+  };
+}
+
+/// A daemon in this process, on its own threads.
+struct LiveDaemon {
+  LiveDaemon(const config::DaemonConfig& config, SourceScript& script) {
+    DaemonOptions options;
+    options.source_factory = scripted(script);
+    options.on_log = [](const std::string&) {};
+    auto created = Daemon::create(config, std::nullopt, options);
+    EXPECT_TRUE(created.has_value()) << created.error().text;
+    daemon = std::move(*created);
+    url = "tcp://127.0.0.1:" + std::to_string(daemon->control_port());
+    thread = std::thread([this] { code = daemon->run(); });
+  }
+  ~LiveDaemon() { stop(); }
+  void stop() {
+    daemon->request_stop();
+    if (thread.joinable()) {
+      thread.join();
+    }
+  }
+  std::unique_ptr<Daemon> daemon;
+  std::string url;
+  std::thread thread;
+  int code = -1;
+};
+
+config::DaemonConfig configuration(config::PacingMode mode, const std::string& journal) {
+  config::DaemonConfig config;
+  config.pacing.mode = mode;
+  config.pacing.rate_hz = 400.0;
+  config.host.udp = "127.0.0.1:0";
+  config.control.tcp = "127.0.0.1:0";
+  config.trigger.udp = "127.0.0.1:0";
+  config.journal.file = journal;
+  return config;
+}
+
+/// A sync source at 400 Hz, with faults: numbers missing, sent twice and too early.
+class Triggers {
+ public:
+  explicit Triggers(const Daemon& daemon)
+      : address_(numeric_address("127.0.0.1", daemon.trigger_port())), thread_([this] { run(); }) {}
+  ~Triggers() {
+    stop_.store(true);
+    thread_.join();
+  }
+  Triggers(const Triggers&) = delete;
+  Triggers& operator=(const Triggers&) = delete;
+
+ private:
+  void run() {
+    auto socket = UdpSocket::open(SocketContext(), address_);
+    protocol::Trigger trigger{1, 0, 0};
+    while (socket && !stop_.load()) {
+      trigger.number += trigger.number % 31 == 0 ? 3 : 1;
+      std::array<std::byte, protocol::kTriggerBytes> bytes;
+      protocol::encode(trigger, bytes);
+      for (int copy = trigger.number % 17 == 0 ? 2 : 1; copy > 0; --copy) {
+        static_cast<void>(socket->send_to(bytes, address_));
+      }
+      std::this_thread::sleep_for(std::chrono::microseconds(trigger.number % 23 == 0 ? 100 : 2500));
+    }
+  }
+
+  SocketAddress address_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+/// Everything that a journal must carry: entities, jumps, weather, hold, stop and step, reset, a
+/// restart of the host.
+void drive(client::HostClient& host, client::FrameClient& frames) {
+  std::uint64_t number = 0;
+  std::uint64_t run = 1;
+  const auto send = [&](bool frame_follows) {
+    protocol::HostFrameData frame;
+    frame.frame_number = ++number;
+    frame.run_id = run;
+    frame.sim_time_ns = static_cast<std::int64_t>(number) * 5'000'000;
+    frame.seeker.position_world_m = {0.1 * static_cast<double>(number), -3.0, 200.0};
+    frame.entity_count = 2;
+    for (std::uint32_t i = 0; i < 2; ++i) {
+      frame.entities[i].entity_id = i + 1;
+      frame.entities[i].has_pose = true;
+      frame.entities[i].pose.position_world_m.x = static_cast<double>(number * (i + 1)) / 3.0;
+      frame.entities[i].teleport = number % 17 == 0;
+      frame.entities[i].on = number % 13 != 0;
+    }
+    if (number % 11 == 0) {
+      frame.environment.emplace();
+      frame.environment->air_k = 280.0 + static_cast<double>(number % 7);
+    }
+    ASSERT_TRUE(host.send(frame).has_value());
+    if (frame_follows) {
+      const auto received = frames.receive(kLongNs);
+      ASSERT_TRUE(received.has_value()) << received.error().text;
+      ASSERT_NE(*received, nullptr);
+    }
+  };
+  const auto command = [&](protocol::CommandKind kind) {
+    ASSERT_TRUE(host.command(kind).has_value());
+    const auto status = host.receive_status(kLongNs);
+    ASSERT_TRUE(status.has_value()) << status.error().text;
+    ASSERT_TRUE(status->has_value() && (*status)->ok());
+  };
+  const auto send_some = [&](int count, bool frame_follows = true) {
+    for (int i = 0; i < count; ++i) {
+      ASSERT_NO_FATAL_FAILURE(send(frame_follows));
+    }
+  };
+  ASSERT_NO_FATAL_FAILURE(send_some(60));
+  ASSERT_NO_FATAL_FAILURE(command(protocol::CommandKind::hold));
+  ASSERT_NO_FATAL_FAILURE(send_some(20));
+  ASSERT_NO_FATAL_FAILURE(command(protocol::CommandKind::start));
+  ASSERT_NO_FATAL_FAILURE(command(protocol::CommandKind::stop));
+  ASSERT_NO_FATAL_FAILURE(send_some(20, false));
+  ASSERT_NO_FATAL_FAILURE(command(protocol::CommandKind::step));
+  ASSERT_NO_FATAL_FAILURE(command(protocol::CommandKind::start));
+  const auto stepped = frames.receive(kLongNs);
+  ASSERT_TRUE(stepped.has_value() && *stepped != nullptr);
+  ASSERT_NO_FATAL_FAILURE(send_some(20));
+  ASSERT_NO_FATAL_FAILURE(command(protocol::CommandKind::reset));
+  number = 0;
+  ASSERT_NO_FATAL_FAILURE(send_some(30));
+  ++run;
+  number = 0;
+  ASSERT_NO_FATAL_FAILURE(send_some(30));
+}
+
+/// Applies entries to a fresh source; every frame must come out as it went out live.
+struct Replay {
+  SourceScript script;
+  ScriptedSource source{script, 32, 16, 2};
+  JournalPlayer player{source, *make_channels(std::nullopt, source.info())};
+  std::uint64_t frames = 0;
+  std::uint64_t rendered = 0;
+
+  void apply(const v1::JournalEntry& entry) {
+    const auto frame = player.apply(entry);
+    ASSERT_TRUE(frame.has_value()) << frame.error().text;
+    if (*frame) {
+      ++frames;
+      rendered += (*frame)->repeated ? 0U : 1U;
+      EXPECT_TRUE((*frame)->matches)
+          << "frame " << (*frame)->frame_number << " of run " << (*frame)->run_id;
+    }
+  }
+};
+
+class DaemonReplay : public ::testing::TestWithParam<config::PacingMode> {};
+
+TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
+  const bool lock_step = GetParam() == config::PacingMode::host_step;
+  ScratchFolder folder;
+  SourceScript live_script;
+  Replay from_file;
+  Replay from_stream;
+  std::uint64_t published = 0;
+  {
+    // Frames shed work, lock-step ones always: which did is for the journal to tell.
+    live_script.rungs = {{1.0, 0.0}, {0.5, 0.1}};
+    auto config = configuration(GetParam(), folder.file("run.mcap"));
+    if (lock_step) config.pacing.budget_ns = 1;
+    LiveDaemon live(config, live_script);
+    auto frames = client::FrameClient::connect(live.url);
+    ASSERT_TRUE(frames.has_value()) << frames.error().text;
+    ASSERT_TRUE((*frames)->subscribe({}).has_value());
+    auto recorder = client::RecorderClient::connect(live.url);
+    ASSERT_TRUE(recorder.has_value()) << recorder.error().text;
+    auto host = client::HostClient::connect(live.url);
+    ASSERT_TRUE(host.has_value()) << host.error().text;
+    std::optional<Triggers> triggers;
+    if (GetParam() == config::PacingMode::trigger) triggers.emplace(*live.daemon);
+    ASSERT_NO_FATAL_FAILURE(drive(**host, **frames));
+
+    std::thread stopping([&] { live.stop(); });
+    v1::JournalEntry entry;
+    for (;;) {
+      const auto more = (*recorder)->receive(entry, kLongNs);
+      if (!more) {
+        EXPECT_TRUE((*recorder)->closed()) << more.error().text;
+        break;
+      }
+      EXPECT_TRUE(*more) << "the daemon must close the journal stream when it ends";
+      if (!*more) {
+        break;
+      }
+      from_stream.apply(entry);
+    }
+    stopping.join();
+    EXPECT_EQ(live.code, 0);
+    published = live.daemon->counter(Counter::frames_published);
+    EXPECT_EQ(live.daemon->counter(Counter::journal_dropped), 0U);
+    if (lock_step) {
+      EXPECT_EQ(live.daemon->counter(Counter::frames_shed), published);
+    }
+    EXPECT_EQ(live.daemon->counter(Counter::host_epochs), 1U);
+  }
+  auto log = protocol::LogReader::open(folder.file("run.mcap"));
+  ASSERT_TRUE(log.has_value()) << log.error().text;
+  for (auto more = log->next(); more && *more; more = log->next()) {
+    ASSERT_NO_FATAL_FAILURE(from_file.apply(log->journal()));
+  }
+  EXPECT_EQ(from_file.frames, published);
+  EXPECT_EQ(from_stream.frames, published);
+  EXPECT_EQ(from_file.player.mismatches(), 0U);
+  EXPECT_EQ(from_file.rendered, live_script.submitted.size());
+  EXPECT_EQ(live_script.held.load(), 0) << "every slot went back to the source";
+  // Weather that no frame came to use before the end, or before a reset, is not applied again.
+  EXPECT_LE(from_file.script.weather.size(), live_script.weather.size());
+  EXPECT_GT(from_file.script.weather.size(), 0U);
+  if (lock_step) {
+    EXPECT_EQ(from_file.script.weather.size(), live_script.weather.size());
+    EXPECT_EQ(published, 60U + 20U + 1U + 20U + 30U + 30U);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Pacing, DaemonReplay,
+                         ::testing::Values(config::PacingMode::host_step,
+                                           config::PacingMode::ig_clock,
+                                           config::PacingMode::trigger),
+                         [](const auto& parameter) {
+                           return parameter.param == config::PacingMode::host_step  ? "HostStep"
+                                  : parameter.param == config::PacingMode::ig_clock ? "IgClock"
+                                                                                    : "Trigger";
+                         });
+
+TEST(JournalPlayer, RefusesAJournalWithAHole) {
+  Replay replay;
+  v1::JournalEntry entry;
+  entry.set_sequence(1);
+  entry.mutable_run_start()->set_run_id(1);
+  replay.apply(entry);
+  entry.set_sequence(3);
+  const auto result = replay.player.apply(entry);
+  ASSERT_FALSE(result.has_value());
+  EXPECT_NE(result.error().text.find("lost"), std::string::npos);
+}
+
+TEST(JournalPlayer, RefusesAJournalThatBeginsInTheMiddle) {
+  Replay replay;
+  v1::JournalEntry entry;
+  entry.set_sequence(9);
+  entry.mutable_frame()->set_rendered(true);
+  EXPECT_FALSE(replay.player.apply(entry).has_value());
+}
+
+}  // namespace
+}  // namespace emit::server

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reduced runs of the hostile frames of `emit bench stability`: the renderer's public interface
+// under scenes that ask for trouble.
+#include <gtest/gtest.h>
+
+#include "bench/stability/bench_stability_frames.hpp"
+
+namespace emit {
+namespace {
+
+cli::HostileFrameResult hostile(const std::string& test) {
+  cli::HostileFrameOptions options;
+  options.width_px = 80;
+  options.height_px = 64;
+  options.only = {test};
+  const auto results = cli::run_hostile_frames(options);
+  if (!results || results->size() != 1) {
+    ADD_FAILURE() << (results ? "no result" : results.error().text);
+    return {};
+  }
+  return results->front();
+}
+
+void expect_finite(const cli::HostileFrameResult& r) {
+  EXPECT_GT(r.frames, 0U) << r.test;
+  EXPECT_EQ(r.nan_count, 0U) << r.test;
+  EXPECT_EQ(r.inf_count, 0U) << r.test;
+}
+
+void expect_within(const std::string& test, double budget_k) {
+  const auto r = hostile(test);
+  expect_finite(r);
+  EXPECT_EQ(r.nonfinite_px, 0U) << test;
+  EXPECT_GT(r.cases, 500U) << test << ": too little of the scene was in view";
+  EXPECT_LE(r.max_error_k, budget_k) << test << ": " << r.worst_input;
+}
+
+// Budgets in kelvin: normals of 16 bits turn a face by up to 5e-5 rad, which is worth a millikelvin
+// in full sun; where frames are compared with frames, the rest is shadow edges that move by less
+// than a texel.
+TEST(StabilityFrames, GrazingSunStaysWithTheModel) {
+  // Nearly edge-on a face shades itself in part: slopes are held at 3 degrees above the sun's rays.
+  expect_within("frame-grazing-sun", 0.3);
+}
+
+TEST(StabilityFrames, HistoryOfAYearStaysWithTheModel) {
+  expect_within("frame-history-of-a-year", 0.02);
+}
+
+TEST(StabilityFrames, ExtremeMaterialsStayWithTheModel) {
+  expect_within("frame-extreme-materials", 0.02);
+}
+
+TEST(StabilityFrames, ObscuranceOfOpenGroundIsOneHalfAtEveryRadius) {
+  expect_within("frame-obscurance-radius", 0.02);
+}
+
+TEST(StabilityFrames, ZeroAreaTrianglesChangeNothing) {
+  expect_within("frame-zero-area", 1e-3);
+}
+
+TEST(StabilityFrames, CoincidentFacesDoNotShadeEachOther) {
+  expect_within("frame-coincident-faces", 1e-3);
+}
+
+TEST(StabilityFrames, AFarAndTallWallDoesNotSwallowNearShadows) {
+  const auto r = hostile("frame-depth-range-near-part");
+  expect_finite(r);
+  // Shaded ground is 40 K colder: the cores must stay, the penumbra may go.
+  EXPECT_LT(r.p99_error_k, 20.0) << r.worst_input;
+}
+
+TEST(StabilityFrames, HostileWeatherNeverGivesNaN) {
+  const auto r = hostile("frame-hostile-weather");
+  expect_finite(r);
+  EXPECT_GT(r.clamped_count + r.nonfinite_px, 0U);
+}
+
+TEST(StabilityFrames, HostileCamerasNeverGiveNaN) {
+  expect_finite(hostile("frame-hostile-camera"));
+}
+
+TEST(StabilityFrames, AnUnknownTestIsRefused) {
+  cli::HostileFrameOptions options;
+  options.only = {"frame-of-mind"};
+  EXPECT_FALSE(cli::run_hostile_frames(options).has_value());
+}
+
+}  // namespace
+}  // namespace emit

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "support/emit_process.hpp"
+
+namespace emit::test {
+namespace {
+
+class CliHelp : public testing::TestWithParam<const char*> {};
+
+TEST_P(CliHelp, every_command_explains_itself_with_an_example) {
+  const ProcessResult result = run_emit({GetParam(), "--help"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("--help"), std::string::npos);
+  EXPECT_NE(result.out.find("Example: emit "), std::string::npos) << result.out;
+}
+INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
+                         testing::Values("render", "receive", "send", "stat", "record", "replay",
+                                         "demo", "view", "compare", "inspect", "evaluate",
+                                         "generate", "make-log", "bench"));
+
+TEST(CliUsage, version_names_tool_and_number) {
+  const ProcessResult result = run_emit({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out.rfind("emit ", 0), 0U) << result.out;
+}
+
+TEST(CliUsage, folders_are_shown_as_folders) {
+  for (const auto& [command, option] :
+       {std::pair{"demo", "--out DIR=emit-demo "}, std::pair{"receive", "--out DIR "},
+        std::pair{"replay", "--out DIR "}, std::pair{"generate", "--out DIR REQUIRED"},
+        std::pair{"solve", "--checkpoint DIR "}}) {
+    EXPECT_NE(run_emit({command, "--help"}).out.find(option), std::string::npos) << command;
+  }
+}
+
+TEST(CliUsage, evaluate_says_which_models_are_double_on_the_cpu_only) {
+  const std::string help = run_emit({"evaluate", "--help"}).out;
+  const auto is_marked = [&](const std::string& model) {
+    const std::size_t at = help.find("\n  " + model + ": ");
+    return help.substr(at + 1, help.find('\n', at + 1) - at).find("on the cpu in float64 only") !=
+           std::string::npos;
+  };
+  EXPECT_TRUE(is_marked("conduction-slab"));
+  EXPECT_TRUE(is_marked("sun-position"));
+  EXPECT_FALSE(is_marked("equilibrium"));
+  EXPECT_FALSE(is_marked("sky-view"));
+}
+
+TEST(CliUsage, help_lists_the_exit_codes) {
+  const ProcessResult result = run_emit({"--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.out.find("78 bad configuration"), std::string::npos);
+  EXPECT_NE(result.out.find("75 the device was lost"), std::string::npos);
+  EXPECT_NE(result.out.find("serve"), std::string::npos);
+}
+
+TEST(CliUsage, serve_help_is_the_daemons_own) {
+  const ProcessResult result = run_emit({"serve", "--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.out.find("--config"), std::string::npos) << result.out;
+}
+
+TEST(CliUsage, thermal_truth_judges_the_method_that_scenarios_use) {
+  const ProcessResult result = run_emit({"bench", "thermal-truth", "--help"});
+  EXPECT_NE(result.out.find("{per-frame,cached}=cached"), std::string::npos) << result.out;
+}
+
+class CliBadUsage : public testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(CliBadUsage, exits_with_2) {
+  const ProcessResult result = run_emit(GetParam());
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_FALSE(result.err.empty());
+  EXPECT_TRUE(result.out.empty()) << result.out;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Cases, CliBadUsage,
+    testing::Values(
+        std::vector<std::string>{}, std::vector<std::string>{"no-such-command"},
+        std::vector<std::string>{"render", "box"},
+        std::vector<std::string>{"render", "box", "--time-s", "noon", "--out", "x.exr"},
+        std::vector<std::string>{"render", "box", "--time-s", "1", "--out", "x.exr", "--channel",
+                                 "colour"},
+        std::vector<std::string>{"compare", "a.exr"},
+        std::vector<std::string>{"receive", "http://localhost:1"},
+        std::vector<std::string>{"receive", "tcp://localhost"},
+        std::vector<std::string>{"receive", "tcp://localhost:1", "--every", "0"},
+        std::vector<std::string>{"receive", "tcp://localhost:1", "--every", "1001"},
+        std::vector<std::string>{"receive", "udp://localhost:1", "--multicast", "8.8.8.8"},
+        std::vector<std::string>{"record", "--from", "udp://localhost:1", "--out", "x.mcap"},
+        std::vector<std::string>{"stat", "tcp://localhost:7002"},
+        std::vector<std::string>{"stat", "http://localhost"},
+        std::vector<std::string>{"send", "x.mcap", "--to", "nowhere"},
+        std::vector<std::string>{"send", "x.mcap", "--to", "udp://127.0.0.1:1", "--step"},
+        std::vector<std::string>{"replay", "x.mcap", "--scenario", "box", "--speed", "0"},
+        std::vector<std::string>{"evaluate", "equilibrium"},
+        std::vector<std::string>{"evaluate", "equilibrium", "x.csv", "--precision", "half"},
+        std::vector<std::string>{"generate", "castle", "--out", "."},
+        std::vector<std::string>{"bench"}, std::vector<std::string>{"bench", "speed"},
+        std::vector<std::string>{"bench", "paper", "--frames", "1"}));
+
+TEST(CliUsage, what_is_wrong_is_named) {
+  EXPECT_NE(run_emit({"recieve", "tcp://localhost:1"}).err.find("no command 'recieve'"),
+            std::string::npos);
+  EXPECT_NE(run_emit({"bench", "speed", "--quick"}).err.find("no command 'bench speed'"),
+            std::string::npos);
+  for (const char* rate : {"0", "-1", "nan", "inf", "fast"}) {
+    const ProcessResult result =
+        run_emit({"send", "x.mcap", "--to", "udp://localhost:1", "--rate", rate});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find(std::string(rate) + " is not a number above 0"), std::string::npos)
+        << result.err;
+  }
+}
+
+TEST(CliBadConfiguration, an_unknown_scenario_exits_with_78) {
+  const ProcessResult result =
+      run_emit({"render", "no-such-scenario", "--time-s", "0", "--out", "x.exr"});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("no-such-scenario"), std::string::npos);
+}
+
+TEST(CliBadConfiguration, an_unknown_key_exits_with_78_and_says_where) {
+  const TemporaryFolder folder;
+  write_text(folder.file("bad.toml"), "name = \"bad\"\nnot_a_key = 1\n");
+  const ProcessResult result =
+      run_emit({"render", folder.file("bad.toml"), "--time-s", "0", "--out", folder.file("x.exr")});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("bad.toml:2:"), std::string::npos) << result.err;
+}
+
+TEST(CliBadConfiguration, malformed_toml_exits_with_78) {
+  const TemporaryFolder folder;
+  write_text(folder.file("bad.toml"), "[place\nlat_deg = 1\n");
+  const ProcessResult result =
+      run_emit({"make-log", folder.file("bad.toml"), "--out", folder.file("x.mcap")});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("bad.toml:1:"), std::string::npos) << result.err;
+}
+
+TEST(CliBadConfiguration, an_unknown_override_exits_with_78) {
+  const ProcessResult result =
+      run_emit({"render", "box", "--time-s", "0", "--out", "x.exr", "--set", "thermal.stepz=9"});
+  EXPECT_EQ(result.exit_code, 78) << result.err;
+  EXPECT_NE(result.err.find("stepz"), std::string::npos);
+}
+
+/// With a scenario whose glTF is no glTF, and with one that there is not.
+class CliBadScenario : public testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(CliBadScenario, exits_with_78) {
+  const TemporaryFolder folder;
+  write_text(folder.file("broken.glb"), "no glTF");
+  const auto run = [&](const std::string& scenario) {
+    std::vector<std::string> arguments = GetParam();
+    for (std::string& argument : arguments) {
+      if (argument == "SCENARIO") argument = scenario;
+      if (argument == "OUT") argument = folder.file("out");
+    }
+    if (scenario == "box") {
+      arguments.emplace_back("--set");
+      arguments.push_back("object[box].gltf=\"" + folder.file("broken.glb") + "\"");
+    }
+    return run_emit(arguments);
+  };
+  const ProcessResult broken = run("box");
+  EXPECT_EQ(broken.exit_code, 78) << broken.err;
+  EXPECT_NE(broken.err.find("broken.glb"), std::string::npos) << broken.err;
+  const ProcessResult unknown = run("no-such-scenario");
+  EXPECT_EQ(unknown.exit_code, 78) << unknown.err;
+  EXPECT_NE(unknown.err.find("no-such-scenario"), std::string::npos) << unknown.err;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Commands, CliBadScenario,
+    testing::Values(std::vector<std::string>{"render", "SCENARIO", "--time-s", "0", "--out", "OUT"},
+                    std::vector<std::string>{"solve", "SCENARIO", "--time-s", "0", "--out", "OUT"},
+                    std::vector<std::string>{"view", "SCENARIO"},
+                    std::vector<std::string>{"bench", "turn", "--scene", "SCENARIO"},
+                    std::vector<std::string>{"bench", "budget", "--scene", "SCENARIO"}));
+
+TEST(CliFailure, a_file_that_no_scenario_names_exits_with_1) {
+  const TemporaryFolder folder;
+  write_text(folder.file("broken.glb"), "no glTF");
+  EXPECT_EQ(run_emit({"inspect", folder.file("broken.glb")}).exit_code, 1);
+}
+
+TEST(CliFailure, a_refused_connection_exits_with_1) {
+  const ProcessResult result = run_emit({"receive", "tcp://127.0.0.1:1", "--frames", "1"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+}
+
+TEST(CliFailure, a_missing_log_exits_with_1_and_is_named) {
+  const ProcessResult result = run_emit({"send", "/no/such/log.mcap", "--to", "udp://127.0.0.1:9"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_NE(result.err.find("/no/such/log.mcap"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace emit::test
