@@ -11,6 +11,8 @@ if(EMIT_WARNINGS_AS_ERRORS)
   target_compile_options(emit_options INTERFACE -Werror)
 endif()
 if(EMIT_SANITIZE)
+  # Contracts of innermost loops are checked too.
+  target_compile_definitions(emit_options INTERFACE EMIT_DCHECKS)
   target_compile_options(emit_options INTERFACE -fsanitize=${EMIT_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all)
   target_link_options(emit_options INTERFACE -fsanitize=${EMIT_SANITIZE})
