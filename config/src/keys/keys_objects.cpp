@@ -90,6 +90,37 @@ void append_pose_keys(KeyTable<T>& keys, Pose pose, const std::string& subject) 
       }));
 }
 
+/// Rotation of a model in its body; the file says degrees, the draft holds radians.
+Key<ObjectDraft> model_rotation() {
+  return custom<ObjectDraft>(
+      {"model_rotation_deg", "array of 3 floats", "deg", "-360 .. 360",
+       "Rotation of the model in its body: heading (nose to the right), pitch (nose up), roll "
+       "(right side down). A model whose nose lies along glTF +x needs [90, 0, 0].",
+       false},
+      [](ObjectDraft& out, const Node& node, Diagnostics& diagnostics) {
+        double values_deg[3] = {0.0, 0.0, 0.0};
+        const std::size_t faults = diagnostics.size();
+        read_vector(node, "model_rotation_deg", 3, values_deg, diagnostics);
+        if (diagnostics.size() != faults) {
+          return;
+        }
+        for (const double value_deg : values_deg) {
+          if (!(std::abs(value_deg) <= 360.0)) {
+            diagnostics.add(node.at, "'model_rotation_deg' holds " + toml_number(value_deg) +
+                                         ", must be -360 .. 360");
+            return;
+          }
+        }
+        out.desc.model_rotation_rad =
+            glm::dvec3(values_deg[0], values_deg[1], values_deg[2]) * kDegree;
+      },
+      [](const ObjectDraft& in) -> std::optional<std::string> {
+        const glm::dvec3 values_deg = in.desc.model_rotation_rad / kDegree;
+        const double values[3] = {values_deg.x, values_deg.y, values_deg.z};
+        return toml_vector(values, 3);
+      });
+}
+
 template <class T>
 void append_trajectory_keys(KeyTable<T>& keys) {
   keys.push_back(custom<T>(
@@ -169,6 +200,10 @@ const KeyTable<ObjectDraft>& object_keys() {
             }),
         number<ObjectDraft>("scale", "", above_to(0, 1e6), EMIT_FIELD(desc.scale),
                             "Uniform scale of the geometry."),
+        model_rotation(),
+        vector3<ObjectDraft>("model_offset_m", "m", EMIT_FIELD(desc.model_offset_m),
+                             "Offset of the model's origin in its body: forward, right, down, after "
+                             "scale and rotation."),
         boolean<ObjectDraft>("on", EMIT_FIELD(desc.on),
                              "Entities: present until host or trajectory says otherwise."),
     };

@@ -139,6 +139,14 @@ void resolve_placement(const ObjectDraft& draft, const Node& node, ObjectDesc& d
                                     : resolve_pose(draft.pose, node, diagnostics)};
 }
 
+/// ASCII letters only: an ending in another script is none that is read.
+std::string in_lower_case(std::string text) {
+  for (char& c : text) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
 std::string unique_name(const std::string& stem, const std::vector<ObjectDesc>& objects) {
   std::string name = stem;
   for (int i = 2; std::any_of(objects.begin(), objects.end(),
@@ -171,7 +179,7 @@ ObjectDesc resolve_object(const Node& node, const std::vector<ObjectDesc>& befor
   }
   if (node.has("gltf")) {
     std::error_code code;
-    const std::string extension = desc.gltf.extension().string();
+    const std::string extension = in_lower_case(desc.gltf.extension().string());
     if (desc.gltf.empty() || (extension != ".glb" && extension != ".gltf")) {
       diagnostics.add(key_location(node, "gltf"), "'gltf' must name a .glb or .gltf file");
     } else if (require_files && !std::filesystem::is_regular_file(desc.gltf, code)) {

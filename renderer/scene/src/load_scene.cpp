@@ -131,8 +131,7 @@ class SceneLoader {
       return tl::unexpected(materials.error());
     }
     const std::uint32_t base = mesh_base(**model, *materials);
-    const glm::dmat4 scaled_body_from_gltf =
-        glm::scale(glm::dmat4(1.0), glm::dvec3(object.scale)) * body_from_gltf();
+    const glm::dmat4 body_from_gltf_scaled = body_from_model(object) * body_from_gltf();
     for (std::uint32_t p = 0; p < object.instances.size(); ++p) {
       const glm::dmat4 world_from_body = world_from_body_matrix(object.instances[p]);
       for (const GltfPlacement& placement : (*model)->placements) {
@@ -141,7 +140,7 @@ class SceneLoader {
         instance.object = object_index;
         instance.placement = p;
         instance.entity_id = object.entity_id;
-        instance.body_from_mesh = scaled_body_from_gltf * placement.gltf_from_mesh;
+        instance.body_from_mesh = body_from_gltf_scaled * placement.gltf_from_mesh;
         instance.world_from_mesh = world_from_body * instance.body_from_mesh;
         instance.world_bounds =
             transformed(geometry_.meshes[instance.mesh].bounds, instance.world_from_mesh);

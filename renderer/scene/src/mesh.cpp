@@ -39,6 +39,16 @@ glm::dmat4 body_from_gltf() noexcept {
                     glm::dvec4(1.0, 0.0, 0.0, 0.0), glm::dvec4(0.0, 0.0, 0.0, 1.0));
 }
 
+glm::dmat4 body_from_model(const ObjectDesc& object) noexcept {
+  const glm::dvec3& angles = object.model_rotation_rad;
+  glm::dmat4 matrix = glm::translate(glm::dmat4(1.0), object.model_offset_m);
+  // An angle of zero is left out, so that an object without rotation keeps its exact matrix.
+  if (angles.x != 0.0) matrix = glm::rotate(matrix, angles.x, glm::dvec3(0.0, 0.0, 1.0));
+  if (angles.y != 0.0) matrix = glm::rotate(matrix, angles.y, glm::dvec3(0.0, 1.0, 0.0));
+  if (angles.z != 0.0) matrix = glm::rotate(matrix, angles.z, glm::dvec3(1.0, 0.0, 0.0));
+  return glm::scale(matrix, glm::dvec3(object.scale));
+}
+
 glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept {
   return glm::translate(glm::dmat4(1.0), pose.position_world_m) *
          glm::mat4_cast(glm::normalize(pose.world_from_body));

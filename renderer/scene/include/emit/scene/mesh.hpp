@@ -101,6 +101,8 @@ struct SceneGeometry {
 
 /// body_from_gltf as above; the rotation has determinant +1.
 [[nodiscard]] glm::dmat4 body_from_gltf() noexcept;
+/// Matrix that scales, turns and shifts an object's model (in body axes) into its body.
+[[nodiscard]] glm::dmat4 body_from_model(const ObjectDesc& object) noexcept;
 [[nodiscard]] glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept;
 
 /// Loads every glTF file of the scenario and resolves its materials. A glTF material is looked up

@@ -106,6 +106,11 @@ struct ObjectDesc {
   std::map<std::string, std::string> material_map;  ///< glTF material name -> library material
   std::vector<physics::Pose> instances;  ///< static placements; an entity has exactly one
   double scale = 1.0;
+  /// Rotation of the model in its body: heading (nose to the right), pitch (nose up) and roll (right
+  /// side down), applied in the order roll, pitch, heading. It turns a model whose nose does not
+  /// point along glTF +z.
+  glm::dvec3 model_rotation_rad{0.0};
+  glm::dvec3 model_offset_m{0.0};  ///< of the model's origin in the body: forward, right, down
   Trajectory trajectory;  ///< entities only; empty: stays at its placement until the host moves it
   bool on = true;         ///< entities only: state without trajectory
 };
