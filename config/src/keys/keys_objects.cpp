@@ -115,9 +115,10 @@ Key<ObjectDraft> model_rotation() {
             glm::dvec3(values_deg[0], values_deg[1], values_deg[2]) * kDegree;
       },
       [](const ObjectDraft& in) -> std::optional<std::string> {
-        const glm::dvec3 values_deg = in.desc.model_rotation_rad / kDegree;
-        const double values[3] = {values_deg.x, values_deg.y, values_deg.z};
-        return toml_vector(values, 3);
+        const glm::dvec3& angles_rad = in.desc.model_rotation_rad;
+        return "[" + unscaled_number(angles_rad.x, kDegree) + ", " +
+               unscaled_number(angles_rad.y, kDegree) + ", " +
+               unscaled_number(angles_rad.z, kDegree) + "]";
       });
 }
 

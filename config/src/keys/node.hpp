@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "emit/physics/error.hpp"
+#include "emit/scene/nearest_word.hpp"
 
 /// A parsed file as plain values that know where they came from. The only place that sees the
 /// TOML library is toml_adapter.cpp.
@@ -95,8 +96,6 @@ class Diagnostics {
 [[nodiscard]] std::string toml_string(std::string_view text);
 [[nodiscard]] std::string toml_instant(std::int64_t posix_ns);
 
-/// Nearest of `candidates` within a third of the word's length; empty when none is near.
-[[nodiscard]] std::string_view nearest_word(std::string_view word,
-                                            const std::vector<std::string_view>& candidates);
+using scene::nearest_word;
 
 }  // namespace emit::config

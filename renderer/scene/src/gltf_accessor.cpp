@@ -17,7 +17,8 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Elements without a buffer view are zeros that the file does not pay for; no real file has more.
+/// Elements without a buffer view are zeros that take no bytes in the file. No real file has more
+/// of them; a file that claims more would only cost memory.
 constexpr std::size_t kMaxFreeElements = std::size_t{1} << 20U;
 
 /// A checked region of a buffer: element i begins at data + i * stride.
@@ -166,7 +167,7 @@ Result<void> apply_sparse(const tinygltf::Model& model, const tinygltf::Accessor
 
 Result<std::vector<float>> read_checked(const tinygltf::Model& model,
                                         const tinygltf::Accessor& accessor,
-                                        std::size_t components) {
+                                        std::size_t components, NonFinite non_finite) {
   const int found = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type));
   const std::size_t bytes = component_bytes(accessor.componentType);
   if (found < 0 || static_cast<std::size_t>(found) != components || bytes == 0) {
@@ -200,7 +201,7 @@ Result<std::vector<float>> read_checked(const tinygltf::Model& model,
       return tl::unexpected(applied.error());
     }
   }
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  for (std::size_t i = 0; i < values.size() && non_finite == NonFinite::refuse; ++i) {
     if (!std::isfinite(values[i])) {
       return make_error(ErrorCode::parse, fmt::format("element {} is not finite", i / components));
     }
@@ -219,13 +220,14 @@ tl::unexpected<physics::Error> missing(int index) {
 
 }  // namespace
 
-Result<std::vector<float>> read_floats(const tinygltf::Model& model, int index, int components) {
+Result<std::vector<float>> read_floats(const tinygltf::Model& model, int index, int components,
+                                       NonFinite non_finite) {
   const tinygltf::Accessor* accessor = find_accessor(model, index);
   if (accessor == nullptr) {
     return missing(index);
   }
   Result<std::vector<float>> values =
-      read_checked(model, *accessor, static_cast<std::size_t>(components));
+      read_checked(model, *accessor, static_cast<std::size_t>(components), non_finite);
   if (!values) {
     return tl::unexpected(
         std::move(values.error()).with_context(fmt::format("accessor {}", index)));

@@ -7,13 +7,19 @@
 
 namespace emit::scene {
 
-/// Values of an accessor, tightly packed, `components` per element; normalised integers become
-/// 0..1 or -1..1, other integers their value; sparse elements are filled in.
-/// Errors: parse, "accessor N: ...".
-[[nodiscard]] physics::Result<std::vector<float>> read_floats(const tinygltf::Model& model,
-                                                              int accessor, int components);
+/// What read_floats() does with a value that is infinite or not a number.
+enum class NonFinite { refuse, keep };
 
-/// Vertex indices, each checked against `vertices`; no indices (accessor < 0) gives 0, 1, 2, ...
+/// Values of an accessor, tightly packed, `components` per element. Normalised integers become
+/// 0..1 or -1..1, other integers keep their value; sparse elements are filled in.
+/// Errors: parse, "accessor N: ...".
+[[nodiscard]] physics::Result<std::vector<float>> read_floats(
+    const tinygltf::Model& model, int accessor, int components,
+    NonFinite non_finite = NonFinite::refuse);
+
+/// Vertex indices, each checked against the number of `vertices`. A negative accessor stands for a
+/// primitive without indices and gives 0, 1, 2, ...
+/// Errors: parse, "accessor N: ...".
 [[nodiscard]] physics::Result<std::vector<std::uint32_t>> read_indices(const tinygltf::Model& model,
                                                                        int accessor,
                                                                        std::size_t vertices);

@@ -4,18 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
 #include <exception>
-#include <fstream>
-#include <iterator>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
+
+#include "gltf_buffers.hpp"
+#include "gltf_meshopt.hpp"
+#include "json_text.hpp"
 
 namespace emit::scene {
 namespace {
@@ -28,6 +28,7 @@ static_assert(std::endian::native == std::endian::little, "glTF buffers are litt
 
 constexpr std::uint32_t kMagic = 0x46546c67;  // "glTF"
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a;
+constexpr std::uint32_t kBinaryChunk = 0x004e4942;
 constexpr std::size_t kHeaderBytes = 12;
 constexpr std::size_t kChunkHeaderBytes = 8;
 /// The parser descends by recursion; real files nest below 20.
@@ -35,27 +36,10 @@ constexpr int kMaxNesting = 200;
 
 /// Extensions that do not change the geometry, and those that are handled.
 constexpr std::string_view kAcceptedExtensions[] = {
-    "EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "KHR_texture_transform",
-    "KHR_texture_basisu",      "EXT_texture_webp",      "KHR_lights_punctual",
-    "KHR_xmp_json_ld",         "MSFT_texture_dds"};
-
-Result<std::vector<unsigned char>> read_bytes(const std::filesystem::path& path) {
-  std::error_code status;
-  if (!std::filesystem::is_regular_file(path, status)) {
-    return make_error(ErrorCode::not_found, "no such file");
-  }
-  const std::uintmax_t size = std::filesystem::file_size(path, status);
-  if (status || size > std::numeric_limits<std::uint32_t>::max()) {
-    return make_error(ErrorCode::unsupported, "files of 4 GiB and more are not read");
-  }
-  std::ifstream stream(path, std::ios::binary);
-  std::vector<unsigned char> bytes(static_cast<std::size_t>(size));
-  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (!stream || stream.gcount() != static_cast<std::streamsize>(size)) {
-    return make_error(ErrorCode::io, "reading failed");
-  }
-  return bytes;
-}
+    "EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "KHR_meshopt_compression",
+    "KHR_mesh_quantization",   "KHR_texture_transform",   "KHR_texture_basisu",
+    "EXT_texture_avif",        "EXT_texture_webp",        "KHR_animation_pointer",
+    "KHR_lights_punctual",     "KHR_xmp_json_ld",         "MSFT_texture_dds"};
 
 std::uint32_t read_u32(std::span<const unsigned char> bytes, std::size_t offset) {
   std::uint32_t value = 0;
@@ -63,8 +47,14 @@ std::uint32_t read_u32(std::span<const unsigned char> bytes, std::size_t offset)
   return value;
 }
 
-/// The chunk structure of a .glb; the parser trusts it in places. Gives the JSON text.
-Result<std::span<const unsigned char>> check_container(std::span<const unsigned char> bytes) {
+/// Parts of a .glb.
+struct Container {
+  std::span<const unsigned char> json;
+  std::optional<std::span<const unsigned char>> binary;  ///< the second chunk, if it is binary
+};
+
+/// Checks the header of a .glb and every chunk's size, and finds the two chunks that glTF defines.
+Result<Container> check_container(std::span<const unsigned char> bytes) {
   if (bytes.size() < kHeaderBytes + kChunkHeaderBytes) {
     return make_error(ErrorCode::parse,
                       fmt::format("GLB header: {} bytes are too few", bytes.size()));
@@ -72,7 +62,9 @@ Result<std::span<const unsigned char>> check_container(std::span<const unsigned 
   const std::uint32_t version = read_u32(bytes, 4);
   if (version != 2) {
     return make_error(ErrorCode::unsupported,
-                      fmt::format("GLB header: version {}, not 2", version));
+                      fmt::format("glTF version {} (binary): only glTF 2.x is read; export or "
+                                  "convert the model to glTF 2.0",
+                                  version));
   }
   const std::uint32_t length = read_u32(bytes, 8);
   if (length > bytes.size()) {
@@ -80,7 +72,7 @@ Result<std::span<const unsigned char>> check_container(std::span<const unsigned 
                                                     "bytes: truncated?",
                                                     length, bytes.size()));
   }
-  std::span<const unsigned char> json;
+  Container container;
   std::size_t offset = kHeaderBytes;
   for (int chunk = 0; offset + kChunkHeaderBytes <= length; ++chunk) {
     const std::size_t size = read_u32(bytes, offset);
@@ -95,11 +87,13 @@ Result<std::span<const unsigned char>> check_container(std::span<const unsigned 
       if (kind != kJsonChunk) {
         return make_error(ErrorCode::parse, "GLB chunk 0: not JSON");
       }
-      json = bytes.subspan(offset, size);
+      container.json = bytes.subspan(offset, size);
+    } else if (chunk == 1 && kind == kBinaryChunk) {
+      container.binary = bytes.subspan(offset, size);
     }
     offset += size;
   }
-  return json;
+  return container;
 }
 
 Result<void> check_nesting(std::span<const unsigned char> json) {
@@ -126,13 +120,13 @@ Result<void> check_nesting(std::span<const unsigned char> json) {
   return {};
 }
 
-/// Pictures are of no use here; accepting without decoding also spares their memory.
-bool skip_image(tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*,
-                int, void*) {
-  return true;
-}
-
-std::string one_line(std::string text) {
+/// The parser quotes what it read last, which can be a data URI of many megabytes.
+std::string printable(std::string text) {
+  constexpr std::size_t kMaxText = 300;
+  if (const std::size_t uri = text.find("data:"); uri != std::string::npos) {
+    text = text.substr(0, uri) + "(data URI)";
+  }
+  if (text.size() > kMaxText) text = text.substr(0, kMaxText) + "...";
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) {
     text.pop_back();
   }
@@ -140,53 +134,101 @@ std::string one_line(std::string text) {
   return text;
 }
 
-Result<void> check_extensions(const tinygltf::Model& model) {
-  for (const std::string& name : model.extensionsRequired) {
-    const bool material_only = name.rfind("KHR_materials_", 0) == 0;
-    const bool accepted = std::find(std::begin(kAcceptedExtensions), std::end(kAcceptedExtensions),
-                                    name) != std::end(kAcceptedExtensions);
-    if (!material_only && !accepted) {
+/// Versions are "major.minor"; files of glTF 1.0 parse as 2.0 and would come out empty.
+Result<void> check_version(const std::vector<JsonMember>& root) {
+  const auto asset = json_members(json_member(root, "asset"));
+  if (!asset) return make_error(ErrorCode::parse, "asset: the object is missing");
+  for (const std::string_view key : {"version", "minVersion"}) {
+    const std::string_view value = json_member(*asset, key);
+    if (value.empty() && key == "minVersion") continue;
+    const auto version = json_string(value);
+    if (!version) {
+      return make_error(ErrorCode::parse, fmt::format("asset: {} is missing or no text", key));
+    }
+    if ((*version != "2" && !version->starts_with("2.")) || (key == "minVersion" && *version != "2.0")) {
       return make_error(ErrorCode::unsupported,
-                        fmt::format("required extension '{}' is not supported", name));
+                        fmt::format("asset: {} is {}: only glTF 2.0 is read; export or convert the "
+                                    "model to glTF 2.0",
+                                    key, printable(*version)));
     }
   }
   return {};
 }
 
-Result<void> parse_bytes(const std::vector<unsigned char>& bytes, GltfFile& file) {
-  const bool binary = bytes.size() >= 4 && read_u32(bytes, 0) == kMagic;
-  std::span<const unsigned char> json = bytes;
-  if (binary) {
-    const Result<std::span<const unsigned char>> chunk = check_container(bytes);
-    if (!chunk) {
-      return tl::unexpected(chunk.error());
+Result<void> check_extensions(const std::vector<JsonMember>& root) {
+  const auto required = json_items(json_member(root, "extensionsRequired"));
+  if (!required) return {};
+  for (const std::string_view item : *required) {
+    const std::string name = json_string(item).value_or("");
+    const bool material_only = name.starts_with("KHR_materials_");
+    if (!material_only && std::ranges::count(kAcceptedExtensions, name) == 0) {
+      return make_error(ErrorCode::unsupported,
+                        fmt::format("required extension '{}' is not supported", printable(name)));
     }
-    json = *chunk;
   }
-  if (auto nesting = check_nesting(json); !nesting) {
-    return nesting;
+  return {};
+}
+
+/// The text with the arrays `buffers` and `images` emptied: buffers are loaded here, by rules of
+/// their own, and images are not read at all.
+std::string without_sources(std::string_view json, const std::vector<JsonMember>& root) {
+  std::string out;
+  out.reserve(json.size());
+  std::size_t copied = 0;
+  for (const JsonMember& member : root) {
+    if (member.name != "buffers" && member.name != "images") continue;
+    const auto first = static_cast<std::size_t>(member.value.data() - json.data());
+    out.append(json, copied, first - copied).append("[]");
+    copied = first + member.value.size();
   }
+  return out.append(json, copied);
+}
+
+Result<void> parse_json(const std::string& json, tinygltf::Model& model) {
   tinygltf::TinyGLTF parser;
-  parser.SetImageLoader(skip_image, nullptr);
   std::string error;
   std::string warning;
-  const std::filesystem::path parent = file.path.parent_path();
-  const std::string folder = parent.empty() ? "." : parent.string();
-  const auto size = static_cast<unsigned int>(bytes.size());
   bool parsed = false;
   try {
-    parsed =
-        binary
-            ? parser.LoadBinaryFromMemory(&file.model, &error, &warning, bytes.data(), size, folder)
-            : parser.LoadASCIIFromString(&file.model, &error, &warning,
-                                         reinterpret_cast<const char*>(bytes.data()), size, folder);
+    parsed = parser.LoadASCIIFromString(&model, &error, &warning, json.data(),
+                                        static_cast<unsigned int>(json.size()), "");
   } catch (const std::exception& thrown) {
-    return make_error(ErrorCode::parse, one_line(error + thrown.what()));
+    return make_error(ErrorCode::parse, printable(error + thrown.what()));
   }
   if (!parsed) {
-    return make_error(ErrorCode::parse, error.empty() ? "not a glTF file" : one_line(error));
+    return make_error(ErrorCode::parse, error.empty() ? "not a glTF file" : printable(error));
   }
-  return check_extensions(file.model);
+  return {};
+}
+
+Result<void> parse_bytes(std::span<const unsigned char> bytes, GltfFile& file) {
+  Container parts{bytes, std::nullopt};
+  if (bytes.size() >= 4 && read_u32(bytes, 0) == kMagic) {
+    Result<Container> container = check_container(bytes);
+    if (!container) return tl::unexpected(std::move(container.error()));
+    parts = *container;
+  }
+  if (auto nesting = check_nesting(parts.json); !nesting) return nesting;
+  std::string_view json(reinterpret_cast<const char*>(parts.json.data()), parts.json.size());
+  if (json.starts_with("\xef\xbb\xbf")) json.remove_prefix(3);
+  const auto root = json_members(json);
+  if (!root) {
+    // The parser knows best what is the matter with the text.
+    auto parsed = parse_json(std::string(json), file.model);
+    if (!parsed) return parsed;
+    return make_error(ErrorCode::parse, "not a JSON object");
+  }
+  if (auto checked = check_version(*root); !checked) return checked;
+  if (auto checked = check_extensions(*root); !checked) return checked;
+  if (auto parsed = parse_json(without_sources(json, *root), file.model); !parsed) return parsed;
+  file.model.buffers.clear();
+  const std::filesystem::path parent = file.path.parent_path();
+  if (auto loaded = load_buffers(json_member(*root, "buffers"), parts.binary,
+                                 parent.empty() ? "." : parent, file.model);
+      !loaded) {
+    return loaded;
+  }
+  return decode_meshopt_views(file.model);
 }
 
 }  // namespace

@@ -7,10 +7,15 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "emit/scene/gltf_import.hpp"
 #include "gltf_accessor.hpp"
 
@@ -24,14 +29,30 @@ using physics::Result;
 /// Relative to the longest edge squared: below this a triangle has no direction in float32.
 constexpr double kZeroAreaFrac = 1e-12;
 
-/// In the units of the mesh. Beyond it the squares and products of float32 arithmetic overflow, on
-/// the device too; nothing on Earth is as large.
-constexpr float kMaxCoordinate = 1e9F;
+/// Largest coordinate, in the units of the mesh. Beyond it the squares and products of float32
+/// arithmetic overflow, on the device too; nothing on Earth is as large.
+constexpr double kMaxCoordinate = 1e9;
+
+/// A mesh that lies farther from its origin than this, and farther than it is wide, gets an origin
+/// of its own: below, float32 resolves half a millimetre.
+constexpr double kFarCoordinate = 4096.0;
 
 struct Soup {
   std::vector<glm::vec3> positions_m;
   std::vector<glm::vec3> normals;  ///< empty: to be computed
   std::vector<std::uint32_t> indices;
+};
+
+/// A primitive as the file has it, and where it goes.
+struct RawPrimitive {
+  std::string context;  ///< "mesh 0 'hangar' primitive 1"
+  std::vector<glm::dvec3> positions;
+  std::vector<glm::vec3> normals;      ///< empty: to be computed
+  std::vector<std::uint32_t> indices;  ///< whole triangles
+  std::uint32_t material = kNoGltfMaterial;
+  bool double_sided = false;
+  bool has_indices = false;
+  double max_stored = 0.0;  ///< largest coordinate in the file; 0: stored as whole numbers
 };
 
 glm::dvec3 area_vector(const std::vector<glm::vec3>& p, const std::uint32_t* triangle) {
@@ -151,13 +172,14 @@ Soup with_flat_normals(const Soup& soup) {
   return deduplicated(out);
 }
 
-/// Makes normals unit length; those without direction are taken from the adjacent faces.
+/// Makes normals unit length. Normals without direction (zero, infinite or not a number) are made
+/// from the adjacent faces, weighted by area. Returns their number.
 std::uint64_t repair_normals(Soup& soup) {
   std::uint64_t repaired = 0;
   std::vector<glm::dvec3> face_sum;
   for (std::size_t v = 0; v < soup.normals.size(); ++v) {
     const double length = glm::length(glm::dvec3(soup.normals[v]));
-    if (length > 1e-6) {
+    if (length > 1e-6 && std::isfinite(length)) {
       soup.normals[v] = glm::vec3(glm::dvec3(soup.normals[v]) / length);
       continue;
     }
@@ -177,45 +199,95 @@ std::uint64_t repair_normals(Soup& soup) {
   return repaired;
 }
 
-Result<Soup> read_geometry(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
-                           int mode) {
-  Soup soup;
-  const auto position = primitive.attributes.find("POSITION");
-  const Result<std::vector<float>> positions = read_floats(model, position->second, 3);
-  if (!positions) {
-    return tl::unexpected(physics::Error(positions.error()).with_context("POSITION"));
+/// Moves the vertices of a skinned primitive to where the joints put them. Triangles that a
+/// mirroring joint turns inside out get their winding back.
+void apply_matrices(const std::vector<glm::dmat4>& gltf_from_bind, RawPrimitive& raw) {
+  std::vector<double> handedness(raw.positions.size());
+  for (std::size_t v = 0; v < raw.positions.size(); ++v) {
+    const glm::dmat4& matrix = gltf_from_bind[v];
+    raw.positions[v] = glm::dvec3(matrix * glm::dvec4(raw.positions[v], 1.0));
+    const glm::dmat3 linear(matrix);
+    handedness[v] = glm::determinant(linear);
+    if (raw.normals.empty()) continue;
+    // The cofactor matrix is the inverse transpose without the division, which may fail.
+    const glm::dvec3 n(raw.normals[v]);
+    const glm::dvec3 turned = n.x * glm::cross(linear[1], linear[2]) +
+                              n.y * glm::cross(linear[2], linear[0]) +
+                              n.z * glm::cross(linear[0], linear[1]);
+    const double length = glm::length(turned);
+    raw.normals[v] = length > 0.0 && std::isfinite(length)
+                         ? glm::vec3(turned / (handedness[v] < 0.0 ? -length : length))
+                         : glm::vec3(0.0F);
   }
-  for (std::size_t i = 0; i < positions->size(); ++i) {
-    if (std::abs((*positions)[i]) > kMaxCoordinate) {
-      return make_error(ErrorCode::unsupported, fmt::format("POSITION: element {} lies beyond {:g}",
-                                                            i / 3, kMaxCoordinate));
+  for (std::size_t i = 0; i + 2 < raw.indices.size(); i += 3) {
+    const double sum = handedness[raw.indices[i]] + handedness[raw.indices[i + 1]] +
+                       handedness[raw.indices[i + 2]];
+    if (sum < 0.0) std::swap(raw.indices[i + 1], raw.indices[i + 2]);
+  }
+}
+
+Result<void> check_coordinates(const std::vector<glm::dvec3>& positions) {
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const glm::dvec3 size = glm::abs(positions[i]);
+    if (!(std::max({size.x, size.y, size.z}) <= kMaxCoordinate)) {
+      return make_error(ErrorCode::unsupported,
+                        fmt::format("POSITION: element {} lies beyond {:g}", i, kMaxCoordinate));
     }
   }
-  soup.positions_m = to_vectors(*positions);
+  return {};
+}
+
+Result<void> read_positions(const tinygltf::Model& model, int accessor, RawPrimitive& raw) {
+  const Result<std::vector<float>> values = read_floats(model, accessor, 3);
+  if (!values) {
+    return tl::unexpected(physics::Error(values.error()).with_context("POSITION"));
+  }
+  raw.positions.resize(values->size() / 3);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < raw.positions.size(); ++i) {
+    raw.positions[i] =
+        glm::dvec3(glm::vec3((*values)[3 * i], (*values)[3 * i + 1], (*values)[3 * i + 2]));
+    const glm::dvec3 size = glm::abs(raw.positions[i]);
+    largest = std::max({largest, size.x, size.y, size.z});
+  }
+  const bool whole_numbers = model.accessors[static_cast<std::size_t>(accessor)].componentType !=
+                             TINYGLTF_COMPONENT_TYPE_FLOAT;
+  raw.max_stored = whole_numbers ? 0.0 : largest;
+  return check_coordinates(raw.positions);
+}
+
+/// Fills in what the accessors hold.
+Result<void> read_geometry(const tinygltf::Model& model, const tinygltf::Primitive& primitive,
+                           int mode, RawPrimitive& raw) {
+  if (auto read = read_positions(model, primitive.attributes.at("POSITION"), raw); !read) {
+    return read;
+  }
   if (const auto normal = primitive.attributes.find("NORMAL");
       normal != primitive.attributes.end()) {
-    const Result<std::vector<float>> normals = read_floats(model, normal->second, 3);
+    const Result<std::vector<float>> normals =
+        read_floats(model, normal->second, 3, NonFinite::keep);
     if (!normals) {
       return tl::unexpected(physics::Error(normals.error()).with_context("NORMAL"));
     }
-    soup.normals = to_vectors(*normals);
-    if (soup.normals.size() != soup.positions_m.size()) {
+    raw.normals = to_vectors(*normals);
+    if (raw.normals.size() != raw.positions.size()) {
       return make_error(ErrorCode::parse,
-                        fmt::format("NORMAL: {} elements for {} vertices", soup.normals.size(),
-                                    soup.positions_m.size()));
+                        fmt::format("NORMAL: {} elements for {} vertices", raw.normals.size(),
+                                    raw.positions.size()));
     }
   }
-  const Result<std::vector<std::uint32_t>> raw =
-      read_indices(model, primitive.indices, soup.positions_m.size());
-  if (!raw) {
-    return tl::unexpected(raw.error());
-  }
-  Result<std::vector<std::uint32_t>> list = to_triangle_list(*raw, mode);
+  const Result<std::vector<std::uint32_t>> list =
+      read_indices(model, primitive.indices, raw.positions.size());
   if (!list) {
     return tl::unexpected(list.error());
   }
-  soup.indices = std::move(*list);
-  return soup;
+  Result<std::vector<std::uint32_t>> triangles = to_triangle_list(*list, mode);
+  if (!triangles) {
+    return tl::unexpected(triangles.error());
+  }
+  raw.indices = std::move(*triangles);
+  raw.has_indices = primitive.indices >= 0;
+  return {};
 }
 
 void append(Mesh& mesh, const Soup& soup, std::uint32_t material, bool double_sided) {
@@ -233,86 +305,162 @@ void append(Mesh& mesh, const Soup& soup, std::uint32_t material, bool double_si
 
 constexpr std::size_t kMaxMeshIndices = std::size_t{1} << 31U;
 
-/// One primitive; nothing is appended when it is of a kind that is skipped.
-Result<std::uint64_t> add_primitive(const GltfFile& file, const tinygltf::Primitive& primitive,
-                                    const std::string& context, Mesh& mesh,
-                                    std::vector<std::string>& warnings) {
+/// Reads one primitive; nothing when it is of a kind that is skipped.
+Result<std::optional<RawPrimitive>> read_primitive(const GltfFile& file,
+                                                   const tinygltf::Primitive& primitive,
+                                                   const std::string& context, const SkinPose* skin,
+                                                   std::vector<std::string>& warnings) {
   const auto warn = [&](const std::string& text) {
     warnings.push_back(fmt::format("{}: {}: {}", file.name, context, text));
   };
   const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
   if (mode < TINYGLTF_MODE_TRIANGLES) {
     warn("points and lines are skipped");
-    return std::uint64_t{0};
+    return std::optional<RawPrimitive>{};
   }
   if (mode > TINYGLTF_MODE_TRIANGLE_FAN) {
     return make_error(ErrorCode::parse, fmt::format("mode {} does not exist", primitive.mode));
   }
   if (primitive.attributes.count("POSITION") == 0) {
     warn("skipped, it has no POSITION");
-    return std::uint64_t{0};
+    return std::optional<RawPrimitive>{};
   }
   const tinygltf::Model& model = file.model;
-  if (primitive.material >= 0 &&
-      static_cast<std::size_t>(primitive.material) >= model.materials.size()) {
-    return make_error(ErrorCode::parse,
-                      fmt::format("material {} does not exist", primitive.material));
+  RawPrimitive raw;
+  raw.context = context;
+  if (primitive.material >= 0) {
+    const auto material = static_cast<std::size_t>(primitive.material);
+    if (material >= model.materials.size()) {
+      return make_error(ErrorCode::parse,
+                        fmt::format("material {} does not exist", primitive.material));
+    }
+    raw.material = static_cast<std::uint32_t>(primitive.material);
+    raw.double_sided = model.materials[material].doubleSided;
   }
   if (!primitive.targets.empty()) {
     warn("morph targets are not applied");
   }
-  Result<Soup> soup = read_geometry(model, primitive, mode);
-  if (!soup) {
-    return tl::unexpected(soup.error());
+  if (auto read = read_geometry(model, primitive, mode, raw); !read) {
+    return tl::unexpected(read.error());
   }
-  const std::uint64_t dropped = drop_zero_area(*soup);
+  if (skin != nullptr) {
+    auto matrices = vertex_matrices(model, primitive, *skin, raw.positions.size());
+    if (!matrices) return tl::unexpected(std::move(matrices.error()));
+    if (matrices->gltf_from_bind.empty()) {
+      warn("it has no JOINTS_0 and WEIGHTS_0: the skin is ignored");
+      matrices->gltf_from_bind.assign(raw.positions.size(), skin->gltf_from_node);
+    }
+    if (matrices->without_weight > 0) {
+      warn(fmt::format("{} vertices have no weight and follow their first joint",
+                       matrices->without_weight));
+    }
+    apply_matrices(matrices->gltf_from_bind, raw);
+    if (auto checked = check_coordinates(raw.positions); !checked) {
+      return tl::unexpected(checked.error());
+    }
+  }
+  return std::optional<RawPrimitive>{std::move(raw)};
+}
+
+double float32_step(double coordinate) {
+  const auto value = static_cast<float>(coordinate);
+  return static_cast<double>(std::nextafter(value, std::numeric_limits<float>::infinity()) - value);
+}
+
+/// The origin that a mesh gets: the middle of its vertices where they lie far away, else zero. It is
+/// a multiple of the float32 step there, so that taking it off rounds nothing.
+glm::dvec3 origin_of(const std::vector<RawPrimitive>& primitives) {
+  Aabb box;
+  for (const RawPrimitive& raw : primitives) {
+    for (const std::uint32_t index : raw.indices) box.add(raw.positions[index]);
+  }
+  glm::dvec3 origin(0.0);
+  if (box.empty()) return origin;
+  const glm::dvec3 extent = box.max_m - box.min_m;
+  const double width = std::max({extent.x, extent.y, extent.z});
+  for (int axis = 0; axis < 3; ++axis) {
+    const double middle = 0.5 * (box.min_m[axis] + box.max_m[axis]);
+    if (std::abs(middle) <= std::max(kFarCoordinate, width)) continue;
+    const double step = float32_step(std::abs(middle) + 0.5 * width);
+    origin[axis] = step * std::round(middle / step);
+  }
+  return origin;
+}
+
+/// Appends one primitive to the mesh and gives the number of triangles left out.
+Result<std::uint64_t> add_primitive(const GltfFile& file, RawPrimitive raw,
+                                    const glm::dvec3& origin, Mesh& mesh,
+                                    std::vector<std::string>& warnings) {
+  const auto warn = [&](const std::string& text) {
+    warnings.push_back(fmt::format("{}: {}: {}", file.name, raw.context, text));
+  };
+  Soup soup;
+  soup.normals = std::move(raw.normals);
+  soup.indices = std::move(raw.indices);
+  soup.positions_m.reserve(raw.positions.size());
+  for (const glm::dvec3& position : raw.positions) {
+    soup.positions_m.emplace_back(position - origin);
+  }
+  const std::uint64_t dropped = drop_zero_area(soup);
   if (dropped > 0) {
     warn(fmt::format("{} triangles of zero area dropped", dropped));
   }
-  if (soup->indices.empty()) {
+  if (soup.indices.empty()) {
     return dropped;
   }
-  if (soup->normals.empty()) {
-    *soup = with_flat_normals(*soup);
+  if (soup.normals.empty()) {
+    soup = with_flat_normals(soup);
   } else {
-    if (const std::uint64_t repaired = repair_normals(*soup); repaired > 0) {
-      warn(fmt::format("{} normals without direction replaced", repaired));
+    if (const std::uint64_t repaired = repair_normals(soup); repaired > 0) {
+      warn(fmt::format("{} normals without direction replaced by those of their triangles",
+                       repaired));
     }
-    if (primitive.indices < 0) {
-      *soup = deduplicated(*soup);
+    if (!raw.has_indices) {
+      soup = deduplicated(soup);
     }
   }
-  if (mesh.indices.size() + soup->indices.size() > kMaxMeshIndices) {
+  if (mesh.indices.size() + soup.indices.size() > kMaxMeshIndices) {
     return make_error(ErrorCode::unsupported, "more than 2^31 indices in one mesh");
   }
-  const bool has_material = primitive.material >= 0;
-  append(mesh, *soup,
-         has_material ? static_cast<std::uint32_t>(primitive.material) : kNoGltfMaterial,
-         has_material && model.materials[static_cast<std::size_t>(primitive.material)].doubleSided);
+  append(mesh, soup, raw.material, raw.double_sided);
   return dropped;
 }
 
 }  // namespace
 
-Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index,
+Result<ConvertedMesh> convert_mesh(const GltfFile& file, int mesh_index, const SkinPose* skin,
                                    std::vector<std::string>& warnings) {
+  EMIT_CHECK_OP(static_cast<std::size_t>(mesh_index), <, file.model.meshes.size());
   const tinygltf::Mesh& source = file.model.meshes[static_cast<std::size_t>(mesh_index)];
   ConvertedMesh converted;
-  converted.mesh.name = source.name.empty() ? fmt::format("mesh {}", mesh_index) : source.name;
+  Mesh& mesh = converted.mesh;
+  mesh.name = source.name.empty() ? fmt::format("mesh {}", mesh_index) : source.name;
   const std::string mesh_context = element("mesh", mesh_index, source.name);
+  std::vector<RawPrimitive> primitives;
   for (std::size_t p = 0; p < source.primitives.size(); ++p) {
     const std::string context = fmt::format("{} primitive {}", mesh_context, p);
+    Result<std::optional<RawPrimitive>> raw =
+        read_primitive(file, source.primitives[p], context, skin, warnings);
+    if (!raw) {
+      return tl::unexpected(std::move(raw.error()).with_context(context));
+    }
+    if (*raw) primitives.push_back(std::move(**raw));
+  }
+  converted.origin_m = origin_of(primitives);
+  for (RawPrimitive& raw : primitives) {
+    converted.max_coordinate = std::max(converted.max_coordinate, raw.max_stored);
+    const std::string context = raw.context;
     const Result<std::uint64_t> dropped =
-        add_primitive(file, source.primitives[p], context, converted.mesh, warnings);
+        add_primitive(file, std::move(raw), converted.origin_m, mesh, warnings);
     if (!dropped) {
       return tl::unexpected(physics::Error(dropped.error()).with_context(context));
     }
     converted.dropped_triangles += *dropped;
   }
-  for (const std::uint32_t index : converted.mesh.indices) {
-    converted.mesh.bounds.add(glm::dvec3(converted.mesh.positions_m[index]));
+  if (converted.max_coordinate > 0.0) {
+    converted.resolution = float32_step(converted.max_coordinate);
   }
-  converted.mesh.closed = is_closed_surface(converted.mesh);
+  update_bounds(mesh);
   return converted;
 }
 

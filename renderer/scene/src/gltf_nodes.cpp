@@ -11,6 +11,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "gltf_accessor.hpp"
 
 namespace emit::scene {
@@ -86,24 +87,28 @@ bool exists(const tinygltf::Model& model, int node) {
   return node >= 0 && static_cast<std::size_t>(node) < model.nodes.size();
 }
 
-Result<std::vector<int>> root_nodes(const tinygltf::Model& model) {
-  if (model.scenes.empty()) {
-    std::vector<bool> is_child(model.nodes.size(), false);
-    for (const tinygltf::Node& node : model.nodes) {
-      for (const int child : node.children) {
-        if (exists(model, child)) {
-          is_child[static_cast<std::size_t>(child)] = true;
-        }
+/// Nodes that are nobody's child.
+std::vector<int> nodes_without_parent(const tinygltf::Model& model) {
+  std::vector<bool> is_child(model.nodes.size(), false);
+  for (const tinygltf::Node& node : model.nodes) {
+    for (const int child : node.children) {
+      if (exists(model, child)) {
+        is_child[static_cast<std::size_t>(child)] = true;
       }
     }
-    std::vector<int> roots;
-    for (std::size_t i = 0; i < is_child.size(); ++i) {
-      if (!is_child[i]) {
-        roots.push_back(static_cast<int>(i));
-      }
-    }
-    return roots;
   }
+  std::vector<int> roots;
+  for (std::size_t i = 0; i < is_child.size(); ++i) {
+    if (!is_child[i]) {
+      roots.push_back(static_cast<int>(i));
+    }
+  }
+  return roots;
+}
+
+/// Root nodes of the scene shown.
+Result<std::vector<int>> root_nodes(const tinygltf::Model& model) {
+  if (model.scenes.empty()) return nodes_without_parent(model);
   const int scene = std::max(model.defaultScene, 0);
   if (static_cast<std::size_t>(scene) >= model.scenes.size()) {
     return make_error(ErrorCode::parse, fmt::format("scene {} does not exist", scene));
@@ -174,18 +179,12 @@ Result<std::vector<glm::dmat4>> read_instances(const GltfFile& file,
   return transforms;
 }
 
-}  // namespace
-
-Result<std::vector<PlacedNode>> place_nodes(const GltfFile& file) {
-  const tinygltf::Model& model = file.model;
-  const Result<std::vector<int>> roots = root_nodes(model);
-  if (!roots) {
-    return tl::unexpected(roots.error());
-  }
+/// The nodes below `roots`, parents before children.
+Result<std::vector<PlacedNode>> walk(const tinygltf::Model& model, const std::vector<int>& roots) {
   std::vector<PlacedNode> placed;
   std::vector<PlacedNode> open;
   std::vector<bool> visited(model.nodes.size(), false);
-  for (auto root = roots->rbegin(); root != roots->rend(); ++root) {
+  for (auto root = roots.rbegin(); root != roots.rend(); ++root) {
     open.push_back({*root, glm::dmat4(1.0)});
   }
   while (!open.empty()) {
@@ -219,7 +218,31 @@ Result<std::vector<PlacedNode>> place_nodes(const GltfFile& file) {
   return placed;
 }
 
+}  // namespace
+
+Result<std::vector<PlacedNode>> place_nodes(const GltfFile& file) {
+  const Result<std::vector<int>> roots = root_nodes(file.model);
+  if (!roots) {
+    return tl::unexpected(roots.error());
+  }
+  return walk(file.model, *roots);
+}
+
+Result<std::vector<glm::dmat4>> all_node_transforms(const GltfFile& file) {
+  const auto placed = walk(file.model, nodes_without_parent(file.model));
+  if (!placed) {
+    return tl::unexpected(placed.error());
+  }
+  // A cycle apart from every root is not walked; no joint can be told to be anywhere there.
+  std::vector<glm::dmat4> transforms(file.model.nodes.size(), glm::dmat4(1.0));
+  for (const PlacedNode& node : *placed) {
+    transforms[static_cast<std::size_t>(node.node)] = node.gltf_from_node;
+  }
+  return transforms;
+}
+
 Result<std::vector<glm::dmat4>> node_instances(const GltfFile& file, int node_index) {
+  EMIT_CHECK(exists(file.model, node_index));
   const tinygltf::Node& node = file.model.nodes[static_cast<std::size_t>(node_index)];
   const auto extension = node.extensions.find("EXT_mesh_gpu_instancing");
   if (extension == node.extensions.end()) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/ext/matrix_transform.hpp>
 #include <map>
@@ -9,6 +10,7 @@
 
 #include "emit/scene/gltf_import.hpp"
 #include "emit/scene/mesh.hpp"
+#include "coplanar.hpp"
 #include "material_lookup.hpp"
 
 namespace emit::scene {
@@ -38,6 +40,7 @@ class SceneLoader {
         return tl::unexpected(added.error());
       }
     }
+    separate_coplanar();
     const std::vector<std::uint32_t> index_of = lookup_.finish(geometry_);
     for (Mesh& mesh : geometry_.meshes) {
       for (Submesh& submesh : mesh.submeshes) {
@@ -126,6 +129,11 @@ class SceneLoader {
       if (error.code != ErrorCode::io) error.code = ErrorCode::config;
       return tl::unexpected(std::move(error));
     }
+    if ((*model)->placements.empty()) {
+      geometry_.warnings.push_back(fmt::format("{}: object '{}': {} has no triangles to show",
+                                               scenario_.file.string(), object.name,
+                                               object.gltf.string()));
+    }
     const Result<std::vector<std::size_t>> materials = lookup_.resolve(object_index, **model);
     if (!materials) {
       return tl::unexpected(materials.error());
@@ -148,6 +156,55 @@ class SceneLoader {
       }
     }
     return {};
+  }
+
+  /// True where entities place the mesh, or more static instances than are compared.
+  [[nodiscard]] bool is_shared(std::uint32_t mesh, std::size_t static_uses) const {
+    return static_uses > kMaxComparedPlacements ||
+           std::ranges::any_of(geometry_.instances, [&](const Instance& instance) {
+             return instance.mesh == mesh && instance.entity_id != 0;
+           });
+  }
+
+  /// Cuts static surfaces that lie in the plane of those of other placements. Within one placement
+  /// the import has done so.
+  void separate_coplanar() {
+    std::vector<std::size_t> uses(geometry_.meshes.size(), 0);
+    std::vector<std::size_t> candidates;
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> groups;
+    for (std::size_t i = 0; i < geometry_.instances.size(); ++i) {
+      const Instance& instance = geometry_.instances[i];
+      if (instance.entity_id != 0 || ++uses[instance.mesh] > kMaxComparedPlacements) continue;
+      candidates.push_back(i);
+      const auto next = static_cast<std::uint32_t>(groups.size() + 1);
+      groups.try_emplace({instance.object, instance.placement}, next);
+    }
+    if (groups.size() < 2) return;
+    std::vector<CoplanarPart> parts;
+    std::size_t triangles = 0;
+    for (const std::size_t i : candidates) {
+      const Instance& instance = geometry_.instances[i];
+      const Mesh& mesh = geometry_.meshes[instance.mesh];
+      triangles += mesh.indices.size() / 3;
+      parts.push_back({instance.mesh, instance.world_from_mesh,
+                       fmt::format("object '{}' mesh '{}'",
+                                   scenario_.objects[instance.object].name, mesh.name),
+                       groups.at({instance.object, instance.placement})});
+    }
+    if (triangles > kMaxComparedTriangles) return;
+    for (CoplanarPart& part : parts) part.shared = is_shared(part.mesh, uses[part.mesh]);
+    const std::vector<std::string> messages = cut_coplanar(geometry_.meshes, parts);
+    if (messages.empty()) return;
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      Instance& instance = geometry_.instances[candidates[k]];
+      instance.mesh = parts[k].mesh;
+      instance.world_bounds =
+          transformed(geometry_.meshes[instance.mesh].bounds, instance.world_from_mesh);
+    }
+    for (const std::string& message : messages) {
+      geometry_.warnings.push_back(fmt::format("{}: {}", scenario_.file.string(), message));
+    }
+    drop_unused(geometry_.meshes, geometry_.instances);
   }
 
   const ScenarioDesc& scenario_;

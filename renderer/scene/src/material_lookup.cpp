@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "emit/physics/check.hpp"
+#include "emit/scene/nearest_word.hpp"
+
 namespace emit::scene {
 
 using physics::ErrorCode;
@@ -49,8 +52,33 @@ Result<MaterialLookup> MaterialLookup::create(const ScenarioDesc& scenario) {
   return lookup;
 }
 
+void MaterialLookup::warn_of_unknown_keys(const ObjectDesc& object, const GltfModel& model) {
+  std::vector<std::string_view> names;
+  for (const GltfMaterial& material : model.materials) names.push_back(material.name);
+  for (const auto& [key, material] : object.material_map) {
+    // The empty key stands for primitives without material.
+    if (key.empty() || std::ranges::count(names, key) > 0) continue;
+    const std::string_view near = nearest_word(key, names);
+    std::string hint;
+    if (!near.empty()) {
+      hint = fmt::format(", did you mean '{}'?", near);
+    } else if (names.empty()) {
+      hint = ": the file has no materials";
+    } else {
+      constexpr std::size_t kMaxNames = 8;
+      names.resize(std::min(names.size(), kMaxNames));
+      hint = fmt::format(": it has '{}'{}", fmt::join(names, "', '"),
+                         model.materials.size() > kMaxNames ? " and more" : "");
+    }
+    warnings_.push_back(fmt::format("{}: object '{}': material_map: {} has no material '{}'{}",
+                                    scenario_->file.string(), object.name,
+                                    model.file.filename().string(), key, hint));
+  }
+}
+
 Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_index,
                                                          const GltfModel& model) {
+  EMIT_CHECK_OP(object_index, <, scenario_->objects.size());
   const ObjectDesc& object = scenario_->objects[object_index];
   std::vector<bool> in_use(model.materials.size() + 1, false);
   for (const Mesh& mesh : model.meshes) {
@@ -58,6 +86,7 @@ Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_in
       in_use[std::min<std::size_t>(submesh.material, model.materials.size())] = true;
     }
   }
+  warn_of_unknown_keys(object, model);
   std::vector<std::size_t> positions(in_use.size(), default_position_);
   for (std::size_t i = 0; i < in_use.size(); ++i) {
     const std::string name = i < model.materials.size() ? model.materials[i].name : "";

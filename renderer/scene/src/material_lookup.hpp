@@ -12,7 +12,7 @@
 
 namespace emit::scene {
 
-/// Stands in where a scenario names no default: a grey concrete-like body.
+/// Material of scenarios that name no default: a grey concrete-like body.
 [[nodiscard]] Material builtin_default_material();
 
 /// Finds library materials for glTF ones and collects those in use.
@@ -21,7 +21,9 @@ class MaterialLookup {
   /// Error: config, when default_material is not in the library.
   [[nodiscard]] static physics::Result<MaterialLookup> create(const ScenarioDesc& scenario);
 
-  /// Library positions for each glTF material and, last, for primitives without one.
+  /// Library positions for each glTF material and, last, for primitives without one. A material or
+  /// a key of the map that finds nothing is noted for a warning.
+  /// @pre the object exists.
   /// Error: config, naming object and material.
   [[nodiscard]] physics::Result<std::vector<std::size_t>> resolve(std::uint32_t object_index,
                                                                   const GltfModel& model);
@@ -31,6 +33,8 @@ class MaterialLookup {
   [[nodiscard]] std::vector<std::uint32_t> finish(SceneGeometry& geometry);
 
  private:
+  /// Notes each key of the object's material_map that no material of the file has.
+  void warn_of_unknown_keys(const ObjectDesc& object, const GltfModel& model);
   [[nodiscard]] bool find(std::string_view name, std::size_t& position) const noexcept;
 
   const ScenarioDesc* scenario_ = nullptr;

@@ -33,6 +33,14 @@ Aabb transformed(const Aabb& box, const glm::dmat4& target_from_source) noexcept
   return result;
 }
 
+void update_bounds(Mesh& mesh) {
+  mesh.bounds = {};
+  for (const std::uint32_t index : mesh.indices) {
+    mesh.bounds.add(glm::dvec3(mesh.positions_m[index]));
+  }
+  mesh.closed = is_closed_surface(mesh);
+}
+
 glm::dmat4 body_from_gltf() noexcept {
   // Columns: where glTF x (left), y (up) and z (forward) go in forward, right, down.
   return glm::dmat4(glm::dvec4(0.0, -1.0, 0.0, 0.0), glm::dvec4(0.0, 0.0, -1.0, 0.0),

@@ -99,6 +99,9 @@ struct SceneGeometry {
 /// positive, i.e. front faces look outwards. Setup only: O(n log n) in time, 24 bytes a triangle.
 [[nodiscard]] bool is_closed_surface(const Mesh& mesh);
 
+/// Computes Mesh::bounds and Mesh::closed anew, from positions and indices.
+void update_bounds(Mesh& mesh);
+
 /// body_from_gltf as above; the rotation has determinant +1.
 [[nodiscard]] glm::dmat4 body_from_gltf() noexcept;
 /// Matrix that scales, turns and shifts an object's model (in body axes) into its body.
