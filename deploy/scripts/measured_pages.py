@@ -243,7 +243,7 @@ def date_of(commit, page):
                          text=True, check=False)
     if git.returncode == 0 and git.stdout.strip():
         return git.stdout.strip()
-    known = re.search(rf"commit `{re.escape(commit_only)}[^`]*` of (\d{{4}}-\d{{2}}-\d{{2}})", page)
+    known = re.search(rf"commit `{re.escape(commit_only)}[^`]*`\s+of\s+(\d{{4}}-\d{{2}}-\d{{2}})", page)
     return known.group(1) if known else "an unknown date"
 
 
