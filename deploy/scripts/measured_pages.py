@@ -308,7 +308,7 @@ def readme_section(_page):
          f"published method {published['frame_ms_median'] / 1000:.1f} s; ray tracing {embree_s:.1f} s", "statue"),
         ("its error, RMS / p99", f"{cached['rms_error_k']:.2f} / {cached['p99_error_k']:.2f} K",
          f"published method {published['rms_error_k']:.2f} / {published['p99_error_k']:.2f} K", "statue"),
-        ("error against 3-D conduction, RMS", f"{near['rms_error_k']:.2f} K in {number(near['frame_ms_median'], 2)} ms",
+        ("RMS to 3-D conduction", f"{near['rms_error_k']:.2f} K in {number(near['frame_ms_median'], 2)} ms",
          f"per frame {far['rms_error_k']:.2f} K in {far['frame_ms_median']:.0f} ms; "
          f"ray tracing {rays['rms_error_k']:.2f} K in {rays['frame_ms_median']:.0f} ms", "block"),
         ("frame time for 4 times the history", f"x {steps:.2f}", "published method: in proportion", "scaling"),
