@@ -101,7 +101,9 @@ while IFS=: read -r file line kind name; do
   folder=.
   if [[ $file == */* ]]; then folder=${file%/*}; fi
   case $kind in
-    path) matches=($name) ;; # unquoted: wildcards
+    # shellcheck disable=SC2206 # unquoted, because names hold wildcards
+    path) matches=($name) ;;
+    # shellcheck disable=SC2206
     link) matches=("$folder"/$name) ;;
     *) continue ;;
   esac
