@@ -100,10 +100,9 @@ missing=
 while IFS=: read -r file line kind name; do
   folder=.
   if [[ $file == */* ]]; then folder=${file%/*}; fi
+  # shellcheck disable=SC2206 # unquoted, because names hold wildcards
   case $kind in
-    # shellcheck disable=SC2206 # unquoted, because names hold wildcards
     path) matches=($name) ;;
-    # shellcheck disable=SC2206
     link) matches=("$folder"/$name) ;;
     *) continue ;;
   esac
