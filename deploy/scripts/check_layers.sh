@@ -185,7 +185,7 @@ only Ceres    'ceres/'            'renderer/reference/'
 only OpenSSL  'openssl/'          'protocol/src/|server/net/tls_|server/app/sha256'
 only CLI11    'CLI/'              'server/'
 
-missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.cmake' \
+missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.py' '*.cmake' \
     '*CMakeLists.txt' '*.proto' | xargs grep -L 'SPDX-License-Identifier: Apache-2.0' || true)
 if [[ -n $missing ]]; then
   echo "files without licence line:"
