@@ -353,6 +353,31 @@ TEST_F(ConfigTest, the_environment_reaches_nested_scalars) {
   EXPECT_EQ(loaded->sensor.trajectory[0].pose.position_world_m, glm::dvec3(1, 2, 3));
 }
 
+TEST_F(ConfigTest, a_model_has_a_rotation_and_an_offset_in_its_body) {
+  const auto loaded = scenario(
+      "[[object]]\ngltf = \"a.glb\"\nmodel_rotation_deg = [90, -33.3, 5]\n"
+      "model_offset_m = [0.5, 0, -1.25]\n");
+  ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  const scene::ObjectDesc& object = loaded->objects[0];
+  EXPECT_EQ(object.model_rotation_rad, glm::dvec3(90.0, -33.3, 5.0) * kDegree);
+  EXPECT_EQ(object.model_offset_m, glm::dvec3(0.5, 0.0, -1.25));
+  const auto again = load_scenario(write("p.toml", print_scenario(*loaded)), {}, options_);
+  ASSERT_TRUE(again.has_value()) << again.error().text;
+  EXPECT_EQ(again->objects[0].model_rotation_rad, object.model_rotation_rad);
+  EXPECT_EQ(again->objects[0].model_offset_m, object.model_offset_m);
+  EXPECT_EQ(scenario_error("[[object]]\ngltf = \"a.glb\"\nmodel_rotation_deg = [400, 0, 0]\n"),
+            "s.toml:4:22: 'model_rotation_deg' holds 400, must be -360 .. 360");
+  EXPECT_THAT(scenario_error("[[object]]\ngltf = \"a.glb\"\nmodel_offset_m = [1, 2]\n"),
+              ::testing::HasSubstr("'model_offset_m' must be an array of 3 numbers"));
+}
+
+TEST_F(ConfigTest, endings_of_scene_files_may_be_upper_case) {
+  for (const std::string name : {"TRUCK.GLB", "truck.Gltf"}) {
+    const auto loaded = scenario("[[object]]\ngltf = \"" + name + "\"\n");
+    EXPECT_TRUE(loaded.has_value()) << loaded.error().text;
+  }
+}
+
 TEST_F(ConfigTest, a_scenario_material_replaces_the_library_one) {
   const auto loaded = scenario(
       "[[material]]\nname = \"concrete\"\nsolar_absorptance_frac = 0.1\nemissivity_frac = "

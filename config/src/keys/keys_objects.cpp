@@ -202,9 +202,10 @@ const KeyTable<ObjectDraft>& object_keys() {
         number<ObjectDraft>("scale", "", above_to(0, 1e6), EMIT_FIELD(desc.scale),
                             "Uniform scale of the geometry."),
         model_rotation(),
-        vector3<ObjectDraft>("model_offset_m", "m", EMIT_FIELD(desc.model_offset_m),
-                             "Offset of the model's origin in its body: forward, right, down, after "
-                             "scale and rotation."),
+        vector3<ObjectDraft>(
+            "model_offset_m", "m", EMIT_FIELD(desc.model_offset_m),
+            "Offset of the model's origin in its body: forward, right, down, after "
+            "scale and rotation."),
         boolean<ObjectDraft>("on", EMIT_FIELD(desc.on),
                              "Entities: present until host or trajectory says otherwise."),
     };

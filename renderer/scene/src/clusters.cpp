@@ -9,12 +9,15 @@
 #include <glm/common.hpp>
 #include <limits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::scene {
 namespace {
 
-/// Triangles alone do not fill a cluster whose vertices are all different.
+/// Largest number of vertices in a cluster. A cluster whose vertices are all different reaches it
+/// before it is full of triangles.
 constexpr std::size_t kClusterVertices = 192;
-/// How much facing alike counts against lying close.
+/// Weight of facing alike against lying close, 0 to 1, when a cluster grows.
 constexpr float kConeWeight = 0.5F;
 
 glm::vec3 vec3(const float (&v)[3]) {
@@ -31,6 +34,11 @@ bool is_finite(const Cluster& cluster) {
   return std::isfinite(sum);
 }
 
+/// True when every index is below the number of vertices.
+bool within(std::span<const std::uint32_t> indices, std::size_t vertices) {
+  return std::ranges::all_of(indices, [=](std::uint32_t index) { return index < vertices; });
+}
+
 void set_box(Cluster& cluster, std::span<const glm::vec3> positions_m,
              std::span<const std::uint32_t> indices) {
   glm::vec3 least_m(std::numeric_limits<float>::infinity());
@@ -43,8 +51,8 @@ void set_box(Cluster& cluster, std::span<const glm::vec3> positions_m,
   cluster.box_half_m = 0.5F * (most_m - least_m);
 }
 
-/// Where the library's arithmetic ends, at the extremes of float32, it leaves triangles out: then
-/// they stay in their order, in clusters that are always drawn.
+/// Cuts triangles in their order into clusters that are always drawn. The library leaves triangles
+/// out when its arithmetic overflows, at the extremes of float32.
 void cut_in_order(std::uint32_t indices, std::vector<Cluster>& clusters) {
   constexpr auto kIndices = static_cast<std::uint32_t>(3 * kClusterTriangles);
   for (std::uint32_t at = 0; at < indices; at += kIndices) {
@@ -63,6 +71,7 @@ std::vector<Cluster> cut_into_clusters(std::span<const glm::vec3> positions_m,
                                        std::span<std::uint32_t> indices) {
   std::vector<Cluster> clusters;
   if (indices.empty()) return clusters;
+  EMIT_DCHECK(within(indices, positions_m.size()));
   const float* positions = &positions_m[0].x;
   const std::size_t vertices = positions_m.size();
   meshopt_optimizeVertexCache(indices.data(), indices.data(), indices.size(), vertices);
@@ -110,6 +119,7 @@ std::vector<Cluster> cut_into_clusters(std::span<const glm::vec3> positions_m,
 
 std::vector<std::uint32_t> place_numbers(std::span<const glm::vec3> positions_m,
                                          std::span<const std::uint32_t> indices) {
+  EMIT_DCHECK(within(indices, positions_m.size()));
   std::vector<std::uint32_t> numbers(positions_m.size());
   const meshopt_Stream stream{positions_m.data(), sizeof(glm::vec3), sizeof(glm::vec3)};
   meshopt_generateVertexRemapMulti(numbers.data(), indices.data(), indices.size(), numbers.size(),

@@ -26,8 +26,8 @@ namespace {
 /// Corners within this distance lie in a plane; float32 positions add a share of their size.
 constexpr double kPlaneM = 2e-4;
 constexpr double kPlaneFrac = 2.4e-7;
-/// Widths of the cells in which planes are sorted. Two lattices, half a cell apart, keep planes that
-/// agree to rounding together in at least one of them.
+/// Widths of the cells in which planes are sorted. Two lattices, half a cell apart, keep planes
+/// that agree to rounding together in at least one of them.
 constexpr double kNormalCell = 0.0137;
 constexpr double kOffsetCellM = 0.0113;
 /// An overlap narrower than this share of the covering triangle's size is a common edge.
@@ -94,8 +94,8 @@ struct Line {
   [[nodiscard]] double side(const Point2& p) const { return cross2(direction, p - from); }
 };
 
-/// Two pieces may reach the same corner over different edges. Rounding gives it the same weights, and
-/// so the same position to the last bit.
+/// Two pieces may reach the same corner over different edges. Rounding gives it the same weights,
+/// and so the same position to the last bit.
 glm::dvec3 rounded(const glm::dvec3& weight) {
   constexpr double kSteps = 68719476736.0;  // 2^36: far finer than float32
   return glm::round(weight * kSteps) / kSteps;
@@ -156,8 +156,8 @@ EdgeKey edge_key(const glm::dvec3& a, const glm::dvec3& b, double cell_m) {
 
 std::uint64_t plane_key(const glm::dvec3& normal, double offset_m, double shift) {
   std::uint64_t hash = 0xcbf29ce484222325ULL;
-  for (const double value : {normal.x / kNormalCell, normal.y / kNormalCell,
-                             normal.z / kNormalCell, offset_m / kOffsetCellM}) {
+  for (const double value : {normal.x / kNormalCell, normal.y / kNormalCell, normal.z / kNormalCell,
+                             offset_m / kOffsetCellM}) {
     hash = (hash ^ static_cast<std::uint64_t>(std::llround(value + shift))) * 0x9e3779b97f4a7c15ULL;
     hash ^= hash >> 29U;
   }
@@ -226,8 +226,8 @@ class CoplanarCutter {
          i += 3) {
       Facet facet{part, submesh_index, i, submesh.material, submesh.double_sided};
       for (std::uint32_t k = 0; k < 3; ++k) {
-        facet.corner_m[k] = glm::dvec3(
-            matrix * glm::dvec4(glm::dvec3(mesh.positions_m[mesh.indices[i + k]]), 1.0));
+        facet.corner_m[k] =
+            glm::dvec3(matrix * glm::dvec4(glm::dvec3(mesh.positions_m[mesh.indices[i + k]]), 1.0));
       }
       const glm::dvec3 area = 0.5 * glm::cross(facet.corner_m[1] - facet.corner_m[0],
                                                facet.corner_m[2] - facet.corner_m[0]);
@@ -258,8 +258,8 @@ class CoplanarCutter {
       bool mixed = false;
       for (next = i; next < entries.size() && entries[next].key == entries[i].key; ++next) {
         plane.push_back(entries[next].facet);
-        mixed = mixed || facets_[entries[next].facet].material !=
-                             facets_[entries[i].facet].material;
+        mixed =
+            mixed || facets_[entries[next].facet].material != facets_[entries[i].facet].material;
       }
       if (mixed) compare(plane);
     }
@@ -296,8 +296,8 @@ class CoplanarCutter {
         const double area_b = area_m2[b.material];
         // Equal areas differ by rounding only; then the later one covers the earlier one.
         const bool equal = std::abs(area_a - area_b) <= 1e-9 * (area_a + area_b);
-        const bool a_covers = equal ? std::tie(a.part, a.submesh) > std::tie(b.part, b.submesh)
-                                    : area_a < area_b;
+        const bool a_covers =
+            equal ? std::tie(a.part, a.submesh) > std::tie(b.part, b.submesh) : area_a < area_b;
         const std::uint32_t top = a_covers ? box.facet : other.facet;
         const std::uint32_t bottom = a_covers ? other.facet : box.facet;
         if (overlap(facets_[bottom], facets_[top])) covers_[bottom].insert(top);
@@ -316,8 +316,7 @@ class CoplanarCutter {
     const auto within = [](const Facet& plane, const Facet& other) {
       return std::ranges::all_of(other.corner_m, [&](const glm::dvec3& corner) {
         const glm::dvec3 size = glm::abs(corner);
-        const double tolerance_m =
-            kPlaneM + kPlaneFrac * std::max({size.x, size.y, size.z});
+        const double tolerance_m = kPlaneM + kPlaneFrac * std::max({size.x, size.y, size.z});
         return std::abs(glm::dot(plane.normal, corner - plane.corner_m[0])) <= tolerance_m;
       });
     };
@@ -360,8 +359,8 @@ class CoplanarCutter {
       if (inside.size() < 3) return false;
     }
     const double around = perimeter(inside);
-    return around > 0.0 && 2.0 * std::abs(area2(inside)) >
-                               kMinWidthFrac * std::sqrt(top.area_m2) * around;
+    return around > 0.0 &&
+           2.0 * std::abs(area2(inside)) > kMinWidthFrac * std::sqrt(top.area_m2) * around;
   }
 
   /// Edges that two covering facets share; a cut goes on below them.
@@ -394,7 +393,8 @@ class CoplanarCutter {
       }
       const std::array<Line, 3> lines = sides(top, flat, inset);
       std::vector<Piece> next;
-      for (Piece& piece : pieces) subtract(std::move(piece), lines, tolerance_of(top), next);
+      const std::array<Line, 3> edges = sides(top, flat, {0.0, 0.0, 0.0});
+      for (Piece& piece : pieces) subtract(std::move(piece), lines, edges, tolerance_of(top), next);
       pieces = std::move(next);
     }
     std::erase_if(pieces, [&](const Piece& piece) {
@@ -403,7 +403,10 @@ class CoplanarCutter {
     return pieces;
   }
 
-  static void subtract(Piece piece, const std::array<Line, 3>& lines, double tolerance,
+  /// Splits a piece along `lines` and keeps what lies outside of them, unless it does not reach out
+  /// from under the covering triangle with these `edges`.
+  static void subtract(Piece piece, const std::array<Line, 3>& lines,
+                       const std::array<Line, 3>& edges, double tolerance,
                        std::vector<Piece>& out) {
     Piece inside = piece;
     for (const Line& line : lines) {
@@ -416,7 +419,11 @@ class CoplanarCutter {
     }
     for (const Line& line : lines) {
       auto [left, right] = split(piece, line, tolerance);
-      if (right.size() >= 3) out.push_back(std::move(right));
+      const bool hidden = std::ranges::all_of(right, [&](const PieceCorner& corner) {
+        return std::ranges::all_of(
+            edges, [&](const Line& edge) { return edge.side(corner.at) >= -10.0 * tolerance; });
+      });
+      if (right.size() >= 3 && !hidden) out.push_back(std::move(right));
       piece = std::move(left);
     }
   }
@@ -576,8 +583,8 @@ class CoplanarCutter {
       const glm::vec3 from(corner[static_cast<std::size_t>(k)]);
       const glm::vec3 to(corner[static_cast<std::size_t>(next)]);
       const bool ordered = bits(from) < bits(to);
-      const auto found =
-          on_edges.find(ordered ? std::pair{bits(from), bits(to)} : std::pair{bits(to), bits(from)});
+      const auto found = on_edges.find(ordered ? std::pair{bits(from), bits(to)}
+                                               : std::pair{bits(to), bits(from)});
       if (found == on_edges.end()) continue;
       for (const auto& [share, position] : found->second) {
         PieceCorner vertex;
@@ -613,8 +620,8 @@ class CoplanarCutter {
       piece.push_back(own);
       exact.push_back(from);
       const bool ordered = bits(from) < bits(to);
-      const auto found =
-          on_edges.find(ordered ? std::pair{bits(from), bits(to)} : std::pair{bits(to), bits(from)});
+      const auto found = on_edges.find(ordered ? std::pair{bits(from), bits(to)}
+                                               : std::pair{bits(to), bits(from)});
       if (found == on_edges.end()) continue;
       std::vector<std::pair<double, glm::vec3>> fresh = found->second;
       for (auto& [t, at] : fresh) t = ordered ? t : 1.0 - t;
@@ -635,11 +642,18 @@ class CoplanarCutter {
       mesh.indices.insert(mesh.indices.end(), corner.begin(), corner.end());
       return;
     }
-    // Rounded points may lie a little outside the straight edge; the exact edge is what counts here.
+    // Rounded points may lie a little outside the straight edge; the exact edge is what counts
+    // here.
     for (PieceCorner& p : piece) {
       p.at = flat(p.weight.x * a + p.weight.y * b + p.weight.z * c);
     }
     append(mesh, corner, piece, &exact);
+  }
+
+  static glm::dvec3 area_of(const Mesh& mesh, const std::array<std::uint32_t, 3>& corner) {
+    const glm::dvec3 a(mesh.positions_m[corner[0]]);
+    return 0.5 * glm::cross(glm::dvec3(mesh.positions_m[corner[1]]) - a,
+                            glm::dvec3(mesh.positions_m[corner[2]]) - a);
   }
 
   /// Appends the triangles of a piece, with normals between those of the cut triangle's corners.
@@ -662,8 +676,13 @@ class CoplanarCutter {
       mesh.positions_m.push_back(exact != nullptr ? (*exact)[i]
                                                   : position_of(mesh, corner, weight));
     }
+    const glm::dvec3 front = area_of(mesh, corner);
     for (const auto& triangle : triangulate(piece)) {
-      for (const std::size_t i : triangle) mesh.indices.push_back(vertex[i]);
+      const std::array<std::uint32_t, 3> index{vertex[triangle[0]], vertex[triangle[1]],
+                                               vertex[triangle[2]]};
+      // Rounding to float32 turns the thinnest slivers over.
+      if (!(glm::dot(area_of(mesh, index), front) > 0.0)) continue;
+      mesh.indices.insert(mesh.indices.end(), index.begin(), index.end());
     }
   }
 
@@ -684,8 +703,8 @@ class CoplanarCutter {
     for (const auto& [pair, triangles] : pairs_) {
       const auto& [bottom_part, bottom_submesh, top_part, top_submesh] = pair;
       if (out.size() == kMaxMessages) {
-        out.push_back(
-            fmt::format("{} more pairs of surfaces lie in one plane", pairs_.size() - kMaxMessages));
+        out.push_back(fmt::format("{} more pairs of surfaces lie in one plane",
+                                  pairs_.size() - kMaxMessages));
         break;
       }
       out.push_back(fmt::format(
@@ -714,8 +733,7 @@ class CoplanarCutter {
 
 }  // namespace
 
-std::vector<std::string> cut_coplanar(std::vector<Mesh>& meshes,
-                                      std::vector<CoplanarPart>& parts) {
+std::vector<std::string> cut_coplanar(std::vector<Mesh>& meshes, std::vector<CoplanarPart>& parts) {
   return CoplanarCutter(meshes, parts).run();
 }
 

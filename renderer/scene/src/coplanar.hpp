@@ -20,7 +20,7 @@ inline constexpr std::size_t kMaxComparedTriangles = 4'000'000;
 struct CoplanarPart {
   std::uint32_t mesh = 0;  ///< index into the meshes; a part that is cut may get a copy of its own
   glm::dmat4 common_from_mesh{1.0};  ///< into axes that all parts share
-  std::string name;                  ///< for messages: "mesh 'road' of node 'road'"
+  std::string name;                  ///< for messages: "node 'road' mesh 'road'"
   /// Parts of one group have been compared before and are not compared again; 0: no group.
   std::uint32_t group = 0;
   bool shared = false;  ///< something outside the list places the mesh too
@@ -34,8 +34,8 @@ struct CoplanarPart {
 /// Surfaces are in one plane when the corners of one lie within 0.2 mm of the other and both face
 /// the same way, or one is double-sided. A cut reaches under the edge of the covering surface by
 /// 1e-4 of its size, so that no gap opens. New vertices are set into the neighbours' edges as well.
-/// A mesh that other parts share is copied before it is cut. A part that is covered altogether keeps
-/// its place in the list and gets a mesh without triangles.
+/// A mesh that other parts share is copied before it is cut. A part that is covered altogether
+/// keeps its place in the list and gets a mesh without triangles.
 ///
 /// A mesh with many placements is compared at its first ones only, see kMaxComparedPlacements.
 ///

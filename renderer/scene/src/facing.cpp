@@ -49,7 +49,7 @@ struct Surface {
   std::vector<std::uint32_t> triangles;
   double area_m2 = 0.0;
   double contradiction_m2 = 0.0;
-  double volume_m3 = 0.0;          ///< by sign; about the middle of the rim
+  double volume_m3 = 0.0;  ///< by sign; about the middle of the rim
   double volume_by_winding_m3 = 0.0;
   glm::dvec3 signed_area_m2{0.0};  ///< area vectors added up by sign
   glm::dvec3 winding_area_m2{0.0};
@@ -108,8 +108,8 @@ class Facing {
           bounds_.add(points_m_[triangle.corner[k]]);
         }
         const glm::dvec3& a = points_m_[triangle.corner[0]];
-        triangle.area_m2 = 0.5 * glm::cross(points_m_[triangle.corner[1]] - a,
-                                            points_m_[triangle.corner[2]] - a);
+        triangle.area_m2 =
+            0.5 * glm::cross(points_m_[triangle.corner[1]] - a, points_m_[triangle.corner[2]] - a);
         triangle.contradicts = contradicts(mesh, i);
         triangles_.push_back(triangle);
       }
@@ -225,15 +225,14 @@ class Facing {
     for (const Edge& edge : rim_) {
       const std::uint32_t s = surface_of[edge.triangle];
       surfaces_[s].closed = false;
-      rim_sum_m[s] += points_m_[edge.corners >> 32U] +
-                      points_m_[static_cast<std::uint32_t>(edge.corners)];
+      rim_sum_m[s] +=
+          points_m_[edge.corners >> 32U] + points_m_[static_cast<std::uint32_t>(edge.corners)];
       rim_edges[s] += 2.0;
     }
     for (std::size_t s = 0; s < surfaces_.size(); ++s) {
-      measure(surfaces_[s],
-              rim_edges[s] > 0.0
-                  ? rim_sum_m[s] / rim_edges[s]
-                  : points_m_[triangles_[surfaces_[s].triangles.front()].corner[0]]);
+      measure(surfaces_[s], rim_edges[s] > 0.0
+                                ? rim_sum_m[s] / rim_edges[s]
+                                : points_m_[triangles_[surfaces_[s].triangles.front()].corner[0]]);
     }
   }
 
@@ -273,8 +272,8 @@ class Facing {
     if (!surface.closed && std::abs(level_m2) >= kMinLevelFrac * surface.area_m2) {
       return level_m2 > 0.0 ? 1.0 : -1.0;
     }
-    const double least = (surface.closed ? kMinClosedVolume : kMinOpenVolume) *
-                         surface.area_m2 * std::sqrt(surface.area_m2);
+    const double least = (surface.closed ? kMinClosedVolume : kMinOpenVolume) * surface.area_m2 *
+                         std::sqrt(surface.area_m2);
     if (std::abs(surface.volume_m3) > least) return surface.volume_m3 > 0.0 ? 1.0 : -1.0;
     return surface.majority_m2 >= 0.0 ? 1.0 : -1.0;
   }
@@ -317,8 +316,8 @@ class Facing {
   }
 
   [[nodiscard]] std::string name_of(std::uint32_t mesh) const {
-    return fmt::format("{}: mesh '{}' of node '{}'", model_.file.filename().string(),
-                       model_.meshes[mesh].name, placement_of_[mesh]->node);
+    return fmt::format("{}: node '{}': mesh '{}'", model_.file.filename().string(),
+                       placement_of_[mesh]->node, model_.meshes[mesh].name);
   }
 
   void report_changes() {
@@ -326,8 +325,8 @@ class Facing {
       const Change& change = changes_[m];
       if (change.wound + change.normals == 0) continue;
       model_.warnings.push_back(fmt::format(
-          "{}: {} of {} triangles have normals against their winding; the winding of {} triangles "
-          "and {} normals are turned to the side that is outside or above",
+          "{}: {} of {} triangles have normals against their winding; the geometry decides: the "
+          "winding of {} triangles and {} normals are turned",
           name_of(m), change.triangles, model_.meshes[m].indices.size() / 3, change.wound,
           change.normals));
     }
@@ -369,10 +368,11 @@ class Facing {
     }
     for (std::uint32_t m = 0; m < count.size(); ++m) {
       if (count[m] == 0) continue;
-      model_.warnings.push_back(fmt::format(
-          "{}: {} triangles bound a body whose fronts and normals all look inwards: it is seen from "
-          "inside only; turn its faces if it is not a room",
-          name_of(m), count[m]));
+      model_.warnings.push_back(
+          fmt::format("{}: {} triangles bound a body whose fronts and normals all look inwards: it "
+                      "is seen from "
+                      "inside only; turn its faces if it is not a room",
+                      name_of(m), count[m]));
     }
   }
 
@@ -381,16 +381,16 @@ class Facing {
     const double plan_m2 = size_m.x * size_m.z;
     double up_m2 = 0.0;
     for (const Triangle& triangle : triangles_) {
-      if (triangle.area_m2.y > 0.0 || is_double_sided(triangle)) up_m2 += std::abs(triangle.area_m2.y);
+      if (triangle.area_m2.y > 0.0 || is_double_sided(triangle))
+        up_m2 += std::abs(triangle.area_m2.y);
     }
     for (const Surface& surface : surfaces_) {
       if (surface.closed || surface.double_sided || was_mended(surface)) continue;
       const double down_m2 = -surface.winding_area_m2.y;
       const double middle_m = 0.5 * (bounds_.min_m.y + bounds_.max_m.y);
-      const bool is_ground = down_m2 >= kMinLevelFrac * surface.area_m2 &&
-                             down_m2 >= kMinGroundFrac * plan_m2 &&
-                             surface.bounds.max_m.y <= middle_m + 1e-6 * size_m.y &&
-                             up_m2 < 0.5 * down_m2;
+      const bool is_ground =
+          down_m2 >= kMinLevelFrac * surface.area_m2 && down_m2 >= kMinGroundFrac * plan_m2 &&
+          surface.bounds.max_m.y <= middle_m + 1e-6 * size_m.y && up_m2 < 0.5 * down_m2;
       if (!is_ground) continue;
       model_.warnings.push_back(fmt::format(
           "{}: {} triangles face down, where ground would face up: they are not seen from above; "

@@ -166,8 +166,8 @@ Result<void> apply_sparse(const tinygltf::Model& model, const tinygltf::Accessor
 }
 
 Result<std::vector<float>> read_checked(const tinygltf::Model& model,
-                                        const tinygltf::Accessor& accessor,
-                                        std::size_t components, NonFinite non_finite) {
+                                        const tinygltf::Accessor& accessor, std::size_t components,
+                                        NonFinite non_finite) {
   const int found = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type));
   const std::size_t bytes = component_bytes(accessor.componentType);
   if (found < 0 || static_cast<std::size_t>(found) != components || bytes == 0) {

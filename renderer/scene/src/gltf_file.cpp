@@ -34,7 +34,7 @@ constexpr std::size_t kChunkHeaderBytes = 8;
 /// The parser descends by recursion; real files nest below 20.
 constexpr int kMaxNesting = 200;
 
-/// Extensions that do not change the geometry, and those that are handled.
+/// Extensions that the import handles, and those that do not change the geometry.
 constexpr std::string_view kAcceptedExtensions[] = {
     "EXT_mesh_gpu_instancing", "EXT_meshopt_compression", "KHR_meshopt_compression",
     "KHR_mesh_quantization",   "KHR_texture_transform",   "KHR_texture_basisu",
@@ -145,7 +145,8 @@ Result<void> check_version(const std::vector<JsonMember>& root) {
     if (!version) {
       return make_error(ErrorCode::parse, fmt::format("asset: {} is missing or no text", key));
     }
-    if ((*version != "2" && !version->starts_with("2.")) || (key == "minVersion" && *version != "2.0")) {
+    if ((*version != "2" && !version->starts_with("2.")) ||
+        (key == "minVersion" && *version != "2.0")) {
       return make_error(ErrorCode::unsupported,
                         fmt::format("asset: {} is {}: only glTF 2.0 is read; export or convert the "
                                     "model to glTF 2.0",

@@ -15,8 +15,8 @@
 
 namespace emit::scene {
 
-/// A parsed file. The parser checks syntax; everything an element refers to is checked by whoever
-/// reads the element.
+/// A parsed file whose buffers are loaded and decompressed. The parser checks syntax. The reader of
+/// an element checks what the element refers to.
 struct GltfFile {
   std::filesystem::path path;
   std::string name;  ///< file name without folder: begins every message
@@ -24,10 +24,12 @@ struct GltfFile {
   std::vector<std::string> warnings;
 };
 
-/// Errors: not_found, io, parse, unsupported (required extension). Never throws.
+/// Reads and parses a file.
+/// Errors name file and element: not_found, io, parse, unsupported (required extension, version).
+/// Throws std::bad_alloc only.
 [[nodiscard]] physics::Result<GltfFile> parse_gltf_file(const std::filesystem::path& path);
 
-/// "mesh 3 'hangar'"; without quotes where the element has no name.
+/// Name of an element for messages: "mesh 3 'hangar'", or "mesh 3" for an element without a name.
 [[nodiscard]] std::string element(const char* kind, int index, const std::string& name);
 
 }  // namespace emit::scene

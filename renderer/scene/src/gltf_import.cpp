@@ -159,9 +159,9 @@ Result<void> place_mesh(const GltfFile& file, const PlacedNode& placed, MeshStor
   }
   glm::dmat4 gltf_from_node = placed.gltf_from_node;
   if (node.skin >= 0) {
-    model.warnings.push_back(fmt::format(
-        "{}: {}: the skinned mesh stays in the pose that the file's joints have", file.name,
-        context));
+    model.warnings.push_back(
+        fmt::format("{}: {}: the skinned mesh stays in the pose that the file's joints have",
+                    file.name, context));
     gltf_from_node = glm::dmat4(1.0);
     *instances = {glm::dmat4(1.0)};
   }
@@ -186,7 +186,8 @@ Result<void> place_mesh(const GltfFile& file, const PlacedNode& placed, MeshStor
     const double resolution_m = mesh->resolution * greatest_scale(gltf_from_mesh);
     if (mesh->first_use && resolution_m > kMaxResolutionM) {
       model.warnings.push_back(fmt::format(
-          "{}: {}: vertices lie up to {:.3g} from the origin of {}, where float32 positions resolve "
+          "{}: {}: vertices lie up to {:.3g} from the origin of {}, where float32 positions "
+          "resolve "
           "{:.2g} m: details finer than that are lost in the file; export local coordinates",
           file.name, context, mesh->max_coordinate,
           element("mesh", node.mesh, file.model.meshes[static_cast<std::size_t>(node.mesh)].name),
@@ -208,10 +209,9 @@ Result<void> place_mesh(const GltfFile& file, const PlacedNode& placed, MeshStor
 
 bool has_texture(const tinygltf::Material& material) {
   const auto& pbr = material.pbrMetallicRoughness;
-  for (const int index :
-       {pbr.baseColorTexture.index, pbr.metallicRoughnessTexture.index,
-        material.normalTexture.index, material.occlusionTexture.index,
-        material.emissiveTexture.index}) {
+  for (const int index : {pbr.baseColorTexture.index, pbr.metallicRoughnessTexture.index,
+                          material.normalTexture.index, material.occlusionTexture.index,
+                          material.emissiveTexture.index}) {
     if (index >= 0) return true;
   }
   const auto extension = material.extensions.find("KHR_materials_pbrSpecularGlossiness");
@@ -271,9 +271,10 @@ void warn_of_the_rest(const GltfFile& file, const std::vector<bool>& shown, Gltf
         fmt::format("{}: vertex colours are ignored: {}", file.name, list_of(coloured)));
   }
   if (!file.model.animations.empty()) {
-    model.warnings.push_back(fmt::format("{}: {} animations are not played: nodes stay where the "
-                                         "file places them",
-                                         file.name, file.model.animations.size()));
+    model.warnings.push_back(
+        fmt::format("{}: {} animations are not played: nodes stay where the "
+                    "file places them",
+                    file.name, file.model.animations.size()));
   }
   if (!model.placements.empty()) return;
   const bool other_scene = file.model.scenes.size() > 1;
@@ -281,10 +282,10 @@ void warn_of_the_rest(const GltfFile& file, const std::vector<bool>& shown, Gltf
       "{}: {} has no triangles{}", file.name,
       file.model.scenes.empty()
           ? std::string("the file")
-          : element("scene", std::max(file.model.defaultScene, 0),
-                    file.model.scenes[static_cast<std::size_t>(
-                                          std::max(file.model.defaultScene, 0))]
-                        .name),
+          : element(
+                "scene", std::max(file.model.defaultScene, 0),
+                file.model.scenes[static_cast<std::size_t>(std::max(file.model.defaultScene, 0))]
+                    .name),
       other_scene ? "; the other scenes of the file are not shown" : ""));
 }
 
@@ -298,9 +299,9 @@ void separate_coplanar(const GltfFile& file, GltfModel& model) {
     const GltfPlacement& placement = model.placements[i];
     if (++count[placement.mesh] > kMaxComparedPlacements) continue;
     triangles += model.meshes[placement.mesh].indices.size() / 3;
-    parts.push_back({placement.mesh, placement.gltf_from_mesh,
-                     fmt::format("mesh '{}' of node '{}'", model.meshes[placement.mesh].name,
-                                 placement.node)});
+    parts.push_back(
+        {placement.mesh, placement.gltf_from_mesh,
+         fmt::format("node '{}' mesh '{}'", placement.node, model.meshes[placement.mesh].name)});
     placement_of.push_back(i);
   }
   if (triangles > kMaxComparedTriangles) return;

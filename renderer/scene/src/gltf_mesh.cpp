@@ -26,7 +26,8 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Relative to the longest edge squared: below this a triangle has no direction in float32.
+/// Smallest area of a triangle, relative to its longest edge squared. A smaller triangle has no
+/// direction in float32.
 constexpr double kZeroAreaFrac = 1e-12;
 
 /// Largest coordinate, in the units of the mesh. Beyond it the squares and products of float32
@@ -77,7 +78,8 @@ std::vector<glm::vec3> to_vectors(const std::vector<float>& values) {
   return vectors;
 }
 
-/// Triangle lists out of strips and fans; the winding of odd strip triangles is turned back.
+/// Makes a triangle list of a list, strip or fan. The winding of odd strip triangles is turned
+/// back.
 Result<std::vector<std::uint32_t>> to_triangle_list(const std::vector<std::uint32_t>& in,
                                                     int mode) {
   if (mode == TINYGLTF_MODE_TRIANGLES) {
@@ -133,7 +135,7 @@ struct VertexHash {
   }
 };
 
-/// One vertex per distinct position and normal; unused ones vanish.
+/// Keeps one vertex per distinct position and normal, and no unused one.
 Soup deduplicated(const Soup& soup) {
   Soup out;
   out.indices.reserve(soup.indices.size());
@@ -141,7 +143,7 @@ Soup deduplicated(const Soup& soup) {
   seen.reserve(soup.positions_m.size());
   for (const std::uint32_t index : soup.indices) {
     VertexKey key{};
-    // -0 and 0 are one place, and one normal.
+    // Adding +0 turns -0 into +0, which is the same place and the same normal.
     const glm::vec3 position_m = soup.positions_m[index] + glm::vec3(0.0F);
     const glm::vec3 normal = soup.normals[index] + glm::vec3(0.0F);
     std::memcpy(key.bits.data(), &position_m, sizeof(glm::vec3));
@@ -157,7 +159,7 @@ Soup deduplicated(const Soup& soup) {
   return out;
 }
 
-/// Flat shading, as the specification asks where a primitive has no normals.
+/// Gives each triangle its own normal, as the specification asks for primitives without normals.
 Soup with_flat_normals(const Soup& soup) {
   Soup out;
   out.positions_m.reserve(soup.indices.size());
@@ -271,9 +273,8 @@ Result<void> read_geometry(const tinygltf::Model& model, const tinygltf::Primiti
     }
     raw.normals = to_vectors(*normals);
     if (raw.normals.size() != raw.positions.size()) {
-      return make_error(ErrorCode::parse,
-                        fmt::format("NORMAL: {} elements for {} vertices", raw.normals.size(),
-                                    raw.positions.size()));
+      return make_error(ErrorCode::parse, fmt::format("NORMAL: {} elements for {} vertices",
+                                                      raw.normals.size(), raw.positions.size()));
     }
   }
   const Result<std::vector<std::uint32_t>> list =
@@ -303,6 +304,7 @@ void append(Mesh& mesh, const Soup& soup, std::uint32_t material, bool double_si
   mesh.submeshes.push_back({first, count, material, double_sided});
 }
 
+/// Largest number of indices in a mesh: draw calls count them in 32 bits.
 constexpr std::size_t kMaxMeshIndices = std::size_t{1} << 31U;
 
 /// Reads one primitive; nothing when it is of a kind that is skipped.
@@ -367,8 +369,8 @@ double float32_step(double coordinate) {
   return static_cast<double>(std::nextafter(value, std::numeric_limits<float>::infinity()) - value);
 }
 
-/// The origin that a mesh gets: the middle of its vertices where they lie far away, else zero. It is
-/// a multiple of the float32 step there, so that taking it off rounds nothing.
+/// The origin that a mesh gets: the middle of its vertices where they lie far away, else zero. It
+/// is a multiple of the float32 step there, so that taking it off rounds nothing.
 glm::dvec3 origin_of(const std::vector<RawPrimitive>& primitives) {
   Aabb box;
   for (const RawPrimitive& raw : primitives) {

@@ -77,16 +77,16 @@ Result<Compressed> read_extension(const tinygltf::Value& object) {
 /// The decoders assert what is checked here.
 Result<void> check_layout(const Compressed& view) {
   const bool indices = view.mode != "ATTRIBUTES";
-  const bool stride_fits = indices ? view.stride == 2 || view.stride == 4
-                                   : view.stride > 0 && view.stride <= kMaxStride &&
-                                         view.stride % 4 == 0;
+  const bool stride_fits =
+      indices ? view.stride == 2 || view.stride == 4
+              : view.stride > 0 && view.stride <= kMaxStride && view.stride % 4 == 0;
   if (!stride_fits) {
     return make_error(ErrorCode::parse,
                       fmt::format("byteStride {} does not fit mode {}", view.stride, view.mode));
   }
   if (view.mode == "TRIANGLES" && view.count % 3 != 0) {
-    return make_error(ErrorCode::parse, fmt::format("{} indices are not whole triangles",
-                                                    view.count));
+    return make_error(ErrorCode::parse,
+                      fmt::format("{} indices are not whole triangles", view.count));
   }
   if (view.filter == "NONE") return {};
   const bool known =
@@ -127,9 +127,9 @@ Result<std::vector<unsigned char>> decode(const Compressed& view, const tinygltf
     return make_error(ErrorCode::parse, fmt::format("the data are not of mode {}", view.mode));
   }
   if ((data[0] & 0x0fU) > codec->max_version) {
-    return make_error(ErrorCode::unsupported,
-                      fmt::format("version {} of the codec for {} is not supported",
-                                  data[0] & 0x0fU, view.mode));
+    return make_error(
+        ErrorCode::unsupported,
+        fmt::format("version {} of the codec for {} is not supported", data[0] & 0x0fU, view.mode));
   }
   if (view.count > kMaxRatio * view.length / view.stride) {
     return make_error(ErrorCode::parse,
@@ -142,8 +142,8 @@ Result<std::vector<unsigned char>> decode(const Compressed& view, const tinygltf
   if (view.mode == "TRIANGLES") decoder = meshopt_decodeIndexBuffer;
   if (view.mode == "INDICES") decoder = meshopt_decodeIndexSequence;
   if (decoder(out.data(), view.count, view.stride, data, view.length) != 0) {
-    return make_error(ErrorCode::parse, fmt::format("the data of mode {} are malformed",
-                                                    view.mode));
+    return make_error(ErrorCode::parse,
+                      fmt::format("the data of mode {} are malformed", view.mode));
   }
   if (view.filter == "OCTAHEDRAL") {
     meshopt_decodeFilterOct(out.data(), view.count, view.stride);

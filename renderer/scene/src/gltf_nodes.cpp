@@ -30,7 +30,7 @@ bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
 }
 
-/// `values` is empty where the file leaves the property out.
+/// Checks a property of a node; `values` is empty when the file leaves it out.
 Result<void> check_property(const char* name, const std::vector<double>& values, std::size_t size) {
   if (!values.empty() && (values.size() != size || !all_finite(values))) {
     return make_error(ErrorCode::parse, fmt::format("{}: {} numbers instead of {} finite ones",
@@ -116,7 +116,7 @@ Result<std::vector<int>> root_nodes(const tinygltf::Model& model) {
   return model.scenes[static_cast<std::size_t>(scene)].nodes;
 }
 
-/// Values of one instancing attribute; empty when absent.
+/// Values of one instancing attribute; empty when the file leaves it out.
 Result<std::vector<float>> instance_attribute(const GltfFile& file, const tinygltf::Value& list,
                                               const char* name, int components) {
   if (!list.Has(name)) {
@@ -233,7 +233,7 @@ Result<std::vector<glm::dmat4>> all_node_transforms(const GltfFile& file) {
   if (!placed) {
     return tl::unexpected(placed.error());
   }
-  // A cycle apart from every root is not walked; no joint can be told to be anywhere there.
+  // Nodes in a cycle hang below no root. They keep the identity.
   std::vector<glm::dmat4> transforms(file.model.nodes.size(), glm::dmat4(1.0));
   for (const PlacedNode& node : *placed) {
     transforms[static_cast<std::size_t>(node.node)] = node.gltf_from_node;

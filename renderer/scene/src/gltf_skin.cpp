@@ -69,8 +69,8 @@ Result<SkinPose> read_skin(const GltfFile& file, int skin_index,
   for (std::size_t j = 0; j < skin.joints.size(); ++j) {
     const int node = skin.joints[j];
     if (node < 0 || static_cast<std::size_t>(node) >= gltf_from_node.size()) {
-      return make_error(ErrorCode::parse, fmt::format("{}: joint {}: node {} does not exist",
-                                                      context, j, node));
+      return make_error(ErrorCode::parse,
+                        fmt::format("{}: joint {}: node {} does not exist", context, j, node));
     }
     (*matrices)[j] = gltf_from_node[static_cast<std::size_t>(node)] * (*matrices)[j];
   }

@@ -135,7 +135,8 @@ std::string to_text(const SceneSummary& summary) {
     fmt::format_to(put,
                    "bounds      forward {:.3f} .. {:.3f} m, right {:.3f} .. {:.3f} m, up {:.3f} .. "
                    "{:.3f} m\n",
-                   box.min_m.x, box.max_m.x, box.min_m.y, box.max_m.y, -box.max_m.z, -box.min_m.z);
+                   box.min_m.x, box.max_m.x, box.min_m.y, box.max_m.y, 0.0 - box.max_m.z,
+                   0.0 - box.min_m.z);
   }
   fmt::format_to(put, "meshes\n");
   for (const SceneSummary::MeshRow& row : summary.meshes) {
@@ -145,9 +146,9 @@ std::string to_text(const SceneSummary& summary) {
   }
   fmt::format_to(put, "materials\n");
   for (const SceneSummary::MaterialRow& row : summary.materials) {
-    fmt::format_to(put, "  {:<32} {:>9} triangles {:>12.2f} m2  {}{}\n",
+    fmt::format_to(put, "  {:<32} {:>9} triangles {:>12.{}f} m2  {}{}\n",
                    row.gltf_material.empty() ? "(none)" : row.gltf_material, row.triangles,
-                   row.area_m2,
+                   row.area_m2, row.area_m2 < 1.0 ? 6 : 2,
                    row.library_material.empty() ? "not in the library" : "in the library",
                    row.sheet_triangles > 0
                        ? fmt::format(", double sided: {} triangles are sheets", row.sheet_triangles)

@@ -8,9 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "coplanar.hpp"
 #include "emit/scene/gltf_import.hpp"
 #include "emit/scene/mesh.hpp"
-#include "coplanar.hpp"
 #include "material_lookup.hpp"
 
 namespace emit::scene {
@@ -20,7 +20,7 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Meshes of one file under one assignment of materials; objects that agree in both share them.
+/// One file under one assignment of materials. Objects that agree in both share its meshes.
 struct ModelUse {
   std::filesystem::path file;
   std::vector<std::size_t> materials;
@@ -99,7 +99,8 @@ class SceneLoader {
     return &models_.emplace(key, std::move(*model)).first->second;
   }
 
-  /// First of the model's meshes in the scene; submesh materials are library positions for now.
+  /// Index of the model's first mesh in the scene. Until the end of the load, materials of
+  /// submeshes are positions in the library.
   std::uint32_t mesh_base(const GltfModel& model, const std::vector<std::size_t>& materials) {
     const ModelUse use{model.file, materials};
     const auto [entry, is_new] =
@@ -125,7 +126,8 @@ class SceneLoader {
     if (!model) {
       physics::Error error =
           physics::Error(model.error()).with_context(fmt::format("object '{}'", object.name));
-      // What cannot be read now may be read later; any other fault is the scenario's own.
+      // A file that cannot be read now may be readable later. Any other fault is the scenario's
+      // own.
       if (error.code != ErrorCode::io) error.code = ErrorCode::config;
       return tl::unexpected(std::move(error));
     }
@@ -186,10 +188,10 @@ class SceneLoader {
       const Instance& instance = geometry_.instances[i];
       const Mesh& mesh = geometry_.meshes[instance.mesh];
       triangles += mesh.indices.size() / 3;
-      parts.push_back({instance.mesh, instance.world_from_mesh,
-                       fmt::format("object '{}' mesh '{}'",
-                                   scenario_.objects[instance.object].name, mesh.name),
-                       groups.at({instance.object, instance.placement})});
+      parts.push_back(
+          {instance.mesh, instance.world_from_mesh,
+           fmt::format("object '{}' mesh '{}'", scenario_.objects[instance.object].name, mesh.name),
+           groups.at({instance.object, instance.placement})});
     }
     if (triangles > kMaxComparedTriangles) return;
     for (CoplanarPart& part : parts) part.shared = is_shared(part.mesh, uses[part.mesh]);

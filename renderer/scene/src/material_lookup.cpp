@@ -137,7 +137,7 @@ std::vector<std::uint32_t> MaterialLookup::finish(SceneGeometry& geometry) {
     mappings_[i].index = index_of[mapping_positions_[i]];
   }
   geometry.mappings = std::move(mappings_);
-  // Several objects of one file say the same.
+  // Several objects of one file give the same warnings.
   std::sort(warnings_.begin(), warnings_.end());
   warnings_.erase(std::unique(warnings_.begin(), warnings_.end()), warnings_.end());
   geometry.warnings.insert(geometry.warnings.end(), warnings_.begin(), warnings_.end());

@@ -28,8 +28,8 @@ class MaterialLookup {
   [[nodiscard]] physics::Result<std::vector<std::size_t>> resolve(std::uint32_t object_index,
                                                                   const GltfModel& model);
 
-  /// Moves materials, mappings and warnings into `geometry` and gives, for each library position,
-  /// the index in the table (0 for those not in use).
+  /// Moves materials, mappings and warnings into `geometry`. Returns, by library position, the
+  /// index in its table (0 for materials that are not in use).
   [[nodiscard]] std::vector<std::uint32_t> finish(SceneGeometry& geometry);
 
  private:

@@ -9,7 +9,8 @@
 namespace emit::scene {
 namespace {
 
-/// Convection and radiation of a face of 290 K: what the library's modes are derived with.
+/// Convection and radiation of a face of 290 K. The library's modes are derived with the same
+/// value.
 constexpr double kFilmW_m2_k = 19.0;
 
 }  // namespace
@@ -17,7 +18,7 @@ constexpr double kFilmW_m2_k = 19.0;
 std::optional<Material> sheet_of(const Material& material) {
   if (material.prescribed_k) return std::nullopt;
   Material sheet = material;
-  // emit2014 knows no other film than that to what lies behind.
+  // The only film in emit2014 is the one to the core behind the layers.
   if (!sheet.core_conductance_w_m2_k) {
     double gas_m2k_w = 0.0;
     for (const Layer& layer : material.layers) {
@@ -54,7 +55,7 @@ bool may_have_sheets(const Mesh& mesh) {
 }
 
 void adopt_sheets(SceneGeometry& geometry) {
-  std::map<std::uint32_t, std::uint32_t> sheets;  // by material
+  std::map<std::uint32_t, std::uint32_t> sheets;  // material -> its sheet
   const std::size_t materials = geometry.materials.size();
   for (std::uint32_t m = 0; m < materials; ++m) {
     if (auto sheet = sheet_of(geometry.materials[m])) {
@@ -73,7 +74,7 @@ void adopt_sheets(SceneGeometry& geometry) {
       used[submesh.material] = 1;
     }
   }
-  // Only sheets in use stay.
+  // Keep only the sheets that are in use.
   std::vector<std::uint32_t> renumbered(geometry.materials.size());
   std::uint32_t next = 0;
   for (std::uint32_t m = 0; m < geometry.materials.size(); ++m) {

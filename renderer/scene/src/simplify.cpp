@@ -14,17 +14,20 @@
 #include <utility>
 #include <vector>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::scene {
 namespace {
 
+/// Distance that a surface may move, in pixels.
 constexpr double kErrorPx = 0.25;
-/// Wider triangles than this, on average, are left alone: there is little to gain.
+/// Meshes whose triangles are wider than this on average are left alone: there is little to gain.
 constexpr double kLeastEdgePx = 6.0;
-/// Instances that look wider have their own mesh, as long as the copies have no more vertices than
-/// this. Those that classes share have as many again.
+/// Instances that look wider than this have their own mesh, as long as the copies have no more than
+/// kMostCopied vertices. The meshes that classes share may have as many again.
 constexpr double kOwnMeshPx = 16.0;
 constexpr std::size_t kMostCopied = 2'000'000;
-/// Below this the collapse itself is all rounding.
+/// Errors below this are smaller than the rounding of the collapse itself.
 constexpr double kLeastErrorM = 1e-6;
 
 double greatest_scale(const glm::dmat4& m) {
@@ -32,7 +35,8 @@ double greatest_scale(const glm::dmat4& m) {
                    glm::length(glm::dvec3(m[2]))});
 }
 
-/// On what lies in the box, seen from the nearest eye; infinite where an eye is inside.
+/// Pixels per metre on a surface in the box, seen from the nearest eye; infinite when an eye is
+/// inside.
 double pixels_per_m(const Aabb& box, const DetailView& view) {
   double nearest_m = std::numeric_limits<double>::infinity();
   for (const glm::dvec3& eye_m : view.eyes_world_m) {
@@ -41,8 +45,8 @@ double pixels_per_m(const Aabb& box, const DetailView& view) {
   return 1.0 / (view.pixel_rad * nearest_m);
 }
 
-/// Width of a pixel on the nearest instance of every mesh, in the mesh's own lengths; 0 where a
-/// mesh may come as close as it likes.
+/// Width of a pixel on the nearest instance of every mesh, in the mesh's own lengths; 0 for a mesh
+/// that may come as close as it likes.
 std::vector<double> pixel_widths(const SceneGeometry& geometry, const DetailView& view) {
   std::vector<double> widths(geometry.meshes.size(), std::numeric_limits<double>::infinity());
   for (const Instance& instance : geometry.instances) {
@@ -58,13 +62,14 @@ std::vector<double> pixel_widths(const SceneGeometry& geometry, const DetailView
   return widths;
 }
 
-/// How wide a body looks at least from most sides; of poles their thickness, of sheets not.
+/// Width that a body shows at least from most sides. It is the thickness of a pole, but not that of
+/// a sheet.
 double middle_extent(const Aabb& box) {
   const glm::dvec3 e = box.max_m - box.min_m;
   return std::max(std::min(e.x, e.y), std::min(std::max(e.x, e.y), e.z));
 }
 
-/// Of an equilateral triangle of the mean area.
+/// Edge of an equilateral triangle that has the mean area of the mesh's triangles.
 double mean_edge(const Mesh& mesh) {
   double area = 0.0;
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
@@ -91,7 +96,7 @@ void renumber(Mesh& mesh, std::span<const std::uint32_t> remap, std::size_t coun
   gather(mesh.positions_m);
 }
 
-/// `kept`: by triangle; empty: none.
+/// Collapses edges of a mesh. `kept` marks triangles that stay; empty: none.
 void collapse(Mesh& mesh, double error, const std::vector<bool>& kept) {
   const float* positions = &mesh.positions_m[0].x;
   const std::size_t vertices = mesh.positions_m.size();
@@ -191,6 +196,8 @@ std::vector<double> simplify_errors(const SceneGeometry& geometry, const DetailV
 
 SceneGeometry simplified(SceneGeometry geometry, std::span<const double> errors,
                          std::span<const std::vector<bool>> kept) {
+  EMIT_CHECK_OP(errors.size(), ==, geometry.meshes.size());
+  EMIT_CHECK(kept.empty() || kept.size() == geometry.meshes.size());
   for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {
     if (errors[m] == 0.0) continue;
     collapse(geometry.meshes[m], errors[m], kept.empty() ? std::vector<bool>() : kept[m]);

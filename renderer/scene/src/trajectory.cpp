@@ -3,9 +3,12 @@
 
 #include <algorithm>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::scene {
 
 TrajectoryState trajectory_at(const Trajectory& keyframes, std::int64_t sim_time_ns) noexcept {
+  EMIT_DCHECK(!keyframes.empty());
   const auto after = std::upper_bound(
       keyframes.begin(), keyframes.end(), sim_time_ns,
       [](std::int64_t time_ns, const Keyframe& key) { return time_ns < key.sim_time_ns; });

@@ -18,6 +18,7 @@ using test::test_folder;
 using test::write_file;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 Material named(const std::string& name) {
   Material material;
@@ -100,6 +101,26 @@ TEST(SceneOrientation, scale_applies_to_the_geometry_not_to_the_place) {
   expect_near(world_point(*scene, {0, 1, 0}), {10, 0, 3});
 }
 
+TEST(SceneOrientation, a_model_is_turned_and_offset_in_its_body) {
+  ScenarioDesc scenario = one_triangle();
+  ObjectDesc& object = scenario.objects[0];
+  // Its nose lies along glTF +x, which is left: a quarter turn to the right brings it forward.
+  object.model_rotation_rad = {std::acos(0.0), 0.0, 0.0};
+  object.model_offset_m = {0.0, 2.0, -1.0};
+  object.scale = 3.0;
+  const auto turned = load_scene(scenario);
+  ASSERT_TRUE(turned);
+  expect_near(world_point(*turned, {0, 0, 0}), {2, 0, 1});  // right is east, and up
+  expect_near(world_point(*turned, {1, 0, 0}), {2, 3, 1});
+  expect_near(world_point(*turned, {0, 1, 0}), {2, 0, 4});
+  object.model_offset_m = {0.0, 0.0, 0.0};
+  object.scale = 1.0;
+  object.model_rotation_rad = {0.0, std::acos(0.0), 0.0};
+  expect_near(world_point(*load_scene(scenario), {0, 0, 1}), {0, 0, 1});  // nose up
+  object.model_rotation_rad = {0.0, 0.0, std::acos(0.0)};
+  expect_near(world_point(*load_scene(scenario), {-1, 0, 0}), {0, 0, -1});  // right side down
+}
+
 TEST(LoadScene, materials_map_by_table_then_object_then_name_then_default) {
   const std::string materials = R"({"name":"paint"},{"name":"steel"},{"name":"unknown"})";
   const auto material_of = [&](int gltf, auto change) {
@@ -130,6 +151,37 @@ TEST(LoadScene, default_material_is_entry_zero_and_its_use_is_warned_of) {
   EXPECT_THAT(scene->warnings,
               Contains(AllOf(HasSubstr("thing.gltf"), HasSubstr("'unobtainium'"))));
   EXPECT_EQ(scene->mappings.at(0).by, MappedBy::fallback);
+}
+
+TEST(LoadScene, keys_of_the_map_that_no_material_has_are_warned_of) {
+  const auto warnings_of = [](const std::string& key, const std::string& materials) {
+    ScenarioDesc scenario = one_triangle(materials, materials.empty() ? "" : R"(,"material":0)");
+    scenario.objects[0].material_map = {{key, "asphalt"}};
+    const auto scene = load_scene(scenario);
+    EXPECT_TRUE(scene);
+    return scene ? scene->warnings : std::vector<std::string>();
+  };
+  const std::string materials = R"({"name":"concrete"},{"name":"wheel"})";
+  EXPECT_THAT(warnings_of("Concrete", materials),
+              Contains(AllOf(HasSubstr("object 'thing'"), HasSubstr("thing.gltf"),
+                             HasSubstr("'Concrete', did you mean 'concrete'?"))));
+  EXPECT_THAT(warnings_of("glass", materials), Contains(HasSubstr("it has 'concrete', 'wheel'")));
+  EXPECT_THAT(warnings_of("glass", ""), Contains(HasSubstr("the file has no materials")));
+  EXPECT_THAT(warnings_of("wheel", materials), Not(Contains(HasSubstr("material_map"))));
+}
+
+TEST(LoadScene, an_object_without_triangles_is_warned_of) {
+  GltfText text;
+  text.scenes = R"({"nodes":[]},{"nodes":[0]})";
+  const auto scene = load_scene(scenario_of(write_file(test_folder() / "thing.gltf", text.json())));
+  ASSERT_TRUE(scene);
+  EXPECT_THAT(scene->warnings,
+              Contains(AllOf(HasSubstr("object 'thing'"), HasSubstr("no triangles"))));
+}
+
+TEST(LoadScene, endings_of_files_may_be_upper_case) {
+  const GltfText text;
+  EXPECT_TRUE(load_scene(scenario_of(write_file(test_folder() / "THING.GLTF", text.json()))));
 }
 
 TEST(LoadScene, unknown_library_names_are_configuration_errors) {

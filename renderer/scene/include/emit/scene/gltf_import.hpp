@@ -10,17 +10,26 @@
 
 /// glTF 2.0 files (.glb, .gltf with embedded or external buffers) to plain meshes.
 ///
-/// Handled: node hierarchies (TRS and matrix, mirrored ones too), the default scene (else the
-/// first, else all root nodes), any number of primitives and materials, triangle lists, strips and
-/// fans, 8/16/32-bit and no indices, interleaved, strided, normalised and sparse accessors,
-/// EXT_mesh_gpu_instancing, KHR_mesh_quantization, doubleSided. Images are not read. Points, lines,
-/// skins and morph targets are skipped with a warning; an unknown required extension is an error,
-/// and so are coordinates beyond 1e9. Missing normals are computed flat, as the glTF specification
-/// asks.
+/// The import handles node hierarchies (TRS and matrix, mirrored ones too), the default scene (else
+/// the first, else all root nodes), any number of primitives and materials, triangle lists, strips
+/// and fans, 8/16/32-bit and no indices, interleaved, strided, normalised and sparse accessors,
+/// skins in the pose of the file, doubleSided, EXT_mesh_gpu_instancing, KHR_mesh_quantization and
+/// EXT_meshopt_compression. Missing normals are computed flat, as the glTF specification asks.
+///
+/// A warning names points, lines, morph targets, animations, images, vertex colours and alpha
+/// modes, none of which is used. An unknown required extension, another version than 2 and
+/// coordinates beyond 1e9 are errors.
+///
+/// The import repairs what would otherwise be shown wrong, and warns of it: normals without
+/// direction, normals against the winding, surfaces of two materials in one plane. Vertices far
+/// from the origin of their mesh get an origin of their own, which the placements take into
+/// account.
 namespace emit::scene {
 
+/// Submesh::material of a primitive without material.
 inline constexpr std::uint32_t kNoGltfMaterial = 0xffffffffU;
 
+/// A material of the file.
 struct GltfMaterial {
   std::string name;  ///< "material N" where the file gives none
   bool double_sided = false;
@@ -33,14 +42,15 @@ struct GltfPlacement {
   std::string node;                ///< name of the node, "node N" where the file gives none
 };
 
+/// A file as the scene loader needs it.
 struct GltfModel {
   std::filesystem::path file;
   std::vector<Mesh> meshes;  ///< Submesh::material indexes `materials`, or is kNoGltfMaterial
   std::vector<GltfMaterial> materials;
   std::vector<GltfPlacement> placements;
-  std::uint32_t nodes = 0;  ///< of the scene shown, with and without a mesh
-  std::uint64_t dropped_triangles = 0;
-  std::vector<std::string> warnings;  ///< each begins with the file name
+  std::uint32_t nodes = 0;              ///< nodes of the scene shown, with and without a mesh
+  std::uint64_t dropped_triangles = 0;  ///< triangles of zero area
+  std::vector<std::string> warnings;    ///< each begins with the file name
 };
 
 /// Setup only; any thread. Errors name file and element: not_found, io, parse (malformed or

@@ -11,7 +11,7 @@
 
 namespace emit::scene {
 
-/// What the loader sees in one glTF file: the content of `emit inspect`.
+/// Summary of one glTF file as the loader sees it. `emit inspect` prints it.
 struct SceneSummary {
   struct MeshRow {
     std::string name;
@@ -22,18 +22,19 @@ struct SceneSummary {
   };
   struct MaterialRow {
     std::string gltf_material;     ///< "" for primitives without material
-    std::string library_material;  ///< "" when nothing of that name is in the library
+    std::string library_material;  ///< "" when the library has no material of that name
     bool double_sided = false;
-    std::uint64_t triangles = 0;  ///< placements counted
-    double area_m2 = 0.0;         ///< placements counted
-    /// Of these, sheets with the library's material (sheets.hpp): one temperature for both faces.
+    std::uint64_t triangles = 0;  ///< sum over the placements
+    double area_m2 = 0.0;         ///< sum over the placements
+    /// Number of these triangles that are sheets with the library's material (see sheets.hpp): both
+    /// faces have one temperature.
     std::uint64_t sheet_triangles = 0;
   };
   std::filesystem::path file;
   std::uint32_t nodes = 0;
   std::uint32_t placements = 0;
-  std::uint64_t triangles = 0;  ///< placements counted
-  std::uint64_t vertices = 0;   ///< stored, each mesh once
+  std::uint64_t triangles = 0;  ///< sum over the placements
+  std::uint64_t vertices = 0;   ///< sum over the meshes
   std::uint64_t dropped_triangles = 0;
   std::vector<MeshRow> meshes;
   std::vector<MaterialRow> materials;
@@ -41,12 +42,14 @@ struct SceneSummary {
   Aabb bounds_body;  ///< body axes: x forward, y right, z down
 };
 
-/// @param library  materials to match glTF names against; may be empty. Setup only.
-/// Errors as import_gltf().
+/// Loads a file and sums up what is in it. Setup only.
+/// @param library  materials whose names glTF materials may have; may be empty
+/// Errors are those of import_gltf().
 [[nodiscard]] physics::Result<SceneSummary> inspect_gltf(const std::filesystem::path& file,
                                                          std::span<const Material> library);
-/// Lines for people, and one JSON object with the same content.
+/// The summary as lines for people.
 [[nodiscard]] std::string to_text(const SceneSummary& summary);
+/// The summary as one JSON object with the same content.
 [[nodiscard]] std::string to_json(const SceneSummary& summary);
 
 }  // namespace emit::scene

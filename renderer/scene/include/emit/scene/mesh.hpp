@@ -24,7 +24,7 @@
 /// (the usual export of a plan with x east and y north) is placed with heading 180 degrees.
 namespace emit::scene {
 
-/// Axis-aligned box; empty (min > max) until something is added.
+/// Axis-aligned box. It is empty (min > max) until something is added.
 struct Aabb {
   glm::dvec3 min_m{std::numeric_limits<double>::infinity()};
   glm::dvec3 max_m{-std::numeric_limits<double>::infinity()};
@@ -41,38 +41,39 @@ struct Submesh {
   std::uint32_t first_index = 0;
   std::uint32_t index_count = 0;  ///< multiple of 3
   std::uint32_t material = 0;     ///< index into SceneGeometry::materials
-  bool double_sided = false;      ///< both sides are seen and lit; thin ones are sheets
+  bool double_sided = false;      ///< both sides are seen and lit; thin materials are sheets
 };
 
-/// Indexed triangles, counter-clockwise seen from outside. positions_m and normals have equal size;
-/// every index is below it; normals are unit length.
+/// Indexed triangles, counter-clockwise seen from outside. positions_m and normals have equal size,
+/// every index is below that size, and normals have unit length.
 struct Mesh {
   std::string name;
   std::vector<glm::vec3> positions_m;
   std::vector<glm::vec3> normals;
   std::vector<std::uint32_t> indices;
   std::vector<Submesh> submeshes;  ///< cover `indices` without gap or overlap
-  Aabb bounds;                     ///< of positions_m, in the mesh's own axes
-  /// The surface of a body, see is_closed_surface(): seen from outside, its nearest face along any
-  /// ray is a front face.
+  Aabb bounds;                     ///< around the triangles, in the mesh's own axes
+  /// True for the surface of a body, see is_closed_surface(): seen from outside, its nearest face
+  /// along any ray is a front face.
   bool closed = false;
 };
 
-/// One mesh drawn once. Transforms have a positive determinant: where a glTF node mirrors, a
-/// mirrored copy of the mesh is used, so front faces are always counter-clockwise. Scales need not
-/// be uniform: normals go with the inverse transpose.
+/// One mesh drawn once. Transforms have a positive determinant: a glTF node that mirrors gets a
+/// mirrored copy of the mesh, so front faces are always counter-clockwise. Scales need not be
+/// uniform: normals are transformed by the inverse transpose.
 struct Instance {
   std::uint32_t mesh = 0;
   std::uint32_t object = 0;         ///< index into ScenarioDesc::objects
   std::uint32_t placement = 0;      ///< index into that object's instances
   std::uint32_t entity_id = 0;      ///< 0: static
-  glm::dmat4 body_from_mesh{1.0};   ///< node transform, scale and axis change; fixed for life
+  glm::dmat4 body_from_mesh{1.0};   ///< node transform, axis change, place of the model; fixed
   glm::dmat4 world_from_mesh{1.0};  ///< at the placement of the scenario
   Aabb world_bounds;                ///< at that placement
 };
 
-/// How one glTF material of one object found its entry in SceneGeometry::materials.
+/// Rule by which a glTF material found its entry in SceneGeometry::materials.
 enum class MappedBy : std::uint8_t { material_map, object_material, name, fallback };
+/// Material of one glTF material of one object.
 struct MaterialMapping {
   std::uint32_t object = 0;
   std::string gltf_material;  ///< "" for primitives without material
@@ -81,36 +82,40 @@ struct MaterialMapping {
   MappedBy by = MappedBy::fallback;
 };
 
+/// Geometry and materials of a whole scenario.
 struct SceneGeometry {
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
-  /// Only those in use, in the order of the library. Entry 0 is the default material, always there.
+  /// Materials in use, in the order of the library. Entry 0 is the default material, in use or not.
   std::vector<Material> materials;
   std::vector<MaterialMapping> mappings;
-  std::vector<std::string> warnings;  ///< unmapped materials, skipped primitives, dropped triangles
-  std::uint64_t triangles = 0;        ///< instances counted
-  std::uint64_t dropped_triangles = 0;  ///< of zero area, counted once per file
+  std::vector<std::string> warnings;    ///< faults of the files and what was done about them
+  std::uint64_t triangles = 0;          ///< sum over the instances
+  std::uint64_t dropped_triangles = 0;  ///< triangles of zero area, counted once per file
   Aabb static_bounds;                   ///< world, static instances
   Aabb bounds;                          ///< world, all instances at their placements
 };
 
 /// True when the triangles bound a body: every directed edge is met by exactly one opposite one
-/// (vertices at equal positions count as one), no submesh is a sheet, and the enclosed volume is
-/// positive, i.e. front faces look outwards. Setup only: O(n log n) in time, 24 bytes a triangle.
+/// (vertices at equal positions count as one), no submesh is double-sided, and the enclosed volume
+/// is positive, which means that front faces look outwards. Setup only: O(n log n) in time, 24
+/// bytes a triangle.
 [[nodiscard]] bool is_closed_surface(const Mesh& mesh);
 
 /// Computes Mesh::bounds and Mesh::closed anew, from positions and indices.
 void update_bounds(Mesh& mesh);
 
-/// body_from_gltf as above; the rotation has determinant +1.
+/// The change of axes described above. Its determinant is +1.
 [[nodiscard]] glm::dmat4 body_from_gltf() noexcept;
 /// Matrix that scales, turns and shifts an object's model (in body axes) into its body.
 [[nodiscard]] glm::dmat4 body_from_model(const ObjectDesc& object) noexcept;
+/// Matrix of a pose.
 [[nodiscard]] glm::dmat4 world_from_body_matrix(const physics::Pose& pose) noexcept;
 
 /// Loads every glTF file of the scenario and resolves its materials. A glTF material is looked up
 /// in the object's material_map, then the object's `material`, then the library by name, then the
-/// scenario's default_material (with a warning that names it). Setup only; any thread.
+/// scenario's default_material (with a warning that names it). Static surfaces of different objects
+/// that lie in one plane are cut, so that one of them wins everywhere. Setup only; any thread.
 /// Errors: io (a file cannot be read), config (a file that is missing or malformed, naming file and
 /// element; unknown library material, naming object and material; an entity without exactly one
 /// placement).

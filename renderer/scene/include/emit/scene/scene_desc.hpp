@@ -14,11 +14,12 @@
 /// it; it holds no loaded geometry and no GPU or parser types. All values SI, angles in radians.
 namespace emit::scene {
 
-/// Spectral band. An empty response is a perfect rectangle over [lo_um, hi_um].
+/// One point of a spectral response.
 struct ResponseSample {
   double wavelength_um = 0.0;
   double response_frac = 0.0;  ///< relative response, 0..1
 };
+/// Spectral band of a detector. An empty response is a perfect rectangle over [lo_um, hi_um].
 struct SpectralBand {
   std::string name;  ///< e.g. "8-12"
   double lo_um = 0.0;
@@ -26,6 +27,7 @@ struct SpectralBand {
   std::vector<ResponseSample> response;  ///< ascending in wavelength, linear in between
 };
 
+/// One layer of a body under its surface.
 struct Layer {
   double thickness_m = 0.0;
   double conductivity_w_m_k = 0.0;
@@ -33,31 +35,34 @@ struct Layer {
   double specific_heat_j_kg_k = 0.0;
 };
 
-/// One exponential of the surface's step response (PHYSICS: T = sum w_i x_i, tau_i x_i' = u - x_i).
+/// One exponential of the surface's step response: T = sum w_i x_i, tau_i x_i' = u - x_i
+/// (renderer/docs/physics.md).
 struct RelaxationMode {
   double tau_s = 0.0;
   double weight_frac = 0.0;
 };
 
-/// One state of a thermal network between the surface and the base (physics.md eq. 17):
-/// T = base_k + sum x_i, tau_i x_i' = r_i q - x_i, q = net flux into the solid.
+/// One state of a thermal network between the surface and the base (physics.md eq. 17). The surface
+/// has T = base_k + sum x_i with tau_i x_i' = r_i q - x_i, where q is the net flux into the solid.
 struct FosterMode {
   double tau_s = 0.0;
-  double resistance_m2k_w = 0.0;  ///< r_i; the sum over the modes is that of the layers
+  double resistance_m2k_w = 0.0;  ///< r_i; all modes together have the resistance of the layers
 };
 
-/// What is known about the fitted modes of a material against the reference solver.
+/// Error of the fitted modes of a material against the reference solver.
 struct FosterFit {
-  double horizon_s = 0.0;  ///< length of the histories they were fitted over
+  double horizon_s = 0.0;  ///< length of the histories over which the modes were fitted
   double rms_k = 0.0;      ///< largest of the scenarios' root mean squares
   double max_k = 0.0;      ///< over all scenarios
 };
 
+/// Emissivity of a material in one band.
 struct BandEmissivity {
   std::string band;  ///< name of a SpectralBand
   double emissivity_frac = 0.0;
 };
 
+/// Thermal and optical properties of a surface and of the body under it.
 struct Material {
   std::string name;
   double solar_absorptance_frac = 0.0;          ///< absorbed share of sunlight: 1 - albedo
@@ -65,22 +70,24 @@ struct Material {
   std::vector<BandEmissivity> band_emissivity;  ///< bands not listed use emissivity_frac
   std::vector<Layer> layers;                    ///< outermost first; emit2014 uses the first only
   double base_k = 0.0;                          ///< core temperature under the last layer
-  /// emit2014: conductance between surface and core; absent: that of the first layer.
+  /// emit2014: conductance between surface and core. When absent, the first layer's counts.
   std::optional<double> core_conductance_w_m2_k;
   std::optional<double> initial_k;    ///< surface at history start; else thermal.initial_k
   std::vector<RelaxationMode> modes;  ///< emit2014; weights sum to 1
-  /// foster: 1 to 4 modes, fastest first, of all layers together; empty: derived from them.
+  /// foster: 1 to 4 modes of all layers together, fastest first. When empty, they are derived from
+  /// the layers.
   std::vector<FosterMode> foster_modes;
-  std::optional<FosterFit> foster_fit;  ///< absent: modes come from the layers alone
-  /// False where heat moves otherwise than through dry layers: evaporation, melting, stirring.
+  std::optional<FosterFit> foster_fit;  ///< absent: the modes come from the layers alone
+  /// False for materials in which heat does not move through dry layers alone, but by evaporation,
+  /// melting or stirring.
   bool dry_layers_valid = true;
-  /// A hot part or another emitter of given temperature: takes no part in the thermal simulation.
+  /// Temperature of a hot part or another emitter that takes no part in the thermal simulation.
   std::optional<double> prescribed_k;
-  /// Both faces of a thin body, whose layers are half of it over an insulated middle (sheets.hpp);
-  /// base_k counts for emit2014 only.
+  /// True for both faces of a thin body, whose layers are half of it over an insulated middle (see
+  /// sheets.hpp). Then base_k counts for emit2014 only.
   bool sheet = false;
-  std::string source;       ///< where the numbers come from
-  std::string uncertainty;  ///< what is known about their error
+  std::string source;       ///< origin of the numbers
+  std::string uncertainty;  ///< known error of the numbers
 };
 
 /// One node of a trajectory: linear in position, slerp in attitude; `on` holds until the next one.
@@ -91,8 +98,8 @@ struct Keyframe {
   bool teleport = false;  ///< no interpolation from the previous keyframe: a jump
 };
 
-/// Keyframes in ascending time; before the first its pose and on state hold, likewise after the
-/// last.
+/// Keyframes in ascending time. The first one's pose and on state hold before it, the last one's
+/// after it.
 using Trajectory = std::vector<Keyframe>;
 
 /// A glTF file placed in the world, once or many times.
@@ -100,22 +107,22 @@ struct ObjectDesc {
   std::string name;
   std::uint32_t entity_id = 0;  ///< 0: static scenery; otherwise addressed by host frames, unique
   std::filesystem::path gltf;
-  /// Library material for glTF materials not listed in material_map ("" = map by name, then
-  /// default).
+  /// Library material for glTF materials that material_map does not list. When empty, they are
+  /// looked up by their name, then the default material is used.
   std::string material;
   std::map<std::string, std::string> material_map;  ///< glTF material name -> library material
   std::vector<physics::Pose> instances;  ///< static placements; an entity has exactly one
   double scale = 1.0;
-  /// Rotation of the model in its body: heading (nose to the right), pitch (nose up) and roll (right
-  /// side down), applied in the order roll, pitch, heading. It turns a model whose nose does not
-  /// point along glTF +z.
+  /// Rotation of the model in its body: heading (nose to the right), pitch (nose up) and roll
+  /// (right side down), applied in the order roll, pitch, heading. It turns a model whose nose does
+  /// not point along glTF +z.
   glm::dvec3 model_rotation_rad{0.0};
   glm::dvec3 model_offset_m{0.0};  ///< of the model's origin in the body: forward, right, down
   Trajectory trajectory;  ///< entities only; empty: stays at its placement until the host moves it
-  bool on = true;         ///< entities only: state without trajectory
+  bool on = true;         ///< entities only: on state without a trajectory
 };
 
-/// One camera. Square pixels; the vertical field of view follows from the format.
+/// One camera. Its pixels are square; the vertical field of view follows from the format.
 struct SensorDesc {
   std::string name;
   std::uint32_t width_px = 640;
@@ -135,16 +142,18 @@ struct PixelRect {
   [[nodiscard]] bool operator==(const PixelRect&) const = default;
 };
 
+/// Use of a channel's frames: injected into a processing unit, or shown by a projector.
 enum class ChannelKind : std::uint8_t { injection, projector };
+/// One output stream: a band and a window of the sensor's image.
 struct ChannelDesc {
   std::string name;
   ChannelKind kind = ChannelKind::injection;
   std::string band;             ///< name of a SpectralBand
-  PixelRect window_px = {};     ///< of the sensor's image; empty: all of it
+  PixelRect window_px = {};     ///< part of the sensor's image; empty: all of it
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
 };
 
-/// Forcing at one instant. Linear between samples, constant outside.
+/// Weather at one instant. It is linear between samples and constant before and after them.
 struct WeatherSample {
   std::int64_t sim_time_ns = 0;
   double direct_normal_w_m2 = 0.0;
@@ -152,12 +161,13 @@ struct WeatherSample {
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
   double wind_m_s = 0.0;
-  double cloud_frac = 0.0;              ///< beta of Eq. 1 for clear-sky models; 0 for measured sun
-  std::optional<double> environment_k;  ///< surroundings; absent: air temperature
+  double cloud_frac = 0.0;              ///< beta of eq. 1 for clear-sky models; 0 for measured sun
+  std::optional<double> environment_k;  ///< temperature of the surroundings; absent: of the air
   std::optional<double> film_w_m2_k;    ///< convection coefficient; not used by emit2014
 };
 
-/// Clear-sky models used when no weather table is given (PHYSICS 9).
+/// Parameters of the clear-sky models, which are used when no weather table is given (physics.md,
+/// section 9).
 struct ClearSkyDesc {
   double linke_turbidity = 3.5;
   double air_mean_k = 290.0;
@@ -167,18 +177,20 @@ struct ClearSkyDesc {
   double cloud_frac = 0.0;
 };
 
-/// Band transmittance by range: tau(R) = sum a_i exp(-k_i R), sum a_i = 1; path radiance
-/// (1 - tau) L_band(air). Sky radiance by elevation from the vertical transmittance.
+/// One term of a band's transmittance by range: tau(R) = sum a_i exp(-k_i R) with sum a_i = 1. The
+/// path radiance is (1 - tau) L_band(air).
 struct AtmosphereTerm {
   double amplitude_frac = 0.0;
   double extinction_per_km = 0.0;
 };
+/// Air in one band. The sky's radiance by elevation comes from the vertical transmittance.
 struct BandAtmosphere {
   std::string band;
   std::vector<AtmosphereTerm> terms;
-  double vertical_transmittance_frac = 0.7;  ///< ground to space, zenith; sky = (1-tau^m) L(air)
-  physics::AtmosphereGrid table = {};        ///< not empty: in place of terms and vertical
+  double vertical_transmittance_frac = 0.7;  ///< ground to space; sky = (1 - tau^m) L(air)
+  physics::AtmosphereGrid table = {};        ///< not empty: replaces terms and vertical value
 };
+/// Air between surface and sensor, by band.
 struct AtmosphereDesc {
   bool enabled = true;
   std::vector<BandAtmosphere> bands;
@@ -188,19 +200,20 @@ enum class ThermalMethod : std::uint8_t { per_frame, cached };
 enum class ThermalModel : std::uint8_t { emit2014, foster };
 enum class StepSpacing : std::uint8_t { uniform, geometric };
 
+/// Choice and parameters of the thermal simulation.
 struct ThermalOptions {
   ThermalMethod method = ThermalMethod::cached;
   ThermalModel model = ThermalModel::emit2014;
   double tolerance_k = 0.1;
   double initial_k = 290.0;           ///< surface temperature at history start
-  std::int64_t history_start_ns = 0;  ///< sim time; the thermal simulation runs from here to now
-  /// Unshadowed forcing before history start, from a steady profile; emit2014 ignores it. Scenario
-  /// files default to two days for foster.
+  std::int64_t history_start_ns = 0;  ///< sim time at which the thermal simulation starts
+  /// Length of the time before the history start in which forcing without shadows acts on a steady
+  /// profile. emit2014 ignores it. Scenario files default to two days for foster.
   std::int64_t spin_up_ns = 0;
-  /// foster: what the surroundings consist of, where the weather does not state environment_k;
-  /// empty: default_material.
+  /// foster: material of the surroundings when the weather does not state environment_k. When
+  /// empty, default_material is used.
   std::string surroundings_material;
-  /// foster: number of modes derived from the layers, 2..4; 0: the modes of the material.
+  /// foster: number of modes derived from the layers, 2 to 4; 0 takes the modes of the material.
   std::uint32_t foster_modes = 0;
   std::uint32_t steps = 27;
   StepSpacing spacing = StepSpacing::uniform;
@@ -213,25 +226,27 @@ struct ThermalOptions {
   std::uint32_t max_samples =
       1'000'000;         ///< cached: thermal samples, about 1.5 kB each at 27 steps
   bool lateral = true;   ///< cached: conduction along the surface and across convex edges
-  bool exchange = true;  ///< cached: what a face sees of others is these, not the surroundings
-  std::filesystem::path state_file;  ///< cached: the warmed-up state; empty: kept nowhere
+  bool exchange = true;  ///< cached: faces exchange radiation with the faces that they see
+  std::filesystem::path state_file;  ///< cached: file of the warmed-up state; empty: none
 };
 
+/// Place of the world's origin on the Earth.
 struct Place {
   double lat_rad = 0.0;
   double lon_rad = 0.0;
   double height_m = 0.0;
 };
 
-/// Limits of the false-colour display.
+/// Temperatures at both ends of the false-colour scale.
 struct DisplayOptions {
   double min_k = 280.0;
   double max_k = 330.0;
 };
 
+/// All that a scenario file says.
 struct ScenarioDesc {
   std::string name;
-  std::filesystem::path file;  ///< where it came from, for messages
+  std::filesystem::path file;  ///< the file itself, for messages
   Place place;
   std::int64_t epoch_utc_ns = 0;       ///< POSIX ns (UTC) of sim time 0
   std::vector<WeatherSample> weather;  ///< empty: clear_sky
@@ -239,7 +254,7 @@ struct ScenarioDesc {
   AtmosphereDesc atmosphere;
   std::vector<SpectralBand> bands;
   std::vector<Material> materials;  ///< library plus the scenario's own
-  std::string default_material;     ///< for glTF materials nothing maps
+  std::string default_material;     ///< for glTF materials that nothing maps
   std::vector<ObjectDesc> objects;
   SensorDesc sensor;
   std::vector<ChannelDesc> channels;

@@ -9,23 +9,25 @@
 /// insulated middle, and a thin one behaves like that under any fluxes.
 namespace emit::scene {
 
-/// Of a sheet's body: 20 W m-2 K-1 on either face leave a twentieth of what they drive as a
-/// difference.
+/// Largest resistance of a sheet's body from face to face. Films of 20 W m-2 K-1 on either face
+/// leave a twentieth of what they drive as a difference between the faces.
 inline constexpr double kMaxSheetResistanceM2kW = 5e-3;
-/// A lighter layer is the air behind; a body is the layers in front of the first one.
+/// A layer lighter than this is the air behind a body. The body is made of the layers in front of
+/// the first such layer.
 inline constexpr double kMaxGasKgM3 = 10.0;
 
-/// What a sheet of this material is made of: half of its body's layers, `sheet` set. None where the
-/// material is prescribed, has no body, or one that is no sheet. Modes of emit2014 become one, rho
-/// c d / 2 over a film of 19 W m-2 K-1; its conductance to the core, which that model has for want
-/// of convection, is that of the material or of the air behind.
+/// The material of a sheet made of this material: half of its body's layers, with `sheet` set.
+/// Nothing when the material has a prescribed temperature, has no body, or has one that is too
+/// thick. The modes of emit2014 become a single one, rho c d / 2 over a film of 19 W m-2 K-1. Its
+/// conductance to the core, which stands for convection in that model, is the material's own or
+/// that of the air behind.
 [[nodiscard]] std::optional<Material> sheet_of(const Material& material);
 
 /// True where the mesh has double-sided faces and is not the surface of a closed body.
 [[nodiscard]] bool may_have_sheets(const Mesh& mesh);
 
-/// Gives double-sided faces of thin materials the material of a sheet, appended to
-/// SceneGeometry::materials. Not the faces of closed bodies: nothing gets to their other side.
+/// Gives double-sided faces of thin materials the material of a sheet, which is appended to
+/// SceneGeometry::materials. Faces of closed bodies keep theirs: nothing gets to their other side.
 /// Setup only.
 void adopt_sheets(SceneGeometry& geometry);
 

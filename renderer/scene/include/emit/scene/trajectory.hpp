@@ -7,13 +7,15 @@
 
 namespace emit::scene {
 
+/// Pose and on state at one instant.
 struct TrajectoryState {
   physics::Pose pose;
   bool on = true;
 };
 
-/// Pose and on state at an instant: interpolated between keyframes, constant outside, no motion
-/// towards a keyframe marked teleport. @pre not empty, ascending. RT-safe.
+/// Pose and on state at an instant. They are interpolated between keyframes and constant before the
+/// first and after the last one. There is no motion towards a keyframe marked teleport. RT-safe.
+/// @pre the trajectory is not empty and ascends in time.
 [[nodiscard]] TrajectoryState trajectory_at(const Trajectory& keyframes,
                                             std::int64_t sim_time_ns) noexcept;
 
