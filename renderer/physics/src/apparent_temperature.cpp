@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 

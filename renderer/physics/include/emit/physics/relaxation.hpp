@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "emit/physics/check.hpp"
+
 /// Relaxation of a surface towards its equilibrium temperature as a sum of exponentials:
 ///
 ///   T(t) = sum w_i x_i(t),   tau_i x_i' = u(t) - x_i,   sum w_i = 1        (physics.md eq. 5)
