@@ -48,8 +48,8 @@ struct ClimateOptions {
 /// immutable afterwards and serves any number of threads.
 class SurfaceClimate {
  public:
-  /// Creates the climate. Errors: invalid_argument (step_s is not positive or gives 10 million nodes
-  /// or more), config (the surroundings material is unknown or has no layers).
+  /// Creates the climate. Errors: invalid_argument (step_s is not positive or gives 10 million
+  /// nodes or more), config (the surroundings material is unknown or has no layers).
   [[nodiscard]] static physics::Result<SurfaceClimate> create(const scene::ScenarioDesc& scenario,
                                                               const ClimateOptions& options);
 
