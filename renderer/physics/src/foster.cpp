@@ -13,7 +13,7 @@ std::complex<double> stack_impedance_m2k_w(std::span<const StackLayer> layers,
     const std::complex<double> g = std::sqrt(std::complex<double>(
         0.0, angular_rad_s * layer->volumetric_heat_j_m3_k / layer->conductivity_w_m_k));
     const std::complex<double> gd = g * layer->thickness_m;
-    // A thin layer is a plain resistance; tanh(gd)/gd would lose digits.
+    // Treat a thin layer as a plain resistance: its own impedance is infinite at frequency 0.
     if (std::abs(gd) < 1e-6) {
       z += layer->thickness_m / layer->conductivity_w_m_k;
       continue;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+
 #include "emit/physics/check.hpp"
 
 namespace emit::physics {

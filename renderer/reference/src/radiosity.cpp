@@ -250,9 +250,9 @@ double SunOnFaces::mean_frac(const SceneInstant& scene, const glm::dvec3& to_sun
 
 void SunOnFaces::visible_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
                               std::span<double> out) const {
+  EMIT_CHECK_OP(out.size(), ==, faces_.size());
   // Test sun or shade by one ray per face. Then integrate the faces beside a change, and from there
   // on their neighbours as long as the disc is partly covered. This covers every penumbra.
-  EMIT_CHECK_OP(out.size(), ==, faces_.size());
   const std::size_t n = faces_.size();
   const auto towards = [&](std::size_t f) {
     return !surfaces_[f].enclosed && glm::dot(surfaces_[f].normal, to_sun) > 0.0;

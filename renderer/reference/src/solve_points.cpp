@@ -146,8 +146,8 @@ std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
     }
     return std::pair(sample, sun);
   };
-  // Halve an interval until the sun's share is even over it.
   double last_sun = 0.0;
+  // Halve an interval until the sun's share is even over it.
   std::function<void(std::int64_t, double, std::int64_t, double, std::int64_t)> between =
       [&](std::int64_t from, double sun_from, std::int64_t to, double sun_to,
           std::int64_t shortest) {

@@ -205,16 +205,16 @@ Result<void> SolidHistory::spin_up() {
       out.air_k[f] = face.air_k;
     }
   };
+  // Advance from the steady profile to the start of the history.
   solver->set_temperature(start_s, steady);
   const auto reached = solver->advance(
       history_s, drive_open, [&](double) { return !options_.progress || options_.progress(0.0); });
   if (!reached) return tl::unexpected(reached.error());
-  // Advance from the steady profile to the start of the history.
+  // Take over the temperatures.
   const NodeField field(coarse->grid(), *solver);
   solver_->set_temperature(history_s, [&](const glm::dvec3& p) { return field.at(p); });
   spin_up_stats_ = solver->stats();
   return {};
-  // Take over the temperatures.
 }
 
 void SolidHistory::drive(double time_s, std::span<const double> face_k, const FaceDrive& out) {

@@ -15,7 +15,7 @@ std::vector<std::complex<double>> periodic_response(const LayerMesh& mesh, doubl
   // Eliminate from the base upwards. Everything below a node then acts as one complex ratio of the
   // node below to the node.
   std::vector<Complex> ratio(nodes, Complex(0.0, 0.0));  // T_i+1 = ratio_i T_i
-  Complex diagonal(0.0, 0.0);                            ///< the pivot of the row
+  Complex diagonal(0.0, 0.0);                            // pivot of the row
   // Assemble the row of K + i w M and fold the rows below into its diagonal.
   for (std::size_t i = unknowns; i-- > 0;) {
     const double up = i > 0 ? conductance[i - 1] : 0.0;

@@ -230,7 +230,7 @@ double LayerSolver::solve_face(const Face& face, double frac, double pivot, doub
     const double change = (rhs + gain * flux.flux_w_m2 - pivot * x) / slope;
     x += change;
     if (std::abs(change) <= 4.0e-15 * (std::abs(base_k) + std::abs(x))) {
-      flux.flux_w_m2 += flux.slope_w_m2_k * change;  ///< the flux at the converged temperature
+      flux.flux_w_m2 += flux.slope_w_m2_k * change;  // the flux at the converged temperature
       return x;
     }
   }

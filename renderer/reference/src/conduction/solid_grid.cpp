@@ -47,15 +47,15 @@ void fill_span(const GradedLines& wanted, double from, double to, std::vector<do
 }  // namespace
 
 std::vector<double> graded_lines(const GradedLines& wanted, double merge_m) {
+  EMIT_CHECK(!wanted.fixed_m.empty());
   // Merge fixed places that are too close together.
   std::vector<double> fixed = wanted.fixed_m;
-  EMIT_CHECK(!fixed.empty());
   std::sort(fixed.begin(), fixed.end());
   std::vector<double> kept{fixed.front()};
   for (const double place : fixed) {
     if (place > kept.back() + merge_m) kept.push_back(place);
-    EMIT_CHECK_OP(kept.size(), >=, 2U);
   }
+  EMIT_CHECK_OP(kept.size(), >=, 2U);
   // Fill the spans between the fixed lines.
   std::vector<double> lines{kept.front()};
   for (std::size_t i = 0; i + 1 < kept.size(); ++i) fill_span(wanted, kept[i], kept[i + 1], lines);

@@ -94,7 +94,7 @@ ConeTree::ConeTree(std::span<const std::array<glm::dvec3, 3>> triangles) {
           return centres[a][axis] != centres[b][axis] ? centres[a][axis] < centres[b][axis] : a < b;
         });
     open.push_back({middle, range.end, index, true});
-    // Taken next, so that it follows its parent.
+    // Push the first half last: it is taken next and thereby follows its parent.
     open.push_back({range.begin, middle, index, false});
   }
 }

@@ -140,8 +140,8 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
   now_ns_ = start_ns;
   climate_row_ = 0;
   view_row_ = 0;
-  // Replace empty views by open ones.
   back_row_ = 0;
+  // Replace empty views by open ones.
   const ViewSample open = open_view(normal);
   const ViewSample open_behind = open_view(-normal);
   const Views seen{views.front.empty() ? std::span(&open, 1) : views.front,

@@ -185,8 +185,8 @@ SkyView SceneInstant::sky_view(const SurfacePoint& point, std::uint32_t rays,
   // Define one measure: shares of sky and of ground along a sequence of directions.
   const auto measure = [&](const auto& direction, Share& sky, Share& ground) {
     BlockMean above(rays);
-    // A ray that leaves the scene shows sky above the horizon and surroundings below it.
     BlockMean below(rays);
+    // A ray that leaves the scene shows sky above the horizon and surroundings below it.
     trace(*impl_, point, rays, direction,
           [&](std::uint32_t i, bool seen, const glm::dvec3& towards) {
             above.add(i, seen && towards.z >= 0.0 ? 1.0 : 0.0);
