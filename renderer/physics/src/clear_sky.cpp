@@ -50,8 +50,8 @@ SolarIrradiance clear_sky_irradiance(const SunPosition& sun, Metres height,
   const double b = 0.664 + 0.163 / fh1;
   const double direct =
       extraterrestrial * std::max(0.0, b * std::exp(-0.09 * air_mass * (tl - 1.0)));
-  // At low turbidity the fit of the direct irradiance exceeds what the global irradiance allows.
-  // Limit it.
+  // Limit the direct irradiance: at low turbidity its fit exceeds what the global irradiance
+  // allows.
   const double direct_limit =
       global *
       std::max(0.0, (1.0 - (0.1 - 0.2 * std::exp(-tl)) / (0.1 + 0.882 / fh1)) / cos_zenith);

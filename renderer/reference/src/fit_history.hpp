@@ -34,11 +34,11 @@ struct FitProblem {
   double base_k = 0.0;
   double initial_k = 0.0;
   double resistance_m2k_w = 0.0;
-  double core_conductance_w_m2_k = 0.0;  ///< for emit2014
+  double core_conductance_w_m2_k = 0.0;  ///< used by emit2014
   FitHistory beginning;                  ///< spin-up; it may have residuals of its own
   std::vector<FitHistory> histories;
   std::vector<double> step_lengths_s;
-  double truth_at_start_k = 0.0;  ///< at the start of the histories
+  double truth_at_start_k = 0.0;  ///< true temperature at the start of the histories
 
   /// Fills FitStep::gains and step_lengths_s.
   void index_steps();

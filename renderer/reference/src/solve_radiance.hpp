@@ -43,7 +43,7 @@ class BandRadiance {
   [[nodiscard]] double emissivity(const scene::Material& material) const;
   /// Cosine-weighted mean of the sky's radiance, W m-2 sr-1.
   [[nodiscard]] double sky_mean() const noexcept { return sky_mean_; }
-  /// In-band irradiance of the sun across its direction, W m-2.
+  /// Irradiance of the sun in the band, across its direction, W m-2.
   [[nodiscard]] double sun_w_m2() const noexcept { return sun_w_m2_; }
   /// Returns the radiance `leaving` as seen through `range_m` of air, along a line of sight with
   /// this sine of the elevation.

@@ -103,7 +103,7 @@ physics::Result<LayerMesh> LayerMesh::build(std::span<const SolidLayer> given, c
 
   // Measure every layer in the diffusion coordinate s = integral dz / sqrt(a).
   double total_s = 0.0;
-  std::vector<double> length_s;  // of each layer, in the root of seconds
+  std::vector<double> length_s;  // one per layer, s^0.5
   for (const SolidLayer& layer : layers) {
     length_s.push_back(layer.thickness_m *
                        std::sqrt(layer.heat_capacity_j_m3_k / layer.conductivity_w_m_k));
@@ -196,7 +196,7 @@ void LayerMesh::assemble_mass() {
         from_below = b;
       }
     } else if (i == cells && !base_held()) {
-      from_above = above / 12.0;  // without flux the profile is even about the base
+      from_above = above / 12.0;  // the profile is even about a base without flux
     }
     mass_above_[i] = from_above;
     mass_below_[i] = from_below;

@@ -128,7 +128,7 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
   impl->desc = std::move(desc);
   impl->arithmetic = arithmetic;
 
-  // Sort the triangles into sets: one for everything static, one per mover.
+  // Sort the triangles into sets: one for everything static, one per entity.
   std::vector<RaySet::Builder> builders(1 + impl->desc.movers.size());
   for (std::size_t m = 0; m < impl->desc.meshes.size(); ++m) {
     const RayMesh& mesh = impl->desc.meshes[m];
@@ -162,7 +162,7 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
 SceneInstant RayScene::at(std::int64_t sim_time_ns) const {
   auto instant = std::make_shared<SceneInstant::Impl>();
   instant->scene = impl_.get();
-  // Place every mover at its pose and find the centre of its set.
+  // Place every entity at its pose and find the centre of its set.
   for (std::size_t i = 0; i < impl_->movers.size(); ++i) {
     const scene::TrajectoryState state =
         scene::trajectory_at(impl_->desc.movers[i].poses, sim_time_ns);
@@ -240,7 +240,7 @@ PreparedRay SceneInstant::Impl::in_mover(const PlacedMover& mover, const Ray& ra
 
 bool SceneInstant::Impl::near(const PlacedMover& mover, const Ray& ray) const noexcept {
   if (!mover.on || mover.set->empty()) return false;
-  // Test the ray against the ball around the mover.
+  // Test the ray against the ball around the entity.
   const glm::dvec3 to_centre = mover.centre_world_m - ray.origin_world_m;
   const double distance2 = glm::dot(to_centre, to_centre);
   const double radius_m = mover.set->radius_m() * 1.000001;
@@ -257,7 +257,7 @@ std::uint32_t SceneInstant::Impl::blocked_16(std::span<const Ray> rays) const {
   // Test the static set with all rays at once.
   for (std::size_t i = 0; i < rays.size(); ++i) prepared[i] = in_fixed(rays[i]);
   scene->fixed->occluded_16({prepared.data(), rays.size()}, blocked);
-  // Test the remaining rays against the movers near them.
+  // Test the remaining rays against the entities near them.
   for (const PlacedMover& mover : movers) {
     if (blocked == all) break;
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -319,7 +319,7 @@ std::optional<RayHit> SceneInstant::first_hit(const Ray& ray) const {
     set = impl_->scene->fixed.get();
     limit_m = hit.triangle.distance_m;
   }
-  // Look for nearer hits on the movers.
+  // Look for nearer hits on the entities.
   for (const PlacedMover& mover : impl_->movers) {
     SetHit nearer;
     if (!impl_->near(mover, ray)) continue;
@@ -363,7 +363,7 @@ void SceneInstant::Impl::gather(const SurfacePoint& point, const glm::dvec3& axi
       out.push_back(corners);
     }
   };
-  // Search the static set, then every mover in its own frame.
+  // Search the static set, then every entity in its own frame.
   add(*scene->fixed, point.position_world_m - scene->fixed->origin_m(), axis, nullptr);
   for (const PlacedMover& mover : movers) {
     if (!mover.on || mover.set->empty()) continue;

@@ -42,9 +42,9 @@ struct SceneInstant::Impl {
   [[nodiscard]] double plane_m(const glm::dvec3& point_world_m, double tolerance_m) const noexcept;
   /// Returns the ray relative to the static set.
   [[nodiscard]] PreparedRay in_fixed(const Ray& ray) const noexcept;
-  /// Returns the ray in the frame of a mover's set.
+  /// Returns the ray in the frame of an entity's set.
   [[nodiscard]] PreparedRay in_mover(const PlacedMover& mover, const Ray& ray) const noexcept;
-  /// Returns true if the ray may hit the mover.
+  /// Returns true if the ray may hit the entity.
   [[nodiscard]] bool near(const PlacedMover& mover, const Ray& ray) const noexcept;
 
   /// Returns a mask whose bit i is set if rays[i] is blocked.

@@ -43,7 +43,7 @@ struct SetHit {
 class RaySet {
  public:
   struct Builder {
-    std::vector<std::array<glm::dvec3, 3>> triangles;  ///< in the coordinates of the frame
+    std::vector<std::array<glm::dvec3, 3>> triangles;  ///< coordinates of the frame, m
     std::vector<TriangleSource> sources;
   };
   /// Builds the hierarchy. Errors: invalid_argument (too many triangles, wider than 1e15 m),

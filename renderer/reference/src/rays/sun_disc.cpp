@@ -25,7 +25,7 @@ constexpr double kClip = 2.0;
 
 /// Gauss-Legendre rule of kNodes points.
 struct GaussRule {
-  std::array<double, kNodes> node;  ///< in (-1, 1)
+  std::array<double, kNodes> node;  ///< abscissae in (-1, 1)
   std::array<double, kNodes> weight;
 };
 
@@ -365,8 +365,8 @@ void add_breaks(const std::vector<Outline>& outlines, std::vector<double>& break
 std::array<glm::dvec3, 3> tangent_plane_cover(const glm::dvec3& normal, double radius) noexcept {
   const glm::dvec2 across(normal.x, normal.y);
   const double size = glm::length(across);
-  // Find the line of the tangent plane on the plane z = 1; its light side is across . p + normal.z
-  // > 0.
+  // Find the line of the tangent plane on the plane z = 1; its light side is dot(across, p) +
+  // normal.z > 0.
   const glm::dvec2 inward = across / size;
   const glm::dvec2 along(-inward.y, inward.x);
   const glm::dvec2 foot = -inward * (normal.z / size);
@@ -434,7 +434,7 @@ DiscShare visible_disc_share(std::span<const std::array<glm::dvec3, 3>> triangle
       if (breaks[i + 1] > breaks[i]) covered += integral.covered(breaks[i], breaks[i + 1]);
     }
   } else {
-    // With too many outlines use even chords, and compare the two halves for an error estimate.
+    // Use even chords for too many outlines, and compare the two halves for an error estimate.
     double even = 0.0;
     double odd = 0.0;
     for (std::size_t i = 0; i < kEvenChords; ++i) {

@@ -16,7 +16,7 @@ struct AtmosphereGrid {
   std::vector<double> range_m;                ///< ascending, >= 0
   std::vector<double> elevation_rad;          ///< ascending, -pi/2..pi/2; a single one fits all
   std::vector<double> transmittance_frac;     ///< 0..1, must not rise with range
-  std::vector<double> path_radiance_w_m2_sr;  ///< in-band radiance, >= 0
+  std::vector<double> path_radiance_w_m2_sr;  ///< >= 0, in the band
 
   [[nodiscard]] bool empty() const noexcept { return range_m.empty(); }
 };

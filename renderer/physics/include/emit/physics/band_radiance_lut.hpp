@@ -9,7 +9,7 @@
 
 namespace emit::physics {
 
-/// In-band radiance of a blackbody as a float32 table of y = T ln L over T, uniform in T.
+/// Table of the in-band radiance L of a blackbody: float32 values of y = T ln L, uniform in T.
 /// L = exp(y/T), and y is nearly straight, so one linear interpolation is enough (physics.md eq.
 /// 8). The shader shaders/lib/planck_lut.glsl reads the same table.
 /// Accuracy with the default options: the relative error is <= 1e-5 at 200..3000 K and <= 1e-3 at

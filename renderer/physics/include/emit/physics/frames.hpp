@@ -11,7 +11,7 @@
 /// `world_from_body`.
 namespace emit::physics {
 
-/// Position and attitude of a body in the world frame.
+/// Position and attitude of an entity or sensor in the world frame.
 struct Pose {
   glm::dvec3 position_world_m{0.0, 0.0, 0.0};
   glm::dquat world_from_body{1.0, 0.0, 0.0, 0.0};

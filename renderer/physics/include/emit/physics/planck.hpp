@@ -6,8 +6,8 @@
 #include "emit/physics/error.hpp"
 #include "emit/physics/units.hpp"
 
-/// In-band radiance of a blackbody in double (physics.md eq. 7). Gauss-Legendre panels run in x =
-/// c2 / (lambda T). All terms are positive, so nothing cancels at either end of the temperature
+/// Radiance of a blackbody in a band, in double (physics.md eq. 7). Gauss-Legendre panels run in
+/// x = c2 / (lambda T). All terms are positive, so nothing cancels at either end of the temperature
 /// scale.
 /// Any thread after construction. Real time: validate() is setup only. The rest does not allocate
 /// but takes microseconds, so pixels use BandRadianceLut.
@@ -34,7 +34,7 @@ struct Band {
 /// Errors: invalid_argument, naming the point.
 [[nodiscard]] Result<void> validate(const Band& band);
 
-/// In-band radiance L at a temperature, and its derivative.
+/// Radiance L of a blackbody in a band, and its derivative.
 struct BandRadiance {
   double radiance_w_m2_sr = 0.0;      ///< L; 0 where it underflows double
   double derivative_w_m2_sr_k = 0.0;  ///< dL/dT

@@ -23,7 +23,7 @@ struct GeoPlace {
 /// Direction and distance of the sun, seen from a place.
 struct SunPosition {
   glm::dvec3 direction_enu{0.0, 0.0, 1.0};  ///< unit vector from the place to the sun's centre
-  Radians azimuth;                          ///< from north through east, [0, 2 pi)
+  Radians azimuth;                          ///< clockwise from north, [0, 2 pi)
   Radians elevation;                        ///< topocentric, airless
   double distance_au = 1.0;                 ///< distance from the place to the sun, au
 };

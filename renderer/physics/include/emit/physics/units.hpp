@@ -58,7 +58,7 @@ using Kelvin = Quantity<struct KelvinTag>;
 using Metres = Quantity<struct MetresTag>;
 using Micrometres = Quantity<struct MicrometresTag>;
 using Radians = Quantity<struct RadiansTag>;
-/// In-band radiance, W m-2 sr-1.
+/// Radiance in a band, W m-2 sr-1.
 using Radiance = Quantity<struct RadianceTag>;
 /// Spectral radiance, W m-2 sr-1 um-1.
 using SpectralRadiance = Quantity<struct SpectralRadianceTag>;

@@ -68,7 +68,7 @@ struct FitResult {
   physics::FosterNetwork network;            ///< result of a fit of foster
   std::vector<scene::RelaxationMode> modes;  ///< result of a fit of emit2014
   std::vector<FitResidual> residuals;
-  double rms_k = 0.0;  ///< of the worst history
+  double rms_k = 0.0;  ///< largest of all histories
   double max_k = 0.0;
   /// Length of the fitted time, including the part of the spin-up that counted.
   double horizon_s = 0.0;
