@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/frames.hpp"
 
@@ -117,6 +118,7 @@ inline constexpr std::uint32_t kMaxEveryNth = 1000;
 /// @pre every_nth > 0
 [[nodiscard]] constexpr bool is_every_nth(std::uint64_t frame_number,
                                           std::uint32_t every_nth) noexcept {
+  EMIT_CHECK_OP(every_nth, >, 0U);
   return every_nth == 1 || frame_number % every_nth == 1;
 }
 

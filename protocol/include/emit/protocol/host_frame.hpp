@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/frames.hpp"
 
 /// Host frames as plain structs of fixed size, which the rings between agents carry (docs/wire.md
@@ -57,6 +58,7 @@ struct HostFrameData {
   /// Returns the entities in use.
   /// @pre entity_count <= kMaxEntitiesPerFrame
   [[nodiscard]] std::span<const EntityStateData> entity_span() const noexcept {
+    EMIT_CHECK_OP(entity_count, <=, kMaxEntitiesPerFrame);
     return {entities.data(), entity_count};
   }
 };

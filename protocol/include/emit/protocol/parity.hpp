@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/protocol/fragment.hpp"
 
 /// Forward error correction of a frame's fragments (docs/wire.md section 4): a Reed-Solomon erasure
@@ -56,6 +57,7 @@ struct ParityGeometry {
   /// Returns the number of data fragments in a group.
   /// @pre group < groups
   [[nodiscard]] std::uint32_t group_size(std::uint32_t group) const noexcept {
+    EMIT_DCHECK_OP(group, <, groups);
     return (fragments - group - 1) / groups + 1;
   }
   /// Returns the index within the frame of the fragment at a position of a group.
@@ -138,6 +140,8 @@ class ParityEncoder {
   /// @pre encode_some() returned true for this frame, and first + count <= datagram_count()
   [[nodiscard]] std::span<const std::byte> datagrams(std::uint32_t first,
                                                      std::uint32_t count) const noexcept {
+    EMIT_CHECK_OP(encoded_groups_, ==, geometry_.groups);
+    EMIT_CHECK_OP(std::uint64_t{first} + count, <=, datagram_count());
     return std::span(memory_).subspan(std::size_t{first} * datagram_bytes(),
                                       std::size_t{count} * datagram_bytes());
   }

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/protocol/frame_header.hpp"
 
@@ -172,6 +173,7 @@ class RingReader {
   /// Returns the length of a channel's pixels, bytes.
   /// @pre channel < channel_count()
   [[nodiscard]] std::uint64_t pixel_bytes(std::size_t channel) const noexcept {
+    EMIT_CHECK_OP(channel, <, channels_.size());
     return channels_[channel].pixel_bytes;
   }
   /// Returns the wall instant of the daemon's start, ns TAI.
