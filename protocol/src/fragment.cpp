@@ -133,7 +133,7 @@ Fragmenter::Fragmenter(const Params& params,
       std::clamp(params.max_payload_bytes, kMinFragmentPayloadBytes, kMaxFragmentPayloadBytes) &
       ~std::uint32_t{3};
   const std::uint32_t body = kHeader + static_cast<std::uint32_t>(pixels.size());
-  // bytes used of the fragment in which the pixels end
+  // Bytes used of the fragment in which the pixels end.
   const std::uint32_t used = body % payload_bytes_;
   // When used is 0, the second header starts a fragment of its own.
   padding_bytes_ = used + kHeader > payload_bytes_ ? payload_bytes_ - used : 0;

@@ -101,7 +101,7 @@ FragmentStatus decode_parity_header(std::span<const std::byte> header, std::size
 /// Tables and arrays of the encoder. Groups of a frame differ in size by at most one fragment, so
 /// there are tables for two sizes.
 struct ParityEncoder::Code {
-  std::array<std::vector<std::uint8_t>, 2> tables;  // for the largest size, and for one less
+  std::array<std::vector<std::uint8_t>, 2> tables;  // tables for the largest size, and for one less
   std::array<const std::byte*, kMaxFecData> in{};
   std::array<std::byte*, kMaxFecParity> out{};
 };

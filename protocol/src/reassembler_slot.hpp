@@ -61,7 +61,7 @@ struct Reassembler::Slot {
   /// come out of order.
   void sum(std::size_t offset, std::span<const std::byte> payload) noexcept {
     // Every byte up to here belongs to the first header or the pixels, however long the padding is.
-    // length of the longest padding and the second header
+    // length of the longest padding and the second header.
     constexpr std::size_t kMaxTrailerBytes = 2 * kFrameHeaderBytes;
     const std::size_t certain_end =
         std::max<std::size_t>(total_bytes, kMaxTrailerBytes) - kMaxTrailerBytes;

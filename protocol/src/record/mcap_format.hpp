@@ -38,7 +38,7 @@ enum class Opcode : std::uint8_t {
   data_end = 0x0F,
 };
 inline constexpr std::size_t kRecordPrefixBytes = 9;  // length of opcode and u64 record length
-// length of a message's fields in front of its data
+// Length of a message's fields in front of its data.
 inline constexpr std::size_t kMessageFieldBytes = 22;
 
 /// Appends fields to a buffer.

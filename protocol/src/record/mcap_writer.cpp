@@ -272,7 +272,7 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
   struct stat status {};
   const bool regular = ::fstat(impl->fd, &status) == 0 && S_ISREG(status.st_mode);
   // Refuse a second writer, because two writers would make one unreadable log. (Pipes and /dev/null
-  // may have any number.)
+  // may have any number.).
   if (regular && ::flock(impl->fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return make_error(ErrorCode::io, path.string() + ": another process writes it");
   }

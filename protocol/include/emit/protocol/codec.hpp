@@ -26,13 +26,13 @@ enum class DecodeStatus : std::uint8_t {
   ok = 1,
   wrong_version = 2,  ///< protocol_version is not kProtocolVersion
   oversize = 3,       ///< over kMaxHostFrameBytes or kMaxEntitiesPerFrame
-  /// the bytes are not a HostFrame, an entity id stands twice, or the simulation time exceeds
-  /// kMaxSimTimeNs
+  /// The bytes are not a HostFrame, an entity id stands twice, or the simulation time exceeds
+  /// kMaxSimTimeNs.
   malformed = 4,
   /// A part is missing, a number is NaN or infinite, the quaternion is not of unit length, the
   /// position is too far away, or only one of the two rates is present.
   invalid_pose = 6,
-  /// a value is NaN, infinite or outside the range that docs/wire.md gives
+  /// A value is NaN, infinite or outside the range that docs/wire.md gives.
   invalid_environment = 13,
 };
 /// Returns the English name of a status, for messages. RT-safe.

@@ -41,7 +41,7 @@ struct FragmentHeader {
   std::uint8_t flags = 0;       ///< FragmentFlags; unknown bits are ignored
   std::uint16_t stream_id = 0;  ///< number of the stream, from Subscribed
   std::uint32_t frame_id = 0;   ///< counter of the frames sent on this stream; it wraps
-  /// Position of the payload in the frame's byte stream, a multiple of 4
+  /// Position of the payload in the frame's byte stream, a multiple of 4.
   std::uint32_t byte_offset = 0;
   std::uint32_t total_bytes = 0;    ///< length of the frame's byte stream, a multiple of 4
   std::uint16_t payload_bytes = 0;  ///< length of the payload, a multiple of 4, not 0
@@ -60,7 +60,7 @@ enum class FragmentStatus : std::uint8_t {
   oversize,    ///< total_bytes is too small for a frame or over the receiver's limit
   duplicate,   ///< every byte has arrived before
   overlap,     ///< some bytes have arrived before, so one of the two fragments is wrong
-  /// Total, simulation time or first/last flag contradict the frame's other fragments
+  /// Total, simulation time or first/last flag contradict the frame's other fragments.
   inconsistent,
   late,       ///< the frame was already handed out or pushed out
   no_buffer,  ///< the consumer holds every buffer

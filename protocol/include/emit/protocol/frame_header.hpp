@@ -44,10 +44,10 @@ enum FrameFlags : std::uint32_t {
   kFlagGapBefore = 1u << 9,     ///< frames before this one were not sent to this client
   kFlagCanned = 1u << 10,       ///< the pixels were rendered in advance
   kFlagTimeUnset = 1u << 11,    ///< kernel TAI offset unknown: wall instants are UTC
-  /// The trigger was late, or others before it were missing or refused
+  /// The trigger was late, or others before it were missing or refused.
   kFlagTriggerFault = 1u << 12,
   kFlagCorrupt = 1u << 13,  ///< set by a receiver: no pixel is missing, but the checksum is wrong
-  /// Set by a receiver: frames before this one were lost on the network
+  /// Set by a receiver: frames before this one were lost on the network.
   kFlagLostBefore = 1u << 14,
 };
 /// Flags that only a receiver may set. A receiver clears them where a sender set them.
@@ -87,19 +87,19 @@ struct FrameHeader {
   std::int64_t render_end_ns = 0;    ///< instant at which the device finished the frame
   std::int64_t readback_end_ns = 0;  ///< instant at which the CPU could read the pixels
   std::int64_t send_start_ns = 0;    ///< instant at which the kernel took the first byte
-  /// Frame completed last: its age in simulation time at its last byte
+  /// Frame completed last: its age in simulation time at its last byte.
   std::int64_t previous_age_ns = 0;
-  /// Frame completed last: time from the receipt of its pose to its last byte
+  /// Frame completed last: time from the receipt of its pose to its last byte.
   std::int64_t previous_delay_ns = 0;
   std::uint64_t previous_frame_number = 0;
   /// Smoothed jitter of previous_delay_ns on this client's stream, ns, as in RFC 3550: the mean of
   /// |difference of two consecutive delays|, in which the newest difference has the weight 1/16.
   std::int64_t previous_jitter_ns = 0;
-  /// Ig-clock, trigger: wall instant at which the slot began; otherwise 0
+  /// Ig-clock, trigger: wall instant at which the slot began; otherwise 0.
   std::int64_t slot_begin_ns = 0;
-  /// Trigger: number of the trigger that started the frame; otherwise 0
+  /// Trigger: number of the trigger that started the frame; otherwise 0.
   std::uint64_t trigger_number = 0;
-  /// Position error of the newest prediction whose true pose is known
+  /// Position error of the newest prediction whose true pose is known.
   float prediction_error_m = 0.0F;
   float prediction_error_rad = 0.0F;  ///< attitude error of the same prediction
   std::uint32_t predictions = 0;     ///< number of predictions of this run whose true pose is known

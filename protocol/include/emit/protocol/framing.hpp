@@ -22,9 +22,9 @@ inline constexpr std::uint32_t kDefaultMaxControlBytes = 1u << 20;
 enum class RecordKind : std::uint8_t {
   control = 1,  ///< Protobuf emit.v1.ControlRecord
   frame = 2,    ///< frame header (320 bytes), then the pixels in the encoding that it names
-  /// Protobuf emit.v1.HostFrame without the envelope; the receiver allocates nothing for it
+  /// Protobuf emit.v1.HostFrame without the envelope; the receiver allocates nothing for it.
   host_frame = 3,
-  /// Request for missing fragments (resend.hpp); the receiver allocates nothing for it
+  /// Request for missing fragments (resend.hpp); the receiver allocates nothing for it.
   resend = 4,
 };
 

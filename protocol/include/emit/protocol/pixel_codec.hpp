@@ -36,7 +36,7 @@ class PixelEncoder {
  private:
   std::vector<std::byte> state_;
   std::vector<std::byte> shuffled_;
-  // capacity_ bytes; not initialised, so no page is touched before it is needed
+  // capacity_ bytes; not initialised, so no page is touched before it is needed.
   std::unique_ptr<std::byte[]> out_;
   std::size_t capacity_ = 0;
   std::span<const std::byte> pixels_;

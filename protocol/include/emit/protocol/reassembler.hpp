@@ -67,7 +67,7 @@ struct ReassemblerCounters {
   std::uint64_t frames_lost = 0;  ///< number of frame ids of which no fragment arrived
   std::uint64_t missing_px = 0;
   std::uint64_t crc_mismatches = 0;
-  std::uint64_t resyncs = 0;             ///< how often a stream's frame ids started again
+  std::uint64_t resyncs = 0;             ///< number of restarts of a stream's frame ids
   std::uint64_t fragments_repaired = 0;  ///< fragments that error correction restored
   std::uint64_t frames_repaired = 0;     ///< frames that are complete because of error correction
   /// Groups of frames handed out that lost more fragments than they had parity fragments.

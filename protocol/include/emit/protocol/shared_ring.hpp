@@ -123,7 +123,7 @@ class RingWriter {
   std::byte* memory_;
   std::vector<RingChannelEntry> channels_;
   std::vector<RingChannelEntry> planes_;  // header_offset unused
-  // number of the publication that is being written or was completed last
+  // Number of the publication that is being written or was completed last.
   std::uint64_t publication_ = 0;
 };
 
@@ -187,7 +187,7 @@ class RingReader {
 
   const RingHead* head_ = nullptr;
   const std::byte* slots_ = nullptr;
-  // copies of the checked values: the shared memory is not read a second time
+  // Copies of the checked values: the shared memory is not read a second time.
   std::uint32_t slot_count_ = 0;
   std::uint64_t slot_bytes_ = 0;
   std::vector<RingChannelEntry> channels_;
