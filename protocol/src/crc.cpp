@@ -72,7 +72,7 @@ constexpr ShiftTable make_shift(std::size_t zero_bytes) {
   // The shift is linear, so the images of the 32 unit registers determine it.
   std::array<std::uint32_t, 32> image{};
   for (std::size_t bit = 0; bit < 32; ++bit) image[bit] = std::uint32_t{1} << bit;
-  // Doubling: image holds the shift by `step` bytes. Start with one byte.
+  // Start with the shift by one byte and double it: `image` holds the shift by `step` bytes.
   for (auto& value : image) value = (value >> 8) ^ kCastagnoliSlices[0][value & 0xFFu];
   auto apply = [](const std::array<std::uint32_t, 32>& matrix, std::uint32_t value) {
     std::uint32_t sum = 0;

@@ -50,7 +50,7 @@ class LogFile : public ::testing::Test {
     file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   }
 
-  /// Host frames 1..count, 5 ms apart, each followed by a journal entry.
+  /// Writes host frames 1..count, 5 ms apart, each followed by a journal entry.
   static void write_messages(LogWriter& writer, std::uint64_t count) {
     auto frame = test::make_host_frame(2);
     for (std::uint64_t i = 1; i <= count; ++i) {
@@ -327,7 +327,7 @@ class TemporaryFolder {
   std::optional<std::string> before_;
 };
 
-/// A file in memory has no folder that takes another one, whoever runs the test.
+/// A file in memory has no folder that takes another file, whoever runs the test.
 TEST_F(LogFile, AFileWhoseFolderTakesNoIndexIsWrittenOrStaysAsItWas) {
   const int fd = ::memfd_create("log", MFD_CLOEXEC);
   ASSERT_GE(fd, 0);

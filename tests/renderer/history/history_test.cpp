@@ -216,7 +216,7 @@ TEST(Environment, takes_weather_with_every_pose_for_hours) {
   sample.air_k = 290.0;
   for (int i = 0; i < 100'000; ++i) {
     sample.sim_time_ns = i * 5'000'000LL;
-    ASSERT_TRUE(environment.append(sample));  // unchanged
+    ASSERT_TRUE(environment.append(sample));  // the weather is unchanged
   }
   EXPECT_EQ(environment.changes_ns().size(), 1U);
   for (int i = 100'000; i < 200'000; ++i) {

@@ -74,7 +74,7 @@ void add_trees_and_fence(Scene& scene, std::uint32_t seed) {
     add_tree(trees, random, -590.0 + 20.0 * i + random.between(-3.0, 3.0),
              -520.0 + random.between(-6.0, 6.0));
   }
-  for (int i = 0; i < 24; ++i) {  // between the buildings
+  for (int i = 0; i < 24; ++i) {  // single trees between the buildings
     add_tree(trees, random, random.between(-460.0, -330.0), random.between(20.0, 180.0));
   }
   scene.place(scene.add_mesh(trees.take()), "trees");

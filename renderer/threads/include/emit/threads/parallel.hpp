@@ -19,7 +19,7 @@
 namespace emit::threads {
 
 /// Calls body(part) for parts of `range` on all cores.
-/// @param range        as for tbb::parallel_for
+/// @param range        a range of tbb::parallel_for
 /// @param partitioner  none, or one of oneTBB's partitioners
 template <class Range, class Body, class... Partitioner>
 void parallel_ranges(const Range& range, const Body& body, const Partitioner&... partitioner) {

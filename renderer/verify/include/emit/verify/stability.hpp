@@ -83,10 +83,10 @@ struct NamedBand {
 /// Recorded history of one surface: the equilibrium temperature at nodes, linear in between.
 struct DriveHistory {
   std::string name;
-  std::vector<double> node_s;   ///< ascending
+  std::vector<double> node_s;   ///< times of the nodes, ascending
   std::vector<double> drive_k;  ///< one value per node
   double start_k = 0.0;
-  std::vector<double> tau_s;        ///< 1..3 modes
+  std::vector<double> tau_s;        ///< one value per mode, 1..3 modes
   std::vector<double> weight_frac;  ///< one weight per mode
 };
 /// Cuts every interval of every history into `splits` equal parts (each 1..1000), with the drive

@@ -53,20 +53,20 @@ struct BlockOnRoadOptions {
 struct RibbedOptions {
   std::uint32_t ribs = 8;      ///< 1 .. 1000
   double pitch_m = 0.5;        ///< distance from rib to rib
-  double rib_width_m = 0.25;   ///< in (0, pitch_m)
+  double rib_width_m = 0.25;   ///< > 0 and < pitch_m
   double rib_height_m = 0.25;  ///< > 0
   double length_m = 4.0;       ///< > 0
 };
 
 /// Airfield of about a square kilometre. The plan is in airfield.hpp.
 struct AirfieldOptions {
-  std::uint32_t seed = 1;  ///< places trees, cars and small things
+  std::uint32_t seed = 1;  ///< seed of the places of trees, cars and small things
 };
 
 /// Options of generate(). Only those of `kind` are used.
 struct GenerateOptions {
   SceneKind kind = SceneKind::box;
-  std::filesystem::path directory;  ///< created when missing
+  std::filesystem::path directory;  ///< folder of the files; it is created when missing
   BoxOptions box;
   StatueOptions statue;
   BlockOnRoadOptions block_on_road;
