@@ -14,7 +14,7 @@ renderer/physics:
 renderer/image: renderer/physics
 renderer/scene: renderer/physics
 renderer/scene/generate: renderer/physics
-renderer/threads:
+renderer/threads: renderer/physics
 renderer/reference: renderer/physics renderer/scene
 renderer/reference/src/rays: renderer/reference renderer/physics renderer/scene renderer/threads
 renderer/reference/src/conduction: renderer/reference renderer/reference/src/rays renderer/physics renderer/scene renderer/threads
