@@ -51,7 +51,7 @@ void resolve_daemon_scenario(const Node& root, const std::string& text, DaemonCo
 }
 
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
-  Diagnostics reported_before;  // section() reported wrong kinds already
+  Diagnostics reported_before;  // section() has reported wrong kinds
   const Node& pacing = section(root, "pacing", reported_before);
   if (daemon.pacing.mode != PacingMode::host_step &&
       daemon.pacing.display_delay_ns > daemon.pacing.horizon_ns) {
@@ -108,8 +108,8 @@ bool is_endpoint(std::string_view text) {
 }
 
 bool is_shm_name(std::string_view text) noexcept {
-  constexpr std::size_t kMostCharacters = 64;
-  return !text.empty() && text.size() <= kMostCharacters && is_ascii_alnum(text.front()) &&
+  constexpr std::size_t kMaxCharacters = 64;
+  return !text.empty() && text.size() <= kMaxCharacters && is_ascii_alnum(text.front()) &&
          std::all_of(text.begin(), text.end(),
                      [](char c) { return is_ascii_alnum(c) || c == '_' || c == '-' || c == '.'; });
 }

@@ -18,16 +18,16 @@ class Environment {
 
   explicit Environment(const scene::ScenarioDesc& scenario);
 
-  /// Holds from its time on until the next one; false when time goes back. A sample equal to the
+  /// Holds from its time on until the next one; false when time goes back. A row equal to the
   /// newest changes nothing. When the store is full, its oldest half is thinned to every other one.
-  bool append(const scene::WeatherSample& sample) noexcept;
+  bool append(const physics::WeatherSample& row) noexcept;
   void reset() noexcept;
 
   /// Instants at which live weather changes, ascending.
   [[nodiscard]] std::span<const std::int64_t> changes_ns() const noexcept { return changes_ns_; }
 
   /// What the host sent and is kept, ascending.
-  [[nodiscard]] std::span<const physics::WeatherRow> live() const noexcept { return live_; }
+  [[nodiscard]] std::span<const physics::WeatherSample> live() const noexcept { return live_; }
 
   /// The earliest instant from which the weather is not what it was at that revision; the lowest
   /// there is where it may be any, the highest where nothing has changed.
@@ -44,8 +44,8 @@ class Environment {
   physics::GeoPlace place_;
   std::int64_t epoch_utc_ns_ = 0;
   physics::ClearSky clear_sky_;
-  std::vector<physics::WeatherRow> table_;
-  std::vector<physics::WeatherRow> live_;
+  std::vector<physics::WeatherSample> table_;
+  std::vector<physics::WeatherSample> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of live_
   std::vector<std::uint64_t> revisions_;  ///< of live_, ascending
   std::uint64_t revision_ = 0;

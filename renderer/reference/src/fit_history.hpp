@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "emit/physics/constants.hpp"
 #include "emit/reference/fit.hpp"
 
 namespace emit::reference {
@@ -10,13 +11,12 @@ namespace emit::reference {
 /// Part of a history over which the drive is linear; samples of the truth at some of the ends.
 struct FitStep {
   double dt_s = 0.0;
-  physics::FosterDrive<double> begin;  ///< air as an offset from kFitReferenceK
+  physics::FosterDrive<double> begin;  ///< air as an offset from physics::kReferenceK
   physics::FosterDrive<double> end;
   double truth_k = 0.0;     ///< at the end
   double weight = 0.0;      ///< 0: no residual here
   std::uint32_t gains = 0;  ///< which of the distinct step lengths
 };
-inline constexpr double kFitReferenceK = 295.0;
 
 struct FitHistory {
   std::string name;

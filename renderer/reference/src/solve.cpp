@@ -13,9 +13,10 @@
 #include <numeric>
 #include <optional>
 
-#include "emit/threads/parallel.hpp"
+#include "emit/physics/weather.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
+#include "emit/threads/parallel.hpp"
 #include "solve_checkpoint.hpp"
 #include "solve_points.hpp"
 #include "solve_radiance.hpp"
@@ -51,17 +52,8 @@ std::uint64_t mix(std::uint64_t x) {
 
 /// Share of the direct sun that clouds take: the weather table's, linear, or the model's.
 double cloud_frac_at(const scene::ScenarioDesc& scenario, std::int64_t sim_time_ns) {
-  const auto& rows = scenario.weather;
-  if (rows.empty()) return scenario.clear_sky.cloud_frac;
-  const auto after =
-      std::upper_bound(rows.begin(), rows.end(), sim_time_ns,
-                       [](std::int64_t t, const auto& row) { return t < row.sim_time_ns; });
-  if (after == rows.begin()) return rows.front().cloud_frac;
-  if (after == rows.end()) return rows.back().cloud_frac;
-  const auto& before = *(after - 1);
-  const double share = static_cast<double>(sim_time_ns - before.sim_time_ns) /
-                       static_cast<double>(after->sim_time_ns - before.sim_time_ns);
-  return before.cloud_frac + share * (after->cloud_frac - before.cloud_frac);
+  if (scenario.weather.empty()) return scenario.clear_sky.cloud_frac;
+  return physics::forcing_from_rows(scenario.weather, sim_time_ns).cloud_frac;
 }
 
 /// The pixels with the smallest hashes: a random-looking choice, the same every time.

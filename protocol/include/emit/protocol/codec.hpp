@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/version.hpp"
 
@@ -15,9 +16,10 @@ namespace emit::protocol {
 /// Largest encoded host frame: one UDP datagram.
 inline constexpr std::size_t kMaxHostFrameBytes = 65507;
 /// Positions farther from the origin are refused, m.
-inline constexpr double kMaxPositionM = 1e8;
+inline constexpr double kMaxPositionM = physics::limits::kMaxPositionM;
 /// Simulation times farther from the scenario's epoch are refused, ns: 1e9 s, as in scenarios.
-inline constexpr std::int64_t kMaxSimTimeNs = 1'000'000'000'000'000'000;
+inline constexpr auto kMaxSimTimeNs =
+    static_cast<std::int64_t>(physics::limits::kMaxSimTimeS * 1e9);
 
 /// Values are those of emit.v1.Status.Code.
 enum class DecodeStatus : std::uint8_t {

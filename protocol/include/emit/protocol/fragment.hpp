@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/frame_header.hpp"
 
 /// UDP fragments of a frame: each one describes itself (docs/wire.md).
@@ -20,8 +21,8 @@ inline constexpr std::uint32_t kFragmentMagic = 0x474D4645;  ///< "EFMG" as byte
 inline constexpr std::uint8_t kFragmentVersion = 1;
 inline constexpr std::size_t kFragmentHeaderBytes = 32;
 /// Smallest payload: the frame header fits into fragment 0. Largest: a UDP datagram over IPv4.
-inline constexpr std::uint32_t kMinFragmentPayloadBytes = 320;
-inline constexpr std::uint32_t kMaxFragmentPayloadBytes = 65472;
+inline constexpr std::uint32_t kMinFragmentPayloadBytes = physics::limits::kFragmentPayloadBytes.lo;
+inline constexpr std::uint32_t kMaxFragmentPayloadBytes = physics::limits::kFragmentPayloadBytes.hi;
 
 enum FragmentFlags : std::uint8_t {
   kFragmentFirst = 1u << 0,  ///< begins with the frame header

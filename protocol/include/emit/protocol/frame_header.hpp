@@ -7,6 +7,7 @@
 
 #include "emit/physics/error.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/physics/limits.hpp"
 
 /// Header in front of every frame's pixels: fixed size, little endian, versioned (docs/wire.md).
 namespace emit::protocol {
@@ -95,7 +96,7 @@ struct FrameHeader {
 };
 
 /// Most that a client may ask for as "every n-th frame".
-inline constexpr std::uint32_t kMaxEveryNth = 1000;
+inline constexpr std::uint32_t kMaxEveryNth = physics::limits::kMaxEveryNth;
 
 /// True for frames 1, 1 + n, 1 + 2 n, ... of a run: who takes every n-th frame takes these, so that
 /// all who do have the same ones, and know which number comes next. Precondition: every_nth > 0.

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/fragment.hpp"
 
 /// Forward error correction of a frame's fragments (docs/wire.md section 4): Reed-Solomon erasure
@@ -17,8 +18,8 @@ namespace emit::protocol {
 /// Fragments with another layout than kFragmentVersion's: receivers that do not know them drop and
 /// count them.
 inline constexpr std::uint8_t kParityVersion = 2;
-inline constexpr std::uint32_t kMaxFecData = 128;
-inline constexpr std::uint32_t kMaxFecParity = 32;
+inline constexpr std::uint32_t kMaxFecData = physics::limits::kMaxFecData;
+inline constexpr std::uint32_t kMaxFecParity = physics::limits::kMaxFecParity;
 /// What is taken where only "with error correction" was said: at 1 % random loss fewer than one
 /// frame of 1 MB in a thousand stays incomplete.
 inline constexpr std::uint32_t kDefaultFecData = 48;

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <functional>
 
-#include "csv_table.hpp"
-#include "emit/verify/evaluate.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/reference/visibility.hpp"
+#include "emit/verify/evaluate.hpp"
 #include "visibility_rows.hpp"
 
 namespace emit::verify {
@@ -17,7 +17,8 @@ inline constexpr std::uint32_t kSkyRays = 16384;
 /// Builds the geometry of each row and asks it, rows split over the cores. `make` and `ask` run on
 /// several threads at once. Errors name file and line of the first bad row.
 [[nodiscard]] physics::Result<void> for_each_row(
-    const CsvTable& table, const std::function<physics::Result<VisibilityRow>(std::size_t)>& make,
+    const physics::CsvTable& table,
+    const std::function<physics::Result<VisibilityRow>(std::size_t)>& make,
     const std::function<void(std::size_t, const VisibilityRow&, const reference::SceneInstant&)>&
         ask);
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 #include "visibility_rows.hpp"
 
@@ -17,7 +17,7 @@ using MakeRow = std::function<physics::Result<VisibilityRow>(std::size_t)>;
 /// What a query of the GPU path works on; all outlive it.
 struct VisibilityQuery {
   const EvaluateRequest& request;
-  const CsvTable& table;
+  const physics::CsvTable& table;
   std::string_view outputs;  ///< names of the columns
   const MakeRow& make;
 };

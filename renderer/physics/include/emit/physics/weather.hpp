@@ -11,17 +11,18 @@
 /// Any thread. RT-safe: no allocation.
 namespace emit::physics {
 
-/// One row of a weather table. Times in ns on any one scale, ascending over the table.
-struct WeatherRow {
-  std::int64_t time_ns = 0;
+/// Weather at one instant of simulation time: a row of a weather table, or what the host sent.
+/// A table is linear between its samples and constant outside.
+struct WeatherSample {
+  std::int64_t sim_time_ns = 0;
   double direct_normal_w_m2 = 0.0;
   double diffuse_horizontal_w_m2 = 0.0;
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
   double wind_m_s = 0.0;
-  double cloud_frac = 0.0;              ///< beta of Eq. 1
+  double cloud_frac = 0.0;              ///< beta of Eq. 1 for clear-sky models; 0 for measured sun
   std::optional<double> environment_k;  ///< surroundings; absent: air temperature
-  std::optional<double> film_w_m2_k;    ///< absent: from the wind
+  std::optional<double> film_w_m2_k;    ///< absent: from the wind; not used by emit2014
 };
 
 /// Parameters of the clear-sky models.
@@ -51,8 +52,8 @@ struct Forcing {
 /// a jump: the later row holds from that instant on. An optional value that only one of two
 /// neighbours states is replaced by its model at the other.
 /// @pre rows is not empty and ascending.
-[[nodiscard]] Forcing forcing_from_rows(std::span<const WeatherRow> rows,
-                                        std::int64_t time_ns) noexcept;
+[[nodiscard]] Forcing forcing_from_rows(std::span<const WeatherSample> rows,
+                                        std::int64_t sim_time_ns) noexcept;
 
 /// Clear sky at a place and an instant (POSIX ns UTC); `sun` is the sun's position there and then.
 [[nodiscard]] Forcing forcing_from_clear_sky(const ClearSky& model, const GeoPlace& place,
