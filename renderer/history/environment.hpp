@@ -23,15 +23,14 @@ class Environment {
   /// Adds a weather sample of the host. It holds from its time on until the next one. Returns false
   /// when its time is before the newest one. A sample equal to the newest changes nothing. When the
   /// store is full, its oldest half is thinned to every other sample.
-  bool append(const scene::WeatherSample& sample) noexcept;
-  /// Forgets the live samples.
+  bool append(const physics::WeatherSample& row) noexcept;
   void reset() noexcept;
 
   /// Returns the instants at which live weather changes, ascending.
   [[nodiscard]] std::span<const std::int64_t> changes_ns() const noexcept { return changes_ns_; }
 
   /// Returns the live samples that are kept, ascending in time.
-  [[nodiscard]] std::span<const physics::WeatherRow> live() const noexcept { return live_; }
+  [[nodiscard]] std::span<const physics::WeatherSample> live() const noexcept { return live_; }
 
   /// Returns the earliest instant from which the weather differs from that of a revision. It
   /// returns the lowest number when any instant may differ, and the highest one when nothing has
@@ -51,9 +50,9 @@ class Environment {
   physics::GeoPlace place_;
   std::int64_t epoch_utc_ns_ = 0;
   physics::ClearSky clear_sky_;
-  std::vector<physics::WeatherRow> table_;
-  std::vector<physics::WeatherRow> live_;
-  std::vector<std::int64_t> changes_ns_;  ///< times of the rows of live_
+  std::vector<physics::WeatherSample> table_;
+  std::vector<physics::WeatherSample> live_;
+  std::vector<std::int64_t> changes_ns_;  ///< times of live_
   std::vector<std::uint64_t> revisions_;  ///< revisions of the rows of live_, ascending
   std::uint64_t revision_ = 0;
   std::uint64_t reset_revision_ = 0;

@@ -3,19 +3,13 @@
 
 #include <algorithm>
 
+#include "emit/physics/constants.hpp"
 #include "history/environment.hpp"
 #include "history/foster_history.hpp"
 #include "history/foster_setup.hpp"
 #include "history/surface_history.hpp"
 
 namespace emit::renderer {
-namespace {
-
-// Reference of the surroundings' temperature offsets, K. Its value does not matter in float64.
-constexpr double kReferenceK = 295.0;
-
-}  // namespace
-
 physics::Result<std::vector<IntervalForcing>> surface_forcing(
     const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns) {
   if (nodes_ns.size() < 2 || !std::is_sorted(nodes_ns.begin(), nodes_ns.end())) {
@@ -31,7 +25,7 @@ physics::Result<std::vector<IntervalForcing>> surface_forcing(
     // Only the surroundings are simulated, so no other material is needed.
     auto materials = build_foster_materials(start, {});
     if (!materials) return tl::unexpected(std::move(materials.error()));
-    FosterHistory history(start, {}, materials->back(), environment, kReferenceK);
+    FosterHistory history(start, {}, materials->back(), environment, physics::kReferenceK);
     history.forcing_over(nodes_ns, environment, out);
     return out;
   }

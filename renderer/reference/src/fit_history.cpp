@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/reference/layer_solver.hpp"
@@ -108,12 +109,12 @@ FosterDrive<double> drive_of(const scene::Material& material, const GroundForcin
               material.solar_absorptance_frac * (f.direct_w_m2 * sun_frac + f.diffuse_w_m2) +
               material.emissivity_frac * f.longwave_w_m2,
           .film_w_m2_k = f.film_w_m2_k,
-          .air_offset_k = f.air_k - kFitReferenceK};
+          .air_offset_k = f.air_k - physics::kReferenceK};
 }
 
 /// Converts a drive to the reference solver's units.
 FaceState face_of(const FosterDrive<double>& drive) noexcept {
-  return {drive.absorbed_w_m2, drive.film_w_m2_k, kFitReferenceK + drive.air_offset_k};
+  return {drive.absorbed_w_m2, drive.film_w_m2_k, physics::kReferenceK + drive.air_offset_k};
 }
 
 /// Advances the solver along a history and fills in the truth at the end of every step.
@@ -158,16 +159,7 @@ std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario, d
   const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),
                                 physics::Radians(scenario.place.lon_rad),
                                 physics::Metres(scenario.place.height_m)};
-  // Convert the weather of the scenario.
-  std::vector<physics::WeatherRow> rows;
-  for (const scene::WeatherSample& s : scenario.weather) {
-    rows.push_back({s.sim_time_ns, s.direct_normal_w_m2, s.diffuse_horizontal_w_m2,
-                    s.longwave_down_w_m2, s.air_k, s.wind_m_s, s.cloud_frac, s.environment_k,
-                    s.film_w_m2_k});
-  }
-  const scene::ClearSkyDesc& sky = scenario.clear_sky;
-  const physics::ClearSky clear{sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k,
-                                sky.dew_point_k,     sky.wind_m_s,   sky.cloud_frac};
+  const std::vector<physics::WeatherSample>& rows = scenario.weather;
   std::vector<GroundForcing> out;
   const auto count = static_cast<std::size_t>(std::ceil((end_s - begin_s) / step_s)) + 1;
   // Sample the forcing. Direct sun is that on level ground, after clouds.
@@ -176,9 +168,9 @@ std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario, d
     const std::int64_t sim_ns = std::llround(time_s * 1e9);
     const std::int64_t utc_ns = scenario.epoch_utc_ns + sim_ns;
     const physics::SunPosition sun = physics::sun_position(utc_ns, place);
-    const physics::Forcing f = rows.empty()
-                                   ? physics::forcing_from_clear_sky(clear, place, sun, utc_ns)
-                                   : physics::forcing_from_rows(rows, sim_ns);
+    const physics::Forcing f =
+        rows.empty() ? physics::forcing_from_clear_sky(scenario.clear_sky, place, sun, utc_ns)
+                     : physics::forcing_from_rows(rows, sim_ns);
     out.push_back({time_s,
                    f.direct_normal_w_m2 * (1.0 - f.cloud_frac) * std::max(0.0, sun.direction_enu.z),
                    f.diffuse_horizontal_w_m2, f.longwave_down_w_m2, f.film_w_m2_k, f.air_k});
@@ -294,7 +286,7 @@ Result<FitProblem> curve_problem(const scene::Material& material,
   FitHistory history;
   history.name = "curve";
   const auto drive = [](const CurvePoint& p) {
-    return FosterDrive<double>{p.absorbed_w_m2, p.film_w_m2_k, p.air_k - kFitReferenceK};
+    return FosterDrive<double>{p.absorbed_w_m2, p.film_w_m2_k, p.air_k - physics::kReferenceK};
   };
   // Split every interval of the curve, with the truth at its end.
   for (std::size_t i = 1; i < curve.size(); ++i) {
@@ -340,8 +332,8 @@ void foster_residuals(const FitProblem& problem, const physics::FosterNetwork& n
   for (const double dt_s : problem.step_lengths_s) {
     gains.push_back(physics::foster_gains(dt_s, network));
   }
-  const auto surface =
-      physics::foster_surface(network, problem.emissivity_frac, problem.base_k, kFitReferenceK);
+  const auto surface = physics::foster_surface(network, problem.emissivity_frac, problem.base_k,
+                                               physics::kReferenceK);
   physics::FosterState<double> start = physics::foster_steady(
       (problem.initial_k - problem.base_k) / network.resistance_m2k_w(), surface);
   // Run a history and collect its weighted errors.
@@ -350,7 +342,7 @@ void foster_residuals(const FitProblem& problem, const physics::FosterNetwork& n
       physics::foster_step(x, step.begin, step.end, gains[step.gains], surface);
       if (step.weight > 0.0) {
         out.push_back(step.weight *
-                      (kFitReferenceK + physics::foster_offset_k(x, surface) - step.truth_k));
+                      (physics::kReferenceK + physics::foster_offset_k(x, surface) - step.truth_k));
       }
     }
   };

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "emit/physics/constants.hpp"
 #include "emit/reference/fit.hpp"
 
 namespace emit::reference {
@@ -11,14 +12,12 @@ namespace emit::reference {
 /// end.
 struct FitStep {
   double dt_s = 0.0;
-  physics::FosterDrive<double> begin;  ///< air_offset_k is an offset from kFitReferenceK
+  physics::FosterDrive<double> begin;  ///< air as an offset from physics::kReferenceK
   physics::FosterDrive<double> end;
   double truth_k = 0.0;     ///< temperature at the end of the step
   double weight = 0.0;      ///< weight of the residual; 0 if there is none
   std::uint32_t gains = 0;  ///< index of the step's length in step_lengths_s
 };
-/// Reference of the temperature offsets, K.
-inline constexpr double kFitReferenceK = 295.0;
 
 /// History of a surface.
 struct FitHistory {

@@ -13,6 +13,7 @@
 #include <numeric>
 #include <optional>
 
+#include "emit/physics/weather.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
 #include "emit/threads/parallel.hpp"
@@ -53,17 +54,8 @@ std::uint64_t mix(std::uint64_t x) {
 /// Returns the share of the direct sun that clouds take: from the weather table, linear between
 /// rows, else from the clear-sky model.
 double cloud_frac_at(const scene::ScenarioDesc& scenario, std::int64_t sim_time_ns) {
-  const auto& rows = scenario.weather;
-  if (rows.empty()) return scenario.clear_sky.cloud_frac;
-  const auto after =
-      std::upper_bound(rows.begin(), rows.end(), sim_time_ns,
-                       [](std::int64_t t, const auto& row) { return t < row.sim_time_ns; });
-  if (after == rows.begin()) return rows.front().cloud_frac;
-  if (after == rows.end()) return rows.back().cloud_frac;
-  const auto& before = *(after - 1);
-  const double share = static_cast<double>(sim_time_ns - before.sim_time_ns) /
-                       static_cast<double>(after->sim_time_ns - before.sim_time_ns);
-  return before.cloud_frac + share * (after->cloud_frac - before.cloud_frac);
+  if (scenario.weather.empty()) return scenario.clear_sky.cloud_frac;
+  return physics::forcing_from_rows(scenario.weather, sim_time_ns).cloud_frac;
 }
 
 /// Keeps the pixels with the smallest hashes. The choice looks random and is the same every time.

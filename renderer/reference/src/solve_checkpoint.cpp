@@ -102,7 +102,7 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
                              .value();
   // Hash the weather.
   Hash weather;
-  const scene::ClearSkyDesc& sky = scenario.clear_sky;
+  const scene::ClearSky& sky = scenario.clear_sky;
   for (const double v : {sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k, sky.dew_point_k,
                          sky.wind_m_s, sky.cloud_frac}) {
     weather.add(v);

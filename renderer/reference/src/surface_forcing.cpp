@@ -26,30 +26,14 @@ struct Weather {
   physics::GeoPlace place;
   std::int64_t epoch_utc_ns = 0;
   physics::ClearSky clear_sky;
-  std::vector<physics::WeatherRow> rows;
+  std::vector<physics::WeatherSample> rows;
 
   explicit Weather(const scene::ScenarioDesc& scenario)
       : place{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
               physics::Metres(scenario.place.height_m)},
         epoch_utc_ns(scenario.epoch_utc_ns),
-        clear_sky{.linke_turbidity = scenario.clear_sky.linke_turbidity,
-                  .air_mean_k = scenario.clear_sky.air_mean_k,
-                  .air_amplitude_k = scenario.clear_sky.air_amplitude_k,
-                  .dew_point_k = scenario.clear_sky.dew_point_k,
-                  .wind_m_s = scenario.clear_sky.wind_m_s,
-                  .cloud_frac = scenario.clear_sky.cloud_frac} {
-    for (const scene::WeatherSample& sample : scenario.weather) {
-      rows.push_back({.time_ns = sample.sim_time_ns,
-                      .direct_normal_w_m2 = sample.direct_normal_w_m2,
-                      .diffuse_horizontal_w_m2 = sample.diffuse_horizontal_w_m2,
-                      .longwave_down_w_m2 = sample.longwave_down_w_m2,
-                      .air_k = sample.air_k,
-                      .wind_m_s = sample.wind_m_s,
-                      .cloud_frac = sample.cloud_frac,
-                      .environment_k = sample.environment_k,
-                      .film_w_m2_k = sample.film_w_m2_k});
-    }
-  }
+        clear_sky(scenario.clear_sky),
+        rows(scenario.weather) {}
 
   /// Returns the climate at a time. `before` gives the limit from earlier times at a jump of the
   /// table. `stated` returns whether the weather gives the temperature of the surroundings.
@@ -83,8 +67,8 @@ std::vector<std::int64_t> node_times(const Weather& weather, std::int64_t start_
                                      std::int64_t step_ns) {
   // Collect the times that must have a node.
   std::vector<std::int64_t> marks{start_ns, history_ns, end_ns};
-  for (const physics::WeatherRow& row : weather.rows) {
-    if (row.time_ns > start_ns && row.time_ns < end_ns) marks.push_back(row.time_ns);
+  for (const physics::WeatherSample& row : weather.rows) {
+    if (row.sim_time_ns > start_ns && row.sim_time_ns < end_ns) marks.push_back(row.sim_time_ns);
   }
   std::sort(marks.begin(), marks.end());
   marks.erase(std::unique(marks.begin(), marks.end()), marks.end());
@@ -193,9 +177,9 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
   for (const std::int64_t time_ns :
        node_times(weather, start_ns, climate.history_start_ns_, end_ns,
                   static_cast<std::int64_t>(std::min(step_ns, 9e18)))) {
-    const auto rows_here =
-        std::count_if(weather.rows.begin(), weather.rows.end(),
-                      [time_ns](const physics::WeatherRow& row) { return row.time_ns == time_ns; });
+    const auto rows_here = std::count_if(
+        weather.rows.begin(), weather.rows.end(),
+        [time_ns](const physics::WeatherSample& row) { return row.sim_time_ns == time_ns; });
     if (rows_here > 1 && time_ns > start_ns) add(time_ns, true);
     add(time_ns, false);
   }

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 
 /// Functions of the models, one each. A function reads its columns from `table` and returns the
@@ -45,36 +45,36 @@ inline constexpr std::string_view kSurfaceHistoryInputs = "t_s,Tair,E0,E1,E2,E3"
 inline constexpr std::string_view kSurfaceHistoryOutputs = "Ts0,Ts1,Ts2,Ts3";
 
 [[nodiscard]] physics::Result<std::string> run_equilibrium(const EvaluateRequest& request,
-                                                           const CsvTable& table);
+                                                           const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_band_radiance(const EvaluateRequest& request,
-                                                             const CsvTable& table);
+                                                             const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_balance(const EvaluateRequest& request,
-                                                       const CsvTable& table);
+                                                       const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_relaxation(const EvaluateRequest& request,
-                                                          const CsvTable& table);
+                                                          const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sun_position(const EvaluateRequest& request,
-                                                            const CsvTable& table);
+                                                            const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sun_disc(const EvaluateRequest& request,
-                                                        const CsvTable& table);
+                                                        const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_wall_shadow(const EvaluateRequest& request,
-                                                           const CsvTable& table);
+                                                           const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sky_view(const EvaluateRequest& request,
-                                                        const CsvTable& table);
+                                                        const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_slab(const EvaluateRequest& request,
-                                                               const CsvTable& table);
+                                                               const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_semi_infinite(
-    const EvaluateRequest& request, const CsvTable& table);
+    const EvaluateRequest& request, const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_layered(const EvaluateRequest& request,
-                                                                  const CsvTable& table);
+                                                                  const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_lateral(const EvaluateRequest& request,
-                                                                  const CsvTable& table);
+                                                                  const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_surface_history(const EvaluateRequest& request,
-                                                               const CsvTable& table);
+                                                               const physics::CsvTable& table);
 
 /// Values of several columns, each as long as the table.
 template <std::size_t N>
 [[nodiscard]] physics::Result<std::array<std::vector<double>, N>> read_columns(
-    const CsvTable& table, const std::array<std::string_view, N>& names) {
+    const physics::CsvTable& table, const std::array<std::string_view, N>& names) {
   std::array<std::vector<double>, N> columns;
   for (std::size_t i = 0; i < N; ++i) {
     auto column = table.numbers(names[i]);

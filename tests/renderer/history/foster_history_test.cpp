@@ -14,7 +14,7 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 
 scene::Material material(const std::string& name, std::vector<scene::Layer> layers) {
   scene::Material out;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/physics/foster.hpp"
+#include "emit/physics/constants.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +15,6 @@ namespace {
 const std::vector<StackLayer> kRoad = {{0.15, 0.7, 1.95e6}, {0.3, 1.5, 1.9e6}, {1.55, 1.2, 2.2e6}};
 const std::vector<StackLayer> kThickConcrete = {{0.5, 1.7, 2.02e6}};
 const std::vector<StackLayer> kSheet = {{0.001, 45.0, 3.69e6}, {0.02, 0.16, 1.2e3}};
-constexpr double kReferenceK = 295.0;
 
 FosterNetwork network(const std::vector<StackLayer>& layers, std::size_t modes) {
   auto result = network_of_stack(layers, {.modes = modes});

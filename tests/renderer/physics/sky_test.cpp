@@ -149,10 +149,10 @@ TEST(ClearSky, AirIsWarmestAtThreeInTheAfternoon) {
 }
 
 TEST(Weather, RowsAreLinearBetweenAndConstantOutside) {
-  const std::array<WeatherRow, 3> rows = {
-      WeatherRow{100, 0.0, 10.0, 300.0, 280.0, 1.0, 0.0, 285.0, 7.0},
-      WeatherRow{200, 800.0, 110.0, 340.0, 290.0, 3.0, 0.5, std::nullopt, std::nullopt},
-      WeatherRow{300, 400.0, 60.0, 320.0, 288.0, 2.0, 0.0, std::nullopt, std::nullopt}};
+  const std::array<WeatherSample, 3> rows = {
+      WeatherSample{100, 0.0, 10.0, 300.0, 280.0, 1.0, 0.0, 285.0, 7.0},
+      WeatherSample{200, 800.0, 110.0, 340.0, 290.0, 3.0, 0.5, std::nullopt, std::nullopt},
+      WeatherSample{300, 400.0, 60.0, 320.0, 288.0, 2.0, 0.0, std::nullopt, std::nullopt}};
   const Forcing middle = forcing_from_rows(rows, 150);
   EXPECT_DOUBLE_EQ(middle.direct_normal_w_m2, 400.0);
   EXPECT_DOUBLE_EQ(middle.diffuse_horizontal_w_m2, 60.0);
@@ -168,7 +168,7 @@ TEST(Weather, RowsAreLinearBetweenAndConstantOutside) {
 }
 
 TEST(Weather, TwoRowsAtOneInstantAreAJump) {
-  std::array<WeatherRow, 3> rows;
+  std::array<WeatherSample, 3> rows;
   rows[0].air_k = rows[1].air_k = 280.0;
   rows[1].time_ns = rows[2].time_ns = 10;
   rows[2].air_k = 300.0;

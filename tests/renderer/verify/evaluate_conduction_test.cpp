@@ -26,8 +26,8 @@ test::OracleRun run(const std::string& model, const std::string& table, std::uin
   request.history.modes = {{2181.0, 0.357}, {9438.0, 0.643}};
   const auto result = verify::evaluate(request);
   EXPECT_TRUE(result.has_value()) << result.error().text;
-  auto expected = verify::CsvTable::read(request.table);
-  auto got = verify::CsvTable::parse(result.value_or("empty\n"), "result");
+  auto expected = physics::CsvTable::read(request.table);
+  auto got = physics::CsvTable::parse(result.value_or("empty\n"), "result");
   EXPECT_TRUE(expected.has_value() && got.has_value());
   return {std::move(*expected), std::move(*got)};
 }

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 #include "support/oracle_check.hpp"
 
@@ -34,7 +34,7 @@ std::vector<double> on_gpu(const std::string& model, const std::string& text,
     ADD_FAILURE() << result.error().text;
     return {};
   }
-  const auto table = verify::CsvTable::parse(*result, "result");
+  const auto table = physics::CsvTable::parse(*result, "result");
   return table ? table->numbers(column).value_or(std::vector<double>{}) : std::vector<double>{};
 }
 
@@ -82,8 +82,8 @@ void expect_all_near(const std::string& model, const std::string& table, const s
   const auto file = test::oracle_file(table);
   const auto result = verify::evaluate(gpu_request(model, file, "cached"));
   ASSERT_TRUE(result.has_value()) << result.error().text;
-  const auto rows = verify::CsvTable::read(file);
-  const auto found = verify::CsvTable::parse(*result, "result");
+  const auto rows = physics::CsvTable::read(file);
+  const auto found = physics::CsvTable::parse(*result, "result");
   ASSERT_TRUE(rows.has_value() && found.has_value());
   const auto expected = rows->numbers(exact);
   const auto got = found->numbers(column);

@@ -25,8 +25,8 @@ test::OracleRun run(const std::string& model, const std::string& table,
   request.rays = rays;
   auto result = verify::evaluate(request);
   EXPECT_TRUE(result.has_value()) << result.error().text;
-  auto expected = verify::CsvTable::read(request.table);
-  auto got = verify::CsvTable::parse(result.value_or("empty\n"), "result");
+  auto expected = physics::CsvTable::read(request.table);
+  auto got = physics::CsvTable::parse(result.value_or("empty\n"), "result");
   EXPECT_TRUE(expected.has_value() && got.has_value());
   return {std::move(*expected), std::move(*got)};
 }
@@ -60,7 +60,7 @@ TEST(EvaluateVisibility, SunDiscIsExactOnTheSphere) {
 }
 
 TEST(EvaluateVisibility, LimbDarkenedDiscMatchesThePlanarTable) {
-  const auto table = verify::CsvTable::read(oracle_file("sun_disc_edge.csv"));
+  const auto table = physics::CsvTable::read(oracle_file("sun_disc_edge.csv"));
   ASSERT_TRUE(table.has_value());
   const auto delta_deg = *table->numbers("delta_deg");
   const auto expected = *table->numbers("f_limb0.6");

@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/version.hpp"
 
@@ -15,11 +16,11 @@ namespace emit::protocol {
 
 /// Largest encoded host frame, bytes: the payload of one UDP datagram over IPv4.
 inline constexpr std::size_t kMaxHostFrameBytes = 65507;
-/// Largest magnitude of a position coordinate, m. A larger one is refused.
-inline constexpr double kMaxPositionM = 1e8;
-/// Largest distance of a simulation time from the scenario's epoch, ns: 1e9 s, the same limit as in
-/// scenarios. A larger one is refused.
-inline constexpr std::int64_t kMaxSimTimeNs = 1'000'000'000'000'000'000;
+/// Positions farther from the origin are refused, m.
+inline constexpr double kMaxPositionM = physics::limits::kMaxPositionM;
+/// Simulation times farther from the scenario's epoch are refused, ns: 1e9 s, as in scenarios.
+inline constexpr auto kMaxSimTimeNs =
+    static_cast<std::int64_t>(physics::limits::kMaxSimTimeS * 1e9);
 
 /// Result of decoding a host frame. The values are those of emit.v1.Status.Code.
 enum class DecodeStatus : std::uint8_t {

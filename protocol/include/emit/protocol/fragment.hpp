@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/frame_header.hpp"
 
 /// UDP fragments of a frame (docs/wire.md section 4). Each fragment describes itself.
@@ -22,8 +23,8 @@ inline constexpr std::uint8_t kFragmentVersion = 1;
 inline constexpr std::size_t kFragmentHeaderBytes = 32;
 /// Smallest and largest payload of a fragment, bytes. The smallest one holds the frame header; the
 /// largest one fills a UDP datagram over IPv4.
-inline constexpr std::uint32_t kMinFragmentPayloadBytes = 320;
-inline constexpr std::uint32_t kMaxFragmentPayloadBytes = 65472;
+inline constexpr std::uint32_t kMinFragmentPayloadBytes = physics::limits::kFragmentPayloadBytes.lo;
+inline constexpr std::uint32_t kMaxFragmentPayloadBytes = physics::limits::kFragmentPayloadBytes.hi;
 /// Largest number of pixel bytes whose byte stream a 32-bit offset can address.
 inline constexpr std::uint32_t kMaxFragmentedPixelBytes = 0xFFFFFFFF - 1283;
 

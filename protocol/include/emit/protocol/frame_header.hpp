@@ -8,6 +8,7 @@
 #include "emit/physics/check.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/physics/limits.hpp"
 
 /// Header in front of every frame's pixels: fixed size, little endian, versioned (docs/wire.md
 /// section 3).
@@ -110,8 +111,8 @@ struct FrameHeader {
   std::uint32_t encoded_bytes = 0;  ///< length of the encoded pixels behind the header; 0 when raw
 };
 
-/// Largest n that a client may ask for in "every n-th frame".
-inline constexpr std::uint32_t kMaxEveryNth = 1000;
+/// Most that a client may ask for as "every n-th frame".
+inline constexpr std::uint32_t kMaxEveryNth = physics::limits::kMaxEveryNth;
 
 /// Returns true for the frames 1, 1 + n, 1 + 2 n, ... of a run. All clients that take every n-th
 /// frame take these: they receive the same frames, and each knows which number comes next. RT-safe.

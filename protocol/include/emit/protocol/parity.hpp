@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "emit/physics/check.hpp"
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/fragment.hpp"
 
 /// Forward error correction of a frame's fragments (docs/wire.md section 4): a Reed-Solomon erasure
@@ -18,10 +19,10 @@ namespace emit::protocol {
 /// Version byte of parity fragments. Their layout differs from kFragmentVersion's, so receivers
 /// that do not know them drop and count them.
 inline constexpr std::uint8_t kParityVersion = 2;
-inline constexpr std::uint32_t kMaxFecData = 128;
-inline constexpr std::uint32_t kMaxFecParity = 32;
-/// Default group, taken where a client asks for error correction without numbers. At 1 % random
-/// loss fewer than one frame of 1 MB in a thousand stays incomplete.
+inline constexpr std::uint32_t kMaxFecData = physics::limits::kMaxFecData;
+inline constexpr std::uint32_t kMaxFecParity = physics::limits::kMaxFecParity;
+/// What is taken where only "with error correction" was said: at 1 % random loss fewer than one
+/// frame of 1 MB in a thousand stays incomplete.
 inline constexpr std::uint32_t kDefaultFecData = 48;
 inline constexpr std::uint32_t kDefaultFecParity = 5;
 

@@ -10,6 +10,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/frame_header.hpp"
 
 /// Ring of frames in shared memory (docs/wire.md section 9). One daemon writes it; readers on the
@@ -20,8 +21,8 @@ namespace emit::protocol {
 
 inline constexpr std::uint32_t kRingMagic = 0x534D4645;  ///< "EFMS" as bytes E F M S
 inline constexpr std::uint16_t kRingVersion = 2;
-inline constexpr std::uint32_t kMinRingSlots = 3;
-inline constexpr std::uint32_t kMaxRingSlots = 1024;
+inline constexpr std::uint32_t kMinRingSlots = physics::limits::kRingSlots.lo;
+inline constexpr std::uint32_t kMaxRingSlots = physics::limits::kRingSlots.hi;
 inline constexpr std::uint32_t kMaxRingChannels = 1024;
 
 enum class RingState : std::uint32_t {

@@ -40,7 +40,7 @@ using Columns = std::array<std::vector<double>, kColumns>;
 template <class Real>
 using Results = std::array<std::vector<Real>, kOutputs>;
 
-Result<Columns> read(const CsvTable& table) {
+Result<Columns> read(const physics::CsvTable& table) {
   auto columns = read_columns(table, kNames);
   if (!columns) return tl::unexpected(std::move(columns.error()));
   const auto readings = table.texts("alb_reading");
@@ -129,7 +129,7 @@ Result<Results<float>> on_gpu(const Columns& in, int gpu_index) {
 
 }  // namespace
 
-Result<std::string> run_balance(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_balance(const EvaluateRequest& request, const physics::CsvTable& table) {
   const auto columns = read(table);
   if (!columns) return tl::unexpected(columns.error());
   if (request.device == Device::gpu) {

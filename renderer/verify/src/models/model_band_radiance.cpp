@@ -106,7 +106,8 @@ Result<Results<float>> on_gpu(const std::vector<BandRadianceLut>& luts,
 
 }  // namespace
 
-Result<std::string> run_band_radiance(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_band_radiance(const EvaluateRequest& request,
+                                      const physics::CsvTable& table) {
   const auto temperature_k = table.numbers(kBandRadianceInputs);
   if (!temperature_k) return tl::unexpected(temperature_k.error());
   if (request.precision == Precision::float64) {

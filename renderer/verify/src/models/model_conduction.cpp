@@ -43,7 +43,7 @@ Result<void> check_refine(const EvaluateRequest& request) {
   return make_error(ErrorCode::invalid_argument, "--refine must be 1, 2 or 4");
 }
 
-tl::unexpected<physics::Error> bad_kind(const CsvTable& table, std::size_t row,
+tl::unexpected<physics::Error> bad_kind(const physics::CsvTable& table, std::size_t row,
                                         std::string_view kind, std::string_view known) {
   return make_error(ErrorCode::parse, fmt::format("{}:{}: column 'kind': '{}' is none of {}",
                                                   table.name(), table.line_of(row), kind, known));
@@ -148,7 +148,8 @@ double periodic_temperature(const Case& c, double amplitude_k, double period_s, 
 
 }  // namespace
 
-Result<std::string> run_conduction_slab(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_conduction_slab(const EvaluateRequest& request,
+                                        const physics::CsvTable& table) {
   if (auto fine = check_refine(request); !fine) return tl::unexpected(fine.error());
   const auto kinds = table.texts("kind");
   if (!kinds) return tl::unexpected(kinds.error());
@@ -182,7 +183,7 @@ Result<std::string> run_conduction_slab(const EvaluateRequest& request, const Cs
 }
 
 Result<std::string> run_conduction_semi_infinite(const EvaluateRequest& request,
-                                                 const CsvTable& table) {
+                                                 const physics::CsvTable& table) {
   if (auto fine = check_refine(request); !fine) return tl::unexpected(fine.error());
   const auto kinds = table.texts("kind");
   if (!kinds) return tl::unexpected(kinds.error());
@@ -217,7 +218,8 @@ Result<std::string> run_conduction_semi_infinite(const EvaluateRequest& request,
   return write_csv(kConductionOutputs, std::span(&result, 1));
 }
 
-Result<std::string> run_conduction_layered(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_conduction_layered(const EvaluateRequest& request,
+                                           const physics::CsvTable& table) {
   if (auto fine = check_refine(request); !fine) return tl::unexpected(fine.error());
   const auto bases = table.texts("base");
   if (!bases) return tl::unexpected(bases.error());

@@ -63,7 +63,8 @@ Result<std::vector<float>> on_gpu(const Columns& in, int gpu_index) {
 
 }  // namespace
 
-Result<std::string> run_equilibrium(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_equilibrium(const EvaluateRequest& request,
+                                    const physics::CsvTable& table) {
   const auto columns = read_columns(table, kNames);
   if (!columns) return tl::unexpected(columns.error());
   if (request.device == Device::gpu) {

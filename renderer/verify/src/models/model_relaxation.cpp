@@ -49,7 +49,7 @@ struct Interval {
 };
 
 Result<Cases> read_cases(const std::filesystem::path& file) {
-  const auto table = CsvTable::read(file);
+  const auto table = physics::CsvTable::read(file);
   if (!table) return tl::unexpected(table.error());
   const auto names = table->texts("case");
   if (!names) return tl::unexpected(names.error());
@@ -89,7 +89,7 @@ Result<Cases> read_cases(const std::filesystem::path& file) {
 }
 
 Result<void> read_nodes(const std::filesystem::path& file, Cases& cases) {
-  const auto table = CsvTable::read(file);
+  const auto table = physics::CsvTable::read(file);
   if (!table) return tl::unexpected(table.error());
   const auto names = table->texts("case");
   if (!names) return tl::unexpected(names.error());
@@ -151,7 +151,7 @@ struct Query {
   bool defined = false;  ///< true when the time is not before that of the given state
 };
 
-Result<std::vector<Query>> read_queries(const CsvTable& table, const Cases& cases,
+Result<std::vector<Query>> read_queries(const physics::CsvTable& table, const Cases& cases,
                                         const std::filesystem::path& cases_file,
                                         const std::filesystem::path& nodes_file) {
   const auto names = table.texts("case");
@@ -271,7 +271,7 @@ Result<std::vector<float>> on_gpu(const std::vector<Query>& queries, int gpu_ind
 
 }  // namespace
 
-Result<std::string> run_relaxation(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_relaxation(const EvaluateRequest& request, const physics::CsvTable& table) {
   if (request.cases.empty() || request.nodes.empty()) {
     return make_error(ErrorCode::invalid_argument,
                       "model 'relaxation' needs --cases FILE and --nodes FILE");

@@ -43,7 +43,7 @@ struct History {
 };
 using Temperatures = std::array<std::vector<double>, kScenarios>;
 
-Result<History> read_history(const EvaluateRequest& request, const CsvTable& table) {
+Result<History> read_history(const EvaluateRequest& request, const physics::CsvTable& table) {
   const HistoryOptions& options = request.history;
   const auto missing = [](std::string_view option) {
     return make_error(ErrorCode::invalid_argument,
@@ -264,7 +264,8 @@ Result<Temperatures> by_foster(const History& history, std::uint32_t refine) {
 
 }  // namespace
 
-Result<std::string> run_surface_history(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_surface_history(const EvaluateRequest& request,
+                                        const physics::CsvTable& table) {
   if (request.refine != 1 && request.refine != 2 && request.refine != 4) {
     return make_error(ErrorCode::invalid_argument, "--refine must be 1, 2 or 4");
   }

@@ -21,7 +21,7 @@ constexpr double kOffsetFrac = 1e-5;
 /// Runs all rows. `read(row, sight, set)` calls set(column, value).
 template <std::size_t N, class Read>
 Result<std::string> run_rows(const VisibilityQuery& query, const Read& read) {
-  const CsvTable& table = query.table;
+  const physics::CsvTable& table = query.table;
   std::vector<std::vector<float>> out(N, std::vector<float>(table.rows(), kUndefined<float>));
   for (std::size_t i = 0; i < table.rows(); ++i) {
     const auto context = [&] { return fmt::format("{}:{}", table.name(), table.line_of(i)); };

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/reference/visibility.hpp"
 #include "emit/verify/evaluate.hpp"
 #include "visibility_rows.hpp"
@@ -18,7 +18,8 @@ inline constexpr std::uint32_t kSkyRays = 16384;
 /// the cores, so both functions run on several threads at once. Errors name file and line of the
 /// first bad row.
 [[nodiscard]] physics::Result<void> for_each_row(
-    const CsvTable& table, const std::function<physics::Result<VisibilityRow>(std::size_t)>& make,
+    const physics::CsvTable& table,
+    const std::function<physics::Result<VisibilityRow>(std::size_t)>& make,
     const std::function<void(std::size_t, const VisibilityRow&, const reference::SceneInstant&)>&
         ask);
 

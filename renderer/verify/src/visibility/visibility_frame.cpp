@@ -106,7 +106,7 @@ class RowProbe {
 
 template <std::size_t N, class Read>
 Result<std::string> run_rows(const VisibilityQuery& query, const Look& look, const Read& read) {
-  const CsvTable& table = query.table;
+  const physics::CsvTable& table = query.table;
   auto probe = RowProbe::create(query.request, look);
   if (!probe) return tl::unexpected(std::move(probe.error()));
   std::vector<std::vector<float>> out(N, std::vector<float>(table.rows(), kUndefined<float>));

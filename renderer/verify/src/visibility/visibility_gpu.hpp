@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 #include "visibility_rows.hpp"
 
@@ -18,8 +18,8 @@ using MakeRow = std::function<physics::Result<VisibilityRow>(std::size_t)>;
 /// Input of the functions below. All references must outlive it.
 struct VisibilityQuery {
   const EvaluateRequest& request;
-  const CsvTable& table;
-  std::string_view outputs;  ///< names of the output columns
+  const physics::CsvTable& table;
+  std::string_view outputs;  ///< names of the columns
   const MakeRow& make;
 };
 

@@ -30,6 +30,10 @@ inline constexpr double kSunTemperatureK = 5772.0;
 /// Mean extraterrestrial irradiance of the sun, W m-2.
 inline constexpr double kSolarConstantWPerM2 = 1361.0;
 
+/// Reference temperature, K. Surface states in float32 are offsets from it, because a float32
+/// kelvin near 300 K resolves only 0.03 mK.
+inline constexpr double kReferenceK = 295.0;
+
 // WGS-84 ellipsoid.
 inline constexpr double kWgs84SemiMajorM = 6378137.0;
 inline constexpr double kWgs84Flattening = 1.0 / 298.257223563;

@@ -11,17 +11,18 @@
 /// clear-sky models. Any thread. RT-safe: no allocation.
 namespace emit::physics {
 
-/// One row of a weather table. Times are in ns on any one scale and ascend over the table.
-struct WeatherRow {
-  std::int64_t time_ns = 0;
+/// Weather at one instant of simulation time: a row of a weather table, or what the host sent.
+/// A table is linear between its samples and constant outside.
+struct WeatherSample {
+  std::int64_t sim_time_ns = 0;
   double direct_normal_w_m2 = 0.0;
   double diffuse_horizontal_w_m2 = 0.0;
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
   double wind_m_s = 0.0;
-  double cloud_frac = 0.0;              ///< beta of eq. 1, 0..1
-  std::optional<double> environment_k;  ///< surroundings; if absent, the air temperature
-  std::optional<double> film_w_m2_k;    ///< if absent, film_coefficient_w_m2_k() of the wind
+  double cloud_frac = 0.0;              ///< beta of Eq. 1 for clear-sky models; 0 for measured sun
+  std::optional<double> environment_k;  ///< surroundings; absent: air temperature
+  std::optional<double> film_w_m2_k;    ///< absent: from the wind; not used by emit2014
 };
 
 /// Parameters of the clear-sky models.
@@ -51,8 +52,8 @@ struct Forcing {
 /// last. Two rows with the same time make a jump, and the later row holds from that instant on. If
 /// only one of two neighbours states an optional value, the other one takes it from its model.
 /// @pre rows is not empty and ascending in time.
-[[nodiscard]] Forcing forcing_from_rows(std::span<const WeatherRow> rows,
-                                        std::int64_t time_ns) noexcept;
+[[nodiscard]] Forcing forcing_from_rows(std::span<const WeatherSample> rows,
+                                        std::int64_t sim_time_ns) noexcept;
 
 /// Returns the forcing of a clear sky at a place and an instant (POSIX ns UTC). `sun` is the sun's
 /// position at that place and instant.
