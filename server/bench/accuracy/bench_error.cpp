@@ -11,11 +11,12 @@
 #include <numeric>
 #include <optional>
 
+#include "bench/accuracy/accuracy_benches.hpp"
 #include "bench/accuracy/bench_rules.hpp"
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "bench/accuracy/converged_history.hpp"
 #include "bench/accuracy/embree_yardstick.hpp"
+#include "bench/accuracy/error_figures.hpp"
+#include "bench/accuracy/error_regions.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/reference/solve.hpp"
 #include "emit/reference/visibility.hpp"
@@ -23,8 +24,8 @@
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/sheets.hpp"
 #include "emit/version.hpp"
-#include "bench/accuracy/error_figures.hpp"
-#include "bench/accuracy/error_regions.hpp"
+#include "tool/support/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/scenario_input.hpp"
@@ -33,6 +34,22 @@
 
 namespace emit::tool {
 namespace {
+
+struct ErrorOptions {
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> csv;
+  std::optional<std::filesystem::path> plot;
+  std::optional<std::filesystem::path> figures;
+  std::vector<std::string> scenes;
+  bool quick = false;
+  std::uint32_t frames = 3;
+  std::uint32_t width_px = 320;
+  std::uint32_t height_px = 256;
+  std::uint32_t rays = 256;
+  double refine = 1.0;
+  std::uint64_t pixels = 0;
+  int gpu_index = -1;
+};
 
 using Clock = std::chrono::steady_clock;
 using physics::Result;
@@ -131,7 +148,7 @@ struct Shot {
 };
 
 Result<Shot> shoot(scene::ScenarioDesc scenario, const Setting& setting,
-                   const reference::SolveView& view, const BenchErrorCommand& command) {
+                   const reference::SolveView& view, const ErrorOptions& command) {
   scene::ThermalOptions& thermal = scenario.thermal;
   thermal.method = setting.method == Method::cached ? scene::ThermalMethod::cached
                                                     : scene::ThermalMethod::per_frame;
@@ -231,7 +248,7 @@ std::string describe(const reference::SolveReport& report, std::uint32_t rays) {
 }
 
 Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::SolveView& view,
-                          const BenchErrorCommand& command, const std::string& label) {
+                          const ErrorOptions& command, const std::string& label) {
   auto geometry = scene::load_scene(scenario);
   if (!geometry) return tl::unexpected(geometry.error());
   scene::adopt_sheets(*geometry);
@@ -306,7 +323,7 @@ std::uint32_t modes_of(const Setting& setting) {
   return setting.model == scene::ThermalModel::emit2014 ? 2 : setting.modes;
 }
 
-Json row_json(const Row& row, const BenchErrorCommand& command, const std::string& reference) {
+Json row_json(const Row& row, const ErrorOptions& command, const std::string& reference) {
   const Setting& s = row.setting;
   Json json = Json::object();
   json.set("scene", row.scene).set("region", name_of(row.region)).set("method", name_of(s.method));
@@ -407,9 +424,7 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
   return plot;
 }
 
-}  // namespace
-
-int run_bench_error(const BenchErrorCommand& command) {
+int run(const ErrorOptions& command) {
   const std::vector<std::string> scenes =
       command.scenes.empty()
           ? std::vector<std::string>{"block-on-road", "ribbed", "statue", "airfield"}
@@ -518,6 +533,41 @@ int run_bench_error(const BenchErrorCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, ErrorOptions& options) {
+  line.option("--scene", options.scenes,
+              "Scenario; repeatable; default block-on-road, ribbed, statue, airfield")
+      .repeatable();
+  line.flag("--quick", options.quick, "Models, spacings and two step counts only");
+  line.path("--csv", options.csv, "Write the results as CSV");
+  line.path("--plot", options.plot, "Write the diagrams as SVG");
+  line.path("--figures", options.figures,
+            "Folder for pictures and profiles of reference and models")
+      .type_name("DIR");
+  line.option("--frames", options.frames, "Frames timed per setting").positive().show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  line.option("--rays", options.rays, "Rays per face or pixel of the reference")
+      .positive()
+      .show_default();
+  line.option("--refine", options.refine, "Refinement of the three-dimensional reference")
+      .positive()
+      .show_default();
+  line.option("--pixels", options.pixels,
+              "Surface pixels the reference solves (published figures: 20000 or more); 0: all")
+      .show_default();
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_error(CommandLine& bench) {
+  bench.command<ErrorOptions>(
+      {.name = "error-vs-time",
+       .text = "What every setting costs in time and in error against the reference solver",
+       .example = "emit bench error-vs-time --json error.json --csv error.csv --plot error.svg"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

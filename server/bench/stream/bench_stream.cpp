@@ -14,21 +14,42 @@
 #include <thread>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
-#include "tool/support/daemon_process.hpp"
-#include "emit/version.hpp"
-#include "tool/support/frame_files.hpp"
-#include "net/socket.hpp"
-#include "tool/support/json.hpp"
-#include "tool/support/statistics.hpp"
-#include "tool/streams/stream_client.hpp"
+#include "bench/stream/stream_benches.hpp"
 #include "bench/stream/stream_loss.hpp"
 #include "bench/stream/stream_throughput.hpp"
 #include "bench/stream/stream_yardstick.hpp"
+#include "emit/version.hpp"
+#include "net/socket.hpp"
+#include "tool/streams/stream_client.hpp"
+#include "tool/streams/stream_options.hpp"
+#include "tool/support/common_options.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/daemon_process.hpp"
+#include "tool/support/frame_files.hpp"
+#include "tool/support/json.hpp"
+#include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct StreamOptions {
+  std::optional<std::filesystem::path> json;
+  std::uint64_t frames = 1000;
+  double rate_hz = 200.0;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  std::uint32_t clients = 4;
+  std::vector<std::string> transports{"tcp", "udp", "shm", "mixed"};
+  std::uint32_t repeats = 5;      ///< of the throughput measurements; 0: none
+  std::vector<std::string> only;  ///< of the throughput measurements; empty: all
+  std::string cpus;               ///< realtime.cpus of the daemons
+  /// Shares of datagrams lost on the way; not empty: nothing but lossy networks is measured.
+  std::vector<double> losses;
+  double burst_mean = 1.0;  ///< datagrams lost in a row
+  protocol::FecParams fec{protocol::kDefaultFecData, protocol::kDefaultFecParity};
+  std::uint32_t payload_bytes = 1400;  ///< of a fragment on lossy networks
+  std::uint64_t seed = 1;
+};
 
 using physics::Result;
 
@@ -52,7 +73,7 @@ struct Row {
 
 class StreamBench {
  public:
-  StreamBench(const BenchStreamCommand& command, std::filesystem::path work)
+  StreamBench(const StreamOptions& command, std::filesystem::path work)
       : command_(command), work_(std::move(work)) {
     yardstick_.frame_bytes =
         sizeof(float) * static_cast<std::size_t>(command.width_px) * command.height_px;
@@ -74,7 +95,7 @@ class StreamBench {
   Result<void> lossy();
   Result<void> throughput();
 
-  const BenchStreamCommand& command_;
+  const StreamOptions& command_;
   std::filesystem::path work_;
   YardstickOptions yardstick_;
   std::string device_;
@@ -283,7 +304,7 @@ const std::vector<Contender>& contenders() {
   return all;
 }
 
-std::vector<Contender> contenders_of(const BenchStreamCommand& command) {
+std::vector<Contender> contenders_of(const StreamOptions& command) {
   std::vector<Contender> out = contenders();
   if (!command.only.empty()) {
     std::erase_if(out, [&](const Contender& contender) {
@@ -497,15 +518,13 @@ void StreamBench::print(std::FILE* out) const {
   }
 }
 
-}  // namespace
-
 std::vector<std::string> stream_contenders() {
   std::vector<std::string> names;
   for (const Contender& contender : contenders()) names.emplace_back(contender.name);
   return names;
 }
 
-int run_bench_stream(const BenchStreamCommand& command) {
+int run(const StreamOptions& command) {
   if (!command.only.empty() && command.repeats == 0) {
     return fail(kExitUsage, "--only names what --repeats 0 leaves out");
   }
@@ -530,6 +549,69 @@ int run_bench_stream(const BenchStreamCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return bench.sound() ? kExitOk : kExitFailure;
+}
+
+void add_options(CommandLine& line, StreamOptions& options) {
+  line.count("--frames", options.frames, "Frames per client at the fixed rate")
+      .positive()
+      .show_default();
+  line.option("--rate", options.rate_hz, "Frames a second").positive().show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  line.option("--clients", options.clients, "Clients at the fixed rate")
+      .in_range(1U, 8U)
+      .show_default();
+  const Option transport =
+      line.option("--transport", options.transports,
+                  "Transport at the fixed rate; repeatable; mixed: tcp, udp, shm in turn; tcp-lz4: "
+                  "compressed")
+          .repeatable()
+          .one_of({"tcp", "tcp-lz4", "udp", "shm", "mixed"})
+          .show_default();
+  line.option("--repeats", options.repeats,
+              "Interleaved measurements of throughput, medians of which count; 0: none")
+      .in_range(0U, 1000U)
+      .show_default();
+  const Option only =
+      line.option("--only", options.only,
+                  "Of the throughput measurements only this one, e.g. tcp, and nothing at a "
+                  "fixed rate; repeatable; default: all")
+          .repeatable()
+          .one_of(stream_contenders())
+          .type_name("NAME")
+          .excludes(transport);
+  line.option("--cpus", options.cpus,
+              "Cores of the daemon's agents, as realtime.cpus has them, e.g. \"sender=0, "
+              "render=1\"; default: wherever the kernel likes, like all yardsticks");
+  line.option("--loss", options.losses,
+              "Nothing but this: frames over UDP through a network that loses this share of "
+              "the datagrams: without help, with resend, with error correction; repeatable")
+      .repeatable()
+      .in_range(0.0, 0.9)
+      .type_name("FRAC")
+      .excludes(only);
+  line.option("--burst", options.burst_mean, "--loss: datagrams lost in a row, mean")
+      .in_range(1.0, 1000.0)
+      .show_default();
+  add_error_correction(line, options.fec);
+  line.option("--payload", options.payload_bytes, "--loss: bytes of a fragment")
+      .in_range(320U, 65000U)
+      .show_default();
+  line.option("--seed", options.seed, "--loss: loses other datagrams")
+      .type_name("N")
+      .show_default();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_stream(CommandLine& bench) {
+  bench.command<StreamOptions>(
+      {.name = "stream",
+       .text =
+           "Transport alone: canned frames over loopback and shared memory, first at a fixed rate, "
+           "then as fast as they go, beside bare sockets in the same run",
+       .example = "emit bench stream --json stream.json --frames 1000 --rate 200"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -7,19 +7,43 @@
 #include <optional>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
-#include "tool/streams/error_correction.hpp"
-#include "tool/support/frame_files.hpp"
-#include "tool/support/interrupt.hpp"
 #include "emit/client/client.hpp"
 #include "net/socket_address.hpp"
-#include "tool/support/json.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/streams/error_correction.hpp"
+#include "tool/streams/stream_options.hpp"
 #include "tool/streams/stream_report.hpp"
 #include "tool/streams/stream_subscription.hpp"
+#include "tool/support/common_options.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/frame_files.hpp"
+#include "tool/support/interrupt.hpp"
+#include "tool/support/json.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct ReceiveOptions {
+  std::string url;
+  std::uint64_t frames = 0;  ///< 0: until interrupted or the daemon ends
+  std::optional<std::filesystem::path> out;
+  std::optional<std::filesystem::path> json;
+  std::string channel_name;
+  std::string channel_kind;
+  std::string band;
+  std::string sensor;
+  std::string multicast_group;
+  std::optional<protocol::FecParams> fec;  ///< absent: the daemon's choice
+  bool compress = false;
+  bool resend = false;
+  double timeout_s = 10.0;
+  bool every_frame = false;
+  std::uint32_t every_nth = 1;
+  bool reconnect = false;
+  double min_k = 280.0;
+  double max_k = 330.0;
+  client::Security security;
+};
 
 using Clock = std::chrono::steady_clock;
 
@@ -81,9 +105,7 @@ void print_losses(std::FILE* out, const client::ReceiveCounters& c, const Stream
              report.flagged(protocol::kFlagClamped));
 }
 
-}  // namespace
-
-int run_receive(const ReceiveCommand& command) {
+int run(const ReceiveOptions& command) {
   if (command.out) {
     if (auto made = make_directory(*command.out); !made) return fail(made.error());
   }
@@ -258,6 +280,61 @@ int run_receive(const ReceiveCommand& command) {
     if (auto done = write_json(*command.json, json); !done) return fail(done.error());
   }
   return exit_code;
+}
+
+void add_options(CommandLine& line, ReceiveOptions& options) {
+  line.option("url", options.url,
+              "Control address of the daemon; the scheme chooses how frames travel: "
+              "tcp://host:port or udp://host:port; shm://name: shared memory of a daemon on "
+              "this host that has stream.shm = \"name\"")
+      .required()
+      .type_name("URL");
+  line.count("--frames", options.frames, "Stop after this many; 0: until interrupted");
+  line.path("--out", options.out,
+            "Folder for frame_NNNNNN.exr and .png (apparent temperature, by the band's response "
+            "where "
+            "the daemon tells it, else as of a rectangular band)")
+      .type_name("DIR");
+  line.option("--name", options.channel_name, "Channel; default: the first that fits")
+      .type_name("NAME");
+  line.option("--channel", options.channel_kind, "Channel kind; default: any")
+      .one_of({"injection", "projector"});
+  line.option("--band", options.band, "Band; default: any").type_name("NAME");
+  line.option("--sensor", options.sensor, "Sensor; default: any").type_name("NAME");
+  line.option("--multicast", options.multicast_group, "UDP: group to join instead of unicast")
+      .type_name("ADDRESS");
+  line.seconds("--timeout-s", options.timeout_s, "Give up when no frame comes for this long")
+      .positive()
+      .show_default();
+  add_error_correction(line, options.fec);
+  line.flag("--resend", options.resend,
+            "UDP, daemon in host-step: ask for fragments that are missing");
+  line.flag("--compress", options.compress,
+            "TCP: frames losslessly compressed (stream.compression of the daemon)");
+  line.flag("--every-frame", options.every_frame, "TCP, shm: end rather than skip frames");
+  line.option("--every", options.every_nth,
+              "Only frames 1, 1 + N, 1 + 2 N, ... of a run; those left out are no gap")
+      .type_name("N")
+      .in_range(1U, 1000U)
+      .show_default();
+  line.flag("--reconnect", options.reconnect,
+            "When the stream ends, connect again and go on, until no frame came for --timeout-s");
+  add_security(line, options.security);
+  line.option("--min-k", options.min_k, "Lower limit of the PNG's colours").show_default();
+  line.option("--max-k", options.max_k, "Upper limit of the PNG's colours").show_default();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_receive(CommandLine& tool) {
+  tool.command<ReceiveOptions>(
+      {.name = "receive",
+       .text = "Receive frames, check sequence and CRC, print the latency histogram; exits 1 when "
+               "frames "
+               "were lost or a gap was not flagged",
+       .example = "emit receive tcp://127.0.0.1:7000 --frames 100 --out frames"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

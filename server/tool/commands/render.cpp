@@ -5,10 +5,11 @@
 #include <chrono>
 #include <cmath>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "emit/scene/trajectory.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
@@ -17,12 +18,23 @@
 namespace emit::tool {
 namespace {
 
+struct RenderOptions {
+  ScenarioChoice input;
+  double time_s = 0.0;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> png;
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> channels;  ///< empty: all of temperature, depth, object
+  std::string band;                   ///< empty: the scenario's first
+  int gpu_index = -1;
+};
+
 double ms_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
       .count();
 }
 
-bool wants(const RenderCommand& command, const char* channel) {
+bool wants(const RenderOptions& command, const char* channel) {
   return command.channels.empty() || std::find(command.channels.begin(), command.channels.end(),
                                                channel) != command.channels.end();
 }
@@ -46,9 +58,7 @@ Json plane_json(std::span<const float> plane) {
   return json;
 }
 
-}  // namespace
-
-int run_render(const RenderCommand& command) {
+int run(const RenderOptions& command) {
   auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
   const auto band = find_band(*scenario, command.band);
@@ -159,6 +169,32 @@ int run_render(const RenderCommand& command) {
   }
   renderer.release(static_cast<renderer::SlotIndex>(slot));
   return kExitOk;
+}
+
+void add_options(CommandLine& line, RenderOptions& options) {
+  add_scenario(line, options.input, "scenario");
+  line.seconds("--time-s", options.time_s, "Simulated time since the scenario's epoch, s")
+      .required();
+  line.path("--out", options.out, "OpenEXR file to write").required();
+  line.path("--png", options.png, "False-colour temperature as PNG");
+  line.option("--channel", options.channels,
+              "Channel beside radiance: temperature, depth, object; repeatable; default all")
+      .repeatable()
+      .one_of({"temperature", "depth", "object"});
+  line.option("--band", options.band, "Band of the radiance channel; default: the first")
+      .type_name("NAME");
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_render(CommandLine& tool) {
+  tool.command<RenderOptions>(
+      {.name = "render",
+       .text = "Render one frame of a scenario offline",
+       .example = "emit render block-on-road --time-s 41400 --out road.exr --png road.png"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -9,10 +9,11 @@
 #include <cmath>
 #include <optional>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/scene/sheets.hpp"
 #include "emit/scene/trajectory.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
@@ -20,6 +21,22 @@
 
 namespace emit::tool {
 namespace {
+
+struct SolveOptions {
+  ScenarioChoice input;
+  double time_s = 0.0;
+  std::filesystem::path out;
+  std::optional<std::filesystem::path> png;
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> checkpoint;
+  std::string dimension = "auto";  ///< "auto", "1" or "3"
+  std::string band;                ///< empty: the scenario's first
+  std::uint32_t rays = 256;
+  std::uint32_t threads = 0;  ///< 0: all
+  std::uint64_t pixels = 0;   ///< 0: all
+  double refine = 1.0;
+  double tolerance_k = 0.02;
+};
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -33,9 +50,7 @@ Json stats_json(const reference::SolidStats& stats) {
   return json;
 }
 
-}  // namespace
-
-int run_solve(const SolveCommand& command) {
+int run(const SolveOptions& command) {
   const auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
   const auto band = find_band(*scenario, command.band);
@@ -144,6 +159,49 @@ int run_solve(const SolveCommand& command) {
     if (auto done = write_json(*command.json, json); !done) return fail(done.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, SolveOptions& options) {
+  add_scenario(line, options.input, "scenario");
+  line.seconds("--time-s", options.time_s, "Simulated time since the scenario's epoch, s")
+      .required();
+  line.path("--out", options.out, "OpenEXR file to write").required();
+  line.path("--png", options.png, "False-colour temperature as PNG");
+  line.option("--dimension", options.dimension,
+              "Conduction: 3 (solids of axis-aligned faces, nothing moving), 1 (behind every "
+              "pixel), auto (3 where it fits)")
+      .one_of({"auto", "1", "3"})
+      .show_default();
+  line.option("--rays", options.rays, "Rays per face or pixel for sky and surroundings")
+      .in_range(1U, 1U << 20U)
+      .show_default();
+  line.option("--refine", options.refine, "Three dimensions: multiplies cells per axis and steps")
+      .in_range(0.1, 8.0)
+      .show_default();
+  line.option("--tolerance-k", options.tolerance_k,
+              "Three dimensions: error of a step at refine 1, K")
+      .positive()
+      .show_default();
+  line.count("--pixels", options.pixels,
+             "Only so many surface pixels, always the same ones, the rest NaN; 0: all");
+  line.path("--checkpoint", options.checkpoint,
+            "Folder to save the three-dimensional history in, and to go on from")
+      .type_name("DIR");
+  line.option("--threads", options.threads, "Threads; 0: one per core").show_default();
+  line.option("--band", options.band, "Band of the radiance channel; default: the first")
+      .type_name("NAME");
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_solve(CommandLine& tool) {
+  tool.command<SolveOptions>(
+      {.name = "solve",
+       .text =
+           "Reference solution: the picture of render by transient conduction and rays, in double",
+       .example = "emit solve block-on-road --time-s 12600 --out truth.exr --checkpoint runs"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

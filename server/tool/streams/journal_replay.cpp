@@ -6,10 +6,10 @@
 #include <chrono>
 #include <thread>
 
-#include "tool/support/console.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/record/pose_pcap.hpp"
 #include "emit/v1/control.pb.h"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 
 namespace emit::tool {
