@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "tool/support/command_line.hpp"
+#include "tool/command_line/command_line.hpp"
 
 /// Suites of `emit bench` that compare temperatures with a reference. Each is one file of this
 /// folder.

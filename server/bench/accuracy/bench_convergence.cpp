@@ -14,7 +14,7 @@
 #include "emit/reference/layer_solver.hpp"
 #include "emit/reference/solid_solver.hpp"
 #include "emit/version.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -24,7 +24,7 @@
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/sheets.hpp"
 #include "emit/version.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

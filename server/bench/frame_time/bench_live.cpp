@@ -14,7 +14,7 @@
 #include "emit/physics/weather.hpp"
 #include "emit/scene/trajectory.hpp"
 #include "emit/version.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

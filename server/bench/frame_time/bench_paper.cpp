@@ -10,7 +10,7 @@
 #include "bench/frame_time/paper_errors.hpp"
 #include "bench/frame_time/paper_run.hpp"
 #include "emit/version.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -15,7 +15,7 @@
 #include "bench/frame_time/scaling_axes.hpp"
 #include "bench/stability/bench_stability_scene.hpp"
 #include "emit/version.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -13,7 +13,7 @@
 #include "emit/physics/constants.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/version.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "tool/support/command_line.hpp"
+#include "tool/command_line/command_line.hpp"
 
 /// Suites of `emit bench` that measure how long frames take. Each is one file of this folder.
 namespace emit::tool {

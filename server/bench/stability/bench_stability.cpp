@@ -9,7 +9,7 @@
 #include "bench/stability/stability_benches.hpp"
 #include "emit/verify/stability.hpp"
 #include "emit/version.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

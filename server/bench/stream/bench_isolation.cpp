@@ -17,7 +17,7 @@
 #include "client/client_connection.hpp"
 #include "emit/version.hpp"
 #include "tool/streams/stream_client.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"

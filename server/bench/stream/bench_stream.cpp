@@ -22,7 +22,7 @@
 #include "net/socket.hpp"
 #include "tool/streams/stream_client.hpp"
 #include "tool/streams/stream_options.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "tool/support/command_line.hpp"
+#include "tool/command_line/command_line.hpp"
 
 /// The subcommands of `emit`. Each is one file of this folder, which holds its options, how they
 /// are declared and what runs. Its functions return the exit code of the process; they print

@@ -16,7 +16,7 @@
 #include "tool/commands/demo_report.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/streams/pose_plan.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"

@@ -11,7 +11,7 @@
 
 #include "emit/config/slab_modes.hpp"
 #include "tool/commands/commands.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 
 namespace emit::tool {

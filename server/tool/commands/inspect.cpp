@@ -6,7 +6,7 @@
 
 #include "emit/scene/inspect.hpp"
 #include "tool/commands/commands.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/scenario_input.hpp"
 

@@ -18,7 +18,7 @@
 #include "tool/streams/pose_log.hpp"
 #include "tool/streams/stream_options.hpp"
 #include "tool/streams/stream_report.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -14,7 +14,7 @@
 #include "tool/streams/stream_options.hpp"
 #include "tool/streams/stream_report.hpp"
 #include "tool/streams/stream_subscription.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"

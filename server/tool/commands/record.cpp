@@ -9,7 +9,7 @@
 #include "emit/version.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/streams/stream_options.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -12,7 +12,7 @@
 #include "emit/scene/sheets.hpp"
 #include "emit/scene/trajectory.hpp"
 #include "tool/commands/commands.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"

@@ -10,7 +10,7 @@
 #include "client/http_get.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/streams/metrics_parse.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -5,7 +5,7 @@
 
 #include "client/http_get.hpp"
 #include "tool/commands/commands.hpp"
-#include "tool/support/command_line.hpp"
+#include "tool/command_line/command_line.hpp"
 #include "tool/support/console.hpp"
 
 namespace emit::tool {

@@ -13,7 +13,7 @@
 #include "net/socket.hpp"
 #include "rt/clock.hpp"
 #include "tool/commands/commands.hpp"
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -4,7 +4,7 @@
 
 #include "emit/client/security.hpp"
 #include "emit/protocol/parity.hpp"
-#include "tool/support/command_line.hpp"
+#include "tool/command_line/command_line.hpp"
 
 /// Options of the commands that talk to a daemon.
 namespace emit::tool {

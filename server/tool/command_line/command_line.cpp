@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tool/support/command_line.hpp"
+#include "tool/command_line/command_line.hpp"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "tool/support/console.hpp"
-#include "tool/support/nearest_name.hpp"
+#include "tool/command_line/nearest_name.hpp"
 
 namespace emit::tool {
 

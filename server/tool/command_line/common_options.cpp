@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tool/support/common_options.hpp"
+#include "tool/command_line/common_options.hpp"
 
 namespace emit::tool {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tool/support/command_line.hpp"
+#include "tool/command_line/command_line.hpp"
 #include "tool/support/scenario_input.hpp"
 
 /// Options that several commands have, so that they are called and explained alike.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tool/support/nearest_name.hpp"
+#include "tool/command_line/nearest_name.hpp"
 
 #include <algorithm>
 #include <cstddef>

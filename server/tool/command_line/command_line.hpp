@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "emit/physics/error.hpp"
-#include "tool/support/command_description.hpp"
+#include "tool/command_line/command_description.hpp"
 
 /// The command line of `emit`, without the library that parses it: CLI11 takes seconds of compiler
 /// time in every file that includes it, so that command_line.cpp alone does.
