@@ -42,24 +42,25 @@ renderer/verify/src/visibility: renderer/verify renderer/verify/src renderer/inc
 renderer/verify/src/stability: renderer/verify renderer/verify/src renderer/gl renderer/physics renderer/shaders/shared
 renderer/verify/src/models: renderer/verify renderer/verify/src renderer/verify/src/visibility renderer/physics renderer/reference
 protocol: renderer/physics
-config/include: renderer/physics renderer/scene
-config/src/keys: config/include renderer/physics renderer/scene
-config/src/tables: config/include config/src/keys renderer/physics renderer/scene
-config/src/resolve: config/include config/src/keys config/src/tables renderer/physics renderer/scene
-config/src: config/include config/src/keys config/src/tables config/src/resolve renderer/physics renderer/scene
+config/include: protocol renderer/physics renderer/scene
+config/src/keys: protocol config/include renderer/physics renderer/scene
+config/src/tables: protocol config/include config/src/keys renderer/physics renderer/scene
+config/src/resolve: protocol config/include config/src/keys config/src/tables renderer/physics renderer/scene
+config/src: protocol config/include config/src/keys config/src/tables config/src/resolve renderer/physics renderer/scene
 config/tools: config/include config/src config/src/keys config/src/resolve renderer/physics renderer/scene
-server/rt: config/include renderer/physics
-server/net: server/rt config/include protocol renderer/physics
-server/client: server/net server/rt config/include protocol renderer/physics
+server/rt: renderer/physics
+server/host: server/rt config/include renderer/physics
+server/net: server/rt protocol renderer/physics
+server/client: server/net server/rt protocol renderer/physics
 server/pacing: protocol renderer/include renderer/physics renderer/scene
-server/telemetry: server/net server/rt config/include protocol renderer/physics
-server/agents: server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
+server/agents: server/host server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/receiver: server/agents server/agents/sender server/net server/rt config/include protocol renderer/physics
 server/agents/conductor: server/agents server/net server/pacing server/rt config/include protocol renderer/physics
 server/agents/recorder: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/render: server/agents server/pacing renderer/image renderer/physics
-server/app: server/agents server/agents/conductor server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/app: server/host server/agents server/agents/conductor server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/tool/support: server/app server/pacing config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/tool/command_line: server/tool/support renderer/physics
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene

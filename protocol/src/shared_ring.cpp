@@ -200,4 +200,15 @@ bool RingReader::intact(std::uint64_t publication) const noexcept {
   return head->sequence.load(std::memory_order_relaxed) == 2 * publication;
 }
 
+bool is_shm_name(std::string_view text) noexcept {
+  constexpr std::size_t kMaxCharacters = 64;
+  const auto is_alphanumeric = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  return !text.empty() && text.size() <= kMaxCharacters && is_alphanumeric(text.front()) &&
+         std::all_of(text.begin(), text.end(), [&](char c) {
+           return is_alphanumeric(c) || c == '_' || c == '-' || c == '.';
+         });
+}
+
 }  // namespace emit::protocol

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "emit/config/network.hpp"
+#include "emit/protocol/ip_address.hpp"
 #include "emit/physics/error.hpp"
 
 /// What emitd reads from --config; keys are documented in config/README.md. Plain data.
@@ -95,8 +95,6 @@ struct StreamConfig {
   std::uint32_t shm_mode = 0600;
 };
 
-/// 1 to 64 letters, digits, `_`, `-` and `.`, the first a letter or digit: no path can come of it.
-[[nodiscard]] bool is_shm_name(std::string_view text) noexcept;
 
 struct MetricsConfig {
   std::string listen;  ///< /metrics, /healthz and /readyz over HTTP; empty = off
@@ -104,14 +102,14 @@ struct MetricsConfig {
 
 /// Who may connect beside programs on this host.
 struct AccessConfig {
-  std::vector<Network> allow;  ///< empty: whoever reaches the port
+  std::vector<protocol::Network> allow;  ///< empty: whoever reaches the port
   /// Groups that a client may ask for: site-local scopes (RFC 2365, RFC 4291).
-  std::vector<Network> multicast_groups = default_multicast_groups();
+  std::vector<protocol::Network> multicast_groups = default_multicast_groups();
   std::uint32_t max_connections_per_peer = 8;  ///< peers on this host are not counted
   std::uint32_t max_host_frames_hz = 20'000;   ///< per peer address
   std::uint32_t max_control_records_hz = 1000;
 
-  [[nodiscard]] static std::vector<Network> default_multicast_groups();
+  [[nodiscard]] static std::vector<protocol::Network> default_multicast_groups();
 };
 
 /// Mutual TLS 1.3 on the control port.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "emit/physics/error.hpp"
@@ -164,5 +165,8 @@ class RingReader {
   std::vector<RingChannelEntry> channels_;
   std::span<const std::byte> welcome_;
 };
+
+/// 1 to 64 letters, digits, `_`, `-` and `.`, the first a letter or digit: no path can come of it.
+[[nodiscard]] bool is_shm_name(std::string_view text) noexcept;
 
 }  // namespace emit::protocol
