@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,9 +21,9 @@
 #include "bench/stream/stream_yardstick.hpp"
 #include "emit/version.hpp"
 #include "net/socket.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/streams/stream_client.hpp"
 #include "tool/streams/stream_options.hpp"
-#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"
@@ -71,6 +72,9 @@ struct Row {
   bool wrong = false;               ///< lossy: something came that was not as it said
 };
 
+struct Contender;
+struct Series;
+
 class StreamBench {
  public:
   StreamBench(const StreamOptions& command, std::filesystem::path work)
@@ -94,6 +98,15 @@ class StreamBench {
   Result<Row> bare_paced();
   Result<void> lossy();
   Result<void> throughput();
+  struct Daemons;
+  /// Errors: those of StreamThroughput::start().
+  [[nodiscard]] Result<Daemons> start_daemons() const;
+  /// One measurement of one contender.
+  Result<YardstickResult> measure(const std::string& name, Daemons& daemons) const;
+  /// One measurement of each contender; `progress` gets the index of the one that is next.
+  Result<void> measure_round(const std::vector<Contender>& contenders, Daemons& daemons,
+                             std::map<std::string, Series>& series,
+                             const std::function<void(std::size_t)>& progress) const;
 
   const StreamOptions& command_;
   std::filesystem::path work_;
@@ -325,21 +338,20 @@ struct Series {
   std::string missing;  ///< why there is none
 };
 
-Result<void> StreamBench::throughput() {
-  // Long enough that starting up does not show.
-  constexpr double kBytes = 2e9;
-  constexpr std::uint64_t kLeastFrames = 200;
-  constexpr std::uint64_t kMostFrames = 4000;
-  yardstick_.frames =
-      std::clamp(static_cast<std::uint64_t>(kBytes / static_cast<double>(yardstick_.frame_bytes)),
-                 kLeastFrames, kMostFrames);
-  const std::string shm = own_shm_name();
-  // What the ring costs is the ring's: the others get a daemon without one.
-  const auto start = [&](const std::string& name,
+/// The daemons of the throughput measurements. A ring in shared memory costs only the daemon that
+/// has one.
+struct StreamBench::Daemons {
+  Result<StreamThroughput> plain;
+  Result<StreamThroughput> shared;
+  Result<StreamThroughput> secured;  ///< an error where no certificate can be made
+};
+
+Result<StreamBench::Daemons> StreamBench::start_daemons() const {
+  const auto start = [&](const std::string& shm,
                          const client::Security& security) -> Result<StreamThroughput> {
-    const auto directory = work_ / (name + (security.tls() ? "-tls" : "-plain"));
+    const auto directory = work_ / (shm + (security.tls() ? "-tls" : "-plain"));
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
-    auto config = canned_daemon(command_.width_px, command_.height_px, name);
+    auto config = canned_daemon(command_.width_px, command_.height_px, shm);
     config.realtime.cpus = command_.cpus;
     config.tls.certificate = security.tls_certificate;
     config.tls.key = security.tls_key;
@@ -348,111 +360,137 @@ Result<void> StreamBench::throughput() {
   };
   auto plain = start("", {});
   if (!plain) return tl::unexpected(plain.error());
-  auto shared = start(shm, {});
+  auto shared = start(own_shm_name(), {});
   if (!shared) return tl::unexpected(shared.error());
   const auto certificate = make_certificate(work_);
   auto secured = certificate ? start("", *certificate)
                              : Result<StreamThroughput>(tl::unexpected(certificate.error()));
   if (certificate && !secured) return tl::unexpected(secured.error());
-  const auto measure = [&](const std::string& name) -> Result<YardstickResult> {
-    if (name == "bare-tcp") return measure_bare_tcp(yardstick_, false);
-    if (name == "bare-tcp-crc") return measure_bare_tcp(yardstick_, true);
-    if (name == "bare-udp") return measure_bare_udp(yardstick_);
-    if (name == "zeromq") return measure_zeromq(yardstick_, false);
-    if (name == "zeromq-crc") return measure_zeromq(yardstick_, true);
-    if (name == "iceoryx") return measure_iceoryx(yardstick_, work_, false);
-    if (name == "iceoryx-crc") return measure_iceoryx(yardstick_, work_, true);
-    if (name == "iperf3") {
-      constexpr int kSeconds = 1;
-      const auto gbit_s = measure_iperf3_gbit_s(work_, kSeconds);
-      if (!gbit_s) return tl::unexpected(gbit_s.error());
-      YardstickResult result;
-      result.seconds = kSeconds;
-      result.frames = static_cast<std::uint64_t>(*gbit_s * 1e9 / 8.0 /
-                                                 static_cast<double>(yardstick_.frame_bytes));
-      return result;
+  return Daemons{std::move(plain), std::move(shared), std::move(secured)};
+}
+
+Result<YardstickResult> StreamBench::measure(const std::string& name, Daemons& daemons) const {
+  if (name == "bare-tcp") return measure_bare_tcp(yardstick_, false);
+  if (name == "bare-tcp-crc") return measure_bare_tcp(yardstick_, true);
+  if (name == "bare-udp") return measure_bare_udp(yardstick_);
+  if (name == "zeromq") return measure_zeromq(yardstick_, false);
+  if (name == "zeromq-crc") return measure_zeromq(yardstick_, true);
+  if (name == "iceoryx") return measure_iceoryx(yardstick_, work_, false);
+  if (name == "iceoryx-crc") return measure_iceoryx(yardstick_, work_, true);
+  if (name == "iperf3") {
+    constexpr int kSeconds = 1;
+    const auto gbit_s = measure_iperf3_gbit_s(work_, kSeconds);
+    if (!gbit_s) return tl::unexpected(gbit_s.error());
+    YardstickResult result;
+    result.seconds = kSeconds;
+    result.frames = static_cast<std::uint64_t>(*gbit_s * 1e9 / 8.0 /
+                                               static_cast<double>(yardstick_.frame_bytes));
+    return result;
+  }
+  if (name == "tls" && !daemons.secured) return tl::unexpected(daemons.secured.error());
+  return (name == "shm"   ? *daemons.shared
+          : name == "tls" ? *daemons.secured
+                          : *daemons.plain)
+      .measure(name, yardstick_.frames, yardstick_.window);
+}
+
+Result<void> StreamBench::measure_round(const std::vector<Contender>& contenders, Daemons& daemons,
+                                        std::map<std::string, Series>& series,
+                                        const std::function<void(std::size_t)>& progress) const {
+  std::map<std::string, double> of_round;
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
+    const Contender& contender = contenders[i];
+    Series& own = series[contender.name];
+    progress(i);
+    if (!own.missing.empty()) continue;
+    const auto result = measure(contender.name, daemons);
+    if (!result) {
+      const auto code = result.error().code;
+      if (code != physics::ErrorCode::not_found && code != physics::ErrorCode::unsupported) {
+        return tl::unexpected(result.error());
+      }
+      own.missing = result.error().text;
+      continue;
     }
-    if (name == "tls" && !secured) return tl::unexpected(secured.error());
-    return (name == "shm"   ? *shared
-            : name == "tls" ? *secured
-                            : *plain)
-        .measure(name, yardstick_.frames, yardstick_.window);
-  };
+    const double gbit_s =
+        8e-9 * static_cast<double>(result->frames * yardstick_.frame_bytes) / result->seconds;
+    of_round[contender.name] = gbit_s;
+    own.gbit_s.add(gbit_s);
+    if (result->cpu_s > 0.0) {
+      own.cpu_frac.add(result->cpu_s / result->seconds);
+      own.cpu_s_per_gbit.add(result->cpu_s / (gbit_s * result->seconds));
+    }
+    own.frames += result->frames;
+    own.lost += result->lost;
+  }
+  for (const Contender& contender : contenders) {
+    for (const char* yardstick : contender.yardsticks) {
+      if (of_round.count(contender.name) == 0 || of_round.count(yardstick) == 0) continue;
+      series[contender.name].ratios[yardstick].add(of_round[contender.name] / of_round[yardstick]);
+    }
+  }
+  return {};
+}
+
+Row throughput_row(const Contender& contender, const Series& own) {
+  Row row;
+  row.transport = contender.name;
+  row.frames = own.frames;
+  row.lost = own.lost;
+  row.more.set("repeats", own.gbit_s.count());
+  if (own.missing.empty()) {
+    row.gbit_s = own.gbit_s.median();
+    if (!own.cpu_frac.empty()) {
+      row.cpu_frac = own.cpu_frac.median();
+      row.more.set("cpu_s_per_gbit", own.cpu_s_per_gbit.median());
+    }
+    row.more.set("min_gbit_s", own.gbit_s.percentile(0.0)).set("max_gbit_s", own.gbit_s.max());
+  } else {
+    row.more.set("reason", own.missing);
+  }
+  Json ratios = Json::object();
+  for (const char* yardstick : contender.yardsticks) {
+    const auto found = own.ratios.find(yardstick);
+    if (found == own.ratios.end()) continue;
+    const double ratio = found->second.median();
+    row.ratios.push_back(fmt::format("{:.2f} of {}", ratio, yardstick));
+    ratios.set(yardstick, ratio);
+    if (yardstick == contender.yardsticks.front()) {
+      row.more.set("yardstick", yardstick).set("ratio", ratio);
+    }
+  }
+  if (!row.ratios.empty()) row.more.set("ratios", std::move(ratios));
+  row.more.set("cpu", "daemon and client, or sender and receiver; cores");
+  return row;
+}
+
+Result<void> StreamBench::throughput() {
+  // Long enough that starting up does not show.
+  constexpr double kBytes = 2e9;
+  constexpr std::uint64_t kLeastFrames = 200;
+  constexpr std::uint64_t kMostFrames = 4000;
+  yardstick_.frames =
+      std::clamp(static_cast<std::uint64_t>(kBytes / static_cast<double>(yardstick_.frame_bytes)),
+                 kLeastFrames, kMostFrames);
+  auto daemons = start_daemons();
+  if (!daemons) return tl::unexpected(daemons.error());
   const std::vector<Contender> contenders = contenders_of(command_);
   std::map<std::string, Series> series;
   ProgressBar progress("throughput", command_.repeats * contenders.size());
   for (std::uint32_t round = 0; round < command_.repeats; ++round) {
-    std::map<std::string, double> of_round;
-    for (std::size_t i = 0; i < contenders.size(); ++i) {
-      const Contender& contender = contenders[i];
-      Series& own = series[contender.name];
+    const auto measured = measure_round(contenders, *daemons, series, [&](std::size_t i) {
       progress.advance_to(round * contenders.size() + i);
-      if (!own.missing.empty()) continue;
-      const auto result = measure(contender.name);
-      if (!result) {
-        const auto code = result.error().code;
-        if (code != physics::ErrorCode::not_found && code != physics::ErrorCode::unsupported) {
-          return tl::unexpected(result.error());
-        }
-        own.missing = result.error().text;
-        continue;
-      }
-      const double gbit_s =
-          8e-9 * static_cast<double>(result->frames * yardstick_.frame_bytes) / result->seconds;
-      of_round[contender.name] = gbit_s;
-      own.gbit_s.add(gbit_s);
-      if (result->cpu_s > 0.0) {
-        own.cpu_frac.add(result->cpu_s / result->seconds);
-        own.cpu_s_per_gbit.add(result->cpu_s / (gbit_s * result->seconds));
-      }
-      own.frames += result->frames;
-      own.lost += result->lost;
-    }
-    for (const Contender& contender : contenders) {
-      for (const char* yardstick : contender.yardsticks) {
-        if (of_round.count(contender.name) == 0 || of_round.count(yardstick) == 0) continue;
-        series[contender.name].ratios[yardstick].add(of_round[contender.name] /
-                                                     of_round[yardstick]);
-      }
-    }
+    });
+    if (!measured) return measured;
   }
   progress.finish();
-  for (auto* daemon : {&plain, &shared, &secured}) {
+  for (auto* daemon : {&daemons->plain, &daemons->shared, &daemons->secured}) {
     if (!*daemon) continue;
     if (device_.empty()) device_ = (*daemon)->device();
     if (auto stopped = (*daemon)->stop(); !stopped) return stopped;
   }
   for (const Contender& contender : contenders) {
-    const Series& own = series[contender.name];
-    Row row;
-    row.transport = contender.name;
-    row.frames = own.frames;
-    row.lost = own.lost;
-    row.more.set("repeats", own.gbit_s.count());
-    if (own.missing.empty()) {
-      row.gbit_s = own.gbit_s.median();
-      if (!own.cpu_frac.empty()) {
-        row.cpu_frac = own.cpu_frac.median();
-        row.more.set("cpu_s_per_gbit", own.cpu_s_per_gbit.median());
-      }
-      row.more.set("min_gbit_s", own.gbit_s.percentile(0.0)).set("max_gbit_s", own.gbit_s.max());
-    } else {
-      row.more.set("reason", own.missing);
-    }
-    Json ratios = Json::object();
-    for (const char* yardstick : contender.yardsticks) {
-      const auto found = own.ratios.find(yardstick);
-      if (found == own.ratios.end()) continue;
-      const double ratio = found->second.median();
-      row.ratios.push_back(fmt::format("{:.2f} of {}", ratio, yardstick));
-      ratios.set(yardstick, ratio);
-      if (yardstick == contender.yardsticks.front()) {
-        row.more.set("yardstick", yardstick).set("ratio", ratio);
-      }
-    }
-    if (!row.ratios.empty()) row.more.set("ratios", std::move(ratios));
-    row.more.set("cpu", "daemon and client, or sender and receiver; cores");
-    rows_.push_back(std::move(row));
+    rows_.push_back(throughput_row(contender, series[contender.name]));
   }
   return {};
 }

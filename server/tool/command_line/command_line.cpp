@@ -9,8 +9,8 @@
 #include <map>
 #include <string_view>
 
-#include "tool/support/console.hpp"
 #include "tool/command_line/nearest_name.hpp"
+#include "tool/support/console.hpp"
 
 namespace emit::tool {
 

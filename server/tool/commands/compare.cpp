@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "emit/image/image_diff.hpp"
-#include "tool/commands/commands.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/json.hpp"

@@ -12,11 +12,11 @@
 
 #include "emit/config/load.hpp"
 #include "emit/protocol/record/log.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/commands/demo_report.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/streams/pose_plan.hpp"
-#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "emit/config/slab_modes.hpp"
-#include "tool/commands/commands.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 
 namespace emit::tool {

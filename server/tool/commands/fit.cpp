@@ -11,8 +11,8 @@
 #include <sstream>
 
 #include "emit/config/load.hpp"
-#include "tool/commands/commands.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/library_edit.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tool/commands/commands.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/scene_options.hpp"
 

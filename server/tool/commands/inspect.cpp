@@ -5,8 +5,8 @@
 #include <fstream>
 
 #include "emit/scene/inspect.hpp"
-#include "tool/commands/commands.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/scenario_input.hpp"
 

@@ -6,8 +6,8 @@
 
 #include "emit/protocol/record/log.hpp"
 #include "emit/version.hpp"
-#include "tool/commands/commands.hpp"
 #include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/scenario_input.hpp"
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <optional>
 
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/streams/journal_replay.hpp"
-#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"

@@ -8,10 +8,10 @@
 #include <thread>
 
 #include "emit/client/client.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/streams/stream_options.hpp"
-#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

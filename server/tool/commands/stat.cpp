@@ -8,9 +8,9 @@
 #include <thread>
 
 #include "client/http_get.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/streams/metrics_parse.hpp"
-#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"

@@ -4,8 +4,8 @@
 #include <fstream>
 
 #include "client/http_get.hpp"
-#include "tool/commands/commands.hpp"
 #include "tool/command_line/command_line.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 
 namespace emit::tool {

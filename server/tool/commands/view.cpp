@@ -8,9 +8,9 @@
 #include <thread>
 
 #include "emit/image/false_color.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/streams/stream_options.hpp"
-#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/view/frame_provider.hpp"
