@@ -10,7 +10,7 @@ bool holds(std::string_view network, std::string_view address) {
   return protocol::parse_network(network)->contains(*protocol::parse_ip(address));
 }
 
-TEST(protocol::Network, HoldsTheAddressesThatBeginAlike) {
+TEST(Network, HoldsTheAddressesThatBeginAlike) {
   EXPECT_TRUE(holds("10.0.0.0/8", "10.255.0.1"));
   EXPECT_FALSE(holds("10.0.0.0/8", "11.0.0.1"));
   EXPECT_TRUE(holds("192.0.2.64/26", "192.0.2.127"));
@@ -27,7 +27,7 @@ TEST(protocol::Network, HoldsTheAddressesThatBeginAlike) {
 }
 
 // A socket for both families shows IPv4 peers as IPv6 addresses.
-TEST(protocol::Network, MappedAddressesAreIpv4) {
+TEST(Network, MappedAddressesAreIpv4) {
   EXPECT_TRUE(holds("10.0.0.0/8", "::ffff:10.1.2.3"));
   EXPECT_TRUE(holds("::ffff:10.0.0.0/104", "10.1.2.3"));
   EXPECT_FALSE(holds("::/0", "::ffff:10.1.2.3"));
@@ -35,7 +35,7 @@ TEST(protocol::Network, MappedAddressesAreIpv4) {
 }
 
 // Against arithmetic on the whole address.
-TEST(protocol::Network, EveryPrefixLengthCutsAtItsBit) {
+TEST(Network, EveryPrefixLengthCutsAtItsBit) {
   const protocol::IpAddress address = *protocol::parse_ip("170.170.170.170");
   for (unsigned bits = 1; bits <= 32; ++bits) {
     protocol::Network network;
@@ -53,7 +53,7 @@ TEST(protocol::Network, EveryPrefixLengthCutsAtItsBit) {
   }
 }
 
-TEST(protocol::Network, LoopbackIsRecognised) {
+TEST(Network, LoopbackIsRecognised) {
   for (const char* text : {"127.0.0.1", "127.9.9.9", "::1", "::ffff:127.0.0.1"}) {
     EXPECT_TRUE(protocol::parse_ip(text)->is_loopback()) << text;
   }
@@ -62,7 +62,7 @@ TEST(protocol::Network, LoopbackIsRecognised) {
   }
 }
 
-TEST(protocol::Network, WhatIsNoneIsRefusedByName) {
+TEST(Network, WhatIsNoneIsRefusedByName) {
   for (const char* text : {"", "/8", "10.0.0.0/", "10.0.0.0/33", "10.0.0/8", "10.0.0.0/-1",
                            "10.0.0.0/8 ", "fd00::/129", "::ffff:10.0.0.0/95", "rig", "10.0.0.0/8/8",
                            "1111:2222:3333:4444:5555:6666:7777:8888:9999"}) {
