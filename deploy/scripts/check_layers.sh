@@ -14,7 +14,7 @@ renderer/physics:
 renderer/image: renderer/physics
 renderer/scene: renderer/physics
 renderer/scene/generate: renderer/physics
-renderer/threads:
+renderer/threads: renderer/physics
 renderer/reference: renderer/physics renderer/scene
 renderer/reference/src/rays: renderer/reference renderer/physics renderer/scene renderer/threads
 renderer/reference/src/conduction: renderer/reference renderer/reference/src/rays renderer/physics renderer/scene renderer/threads
@@ -186,7 +186,7 @@ only Ceres    'ceres/'            'renderer/reference/'
 only OpenSSL  'openssl/'          'protocol/src/|server/net/tls_|server/app/sha256'
 only CLI11    'CLI/'              'server/tool/command_line/command_line.cpp'
 
-missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.cmake' \
+missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.py' '*.cmake' \
     '*CMakeLists.txt' '*.proto' | xargs grep -L 'SPDX-License-Identifier: Apache-2.0' || true)
 if [[ -n $missing ]]; then
   echo "files without licence line:"

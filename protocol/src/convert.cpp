@@ -21,13 +21,13 @@ static_assert(static_cast<int>(DecodeStatus::invalid_pose) == v1::Status::CODE_I
 static_assert(static_cast<int>(DecodeStatus::invalid_environment) ==
               v1::Status::CODE_INVALID_ENVIRONMENT);
 
-// Ranges of docs/wire.md.
+// Ranges that docs/wire.md section 5 gives.
 constexpr double kMinNorm = 0.99;
 constexpr double kMaxNorm = 1.01;
 constexpr double kMaxSpeedMS = 1e6;
 constexpr double kMaxAngularRateRadS = 1e4;
-// Weather: those of a scenario's [[weather.sample]], so that live weather can do nothing that a
-// scenario cannot.
+// Ranges of the weather. They are those of a scenario's [[weather.sample]], so that live weather
+// can do nothing that a scenario cannot.
 constexpr double kMaxDirectNormalWM2 = 2000.0;
 constexpr double kMaxDiffuseHorizontalWM2 = 1500.0;
 constexpr double kMaxLongwaveDownWM2 = 1000.0;
@@ -37,7 +37,8 @@ constexpr double kMinEnvironmentK = 100.0;
 constexpr double kMaxEnvironmentK = 400.0;
 constexpr double kMaxWindMS = 100.0;
 constexpr double kMaxFilmWM2K = 1000.0;
-/// Squared norms nearer to 1 are left alone, so that decoding what was decoded changes no bit.
+/// Largest difference of a squared norm from 1 that is not normalised away, so that decoding a
+/// decoded value changes no bit.
 constexpr double kNormTolerance = 1e-12;
 
 glm::dvec3 from(const v1::Vector3& in) noexcept {
@@ -50,14 +51,16 @@ void set(const glm::dvec3& in, v1::Vector3& out) {
   out.set_z(in.z);
 }
 
-/// False for NaN too.
+/// Returns true when every component is within [-limit, limit]; false for NaN.
 bool within(const glm::dvec3& vector, double limit) noexcept {
   return std::abs(vector.x) <= limit && std::abs(vector.y) <= limit && std::abs(vector.z) <= limit;
 }
+/// Returns true when the value is within [lowest, highest]; false for NaN.
 bool within(double value, double lowest, double highest) noexcept {
   return value >= lowest && value <= highest;
 }
 
+/// Reads a quaternion and normalises it. Returns false when its norm is out of range.
 bool read_attitude(const v1::Quaternion& in, glm::dquat& out) noexcept {
   out = glm::dquat(in.w(), in.x(), in.y(), in.z());
   const double squared = out.w * out.w + out.x * out.x + out.y * out.y + out.z * out.z;
@@ -69,6 +72,7 @@ bool read_attitude(const v1::Quaternion& in, glm::dquat& out) noexcept {
   return true;
 }
 
+/// Returns true when an entity before entity `checked` has the same id.
 bool repeats_an_id(const HostFrameData& frame, std::uint32_t checked) noexcept {
   for (std::uint32_t i = 0; i < checked; ++i) {
     if (frame.entities[i].entity_id == frame.entities[checked].entity_id) return true;

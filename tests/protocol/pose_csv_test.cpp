@@ -21,7 +21,7 @@ class PoseCsv : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove(path_); }
 
-  /// Text of the first error, or "N rows".
+  /// Returns the text of the first error, or "N rows".
   [[nodiscard]] std::string outcome(std::string_view text) const {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << text;
     auto reader = PoseCsvReader::open(path_);
@@ -68,7 +68,7 @@ TEST_F(PoseCsv, ErrorsNameFileLineAndColumn) {
   EXPECT_THAT(outcome(head + "0,0,0,0,1,1,0,0,7\n"), HasSubstr(":2: invalid pose"));
   EXPECT_THAT(outcome(head + "0,nan,0,0,1,0,0,0,7\n"), HasSubstr(":2: invalid pose"));
   EXPECT_THAT(outcome(head + "1e300,0,0,0,1,0,0,0,7\n"), HasSubstr("'sim_time_s': out of range"));
-  // What a host may not send in a datagram cannot stand in a file either.
+  // A value that a host may not send in a datagram is refused in a file too.
   EXPECT_EQ(outcome(head + "1e9,0,0,0,1,0,0,0,7\n"), "1 rows");
   EXPECT_THAT(outcome(head + "1000000001,0,0,0,1,0,0,0,7\n"),
               HasSubstr("'sim_time_s': out of range"));

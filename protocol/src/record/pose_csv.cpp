@@ -27,7 +27,7 @@ enum Column : std::size_t { kTime, kEast, kNorth, kUp, kQw, kQx, kQy, kQz, kFram
 constexpr std::array<std::string_view, kColumns> kNames{
     "sim_time_s", "east_m", "north_m", "up_m", "qw", "qx", "qy", "qz", "frame_number"};
 constexpr std::size_t kMandatory = kFrame;
-/// As from the wire.
+/// Largest magnitude of a time, s, the same as on the wire.
 constexpr double kMaxTimeS = kMaxSimTimeNs / 1e9;
 
 std::string_view trimmed(std::string_view text) {
@@ -61,7 +61,7 @@ struct PoseCsvReader::Impl {
   std::string line;
   std::uint64_t line_number = 0;
   std::vector<std::string_view> fields;
-  std::array<std::optional<std::size_t>, kColumns> place;  // of each column in a row
+  std::array<std::optional<std::size_t>, kColumns> place;  // position of each column in a row
   HostFrameData host;
   bool has_row = false;
   std::optional<Error> failure;
@@ -71,7 +71,7 @@ struct PoseCsvReader::Impl {
     return tl::unexpected(*failure);
   }
 
-  /// Next line with content, split; false at the end.
+  /// Reads the next line with content and splits it. Returns false at the end.
   bool next_line() {
     while (std::getline(file, line)) {
       ++line_number;
@@ -127,7 +127,7 @@ struct PoseCsvReader::Impl {
       if (!number) return tl::unexpected(number.error());
       frame_number = *number;
     }
-    // The same rules as for a pose from the wire.
+    // Apply the same rules as to a pose from the wire.
     const physics::Pose pose{{values[kEast], values[kNorth], values[kUp]},
                              {values[kQw], values[kQx], values[kQy], values[kQz]}};
     v1::Pose message;

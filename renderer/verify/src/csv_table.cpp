@@ -24,12 +24,13 @@ bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
 }
 
-/// Shrinks [begin, end) by the blanks at both ends.
+/// Removes the blanks at both ends of [begin, end).
 void trim(std::string_view text, std::size_t& begin, std::size_t& end) {
   while (begin < end && is_blank(text[begin])) ++begin;
   while (end > begin && is_blank(text[end - 1])) --end;
 }
 
+/// Returns the number that the text consists of, or nothing.
 std::optional<double> parse_number(std::string_view text) {
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   double value = 0.0;
@@ -37,7 +38,7 @@ std::optional<double> parse_number(std::string_view text) {
   if (end != text.data() + text.size() || text.empty()) return std::nullopt;
   if (error == std::errc()) return value;
   if (error != std::errc::result_out_of_range) return std::nullopt;
-  // 1e-400 is 0 and 1e400 is Inf, as everywhere else in IEEE arithmetic.
+  // 1e-400 gives 0 and 1e400 gives infinity, as everywhere in IEEE arithmetic.
   return std::strtod(std::string(text).c_str(), nullptr);
 }
 

@@ -6,28 +6,36 @@
 #include <string_view>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/error.hpp"
 
 namespace emit::verify {
 
-/// A CSV table in memory: comma separated, header row, LF or CRLF, lines starting with '#' and
-/// blank lines ignored, no quoting. Cells are parsed only where a column is asked for.
+/// CSV table in memory: comma separated, with a header row, LF or CRLF, without quoting. Blank
+/// lines and lines that begin with '#' are ignored. Cells are parsed only in columns that a caller
+/// requests.
 class CsvTable {
  public:
-  /// Errors: not_found, io; parse naming file and line (cell count, double or empty column name,
-  /// no header).
+  /// Reads a file. Errors: not_found; io; parse names file and line (number of cells, repeated or
+  /// empty column name, no header).
   [[nodiscard]] static physics::Result<CsvTable> read(const std::filesystem::path& file);
-  /// The same from text; `name` stands for the file in messages.
+  /// Reads a table from text. `name` replaces the file in messages. Errors: parse.
   [[nodiscard]] static physics::Result<CsvTable> parse(std::string text, std::string name);
 
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  /// Line of a row in the file, from 1, for messages.
-  [[nodiscard]] std::size_t line_of(std::size_t row) const { return lines_[row]; }
+  /// Returns the line of a row in the file, from 1, for messages.
+  /// @pre row < rows()
+  [[nodiscard]] std::size_t line_of(std::size_t row) const {
+    EMIT_CHECK_OP(row, <, rows());
+    return lines_[row];
+  }
 
-  /// Errors: invalid_argument naming the missing column; parse naming file, line and column of a
-  /// cell that is not a number (`nan` and `inf` are).
+  /// Returns the numbers of a column. Errors: invalid_argument names the missing column; parse
+  /// names file, line and column of a cell that is not a number (`nan` and `inf` are numbers).
   [[nodiscard]] physics::Result<std::vector<double>> numbers(std::string_view column) const;
+  /// Returns the texts of a column, which point into the table. Errors: invalid_argument names the
+  /// missing column.
   [[nodiscard]] physics::Result<std::vector<std::string_view>> texts(std::string_view column) const;
 
  private:
@@ -35,7 +43,7 @@ class CsvTable {
   [[nodiscard]] std::string_view cell(std::size_t row, std::size_t column) const;
 
   std::string name_;
-  std::string text_;  // cells are offsets into it, so that a moved table stays valid
+  std::string text_;  // cells are offsets into the text, so that a moved table stays valid
   struct Cell {
     std::size_t begin = 0;
     std::size_t length = 0;
