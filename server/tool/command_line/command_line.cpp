@@ -167,7 +167,7 @@ Option& Option::one_of(const std::vector<std::string>& values) {
   return *this;
 }
 
-Option& Option::one_of(const std::vector<int>& values) {
+Option& Option::one_of_numbers(const std::vector<int>& values) {
   option_->check(CLI::IsMember(values));
   for (const int value : values) registry_->choices[option_].push_back(fmt::format("{}", value));
   return *this;

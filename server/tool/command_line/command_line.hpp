@@ -40,7 +40,7 @@ class Option {
   /// Finite numbers above 0.
   Option& positive();
   Option& one_of(const std::vector<std::string>& values);
-  Option& one_of(const std::vector<int>& values);
+  Option& one_of_numbers(const std::vector<int>& values);
   /// --help shows the target's value as the default.
   Option& show_default();
   Option& default_text(const std::string& text);

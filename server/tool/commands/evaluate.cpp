@@ -146,7 +146,7 @@ void add_options(CommandLine& line, EvaluateOptions& options) {
   line.path("--cases", options.cases, "relaxation: CSV of the cases");
   line.path("--nodes", options.nodes, "relaxation: CSV of the history's nodes");
   line.option("--refine", options.refine, "conduction-*, surface-history: scales cells and steps")
-      .one_of({1, 2, 4})
+      .one_of_numbers({1, 2, 4})
       .show_default();
   line.option("--layers", options.layers,
               "surface-history: layers from the surface, thickness m : conductivity W/m/K : "
