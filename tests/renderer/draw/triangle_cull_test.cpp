@@ -297,8 +297,8 @@ TEST_F(TriangleCullTest, TakesNoMoreThanAFrameHasMemoryFor) {
     if (!full) indices += clusters_[c].index_count;
   }
   EXPECT_TRUE(full);
-  EXPECT_GT(indices, TriangleCull::kMostIndices - 3 * scene::kClusterTriangles);
-  EXPECT_LE(indices, TriangleCull::kMostIndices);
+  EXPECT_GT(indices, TriangleCull::kMaxIndices - 3 * scene::kClusterTriangles);
+  EXPECT_LE(indices, TriangleCull::kMaxIndices);
   EXPECT_TRUE(cull_.close(0));
   cull_.run();
   EXPECT_GT(cull_.indices().size(), 0U);
