@@ -15,7 +15,7 @@ namespace emit::renderer {
 struct LadderSubject {
   Renderer& renderer;
   const scene::SensorDesc& sensor;
-  std::span<const physics::ApparentTemperature> apparent;  ///< by band
+  std::span<const physics::ApparentTemperature> apparent;  ///< one entry per band
   glm::uvec2 output_px;                                    ///< size of the output image
   /// Number of triangles that each quality level draws of a frame.
   std::function<TrianglesPerLevel(const FrameRequest&)> triangles;

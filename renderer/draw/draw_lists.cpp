@@ -71,7 +71,7 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
   for (const SceneBuffers::MeshRange& mesh : scene.meshes()) {
     submesh_instances += mesh.submeshes.size() * mesh.instance_count;
     for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
-      // In the worst case every cluster is a range of its own.
+      // Count every cluster as a range of its own, which is the worst case.
       view_ranges += mesh.instance_count * (1 + submesh.cluster_count);
     }
   }

@@ -130,8 +130,8 @@ class DrawLists {
   std::vector<std::int32_t> history_of_instance_;  ///< entity of each instance; -1: static
   std::vector<std::uint32_t> moving_;              ///< instances of entities
   std::vector<double> size_of_instance_m_;         ///< longest side of its box
-  std::vector<Placed> view_placed_;   ///< by instance, for the camera; static ones never change
-  std::vector<Placed> light_placed_;  ///< by instance, for the shadow passes that follow
+  std::vector<Placed> view_placed_;  ///< one per instance, for the camera; static ones never change
+  std::vector<Placed> light_placed_;  ///< one per instance, for the shadow passes that follow
   scene::Aabb static_bounds_world_;
   std::vector<DrawRecord> records_;
   std::vector<LightRecord> light_records_;

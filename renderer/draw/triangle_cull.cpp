@@ -145,7 +145,7 @@ struct Block {
   static constexpr std::uint32_t kMax = 64;
   enum Verdict : std::uint32_t { kGone, kKept, kSmall };
   std::uint32_t count = 0;
-  std::array<std::array<float, kMax>, 3> x_px;  ///< by corner
+  std::array<std::array<float, kMax>, 3> x_px;  ///< positions of each corner
   std::array<std::array<float, kMax>, 3> y_px;
   std::array<std::uint32_t, kMax> verdict;
 

@@ -99,12 +99,12 @@ class TriangleCull {
   [[nodiscard]] std::uint32_t cull(const Job& job, std::uint32_t* out) const noexcept;
 
   threads::WorkerPool workers_;
-  std::vector<Local> locals_;  ///< by cluster
-  std::vector<float> x_m_;     ///< by local vertex, mesh coordinates
+  std::vector<Local> locals_;  ///< one entry per cluster
+  std::vector<float> x_m_;     ///< one entry per local vertex, mesh coordinates
   std::vector<float> y_m_;
   std::vector<float> z_m_;
-  std::vector<std::uint8_t> corners_;        ///< by index: local vertex
-  std::vector<std::uint32_t> mesh_indices_;  ///< by index: vertex of the mesh
+  std::vector<std::uint8_t> corners_;        ///< local vertex of each index
+  std::vector<std::uint32_t> mesh_indices_;  ///< vertex of each index in its mesh
   glm::uvec2 size_px_{0};
   std::vector<Job> jobs_;
   std::uint32_t open_ = 0;  ///< jobs that are in no part yet

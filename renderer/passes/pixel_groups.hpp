@@ -17,7 +17,7 @@ namespace emit::renderer {
 [[nodiscard]] constexpr std::uint32_t pixel_rows(bool software) noexcept {
   return software ? 8 : 1;
 }
-/// Definition EMIT_ROWS that tells a shader how many blocks a work group computes.
+/// Definition EMIT_ROWS, the number of blocks that a work group computes.
 [[nodiscard]] gl::Define rows_define(std::uint32_t rows);
 
 /// Dispatches the current program over `size_px` pixels, with `rows` blocks per work group.

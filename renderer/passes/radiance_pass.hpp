@@ -18,7 +18,7 @@ struct RadianceContent {
   std::uint32_t outputs = 0;    ///< planes behind those of the bands, EMIT_OUTPUT_*
 };
 
-/// In-band radiance of every pixel (part 5 of the paper). See passes/radiance.comp.
+/// Radiance of every pixel in all bands (part 5 of the paper). See passes/radiance.comp.
 /// Thread: the one that owns the GL context. Real time: create() is setup only, the rest is
 /// RT-safe.
 class RadiancePass {

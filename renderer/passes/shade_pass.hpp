@@ -66,7 +66,7 @@ class ShadePass {
   gl::BufferTexture tile_table_;
   gl::Buffer list_buffer_;
   gl::BufferTexture list_table_;
-  std::vector<std::uint32_t> sent_;  ///< by entity: revision of the depth map on the device
+  std::vector<std::uint32_t> sent_;  ///< revision of each entity's depth map on the device
 };
 
 }  // namespace emit::renderer

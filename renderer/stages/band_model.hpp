@@ -49,7 +49,7 @@ class BandModel {
   /// Constants of one band.
   struct Entry {
     physics::Band band;
-    double sun_radiance_w_m2_sr = 0.0;  ///< in-band radiance of the photosphere
+    double sun_radiance_w_m2_sr = 0.0;  ///< band radiance of the photosphere
     /// Mean radiance of the sky over the hemisphere divided by a blackbody at air temperature.
     double sky_hemisphere_frac = 0.0;
     double vertical_transmittance_frac = 1.0;

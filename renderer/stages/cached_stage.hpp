@@ -72,7 +72,7 @@ class CachedStage final : public ThermalStage {
   physics::SunPosition sun_now_;
   physics::Forcing forcing_now_;
 
-  std::array<gl::Buffer, 3> node_buffers_;  ///< by storage of CachedSurface
+  std::array<gl::Buffer, 3> node_buffers_;  ///< one per storage of CachedSurface
   std::optional<ShadePass> shade_pass_;     ///< empty when the scenario has no entities
   gl::Buffer shade_buffer_;                 ///< recent shade of entities by vertex, K
 };

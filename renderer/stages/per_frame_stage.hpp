@@ -76,7 +76,8 @@ class PerFrameStage final : public ThermalStage {
 
   std::vector<StepSlot> step_params_;  ///< intervals, the instant of the frame, the spin-up tail
   std::vector<gpu::RelaxationParams> relaxation_params_;
-  std::vector<std::array<CommandRange, 4>> shadow_commands_;  ///< by step and light frustum
+  std::vector<std::array<CommandRange, 4>>
+      shadow_commands_;          ///< one entry per step and light frustum
   bool extra_sun_pass_ = false;  ///< the frame needs the shade of its own instant
 
   gl::Buffer step_buffer_;

@@ -7,8 +7,8 @@
 // The including shader defines EMIT_ATMOSPHERE_TABLE(index), the float at that place of its buffer.
 // `grid`: x = index of the table's first float, y = number of ranges (>= 2), z = number of elevations (>= 1).
 
-// Cell of the ascending axis that starts at index `first`, for the value `x`. Result: x = index of the cell, y = position
-// in it, 0..1. Sets `clamped` where `x` lies outside the axis.
+// Cell of the ascending axis that starts at index `first`, for the value `x`. Result: x = index of the cell, y =
+// position in it, 0..1. Sets `clamped` where `x` lies outside the axis.
 vec2 atmosphere_table_cell(int first, int nodes, float x, inout bool clamped) {
   float lowest = EMIT_ATMOSPHERE_TABLE(first);
   float highest = EMIT_ATMOSPHERE_TABLE(first + nodes - 1);
@@ -60,7 +60,8 @@ vec2 atmosphere_table_air(uvec4 grid, float range_m, float sin_elevation, inout 
     float sine = clamp(sin_elevation, -1.0, 1.0);
     vec2 elevation_place = atmosphere_table_cell(axis + ranges, elevations, sine, clamped);
     int row = values + 2 * ranges * int(elevation_place.x);
-    air = mix(atmosphere_table_at(row, range_place), atmosphere_table_at(row + 2 * ranges, range_place), elevation_place.y);
+    air = mix(atmosphere_table_at(row, range_place), atmosphere_table_at(row + 2 * ranges, range_place),
+              elevation_place.y);
   }
   return vec2(exp(-air.x), air.y);
 }

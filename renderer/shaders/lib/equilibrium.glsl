@@ -11,9 +11,9 @@ float held_in_range(float value, float low, float high, inout bool clamped) {
   return held;
 }
 
-// Positive root of  emission T^4 + conductance T = source  (physics.md eq. 4), in kelvin.
-// Twin of emit/physics/equilibrium.hpp, which states the accuracy. The result is finite for every input: inputs are held
-// in their ranges, which sets `clamped` (never clears it). The ranges keep every intermediate result within float32.
+// Positive root of  emission T^4 + conductance T = source  (physics.md eq. 4), in kelvin. Twin of
+// emit/physics/equilibrium.hpp, which states the accuracy. The result is finite for every input: inputs are held in
+// their ranges, which sets `clamped` (never clears it). The ranges keep every intermediate result within float32.
 float equilibrium_k(float emission_w_m2_k4, float conductance_w_m2_k, float source_w_m2,
                     inout bool clamped) {
   float e = held_in_range(emission_w_m2_k4, 1e-20, 1.0, clamped);

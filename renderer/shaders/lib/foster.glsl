@@ -25,8 +25,8 @@ float foster_flux_w_m2(float offset_k, vec3 drive, FosterSurface s) {
   return drive.x + drive.y * (drive.z - offset_k) - s.emission_w_m2_k4 * t2 * t2;
 }
 
-// States after one step whose drive goes from `begin` to `end`. The flux at its start is that of `begin`. Sets `clamped`
-// where an input lies outside its range.
+// States after one step whose drive goes from `begin` to `end`. The flux at its start is that of `begin`. Sets
+// `clamped` where an input lies outside its range.
 vec4 foster_step(vec4 x, vec3 begin, vec3 end, vec4 start_frac, vec4 end_frac, FosterSurface s,
                  inout bool clamped) {
   // Advance the states with the flux at the start; the flux at the end is still missing.
@@ -43,8 +43,8 @@ vec4 foster_step(vec4 x, vec3 begin, vec3 end, vec4 start_frac, vec4 end_frac, F
                           end.x + end.y * (s.reference_k + end.z) + conductance * (s.reference_k + p_k),
                           guarded);
   clamped = clamped || guarded;
-  // Polish it by one Newton step on offsets. A temperature in kelvin resolves only 3e-5 K, which a short step would turn
-  // into a wrong flux.
+  // Polish it by one Newton step on offsets. A temperature in kelvin resolves only 3e-5 K, which a short step would
+  // turn into a wrong flux.
   float offset_k = t - s.reference_k;
   float slope = 4.0 * s.emission_w_m2_k4 * t * t * t + end.y;
   if (!guarded) {

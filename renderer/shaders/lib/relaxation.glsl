@@ -2,8 +2,8 @@
 #ifndef EMIT_LIB_RELAXATION
 #define EMIT_LIB_RELAXATION
 
-// Exact steps of tau x' = u - x (physics.md eq. 6). Twin of emit/physics/relaxation.hpp, which computes the gains (start,
-// end) in double on the CPU. `x` and `u` are offsets from a reference temperature, in K.
+// Exact steps of tau x' = u - x (physics.md eq. 6). Twin of emit/physics/relaxation.hpp, which computes the gains
+// (start, end) in double on the CPU. `x` and `u` are offsets from a reference temperature, in K.
 
 // State after a step whose drive goes linearly from u0 to u1.
 float relax_linear(float x, float u0, float u1, vec2 gains_frac) {

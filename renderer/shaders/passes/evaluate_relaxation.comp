@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shader of `emit evaluate relaxation`. Input row: first interval, number of intervals, 1 for a linear drive, then weight
-// and start offset of three modes. Output row: offset of the temperature in K. The constants hold for each interval the
-// drive offset at both ends, then the gains (start, end) of three modes, which the CPU computes in double.
+// Shader of `emit evaluate relaxation`. Input row: first interval, number of intervals, 1 for a linear drive, then
+// weight and start offset of three modes. Output row: offset of the temperature in K. The constants hold for each
+// interval the drive offset at both ends, then the gains (start, end) of three modes, which the CPU computes in double.
 #include "lib/relaxation.glsl"
 
 layout(local_size_x = 64) in;

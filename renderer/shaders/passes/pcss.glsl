@@ -18,7 +18,9 @@ float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
   // Choose the light frustum that serves the distance of the point.
   if (step_params.cascade_count == 0u) return 1.0;
   uint cascade = 0u;
-  while (cascade + 1u < step_params.cascade_count && boresight_m > step_params.cascades[cascade].end_boresight_m) ++cascade;
+  while (cascade + 1u < step_params.cascade_count && boresight_m > step_params.cascades[cascade].end_boresight_m) {
+    ++cascade;
+  }
   vec4 row0 = step_params.cascades[cascade].light_row0;
   vec4 row1 = step_params.cascades[cascade].light_row1;
   vec4 row2 = step_params.cascades[cascade].light_row2;

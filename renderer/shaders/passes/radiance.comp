@@ -24,7 +24,7 @@ layout(std430, binding = EMIT_BIND_STATS) buffer Stats { FrameStatsGpu stats; };
 #define EMIT_ATMOSPHERE_TABLE(index) texelFetch(band_lut, index).r
 #include "lib/atmosphere_table.glsl"
 
-// What a pixel shows. Where it shows sky only `boresight_m` is used.
+// Surface that a pixel shows. For a pixel of the sky only `boresight_m` is used.
 struct Seen {
   float boresight_m;
   float temperature_k;
@@ -85,9 +85,10 @@ float air_mass(float sin_elevation) {
   return 1.0 / (max(sin_elevation, 0.0) + 0.50572 * exp(-1.6364 * log(elevation_deg + 6.07995)));
 }
 
-// In-band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms.
+// Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms.
 float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
-  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log(max(bands[band].vertical_transmittance_frac, 1e-30)) * air_mass(sin_elevation)));
+  float log_vertical = log(max(bands[band].vertical_transmittance_frac, 1e-30));
+  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation)));
 }
 
 // Transmittance of the air over a range, 0..1, as a sum of exponential terms.
@@ -104,9 +105,10 @@ uvec4 air_table(uint band) {
   return uvec4(bands[band].air_table_first, bands[band].air_table_ranges, bands[band].air_table_elevations, 0u);
 }
 
-// In-band radiance that leaves the surface, W m-2 sr-1. Sets `clamped` where the temperature lies outside the table.
+// Band radiance that leaves the surface, W m-2 sr-1. Sets `clamped` where the temperature lies outside the table.
 float leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
-  vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node, float(band * frame.band_lut_nodes));
+  vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
+                  float(band * frame.band_lut_nodes));
   float emissivity_frac = texelFetch(band_lut, int(frame.first_emissivity + seen.material * EMIT_BANDS + band)).r;
   float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(seen.temperature_k, lut, clamped);
   // Add the diffuse reflection. The open part of the hemisphere shows sky, the rest the surroundings.
@@ -125,7 +127,8 @@ void write_pixel(ivec2 px) {
   Seen seen = seen_at(px);
   vec3 ray = sensor_ray(px);
   float ray_length = length(ray);
-  float sin_elevation = dot(vec3(frame.relworld_from_sensor[0].z, frame.relworld_from_sensor[1].z, frame.relworld_from_sensor[2].z), ray) / ray_length;
+  vec3 up = vec3(frame.relworld_from_sensor[0].z, frame.relworld_from_sensor[1].z, frame.relworld_from_sensor[2].z);
+  float sin_elevation = dot(up, ray) / ray_length;
   bool surface = seen.boresight_m < EMIT_SKY_DEPTH_M;
   bool clamped = false;
   bool nonfinite = false;
@@ -162,9 +165,12 @@ void write_pixel(ivec2 px) {
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_DEPTH) != 0u) {
     planes[plane++ * plane_px + pixel] = surface ? seen.boresight_m : uintBitsToFloat(0x7f800000u);
   }
-  if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) {
+    planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
+  }
   // Count the pixel if it is flagged.
-  if (nonfinite || clamped) atomicAdd(stats.flagged_px[(nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0)], 1u);
+  int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);
+  if (flags != 0) atomicAdd(stats.flagged_px[flags], 1u);
 }
 
 void main() {

@@ -20,8 +20,8 @@ layout(binding = EMIT_TEX_SILHOUETTE_PARAMS) uniform samplerBuffer silhouette_pa
 layout(binding = EMIT_TEX_SHADE_TILES) uniform usamplerBuffer shade_tiles;
 layout(binding = EMIT_TEX_SHADE_LIST) uniform usamplerBuffer shade_list;
 
-// Loops with at most one turn stand for branches here: software rasterisers run both sides of a branch, but leave a loop
-// that no lane is in.
+// Loops with at most one turn stand for branches here: software rasterisers run both sides of a branch, but leave a
+// loop that no lane is in.
 
 // Temperature in K that recent shade has taken off a surface that faces the sun, by exposure tile `page` (physics.md
 // eq. 25). `p` is the point in relworld axes.
@@ -52,7 +52,8 @@ float lit_frac(vec3 p, int silhouette) {
   // Find the point on the map.
   int texel = silhouette * EMIT_SILHOUETTE_TEXELS;
   vec4 point = vec4(p, 1.0);
-  vec2 at = vec2(dot(texelFetch(silhouette_params, texel), point), dot(texelFetch(silhouette_params, texel + 1), point));
+  vec2 at = vec2(dot(texelFetch(silhouette_params, texel), point),
+                 dot(texelFetch(silhouette_params, texel + 1), point));
   float depth_m = dot(texelFetch(silhouette_params, texel + 2), point);
   // Compute the radius of the sun's disc on the map.
   vec4 penumbra = texelFetch(silhouette_params, texel + 3);  // mean_depth_m, penumbra_texels_per_m, layer
@@ -89,7 +90,8 @@ void shade_pixel(ivec2 px, uvec4 tile) {
   for (int i = first; i < behind_pages; ++i) {
     colder_k += cooler_k(p, texel_material(texel), int(texelFetch(shade_list, i).r));
   }
-  // Multiply the shares of the sun that the shadow depth maps leave. The texel holds the share that static surfaces leave.
+  // Multiply the shares of the sun that the shadow depth maps leave. The texel holds the share that static surfaces
+  // leave.
   float left_frac = 1.0;
   for (int i = behind_pages; i < last; ++i) left_frac *= lit_frac(p, int(texelFetch(shade_list, i).r));
   // Write the pixel if it changed.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shader of `emit bench stability`: many relaxation steps per case. A dispatch does some of them, because Mesa's software
-// rasteriser leaves the loops of an invocation after 65535 turns without an error. The constants hold for each case the
-// number of steps (as an exact float), 1 for a linear drive, the start offset in K, and the gains (start, end) of four
-// step lengths that take turns. The drive is drawn from the numbers of case and node.
+// Shader of `emit bench stability`: many relaxation steps per case. A dispatch does some of them, because Mesa's
+// software rasteriser leaves the loops of an invocation after 65535 turns without an error. The constants hold for each
+// case the number of steps (as an exact float), 1 for a linear drive, the start offset in K, and the gains (start, end)
+// of four step lengths that take turns. The drive is drawn from the numbers of case and node.
 #include "lib/relaxation.glsl"
 #include "shared/stability_inputs.glsl.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Advances every visible surface point over one interval of the thermal history: soft shadow, Eq. 1, the stable root of
-// Eq. 5, and the exact relaxation of two modes (physics.md eq. 1 to 6). Inside an interval the shade is constant, at its
-// mean, and the drive is linear between the equilibria at the two ends.
-// With EMIT_SUN_ONLY the pass stores the shade of the last step and changes no temperature.
+// Eq. 5, and the exact relaxation of two modes (physics.md eq. 1 to 6). Inside an interval the shade is constant, at
+// its mean, and the drive is linear between the equilibria at the two ends. With EMIT_SUN_ONLY the pass stores the
+// shade of the last step and changes no temperature.
 #include "passes/gbuffer.glsl"
 #include "passes/pcss.glsl"
 #include "passes/tables.glsl"

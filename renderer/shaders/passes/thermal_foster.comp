@@ -62,7 +62,8 @@ void main() {
   vec4 surface = material_surface(material);
   vec4 start = material_start(material);
   if (start.z > 0.5) return;
-  // Estimate the cosine-weighted share of the sky: the share above the horizon times the share that near geometry leaves.
+  // Estimate the cosine-weighted share of the sky: the share above the horizon times the share that near geometry
+  // leaves.
   float sky_frac = 0.5 * (1.0 + n.z);
   if (!unshaded) sky_frac *= min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0);
 
@@ -74,7 +75,8 @@ void main() {
 
   // Set up the drive at both ends: absorbed flux, film coefficient, air temperature.
   vec3 begin = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_start_w_m2, step_params.longwave_start_w_m2,
-                                           step_params.reflected_start_w_m2, step_params.environment_start_w_m2, sky_frac),
+                                           step_params.reflected_start_w_m2, step_params.environment_start_w_m2,
+                                           sky_frac),
                     step_params.film_start_w_m2_k, step_params.air_start_offset_k);
   vec3 end = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_end_w_m2, step_params.longwave_end_w_m2,
                                          step_params.reflected_end_w_m2, step_params.environment_end_w_m2, sky_frac),

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lets one file define a struct for C++ and for GLSL.
-// A member is a mat4, a vec4, a uvec4, or part of a group that fills 16 bytes: four scalars, two vec2, or a vec3 and a
-// scalar. Padding has a name. Then std140 and std430 give the offsets that C++ gives. Each file asserts size and offsets
-// for C++, and tests/renderer/gl/shared_structs_test.cpp compares them with those of the driver.
+// Lets one file define a struct for C++ and for GLSL. A member is a mat4, a vec4, a uvec4, or part of a group that
+// fills 16 bytes: four scalars, two vec2, or a vec3 and a scalar. Padding has a name. Then std140 and std430 give the
+// offsets that C++ gives. Each file asserts size and offsets for C++, and tests/renderer/gl/shared_structs_test.cpp
+// compares them with those of the driver.
 #pragma once
 #ifdef __cplusplus
 #include <cstddef>

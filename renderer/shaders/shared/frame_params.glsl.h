@@ -3,8 +3,8 @@
 //
 // "relworld" is a frame of reference: the axes of the world (east, north, up) with the origin at the camera, in metres.
 // The "rendered image" holds the pixels that the passes compute. The "output image" holds the pixels that leave the
-// renderer. It is larger than the rendered image where a quality level renders fewer pixels.
-// A member that one thermal model or method alone uses names it: emit2014, foster (thermal.model), cached (thermal.method).
+// renderer. It is larger than the rendered image where a quality level renders fewer pixels. A member that one thermal
+// model or method alone uses names it: emit2014, foster (thermal.model), cached (thermal.method).
 #pragma once
 #include "shared/bindings.glsl.h"
 #include "shared/cpp_glsl.glsl.h"

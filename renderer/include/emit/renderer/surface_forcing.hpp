@@ -41,7 +41,7 @@ struct IntervalForcing {
 
 /// Material of the extended thermal model.
 struct FosterMaterial {
-  physics::FosterNetwork network;  ///< without modes the temperature is prescribed
+  physics::FosterNetwork network;  ///< no modes: the temperature is prescribed
   double solar_absorptance_frac = 0.0;
   double emissivity_frac = 1.0;
   double base_k = 0.0;
