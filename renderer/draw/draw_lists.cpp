@@ -286,9 +286,9 @@ void DrawLists::drop_empty_ranges() noexcept {
   }
 }
 
-scene::Aabb DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_ns,
-                                    std::int64_t end_ns,
-                                    std::span<const PoseHistory> entities) noexcept {
+scene::Aabb DrawLists::pose_entities(std::int64_t sample_ns, std::int64_t begin_ns,
+                                     std::int64_t end_ns,
+                                     std::span<const PoseHistory> entities) noexcept {
   EMIT_CHECK_OP(entities.size(), >=, entities_);
   scene::Aabb box;
   for (const std::uint32_t i : moving_) {

@@ -68,8 +68,8 @@ class DrawLists {
   /// a smaller share of the interval than size / way, and one pose would shade the whole interval.
   /// Returns the box around the entities that cast shadows, relative to the camera, in metres.
   /// @pre `entities` has an entry for every entity of the constructor.
-  scene::Aabb pose_casters(std::int64_t sample_ns, std::int64_t begin_ns, std::int64_t end_ns,
-                           std::span<const PoseHistory> entities) noexcept;
+  scene::Aabb pose_entities(std::int64_t sample_ns, std::int64_t begin_ns, std::int64_t end_ns,
+                            std::span<const PoseHistory> entities) noexcept;
   /// Lists the draws into the shadow map of a light frustum. The result is a part of
   /// light_commands().
   /// @pre At most `max_passes` calls in a frame.

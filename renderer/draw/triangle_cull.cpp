@@ -41,12 +41,12 @@ Edge edge(float x0, float y0, float x1, float y1, float side) noexcept {
 }
 
 /// Centres of pixels between two positions along one axis. Pixel k has its centre at (k + 0.5) px.
-struct Middles {
+struct Centres {
   /// Shift of pixel numbers that makes them positive, so that a conversion to int rounds down.
   static constexpr int kShift = 16;
   /// Centres in [low_px, high_px] of an image with `size_px` pixels along the axis.
   /// @pre Both positions lie at most kRimPx outside the image.
-  Middles(float low_px, float high_px, int size_px) noexcept
+  Centres(float low_px, float high_px, int size_px) noexcept
       : first(std::max(static_cast<int>(low_px + (0.5F - kMarginPx + kShift)), kShift)),
         count(std::min(static_cast<int>(high_px + (kMarginPx - 0.5F + kShift)),
                        size_px - 1 + kShift) -
@@ -61,11 +61,11 @@ struct Middles {
   int first;  ///< number of the first pixel + kShift
   int count;  ///< less than 1 when there is none
 };
-static_assert(kRimPx + 0.5F < Middles::kShift);
+static_assert(kRimPx + 0.5F < Centres::kShift);
 
 /// True when all edges hold one of the centres `along` on the line at `line_px`.
 template <float Edge::*kAlong, float Edge::*kAcross>
-bool hold_any(const std::array<Edge, 3>& edges, const Middles& along, float line_px,
+bool hold_any(const std::array<Edge, 3>& edges, const Centres& along, float line_px,
               int size_px) noexcept {
   float low_px = along.at_px(0);
   float high_px = along.at_px(along.count - 1);
@@ -80,7 +80,7 @@ bool hold_any(const std::array<Edge, 3>& edges, const Middles& along, float line
       return false;
     }
   }
-  return low_px <= high_px && Middles(low_px, high_px, size_px).count > 0;
+  return low_px <= high_px && Centres(low_px, high_px, size_px).count > 0;
 }
 
 // These functions take their arguments by value, so that compilers vectorise them.
@@ -110,26 +110,26 @@ struct Triangle {
   [[nodiscard]] float turn_px2() const noexcept {
     return (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0);
   }
-  [[nodiscard]] Middles columns(const glm::ivec2& size_px) const noexcept {
+  [[nodiscard]] Centres columns(const glm::ivec2& size_px) const noexcept {
     return {left(), right(), size_px.x};
   }
-  [[nodiscard]] Middles rows(const glm::ivec2& size_px) const noexcept {
+  [[nodiscard]] Centres rows(const glm::ivec2& size_px) const noexcept {
     return {low(), high(), size_px.y};
   }
 };
 
 /// True when a triangle holds the centre of a pixel. It walks along rows or along columns,
 /// whichever are fewer.
-bool holds_middle(const Triangle& t, const glm::ivec2& size_px) noexcept {
+bool holds_centre(const Triangle& t, const glm::ivec2& size_px) noexcept {
   const float side = t.turn_px2() < 0.0F ? -1.0F : 1.0F;
   // Make all edges from the same rounded corners, so that a needle has its inside between them too.
   const std::array<Edge, 3> edges = {edge(t.x0, t.y0, t.x1, t.y1, side),
                                      edge(t.x1, t.y1, t.x2, t.y2, side),
                                      edge(t.x2, t.y2, t.x0, t.y0, side)};
-  const Middles columns = t.columns(size_px);
-  const Middles rows = t.rows(size_px);
+  const Centres columns = t.columns(size_px);
+  const Centres rows = t.rows(size_px);
   const bool by_row = rows.count <= columns.count;
-  const Middles& lines = by_row ? rows : columns;
+  const Centres& lines = by_row ? rows : columns;
   for (int line = 0; line < lines.count; ++line) {
     const float at_px = lines.at_px(line);
     if (by_row ? hold_any<&Edge::a, &Edge::b>(edges, columns, at_px, size_px.x)
@@ -152,7 +152,7 @@ struct Block {
   [[nodiscard]] Triangle at(std::uint32_t t) const noexcept {
     return {x_px[0][t], x_px[1][t], x_px[2][t], y_px[0][t], y_px[1][t], y_px[2][t]};
   }
-  /// Decides for every triangle whether it is gone, kept, or small enough for holds_middle(). The
+  /// Decides for every triangle whether it is gone, kept, or small enough for holds_centre(). The
   /// loop has no branch, because compilers vectorise nothing else.
   void judge(const glm::ivec2& size_px, bool single_sided) noexcept {
     const float max_x = static_cast<float>(size_px.x) + kRimPx;
@@ -309,7 +309,7 @@ std::uint32_t TriangleCull::cull(const Job& job, std::uint32_t* out) const noexc
     block.judge(size_px, job.single_sided);
     for (std::uint32_t t = 0; t < block.count; ++t) {
       if (block.verdict[t] == Block::kGone) continue;
-      if (block.verdict[t] == Block::kSmall && !holds_middle(block.at(t), size_px)) continue;
+      if (block.verdict[t] == Block::kSmall && !holds_centre(block.at(t), size_px)) continue;
       std::copy_n(from + 3 * (first + t), 3, out + count);
       count += 3;
     }

@@ -35,7 +35,7 @@ class TriangleCull {
   TriangleCull() : workers_(threads::WorkerPool::all_cores()) {}
   /// Adds the clusters of a mesh. `first_index` is the number of the mesh's first index among the
   /// indices of all meshes. The order of the calls numbers the clusters, from 0.
-  /// @pre Every cluster lies within the indices that end with this mesh; no frame has begun.
+  /// @pre Every cluster lies within the indices that end with this mesh; finish() was not called.
   void add(const scene::Mesh& mesh, std::span<const scene::Cluster> clusters,
            std::uint32_t first_index);
   /// Allocates the memory of a frame, after the last add().

@@ -131,8 +131,8 @@ void PerFrameStage::prepare_steps(const FrameRequest& request, CameraSetup& came
     // Pose the casters of that time. They may have stood where nothing stands now, and higher.
     scene::Aabb casters = bounds;
     if (interval.sun_up) {
-      casters.add(drawn_.lists.pose_casters(interval.sample_ns, interval.begin_ns, interval.end_ns,
-                                            history_.entities));
+      casters.add(drawn_.lists.pose_entities(interval.sample_ns, interval.begin_ns, interval.end_ns,
+                                             history_.entities));
     }
     if (!casters.empty()) {
       camera.view.casters_min_m = casters.min_m;
