@@ -14,7 +14,7 @@ bool is_loopback_endpoint(std::string_view endpoint) {
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
     host = host.substr(1, host.size() - 2);
   }
-  const auto address = parse_ip(host);
+  const auto address = protocol::parse_ip(host);
   return address ? address->is_loopback() : host == "localhost";
 }
 

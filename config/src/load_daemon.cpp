@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "emit/protocol/shared_ring.hpp"
 #include "keys/data_files.hpp"
 #include "overrides.hpp"
 #include "resolve/resolve.hpp"
@@ -64,7 +65,7 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
   check_endpoint(section(root, "control", reported_before), "tcp", daemon.control.tcp, false,
                  diagnostics);
   check_endpoint(section(root, "host", reported_before), "udp", daemon.host.udp, true, diagnostics);
-  if (!daemon.stream.shm.empty() && !is_shm_name(daemon.stream.shm)) {
+  if (!daemon.stream.shm.empty() && !protocol::is_shm_name(daemon.stream.shm)) {
     diagnostics.add(key_location(section(root, "stream", reported_before), "shm"),
                     fmt::format("'shm' is '{}', must be 1 to 64 letters, digits, '_', '-' or '.', "
                                 "beginning with a letter or digit",
@@ -105,13 +106,6 @@ bool is_endpoint(std::string_view text) {
   unsigned value = 0;
   const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
   return parsed.ec == std::errc() && parsed.ptr == port.data() + port.size() && value <= 65535;
-}
-
-bool is_shm_name(std::string_view text) noexcept {
-  constexpr std::size_t kMaxCharacters = 64;
-  return !text.empty() && text.size() <= kMaxCharacters && is_ascii_alnum(text.front()) &&
-         std::all_of(text.begin(), text.end(),
-                     [](char c) { return is_ascii_alnum(c) || c == '_' || c == '-' || c == '.'; });
 }
 
 Result<DaemonConfig> load_daemon(const std::filesystem::path& file,

@@ -26,7 +26,8 @@ namespace limits = physics::limits;
 
 constexpr double kMaxSpeedMS = 1e6;
 constexpr double kMaxAngularRateRadS = 1e4;
-/// Squared norms nearer to 1 are left alone, so that decoding what was decoded changes no bit.
+/// Largest difference of a squared norm from 1 that is not normalised away, so that decoding a
+/// decoded value changes no bit.
 constexpr double kNormTolerance = 1e-12;
 
 glm::dvec3 from(const v1::Vector3& in) noexcept {
@@ -39,11 +40,12 @@ void set(const glm::dvec3& in, v1::Vector3& out) {
   out.set_z(in.z);
 }
 
-/// False for NaN too.
+/// Returns true when every component is within [-limit, limit]; false for NaN.
 bool within(const glm::dvec3& vector, double limit) noexcept {
   return std::abs(vector.x) <= limit && std::abs(vector.y) <= limit && std::abs(vector.z) <= limit;
 }
 
+/// Reads a quaternion and normalises it. Returns false when its norm is out of range.
 bool read_attitude(const v1::Quaternion& in, glm::dquat& out) noexcept {
   out = glm::dquat(in.w(), in.x(), in.y(), in.z());
   const double squared = out.w * out.w + out.x * out.x + out.y * out.y + out.z * out.z;
@@ -55,6 +57,7 @@ bool read_attitude(const v1::Quaternion& in, glm::dquat& out) noexcept {
   return true;
 }
 
+/// Returns true when an entity before entity `checked` has the same id.
 bool repeats_an_id(const HostFrameData& frame, std::uint32_t checked) noexcept {
   for (std::uint32_t i = 0; i < checked; ++i) {
     if (frame.entities[i].entity_id == frame.entities[checked].entity_id) return true;

@@ -24,7 +24,7 @@ physics::Result<std::vector<IntervalForcing>> surface_forcing(
     scene::ScenarioDesc start = scenario;
     start.thermal.history_start_ns = nodes_ns.front();
     start.thermal.spin_up_ns = 0;
-    // Only the surroundings are carried.
+    // Only the surroundings are simulated, so no other material is needed.
     auto materials = build_foster_materials(start, {});
     if (!materials) return tl::unexpected(std::move(materials.error()));
     FosterHistory history(start, {}, materials->back(), environment, physics::kReferenceK);

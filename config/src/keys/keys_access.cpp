@@ -38,19 +38,19 @@ template <class Field>
 Key<AccessConfig> networks(std::string name, Field field, std::string meaning) {
   return texts<AccessConfig>(
       name, "networks such as 10.0.0.0/8, fd00::/8", field,
-      [name](std::vector<Network>& out, const std::string& word, const Location& at,
+      [name](std::vector<protocol::Network>& out, const std::string& word, const Location& at,
              Diagnostics& diagnostics) {
-        const auto network = parse_network(word);
+        const auto network = protocol::parse_network(word);
         network ? out.push_back(*network)
                 : diagnostics.add(at, "'" + name + "': " + network.error().text);
       },
-      [](const Network& network) { return to_string(network); }, std::move(meaning));
+      [](const protocol::Network& network) { return to_string(network); }, std::move(meaning));
 }
 
 }  // namespace
 
-std::vector<Network> AccessConfig::default_multicast_groups() {
-  return {*parse_network("239.255.0.0/16"), *parse_network("ff15::/16")};
+std::vector<protocol::Network> AccessConfig::default_multicast_groups() {
+  return {*protocol::parse_network("239.255.0.0/16"), *protocol::parse_network("ff15::/16")};
 }
 
 const KeyTable<AccessConfig>& access_keys() {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 
@@ -23,6 +25,8 @@ Forcing forcing_of(const WeatherSample& row) noexcept {
 }  // namespace
 
 Forcing forcing_from_rows(std::span<const WeatherSample> rows, std::int64_t sim_time_ns) noexcept {
+  EMIT_CHECK(!rows.empty());
+  EMIT_DCHECK(std::ranges::is_sorted(rows, {}, &WeatherSample::sim_time_ns));
   const auto after = std::upper_bound(
       rows.begin(), rows.end(), sim_time_ns,
       [](std::int64_t t, const WeatherSample& row) { return t < row.sim_time_ns; });
@@ -33,6 +37,7 @@ Forcing forcing_from_rows(std::span<const WeatherSample> rows, std::int64_t sim_
   if (after == rows.end()) {
     return forcing_of(before);
   }
+  // Interpolate every input linearly between the two rows.
   const Forcing a = forcing_of(before);
   const Forcing b = forcing_of(*after);
   const double s = static_cast<double>(sim_time_ns - before.sim_time_ns) /

@@ -12,6 +12,7 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
+/// Model and its function.
 struct Model {
   ModelInfo info;
   Result<std::string> (*run)(const EvaluateRequest&, const physics::CsvTable&);

@@ -10,7 +10,8 @@
 #include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 
-/// One function per model: reads its columns from `table`, returns the result as CSV text.
+/// Functions of the models, one each. A function reads its columns from `table` and returns the
+/// result as CSV text. Errors are those of evaluate().
 namespace emit::verify {
 
 inline constexpr std::string_view kEquilibriumInputs = "lambda,d,eps,Ta,Tc,hc,Tair";
@@ -83,11 +84,13 @@ template <std::size_t N>
   return columns;
 }
 
-/// A conduction column `d` and conductivity `lambda` that describe a body: both positive.
+/// Returns true when a conductivity `lambda` (not negative) and a thickness `d` (positive) describe
+/// a body.
 [[nodiscard]] inline bool is_body(double conductivity, double thickness) {
   return conductivity >= 0.0 && thickness > 0.0;
 }
 
+/// Value of a result that is not defined.
 template <class Real>
 inline constexpr Real kUndefined = std::numeric_limits<Real>::quiet_NaN();
 

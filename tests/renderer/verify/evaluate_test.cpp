@@ -78,7 +78,8 @@ TEST_F(Evaluate, BalanceReadsBothSensesOfTheAlbedoColumn) {
   ASSERT_TRUE(result.has_value()) << result.error().text;
   EXPECT_THAT(*result, testing::StartsWith("E_abs,Ta,Ts,Ts_conv\n62.5,"));
   EXPECT_THAT(*result, HasSubstr("\n187.5,"));
-  // Emits more than conduction can bring: no radiative and no plain equilibrium temperature.
+  // The surface emits more than conduction can supply, so there is no radiative and no plain
+  // equilibrium temperature.
   EXPECT_THAT(*result, HasSubstr("\n-4000,nan,nan,"));
   EXPECT_THAT(*result, testing::Not(testing::EndsWith("nan\n")));
 
@@ -99,7 +100,8 @@ TEST_F(Evaluate, BandRadianceIsZeroAtZeroAndNanBelow) {
 const char* const kCaseHeader = "case,kind,n,tau1,tau2,tau3,w1,w2,w3,x0_1,x0_2,x0_3\n";
 
 TEST_F(Evaluate, RelaxationHoldsTheDriveOutsideItsNodes) {
-  // tau so short that the state is the drive: this shows which drive is used when.
+  // The time constant is so short that the state equals the drive, which shows the drive in use at
+  // each time.
   auto r = request("relaxation",
                    "t_s,case\n5,c\n15,c\n25,c\n99,c\n5,l\n15,l\n20,l\n99,l\n-1,l\n0,l\nnan,l\n");
   r.cases = write("cases.csv", std::string(kCaseHeader) +
@@ -111,15 +113,15 @@ TEST_F(Evaluate, RelaxationHoldsTheDriveOutsideItsNodes) {
   auto lines = physics::CsvTable::parse(*result, "out");
   const auto t = *lines->numbers("T_K");
   ASSERT_EQ(t.size(), 11U);
-  EXPECT_NEAR(t[0], 300.0, 1e-9);  // before the first node its drive holds
+  EXPECT_NEAR(t[0], 300.0, 1e-9);  // the first node's drive holds before it
   EXPECT_NEAR(t[1], 300.0, 1e-9);  // constant from node to node
   EXPECT_NEAR(t[2], 310.0, 1e-9);
-  EXPECT_NEAR(t[3], 310.0, 1e-9);  // and after the last
+  EXPECT_NEAR(t[3], 310.0, 1e-9);  // the last node's drive holds after it
   EXPECT_NEAR(t[4], 300.0, 1e-9);
-  EXPECT_NEAR(t[5], 310.0 - 0.002, 1e-9);  // a ramp is followed one tau behind
+  EXPECT_NEAR(t[5], 310.0 - 0.002, 1e-9);  // the state follows a ramp one tau behind
   EXPECT_NEAR(t[6], 320.0 - 0.002, 1e-9);
   EXPECT_NEAR(t[7], 320.0, 1e-9);
-  EXPECT_TRUE(std::isnan(t[8]));  // before the state is given
+  EXPECT_TRUE(std::isnan(t[8]));  // the time is before that of the given state
   EXPECT_EQ(t[9], 250.0);
   EXPECT_TRUE(std::isnan(t[10]));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the two thermal methods see, by itself, on geometry built from rows: the frame's soft shadow
-// and obscurance, with bounds a little above what was measured over the whole tables, and the rays
-// of the method `cached` against every row of them.
+// Tests of the visibility of the two thermal methods, by itself, on geometry built from rows: the
+// frame's soft shadow and obscurance, with limits a little above the values measured over the whole
+// tables, and the rays of the method `cached` against every row.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -53,7 +53,7 @@ TEST(EvaluateVisibilityGpu, ShadowEdgeFollowsTheDisc) {
 }
 
 TEST(EvaluateVisibilityGpu, WallShadowIsNearTheExactShare) {
-  // Core shadow, a penumbra, full sun.
+  // The rows are core shadow, penumbra and full sun.
   const auto f = on_gpu("wall-shadow",
                         "H,e_deg,x\n1,45,0.8\n0.48371750116348267,31.859729766845703,"
                         "0.7844818234443665\n1,45,1.2\n",
@@ -76,7 +76,7 @@ TEST(EvaluateVisibilityGpu, ObscuranceKnowsFlatConcaveAndConvex) {
   EXPECT_NEAR(f[3], 0.875, 0.05);
 }
 
-/// Every row of a column against the exact value; rows without one must have none.
+/// Expects that every row of a column is near the exact value, and that rows without one have none.
 void expect_all_near(const std::string& model, const std::string& table, const std::string& column,
                      const std::string& exact, double bar) {
   const auto file = test::oracle_file(table);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Visibility models against tables computed with 60 digits, through the evaluator as a user runs
-// it.
+// Tests of the visibility models against tables computed with 60 digits, through the evaluator as a
+// user runs it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -65,7 +65,7 @@ TEST(EvaluateVisibility, LimbDarkenedDiscMatchesThePlanarTable) {
   const auto delta_deg = *table->numbers("delta_deg");
   const auto expected = *table->numbers("f_limb0.6");
   for (std::size_t i = 0; i < delta_deg.size(); ++i) {
-    // A wall below the horizon, seen from its foot's height.
+    // The wall is below the horizon, seen from the height of its foot.
     const double e = delta_deg[i] * physics::kDegree;
     const reference::SunDisc disc{.to_centre = {std::cos(e), 0.0, std::sin(e)},
                                   .semi_angle_rad = physics::kSunSemiAngleRad,

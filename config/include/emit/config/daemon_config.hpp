@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "emit/config/network.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/protocol/ip_address.hpp"
 
 /// Configuration that emitd reads from --config, as plain data. config/README.md documents the
 /// keys.
@@ -97,24 +97,20 @@ struct StreamConfig {
   std::uint32_t shm_mode = 0600;
 };
 
-/// True for 1 to 64 letters, digits, `_`, `-` and `.`, the first a letter or digit. Such a name
-/// cannot be a path.
-[[nodiscard]] bool is_shm_name(std::string_view text) noexcept;
-
 struct MetricsConfig {
   std::string listen;  ///< address:port of the HTTP server; empty: off
 };
 
 /// Hosts that may connect, beside this one.
 struct AccessConfig {
-  std::vector<Network> allow;  ///< empty: every host
+  std::vector<protocol::Network> allow;  ///< empty: every host
   /// Multicast groups that a client may ask for: the site-local scopes (RFC 2365, RFC 4291).
-  std::vector<Network> multicast_groups = default_multicast_groups();
+  std::vector<protocol::Network> multicast_groups = default_multicast_groups();
   std::uint32_t max_connections_per_peer = 8;  ///< this host is not limited
   std::uint32_t max_host_frames_hz = 20'000;   ///< per peer address
   std::uint32_t max_control_records_hz = 1000;
 
-  [[nodiscard]] static std::vector<Network> default_multicast_groups();
+  [[nodiscard]] static std::vector<protocol::Network> default_multicast_groups();
 };
 
 /// Mutual TLS 1.3 on the control port.

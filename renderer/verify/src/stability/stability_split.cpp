@@ -19,15 +19,15 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-// Rows and intervals as passes/evaluate_relaxation.comp reads them.
+// Layout of rows and intervals for passes/evaluate_relaxation.comp.
 constexpr std::size_t kModes = 3;
 constexpr std::size_t kRowStride = 3 + 2 * kModes;
-constexpr std::uint32_t kMostSplits = 1000;
-constexpr std::size_t kMostIntervals = 65'535;
+constexpr std::uint32_t kMaxSplits = 1000;
+constexpr std::size_t kMaxIntervals = 65'535;
 bool is_valid(const DriveHistory& h, std::uint32_t splits) {
   return h.node_s.size() >= 2 && h.node_s.size() == h.drive_k.size() && !h.tau_s.empty() &&
          h.tau_s.size() <= kModes && h.tau_s.size() == h.weight_frac.size() && splits >= 1 &&
-         splits <= kMostSplits && (h.node_s.size() - 1) * splits <= kMostIntervals;
+         splits <= kMaxSplits && (h.node_s.size() - 1) * splits <= kMaxIntervals;
 }
 
 void append_intervals(const DriveHistory& h, std::uint32_t splits, std::vector<float>& out) {
@@ -49,7 +49,7 @@ void append_intervals(const DriveHistory& h, std::uint32_t splits, std::vector<f
   }
 }
 
-/// Surface offsets of all histories at their last node.
+/// Returns the surface offsets of all histories at their last node, K.
 Result<std::vector<float>> relaxed(std::span<const DriveHistory> histories, std::uint32_t splits,
                                    int gpu_index) {
   std::vector<float> rows;

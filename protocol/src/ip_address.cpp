@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/config/network.hpp"
+#include "emit/protocol/ip_address.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -8,7 +8,7 @@
 #include <charconv>
 #include <cstring>
 
-namespace emit::config {
+namespace emit::protocol {
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -111,4 +111,4 @@ std::string to_string(const Network& network) {
   return fmt::format("{}/{}", to_string(network.first), network.prefix_bits);
 }
 
-}  // namespace emit::config
+}  // namespace emit::protocol

@@ -9,7 +9,7 @@
 
 #include "emit/physics/error.hpp"
 
-namespace emit::config {
+namespace emit::protocol {
 
 /// An internet address without port. IPv4 addresses stand in the first 4 bytes. An IPv4 address
 /// mapped into IPv6 (::ffff:a.b.c.d) counts as the IPv4 address.
@@ -51,4 +51,4 @@ struct Network {
   return false;
 }
 
-}  // namespace emit::config
+}  // namespace emit::protocol
