@@ -21,7 +21,7 @@ class PoseCsv : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove(path_); }
 
-  /// Returns the text of the first error, or "N rows".
+  /// Text of the first error, or "N rows".
   [[nodiscard]] std::string outcome(std::string_view text) const {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << text;
     auto reader = PoseCsvReader::open(path_);
