@@ -80,7 +80,7 @@ physics::Error Diagnostics::error() const {
 
 std::string toml_number(double value) {
   std::string text = fmt::format("{}", value);
-  // TOML tells a float from an integer by the point or the exponent.
+  // In TOML a float has a point or an exponent.
   if (text.find_first_of(".en") == std::string::npos) {
     text += ".0";
   }

@@ -184,6 +184,17 @@ TEST(LoadScene, endings_of_files_may_be_upper_case) {
   EXPECT_TRUE(load_scene(scenario_of(write_file(test_folder() / "THING.GLTF", text.json()))));
 }
 
+TEST(LoadScene, materials_in_use_that_are_more_than_dry_layers_are_warned_of_by_name) {
+  ScenarioDesc scenario = one_triangle(R"({"name":"steel"})", R"(,"material":0)");
+  EXPECT_TRUE(load_scene(scenario)->warnings.empty());
+  for (Material& material : scenario.materials) material.dry_layers_valid = false;
+  const auto scene = load_scene(scenario);
+  ASSERT_TRUE(scene);
+  ASSERT_EQ(scene->warnings.size(), 1U);
+  EXPECT_THAT(scene->warnings[0],
+              AllOf(HasSubstr("material 'steel'"), HasSubstr("dry_layers_valid = false")));
+}
+
 TEST(LoadScene, unknown_library_names_are_configuration_errors) {
   ScenarioDesc scenario = one_triangle();
   scenario.objects[0].material = "ashpalt";
