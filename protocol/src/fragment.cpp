@@ -125,9 +125,7 @@ Fragmenter::Fragmenter(const Params& params,
                        std::span<const std::byte, kFrameHeaderBytes> frame_header,
                        std::span<const std::byte> pixels) noexcept
     : params_(params), frame_header_(frame_header), pixels_(pixels) {
-  payload_bytes_ =
-      std::clamp(params.max_payload_bytes, kMinFragmentPayloadBytes, kMaxFragmentPayloadBytes) &
-      ~std::uint32_t{3};
+  payload_bytes_ = granted_fragment_payload_bytes(params.max_payload_bytes);
   const std::uint32_t body = kHeader + static_cast<std::uint32_t>(pixels.size());
   const std::uint32_t used = body % payload_bytes_;  // of the fragment in which the pixels end
   // used == 0: the header starts a fragment of its own.

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "agents/conductor/conductor.hpp"
+#include "agents/context.hpp"
 #include "agents/receiver/receiver.hpp"
 #include "agents/recorder/recorder.hpp"
 #include "agents/render/render_agent.hpp"
@@ -16,7 +17,6 @@
 #include "agents/sender/sender.hpp"
 #include "agents/sender/shm_client.hpp"
 #include "app/clock_watch.hpp"
-#include "agents/context.hpp"
 #include "app/daemon.hpp"
 #include "app/service_health.hpp"
 #include "net/trigger_port.hpp"
@@ -80,6 +80,9 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] int end_without_device();
   [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
   [[nodiscard]] MetricsMoment moment() const;
+  /// Returns true while host frames are taken and frames come: false while stopping, and while the
+  /// surface warms up again behind a jump of simulation time. Any thread.
+  [[nodiscard]] bool is_ready() const noexcept;
   void housekeep();
   void watch_ptp();
   void log_summary();

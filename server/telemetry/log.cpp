@@ -152,7 +152,9 @@ EventText describe(const Event& event) {
     case EventKind::refused:
       return {LogLevel::warn,
               fmt::format("event=refused status={} text=\"{}\"", event.a,
-                          text.empty() ? protocol::status_text(static_cast<protocol::StatusCode>(event.a), 0) : text),
+                          text.empty()
+                              ? protocol::status_text(static_cast<protocol::StatusCode>(event.a), 0)
+                              : text),
               true};
     case EventKind::connected:
       return {LogLevel::info,
@@ -222,6 +224,14 @@ EventText describe(const Event& event) {
               fmt::format("event=poses_dropped count={} effect=\"oldest motion of this run is kept "
                           "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
                           event.a),
+              false};
+    case EventKind::warmed_up:
+      return {LogLevel::warn,
+              fmt::format("event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
+                          "meanwhile, this frame is flagged degraded\" remedy=\"move simulation "
+                          "time on in steps, or start at that time\"",
+                          static_cast<double>(event.a) * 1e-9,
+                          static_cast<double>(static_cast<std::int64_t>(event.b)) * 1e-9),
               false};
     case EventKind::peer_refused: {
       static constexpr std::array kWhy{"not in access.allow", "TLS handshake failed",

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "emit/physics/error.hpp"
@@ -23,6 +24,8 @@ class SpillFile {
   /// of the file itself, links followed, which need not exist yet; else the one for temporary
   /// files.
   [[nodiscard]] physics::Result<void> open(const std::filesystem::path& beside);
+  /// Returns the system's reason why the last folder took no file; empty where open() succeeded.
+  [[nodiscard]] std::error_code cause() const noexcept { return cause_; }
   SpillFile() = default;
   SpillFile(const SpillFile&) = delete;
   SpillFile& operator=(const SpillFile&) = delete;
@@ -43,6 +46,7 @@ class SpillFile {
   std::vector<std::byte> block_;
   std::uint64_t spilled_bytes_ = 0;
   int fd_ = -1;
+  std::error_code cause_;
 };
 
 }  // namespace emit::protocol

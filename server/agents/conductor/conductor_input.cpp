@@ -70,7 +70,9 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
     if (control_.running()) {
       issue_host_step(false, frame.received_ns);
     } else {
-      context_.counters.add(Counter::host_frames_unused);
+      // A host in lock step waits for a frame or for an answer.
+      reply(input.origin, StatusCode::ok, frame.frame_number,
+            context_.counters.add(Counter::host_frames_unused), protocol::kDetailStopped);
     }
   }
   return true;
@@ -216,8 +218,9 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
 void Conductor::refuse(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
                        std::uint64_t detail) noexcept {
   const std::uint64_t count = context_.counters.add(counter_of(code));
-  context_.conductor_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
-                                 detail == protocol::kDetailOldRun ? "a host frame of a replaced run" : "");
+  context_.conductor_events.push(
+      EventKind::refused, static_cast<std::uint64_t>(code), count,
+      detail == protocol::kDetailOldRun ? "a host frame of a replaced run" : "");
   reply(origin, code, host_frame_number, count, detail);
 }
 

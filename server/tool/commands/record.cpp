@@ -3,13 +3,13 @@
 
 #include <chrono>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/version.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
-#include "emit/client/client.hpp"
 #include "tool/support/json.hpp"
 
 namespace emit::tool {
@@ -71,11 +71,15 @@ int run_record(const RecordCommand& command) {
       lost_entries += entry.sequence() - last_sequence - 1;
     }
     if (entries == 0 && !entry.has_run_start()) {
-      // The daemon keeps some 64 MiB of a run for recorders that come later.
+      // The daemon keeps journal.memory_mib of a run for recorders that connect later.
       from_the_start = false;
-      warn(
-          "the run began longer ago than the daemon remembers: the log does not replay until the "
-          "next run begins");
+      const client::JournalGap& gap = recorder.gap();
+      warn(fmt::format(
+          "the run began longer ago than the daemon remembers (journal.memory_mib): {} the log "
+          "does not replay until the next run begins",
+          gap.entries() == 0 ? std::string()
+                             : fmt::format("{} entries, sequence {} to {}, are lost;",
+                                           gap.entries(), gap.first_sequence, gap.last_sequence)));
     }
     last_sequence = entry.sequence();
     ++entries;

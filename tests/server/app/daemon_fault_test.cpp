@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "emit/protocol/framing.hpp"
-#include "emit/client/client.hpp"
 #include "client/client_connection.hpp"
+#include "emit/client/client.hpp"
+#include "emit/protocol/framing.hpp"
 #include "net/socket.hpp"
 #include "rt/fd.hpp"
 #include "support/daemon_process.hpp"
@@ -53,8 +53,8 @@ class DaemonFaults : public ::testing::Test {
       EXPECT_EQ(daemon_->wait(), 0) << folder_.read("stderr");
     }
   }
-  [[nodiscard]] std::unique_ptr<client::FrameClient> open(const std::string& url = {},
-                                                  client::SubscribeOptions options = {}) const {
+  [[nodiscard]] std::unique_ptr<client::FrameClient> open(
+      const std::string& url = {}, client::SubscribeOptions options = {}) const {
     auto client = client::FrameClient::connect(url.empty() ? control_ : url);
     EXPECT_TRUE(client.has_value()) << client.error().text;
     if (!client) {
@@ -166,7 +166,8 @@ TEST_F(DaemonFaults, FloodsOfEveryKindCostAWellBehavedClientNoFrame) {
   // Sends the same over and over, and comes again when it is thrown out.
   const auto flood = [&](std::vector<std::byte> records) {
     while (!over.load()) {
-      auto connection = client::ClientConnection::open(url, protocol::PeerRole::client, 1'000'000'000);
+      auto connection =
+          client::ClientConnection::open(url, protocol::PeerRole::client, 1'000'000'000);
       if (!connection) continue;
       connections.fetch_add(1);
       while (!over.load() &&
@@ -281,6 +282,23 @@ TEST_F(DaemonFaults, ClientsThatWantEveryThirdFrameAllGetTheSameOnesWithoutAGap)
   ASSERT_TRUE(client.has_value());
   options.every_nth = 1001;
   EXPECT_FALSE((*client)->subscribe(options).has_value());
+}
+
+TEST_F(DaemonFaults, AUdpClientLearnsTheFragmentSizeThatItGets) {
+  start_host_step();
+  const std::string url = "udp://" + daemon_->control();
+  for (const auto& [asked, granted] : std::vector<std::pair<std::uint32_t, std::uint32_t>>{
+           {1000, 1000}, {1441, 1440}, {10, 320}, {100'000, 65472}}) {
+    client::SubscribeOptions options;
+    options.fragment_payload_bytes = asked;
+    const auto client = open(url, options);
+    ASSERT_NE(client, nullptr);
+    EXPECT_EQ(client->terms().fragment_payload_bytes, granted) << asked;
+    ASSERT_NO_FATAL_FAILURE(lock_step());
+    const auto frame = client->receive(kLongNs);
+    EXPECT_TRUE(frame.has_value() && *frame != nullptr) << asked;
+  }
+  EXPECT_EQ(good_->terms().fragment_payload_bytes, 0U) << "there are no fragments over TCP";
 }
 
 TEST_F(DaemonFaults, ASilentHostIsFlaggedStaleUntilItSpeaksAgain) {

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "emit/protocol/ip_address.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/protocol/ip_address.hpp"
 
 /// What emitd reads from --config; keys are documented in config/README.md. Plain data.
 namespace emit::config {
@@ -95,7 +95,6 @@ struct StreamConfig {
   std::uint32_t shm_mode = 0600;
 };
 
-
 struct MetricsConfig {
   std::string listen;  ///< /metrics, /healthz and /readyz over HTTP; empty = off
 };
@@ -126,6 +125,8 @@ struct TlsConfig {
 struct JournalConfig {
   std::filesystem::path file;  ///< written while running; empty = only on request of a recorder
   std::uint32_t ring_entries = 4096;
+  std::uint32_t memory_mib = 64;  ///< entries of the run kept for recorders that connect later
+  bool required = false;          ///< a start without room for the file fails
 };
 
 struct DeviceConfig {

@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 
+#include "emit/protocol/decode_fault.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/version.hpp"
 
@@ -40,11 +41,15 @@ class HostFrameDecoder {
   HostFrameDecoder(HostFrameDecoder&&) noexcept;
   HostFrameDecoder& operator=(HostFrameDecoder&&) noexcept;
 
+  /// Returns which field the last decode_host_frame() refused; kind none after a success.
+  [[nodiscard]] const DecodeFault& fault() const noexcept { return fault_; }
+
  private:
   friend DecodeStatus decode_host_frame(std::span<const std::byte> bytes, HostFrameDecoder& decoder,
                                         HostFrameData& out) noexcept;
   struct Impl;
   std::unique_ptr<Impl> impl_;
+  DecodeFault fault_;
 };
 
 /// Decodes one emit.v1.HostFrame. `out` is written completely on ok (received_ns becomes 0); on an

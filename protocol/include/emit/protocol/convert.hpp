@@ -26,11 +26,17 @@ void to_proto(const EnvironmentData& environment, v1::Environment& out);
 void to_proto(const HostFrameData& frame, v1::HostFrame& out);
 
 /// The from_proto functions check as decode_host_frame does; on an error `out` is unspecified.
+/// `fault`, where it is not null, then names the field and its value; a pose alone cannot know
+/// whether it is the seeker's or an entity's.
 [[nodiscard]] DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose,
-                                      std::optional<PoseRates>& rates) noexcept;
-[[nodiscard]] DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out) noexcept;
-[[nodiscard]] DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcept;
-[[nodiscard]] DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out) noexcept;
+                                      std::optional<PoseRates>& rates,
+                                      DecodeFault* fault = nullptr) noexcept;
+[[nodiscard]] DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out,
+                                      DecodeFault* fault = nullptr) noexcept;
+[[nodiscard]] DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
+                                      DecodeFault* fault = nullptr) noexcept;
+[[nodiscard]] DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out,
+                                      DecodeFault* fault = nullptr) noexcept;
 
 /// Appends record header and message to `out`, ready for a TCP connection.
 void append_control_record(const v1::ControlRecord& message, std::vector<std::byte>& out);

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "emit/physics/error.hpp"
 
@@ -28,9 +29,12 @@ struct McapWriterOptions {
 class McapWriter {
  public:
   /// Errors (io): the file cannot be written; no folder takes its index until close(), and an older
-  /// file is as it was.
+  /// file is as it was. A file that this call made is removed again when it fails.
+  /// @param cause  becomes the system's reason for the failure, such as ENOSPC; empty where there
+  ///               is none; null: not wanted
   [[nodiscard]] static physics::Result<McapWriter> create(const std::filesystem::path& path,
-                                                          const McapWriterOptions& options);
+                                                          const McapWriterOptions& options,
+                                                          std::error_code* cause = nullptr);
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
   ~McapWriter();  ///< close(), errors are lost
@@ -47,6 +51,11 @@ class McapWriter {
   [[nodiscard]] physics::Result<void> write(std::uint16_t channel_id, std::uint32_t sequence,
                                             std::int64_t log_time_ns, std::int64_t publish_time_ns,
                                             std::span<const std::byte> data);
+  /// Returns the system's reason for the failure of a write; empty without a failure.
+  [[nodiscard]] std::error_code failure_cause() const noexcept;
+  /// Returns the number of messages that the kernel has taken. The others wait in the open chunk or
+  /// are lost by a failure.
+  [[nodiscard]] std::uint64_t messages_in_file() const noexcept;
   /// Hands the open chunk to the kernel.
   [[nodiscard]] physics::Result<void> flush();
   /// Writes summary and footer. A second call does nothing.
