@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <charconv>
 
-#include "keys/data_files.hpp"
 #include "emit/protocol/shared_ring.hpp"
+#include "keys/data_files.hpp"
 #include "overrides.hpp"
 #include "resolve/resolve.hpp"
 
@@ -52,7 +52,7 @@ void resolve_daemon_scenario(const Node& root, const std::string& text, DaemonCo
 }
 
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
-  Diagnostics reported_before;  // section() reported wrong kinds already
+  Diagnostics reported_before;  // section() has reported wrong kinds
   const Node& pacing = section(root, "pacing", reported_before);
   if (daemon.pacing.mode != PacingMode::host_step &&
       daemon.pacing.display_delay_ns > daemon.pacing.horizon_ns) {

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "emit/physics/limits.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/v1/host.pb.h"
 #include "emit/v1/status.pb.h"
@@ -22,23 +23,12 @@ static_assert(static_cast<int>(DecodeStatus::invalid_pose) == v1::Status::CODE_I
 static_assert(static_cast<int>(DecodeStatus::invalid_environment) ==
               v1::Status::CODE_INVALID_ENVIRONMENT);
 
-// Ranges of docs/wire.md.
-constexpr double kMinNorm = 0.99;
-constexpr double kMaxNorm = 1.01;
+namespace limits = physics::limits;
+
 constexpr double kMaxSpeedMS = 1e6;
 constexpr double kMaxAngularRateRadS = 1e4;
-// Weather: those of a scenario's [[weather.sample]], so that live weather can do nothing that a
-// scenario cannot.
-constexpr double kMaxDirectNormalWM2 = 2000.0;
-constexpr double kMaxDiffuseHorizontalWM2 = 1500.0;
-constexpr double kMaxLongwaveDownWM2 = 1000.0;
-constexpr double kMinAirK = 180.0;
-constexpr double kMaxAirK = 340.0;
-constexpr double kMinEnvironmentK = 100.0;
-constexpr double kMaxEnvironmentK = 400.0;
-constexpr double kMaxWindMS = 100.0;
-constexpr double kMaxFilmWM2K = 1000.0;
-/// Squared norms nearer to 1 are left alone, so that decoding what was decoded changes no bit.
+/// Largest difference of a squared norm from 1 that is not normalised away, so that decoding a
+/// decoded value changes no bit.
 constexpr double kNormTolerance = 1e-12;
 
 glm::dvec3 from(const v1::Vector3& in) noexcept {
@@ -51,27 +41,22 @@ void set(const glm::dvec3& in, v1::Vector3& out) {
   out.set_z(in.z);
 }
 
-/// False for NaN too.
-bool within(double value, double lowest, double highest) noexcept {
-  return value >= lowest && value <= highest;
-}
-
 /// Checks values one after the other and notes the first one that is out of range.
 class RangeCheck {
  public:
   explicit RangeCheck(DecodeFault* fault) : fault_(fault) {}
-  bool in_range(const char* field, double value, double lowest, double highest) noexcept {
-    if (within(value, lowest, highest)) return true;
-    note({DecodeFault::Kind::out_of_range, DecodeFault::Part::message, 0, field, value, lowest,
-          highest});
+  bool in_range(const char* field, double value, const limits::Interval& range) noexcept {
+    if (range.contains(value)) return true;
+    note({DecodeFault::Kind::out_of_range, DecodeFault::Part::message, 0, field, value, range.lo,
+          range.hi});
     return false;
   }
   /// `fields`: the names of the three components.
   bool in_range(const std::array<const char*, 3>& fields, const glm::dvec3& vector,
                 double limit) noexcept {
-    return in_range(fields[0], vector.x, -limit, limit) &&
-           in_range(fields[1], vector.y, -limit, limit) &&
-           in_range(fields[2], vector.z, -limit, limit);
+    const limits::Interval range{-limit, limit};
+    return in_range(fields[0], vector.x, range) && in_range(fields[1], vector.y, range) &&
+           in_range(fields[2], vector.z, range);
   }
   bool present(const char* field, bool is_there) noexcept {
     if (!is_there) {
@@ -95,17 +80,19 @@ void set_part(DecodeFault* fault, DecodeFault::Part part, std::uint32_t entity_i
   }
 }
 
+/// Reads a quaternion and normalises it. Returns false when its norm is out of range.
 bool read_attitude(const v1::Quaternion& in, glm::dquat& out, RangeCheck& check) noexcept {
   out = glm::dquat(in.w(), in.x(), in.y(), in.z());
   const double squared = out.w * out.w + out.x * out.x + out.y * out.y + out.z * out.z;
   const double norm = std::sqrt(squared);
-  if (!check.in_range("norm of world_from_body", norm, kMinNorm, kMaxNorm)) return false;
+  if (!check.in_range("norm of world_from_body", norm, limits::kQuaternionNorm)) return false;
   if (std::abs(squared - 1.0) > kNormTolerance) {
     out = glm::dquat(out.w / norm, out.x / norm, out.y / norm, out.z / norm);
   }
   return true;
 }
 
+/// Returns true when an entity before entity `checked` has the same id.
 bool repeats_an_id(const HostFrameData& frame, std::uint32_t checked) noexcept {
   for (std::uint32_t i = 0; i < checked; ++i) {
     if (frame.entities[i].entity_id == frame.entities[checked].entity_id) return true;
@@ -222,18 +209,20 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
   out.cloud_frac = in.cloud_frac();
   if (in.has_environment_k()) out.environment_k = in.environment_k();
   if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
+  // The ranges are those of a scenario's weather, so that live weather can do nothing that a
+  // scenario cannot.
   RangeCheck check(fault);
   const bool valid =
-      check.in_range("direct_normal_w_m2", out.direct_normal_w_m2, 0.0, kMaxDirectNormalWM2) &&
-      check.in_range("diffuse_horizontal_w_m2", out.diffuse_horizontal_w_m2, 0.0,
-                     kMaxDiffuseHorizontalWM2) &&
-      check.in_range("longwave_down_w_m2", out.longwave_down_w_m2, 0.0, kMaxLongwaveDownWM2) &&
-      check.in_range("air_k", out.air_k, kMinAirK, kMaxAirK) &&
-      check.in_range("wind_m_s", out.wind_m_s, 0.0, kMaxWindMS) &&
-      check.in_range("cloud_frac", out.cloud_frac, 0.0, 1.0) &&
+      check.in_range("direct_normal_w_m2", out.direct_normal_w_m2, limits::kDirectNormalWM2) &&
+      check.in_range("diffuse_horizontal_w_m2", out.diffuse_horizontal_w_m2,
+                     limits::kDiffuseHorizontalWM2) &&
+      check.in_range("longwave_down_w_m2", out.longwave_down_w_m2, limits::kLongwaveDownWM2) &&
+      check.in_range("air_k", out.air_k, limits::kAirK) &&
+      check.in_range("wind_m_s", out.wind_m_s, limits::kWindMS) &&
+      check.in_range("cloud_frac", out.cloud_frac, limits::kCloudFrac) &&
       (!out.environment_k ||
-       check.in_range("environment_k", *out.environment_k, kMinEnvironmentK, kMaxEnvironmentK)) &&
-      (!out.film_w_m2_k || check.in_range("film_w_m2_k", *out.film_w_m2_k, 0.0, kMaxFilmWM2K));
+       check.in_range("environment_k", *out.environment_k, limits::kEnvironmentK)) &&
+      (!out.film_w_m2_k || check.in_range("film_w_m2_k", *out.film_w_m2_k, limits::kFilmWM2K));
   if (valid) return DecodeStatus::ok;
   set_part(fault, DecodeFault::Part::environment);
   return DecodeStatus::invalid_environment;
@@ -254,7 +243,7 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault
   if (out.sim_time_ns > kMaxSimTimeNs || out.sim_time_ns < -kMaxSimTimeNs) {
     constexpr auto kLimit = static_cast<double>(kMaxSimTimeNs);
     static_cast<void>(
-        check.in_range("sim_time_ns", static_cast<double>(out.sim_time_ns), -kLimit, kLimit));
+        check.in_range("sim_time_ns", static_cast<double>(out.sim_time_ns), {-kLimit, kLimit}));
     return DecodeStatus::malformed;
   }
   if (!check.present("seeker", in.has_seeker())) return DecodeStatus::invalid_pose;

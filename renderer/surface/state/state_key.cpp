@@ -17,11 +17,9 @@ void add_optional(Fnv64& hash, const std::optional<double>& value) {
   add(hash, value.has_value(), value.value_or(0.0));
 }
 
-/// A row of the scenario's or of the host's.
-template <class Row>
-void add_weather(Fnv64& hash, std::int64_t time_ns, const Row& row) {
-  add(hash, time_ns, row.direct_normal_w_m2, row.diffuse_horizontal_w_m2, row.longwave_down_w_m2,
-      row.air_k, row.wind_m_s, row.cloud_frac);
+void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
+  add(hash, row.sim_time_ns, row.direct_normal_w_m2, row.diffuse_horizontal_w_m2,
+      row.longwave_down_w_m2, row.air_k, row.wind_m_s, row.cloud_frac);
   add_optional(hash, row.environment_k);
   add_optional(hash, row.film_w_m2_k);
 }
@@ -96,10 +94,8 @@ std::uint64_t place_hash(const scene::ScenarioDesc& scenario) {
 
 std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   Fnv64 hash;
-  for (const scene::WeatherSample& sample : scenario.weather) {
-    add_weather(hash, sample.sim_time_ns, sample);
-  }
-  const scene::ClearSkyDesc& sky = scenario.clear_sky;
+  for (const physics::WeatherSample& sample : scenario.weather) add_weather(hash, sample);
+  const scene::ClearSky& sky = scenario.clear_sky;
   add(hash, sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k, sky.dew_point_k, sky.wind_m_s,
       sky.cloud_frac);
   return hash.value();
@@ -174,7 +170,7 @@ void add_first_frame(StateKey& key, std::int64_t start_ns, const RefineView& vie
   at(key, StatePart::first_camera) = camera.value();
   Fnv64 live;
   for (const PoseHistory& entity : entities) add_keys(live, entity.live());
-  for (const physics::WeatherRow& row : environment.live()) add_weather(live, row.time_ns, row);
+  for (const physics::WeatherSample& row : environment.live()) add_weather(live, row);
   at(key, StatePart::live) = live.value();
 }
 

@@ -11,8 +11,8 @@
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/refined_mesh_edges.hpp"
 #include "surface/mesh/sheet_sides.hpp"
-#include "surface/warm_up/surface_exchange.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/warm_up/surface_exchange.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 #include "surface/warm_up/surface_refinement.hpp"
 

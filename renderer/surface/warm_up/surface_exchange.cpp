@@ -5,9 +5,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "surface/model/mover_glow.hpp"
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/sheet_sides.hpp"
+#include "surface/model/mover_glow.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -326,11 +326,13 @@ class Sweeper {
       const SurfacePatch& patch = patches[p];
       const std::size_t offset =
           p < model_.first_sample.size() ? model_.first_sample[p] : model_.drawn_samples;
-      threads::parallel_parts(patch.samples.size(), kGrain, [&, offset](std::size_t from, std::size_t to) {
-        Received front(intervals_);
-        Received back(intervals_);
-        for (std::size_t i = from; i < to; ++i) carry(patch, i, offset + i, first, front, back);
-      });
+      threads::parallel_parts(patch.samples.size(), kGrain,
+                              [&, offset](std::size_t from, std::size_t to) {
+                                Received front(intervals_);
+                                Received back(intervals_);
+                                for (std::size_t i = from; i < to; ++i)
+                                  carry(patch, i, offset + i, first, front, back);
+                              });
     }
     std::swap(before_, after_);
     const std::size_t movers = faces_.size() / nodes_;

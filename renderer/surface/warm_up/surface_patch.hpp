@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "surface/model/drive_worth.hpp"
+#include "surface/model/surface_model.hpp"
 #include "surface/rays/ray_offsets.hpp"
 #include "surface/rays/sphere_view.hpp"
-#include "surface/model/surface_model.hpp"
 
 namespace emit::renderer {
 

@@ -4,21 +4,33 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <sstream>
 
+#include "emit/config/load.hpp"
+#include "emit/physics/csv.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
-#include "emit/config/load.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/library_edit.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct FitOptions {
+  ScenarioChoice input;  ///< a scenario, or a curve (*.csv)
+  std::vector<std::string> materials;
+  std::optional<std::size_t> modes;
+  std::string model = "foster";
+  double spin_up_s = 172'800.0;
+  double history_s = 12'600.0;
+  std::filesystem::path library;  ///< empty: the shipped one
+  std::optional<std::filesystem::path> out;
+  std::optional<std::filesystem::path> json;
+};
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -27,51 +39,26 @@ using physics::Result;
 constexpr const char* kColumns[] = {"time_s", "absorbed_w_m2", "film_w_m2_k", "air_k",
                                     "temperature_k"};
 
-std::vector<std::string> cells_of(std::string line) {
-  while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
-  std::vector<std::string> cells;
-  std::stringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, ',');) {
-    const auto first = cell.find_first_not_of(" \t");
-    const auto last = cell.find_last_not_of(" \t");
-    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
-  }
-  return cells;
-}
-
 /// CSV with a header row; columns in any order, others are ignored.
 Result<std::vector<reference::CurvePoint>> read_curve(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream)
-    return make_error(ErrorCode::not_found, fmt::format("{}: cannot open", file.string()));
+  const auto table = physics::CsvTable::read(file);
+  if (!table) return tl::unexpected(table.error());
+  std::array<std::vector<double>, std::size(kColumns)> columns;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    auto column = table->numbers(kColumns[i]);
+    if (!column) return tl::unexpected(std::move(column.error()));
+    columns[i] = std::move(*column);
+    for (std::size_t row = 0; row < columns[i].size(); ++row) {
+      if (std::isfinite(columns[i][row])) continue;
+      return make_error(ErrorCode::invalid_argument,
+                        fmt::format("{}:{}: column '{}': {} is not finite", file.string(),
+                                    table->line_of(row), kColumns[i], columns[i][row]));
+    }
+  }
   std::vector<reference::CurvePoint> curve;
-  std::vector<std::size_t> column;
-  std::string line;
-  for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    if (line.empty() || line[0] == '#' || line == "\r") continue;
-    const std::vector<std::string> cells = cells_of(line);
-    if (column.empty()) {
-      for (const char* name : kColumns) {
-        const auto found = std::find(cells.begin(), cells.end(), name);
-        if (found == cells.end()) {
-          return make_error(ErrorCode::invalid_argument,
-                            fmt::format("{}: there is no column '{}'", file.string(), name));
-        }
-        column.push_back(static_cast<std::size_t>(found - cells.begin()));
-      }
-      continue;
-    }
-    double value[std::size(kColumns)] = {};
-    for (std::size_t i = 0; i < std::size(kColumns); ++i) {
-      const std::string text = column[i] < cells.size() ? cells[column[i]] : "";
-      const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value[i]);
-      if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value[i])) {
-        return make_error(ErrorCode::invalid_argument,
-                          fmt::format("{}:{}: '{}' in column '{}' is not a number", file.string(),
-                                      number, text, kColumns[i]));
-      }
-    }
-    curve.push_back({value[0], value[1], value[2], value[3], value[4]});
+  for (std::size_t row = 0; row < table->rows(); ++row) {
+    curve.push_back(
+        {columns[0][row], columns[1][row], columns[2][row], columns[3][row], columns[4][row]});
   }
   return curve;
 }
@@ -135,9 +122,7 @@ Result<scene::ScenarioDesc> library_scenario(const std::vector<std::string>& set
   return config::load_scenario(*file, set, options);
 }
 
-}  // namespace
-
-int run_fit(const FitCommand& command) {
+int run(const FitOptions& command) {
   reference::FitOptions options;
   options.model =
       command.model == "emit2014" ? reference::FitModel::emit2014 : reference::FitModel::foster;
@@ -152,6 +137,7 @@ int run_fit(const FitCommand& command) {
   auto scenario =
       curve_input ? library_scenario(command.input.set) : load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
+  for (const std::string& text : scenario->warnings) warn(text);
 
   std::vector<const scene::Material*> materials;
   for (const std::string& name : command.materials) {
@@ -224,6 +210,44 @@ int run_fit(const FitCommand& command) {
     if (auto ok = write_json(*command.json, json); !ok) return fail(ok.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, FitOptions& options) {
+  line.option("input", options.input.scenario,
+              "Scenario: its place, date, weather and materials, over five histories of sun and "
+              "shade. Or a curve, CSV with time_s, absorbed_w_m2, film_w_m2_k, air_k, "
+              "temperature_k")
+      .required()
+      .type_name("SCENARIO|CURVE.csv");
+  add_set(line, options.input.set);
+  line.option("--material", options.materials, "Material; repeatable; default: all of the scenario")
+      .repeatable()
+      .type_name("NAME");
+  line.option("--modes", options.modes, "foster: 2 to 4, default 4; emit2014: 1 or 2, default 2")
+      .type_name("N")
+      .in_range(1, 4);
+  line.option("--model", options.model, "Model whose modes are fitted")
+      .one_of({"foster", "emit2014"})
+      .show_default();
+  line.seconds("--spin-up-s", options.spin_up_s, "Unshadowed time before the histories")
+      .in_range(0.0, 3.2e7)
+      .show_default();
+  line.seconds("--history-s", options.history_s, "Length of a history")
+      .in_range(600.0, 864'000.0)
+      .show_default();
+  line.path("--library", options.library, "Library to start from; default: the shipped one");
+  line.path("--out", options.out, "Library to write: the same with the fitted modes");
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_fit(CommandLine& tool) {
+  tool.command<FitOptions>({.name = "fit",
+                            .text = "Fit a material's modes to the reference solver, or to a curve",
+                            .example = "emit fit block-on-road --material asphalt --modes 4 --json "
+                                       "fit.json --out library.toml"},
+                           add_options, run);
 }
 
 }  // namespace emit::tool

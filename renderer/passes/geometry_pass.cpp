@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/geometry_pass.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "draw/image_window.hpp"
+#include "passes/render_target.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// Number of indices after which commands are flushed on a software rasteriser. Mesa sorts
+/// triangles into screen tiles on the caller's thread, and its other threads fill the tiles
+/// meanwhile, but only with commands that were flushed.
+constexpr std::int32_t kSoftwareBatchIndices = 12'000;
+
+/// Issues one multi-draw per record.
+void issue_at_once(std::span<const ViewDraw> draws, const ViewRanges& ranges,
+                   const gl::Buffer& records) noexcept {
+  for (const ViewDraw& draw : draws) {
+    records.bind_uniform(EMIT_BIND_DRAW, draw.record * sizeof(DrawRecord), sizeof(gpu::DrawParams));
+    glMultiDrawElementsBaseVertex(GL_TRIANGLES, ranges.index_count.data() + draw.first,
+                                  GL_UNSIGNED_INT, ranges.index_offset.data() + draw.first,
+                                  static_cast<GLsizei>(draw.count),
+                                  ranges.base_vertex.data() + draw.first);
+  }
+}
+
+/// Issues the draws in pieces and flushes after every kSoftwareBatchIndices indices.
+void issue_in_batches(std::span<const ViewDraw> draws, const ViewRanges& ranges,
+                      const gl::Buffer& records) noexcept {
+  std::int32_t room = kSoftwareBatchIndices;
+  for (const ViewDraw& draw : draws) {
+    records.bind_uniform(EMIT_BIND_DRAW, draw.record * sizeof(DrawRecord), sizeof(gpu::DrawParams));
+    for (std::uint32_t range = draw.first; range < draw.first + draw.count; ++range) {
+      const auto* next = static_cast<const std::uint32_t*>(ranges.index_offset[range]);
+      for (std::int32_t left = ranges.index_count[range]; left > 0;) {
+        const std::int32_t count = std::min(left, room);
+        glDrawElementsBaseVertex(GL_TRIANGLES, count, GL_UNSIGNED_INT, next,
+                                 ranges.base_vertex[range]);
+        next += count;
+        left -= count;
+        room -= count;
+        if (room > 0) continue;
+        glFlush();
+        room = kSoftwareBatchIndices;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context,
+                                                   std::uint32_t width_px, std::uint32_t height_px,
+                                                   Content content, Shade shade) {
+  GeometryPass pass;
+  pass.software_ = context.software();
+  pass.threads_ = context.threads();
+  // Compile the program for the content.
+  std::vector<gl::Define> defines;
+  const bool sampled = content != Content::normals;
+  const bool objects = content == Content::samples_and_objects;
+  if (sampled) defines.push_back({"EMIT_CACHED", "1"});
+  if (objects) defines.push_back({"EMIT_OBJECTS", "1"});
+  if (shade == Shade::of_entities) defines.push_back({"EMIT_SHADE", "1"});
+  auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
+  if (!program) return tl::unexpected(std::move(program.error()));
+  pass.program_ = std::move(*program);
+  // Make the textures of the content and attach them.
+  const auto width = static_cast<GLsizei>(width_px);
+  const auto height = static_cast<GLsizei>(height_px);
+  pass.sampled_ = sampled;
+  pass.depth_buffer_ = gl::Texture(GL_DEPTH_COMPONENT32F, width, height);
+  pass.framebuffer_ = gl::Framebuffer::make();
+  const GLuint id = pass.framebuffer_.id();
+  glNamedFramebufferTexture(id, GL_DEPTH_ATTACHMENT, pass.depth_buffer_.id(), 0);
+  if (sampled) {
+    pass.surface_ = gl::Texture(GL_RG32UI, width, height);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.surface_.id(), 0);
+    if (objects) {
+      pass.ids_ = gl::Texture(GL_R16UI, width, height);
+      glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.ids_.id(), 0);
+    }
+    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+    glNamedFramebufferDrawBuffers(id, objects ? 2 : 1, targets);
+  } else {
+    pass.depth_m_ = gl::Texture(GL_R32F, width, height);
+    pass.normal_ = gl::Texture(GL_RG16_SNORM, width, height);
+    pass.ids_ = gl::Texture(GL_RG16UI, width, height);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT0, pass.depth_m_.id(), 0);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT1, pass.normal_.id(), 0);
+    glNamedFramebufferTexture(id, GL_COLOR_ATTACHMENT2, pass.ids_.id(), 0);
+    const GLenum targets[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+    glNamedFramebufferDrawBuffers(id, 3, targets);
+  }
+  if (auto ok = check_complete(pass.framebuffer_, "geometry buffer"); !ok) {
+    return tl::unexpected(std::move(ok.error()));
+  }
+  return pass;
+}
+
+void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& lists,
+                        const gl::Buffer& records, CommandRange single_sided,
+                        CommandRange double_sided, const glm::uvec2& size_px,
+                        const glm::uvec4& window_px) const noexcept {
+  // Restrict drawing to the window. Pixels that are not drawn need not be cleared.
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
+  glViewport(0, 0, static_cast<GLsizei>(size_px.x), static_cast<GLsizei>(size_px.y));
+  const glm::uvec2 part_px = window_size_px(window_px);
+  glScissor(static_cast<GLint>(window_px.x), static_cast<GLint>(window_px.y),
+            static_cast<GLsizei>(part_px.x), static_cast<GLsizei>(part_px.y));
+  glEnable(GL_SCISSOR_TEST);
+  // Clear to sky. Depth is reversed: 0 is infinitely far away.
+  const GLfloat far_away = 0.0F;
+  if (!sampled_) {
+    const GLfloat sky[4] = {EMIT_SKY_DEPTH_M, 0.0F, 0.0F, 0.0F};
+    const GLfloat zero[4] = {0.0F, 0.0F, 0.0F, 0.0F};
+    const GLuint none[4] = {0, 0, 0, 0};
+    glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 0, sky);
+    glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 1, zero);
+    glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 2, none);
+  }
+  glClearNamedFramebufferfv(framebuffer_.id(), GL_DEPTH, 0, &far_away);
+  // Front faces turn clockwise, because row 0 of the image is at the bottom of GL's window and the
+  // view is mirrored.
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glFrontFace(GL_CW);
+  glCullFace(GL_BACK);
+  program_.use();
+  vertices.bind_view();
+  // Draw single-sided submeshes with culling, then double-sided ones without.
+  glEnable(GL_CULL_FACE);
+  threads_.leave_core_to_caller();
+  const auto draw_all = software_ ? issue_in_batches : issue_at_once;
+  draw_all(lists.view_draws(single_sided), lists.view_ranges(), records);
+  glDisable(GL_CULL_FACE);
+  draw_all(lists.view_draws(double_sided), lists.view_ranges(), records);
+  if (software_) glFlush();
+  threads_.spread();
+  glDisable(GL_SCISSOR_TEST);
+}
+
+void GeometryPass::bind_textures() const noexcept {
+  if (sampled_) {
+    depth_buffer_.bind(EMIT_TEX_DEPTH);
+    surface_.bind(EMIT_TEX_SURFACE);
+    glBindImageTexture(EMIT_IMG_SURFACE, surface_.id(), 0, GL_FALSE, 0, GL_READ_WRITE, GL_RG32UI);
+    if (ids_.id() != 0) ids_.bind(EMIT_TEX_IDS);
+    return;
+  }
+  depth_m_.bind(EMIT_TEX_DEPTH);
+  normal_.bind(EMIT_TEX_NORMAL);
+  ids_.bind(EMIT_TEX_IDS);
+}
+
+}  // namespace emit::renderer
