@@ -77,11 +77,11 @@ struct Context {
         client_places_(max_clients),
         clients_(std::make_unique<ClientCounts[]>(max_clients)) {}
 
-  /// By place in the receiver's table. Any thread.
+  /// Counts of the connections, by place in the receiver's table. Thread: any.
   [[nodiscard]] std::span<ClientCounts> clients() const noexcept {
     return {clients_.get(), client_places_};
   }
-  /// Of a connection; nullptr when it has no place in the table.
+  /// Returns the counts of a connection; null when it has no place in the table.
   [[nodiscard]] ClientCounts* counts_of(std::uint32_t connection) const noexcept {
     const std::uint32_t place = connection_place(connection);
     return place < client_places_ ? &clients_[place] : nullptr;
@@ -133,7 +133,7 @@ struct Context {
   std::unique_ptr<ClientCounts[]> clients_;
 };
 
-/// Counter of a refusal. Precondition: not ok.
+/// Returns the counter of a refusal; `ok` and `internal` share refused_internal.
 [[nodiscard]] constexpr Counter counter_of(StatusCode code) noexcept {
   switch (code) {
     case StatusCode::wrong_version:

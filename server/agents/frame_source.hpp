@@ -29,8 +29,9 @@ struct SourceInfo {
   renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
 };
 
-/// Where frames come from. The same calls, in the same order, give the same pixels: the journal
-/// and its player rely on it.
+/// Source of frames. The same calls, in the same order, give the same pixels: the journal and its
+/// player rely on it.
+///
 /// Thread: the render agent owns the source from its factory to destruction; release() and info()
 /// may be called by any thread. Real time: everything after construction is RT-safe.
 class FrameSource {
@@ -66,7 +67,8 @@ class FrameSource {
 /// Called once, on the thread that will own the source (a GL context is bound to its thread).
 using FrameSourceFactory = std::function<physics::Result<std::unique_ptr<FrameSource>>()>;
 
-/// Frames of emit::renderer. `progress` is told how far the warm-up is.
+/// Makes a source of frames of emit::renderer. `progress` is called with the part of the warm-up
+/// that is done.
 [[nodiscard]] physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
     const renderer::OutputOptions& output, const renderer::WarmUpProgress& progress = {});

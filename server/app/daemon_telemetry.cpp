@@ -8,7 +8,7 @@
 #include "emit/version.hpp"
 #include "net/ip_address.hpp"
 
-/// What the daemon tells about itself: metrics over HTTP, the log, the state of the clocks.
+/// Reports of the daemon about itself: metrics over HTTP, the log, the state of the clocks.
 namespace emit::server {
 
 using physics::Error;

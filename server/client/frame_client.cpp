@@ -313,7 +313,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
     }
     const int taken = receiver_->take(*reassembler_, account_.counters);
     std::int64_t ask_ns = 0;
-    // What waits in the socket may be what seems to be missing.
+    // The socket may still hold the fragments that seem to be missing.
     if (terms_.resend && receiver_->drained()) {
       if (auto asked = ask_for_missing(monotonic_now_ns(), ask_ns); !asked) {
         return tl::unexpected<physics::Error>(std::move(asked.error()));

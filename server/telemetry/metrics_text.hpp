@@ -40,7 +40,7 @@ class MetricsText {
   std::string text_;
 };
 
-/// Where the numbers come from; all of it is atomic, fixed after start or behind a lock.
+/// Sources of the numbers. All of them are atomic, fixed after start or behind a lock.
 struct MetricsSources {
   const Counters* counters = nullptr;
   const FrameTimes* times = nullptr;
@@ -51,7 +51,7 @@ struct MetricsSources {
   std::vector<std::pair<std::string, const DutyCycle*>> agents;  ///< by name
   MetricsText::Labels build;                                     ///< labels of emitd_build_info
 };
-/// What changes with the moment.
+/// Values that change with the moment of the scrape.
 struct MetricsMoment {
   std::uint64_t run_id = 0;
   bool ready = false;

@@ -13,7 +13,7 @@
 
 namespace emit::test {
 
-/// What a source was asked to do, kept by the test so that it outlives the source.
+/// Calls that a source received, kept by the test so that they outlive the source.
 struct SourceScript {
   bool ready = true;                       ///< poll(): false holds frames back
   bool weather_full = false;               ///< apply_weather(): no room

@@ -24,7 +24,7 @@ namespace emit::server {
 /// go; a recorder that connects later is sent the sequence numbers that it lacks.
 class Recorder final : public Agent {
  public:
-  /// What RunStart says beside the run id.
+  /// Members of RunStart beside the run id.
   struct Identity {
     std::string scenario_name;
     std::string scenario_sha256;
@@ -52,7 +52,7 @@ class Recorder final : public Agent {
   int do_work(std::int64_t now_ns) noexcept override;
   void on_stop() noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
-  /// A frame's line is worth no wake-up of its own.
+  /// Lines of frames wait for each other; none wakes the recorder by itself.
   [[nodiscard]] std::int64_t rest_ns() const noexcept override { return 2'000'000; }
   [[nodiscard]] int wait_fd() const noexcept override { return epoll_.get(); }
 

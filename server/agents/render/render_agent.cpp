@@ -103,7 +103,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
 
 std::optional<renderer::SlotIndex> RenderAgent::submit(const renderer::FrameRequest& request,
                                                        bool& warmed_up) noexcept {
-  // The renderer does not report a warm-up inside submit(). It is told from its causes and its
+  // The renderer does not report a warm-up inside submit(). It is recognised by its causes and its
   // effect: the thermal clock jumped further than a step of the surface, and submit() took long.
   const std::int64_t moved_ns =
       request.thermal_time_ns - last_thermal_ns_.value_or(request.thermal_time_ns);

@@ -59,14 +59,14 @@ class RenderAgent final : public Agent {
   [[nodiscard]] std::optional<renderer::SlotIndex> submit(const renderer::FrameRequest& request,
                                                           bool& warmed_up) noexcept;
   bool finish_oldest() noexcept;
-  /// The pictures of image.channels, and their checksums.
+  /// The images of image.channels, and their checksums.
   void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
   /// Sets the job's rung; returns RungStats::frame_ms of it.
   double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;
-  /// No frame comes any more: the daemon is told, and ends.
+  /// No frame comes any more: sets Context::device_lost, upon which the daemon ends.
   void lose_device(std::string_view why) noexcept;
 
   Context& context_;

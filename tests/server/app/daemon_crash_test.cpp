@@ -122,7 +122,7 @@ bool wait_evenly(std::chrono::milliseconds time) {
   return longest < 25ms;
 }
 
-/// What a log holds: frames of the newest run, and whether the lines before the cut are all there.
+/// Contents of a log: frames of the newest run, and whether the lines before the cut are all there.
 struct LogContents {
   std::set<std::uint64_t> frames;
   std::uint64_t entries = 0;

@@ -200,8 +200,8 @@ TEST(Conductor, SaysWhichFramesHaveEntitiesOfAnOlderOne) {
       EXPECT_EQ(std::isnan(header.estimated_error_k), behind);
       EXPECT_EQ(rig.count(Counter::frames_entities_behind), behind ? 1U : 0U);
       if (stepped) continue;
-      // What stands still waits for nothing: the rest comes with the next frame, then nobody is
-      // behind, however many there are.
+      // Entities that stand still do not block: the rest comes with the next frame, and then no
+      // entity is behind, however many there are.
       for (int slot = 0; slot < 5; ++slot) {
         rig.next_slot();
         EXPECT_EQ(rig.frames.back().header.flags & protocol::kFlagDegraded, 0U) << slot;

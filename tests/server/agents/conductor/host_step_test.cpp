@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "agents/receiver/receiver_connection.hpp"
 #include "support/conductor_rig.hpp"
 
 namespace emit::server {
