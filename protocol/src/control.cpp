@@ -8,7 +8,9 @@ namespace emit::protocol {
 std::string status_text(StatusCode code, std::uint64_t detail) {
   switch (code) {
     case StatusCode::ok:
-      return "taken";
+      return detail == kDetailStopped
+                 ? "pose taken, but no frame: emitd is stopped, send START or STEP"
+                 : "taken";
     case StatusCode::wrong_version:
       return "wrong protocol version";
     case StatusCode::oversize:
@@ -16,7 +18,9 @@ std::string status_text(StatusCode code, std::uint64_t detail) {
     case StatusCode::malformed:
       return "malformed message";
     case StatusCode::unknown_entity:
-      return fmt::format("unknown entity {}: not in the scenario, not applied", detail);
+      return fmt::format(
+          "unknown entity {}: not in the scenario, not applied; the rest of the frame is taken",
+          detail);
     case StatusCode::invalid_pose:
       return "invalid pose";
     case StatusCode::time_backwards:

@@ -96,9 +96,14 @@ struct Context {
   std::vector<Channel> channels;  ///< fixed before the agents run
   std::vector<Picture> pictures;  ///< likewise; their copies are the render agent's to fill
   std::atomic<std::uint64_t> run_id{0};
-  std::atomic<bool> device_lost{false};               ///< set by render: no frame comes any more
+  std::atomic<bool> device_lost{false};  ///< set by render: no frame comes any more
+  /// Since when the render agent has been submitting a frame behind a jump of simulation time,
+  /// monotonic; 0: it is not. See warms_up_again().
+  std::atomic<std::int64_t> jump_since_ns{0};
   std::atomic<std::uint64_t> frames_handed_over{0};   ///< put on `published` by the conductor
   std::atomic<std::uint64_t> journal_handed_over{0};  ///< lines put on `journal`
+  /// Memory of the entries that the recorder keeps for recorders that connect later.
+  std::atomic<std::uint64_t> journal_memory_bytes{0};
 
   SpscRing<HostInput> host_inputs{32};       // receiver -> conductor
   SpscRing<StatusReply> replies{256};        // conductor -> receiver

@@ -22,7 +22,10 @@ struct SourceInfo {
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::uint32_t slots = 0;
-  std::size_t planes = 0;      ///< FrameView::radiance_w_m2_sr.size() of every frame
+  std::size_t planes = 0;  ///< FrameView::radiance_w_m2_sr.size() of every frame
+  /// A frame whose thermal clock is further than this from the frame before it may make the source
+  /// warm up again inside submit(), ns: the newest interval of the surface's history.
+  std::int64_t surface_step_ns = 20'000'000'000;
   renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
 };
 

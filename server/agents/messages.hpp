@@ -87,6 +87,7 @@ struct RenderDone {
   std::uint32_t clamped_px = 0;
   std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
   bool coarse = false;              ///< the surface was not prepared for this camera
+  bool warmed_up = false;           ///< the surface warmed up again within this frame
   std::uint8_t rung = 0;            ///< of the quality ladder
   float estimated_error_k = 0.0F;   ///< of that rung; NaN: not known
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted

@@ -172,12 +172,19 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   }
   recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
   recorder_->set_identity(std::move(identity));
-  const auto older = recorder_->open();
-  if (!older) {
-    return tl::unexpected<Error>(Error(older.error()).with_context("journal.file"));
+  const auto journal = recorder_->open();
+  if (!journal) {
+    return tl::unexpected<Error>(Error(journal.error()).with_context("journal.file"));
   }
-  if (!older->empty()) {
-    log_->write(LogLevel::info, fmt::format("event=journal_kept file={}", older->string()));
+  if (!journal->older.empty()) {
+    log_->write(LogLevel::info, fmt::format("event=journal_kept file={}", journal->older.string()));
+  }
+  if (!journal->off.empty()) {
+    warn(
+        fmt::format("event=journal_off why=\"{}\" effect=\"no journal is written, every entry "
+                    "counts as dropped\" remedy=\"make room and start again, or set "
+                    "journal.required to have the start refused\"",
+                    journal->off));
   }
   receiver_->set_identity(
       {software, scenario_name, std::string(pacing_name(config_.pacing.mode)), source.device});

@@ -80,6 +80,9 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] int end_without_device();
   [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
   [[nodiscard]] MetricsMoment moment() const;
+  /// Returns true while host frames are taken and frames come: false while stopping, and while the
+  /// surface warms up again behind a jump of simulation time. Any thread.
+  [[nodiscard]] bool is_ready() const noexcept;
   void housekeep();
   void watch_ptp();
   void log_summary();

@@ -88,6 +88,7 @@ ServerInfo to_server_info(const v1::Welcome& welcome) {
   info.device = welcome.device();
   info.run_id = welcome.run_id();
   info.tai_offset_unset = welcome.tai_offset_unset();
+  info.sends_journal_end = welcome.sends_journal_end();
   for (const v1::ChannelInfo& channel : welcome.channels()) {
     info.channels.push_back(describe_channel(channel));
   }

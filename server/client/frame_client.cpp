@@ -169,6 +169,7 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
                     answer.subscribed().error_correction().parity_fragments()};
       terms_.compression = !udp_ && answer.subscribed().compression() != v1::COMPRESSION_NONE;
       terms_.resend = udp_ && answer.subscribed().resend();
+      terms_.fragment_payload_bytes = udp_ ? answer.subscribed().fragment_payload_bytes() : 0;
       if (!udp_ || !terms_.fec.on()) {
         terms_.fec = {};
       } else if (!terms_.fec.valid() ||

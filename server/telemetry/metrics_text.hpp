@@ -56,8 +56,9 @@ struct MetricsMoment {
   std::uint64_t run_id = 0;
   bool ready = false;
   std::int64_t uptime_ns = 0;
-  std::int64_t now_ns = 0;       ///< monotonic
-  std::optional<PtpStatus> ptp;  ///< absent: not asked for
+  std::int64_t now_ns = 0;                 ///< monotonic
+  std::uint64_t journal_memory_bytes = 0;  ///< Context::journal_memory_bytes
+  std::optional<PtpStatus> ptp;            ///< absent: not asked for
 };
 
 [[nodiscard]] std::string metrics_text(const MetricsSources& sources, const MetricsMoment& moment);

@@ -404,7 +404,7 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   if (issued.entities_behind) {
     context_.counters.add(Counter::frames_entities_behind);
   }
-  if (done.dropped_poses > 0 || done.coarse || issued.entities_behind) {
+  if (done.dropped_poses > 0 || done.coarse || done.warmed_up || issued.entities_behind) {
     // How much the coarser past or surface, or an entity that stands where it was a frame ago,
     // matters depends on what it shaded: nobody knows.
     header.flags |= protocol::kFlagDegraded;

@@ -70,7 +70,9 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
     if (control_.running()) {
       issue_host_step(false, frame.received_ns);
     } else {
-      context_.counters.add(Counter::host_frames_unused);
+      // A host in lock step waits for a frame or for an answer.
+      reply(input.origin, StatusCode::ok, frame.frame_number,
+            context_.counters.add(Counter::host_frames_unused), protocol::kDetailStopped);
     }
   }
   return true;

@@ -104,6 +104,8 @@ class Receiver final : public Agent {
   int parse(Connection& connection, std::int64_t now_ns);
   /// Whether what a connection waits for has come.
   [[nodiscard]] bool may_go_on(const Connection& connection) noexcept;
+  /// Answers a first record that is no hello, and closes the connection.
+  void refuse_first_record(Connection& connection);
   void take_record(Connection& connection, const protocol::Record& record, std::int64_t now_ns);
   void take_host_frame(Connection& connection, std::span<const std::byte> bytes,
                        std::int64_t now_ns);
@@ -124,8 +126,9 @@ class Receiver final : public Agent {
   [[nodiscard]] physics::Result<UdpSocket> open_stream_socket(const Connection& connection,
                                                               std::uint32_t port,
                                                               const std::string& group) const;
+  /// `event_text` goes to the log in place of `text` where that holds values of the message.
   void refuse(Connection& connection, StatusCode code, const std::string& text,
-              std::uint64_t host_frame_number = 0);
+              std::uint64_t host_frame_number = 0, std::string_view event_text = {});
   void send_status(Connection& connection, StatusCode code, const std::string& text,
                    std::uint64_t host_frame_number, std::uint64_t count);
   void queue(Connection& connection, const v1::ControlRecord& record);

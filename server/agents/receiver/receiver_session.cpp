@@ -16,13 +16,19 @@ using protocol::kProtocolVersion;
 
 void Receiver::take_record(Connection& connection, const protocol::Record& record,
                            std::int64_t now_ns) {
+  if (!connection.welcomed && record.kind != protocol::RecordKind::control) {
+    refuse_first_record(connection);
+    return;
+  }
   switch (record.kind) {
     case protocol::RecordKind::host_frame:
       take_host_frame(connection, record.body, now_ns);
       return;
     case protocol::RecordKind::control: {
       const auto frame = protocol::host_frame_in_control_record(record.body);
-      if (!frame.empty()) {
+      if (!frame.empty() && !connection.welcomed) {
+        refuse_first_record(connection);
+      } else if (!frame.empty()) {
         take_host_frame(connection, frame, now_ns);
       } else {
         take_control(connection, record.body);
@@ -37,6 +43,12 @@ void Receiver::take_record(Connection& connection, const protocol::Record& recor
       return;
   }
   // A kind of a newer version: skipped.
+}
+
+void Receiver::refuse_first_record(Connection& connection) {
+  refuse(connection, StatusCode::not_allowed, "hello comes first");
+  connection.flush_close = true;
+  flush(connection);
 }
 
 void Receiver::take_host_frame(Connection& connection, std::span<const std::byte> bytes,
@@ -59,8 +71,11 @@ void Receiver::take_host_frame(Connection& connection, std::span<const std::byte
   HostInput& input = context_.host_inputs.claim_reserved();
   const protocol::DecodeStatus decoded = protocol::decode_host_frame(bytes, decoder_, input.frame);
   if (decoded != protocol::DecodeStatus::ok) {
+    std::array<char, protocol::kFaultTextBytes> text;
+    std::array<char, protocol::kFaultTextBytes> place;
     refuse(connection, static_cast<StatusCode>(decoded),
-           "host frame: " + std::string(protocol::to_string(decoded)), input.frame.frame_number);
+           "host frame: " + std::string(protocol::fault_text(decoded, decoder_.fault(), text)),
+           input.frame.frame_number, protocol::fault_place(decoded, decoder_.fault(), place));
     return;
   }
   input.kind = HostInput::Kind::frame;
@@ -95,9 +110,7 @@ void Receiver::take_control(Connection& connection, std::span<const std::byte> b
     return;
   }
   if (!connection.welcomed) {
-    refuse(connection, StatusCode::not_allowed, "hello comes first");
-    connection.flush_close = true;
-    flush(connection);
+    refuse_first_record(connection);
     return;
   }
   if (record.has_subscribe()) {
@@ -163,6 +176,7 @@ void Receiver::fill_welcome(v1::Welcome& welcome) const {
   welcome.set_run_id(context_.run_id.load(std::memory_order_relaxed));
   welcome.set_tai_offset_unset(context_.clock.tai_offset_unset());
   welcome.set_device(identity_.device);
+  welcome.set_sends_journal_end(true);
   for (const Channel& channel : context_.channels) {
     fill(channel, *welcome.add_channels());
   }
@@ -272,10 +286,9 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
       return;
     }
     params.udp_socket = std::move(*socket);
-    params.fragment_payload_bytes = std::clamp(
+    params.fragment_payload_bytes = protocol::granted_fragment_payload_bytes(
         subscribe.fragment_payload_bytes() != 0 ? subscribe.fragment_payload_bytes()
-                                                : config_.stream.udp_fragment_payload_bytes,
-        protocol::kMinFragmentPayloadBytes, protocol::kMaxFragmentPayloadBytes);
+                                                : config_.stream.udp_fragment_payload_bytes);
     auto fec = error_correction_for(subscribe, *channel, params.fragment_payload_bytes);
     if (!fec) {
       refuse(connection, StatusCode::not_allowed, fec.error().text);
@@ -299,6 +312,7 @@ void Receiver::take_subscribe(Connection& connection, const v1::ControlRecord& r
   fill(*channel, *answer.mutable_subscribed()->mutable_channel());
   answer.mutable_subscribed()->set_stream_id(params.stream_id);
   answer.mutable_subscribed()->set_resend(params.resend_frames > 0);
+  answer.mutable_subscribed()->set_fragment_payload_bytes(params.fragment_payload_bytes);
   if (params.fec.on()) {
     v1::ErrorCorrection& granted = *answer.mutable_subscribed()->mutable_error_correction();
     granted.set_data_fragments(params.fec.data_fragments);
@@ -452,11 +466,12 @@ physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connec
 }
 
 void Receiver::refuse(Connection& connection, StatusCode code, const std::string& text,
-                      std::uint64_t host_frame_number) {
+                      std::uint64_t host_frame_number, std::string_view event_text) {
   const std::uint64_t count = context_.counters.add(counter_of(code));
   ++connection.misbehaved;
   connection.pace.refusal(context_.clock.monotonic_ns());
-  context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count, text);
+  context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
+                                event_text.empty() ? text : event_text);
   send_status(connection, code, text, host_frame_number, count);
 }
 

@@ -123,9 +123,11 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
   if (decoded != protocol::DecodeStatus::ok) {
     const auto code = static_cast<StatusCode>(decoded);
     const std::uint64_t count = context_.counters.add(counter_of(code));
+    std::array<char, protocol::kFaultTextBytes> text;
     context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
-                                  protocol::to_string(decoded));
-    answer(code, input->frame.frame_number, count, std::string(protocol::to_string(decoded)));
+                                  protocol::fault_place(decoded, decoder_.fault(), text));
+    answer(code, input->frame.frame_number, count,
+           std::string(protocol::fault_text(decoded, decoder_.fault(), text)));
     return;
   }
   input->kind = HostInput::Kind::frame;

@@ -79,6 +79,7 @@ struct ServerInfo {
   std::string device;
   std::uint64_t run_id = 0;
   bool tai_offset_unset = false;
+  bool sends_journal_end = false;  ///< RecorderClient can tell an end in order from a broken one
   std::vector<ChannelDescription> channels;
 };
 
@@ -115,6 +116,9 @@ struct StreamTerms {
   bool compression = false;
   std::uint32_t every_nth = 1;  ///< of the daemon's frames: the wish times the channel's own
   std::uint16_t udp_port = 0;   ///< where this client receives; 0: not over UDP
+  /// UDP: payload of every fragment but the last, which need not be what was asked for; 0: TCP, or
+  /// an older daemon.
+  std::uint32_t fragment_payload_bytes = 0;
 };
 
 /// Pixels stay valid until the next receive().
@@ -219,6 +223,15 @@ class HostClient {
   [[nodiscard]] virtual const ServerInfo* server() const noexcept = 0;
 };
 
+/// Entries of the run that a daemon no longer held when a recorder connected.
+struct JournalGap {
+  std::uint64_t first_sequence = 0;  ///< 0: nothing is missing
+  std::uint64_t last_sequence = 0;
+  [[nodiscard]] std::uint64_t entries() const noexcept {
+    return first_sequence == 0 ? 0 : last_sequence - first_sequence + 1;
+  }
+};
+
 /// Receives the journal over tcp://host:port, from the start of the current run as far as the
 /// daemon still holds it.
 class RecorderClient {
@@ -232,8 +245,15 @@ class RecorderClient {
   /// False when the timeout ran out. Errors: io (connection closed; `closed()` tells), protocol.
   [[nodiscard]] virtual physics::Result<bool> receive(v1::JournalEntry& entry,
                                                       std::int64_t timeout_ns) = 0;
-  /// True after the daemon closed the connection in order: the journal is complete.
+  /// Returns true after the daemon closed the connection in order: everything came that it had.
+  /// False after an error means that the connection broke: the daemon was killed, the network
+  /// failed, or this recorder fell behind. A daemon of version 0.1 does not send the end of the
+  /// journal (ServerInfo::sends_journal_end); any close between two records counts as in order
+  /// then.
   [[nodiscard]] virtual bool closed() const noexcept = 0;
+  /// Returns the entries of the run that came before the first one received and are lost. Valid
+  /// once receive() has returned an entry.
+  [[nodiscard]] virtual const JournalGap& gap() const noexcept = 0;
 };
 
 }  // namespace emit::client
