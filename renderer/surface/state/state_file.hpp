@@ -23,7 +23,7 @@
 namespace emit::renderer {
 
 /// Goes up with every change of the layout, and of what the same inputs are turned into.
-inline constexpr std::uint32_t kStateVersion = 9;
+inline constexpr std::uint32_t kStateVersion = 10;
 
 /// What a state hangs on, told apart so that a file that does not fit can say why.
 enum class StatePart : std::uint8_t {

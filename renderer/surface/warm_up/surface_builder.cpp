@@ -11,8 +11,10 @@
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/refined_mesh_edges.hpp"
 #include "surface/mesh/sheet_sides.hpp"
-#include "surface/warm_up/surface_exchange.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/warm_up/sample_numbers.hpp"
+#include "surface/warm_up/surface_exchange.hpp"
+#include "surface/warm_up/surface_partners.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 #include "surface/warm_up/surface_refinement.hpp"
 
@@ -111,6 +113,7 @@ void Builder::make_patches() {
       patch.back->object = patch.object;
       patch.back->mover = patch.mover;
     }
+    patch.begin(in_.record.size(), !in_.movers_now.empty(), sampler_.keeps_sent());
     patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
     sample_count_ += samples_of(patch.mesh);
     patches_.push_back(std::move(patch));
@@ -142,8 +145,6 @@ void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
 bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   jobs_.clear();
   job_stand_.clear();
-  const std::size_t intervals = in_.record.size();
-  const bool movers = !in_.movers_now.empty();
   for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
     const auto vertices = model_.meshes[mesh].vertices();
     bool looked = false;
@@ -156,13 +157,14 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         adopt_detail(mesh, first);
       }
       looked = true;
-      patch.grow(vertices.size(), intervals, movers);
+      patch.grow(vertices.size());
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
         SurfaceSample& sample = patch.samples[v];
         const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
         const float length = glm::length(inward);
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
-        const glm::vec3 off_edge_m = sampler_.offset_m() * unit_inward;
+        const glm::vec3 drawn_m(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F));
+        const glm::vec3 off_edge_m = sampler_.offsets(drawn_m, patch.mover).around_m * unit_inward;
         const auto to_rel = [&](const glm::vec3& at_m) {
           return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
         };
@@ -187,8 +189,9 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   for (std::size_t begin = 0; begin < jobs_.size(); begin += kSlice) {
     const std::size_t end = std::min(jobs_.size(), begin + kSlice);
     threads::parallel_parts(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
+      PatchSampler::StartMemo memo;
       for (std::size_t j = begin + from; j < begin + to; ++j) {
-        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_stand_[j]);
+        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_stand_[j], memo);
       }
     });
     const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());
@@ -319,9 +322,10 @@ physics::Result<SurfaceModel> Builder::run() {
     to_frac = next_frac();
     if (!sample_new_vertices(done_frac, to_frac)) return stopped();
   }
-  number_samples(in_, sampler_, options_, patches_, model_);
+  if (options_.lateral) add_partners(in_, sampler_, patches_);
+  number_samples(in_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
-  if (!exchange(in_, sampler_, options_, patches_, model_, exchanged)) return stopped();
+  if (!exchange(in_, options_, patches_, model_, exchanged)) return stopped();
   replace_covered();
   return std::move(model_);
 }

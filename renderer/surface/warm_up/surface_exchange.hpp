@@ -6,17 +6,13 @@
 
 namespace emit::renderer {
 
-/// Lays the patches' samples out in one array, adds partners across convex edges and turns what
-/// samples see from places into samples. Setup only.
-void number_samples(const SurfaceInputs& inputs, const PatchSampler& sampler,
-                    const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
-                    SurfaceModel& model);
-
 /// Integrates the history again with the samples' own radiation and conduction between them, until
 /// the exchange has settled (Jacobi sweeps over whole histories, so the result does not depend on
-/// the order of samples). Fills states and outputs of the model. False when `report` stopped it.
-[[nodiscard]] bool exchange(const SurfaceInputs& inputs, const PatchSampler& sampler,
-                            const SurfaceModelOptions& options, std::vector<SurfacePatch>& patches,
-                            SurfaceModel& model, const SurfaceProgress& report);
+/// the order of samples). What the patches' own evaluation gave is the first sweep. Fills states and
+/// outputs of the model and frees the patches' histories. False when `report` stopped it.
+/// @pre number_samples() has laid out the model
+[[nodiscard]] bool exchange(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
+                            std::vector<SurfacePatch>& patches, SurfaceModel& model,
+                            const SurfaceProgress& report);
 
 }  // namespace emit::renderer
