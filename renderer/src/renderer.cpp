@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
@@ -110,6 +111,7 @@ class GlRenderer final : public Renderer {
                                            const WarmUpProgress& progress) {
     auto ready = stage_->warm_up(first, progress);
     if (ready) stage_->describe(scene_stats_);
+    warm_ = warm_ || ready.has_value();
     return ready;
   }
   [[nodiscard]] glm::uvec2 picture_px() const noexcept {
@@ -135,6 +137,7 @@ class GlRenderer final : public Renderer {
   BandModel bands_;
   FramePasses passes_;
   std::unique_ptr<ThermalStage> stage_;
+  bool warm_ = false;  ///< the stage has been warmed up
 
   gpu::FrameParams frame_params_{};
   CommandRange view_single_sided_;
@@ -401,7 +404,16 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   view.rung = 0;
   view.estimated_error_k = 0.0F;
   StageTimes& stages = view.stages_ms;
-  view.device_failed = stage_->cold(request) && !warm_up_stage(request, {});
+  // Prepare the surface where the thermal time has jumped, and measure how long that takes.
+  view.stats.rewarm_s = 0.0;
+  view.device_failed = false;
+  if (stage_->cold(request)) {
+    const bool again = warm_;
+    const auto begin = std::chrono::steady_clock::now();
+    view.device_failed = !warm_up_stage(request, {});
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+    if (again) view.stats.rewarm_s = took.count();
+  }
   if (view.device_failed) {  // nothing can be drawn: what the planes held goes out, flagged
     const ReadbackRing::Range all{0, output_buffer_.bytes()};
     readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot), {&all, 1});
@@ -416,7 +428,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
                                           : std::numeric_limits<float>::quiet_NaN();
   const QualityRung& rung = kQualityLadder[view.rung];
   prepare(request, rung);
-  view.stats.coarse = stage_->coarse_from(request.sensor_pose);
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0;
   bind_frame();
   const std::uint32_t zero = 0;
   glClearNamedBufferSubData(output_buffer_.id(), GL_R32UI, static_cast<GLintptr>(stats_offset_),

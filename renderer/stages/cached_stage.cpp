@@ -21,6 +21,8 @@ constexpr std::size_t kSuns = 16;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
 /// The camera may point that share of its field of view aside of where it was said to.
 constexpr double kFieldMarginFrac = 0.5;
+/// The camera may point anywhere.
+constexpr double kAnyCosine = -2.0;
 
 double pixel_rad(const scene::SensorDesc& sensor) {
   return 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
@@ -153,11 +155,17 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
   const RefineView view = refine_view(sensor_, request);
+  if (saved_) {
+    const RefineView::Eye here = view.eyes.front();
+    saved_->fits_camera = [this, here](std::span<const RefineView::Eye> eyes) {
+      return stands_near(eyes_around(eyes, static_bounds_), here, kAnyCosine);
+    };
+  }
   auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, surface_history_,
                                  saved_, progress);
   if (!ready) return ready;
   if (saved_) saved_->start = false;  // after a jump of sim time the start's state need not fit
-  refined_eyes_ = eyes_around(view.eyes, static_bounds_);
+  refined_eyes_ = eyes_around(surface_->model().eyes, static_bounds_);
   drawn_.reset();  // its device memory goes before that of the next one is taken
   drawn_ = std::make_unique<DrawnScene>(surface_->drawn_scene(), history_of_object_, software_);
   for (gl::Buffer& node : node_buffers_) {
@@ -174,22 +182,24 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   return {};
 }
 
+bool CachedStage::stands_near(const std::vector<Eye>& eyes, const RefineView::Eye& here,
+                              double cos_at_least) noexcept {
+  return std::ranges::any_of(eyes, [&](const Eye& each) {
+    return glm::distance(each.eye.world_m, here.world_m) <= each.reach_m &&
+           glm::dot(each.eye.boresight, here.boresight) >= cos_at_least;
+  });
+}
+
 bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   const RefineView::Eye here = eye_of(camera);
   // Where samples ran out, they went to what was said to be in view.
   const double least_cos =
-      surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : -2.0;
-  const auto stands_near = [&](const std::vector<Eye>& eyes, double cos_at_least) {
-    return std::ranges::any_of(eyes, [&](const Eye& each) {
-      return glm::distance(each.eye.world_m, here.world_m) <= each.reach_m &&
-             glm::dot(each.eye.boresight, here.boresight) >= cos_at_least;
-    });
-  };
+      surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : kAnyCosine;
   // Without known eyes no mesh was simplified.
   return visibly_simplified_ || surface_->model().full_in_view ||
          surface_->shade().short_of_pages() || surface_->stale_shadow() || surface_->lags() ||
-         !stands_near(refined_eyes_, least_cos) ||
-         (!detail_eyes_.empty() && !stands_near(detail_eyes_, -2.0));
+         !stands_near(refined_eyes_, here, least_cos) ||
+         (!detail_eyes_.empty() && !stands_near(detail_eyes_, here, kAnyCosine));
 }
 
 void CachedStage::describe(SceneStats& stats) const noexcept {

@@ -47,6 +47,9 @@ class CachedStage final : public ThermalStage {
   };
   static std::vector<Eye> eyes_around(std::span<const RefineView::Eye> eyes,
                                       const scene::Aabb& static_bounds);
+  /// True where the camera stands within reach of one of the places, and points as that does.
+  static bool stands_near(const std::vector<Eye>& eyes, const RefineView::Eye& here,
+                          double cos_at_least) noexcept;
 
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,

@@ -164,7 +164,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         const float length = glm::length(inward);
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
         const glm::vec3 drawn_m(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F));
-        const glm::vec3 off_edge_m = sampler_.offsets(drawn_m, patch.mover).around_m * unit_inward;
+        const glm::vec3 off_edge_m = sampler_.tracer().offsets(drawn_m, patch.mover).around_m * unit_inward;
         const auto to_rel = [&](const glm::vec3& at_m) {
           return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
         };
@@ -222,7 +222,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
 void Builder::replace_covered() {
   SurfaceSamples& all = model_.samples;
   for (std::size_t p = 0; p < in_.geometry.instances.size(); ++p) {
-    const RefinedMesh& mesh = model_.meshes[patches_[p].mesh];
+    const RefinedMesh& mesh = model_.meshes[in_.geometry.instances[p].mesh];
     const std::uint32_t first = model_.first_sample[p];
     const auto vertices = mesh.vertices();
     std::vector<std::uint32_t> open(vertices.size(), kNoSample);
@@ -325,7 +325,11 @@ physics::Result<SurfaceModel> Builder::run() {
   if (options_.lateral) add_partners(in_, sampler_, patches_);
   number_samples(in_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
-  if (!exchange(in_, options_, patches_, model_, exchanged)) return stopped();
+  SampleHistories histories = take_histories(in_, patches_, model_);
+  const ExchangeOptions exchange_options{.sweeps = sampler_.keeps_sent() ? kExchangeSweeps : 0,
+                                         .evaluated = true,
+                                         .glow = options_.exchange};
+  if (!exchange(in_, exchange_options, std::move(histories), model_, exchanged)) return stopped();
   replace_covered();
   return std::move(model_);
 }

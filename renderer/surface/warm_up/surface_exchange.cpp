@@ -14,9 +14,6 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::size_t kGrain = 64;
-/// Sweeps after the one that takes the surroundings for whatever is seen: each passes heat on by
-/// one more bounce, of which a third at most is reflected or re-emitted within minutes.
-constexpr std::uint32_t kSweeps = 3;
 constexpr std::uint32_t kNoList = 0xffffffffU;
 
 /// What the seen samples of every list send together, over the whole history: their weights are
@@ -71,34 +68,33 @@ class SeenRadiation {
 /// Carries samples over the whole history, from what the others sent in the sweep before.
 class Sweeper {
  public:
-  /// Takes over what the patches' own evaluation gave: that is the first sweep.
-  Sweeper(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
-          std::vector<SurfacePatch>& patches, SurfaceModel& model);
+  Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options, SampleHistories histories,
+          SurfaceModel& model);
 
-  void sweep();
+  /// `all`: also those that no sweep changes.
+  void sweep(bool all);
 
  private:
-  void adopt(SurfacePatch& patch, std::size_t first);
   /// Measures what the faces of entities send at every node, as `before_` has it.
   void measure_faces();
   /// True where no sweep changes anything: the sample sees no other one, has no partner, and no
   /// entity that sends anything hides its sky.
-  [[nodiscard]] bool alone(const SurfacePatch& patch, std::size_t vertex,
-                           const SurfaceSample& sample) const noexcept;
-  /// What the sample on that side of a patch receives in interval j.
-  [[nodiscard]] SampleDrive drive(const SurfacePatch& side, std::size_t vertex,
-                                  const SurfaceSample& sample, std::size_t j) const noexcept;
+  [[nodiscard]] bool alone(std::size_t s) const noexcept;
+  /// What sample `s` receives in interval j.
+  [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal,
+                                  std::size_t j) const noexcept;
   /// Adds what the entities send that hide the sample's sky in interval j.
-  void add_glow(const SurfaceSample& sample, const glm::vec3& normal, const SurfacePatch& side,
-                std::size_t vertex, std::size_t j, SampleDrive& drive) const noexcept;
-  void carry(const SurfacePatch& patch, std::size_t vertex, std::size_t s);
+  void add_glow(std::size_t s, const glm::vec3& normal, std::size_t j,
+                SampleDrive& drive) const noexcept;
+  void carry(std::uint32_t s);
 
   const SurfaceInputs& in_;
-  const std::vector<SurfacePatch>& patches_;
   SurfaceModel& model_;
   std::size_t intervals_;
   std::size_t nodes_;
-  std::vector<physics::FosterState<double>> start_k_;  ///< by sample
+  std::vector<SampleState> start_;
+  std::vector<float> sun_frac_;
+  std::vector<HiddenSky> hidden_sky_;
   SentHistory before_;
   SentHistory after_;
   SeenRadiation seen_;
@@ -106,40 +102,23 @@ class Sweeper {
   std::vector<MoverFaces> faces_;  ///< by node, then entity; empty without exchange or entities
 };
 
-Sweeper::Sweeper(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
-                 std::vector<SurfacePatch>& patches, SurfaceModel& model)
+Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
+                 SampleHistories histories, SurfaceModel& model)
     : in_(inputs),
-      patches_(patches),
       model_(model),
       intervals_(inputs.record.size()),
       nodes_(intervals_ + 1),
-      start_k_(model.samples.samples.size()),
-      before_(intervals_),
+      start_(std::move(histories.start)),
+      sun_frac_(std::move(histories.sun_frac)),
+      hidden_sky_(std::move(histories.hidden_sky)),
+      before_(std::move(histories.sent)),
+      after_(before_),
       seen_(model.samples, before_.radiation_size()) {
-  before_.resize(start_k_.size());
-  for (std::size_t p = 0; p < patches.size(); ++p) {
-    adopt(patches[p], p < model_.first_sample.size() ? model_.first_sample[p] : model_.drawn_samples);
-  }
-  after_ = before_;
-  if (options.exchange && !inputs.movers_now.empty()) {
+  if (options.glow && before_.keeps() && !inputs.movers_now.empty()) {
     glow_ = MoverGlow(model, inputs.geometry, inputs.mover_of_object);
     faces_.resize(inputs.movers_now.size() * nodes_);
     measure_faces();
   }
-}
-
-void Sweeper::adopt(SurfacePatch& patch, std::size_t first) {
-  for (std::size_t i = 0; i < patch.samples.size(); ++i) {
-    start_k_[first + i] = patch.start_k[i];
-    std::ranges::copy(patch.sent.row(i), before_.row(first + i).begin());
-    const std::uint32_t other = model_.samples.samples[first + i].other_side;
-    if (other != kNoSample) {
-      std::ranges::copy(patch.back->sent.row(i), before_.row(other).begin());
-    }
-  }
-  patch.sent.clear();
-  patch.start_k = {};
-  if (patch.back) patch.back->sent.clear();
 }
 
 void Sweeper::measure_faces() {
@@ -154,112 +133,98 @@ void Sweeper::measure_faces() {
   });
 }
 
-void Sweeper::sweep() {
+void Sweeper::sweep(bool all) {
   seen_.gather(before_);
-  for (std::size_t p = 0; p < patches_.size(); ++p) {
-    const SurfacePatch& patch = patches_[p];
-    const std::size_t first =
-        p < model_.first_sample.size() ? model_.first_sample[p] : model_.drawn_samples;
-    threads::parallel_parts(patch.samples.size(), kGrain, [&](std::size_t from, std::size_t to) {
-      for (std::size_t i = from; i < to; ++i) carry(patch, i, first + i);
-    });
-  }
+  threads::parallel_parts(start_.size(), kGrain, [&](std::size_t from, std::size_t to) {
+    for (auto s = static_cast<std::uint32_t>(from); s < to; ++s) {
+      if (!steps_itself(model_.samples, s)) continue;
+      const std::uint32_t other = model_.samples.samples[s].other_side;
+      if (all || !alone(s) || (other != kNoSample && !alone(other))) carry(s);
+    }
+  });
   std::swap(before_, after_);
   measure_faces();
 }
 
-bool Sweeper::alone(const SurfacePatch& side, std::size_t vertex,
-                    const SurfaceSample& sample) const noexcept {
+bool Sweeper::alone(std::size_t s) const noexcept {
+  const SurfaceSample& sample = model_.samples.samples[s];
   if (sample.seen_count != 0) return false;
   for (const Partner& partner : sample.partners) {
     if (partner.sample != kNoSample) return false;
   }
   if (faces_.empty()) return true;
-  const auto hidden = std::span(side.hidden_sky).subspan(vertex * intervals_, intervals_);
+  const auto hidden = std::span(hidden_sky_).subspan(s * intervals_, intervals_);
   return std::ranges::all_of(hidden, [](const HiddenSky& sky) { return sky.frac == 0.0F; });
 }
 
-SampleDrive Sweeper::drive(const SurfacePatch& side, std::size_t vertex,
-                           const SurfaceSample& sample, std::size_t j) const noexcept {
+SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j) const noexcept {
+  const SurfaceSample& sample = model_.samples.samples[s];
   SampleDrive drive;
-  drive.sun_frac = side.sun_frac[vertex * intervals_ + j];
-  if (!side.hidden_sky.empty()) {
-    drive.hidden_sky_frac = side.hidden_sky[vertex * intervals_ + j].frac;
-  }
+  drive.sun_frac = sun_frac_[s * intervals_ + j];
+  if (!hidden_sky_.empty()) drive.hidden_sky_frac = hidden_sky_[s * intervals_ + j].frac;
   if (const std::span<const double> received_w_m2 = seen_.of(sample); !received_w_m2.empty()) {
     const double scale = sample.seen_scale;
     drive.longwave_begin_w_m2 = scale * received_w_m2[j];
     drive.longwave_end_w_m2 = scale * received_w_m2[j + 1];
     drive.shortwave_w_m2 = scale * received_w_m2[nodes_ + j];
   }
+  add_glow(s, normal, j, drive);
   return drive;
 }
 
-void Sweeper::add_glow(const SurfaceSample& sample, const glm::vec3& normal,
-                       const SurfacePatch& side, std::size_t vertex, std::size_t j,
+void Sweeper::add_glow(std::size_t s, const glm::vec3& normal, std::size_t j,
                        SampleDrive& drive) const noexcept {
   if (faces_.empty() || drive.hidden_sky_frac == 0.0F) return;
-  const std::size_t mover = side.hidden_sky[vertex * intervals_ + j].mover;
+  const std::size_t mover = hidden_sky_[s * intervals_ + j].mover;
   const std::size_t movers = faces_.size() / nodes_;
   const float begin_w_m2 = faces_[j * movers + mover].towards_w_m2(normal);
   const float end_w_m2 = faces_[(j + 1) * movers + mover].towards_w_m2(normal);
   if (begin_w_m2 < 0.0F || end_w_m2 < 0.0F) return;
-  const double hidden_frac = sample.sky_frac * drive.hidden_sky_frac;
+  const double hidden_frac = model_.samples.samples[s].sky_frac * drive.hidden_sky_frac;
   drive.longwave_begin_w_m2 += hidden_frac * begin_w_m2;
   drive.longwave_end_w_m2 += hidden_frac * end_w_m2;
   drive.hidden_is_seen = true;
 }
 
-void Sweeper::carry(const SurfacePatch& patch, std::size_t vertex, std::size_t s) {
+void Sweeper::carry(std::uint32_t s) {
   const SurfaceSample& sample = model_.samples.samples[s];
   const std::uint32_t other = sample.other_side;
   const bool sheet = other != kNoSample;
-  const SurfaceSample& behind = sheet ? model_.samples.samples[other] : sample;
-  if (alone(patch, vertex, sample) && (!sheet || alone(*patch.back, vertex, behind))) return;
-  SampleState state;
-  state.modes_k = start_k_[s];
-  // Start the modes that a partner drives where its own modes start, scaled like its flux.
-  for (std::size_t p = 0; p < kMaxPartners; ++p) {
-    const Partner& partner = sample.partners[p];
-    if (partner.sample == kNoSample) continue;
-    for (std::size_t m = 0; m < physics::kMaxFosterModes; ++m) {
-      state.partner_k[p][m] = partner.weight_frac[m] * start_k_[partner.sample][m];
-    }
-  }
+  const bool keeps = after_.keeps();
+  SampleState state = start_[s];
   SampleOutput output;
   SampleOutput back_output;
   for (std::size_t j = 0; j < intervals_; ++j) {
     // Collect what the sample receives over the interval.
     const HeatInterval& interval = in_.record.intervals[j];
-    SampleDrive drive = this->drive(patch, vertex, sample, j);
+    const SurfaceForcing& begin = interval.forcing.begin;
+    const glm::vec3 normal = in_.record.rays[j].normal(sample);
+    SampleDrive drive = this->drive(s, normal, j);
     for (std::size_t p = 0; p < kMaxPartners; ++p) {
       const std::uint32_t partner = sample.partners[p].sample;
-      if (partner == kNoSample) continue;
+      if (partner == kNoSample || !keeps) continue;
       drive.partner_begin_w_m2[p] = before_.flux_w_m2(partner, j);
       drive.partner_end_w_m2[p] = before_.flux_w_m2(partner, j + 1);
     }
-    const glm::vec3 normal = in_.record.rays[j].normal(sample);
-    add_glow(sample, normal, patch, vertex, j, drive);
-    if (j == 0) {
-      after_.keep_begin(s, in_.heat.output(sample, normal, interval.forcing.begin, drive, state));
+    if (keeps && j == 0) {
+      after_.keep_begin(s, in_.heat.output(sample, normal, begin, drive, state));
     }
     // Advance it, together with its other face where it is a sheet.
     if (!sheet) {
       output = in_.heat.advance(sample, normal, interval, drive, state);
     } else {
-      SampleDrive back_drive = this->drive(*patch.back, vertex, behind, j);
-      add_glow(behind, -normal, *patch.back, vertex, j, back_drive);
+      const SurfaceSample& behind = model_.samples.samples[other];
+      SampleDrive back_drive = this->drive(other, -normal, j);
       const SheetBack face{behind, back_drive};
-      if (j == 0) {
-        after_.keep_begin(
-            other, in_.heat.output(behind, -normal, interval.forcing.begin, back_drive, state));
+      if (keeps && j == 0) {
+        after_.keep_begin(other, in_.heat.output(behind, -normal, begin, back_drive, state));
       }
       output = in_.heat.advance(sample, normal, interval, drive, state, &face);
       back_drive.longwave_begin_w_m2 = back_drive.longwave_end_w_m2;
       back_output = in_.heat.output(behind, -normal, interval.forcing.end, back_drive, state);
-      after_.keep_end(other, j, back_output);
+      if (keeps) after_.keep_end(other, j, back_output);
     }
-    after_.keep_end(s, j, output);
+    if (keeps) after_.keep_end(s, j, output);
   }
   model_.states[s] = state;
   model_.outputs[s] = output;
@@ -269,38 +234,72 @@ void Sweeper::carry(const SurfacePatch& patch, std::size_t vertex, std::size_t s
   }
 }
 
-/// Copies what the patches' own evaluation gave.
-void take_evaluated(const std::vector<SurfacePatch>& patches, SurfaceModel& model) {
+}  // namespace
+
+SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfacePatch>& patches,
+                               SurfaceModel& model) {
+  EMIT_CHECK_OP(model.first_sample.size(), ==, inputs.geometry.instances.size());
   const std::size_t count = model.samples.samples.size();
+  const std::size_t intervals = inputs.record.size();
+  const bool movers = !inputs.movers_now.empty();
+  const bool keeps = !patches.empty() && patches.front().sent.keeps();
+  SampleHistories out;
+  out.start.resize(count);
+  out.sun_frac.resize(count * intervals);
+  if (movers) out.hidden_sky.resize(count * intervals);
+  out.sent = SentHistory(keeps ? intervals : 0);
+  out.sent.resize(count);
   model.states.resize(count);
   model.outputs.resize(count);
+  // Copy one side of a vertex to its sample.
+  const auto take = [&](const SurfacePatch& side, std::size_t vertex, std::size_t s) {
+    const auto at = [&](std::size_t row) { return static_cast<std::ptrdiff_t>(row * intervals); };
+    std::copy_n(side.sun_frac.begin() + at(vertex), intervals, out.sun_frac.begin() + at(s));
+    if (movers) {
+      std::copy_n(side.hidden_sky.begin() + at(vertex), intervals, out.hidden_sky.begin() + at(s));
+    }
+    if (keeps) std::ranges::copy(side.sent.row(vertex), out.sent.row(s).begin());
+  };
   for (std::size_t p = 0; p < patches.size(); ++p) {
-    const SurfacePatch& patch = patches[p];
+    SurfacePatch& patch = patches[p];
     const std::size_t first =
         p < model.first_sample.size() ? model.first_sample[p] : model.drawn_samples;
     for (std::size_t i = 0; i < patch.samples.size(); ++i) {
+      take(patch, i, first + i);
+      if (keeps) out.start[first + i].modes_k = patch.start_k[i];
       model.states[first + i] = patch.states[i];
       model.outputs[first + i] = patch.outputs[i];
       const std::uint32_t other = model.samples.samples[first + i].other_side;
       if (other == kNoSample) continue;
+      take(*patch.back, i, other);
       model.states[other] = patch.states[i];
       model.outputs[other] = patch.back->outputs[i];
     }
+    patch = {};
   }
+  // Start the modes that a partner drives where its own modes start, scaled like its flux.
+  for (std::size_t s = 0; s < count; ++s) {
+    for (std::size_t p = 0; p < kMaxPartners; ++p) {
+      const Partner& partner = model.samples.samples[s].partners[p];
+      if (partner.sample == kNoSample) continue;
+      for (std::size_t m = 0; m < physics::kMaxFosterModes; ++m) {
+        out.start[s].partner_k[p][m] =
+            partner.weight_frac[m] * out.start[partner.sample].modes_k[m];
+      }
+    }
+  }
+  return out;
 }
 
-}  // namespace
-
-bool exchange(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
-              std::vector<SurfacePatch>& patches, SurfaceModel& model,
-              const SurfaceProgress& report) {
-  EMIT_CHECK_OP(model.first_sample.size(), ==, inputs.geometry.instances.size());
-  take_evaluated(patches, model);
-  if (!options.exchange && !options.lateral) return !report || report(1.0);
-  Sweeper sweeper(inputs, options, patches, model);
-  for (std::uint32_t i = 0; i < kSweeps; ++i) {
-    if (report && !report((i + 1.0) / (kSweeps + 1.0))) return false;
-    sweeper.sweep();
+bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,
+              SampleHistories histories, SurfaceModel& model, const SurfaceProgress& report) {
+  EMIT_CHECK_OP(histories.start.size(), ==, model.samples.samples.size());
+  EMIT_CHECK_OP(histories.sun_frac.size(), ==,
+                model.samples.samples.size() * inputs.record.size());
+  Sweeper sweeper(inputs, options, std::move(histories), model);
+  for (std::uint32_t i = 0; i < options.sweeps; ++i) {
+    if (report && !report((i + 1.0) / (options.sweeps + 1.0))) return false;
+    sweeper.sweep(!options.evaluated && i == 0);
   }
   return !report || report(1.0);
 }

@@ -79,7 +79,7 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
     selection.movers = alone;
   }
   // Inside a body's own axes float32 resolves more than where the body stands.
-  const float offset_m = sampler_.offsets(own.position_m, -1).around_m;
+  const float offset_m = sampler_.tracer().offsets(own.position_m, -1).around_m;
   const ViewPoint point{own.position_m, own.normal, glm::vec3(0.0F), offset_m};
   const AdjacentFaces adjacent = adjacent_faces(in_.places, point, reach_m, selection);
   for (std::uint32_t k = 0; k < adjacent.count && found_[index].size() < kMaxPartners; ++k) {

@@ -39,7 +39,7 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
       view_(kSampleViewRays),
       sky_(inputs.heat.sky_measure() == SkyMeasure::cosine ? kSampleSkyRays : kSampleViewRays),
       sphere_(kSampleViewRays),
-      offsets_(ray_offsets(inputs.geometry)) {
+      tracer_(inputs, options) {
   history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
@@ -49,12 +49,6 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
     sky_limit_frac_.push_back(
         std::max(kSkyNoiseFrac, alike_k / std::max(std::abs(worth.sky_k(m)), 1e-3F)));
   }
-}
-
-RayOffsets PatchSampler::offsets(const glm::vec3& place_m, std::int32_t mover) const noexcept {
-  if (mover < 0) return offsets_.at(place_m);
-  const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(mover)];
-  return place.on ? offsets_.at(place.rel_from_body * place_m + place.position_m) : offsets_;
 }
 
 SampleState PatchSampler::start_state(const SurfaceSample& sample, StartMemo& memo) const noexcept {
@@ -117,7 +111,8 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
       sample.mover >= 0 &&
       glm::length(in_.movers_now[static_cast<std::size_t>(sample.mover)].position_m) > kMaxWorldM;
   const float offset_m =
-      far_off ? offsets_.around_m : offsets(sample.position_m, sample.mover).around_m;
+      far_off ? tracer_.bulk_offsets().around_m
+              : tracer_.offsets(sample.position_m, sample.mover).around_m;
   ViewPoint point{sample.position_m, sample.normal, stand.inward, offset_m};
   ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offset_m};
   std::array<MoverPlacement, 1> self;
@@ -245,25 +240,6 @@ bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
   });
 }
 
-void PatchSampler::trace(SurfacePatch& patch, std::uint32_t index) const {
-  const SurfaceSample& sample = patch.samples[index];
-  const HistoryRecord& record = in_.record;
-  const std::size_t count = record.size();
-  const RayOffsets offsets = this->offsets(sample.position_m, sample.mover);
-  const float max_blur_m =
-      options_.lateral ? std::min(static_cast<float>(options_.max_blur_m), 0.5F * sample.flat_m)
-                       : 0.0F;
-  for (std::size_t i = 0; i < count; ++i) {
-    const IntervalRays& rays = record.rays[i];
-    const float blur_m = std::min(
-        max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
-    patch.sun_frac[index * count + i] = rays.sun_frac(in_.rays, sample, offsets.sun_m, blur_m);
-    if (!patch.hidden_sky.empty()) {
-      patch.hidden_sky[index * count + i] = rays.hidden_sky(in_.rays, sample, offsets.around_m);
-    }
-  }
-}
-
 void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const {
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();
@@ -323,7 +299,11 @@ void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const Samp
                             StartMemo& memo) const {
   const auto look = [&](SurfacePatch& side) {
     if (!inherit_view(side, index, stand)) look_around(side, index, stand);
-    trace(side, index);
+    const std::size_t count = in_.record.size();
+    const std::size_t first = index * count;
+    tracer_.trace(side.samples[index], std::span(side.sun_frac).subspan(first, count),
+                  side.hidden_sky.empty() ? std::span<HiddenSky>()
+                                          : std::span(side.hidden_sky).subspan(first, count));
   };
   look(patch);
   if (patch.back && in_.materials[patch.samples[index].material].sheet) look(*patch.back);

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "surface/model/drive_worth.hpp"
-#include "surface/rays/ray_offsets.hpp"
 #include "surface/rays/sphere_view.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/warm_up/sent_history.hpp"
+#include "surface/warm_up/sun_tracer.hpp"
 
 namespace emit::renderer {
 
@@ -79,9 +79,7 @@ class PatchSampler {
   PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
                const SurfaceModelOptions& options);
 
-  /// Distances of ray starts from the surface at a place, which is in the body frame of an entity
-  /// where `mover` is not negative.
-  [[nodiscard]] RayOffsets offsets(const glm::vec3& place_m, std::int32_t mover) const noexcept;
+  [[nodiscard]] const SunTracer& tracer() const noexcept { return tracer_; }
   /// True where samples exchange heat with others, so that what they send must be known.
   [[nodiscard]] bool keeps_sent() const noexcept { return options_.exchange || options_.lateral; }
 
@@ -107,8 +105,6 @@ class PatchSampler {
   /// and nothing changed, where rays are needed.
   bool inherit_view(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
-  /// Shares of the sun's disc, and of the sky that entities hide, over the history.
-  void trace(SurfacePatch& patch, std::uint32_t index) const;
   /// Temperature over the history, and what the sample sends out.
   void integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const;
 
@@ -131,7 +127,7 @@ class PatchSampler {
   ViewSampler view_;
   ViewSampler sky_;
   SphereSampler sphere_;
-  RayOffsets offsets_;
+  SunTracer tracer_;
   double history_s_ = 0.0;
   std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
   std::vector<float> sky_limit_frac_;    ///< by material: shares that differ less are alike

@@ -90,8 +90,12 @@ struct FrameStats {
   std::uint64_t dropped_poses = 0;
   /// thermal.method = "cached": the camera stands where no one said it would, or samples ran out
   /// before what it sees was fine enough: triangles may be wider than its pixels and shadows
-  /// coarser than thermal.tolerance_k. Or some surfaces do not know yet that the weather changed.
+  /// coarser than thermal.tolerance_k. Or some surfaces do not know yet that the weather changed, or
+  /// the surface was prepared anew (rewarm_s).
   bool coarse = false;
+  /// How long it took to prepare the surface anew inside this frame, because the thermal time had
+  /// jumped, in s of wall time; 0 in frames that did not. The frame is also `coarse`.
+  double rewarm_s = 0.0;
 };
 
 /// One rendered frame. Rows go down, row-major, float32, no padding.
