@@ -3,18 +3,18 @@
 
 #include "resolve/resolve.hpp"
 
-/// What the daemon's configuration has to say before other hosts may reach a port.
+/// Protection that the daemon's configuration needs before other hosts may reach a port.
 namespace emit::config {
 
 namespace {
 
-/// Of "address:port". A name other than localhost may be any host's.
+/// True when "address:port" is on loopback. A name other than localhost may be any host's.
 bool is_loopback_endpoint(std::string_view endpoint) {
   std::string_view host = endpoint.substr(0, endpoint.rfind(':'));
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
     host = host.substr(1, host.size() - 2);
   }
-  const auto address = parse_ip(host);
+  const auto address = protocol::parse_ip(host);
   return address ? address->is_loopback() : host == "localhost";
 }
 
@@ -46,7 +46,7 @@ std::string_view protections_of(Port port) noexcept {
 }
 
 void check_access(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
-  Diagnostics reported_before;  // section() reported wrong kinds already
+  Diagnostics reported_before;  // section() has reported wrong kinds
   const auto check = [&](Port port, std::string_view table, std::string_view key,
                          const std::string& endpoint) {
     if (!is_endpoint(endpoint) || is_loopback_endpoint(endpoint) || is_protected(daemon, port))

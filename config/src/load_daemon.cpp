@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "keys/data_files.hpp"
+#include "emit/protocol/shared_ring.hpp"
 #include "overrides.hpp"
 #include "resolve/resolve.hpp"
 
@@ -51,7 +52,7 @@ void resolve_daemon_scenario(const Node& root, const std::string& text, DaemonCo
 }
 
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
-  Diagnostics reported_before;  // section() reported wrong kinds already
+  Diagnostics reported_before;  // section() has reported wrong kinds
   const Node& pacing = section(root, "pacing", reported_before);
   if (daemon.pacing.mode != PacingMode::host_step &&
       daemon.pacing.display_delay_ns > daemon.pacing.horizon_ns) {
@@ -64,7 +65,7 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
   check_endpoint(section(root, "control", reported_before), "tcp", daemon.control.tcp, false,
                  diagnostics);
   check_endpoint(section(root, "host", reported_before), "udp", daemon.host.udp, true, diagnostics);
-  if (!daemon.stream.shm.empty() && !is_shm_name(daemon.stream.shm)) {
+  if (!daemon.stream.shm.empty() && !protocol::is_shm_name(daemon.stream.shm)) {
     diagnostics.add(key_location(section(root, "stream", reported_before), "shm"),
                     fmt::format("'shm' is '{}', must be 1 to 64 letters, digits, '_', '-' or '.', "
                                 "beginning with a letter or digit",
@@ -105,13 +106,6 @@ bool is_endpoint(std::string_view text) {
   unsigned value = 0;
   const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
   return parsed.ec == std::errc() && parsed.ptr == port.data() + port.size() && value <= 65535;
-}
-
-bool is_shm_name(std::string_view text) noexcept {
-  constexpr std::size_t kMostCharacters = 64;
-  return !text.empty() && text.size() <= kMostCharacters && is_ascii_alnum(text.front()) &&
-         std::all_of(text.begin(), text.end(),
-                     [](char c) { return is_ascii_alnum(c) || c == '_' || c == '-' || c == '.'; });
 }
 
 Result<DaemonConfig> load_daemon(const std::filesystem::path& file,

@@ -5,6 +5,7 @@
 
 #include "emit/physics/constants.hpp"
 #include "overrides.hpp"
+#include "resolve/complete_weather.hpp"
 #include "resolve/resolve.hpp"
 
 namespace emit::config {
@@ -43,6 +44,34 @@ void report_file_error(const physics::Error& error, const Node& table, std::stri
 
 namespace {
 
+/// Keys of [weather] beside `file` and `sample`: parameters of the clear-sky models.
+bool is_clear_sky_key(std::string_view key) {
+  return key != "file" && key != "sample" &&
+         std::any_of(weather_keys().begin(), weather_keys().end(),
+                     [key](const auto& known) { return known.spec.name == key; });
+}
+
+/// Completes a table of weather. Clear-sky keys beside a table that needs none of the models have
+/// no effect, which is a fault.
+void complete_table(const Node& table, const std::filesystem::path& file, ScenarioDesc& scenario,
+                    Diagnostics& diagnostics) {
+  const StatedClearSky stated{.air_mean = table.has("air_mean_k"),
+                              .air_amplitude = table.has("air_amplitude_k"),
+                              .dew_point = table.has("dew_point_k"),
+                              .wind = table.has("wind_m_s"),
+                              .cloud = table.has("cloud_frac")};
+  const std::string name =
+      file.empty() ? fmt::format("{}: [[weather.sample]]", scenario.file.string()) : file.string();
+  if (complete_weather(name, stated, scenario)) return;
+  for (const Member& member : table.members) {
+    if (!is_clear_sky_key(member.key)) continue;
+    diagnostics.add(member.key_at,
+                    fmt::format("'{}' has no effect: the weather comes from {}", member.key,
+                                file.empty() ? "[[weather.sample]]" : "a file"));
+  }
+}
+
+/// Reads the weather. The thermal options say how far back it has to reach.
 void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diagnostics) {
   const Node& table = section(root, "weather", diagnostics);
   WeatherDraft draft;
@@ -55,17 +84,6 @@ void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diag
     diagnostics.add(key_location(table, "file"), "use only one of 'file' and [[weather.sample]]");
     return;
   }
-  if (has_file || has_samples) {
-    for (const Member& member : table.members) {
-      if (member.key != "file" && member.key != "sample" &&
-          std::any_of(weather_keys().begin(), weather_keys().end(),
-                      [&member](const auto& key) { return key.spec.name == member.key; })) {
-        diagnostics.add(member.key_at,
-                        fmt::format("'{}' has no effect: the weather comes from {}", member.key,
-                                    has_file ? "a file" : "[[weather.sample]]"));
-      }
-    }
-  }
   if (has_file) {
     auto loaded = load_weather_csv(draft.file);
     if (!loaded) {
@@ -73,16 +91,21 @@ void resolve_weather(const Node& root, ScenarioDesc& scenario, Diagnostics& diag
       return;
     }
     scenario.weather = std::move(*loaded);
-    return;
-  }
-  scenario.weather = std::move(draft.samples);
-  for (std::size_t i = 1; i < scenario.weather.size() && diagnostics.size() == faults; ++i) {
-    if (scenario.weather[i].sim_time_ns <= scenario.weather[i - 1].sim_time_ns) {
-      diagnostics.add(key_location(table.find("sample")->items[i], "time_s"),
-                      "'time_s' is not later than in the sample before");
+  } else {
+    scenario.weather = std::move(draft.samples);
+    for (std::size_t i = 1; i < scenario.weather.size() && diagnostics.size() == faults; ++i) {
+      if (scenario.weather[i].sim_time_ns <= scenario.weather[i - 1].sim_time_ns) {
+        diagnostics.add(key_location(table.find("sample")->items[i], "time_s"),
+                        "'time_s' is not later than in the sample before");
+      }
     }
   }
-  if (draft.clear_sky.dew_point_k > draft.clear_sky.air_mean_k + draft.clear_sky.air_amplitude_k) {
+  const bool model = !has_file && !has_samples;
+  if (!model && diagnostics.size() == faults) {
+    complete_table(table, draft.file, scenario, diagnostics);
+  }
+  if (model &&
+      draft.clear_sky.dew_point_k > draft.clear_sky.air_mean_k + draft.clear_sky.air_amplitude_k) {
     diagnostics.add(
         key_location(table, "dew_point_k"),
         fmt::format("'dew_point_k' ({}) is above the warmest air ({})", draft.clear_sky.dew_point_k,
@@ -100,7 +123,7 @@ void resolve_display(const Node& root, ScenarioDesc& scenario, Diagnostics& diag
   }
 }
 
-/// Keys of the root that are sections of their own.
+/// Names of the sections, which are keys of the root too.
 std::vector<std::string_view> section_names() {
   std::vector<std::string_view> names;
   for (const SectionDoc& doc : scenario_sections()) {
@@ -129,8 +152,6 @@ void resolve_head(const Node& root, ScenarioDesc& scenario, ScenarioHead& head,
   scenario.name = head.name;
   scenario.epoch_utc_ns = head.epoch_utc_ns;
 }
-
-constexpr std::int64_t kFosterSpinUpNs = 172'800'000'000'000;  // two days
 
 void check_surroundings(const Node& thermal, const ScenarioDesc& scenario,
                         Diagnostics& diagnostics) {
@@ -185,7 +206,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   ScenarioHead head;
   resolve_head(root, scenario, head, diagnostics);
 
-  // Overrides reach library materials too, so they wait until all tables are together.
+  // Overrides may address library materials too, so they wait until all tables are together.
   Node pool;
   Node list;
   list.kind = Node::Kind::array;
@@ -199,12 +220,13 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
 
   scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 0.0};
   read_table(section(root, "place", diagnostics), place_keys(), scenario.place, diagnostics);
-  resolve_weather(root, scenario, diagnostics);
   const Node& thermal = section(root, "thermal", diagnostics);
+  scenario.thermal = default_thermal();
   read_table(thermal, thermal_keys(), scenario.thermal, diagnostics);
-  if (scenario.thermal.model == scene::ThermalModel::foster && !thermal.has("spin_up_s")) {
-    scenario.thermal.spin_up_ns = kFosterSpinUpNs;
+  if (scenario.thermal.model != scene::ThermalModel::foster && !thermal.has("spin_up_s")) {
+    scenario.thermal.spin_up_ns = 0;
   }
+  resolve_weather(root, scenario, diagnostics);
   resolve_display(root, scenario, diagnostics);
 
   const std::vector<scene::SpectralBand> declared = resolve_declared_bands(root, diagnostics);
@@ -214,7 +236,7 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   scenario.atmosphere = resolve_atmosphere(root, scenario.bands, diagnostics);
 
   scenario.materials = resolve_materials(pool.members[0].value.items, known, diagnostics);
-  // A [[band]] that no channel shows is not handed over, so neither are emissivities in it.
+  // The renderer gets only bands that a channel shows, and emissivities in those bands.
   std::vector<std::string> handed_over = known_band_names({});
   for (const scene::SpectralBand& band : scenario.bands) {
     handed_over.push_back(band.name);

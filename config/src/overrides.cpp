@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 
@@ -18,7 +19,7 @@ struct Segment {
   std::string selector;  ///< index or name in brackets
 };
 
-/// False when the path is not written as a.b[c].d.
+/// Reads a path such as a.b[c].d. False when it is none.
 bool parse_path(std::string_view text, std::vector<Segment>& out) {
   std::size_t i = 0;
   while (i < text.size()) {
@@ -125,6 +126,48 @@ std::string environment_name(const std::string& section, const std::string& key)
   return out;
 }
 
+struct EnvironmentKey {
+  std::string name;  ///< EMIT_THERMAL_STEPS
+  std::string path;  ///< thermal.steps
+};
+
+/// The keys of `sections` that a variable can set. Elements of arrays of tables have no names.
+std::vector<EnvironmentKey> environment_keys(const std::vector<SectionDoc>& sections) {
+  std::vector<EnvironmentKey> keys;
+  for (const SectionDoc& section : sections) {
+    if (section.array) continue;
+    for (const SectionDoc::Row& row : section.rows) {
+      if (row.spec.type == "array of tables") continue;
+      keys.push_back({environment_name(section.path, row.spec.name),
+                      section.path.empty() ? row.spec.name : section.path + "." + row.spec.name});
+    }
+  }
+  return keys;
+}
+
+/// Variables that programs of this repository read themselves: the folder of the data files, and
+/// settings of its tests and scripts.
+constexpr std::array<std::string_view, 4> kOwnVariables{"EMIT_DATA_DIR", "EMIT_SOAK_S",
+                                                        "EMIT_TIDY_JOBS", "EMIT_UPDATE_GOLDENS"};
+
+/// A misspelt variable would otherwise change nothing without a word. One environment serves
+/// scenario and daemon, so that the keys of both are known here.
+void report_unknown_names(const std::vector<std::string>& entries, Diagnostics& diagnostics) {
+  std::vector<EnvironmentKey> keys = environment_keys(scenario_sections());
+  for (EnvironmentKey& key : environment_keys(daemon_sections())) keys.push_back(std::move(key));
+  std::vector<std::string_view> known(kOwnVariables.begin(), kOwnVariables.end());
+  for (const EnvironmentKey& key : keys) known.push_back(key.name);
+  for (const std::string& entry : entries) {
+    const std::string_view name = std::string_view(entry).substr(0, entry.find('='));
+    if (!name.starts_with("EMIT_") || std::ranges::find(known, name) != known.end()) continue;
+    const std::string_view near = nearest_word(name, known);
+    diagnostics.add({working_directory_source(std::string(name)), 0, 0},
+                    near.empty()
+                        ? std::string("unknown environment variable: no key has this name")
+                        : fmt::format("unknown environment variable, did you mean {}?", near));
+  }
+}
+
 const std::vector<std::string>& process_environment(std::vector<std::string>& store) {
   for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry) {
     if (std::string_view(*entry).substr(0, 5) == "EMIT_") {
@@ -141,36 +184,25 @@ void apply_environment(Node& root, const std::vector<SectionDoc>& sections,
   std::vector<std::string> store;
   const std::vector<std::string>& entries =
       options.environment ? *options.environment : process_environment(store);
-  for (const SectionDoc& section : sections) {
-    if (section.array) {
-      continue;
-    }
-    for (const SectionDoc::Row& row : section.rows) {
-      if (row.spec.type == "array of tables") {
-        continue;
-      }
-      const std::string name = environment_name(section.path, row.spec.name);
-      for (const std::string& entry : entries) {
-        if (entry.size() > name.size() && entry[name.size()] == '=' &&
-            entry.compare(0, name.size(), name) == 0) {
-          std::vector<Segment> path;
-          const std::string key =
-              section.path.empty() ? row.spec.name : section.path + "." + row.spec.name;
-          if (parse_path(key, path)) {
-            put(root, path,
-                parse_override_value(std::string_view(entry).substr(name.size() + 1),
-                                     working_directory_source(name)),
-                diagnostics);
-          }
-        }
-      }
+  const std::vector<EnvironmentKey> keys = environment_keys(sections);
+  for (const std::string& entry : entries) {
+    const std::string_view name = std::string_view(entry).substr(0, entry.find('='));
+    const auto key = std::ranges::find(keys, name, &EnvironmentKey::name);
+    if (key == keys.end() || name.size() == entry.size()) continue;
+    std::vector<Segment> path;
+    if (parse_path(key->path, path)) {
+      put(root, path,
+          parse_override_value(std::string_view(entry).substr(name.size() + 1),
+                               working_directory_source(key->name)),
+          diagnostics);
     }
   }
+  report_unknown_names(entries, diagnostics);
 }
 
 void apply_override(Node& root, std::string_view text, Diagnostics& diagnostics) {
   const auto source = working_directory_source("--set " + std::string(text));
-  // The first '=' outside brackets ends the key.
+  // The key ends at the first '=' outside brackets.
   const std::size_t close = text.find(']');
   const std::size_t open = text.find('[');
   std::size_t equals = text.find('=');

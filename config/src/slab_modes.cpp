@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 
 namespace emit::config {
@@ -15,7 +16,7 @@ namespace {
 double slab_root(double biot, int index) {
   double lo = (index + 0.5) * physics::kPi;
   double hi = (index + 1.0) * physics::kPi;
-  const double sign_lo = index % 2 == 0 ? 1.0 : -1.0;  // of the function at lo: Bi sin(lo)
+  const double sign_lo = index % 2 == 0 ? 1.0 : -1.0;  // sign of the function at lo, Bi sin(lo)
   for (int i = 0; i < 100; ++i) {
     const double mid = 0.5 * (lo + hi);
     const double value = mid * std::cos(mid) + biot * std::sin(mid);
@@ -28,6 +29,13 @@ double slab_root(double biot, int index) {
 
 std::vector<scene::RelaxationMode> slab_modes(const scene::Layer& layer, double film_w_m2_k,
                                               int count) {
+  for (const double value : {layer.thickness_m, layer.conductivity_w_m_k, layer.density_kg_m3,
+                             layer.specific_heat_j_kg_k, film_w_m2_k}) {
+    EMIT_CHECK(std::isfinite(value));
+    EMIT_CHECK_OP(value, >, 0.0);
+  }
+  EMIT_CHECK_OP(count, >=, 1);
+  EMIT_CHECK_OP(count, <=, 16);
   const double diffusivity_m2_s =
       layer.conductivity_w_m_k / (layer.density_kg_m3 * layer.specific_heat_j_kg_k);
   const double biot = film_w_m2_k * layer.thickness_m / layer.conductivity_w_m_k;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one file that sees the TOML library.
+// This is the only file that includes the TOML library.
 #include <toml++/toml.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ std::int64_t posix_ns(const toml::date_time& value) {
   return duration_cast<nanoseconds>(day.time_since_epoch() + of_day - offset).count();
 }
 
-/// int64 ns since 1970 ends in 2262.
+/// True for the years that int64 ns since 1970 can hold; they end in 2262.
 bool year_fits(const toml::date& date) {
   return date.year >= 1900 && date.year <= 2199;
 }
@@ -136,7 +136,7 @@ Node parse_override_value(std::string_view text, std::shared_ptr<const Source> s
   Node out;
   out.kind = Node::Kind::text;
   out.text = std::string(text);
-  // A line end could smuggle in more keys, a `#` would silently drop the rest of a plain word.
+  // A line end could bring in more keys, and a `#` would drop the rest of a plain word.
   const bool quoted = !text.empty() && (text.front() == '"' || text.front() == '\'' ||
                                         text.front() == '[' || text.front() == '{');
   if (text.find('\n') == std::string_view::npos &&

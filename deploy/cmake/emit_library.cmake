@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-# emit_library(NAME name INCLUDE dirs... [SOURCES files...] [PUBLIC libs...] [PRIVATE libs...])
+# emit_library(NAME name INCLUDE dirs... [SOURCES files...] [SEPARATE files...] [PUBLIC libs...] [PRIVATE libs...])
 # Adds the static library emit_<name> with the alias emit::<name>. Every folder of sources is one library, so that tests
 # and fuzz targets link what they exercise. A folder of headers alone becomes an interface library.
+# With EMIT_UNITY_BUILD a few sources of a library at a time are compiled as one, which halves the time of a first build.
+# SEPARATE names those of SOURCES that define the same private names as others, so they are compiled alone.
+option(EMIT_UNITY_BUILD "Compile several sources of a library at a time: faster from clean, slower after a change" OFF)
 function(emit_library)
-  cmake_parse_arguments(arg "" "NAME" "INCLUDE;SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "" "NAME" "INCLUDE;SOURCES;SEPARATE;PUBLIC;PRIVATE" ${ARGN})
   set(target emit_${arg_NAME})
+  list(TRANSFORM arg_INCLUDE REPLACE "(.+)" "$<BUILD_INTERFACE:\\1>")
   if(arg_SOURCES)
     add_library(${target} STATIC ${arg_SOURCES})
+    set_target_properties(${target} PROPERTIES
+      EXPORT_NAME ${arg_NAME} UNITY_BUILD ${EMIT_UNITY_BUILD} UNITY_BUILD_BATCH_SIZE 6)
+    set_source_files_properties(${arg_SEPARATE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     target_include_directories(${target} PUBLIC ${arg_INCLUDE})
-    target_link_libraries(${target} PUBLIC ${arg_PUBLIC} PRIVATE emit_options ${arg_PRIVATE})
+    target_link_libraries(${target} PUBLIC ${arg_PUBLIC} PRIVATE $<BUILD_INTERFACE:emit_options> ${arg_PRIVATE})
   else()
     add_library(${target} INTERFACE)
     target_include_directories(${target} INTERFACE ${arg_INCLUDE})

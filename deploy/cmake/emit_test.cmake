@@ -17,6 +17,18 @@ target_compile_definitions(emit_test_paths INTERFACE
   EMIT_TEST_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}"
   EMIT_TEST_SHARE_DIR="${EMIT_SHARE_DIR}")
 
+# Every test includes GoogleTest and the same parts of the standard library. They are compiled once.
+option(EMIT_PRECOMPILED_HEADERS "Compile the headers that all tests include once" ON)
+if(EMIT_PRECOMPILED_HEADERS)
+  set(emit_precompiled_source "${PROJECT_BINARY_DIR}/generated/test_headers.cpp")
+  file(CONFIGURE OUTPUT "${emit_precompiled_source}" CONTENT "// Holds the precompiled headers of the tests.\n")
+  add_library(emit_test_headers OBJECT "${emit_precompiled_source}")
+  target_link_libraries(emit_test_headers PRIVATE emit_options emit_test_options GTest::gmock)
+  target_precompile_headers(emit_test_headers PRIVATE
+    <algorithm> <array> <cmath> <cstdint> <memory> <optional> <span> <string> <string_view> <utility> <vector>
+    <gmock/gmock.h> <gtest/gtest.h>)
+endif()
+
 # emit_test(NAME name LABEL label SOURCES ... LIBS ... [SERIAL] [TIMEOUT seconds])
 # One GoogleTest executable; each TEST becomes a CTest case carrying the label.
 function(emit_test)
@@ -26,6 +38,9 @@ function(emit_test)
   endif()
   add_executable(${arg_NAME} ${arg_SOURCES})
   target_link_libraries(${arg_NAME} PRIVATE emit_options emit_test_options emit_test_paths ${arg_LIBS} GTest::gmock GTest::gtest_main)
+  if(EMIT_PRECOMPILED_HEADERS)
+    target_precompile_headers(${arg_NAME} REUSE_FROM emit_test_headers)
+  endif()
   set_target_properties(${arg_NAME} PROPERTIES RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/tests")
   set(properties LABELS ${arg_LABEL} TIMEOUT ${arg_TIMEOUT})
   if(arg_SERIAL)

@@ -14,7 +14,7 @@ renderer/physics:
 renderer/image: renderer/physics
 renderer/scene: renderer/physics
 renderer/scene/generate: renderer/physics
-renderer/threads:
+renderer/threads: renderer/physics
 renderer/reference: renderer/physics renderer/scene
 renderer/reference/src/rays: renderer/reference renderer/physics renderer/scene renderer/threads
 renderer/reference/src/conduction: renderer/reference renderer/reference/src/rays renderer/physics renderer/scene renderer/threads
@@ -42,24 +42,25 @@ renderer/verify/src/visibility: renderer/verify renderer/verify/src renderer/inc
 renderer/verify/src/stability: renderer/verify renderer/verify/src renderer/gl renderer/physics renderer/shaders/shared
 renderer/verify/src/models: renderer/verify renderer/verify/src renderer/verify/src/visibility renderer/physics renderer/reference
 protocol: renderer/physics
-config/include: renderer/physics renderer/scene
-config/src/keys: config/include renderer/physics renderer/scene
-config/src/tables: config/include config/src/keys renderer/physics renderer/scene
-config/src/resolve: config/include config/src/keys config/src/tables renderer/physics renderer/scene
-config/src: config/include config/src/keys config/src/tables config/src/resolve renderer/physics renderer/scene
+config/include: protocol renderer/physics renderer/scene
+config/src/keys: protocol config/include renderer/physics renderer/scene
+config/src/tables: protocol config/include config/src/keys renderer/physics renderer/scene
+config/src/resolve: protocol config/include config/src/keys config/src/tables renderer/physics renderer/scene
+config/src: protocol config/include config/src/keys config/src/tables config/src/resolve renderer/physics renderer/scene
 config/tools: config/include config/src config/src/keys config/src/resolve renderer/physics renderer/scene
-server/rt: config/include renderer/physics
-server/net: server/rt config/include protocol renderer/physics
-server/client: server/net server/rt config/include protocol renderer/physics
+server/rt: renderer/physics
+server/host: server/rt config/include renderer/physics
+server/net: server/rt protocol renderer/physics
+server/client: server/net server/rt protocol renderer/physics
 server/pacing: protocol renderer/include renderer/physics renderer/scene
-server/telemetry: server/net server/rt config/include protocol renderer/physics
-server/agents: server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
+server/agents: server/host server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/receiver: server/agents server/agents/sender server/net server/rt config/include protocol renderer/physics
 server/agents/conductor: server/agents server/net server/pacing server/rt config/include protocol renderer/physics
 server/agents/recorder: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/render: server/agents server/pacing renderer/image renderer/physics
-server/app: server/agents server/agents/conductor server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/app: server/host server/agents server/agents/conductor server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/tool/support: server/app server/pacing config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/tool/streams: server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
 server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
@@ -181,10 +182,10 @@ only spdlog   'spdlog/'           'server/'
 only Embree   'embree3/'          'renderer/reference/|renderer/surface/rays/caster_'
 only Eigen    'Eigen/'            'renderer/reference/'
 only Ceres    'ceres/'            'renderer/reference/'
-only OpenSSL  'openssl/'          'protocol/src/|server/net/tls_'
+only OpenSSL  'openssl/'          'protocol/src/|server/net/tls_|server/app/sha256'
 only CLI11    'CLI/'              'server/'
 
-missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.cmake' \
+missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.py' '*.cmake' \
     '*CMakeLists.txt' '*.proto' | xargs grep -L 'SPDX-License-Identifier: Apache-2.0' || true)
 if [[ -n $missing ]]; then
   echo "files without licence line:"

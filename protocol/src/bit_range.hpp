@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <span>
 
-/// Ranges of bits in an array of 64-bit words. Precondition of all: the range lies within the
-/// words.
+#include "emit/physics/check.hpp"
+
+/// Operations on ranges of bits in an array of 64-bit words. All functions are RT-safe.
 namespace emit::protocol::bits {
 
-/// Calls visit(word index, mask of the range's bits in it).
+/// Calls visit(index of a word, mask of the range's bits in it) for every word of the range [begin,
+/// begin + count).
 template <class Visit>
 void for_each_word(std::size_t begin, std::size_t count, Visit visit) noexcept {
   const std::size_t end = begin + count;
@@ -23,8 +25,11 @@ void for_each_word(std::size_t begin, std::size_t count, Visit visit) noexcept {
   }
 }
 
+/// Returns the number of set bits in the range.
+/// @pre the range lies within the words
 [[nodiscard]] inline std::size_t count_set(std::span<const std::uint64_t> words, std::size_t begin,
                                            std::size_t count) noexcept {
+  EMIT_DCHECK_OP(begin + count, <=, words.size() * 64);
   std::size_t set = 0;
   for_each_word(begin, count, [&](std::size_t index, std::uint64_t mask) {
     set += static_cast<std::size_t>(std::popcount(words[index] & mask));
@@ -32,8 +37,11 @@ void for_each_word(std::size_t begin, std::size_t count, Visit visit) noexcept {
   return set;
 }
 
+/// Sets every bit of the range.
+/// @pre the range lies within the words
 inline void set_range(std::span<std::uint64_t> words, std::size_t begin,
                       std::size_t count) noexcept {
+  EMIT_DCHECK_OP(begin + count, <=, words.size() * 64);
   for_each_word(begin, count, [&](std::size_t index, std::uint64_t mask) { words[index] |= mask; });
 }
 

@@ -14,10 +14,12 @@
 namespace emit::protocol {
 namespace {
 
-// Holds the largest host frame parsed: 128 entities of about 270 bytes each.
+// Length of the arena, bytes. It holds the largest parsed host frame: 128 entities of about 270
+// bytes each.
 constexpr std::size_t kArenaBytes = std::size_t{128} << 10;
 
-/// Arena that starts in memory of its own and goes back to it, so that it does not allocate.
+/// Arena with memory of its own, to which it returns after every message, so that it does not
+/// allocate.
 class FixedArena {
  public:
   FixedArena() : block_(std::make_unique<char[]>(kArenaBytes)), arena_(options(block_.get())) {}
@@ -37,7 +39,8 @@ class FixedArena {
   google::protobuf::Arena arena_;
 };
 
-/// Reads a varint at `at` and moves behind it; false when it is cut off or too long.
+/// Reads a varint at `at` and moves `at` behind it. Returns false when the varint is cut off or too
+/// long.
 bool read_varint(std::span<const std::byte> bytes, std::size_t& at, std::uint64_t& value) noexcept {
   value = 0;
   for (unsigned shift = 0; shift < 64; shift += 7) {
@@ -49,13 +52,15 @@ bool read_varint(std::span<const std::byte> bytes, std::size_t& at, std::uint64_
   return false;
 }
 
+/// Fields of a host frame that are read before Protobuf parses it.
 struct Outline {
   std::uint64_t protocol_version = 0;
   std::uint64_t entities = 0;
 };
 
-/// Walks the top-level fields before Protobuf gets to see the message: the version is known even
-/// where a newer layout would not parse, and the number of entities bounds the memory.
+/// Reads the top-level fields before Protobuf parses the message. The version is then known even
+/// where a newer layout would not parse, and the number of entities bounds the memory. Returns
+/// false when the bytes are no message.
 bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameData& out) noexcept {
   enum WireType : std::uint64_t { kVarint = 0, kFixed64 = 1, kDelimited = 2, kFixed32 = 5 };
   std::size_t at = 0;
@@ -69,7 +74,7 @@ bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameD
       case kVarint:
         if (!read_varint(bytes, at, value)) return false;
         if (field == v1::HostFrame::kProtocolVersionFieldNumber) {
-          outline.protocol_version = value & 0xFFFFFFFFu;  // as Protobuf reads a uint32
+          outline.protocol_version = value & 0xFFFFFFFFu;  // a uint32, cut as Protobuf cuts it
         } else if (field == v1::HostFrame::kFrameNumberFieldNumber) {
           out.frame_number = value;
         } else if (field == v1::HostFrame::kRunIdFieldNumber) {
@@ -93,7 +98,7 @@ bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameD
         at += 4;
         break;
       default:
-        return false;  // groups: proto3 has none
+        return false;  // proto3 has no groups
     }
   }
   return true;
@@ -158,7 +163,7 @@ DecodeStatus decode_host_frame(std::span<const std::byte> bytes, HostFrameDecode
 }
 
 std::span<const std::byte> host_frame_in_control_record(std::span<const std::byte> body) noexcept {
-  constexpr std::uint64_t kHostFrameTag = (6u << 3) | 2u;  // ControlRecord.host_frame
+  constexpr std::uint64_t kHostFrameTag = (6u << 3) | 2u;  // tag of ControlRecord.host_frame
   std::size_t at = 0;
   std::uint64_t tag = 0;
   std::uint64_t length = 0;
@@ -171,7 +176,7 @@ std::span<const std::byte> host_frame_in_control_record(std::span<const std::byt
 
 struct HostFrameEncoder::Impl {
   FixedArena arena;
-  // 128 entities with rates stay under 200 bytes each.
+  // Encoded message. It is large enough: 128 entities with rates take less than 200 bytes each.
   std::array<std::byte, kMaxHostFrameBytes> bytes;
 };
 

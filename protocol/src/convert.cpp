@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "emit/physics/limits.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/v1/host.pb.h"
 #include "emit/v1/status.pb.h"
@@ -21,22 +22,10 @@ static_assert(static_cast<int>(DecodeStatus::invalid_pose) == v1::Status::CODE_I
 static_assert(static_cast<int>(DecodeStatus::invalid_environment) ==
               v1::Status::CODE_INVALID_ENVIRONMENT);
 
-// Ranges of docs/wire.md.
-constexpr double kMinNorm = 0.99;
-constexpr double kMaxNorm = 1.01;
+namespace limits = physics::limits;
+
 constexpr double kMaxSpeedMS = 1e6;
 constexpr double kMaxAngularRateRadS = 1e4;
-// Weather: those of a scenario's [[weather.sample]], so that live weather can do nothing that a
-// scenario cannot.
-constexpr double kMaxDirectNormalWM2 = 2000.0;
-constexpr double kMaxDiffuseHorizontalWM2 = 1500.0;
-constexpr double kMaxLongwaveDownWM2 = 1000.0;
-constexpr double kMinAirK = 180.0;
-constexpr double kMaxAirK = 340.0;
-constexpr double kMinEnvironmentK = 100.0;
-constexpr double kMaxEnvironmentK = 400.0;
-constexpr double kMaxWindMS = 100.0;
-constexpr double kMaxFilmWM2K = 1000.0;
 /// Squared norms nearer to 1 are left alone, so that decoding what was decoded changes no bit.
 constexpr double kNormTolerance = 1e-12;
 
@@ -50,25 +39,24 @@ void set(const glm::dvec3& in, v1::Vector3& out) {
   out.set_z(in.z);
 }
 
-/// False for NaN too.
+/// Returns true when every component is within [-limit, limit]; false for NaN.
 bool within(const glm::dvec3& vector, double limit) noexcept {
   return std::abs(vector.x) <= limit && std::abs(vector.y) <= limit && std::abs(vector.z) <= limit;
 }
-bool within(double value, double lowest, double highest) noexcept {
-  return value >= lowest && value <= highest;
-}
 
+/// Reads a quaternion and normalises it. Returns false when its norm is out of range.
 bool read_attitude(const v1::Quaternion& in, glm::dquat& out) noexcept {
   out = glm::dquat(in.w(), in.x(), in.y(), in.z());
   const double squared = out.w * out.w + out.x * out.x + out.y * out.y + out.z * out.z;
   const double norm = std::sqrt(squared);
-  if (!within(norm, kMinNorm, kMaxNorm)) return false;
+  if (!limits::kQuaternionNorm.contains(norm)) return false;
   if (std::abs(squared - 1.0) > kNormTolerance) {
     out = glm::dquat(out.w / norm, out.x / norm, out.y / norm, out.z / norm);
   }
   return true;
 }
 
+/// Returns true when an entity before entity `checked` has the same id.
 bool repeats_an_id(const HostFrameData& frame, std::uint32_t checked) noexcept {
   for (std::uint32_t i = 0; i < checked; ++i) {
     if (frame.entities[i].entity_id == frame.entities[checked].entity_id) return true;
@@ -169,14 +157,14 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcep
   out.cloud_frac = in.cloud_frac();
   if (in.has_environment_k()) out.environment_k = in.environment_k();
   if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
-  const bool valid =
-      within(out.direct_normal_w_m2, 0.0, kMaxDirectNormalWM2) &&
-      within(out.diffuse_horizontal_w_m2, 0.0, kMaxDiffuseHorizontalWM2) &&
-      within(out.longwave_down_w_m2, 0.0, kMaxLongwaveDownWM2) &&
-      within(out.air_k, kMinAirK, kMaxAirK) && within(out.wind_m_s, 0.0, kMaxWindMS) &&
-      within(out.cloud_frac, 0.0, 1.0) &&
-      (!out.environment_k || within(*out.environment_k, kMinEnvironmentK, kMaxEnvironmentK)) &&
-      (!out.film_w_m2_k || within(*out.film_w_m2_k, 0.0, kMaxFilmWM2K));
+  // Live weather can do nothing that a scenario cannot: the ranges are those of both.
+  const bool valid = limits::kDirectNormalWM2.contains(out.direct_normal_w_m2) &&
+                     limits::kDiffuseHorizontalWM2.contains(out.diffuse_horizontal_w_m2) &&
+                     limits::kLongwaveDownWM2.contains(out.longwave_down_w_m2) &&
+                     limits::kAirK.contains(out.air_k) && limits::kWindMS.contains(out.wind_m_s) &&
+                     limits::kCloudFrac.contains(out.cloud_frac) &&
+                     (!out.environment_k || limits::kEnvironmentK.contains(*out.environment_k)) &&
+                     (!out.film_w_m2_k || limits::kFilmWM2K.contains(*out.film_w_m2_k));
   return valid ? DecodeStatus::ok : DecodeStatus::invalid_environment;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 
+#include "emit/physics/check.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "wire_bytes.hpp"
 
@@ -17,9 +18,11 @@ namespace {
 constexpr std::uint32_t kCastagnoliReflected = 0x82F63B78;
 constexpr std::uint32_t kIeeeReflected = 0xEDB88320;
 
+/// Tables for a CRC of eight bytes a step.
 using SliceTable = std::array<std::array<std::uint32_t, 256>, 8>;
 
-/// Table k gives the effect of a byte that is followed by k zero bytes.
+/// Computes the tables of a polynomial. Table k gives the effect of a byte that is followed by k
+/// zero bytes.
 constexpr SliceTable make_slices(std::uint32_t polynomial) {
   SliceTable table{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
@@ -57,18 +60,19 @@ std::uint32_t crc_by_slices(const SliceTable& table, std::span<const std::byte> 
 
 #if defined(__x86_64__)
 
-// The instruction takes three cycles but starts every cycle: three independent streams keep it
-// busy.
+// Length of one of three independent streams, bytes. The instruction takes three cycles but starts
+// every cycle, so three streams keep it busy.
 constexpr std::size_t kStreamBytes = 4096;
 
-/// Moves a CRC register over kStreamBytes zero bytes: four table look-ups, one per register byte.
+/// Tables that move a CRC register over kStreamBytes zero bytes by four look-ups, one per register
+/// byte.
 using ShiftTable = std::array<std::array<std::uint32_t, 256>, 4>;
 
 constexpr ShiftTable make_shift(std::size_t zero_bytes) {
   // The shift is linear, so the images of the 32 unit registers determine it.
   std::array<std::uint32_t, 32> image{};
   for (std::size_t bit = 0; bit < 32; ++bit) image[bit] = std::uint32_t{1} << bit;
-  // Doubling: image holds the shift by `step` bytes. Start with one byte.
+  // Start with the shift by one byte and double it: `image` holds the shift by `step` bytes.
   for (auto& value : image) value = (value >> 8) ^ kCastagnoliSlices[0][value & 0xFFu];
   auto apply = [](const std::array<std::uint32_t, 32>& matrix, std::uint32_t value) {
     std::uint32_t sum = 0;
@@ -93,6 +97,7 @@ constexpr ShiftTable make_shift(std::size_t zero_bytes) {
 static_assert((kStreamBytes & (kStreamBytes - 1)) == 0, "make_shift doubles");
 constexpr ShiftTable kShift = make_shift(kStreamBytes);
 
+/// Moves a CRC register over kStreamBytes zero bytes.
 std::uint32_t shift_stream(std::uint32_t crc) noexcept {
   return kShift[0][crc & 0xFFu] ^ kShift[1][(crc >> 8) & 0xFFu] ^ kShift[2][(crc >> 16) & 0xFFu] ^
          kShift[3][crc >> 24];
@@ -124,6 +129,7 @@ bool has_crc32c_instruction() noexcept {
 
 __attribute__((target("sse4.2"))) std::uint32_t crc32c_hardware(std::span<const std::byte> bytes,
                                                                 std::uint32_t crc) noexcept {
+  EMIT_DCHECK(has_crc32c_instruction());
   const std::byte* at = bytes.data();
   std::size_t left = bytes.size();
   std::uint64_t first = static_cast<std::uint32_t>(~crc);
@@ -157,7 +163,7 @@ bool has_crc32c_wide_folding() noexcept {
 
 namespace {
 
-/// x^n mod the polynomial, reflected as registers are: the highest bit is x^0.
+/// Returns x^n modulo the polynomial, reflected like the registers: the highest bit is x^0.
 constexpr std::uint32_t power_of_x(unsigned n) {
   std::uint32_t value = 0x80000000;
   for (unsigned i = 0; i < n; ++i) {
@@ -166,15 +172,17 @@ constexpr std::uint32_t power_of_x(unsigned n) {
   return value;
 }
 
-/// What moves half a lane over `bits` of the message: for its low half 32 bits more, for its high
-/// half 32 bits less (Gopal et al., Fast CRC Computation for Generic Polynomials Using PCLMULQDQ,
-/// 2009). The shift makes up for the product of reflected factors, which is one bit short.
+/// Returns the factor that moves half a lane over `bits` bits of the message. The low half of a
+/// lane moves 32 bits more, the high half 32 bits less (Gopal et al., Fast CRC Computation for
+/// Generic Polynomials Using PCLMULQDQ, 2009). The shift by one makes up for the product of
+/// reflected factors, which is one bit short.
 constexpr long long fold_factor(unsigned bits) {
   return static_cast<long long>(std::uint64_t{power_of_x(bits)} << 1);
 }
 
 constexpr std::size_t kFoldBytes = 128;
 
+/// Moves lanes over kFoldBytes bytes and adds the next 32 bytes.
 __attribute__((target("avx2,vpclmulqdq"))) inline __m256i fold(__m256i lanes, __m256i factors,
                                                                const std::byte* next) noexcept {
   return _mm256_xor_si256(_mm256_xor_si256(_mm256_clmulepi64_epi128(lanes, factors, 0x00),
@@ -189,6 +197,7 @@ __attribute__((target("avx512f,vpclmulqdq"))) inline __m512i load_wide(
   return _mm512_loadu_si512(from);
 }
 
+/// Moves lanes over kWideFoldBytes bytes and adds the next 64 bytes.
 __attribute__((target("avx512f,vpclmulqdq"))) inline __m512i fold_wide(
     __m512i lanes, __m512i factors, const std::byte* next) noexcept {
   return _mm512_xor_si512(_mm512_xor_si512(_mm512_clmulepi64_epi128(lanes, factors, 0x00),
@@ -196,7 +205,8 @@ __attribute__((target("avx512f,vpclmulqdq"))) inline __m512i fold_wide(
                           load_wide(next));
 }
 
-/// Of the bytes of lanes that are a message with the same remainder.
+/// Returns the CRC of the lanes, which are a message with the same remainder as the one folded into
+/// them.
 __attribute__((target("sse4.2"))) inline std::uint32_t sum_of_lanes(
     std::span<const std::byte> lanes) noexcept {
   std::uint64_t sum = 0;
@@ -208,6 +218,7 @@ __attribute__((target("sse4.2"))) inline std::uint32_t sum_of_lanes(
 
 __attribute__((target("avx512f,vpclmulqdq,sse4.2"))) std::uint32_t crc32c_wide_folding(
     std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  EMIT_DCHECK(has_crc32c_wide_folding());
   if (bytes.size() < 2 * kWideFoldBytes) return crc32c_folding(bytes, crc);
   constexpr unsigned kBits = 8 * kWideFoldBytes;
   const __m512i factors =
@@ -237,8 +248,9 @@ __attribute__((target("avx512f,vpclmulqdq,sse4.2"))) std::uint32_t crc32c_wide_f
 
 __attribute__((target("avx2,vpclmulqdq,sse4.2"))) std::uint32_t crc32c_folding(
     std::span<const std::byte> bytes, std::uint32_t crc) noexcept {
+  EMIT_DCHECK(has_crc32c_folding());
   if (bytes.size() < 2 * kFoldBytes) return crc32c_hardware(bytes, crc);
-  // Eight lanes side by side; memory is read from front to back, as prefetchers like it.
+  // Eight lanes stand side by side. Memory is read from front to back, which suits the prefetchers.
   constexpr unsigned kBits = 8 * kFoldBytes;
   const __m256i factors = _mm256_set_epi64x(fold_factor(kBits - 32), fold_factor(kBits + 32),
                                             fold_factor(kBits - 32), fold_factor(kBits + 32));

@@ -6,28 +6,35 @@
 
 namespace emit::protocol {
 
-/// CRC-32C by tables, eight bytes a step; any CPU. Same interface as crc32c().
+/// Returns the CRC-32C, computed by tables, eight bytes a step. It runs on any CPU. `crc` continues
+/// an earlier call. RT-safe, like all functions of this file.
 [[nodiscard]] std::uint32_t crc32c_portable(std::span<const std::byte> bytes,
                                             std::uint32_t crc = 0) noexcept;
 
-/// CRC-32C by the CPU's instruction, three streams at a time. Precondition:
-/// has_crc32c_instruction().
+/// Returns the CRC-32C, computed by the CPU's instruction, three streams at a time.
+/// @pre has_crc32c_instruction()
 [[nodiscard]] std::uint32_t crc32c_hardware(std::span<const std::byte> bytes,
                                             std::uint32_t crc = 0) noexcept;
+/// Returns true when the CPU has the instructions that crc32c_hardware() needs.
 [[nodiscard]] bool has_crc32c_instruction() noexcept;
 
-/// CRC-32C by carry-less products of 32 bytes; short pieces by the instruction. Precondition:
-/// has_crc32c_folding().
+/// Returns the CRC-32C, computed by carry-less products of 32 bytes, and by the instruction for
+/// short pieces.
+/// @pre has_crc32c_folding()
 [[nodiscard]] std::uint32_t crc32c_folding(std::span<const std::byte> bytes,
                                            std::uint32_t crc = 0) noexcept;
+/// Returns true when the CPU has the instructions that crc32c_folding() needs.
 [[nodiscard]] bool has_crc32c_folding() noexcept;
 
-/// The same by products of 64 bytes. Precondition: has_crc32c_wide_folding().
+/// Returns the CRC-32C, computed by carry-less products of 64 bytes.
+/// @pre has_crc32c_wide_folding()
 [[nodiscard]] std::uint32_t crc32c_wide_folding(std::span<const std::byte> bytes,
                                                 std::uint32_t crc = 0) noexcept;
+/// Returns true when the CPU has the instructions that crc32c_wide_folding() needs.
 [[nodiscard]] bool has_crc32c_wide_folding() noexcept;
 
-/// CRC-32 of zlib, PNG and MCAP (reflected 0x04C11DB7); `crc` continues an earlier call.
+/// Returns the CRC-32 of zlib, PNG and MCAP (reflected 0x04C11DB7). `crc` continues an earlier
+/// call.
 [[nodiscard]] std::uint32_t crc32(std::span<const std::byte> bytes, std::uint32_t crc = 0) noexcept;
 
 }  // namespace emit::protocol

@@ -3,15 +3,20 @@
 
 #include <isa-l/erasure_code.h>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::protocol::erasure {
 namespace {
 
-/// Parity rows are numbered from here, so that no row number equals a column number.
+/// First row number of the parity. No row number equals a column number, as a Cauchy matrix
+/// requires.
 constexpr std::uint32_t kFirstRow = 128;
 
 }  // namespace
 
 std::uint8_t coefficient(std::uint32_t parity, std::uint32_t data) noexcept {
+  EMIT_DCHECK_OP(parity, <, kFirstRow);
+  EMIT_DCHECK_OP(data, <, kFirstRow);
   return ::gf_inv(static_cast<unsigned char>((kFirstRow + parity) ^ data));
 }
 
@@ -25,7 +30,7 @@ bool invert(std::span<std::uint8_t> in, std::span<std::uint8_t> out, std::uint32
 
 void expand(std::span<const std::uint8_t> coefficients, std::uint32_t rows, std::uint32_t columns,
             std::span<std::uint8_t> tables) noexcept {
-  // ISA-L only reads its inputs, here and below; its interface does not say so.
+  // ISA-L only reads its inputs, here and in combine(), but its interface is not const.
   ::ec_init_tables(static_cast<int>(columns), static_cast<int>(rows),
                    const_cast<std::uint8_t*>(coefficients.data()), tables.data());
 }

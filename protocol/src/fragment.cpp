@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "emit/physics/check.hpp"
 #include "wire_bytes.hpp"
 
 namespace emit::protocol {
@@ -12,7 +13,8 @@ namespace {
 constexpr std::array<std::byte, kFrameHeaderBytes> kZeroBytes{};
 constexpr std::uint32_t kHeader = static_cast<std::uint32_t>(kFrameHeaderBytes);
 
-/// Part of `source`, which lies at `source_begin` of the byte stream, within [begin, end).
+/// Returns the part of `source` within [begin, end). `source` lies at `source_begin` of the byte
+/// stream.
 std::span<const std::byte> overlap(std::span<const std::byte> source, std::uint64_t source_begin,
                                    std::uint64_t begin, std::uint64_t end) noexcept {
   const std::uint64_t from = std::max(begin, source_begin);
@@ -105,7 +107,7 @@ FragmentStatus decode_fragment_header(std::span<const std::byte> header, std::si
   if (payload != out.payload_bytes || payload == 0 || payload % 4 != 0) {
     return FragmentStatus::bad_length;
   }
-  // Both headers and one pixel are the least that a frame can be.
+  // The smallest frame has both headers and one pixel.
   if (out.total_bytes < 2 * kHeader + 4 || out.total_bytes % 4 != 0) {
     return FragmentStatus::oversize;
   }
@@ -125,12 +127,15 @@ Fragmenter::Fragmenter(const Params& params,
                        std::span<const std::byte, kFrameHeaderBytes> frame_header,
                        std::span<const std::byte> pixels) noexcept
     : params_(params), frame_header_(frame_header), pixels_(pixels) {
+  EMIT_CHECK_OP(pixels.size() % 4, ==, 0U);
+  EMIT_CHECK_OP(pixels.size(), <=, kMaxFragmentedPixelBytes);
   payload_bytes_ =
       std::clamp(params.max_payload_bytes, kMinFragmentPayloadBytes, kMaxFragmentPayloadBytes) &
       ~std::uint32_t{3};
   const std::uint32_t body = kHeader + static_cast<std::uint32_t>(pixels.size());
-  const std::uint32_t used = body % payload_bytes_;  // of the fragment in which the pixels end
-  // used == 0: the header starts a fragment of its own.
+  // Bytes used of the fragment in which the pixels end.
+  const std::uint32_t used = body % payload_bytes_;
+  // When used is 0, the second header starts a fragment of its own.
   padding_bytes_ = used + kHeader > payload_bytes_ ? payload_bytes_ - used : 0;
   total_bytes_ = body + padding_bytes_ + kHeader;
   fragment_count_ = (total_bytes_ - 1) / payload_bytes_ + 1;
@@ -145,6 +150,7 @@ std::span<const std::byte> Fragmenter::pixels_of(std::uint32_t index) const noex
 Fragmenter::Pieces Fragmenter::pieces(std::uint32_t index,
                                       std::span<std::byte, kFragmentHeaderBytes> header_memory,
                                       std::uint8_t more_flags) const noexcept {
+  EMIT_DCHECK_OP(index, <, fragment_count_);
   const std::uint64_t begin = std::uint64_t{index} * payload_bytes_;
   const std::uint64_t end = std::min<std::uint64_t>(begin + payload_bytes_, total_bytes_);
 

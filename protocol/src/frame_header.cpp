@@ -15,7 +15,8 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-// Offsets of docs/wire.md. kReservedAt..kPreviousJitterAt and kReservedBehindAt..kCrcAt are zero.
+// Offsets of the fields (docs/wire.md section 3). The bytes kReservedAt..kPreviousJitterAt and
+// kReservedBehindAt..kCrcAt are zero.
 enum Offset : std::size_t {
   kMagicAt = 0,
   kVersionAt = 4,
@@ -69,18 +70,20 @@ enum Offset : std::size_t {
 };
 static_assert(kCrcAt + 4 == kFrameHeaderBytes);
 
-/// Pixels' bytes, or 0 when they cannot be counted in 64 bits or the frame is empty.
+/// Returns the length of the pixels, bytes, or 0 when it exceeds 64 bits or the frame is empty.
 std::uint64_t expected_payload_bytes(std::uint32_t width_px, std::uint32_t height_px) noexcept {
   const std::uint64_t pixels = std::uint64_t{width_px} * height_px;
   return pixels > (std::uint64_t{1} << 61) ? 0 : pixels * sizeof(float);
 }
 
+/// Returns true when the window lies within the sensor's image, or when no window is given.
 bool window_fits(const FrameHeader& header) noexcept {
   if (header.sensor_width_px == 0 && header.sensor_height_px == 0) return true;
   return std::uint64_t{header.window_x_px} + header.width_px <= header.sensor_width_px &&
          std::uint64_t{header.window_y_px} + header.height_px <= header.sensor_height_px;
 }
 
+/// Returns the text of an error message for a fault.
 std::string describe(HeaderFault fault, std::span<const std::byte> bytes,
                      const FrameHeader& header) {
   switch (fault) {

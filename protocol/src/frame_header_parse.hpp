@@ -4,6 +4,7 @@
 
 namespace emit::protocol {
 
+/// Reason why bytes are no valid frame header.
 enum class HeaderFault : std::uint8_t {
   none,
   short_input,
@@ -18,7 +19,8 @@ enum class HeaderFault : std::uint8_t {
   window
 };
 
-/// decode_frame_header() without the text: RT-safe. `header` is filled for none and payload_size.
+/// Decodes a frame header as decode_frame_header() does, without an error text. `header` is filled
+/// for none, payload_size and window. RT-safe.
 [[nodiscard]] HeaderFault parse_frame_header(std::span<const std::byte> bytes,
                                              FrameHeader& header) noexcept;
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "wire_bytes.hpp"
 
 namespace emit::protocol {
@@ -51,7 +52,7 @@ std::span<std::byte> RecordParser::writable() noexcept {
   if (begin_ == end_) {
     begin_ = end_ = 0;
   } else if (begin_ >= capacity_ / 2) {
-    // Half the buffer holds any record, so what is kept always fits in front.
+    // Half the buffer holds any record, so the bytes held always fit in front.
     std::memmove(buffer_.get(), buffer_.get() + begin_, end_ - begin_);
     end_ -= begin_;
     begin_ = 0;
@@ -60,7 +61,8 @@ std::span<std::byte> RecordParser::writable() noexcept {
 }
 
 void RecordParser::commit(std::size_t count) noexcept {
-  end_ += std::min(count, capacity_ - end_);
+  EMIT_CHECK_OP(count, <=, capacity_ - end_);
+  end_ += count;
 }
 
 ParseStatus RecordParser::next(Record& record) noexcept {
@@ -90,7 +92,7 @@ ParseStatus RecordParser::next(Record& record) noexcept {
   return ParseStatus::record;
 }
 
-/// Pixels are summed when they have just arrived: they are still in the cache.
+/// Continues the CRC over the pixels that have just arrived, while they are in the cache.
 void RecordParser::sum(RecordKind kind, std::size_t body_bytes) noexcept {
   constexpr std::size_t kFirst = kRecordHeaderBytes + kFrameHeaderBytes;
   const std::size_t from = std::max(summed_, kFirst);

@@ -70,7 +70,7 @@ bool ReplayWindow::accept(std::uint64_t counter) noexcept {
   const std::uint64_t word = counter / 64;
   if (counter > highest_) {
     const std::uint64_t first = highest_ / 64 + 1;
-    // Words that the window moves into held counters long gone.
+    // Clear the words that the window moves into. They hold counters that are too old.
     for (std::uint64_t i = 0; i < kWords && i + first <= word; ++i) {
       seen_[(word - i) % kWords] = 0;
     }
@@ -104,7 +104,7 @@ physics::Result<std::vector<SessionKey>> parse_key_file(std::string_view text) {
     while (!line.empty() && is_blank(line.front())) line.remove_prefix(1);
     if (line.empty() || line.front() == '#') continue;
     SessionKey key;
-    // The text is a secret: messages name the line alone.
+    // The text is a secret, so messages name only the line.
     const auto bad = [&](std::string_view why) {
       return physics::make_error(physics::ErrorCode::config,
                                  fmt::format("line {}: {}", number, why));

@@ -12,6 +12,9 @@ namespace emit::protocol {
 
 ParityGeometry ParityGeometry::of(const FecParams& params, std::uint32_t total_bytes,
                                   std::uint32_t fragment_bytes) noexcept {
+  EMIT_CHECK(params.on() && params.valid());
+  EMIT_CHECK_OP(fragment_bytes, >, 0U);
+  EMIT_CHECK_OP(fragment_bytes, <=, total_bytes);
   ParityGeometry out;
   out.total_bytes = total_bytes;
   out.fragment_bytes = fragment_bytes;
@@ -28,10 +31,11 @@ std::size_t max_parity_groups(const FecParams& params, std::uint32_t max_total_b
 }
 
 std::size_t max_parity_bytes(const FecParams& params, std::uint32_t max_total_bytes) noexcept {
-  // groups * fragment_bytes, each division rounded up.
-  const std::size_t most_fragment_bytes = std::min(max_total_bytes, kMaxFragmentPayloadBytes);
+  EMIT_CHECK(params.on() && params.valid());
+  // The bound is groups * fragment_bytes, with each division rounded up.
+  const std::size_t max_fragment_bytes = std::min(max_total_bytes, kMaxFragmentPayloadBytes);
   return params.parity_fragments *
-         (std::size_t{max_total_bytes} / params.data_fragments + 2 * most_fragment_bytes);
+         (std::size_t{max_total_bytes} / params.data_fragments + 2 * max_fragment_bytes);
 }
 
 void encode(const ParityHeader& header, std::span<std::byte, kFragmentHeaderBytes> out) noexcept {
@@ -58,6 +62,7 @@ bool is_parity(std::span<const std::byte> header) noexcept {
 
 FragmentStatus decode_parity_header(std::span<const std::byte> header, std::size_t payload_bytes,
                                     const FecParams& agreed, ParityHeader& out) noexcept {
+  EMIT_DCHECK(agreed.valid());
   if (header.size() < kFragmentHeaderBytes) return FragmentStatus::short_input;
   if (wire::get<std::uint32_t>(header, 0) != kFragmentMagic) return FragmentStatus::wrong_magic;
   if (!is_parity(header)) return FragmentStatus::wrong_version;
@@ -93,9 +98,10 @@ FragmentStatus decode_parity_header(std::span<const std::byte> header, std::size
 
 // ParityEncoder
 
-/// Groups of a frame differ by one fragment in size: tables for both.
+/// Tables and arrays of the encoder. Groups of a frame differ in size by at most one fragment, so
+/// there are tables for two sizes.
 struct ParityEncoder::Code {
-  std::array<std::vector<std::uint8_t>, 2> tables;  // of the largest size, and of one less
+  std::array<std::vector<std::uint8_t>, 2> tables;  // tables for the largest size, and for one less
   std::array<const std::byte*, kMaxFecData> in{};
   std::array<std::byte*, kMaxFecParity> out{};
 };
@@ -103,7 +109,7 @@ struct ParityEncoder::Code {
 ParityEncoder::ParityEncoder(const FecParams& params, const Fragmenter& like)
     : geometry_(ParityGeometry::of(params, like.total_bytes(), like.payload_bytes())),
       memory_(std::size_t{geometry_.parity_count()} * datagram_bytes()),
-      // The first fragment and the last two do not consist of pixels alone.
+      // Three fragments do not consist of pixels alone: the first one and the last two.
       scratch_(std::size_t{3} * geometry_.fragment_bytes),
       code_(std::make_unique<Code>()) {
   const std::uint32_t largest = geometry_.group_size(0);
@@ -125,6 +131,8 @@ ParityEncoder::ParityEncoder(ParityEncoder&&) noexcept = default;
 ParityEncoder& ParityEncoder::operator=(ParityEncoder&&) noexcept = default;
 
 bool ParityEncoder::encode_some(const Fragmenter& fragments, std::size_t budget_bytes) noexcept {
+  EMIT_CHECK_OP(fragments.total_bytes(), ==, geometry_.total_bytes);
+  EMIT_CHECK_OP(fragments.payload_bytes(), ==, geometry_.fragment_bytes);
   std::size_t read_bytes = 0;
   while (encoded_groups_ < geometry_.groups) {
     encode_group(fragments, encoded_groups_);
@@ -180,9 +188,10 @@ void ParityEncoder::encode_group(const Fragmenter& fragments, std::uint32_t grou
 
 // GroupDecoder
 
+/// Tables and arrays of the decoder.
 struct GroupDecoder::Code {
   std::array<std::uint32_t, kMaxFecParity> missing{};
-  std::array<std::uint32_t, kMaxFecParity> rows{};  // the parity fragments that are used
+  std::array<std::uint32_t, kMaxFecParity> rows{};  // parity fragments that are used
   std::array<std::uint8_t, kMaxFecParity * kMaxFecParity> matrix{};
   std::array<std::uint8_t, kMaxFecParity * kMaxFecParity> inverse{};
   std::vector<std::uint8_t> coefficients;
@@ -191,7 +200,9 @@ struct GroupDecoder::Code {
 };
 
 GroupDecoder::GroupDecoder(const FecParams& params) : code_(std::make_unique<Code>()) {
-  // As many inputs as the group has fragments: present ones and parity in place of the others.
+  EMIT_CHECK(params.on() && params.valid());
+  // A group has as many inputs as data fragments: the present ones, and parity in place of the
+  // others.
   code_->coefficients.resize(std::size_t{params.parity_fragments} * params.data_fragments);
   code_->tables.resize(code_->coefficients.size() * erasure::kTableBytes);
 }
@@ -227,7 +238,8 @@ bool GroupDecoder::decode(std::size_t bytes, std::span<const std::byte* const> d
                        missing)) {
     return false;
   }
-  // missing = inverse * (parity - what the present fragments have in it); minus is plus here.
+  // Compute missing = inverse * (parity - contribution of the present fragments to it). Minus
+  // equals plus in this field.
   std::uint32_t columns = 0;
   const auto inputs = static_cast<std::uint32_t>(data.size());
   for (std::uint32_t j = 0; j < inputs; ++j) {

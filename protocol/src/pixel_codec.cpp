@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "emit/physics/check.hpp"
 #include "wire_bytes.hpp"
 
 namespace emit::protocol {
@@ -14,7 +15,7 @@ namespace {
 constexpr std::size_t kValueBytes = 4;
 constexpr std::size_t kLengthBytes = 4;
 
-/// All first bytes, then all second ones ...
+/// Writes all first bytes of the values, then all second ones and so on.
 void shuffle(std::span<const std::byte> values, std::byte* out) noexcept {
   const std::size_t count = values.size() / kValueBytes;
   const std::byte* in = values.data();
@@ -26,6 +27,7 @@ void shuffle(std::span<const std::byte> values, std::byte* out) noexcept {
   }
 }
 
+/// Reverses shuffle().
 void unshuffle(const std::byte* in, std::span<std::byte> values) noexcept {
   const std::size_t count = values.size() / kValueBytes;
   std::byte* out = values.data();
@@ -50,9 +52,12 @@ PixelEncoder::PixelEncoder(std::size_t max_pixel_bytes)
     : state_(static_cast<std::size_t>(LZ4_sizeofState())),
       shuffled_(kBlockBytes),
       out_(std::make_unique_for_overwrite<std::byte[]>(max_pixel_bytes)),
-      capacity_(max_pixel_bytes) {}
+      capacity_(max_pixel_bytes) {
+  EMIT_CHECK_OP(max_pixel_bytes % kValueBytes, ==, 0U);
+}
 
 void PixelEncoder::begin(std::span<const std::byte> pixels) noexcept {
+  EMIT_CHECK_OP(pixels.size() % kValueBytes, ==, 0U);
   pixels_ = pixels;
   taken_ = 0;
   made_ = 0;
@@ -68,7 +73,7 @@ bool PixelEncoder::encode_block() noexcept {
   }
   const auto block = pixels_.subspan(taken_, std::min(kBlockBytes, pixels_.size() - taken_));
   shuffle(block, shuffled_.data());
-  const std::size_t limit = pixels_.size() - 1;  // or it need not be
+  const std::size_t limit = pixels_.size() - 1;  // the encoding must be smaller than the image
   const std::size_t room = limit > made_ + kLengthBytes ? limit - made_ - kLengthBytes : 0;
   const int length = LZ4_compress_fast_extState(
       state_.data(), chars(shuffled_.data()), chars(out_.get() + made_ + kLengthBytes),

@@ -4,8 +4,8 @@
 
 namespace emit::protocol {
 
-/// Protobuf prints what it dislikes to standard error; a peer could fill the disk with that, and
-/// every caller gets the failure as a value. Process-wide, from the first call on.
+/// Switches off Protobuf's messages on standard error, for the whole process, from the first call
+/// on. A peer could fill the disk with them, and every caller receives the failure as a value.
 inline void quiet_protobuf() {
   static const auto previous = google::protobuf::SetLogHandler(nullptr);
   static_cast<void>(previous);

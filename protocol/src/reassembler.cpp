@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstring>
 
+#include "emit/physics/check.hpp"
 #include "frame_header_parse.hpp"
 #include "reassembler_slot.hpp"
 
@@ -13,30 +14,33 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "pixels are handed out as they arrive");
 
-/// Fragments this far behind are not reordered ones: after kResyncCount of them in a row the sender
-/// is taken to have started again.
+/// Largest distance, in frames, of a reordered fragment. After kResyncCount fragments in a row from
+/// farther behind, the sender is assumed to have started again.
 constexpr std::int32_t kReorderWindow = 64;
 constexpr std::uint32_t kResyncCount = 16;
-/// A wider gap in frame ids is a restart too, not a loss.
+/// Largest gap in frame ids that counts as a loss. A wider one means that the sender started again.
 constexpr std::uint32_t kMaxCountedGap = 65536;
 
+/// Allocates zeroed memory for a frame.
 AlignedBytes allocate_aligned(std::size_t count) {
   void* memory = ::operator new[](count, std::align_val_t{kPixelAlignment});
-  std::memset(memory, 0, count);  // also touches the pages, before frames are due
+  std::memset(memory, 0, count);  // this also touches the pages, before frames are due
   return AlignedBytes(static_cast<std::byte*>(memory));
 }
 
-/// Bytes of zeros between pixels and second header are fewer than a header.
+/// Returns true when a frame with this many pixel bytes can have this total length. The zero bytes
+/// between the pixels and the second header are fewer than a header.
 bool fits(std::uint32_t total_bytes, std::uint64_t payload_bytes) noexcept {
-  const std::uint64_t least = payload_bytes + 2 * kFrameHeaderBytes;
-  return payload_bytes <= total_bytes && least <= total_bytes &&
-         total_bytes - least < kFrameHeaderBytes;
+  const std::uint64_t min_total_bytes = payload_bytes + 2 * kFrameHeaderBytes;
+  return payload_bytes <= total_bytes && min_total_bytes <= total_bytes &&
+         total_bytes - min_total_bytes < kFrameHeaderBytes;
 }
 
 }  // namespace
 
 bool PixelValidity::pixel(std::size_t index) const noexcept {
   const std::size_t bit = first_bit_ + index;
+  EMIT_DCHECK_OP(bit / 64, <, words_.size());
   return ((words_[bit / 64] >> (bit % 64)) & 1u) != 0;
 }
 
@@ -58,9 +62,9 @@ Reassembler::Reassembler(const Params& params) : params_(params) {
   }
   if (params_.fec.on()) {
     for (Slot& slot : slots_) {
-      const auto most_bytes = static_cast<std::uint32_t>(capacity);
-      slot.parity_bytes.resize(max_parity_bytes(params_.fec, most_bytes));
-      slot.parity_arrived.resize(max_parity_groups(params_.fec, most_bytes));
+      const auto max_bytes = static_cast<std::uint32_t>(capacity);
+      slot.parity_bytes.resize(max_parity_bytes(params_.fec, max_bytes));
+      slot.parity_arrived.resize(max_parity_groups(params_.fec, max_bytes));
     }
     scratch_.resize(kMaxFragmentPayloadBytes);
     decoder_.emplace(params_.fec);
@@ -110,7 +114,8 @@ Reassembler::Expected Reassembler::expected() noexcept {
 }
 
 Reassembler::Slot* Reassembler::enter(const FrameKey& key, FragmentStatus& status) noexcept {
-  // The padding is shorter than a header, so the constructor's three headers always suffice.
+  // The padding is shorter than a header, so the three headers that the constructor added always
+  // suffice.
   if (key.total_bytes - 2 * kFrameHeaderBytes >=
       std::uint64_t{params_.max_payload_bytes} + kFrameHeaderBytes) {
     status = FragmentStatus::oversize;
@@ -152,7 +157,7 @@ FragmentStatus Reassembler::take(const FragmentHeader& header,
 
   const std::size_t first_word = header.byte_offset / kWordBytes;
   const std::size_t words = payload.size() / kWordBytes;
-  // Where nothing but what came in order is here, the next in order is new.
+  // When every byte received so far came in order, the next one in order is new.
   const bool in_order = header.byte_offset == slot->prefix_bytes &&
                         slot->received_words * kWordBytes == slot->prefix_bytes;
   const std::size_t present = in_order ? 0 : bits::count_set(slot->received, first_word, words);
@@ -192,7 +197,7 @@ void Reassembler::complete(Slot& slot) noexcept {
   finish_complete(stream);
 }
 
-/// Complete frames that waited for the one that has left.
+/// Finishes the complete frames that waited for the one that has left.
 void Reassembler::finish_complete(Stream& stream) noexcept {
   for (Slot* slot = oldest_open(&stream); slot != nullptr && slot->all_received();
        slot = oldest_open(&stream)) {
@@ -205,7 +210,7 @@ Reassembler::Stream* Reassembler::stream_of(std::uint16_t stream_id) noexcept {
     if (stream.id == stream_id) return &stream;
   }
   if (streams_.size() == params_.max_streams) return nullptr;
-  Stream& stream = streams_.emplace_back();  // within the reserved capacity
+  Stream& stream = streams_.emplace_back();  // stays within the reserved capacity
   stream.id = stream_id;
   return &stream;
 }
@@ -227,16 +232,16 @@ Reassembler::Slot* Reassembler::open_slot(Stream& stream, const FrameKey& key,
       return nullptr;
     }
     finish(*oldest);
-    // Dropped as unusable, it is free again.
+    // A frame that was dropped as unusable leaves its slot free.
     if (vacant == nullptr && oldest->state == Slot::State::free) vacant = oldest;
     finish_complete(stream);
   }
   if (stream.has_finished && frame_distance(key.frame_id, stream.finished_id) <= 0) {
-    status = FragmentStatus::late;  // a newer frame was complete and has just left
+    status = FragmentStatus::late;  // a newer, complete frame has just left
     return nullptr;
   }
   if (vacant == nullptr) {
-    // The next fragments find room once the consumer has taken this one.
+    // The next fragments find room when the consumer has taken this frame.
     if (Slot* oldest = oldest_open(nullptr)) {
       Stream& its_stream = *oldest->stream;
       finish_older(its_stream, oldest->frame_id);
@@ -285,7 +290,8 @@ void Reassembler::finish_older(Stream& stream, std::uint32_t frame_id) noexcept 
   }
 }
 
-/// Finds out what a frame is, by either of its headers or by the frame before it.
+/// Determines the header of a frame from either of its two copies or from the stream's frame before
+/// it. Returns false when the frame is not usable.
 bool Reassembler::identify(Slot& slot, FrameHeader& header, bool& known) noexcept {
   Stream& stream = *slot.stream;
   const std::span<const std::byte> bytes{slot.bytes.get(), slot.total_bytes};
@@ -351,7 +357,7 @@ void Reassembler::finish(Slot& slot) noexcept {
   const auto pixel_bytes = static_cast<std::size_t>(header.payload_bytes);
   const std::size_t pixel_count = pixel_bytes / kWordBytes;
   frame.header = header;
-  // These are this side's to say.
+  // Only a receiver may set these flags.
   frame.header.flags &= ~kReceiverFlags;
   frame.header_known = known;
   frame.repaired_fragments = slot.repaired;
@@ -377,7 +383,8 @@ void Reassembler::finish(Slot& slot) noexcept {
     counters_.groups_unrepairable += unrepaired_groups(slot);
     counters_.missing_px += frame.missing_px;
     frame.header.flags |= kFlagPartial;
-    // The buffer still holds an earlier frame: nothing of it may show.
+    // The buffer still holds an earlier frame. Clear the missing pixels, so that nothing of it
+    // shows.
     bits::for_each_word(kHeaderWords, pixel_count, [&](std::size_t index, std::uint64_t mask) {
       std::uint64_t missing = ~slot.received[index] & mask;
       for (; missing != 0; missing &= missing - 1) {
@@ -403,9 +410,11 @@ const ReceivedFrame* Reassembler::pop() noexcept {
 }
 
 void Reassembler::release(const ReceivedFrame* frame) noexcept {
-  for (Slot& slot : slots_) {
-    if (&slot.frame == frame && slot.state == Slot::State::held) slot.state = Slot::State::free;
-  }
+  const auto held = std::ranges::find_if(slots_, [frame](const Slot& slot) {
+    return &slot.frame == frame && slot.state == Slot::State::held;
+  });
+  EMIT_CHECK(held != slots_.end());
+  held->state = Slot::State::free;
 }
 
 void Reassembler::flush() noexcept {

@@ -3,8 +3,8 @@
 
 #include "reassembler_slot.hpp"
 
-/// What the reassembler does about missing fragments: error correction, and telling what to ask
-/// for.
+/// Part of the reassembler that handles missing fragments: error correction, and the ranges for
+/// resend requests.
 namespace emit::protocol {
 
 FragmentStatus Reassembler::take_parity(const ParityHeader& header,
@@ -13,11 +13,11 @@ FragmentStatus Reassembler::take_parity(const ParityHeader& header,
   Slot* slot =
       enter({header.stream_id, header.frame_id, header.total_bytes, header.sim_time_ns}, status);
   if (slot == nullptr) return status;
-  if (slot->all_received()) return FragmentStatus::late;  // waits for an older frame
+  if (slot->all_received()) return FragmentStatus::late;  // complete; it waits for an older frame
   const auto geometry = ParityGeometry::of(params_.fec, header.total_bytes,
                                            static_cast<std::uint32_t>(payload.size()));
   if (!slot->has_parity) {
-    // The constructor took memory for any geometry that decode_parity_header() lets pass.
+    // The constructor allocated memory for every geometry that decode_parity_header() accepts.
     slot->has_parity = true;
     slot->geometry = geometry;
     std::ranges::fill(slot->parity_arrived, 0u);
@@ -34,7 +34,7 @@ FragmentStatus Reassembler::take_parity(const ParityHeader& header,
   return FragmentStatus::accepted;
 }
 
-/// Brings the group's missing fragments back as soon as enough of it has arrived.
+/// Restores the group's missing fragments as soon as enough of the group has arrived.
 void Reassembler::repair(Slot& slot, std::uint32_t group) noexcept {
   const ParityGeometry& geometry = slot.geometry;
   const std::uint32_t arrived = slot.parity_arrived[group];
@@ -51,7 +51,7 @@ void Reassembler::repair(Slot& slot, std::uint32_t group) noexcept {
 
   const std::size_t bytes = geometry.fragment_bytes;
   const std::uint32_t last = geometry.fragments - 1;
-  // The last fragment may be shorter, and its place in the frame with it.
+  // The last fragment may be shorter than the others, so it is decoded in scratch memory.
   std::byte* const scratch = scratch_.data();
   std::array<const std::byte*, kMaxFecData> data{};
   std::array<const std::byte*, kMaxFecParity> parity{};
@@ -87,7 +87,7 @@ void Reassembler::repair(Slot& slot, std::uint32_t group) noexcept {
     const std::size_t length = geometry.bytes_of(missing[i]);
     if (missing[i] == last) std::memcpy(slot.bytes.get() + begin, scratch, length);
     const std::size_t words = length / kWordBytes;
-    // A part of it may have come in another cut.
+    // A part of the fragment may have arrived in fragments of another length.
     slot.received_words += words - bits::count_set(slot.received, begin / kWordBytes, words);
     bits::set_range(slot.received, begin / kWordBytes, words);
     if (begin < slot.summed_bytes) {

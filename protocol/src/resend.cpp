@@ -3,12 +3,14 @@
 
 #include <limits>
 
+#include "emit/physics/check.hpp"
 #include "wire_bytes.hpp"
 
 namespace emit::protocol {
 
 std::size_t encode(const ResendRequest& request,
                    std::span<std::byte, kMaxResendBytes> out) noexcept {
+  EMIT_CHECK_OP(request.count, <=, kMaxResendRanges);
   wire::put(out, 0, request.stream_id);
   wire::put(out, 2, request.count);
   wire::put(out, 4, request.frame_id);

@@ -12,6 +12,7 @@ namespace emit::protocol {
 
 namespace {
 
+/// Deleter of OpenSSL's objects.
 struct FreeMac {
   void operator()(EVP_MAC* mac) const noexcept { EVP_MAC_free(mac); }
   void operator()(EVP_MAC_CTX* context) const noexcept { EVP_MAC_CTX_free(context); }
@@ -22,13 +23,15 @@ const unsigned char* raw(std::span<const std::byte> bytes) noexcept {
   return reinterpret_cast<const unsigned char*>(bytes.data());
 }
 
-/// The tag's length goes into BLAKE2b's parameters: it has to be set before the key.
+/// Begins a MAC. The tag's length is one of BLAKE2b's parameters, so it has to be set before the
+/// key.
 bool start(EVP_MAC_CTX* context, const SessionKey& key, std::size_t tag_bytes) noexcept {
   const OSSL_PARAM parameters[] = {OSSL_PARAM_construct_size_t(OSSL_MAC_PARAM_SIZE, &tag_bytes),
                                    OSSL_PARAM_construct_end()};
   return EVP_MAC_init(context, raw(key), key.size(), parameters) == 1;
 }
 
+/// Ends a MAC and writes the tag. Returns false when the library failed.
 bool finish(EVP_MAC_CTX* context, std::span<std::byte> tag) noexcept {
   std::size_t length = 0;
   return EVP_MAC_final(context, reinterpret_cast<unsigned char*>(tag.data()), &length,
@@ -107,14 +110,16 @@ SessionKey SessionMac::derive(std::string_view purpose,
                               std::span<const std::byte> context) noexcept {
   SessionKey out{};
   EVP_MAC_CTX* const mac = impl_->context.get();
-  // The purpose's end is marked, so that no two pairs read alike.
+  // A zero byte marks the end of the purpose, so that no two pairs of purpose and context give the
+  // same bytes.
   constexpr unsigned char kEnd = 0;
   const bool made = start(mac, impl_->key, out.size()) &&
                     EVP_MAC_update(mac, reinterpret_cast<const unsigned char*>(purpose.data()),
                                    purpose.size()) == 1 &&
                     EVP_MAC_update(mac, &kEnd, 1) == 1 &&
                     EVP_MAC_update(mac, raw(context), context.size()) == 1 && finish(mac, out);
-  // create() has shown that it works. Should it fail all the same: a key that fits nothing.
+  // create() has shown that the algorithm works. If it fails all the same, a random key fits
+  // nothing.
   if (!made) RAND_bytes(reinterpret_cast<unsigned char*>(out.data()), static_cast<int>(out.size()));
   return out;
 }

@@ -8,10 +8,12 @@
 #include <cstring>
 #include <new>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::protocol {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the ring is read as it lies");
+static_assert(std::endian::native == std::endian::little, "the ring holds native integers");
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -23,22 +25,31 @@ constexpr std::uint64_t align_up(std::uint64_t value, std::uint64_t to) noexcept
   return (value + to - 1) / to * to;
 }
 
+/// Offsets and lengths of a ring, bytes.
 struct Layout {
   std::uint64_t channels_offset = 0;
   std::uint64_t welcome_offset = 0;
   std::uint64_t slots_offset = 0;
-  std::uint64_t first_plane_offset = 0;  // in a slot
+  std::uint64_t first_plane_offset = 0;  // offset within a slot
   std::uint64_t slot_bytes = 0;
   std::uint64_t object_bytes = 0;
 };
 
 Layout layout_of(const RingParams& params) noexcept {
   const std::uint64_t channels = params.plane_of_channel.size();
+  EMIT_CHECK_OP(params.slots, >=, kMinRingSlots);
+  EMIT_CHECK_OP(params.slots, <=, kMaxRingSlots);
+  EMIT_CHECK_OP(channels, >=, 1U);
+  EMIT_CHECK_OP(channels, <=, kMaxRingChannels);
+  for (const std::uint32_t plane : params.plane_of_channel) {
+    EMIT_CHECK_OP(plane, <, params.plane_bytes.size());
+  }
   Layout out;
   out.channels_offset = sizeof(RingHead);
   out.welcome_offset = out.channels_offset + channels * sizeof(RingChannelEntry);
   out.slots_offset = align_up(out.welcome_offset + params.welcome.size(), kPageBytes);
-  // Pages of their own for the pixels: what is mapped further (a device, a pipe) wants whole ones.
+  // The pixels begin on a page of their own, because a mapping to a device or a pipe takes whole
+  // pages.
   out.first_plane_offset =
       align_up(sizeof(RingSlotHead) + channels * kFrameHeaderBytes, kPageBytes);
   out.slot_bytes = out.first_plane_offset;
@@ -49,7 +60,12 @@ Layout layout_of(const RingParams& params) noexcept {
   return out;
 }
 
-/// [offset, offset + bytes) lies within [0, limit).
+/// Returns true when the address is a multiple of kLineBytes.
+bool is_aligned(const std::byte* memory) noexcept {
+  return reinterpret_cast<std::uintptr_t>(memory) % kLineBytes == 0;
+}
+
+/// Returns true when [offset, offset + bytes) lies within [0, limit).
 constexpr bool within(std::uint64_t offset, std::uint64_t bytes, std::uint64_t limit) noexcept {
   return offset <= limit && bytes <= limit - offset;
 }
@@ -61,8 +77,12 @@ std::uint64_t ring_bytes(const RingParams& params) noexcept {
 }
 
 RingWriter::RingWriter(std::span<std::byte> memory, const RingParams& params)
-    : head_(new (memory.data()) RingHead{}), memory_(memory.data()) {
+    : head_(nullptr), memory_(memory.data()) {
   const Layout layout = layout_of(params);
+  EMIT_CHECK(is_aligned(memory.data()));
+  EMIT_CHECK_OP(memory.size(), >=, layout.object_bytes);
+  EMIT_DCHECK(std::ranges::all_of(memory, [](std::byte byte) { return byte == std::byte{0}; }));
+  head_ = new (memory_) RingHead{};
   head_->magic = kRingMagic;
   head_->version = kRingVersion;
   head_->slot_count = params.slots;
@@ -88,7 +108,7 @@ RingWriter::RingWriter(std::span<std::byte> memory, const RingParams& params)
   }
   std::memcpy(memory_ + layout.channels_offset, channels_.data(),
               channels_.size() * sizeof(RingChannelEntry));
-  std::ranges::copy(params.welcome, memory_ + layout.welcome_offset);  // may be empty
+  std::ranges::copy(params.welcome, memory_ + layout.welcome_offset);  // the welcome may be empty
   for (std::uint32_t i = 0; i < params.slots; ++i) {
     new (memory_ + layout.slots_offset + i * layout.slot_bytes) RingSlotHead{};
   }
@@ -102,16 +122,18 @@ void RingWriter::begin() noexcept {
   ++publication_;
   auto& sequence = std::launder(reinterpret_cast<RingSlotHead*>(slot()))->sequence;
   sequence.store(2 * publication_ - 1, std::memory_order_relaxed);
-  // No byte of the new publication may show before the mark does.
+  // No byte of the new publication may be visible before the mark is.
   std::atomic_thread_fence(std::memory_order_release);
 }
 
 std::span<std::byte, kFrameHeaderBytes> RingWriter::header(std::size_t channel) noexcept {
+  EMIT_CHECK_OP(channel, <, channels_.size());
   return std::span<std::byte, kFrameHeaderBytes>(slot() + channels_[channel].header_offset,
                                                  kFrameHeaderBytes);
 }
 
 std::span<std::byte> RingWriter::plane(std::size_t plane) noexcept {
+  EMIT_CHECK_OP(plane, <, planes_.size());
   return {slot() + planes_[plane].pixels_offset,
           static_cast<std::size_t>(planes_[plane].pixel_bytes)};
 }
@@ -129,6 +151,7 @@ void RingWriter::end() noexcept {
 }
 
 physics::Result<RingReader> RingReader::open(std::span<const std::byte> memory) {
+  EMIT_CHECK(is_aligned(memory.data()));
   if (memory.size() < sizeof(RingHead)) {
     return make_error(ErrorCode::protocol, "too short for a ring of frames");
   }
@@ -183,6 +206,7 @@ const std::byte* RingReader::slot(std::uint64_t publication) const noexcept {
 
 std::optional<RingReader::View> RingReader::view(std::uint64_t publication,
                                                  std::size_t channel) const noexcept {
+  EMIT_CHECK_OP(channel, <, channels_.size());
   const std::byte* const begin = slot(publication);
   const auto* head = std::launder(reinterpret_cast<const RingSlotHead*>(begin));
   if (publication == 0 || head->sequence.load(std::memory_order_acquire) != 2 * publication) {
@@ -194,10 +218,21 @@ std::optional<RingReader::View> RingReader::view(std::uint64_t publication,
 }
 
 bool RingReader::intact(std::uint64_t publication) const noexcept {
-  // What was read before stays before the second look.
+  // Reads before this fence stay before the second look at the sequence.
   std::atomic_thread_fence(std::memory_order_acquire);
   const auto* head = std::launder(reinterpret_cast<const RingSlotHead*>(slot(publication)));
   return head->sequence.load(std::memory_order_relaxed) == 2 * publication;
+}
+
+bool is_shm_name(std::string_view text) noexcept {
+  constexpr std::size_t kMaxCharacters = 64;
+  const auto is_alphanumeric = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+  };
+  return !text.empty() && text.size() <= kMaxCharacters && is_alphanumeric(text.front()) &&
+         std::all_of(text.begin(), text.end(), [&](char c) {
+           return is_alphanumeric(c) || c == '_' || c == '-' || c == '.';
+         });
 }
 
 }  // namespace emit::protocol

@@ -9,7 +9,7 @@
 namespace emit::protocol {
 namespace {
 
-// Offsets of docs/wire.md; what lies between is zero.
+// Offsets of the fields (docs/wire.md section 10). All other bytes are zero.
 enum Offset : std::size_t {
   kMagicAt = 0,
   kVersionAt = 4,

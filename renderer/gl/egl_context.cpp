@@ -28,12 +28,14 @@ bool has_extension(const char* list, std::string_view name) {
   return false;
 }
 
+/// Display that may give a context, and its name for messages.
 struct Candidate {
   EGLDisplay display = EGL_NO_DISPLAY;
   std::string name;
 };
 
-/// EGL devices, hardware before software, then the surfaceless platform.
+/// Returns the EGL devices, hardware before software, then the surfaceless platform. With gpu_index
+/// >= 0 it returns that device alone. `tried` gets the reason when the list is empty.
 std::vector<Candidate> list_candidates(int gpu_index, std::string& tried) {
   std::vector<Candidate> candidates;
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
@@ -75,7 +77,7 @@ std::vector<Candidate> list_candidates(int gpu_index, std::string& tried) {
 }
 
 EGLContext make_context(EGLDisplay display, bool debug, std::string& why) {
-  const threads::SoftwareThreads::Naming naming;  // of what the driver starts here
+  const threads::SoftwareThreads::Naming naming;  // names the threads that the driver starts here
   EGLint major = 0;
   EGLint minor = 0;
   if (display == EGL_NO_DISPLAY || eglInitialize(display, &major, &minor) != EGL_TRUE) {
@@ -86,15 +88,16 @@ EGLContext make_context(EGLDisplay display, bool debug, std::string& why) {
     why = "no desktop OpenGL";
     return EGL_NO_CONTEXT;
   }
-  // Prefers a config without surface; drivers that insist on one get a pbuffer-capable config.
+  // Drivers that insist on a config get one that supports pbuffers.
   EGLConfig config = nullptr;
   EGLint count = 0;
   const EGLint attributes[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE,
                                EGL_OPENGL_BIT, EGL_NONE};
   if (eglChooseConfig(display, attributes, &config, 1, &count) != EGL_TRUE || count == 0) {
-    config = nullptr;  // EGL_KHR_no_config_context
+    config = nullptr;  // needs EGL_KHR_no_config_context
   }
-  // With notification a context that the device lost says so. Not every driver offers it.
+  // The reset notification makes a context that the device lost report it. Not every driver offers
+  // it.
   std::array context_attributes{EGL_CONTEXT_MAJOR_VERSION,
                                 4,
                                 EGL_CONTEXT_MINOR_VERSION,
@@ -136,7 +139,7 @@ struct EglContext::Impl {
     if (context == EGL_NO_CONTEXT) return;
     eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     eglDestroyContext(display, context);
-    // The display is shared by every context of the process on this device: not terminated.
+    // The display is not terminated, because all contexts of the process on this device share it.
   }
 };
 

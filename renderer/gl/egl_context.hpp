@@ -8,23 +8,29 @@
 
 namespace emit::gl {
 
-/// Headless OpenGL 4.5 core context through EGL, current on the thread that created it.
-/// Owner: Renderer or a GPU evaluator. Thread: one, for life.
+/// Headless OpenGL 4.5 core context through EGL. It is current on the thread that created it.
+/// Owner: Renderer or a GPU evaluator.
+/// Thread: one, for life.  Real time: setup only.
 class EglContext {
  public:
-  /// gpu_index >= 0: that EGL device (hardware devices are counted first, then software ones).
-  /// -1: the first hardware device that gives a 4.5 context, else Mesa's surfaceless platform.
-  /// Errors (gpu): no device or no 4.5 context, naming every platform and device that was tried.
+  /// Creates a context.
+  /// @param gpu_index  0 or more: the EGL device of that index (hardware devices are counted first,
+  ///   then software ones); -1: the first hardware device that gives a 4.5 context, otherwise
+  ///   Mesa's surfaceless platform
+  /// @param debug      true: a debug context
+  /// Errors (gpu): no device, or no 4.5 context; the text names every platform and device that was
+  /// tried.
   [[nodiscard]] static physics::Result<EglContext> create(int gpu_index, bool debug);
   ~EglContext();
   EglContext(EglContext&&) noexcept;
   EglContext& operator=(EglContext&&) noexcept;
 
-  /// GL_RENDERER and GL_VERSION.
+  /// Returns GL_RENDERER and GL_VERSION.
   [[nodiscard]] const std::string& device_name() const noexcept;
-  /// True: Mesa draws on the processor.
+  /// Returns true when Mesa draws on the processor.
   [[nodiscard]] bool software() const noexcept;
-  /// On which it does; none of a graphics processor.
+  /// Returns Mesa's threads when it draws on the processor. The set is empty for a graphics
+  /// processor.
   [[nodiscard]] const threads::SoftwareThreads& threads() const noexcept;
 
  private:

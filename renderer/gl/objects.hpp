@@ -6,14 +6,19 @@
 #include <span>
 #include <utility>
 
-/// Owning handles of GL objects, direct state access. Thread: the one with the context.
+#include "emit/physics/check.hpp"
+
+/// Owning handles of GL objects, used by direct state access.
+/// Thread: the one with the context.  Real time: construction is setup; bind and upload functions
+/// allocate no memory of the process.
 namespace emit::gl {
 
+/// Buffer object with immutable storage.
 class Buffer {
  public:
   Buffer() = default;
-  /// Immutable storage; `flags` as in glNamedBufferStorage. `data` may be null.
-  Buffer(std::size_t bytes, const void* data, GLbitfield flags) : bytes_(bytes) {
+  /// Creates the storage. `flags` are those of glNamedBufferStorage; `data` may be null.
+  Buffer(std::size_t bytes, const void* data, GLbitfield flags) : bytes_(bytes), flags_(flags) {
     glCreateBuffers(1, &id_);
     glNamedBufferStorage(id_, static_cast<GLsizeiptr>(bytes), data, flags);
   }
@@ -21,35 +26,44 @@ class Buffer {
     if (id_ != 0) glDeleteBuffers(1, &id_);
   }
   Buffer(Buffer&& other) noexcept
-      : id_(std::exchange(other.id_, 0)), bytes_(std::exchange(other.bytes_, 0)) {}
+      : id_(std::exchange(other.id_, 0)),
+        bytes_(std::exchange(other.bytes_, 0)),
+        flags_(std::exchange(other.flags_, 0)) {}
   Buffer& operator=(Buffer&& other) noexcept {
     std::swap(id_, other.id_);
     std::swap(bytes_, other.bytes_);
+    std::swap(flags_, other.flags_);
     return *this;
   }
 
+  /// Creates a buffer that holds `data`.
   template <class T>
   [[nodiscard]] static Buffer from(std::span<const T> data, GLbitfield flags = 0) {
     return Buffer(data.size_bytes(), data.data(), flags);
   }
 
-  /// Storage that upload() refills; at least 16 bytes.
+  /// Creates storage of at least 16 bytes that upload() can refill.
   [[nodiscard]] static Buffer dynamic(std::size_t bytes) {
     return Buffer(bytes < 16 ? 16 : bytes, nullptr, GL_DYNAMIC_STORAGE_BIT);
   }
-  /// Copies to the device, from element `first` on. @pre made by dynamic(), and it fits
+  /// Copies `data` into the buffer, from element `first` on.
+  /// @pre the buffer has GL_DYNAMIC_STORAGE_BIT, as dynamic() sets it, and the data fit into it
   template <class T>
   void upload(std::span<const T> data, std::size_t first = 0) const noexcept {
+    EMIT_CHECK((flags_ & GL_DYNAMIC_STORAGE_BIT) != 0 || data.empty());
+    EMIT_CHECK_OP(first * sizeof(T) + data.size_bytes(), <=, bytes_);
     if (data.empty()) return;
     glNamedBufferSubData(id_, static_cast<GLintptr>(first * sizeof(T)),
                          static_cast<GLsizeiptr>(data.size_bytes()), data.data());
   }
 
-  /// Persistent, coherent mapping for life; the buffer must have been created with the same flags.
+  /// Maps the whole buffer persistently and coherently, for its lifetime.
+  /// @pre the storage was created with `access`, GL_MAP_PERSISTENT_BIT and GL_MAP_COHERENT_BIT
   [[nodiscard]] std::byte* map_persistent(GLbitfield access) const {
+    const GLbitfield flags = access | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+    EMIT_CHECK((flags_ & flags) == flags);
     return static_cast<std::byte*>(
-        glMapNamedBufferRange(id_, 0, static_cast<GLsizeiptr>(bytes_),
-                              access | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT));
+        glMapNamedBufferRange(id_, 0, static_cast<GLsizeiptr>(bytes_), flags));
   }
   void bind_storage(GLuint binding) const noexcept {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, id_);
@@ -71,9 +85,11 @@ class Buffer {
  private:
   GLuint id_ = 0;
   std::size_t bytes_ = 0;
+  GLbitfield flags_ = 0;
 };
 
-/// 2-D texture or 2-D array (layers > 0), one level, nearest and clamped unless changed.
+/// 2-D texture, or 2-D array texture when layers > 0, with one level. Filtering is nearest and
+/// coordinates are clamped unless parameter() changes that.
 class Texture {
  public:
   Texture() = default;
@@ -109,7 +125,7 @@ class Texture {
   GLuint id_ = 0;
 };
 
-/// A buffer read as a one-dimensional texture. The buffer must outlive it.
+/// One-dimensional texture over the contents of a buffer, which must outlive it.
 class BufferTexture {
  public:
   BufferTexture() = default;
@@ -131,6 +147,7 @@ class BufferTexture {
   GLuint id_ = 0;
 };
 
+/// Framebuffer object.
 class Framebuffer {
  public:
   Framebuffer() = default;
@@ -153,6 +170,7 @@ class Framebuffer {
   GLuint id_ = 0;
 };
 
+/// Vertex array object.
 class VertexArray {
  public:
   VertexArray() = default;

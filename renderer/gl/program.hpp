@@ -10,7 +10,8 @@
 
 namespace emit::gl {
 
-/// A linked GL program. Owner: one pass. Thread: the one with the context. Build: setup only.
+/// Linked GL program. Owner: one pass.
+/// Thread: the one with the context.  Real time: building is setup only.
 class Program {
  public:
   Program() = default;
@@ -20,17 +21,20 @@ class Program {
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
 
-  /// Errors (gpu): the driver's message with file names put back in.
+  /// Builds a compute program from an embedded shader. Errors: gpu (the driver's message, with a
+  /// table of its file numbers); not_found (a shader that is not embedded).
   [[nodiscard]] static physics::Result<Program> compute(std::string_view path,
                                                         std::span<const Define> defines = {});
-  /// An empty `fragment_path` links a depth-only program.
+  /// Builds a program for drawing. An empty `fragment_path` gives a depth-only program. Errors as
+  /// for compute().
   [[nodiscard]] static physics::Result<Program> graphics(std::string_view vertex_path,
                                                          std::string_view fragment_path,
                                                          std::span<const Define> defines = {});
 
   void use() const noexcept { glUseProgram(id_); }
   [[nodiscard]] GLuint id() const noexcept { return id_; }
-  /// Byte offset that the driver gave a member of a uniform block, -1 if it is not in use.
+  /// Returns the byte offset that the driver gave a member of a uniform block, or -1 when the
+  /// member is not in use.
   [[nodiscard]] GLint uniform_offset(const char* name) const noexcept;
 
  private:

@@ -7,19 +7,7 @@
 namespace emit::renderer {
 namespace {
 
-physics::WeatherRow row_from(const scene::WeatherSample& sample) noexcept {
-  return {.time_ns = sample.sim_time_ns,
-          .direct_normal_w_m2 = sample.direct_normal_w_m2,
-          .diffuse_horizontal_w_m2 = sample.diffuse_horizontal_w_m2,
-          .longwave_down_w_m2 = sample.longwave_down_w_m2,
-          .air_k = sample.air_k,
-          .wind_m_s = sample.wind_m_s,
-          .cloud_frac = sample.cloud_frac,
-          .environment_k = sample.environment_k,
-          .film_w_m2_k = sample.film_w_m2_k};
-}
-
-bool same_weather(const physics::WeatherRow& a, const physics::WeatherRow& b) noexcept {
+bool same_weather(const physics::WeatherSample& a, const physics::WeatherSample& b) noexcept {
   return a.direct_normal_w_m2 == b.direct_normal_w_m2 &&
          a.diffuse_horizontal_w_m2 == b.diffuse_horizontal_w_m2 &&
          a.longwave_down_w_m2 == b.longwave_down_w_m2 && a.air_k == b.air_k &&
@@ -33,24 +21,18 @@ Environment::Environment(const scene::ScenarioDesc& scenario)
     : place_{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
              physics::Metres(scenario.place.height_m)},
       epoch_utc_ns_(scenario.epoch_utc_ns),
-      clear_sky_{.linke_turbidity = scenario.clear_sky.linke_turbidity,
-                 .air_mean_k = scenario.clear_sky.air_mean_k,
-                 .air_amplitude_k = scenario.clear_sky.air_amplitude_k,
-                 .dew_point_k = scenario.clear_sky.dew_point_k,
-                 .wind_m_s = scenario.clear_sky.wind_m_s,
-                 .cloud_frac = scenario.clear_sky.cloud_frac} {
-  for (const scene::WeatherSample& sample : scenario.weather) table_.push_back(row_from(sample));
+      clear_sky_(scenario.clear_sky),
+      table_(scenario.weather) {
   live_.reserve(kMaxLiveSamples);
   changes_ns_.reserve(kMaxLiveSamples);
   revisions_.reserve(kMaxLiveSamples);
 }
 
-bool Environment::append(const scene::WeatherSample& sample) noexcept {
-  physics::WeatherRow row = row_from(sample);
+bool Environment::append(const physics::WeatherSample& row) noexcept {
   if (!live_.empty()) {
-    if (row.time_ns < live_.back().time_ns) return false;
+    if (row.sim_time_ns < live_.back().sim_time_ns) return false;
     if (same_weather(row, live_.back())) return true;
-    if (row.time_ns == live_.back().time_ns) {
+    if (row.sim_time_ns == live_.back().sim_time_ns) {
       live_.back() = row;
       revisions_.back() = ++revision_;
       return true;
@@ -69,7 +51,7 @@ bool Environment::append(const scene::WeatherSample& sample) noexcept {
   }
   live_.push_back(row);
   revisions_.push_back(++revision_);
-  changes_ns_.push_back(row.time_ns);
+  changes_ns_.push_back(row.sim_time_ns);
   return true;
 }
 
@@ -96,7 +78,7 @@ physics::Forcing Environment::forcing_at(std::int64_t sim_time_ns,
                                          const physics::SunPosition& sun) const noexcept {
   const auto after = std::upper_bound(
       live_.begin(), live_.end(), sim_time_ns,
-      [](std::int64_t t, const physics::WeatherRow& row) { return t < row.time_ns; });
+      [](std::int64_t t, const physics::WeatherSample& row) { return t < row.sim_time_ns; });
   if (after != live_.begin()) return physics::forcing_from_rows({&*(after - 1), 1}, sim_time_ns);
   if (!table_.empty()) return physics::forcing_from_rows(table_, sim_time_ns);
   return physics::forcing_from_clear_sky(clear_sky_, place_, sun, epoch_utc_ns_ + sim_time_ns);

@@ -10,33 +10,39 @@
 
 namespace emit::renderer {
 
-/// Sun and weather of a scenario at any instant of the thermal history, with changes that the host
-/// sent. Owner: Renderer. Real time: everything but the constructor is RT-safe.
+/// Sun and weather of a scenario at any instant of the thermal history, including the changes that
+/// the host sent. Owner: Renderer.
+/// Thread: the renderer's.  Real time: everything but the constructor is RT-safe.
 class Environment {
  public:
+  /// Largest number of live samples.
   static constexpr std::size_t kMaxLiveSamples = 4096;
 
   explicit Environment(const scene::ScenarioDesc& scenario);
 
-  /// Holds from its time on until the next one; false when time goes back. A sample equal to the
-  /// newest changes nothing. When the store is full, its oldest half is thinned to every other one.
-  bool append(const scene::WeatherSample& sample) noexcept;
+  /// Adds a weather sample of the host. It holds from its time on until the next one. Returns false
+  /// when its time is before the newest one. A sample equal to the newest changes nothing. When the
+  /// store is full, its oldest half is thinned to every other sample.
+  bool append(const physics::WeatherSample& row) noexcept;
   void reset() noexcept;
 
-  /// Instants at which live weather changes, ascending.
+  /// Returns the instants at which live weather changes, ascending.
   [[nodiscard]] std::span<const std::int64_t> changes_ns() const noexcept { return changes_ns_; }
 
-  /// What the host sent and is kept, ascending.
-  [[nodiscard]] std::span<const physics::WeatherRow> live() const noexcept { return live_; }
+  /// Returns the live samples that are kept, ascending in time.
+  [[nodiscard]] std::span<const physics::WeatherSample> live() const noexcept { return live_; }
 
-  /// The earliest instant from which the weather is not what it was at that revision; the lowest
-  /// there is where it may be any, the highest where nothing has changed.
+  /// Returns the earliest instant from which the weather differs from that of a revision. It
+  /// returns the lowest number when any instant may differ, and the highest one when nothing has
+  /// changed.
   [[nodiscard]] std::int64_t changed_since_ns(std::uint64_t revision) const noexcept;
 
-  /// Goes up with every change by the host.
+  /// Returns the revision, which every change by the host raises.
   [[nodiscard]] std::uint64_t revision() const noexcept { return revision_; }
 
+  /// Returns the position of the sun.
   [[nodiscard]] physics::SunPosition sun_at(std::int64_t sim_time_ns) const noexcept;
+  /// Returns the weather. `sun` is the result of sun_at() for the same instant.
   [[nodiscard]] physics::Forcing forcing_at(std::int64_t sim_time_ns,
                                             const physics::SunPosition& sun) const noexcept;
 
@@ -44,10 +50,10 @@ class Environment {
   physics::GeoPlace place_;
   std::int64_t epoch_utc_ns_ = 0;
   physics::ClearSky clear_sky_;
-  std::vector<physics::WeatherRow> table_;
-  std::vector<physics::WeatherRow> live_;
+  std::vector<physics::WeatherSample> table_;
+  std::vector<physics::WeatherSample> live_;
   std::vector<std::int64_t> changes_ns_;  ///< times of live_
-  std::vector<std::uint64_t> revisions_;  ///< of live_, ascending
+  std::vector<std::uint64_t> revisions_;  ///< revisions of the rows of live_, ascending
   std::uint64_t revision_ = 0;
   std::uint64_t reset_revision_ = 0;
 };

@@ -11,6 +11,7 @@
 #include <glm/ext/vector_double4.hpp>
 #include <glm/geometric.hpp>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/step_nodes.hpp"
 
 namespace emit::renderer {
@@ -20,20 +21,21 @@ using physics::ErrorCode;
 using physics::FosterDrive;
 using physics::FosterState;
 
-// Steps of the spin-up, a quarter of an hour at most: the sun goes straight between their ends. The
-// same holds for the tail, which also makes the fast modes.
+// Steps of the spin-up, 15 minutes at most. The sun's input is linear between their ends. The same
+// holds for the tail, which also sets the fast modes.
 constexpr std::size_t kSpinUpSteps = 288;
 constexpr double kFirstSpinUpStepS = 300.0;
 constexpr double kFirstTailStepS = 300.0;
-// How well the surroundings are followed.
+// Tolerance of the surroundings' temperature, K.
 constexpr double kSurroundingsToleranceK = 0.01;
-/// Behind the middle of a sheet: 50 K leave by 0.05 W/m2.
+/// Thermal resistance behind the middle of a sheet, m2 K/W: a difference of 50 K gives 0.05 W/m2.
 constexpr double kInsulationM2kW = 1e3;
 
 double seconds(std::int64_t begin_ns, std::int64_t end_ns) noexcept {
   return static_cast<double>(end_ns - begin_ns) * 1e-9;
 }
 
+/// Returns the unit vector of octahedral coordinates.
 glm::dvec3 unit_from_octahedral(double u, double v) noexcept {
   glm::dvec3 n(u, v, 1.0 - std::abs(u) - std::abs(v));
   const double t = std::max(-n.z, 0.0);
@@ -42,6 +44,7 @@ glm::dvec3 unit_from_octahedral(double u, double v) noexcept {
   return glm::normalize(n);
 }
 
+/// Returns the octahedral coordinates of a unit vector.
 glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
   const double scale = 1.0 / (std::abs(n.x) + std::abs(n.y) + std::abs(n.z));
   glm::dvec2 p(n.x * scale, n.y * scale);
@@ -52,7 +55,7 @@ glm::dvec2 octahedral_from_unit(const glm::dvec3& n) noexcept {
   return p;
 }
 
-/// Steady profile between the initial surface temperature and the base.
+/// Returns the states of a steady profile between the initial surface temperature and the base.
 FosterState<double> initial_states(const FosterMaterial& material) noexcept {
   FosterState<double> x{};
   const double flux_w_m2 =
@@ -69,8 +72,8 @@ physics::FosterSurface<double> surface_of(const FosterMaterial& material,
                                  reference_k);
 }
 
-/// What weather that changes within the interval was over it: the line of least squares, which
-/// keeps the mean, as steep as leaves its ends among the values that there were.
+/// Replaces weather that changes within the interval by a line of least squares. The line keeps the
+/// mean, and its slope is limited so that its ends stay among the values that occurred.
 void fit_changes(HistoryInterval& interval, const Environment& environment) noexcept {
   const auto changes_ns = environment.changes_ns();
   const auto first = std::ranges::upper_bound(changes_ns, interval.begin_ns);
@@ -98,8 +101,8 @@ void fit_changes(HistoryInterval& interval, const Environment& environment) noex
       low = std::min(low, parts[i].*value);
       high = std::max(high, parts[i].*value);
     }
-    const double most = std::max(0.0, std::min(mean - low, high - mean));
-    const double half = std::clamp(6.0 * moment, -most, most);
+    const double max_half = std::max(0.0, std::min(mean - low, high - mean));
+    const double half = std::clamp(6.0 * moment, -max_half, max_half);
     interval.forcing_begin.*value = mean - half;
     interval.forcing_end.*value = mean + half;
   }
@@ -263,6 +266,8 @@ void FosterHistory::carry(const HistoryInterval& interval, double tolerance_k,
 void FosterHistory::forcing_over(std::span<const std::int64_t> nodes_ns,
                                  const Environment& environment,
                                  std::span<IntervalForcing> out) noexcept {
+  EMIT_CHECK_OP(out.size() + 1, ==, nodes_ns.size());
+  EMIT_DCHECK(std::ranges::is_sorted(nodes_ns));
   surroundings_state_ = surroundings_at_start_;
   for (std::size_t i = 0; i < out.size(); ++i) {
     carry(interval_between(nodes_ns[i], nodes_ns[i + 1], environment), tolerance_k_, out[i]);
@@ -294,6 +299,7 @@ void FosterHistory::spin_up_surroundings(const Environment& environment) noexcep
 
 FosterState<double> FosterHistory::start_states(std::size_t material,
                                                 const glm::dvec3& normal) const noexcept {
+  EMIT_DCHECK_OP(material, <, materials_.size());
   const glm::dvec2 place =
       (octahedral_from_unit(normal) * 0.5 + 0.5) * static_cast<double>(grid_nodes_ - 1);
   const glm::dvec2 low = glm::clamp(glm::floor(place), glm::dvec2(0.0),
@@ -317,6 +323,7 @@ IntervalForcing FosterHistory::extend(std::int64_t begin_ns, std::int64_t end_ns
 
 FosterState<double> FosterHistory::spun_up(std::size_t index,
                                            const glm::dvec3& normal) const noexcept {
+  EMIT_DCHECK_OP(index, <, materials_.size());
   const FosterMaterial& material = materials_[index];
   FosterState<double> x = initial_states(material);
   if (spin_up_.empty()) return x;
@@ -327,7 +334,7 @@ FosterState<double> FosterHistory::spun_up(std::size_t index,
     const FosterDrive<double> to =
         unshadowed_drive(spin_up_[i].end, material, normal, reference_k_);
     physics::foster_step(x, from, to, spin_up_gains_[index][i], surface);
-    // A jump of the weather at the node acts from there on.
+    // A jump of the weather at a node acts from that node on.
     from = i + 1 < spin_up_.size()
                ? unshadowed_drive(spin_up_[i + 1].begin, material, normal, reference_k_)
                : to;

@@ -8,16 +8,18 @@
 #include "emit/scene/scene_desc.hpp"
 #include "history/foster_history.hpp"
 
-/// What the extended thermal model needs once, at set-up. Nothing of it costs emit2014 a byte but
-/// an empty table.
+/// Set-up of the extended thermal model, done once. With the model emit2014 it costs nothing but an
+/// empty table.
+/// Thread: any.  Real time: setup only.
 namespace emit::renderer {
 
-/// The networks of all simulated materials and, last, of the surroundings; empty for emit2014.
+/// Returns the networks of all simulated materials and, as the last entry, of the surroundings. The
+/// vector is empty for emit2014.
 /// Errors (config) name the material.
 [[nodiscard]] physics::Result<std::vector<FosterMaterial>> build_foster_materials(
     const scene::ScenarioDesc& scenario, std::span<const scene::Material> materials);
 
-/// Runs the spin-up; nothing for emit2014. `materials` as build_foster_materials() made them.
+/// Runs the spin-up with the `materials` of build_foster_materials(). Returns nothing for emit2014.
 [[nodiscard]] std::optional<FosterHistory> make_foster(const scene::ScenarioDesc& scenario,
                                                        std::vector<FosterMaterial> materials,
                                                        const Environment& environment,

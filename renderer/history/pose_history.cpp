@@ -34,7 +34,7 @@ bool moves(const scene::Keyframe& from, const scene::Keyframe& to) noexcept {
              kMovingMPerS * seconds;
 }
 
-/// Way along the keyframes between two instants.
+/// Returns the length of the path along the keyframes between two instants, m.
 double path_in(const scene::Trajectory& keys, std::int64_t begin_ns, std::int64_t end_ns) noexcept {
   double path_m = 0.0;
   auto next = std::upper_bound(
@@ -85,7 +85,7 @@ void PoseHistory::note_event(std::int64_t sim_time_ns) noexcept {
   if (events_ns_.size() < kMaxEvents) {
     events_ns_.insert(place, sim_time_ns);
   } else if (place != events_ns_.begin()) {
-    std::move(events_ns_.begin() + 1, place, events_ns_.begin());  // the oldest makes room
+    std::move(events_ns_.begin() + 1, place, events_ns_.begin());  // drops the oldest event
     *(place - 1) = sim_time_ns;
   }
 }
@@ -114,7 +114,7 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
   const scene::Keyframe next{
       .sim_time_ns = sim_time_ns, .pose = pose, .on = on, .teleport = teleport};
   if (live_.empty()) {
-    // What the script planned after this instant will not happen.
+    // Drop the events of the script after this instant, because they will not happen.
     const TrajectoryState planned = trajectory_at(scripted_, sim_time_ns);
     while (!events_ns_.empty() && events_ns_.back() >= sim_time_ns) {
       events_ns_.pop_back();
@@ -145,8 +145,8 @@ bool PoseHistory::append(std::int64_t sim_time_ns, const physics::Pose& pose, bo
   return true;
 }
 
-/// True when the newest pose may go because the way from the one before it to `next` passes it and
-/// everything already thinned out in between.
+/// Returns true when `next` may replace the newest pose: the path from the pose before it to `next`
+/// passes the newest pose and all poses thinned out in between.
 bool PoseHistory::replaces_last(const scene::Keyframe& next) noexcept {
   if (live_.size() < 2) return false;
   const scene::Keyframe& before = live_[live_.size() - 2];
@@ -176,7 +176,7 @@ bool PoseHistory::replaces_last(const scene::Keyframe& next) noexcept {
   return true;
 }
 
-/// Keeps the newest half whole and every other pose of the oldest half.
+/// Keeps the whole newer half and every other pose of the older half.
 void PoseHistory::make_room() noexcept {
   const auto half = live_.begin() + kMaxLivePoses / 2;
   auto write = live_.begin() + 1;
@@ -192,7 +192,7 @@ void PoseHistory::reset() noexcept {
   skipped_stride_ = 1;
   skipped_phase_ = 0;
   moving_ = false;
-  // The script's own events may have been cut by live poses.
+  // Live poses may have removed events of the script.
   events_ns_.clear();
   note_scripted_events();
 }
@@ -210,7 +210,7 @@ TrajectoryState PoseHistory::ahead(std::int64_t sim_time_ns) const noexcept {
   const scene::Keyframe& before = live_[live_.size() - 2];
   const scene::Keyframe& last = live_.back();
   if (last.teleport || !last.on || last.sim_time_ns <= before.sim_time_ns) return state;
-  const double ways = static_cast<double>(std::min(sim_time_ns - last.sim_time_ns, kMostAheadNs)) /
+  const double ways = static_cast<double>(std::min(sim_time_ns - last.sim_time_ns, kMaxAheadNs)) /
                       static_cast<double>(last.sim_time_ns - before.sim_time_ns);
   state.pose.position_world_m += ways * (last.pose.position_world_m - before.pose.position_world_m);
   return state;
@@ -229,13 +229,13 @@ TrajectoryState PoseHistory::as_known(const Known& then, std::int64_t sim_time_n
 bool PoseHistory::departs(const Known& then, std::int64_t sim_time_ns) const noexcept {
   if (live_.empty() && !then.live) return false;
   const TrajectoryState now = at(sim_time_ns);
-  const TrajectoryState told = as_known(then, sim_time_ns);
-  return now.on != told.on || (now.on && !close(now.pose, told.pose));
+  const TrajectoryState before = as_known(then, sim_time_ns);
+  return now.on != before.on || (now.on && !close(now.pose, before.pose));
 }
 
 double PoseHistory::path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept {
   if (live_.empty()) return path_in(scripted_, begin_ns, end_ns);
-  // Where live poses take over from the script the entity may jump.
+  // The entity may jump at the instant at which live poses replace the script.
   const std::int64_t seam_ns = live_.front().sim_time_ns;
   return path_in(scripted_, begin_ns, std::min(end_ns, seam_ns)) +
          path_in(live_, std::max(begin_ns, seam_ns), end_ns);

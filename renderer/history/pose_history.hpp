@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "emit/scene/trajectory.hpp"
@@ -14,57 +15,66 @@ namespace emit::renderer {
 using scene::trajectory_at;
 using scene::TrajectoryState;
 
-/// Where an entity was and whether it was there, at any instant of the thermal history: the
-/// scenario's trajectory, overridden from the first live pose on by what the host sent.
-/// Owner: Renderer. Thread: the renderer's. Real time: everything but the constructor is RT-safe.
+/// Poses of one entity, and whether it was present, at any instant of the thermal history. The
+/// poses are those of the scenario's trajectory, and from the first live pose on those that the
+/// host sent. Owner: Renderer.
+/// Thread: the renderer's.  Real time: everything but the constructor is RT-safe.
 class PoseHistory {
  public:
+  /// Largest number of live poses and of events.
   static constexpr std::size_t kMaxLivePoses = 16384;
   static constexpr std::size_t kMaxEvents = 256;
-  static constexpr std::int64_t kMostAheadNs = 2'000'000'000;
+  /// Longest extrapolation of ahead(), ns.
+  static constexpr std::int64_t kMaxAheadNs = 2'000'000'000;
 
-  /// `placement` holds until the first keyframe of an entity without trajectory.
+  /// Starts with the scenario's trajectory of the object. An entity without trajectory stands at
+  /// `placement`.
   PoseHistory(const scene::ObjectDesc& object, const physics::Pose& placement);
 
   /// Adds a live pose. Poses that lie on the way between their neighbours are thinned out (to 1 cm
-  /// and 1 mrad, at most one second apart while moving). A time before the newest live pose is
-  /// refused (false).
+  /// and 1 mrad, at most one second apart while moving). Returns false, and ignores the pose, when
+  /// its time is before the newest live pose.
   bool append(std::int64_t sim_time_ns, const physics::Pose& pose, bool on, bool teleport) noexcept;
   /// Forgets the live poses.
   void reset() noexcept;
 
+  /// Returns the state of the entity at an instant.
   [[nodiscard]] TrajectoryState at(std::int64_t sim_time_ns) const noexcept;
-  /// Like at(), but an entity that moves goes on straight for kMostAheadNs after its newest live
-  /// pose.
+  /// Returns the state at an instant like at(), but a moving entity continues straight for
+  /// kMaxAheadNs after its newest live pose.
   [[nodiscard]] TrajectoryState ahead(std::int64_t sim_time_ns) const noexcept;
 
-  /// The scenario's trajectory, ascending.
+  /// Returns the scenario's trajectory, ascending in time.
   [[nodiscard]] std::span<const scene::Keyframe> script() const noexcept { return scripted_; }
 
-  /// What is known of an entity at some time.
+  /// Knowledge about an entity at some time.
   struct Known {
-    bool live = false;       ///< the host drives it
-    scene::Keyframe newest;  ///< its newest live pose, if so
+    bool live = false;       ///< true when the host drives the entity
+    scene::Keyframe newest;  ///< newest live pose of such an entity
   };
+  /// Returns what is known now.
   [[nodiscard]] Known known() const noexcept;
-  /// Where it was to be at `sim_time_ns` by what was known then. @pre no reset() since
+  /// Returns the state at an instant by what was known earlier. After a reset() the earlier live
+  /// poses are forgotten, so the result may differ.
   [[nodiscard]] TrajectoryState as_known(const Known& then,
                                          std::int64_t sim_time_ns) const noexcept;
-  /// True when that is not where it is by what is known now (1 cm, 1 mrad).
+  /// Returns true when the state at an instant, by what is known now, differs from the earlier one
+  /// by more than 1 cm or 1 mrad, or in presence.
   [[nodiscard]] bool departs(const Known& then, std::int64_t sim_time_ns) const noexcept;
 
-  /// Length of the way between two instants while switched on; jumps do not count.
+  /// Returns the length of the path between two instants while the entity is switched on, m. Jumps
+  /// do not count.
   [[nodiscard]] double path_m(std::int64_t begin_ns, std::int64_t end_ns) const noexcept;
 
-  /// Instants at which the entity appears, vanishes, starts or stops, ascending: the latest
-  /// kMaxEvents.
+  /// Returns the instants at which the entity appears, vanishes, starts or stops, ascending: the
+  /// latest kMaxEvents.
   [[nodiscard]] std::span<const std::int64_t> events_ns() const noexcept { return events_ns_; }
 
-  /// What the host sent and is kept, ascending.
+  /// Returns the live poses that are kept, ascending in time.
   [[nodiscard]] std::span<const scene::Keyframe> live() const noexcept { return live_; }
 
-  /// Live poses dropped since the last reset because the store was full; the oldest are halved in
-  /// density then.
+  /// Returns the number of live poses dropped since the last reset because the store was full. The
+  /// older half then keeps every other pose.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:
@@ -77,11 +87,12 @@ class PoseHistory {
   scene::Trajectory scripted_;
   scene::Trajectory live_;
   std::vector<std::int64_t> events_ns_;
-  // A live entity starts when it leaves the spot it rested on, and stops when it has stayed on one
-  // for a while: jitter of the host is neither.
+  // State of the detection of starts and stops. A live entity starts when it leaves the place where
+  // it rested, and stops when it has stayed in one place for a while. Jitter of the host is
+  // neither.
   bool moving_ = false;
   scene::Keyframe spot_;
-  // Thinned-out poses since the last kept one, a sample of them: what the next pose must fit.
+  // Sample of the poses thinned out since the last kept one. The next pose must fit all of them.
   std::array<scene::Keyframe, 16> skipped_;
   std::size_t skipped_count_ = 0;
   std::size_t skipped_stride_ = 1;
@@ -89,26 +100,30 @@ class PoseHistory {
   std::uint64_t dropped_ = 0;
 };
 
-/// Which poses of the entities count.
+/// View of the entities' poses: by what is known now, by what was known earlier, or with
+/// extrapolation. RT-safe.
 class EntityPoses {
  public:
-  /// Those that are known now.
+  /// Selects the poses that are known now.
   explicit EntityPoses(std::span<const PoseHistory> entities) : entities_(entities) {}
-  /// Those that were known then, by entity.
+  /// Selects the poses by what was known earlier, one entry of `then` per entity.
   [[nodiscard]] static EntityPoses as_known(std::span<const PoseHistory> entities,
                                             std::span<const PoseHistory::Known> then) {
     EntityPoses poses(entities);
     poses.then_ = then;
     return poses;
   }
-  /// Those that are known now; entities that move go on.
+  /// Selects the poses that are known now, with extrapolation of moving entities.
   [[nodiscard]] static EntityPoses ahead(std::span<const PoseHistory> entities) {
     EntityPoses poses(entities);
     poses.ahead_ = true;
     return poses;
   }
 
+  /// Returns the state of an entity at an instant.
+  /// @pre entity is an index into the entities
   [[nodiscard]] TrajectoryState at(std::size_t entity, std::int64_t sim_time_ns) const noexcept {
+    EMIT_DCHECK_OP(entity, <, entities_.size());
     const PoseHistory& history = entities_[entity];
     if (!then_.empty()) return history.as_known(then_[entity], sim_time_ns);
     return ahead_ ? history.ahead(sim_time_ns) : history.at(sim_time_ns);

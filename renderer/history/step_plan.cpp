@@ -16,7 +16,7 @@ StepPlan::StepPlan(const scene::ThermalOptions& options)
 
 void StepPlan::snap_to(std::span<const std::int64_t> events_ns) noexcept {
   const std::size_t last = nodes_ns_.size() - 1;
-  // The newest events matter most, so they choose first.
+  // The newest events matter most, so they choose their nodes first.
   for (auto event = events_ns.rbegin(); event != events_ns.rend(); ++event) {
     if (*event >= nodes_ns_.back()) continue;
     if (*event <= nodes_ns_.front()) break;
@@ -67,7 +67,7 @@ void StepPlan::update(std::int64_t now_ns, const Environment& environment,
     interval.sample_ns = interval.begin_ns + (interval.end_ns - interval.begin_ns) / 2;
     interval.sun_sample = environment.sun_at(interval.sample_ns);
     if (interval.sun_sample.elevation.value() <= kMinSunElevationRad) {
-      // Sunrise or sunset inside the interval: the lit end stands for it.
+      // The sun rises or sets within the interval, so the lit end represents it.
       const bool rising = interval.sun_end.elevation.value() > interval.sun_begin.elevation.value();
       interval.sample_ns = rising ? interval.end_ns : interval.begin_ns;
       interval.sun_sample = rising ? interval.sun_end : interval.sun_begin;

@@ -10,7 +10,7 @@
 
 namespace emit::renderer {
 
-/// One interval of the thermal history and the instant whose shadow stands for it.
+/// Interval of the thermal history, with the instant whose shadow represents it.
 struct HistoryInterval {
   std::int64_t begin_ns = 0;
   std::int64_t end_ns = 0;
@@ -20,27 +20,28 @@ struct HistoryInterval {
   physics::SunPosition sun_end;
   physics::Forcing forcing_begin;
   physics::Forcing forcing_end;
-  bool sun_up = false;  ///< worth a shadow map
+  bool sun_up = false;  ///< true when the sun needs a shadow map
 };
 
-/// The intervals from history start to a frame's instant, in order of time. Their number is fixed
-/// (thermal.steps); near every event of an entity (appears, vanishes, starts, stops) the closest
-/// inner node is moved onto it, so that a parked vehicle's shade begins and ends on time; likewise
-/// near every change of the weather by the host.
-/// Owner: Renderer. Real time: update is RT-safe.
+/// Intervals from the history's start to a frame's instant, in order of time. Their number is fixed
+/// (thermal.steps). The closest inner node moves onto every event of an entity (appears, vanishes,
+/// starts, stops), so that a parked vehicle's shade begins and ends on time. The same holds for
+/// every change of the weather by the host. Owner: Renderer.
+/// Thread: the renderer's.  Real time: update is RT-safe.
 class StepPlan {
  public:
   explicit StepPlan(const scene::ThermalOptions& options);
 
+  /// Computes the intervals up to `now_ns`.
   void update(std::int64_t now_ns, const Environment& environment,
               std::span<const PoseHistory> entities) noexcept;
 
   [[nodiscard]] std::span<const HistoryInterval> intervals() const noexcept { return intervals_; }
-  /// Sun at the frame's instant.
+  /// Returns the sun and the weather at the frame's instant.
   [[nodiscard]] const physics::SunPosition& sun_now() const noexcept { return sun_now_; }
   [[nodiscard]] const physics::Forcing& forcing_now() const noexcept { return forcing_now_; }
 
-  /// Below this elevation the direct sun is negligible and no shadow map is drawn.
+  /// Lowest elevation of the sun that needs a shadow map. The direct sun is negligible below it.
   static constexpr double kMinSunElevationRad = 0.5 * physics::kDegree;
 
  private:

@@ -3,19 +3,13 @@
 
 #include <algorithm>
 
+#include "emit/physics/constants.hpp"
 #include "history/environment.hpp"
 #include "history/foster_history.hpp"
-#include "history/surface_history.hpp"
 #include "history/foster_setup.hpp"
+#include "history/surface_history.hpp"
 
 namespace emit::renderer {
-namespace {
-
-// Offsets of the surroundings' temperature are from here: their float64 does not care.
-constexpr double kReferenceK = 295.0;
-
-}  // namespace
-
 physics::Result<std::vector<IntervalForcing>> surface_forcing(
     const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns) {
   if (nodes_ns.size() < 2 || !std::is_sorted(nodes_ns.begin(), nodes_ns.end())) {
@@ -28,10 +22,10 @@ physics::Result<std::vector<IntervalForcing>> surface_forcing(
     scene::ScenarioDesc start = scenario;
     start.thermal.history_start_ns = nodes_ns.front();
     start.thermal.spin_up_ns = 0;
-    // Only the surroundings are carried.
+    // Only the surroundings are simulated, so no other material is needed.
     auto materials = build_foster_materials(start, {});
     if (!materials) return tl::unexpected(std::move(materials.error()));
-    FosterHistory history(start, {}, materials->back(), environment, kReferenceK);
+    FosterHistory history(start, {}, materials->back(), environment, physics::kReferenceK);
     history.forcing_over(nodes_ns, environment, out);
     return out;
   }

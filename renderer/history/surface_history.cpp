@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/surface_balance.hpp"
 
 namespace emit::renderer {
@@ -61,7 +62,9 @@ std::optional<double> SurfaceHistory::surroundings_now_k() const noexcept {
 }
 
 const physics::FosterNetwork& SurfaceHistory::network(std::size_t material) const noexcept {
-  return foster_ ? foster_->materials()[material].network : no_network_;
+  if (!foster_) return no_network_;
+  EMIT_DCHECK_OP(material, <, foster_->materials().size());
+  return foster_->materials()[material].network;
 }
 
 physics::FosterState<double> SurfaceHistory::start_states(std::size_t material,

@@ -15,46 +15,50 @@
 
 namespace emit::renderer {
 
-/// Forcing of an interval whose surroundings have the temperature that the weather gives them and
-/// reflect nothing: that of the model emit2014.
+/// Returns the forcing of an interval as the model emit2014 has it: the surroundings have the
+/// temperature that the weather gives and reflect nothing. RT-safe.
 [[nodiscard]] IntervalForcing weather_forcing(const HistoryInterval& interval) noexcept;
 
-/// The forcing that all samples of a surface share, whatever the thermal model: with `foster` the
-/// surroundings are carried along, with emit2014 they are the weather's.
-/// Owner: CachedStage. Real time: everything but the constructor is RT-safe.
+/// Forcing that all samples of a surface share, for either thermal model: with `foster` the
+/// surroundings are simulated, with emit2014 they are the weather's. Owner: CachedStage.
+/// Thread: the renderer's.  Real time: everything but the constructor is RT-safe.
 class SurfaceHistory {
  public:
-  /// `steps` of the plan; `foster`: nothing for emit2014.
+  /// Prepares for a plan of `steps` intervals. `foster` is empty for emit2014.
   SurfaceHistory(std::uint32_t steps, std::optional<FosterHistory> foster)
       : foster_(std::move(foster)), intervals_(foster_ ? 0 : steps) {}
 
-  /// Brings the intervals to those of the plan.
+  /// Computes the forcing of the plan's intervals.
   void update(const StepPlan& plan, const Environment& environment) noexcept;
 
   [[nodiscard]] std::span<const IntervalForcing> intervals() const noexcept;
-  /// Unshadowed, before the history; none with emit2014.
+  /// Returns the unshadowed intervals before the history. The span is empty with emit2014.
   [[nodiscard]] std::span<const IntervalForcing> tail() const noexcept;
 
-  /// Forcing of an interval that follows the last one.
+  /// Returns the forcing of an interval that follows the last one.
   [[nodiscard]] IntervalForcing extend(std::int64_t begin_ns, std::int64_t end_ns,
                                        const Environment& environment) noexcept;
-  /// States of the surroundings where update() or extend() left them, and going back to such.
+  /// Returns the states of the surroundings after the last update() or extend().
   [[nodiscard]] physics::FosterState<double> surroundings() const noexcept;
+  /// Restores states that surroundings() returned.
   void restore_surroundings(const physics::FosterState<double>& state) noexcept;
 
-  /// Temperature of the surroundings where the model carries it; nothing with emit2014.
+  /// Returns the temperature of the surroundings, K; nothing with emit2014.
   [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept;
 
-  /// What foster knows of a material: its network, and its states before the tail on an unshadowed
-  /// face of direction `normal`. emit2014: no modes, no states.
+  /// Returns the network of a material. With emit2014 it has no modes.
+  /// @pre material is an index into the scene's materials
   [[nodiscard]] const physics::FosterNetwork& network(std::size_t material) const noexcept;
+  /// Returns the states of a material before the tail, on an unshadowed face with that normal. With
+  /// emit2014 they are 0.
+  /// @pre material is an index into the scene's materials
   [[nodiscard]] physics::FosterState<double> start_states(std::size_t material,
                                                           const glm::dvec3& normal) const noexcept;
 
  private:
   std::optional<FosterHistory> foster_;
   physics::FosterNetwork no_network_;
-  std::vector<IntervalForcing> intervals_;  ///< emit2014
+  std::vector<IntervalForcing> intervals_;  ///< intervals of emit2014
 };
 
 }  // namespace emit::renderer

@@ -10,21 +10,24 @@
 #include <limits>
 #include <optional>
 
+#include "budget/ladder_survey.hpp"
+#include "budget/quality_ladder.hpp"
+#include "draw/picture_window.hpp"
+#include "emit/physics/constants.hpp"
+#include "emit/physics/limits.hpp"
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/sheets.hpp"
 #include "gl/egl_context.hpp"
-#include "history/pose_history.hpp"
-#include "stages/band_model.hpp"
-#include "stages/cached_stage.hpp"
-#include "passes/compute_passes.hpp"
+#include "history/first_frame_warnings.hpp"
 #include "history/foster_setup.hpp"
-#include "stages/frame_setup.hpp"
-#include "budget/ladder_survey.hpp"
-#include "stages/per_frame_stage.hpp"
-#include "draw/picture_window.hpp"
-#include "budget/quality_ladder.hpp"
+#include "history/pose_history.hpp"
+#include "passes/compute_passes.hpp"
 #include "passes/raster_passes.hpp"
 #include "passes/readback_ring.hpp"
+#include "stages/band_model.hpp"
+#include "stages/cached_stage.hpp"
+#include "stages/frame_setup.hpp"
+#include "stages/per_frame_stage.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -33,35 +36,43 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
+namespace limits = physics::limits;
+static_assert(EMIT_MAX_BANDS == limits::kMaxBands);
+static_assert(EMIT_MAX_CASCADES == limits::kCascades.hi);
+static_assert(EMIT_MAX_TAPS == limits::kShadowTaps.hi);
+static_assert(EMIT_MAX_MODES == limits::kMaxRelaxationModes);
+static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
+
 constexpr std::size_t kBlockAlignment = 256;  // GL guarantees that no driver asks for more
 constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 3;  // temperature, depth, object
 
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   const scene::ThermalOptions& thermal = scenario.thermal;
   const auto fail = [](std::string text) { return make_error(ErrorCode::config, std::move(text)); };
-  if (scenario.sensor.width_px == 0 || scenario.sensor.width_px > 8192 ||
-      scenario.sensor.height_px == 0 || scenario.sensor.height_px > 8192) {
-    return fail(fmt::format("sensor format {} x {}: 1 to 8192 pixels are possible",
-                            scenario.sensor.width_px, scenario.sensor.height_px));
+  if (!limits::kSensorPx.contains(scenario.sensor.width_px) ||
+      !limits::kSensorPx.contains(scenario.sensor.height_px)) {
+    return fail(fmt::format("sensor format {} x {}: {} to {} pixels are possible",
+                            scenario.sensor.width_px, scenario.sensor.height_px,
+                            limits::kSensorPx.lo, limits::kSensorPx.hi));
   }
-  if (!(scenario.sensor.fov_h_rad > 0.0 && scenario.sensor.fov_h_rad < 0.95 * physics::kPi)) {
-    return fail("sensor field of view must lie between 0 and 171 degrees");
+  // A scenario's degrees and back may round beyond the limit by a bit.
+  const double fov_h_deg = scenario.sensor.fov_h_rad / physics::kDegree;
+  if (!(fov_h_deg > 0.0 && fov_h_deg <= limits::kFieldOfViewDeg.hi + 1e-9)) {
+    return fail(fmt::format("sensor field of view of {} degrees: above 0 to {} are possible",
+                            fov_h_deg, limits::kFieldOfViewDeg.hi));
   }
-  if (thermal.steps < 1 || thermal.steps > 4096) {
-    return fail(fmt::format("thermal steps {}: 1 to 4096 are possible", thermal.steps));
-  }
-  if (thermal.max_cascades < 1 || thermal.max_cascades > EMIT_MAX_CASCADES) {
-    return fail(
-        fmt::format("{} cascades: 1 to {} are possible", thermal.max_cascades, EMIT_MAX_CASCADES));
-  }
-  if (thermal.shadow_map_px < 16 || thermal.shadow_map_px > 16384) {
-    return fail(
-        fmt::format("shadow map of {} px: 16 to 16384 are possible", thermal.shadow_map_px));
-  }
-  if (thermal.blocker_taps < 1 || thermal.blocker_taps > EMIT_MAX_TAPS || thermal.filter_taps < 1 ||
-      thermal.filter_taps > EMIT_MAX_TAPS) {
-    return fail(fmt::format("shadow taps {} + {}: 1 to {} each are possible", thermal.blocker_taps,
-                            thermal.filter_taps, EMIT_MAX_TAPS));
+  const auto check = [&fail](std::string_view what, std::uint32_t value,
+                             const limits::Count& count) -> Result<void> {
+    if (count.contains(value)) return {};
+    return fail(fmt::format("{} {}: {} to {} are possible", what, value, count.lo, count.hi));
+  };
+  for (const auto& checked :
+       {check("thermal.steps", thermal.steps, limits::kHistorySteps),
+        check("thermal.max_cascades", thermal.max_cascades, limits::kCascades),
+        check("thermal.shadow_map_px", thermal.shadow_map_px, limits::kShadowMapPx),
+        check("thermal.blocker_taps", thermal.blocker_taps, limits::kShadowTaps),
+        check("thermal.filter_taps", thermal.filter_taps, limits::kShadowTaps)}) {
+    if (!checked) return checked;
   }
   if (output.slots < 2 || output.slots > ReadbackRing::kMaxSlots) {
     return fail(fmt::format("{} read-back slots: 2 to {} are possible", output.slots,
@@ -111,6 +122,7 @@ class GlRenderer final : public Renderer {
                                            const WarmUpProgress& progress) {
     auto ready = stage_->warm_up(first, progress);
     if (ready) stage_->describe(scene_stats_);
+    scene_stats_.first_frame_warnings = first_frame_warnings(scenario_, first.thermal_time_ns);
     warm_ = warm_ || ready.has_value();
     return ready;
   }
@@ -192,7 +204,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       context_(std::move(context)),
       scene_stats_{.triangles = geometry.triangles,
                    .instances = static_cast<std::uint32_t>(geometry.instances.size()),
-                   .warnings = geometry.warnings},
+                   .warnings = scenario.warnings},
       history_{Environment(scenario), {}},
       bands_(std::move(bands)),
       passes_(std::move(passes)),
@@ -206,6 +218,8 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       readback_(output.slots, output_buffer_.bytes()),
       views_(output.slots),
       clock_(output.stage_timing) {
+  scene_stats_.warnings.insert(scene_stats_.warnings.end(), geometry.warnings.begin(),
+                               geometry.warnings.end());
   for (const scene::ObjectDesc& object : scenario_.objects) {
     if (object.entity_id == 0) continue;
     entity_ids_.push_back(object.entity_id);
@@ -215,7 +229,7 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
   frame_params_.picture_px = glm::uvec4(scenario_.sensor.width_px, scenario_.sensor.height_px,
                                         static_cast<std::uint32_t>(plane_px), 0U);
   frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
-                                       static_cast<float>(kReferenceK),
+                                       static_cast<float>(physics::kReferenceK),
                                        static_cast<float>(scenario_.thermal.tolerance_k), 0.0F);
   frame_params_.samples.y = static_cast<float>(scenario_.sensor.near_m);
   frame_params_.bands = glm::uvec4(bands_.nodes_per_band(), bands_.first_emissivity(), 0U, 0U);

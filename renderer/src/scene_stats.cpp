@@ -3,8 +3,8 @@
 
 namespace emit::renderer {
 
-std::vector<std::string> sampling_warnings(const SceneStats& stats) {
-  std::vector<std::string> out;
+std::vector<std::string> warm_up_warnings(const SceneStats& stats) {
+  std::vector<std::string> out = stats.first_frame_warnings;
   if (stats.samples_full) {
     out.emplace_back(
         "thermal.max_samples stopped the refinement: shadows are coarser than tolerance_k asks");

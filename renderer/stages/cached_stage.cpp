@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "emit/physics/constants.hpp"
 #include "emit/scene/simplify.hpp"
 #include "history/foster_setup.hpp"
 #include "surface/rays/coarse_geometry.hpp"
@@ -117,9 +118,10 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
                                 scenario.thermal.max_samples);
   if (!coarse) return tl::unexpected(std::move(coarse.error()));
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
-  auto surface = CachedSurface::create(
-      scenario, std::move(coarse->geometry), histories_of_objects(scenario),
-      std::span(foster_materials).first(simulated), kReferenceK, std::move(coarse->detail));
+  auto surface =
+      CachedSurface::create(scenario, std::move(coarse->geometry), histories_of_objects(scenario),
+                            std::span(foster_materials).first(simulated), physics::kReferenceK,
+                            std::move(coarse->detail));
   if (!surface) return tl::unexpected(std::move(surface.error()));
   std::optional<ShadePass> shade_pass;
   if (!history.entities.empty()) {
@@ -145,8 +147,9 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
       history_of_object_(histories_of_objects(scenario)),
       history_(history),
       plan_(scenario.thermal),
-      surface_history_(scenario.thermal.steps, make_foster(scenario, std::move(foster_materials),
-                                                           history.environment, kReferenceK)),
+      surface_history_(scenario.thermal.steps,
+                       make_foster(scenario, std::move(foster_materials), history.environment,
+                                   physics::kReferenceK)),
       surface_(std::move(surface)),
       saved_(std::move(saved)),
       shade_pass_(std::move(shade_pass)) {}

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "emit/physics/constants.hpp"
 #include "stages/band_model.hpp"
 
 namespace emit::renderer {
@@ -21,7 +22,8 @@ gl::Buffer make_tap_buffer(const scene::ThermalOptions& options) {
 std::vector<gpu::MaterialParams> make_material_params(const scene::ScenarioDesc& scenario,
                                                       std::span<const scene::Material> materials,
                                                       const std::optional<FosterHistory>& foster) {
-  std::vector<gpu::MaterialParams> params = material_params(materials, scenario, kReferenceK);
+  std::vector<gpu::MaterialParams> params =
+      material_params(materials, scenario, physics::kReferenceK);
   add_resistances(foster, params);
   return params;
 }
@@ -51,7 +53,8 @@ PerFrameStage::PerFrameStage(const scene::ScenarioDesc& scenario, scene::SceneGe
       history_(history),
       materials_(geometry.materials),
       plan_(scenario.thermal),
-      foster_(make_foster(scenario, std::move(foster_materials), history.environment, kReferenceK)),
+      foster_(make_foster(scenario, std::move(foster_materials), history.environment,
+                          physics::kReferenceK)),
       tail_steps_(foster_ ? static_cast<std::uint32_t>(foster_->tail().size()) : 0),
       drawn_(std::move(geometry), histories_of_objects(scenario),
              (scenario.thermal.steps + 1) * scenario.thermal.max_cascades),
@@ -89,7 +92,7 @@ void PerFrameStage::prepare_foster(bool table_changed) noexcept {
   const auto materials = foster_->materials();
   const std::size_t stride = materials.size() * (EMIT_FOSTER_LEVELS + 1);
   const auto set = [&](const IntervalForcing& forcing, std::size_t entry, gpu::StepParams& params) {
-    set_foster_forcing(forcing, kReferenceK, params);
+    set_foster_forcing(forcing, physics::kReferenceK, params);
     set_foster_gains(forcing.dt_s, materials,
                      std::span(relaxation_params_).subspan(entry * stride, stride));
     params.info.y = static_cast<std::uint32_t>(entry * stride);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
@@ -11,14 +12,11 @@
 #include "gl/objects.hpp"
 #include "history/environment.hpp"
 #include "history/pose_history.hpp"
+#include "shared/frame_params.glsl.h"
 #include "stages/drawn_scene.hpp"
 #include "stages/frame_setup.hpp"
-#include "shared/frame_params.glsl.h"
 
 namespace emit::renderer {
-
-/// Temperatures on the device are offsets from here: float32 then resolves micro-kelvins.
-inline constexpr double kReferenceK = 295.0;
 
 /// Time per stage. Enabled, it waits for the device at every mark.
 class StageClock {

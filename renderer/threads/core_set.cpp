@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "threads/core_set.hpp"
 
+#include "emit/physics/check.hpp"
+
 namespace emit::threads {
 
 CoreSet CoreSet::of(pid_t thread) noexcept {
@@ -16,6 +18,7 @@ CoreSet CoreSet::without(int core) const noexcept {
 }
 
 CoreSet CoreSet::only(std::size_t index) const noexcept {
+  EMIT_CHECK_OP(index, <, static_cast<std::size_t>(count()));
   CoreSet one;
   std::size_t core = 0;
   for (std::size_t left = index; !CPU_ISSET(core, &cores_) || left-- > 0;) ++core;

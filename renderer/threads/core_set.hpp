@@ -7,22 +7,26 @@
 
 namespace emit::threads {
 
-/// Cores of this machine, by the numbers that the kernel gives them.
+/// Set of cores of this machine, by the numbers that the kernel gives them.
+/// Thread: any number of threads may call const functions.  Real time: RT-safe; of() and give_to()
+/// make one system call.
 class CoreSet {
  public:
   CoreSet() noexcept { CPU_ZERO(&cores_); }
-  /// Where a thread may run, 0 = the caller; empty where the kernel does not say, as for one that
-  /// has ended.
+  /// Returns the cores on which a thread may run; 0 is the calling thread. The set is empty when
+  /// the kernel does not answer, for example for a thread that has ended.
   [[nodiscard]] static CoreSet of(pid_t thread) noexcept;
 
   [[nodiscard]] int count() const noexcept { return CPU_COUNT(&cores_); }
-  /// `core` < 0, as when sched_getcpu() fails: all.
+  /// Returns the set without one core. A negative `core`, as sched_getcpu() returns on failure,
+  /// removes none.
   [[nodiscard]] CoreSet without(int core) const noexcept;
-  /// One of them alone, the `index`th from below. Precondition: index < count().
+  /// Returns a set that holds one core alone: the `index`th of this set, in ascending order.
+  /// @pre index < count()
   [[nodiscard]] CoreSet only(std::size_t index) const noexcept;
 
-  /// From now on the thread runs here; where it runs elsewhere it is moved at once. An empty set,
-  /// and what the kernel refuses, change nothing. Real time: one system call.
+  /// Restricts a thread to these cores. The kernel moves it at once when it runs on another core.
+  /// Nothing changes when the set is empty or the kernel refuses.
   void give_to(pid_t thread) const noexcept;
 
   [[nodiscard]] bool operator==(const CoreSet& other) const noexcept {

@@ -18,18 +18,19 @@
 namespace emit::threads {
 namespace {
 
-/// What Mesa calls its raster threads, followed by their numbers.
+/// Prefix of the names of Mesa's raster threads. Their number follows.
 constexpr std::string_view kRasterName = "llvmpipe-";
-/// Inherited by the threads that it leaves unnamed.
+/// Name that the threads inherit which Mesa leaves unnamed.
 constexpr const char* kComputeName = "mesa-compute";
 
-/// One thread per core, in their order.
+/// Gives each thread a core of its own, in ascending order.
 void spread_over(const CoreSet& cores, const std::vector<pid_t>& threads) noexcept {
   for (std::size_t i = 0; i < threads.size(); ++i) {
     cores.only(i).give_to(threads[i]);
   }
 }
 
+/// Returns the decimal number that the text consists of, or -1.
 int number_in(std::string_view digits) noexcept {
   int number = -1;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
@@ -52,12 +53,12 @@ SoftwareThreads SoftwareThreads::find() {
   found.cores_ = CoreSet::of(0);
   const auto cores = static_cast<std::size_t>(found.cores_.count());
   if (cores < 2) return found;
-  // Those that draw name themselves when they first run, as do others of Mesa, which on a busy host
-  // is later than this.
-  constexpr int kMostLooks = 500;
+  // Raster threads take their names when they first run, like other threads of Mesa. On a busy host
+  // that happens after this call began.
+  constexpr int kMaxAttempts = 500;
   const auto fit = [&] { return found.raster_.size() == cores && found.compute_.size() == cores; };
-  for (int look = 0; look < kMostLooks; ++look) {
-    found.look_for_them();
+  for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
+    found.list_threads();
     if (fit() || found.raster_.size() + found.compute_.size() < 2 * cores) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
@@ -67,10 +68,10 @@ SoftwareThreads SoftwareThreads::find() {
   return found;
 }
 
-void SoftwareThreads::look_for_them() {
+void SoftwareThreads::list_threads() {
   raster_.clear();
   compute_.clear();
-  std::vector<std::pair<int, pid_t>> raster;  // number, thread
+  std::vector<std::pair<int, pid_t>> raster;  // number of the thread, id of the thread
   std::error_code error;
   for (std::filesystem::directory_iterator task("/proc/self/task", error), end;
        !error && task != end; task.increment(error)) {

@@ -9,15 +9,17 @@
 
 namespace emit::threads {
 
-/// The threads on which Mesa's llvmpipe draws and computes, one of each per core, and where they
-/// run. Left to the kernel, two that are woken at once often queue on one core while another has
-/// nothing to do, up to a tick of 4 ms: all of them wait for the last of each batch and dispatch.
+/// Threads on which Mesa's llvmpipe draws and computes, one of each kind per core, and the cores on
+/// which they run. When the kernel places them, two threads that are woken together often queue on
+/// one core while another is idle, for up to a tick of 4 ms. All threads then wait for the last one
+/// of each batch and dispatch.
 ///
-/// Owner: EglContext. Thread: the one that submits. The driver shares its threads among contexts.
+/// Owner: EglContext. The driver shares its threads among contexts.
+/// Thread: the one that submits.
 class SoftwareThreads {
  public:
-  /// While one lives, threads that the calling thread starts are named so that find() knows those
-  /// to which Mesa gives no name of their own.
+  /// Scope in which the calling thread has a name that its new threads inherit, so that find()
+  /// recognises those to which Mesa gives no name.
   class Naming {
    public:
     Naming() noexcept;
@@ -30,25 +32,29 @@ class SoftwareThreads {
   };
 
   SoftwareThreads() = default;
-  /// Those of this process that Mesa started under a Naming; none unless there are as many as the
-  /// caller has cores, at least two. Gives each compute thread its core. Waits until they have
-  /// their names, half a second at most.
+  /// Finds the threads of this process that Mesa started within a Naming, and gives each compute
+  /// thread a core of its own. A kind is empty unless it has as many threads as the caller has
+  /// cores, at least two. The call waits until the threads have their names, half a second at most.
+  /// Real time: setup only.
   [[nodiscard]] static SoftwareThreads find();
 
-  /// Around draws: while the caller submits them, tiles are filled on the other cores; while it
-  /// waits for what it has flushed, on all. Real time: a system call per thread and call.
+  /// Moves the raster threads away from the caller's core. Call it before submitting draws: tiles
+  /// are then filled on the other cores while the caller submits. Real time: one system call per
+  /// thread.
   void leave_core_to_caller() const noexcept;
+  /// Gives each raster thread a core of its own again. Call it before waiting for submitted draws.
+  /// Real time: one system call per thread.
   void spread() const noexcept;
 
   [[nodiscard]] const std::vector<pid_t>& raster() const noexcept { return raster_; }
   [[nodiscard]] const std::vector<pid_t>& compute() const noexcept { return compute_; }
 
  private:
-  void look_for_them();
+  void list_threads();
 
   CoreSet cores_;
-  std::vector<pid_t> raster_;   ///< in the order of their numbers
-  std::vector<pid_t> compute_;  ///< ascending
+  std::vector<pid_t> raster_;   ///< raster threads, in the order of their numbers
+  std::vector<pid_t> compute_;  ///< compute threads, ascending
 };
 
 }  // namespace emit::threads

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::threads {
 
 WorkerPool::WorkerPool(unsigned int threads) : cores_(CoreSet::of(0)) {
@@ -15,7 +17,7 @@ WorkerPool::WorkerPool(unsigned int threads) : cores_(CoreSet::of(0)) {
   try {
     for (unsigned int i = 1; i < threads; ++i) threads_.emplace_back([this] { work(); });
   } catch (const std::system_error&) {
-    // The system has no more: results do not depend on how many there are.
+    // The system has no more threads. Results do not depend on their number.
   }
 }
 
@@ -43,6 +45,7 @@ void WorkerPool::take_parts(const Loop& loop) noexcept {
 }
 
 void WorkerPool::run_loop(const Loop& loop) noexcept {
+  EMIT_CHECK_OP(loop.grain, >, 0U);
   if (loop.count == 0) return;
   if (loop.count <= loop.grain || threads_.empty()) {
     for (std::size_t begin = 0; begin < loop.count; begin += loop.grain) {

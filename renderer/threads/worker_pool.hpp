@@ -13,28 +13,30 @@
 
 namespace emit::threads {
 
-/// Threads that share loops with the one that calls: for work inside frames, where nothing may
-/// allocate. They sleep while there is none, and a call waits for no thread that has not begun.
-/// Where each can have a core of the constructing thread's they stay off the one that calls: the
-/// kernel may wake them there, to wait behind the caller.
+/// Pool of threads that share loops with the calling thread, for work within frames, where nothing
+/// may allocate. The threads sleep while there is no work, and a call does not wait for a thread
+/// that has not begun. While there is a core for each thread, they stay off the caller's core,
+/// because the kernel may wake them there and let them wait behind the caller.
 ///
-/// Owner: whoever calls run(), one thread at a time. Real time: run() allocates nothing, takes a
-/// lock that is held for an instant only, and wakes threads, which it moves when the caller has
-/// come to another core; construction is setup.
+/// Owner: the thread that calls run(), one thread at a time. Real time: construction is setup.
+/// run() allocates nothing. It takes a lock that is held only briefly, and wakes the threads; it
+/// moves them when the caller has changed its core.
 class WorkerPool {
  public:
-  /// `threads` in all, the caller among them; at least 1.
+  /// Starts the pool. `threads` is the total number, including the caller; 0 counts as 1. When the
+  /// system refuses a thread, the pool is smaller.
   explicit WorkerPool(unsigned int threads);
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
   ~WorkerPool();
 
-  /// As many threads as the process may run on.
+  /// Returns the number of cores on which the process may run, at least 1.
   [[nodiscard]] static unsigned int all_cores() noexcept;
 
-  /// body(begin, end) over parts of [0, count) of at most `grain` >= 1. The parts go to whoever is
-  /// free: bodies must not depend on them. What the caller wrote before is read by the bodies and
-  /// the other way round. Bodies must not throw.
+  /// Calls body(begin, end) for parts of [0, count) of at most `grain` indices. Any free thread
+  /// takes the next part, so a result must not depend on the parts. Bodies see what the caller
+  /// wrote before the call, and the caller sees what they wrote. Bodies must not throw.
+  /// @pre grain > 0
   template <class Body>
   void run(std::size_t count, std::size_t grain, const Body& body) noexcept {
     run_loop({[](const void* self, std::size_t begin, std::size_t end) {
@@ -44,6 +46,7 @@ class WorkerPool {
   }
 
  private:
+  /// Loop in work.
   struct Loop {
     void (*call)(const void* body, std::size_t begin, std::size_t end) = nullptr;
     const void* body = nullptr;
@@ -51,7 +54,7 @@ class WorkerPool {
     std::size_t grain = 1;
   };
   void run_loop(const Loop& loop) noexcept;
-  /// Takes parts of the open loop until none is left.
+  /// Executes parts of the open loop until none is left.
   void take_parts(const Loop& loop) noexcept;
   void work() noexcept;
   void leave_core_to_caller() noexcept;
@@ -59,15 +62,16 @@ class WorkerPool {
   std::mutex mutex_;
   std::condition_variable begun_;
   std::condition_variable left_;
-  Loop loop_;                      ///< guarded by mutex_, like the next four
-  unsigned long long number_ = 0;  ///< of the loop
-  bool open_ = false;              ///< threads may enter the loop
-  unsigned int inside_ = 0;        ///< threads, the caller not counted
+  Loop loop_;                      ///< guarded by mutex_, like the next four members
+  unsigned long long number_ = 0;  ///< number of the loop, from 1
+  bool open_ = false;              ///< true while threads may enter the loop
+  unsigned int inside_ = 0;        ///< number of threads in the loop, without the caller
   bool stop_ = false;
   std::atomic<std::size_t> next_{0};  ///< first index of the next part
   CoreSet cores_;
-  std::vector<pid_t> ids_;  ///< of the threads that have come up; guarded by mutex_
-  int left_core_ = -1;      ///< where `placed_` of them do not run
+  std::vector<pid_t> ids_;  ///< ids of the threads that have started; guarded by mutex_
+  /// Core that the first `placed_` threads of ids_ avoid; -1: none yet.
+  int left_core_ = -1;
   std::size_t placed_ = 0;
   std::vector<std::thread> threads_;
 };

@@ -8,7 +8,7 @@
 #include "agents/agent.hpp"
 #include "rt/clock.hpp"
 #include "rt/fd.hpp"
-#include "rt/realtime.hpp"
+#include "host/realtime.hpp"
 #include "telemetry/duty_cycle.hpp"
 
 namespace emit::server {

@@ -328,7 +328,7 @@ void DaemonImpl::tell_scene(const renderer::SceneStats& scene) {
     std::ranges::replace(text, '"', '\'');
     warn(fmt::format("event=scene_warning text=\"{}\"", text));
   }
-  for (const std::string& text : renderer::sampling_warnings(scene)) {
+  for (const std::string& text : renderer::warm_up_warnings(scene)) {
     warn(fmt::format("event=scene_warning text=\"{}\"", text));
   }
 }

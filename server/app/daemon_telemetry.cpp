@@ -59,14 +59,14 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   answers.trace = [this] { return chrome_trace(context_.trace.entries()); };
   answers.ready = [this] { return serving_.load(std::memory_order_acquire); };
   answers.admits = [this](const SocketAddress& peer) {
-    const config::IpAddress ip = ip_of(peer);
+    const protocol::IpAddress ip = ip_of(peer);
     if (receiver_->may_connect(ip)) {
       return true;
     }
     context_.counters.add(Counter::peers_refused);
     context_.metrics_events.push(EventKind::peer_refused,
                                  static_cast<std::uint64_t>(PeerRefusal::not_allowed), 0,
-                                 config::to_string(ip));
+                                 protocol::to_string(ip));
     return false;
   };
   answers.healthy = [this] {

@@ -168,6 +168,11 @@ int serve(const Arguments& arguments, const char* program) {
       fail(program, physics::Error(checked.error()).with_context(arguments.config_file));
       return kExitConfig;
     }
+    if (scenario) {
+      for (const std::string& text : scenario->warnings) {
+        fmt::print(stderr, "{}: warning: {}\n", program, text);
+      }
+    }
     fmt::print("{}: ok\n", arguments.config_file);
     return 0;
   }

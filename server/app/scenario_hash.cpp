@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
 #include <array>
-#include <boost/property_tree/json_parser.hpp>
-#include <boost/property_tree/ptree.hpp>
 #include <charconv>
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <sstream>
 #include <vector>
 
 #include "app/replay.hpp"
@@ -98,22 +97,22 @@ std::string percent_decoded(const std::string& uri) {
 /// is rendered from them.
 Result<std::vector<fs::path>> buffer_files(const fs::path& gltf) {
   std::vector<fs::path> out;
-  try {
-    std::istringstream text(json_of(gltf));
-    boost::property_tree::ptree root;
-    boost::property_tree::read_json(text, root);
-    const auto buffers = root.get_child_optional("buffers");
-    if (!buffers) {
-      return out;
+  google::protobuf::Struct root;
+  if (const auto status = google::protobuf::util::JsonStringToMessage(json_of(gltf), &root);
+      !status.ok()) {
+    return make_error(ErrorCode::parse, fmt::format("{}: {}", gltf.string(), status.ToString()));
+  }
+  const auto buffers = root.fields().find("buffers");
+  if (buffers == root.fields().end()) return out;
+  for (const auto& buffer : buffers->second.list_value().values()) {
+    const auto& fields = buffer.struct_value().fields();
+    const auto uri = fields.find("uri");
+    if (uri == fields.end() || uri->second.string_value().empty() ||
+        uri->second.string_value().starts_with("data:")) {
+      continue;
     }
-    for (const auto& [key, buffer] : *buffers) {
-      const auto uri = buffer.get_optional<std::string>("uri");
-      if (uri && !uri->starts_with("data:")) {
-        out.push_back((gltf.parent_path() / percent_decoded(*uri)).lexically_normal());
-      }
-    }
-  } catch (const std::exception& error) {
-    return make_error(ErrorCode::parse, fmt::format("{}: {}", gltf.string(), error.what()));
+    out.push_back(
+        (gltf.parent_path() / percent_decoded(uri->second.string_value())).lexically_normal());
   }
   return out;
 }

@@ -1,28 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <array>
 #include <cstddef>
-#include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 
+// OpenSSL's digest context; only sha256.cpp includes OpenSSL.
+struct evp_md_ctx_st;
+
 namespace emit::server {
 
-/// SHA-256 (FIPS 180-4), to tell scenarios apart.
+/// SHA-256 (FIPS 180-4) of bytes that come in parts. It tells scenarios apart. OpenSSL computes it.
 class Sha256 {
  public:
+  Sha256();
   void update(std::span<const std::byte> bytes) noexcept;
-  /// Lower-case hex. Once.
+  /// Returns the digest as 64 lower-case hexadecimal digits.
+  /// @pre finish() was not called before.
   [[nodiscard]] std::string finish();
 
  private:
-  void block(const std::byte* data) noexcept;
-
-  std::array<std::uint32_t, 8> state_{0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
-                                      0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-  std::array<std::byte, 64> pending_{};
-  std::size_t pending_bytes_ = 0;
-  std::uint64_t total_bytes_ = 0;
+  struct Free {
+    void operator()(evp_md_ctx_st* context) const noexcept;
+  };
+  std::unique_ptr<evp_md_ctx_st, Free> context_;
 };
 
 }  // namespace emit::server

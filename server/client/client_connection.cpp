@@ -9,7 +9,7 @@
 #include <cstring>
 #include <ctime>
 
-#include "emit/config/daemon_config.hpp"
+#include "emit/protocol/shared_ring.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
@@ -98,7 +98,7 @@ physics::Result<Url> parse_frame_url(const std::string& text) {
   constexpr std::string_view kShm = "shm://";
   if (text.starts_with(kShm)) {
     Url url{Url::Scheme::shm, text.substr(kShm.size()), 0};
-    if (!config::is_shm_name(url.host)) {
+    if (!protocol::is_shm_name(url.host)) {
       return make_error(ErrorCode::invalid_argument,
                         fmt::format("'{}': not shm://name, a name as stream.shm takes it", text));
     }

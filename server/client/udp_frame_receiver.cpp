@@ -163,7 +163,7 @@ void UdpFrameReceiver::bring_together(std::size_t index) noexcept {
 
 bool UdpFrameReceiver::from_peer(std::size_t index) const noexcept {
   // A stream to a group may be of another family than the control connection.
-  const config::IpAddress source = server::ip_of(sources_[index]);
+  const protocol::IpAddress source = server::ip_of(sources_[index]);
   return source == peer_ || source.v4 != peer_.v4;
 }
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "emit/config/network.hpp"
+#include "emit/protocol/ip_address.hpp"
 #include "emit/protocol/reassembler.hpp"
 #include "emit/client/client.hpp"
 #include "net/socket.hpp"
@@ -82,7 +82,7 @@ class UdpFrameReceiver {
   void push_data(std::size_t index, protocol::Reassembler& reassembler, ReceiveCounters& counters);
 
   server::UdpSocket socket_;
-  config::IpAddress peer_;
+  protocol::IpAddress peer_;
   std::uint16_t stream_id_ = 0;
   bool drained_ = true;
   std::uint64_t misplaced_ = 0;

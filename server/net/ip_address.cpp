@@ -5,10 +5,10 @@
 
 namespace emit::server {
 
-config::IpAddress ip_of(const sockaddr_storage& address) noexcept {
+protocol::IpAddress ip_of(const sockaddr_storage& address) noexcept {
   if (address.ss_family == AF_INET6) {
     const auto& v6 = reinterpret_cast<const sockaddr_in6&>(address);
-    return config::ip_from_bytes(v6.sin6_addr.s6_addr);
+    return protocol::ip_from_bytes(v6.sin6_addr.s6_addr);
   }
   // Anything but an internet address: 0.0.0.0, which is in no network that one would allow.
   const auto& v4 = reinterpret_cast<const sockaddr_in&>(address);
@@ -16,10 +16,10 @@ config::IpAddress ip_of(const sockaddr_storage& address) noexcept {
   const std::array<std::uint8_t, 4> bytes{
       static_cast<std::uint8_t>(bits >> 24U), static_cast<std::uint8_t>(bits >> 16U),
       static_cast<std::uint8_t>(bits >> 8U), static_cast<std::uint8_t>(bits)};
-  return config::ip_from_bytes(bytes);
+  return protocol::ip_from_bytes(bytes);
 }
 
-config::IpAddress ip_of(const SocketAddress& address) noexcept {
+protocol::IpAddress ip_of(const SocketAddress& address) noexcept {
   return ip_of(address.storage);
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "emit/config/network.hpp"
+#include "emit/protocol/ip_address.hpp"
 #include "net/socket_address.hpp"
 
 namespace emit::server {
 
 /// Without the port. Thread: any. RT-safe.
-[[nodiscard]] config::IpAddress ip_of(const SocketAddress& address) noexcept;
+[[nodiscard]] protocol::IpAddress ip_of(const SocketAddress& address) noexcept;
 /// From what the kernel filled in.
-[[nodiscard]] config::IpAddress ip_of(const sockaddr_storage& address) noexcept;
+[[nodiscard]] protocol::IpAddress ip_of(const sockaddr_storage& address) noexcept;
 
 }  // namespace emit::server

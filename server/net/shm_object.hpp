@@ -27,11 +27,11 @@ class ShmObject {
   [[nodiscard]] static physics::Result<ShmObject> create(std::uint64_t bytes, std::uint32_t mode);
   /// Gives the memory its name: from here on readers find it, complete. What a crashed process left
   /// under that name is replaced. Errors (io): a living process has it.
-  /// Precondition: config::is_shm_name(name).
+  /// Precondition: protocol::is_shm_name(name).
   [[nodiscard]] physics::Result<void> publish(std::string_view name);
 
   /// Maps what is under that name, read-only, and tells its maker that somebody reads. Errors:
-  /// not_found, io (not permitted; its maker has gone). Precondition: config::is_shm_name(name).
+  /// not_found, io (not permitted; its maker has gone). Precondition: protocol::is_shm_name(name).
   [[nodiscard]] static physics::Result<ShmObject> open(std::string_view name);
   /// True while the process that made it lives and has it open. One system call.
   [[nodiscard]] bool alive() const noexcept;

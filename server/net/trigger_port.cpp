@@ -31,9 +31,9 @@ physics::Result<std::unique_ptr<TriggerPort>> TriggerPort::open(
   if (!where) return named(where.error(), "trigger.udp");
   const auto address = resolve(*where, Transport::udp, true);
   if (!address) return named(address.error(), "trigger.udp");
-  std::optional<config::IpAddress> from;
+  std::optional<protocol::IpAddress> from;
   if (!peer.empty()) {
-    from = config::parse_ip(peer);
+    from = protocol::parse_ip(peer);
     if (!from) {
       return make_error(ErrorCode::config, fmt::format("trigger.peer: '{}' is no address", peer));
     }
@@ -67,7 +67,7 @@ std::string_view TriggerPort::take_unauthenticated() noexcept {
   return written ? std::string_view(text_.data()) : std::string_view("?");
 }
 
-bool TriggerPort::accept(std::span<const std::byte> datagram, const config::IpAddress& from,
+bool TriggerPort::accept(std::span<const std::byte> datagram, const protocol::IpAddress& from,
                          ReceivedTrigger& out) noexcept {
   using Verdict = protocol::TriggerSeal::Verdict;
   if (peer_ && from != *peer_) {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "emit/config/network.hpp"
+#include "emit/protocol/ip_address.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/protocol/trigger.hpp"
 #include "emit/protocol/trigger_seal.hpp"
@@ -63,20 +63,20 @@ class TriggerPort final : public TriggerInput {
   [[nodiscard]] SocketAddress address() const noexcept { return socket_.local_address(); }
 
  private:
-  TriggerPort(UdpSocket socket, const std::optional<config::IpAddress>& peer,
+  TriggerPort(UdpSocket socket, const std::optional<protocol::IpAddress>& peer,
               std::optional<protocol::TriggerSeal> seal, const Clock& clock, Counters& counters)
       : socket_(std::move(socket)),
         peer_(peer),
         seal_(std::move(seal)),
         clock_(clock),
         counters_(counters) {}
-  bool accept(std::span<const std::byte> datagram, const config::IpAddress& from,
+  bool accept(std::span<const std::byte> datagram, const protocol::IpAddress& from,
               ReceivedTrigger& out) noexcept;
 
   UdpSocket socket_;
-  std::optional<config::IpAddress> peer_;  // none: any
+  std::optional<protocol::IpAddress> peer_;  // none: any
   std::optional<protocol::TriggerSeal> seal_;
-  std::optional<config::IpAddress> unauthenticated_;
+  std::optional<protocol::IpAddress> unauthenticated_;
   std::array<char, 46> text_{};  // what take_unauthenticated() gave away
   const Clock& clock_;
   Counters& counters_;

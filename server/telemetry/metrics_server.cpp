@@ -35,7 +35,8 @@ Response answer_to(const http::request<http::empty_body>& request,
   Response response(http::status::ok, request.version());
   response.keep_alive(false);
   response.set(http::field::content_type, "text/plain; version=0.0.4; charset=utf-8");
-  const auto target = request.target();
+  // Scrapers add parameters to the path; no answer depends on them.
+  const auto target = request.target().substr(0, request.target().find('?'));
   const auto say_whether = [&](bool good) {
     response.result(good ? http::status::ok : http::status::service_unavailable);
     response.body() = good ? "yes\n" : "no\n";

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "rt/connection_key.hpp"
+
 namespace emit::server {
 namespace {
 

@@ -12,7 +12,7 @@
 #include "rt/counters.hpp"
 #include "rt/histogram.hpp"
 #include "rt/prediction_error.hpp"
-#include "rt/realtime.hpp"
+#include "host/realtime.hpp"
 #include "telemetry/duty_cycle.hpp"
 #include "telemetry/ptp_status.hpp"
 #include "telemetry/status_board.hpp"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "telemetry/status_board.hpp"
 
+#include "rt/connection_key.hpp"
+
 namespace emit::server {
 
 void StatusBoard::note(const Event& event) {

@@ -7,7 +7,7 @@ namespace {
 const std::string kCanned = "[source]\nkind = \"canned\"\n";
 
 bool holds(std::string_view network, std::string_view address) {
-  return parse_network(network)->contains(*parse_ip(address));
+  return protocol::parse_network(network)->contains(*protocol::parse_ip(address));
 }
 
 TEST(Network, HoldsTheAddressesThatBeginAlike) {
@@ -36,9 +36,9 @@ TEST(Network, MappedAddressesAreIpv4) {
 
 // Against arithmetic on the whole address.
 TEST(Network, EveryPrefixLengthCutsAtItsBit) {
-  const IpAddress address = *parse_ip("170.170.170.170");
+  const protocol::IpAddress address = *protocol::parse_ip("170.170.170.170");
   for (unsigned bits = 1; bits <= 32; ++bits) {
-    Network network;
+    protocol::Network network;
     network.prefix_bits = static_cast<std::uint8_t>(bits);
     const std::uint32_t mask = ~std::uint32_t{0} << (32 - bits);
     for (unsigned byte = 0; byte < 4; ++byte) {
@@ -46,7 +46,7 @@ TEST(Network, EveryPrefixLengthCutsAtItsBit) {
           static_cast<std::uint8_t>((0xAAAAAAAAU & mask) >> (24 - 8 * byte));
     }
     for (unsigned flipped = 0; flipped < 32; ++flipped) {
-      IpAddress other = address;
+      protocol::IpAddress other = address;
       other.bytes[flipped / 8] ^= static_cast<std::uint8_t>(0x80U >> (flipped % 8));
       EXPECT_EQ(network.contains(other), flipped >= bits) << bits << " " << flipped;
     }
@@ -55,10 +55,10 @@ TEST(Network, EveryPrefixLengthCutsAtItsBit) {
 
 TEST(Network, LoopbackIsRecognised) {
   for (const char* text : {"127.0.0.1", "127.9.9.9", "::1", "::ffff:127.0.0.1"}) {
-    EXPECT_TRUE(parse_ip(text)->is_loopback()) << text;
+    EXPECT_TRUE(protocol::parse_ip(text)->is_loopback()) << text;
   }
   for (const char* text : {"0.0.0.0", "10.0.0.1", "::", "::2", "::ffff:10.0.0.1", "fe80::1"}) {
-    EXPECT_FALSE(parse_ip(text)->is_loopback()) << text;
+    EXPECT_FALSE(protocol::parse_ip(text)->is_loopback()) << text;
   }
 }
 
@@ -66,11 +66,11 @@ TEST(Network, WhatIsNoneIsRefusedByName) {
   for (const char* text : {"", "/8", "10.0.0.0/", "10.0.0.0/33", "10.0.0/8", "10.0.0.0/-1",
                            "10.0.0.0/8 ", "fd00::/129", "::ffff:10.0.0.0/95", "rig", "10.0.0.0/8/8",
                            "1111:2222:3333:4444:5555:6666:7777:8888:9999"}) {
-    const auto network = parse_network(text);
+    const auto network = protocol::parse_network(text);
     ASSERT_FALSE(network.has_value()) << text;
     EXPECT_EQ(network.error().text.find(std::string("'").append(text).append("'")), 0U);
   }
-  EXPECT_EQ(parse_network("10.0.0.5/8").error().text,
+  EXPECT_EQ(protocol::parse_network("10.0.0.5/8").error().text,
             "'10.0.0.5/8' is not a network: bits are set behind the prefix; did you mean "
             "10.0.0.0/8?");
 }

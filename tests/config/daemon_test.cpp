@@ -166,7 +166,7 @@ TEST_F(ConfigTest, an_unknown_scenario_is_reported_where_it_is_named) {
 TEST_F(ConfigTest, file_environment_and_set_apply_in_that_order) {
   const std::string text = kCanned + "[pacing]\nrate_hz = 10\nhorizon_ms = 11\nbudget_ms = 12\n";
   options_.environment = {"EMIT_PACING_RATE_HZ=20", "EMIT_PACING_HORIZON_MS=21",
-                          "EMIT_SOMETHING_ELSE=1", "PACING_BUDGET_MS=99"};
+                          "EMIT_THERMAL_STEPS=9", "PACING_BUDGET_MS=99"};
   const auto loaded =
       daemon(text, {"pacing.rate_hz=30", "device.gpu_index=1", "log.level=warn", "host.udp="});
   ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
@@ -176,6 +176,19 @@ TEST_F(ConfigTest, file_environment_and_set_apply_in_that_order) {
   EXPECT_EQ(loaded->device.gpu_index, 1);
   EXPECT_EQ(loaded->log.level, "warn");
   EXPECT_EQ(loaded->host.udp, "");
+}
+
+/// A misspelt variable must not be ignored. Keys of scenarios are known to the daemon's loader and
+/// the other way round, because one environment serves both.
+TEST_F(ConfigTest, unknown_names_in_the_environment_are_errors_with_a_suggestion) {
+  options_.environment = {"EMIT_PACING_RATEHZ=5", "EMIT_FOO=1", "EMIT_DATA_DIR=/x", "HOME=/root"};
+  EXPECT_EQ(daemon_error(kCanned),
+            "EMIT_PACING_RATEHZ: unknown environment variable, did you mean EMIT_PACING_RATE_HZ?\n"
+            "EMIT_FOO: unknown environment variable: no key has this name");
+  options_.environment = {"EMIT_PACING_RATE_HZ=5", "EMIT_THERMAL_STEP=5", "EMIT_OBJECT_SCALE=2"};
+  EXPECT_EQ(scenario_error(""),
+            "EMIT_THERMAL_STEP: unknown environment variable, did you mean EMIT_THERMAL_STEPS?\n"
+            "EMIT_OBJECT_SCALE: unknown environment variable: no key has this name");
 }
 
 TEST_F(ConfigTest, faults_in_environment_and_set_name_them) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
@@ -16,8 +17,9 @@ TEST_F(ConfigTest, weather_is_read_with_columns_in_any_order) {
   write("w.csv",
         "# measured\r\nair_k, time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,wind_m_s,cloud_frac,"
         "environment_k\r\n290,0,800,100,330,2,0,\r\n\r\n291.5,60.5,810,101,331,2.5,0.1,288\r\n");
-  const auto loaded = scenario(kWeather);
+  const auto loaded = scenario(std::string(kWeather) + "[thermal]\nspin_up_s = 0\n");
   ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  EXPECT_THAT(loaded->warnings, ::testing::IsEmpty());
   ASSERT_EQ(loaded->weather.size(), 2U);
   EXPECT_EQ(loaded->weather[0].air_k, 290.0);
   EXPECT_FALSE(loaded->weather[0].environment_k.has_value());
@@ -39,14 +41,31 @@ struct CsvCase {
 
 const std::vector<CsvCase>& csv_cases() {
   static const std::vector<CsvCase> all = {
-      {"missing_column", "time_s,dni_w_m2\n0,1\n", "w.csv:1:1: column 'dhi_w_m2' is missing"},
+      {"missing_column", "time_s,dni_w_m2\n0,1\n",
+       "w.csv:1:1: columns 'dhi_w_m2', 'longwave_down_w_m2', 'air_k', 'wind_m_s', 'cloud_frac' are "
+       "missing"},
+      {"one_missing_column", "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s\n",
+       "w.csv:1:1: column 'cloud_frac' is missing"},
+      {"foreign_table", "date,temp,rh\n",
+       "w.csv:1:1: unknown columns 'date', 'temp', 'rh' (known: 'time_s', "},
       {"unknown_column", "time_s,dni_wm2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n",
        "w.csv:1:8: unknown column 'dni_wm2', did you mean 'dni_w_m2'?"},
       {"column_twice",
        "time_s,time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n",
        "w.csv:1:8: column 'time_s' appears twice"},
       {"not_a_number", std::string(kHeader) + "0,8x0,100,330,290,2,0\n",
-       "w.csv:2:3: 'dni_w_m2' is '8x0', which is not a number"},
+       "w.csv:2:3: 'dni_w_m2': '8x0' is not a number"},
+      {"decimal_comma", std::string(kHeader) + "0,\"8,5\",100,330,290,2,0\n",
+       "w.csv:2:3: 'dni_w_m2': '8,5' is not a number; write '.' for the decimal point"},
+      {"date", std::string(kHeader) + "2014-06-21 06:00,0,100,330,290,2,0\n",
+       "w.csv:2:1: 'time_s': '2014-06-21 06:00' is not a number; dates"},
+      {"unix_time", std::string(kHeader) + "1403330400,0,100,330,290,2,0\n",
+       "w.csv:2:1: 'time_s' is 1403330400, must be -1000000000 .. 1000000000; this looks like UNIX "
+       "time in seconds (2014-06-21)"},
+      {"utf_16", std::string("\xFF\xFEt\0i\0", 6), "w.csv: the file is UTF-16 text"},
+      {"semicolons", "time_s;dni_w_m2\n0;1\n", "w.csv:1:1: cells are separated by ';'"},
+      {"indented_comment", "  # measured\n" + std::string(kHeader),
+       "w.csv:1:3: a comment has to begin in the first column"},
       {"empty_value", std::string(kHeader) + "0,,100,330,290,2,0\n",
        "w.csv:2:3: 'dni_w_m2' is empty"},
       {"out_of_range", std::string(kHeader) + "0,800,100,330,20,2,0\n",
@@ -69,6 +88,33 @@ TEST_P(CsvError, names_file_and_line) {
   const CsvCase& test = csv_cases()[GetParam()];
   write("w.csv", test.text);
   EXPECT_THAT(scenario_error(kWeather), ::testing::StartsWith("s.toml:3:8: 'file': " + test.error));
+}
+
+/// A fault that every row has is one line.
+TEST_F(ConfigTest, faults_of_a_column_are_counted) {
+  write("w.csv",
+        std::string(kHeader) + "1,x,100,330,90,2,0\n2,y,100,330,90,2,0\n3,z,1,330,90,2,0\n");
+  EXPECT_EQ(scenario_error(kWeather),
+            "s.toml:3:8: 'file': w.csv:2:3: 'dni_w_m2': 'x' is not a number (and 2 other rows)\n"
+            "w.csv:2:13: 'air_k' is 90, must be 180 .. 340 (and 2 other rows)");
+}
+
+/// Tables as spreadsheets write them are read like plain ones.
+TEST_F(ConfigTest, weather_in_other_spellings_is_read_alike) {
+  const std::string plain = std::string(kHeader) + "0,800,100,330,290,2,0\n";
+  std::string cr = plain;
+  std::replace(cr.begin(), cr.end(), '\n', '\r');
+  for (const std::string& text :
+       {cr, "\xEF\xBB\xBF" + plain,
+        std::string("\"time_s\",\"dni_w_m2\",\"dhi_w_m2\",\"longwave_down_w_m2\",\"air_k\","
+                    "\"wind_m_s\",\"cloud_frac\"\r\n\"0\",+800,1e2,\"330\",290,2,0\r\n")}) {
+    write("w.csv", text);
+    const auto loaded = scenario(kWeather);
+    ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+    ASSERT_EQ(loaded->weather.size(), 1U);
+    EXPECT_EQ(loaded->weather[0].direct_normal_w_m2, 800.0);
+    EXPECT_EQ(loaded->weather[0].longwave_down_w_m2, 330.0);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, CsvError, ::testing::Range<std::size_t>(0, csv_cases().size()),

@@ -9,21 +9,23 @@
 #include <span>
 #include <utility>
 
+#include "client/client_connection.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/framing.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/fuzz_input.hpp"
-#include "client/client_connection.hpp"
 
-/// A daemon at the other end of a client's connection that says what the input holds and hangs up.
+/// Peer of a client's connection: a daemon that sends the fuzz input and then closes its side.
 namespace emit::fuzz {
 
-/// More is left out: the socket has to hold it all.
+/// Largest number of bytes sent; the rest of an input is left out, because the socket has to hold
+/// all of it.
 inline constexpr std::size_t kMaxSaidBytes = 64u << 10;
-/// Small, because taking the usual megabytes costs more than all else.
+/// Limits of the client. They are small, because allocating the usual megabytes would take most of
+/// the time.
 inline constexpr protocol::RecordLimits kLimits{8192, 0};
 
-/// The client after the welcome; empty when it did not like it.
+/// Returns the client after the welcome, or nothing when it refused the welcome.
 [[nodiscard]] inline std::optional<client::ClientConnection> connect_to(
     std::span<const std::byte> said, protocol::PeerRole role) {
   static const server::SocketContext context;
@@ -33,9 +35,9 @@ inline constexpr protocol::RecordLimits kLimits{8192, 0};
   require(::send(pair[1], said.data(), said.size(), MSG_DONTWAIT | MSG_NOSIGNAL) ==
               static_cast<ssize_t>(said.size()),
           "the socket holds what the daemon says");
-  // Closed for sending alone: the client may still speak.
+  // Only the sending side is closed, so the client may still send.
   ::shutdown(pair[1], SHUT_WR);
-  static int held = -1;  // until the next input
+  static int held = -1;  // open until the next input
   if (held >= 0) ::close(held);
   held = pair[1];
   auto socket = server::TcpSocket::adopt(context, pair[0]);
@@ -46,8 +48,8 @@ inline constexpr protocol::RecordLimits kLimits{8192, 0};
   return std::move(*connection);
 }
 
-/// True when every channel of the welcome is small: the client takes memory for frames of the size
-/// that the daemon announces, which is its right and says nothing about the decoder.
+/// Returns true when every channel of the welcome is small. A client rightly allocates memory for
+/// frames of the announced size, which is no finding about the decoder.
 [[nodiscard]] inline bool announces_small_frames(const client::ServerInfo& info) {
   constexpr std::uint32_t kMaxPx = 64;
   return std::ranges::all_of(info.channels, [](const client::ChannelDescription& channel) {

@@ -10,8 +10,8 @@
 
 namespace emit::fuzz {
 
-/// Writes the checksum that a frame header at the front of `bytes` ought to have, so that inputs
-/// get past it. Leaves shorter ones, and what does not begin like a header, alone.
+/// Writes the correct checksum of a frame header at the front of `bytes`, so that inputs pass its
+/// check. Shorter inputs, and those that do not begin like a header, stay unchanged.
 inline void seal_frame_header(std::span<std::byte> bytes) {
   if (bytes.size() < protocol::kFrameHeaderBytes) return;
   const std::array magic{std::byte{'E'}, std::byte{'F'}, std::byte{'M'}, std::byte{'R'}};
@@ -21,8 +21,8 @@ inline void seal_frame_header(std::span<std::byte> bytes) {
   std::memcpy(bytes.data() + kCrcAt, &crc, sizeof crc);
 }
 
-/// A datagram of fragments behind its length (u16). Bits of `instructions`: 1 seal the frame header
-/// behind the fragment's, 2 seal the one at the end.
+/// Reads a datagram behind its length (u16). Bits of `instructions`: 1 corrects the checksum of the
+/// frame header behind the fragment header, 2 that of the frame header at the end.
 [[nodiscard]] inline std::vector<std::byte> read_datagram(InputReader& input,
                                                           std::uint8_t instructions) {
   const auto piece = input.bytes(input.number<std::uint16_t>());

@@ -10,7 +10,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
-/// What the fuzz targets share. Under libFuzzer the data lie in heap memory of their exact size, so
+/// Helpers of the fuzz targets. Under libFuzzer the data lie in heap memory of their exact size, so
 /// that the address sanitizer sees a read beyond the end.
 namespace emit::fuzz {
 
@@ -19,20 +19,20 @@ namespace emit::fuzz {
   return {reinterpret_cast<const std::byte*>(data), size};
 }
 
-/// A decoder broke its promise: ends the process as a finding.
+/// Ends the process as a finding when a decoder broke a promise.
 inline void require(bool holds, const char* promise) {
   if (holds) return;
   std::fprintf(stderr, "broken: %s\n", promise);
   std::abort();
 }
 
-/// Cuts an input into numbers and pieces; at its end there are zeros and empty pieces.
+/// Cuts an input into numbers and pieces. It returns zeros and empty pieces at the end.
 class InputReader {
  public:
   explicit InputReader(std::span<const std::byte> bytes) : left_(bytes) {}
   [[nodiscard]] bool empty() const noexcept { return left_.empty(); }
 
-  /// Little endian, as in memory.
+  /// Returns the next number, in the byte order of this machine (little endian).
   template <class T>
   [[nodiscard]] T number() {
     T value{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the binary seeds of corpus/: make_corpus FOLDER. Seeds made of text lie there as they are,
-// and so does what once was a finding (regression_*).
+// Program that writes the binary seeds of corpus/: make_corpus FOLDER. Text seeds and former
+// findings (regression_*) are kept in the corpus as they are.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -80,7 +80,7 @@ Bytes frame_record(std::uint64_t number) {
   return record(protocol::RecordKind::frame, body);
 }
 
-/// The same size, of one value, so that it shrinks.
+/// Returns a record of the same image size with a single pixel value, so that it compresses.
 Bytes encoded_frame_record(std::uint64_t number) {
   test::Frame frame = test::make_frame(4, 3, number);
   for (std::size_t i = 4; i < frame.pixels.size(); ++i) frame.pixels[i] = frame.pixels[i - 4];
@@ -183,7 +183,7 @@ Bytes joined(std::initializer_list<Bytes> parts) {
   for (const Bytes& part : parts) append(out, part);
   return out;
 }
-/// As the targets receiver and fragments take their input.
+/// Returns a piece in the form that the targets receiver and fragments read.
 Bytes piece(std::uint8_t instructions, const Bytes& bytes) {
   Bytes out{std::byte{instructions}};
   append_number(out, static_cast<std::uint16_t>(bytes.size()));
@@ -277,9 +277,9 @@ void make_network_seeds() {
   write("receiver", "datagrams", joined({piece(1, host_frame(0)), piece(1, host_frame(2))}));
 }
 
-/// Frames that lost fragments: repaired by parity, beyond repair, and waited for.
+/// Writes frames that lost fragments: repaired by parity, beyond repair, and waited for.
 void make_loss_seeds() {
-  const protocol::FecParams fec{3, 2};  // as the target has it
+  const protocol::FecParams fec{3, 2};  // the parameters of the target
   const test::Frame frame = test::make_frame(32, 20, 1);
   const auto data = test::datagrams_of(frame, 400, 1);
   protocol::Fragmenter::Params params;
@@ -328,7 +328,7 @@ void make_loss_seeds() {
 }
 
 void make_session_seeds() {
-  // The target puts the MACs right, and knows key zero.
+  // The target corrects the MACs and knows the key of zeros.
   auto mac = std::move(*protocol::SessionMac::create());
   const protocol::SharedKey shared = protocol::make_shared_key({}, mac);
   const auto datagram = [&](protocol::SessionKind kind, std::uint64_t counter, const Bytes& body) {
@@ -352,7 +352,8 @@ void make_session_seeds() {
 void make_fragment_seeds() {
   Bytes whole;
   Bytes lossy;
-  Bytes in_messages;  // two by two, with strangers between and taken now and then
+  // Two datagrams per message, with other senders in between, taken now and then.
+  Bytes in_messages;
   for (std::uint32_t id = 1; id <= 2; ++id) {
     const test::Frame frame = test::make_frame(16, 12, id);
     protocol::Fragmenter::Params params;
@@ -511,7 +512,7 @@ void make_trigger_seeds() {
     protocol::encode(trigger, std::span(bytes).first<protocol::kTriggerBytes>());
     write("trigger", name, bytes);
   }
-  const protocol::SessionKey key{};  // the target's
+  const protocol::SessionKey key{};  // the key of the target
   auto seal = protocol::TriggerSeal::create(std::span(&key, 1));
   Bytes sealed(protocol::kSealedTriggerBytes);
   if (!seal || !seal->seal({2, 3, 1'800'000'000'000'000'005},

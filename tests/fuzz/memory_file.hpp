@@ -6,8 +6,8 @@
 
 namespace emit::fuzz {
 
-/// A regular file that lies in memory only, for readers that take a path. One per process; its
-/// siblings do not exist. Ends the process where the system refuses.
+/// Regular file in memory, for readers that take a path. There is one per process, and no file
+/// exists beside it. The process ends where the system refuses.
 class MemoryFile {
  public:
   MemoryFile();
@@ -23,7 +23,7 @@ class MemoryFile {
   std::filesystem::path path_;
 };
 
-/// The file with these bytes.
+/// Returns the path of the file after writing these bytes to it.
 [[nodiscard]] const std::filesystem::path& file_of(std::span<const std::byte> bytes);
 
 }  // namespace emit::fuzz

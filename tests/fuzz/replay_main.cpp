@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stands in for libFuzzer where there is none: runs the target over every file of some folders.
+// Replacement of libFuzzer's main program: it runs the target over every file of some folders.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -24,18 +24,18 @@ std::vector<fs::path> files_in(const fs::path& folder) {
   return files;
 }
 
-/// False: the file cannot be read.
+/// Runs the target over a file. Returns false when the file cannot be read.
 bool replay(const fs::path& file) {
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
   std::ifstream in(file, std::ios::binary);
   if (error || !in) return false;
-  // Memory of the exact size, as under libFuzzer.
+  // The memory has the exact size, as under libFuzzer.
   const auto bytes = std::make_unique<std::uint8_t[]>(size);
   in.read(reinterpret_cast<char*>(bytes.get()), static_cast<std::streamsize>(size));
   if (in.gcount() != static_cast<std::streamsize>(size)) return false;
   std::printf("%s\n", file.filename().c_str());
-  std::fflush(stdout);  // the last name shown is the one that failed
+  std::fflush(stdout);  // the last name shown is the failing one
   LLVMFuzzerTestOneInput(bytes.get(), size);
   return true;
 }

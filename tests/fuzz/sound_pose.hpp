@@ -5,7 +5,7 @@
 #include "emit/protocol/codec.hpp"
 #include "fuzz/fuzz_input.hpp"
 
-/// What a host frame that was accepted promises.
+/// Checks of the promises that an accepted host frame makes.
 namespace emit::fuzz {
 
 inline void require_sound(const physics::Pose& pose) {

@@ -2,7 +2,7 @@
 #pragma once
 #include "surface/state/state_file.hpp"
 
-/// The scene that the state files of the corpus belong to.
+/// Scene of the state files in the corpus.
 namespace emit::fuzz {
 
 inline constexpr std::size_t kMovers = 2;
@@ -13,7 +13,7 @@ inline constexpr std::size_t kMovers = 2;
   return key;
 }
 
-/// One octahedron of two materials.
+/// Returns one octahedron of two materials.
 [[nodiscard]] inline scene::SceneGeometry state_geometry() {
   scene::Mesh mesh;
   mesh.positions_m = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};

@@ -90,8 +90,8 @@ TEST(HostFrameCodec, RoundTripsBitForBit) {
 }
 
 TEST(HostFrameCodec, DecodesTheGoldenBytes) {
-  // protocol_version 1, frame_number 300, sim_time_ns 5, seeker at (1, 2, 0) heading north-up
-  // identity, run_id 7: written by hand after the Protobuf encoding rules.
+  // The bytes hold protocol_version 1, frame_number 300, sim_time_ns 5, run_id 7 and a seeker at
+  // (1, 2, 0) with identity attitude. They were written by hand after the Protobuf encoding rules.
   const auto bytes = test::from_hex(
       "0801"
       "10ac02"
@@ -139,7 +139,7 @@ TEST(HostFrameCodec, AQuaternionSlightlyOffUnitLengthIsNormalisedOnce) {
   ASSERT_EQ(decode_host_frame(encoded(message), decoder, *first), DecodeStatus::ok);
   const auto& q = first->seeker.world_from_body;
   EXPECT_NEAR(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z, 1.0, 1e-15);
-  // What was decoded decodes to the same bits: a journal replays exactly.
+  // A decoded frame decodes to the same bits after encoding, so a journal replays exactly.
   HostFrameEncoder encoder;
   const auto second = std::make_unique<HostFrameData>();
   ASSERT_EQ(decode_host_frame(encoder.encode(*first), decoder, *second), DecodeStatus::ok);
@@ -203,7 +203,7 @@ TEST(HostFrameCodec, TakesTheWeatherThatScenariosTakeAndNoOther) {
     double lowest;
     double highest;
   };
-  // As [[weather.sample]].
+  // The ranges are those of [[weather.sample]].
   const Range ranges[] = {
       {[](v1::Environment& e, double v) { e.set_direct_normal_w_m2(v); }, 0.0, 2000.0},
       {[](v1::Environment& e, double v) { e.set_diffuse_horizontal_w_m2(v); }, 0.0, 1500.0},
@@ -253,7 +253,7 @@ TEST(HostFrameCodec, RefusesOtherVersionsEvenWhereTheRestCannotBeParsed) {
   EXPECT_EQ(decode(encoded(message)), DecodeStatus::wrong_version);
   message.clear_protocol_version();
   EXPECT_EQ(decode(encoded(message)), DecodeStatus::wrong_version);
-  // Version 2 with a seeker whose content is no Pose.
+  // The version is 2 and the content of the seeker is no Pose.
   EXPECT_EQ(decode(test::from_hex("08022202ffff")), DecodeStatus::wrong_version);
   EXPECT_EQ(decode(test::from_hex("08012202ffff")), DecodeStatus::malformed);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeded random damage to everything that comes from outside. Inputs lie in heap memory of their
-// exact size, so that the address sanitizer sees a read beyond the end.
+// Tests with seeded random damage to everything that comes from outside. Inputs lie in heap memory
+// of their exact size, so that the address sanitizer sees a read beyond the end.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
-/// Flips bits, overwrites runs, cuts, inserts and doubles parts.
+/// Returns a damaged copy: bits flipped, runs overwritten, parts cut, inserted and doubled.
 Bytes damaged(const Bytes& good, std::mt19937& random) {
   Bytes bytes = good;
   const auto place = [&] { return bytes.empty() ? 0 : random() % bytes.size(); };
@@ -197,7 +197,7 @@ TEST(CorruptInput, FragmentsNeverReachBeyondTheBuffers) {
   }
 }
 
-/// Well-formed fragment headers with wild values reach the checks behind the magic number.
+/// Valid fragment headers with random values reach the checks behind the magic number.
 TEST(CorruptInput, FragmentHeadersWithWildValuesAreSurvived) {
   std::mt19937 random(17);
   Reassembler reassembler({.max_payload_bytes = 48 * 32 * 4, .buffers = 4, .max_streams = 3});

@@ -48,7 +48,7 @@ TEST(Crc32c, InstructionAndTablesAgreeForEveryLengthAndAlignment) {
     const auto part = all.subspan(length % 9, length);
     ASSERT_EQ(crc32c_hardware(part), crc32c_portable(part)) << length;
   }
-  // Around one and several rounds of the three interleaved streams of 4096 bytes.
+  // The lengths lie around one and several rounds of the three interleaved streams of 4096 bytes.
   for (const std::size_t length : {12287u, 12288u, 12289u, 24575u, 24576u, 36865u, 59990u}) {
     const auto part = all.subspan(3, length);
     ASSERT_EQ(crc32c_hardware(part, 0x12345678u), crc32c_portable(part, 0x12345678u)) << length;

@@ -14,7 +14,7 @@ using test::from_hex;
 using test::to_hex;
 using ::testing::HasSubstr;
 
-// Written by hand from docs/wire.md with another program, CRC included.
+// Bytes of golden_header(), written by another program after docs/wire.md, CRC included.
 constexpr std::string_view kGolden =
     "45464d52010102014001030280020000000200000000004100004041090100000000803e03000000"
     "05000000d4c3b2a100001400000000008877665544332211e803000000000000e703000000000000"
@@ -79,7 +79,7 @@ std::vector<std::byte> encoded(const FrameHeader& header) {
   return bytes;
 }
 
-/// Changes a byte and makes the header CRC right again.
+/// Returns the golden bytes with one byte changed and a correct header CRC.
 std::vector<std::byte> forged(std::size_t at, std::uint8_t value) {
   auto bytes = encoded(golden_header());
   bytes[at] = std::byte{value};
@@ -132,7 +132,7 @@ TEST(FrameHeader, DecodesEveryFieldOfTheGoldenBytes) {
   EXPECT_EQ(header->sensor_height_px, expected.sensor_height_px);
   EXPECT_EQ(header->encoding, expected.encoding);
   EXPECT_EQ(header->encoded_bytes, expected.encoded_bytes);
-  // Whatever is not compared above would differ here.
+  // Fields that are not compared above would differ here.
   EXPECT_EQ(to_hex(encoded(*header)), kGolden);
 }
 

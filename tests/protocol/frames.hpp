@@ -8,7 +8,7 @@
 #include "emit/protocol/fragment.hpp"
 #include "emit/protocol/frame_header.hpp"
 
-/// Frames and their fragments for tests.
+/// Frames and their fragments, for tests.
 namespace emit::test {
 
 struct Frame {
@@ -37,7 +37,7 @@ inline Frame make_frame(std::uint32_t width_px, std::uint32_t height_px, std::ui
 
 using Datagram = std::vector<std::byte>;
 
-/// The frame's datagrams in order, each in memory of its exact size.
+/// Returns the frame's datagrams in order, each in memory of its exact size.
 inline std::vector<Datagram> datagrams_of(const Frame& frame, std::uint32_t max_payload_bytes,
                                           std::uint32_t frame_id, std::uint16_t stream_id = 1) {
   const protocol::Fragmenter fragmenter({.stream_id = stream_id,

@@ -22,7 +22,7 @@ void append_record(Bytes& stream, RecordKind kind, std::span<const std::byte> bo
   stream.insert(stream.end(), body.begin(), body.end());
 }
 
-/// Hands as much of `bytes` over as there is room for; returns how much.
+/// Hands over as many bytes as there is room for and returns their number.
 std::size_t feed(RecordParser& parser, std::span<const std::byte> bytes) {
   const auto space = parser.writable();
   const std::size_t count = std::min(space.size(), bytes.size());
@@ -124,10 +124,10 @@ TEST(RecordParser, TellsWrongMagicWrongVersionAndOversizeApart) {
     Record record;
     EXPECT_EQ(parser.next(record), c.expected);
     EXPECT_EQ(parser.offending_value(), c.offending);
-    // The framing is lost: nothing more comes out and nothing more is taken in ...
+    // The framing is lost: no record comes out and no byte is accepted.
     EXPECT_EQ(parser.next(record), c.expected);
     EXPECT_TRUE(parser.writable().empty());
-    // ... until the connection is a new one.
+    // The parser works again after reset(), for a new connection.
     parser.reset();
     feed(parser, good);
     EXPECT_EQ(parser.next(record), ParseStatus::record);

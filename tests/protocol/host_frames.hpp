@@ -6,7 +6,7 @@
 
 namespace emit::test {
 
-/// On the heap: a HostFrameData is large.
+/// Returns a host frame with this number of entities, on the heap because a HostFrameData is large.
 inline std::unique_ptr<protocol::HostFrameData> make_host_frame(std::uint32_t entities) {
   auto frame = std::make_unique<protocol::HostFrameData>();
   frame->frame_number = 42;

@@ -63,7 +63,8 @@ TEST_F(HostSession, TheBytesOnTheWireAreTheDocumentedOnes) {
   EXPECT_EQ(std::memcmp(sealed.bytes.data(), head, sizeof head), 0);
 }
 
-// RFC 7693's algorithm as Python's hashlib.blake2b(key=..., digest_size=16) computes it.
+// The expected tag is that of Python's hashlib.blake2b(key=..., digest_size=16), which implements
+// RFC 7693.
 TEST_F(HostSession, TheTagIsKeyedBlake2b) {
   SessionKey key;
   for (std::size_t i = 0; i < key.size(); ++i) key[i] = static_cast<std::byte>(i);
@@ -192,7 +193,7 @@ TEST(ReplayWindow, TheLastCounterPassesAndNothingWrapsAround) {
   EXPECT_TRUE(window.accept(kLast - 5));
 }
 
-// Against a window that remembers everything.
+// The window agrees with one that remembers all counters.
 TEST(ReplayWindow, JudgesLikeAPlainSet) {
   std::mt19937_64 random(11);
   ReplayWindow window;

@@ -50,7 +50,7 @@ class LogFile : public ::testing::Test {
     file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   }
 
-  /// Host frames 1..count, 5 ms apart, each followed by a journal entry.
+  /// Writes host frames 1..count, 5 ms apart, each followed by a journal entry.
   static void write_messages(LogWriter& writer, std::uint64_t count) {
     auto frame = test::make_host_frame(2);
     for (std::uint64_t i = 1; i <= count; ++i) {
@@ -72,7 +72,7 @@ class LogFile : public ::testing::Test {
     std::string error;
     std::string truncation;
   };
-  /// Reads everything and checks order and values on the way.
+  /// Reads the whole log and checks order and values.
   [[nodiscard]] Counts read_all() const {
     Counts counts;
     auto reader = LogReader::open(path_);
@@ -103,6 +103,21 @@ class LogFile : public ::testing::Test {
   std::filesystem::path path_;
 };
 
+TEST_F(LogFile, AMessageIsReadAsWhatItsTopicSays) {
+  {
+    auto writer = LogWriter::create(path_);
+    ASSERT_TRUE(writer) << writer.error().text;
+    write_messages(*writer, 1);
+  }
+  auto reader = LogReader::open(path_);
+  ASSERT_TRUE(reader) << reader.error().text;
+  ASSERT_TRUE(reader->next().value());
+  ASSERT_EQ(reader->topic(), LogTopic::host);
+  EXPECT_DEATH(static_cast<void>(reader->journal()), "topic == LogTopic::journal");
+  ASSERT_TRUE(reader->next().value());
+  EXPECT_DEATH(static_cast<void>(reader->host()), "topic == LogTopic::host");
+}
+
 TEST_F(LogFile, RoundTripsBothTopicsChunkedAndPlain) {
   for (const std::uint32_t chunk_bytes : {0u, 1u, 5000u, 1u << 20}) {
     auto writer = LogWriter::create(path_, {.chunk_bytes = chunk_bytes, .software = "test 1"});
@@ -123,7 +138,7 @@ TEST_F(LogFile, AKilledWriterLeavesAllButTheLastFlushInterval) {
   auto writer = LogWriter::create(path_, {.flush_interval_ns = 100'000'000});
   ASSERT_TRUE(writer);
   write_messages(*writer, 110);
-  // The file as a killed process leaves it: the writer is still open.
+  // The writer is still open, so the file is as a killed process leaves it.
   const Counts counts = read_all();
   EXPECT_EQ(counts.error, "");
   EXPECT_THAT(counts.truncation, HasSubstr("ends without a footer"));
@@ -192,7 +207,7 @@ TEST_F(LogFile, AFlippedBitInAChunkIsFoundByItsCrc) {
     write_messages(*writer, 4);
   }
   std::string bytes = content();
-  std::size_t offset = 8;  // walk the records to the chunk
+  std::size_t offset = 8;  // offset of a record, on the way to the chunk
   auto length_at = [&](std::size_t at) {
     std::uint64_t length = 0;
     for (std::size_t i = 0; i < 8; ++i) {
@@ -209,7 +224,8 @@ TEST_F(LogFile, AFlippedBitInAChunkIsFoundByItsCrc) {
   EXPECT_EQ(counts.host, 0u);
 }
 
-/// Enough chunks that their index leaves memory: the end of the file must lead to each of them.
+/// The number of chunks is large enough for their index to leave memory. The end of the file must
+/// point at each of them.
 TEST_F(LogFile, TheIndexOfThousandsOfChunksPointsAtEachOfThem) {
   constexpr std::uint32_t kMessages = 4000;
   {
@@ -253,7 +269,7 @@ TEST_F(LogFile, TheIndexOfThousandsOfChunksPointsAtEachOfThem) {
     ++chunks;
   }
   EXPECT_EQ(chunks, kMessages);
-  // The last of the summary offsets is that of the chunk indexes.
+  // The last summary offset is that of the chunk indexes.
   std::size_t last = offsets;
   while (last + 9 + length_at(last) < footer) last += 9 + length_at(last);
   EXPECT_EQ(whole[last + 9], 8);
@@ -261,11 +277,11 @@ TEST_F(LogFile, TheIndexOfThousandsOfChunksPointsAtEachOfThem) {
   EXPECT_EQ(wire::get<std::uint64_t>(bytes, last + 18), offsets - first_index);
 }
 
-/// Folders of removed files that this process holds open.
+/// Returns the folders of removed files that this process holds open.
 std::vector<std::string> folders_of_nameless_files() {
   std::vector<std::string> folders;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-    std::error_code gone;  // the descriptor of the iterator itself
+    std::error_code gone;  // set for the descriptor of the iterator itself
     const auto target = std::filesystem::read_symlink(entry.path(), gone);
     if (target.string().ends_with(" (deleted)")) folders.push_back(target.parent_path().string());
   }
@@ -276,11 +292,11 @@ TEST_F(LogFile, TheIndexWaitsWithoutANameInTheFolderOfTheFileItself) {
   const std::filesystem::path folder = path_.string() + ".folder";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder / "links");
-  // As long as a name may be, so that one beside it cannot be longer.
+  // The name has the largest allowed length, so that a name beside it cannot be longer.
   const auto target = folder / std::string(255, 'x');
   const auto link = folder / "links" / "log.mcap";
   std::filesystem::create_symlink(target, link);
-  for (const auto& path : {target, link}) {  // the first makes what the second leads to
+  for (const auto& path : {target, link}) {  // the first creates the target of the second
     auto writer = LogWriter::create(path);
     ASSERT_TRUE(writer) << writer.error().text;
     EXPECT_THAT(folders_of_nameless_files(),
@@ -296,7 +312,7 @@ TEST_F(LogFile, TheIndexWaitsWithoutANameInTheFolderOfTheFileItself) {
   std::filesystem::remove_all(folder);
 }
 
-/// Sets TMPDIR for as long as it lives.
+/// Sets TMPDIR during its lifetime.
 class TemporaryFolder {
  public:
   explicit TemporaryFolder(const char* folder) {
@@ -311,7 +327,7 @@ class TemporaryFolder {
   std::optional<std::string> before_;
 };
 
-/// A file in memory has no folder that takes another one, whoever runs the test.
+/// A file in memory has no folder that takes another file, whoever runs the test.
 TEST_F(LogFile, AFileWhoseFolderTakesNoIndexIsWrittenOrStaysAsItWas) {
   const int fd = ::memfd_create("log", MFD_CLOEXEC);
   ASSERT_GE(fd, 0);
@@ -389,7 +405,7 @@ TEST_F(LogFile, WriteErrorsAreReportedAndFinal) {
   EXPECT_THAT(writer.error().text, HasSubstr("/dev/full: offset 0: cannot write"));
 }
 
-/// Decodes the messages with nothing but what the file says about them.
+/// The messages decode with nothing but the file's own description.
 TEST_F(LogFile, DescribesItselfWithoutTheProtoFiles) {
   {
     auto writer = LogWriter::create(path_);

@@ -66,7 +66,7 @@ struct GeometryCase {
 
 class ParityGeometries : public ::testing::TestWithParam<GeometryCase> {};
 
-/// As many lost fragments of each group, whichever they are, as the group has parity that arrived.
+/// Each group loses as many fragments, whichever they are, as parity fragments arrived.
 TEST_P(ParityGeometries, AnyLossUpToTheParityIsRepaired) {
   const GeometryCase& test = GetParam();
   const Frame frame = test::make_frame(test.width_px, test.height_px, 5);
@@ -126,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(
              std::to_string(test.fec.parity_fragments);
     });
 
-/// Multiplication in GF(2^8) as docs/wire.md has it, bit by bit.
+/// Returns the product in GF(2^8) as docs/wire.md defines it, bit by bit.
 std::uint8_t multiply(std::uint8_t a, std::uint8_t b) {
   std::uint32_t product = 0;
   for (int bit = 0; bit < 8; ++bit) {
@@ -194,7 +194,7 @@ TEST(Parity, WhatIsBeyondRepairStaysMissingAndIsCounted) {
   ASSERT_GE(geometry.groups, 2u);
   Reassembler reassembler(params(frame, fec));
   for (std::uint32_t i = 0; i < data.size(); ++i) {
-    // Three of group 0, two of group 1.
+    // Three fragments of group 0 and two of group 1 are lost.
     const bool lost =
         (i % geometry.groups == 0 && i / geometry.groups >= 3 && i / geometry.groups < 6) ||
         (i % geometry.groups == 1 && i / geometry.groups < 2);

@@ -19,7 +19,8 @@ Bytes bytes_of(const std::vector<float>& pixels) {
   return out;
 }
 
-/// Radiance that changes slowly, with NaN payloads, signed zero and a denormal in between.
+/// Returns radiance that changes slowly, with NaN payloads, a signed zero and a denormal in
+/// between.
 std::vector<float> smooth(std::size_t count) {
   std::vector<float> out(count);
   for (std::size_t i = 0; i < count; ++i) {

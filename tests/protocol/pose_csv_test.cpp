@@ -21,7 +21,7 @@ class PoseCsv : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove(path_); }
 
-  /// Text of the first error, or "N rows".
+  /// Returns the text of the first error, or "N rows".
   [[nodiscard]] std::string outcome(std::string_view text) const {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << text;
     auto reader = PoseCsvReader::open(path_);
@@ -58,22 +58,56 @@ TEST_F(PoseCsv, ReadsColumnsInAnyOrderWithCommentsAndEitherLineEnd) {
 TEST_F(PoseCsv, ErrorsNameFileLineAndColumn) {
   const std::string head = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz,frame_number\n";
   EXPECT_EQ(outcome(head + "0,0,0,0,1,0,0,0,7\n"), "1 rows");
-  EXPECT_THAT(outcome(""), HasSubstr(":0: no header row"));
+  EXPECT_THAT(outcome(""), HasSubstr(": the file has no header row"));
   EXPECT_THAT(outcome("sim_time_s,east_m\n"), HasSubstr(":1: column 'north_m' is missing"));
-  EXPECT_THAT(outcome("qw,qw\n"), HasSubstr(":1: column 'qw' twice"));
+  EXPECT_THAT(outcome("sim_time_s,east_m,north_m,up_m,qw,qw,qx,qy,qz\n"),
+              HasSubstr(":1: column 'qw' appears twice"));
+  EXPECT_THAT(outcome("frame_number," + head), HasSubstr("column 'frame_number' appears twice"));
   EXPECT_THAT(outcome(head + "\n0,0,x,0,1,0,0,0,7\n"),
-              HasSubstr(":3: column 'north_m': 'x' is not"));
-  EXPECT_THAT(outcome(head + "0,0,0\n"), HasSubstr(":2: column 'up_m': no value"));
+              HasSubstr(":3:5: column 'north_m': 'x' is not a number"));
+  EXPECT_THAT(outcome(head + "0,0,0\n"), HasSubstr(":2:1: 3 values, the header has 9"));
+  EXPECT_THAT(outcome(head + "0,0,0,,1,0,0,0,7\n"), HasSubstr(":2:7: column 'up_m': no value"));
   EXPECT_THAT(outcome(head + "0,0,0,0,1,0,0,0,-7\n"), HasSubstr("'frame_number': '-7' is not"));
-  EXPECT_THAT(outcome(head + "0,0,0,0,1,1,0,0,7\n"), HasSubstr(":2: invalid pose"));
-  EXPECT_THAT(outcome(head + "0,nan,0,0,1,0,0,0,7\n"), HasSubstr(":2: invalid pose"));
-  EXPECT_THAT(outcome(head + "1e300,0,0,0,1,0,0,0,7\n"), HasSubstr("'sim_time_s': out of range"));
+  EXPECT_THAT(outcome(head + "0,0,0,0,1,1,0,0,7\n"),
+              HasSubstr(":2:1: invalid pose: position 0, 0, 0 m"));
+  EXPECT_THAT(outcome(head + "0,nan,0,0,1,0,0,0,7\n"), HasSubstr(":2:1: invalid pose"));
+  EXPECT_THAT(outcome(head + "1e300,0,0,0,1,0,0,0,7\n"), HasSubstr("1e300 is out of range"));
   // What a host may not send in a datagram cannot stand in a file either.
   EXPECT_EQ(outcome(head + "1e9,0,0,0,1,0,0,0,7\n"), "1 rows");
-  EXPECT_THAT(outcome(head + "1000000001,0,0,0,1,0,0,0,7\n"),
-              HasSubstr("'sim_time_s': out of range"));
+  EXPECT_THAT(outcome(head + "1000000001,0,0,0,1,0,0,0,7\n"), HasSubstr("is out of range"));
   EXPECT_THAT(outcome(head + "1,0,0,0,1,0,0,0,7\n0,0,0,0,1,0,0,0,8\n"),
-              HasSubstr(":3: column 'sim_time_s': goes back"));
+              HasSubstr(":3:1: column 'sim_time_s': goes back from 1 to 0"));
+}
+
+/// Logs as spreadsheets write them are read like plain ones.
+TEST_F(PoseCsv, SpreadsheetDialectsAreReadAlike) {
+  const std::string head = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz";
+  for (const std::string& text :
+       {"\xEF\xBB\xBF" + head + "\r\n0.5,1,2,3,0,0.6,0.8,0\r\n",
+        "\"sim_time_s\",\"east_m\",\"north_m\",\"up_m\",\"qw\",\"qx\",\"qy\",\"qz\"\n"
+        "\"0.5\",\"1\",2,3,0,0.6,0.8,0\n",
+        head + ",frame_number\n+0.5,+1,+2.0,+3e0,+0,+.6,+0.8,0,+1\n",
+        head + "\r0.5,1,2,3,0,0.6,0.8,0\r", head + ",,\n0.5,1,2,3,0,0.6,0.8,0,,\n,,,,,,,,,\n"}) {
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << text;
+    auto reader = PoseCsvReader::open(path_);
+    ASSERT_TRUE(reader) << reader.error().text;
+    const auto more = reader->next();
+    ASSERT_TRUE(more) << more.error().text;
+    EXPECT_EQ(reader->host().sim_time_ns, 500'000'000) << text;
+    EXPECT_EQ(reader->host().frame_number, 1U);
+    EXPECT_EQ(reader->host().seeker.position_world_m, glm::dvec3(1.0, 2.0, 3.0));
+    EXPECT_FALSE(reader->next().value());
+  }
+}
+
+TEST_F(PoseCsv, UnixTimesAreNamedWithTheRange) {
+  const std::string head = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz\n";
+  const std::string seconds = outcome(head + "1764115200.05,0,0,0,1,0,0,0\n");
+  EXPECT_THAT(seconds,
+              HasSubstr(":2:1: column 'sim_time_s': 1764115200.05 is out of range, must be "
+                        "-1000000000 .. 1000000000"));
+  EXPECT_THAT(seconds, HasSubstr("looks like UNIX time in seconds (2025-11-26)"));
+  EXPECT_THAT(outcome(head + "1764115200050,0,0,0,1,0,0,0\n"), HasSubstr("in milliseconds"));
 }
 
 TEST_F(PoseCsv, AMissingFileIsNamed) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captures are put together here byte by byte: nothing of the reader's own code writes them.
+// Tests of the capture reader. They build the captures byte by byte, without the reader's own code.
 #include "emit/protocol/record/pose_pcap.hpp"
 
 #include <gmock/gmock.h>
@@ -241,7 +241,7 @@ TEST_F(PosePcap, RefusesFragmentsCutPacketsAndUnknownLinkLayers) {
   const Octets fragment = big(17, 1) + big(0, 1) + big(1, 2) + big(77, 4);
   out = read(pcap_header(false, false, 101) + pcap_record(false, ipv6(fragment + datagram, 44)));
   EXPECT_THAT(out.error, HasSubstr("packet 1: a datagram to port 7001 in IP fragments"));
-  // A later fragment has no ports: it goes with the first.
+  // A later fragment has no ports, so it is skipped with the first one.
   EXPECT_EQ(read(head + pcap_record(false, ethernet(ipv4(datagram, 0x0010)))).error, "");
   const Octets packet = ethernet(ipv4(datagram));
   out = read(head + pcap_record(false, packet.substr(0, 96), packet.size()));
@@ -293,7 +293,7 @@ TEST_F(PosePcap, NoCutAndNoFlippedByteBreaksTheReader) {
     }
     for (int round = 0; round < 600; ++round) {
       Octets damaged = file;
-      // Headers are where it matters.
+      // The damage goes into the headers, where it matters.
       damaged[random() % std::min<std::size_t>(damaged.size(), 160)] = static_cast<char>(random());
       write(damaged);
       auto reader = PosePcapReader::open(path_, 7001);

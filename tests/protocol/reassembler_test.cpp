@@ -28,7 +28,7 @@ std::uint64_t count(const Reassembler& reassembler, FragmentStatus status) {
   return reassembler.counters().fragments[static_cast<std::size_t>(status)];
 }
 
-/// Every pixel is the sent one where it is valid and 0 where it is not; the counts agree.
+/// Expects that every valid pixel is the sent one, every other pixel is 0, and the counters agree.
 void expect_true_to(const ReceivedFrame& received, const Frame& sent) {
   ASSERT_EQ(received.pixels.size() * 4, sent.pixels.size());
   std::uint64_t missing = 0;
@@ -178,7 +178,7 @@ TEST(Reassembler, DuplicatesChangeNothing) {
   EXPECT_EQ(reassembler.counters().frames_complete, 1u);
 }
 
-/// A fragment of the frame with another header than the sender's.
+/// Returns a fragment of the frame with a header other than the sender's.
 Datagram forged(FragmentHeader header, std::size_t payload) {
   header.payload_bytes = static_cast<std::uint16_t>(payload);
   Datagram datagram(kFragmentHeaderBytes + payload, std::byte{0x77});
@@ -309,8 +309,8 @@ struct NetworkCase {
 
 class ReassemblerNetwork : public ::testing::TestWithParam<NetworkCase> {};
 
-/// Whatever the network does, what comes out is true to what was sent, in order, and every frame
-/// and fragment is accounted for.
+/// The frames that come out equal the sent ones, in order, and every frame and fragment is counted,
+/// for every behaviour of the network.
 TEST_P(ReassemblerNetwork, AccountsForEveryFrame) {
   const NetworkCase network = GetParam();
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
@@ -328,7 +328,7 @@ TEST_P(ReassemblerNetwork, AccountsForEveryFrame) {
       }
       sent.emplace(id, frame);
     }
-    if (network.reorder_window > 0) {  // nothing moves farther than the window
+    if (network.reorder_window > 0) {  // no datagram moves farther than the window
       std::multimap<std::size_t, Datagram> arrival;
       for (std::size_t i = 0; i < wire.size(); ++i) {
         arrival.emplace(i + random() % network.reorder_window, std::move(wire[i]));

@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint64_t kPixelBytes = 16 * 8 * 4;
 const std::string kWelcome = "welcome";
 
-/// Zeroed memory of exactly the ring's size, so that a sanitizer sees what goes beyond it.
+/// Zeroed memory of exactly the ring's size, so that a sanitizer sees an access beyond it.
 class Memory {
  public:
   explicit Memory(std::size_t bytes)
@@ -41,7 +41,7 @@ class Memory {
   std::byte* at_;
 };
 
-/// Two channels of one band and a third of another.
+/// Returns the layout of two channels of one band and a third of another.
 RingParams three_channels() {
   RingParams params;
   params.slots = 4;
@@ -172,7 +172,7 @@ TEST(SharedRing, AReaderTrustsNothing) {
     const Memory memory(bytes);
     RingWriter writer(memory.span(), params);
     publish(writer, 1);
-    // One field of the fixed part or of the table of channels, by a little or altogether.
+    // One field of the fixed part or of the channel table changes, by a little or completely.
     const std::size_t offset = random() % (192 + 3 * 32) / 4 * 4;
     auto value = memory.get<std::uint32_t>(offset);
     value = random() % 2 == 0 ? value + static_cast<std::uint32_t>(random() % 129) - 64

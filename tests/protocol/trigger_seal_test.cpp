@@ -64,7 +64,8 @@ TEST(TriggerSeal, NoByteCanBeChanged) {
   EXPECT_EQ(verdict_of(seal, sealed(seal, {1, 0, 0})), Verdict::malformed);
 }
 
-/// The key of triggers is no other: what was sealed for one purpose is of no use for another.
+/// The key of triggers differs from all others: a MAC made for one purpose is of no use for
+/// another.
 TEST(TriggerSeal, HasAKeyOfItsOwn) {
   auto mac = std::move(*SessionMac::create());
   const SharedKey shared = make_shared_key(key_of(1), mac);

@@ -12,7 +12,7 @@
 namespace emit::protocol {
 namespace {
 
-// Written from docs/wire.md with another program, CRC included.
+// Bytes of kTrigger, written by another program after docs/wire.md, CRC included.
 constexpr std::string_view kGolden =
     "45464d54010000008877665544332211e8030000000000000500b49376e2fa18000000000afb71a5";
 
@@ -24,7 +24,7 @@ std::vector<std::byte> encoded(const Trigger& trigger) {
   return bytes;
 }
 
-/// Changes a byte and makes the CRC right again.
+/// Returns the bytes of the trigger with one byte changed and a correct CRC.
 std::vector<std::byte> forged(std::size_t at, std::uint8_t value) {
   auto bytes = encoded(kTrigger);
   bytes[at] = std::byte{value};

@@ -13,10 +13,11 @@
 #include <utility>
 #include <vector>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/foster.hpp"
 #include "emit/renderer/renderer.hpp"
-#include "support/renderer_scene.hpp"
 #include "history/foster_history.hpp"
+#include "support/renderer_scene.hpp"
 
 /// Scenarios of the thermal method "cached" with the extended model, and a renderer to look at
 /// them.
@@ -24,7 +25,7 @@ namespace emit::test {
 
 inline constexpr std::int64_t kSecondNs = 1'000'000'000;
 inline constexpr std::int64_t kHourNs = 3600 * kSecondNs;
-inline constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 inline constexpr std::uint32_t kWidth = 96;
 inline constexpr std::uint32_t kHeight = 80;
 

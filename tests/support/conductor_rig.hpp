@@ -32,7 +32,8 @@ class FakeTriggers final : public server::TriggerInput {
 class ConductorRig {
  public:
   explicit ConductorRig(config::PacingConfig pacing = {},
-                        std::optional<scene::ScenarioDesc> scenario = std::nullopt)
+                        std::optional<scene::ScenarioDesc> scenario = std::nullopt,
+                        bool canned = false)
       : scenario_(std::move(scenario)),
         tracks_(scenario_),
         context_(clock, 1u << 20, 4),
@@ -41,7 +42,7 @@ class ConductorRig {
                   return physics::Result<std::unique_ptr<server::FrameSource>>(
                       std::make_unique<ScriptedSource>(script, 8, 4, 7));
                 }),
-        conductor_(context_, tracks_, options(pacing),
+        conductor_(context_, tracks_, options(pacing, canned),
                    pacing.mode == config::PacingMode::trigger ? &triggers_ : nullptr) {
     EXPECT_TRUE(render_.on_start());
     auto table = *server::make_channels(std::nullopt, *render_.source_info());
@@ -138,8 +139,10 @@ class ConductorRig {
   std::vector<server::StatusReply> replies;
 
  private:
-  static server::Conductor::Options options(config::PacingConfig pacing) {
+  static server::Conductor::Options options(config::PacingConfig pacing,
+                                            bool canned) {
     server::Conductor::Options out;
+    out.canned = canned;
     out.pacing = pacing;
     return out;
   }

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 
 /// Runs a model over a table of exact values and hands back both, column by column.
@@ -18,8 +18,8 @@ inline std::filesystem::path oracle_file(const std::string& name) {
 }
 
 struct OracleRun {
-  verify::CsvTable expected;
-  verify::CsvTable got;
+  physics::CsvTable expected;
+  physics::CsvTable got;
 
   struct Pair {
     std::vector<double> expected;
@@ -46,8 +46,8 @@ inline OracleRun run_oracle(const std::string& model, const std::string& table,
   request.device = device;
   auto result = verify::evaluate(request);
   EXPECT_TRUE(result.has_value()) << result.error().text;
-  auto expected = verify::CsvTable::read(request.table);
-  auto got = verify::CsvTable::parse(result.value_or("empty\n"), "result");
+  auto expected = physics::CsvTable::read(request.table);
+  auto got = physics::CsvTable::parse(result.value_or("empty\n"), "result");
   EXPECT_TRUE(expected.has_value() && got.has_value());
   return {std::move(*expected), std::move(*got)};
 }

@@ -82,7 +82,7 @@ Result<fs::path> resolve_scenario(std::string_view name_or_path) {
   if (fs::is_regular_file(given, code)) {
     return given;
   }
-  // A name has no folder: "scenes/box" stays a path that does not exist.
+  // A name has no folder, so that "scenes/box" can only be a path that does not exist.
   if (!given.has_parent_path() && given != "." && given != "..") {
     fs::path file = fs::path("scenarios") / given;
     if (file.extension() != ".toml") {

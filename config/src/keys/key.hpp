@@ -13,13 +13,16 @@
 #include <utility>
 #include <vector>
 
+#include "emit/physics/limits.hpp"
 #include "node.hpp"
 
-/// The key table: every key of every file is one Key<T>, which reads, checks, prints and
-/// documents itself. T is the plain struct (or a small draft around it) that the key fills.
+/// The key table. Every key of every file is one Key<T>, which reads, checks, prints and documents
+/// itself. T is the plain struct that the key fills, or a small draft around it.
 namespace emit::config {
 
-/// What the documentation says about a key.
+namespace limits = physics::limits;
+
+/// Documentation of a key.
 struct KeySpec {
   std::string name;
   std::string type;
@@ -29,7 +32,7 @@ struct KeySpec {
   bool required = false;
 };
 
-/// Interval a number must lie in; also its text for messages and documentation.
+/// Interval of a number. It also makes the text for messages and documentation.
 struct Range {
   double lo = -std::numeric_limits<double>::infinity();
   double hi = std::numeric_limits<double>::infinity();
@@ -42,6 +45,9 @@ struct Range {
 };
 [[nodiscard]] inline Range between(double lo, double hi) {
   return {lo, hi, false};
+}
+[[nodiscard]] inline Range between(const physics::limits::Interval& limits) {
+  return between(limits.lo, limits.hi);
 }
 [[nodiscard]] inline Range above(double lo) {
   return {lo, Range{}.hi, true};
@@ -60,13 +66,13 @@ template <class T>
 struct Key {
   KeySpec spec;
   std::function<void(T&, const Node&, Diagnostics&)> read;
-  /// TOML text of the value; empty when there is nothing to write.
+  /// TOML text of the value. Empty when there is nothing to write.
   std::function<std::optional<std::string>(const T&)> write;
 };
 template <class T>
 using KeyTable = std::vector<Key<T>>;
 
-// Reading of single values; on a fault they report it and leave `out` alone.
+// Readers of single values. They report a fault and leave `out` as it was.
 void read_number(const Node& node, const std::string& name, const Range& range, double& out,
                  Diagnostics& diagnostics);
 void read_integer(const Node& node, const std::string& name, std::int64_t lo, std::int64_t hi,
@@ -80,19 +86,19 @@ void read_vector(const Node& node, const std::string& name, std::size_t count, d
                  Diagnostics& diagnostics);
 void read_instant(const Node& node, const std::string& name, std::int64_t& out,
                   Diagnostics& diagnostics);
-/// Reports `node` unless it is a table / an array of tables.
+/// Reports `node` and returns false unless it is a table, or an array of tables.
 bool expect_table(const Node& node, const std::string& name, Diagnostics& diagnostics);
 bool expect_table_array(const Node& node, const std::string& name, Diagnostics& diagnostics);
 
-/// "unknown key 'x', did you mean 'y'?"
+/// Message "unknown key 'x', did you mean 'y'?".
 [[nodiscard]] std::string unknown_key_text(std::string_view key,
                                            const std::vector<std::string_view>& known);
 
-/// Shortest decimal that gives `value` back when multiplied by `scale`.
+/// Shortest decimal number that gives `value` when it is multiplied by `scale`.
 [[nodiscard]] std::string unscaled_number(double value, double scale);
 
-/// Reads every member of `table` by `keys`: unknown ones, faulty values and missing required ones
-/// are reported. `also_known` are keys of the same table that the caller reads itself.
+/// Reads every member of `table` by `keys`. It reports unknown keys, faulty values and required
+/// keys that are missing. The caller reads the keys `also_known` itself.
 template <class T>
 void read_table(const Node& table, const KeyTable<T>& keys, T& out, Diagnostics& diagnostics,
                 const std::vector<std::string_view>& also_known = {}) {
@@ -127,7 +133,7 @@ void read_table(const Node& table, const KeyTable<T>& keys, T& out, Diagnostics&
   }
 }
 
-/// Appends "name = value" lines.
+/// Appends one line "name = value" per key.
 template <class T>
 void write_table(const T& value, const KeyTable<T>& keys, std::string& out) {
   for (const Key<T>& key : keys) {
@@ -136,7 +142,7 @@ void write_table(const T& value, const KeyTable<T>& keys, std::string& out) {
     }
   }
 }
-/// The same as an inline table.
+/// Text of the keys as an inline table.
 template <class T>
 std::string inline_table(const T& value, const KeyTable<T>& keys) {
   std::string out = "{";
@@ -148,7 +154,7 @@ std::string inline_table(const T& value, const KeyTable<T>& keys) {
   return out + " }";
 }
 
-/// Which member a key fills, for const and mutable structs alike.
+/// Function that gives the member a key fills, for const and mutable structs.
 #define EMIT_FIELD(member)    \
   [](auto& object) -> auto& { \
     return object.member;     \
@@ -179,7 +185,7 @@ Key<T> number(std::string name, std::string unit, Range range, Field field, std:
   return key;
 }
 
-/// A time kept as int64 ns; `scale_ns` is the unit of the file (1e9 for seconds).
+/// Key of a time that is kept as int64 ns. `scale_ns` is the unit of the file (1e9 for seconds).
 template <class T, class Field>
 Key<T> nanoseconds(std::string name, std::string unit, double scale_ns, Range range, Field field,
                    std::string meaning) {
@@ -220,6 +226,14 @@ Key<T> integer(std::string name, std::string unit, std::int64_t lo, std::int64_t
   return key;
 }
 
+/// Key of an integer whose range stands in the table of limits.
+template <class T, class Field>
+Key<T> integer(std::string name, std::string unit, const physics::limits::Count& limits,
+               Field field, std::string meaning) {
+  return integer<T>(std::move(name), std::move(unit), std::int64_t{limits.lo},
+                    std::int64_t{limits.hi}, field, std::move(meaning));
+}
+
 template <class T, class Field>
 Key<T> boolean(std::string name, Field field, std::string meaning) {
   Key<T> key;
@@ -244,7 +258,7 @@ Key<T> text(std::string name, Field field, std::string meaning) {
   return key;
 }
 
-/// One of several words; V is what each stands for (an enumerator, or the word itself).
+/// Key with one of several words. V is the value of a word: an enumerator, or the word itself.
 template <class T, class Field, class V>
 Key<T> choice(std::string name, std::vector<std::pair<std::string, V>> options, Field field,
               std::string meaning) {
@@ -294,14 +308,14 @@ Key<T> path(std::string name, Field field, std::string meaning) {
   return key;
 }
 
-/// A key with its own reader and writer.
+/// Key with its own reader and writer.
 template <class T>
 Key<T> custom(KeySpec spec, std::function<void(T&, const Node&, Diagnostics&)> read,
               std::function<std::optional<std::string>(const T&)> write) {
   return {std::move(spec), std::move(read), std::move(write)};
 }
 
-/// Not written while `present` says there is no value.
+/// Key that is written only where `present` is true.
 template <class T, class Present>
 Key<T> written_if(Present present, Key<T> key) {
   key.write = [present, inner = std::move(key.write)](const T& in) -> std::optional<std::string> {

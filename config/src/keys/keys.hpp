@@ -8,10 +8,10 @@
 #include "emit/scene/scene_desc.hpp"
 #include "key.hpp"
 
-/// The one key table, by section. Drafts hold what a file may say before it is resolved.
+/// The key table by sections. A draft holds the values of a file before they are resolved.
 namespace emit::config {
 
-/// Position and one of three spellings of the attitude.
+/// Position, and the attitude in one of three spellings.
 struct PoseDraft {
   glm::dvec3 position_m{0.0, 0.0, 0.0};
   double heading_rad = 0.0;
@@ -44,7 +44,7 @@ struct SensorDraft {
 };
 struct WeatherDraft {
   std::filesystem::path file;
-  scene::ClearSkyDesc clear_sky;
+  scene::ClearSky clear_sky;
   std::vector<scene::WeatherSample> samples;
 };
 struct AtmosphereDraft {
@@ -68,9 +68,10 @@ struct DaemonHead {
   std::string scenario;
 };
 
-/// Defaults that differ from those of the plain structs.
+/// Defaults of scenario files where they differ from those of the plain structs.
 [[nodiscard]] SensorDraft default_sensor();
 [[nodiscard]] ScenarioHead default_scenario_head();
+[[nodiscard]] scene::ThermalOptions default_thermal();
 
 [[nodiscard]] const KeyTable<ScenarioHead>& scenario_head_keys();
 [[nodiscard]] const KeyTable<scene::Place>& place_keys();
@@ -109,15 +110,10 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<LogConfig>& log_keys();
 
 inline constexpr std::string_view kShippedLibrary = "share:materials/library.toml";
-/// Most relaxation modes a material may have: the emit2014 model keeps two states per sample.
-inline constexpr std::size_t kMaxModes = 2;
-/// Most states of the extended model.
-inline constexpr std::size_t kMaxFosterModes = 4;
-
-/// A section as documentation, override routing and the environment see it.
+/// A section for documentation, for the sorting of overrides and for names in the environment.
 struct SectionDoc {
-  std::string path;    ///< "thermal"; "" for the head; "object.instances" for a nested table
-  bool array = false;  ///< an array of tables
+  std::string path;    ///< "thermal", "object.instances"; "" for the keys above the sections
+  bool array = false;  ///< true for an array of tables
   std::string summary;
   struct Row {
     KeySpec spec;
@@ -139,7 +135,7 @@ SectionDoc section_doc(std::string path, bool array, std::string summary, const 
   return doc;
 }
 
-/// Array of tables under a key, one element per table.
+/// Reads an array of tables under a key, one element per table.
 template <class T>
 void read_array(const Node& node, const std::string& name, const KeyTable<T>& keys,
                 const T& defaults, std::vector<T>& out, Diagnostics& diagnostics) {
@@ -165,7 +161,7 @@ std::optional<std::string> write_array(const std::vector<T>& elements, const Key
   return out + "]";
 }
 
-/// vector3 and quaternion as TOML arrays.
+/// Numbers as a TOML array.
 [[nodiscard]] std::string toml_vector(const double* values, std::size_t count);
 
 }  // namespace emit::config

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "keys.hpp"
 
-/// Keys of the daemon's configuration: who may connect.
+/// Keys of the daemon's configuration that say who may connect.
 namespace emit::config {
 
 namespace {
 
-/// An array of strings that `take` turns into elements; it returns false after reporting a fault.
+/// Key of an array of strings. `take` turns a string into an element, or reports a fault.
 template <class T, class Field, class Take, class Write>
 Key<T> texts(std::string name, std::string range, Field field, Take take, Write write,
              std::string meaning) {
@@ -38,39 +38,40 @@ template <class Field>
 Key<AccessConfig> networks(std::string name, Field field, std::string meaning) {
   return texts<AccessConfig>(
       name, "networks such as 10.0.0.0/8, fd00::/8", field,
-      [name](std::vector<Network>& out, const std::string& word, const Location& at,
+      [name](std::vector<protocol::Network>& out, const std::string& word, const Location& at,
              Diagnostics& diagnostics) {
-        const auto network = parse_network(word);
+        const auto network = protocol::parse_network(word);
         network ? out.push_back(*network)
                 : diagnostics.add(at, "'" + name + "': " + network.error().text);
       },
-      [](const Network& network) { return to_string(network); }, std::move(meaning));
+      [](const protocol::Network& network) { return to_string(network); }, std::move(meaning));
 }
 
 }  // namespace
 
-std::vector<Network> AccessConfig::default_multicast_groups() {
-  return {*parse_network("239.255.0.0/16"), *parse_network("ff15::/16")};
+std::vector<protocol::Network> AccessConfig::default_multicast_groups() {
+  return {*protocol::parse_network("239.255.0.0/16"), *protocol::parse_network("ff15::/16")};
 }
 
 const KeyTable<AccessConfig>& access_keys() {
   static const KeyTable<AccessConfig> keys = {
-      networks("allow", EMIT_FIELD(allow),
-               "Networks whose hosts may reach the control, host and metrics ports; others are "
-               "dropped before a byte is read. Loopback always may. Empty: whoever "
-               "reaches a port."),
+      networks(
+          "allow", EMIT_FIELD(allow),
+          "Networks whose hosts may reach the control, host and metrics ports, beside loopback. "
+          "Others are dropped before a byte is read. When it is empty, all hosts may."),
       networks("multicast_groups", EMIT_FIELD(multicast_groups),
-               "Groups that a client may have frames sent to. Default: the site-local scopes."),
-      integer<AccessConfig>("max_connections_per_peer", "", 1, 1024,
-                            EMIT_FIELD(max_connections_per_peer),
-                            "Connections at a time from one address of another host."),
+               "Multicast groups that a client may have frames sent to. The default is the "
+               "site-local scopes."),
+      integer<AccessConfig>(
+          "max_connections_per_peer", "", 1, 1024, EMIT_FIELD(max_connections_per_peer),
+          "Largest number of connections at a time from one address of another host."),
       integer<AccessConfig>(
           "max_host_frames_hz", "1/s", 1, 10'000'000, EMIT_FIELD(max_host_frames_hz),
-          "Host frames a second from one address (on this host: from one socket); more are refused "
-          "(`CODE_OVERLOADED`). A quarter of a second's worth may come at once."),
-      integer<AccessConfig>("max_control_records_hz", "1/s", 1, 10'000'000,
-                            EMIT_FIELD(max_control_records_hz),
-                            "The same for hello, subscribe and commands."),
+          "Largest rate of host frames from one address (on this host: one socket). More are "
+          "refused (`CODE_OVERLOADED`). A quarter of a second's number may come at once."),
+      integer<AccessConfig>(
+          "max_control_records_hz", "1/s", 1, 10'000'000, EMIT_FIELD(max_control_records_hz),
+          "Largest rate of hello, subscribe and command records, in the same way."),
   };
   return keys;
 }
@@ -78,20 +79,22 @@ const KeyTable<AccessConfig>& access_keys() {
 const KeyTable<TlsConfig>& tls_keys() {
   static const KeyTable<TlsConfig> keys = {
       path<TlsConfig>("certificate", EMIT_FIELD(certificate),
-                      "The daemon's certificate, PEM, with intermediate ones behind it; absent: no "
-                      "TLS."),
-      path<TlsConfig>("key", EMIT_FIELD(key), "Its private key, PEM, not readable by others."),
-      path<TlsConfig>("client_ca", EMIT_FIELD(client_ca),
-                      "Certificates (PEM) of the authorities that sign clients' certificates."),
+                      "Certificate of the daemon (PEM), with intermediate ones behind it. Without "
+                      "it there is no TLS."),
+      path<TlsConfig>("key", EMIT_FIELD(key),
+                      "Private key of the certificate (PEM), in a file that others cannot read."),
+      path<TlsConfig>(
+          "client_ca", EMIT_FIELD(client_ca),
+          "Certificates (PEM) of the authorities that sign the certificates of clients."),
       texts<TlsConfig>(
           "allow_names", "", EMIT_FIELD(allow_names),
           [](std::vector<std::string>& out, const std::string& word, const Location&,
              Diagnostics&) { out.push_back(word); },
           [](const std::string& name) { return name; },
           "Names in a client's certificate (subject CN or a DNS name of subjectAltName) that may "
-          "connect; empty: every certificate of the authorities."),
+          "connect. When it is empty, every certificate of the authorities may."),
       integer<TlsConfig>("max_handshakes", "", 1, 1024, EMIT_FIELD(max_handshakes),
-                         "Handshakes under way at a time; further connections are closed."),
+                         "Largest number of handshakes at a time. Further connections are closed."),
   };
   return keys;
 }

@@ -6,9 +6,9 @@ namespace emit::config {
 
 const KeyTable<DaemonHead>& daemon_head_keys() {
   static const KeyTable<DaemonHead> keys = {
-      text<DaemonHead>("scenario", EMIT_FIELD(scenario),
-                       "Scenario file, or the name of a shipped one. May be absent only with a "
-                       "canned source."),
+      text<DaemonHead>(
+          "scenario", EMIT_FIELD(scenario),
+          "Scenario file, or the name of a shipped scenario. Only a canned source goes without."),
   };
   return keys;
 }
@@ -19,14 +19,16 @@ const KeyTable<SourceConfig>& source_keys() {
                            std::vector<std::pair<std::string, SourceKind>>{
                                {"renderer", SourceKind::renderer}, {"canned", SourceKind::canned}},
                            EMIT_FIELD(kind),
-                           "Where frames come from: rendered, or pre-rendered (to test a rig)."),
-      path<SourceConfig>("canned_dir", EMIT_FIELD(canned_dir),
-                         "Folder of `frame_*.exr` with a `radiance` channel, shown in name order, "
-                         "again and again. Absent: a moving test pattern."),
-      integer<SourceConfig>("canned_width_px", "px", 1, 16384, EMIT_FIELD(canned_width_px),
+                           "renderer: frames are rendered. canned: frames are read or made "
+                           "beforehand, to test a rig."),
+      path<SourceConfig>(
+          "canned_dir", EMIT_FIELD(canned_dir),
+          "canned: folder of `frame_*.exr` with a `radiance` channel. They are shown in the order "
+          "of names, again and again. Without it a test pattern moves."),
+      integer<SourceConfig>("canned_width_px", "px", limits::kCannedPx, EMIT_FIELD(canned_width_px),
                             "Columns of the test pattern."),
-      integer<SourceConfig>("canned_height_px", "px", 1, 16384, EMIT_FIELD(canned_height_px),
-                            "Rows of the test pattern."),
+      integer<SourceConfig>("canned_height_px", "px", limits::kCannedPx,
+                            EMIT_FIELD(canned_height_px), "Rows of the test pattern."),
       integer<SourceConfig>("canned_frames", "", 1, 1024, EMIT_FIELD(canned_frames),
                             "Length of the test pattern in frames."),
   };
@@ -41,24 +43,22 @@ const KeyTable<PacingConfig>& pacing_keys() {
                                                           {"ig-clock", PacingMode::ig_clock},
                                                           {"trigger", PacingMode::trigger}},
           EMIT_FIELD(mode),
-          "host-step: pose k triggers frame k. ig-clock: own period, newest pose. trigger: a "
-          "datagram of a sync source starts the frame, newest pose."),
-      number<PacingConfig>(
-          "rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
-          "ig-clock: frame rate. trigger: the rate that the source is set to, for telling "
-          "late and spurious triggers."),
+          "host-step: pose k starts frame k. ig-clock: frames start at a fixed rate with the "
+          "newest pose. trigger: a datagram of a sync source starts them."),
+      number<PacingConfig>("rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
+                           "ig-clock: frame rate. trigger: rate of the source, by which late and "
+                           "spurious triggers are found."),
       nanoseconds<PacingConfig>(
           "budget_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(budget_ns),
-          "host-step: deadline after the pose arrived; 0: none. trigger: after "
-          "the trigger; 0: one period. Frames shed "
-          "quality to meet it (thermal.method cached)."),
-      nanoseconds<PacingConfig>("horizon_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(horizon_ns),
-                                "Poses are extrapolated this far at most; then the frame is "
-                                "flagged stale."),
+          "Deadline of a frame, after its pose (host-step) or trigger. With 0 it is none, or one "
+          "period with trigger. Frames lose quality to meet it (cached)."),
       nanoseconds<PacingConfig>(
-          "display_delay_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(display_delay_ns),
-          "ig-clock, trigger: poses are predicted to the start of the slot plus this; "
-          "at most horizon_ms."),
+          "horizon_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(horizon_ns),
+          "Poses are extrapolated at most this far. Beyond it the frame is flagged stale."),
+      nanoseconds<PacingConfig>("display_delay_ms", "ms", 1e6, between(0, 60000),
+                                EMIT_FIELD(display_delay_ns),
+                                "ig-clock, trigger: poses are predicted to this time after the "
+                                "start of the slot. It is at most `horizon_ms`."),
   };
   return keys;
 }
@@ -66,11 +66,11 @@ const KeyTable<PacingConfig>& pacing_keys() {
 const KeyTable<TriggerConfig>& trigger_keys() {
   static const KeyTable<TriggerConfig> keys = {
       text<TriggerConfig>("udp", EMIT_FIELD(udp),
-                          "`address:port` for trigger datagrams; opened by `pacing.mode = "
-                          "\"trigger\"` alone. Beyond loopback it needs `peer`."),
+                          "`address:port` for trigger datagrams. Only `pacing.mode = \"trigger\"` "
+                          "opens it. Beyond loopback it needs `peer`."),
       text<TriggerConfig>("peer", EMIT_FIELD(peer),
-                          "Numeric address of the sync source: triggers of others are refused. "
-                          "Empty: any, on loopback only."),
+                          "Numeric address of the sync source. Triggers of others are refused. "
+                          "When it is empty, any source on loopback counts."),
   };
   return keys;
 }
@@ -78,8 +78,8 @@ const KeyTable<TriggerConfig>& trigger_keys() {
 const KeyTable<ClockConfig>& clock_keys() {
   static const KeyTable<ClockConfig> keys = {
       path<ClockConfig>("ptp_socket", EMIT_FIELD(ptp_socket),
-                        "Management socket of linuxptp's ptp4l, whose state then shows in "
-                        "/metrics: `/var/run/ptp4lro`; absent: off."),
+                        "Management socket of ptp4l (linuxptp), such as `/var/run/ptp4lro`. Its "
+                        "state then shows in /metrics."),
       integer<ClockConfig>("ptp_domain", "", 0, 127, EMIT_FIELD(ptp_domain),
                            "PTP domain of that ptp4l."),
   };
@@ -93,35 +93,35 @@ const KeyTable<RealtimeConfig>& realtime_keys() {
                                  {"other", SchedulerKind::other}, {"fifo", SchedulerKind::fifo}},
                              EMIT_FIELD(scheduler),
                              "fifo: conductor, receiver, sender and render run as real-time "
-                             "threads (SCHED_FIFO). Needs LimitRTPRIO."),
-      integer<RealtimeConfig>("priority", "", 4, 99, EMIT_FIELD(priority),
-                              "fifo: priority of the conductor; receiver, sender and render have "
-                              "1, 2 and 3 less."),
+                             "threads (SCHED_FIFO). It needs LimitRTPRIO."),
+      integer<RealtimeConfig>(
+          "priority", "", 4, 99, EMIT_FIELD(priority),
+          "fifo: priority of the conductor. Receiver, sender and render have 1, 2 and 3 less."),
       text<RealtimeConfig>("cpus", EMIT_FIELD(cpus),
                            "Cores of agents, such as `conductor=2, receiver=2, sender=3, "
-                           "render=4-7`; those not named run anywhere."),
-      boolean<RealtimeConfig>("lock_memory", EMIT_FIELD(lock_memory),
-                              "Lock all memory and touch stacks and heap at start: no page faults "
-                              "later. Needs LimitMEMLOCK=infinity."),
+                           "render=4-7`. The others run on any core."),
+      boolean<RealtimeConfig>(
+          "lock_memory", EMIT_FIELD(lock_memory),
+          "With `true` all memory is locked, and stacks and heap are touched at start, so that no "
+          "page faults come later. It needs LimitMEMLOCK=infinity."),
       integer<RealtimeConfig>("heap_touch_mib", "MiB", 0, 65536, EMIT_FIELD(heap_touch_mib),
-                              "lock_memory: heap touched at start and kept."),
+                              "lock_memory: size of the heap that is touched at start and kept."),
       boolean<RealtimeConfig>("required", EMIT_FIELD(required),
-                              "true: what the host refuses of this section ends the start with an "
-                              "error; false: it is warned of and shows in /metrics."),
+                              "With `true` emitd does not start when the host refuses something of "
+                              "this section. With `false` a warning says so."),
   };
   return keys;
 }
 
 const KeyTable<HostConfig>& host_keys() {
   static const KeyTable<HostConfig> keys = {
-      text<HostConfig>("udp", EMIT_FIELD(udp),
-                       "`address:port` for host frames as datagrams; empty: off."),
+      text<HostConfig>(
+          "udp", EMIT_FIELD(udp),
+          "`address:port` for host frames as datagrams. When it is empty, none are received."),
       path<HostConfig>(
           "key_file", EMIT_FIELD(key_file),
-          "Pre-shared keys, one per line as 64 hexadecimal digits, not readable by "
-          "others. Datagrams must then carry a MAC by one of them, or by a key agreed "
-          "over TLS (see `[tls]`); bare ones are dropped. Triggers (`trigger.udp`) must "
-          "carry one by a key of this file and say their instant, a second old at most."),
+          "Pre-shared keys, one per line as 64 hexadecimal digits, in a file that others cannot "
+          "read. Host datagrams and triggers without a MAC by such a key are dropped."),
   };
   return keys;
 }
@@ -130,93 +130,96 @@ const KeyTable<ControlConfig>& control_keys() {
   static const KeyTable<ControlConfig> keys = {
       text<ControlConfig>(
           "tcp", EMIT_FIELD(tcp),
-          "`address:port` of control, host and stream connections; port 0: any free "
-          "one."),
+          "`address:port` of control, host and stream connections. Port 0 takes any free one."),
       integer<ControlConfig>("max_clients", "", 1, 1024, EMIT_FIELD(max_clients),
-                             "Connections at a time."),
-      integer<ControlConfig>("max_record_bytes", "bytes", 1024, 268435456,
-                             EMIT_FIELD(max_record_bytes),
-                             "Longest message a client may send; longer ones close the "
-                             "connection."),
+                             "Largest number of connections at a time."),
+      integer<ControlConfig>(
+          "max_record_bytes", "bytes", 1024, 268435456, EMIT_FIELD(max_record_bytes),
+          "Longest message that a client may send. A longer one closes the connection."),
   };
   return keys;
 }
 
 const KeyTable<StreamConfig>& stream_keys() {
   static const KeyTable<StreamConfig> keys = {
-      integer<StreamConfig>("queue_frames", "", 1, 13, EMIT_FIELD(queue_frames),
-                            "Frames that wait for a slow client before the oldest goes."),
-      integer<StreamConfig>("udp_fragment_payload_bytes", "bytes", 256, 65000,
+      integer<StreamConfig>(
+          "queue_frames", "", 1, 13, EMIT_FIELD(queue_frames),
+          "Number of frames that wait for a slow client. Then the oldest is dropped."),
+      integer<StreamConfig>("udp_fragment_payload_bytes", "bytes", limits::kFragmentPayloadBytes,
                             EMIT_FIELD(udp_fragment_payload_bytes),
-                            "Pixel bytes per datagram; 8900 needs jumbo frames beyond loopback, "
+                            "Pixel bytes per datagram. Beyond loopback 8900 needs jumbo frames, "
                             "1400 fits any Ethernet."),
-      integer<StreamConfig>("tcp_send_buffer_bytes", "bytes", 0, 1073741824,
-                            EMIT_FIELD(tcp_send_buffer_bytes),
-                            "What a TCP client may leave in its socket, at most "
-                            "net.core.wmem_max: what waits there is late, and skipped no more. "
-                            "Over long links at least rate x round trip; 0: the system's choice, "
-                            "up to megabytes."),
+      integer<StreamConfig>(
+          "tcp_send_buffer_bytes", "bytes", 0, 1073741824, EMIT_FIELD(tcp_send_buffer_bytes),
+          "Socket send buffer of a TCP client, at most net.core.wmem_max. Long links need rate "
+          "times round trip. With 0 the system chooses, up to megabytes that are sent late."),
       integer<StreamConfig>("udp_send_buffer_bytes", "bytes", 65536, 1073741824,
-                            EMIT_FIELD(udp_send_buffer_bytes), "Socket send buffer."),
-      integer<StreamConfig>("fec_data_fragments", "", 1, 128, EMIT_FIELD(fec_data_fragments),
-                            "UDP: fragments of a group of the error correction, at most, for "
-                            "clients that do not say what they want."),
-      integer<StreamConfig>("fec_parity_fragments", "", 0, 32, EMIT_FIELD(fec_parity_fragments),
-                            "UDP: parity fragments of such a group: so many lost ones come back; "
-                            "5 of 48 for 1 % loss; 0: none, for clients that do not say."),
-      number<StreamConfig>("fec_max_parity_frac", "", between(0, 32),
+                            EMIT_FIELD(udp_send_buffer_bytes),
+                            "Socket send buffer of a UDP client."),
+      integer<StreamConfig>("fec_data_fragments", "", 1, limits::kMaxFecData,
+                            EMIT_FIELD(fec_data_fragments),
+                            "UDP: largest number of fragments in a group of the error correction, "
+                            "for clients that do not ask for another."),
+      integer<StreamConfig>("fec_parity_fragments", "", 0, limits::kMaxFecParity,
+                            EMIT_FIELD(fec_parity_fragments),
+                            "UDP: parity fragments of such a group. As many lost fragments come "
+                            "back: 5 for 48 suit 1 % loss. With 0 there is no error correction."),
+      number<StreamConfig>("fec_max_parity_frac", "", between(0, limits::kMaxFecParity),
                            EMIT_FIELD(fec_max_parity_frac),
-                           "UDP: parity per data fragment that a client may ask for; 0: no client "
-                           "gets error correction."),
+                           "UDP: largest number of parity fragments per data fragment that a "
+                           "client may ask for. With 0 no client gets error correction."),
       number<StreamConfig>("resend_max_frac", "", between(0, 10), EMIT_FIELD(resend_max_frac),
-                           "UDP, host-step: missing fragments are sent again on request, at most "
-                           "this part of the bytes sent, and up to a frame at once; 0: never."),
+                           "UDP with host-step: missing fragments are sent again on request, up to "
+                           "this part of the bytes sent. With 0 they never are."),
       boolean<StreamConfig>("compression", EMIT_FIELD(compression),
-                            "TCP: clients that ask for it get frames losslessly compressed, once "
-                            "for all of them, at the cost of CPU time."),
-      integer<StreamConfig>("multicast_ttl", "", 0, 255, EMIT_FIELD(multicast_ttl),
-                            "Routers that multicast frames may pass; 0: this host only."),
+                            "TCP: clients that ask for it get frames compressed without loss. It "
+                            "costs CPU time, once for all clients."),
+      integer<StreamConfig>(
+          "multicast_ttl", "", 0, 255, EMIT_FIELD(multicast_ttl),
+          "Number of routers that multicast frames may pass. With 0 they stay on this host."),
       text<StreamConfig>("shm", EMIT_FIELD(shm),
                          "Name under which clients on this host read frames from shared memory "
-                         "(`shm://name`): letters, digits, `_`, `-`, `.`; empty: off."),
-      integer<StreamConfig>("shm_slots", "", 3, 64, EMIT_FIELD(shm_slots),
-                            "Frames in the shared memory: a client that reads them in place has "
-                            "one period less than this before a frame is overwritten."),
-      choice<StreamConfig>(
-          "shm_mode",
-          std::vector<std::pair<std::string, std::uint32_t>>{
-              {"0600", 0600}, {"0640", 0640}, {"0644", 0644}},
-          EMIT_FIELD(shm_mode),
-          "Who may read the shared memory: emitd's user, its group too, or everybody."),
+                         "(`shm://name`). It holds letters, digits, `_`, `-` and `.`."),
+      integer<StreamConfig>("shm_slots", "", limits::kRingSlots, EMIT_FIELD(shm_slots),
+                            "Number of frames in the shared memory. A client that reads in place "
+                            "has one period less than this for a frame."),
+      choice<StreamConfig>("shm_mode",
+                           std::vector<std::pair<std::string, std::uint32_t>>{
+                               {"0600", 0600}, {"0640", 0640}, {"0644", 0644}},
+                           EMIT_FIELD(shm_mode),
+                           "Permissions of the shared memory: 0600 for the user of emitd, 0640 for "
+                           "its group too, 0644 for everybody."),
   };
   return keys;
 }
 
 const KeyTable<MetricsConfig>& metrics_keys() {
   static const KeyTable<MetricsConfig> keys = {
-      text<MetricsConfig>("listen", EMIT_FIELD(listen),
-                          "`address:port` for HTTP: /metrics (Prometheus text), /healthz, /readyz; "
-                          "empty: off. Beyond loopback only with `access.allow`."),
+      text<MetricsConfig>(
+          "listen", EMIT_FIELD(listen),
+          "`address:port` for HTTP: /metrics (Prometheus text), /healthz and /readyz. Beyond "
+          "loopback it needs `access.allow`. When it is empty, there is none."),
   };
   return keys;
 }
 
 const KeyTable<JournalConfig>& journal_keys() {
   static const KeyTable<JournalConfig> keys = {
-      path<JournalConfig>(
-          "file", EMIT_FIELD(file),
-          "Journal written while running; one of an earlier process is kept under another name. "
-          "Absent: only for a recorder that asks."),
-      integer<JournalConfig>("ring_entries", "", 64, 1048576, EMIT_FIELD(ring_entries),
-                             "Entries between the frame loop and the journal's writer."),
+      path<JournalConfig>("file", EMIT_FIELD(file),
+                          "Journal that emitd writes while it runs. One of an earlier process is "
+                          "kept under another name. Without it only recorders get the journal."),
+      integer<JournalConfig>(
+          "ring_entries", "", 64, 1048576, EMIT_FIELD(ring_entries),
+          "Number of entries between the frame loop and the writer of the journal."),
   };
   return keys;
 }
 
 const KeyTable<DeviceConfig>& device_keys() {
   static const KeyTable<DeviceConfig> keys = {
-      integer<DeviceConfig>("gpu_index", "", -1, 63, EMIT_FIELD(gpu_index),
-                            "EGL device; -1: the first hardware device, else software."),
+      integer<DeviceConfig>(
+          "gpu_index", "", -1, 63, EMIT_FIELD(gpu_index),
+          "Number of the EGL device. -1 takes the first hardware device, else software."),
   };
   return keys;
 }
@@ -227,8 +230,9 @@ const KeyTable<LogConfig>& log_keys() {
           "level",
           std::vector<std::pair<std::string, std::string>>{
               {"error", "error"}, {"warn", "warn"}, {"info", "info"}, {"debug", "debug"}},
-          EMIT_FIELD(level), "Least severity that is logged."),
-      path<LogConfig>("file", EMIT_FIELD(file), "Log file; absent: standard error."),
+          EMIT_FIELD(level), "Lowest severity that is logged."),
+      path<LogConfig>("file", EMIT_FIELD(file),
+                      "Log file. Without it the log goes to standard error."),
   };
   return keys;
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "emit/physics/foster.hpp"
 #include "keys.hpp"
 
-/// Keys of materials, in a scenario and in library files alike.
+/// Keys of materials, in scenarios and in library files.
 namespace emit::config {
 
 using scene::FosterFit;
@@ -29,7 +30,7 @@ const KeyTable<RelaxationMode>& mode_keys() {
       required(number<RelaxationMode>("tau_s", "s", above_to(0, 1e8), EMIT_FIELD(tau_s),
                                       "Time constant.")),
       required(number<RelaxationMode>("weight_frac", "", between(0, 1), EMIT_FIELD(weight_frac),
-                                      "Share of the step response; all add up to 1.")),
+                                      "Share of the step response. All shares add up to 1.")),
   };
   return keys;
 }
@@ -40,7 +41,7 @@ const KeyTable<FosterMode>& foster_mode_keys() {
           number<FosterMode>("tau_s", "s", above_to(0, 1e9), EMIT_FIELD(tau_s), "Time constant.")),
       required(number<FosterMode>("resistance_m2k_w", "m2 K W-1", above_to(0, 1e4),
                                   EMIT_FIELD(resistance_m2k_w),
-                                  "Thermal resistance; all add up to that of the layers.")),
+                                  "Thermal resistance. All add up to that of the layers.")),
   };
   return keys;
 }
@@ -48,27 +49,27 @@ const KeyTable<FosterMode>& foster_mode_keys() {
 const KeyTable<FosterFit>& foster_fit_keys() {
   static const KeyTable<FosterFit> keys = {
       required(number<FosterFit>("horizon_s", "s", above_to(0, 1e8), EMIT_FIELD(horizon_s),
-                                 "Length of the histories the modes were fitted over.")),
+                                 "Length of the histories that the modes were fitted over.")),
       required(number<FosterFit>("rms_k", "K", between(0, 1000), EMIT_FIELD(rms_k),
                                  "Root mean square of the residual in the worst history.")),
       required(number<FosterFit>("max_k", "K", between(0, 1000), EMIT_FIELD(max_k),
-                                 "Largest residual of all.")),
+                                 "Largest residual of all histories.")),
   };
   return keys;
 }
 
 const KeyTable<Material>& material_keys() {
   static const KeyTable<Material> keys = {
-      required(text<Material>("name", EMIT_FIELD(name), "Unique name.")),
+      required(text<Material>("name", EMIT_FIELD(name), "Unique name of the material.")),
       required(number<Material>("solar_absorptance_frac", "", between(0, 1),
                                 EMIT_FIELD(solar_absorptance_frac),
-                                "Absorbed share of sunlight: 1 - albedo.")),
+                                "Share of sunlight that is absorbed: 1 - albedo.")),
       required(number<Material>("emissivity_frac", "", between(0.01, 1),
                                 EMIT_FIELD(emissivity_frac),
-                                "Total hemispherical emissivity, long-wave.")),
+                                "Total hemispherical emissivity in the long-wave infrared.")),
       custom<Material>(
           {"band_emissivity_frac", "table", "", "0 .. 1",
-           "Band name = emissivity in that band; other bands use emissivity_frac.", false},
+           "Emissivities by name of the band. Other bands use `emissivity_frac`.", false},
           [](Material& out, const Node& node, Diagnostics& diagnostics) {
             if (!expect_table(node, "band_emissivity_frac", diagnostics)) {
               return;
@@ -92,9 +93,8 @@ const KeyTable<Material>& material_keys() {
           }),
       custom<Material>(
           {"layers", "array of tables", "", "1 .. 16",
-           "Outermost first, down to where the temperature is base_k; emit2014 uses the first. "
-           "Required without prescribed_k. See `layers` "
-           "below.",
+           "Layers from the outside down to where the temperature is `base_k`. emit2014 uses the "
+           "first. Required without `prescribed_k`. See `layers` below.",
            false},
           [](Material& out, const Node& node, Diagnostics& diagnostics) {
             read_array(node, "layers", layer_keys(), Layer{}, out.layers, diagnostics);
@@ -105,21 +105,19 @@ const KeyTable<Material>& material_keys() {
           },
           [](const Material& in) { return write_array(in.layers, layer_keys()); }),
       written_if([](const Material& in) { return in.base_k > 0.0; },
-                 number<Material>("base_k", "K", between(150, 2000), EMIT_FIELD(base_k),
-                                  "Core temperature under the last layer. Required without "
-                                  "prescribed_k.")),
+                 number<Material>(
+                     "base_k", "K", between(150, 2000), EMIT_FIELD(base_k),
+                     "Core temperature under the last layer. Required without `prescribed_k`.")),
       number<Material>("core_conductance_w_m2_k", "W m-2 K-1", above_to(0, 1e7),
                        EMIT_FIELD(core_conductance_w_m2_k),
-                       "emit2014: conductance between surface and core, for sheets; that of the "
-                       "first layer if absent. Give `modes` with it."),
+                       "emit2014: conductance between surface and core, for sheets. Without it "
+                       "that of the first layer counts. It goes with `modes`."),
       number<Material>("initial_k", "K", between(150, 2000), EMIT_FIELD(initial_k),
-                       "Surface temperature at the start of the history; thermal.initial_k if "
-                       "absent."),
+                       "Surface temperature at the start. Without it `thermal.initial_k` counts."),
       custom<Material>(
           {"modes", "array of tables", "", "1 .. 2, weights add up to 1",
-           "emit2014: relaxation modes. If absent: derived from the first layer by the slab "
-           "formula "
-           "(slab_modes.hpp). See `modes` below.",
+           "emit2014: relaxation modes. Without them the slab formula (slab_modes.hpp) derives "
+           "them from the first layer. See `modes` below.",
            false},
           [](Material& out, const Node& node, Diagnostics& diagnostics) {
             const std::size_t faults = diagnostics.size();
@@ -127,7 +125,7 @@ const KeyTable<Material>& material_keys() {
             if (diagnostics.size() != faults) {
               return;
             }
-            if (out.modes.empty() || out.modes.size() > kMaxModes) {
+            if (out.modes.empty() || out.modes.size() > limits::kMaxRelaxationModes) {
               diagnostics.add(node.at, "'modes' has " + std::to_string(out.modes.size()) +
                                            " entries, must have 1 or 2");
               return;
@@ -145,8 +143,8 @@ const KeyTable<Material>& material_keys() {
       custom<Material>(
           {"foster_modes", "array of tables", "",
            "1 .. 4, resistances add up to that of the layers",
-           "foster: modes, fastest first, such as `emit fit` writes. If absent: derived from the "
-           "layers (foster.hpp). See `foster_modes` below.",
+           "foster: modes, fastest first, as `emit fit` writes them. Without them they are derived "
+           "from the layers. See `foster_modes` below.",
            false},
           [](Material& out, const Node& node, Diagnostics& diagnostics) {
             const std::size_t faults = diagnostics.size();
@@ -155,7 +153,7 @@ const KeyTable<Material>& material_keys() {
             if (diagnostics.size() != faults) {
               return;
             }
-            if (out.foster_modes.empty() || out.foster_modes.size() > kMaxFosterModes) {
+            if (out.foster_modes.empty() || out.foster_modes.size() > physics::kMaxFosterModes) {
               diagnostics.add(node.at, "'foster_modes' has " +
                                            std::to_string(out.foster_modes.size()) +
                                            " entries, must have 1 to 4");
@@ -175,8 +173,8 @@ const KeyTable<Material>& material_keys() {
           }),
       custom<Material>(
           {"foster_fit", "table", "", "",
-           "What `emit fit` found for foster_modes against the reference solver: `horizon_s`, "
-           "`rms_k`, `max_k`. Absent: they come from the layers alone.",
+           "Error of `foster_modes` against the reference solver as `emit fit` found it: "
+           "`horizon_s`, `rms_k`, `max_k`.",
            false},
           [](Material& out, const Node& node, Diagnostics& diagnostics) {
             if (expect_table(node, "foster_fit", diagnostics)) {
@@ -190,12 +188,13 @@ const KeyTable<Material>& material_keys() {
             return inline_table(*in.foster_fit, foster_fit_keys());
           }),
       boolean<Material>("dry_layers_valid", EMIT_FIELD(dry_layers_valid),
-                        "False where heat moves otherwise than through dry layers: evaporation, "
-                        "melting, stirring. Its temperatures are then a guide only."),
-      number<Material>("prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
-                       "A part of given temperature (hot parts): no thermal simulation."),
-      text<Material>("source", EMIT_FIELD(source), "Where the numbers come from."),
-      text<Material>("uncertainty", EMIT_FIELD(uncertainty), "What is known about their error."),
+                        "`false` says that heat also moves by evaporation, melting or stirring. "
+                        "Temperatures are then a guide only, and a warning says so."),
+      number<Material>(
+          "prescribed_k", "K", between(100, 5000), EMIT_FIELD(prescribed_k),
+          "Given temperature of a part, such as a hot engine. It has no thermal simulation."),
+      text<Material>("source", EMIT_FIELD(source), "Source of the numbers."),
+      text<Material>("uncertainty", EMIT_FIELD(uncertainty), "Known uncertainty of the numbers."),
   };
   return keys;
 }

@@ -80,7 +80,7 @@ physics::Error Diagnostics::error() const {
 
 std::string toml_number(double value) {
   std::string text = fmt::format("{}", value);
-  // TOML tells a float from an integer by the point or the exponent.
+  // In TOML a float has a point or an exponent.
   if (text.find_first_of(".en") == std::string::npos) {
     text += ".0";
   }
@@ -121,7 +121,7 @@ std::string toml_instant(std::int64_t posix_ns) {
 
 namespace {
 
-/// Optimal string alignment distance: edits and swaps of neighbours.
+/// Optimal string alignment distance, which counts edits and swaps of neighbours.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   const std::size_t columns = b.size() + 1;
   std::vector<std::size_t> before(columns), above(columns), row(columns);
@@ -159,7 +159,7 @@ std::string_view nearest_word(std::string_view word,
   if (!best.empty()) {
     return best;
   }
-  // A forgotten or foreign unit suffix: `height` for `height_px`, `near_mm` for `near_m`.
+  // The unit may be forgotten or another one: `height` for `height_px`, `near_mm` for `near_m`.
   for (const std::string_view candidate : candidates) {
     if (word.size() >= 4 &&
         (candidate.substr(0, word.size()) == word ||

@@ -9,14 +9,14 @@
 
 #include "emit/physics/error.hpp"
 
-/// A parsed file as plain values that know where they came from. The only place that sees the
-/// TOML library is toml_adapter.cpp.
+/// A parsed file as plain values that know their place in the file. Only toml_adapter.cpp includes
+/// the TOML library.
 namespace emit::config {
 
 /// A file, an environment variable or an override.
 struct Source {
-  std::string name;                 ///< what messages show
-  std::filesystem::path directory;  ///< where relative paths start
+  std::string name;                 ///< name for messages
+  std::filesystem::path directory;  ///< relative paths start here
 };
 
 struct Location {
@@ -24,7 +24,7 @@ struct Location {
   std::uint32_t line = 0;  ///< from 1; 0: the source as a whole
   std::uint32_t column = 0;
 
-  /// "file:line:column", or the source's name alone.
+  /// Text "file:line:column", or only the name of the source.
   [[nodiscard]] std::string to_string() const;
 };
 
@@ -68,7 +68,7 @@ struct Member {
 /// "a string", "an integer", ... for messages.
 [[nodiscard]] std::string_view kind_name(Node::Kind kind) noexcept;
 
-/// Faults found in one load; all are reported together.
+/// Collects the faults of one load, so that all are reported together.
 class Diagnostics {
  public:
   void add(const Location& at, std::string_view text);
@@ -84,18 +84,20 @@ class Diagnostics {
 [[nodiscard]] physics::Result<Node> parse_toml_file(const std::filesystem::path& file);
 [[nodiscard]] physics::Result<Node> parse_toml_text(std::string_view text,
                                                     std::shared_ptr<const Source> source);
-/// One value as in `--set key=value`: TOML, else plain text. All locations are `source` as a whole.
+/// Reads one value as in `--set key=value`: as TOML, else as plain text. All locations are `source`
+/// as a whole.
 [[nodiscard]] Node parse_override_value(std::string_view text,
                                         std::shared_ptr<const Source> source);
-/// RFC 3339 instant with offset, such as 2014-06-21T06:00:00Z. False when it is not one.
+/// Reads an RFC 3339 instant with offset, such as 2014-06-21T06:00:00Z. False when it is none.
 [[nodiscard]] bool parse_instant(std::string_view text, std::int64_t& posix_ns);
 
-/// TOML spellings.
+/// Values in the spelling of TOML.
 [[nodiscard]] std::string toml_number(double value);
 [[nodiscard]] std::string toml_string(std::string_view text);
 [[nodiscard]] std::string toml_instant(std::int64_t posix_ns);
 
-/// Nearest of `candidates` within a third of the word's length; empty when none is near.
+/// The candidate that differs from `word` by the fewest edits, at most a third of its length. Empty
+/// when none is so near.
 [[nodiscard]] std::string_view nearest_word(std::string_view word,
                                             const std::vector<std::string_view>& candidates);
 

@@ -2,7 +2,7 @@
 #include "emit/config/load.hpp"
 #include "keys.hpp"
 
-/// The effective configuration, written by the same key table that reads it.
+/// Writer of the effective configuration, by the key table that also reads it.
 namespace emit::config {
 
 namespace {
@@ -76,7 +76,7 @@ std::string print_scenario(const scene::ScenarioDesc& scenario) {
   head.name = scenario.name;
   head.epoch_utc_ns = scenario.epoch_utc_ns;
   head.default_material = scenario.default_material;
-  write_table(head, scenario_head_keys(), out);  // materials = []: all are written out below
+  write_table(head, scenario_head_keys(), out);  // all materials are written out below
   print_section("[place]", scenario.place, place_keys(), out);
 
   WeatherDraft weather;

@@ -16,7 +16,7 @@ void wrong_type(const Node& node, const std::string& name, std::string_view want
                   fmt::format("'{}' must be {}, not {}", name, wanted, kind_name(node.kind)));
 }
 
-/// Numbers of either kind; false where the node is something else.
+/// Takes a float or an integer as a number. False when the node is something else.
 bool as_number(const Node& node, double& out) {
   if (node.kind == Node::Kind::number) {
     out = node.number;
@@ -85,7 +85,7 @@ bool read_text(const Node& node, const std::string& name, std::string& out,
     out = node.text;
     return true;
   }
-  // `--set sensor.name=7` means the word 7.
+  // In `--set sensor.name=7` the word 7 is meant.
   if (!node.raw.empty() && node.kind != Node::Kind::array && node.kind != Node::Kind::table) {
     out = node.raw;
     return true;
@@ -185,8 +185,8 @@ std::string unscaled_number(double value, double scale) {
     return toml_number(value);
   }
   const double plain = value / scale;
-  // 48.56 deg in radians and back is 48.560000000000002: prefer the short decimal that reads back
-  // as the very same radians.
+  // 48.56 degrees in radians and back are 48.560000000000002. The shortest decimal that gives the
+  // very same radians is better to read.
   for (int digits = 6; digits <= 17; ++digits) {
     const std::string text = fmt::format("{:.{}g}", plain, digits);
     const double back = std::stod(text);
@@ -194,7 +194,7 @@ std::string unscaled_number(double value, double scale) {
       return toml_number(back);
     }
   }
-  // No decimal near the quotient may round back; step to the neighbours that do.
+  // The quotient itself may not give the value back, but a neighbour does.
   double below = plain;
   double beyond = plain;
   for (int i = 0; i < 4; ++i) {

@@ -2,55 +2,61 @@
 #include "emit/config/load.hpp"
 #include "keys.hpp"
 
-/// The sections in the order of the documentation, and the documentation itself.
+/// The sections in the order of the documentation, and the text of the documentation.
 namespace emit::config {
 
 const std::vector<SectionDoc>& scenario_sections() {
   static const std::vector<SectionDoc> sections = {
-      section_doc("", false, "Above the first section.", scenario_head_keys(),
+      section_doc("", false, "These keys stand above the first section.", scenario_head_keys(),
                   default_scenario_head()),
-      section_doc("place", false, "Where the world origin lies.", place_keys(),
+      section_doc("place", false, "Place of the world origin.", place_keys(),
                   scene::Place{48.56 * 0.017453292519943295, 11.26 * 0.017453292519943295, 0.0}),
-      section_doc("weather", false, "Sun, sky and air over time.", weather_keys(), WeatherDraft{}),
+      section_doc(
+          "weather", false,
+          "Sun, sky and air over time. A table that begins after `thermal.history_start_s - "
+          "thermal.spin_up_s` is completed by the clear-sky models, with a warning; parameters of "
+          "them that are absent then follow the table. One row alone is constant weather.",
+          weather_keys(), WeatherDraft{}),
       section_doc("weather.sample", true,
-                  "Forcing at one instant: linear between samples, constant outside. The same "
-                  "names are the columns of the CSV.",
+                  "Weather at one instant. It is linear between samples and constant behind the "
+                  "last one. The columns of the CSV file have the same names.",
                   weather_sample_keys(), scene::WeatherSample{}),
-      section_doc("atmosphere", false, "What the air does between surface and sensor.",
-                  atmosphere_keys(), AtmosphereDraft{}),
-      section_doc("atmosphere.band", true, "Transmittance of one band: terms or a table.",
+      section_doc("atmosphere", false, "The air between surface and sensor.", atmosphere_keys(),
+                  AtmosphereDraft{}),
+      section_doc("atmosphere.band", true, "Transmittance of one band, as terms or as a table.",
                   band_atmosphere_keys(), scene::BandAtmosphere{}),
-      section_doc("thermal", false, "The thermal simulation.", thermal_keys(),
-                  scene::ThermalOptions{}),
+      section_doc("thermal", false, "The thermal simulation.", thermal_keys(), default_thermal()),
       section_doc("sensor", false,
-                  "The camera: looks along the x axis of its body. Host frames override its poses.",
+                  "The camera. It looks along the x axis of its body. Poses of host frames "
+                  "override the scenario's.",
                   sensor_keys(), default_sensor()),
       section_doc("channel", true,
-                  "An output stream. Without any: `lwir` (8-12) and `mwir` (3-5), both injection.",
+                  "An output stream. Without channels there are `lwir` (8-12) and `mwir` (3-5), "
+                  "both of kind injection.",
                   channel_keys(), scene::ChannelDesc{}),
-      section_doc("band", true,
-                  "A spectral band beside the built-in ones. Each band in use costs one image per "
-                  "frame.",
-                  band_keys(), BandDraft{}),
+      section_doc(
+          "band", true,
+          "A spectral band beside the built-in ones. Each band in use costs one image per frame.",
+          band_keys(), BandDraft{}),
       section_doc("object", true, "A glTF file placed in the world.", object_keys(), ObjectDraft{}),
-      section_doc("object.instances", true, "One placement of static scenery.", instance_keys(),
-                  InstanceDraft{}),
+      section_doc("object.instances", true, "One placement of an object that does not move.",
+                  instance_keys(), InstanceDraft{}),
       section_doc("object.trajectory", true,
-                  "A keyframe; also of `[sensor]` (`[[sensor.trajectory]]`). Before the first its "
-                  "pose holds, likewise after the last.",
+                  "A keyframe of an object or of the sensor (`[[sensor.trajectory]]`). The first "
+                  "pose holds before it, the last one after it.",
                   keyframe_keys(), KeyframeDraft{}),
-      section_doc("material", true,
-                  "A material; the same in a library file, which holds nothing else.",
-                  material_keys(), scene::Material{}),
+      section_doc(
+          "material", true,
+          "A material of the scenario or of a library file, which holds nothing but materials.",
+          material_keys(), scene::Material{}),
       section_doc("material.layers", true, "A layer of a material, outermost first.", layer_keys(),
                   scene::Layer{}),
       section_doc("material.modes", true, "An exponential of a material's step response.",
                   mode_keys(), scene::RelaxationMode{}),
-      section_doc(
-          "material.foster_modes", true,
-          "A flux-driven state of a material: tau x' = resistance q - x, q the net flux into "
-          "the surface, which is base_k plus the sum of the states.",
-          foster_mode_keys(), scene::FosterMode{}),
+      section_doc("material.foster_modes", true,
+                  "A state x of a material, driven by the net flux q into the surface: tau x' = "
+                  "resistance q - x. The surface has `base_k` plus the sum of the states.",
+                  foster_mode_keys(), scene::FosterMode{}),
       section_doc("display", false, "Limits of the false-colour display.", display_keys(),
                   scene::DisplayOptions{}),
   };
@@ -59,42 +65,43 @@ const std::vector<SectionDoc>& scenario_sections() {
 
 const std::vector<SectionDoc>& daemon_sections() {
   static const std::vector<SectionDoc> sections = {
-      section_doc("", false, "Above the first section.", daemon_head_keys(), DaemonHead{}),
-      section_doc("source", false, "Where the frames come from.", source_keys(), SourceConfig{}),
-      section_doc("pacing", false, "When a frame is due.", pacing_keys(), PacingConfig{}),
+      section_doc("", false, "These keys stand above the first section.", daemon_head_keys(),
+                  DaemonHead{}),
+      section_doc("source", false, "Source of the frames.", source_keys(), SourceConfig{}),
+      section_doc("pacing", false, "Time at which a frame is due.", pacing_keys(), PacingConfig{}),
       section_doc("trigger", false, "The external sync source of `pacing.mode = \"trigger\"`.",
                   trigger_keys(), TriggerConfig{}),
-      section_doc("clock", false, "What disciplines the clock.", clock_keys(), ClockConfig{}),
+      section_doc("clock", false, "Source of the clock's time.", clock_keys(), ClockConfig{}),
       section_doc("realtime", false,
-                  "What the agents ask of the host; `deploy/scripts/check_host.sh` tells what it "
-                  "would refuse.",
+                  "Real-time settings of the agents. `deploy/scripts/check_host.sh` shows what the "
+                  "host would refuse.",
                   realtime_keys(), RealtimeConfig{}),
-      section_doc("host", false, "Poses in.", host_keys(), HostConfig{}),
+      section_doc("host", false, "Input of poses.", host_keys(), HostConfig{}),
       section_doc("control", false, "The TCP port for everything but datagrams.", control_keys(),
                   ControlConfig{}),
-      section_doc("stream", false, "Frames out.", stream_keys(), StreamConfig{}),
+      section_doc("stream", false, "Output of frames.", stream_keys(), StreamConfig{}),
       section_doc("metrics", false, "Numbers for monitoring.", metrics_keys(), MetricsConfig{}),
       section_doc("access", false,
-                  "Who may connect. A port that other hosts reach is refused at start unless "
-                  "something keeps strangers out: `allow`, or for `control.tcp` `[tls]`, or for "
-                  "`host.udp` `host.key_file` or `[tls]`.",
+                  "Hosts that may connect. emitd does not start with a port that other hosts reach "
+                  "unless it is protected: by `allow`, for `control.tcp` also by `[tls]`, for "
+                  "`host.udp` also by `host.key_file` or `[tls]`.",
                   access_keys(), AccessConfig{}),
       section_doc("tls", false,
-                  "Mutual TLS 1.3 on `control.tcp`: with a certificate, plain connections are "
+                  "Mutual TLS 1.3 on `control.tcp`. With a certificate, plain connections are "
                   "refused, and so are host datagrams without a MAC by `host.key_file` or by the "
                   "key that a host agrees over its TLS connection.",
                   tls_keys(), TlsConfig{}),
-      section_doc("journal", false, "The record that makes replay exact.", journal_keys(),
-                  JournalConfig{}),
+      section_doc("journal", false, "Record of all inputs, which makes a replay exact.",
+                  journal_keys(), JournalConfig{}),
       section_doc("device", false, "The graphics device.", device_keys(), DeviceConfig{}),
-      section_doc("log", false, "Messages.", log_keys(), LogConfig{}),
+      section_doc("log", false, "Messages of emitd.", log_keys(), LogConfig{}),
   };
   return sections;
 }
 
 namespace {
 
-/// `|` would end a table cell.
+/// Text for a cell of a table, where `|` would end the cell.
 std::string cell(std::string_view text) {
   std::string out;
   for (const char c : text) {

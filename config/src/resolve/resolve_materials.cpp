@@ -91,7 +91,7 @@ std::vector<Node> collect_material_nodes(const Node& root,
   for (const std::filesystem::path& library : libraries) {
     append_library(library, nodes, diagnostics, key_location(root, "materials"));
   }
-  // Two libraries must not silently compete; the scenario's own entries win on purpose.
+  // Two libraries with one name are a fault. The scenario's own material replaces a library's.
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const std::string name = node_name(nodes[i]);
     for (std::size_t j = 0; j < i && !name.empty(); ++j) {
@@ -138,8 +138,8 @@ std::vector<Material> resolve_materials(const std::vector<Node>& nodes,
     read_table(node, material_keys(), material, diagnostics);
     check_material(material, node, known_bands, diagnostics);
     if (diagnostics.size() == faults && material.modes.empty() && !material.layers.empty()) {
-      material.modes =
-          slab_modes(material.layers.front(), kSlabModesFilmWPerM2K, static_cast<int>(kMaxModes));
+      material.modes = slab_modes(material.layers.front(), kSlabModesFilmWPerM2K,
+                                  static_cast<int>(limits::kMaxRelaxationModes));
     }
     materials.push_back(std::move(material));
   }

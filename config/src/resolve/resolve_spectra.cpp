@@ -110,7 +110,7 @@ SpectralBand resolve_band(const Node& node, Diagnostics& diagnostics) {
   return band;
 }
 
-/// The [[band]] of that name, else `fallback`.
+/// Place of the [[band]] of that name, else of `fallback`.
 const Location& band_location(const Node& root, const std::string& name, const Node& fallback) {
   if (const Node* bands = root.find("band")) {
     for (const Node& node : bands->items) {
@@ -179,17 +179,15 @@ std::vector<ChannelDesc> resolve_channels(const Node& root,
     }
     channels.push_back(std::move(channel));
   }
-  // What a frame's metadata and the renderer hold.
-  constexpr std::size_t kMaxBands = 4;
   std::vector<std::string> used;
   for (std::size_t i = 0; i < channels.size() && diagnostics.empty(); ++i) {
     if (contains(used, channels[i].band)) {
       continue;
     }
     used.push_back(channels[i].band);
-    if (used.size() == kMaxBands + 1) {
+    if (used.size() == limits::kMaxBands + 1) {
       diagnostics.add(key_location(root.find("channel")->items[i], "band"),
-                      fmt::format("channels use more than {} bands", kMaxBands));
+                      fmt::format("channels use more than {} bands", limits::kMaxBands));
     }
   }
   if (channels.empty() && diagnostics.empty()) {
@@ -248,7 +246,7 @@ std::vector<SpectralBand> bands_in_use(const std::vector<ChannelDesc>& channels,
 
 namespace {
 
-/// Names of every band a scenario may speak of, shown or not.
+/// Names of all bands that a scenario may name, whether a channel shows them or not.
 std::vector<std::string> speakable_band_names(const Node& root,
                                               const std::vector<SpectralBand>& bands) {
   std::vector<std::string> names = known_band_names(bands);
@@ -263,7 +261,7 @@ std::vector<std::string> speakable_band_names(const Node& root,
   return names;
 }
 
-/// `[[atmosphere.band]]`: terms or a table, and the table must hold together.
+/// Checks that an `[[atmosphere.band]]` has either terms or a complete table.
 void check_inline_atmosphere(const Node& node, const BandAtmosphere& entry,
                              Diagnostics& diagnostics) {
   constexpr const char* kTableKeys[] = {"range_m", "elevation_deg", "transmittance_frac",

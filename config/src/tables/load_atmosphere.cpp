@@ -2,14 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 
-#include "csv.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/csv.hpp"
 #include "tables.hpp"
+#include "typed_table.hpp"
 
-/// Atmospheres from CSV: a table by range and elevation, or the terms of a sum of exponentials.
+/// Reader of atmospheres: a table by range and elevation, or the terms of a sum of exponentials.
 namespace emit::config {
 
 using physics::ErrorCode;
@@ -26,19 +26,7 @@ tl::unexpected<physics::Error> fault(const fs::path& file, std::uint32_t line,
                              fmt::format("{}:{}: {}", file.string(), line, text));
 }
 
-/// First line that is neither blank nor a comment; empty where there is none.
-std::string header_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string line;
-  while (std::getline(stream, line)) {
-    if (line.find_first_not_of(" \t\r") != std::string::npos && line[0] != '#') {
-      return line;
-    }
-  }
-  return {};
-}
-
-Result<void> check_band(const fs::path& file, const CsvRow& row,
+Result<void> check_band(const fs::path& file, const TableRow& row,
                         const std::vector<std::string>& known_bands) {
   if (std::find(known_bands.begin(), known_bands.end(), row.texts[0]) != known_bands.end()) {
     return {};
@@ -53,17 +41,17 @@ Result<void> check_band(const fs::path& file, const CsvRow& row,
 
 Result<std::vector<BandAtmosphere>> load_terms(const fs::path& file,
                                                const std::vector<std::string>& known_bands) {
-  const Result<std::vector<CsvRow>> rows =
-      read_csv(file, {{"band", true, any_number(), true},
-                      {"amplitude_frac", true, between(0, 1)},
-                      {"extinction_per_km", true, at_least(0)},
-                      {"vertical_transmittance_frac", true, between(0, 1)}});
+  const Result<std::vector<TableRow>> rows =
+      read_typed_table(file, {{"band", true, any_number(), true},
+                              {"amplitude_frac", true, between(0, 1)},
+                              {"extinction_per_km", true, at_least(0)},
+                              {"vertical_transmittance_frac", true, between(0, 1)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
   std::vector<BandAtmosphere> out;
   std::vector<std::uint32_t> first_line;
-  for (const CsvRow& row : *rows) {
+  for (const TableRow& row : *rows) {
     std::size_t index = 0;
     while (index < out.size() && out[index].band != row.texts[0]) {
       ++index;
@@ -88,17 +76,17 @@ Result<std::vector<BandAtmosphere>> load_terms(const fs::path& file,
     for (const scene::AtmosphereTerm& term : out[i].terms) {
       sum += term.amplitude_frac;
     }
-    if (std::abs(sum - 1.0) > 1e-3 || out[i].terms.size() > 4) {
+    if (std::abs(sum - 1.0) > 1e-3 || out[i].terms.size() > limits::kMaxAtmosphereTerms) {
       return fault(file, first_line[i],
                    fmt::format("the amplitudes of band '{}' add up to {} over {} rows, "
-                               "must be 1 over at most 4",
-                               out[i].band, sum, out[i].terms.size()));
+                               "must be 1 over at most {}",
+                               out[i].band, sum, out[i].terms.size(), limits::kMaxAtmosphereTerms));
     }
   }
   return out;
 }
 
-/// One row of a table, and where it stands.
+/// One row of a table.
 struct Point {
   double range_m = 0.0;
   double transmittance_frac = 0.0;
@@ -111,15 +99,15 @@ struct BandRows {
   std::map<double, std::vector<Point>> by_elevation_deg;
 };
 
-/// Rows may come in any order of bands and elevations; along one line of sight ranges ascend.
-Result<void> add_row(const fs::path& file, const CsvRow& row, BandRows& band) {
+/// Adds a row. Bands and elevations may come in any order; ranges increase along one line of sight.
+Result<void> add_row(const fs::path& file, const TableRow& row, BandRows& band) {
   const double elevation_deg = *row.numbers[2];
   const Point point{*row.numbers[1], *row.numbers[3], *row.numbers[4], row.line};
   std::vector<Point>& points = band.by_elevation_deg[elevation_deg];
   for (const Point& other : points) {
     if (other.range_m == point.range_m) {
       return fault(file, row.line,
-                   fmt::format("band '{}', elevation {} deg, range {} m stands already in line {}",
+                   fmt::format("band '{}', elevation {} deg, range {} m is already in line {}",
                                band.name, elevation_deg, point.range_m, other.line));
     }
   }
@@ -143,7 +131,7 @@ Result<void> add_row(const fs::path& file, const CsvRow& row, BandRows& band) {
   return {};
 }
 
-/// Every elevation has the ranges of the lowest one.
+/// Makes the grid of a band. Every elevation has to have the ranges of the lowest one.
 Result<BandAtmosphere> grid_of(const fs::path& file, const BandRows& band) {
   BandAtmosphere out;
   out.band = band.name;
@@ -159,7 +147,7 @@ Result<BandAtmosphere> grid_of(const fs::path& file, const BandRows& band) {
       if (i < points.size() && i < first.size() && points[i].range_m == first[i].range_m) {
         continue;
       }
-      // The smaller of the two is what the other line of sight lacks.
+      // The other line of sight lacks the smaller of the two ranges.
       const bool lacking =
           i == points.size() || (i < first.size() && first[i].range_m < points[i].range_m);
       if (lacking) {
@@ -190,17 +178,17 @@ Result<BandAtmosphere> grid_of(const fs::path& file, const BandRows& band) {
 
 Result<std::vector<BandAtmosphere>> load_table(const fs::path& file,
                                                const std::vector<std::string>& known_bands) {
-  const Result<std::vector<CsvRow>> rows =
-      read_csv(file, {{"band", true, any_number(), true},
-                      {"range_m", true, between(0, 1e7)},
-                      {"elevation_deg", true, between(-90, 90)},
-                      {"transmittance_frac", true, between(0, 1)},
-                      {"path_radiance_w_m2_sr", true, between(0, 1e6)}});
+  const Result<std::vector<TableRow>> rows =
+      read_typed_table(file, {{"band", true, any_number(), true},
+                              {"range_m", true, between(0, 1e7)},
+                              {"elevation_deg", true, between(-90, 90)},
+                              {"transmittance_frac", true, between(0, 1)},
+                              {"path_radiance_w_m2_sr", true, between(0, 1e6)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
   std::vector<BandRows> bands;
-  for (const CsvRow& row : *rows) {
+  for (const TableRow& row : *rows) {
     auto band = std::find_if(bands.begin(), bands.end(),
                              [&row](const BandRows& other) { return other.name == row.texts[0]; });
     if (band == bands.end()) {
@@ -229,12 +217,14 @@ Result<std::vector<BandAtmosphere>> load_table(const fs::path& file,
 
 Result<std::vector<BandAtmosphere>> load_atmosphere_csv(
     const fs::path& file, const std::vector<std::string>& known_bands) {
-  const std::string header = header_of(file);
-  const auto names = [&header](std::string_view column) {
-    return header.find(column) != std::string::npos;
-  };
-  const bool terms =
-      names("amplitude_frac") || names("extinction_per_km") || names("vertical_transmittance_frac");
+  const Result<physics::CsvReader> reader = physics::CsvReader::open(file);
+  if (!reader) {
+    return tl::unexpected<physics::Error>(reader.error());
+  }
+  const bool terms = std::ranges::any_of(reader->header(), [](const physics::CsvCell& cell) {
+    return cell.text == "amplitude_frac" || cell.text == "extinction_per_km" ||
+           cell.text == "vertical_transmittance_frac";
+  });
   return terms ? load_terms(file, known_bands) : load_table(file, known_bands);
 }
 

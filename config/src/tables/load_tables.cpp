@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include "csv.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/physics/limits.hpp"
 #include "tables.hpp"
+#include "typed_table.hpp"
 
 namespace emit::config {
 
@@ -17,30 +18,30 @@ std::int64_t nanoseconds_of(double seconds) {
   return std::llround(seconds * 1e9);
 }
 
-std::string at_line(const std::filesystem::path& file, const CsvRow& row, std::string_view text) {
+std::string at_line(const std::filesystem::path& file, const TableRow& row, std::string_view text) {
   return fmt::format("{}:{}: {}", file.string(), row.line, text);
 }
 
-const Range kTime = between(-1e9, 1e9);
+const Range kTime = between(-limits::kMaxSimTimeS, limits::kMaxSimTimeS);
 
 }  // namespace
 
 Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem::path& file) {
-  const Result<std::vector<CsvRow>> rows =
-      read_csv(file, {{"time_s", true, kTime},
-                      {"dni_w_m2", true, between(0, 2000)},
-                      {"dhi_w_m2", true, between(0, 1500)},
-                      {"longwave_down_w_m2", true, between(0, 1000)},
-                      {"air_k", true, between(180, 340)},
-                      {"wind_m_s", true, between(0, 100)},
-                      {"cloud_frac", true, between(0, 1)},
-                      {"environment_k", false, between(100, 400)},
-                      {"film_w_m2_k", false, between(0, 1000)}});
+  const Result<std::vector<TableRow>> rows =
+      read_typed_table(file, {{"time_s", true, kTime},
+                              {"dni_w_m2", true, between(limits::kDirectNormalWM2)},
+                              {"dhi_w_m2", true, between(limits::kDiffuseHorizontalWM2)},
+                              {"longwave_down_w_m2", true, between(limits::kLongwaveDownWM2)},
+                              {"air_k", true, between(limits::kAirK)},
+                              {"wind_m_s", true, between(limits::kWindMS)},
+                              {"cloud_frac", true, between(limits::kCloudFrac)},
+                              {"environment_k", false, between(limits::kEnvironmentK)},
+                              {"film_w_m2_k", false, between(limits::kFilmWM2K)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
   std::vector<scene::WeatherSample> out;
-  for (const CsvRow& row : *rows) {
+  for (const TableRow& row : *rows) {
     scene::WeatherSample sample;
     sample.sim_time_ns = nanoseconds_of(*row.numbers[0]);
     sample.direct_normal_w_m2 = *row.numbers[1];
@@ -61,20 +62,20 @@ Result<std::vector<scene::WeatherSample>> load_weather_csv(const std::filesystem
 }
 
 Result<scene::Trajectory> load_trajectory_csv(const std::filesystem::path& file) {
-  const Result<std::vector<CsvRow>> rows =
-      read_csv(file, {{"time_s", true, kTime},
-                      {"x_m", true, any_number()},
-                      {"y_m", true, any_number()},
-                      {"z_m", true, any_number()},
-                      {"heading_deg", true, between(-360, 360)},
-                      {"pitch_deg", true, between(-90, 90)},
-                      {"roll_deg", true, between(-360, 360)},
-                      {"on", false, between(0, 1)}});
+  const Result<std::vector<TableRow>> rows =
+      read_typed_table(file, {{"time_s", true, kTime},
+                              {"x_m", true, any_number()},
+                              {"y_m", true, any_number()},
+                              {"z_m", true, any_number()},
+                              {"heading_deg", true, between(-360, 360)},
+                              {"pitch_deg", true, between(-90, 90)},
+                              {"roll_deg", true, between(-360, 360)},
+                              {"on", false, between(0, 1)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
   scene::Trajectory out;
-  for (const CsvRow& row : *rows) {
+  for (const TableRow& row : *rows) {
     scene::Keyframe keyframe;
     keyframe.sim_time_ns = nanoseconds_of(*row.numbers[0]);
     keyframe.pose.position_world_m = glm::dvec3(*row.numbers[1], *row.numbers[2], *row.numbers[3]);
@@ -96,13 +97,13 @@ Result<scene::Trajectory> load_trajectory_csv(const std::filesystem::path& file)
 }
 
 Result<std::vector<scene::ResponseSample>> load_response_csv(const std::filesystem::path& file) {
-  const Result<std::vector<CsvRow>> rows = read_csv(
+  const Result<std::vector<TableRow>> rows = read_typed_table(
       file, {{"wavelength_um", true, between(0.2, 100)}, {"response_frac", true, between(0, 1)}});
   if (!rows) {
     return tl::unexpected<physics::Error>(rows.error());
   }
   std::vector<scene::ResponseSample> out;
-  for (const CsvRow& row : *rows) {
+  for (const TableRow& row : *rows) {
     if (!out.empty() && *row.numbers[0] <= out.back().wavelength_um) {
       return make_error(ErrorCode::config,
                         at_line(file, row, "'wavelength_um' is not above the row before"));

@@ -10,7 +10,8 @@
 /// Readers of the CSV files that a scenario names.
 namespace emit::config {
 
-// load_tables.cpp: CSV files.
+// These are in load_tables.cpp. Times and wavelengths have to increase from row to row.
+// Errors: those of read_typed_table(); config, naming the row.
 [[nodiscard]] physics::Result<std::vector<scene::WeatherSample>> load_weather_csv(
     const std::filesystem::path& file);
 [[nodiscard]] physics::Result<scene::Trajectory> load_trajectory_csv(
@@ -18,7 +19,8 @@ namespace emit::config {
 [[nodiscard]] physics::Result<std::vector<scene::ResponseSample>> load_response_csv(
     const std::filesystem::path& file);
 
-// load_atmosphere.cpp: tables or terms, told apart by the header row.
+/// Reads a table of the air or the terms of a model; the header row says which
+/// (load_atmosphere.cpp).
 [[nodiscard]] physics::Result<std::vector<scene::BandAtmosphere>> load_atmosphere_csv(
     const std::filesystem::path& file, const std::vector<std::string>& known_bands);
 

@@ -9,7 +9,7 @@ namespace {
 using Kind = CapturedDatagram::Kind;
 using Bytes = std::span<const std::byte>;
 
-// LINKTYPE_ values.
+// Link types of the tcpdump group's registry (LINKTYPE_).
 enum LinkType : std::uint32_t {
   kBsdLoopback = 0,
   kEthernet = 1,
@@ -31,12 +31,12 @@ constexpr std::size_t kUdpHeaderBytes = 8;
 std::uint8_t u8(Bytes in, std::size_t at) noexcept {
   return std::to_integer<std::uint8_t>(in[at]);
 }
-/// Network byte order.
+/// Reads a number in network byte order.
 std::uint16_t u16(Bytes in, std::size_t at) noexcept {
   return static_cast<std::uint16_t>(u8(in, at) << 8 | u8(in, at + 1));
 }
 
-/// UDP within `ip`, which IP says has `length` bytes, of which `ip` may hold fewer.
+/// Reads the UDP datagram at the begin of `ip`. IP announces `length` bytes; `ip` may hold fewer.
 CapturedDatagram udp(Bytes ip, std::size_t length, bool fragment) noexcept {
   if (ip.size() < kUdpHeaderBytes) return {};
   CapturedDatagram out;
@@ -45,9 +45,9 @@ CapturedDatagram udp(Bytes ip, std::size_t length, bool fragment) noexcept {
     out.kind = Kind::fragment;
     return out;
   }
-  // 0 stands for a jumbo datagram or one that the sender's card had yet to fill in.
-  const std::size_t told = u16(ip, 4);
-  const std::size_t bytes = told == 0 ? length : told;
+  // A length of 0 means a jumbo datagram, or one that the sender's network card had yet to fill in.
+  const std::size_t announced = u16(ip, 4);
+  const std::size_t bytes = announced == 0 ? length : announced;
   if (bytes < kUdpHeaderBytes || bytes > length) return {};
   if (bytes > ip.size()) {
     out.kind = Kind::cut;
@@ -61,9 +61,9 @@ CapturedDatagram udp(Bytes ip, std::size_t length, bool fragment) noexcept {
 CapturedDatagram ipv4(Bytes ip, std::uint64_t wire_bytes) noexcept {
   if (ip.size() < 20 || u8(ip, 0) >> 4 != 4) return {};
   const std::size_t header = std::size_t{4} * (u8(ip, 0) & 0xFu);
-  // Segmentation offload leaves the length at 0.
-  const std::size_t told = u16(ip, 2);
-  const std::size_t total = told == 0 ? static_cast<std::size_t>(wire_bytes) : told;
+  // Segmentation offload leaves the length at 0. The length of the packet then decides.
+  const std::size_t announced = u16(ip, 2);
+  const std::size_t total = announced == 0 ? static_cast<std::size_t>(wire_bytes) : announced;
   if (header < 20 || total < header || ip.size() < header || u8(ip, 9) != kUdp) return {};
   const std::uint16_t fragment = u16(ip, 6);
   const bool more = (fragment & 0x2000u) != 0;
@@ -74,15 +74,16 @@ CapturedDatagram ipv4(Bytes ip, std::uint64_t wire_bytes) noexcept {
 CapturedDatagram ipv6(Bytes ip, std::uint64_t wire_bytes) noexcept {
   constexpr std::size_t kHeader = 40;
   if (ip.size() < kHeader || u8(ip, 0) >> 4 != 6) return {};
-  const std::size_t told = u16(ip, 4);
+  const std::size_t announced = u16(ip, 4);
   std::size_t length =
-      told == 0 ? static_cast<std::size_t>(std::max<std::uint64_t>(wire_bytes, kHeader) - kHeader)
-                : told;
+      announced == 0
+          ? static_cast<std::size_t>(std::max<std::uint64_t>(wire_bytes, kHeader) - kHeader)
+          : announced;
   Bytes rest = ip.subspan(kHeader);
   rest = rest.first(std::min(rest.size(), length));
   std::uint8_t next = u8(ip, 6);
   bool fragment = false;
-  // Hop-by-hop, routing, fragment, authentication, destination options.
+  // Skip the extension headers: hop-by-hop, routing, fragment, authentication, destination options.
   while (next == 0 || next == 43 || next == 44 || next == 51 || next == 60) {
     if (rest.size() < 8) return {};
     std::size_t bytes = 8 + std::size_t{8} * u8(rest, 1);
@@ -115,7 +116,7 @@ CapturedDatagram by_ether_type(std::uint16_t type, Bytes ip, std::uint64_t wire_
 
 CapturedDatagram ethernet(Bytes frame, std::uint64_t wire_bytes) noexcept {
   std::size_t at = 12;
-  // Up to two VLAN tags.
+  // Skip up to two VLAN tags.
   for (int tags = 0; tags < 2 && frame.size() >= at + 2; ++tags) {
     const std::uint16_t type = u16(frame, at);
     if (type != 0x8100 && type != 0x88A8 && type != 0x9100) break;
@@ -127,8 +128,8 @@ CapturedDatagram ethernet(Bytes frame, std::uint64_t wire_bytes) noexcept {
 
 CapturedDatagram loopback(const CapturedPacket& packet) noexcept {
   if (packet.data.size() < 4 || packet.wire_bytes < 4) return {};
-  // The address family of the capturing machine, in its byte order: 2 is IPv4 everywhere, IPv6 is
-  // 10, 24, 28 or 30; the version in the IP header tells as well.
+  // The first four bytes are the address family in the byte order of the capturing machine. It
+  // differs between systems (IPv6 is 10, 24, 28 or 30), so the version in the IP header decides.
   return by_version(packet.data.subspan(4), packet.wire_bytes - 4);
 }
 

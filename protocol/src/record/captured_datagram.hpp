@@ -9,23 +9,23 @@
 
 namespace emit::protocol {
 
-/// UDP datagram within a captured packet.
+/// UDP datagram found in a captured packet.
 struct CapturedDatagram {
   enum class Kind : std::uint8_t {
-    none,                ///< something else: other protocol, later fragment
-    datagram,            ///< whole
-    fragment,            ///< the first part of one that IP took apart
-    cut,                 ///< the capture did not keep all of it
-    unknown_link_layer,  ///< see CapturedPacket::link_type
+    none,                ///< something else: another protocol, or a later fragment
+    datagram,            ///< a whole datagram
+    fragment,            ///< the first IP fragment of a datagram
+    cut,                 ///< a datagram that the capture holds only in part
+    unknown_link_layer,  ///< an unknown link layer, see CapturedPacket::link_type
   };
   Kind kind = Kind::none;
-  std::uint16_t destination_port = 0;  ///< not for none and unknown_link_layer
-  std::span<const std::byte> payload;  ///< datagram only
+  std::uint16_t destination_port = 0;  ///< valid except for none and unknown_link_layer
+  std::span<const std::byte> payload;  ///< payload of a whole datagram
 };
 
-/// Takes link layer (Ethernet with VLAN tags, Linux cooked 1 and 2, BSD loopback, raw IP), IPv4 or
-/// IPv6 with extension headers, and UDP apart. Checksums are not looked at: captures of the sending
-/// machine hold them unfinished.
+/// Finds the UDP datagram in a packet. It understands Ethernet with VLAN tags, Linux cooked 1 and
+/// 2, BSD loopback and raw IP; IPv4, and IPv6 with extension headers. Checksums are not checked,
+/// because captures on the sending machine hold them unfinished.
 [[nodiscard]] CapturedDatagram find_datagram(const CapturedPacket& packet) noexcept;
 
 }  // namespace emit::protocol

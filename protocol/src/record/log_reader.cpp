@@ -3,10 +3,11 @@
 
 #include <limits>
 
-#include "quiet_protobuf.hpp"
+#include "emit/physics/check.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/record/mcap_reader.hpp"
 #include "emit/v1/control.pb.h"
+#include "quiet_protobuf.hpp"
 
 namespace emit::protocol {
 namespace {
@@ -35,7 +36,7 @@ struct LogReader::Impl {
                                                     mcap.message().file_offset, text));
   }
 
-  /// Topic, encoding and message type have to agree before the bytes are believed.
+  /// Checks that topic, encoding and message type agree, before the bytes are decoded.
   Result<void> check_channel(const McapChannel& channel, std::string_view expected) const {
     const McapSchema* schema = mcap.schema(channel.schema_id);
     if (channel.message_encoding != "protobuf" || schema == nullptr || schema->name != expected) {
@@ -97,9 +98,11 @@ std::int64_t LogReader::log_time_ns() const noexcept {
   return static_cast<std::int64_t>(impl_->mcap.message().log_time_ns);
 }
 const HostFrameData& LogReader::host() const noexcept {
+  EMIT_CHECK(impl_->topic == LogTopic::host);
   return impl_->host;
 }
 const v1::JournalEntry& LogReader::journal() const noexcept {
+  EMIT_CHECK(impl_->topic == LogTopic::journal);
   return impl_->journal;
 }
 const std::optional<std::string>& LogReader::truncation() const noexcept {

@@ -17,7 +17,7 @@ namespace {
 
 using physics::Result;
 
-/// Imports first, each file once.
+/// Adds a file's descriptor behind those of its imports, each file once.
 void add_with_imports(const google::protobuf::FileDescriptor& file, std::set<std::string>& added,
                       google::protobuf::FileDescriptorSet& out) {
   if (!added.insert(file.name()).second) return;
@@ -82,7 +82,7 @@ Result<LogWriter> LogWriter::create(const std::filesystem::path& path,
 }
 
 Result<void> LogWriter::write_host(const HostFrameData& frame, std::int64_t log_time_ns) {
-  // MCAP has no negative times; the message keeps the exact one.
+  // MCAP has no negative times. The message itself keeps the exact time.
   return impl_->mcap.write(impl_->host_channel, ++impl_->host_sequence, log_time_ns,
                            std::max<std::int64_t>(frame.sim_time_ns, 0),
                            impl_->encoder.encode(frame));

@@ -11,13 +11,15 @@
 
 #include "wire_bytes.hpp"
 
-/// Building blocks of the MCAP format: little endian, strings and arrays with a u32 byte length.
+/// Building blocks of the MCAP format: little endian; strings and arrays begin with their length in
+/// bytes, a u32.
 namespace emit::protocol::mcap {
 
 inline constexpr std::array<std::byte, 8> kMagic{std::byte{0x89}, std::byte{'M'}, std::byte{'C'},
                                                  std::byte{'A'},  std::byte{'P'}, std::byte{'0'},
                                                  std::byte{0x0D}, std::byte{0x0A}};
 
+/// Kind of a record.
 enum class Opcode : std::uint8_t {
   header = 0x01,
   footer = 0x02,
@@ -35,8 +37,9 @@ enum class Opcode : std::uint8_t {
   summary_offset = 0x0E,
   data_end = 0x0F,
 };
-inline constexpr std::size_t kRecordPrefixBytes = 9;   // opcode, u64 length
-inline constexpr std::size_t kMessageFieldBytes = 22;  // of a message, in front of the data
+inline constexpr std::size_t kRecordPrefixBytes = 9;  // length of opcode and u64 record length
+// Length of a message's fields in front of its data.
+inline constexpr std::size_t kMessageFieldBytes = 22;
 
 /// Appends fields to a buffer.
 class Output {
@@ -54,13 +57,13 @@ class Output {
     number(static_cast<std::uint32_t>(text.size()));
     raw(std::as_bytes(std::span(text)));
   }
-  /// Starts a record; end_record() fills its length in.
+  /// Begins a record. end_record() fills in its length.
   [[nodiscard]] std::size_t begin_record(Opcode opcode) {
     number(static_cast<std::uint8_t>(opcode));
     return begin_block<std::uint64_t>();
   }
   void end_record(std::size_t block) { end_block<std::uint64_t>(block); }
-  /// Length-prefixed block, for arrays and maps.
+  /// Begins a block with a length prefix, for arrays and maps. end_block() fills in its length.
   template <class Length>
   [[nodiscard]] std::size_t begin_block() {
     number(Length{0});
@@ -79,8 +82,8 @@ class Output {
   std::vector<std::byte> bytes_;
 };
 
-/// Takes fields off a record; after the first one that does not fit, ok() is false and the rest is
-/// empty or 0.
+/// Takes fields off a record. After the first one that does not fit, ok() is false and all further
+/// fields are empty or 0.
 class Input {
  public:
   explicit Input(std::span<const std::byte> bytes) noexcept : rest_(bytes) {}

@@ -21,9 +21,10 @@ using physics::Error;
 using physics::ErrorCode;
 using physics::Result;
 
-/// Records beyond this are refused rather than read into memory.
+/// Largest record, bytes. A larger one is refused rather than read into memory.
 constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{1} << 30;
 
+/// One record of the file or of a chunk.
 struct RecordView {
   Opcode opcode{};
   std::span<const std::byte> content;
@@ -35,7 +36,7 @@ struct McapReader::Impl {
   std::filesystem::path path;
   std::ifstream file;
   std::uint64_t file_bytes = 0;
-  std::uint64_t offset = 0;  // of the next record in the file
+  std::uint64_t offset = 0;  // offset of the next record in the file
   bool has_end_magic = false;
   bool ended = false;
   std::uint64_t message_count = 0;
@@ -61,14 +62,14 @@ struct McapReader::Impl {
     return static_cast<std::size_t>(file.gcount()) == out.size();
   }
 
-  /// The file ends here although its writer had not finished it.
+  /// Ends the reading where the file ends although its writer had not finished it.
   void end_truncated(std::string_view what) {
     ended = true;
     truncation = fmt::format("{}: offset {}: {} after {} messages; the last {} bytes are not used",
                              path.string(), offset, what, message_count, file_bytes - offset);
   }
 
-  /// Reads the next record of the file; no value at the end.
+  /// Reads the next record of the file. Returns no value at the end.
   Result<std::optional<RecordView>> next_record() {
     const std::uint64_t left = file_bytes - offset;
     if (left < mcap::kRecordPrefixBytes) {
@@ -82,7 +83,8 @@ struct McapReader::Impl {
     const auto length = fields.number<std::uint64_t>();
     if (opcode == 0) return fail(ErrorCode::parse, offset, "opcode 0 is not valid");
     if (length > left - mcap::kRecordPrefixBytes) {
-      // A file that was closed ends with the magic bytes: then the length is wrong, not the end.
+      // A file that was closed ends with the magic bytes. In such a file the length is wrong, not
+      // the end.
       if (has_end_magic) {
         return fail(ErrorCode::parse, offset,
                     fmt::format("record of {} bytes reaches beyond the end of the file", length));
@@ -102,8 +104,8 @@ struct McapReader::Impl {
     return RecordView{static_cast<Opcode>(opcode), record};
   }
 
-  /// Takes the next record off the chunk; the chunk is one record of the file, so whatever does not
-  /// fit into it is wrong.
+  /// Takes the next record off the chunk. The chunk is one record of the file, so a record that
+  /// does not fit into it is wrong.
   Result<RecordView> next_in_chunk() {
     Input fields(chunk_rest);
     const auto opcode = fields.number<std::uint8_t>();
@@ -187,7 +189,8 @@ struct McapReader::Impl {
     return {};
   }
 
-  /// True: `message` is the next one. False: the record was something else.
+  /// Processes a record. Returns true when `message` is the next message, and false when the record
+  /// was something else.
   Result<bool> take(const RecordView& view, bool in_chunk) {
     Result<void> taken;
     switch (view.opcode) {
@@ -210,13 +213,13 @@ struct McapReader::Impl {
         if (in_chunk) return fail(ErrorCode::parse, record_offset, "end of data within a chunk");
         return finish();
       default:
-        break;  // index, attachment, metadata, or an opcode to come: skipped
+        break;  // index, attachment, metadata or a future opcode: skipped
     }
     if (!taken) return tl::unexpected(taken.error());
     return false;
   }
 
-  /// The data section is over: what follows repeats it. Only tells whether the end is there.
+  /// Ends the data section. The rest of the file repeats it, so only the end magic is checked.
   Result<bool> finish() {
     ended = true;
     if (!has_end_magic) end_truncated("the file ends within its summary");

@@ -31,7 +31,7 @@ using physics::Result;
 
 struct IndexEntry {
   std::uint64_t log_time_ns;
-  std::uint64_t offset;  // within the chunk's records
+  std::uint64_t offset;  // offset within the chunk's records
 };
 
 }  // namespace
@@ -44,18 +44,18 @@ struct McapWriter::Impl {
   bool closed = false;
   std::optional<Error> failure;
 
-  Output schemas;  // records as written, for the summary
+  Output schemas;  // records as written, repeated in the summary
   Output channels;
   std::uint16_t schema_count = 0;
   std::uint16_t channel_count = 0;
 
-  Output chunk;  // records of the open chunk
+  Output chunk;  // records of the chunk in work
   std::map<std::uint16_t, std::vector<IndexEntry>> chunk_index;
-  std::uint64_t chunk_first_ns = 0;  // log time of its first message
+  std::uint64_t chunk_first_ns = 0;  // log time of the chunk's first message
   std::uint64_t chunk_start_ns = 0;
   std::uint64_t chunk_end_ns = 0;
   std::uint32_t chunk_count = 0;
-  SpillFile chunk_indexes;  // records of the summary: a chunk's is written with the chunk
+  SpillFile chunk_indexes;  // chunk index records for the summary, written with their chunks
 
   std::uint64_t message_count = 0;
   std::uint64_t start_ns = 0;
@@ -181,12 +181,12 @@ struct McapWriter::Impl {
     out.end_record(record);
   }
 
-  /// Writes the end of the file: data end, summary, summary offsets and footer, which holds the CRC
-  /// of everything between.
+  /// Writes the end of the file: data end, summary, summary offsets and footer. The footer holds
+  /// the CRC of the summary section.
   Result<void> write_end() {
     Output out;
     const auto data_end = out.begin_record(Opcode::data_end);
-    out.number(std::uint32_t{0});  // chunks carry the CRCs
+    out.number(std::uint32_t{0});  // no CRC here: the chunks carry theirs
     out.end_record(data_end);
     if (auto written = put(out.bytes()); !written) return written;
     out.clear();
@@ -222,7 +222,7 @@ struct McapWriter::Impl {
       out.number(entry.bytes);
       out.end_record(record);
     }
-    // The length is fixed, so that the CRC can cover it.
+    // The footer's length is fixed, so that the CRC can cover its first fields.
     out.number(static_cast<std::uint8_t>(Opcode::footer));
     out.number(std::uint64_t{20});
     out.number(summary_at);
@@ -252,7 +252,7 @@ struct McapWriter::Impl {
 McapWriter::McapWriter(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 McapWriter::McapWriter(McapWriter&&) noexcept = default;
 McapWriter& McapWriter::operator=(McapWriter&& other) noexcept {
-  std::swap(impl_, other.impl_);  // the old file is closed by the other's destructor
+  std::swap(impl_, other.impl_);  // the destructor of `other` closes the old file
   return *this;
 }
 McapWriter::~McapWriter() {
@@ -262,7 +262,7 @@ McapWriter::~McapWriter() {
 Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
                                       const McapWriterOptions& options) {
   auto impl = std::make_unique<Impl>(path, options);
-  // First: what fails here leaves an older log as it is.
+  // Open the index first: a failure here leaves an older log unchanged.
   if (auto opened = impl->chunk_indexes.open(path); !opened) return tl::unexpected(opened.error());
   impl->fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
   if (impl->fd < 0) {
@@ -271,8 +271,8 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
   }
   struct stat status {};
   const bool regular = ::fstat(impl->fd, &status) == 0 && S_ISREG(status.st_mode);
-  // Two writers would make one log of two, which reads like neither. (Pipes and /dev/null may have
-  // any number.)
+  // Refuse a second writer, because two writers would make one unreadable log. (Pipes and /dev/null
+  // may have any number.).
   if (regular && ::flock(impl->fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return make_error(ErrorCode::io, path.string() + ": another process writes it");
   }

@@ -13,10 +13,10 @@ using physics::Error;
 using physics::ErrorCode;
 using physics::Result;
 
-// Magic numbers as read with the least significant byte first.
+// Magic numbers, read with the least significant byte first.
 constexpr std::uint32_t kMicroseconds = 0xA1B2C3D4;
 constexpr std::uint32_t kNanoseconds = 0xA1B23C4D;
-constexpr std::uint32_t kPatched = 0xA1B2CD34;  // record headers of other size
+constexpr std::uint32_t kPatched = 0xA1B2CD34;  // a variant with longer record headers
 constexpr std::uint32_t kSectionBlock = 0x0A0D0D0A;
 constexpr std::uint32_t kByteOrderMagic = 0x1A2B3C4D;
 
@@ -25,7 +25,7 @@ constexpr std::uint32_t kObsoletePacketBlock = 2;
 constexpr std::uint32_t kSimplePacketBlock = 3;
 constexpr std::uint32_t kEnhancedPacketBlock = 6;
 
-/// Capture tools write 256 KiB at most; more is damage.
+/// Largest packet, bytes. Capture tools write 256 KiB at most, so a larger one is damage.
 constexpr std::uint32_t kMaxPacketBytes = 1u << 20;
 constexpr std::uint32_t kMaxBlockBytes = 16u << 20;
 
@@ -107,7 +107,7 @@ Result<PcapFile> PcapFile::open(const std::filesystem::path& path) {
   std::vector<std::byte> magic;
   if (!out.read(4, magic, "the magic number")) return out.fail(ErrorCode::io, "cannot read");
   if (first_word(magic) == kSectionBlock) {
-    // A block like any other; read it again from its start.
+    // The section header is a block like any other. Read it again from its start.
     out.file_.seekg(0);
     out.next_offset_ = 0;
     out.next_generation_ = true;
@@ -172,7 +172,7 @@ Result<bool> PcapFile::next_block() {
     view_ = head_;
     const bool section = first_word(view_) == kSectionBlock;
     if (section) {
-      // Its byte order is not known before the four bytes behind the length.
+      // The byte order of a section is not known before the four bytes behind the length.
       std::vector<std::byte> order;
       if (!read(4, order, "a section header")) return false;
       const std::uint32_t magic = first_word(order);
@@ -232,7 +232,7 @@ Result<void> PcapFile::take_interface() {
     if (length > view_.size() - at) return fail(ErrorCode::parse, "an option beyond its block");
     if (option == kEnd) break;
     if (option == kResolution && length >= 1) {
-      // Ticks per second: a power of ten, or of two with the highest bit set.
+      // The option gives ticks per second: a power of ten, or of two when the highest bit is set.
       const auto code = std::to_integer<std::uint32_t>(view_[at]);
       const std::uint32_t exponent = code & 0x7Fu;
       const bool binary = (code & 0x80u) != 0;
@@ -251,7 +251,7 @@ Result<void> PcapFile::take_interface() {
 }
 
 Result<void> PcapFile::set_time(const Interface& interface, std::uint64_t ticks) {
-  // Year 2262: beyond it nanoseconds do not fit into 64 bits.
+  // Largest time stamp, s. Nanoseconds beyond the year 2262 do not fit into 64 bits.
   constexpr std::uint64_t kMaxSeconds = 9'000'000'000;
   const std::uint64_t seconds = ticks / interface.ticks_per_s;
   const std::uint64_t rest = ticks % interface.ticks_per_s;
@@ -261,7 +261,7 @@ Result<void> PcapFile::set_time(const Interface& interface, std::uint64_t ticks)
     return fail(ErrorCode::parse, "a time stamp out of range");
   }
   const double fraction = static_cast<double>(rest) / static_cast<double>(interface.ticks_per_s);
-  // Exact where the resolution divides a nanosecond count, else to the nearest.
+  // The result is exact where the resolution divides a nanosecond count, and else the nearest one.
   const std::uint64_t whole = interface.ticks_per_s <= 1'000'000'000
                                   ? rest * 1'000'000'000 / interface.ticks_per_s
                                   : static_cast<std::uint64_t>(fraction * 1e9);

@@ -14,28 +14,32 @@
 
 namespace emit::protocol {
 
+/// One packet of a capture file.
 struct CapturedPacket {
-  std::uint64_t number = 0;             ///< from 1, as capture tools count
+  std::uint64_t number = 0;             ///< number of the packet from 1, as capture tools count
   std::uint32_t link_type = 0;          ///< LINKTYPE_ value of the tcpdump group's registry
   std::optional<std::int64_t> time_ns;  ///< UTC; absent in a simple packet block
-  std::uint64_t wire_bytes = 0;         ///< what the packet had before it was cut
-  std::span<const std::byte> data;      ///< valid until the next call of next()
+  std::uint64_t wire_bytes = 0;  ///< length of the packet on the network, before the capture cut it
+  std::span<const std::byte> data;  ///< valid until the next call of next()
 };
 
-/// Packets of a capture file: classic pcap (micro- and nanoseconds) and pcapng, either byte order.
-/// Checks every length before use. Errors name file and offset.
-/// Thread: one owner.
+/// Reads the packets of a capture file: classic pcap (micro- and nanoseconds) and pcapng, in either
+/// byte order. It checks every length before use. Errors name file and offset.
+/// Thread: one owner.  Real time: not RT-safe.
 class PcapFile {
  public:
-  /// True when the first four bytes say so.
+  /// Returns true when the first four bytes are those of a capture.
   [[nodiscard]] static bool is_capture(const std::filesystem::path& path);
-  /// Errors: not_found, io, parse (no capture file), unsupported (a patched format).
+  /// Opens a capture. Errors: not_found, io, parse (no capture file), unsupported (a patched
+  /// format).
   [[nodiscard]] static physics::Result<PcapFile> open(const std::filesystem::path& path);
 
-  /// Moves to the next packet; false at the end. An error is final.
+  /// Moves to the next packet. Returns false at the end. An error is final.
   [[nodiscard]] physics::Result<bool> next();
+  /// Returns the packet that next() moved to.
   [[nodiscard]] const CapturedPacket& packet() const noexcept { return packet_; }
-  /// Set at the end of a file that ends within a packet or block.
+  /// Returns a description of the missing part at the end of a file that ends within a packet or
+  /// block.
   [[nodiscard]] const std::optional<std::string>& truncation() const noexcept {
     return truncation_;
   }
@@ -48,7 +52,8 @@ class PcapFile {
   };
 
   tl::unexpected<physics::Error> fail(physics::ErrorCode code, std::string_view text);
-  /// False at the end of the file; what is missing of `bytes` then counts as truncation.
+  /// Reads `bytes` bytes into `out`. Returns false at the end of the file; a part of `bytes` then
+  /// counts as truncation.
   bool read(std::size_t bytes, std::vector<std::byte>& out, std::string_view what);
   [[nodiscard]] std::uint16_t u16(std::size_t at) const noexcept;
   [[nodiscard]] std::uint32_t u32(std::size_t at) const noexcept;
@@ -64,7 +69,7 @@ class PcapFile {
 
   std::filesystem::path path_;
   std::ifstream file_;
-  std::uint64_t offset_ = 0;  ///< of the record or block under way
+  std::uint64_t offset_ = 0;  ///< offset of the record or block in work
   std::uint64_t next_offset_ = 0;
   bool next_generation_ = false;
   bool big_endian_ = false;
@@ -73,7 +78,7 @@ class PcapFile {
   std::vector<Interface> interfaces_;
   std::vector<std::byte> head_;
   std::vector<std::byte> body_;
-  std::span<const std::byte> view_;  ///< what u16() and u32() read from
+  std::span<const std::byte> view_;  ///< bytes that u16() and u32() read from
   CapturedPacket packet_;
   std::optional<physics::Error> failure_;
   std::optional<std::string> truncation_;

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <vector>
 
-#include "quiet_protobuf.hpp"
 #include "captured_datagram.hpp"
 #include "emit/protocol/codec.hpp"
 #include "pcap_file.hpp"
+#include "quiet_protobuf.hpp"
 
 namespace emit::protocol {
 
@@ -26,7 +26,7 @@ struct PosePcapReader::Impl {
   std::uint16_t port;
   HostFrameDecoder decoder;
   HostFrameData host;
-  std::vector<std::byte> last;  // payload of the last datagram to the port
+  std::vector<std::byte> last;  // payload of the newest datagram to the port
   std::uint64_t frames = 0;
   std::uint64_t repeated = 0;
   std::uint64_t refused = 0;
@@ -39,9 +39,9 @@ struct PosePcapReader::Impl {
     return tl::unexpected(*failure);
   }
 
-  /// True when the datagram is a new host frame.
+  /// Takes a datagram. Returns true when it is a new host frame.
   bool take(std::span<const std::byte> payload) {
-    // Captures on "any" interface hold what stays on the machine twice.
+    // Captures on the "any" interface hold local datagrams twice.
     if (!last.empty() && std::ranges::equal(payload, last)) {
       ++repeated;
       return false;

@@ -19,8 +19,8 @@ using physics::Result;
 
 namespace {
 
-/// Of the file that `path` leads to, through links too; empty where that has no folder (a pipe, a
-/// file that was removed).
+/// Returns the folder of the file that `path` leads to, also through links. It is empty where the
+/// file has no folder (a pipe, a file that was removed).
 std::filesystem::path real_folder(const std::filesystem::path& path) {
   std::error_code error;
   const auto type = std::filesystem::status(path, error).type();
@@ -32,11 +32,11 @@ std::filesystem::path real_folder(const std::filesystem::path& path) {
   return std::filesystem::weakly_canonical(absolute, error).parent_path();
 }
 
-/// -1 and errno where the folder takes none.
+/// Opens a nameless file in the folder. Returns -1 and sets errno where the folder takes none.
 int open_nameless(const std::filesystem::path& folder) {
   int fd = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
   if (fd >= 0) return fd;
-  // Not every file system has O_TMPFILE.
+  // Not every file system supports O_TMPFILE.
   std::string name = (folder / "emit-index-XXXXXX").string();
   fd = ::mkostemp(name.data(), O_CLOEXEC);
   if (fd >= 0 && ::unlink(name.c_str()) != 0) {

@@ -11,27 +11,31 @@
 
 namespace emit::protocol {
 
-/// Bytes that wait for the end of a file: the last kBlockBytes in memory, what came before in a
-/// nameless file, which the kernel removes however the process ends.
+/// Buffer for bytes that are written at the end of a file. The newest kBlockBytes are in memory,
+/// the older ones in a nameless file, which the kernel removes however the process ends.
 ///
-/// Errors (io) name the file. Thread: one owner.  Not RT-safe.
+/// Errors (io) name the file.
+/// Thread: one owner.  Real time: not RT-safe.
 class SpillFile {
  public:
   static constexpr std::size_t kBlockBytes = std::size_t{256} << 10;
 
-  /// Makes the nameless file at once, so that it is told at the start when no folder takes it: that
-  /// of the file itself, links followed, which need not exist yet; else the one for temporary
-  /// files.
+  /// Creates the nameless file, so that a folder that takes none is reported at the start. The
+  /// folder is that of the file `beside`, links followed, which need not exist yet; otherwise the
+  /// one for temporary files.
   [[nodiscard]] physics::Result<void> open(const std::filesystem::path& beside);
   SpillFile() = default;
   SpillFile(const SpillFile&) = delete;
   SpillFile& operator=(const SpillFile&) = delete;
   ~SpillFile();
 
+  /// Appends bytes.
   [[nodiscard]] physics::Result<void> append(std::span<const std::byte> bytes);
+  /// Returns the number of bytes appended.
   [[nodiscard]] std::uint64_t size() const noexcept { return spilled_bytes_ + block_.size(); }
 
-  /// Copies up to `into.size()` bytes from `offset`; fewer at the end only.
+  /// Copies up to `into.size()` bytes from `offset` and returns their number. It is smaller only at
+  /// the end.
   [[nodiscard]] physics::Result<std::size_t> read(std::uint64_t offset,
                                                   std::span<std::byte> into) const;
 
@@ -39,7 +43,7 @@ class SpillFile {
   [[nodiscard]] physics::Result<void> spill();
   [[nodiscard]] physics::Result<void> failed(const char* action, int error) const;
 
-  std::string name_;  // for messages
+  std::string name_;  // description for messages
   std::vector<std::byte> block_;
   std::uint64_t spilled_bytes_ = 0;
   int fd_ = -1;

@@ -26,11 +26,12 @@ static_assert(std::endian::native == std::endian::little, "OpenEXR files are lit
 constexpr std::uint32_t kMagic = 20000630;
 constexpr std::uint32_t kMultiPartFlag = 0x1000;
 constexpr std::size_t kMaxNameBytes = 255;
-/// Rows of a chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+/// Number of rows of a chunk by compression: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA,
+/// DWAB.
 constexpr std::array<std::int64_t, 10> kChunkRows{1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
 
-/// Types of a fixed size: the library takes that much whatever the file says, and would go on
-/// reading elsewhere than this walk does.
+/// Attribute types of a fixed size. The library reads that many bytes whatever size the file
+/// states, and would then continue at another place than this check does.
 struct TypeSize {
   std::string_view type;
   std::int64_t bytes;
@@ -44,6 +45,7 @@ constexpr TypeSize kTypeSizes[] = {{"box2f", 16},      {"box2i", 16},    {"chrom
                                    {"v2d", 16},        {"v2f", 8},       {"v2i", 8},
                                    {"v3d", 24},        {"v3f", 12},      {"v3i", 12}};
 
+/// Binary reader of a file.
 class File {
  public:
   explicit File(const std::filesystem::path& path) : stream_(path, std::ios::binary) {
@@ -60,7 +62,7 @@ class File {
     stream_.read(reinterpret_cast<char*>(&value), sizeof value);
     return value;
   }
-  /// Up to a zero byte; fails beyond kMaxNameBytes.
+  /// Reads a name up to its zero byte. Fails beyond kMaxNameBytes.
   [[nodiscard]] std::string name() {
     std::string out;
     for (char c = 0; stream_.get(c) && c != '\0';) {
@@ -81,7 +83,7 @@ class File {
   std::int64_t bytes_ = 0;
 };
 
-/// What decides on the memory for one part.
+/// Header values that determine how much memory the library allocates for one part.
 struct Part {
   std::array<std::int32_t, 4> data_window{0, 0, -1, -1};
   std::size_t compression = 0;
@@ -89,8 +91,8 @@ struct Part {
   std::optional<std::array<std::uint32_t, 2>> tile_px;
 };
 
-/// Entries: a name, its zero byte, 16 bytes; a zero byte at the end. Empty: they do not fill the
-/// list.
+/// Counts the channels of a list. An entry is a name, its zero byte and 16 bytes; a zero byte ends
+/// the list. Returns nothing if the entries do not fill the list exactly.
 std::optional<std::int64_t> count_channels(const std::vector<char>& list) {
   std::int64_t count = 0;
   std::size_t at = 0;
@@ -101,7 +103,7 @@ std::optional<std::int64_t> count_channels(const std::vector<char>& list) {
   return at + 1 == list.size() ? std::optional(count) : std::nullopt;
 }
 
-/// A width, a height and as many pixels of 4 bytes.
+/// Checks a preview image: a width, a height and as many pixels of 4 bytes.
 bool is_whole_preview(const std::vector<char>& value) {
   std::array<std::uint32_t, 2> size_px{};
   if (value.size() < sizeof size_px) return false;
@@ -110,7 +112,7 @@ bool is_whole_preview(const std::vector<char>& value) {
          value.size() % 4 == 0;
 }
 
-/// Size of a type, if that is fixed.
+/// Returns the size in bytes of a type, if that is fixed.
 std::optional<std::int64_t> fixed_bytes(std::string_view type) {
   const auto* const found = std::ranges::find(kTypeSizes, type, &TypeSize::type);
   return found != std::end(kTypeSizes) ? std::optional(found->bytes) : std::nullopt;
@@ -123,7 +125,7 @@ bool copy_to(const std::vector<char>& value, T& out) {
   return true;
 }
 
-/// False: the value is not what its type or name asks for.
+/// Takes over one attribute. Returns false if its value does not fit its type or name.
 bool take_value(const std::string& name, std::string_view type, const std::vector<char>& value,
                 Part& part) {
   if (type == "preview") return is_whole_preview(value);
@@ -143,6 +145,7 @@ bool take_value(const std::string& name, std::string_view type, const std::vecto
   return true;
 }
 
+/// Checks the sizes that a part announces against the limits and the length of the file.
 Result<void> check_part(const Part& part, std::int64_t file_bytes) {
   const auto side = [&](std::size_t axis) {
     return std::int64_t{part.data_window[axis + 2]} - part.data_window[axis] + 1;
@@ -182,7 +185,7 @@ Result<void> check_part(const Part& part, std::int64_t file_bytes) {
   return {};
 }
 
-/// False: no header was there, the list of parts ends.
+/// Reads and checks the header of the next part. Returns false if the list of parts ends here.
 Result<bool> check_next_part(File& file) {
   Part part;
   for (int count = 0;; ++count) {

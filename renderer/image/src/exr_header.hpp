@@ -6,15 +6,16 @@
 
 namespace emit::image {
 
+/// Limits of what read_exr() accepts: pixels a side, and channels of a part.
 inline constexpr std::int64_t kMaxExrSidePx = 65536;
 inline constexpr std::int64_t kMaxExrChannels = 256;
-/// Of one compressed piece, unpacked.
+/// Largest size of one compressed chunk after decompression, in bytes.
 inline constexpr std::int64_t kMaxExrChunkBytes = std::int64_t{1} << 28;
 
-/// Looks over the headers of an OpenEXR file before the library does, which takes memory for
-/// whatever they announce: nothing may be larger than the file has bytes for, nor over the limits
-/// above. Knows no more of the format than that takes; all else is the library's business.
-/// Errors: io, parse, unsupported; without the file's name.
+/// Checks the headers of an OpenEXR file before the library reads them, because the library
+/// allocates memory for whatever they announce. Nothing may be larger than the file has bytes for,
+/// nor exceed the limits above. The check knows only as much of the format as it needs.
+/// Errors: io, parse, unsupported. The message does not contain the file's name.
 [[nodiscard]] physics::Result<void> check_exr_header(const std::filesystem::path& file);
 
 }  // namespace emit::image

@@ -80,17 +80,19 @@ void read_attributes(const Imf::Header& header, ExrImage& image) {
       image.attributes[it.name()] = integer->value();
     }
   }
-  // Standard attribute of the format itself, not one of ours.
+  // The library adds "type", a standard attribute of the format. It is not ours.
   image.attributes.erase("type");
 }
 
-/// OpenEXR addresses pixel (x, y) at base + x * xs + y * ys, counted from the data window's origin.
+/// Describes a channel's pixels to the library. OpenEXR addresses pixel (x, y) at
+/// base + x * xs + y * ys, counted from the origin of the data window.
 Imf::Slice slice_of(float* pixels, const Imath::Box2i& window, std::uint32_t width) {
   return Imf::Slice::Make(Imf::FLOAT, pixels, window.min, static_cast<int64_t>(width), 1,
                           sizeof(float), sizeof(float) * width);
 }
 
-/// Memory for the planes grows with what was read, so that a small file cannot ask for much.
+/// Reads the pixels in bands of rows. Memory grows with the rows read, so that a small file cannot
+/// ask for much.
 void read_pixels(Imf::InputFile& input, const Imath::Box2i& window, ExrImage& image) {
   constexpr std::size_t kBandValues = std::size_t{1} << 22U;
   const std::size_t row_values = std::size_t{image.width_px} * image.channels.size();
@@ -179,7 +181,7 @@ std::string response_text(const std::vector<physics::ResponsePoint>& response) {
   if (response.empty()) return std::string(kRectangle);
   std::string out;
   for (const physics::ResponsePoint& point : response) {
-    // The shortest digits that read back as the same numbers.
+    // Print the shortest digits that read back as the same numbers.
     out += fmt::format("{}{}:{}", out.empty() ? "" : " ", point.wavelength_um, point.response_frac);
   }
   return out;
@@ -230,7 +232,7 @@ physics::Result<void> write_exr(const std::filesystem::path& file, const ExrImag
     Imf::FrameBuffer frame;
     for (const ExrChannel& channel : image.channels) {
       header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
-      // The library takes a mutable pointer for reading and writing alike; it only reads here.
+      // The library takes a mutable pointer both for reading and for writing; here it only reads.
       frame.insert(channel.name, slice_of(const_cast<float*>(channel.pixels.data()),
                                           header.dataWindow(), image.width_px));
     }

@@ -15,7 +15,8 @@ namespace {
 
 using LinearRgb = std::array<double, 3>;
 
-/// Oklab lightness, chroma and hue to linear sRGB (B. Ottosson's published matrices).
+/// Converts Oklab lightness, chroma and hue to linear sRGB with the matrices published by B.
+/// Ottosson.
 LinearRgb linear_from_oklch(double lightness, double chroma, double hue_rad) {
   const double a = chroma * std::cos(hue_rad);
   const double b = chroma * std::sin(hue_rad);
@@ -37,8 +38,8 @@ std::uint8_t srgb_byte(double linear) {
   return static_cast<std::uint8_t>(std::lround(encoded * 255.0));
 }
 
-/// Path through hue and chroma with lightness linear in the value. Where sRGB cannot show the
-/// chroma, chroma gives way, never lightness.
+/// One knot of a path through hue and chroma, along which the lightness is linear in the value. If
+/// sRGB cannot show the chroma, the chroma is reduced and the lightness is kept.
 struct Knot {
   double value_frac;
   double chroma;
@@ -62,6 +63,7 @@ Rgb thermal_color(double value_frac) {
   const double hue_rad = std::lerp(from.hue_deg, to.hue_deg, t) * physics::kDegree;
   double low = 0.0;
   double high = std::lerp(from.chroma, to.chroma, t);
+  // Find the largest chroma that sRGB can show, by bisection.
   if (!in_gamut(linear_from_oklch(lightness, high, hue_rad))) {
     for (int halving = 0; halving < 30; ++halving) {
       const double middle = 0.5 * (low + high);
@@ -107,7 +109,7 @@ void draw_color_bar(RgbImage& image, std::uint32_t left_px, const FalseColorOpti
   }
   const std::uint32_t margin = 2 * kGlyphHeightPx;
   if (image.height_px < 3 * margin) {
-    return;  // no room for a legible bar
+    return;  // the image has no room for a legible bar
   }
   const std::uint32_t top = margin;
   const std::uint32_t rows = image.height_px - margin - kGlyphHeightPx - 1;
@@ -137,12 +139,6 @@ void draw_color_bar(RgbImage& image, std::uint32_t left_px, const FalseColorOpti
 }
 
 }  // namespace
-
-std::optional<ColorMap> color_map_from(std::string_view name) noexcept {
-  if (name == "thermal") return ColorMap::thermal;
-  if (name == "grey") return ColorMap::grey;
-  return std::nullopt;
-}
 
 const std::array<Rgb, 256>& color_table(ColorMap map) noexcept {
   static const std::array<Rgb, 256> thermal = build_table(thermal_color);

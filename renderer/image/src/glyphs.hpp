@@ -8,8 +8,8 @@ namespace emit::image {
 inline constexpr std::uint32_t kGlyphWidthPx = 5;
 inline constexpr std::uint32_t kGlyphHeightPx = 7;
 
-/// Rows from the top; bit 4 is the left column. Unknown characters give an empty glyph, small
-/// letters their capitals.
+/// Returns the rows of a character from the top; bit 4 is the left column. Small letters give their
+/// capitals, unknown characters an empty glyph.
 [[nodiscard]] std::array<std::uint8_t, kGlyphHeightPx> glyph(char character) noexcept;
 
 }  // namespace emit::image

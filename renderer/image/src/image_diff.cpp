@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::image {
 namespace {
 
@@ -14,7 +16,7 @@ bool is_radiance(const std::string& channel) {
   return channel == kRadianceChannel || channel.rfind("radiance.", 0) == 0;
 }
 
-/// True when two values that are not both finite are not the same kind of non-finite.
+/// Returns true if two values, at least one of them not finite, are not of the same kind.
 bool differs_in_kind(float a, float b) {
   if (std::isnan(a) || std::isnan(b)) {
     return std::isnan(a) != std::isnan(b);
@@ -22,16 +24,16 @@ bool differs_in_kind(float a, float b) {
   return a != b;
 }
 
-/// Value at a percentile by nearest rank; reorders `values`.
+/// Returns the value at a percentile by nearest rank. Reorders `values`.
 double percentile(std::vector<double>& values, double percent) {
-  // 99.9 / 100 * 1000 is a hair over 999; the rank must not become 1000 for it.
+  // The product 99.9 / 100 * 1000 is slightly above 999. The rank must not become 1000 for that.
   const double rank = std::ceil(percent / 100.0 * static_cast<double>(values.size()) - 1e-6);
   const auto index = static_cast<std::ptrdiff_t>(std::max(rank, 1.0)) - 1;
   std::nth_element(values.begin(), values.begin() + index, values.end());
   return values[static_cast<std::size_t>(index)];
 }
 
-/// `scale(a, b)` multiplies a - b; a scale that is not finite leaves the pixel out.
+/// Computes the statistics of (a - b) * scale(a, b). A pixel whose scale is not finite is left out.
 template <class Scale>
 DiffStats scaled_diff(std::span<const float> a, std::span<const float> b, std::uint32_t width_px,
                       Scale scale) {
@@ -80,6 +82,9 @@ DiffStats scaled_diff(std::span<const float> a, std::span<const float> b, std::u
 }  // namespace
 
 DiffStats diff_values(std::span<const float> a, std::span<const float> b, std::uint32_t width_px) {
+  EMIT_CHECK_OP(a.size(), ==, b.size());
+  EMIT_CHECK_OP(width_px, >, 0U);
+  EMIT_CHECK_OP(a.size() % width_px, ==, 0U);
   return scaled_diff(a, b, width_px, [](double, double) { return 1.0; });
 }
 

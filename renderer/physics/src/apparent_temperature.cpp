@@ -6,12 +6,15 @@
 #include <cmath>
 #include <cstdint>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 
 constexpr double kLowestK = 150.0;
 constexpr double kHighestK = 3000.0;
-/// Nodes lie where all but the leading bits of a float are zero: 64 to every doubling of radiance.
+/// Number of low bits that are zero in the radiance of every node. It leaves 64 nodes to every
+/// doubling of radiance.
 constexpr unsigned kDroppedBits = 17;
 
 std::size_t index_of(float radiance_w_m2_sr) noexcept {
@@ -31,10 +34,12 @@ ApparentTemperature::ApparentTemperature(const Band& band) {
   first_ = index_of(static_cast<float>(radiance(kLowestK)));
   const std::size_t last = index_of(static_cast<float>(radiance(kHighestK))) + 1;
   double low_k = kLowestK;
+  // Find the temperature of every node by bisection, starting at the temperature of the node
+  // before.
   for (std::size_t i = first_; i <= last; ++i) {
     const auto wanted = static_cast<double>(radiance_at(i));
     double high_k = kHighestK;
-    for (int round = 0; round < 40; ++round) {  // bisection, from the node before on
+    for (int round = 0; round < 40; ++round) {
       const double middle_k = 0.5 * (low_k + high_k);
       (radiance(middle_k) < wanted ? low_k : high_k) = middle_k;
     }
@@ -43,6 +48,8 @@ ApparentTemperature::ApparentTemperature(const Band& band) {
 }
 
 float ApparentTemperature::k(float radiance_w_m2_sr) const noexcept {
+  // Take the leading bits as the index. NaN and radiances that are not positive count as below the
+  // table.
   const std::size_t index = radiance_w_m2_sr > 0.0F ? index_of(radiance_w_m2_sr) : 0;
   if (index < first_) return node_k_.front();
   const std::size_t i = index - first_;
@@ -54,6 +61,8 @@ float ApparentTemperature::k(float radiance_w_m2_sr) const noexcept {
 
 double ApparentTemperature::rms_difference_k(std::span<const float> a_w_m2_sr,
                                              std::span<const float> b_w_m2_sr) const noexcept {
+  EMIT_CHECK_OP(a_w_m2_sr.size(), ==, b_w_m2_sr.size());
+  EMIT_CHECK(!a_w_m2_sr.empty());
   double sum = 0.0;
   for (std::size_t i = 0; i < a_w_m2_sr.size(); ++i) {
     if (a_w_m2_sr[i] == b_w_m2_sr[i]) continue;

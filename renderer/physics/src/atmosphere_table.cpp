@@ -10,13 +10,15 @@
 namespace emit::physics {
 namespace {
 
+/// Place on an axis: a cell and the fraction of it, 0..1.
 struct Cell {
   std::size_t index = 0;
   double fraction = 0.0;
   bool clamped = false;
 };
 
-/// Cell of an ascending axis of at least two nodes; NaN counts as below it.
+/// Returns the cell of `x` on an ascending axis of at least two nodes. NaN counts as below the
+/// axis.
 Cell find_cell(const std::vector<double>& nodes, double x) noexcept {
   if (!(x >= nodes.front())) return {0, 0.0, true};
   if (x > nodes.back()) return {nodes.size() - 2, 1.0, true};
@@ -26,11 +28,13 @@ Cell find_cell(const std::vector<double>& nodes, double x) noexcept {
   return {index, (x - nodes[index]) / (nodes[index + 1] - nodes[index]), false};
 }
 
-/// Share of a cell's emission that its first part gives: (1 - e^(-u d)) / (1 - e^(-d)).
+/// Returns the share of a cell's emission that comes from its first part u, physics.md eq. 15: (1 -
+/// e^(-u d)) / (1 - e^(-d)).
 double emitted_share(double u, double d) noexcept {
   return d > 1e-12 ? std::expm1(-u * d) / std::expm1(-d) : u;
 }
 
+/// Prints a number without trailing zeros.
 std::string number_text(double value) {
   std::string text = std::to_string(value);
   text.erase(text.find_last_not_of('0') + 1);
@@ -115,6 +119,7 @@ AtmosphereTable::Node AtmosphereTable::at_elevation(std::size_t elevation, std::
                                                     double fraction) const noexcept {
   const Node& a = nodes_[elevation * range_m_.size() + cell];
   const Node& b = nodes_[elevation * range_m_.size() + cell + 1];
+  // Interpolate along range by physics.md eq. 14 and 15.
   const double depth = b.optical_depth - a.optical_depth;
   return {a.optical_depth + fraction * depth,
           a.path_radiance_w_m2_sr +
@@ -127,6 +132,7 @@ AtmosphereTable::Air AtmosphereTable::along(double range_m, double sin_elevation
     const Node node = at_elevation(0, range.index, range.fraction);
     return {std::exp(-node.optical_depth), node.path_radiance_w_m2_sr, range.clamped};
   }
+  // Interpolate both quantities linearly in the sine of the elevation.
   const Cell elevation = find_cell(sin_elevation_, sin_elevation);
   const Node low = at_elevation(elevation.index, range.index, range.fraction);
   const Node high = at_elevation(elevation.index + 1, range.index, range.fraction);
@@ -141,7 +147,8 @@ AtmosphereTable::Air AtmosphereTable::out(double sin_elevation) const noexcept {
 }
 
 double AtmosphereTable::sky_hemisphere_w_m2_sr() const {
-  // Midpoint rule in sin^2 of the elevation, the measure of the cosine-weighted hemisphere.
+  // Midpoint rule in sin^2 of the elevation, which is the measure of the cosine-weighted
+  // hemisphere.
   constexpr int kRings = 1024;
   double sum = 0.0;
   for (int i = 0; i < kRings; ++i) {

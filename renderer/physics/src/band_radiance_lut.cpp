@@ -21,7 +21,8 @@ Result<BandRadianceLut> BandRadianceLut::build(const Band& band, const Options& 
   lut.last_node_ = static_cast<float>(last);
   lut.nodes_.reserve(options.nodes);
   for (std::uint32_t i = 0; i < options.nodes; ++i) {
-    // Where float32 arithmetic puts the node, not where double would.
+    // Evaluate the radiance at the place that float32 arithmetic gives the node, not at the exact
+    // one.
     const double t = static_cast<double>(lut.min_k_) + i / static_cast<double>(lut.nodes_per_k_);
     lut.nodes_.push_back(static_cast<float>(t * band_radiance(band, Kelvin(t)).log_radiance));
   }

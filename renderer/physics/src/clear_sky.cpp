@@ -10,7 +10,7 @@ namespace emit::physics {
 namespace {
 
 constexpr double kIcePointK = 273.15;
-// Below this elevation the disc is wholly set; the air mass formula ends a few degrees lower.
+// The disc is wholly set below this elevation; the air mass formula ends a few degrees lower.
 constexpr double kLowestElevationDeg = -2.0;
 
 }  // namespace
@@ -37,18 +37,21 @@ SolarIrradiance clear_sky_irradiance(const SunPosition& sun, Metres height,
   const double extraterrestrial = kSolarConstantWPerM2 / (sun.distance_au * sun.distance_au);
   const double air_mass = relative_air_mass(sun.elevation) * pressure_ratio(height);
   const double h = height.value();
+  // Coefficients of Ineichen and Perez for the height of the place.
   const double fh1 = std::exp(-h / 8000.0);
   const double fh2 = std::exp(-h / 1250.0);
   const double cg1 = 5.09e-5 * h + 0.868;
   const double cg2 = 3.92e-5 * h + 0.0387;
   const double tl = linke_turbidity;
 
+  // Global and direct irradiance, physics.md eq. 11.
   const double global =
       cg1 * extraterrestrial * cos_zenith * std::exp(-cg2 * air_mass * (fh1 + fh2 * (tl - 1.0)));
   const double b = 0.664 + 0.163 / fh1;
   const double direct =
       extraterrestrial * std::max(0.0, b * std::exp(-0.09 * air_mass * (tl - 1.0)));
-  // At low turbidity the fit of the beam exceeds what the global irradiance leaves for it.
+  // Limit the direct irradiance: at low turbidity its fit exceeds what the global irradiance
+  // allows.
   const double direct_limit =
       global *
       std::max(0.0, (1.0 - (0.1 - 0.2 * std::exp(-tl)) / (0.1 + 0.882 / fh1)) / cos_zenith);

@@ -7,11 +7,13 @@ namespace emit::physics {
 
 std::complex<double> stack_impedance_m2k_w(std::span<const StackLayer> layers,
                                            double angular_rad_s) noexcept {
-  std::complex<double> z = 0.0;  // isothermal base
+  std::complex<double> z = 0.0;  // the base is isothermal
   for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
+    // Pass from below through every layer, physics.md eq. 19.
     const std::complex<double> g = std::sqrt(std::complex<double>(
         0.0, angular_rad_s * layer->volumetric_heat_j_m3_k / layer->conductivity_w_m_k));
     const std::complex<double> gd = g * layer->thickness_m;
+    // Treat a thin layer as a plain resistance: its own impedance is infinite at frequency 0.
     if (std::abs(gd) < 1e-6) {
       z += layer->thickness_m / layer->conductivity_w_m_k;
       continue;
@@ -69,6 +71,7 @@ FosterSurface<double> foster_surface(const FosterNetwork& network, double emissi
 
 FosterLadder foster_ladder(double dt_s, const FosterNetwork& network) noexcept {
   FosterLadder ladder;
+  // Compute the finest level and double it up to the whole interval.
   ladder.level[kMaxFosterLevel] =
       foster_gains(dt_s / static_cast<double>(1 << kMaxFosterLevel), network);
   for (int i = kMaxFosterLevel; i > 0; --i) {
@@ -82,6 +85,7 @@ FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& 
                              const FosterDrive<double>& end, const FosterLadder& ladder,
                              const FosterSurface<double>& surface, double tolerance_k) noexcept {
   FosterAdvance result;
+  // Start with one step, then halve the steps until the result stops moving.
   const FosterState<double> start = x;
   result.clamped = foster_step(x, begin, end, ladder.level[0], surface);
   for (int level = 1; level <= kMaxFosterLevel; ++level) {
@@ -96,6 +100,8 @@ FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& 
       result.clamped = foster_step(x, from, to, gains, surface) || result.clamped;
       from = to;
     }
+    // Compare with the coarser result. Step doubling of a second-order scheme leaves a third of the
+    // change as error.
     double change_k = std::abs(foster_offset_k(x, surface) - foster_offset_k(coarse, surface));
     for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
       change_k = std::max(change_k, std::abs(x[i] - coarse[i]));

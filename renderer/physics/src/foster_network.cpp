@@ -12,11 +12,11 @@ namespace {
 
 constexpr std::size_t kFrequencies = 40;
 constexpr double kTausPerDecade = 8.0;
-// Modes below this share of the resistance are left out: 6 mK in a sheet under full sun.
+// Modes with a smaller share of the resistance are left out: 6 mK in a sheet under full sun.
 constexpr double kLeastShare = 1e-4;
 
-/// The impedance to be met: its samples, the weights that turn impedance into temperature error,
-/// and the resistance that the modes must add up to.
+/// Impedance that the modes must meet: its samples, the weights that turn an error of the impedance
+/// into one of the temperature, and the resistance that the modes must add up to.
 struct Target {
   std::vector<double> angular_rad_s;
   std::vector<std::complex<double>> impedance;
@@ -37,25 +37,27 @@ Target make_target(std::span<const StackLayer> layers, const NetworkOptions& opt
                             std::pow(options.shortest_period_s / options.longest_period_s, f);
     const double angular = 2.0 * kPi / period_s;
     const std::complex<double> z = stack_impedance_m2k_w(layers, angular);
-    // T / drive = 1 / (h + 1/Z): its derivative by Z.
+    // The weight is the derivative of T / drive = 1 / (h + 1/Z) by Z.
     const double weight = 1.0 / std::norm(1.0 + options.film_w_m2_k * z);
     target.angular_rad_s.push_back(angular);
     target.impedance.push_back(z);
     target.weight.push_back(weight);
     scale = std::max(scale, weight);
   }
-  // Heavy enough to hold the sum, light enough not to swamp the rest in rounding.
+  // The sum's weight is heavy enough to hold the sum and light enough not to swamp the rest in
+  // rounding.
   target.sum_weight = 1e3 * scale;
   return target;
 }
 
-/// Non-negative resistances of modes with given time constants; returns the cost.
+/// Finds the non-negative resistances of modes with given time constants. Returns the cost.
 double solve_resistances(const Target& target, std::span<const double> taus_s,
                          std::vector<double>& resistances) {
   const std::size_t columns = taus_s.size();
   const std::size_t rows = 2 * target.angular_rad_s.size() + 1;
   std::vector<double> matrix(rows * columns);
   std::vector<double> rhs(rows);
+  // Fill two rows per frequency: the real and the imaginary part of r / (1 + i w tau).
   for (std::size_t i = 0; i < target.angular_rad_s.size(); ++i) {
     const double w = target.weight[i];
     for (std::size_t j = 0; j < columns; ++j) {
@@ -67,11 +69,13 @@ double solve_resistances(const Target& target, std::span<const double> taus_s,
     rhs[2 * i] = w * target.impedance[i].real();
     rhs[2 * i + 1] = w * target.impedance[i].imag();
   }
+  // Add one heavy row that holds the sum of the resistances.
   for (std::size_t j = 0; j < columns; ++j) {
     matrix[(rows - 1) * columns + j] = target.sum_weight;
   }
   rhs[rows - 1] = target.sum_weight * target.resistance_m2k_w;
   resistances = solve_nnls(matrix, rhs, columns);
+  // The cost is the squared residual of all rows.
   double cost = 0.0;
   for (std::size_t i = 0; i < rows; ++i) {
     double residual = rhs[i];
@@ -83,7 +87,8 @@ double solve_resistances(const Target& target, std::span<const double> taus_s,
   return cost;
 }
 
-/// Nelder and Mead's simplex over the logarithms of the time constants.
+/// Minimises the cost over the logarithms of the time constants by the simplex of Nelder and Mead.
+/// Returns the logarithms.
 std::vector<double> minimise(const Target& target, std::vector<double> start) {
   const std::size_t n = start.size();
   std::vector<double> unused;
@@ -103,6 +108,7 @@ std::vector<double> minimise(const Target& target, std::vector<double> start) {
   for (int round = 0; round < 250; ++round) {
     std::sort(simplex.begin(), simplex.end(), by_cost);
     if (simplex.back().cost - simplex.front().cost <= 1e-9 * simplex.front().cost) break;
+    // Take the centre of all vertices but the worst.
     std::vector<double> centre(n, 0.0);
     for (std::size_t v = 0; v < n; ++v) {
       for (std::size_t i = 0; i < n; ++i) centre[i] += simplex[v].at[i] / static_cast<double>(n);
@@ -113,6 +119,7 @@ std::vector<double> minimise(const Target& target, std::vector<double> start) {
       vertex.cost = cost_of(vertex.at);
       return vertex;
     };
+    // Reflect the worst vertex; then expand, accept, contract or shrink.
     Vertex next = along(-1.0);
     if (next.cost < simplex.front().cost) {
       Vertex farther = along(-2.0);
@@ -136,10 +143,11 @@ std::vector<double> minimise(const Target& target, std::vector<double> start) {
   return std::min_element(simplex.begin(), simplex.end(), by_cost)->at;
 }
 
-/// Joins modes whose time constants are close until `count` are left, and further while that costs
-/// less than `tolerance_m2k_w` of impedance.
+/// Joins modes with similar time constants until `count` are left. It goes on while a further join
+/// costs less than `tolerance_m2k_w` of impedance.
 void merge(std::vector<NetworkMode>& modes, std::size_t count, double tolerance_m2k_w) {
   while (modes.size() > 1) {
+    // Find the two neighbours whose join costs least.
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i + 1 < modes.size(); ++i) {
@@ -153,6 +161,7 @@ void merge(std::vector<NetworkMode>& modes, std::size_t count, double tolerance_
       }
     }
     if (modes.size() <= count && !(least < tolerance_m2k_w)) return;
+    // Join them at the mean of their logarithms, weighted by resistance.
     NetworkMode& a = modes[best];
     const NetworkMode& b = modes[best + 1];
     const double sum = a.resistance_m2k_w + b.resistance_m2k_w;
@@ -163,6 +172,7 @@ void merge(std::vector<NetworkMode>& modes, std::size_t count, double tolerance_
   }
 }
 
+/// Returns the modes whose resistance is above `least`, fastest first.
 std::vector<NetworkMode> modes_of(const std::vector<double>& taus_s,
                                   const std::vector<double>& resistances, double least) {
   std::vector<NetworkMode> modes;
@@ -174,6 +184,7 @@ std::vector<NetworkMode> modes_of(const std::vector<double>& taus_s,
   return modes;
 }
 
+/// Checks the ranges of layers and options.
 Result<void> check(std::span<const StackLayer> layers, const NetworkOptions& options) {
   const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
   if (layers.empty()) return make_error(ErrorCode::config, "a stack needs at least one layer");
@@ -202,11 +213,12 @@ Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
   for (const StackLayer& layer : layers) {
     capacity_j_m2_k += layer.thickness_m * layer.volumetric_heat_j_m3_k;
   }
-  // No mode of the stack is slower than all its heat behind all its resistance.
+  // No mode of the stack is slower than all its heat over all its resistance.
   const double slowest_s = target.resistance_m2k_w * capacity_j_m2_k;
   const double fastest_s = std::min(options.shortest_period_s / (20.0 * kPi), 0.05 * slowest_s);
   const auto count =
       static_cast<std::size_t>(std::ceil(kTausPerDecade * std::log10(slowest_s / fastest_s)) + 1.0);
+  // Solve for the resistances on a fine grid of time constants and merge the result.
   std::vector<double> taus(count);
   for (std::size_t i = 0; i < count; ++i) {
     taus[i] = fastest_s * std::pow(slowest_s / fastest_s,
@@ -218,7 +230,8 @@ Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
   std::vector<NetworkMode> modes = modes_of(taus, resistances, least);
   merge(modes, options.modes, 0.0);
 
-  // The merged modes, and as many spread evenly over the stack's time scales, start the search.
+  // Search from two starts: the merged modes, and as many spread evenly over the stack's time
+  // scales.
   std::vector<std::vector<double>> starts(2);
   for (const NetworkMode& mode : modes) starts[0].push_back(std::log(mode.tau_s));
   for (std::size_t i = 0; i < options.modes; ++i) {
@@ -227,7 +240,7 @@ Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
   }
   double best_cost = std::numeric_limits<double>::infinity();
   for (const std::vector<double>& start : starts) {
-    // A second run from the first one's result frees a collapsed simplex.
+    // Run the search a second time from its own result. This frees a collapsed simplex.
     const std::vector<double> logs = minimise(target, minimise(target, start));
     std::vector<double> found(logs.size());
     for (std::size_t i = 0; i < logs.size(); ++i) {
@@ -238,12 +251,13 @@ Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
     best_cost = cost;
     modes = modes_of(found, resistances, least);
   }
-  merge(modes, options.modes, least);  // those that came to lie together
+  merge(modes, options.modes, least);  // join modes that moved together in the search
   double sum = 0.0;
   for (const NetworkMode& mode : modes) sum += mode.resistance_m2k_w;
   if (modes.empty() || !(sum > 0.0)) {
     return make_error(ErrorCode::config, "the layers have no thermal network");
   }
+  // Scale the resistances so that their sum is exact.
   FosterNetwork network;
   for (const NetworkMode& mode : modes) {
     network.modes[network.count] = {mode.tau_s,

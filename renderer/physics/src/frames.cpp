@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 
@@ -12,7 +14,8 @@ constexpr double kSqrtHalf = 0.70710678118654752440;
 // Sine of the smallest angle to the vertical at which the horizon still defines a heading.
 constexpr double kVerticalSine = 1e-9;
 
-/// East-north-up from north-east-down: half a turn about the axis between north and east.
+/// Rotation of east-north-up from north-east-down: half a turn about the axis between north and
+/// east.
 const glm::dquat kEnuFromNed(0.0, kSqrtHalf, kSqrtHalf, 0.0);
 
 glm::dquat about_axis(double angle_rad, const glm::dvec3& axis) noexcept {
@@ -37,11 +40,13 @@ glm::dquat world_from_body_heading_pitch_roll(double heading_rad, double pitch_r
 
 glm::dquat world_from_body_look_at(const glm::dvec3& eye_world_m,
                                    const glm::dvec3& target_world_m) noexcept {
+  EMIT_CHECK(eye_world_m != target_world_m);
   const glm::dvec3 forward = glm::normalize(target_world_m - eye_world_m);
   const glm::dvec3 up(0.0, 0.0, 1.0);
   glm::dvec3 right = glm::cross(forward, up);
   const double sine = glm::length(right);
-  // Looking straight up or down, "top of the image" is north, so the body's z axis points south.
+  // If the camera looks straight up or down, north is at the top of the image, so the body's z axis
+  // points south.
   right = sine > kVerticalSine ? right / sine
                                : glm::normalize(glm::cross(glm::dvec3(0.0, -1.0, 0.0), forward));
   const glm::dvec3 down = glm::cross(forward, right);

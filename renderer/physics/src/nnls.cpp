@@ -5,11 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 
-/// Unconstrained least squares over the columns in `active`, by modified Gram-Schmidt with one
-/// re-orthogonalisation. Columns that depend on earlier ones get zero.
+/// Solves the least squares problem without constraints over the columns in `active`, by modified
+/// Gram-Schmidt with one re-orthogonalisation. A column that depends on earlier ones gets zero.
 std::vector<double> least_squares(std::span<const double> matrix, std::span<const double> rhs,
                                   std::size_t columns, const std::vector<std::size_t>& active) {
   const std::size_t rows = rhs.size();
@@ -23,6 +25,7 @@ std::vector<double> least_squares(std::span<const double> matrix, std::span<cons
       q[j][i] = matrix[i * columns + active[j]];
       norm_before += q[j][i] * q[j][i];
     }
+    // Remove the components along the earlier columns; the second pass removes what rounding left.
     for (int pass = 0; pass < 2; ++pass) {
       for (std::size_t k = 0; k < j; ++k) {
         if (dependent[k]) continue;
@@ -42,6 +45,7 @@ std::vector<double> least_squares(std::span<const double> matrix, std::span<cons
     r[j * count + j] = norm;
     for (double& value : q[j]) value /= norm;
   }
+  // Solve the triangular system R x = Q^T b from the last row up.
   std::vector<double> x(count, 0.0);
   for (std::size_t j = count; j-- > 0;) {
     if (dependent[j]) continue;
@@ -57,6 +61,7 @@ std::vector<double> least_squares(std::span<const double> matrix, std::span<cons
 
 std::vector<double> solve_nnls(std::span<const double> matrix, std::span<const double> rhs,
                                std::size_t columns) {
+  EMIT_CHECK_OP(matrix.size(), ==, rhs.size() * columns);
   const std::size_t rows = rhs.size();
   std::vector<double> x(columns, 0.0);
   std::vector<bool> tried(columns, false);
@@ -66,7 +71,7 @@ std::vector<double> solve_nnls(std::span<const double> matrix, std::span<const d
   for (const double value : rhs) scale = std::max(scale, std::abs(value));
 
   for (std::size_t round = 0; round < 3 * columns + 3; ++round) {
-    // The column that lowers the residual most, relative to its own length.
+    // Choose the column that lowers the residual most, relative to its own length.
     double best = 1e-12 * scale;
     std::size_t entering = columns;
     for (std::size_t j = 0; j < columns; ++j) {
@@ -86,14 +91,16 @@ std::vector<double> solve_nnls(std::span<const double> matrix, std::span<const d
     if (entering == columns) break;
     active.push_back(entering);
 
+    // Solve over the active columns until all their values are positive.
     while (!active.empty()) {
       const std::vector<double> candidate = least_squares(matrix, rhs, columns, active);
       if (candidate.back() <= 0.0 && active.back() == entering && x[entering] == 0.0) {
-        // Rounding offered a column that does not help.
+        // This column was chosen by rounding alone and does not help. Do not try it again.
         active.pop_back();
         tried[entering] = true;
         break;
       }
+      // Move towards the candidate as far as all values stay non-negative.
       double step = 1.0;
       for (std::size_t k = 0; k < active.size(); ++k) {
         if (candidate[k] <= 0.0) {
@@ -108,12 +115,14 @@ std::vector<double> solve_nnls(std::span<const double> matrix, std::span<const d
         std::fill(tried.begin(), tried.end(), false);
         break;
       }
+      // Release the columns that have reached zero.
       std::erase_if(active, [&](std::size_t j) {
         if (x[j] > 1e-15 * scale) return false;
         x[j] = 0.0;
         return true;
       });
     }
+    // Update the residual.
     for (std::size_t i = 0; i < rows; ++i) {
       residual[i] = rhs[i];
       for (const std::size_t j : active) residual[i] -= matrix[i * columns + j] * x[j];

@@ -10,8 +10,8 @@
 namespace emit::physics {
 namespace {
 
-// Half of the symmetric 16-point Gauss-Legendre rule: abscissae and weights on [-1, 1], found by
-// Newton's method on the Legendre polynomial rather than typed.
+// Symmetric 16-point Gauss-Legendre rule on [-1, 1]. Newton's method on the Legendre polynomial
+// finds its abscissae and weights, so that no number is typed.
 constexpr int kPoints = 16;
 struct GaussRule {
   std::array<double, kPoints> node{};
@@ -24,6 +24,7 @@ GaussRule gauss_legendre() noexcept {
     double z = std::cos(kPi * (i + 0.75) / (kPoints + 0.5));
     double slope = 1.0;
     for (int iteration = 0; iteration < 20; ++iteration) {
+      // Evaluate the polynomial by its three-term recurrence, then its derivative.
       double p0 = 1.0;
       double p1 = z;
       for (int n = 2; n <= kPoints; ++n) {
@@ -50,14 +51,15 @@ const GaussRule& gauss() noexcept {
   return rule;
 }
 
-// e^-60 of the leading term is far below double rounding.
+// Terms this many e-folds below the leading one are far below double rounding.
 constexpr double kTailExponents = 60.0;
 // Widest panel in x; 16 points integrate x^3/(e^x-1) over it to rounding.
 constexpr double kPanelWidth = 3.0;
 constexpr double kMinSearchK = 2.0;
 constexpr double kMaxSearchK = 50000.0;
 
-// 2 k^4 / (h^3 c^2) = c1 / c2^4: L = this T^4 int R x^3/(e^x-1) dx.
+// Factor of physics.md eq. 7, 2 k^4 / (h^3 c^2) = c1 / c2^4: L is this times T^4 int R x^3/(e^x-1)
+// dx.
 const double kRadianceScale = kRadianceC1WUm4PerM2Sr / (kC2UmK * kC2UmK * kC2UmK * kC2UmK);
 
 struct Integrals {
@@ -65,7 +67,7 @@ struct Integrals {
   double derivative = 0.0;  // int R x^4 e^x/(e^x-1)^2 dx, divided by e^-origin
 };
 
-/// Adds one stretch of the band over which the response is linear in wavelength.
+/// Adds the integrals over one stretch of the band in which the response is linear in wavelength.
 void add_stretch(double lo_um, double hi_um, double response_lo, double response_hi,
                  double temperature_k, double origin, Integrals& sum) noexcept {
   const double x_end = std::min(kC2UmK / (lo_um * temperature_k), origin + kTailExponents);
@@ -73,6 +75,7 @@ void add_stretch(double lo_um, double hi_um, double response_lo, double response
   if (!(x < x_end)) {
     return;
   }
+  // Split the stretch into equal panels and sum 16 points on each.
   const double slope = (response_hi - response_lo) / (hi_um - lo_um);
   const int panels = static_cast<int>(std::ceil((x_end - x) / kPanelWidth));
   const GaussRule& rule = gauss();
@@ -93,7 +96,8 @@ void add_stretch(double lo_um, double hi_um, double response_lo, double response
   }
 }
 
-/// Calls `visit(lo, hi, response_lo, response_hi)` for each stretch inside the band.
+/// Calls `visit(lo, hi, response_lo, response_hi)` for each stretch inside the band, wavelengths in
+/// um.
 template <class Visit>
 void for_each_stretch(const Band& band, Visit visit) {
   if (band.response.empty()) {
@@ -153,7 +157,7 @@ BandRadiance band_radiance(const Band& band, Kelvin temperature) noexcept {
   if (t <= 0.0) {
     return {0.0, 0.0, -std::numeric_limits<double>::infinity()};
   }
-  // e^-origin, the size of the largest term, is factored out: ln L survives underflow.
+  // Factor out e^-origin, the size of the largest term: ln L then survives underflow.
   double longest_um = 0.0;
   for_each_stretch(band, [&longest_um](double, double hi, double, double) {
     longest_um = std::max(longest_um, hi);
@@ -163,7 +167,7 @@ BandRadiance band_radiance(const Band& band, Kelvin temperature) noexcept {
   for_each_stretch(band, [&](double lo, double hi, double response_lo, double response_hi) {
     add_stretch(lo, hi, response_lo, response_hi, t, origin, sum);
   });
-  // In halves, so that a result which is itself denormal keeps the bits it can.
+  // Multiply by the decay in two halves, so that a denormal result keeps the bits it can.
   const double half_decay = std::exp(-0.5 * origin);
   const double t3 = t * t * t;
   BandRadiance result;
@@ -192,13 +196,14 @@ std::optional<Kelvin> brightness_temperature(const Band& band, Radiance radiance
       target > band_radiance(band, Kelvin(high)).log_radiance) {
     return std::nullopt;
   }
-  // ln L is nearly straight over 1/T: Newton there, kept inside the shrinking bracket.
+  // Search by Newton over 1/T, where ln L is nearly straight, and keep inside the shrinking
+  // bracket.
   double t = 300.0;
   for (int i = 0; i < 100; ++i) {
     const BandRadiance at = band_radiance(band, Kelvin(t));
     const double miss = at.log_radiance - target;
     (miss < 0.0 ? low : high) = t;
-    // d ln L / d(1/T) = -T^2 L'/L; the ratio is taken in logs' safe range or by bisection.
+    // The slope is d ln L / d(1/T) = -T^2 L'/L. Bisect if L is too small for the ratio.
     double next = 0.5 * (low + high);
     if (at.radiance_w_m2_sr > 1e-290) {
       const double slope = t * t * at.derivative_w_m2_sr_k / at.radiance_w_m2_sr;

@@ -14,16 +14,16 @@ constexpr double kJ2000 = 2451545.0;
 constexpr double kPosixEpochJd = 2440587.5;
 constexpr std::int64_t kNsPerDay = 86400LL * 1000000000LL;
 
-/// amplitude * cos(phase + rate * t), t in Julian millennia from J2000.
+/// One term amplitude * cos(phase + rate * t), with t in Julian millennia from J2000.
 struct Term {
   double amplitude;  // 1e-8 rad or 1e-8 au
   double phase_rad;
   double rate_rad;
 };
 
-// Leading terms of VSOP87D, earth: heliocentric longitude, latitude and radius, equinox of date
-// (Bretagnon and Francou 1988). Terms below 8e-7 rad are left out: together under 2 arcseconds at
-// worst, a fraction of that in practice.
+// Leading terms of VSOP87D for the earth: heliocentric longitude, latitude and radius, equinox of
+// date (Bretagnon and Francou 1988). Terms below 8e-7 rad are left out. Together they are under 2
+// arcseconds at worst and usually a fraction of that.
 constexpr Term kL0[] = {
     {175347046, 0, 0},
     {3341656, 4.6692568, 6283.0758500},
@@ -126,7 +126,7 @@ struct Nutation {
   double obliquity_rad;
 };
 
-/// The five largest terms of the IAU 1980 series; the rest sums to under 0.3 arcseconds.
+/// Sums the five largest terms of the IAU 1980 series; the rest adds up to under 0.3 arcseconds.
 Nutation nutation(double centuries) noexcept {
   const double node = (125.04452 - 1934.136261 * centuries) * kDegree;
   const double sun = (280.4665 + 36000.7698 * centuries) * kDegree;
@@ -145,7 +145,7 @@ Nutation nutation(double centuries) noexcept {
 }  // namespace
 
 double julian_day_0h(int year, int month, int day) noexcept {
-  // Days since 0000-03-01 of the proleptic Gregorian calendar, months counted from March.
+  // Count days since 0000-03-01 of the proleptic Gregorian calendar, with months from March.
   const int y = month > 2 ? year : year - 1;
   const int m = month > 2 ? month - 3 : month + 9;
   const int era = (y >= 0 ? y : y - 399) / 400;
@@ -174,7 +174,7 @@ double delta_t_s(double decimal_year) noexcept {
     return 63.86 +
            t * (0.3345 + t * (-0.060374 + t * (0.0017275 + t * (0.000651814 + t * 0.00002373599))));
   }
-  // The earth has turned faster since than the polynomial foresaw.
+  // The earth has turned faster since 2005 than the polynomial foresaw.
   if (y < 2020.0) {
     return 64.7 + (y - 2005.0) * 0.3;
   }
@@ -191,7 +191,7 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
   const double centuries = tt_days / 36525.0;
   const double millennia = centuries / 10.0;
 
-  // Heliocentric earth, turned round to the geocentric sun.
+  // Sum the heliocentric position of the earth; the geocentric sun lies in the opposite direction.
   const double t = millennia;
   const double earth_longitude =
       sum(kL0, t) + t * (sum(kL1, t) + t * (sum(kL2, t) + t * (sum(kL3, t) + t * sum(kL4, t))));
@@ -199,7 +199,8 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
   const double distance_au = sum(kR0, t) + t * sum(kR1, t);
 
   const Nutation nut = nutation(centuries);
-  // To FK5, nutation in longitude, and aberration with the light's own travel time.
+  // Correct to FK5, and for nutation in longitude and aberration. Aberration includes the light's
+  // travel time.
   const double longitude = earth_longitude + kPi - 0.09033 * kArcsec + nut.longitude_rad -
                            20.4898 * kArcsec / distance_au;
   const double latitude = -earth_latitude;
@@ -208,6 +209,7 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
           kArcsec +
       nut.obliquity_rad;
 
+  // Turn the ecliptic direction to the equator of date.
   const glm::dvec3 ecliptic(std::cos(latitude) * std::cos(longitude),
                             std::cos(latitude) * std::sin(longitude), std::sin(latitude));
   const double se = std::sin(obliquity);
@@ -215,7 +217,8 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
   const glm::dvec3 equatorial(ecliptic.x, ce * ecliptic.y - se * ecliptic.z,
                               se * ecliptic.y + ce * ecliptic.z);
 
-  // Greenwich apparent sidereal time. The fraction of the day goes in last: it carries the bits.
+  // Compute Greenwich apparent sidereal time. The fraction of the day goes in last, because it
+  // carries the significant bits.
   const double ut1_centuries = ut1_days / 36525.0;
   const double whole = std::floor(ut1_days);
   const double sidereal_deg =
@@ -223,7 +226,7 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
       ut1_centuries * ut1_centuries * (0.000387933 - ut1_centuries / 38710000.0);
   const double sidereal = wrap(sidereal_deg * kDegree + nut.longitude_rad * std::cos(obliquity));
 
-  // Earth-fixed vector from the place to the sun: the parallax is the place's own offset.
+  // Turn to the earth-fixed frame and subtract the observer's position, which gives the parallax.
   const double ss = std::sin(sidereal);
   const double cs = std::cos(sidereal);
   const glm::dvec3 sun_ecef_m = distance_au * kAstronomicalUnitM *
@@ -243,6 +246,7 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
   const double range_m = glm::length(to_sun_m);
   const glm::dvec3 d = to_sun_m / range_m;
 
+  // Turn to east-north-up at the place.
   SunPosition result;
   result.direction_enu = glm::normalize(
       glm::dvec3(-slon * d.x + clon * d.y, -slat * clon * d.x - slat * slon * d.y + clat * d.z,
@@ -255,7 +259,7 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
 }
 
 SunPosition sun_position(std::int64_t posix_utc_ns, const GeoPlace& place) noexcept {
-  // Floor division keeps the fraction in [0, 1) before 1970 as well.
+  // Divide with floor, which keeps the fraction in [0, 1) before 1970 as well.
   std::int64_t days = posix_utc_ns / kNsPerDay;
   std::int64_t rest_ns = posix_utc_ns % kNsPerDay;
   if (rest_ns < 0) {

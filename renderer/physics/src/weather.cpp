@@ -3,10 +3,12 @@
 
 #include <algorithm>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::physics {
 namespace {
 
-Forcing forcing_of(const WeatherRow& row) noexcept {
+Forcing forcing_of(const WeatherSample& row) noexcept {
   Forcing f;
   f.direct_normal_w_m2 = row.direct_normal_w_m2;
   f.diffuse_horizontal_w_m2 = row.diffuse_horizontal_w_m2;
@@ -22,21 +24,24 @@ Forcing forcing_of(const WeatherRow& row) noexcept {
 
 }  // namespace
 
-Forcing forcing_from_rows(std::span<const WeatherRow> rows, std::int64_t time_ns) noexcept {
-  const auto after =
-      std::upper_bound(rows.begin(), rows.end(), time_ns,
-                       [](std::int64_t t, const WeatherRow& row) { return t < row.time_ns; });
+Forcing forcing_from_rows(std::span<const WeatherSample> rows, std::int64_t sim_time_ns) noexcept {
+  EMIT_CHECK(!rows.empty());
+  EMIT_DCHECK(std::ranges::is_sorted(rows, {}, &WeatherSample::sim_time_ns));
+  const auto after = std::upper_bound(
+      rows.begin(), rows.end(), sim_time_ns,
+      [](std::int64_t t, const WeatherSample& row) { return t < row.sim_time_ns; });
   if (after == rows.begin()) {
     return forcing_of(rows.front());
   }
-  const WeatherRow& before = *(after - 1);
+  const WeatherSample& before = *(after - 1);
   if (after == rows.end()) {
     return forcing_of(before);
   }
+  // Interpolate every input linearly between the two rows.
   const Forcing a = forcing_of(before);
   const Forcing b = forcing_of(*after);
-  const double s = static_cast<double>(time_ns - before.time_ns) /
-                   static_cast<double>(after->time_ns - before.time_ns);
+  const double s = static_cast<double>(sim_time_ns - before.sim_time_ns) /
+                   static_cast<double>(after->sim_time_ns - before.sim_time_ns);
   const auto mix = [s, &a, &b](double Forcing::*member) {
     return a.*member + s * (b.*member - a.*member);
   };

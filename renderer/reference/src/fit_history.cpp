@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/reference/layer_solver.hpp"
@@ -20,23 +21,24 @@ using physics::FosterDrive;
 using physics::make_error;
 using physics::Result;
 
-// Histories are compared this often; sharp edges of the shade lie on the grid.
+// Histories are compared at this interval. Sharp edges of the shade lie on the grid.
 constexpr double kSampleS = 20.0;
 constexpr double kAfterEdgeS = 600.0;
 constexpr double kAfterEdgeWeight = 2.0;
 constexpr double kFineAfterEdgeS = 180.0;
 constexpr double kSpinUpStepS = 180.0;
 constexpr double kDayS = 86'400.0;
-// The day before counts about a third of all. Much less, and the search gives the slow modes up for
-// 0.03 K in the five, at 1 K over the day.
+// The day before has about a third of all weight. With much less the search sacrifices the slow
+// modes for 0.03 K in the five histories, at 1 K over the day.
 constexpr double kDayBeforeWeight = 1.5;
 constexpr double kDayBeforeEveryS = 300.0;
 
-/// Shade between these times after the history's start.
+/// Shade between two times after the start of the history.
 struct Shade {
   double begin_s;
   double end_s;
 };
+/// One of the five histories that judge a fit.
 struct Scenario {
   const char* name;
   std::array<Shade, 2> shades;
@@ -50,6 +52,7 @@ constexpr std::array<Scenario, 5> kScenarios = {{
     {"two passing shadows", {{{3600, 4800}, {8400, 9000}}}},
 }};
 
+/// Returns true if the middle of an interval lies in shade.
 bool shaded(const Scenario& scenario, double begin_s, double end_s) noexcept {
   const double middle_s = 0.5 * (begin_s + end_s);
   return std::any_of(scenario.shades.begin(), scenario.shades.end(), [&](const Shade& shade) {
@@ -57,8 +60,8 @@ bool shaded(const Scenario& scenario, double begin_s, double end_s) noexcept {
   });
 }
 
-/// Seconds since the last edge at or before `time_s`; the start counts as one where it is shaded
-/// (the spin-up was not).
+/// Returns the seconds since the last edge at or before `time_s`. The start counts as an edge if it
+/// is shaded, because the spin-up is not.
 double since_edge_s(const Scenario& scenario, double time_s) noexcept {
   double since = kAlways;
   for (const Shade& shade : scenario.shades) {
@@ -74,7 +77,8 @@ double since_edge_s(const Scenario& scenario, double time_s) noexcept {
 class ForcingTable {
  public:
   explicit ForcingTable(std::span<const GroundForcing> rows) : rows_(rows) {}
-  /// At a jump the value after it, or before it with `before`.
+  /// Returns the value at a time. At a jump it is the value after it, or the value before it if
+  /// `before` is set.
   [[nodiscard]] GroundForcing at(double time_s, bool before) const noexcept {
     const auto next = before ? std::lower_bound(rows_.begin(), rows_.end(), time_s, earlier)
                              : std::upper_bound(rows_.begin(), rows_.end(), time_s, later);
@@ -98,20 +102,22 @@ class ForcingTable {
   std::span<const GroundForcing> rows_;
 };
 
+/// Returns the drive of a level, open surface of a material, physics.md eq. 16.
 FosterDrive<double> drive_of(const scene::Material& material, const GroundForcing& f,
                              double sun_frac) noexcept {
   return {.absorbed_w_m2 =
               material.solar_absorptance_frac * (f.direct_w_m2 * sun_frac + f.diffuse_w_m2) +
               material.emissivity_frac * f.longwave_w_m2,
           .film_w_m2_k = f.film_w_m2_k,
-          .air_offset_k = f.air_k - kFitReferenceK};
+          .air_offset_k = f.air_k - physics::kReferenceK};
 }
 
+/// Converts a drive to the reference solver's units.
 FaceState face_of(const FosterDrive<double>& drive) noexcept {
-  return {drive.absorbed_w_m2, drive.film_w_m2_k, kFitReferenceK + drive.air_offset_k};
+  return {drive.absorbed_w_m2, drive.film_w_m2_k, physics::kReferenceK + drive.air_offset_k};
 }
 
-/// Solver time along a history; fills the truth at the end of every step.
+/// Advances the solver along a history and fills in the truth at the end of every step.
 void run_reference(LayerSolver& solver, double emissivity_frac, FitHistory& history) {
   for (FitStep& step : history.steps) {
     const double begin_s = solver.time_s();
@@ -122,6 +128,7 @@ void run_reference(LayerSolver& solver, double emissivity_frac, FitHistory& hist
   }
 }
 
+/// Checks that a material has layers to fit.
 Result<void> check_material(const scene::Material& material) {
   if (material.prescribed_k || material.layers.empty()) {
     return make_error(ErrorCode::config,
@@ -130,6 +137,7 @@ Result<void> check_material(const scene::Material& material) {
   return {};
 }
 
+/// Returns a problem with the properties of a material and no histories yet.
 FitProblem problem_of(const scene::Material& material, double initial_k) {
   FitProblem problem;
   problem.emissivity_frac = material.emissivity_frac;
@@ -151,25 +159,18 @@ std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario, d
   const physics::GeoPlace place{physics::Radians(scenario.place.lat_rad),
                                 physics::Radians(scenario.place.lon_rad),
                                 physics::Metres(scenario.place.height_m)};
-  std::vector<physics::WeatherRow> rows;
-  for (const scene::WeatherSample& s : scenario.weather) {
-    rows.push_back({s.sim_time_ns, s.direct_normal_w_m2, s.diffuse_horizontal_w_m2,
-                    s.longwave_down_w_m2, s.air_k, s.wind_m_s, s.cloud_frac, s.environment_k,
-                    s.film_w_m2_k});
-  }
-  const scene::ClearSkyDesc& sky = scenario.clear_sky;
-  const physics::ClearSky clear{sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k,
-                                sky.dew_point_k,     sky.wind_m_s,   sky.cloud_frac};
+  const std::vector<physics::WeatherSample>& rows = scenario.weather;
   std::vector<GroundForcing> out;
   const auto count = static_cast<std::size_t>(std::ceil((end_s - begin_s) / step_s)) + 1;
+  // Sample the forcing. Direct sun is that on level ground, after clouds.
   for (std::size_t i = 0; i < count; ++i) {
     const double time_s = std::min(begin_s + static_cast<double>(i) * step_s, end_s);
     const std::int64_t sim_ns = std::llround(time_s * 1e9);
     const std::int64_t utc_ns = scenario.epoch_utc_ns + sim_ns;
     const physics::SunPosition sun = physics::sun_position(utc_ns, place);
-    const physics::Forcing f = rows.empty()
-                                   ? physics::forcing_from_clear_sky(clear, place, sun, utc_ns)
-                                   : physics::forcing_from_rows(rows, sim_ns);
+    const physics::Forcing f =
+        rows.empty() ? physics::forcing_from_clear_sky(scenario.clear_sky, place, sun, utc_ns)
+                     : physics::forcing_from_rows(rows, sim_ns);
     out.push_back({time_s,
                    f.direct_normal_w_m2 * (1.0 - f.cloud_frac) * std::max(0.0, sun.direction_enu.z),
                    f.diffuse_horizontal_w_m2, f.longwave_down_w_m2, f.film_w_m2_k, f.air_k});
@@ -181,6 +182,7 @@ void FitProblem::index_steps() {
   step_lengths_s.clear();
   const auto index = [this](FitHistory& history) {
     for (FitStep& step : history.steps) {
+      // Look up the length among the known ones, to rounding.
       const auto found = std::find_if(
           step_lengths_s.begin(), step_lengths_s.end(),
           [&](double known_s) { return std::abs(known_s - step.dt_s) < 1e-9 * known_s; });
@@ -204,6 +206,7 @@ Result<FitProblem> material_problem(const scene::Material& material,
   FitProblem problem = problem_of(material, material.initial_k.value_or(initial_k));
   const ForcingTable table(forcing);
 
+  // Build the spin-up: full sun, with residuals over the last day.
   const double begin_s = start_s - options.spin_up_s;
   const auto spin_steps = static_cast<std::size_t>(std::ceil(options.spin_up_s / kSpinUpStepS));
   problem.beginning.name = "day before";
@@ -224,6 +227,7 @@ Result<FitProblem> material_problem(const scene::Material& material,
     }
     problem.beginning.steps.push_back(step);
   }
+  // Build the five histories.
   const auto samples = static_cast<std::size_t>(std::ceil(options.history_s / kSampleS));
   for (const Scenario& scenario : kScenarios) {
     FitHistory history;
@@ -236,7 +240,7 @@ Result<FitProblem> material_problem(const scene::Material& material,
       const FosterDrive<double> begin =
           drive_of(material, table.at(start_s + a_s, false), sun_frac);
       const FosterDrive<double> end = drive_of(material, table.at(start_s + b_s, true), sun_frac);
-      // The model is to be judged, not its steps: short ones after an edge.
+      // Split the steps after an edge: the model is to be judged, not the length of its steps.
       const double since_s = since_edge_s(scenario, b_s);
       const int split = since_s <= kFineAfterEdgeS ? 8 : 1;
       for (int part = 0; part < split; ++part) {
@@ -252,6 +256,8 @@ Result<FitProblem> material_problem(const scene::Material& material,
   }
   problem.index_steps();
 
+  // Solve for the truth by the reference, first along the spin-up, then along every history from
+  // its end.
   const std::vector<SolidLayer> layers = solid_layers(material.layers);
   auto mesh = LayerMesh::build(layers, {BaseKind::fixed_temperature, material.base_k},
                                {.shortest_time_s = 5.0});
@@ -280,15 +286,16 @@ Result<FitProblem> curve_problem(const scene::Material& material,
   FitHistory history;
   history.name = "curve";
   const auto drive = [](const CurvePoint& p) {
-    return FosterDrive<double>{p.absorbed_w_m2, p.film_w_m2_k, p.air_k - kFitReferenceK};
+    return FosterDrive<double>{p.absorbed_w_m2, p.film_w_m2_k, p.air_k - physics::kReferenceK};
   };
+  // Split every interval of the curve, with the truth at its end.
   for (std::size_t i = 1; i < curve.size(); ++i) {
     const double dt_s = curve[i].time_s - curve[i - 1].time_s;
     if (!(dt_s >= 0.0)) {
       return make_error(ErrorCode::invalid_argument,
                         fmt::format("time_s goes back at point {}", i + 1));
     }
-    if (dt_s == 0.0) continue;  // a jump of the forcing
+    if (dt_s == 0.0) continue;  // the forcing jumps here
     constexpr int kSplit = 4;
     for (int part = 0; part < kSplit; ++part) {
       FitStep step;
@@ -320,23 +327,26 @@ std::size_t residual_count(const FitProblem& problem) {
 void foster_residuals(const FitProblem& problem, const physics::FosterNetwork& network,
                       std::vector<double>& out) {
   out.clear();
+  // Compute the gains of all step lengths once.
   std::vector<physics::FosterGains<double>> gains;
   for (const double dt_s : problem.step_lengths_s) {
     gains.push_back(physics::foster_gains(dt_s, network));
   }
-  const auto surface =
-      physics::foster_surface(network, problem.emissivity_frac, problem.base_k, kFitReferenceK);
+  const auto surface = physics::foster_surface(network, problem.emissivity_frac, problem.base_k,
+                                               physics::kReferenceK);
   physics::FosterState<double> start = physics::foster_steady(
       (problem.initial_k - problem.base_k) / network.resistance_m2k_w(), surface);
+  // Run a history and collect its weighted errors.
   const auto run = [&](const FitHistory& history, physics::FosterState<double>& x) {
     for (const FitStep& step : history.steps) {
       physics::foster_step(x, step.begin, step.end, gains[step.gains], surface);
       if (step.weight > 0.0) {
         out.push_back(step.weight *
-                      (kFitReferenceK + physics::foster_offset_k(x, surface) - step.truth_k));
+                      (physics::kReferenceK + physics::foster_offset_k(x, surface) - step.truth_k));
       }
     }
   };
+  // Run the spin-up once and every history from its end.
   run(problem.beginning, start);
   for (const FitHistory& history : problem.histories) {
     physics::FosterState<double> x = start;
@@ -347,6 +357,7 @@ void foster_residuals(const FitProblem& problem, const physics::FosterNetwork& n
 void emit2014_residuals(const FitProblem& problem, std::span<const scene::RelaxationMode> modes,
                         std::vector<double>& out) {
   out.clear();
+  // Solve physics.md eq. 4 without convection, as the published model does.
   const auto equilibrium_k = [&](const FosterDrive<double>& drive) {
     const double g = problem.core_conductance_w_m2_k;
     return physics::solve_equilibrium<double>(
@@ -354,6 +365,7 @@ void emit2014_residuals(const FitProblem& problem, std::span<const scene::Relaxa
                 drive.absorbed_w_m2 + g * problem.base_k})
         .temperature_k;
   };
+  // Start every history at the true temperature and relax by eq. 6.
   for (const FitHistory& history : problem.histories) {
     std::vector<double> x(modes.size(), problem.truth_at_start_k);
     for (const FitStep& step : history.steps) {
@@ -373,6 +385,7 @@ void emit2014_residuals(const FitProblem& problem, std::span<const scene::Relaxa
 std::vector<FitResidual> summarise(const FitProblem& problem, std::span<const double> residuals) {
   std::vector<FitResidual> out;
   std::size_t next = 0;
+  // Take the residuals of one history, in the order in which they were made.
   const auto add = [&](const FitHistory& history) {
     FitResidual residual{history.name, 0.0, 0.0, history.judged};
     double sum = 0.0;

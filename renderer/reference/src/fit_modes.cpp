@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ceres over unconstrained parameters: tau_1 = e^a, tau_i+1 = tau_i (1 + e^b_i), shares by softmax
-// with the last logit 0. Time constants are then positive and ordered, shares positive and add up
-// to one, whatever the parameters.
+// The fits run Ceres over unconstrained parameters: tau_1 = e^a, tau_i+1 = tau_i (1 + e^b_i), and
+// shares by softmax with the last logit 0. Whatever the parameters are, time constants are then
+// positive and ordered, and shares are positive and add up to one.
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
@@ -21,11 +21,13 @@ constexpr double kFastestTauS = 1.0;
 constexpr double kSlowestTauS = 1e8;
 constexpr double kLeastShare = 1e-6;
 
+/// Time constant of a mode and its share of the whole response.
 struct Mode {
   double tau_s = 0.0;
   double share = 0.0;
 };
 
+/// Converts parameters to modes.
 std::vector<Mode> modes_of(const double* p, std::size_t count) {
   std::vector<Mode> modes(count);
   double tau_s = std::exp(p[0]);
@@ -40,6 +42,7 @@ std::vector<Mode> modes_of(const double* p, std::size_t count) {
   return modes;
 }
 
+/// Converts modes to parameters.
 std::vector<double> parameters_of(const std::vector<Mode>& modes) {
   const std::size_t count = modes.size();
   std::vector<double> p(2 * count - 1);
@@ -54,6 +57,7 @@ std::vector<double> parameters_of(const std::vector<Mode>& modes) {
   return p;
 }
 
+/// Returns the network of modes with a given total resistance.
 physics::FosterNetwork network_of(const std::vector<Mode>& modes, double resistance_m2k_w) {
   physics::FosterNetwork network;
   for (const Mode& mode : modes) {
@@ -62,12 +66,14 @@ physics::FosterNetwork network_of(const std::vector<Mode>& modes, double resista
   return network;
 }
 
+/// Returns modes as those of emit2014.
 std::vector<scene::RelaxationMode> relaxation_of(const std::vector<Mode>& modes) {
   std::vector<scene::RelaxationMode> out;
   for (const Mode& mode : modes) out.push_back({mode.tau_s, mode.share});
   return out;
 }
 
+/// Cost function of Ceres: the residuals of a model as a function of the parameters.
 class Residuals {
  public:
   Residuals(const FitProblem& problem, FitModel model, std::size_t count)
@@ -75,6 +81,7 @@ class Residuals {
 
   bool operator()(double const* const* parameters, double* out) const {
     const std::vector<Mode> modes = modes_of(parameters[0], count_);
+    // Refuse parameters outside the range of time constants; Ceres then takes a shorter step.
     if (!(modes.back().tau_s < kSlowestTauS && modes.front().tau_s > kFastestTauS)) return false;
     std::vector<double> residuals;
     evaluate(modes, residuals);
@@ -97,6 +104,7 @@ class Residuals {
   std::size_t count_;
 };
 
+/// Result of one search.
 struct Solution {
   std::vector<Mode> modes;
   double cost = 0.0;
@@ -104,9 +112,10 @@ struct Solution {
   bool converged = false;
 };
 
+/// Searches from one start for the modes of least cost.
 Solution minimise(const FitProblem& problem, FitModel model, const std::vector<Mode>& start) {
   std::vector<double> p = parameters_of(start);
-  // Owned by the cost function, as Ceres wants it.
+  // The cost function owns the residuals, as Ceres requires.
   auto cost = std::make_unique<ceres::DynamicNumericDiffCostFunction<Residuals, ceres::CENTRAL>>(
       new Residuals(problem, model, start.size()));
   cost->AddParameterBlock(static_cast<int>(p.size()));
@@ -129,6 +138,7 @@ Solution minimise(const FitProblem& problem, FitModel model, const std::vector<M
   return out;
 }
 
+/// Returns the modes of a network with their shares of its resistance.
 std::vector<Mode> shares_of(const physics::FosterNetwork& network) {
   std::vector<Mode> modes;
   for (std::size_t i = 0; i < network.count; ++i) {
@@ -138,7 +148,7 @@ std::vector<Mode> shares_of(const physics::FosterNetwork& network) {
   return modes;
 }
 
-/// Networks of the stack over different ranges of periods: what the search starts from.
+/// Returns the starts of the search: networks of the stack over different ranges of periods.
 Result<std::vector<std::vector<Mode>>> foster_starts(const scene::Material& material,
                                                      const FitOptions& options) {
   std::vector<physics::StackLayer> layers;
@@ -162,6 +172,7 @@ Result<std::vector<std::vector<Mode>>> foster_starts(const scene::Material& mate
   return starts;
 }
 
+/// Returns the starts of the search for emit2014: typical time constants.
 std::vector<std::vector<Mode>> emit2014_starts(const FitOptions& options) {
   std::vector<std::vector<Mode>> starts;
   for (const auto& [fast_s, slow_s] :
@@ -174,6 +185,7 @@ std::vector<std::vector<Mode>> emit2014_starts(const FitOptions& options) {
   return starts;
 }
 
+/// Returns the largest errors over the judged histories.
 void worst_of(const std::vector<FitResidual>& residuals, double& rms_k, double& max_k) {
   for (const FitResidual& residual : residuals) {
     if (!residual.judged) continue;
@@ -182,6 +194,7 @@ void worst_of(const std::vector<FitResidual>& residuals, double& rms_k, double& 
   }
 }
 
+/// Fits a model to a problem by the best of several searches.
 Result<FitResult> solve(const scene::Material& material, const FitProblem& problem,
                         const FitOptions& options) {
   const std::size_t most = options.model == FitModel::foster ? physics::kMaxFosterModes : 2;
@@ -196,12 +209,14 @@ Result<FitResult> solve(const scene::Material& material, const FitProblem& probl
     auto found = foster_starts(material, options);
     if (!found) return tl::unexpected(std::move(found.error()));
     starts = std::move(*found);
+    // Judge the modes that follow from the layers alone, for comparison.
     Residuals(problem, options.model, starts[0].size()).evaluate(starts[0], residuals);
     worst_of(summarise(problem, residuals), result.derived_rms_k, result.derived_max_k);
   } else {
     starts = emit2014_starts(options);
   }
 
+  // Search from every start and keep the best.
   Solution best;
   best.cost = std::numeric_limits<double>::infinity();
   for (const std::vector<Mode>& start : starts) {
@@ -220,6 +235,7 @@ Result<FitResult> solve(const scene::Material& material, const FitProblem& probl
   } else {
     result.modes = relaxation_of(best.modes);
   }
+  // Judge the result.
   Residuals(problem, options.model, best.modes.size()).evaluate(best.modes, residuals);
   result.residuals = summarise(problem, residuals);
   worst_of(result.residuals, result.rms_k, result.max_k);
@@ -233,6 +249,7 @@ Result<FitResult> fit_material(const scene::Material& material,
                                double initial_k, const FitOptions& options) {
   auto problem = material_problem(material, forcing, start_s, initial_k, options);
   if (!problem) return tl::unexpected(std::move(problem.error()));
+  // The published model starts with the histories, so it has no spin-up.
   if (options.model == FitModel::emit2014) problem->beginning.steps.clear();
   auto result = solve(material, *problem, options);
   if (result) {
@@ -256,6 +273,7 @@ Result<FitResult> judge_material(const scene::Material& material,
     result.modes = material.modes;
     emit2014_residuals(*problem, result.modes, residuals);
   } else {
+    // Use the modes of the material, else those of its layers.
     for (const scene::FosterMode& mode : material.foster_modes) {
       if (result.network.count == physics::kMaxFosterModes) break;
       result.network.modes[result.network.count++] = {mode.tau_s, mode.resistance_m2k_w};

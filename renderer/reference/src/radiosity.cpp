@@ -10,6 +10,7 @@
 #include <map>
 #include <tuple>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/threads/parallel.hpp"
 
@@ -17,10 +18,11 @@ namespace emit::reference {
 namespace {
 
 constexpr double kPatchM = 0.2;
-/// Reflections: each round is weaker by reflectance times view factor, below a fifth in any scene
-/// of common materials.
+/// Number of reflections that are followed. Each round is weaker by reflectance times view factor,
+/// which is below a fifth in any scene of common materials.
 constexpr int kBounces = 8;
 
+/// Calls body(i) for i < n, in parallel.
 template <class Body>
 void for_range(std::size_t n, std::size_t grain, const Body& body) {
   threads::parallel_ranges(tbb::blocked_range<std::size_t>(0, n, grain), [&](const auto& range) {
@@ -28,6 +30,7 @@ void for_range(std::size_t n, std::size_t grain, const Body& body) {
   });
 }
 
+/// Returns t^4.
 double fourth(double t) {
   const double t2 = t * t;
   return t2 * t2;
@@ -38,6 +41,8 @@ double fourth(double t) {
 SceneExchange::SceneExchange(std::span<const SolidFace> faces,
                              std::span<const ExchangeFace> surfaces, const FaceFinder& finder,
                              const SceneInstant& scene, std::uint32_t rays) {
+  EMIT_CHECK_OP(faces.size(), ==, surfaces.size());
+  // Gather the optics, then the patches, the views of the faces and the links between patches.
   for (const ExchangeFace& surface : surfaces) {
     absorptance_.push_back(surface.solar_absorptance_frac);
     emissivity_.push_back(surface.emissivity_frac);
@@ -55,13 +60,14 @@ void SceneExchange::gather_patches(std::span<const SolidFace> faces) {
                          std::int64_t>;
   std::map<Key, std::uint32_t> known;
   patch_.resize(faces.size());
+  // Assign every face to the tile that contains its centre.
   for (std::size_t f = 0; f < faces.size(); ++f) {
     const SolidFace& face = faces[f];
     const glm::dvec3 centre = face.centre_m();
     std::array<std::int64_t, 3> tile{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double x = centre[static_cast<glm::dvec3::length_type>(axis)];
-      // The plane itself keeps parallel faces apart.
+      // Use the plane's own coordinate across the face, which keeps parallel faces apart.
       tile[axis] = axis == face.axis ? std::llround(x * 1e5)
                                      : static_cast<std::int64_t>(std::floor(x / kPatchM));
     }
@@ -70,6 +76,7 @@ void SceneExchange::gather_patches(std::span<const SolidFace> faces) {
                           static_cast<std::uint32_t>(known.size()));
     patch_[f] = found->second;
   }
+  // Average area and optics over each patch.
   patch_area_m2_.assign(known.size(), 0.0);
   for (std::size_t f = 0; f < faces.size(); ++f) patch_area_m2_[patch_[f]] += area_m2_[f];
   std::vector<double> reflect(faces.size());
@@ -79,6 +86,7 @@ void SceneExchange::gather_patches(std::span<const SolidFace> faces) {
 }
 
 std::vector<double> SceneExchange::patch_means(std::span<const double> per_face) const {
+  EMIT_CHECK_OP(per_face.size(), ==, patch_.size());
   std::vector<double> means(patch_area_m2_.size(), 0.0);
   for (std::size_t f = 0; f < per_face.size(); ++f) means[patch_[f]] += area_m2_[f] * per_face[f];
   for (std::size_t p = 0; p < means.size(); ++p) means[p] /= patch_area_m2_[p];
@@ -91,6 +99,7 @@ void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFind
   std::vector<std::vector<Link>> found(n);
   tbb::enumerable_thread_specific<std::vector<HemisphereRay>> buffers(
       [&] { return std::vector<HemisphereRay>(rays); });
+  // Trace the hemisphere of every face.
   for_range(n, 64, [&](std::size_t f) {
     const ExchangeFace& surface = surfaces[f];
     if (surface.enclosed) return;
@@ -100,6 +109,7 @@ void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFind
     std::uint32_t sky = 0;
     std::uint32_t ground = 0;
     std::vector<std::uint32_t> hits;
+    // Sort the rays into sky, surroundings and patches.
     for (const HemisphereRay& ray : buffer) {
       if (!ray.hit_surface) {
         ++(ray.direction.z > 0.0 ? sky : ground);
@@ -108,7 +118,7 @@ void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFind
       const auto face = ray.hit.front
                             ? finder.find(ray.hit.position_world_m, ray.hit.geometric_normal)
                             : std::nullopt;
-      // A face that is not part of the model counts as surroundings.
+      // Count a surface that is not part of the model as surroundings.
       if (face) {
         hits.push_back(patch_[*face]);
       } else {
@@ -118,6 +128,7 @@ void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFind
     const double share = 1.0 / static_cast<double>(rays);
     sky_frac_[f] = sky * share;
     ground_frac_[f] = ground * share;
+    // Merge the hits of one patch to one link.
     std::sort(hits.begin(), hits.end());
     for (std::size_t i = 0; i < hits.size();) {
       std::size_t end = i;
@@ -126,13 +137,14 @@ void SceneExchange::trace(std::span<const ExchangeFace> surfaces, const FaceFind
       i = end;
     }
   });
+  // Store the links of all faces in one array.
   link_start_.assign(n + 1, 0);
   for (std::size_t f = 0; f < n; ++f) link_start_[f + 1] = link_start_[f] + found[f].size();
   links_.reserve(link_start_[n]);
   for (const auto& list : found) links_.insert(links_.end(), list.begin(), list.end());
 }
 
-/// View factors between patches: the means of those of their faces.
+/// Computes the view factors between patches as means over their faces, weighted by area.
 void SceneExchange::link_patches() {
   patch_sky_ = patch_means(sky_frac_);
   patch_ground_ = patch_means(ground_frac_);
@@ -153,6 +165,10 @@ void SceneExchange::link_patches() {
 
 void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
                              const ExchangeSky& sky, std::span<Incoming> out) const {
+  EMIT_CHECK_OP(direct_w_m2.size(), ==, patch_.size());
+  EMIT_CHECK_OP(face_k.size(), ==, patch_.size());
+  EMIT_CHECK_OP(out.size(), ==, patch_.size());
+  // Start with the direct sun and the emission of the patches.
   const std::size_t n = patches();
   const std::vector<double> direct = patch_means(direct_w_m2);
   std::vector<double> emitted(face_k.size());
@@ -161,6 +177,7 @@ void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<cons
   });
   const std::vector<double> own_long = patch_means(emitted);
   std::vector<double> short_w(n, 0.0), long_w(n, 0.0), next_short(n), next_long(n);
+  // Follow the reflections between patches, J_sw and J_lw of physics.md eq. 20.
   for (int bounce = 0; bounce < kBounces; ++bounce) {
     for_range(n, 256, [&](std::size_t p) {
       double in_short =
@@ -177,6 +194,7 @@ void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<cons
     short_w.swap(next_short);
     long_w.swap(next_long);
   }
+  // Collect the radiosity that every face sees.
   for_range(out.size(), 4096, [&](std::size_t f) {
     Incoming in{sky_frac_[f] * sky.diffuse_w_m2 + ground_frac_[f] * sky.ground_short_w_m2,
                 sky_frac_[f] * sky.longwave_w_m2 + ground_frac_[f] * sky.ground_long_w_m2};
@@ -190,6 +208,7 @@ void SceneExchange::incoming(std::span<const double> direct_w_m2, std::span<cons
 
 SunOnFaces::SunOnFaces(std::span<const SolidFace> faces, std::span<const ExchangeFace> surfaces)
     : faces_(faces), surfaces_(surfaces.begin(), surfaces.end()) {
+  // List the faces around every node: count, sum up, fill.
   std::uint32_t nodes = 0;
   for (const SolidFace& face : faces) {
     for (const std::uint32_t node : face.nodes) nodes = std::max(nodes, node + 1);
@@ -208,7 +227,7 @@ SunOnFaces::SunOnFaces(std::span<const SolidFace> faces, std::span<const Exchang
   }
 }
 
-/// Mean over a face, at Gauss points of order three each way.
+/// Returns the mean over a face at three Gauss points each way.
 double SunOnFaces::mean_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
                              std::size_t f) const {
   static constexpr std::array<double, 3> kPlace{0.1127016653792583, 0.5, 0.8872983346207417};
@@ -231,8 +250,9 @@ double SunOnFaces::mean_frac(const SceneInstant& scene, const glm::dvec3& to_sun
 
 void SunOnFaces::visible_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
                               std::span<double> out) const {
-  // One ray per face tells sun from shade. Faces beside a change are integrated, and from them on
-  // their neighbours as long as the disc is partly covered: that walks through every penumbra.
+  EMIT_CHECK_OP(out.size(), ==, faces_.size());
+  // Test sun or shade by one ray per face. Then integrate the faces beside a change, and from there
+  // on their neighbours as long as the disc is partly covered. This covers every penumbra.
   const std::size_t n = faces_.size();
   const auto towards = [&](std::size_t f) {
     return !surfaces_[f].enclosed && glm::dot(surfaces_[f].normal, to_sun) > 0.0;
@@ -246,13 +266,15 @@ void SunOnFaces::visible_frac(const SceneInstant& scene, const glm::dvec3& to_su
   const auto same_side = [&](std::size_t a, std::size_t b) {
     return faces_[a].axis == faces_[b].axis && faces_[a].sign == faces_[b].sign;
   };
+  // Choose the faces beside a change.
   std::vector<char> taken(n, 0);
   for_range(n, 256, [&](std::size_t f) {
     if (!towards(f)) return;
     for (const std::uint32_t node : faces_[f].nodes) {
       for (std::uint32_t at = node_start_[node]; at < node_start_[node + 1]; ++at) {
         const std::uint32_t other = node_faces_[at];
-        // At the foot or edge of a solid a shadow narrower than a face may begin.
+        // Choose faces at the foot or edge of a solid too: a shadow narrower than a face may begin
+        // there.
         if (same_side(f, other) ? ray[other] != ray[f] : !towards(other)) taken[f] = 1;
       }
     }
@@ -261,6 +283,7 @@ void SunOnFaces::visible_frac(const SceneInstant& scene, const glm::dvec3& to_su
   for (std::size_t f = 0; f < n; ++f) {
     if (taken[f] != 0) front.push_back(static_cast<std::uint32_t>(f));
   }
+  // Integrate the front and move it on while the sun is partly visible.
   while (!front.empty()) {
     for_range(front.size(), 8,
               [&](std::size_t i) { out[front[i]] = mean_frac(scene, to_sun, front[i]); });

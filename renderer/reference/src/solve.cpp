@@ -13,9 +13,10 @@
 #include <numeric>
 #include <optional>
 
-#include "emit/threads/parallel.hpp"
+#include "emit/physics/weather.hpp"
 #include "emit/reference/surface_forcing.hpp"
 #include "emit/reference/visibility.hpp"
+#include "emit/threads/parallel.hpp"
 #include "solve_checkpoint.hpp"
 #include "solve_points.hpp"
 #include "solve_radiance.hpp"
@@ -30,7 +31,7 @@ using physics::Result;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// What a pixel's ray meets.
+/// First hit of a pixel's ray.
 struct PixelHit {
   std::uint32_t pixel = 0;
   SolvePoint point;
@@ -39,9 +40,10 @@ struct PixelHit {
   double sky_frac = 0.0;
   double ground_frac = 0.0;
   double sun_frac = 0.0;
-  std::uint32_t face = 0;  ///< three dimensions
+  std::uint32_t face = 0;  ///< face of the voxel model, if there is one
 };
 
+/// Hash of the pixel's number (SplitMix64).
 std::uint64_t mix(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9ULL;
@@ -49,22 +51,14 @@ std::uint64_t mix(std::uint64_t x) {
   return x ^ (x >> 31U);
 }
 
-/// Share of the direct sun that clouds take: the weather table's, linear, or the model's.
+/// Returns the share of the direct sun that clouds take: from the weather table, linear between
+/// rows, else from the clear-sky model.
 double cloud_frac_at(const scene::ScenarioDesc& scenario, std::int64_t sim_time_ns) {
-  const auto& rows = scenario.weather;
-  if (rows.empty()) return scenario.clear_sky.cloud_frac;
-  const auto after =
-      std::upper_bound(rows.begin(), rows.end(), sim_time_ns,
-                       [](std::int64_t t, const auto& row) { return t < row.sim_time_ns; });
-  if (after == rows.begin()) return rows.front().cloud_frac;
-  if (after == rows.end()) return rows.back().cloud_frac;
-  const auto& before = *(after - 1);
-  const double share = static_cast<double>(sim_time_ns - before.sim_time_ns) /
-                       static_cast<double>(after->sim_time_ns - before.sim_time_ns);
-  return before.cloud_frac + share * (after->cloud_frac - before.cloud_frac);
+  if (scenario.weather.empty()) return scenario.clear_sky.cloud_frac;
+  return physics::forcing_from_rows(scenario.weather, sim_time_ns).cloud_frac;
 }
 
-/// The pixels with the smallest hashes: a random-looking choice, the same every time.
+/// Keeps the pixels with the smallest hashes. The choice looks random and is the same every time.
 void choose(std::vector<PixelHit>& hits, std::uint64_t wanted) {
   if (wanted == 0 || wanted >= hits.size()) return;
   std::sort(hits.begin(), hits.end(),
@@ -76,6 +70,7 @@ void choose(std::vector<PixelHit>& hits, std::uint64_t wanted) {
 
 }  // namespace
 
+/// Copies of the input, and all parts of a run.
 struct SceneSolver::Data {
   scene::ScenarioDesc scenario;
   scene::SceneGeometry geometry;
@@ -116,6 +111,7 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
   data->geometry = geometry;
   data->options = options;
   data->end_ns = end_ns;
+  // Prepare rays, climate and bands, which every run needs.
   auto rays = RayScene::create(ray_scene_desc(scenario, geometry));
   if (!rays) return tl::unexpected(std::move(rays.error()));
   data->rays.emplace(std::move(*rays));
@@ -129,6 +125,7 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
     if (!made) return tl::unexpected(std::move(made.error()));
     data->bands.push_back(std::move(*made));
   }
+  // Decide on the number of dimensions.
   bool three = options.dimension == SolveDimension::three;
   if (options.dimension == SolveDimension::automatic) {
     three = VoxelModel::fits(scenario, geometry);
@@ -140,7 +137,7 @@ Result<SceneSolver> SceneSolver::create(const scene::ScenarioDesc& scenario,
     if (!solid) return tl::unexpected(std::move(solid.error()));
     data->solid = std::move(*solid);
     data->print = fingerprint(scenario, geometry, options);
-    // The grid is fine where shadows fall until the end, so the end belongs to the run.
+    // Add the end to the fingerprint: the grid is fine along all shadows until the end.
     data->print.options ^= static_cast<std::uint64_t>(end_ns) * 0x9e3779b97f4a7c15ULL;
   }
   return SceneSolver(std::move(data));
@@ -151,7 +148,7 @@ SceneSolver::~SceneSolver() = default;
 SceneSolver::SceneSolver(SceneSolver&&) noexcept = default;
 SceneSolver& SceneSolver::operator=(SceneSolver&&) noexcept = default;
 
-/// From the checkpoint, else through the spin-up.
+/// Starts from the checkpoint, else through the spin-up.
 Result<void> SceneSolver::Data::start_solid() {
   if (started) return {};
   if (!options.checkpoint.empty()) {
@@ -186,12 +183,14 @@ Result<void> SceneSolver::advance_to(std::int64_t sim_time_ns) {
                                   d.solid->solver().time_s(), to_s,
                                   d.resumed ? " (remove the checkpoint to start anew)" : ""));
   }
+  // Save the state every few steps and at the end.
   Result<void> saved;
   const auto save = [&] {
     if (d.options.checkpoint.empty()) return;
     saved = save_checkpoint(checkpoint_file(d.scenario, d.options), d.print,
                             d.solid->solver().state(), d.solid->spin_up_stats());
   };
+  // Advance and report the progress after every step.
   const auto done = d.solid->advance(to_s, [&](double time_s) {
     const std::uint64_t steps = d.solid->solver().stats().steps;
     if (d.options.checkpoint_steps > 0 && steps % d.options.checkpoint_steps == 0) save();
@@ -203,11 +202,14 @@ Result<void> SceneSolver::advance_to(std::int64_t sim_time_ns) {
   return saved;
 }
 
+/// Finds the first hit of every pixel and chooses the pixels to solve. Fills depth, objects and the
+/// rays of the sky.
 Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, SolvedImage& image,
                                                      std::vector<glm::dvec3>& sky_rays) const {
   if (view.width_px == 0 || view.height_px == 0 || !(view.fov_h_rad > 0.0)) {
     return make_error(ErrorCode::invalid_argument, "solve: the camera has no pixels or no view");
   }
+  // Start with an image of sky.
   const std::size_t pixels = std::size_t{view.width_px} * view.height_px;
   image.width_px = view.width_px;
   image.height_px = view.height_px;
@@ -216,6 +218,7 @@ Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, Solv
   image.object_id.assign(pixels, 0.0F);
   image.radiance_w_m2_sr.assign(bands.size(), std::vector<float>(pixels, kNan));
   sky_rays.assign(pixels, glm::dvec3(0.0));
+  // Prepare the camera: rays go through the centres of the pixels.
   const double focal_px = 0.5 * view.width_px / std::tan(0.5 * view.fov_h_rad);
   const glm::dmat3 world_from_sensor = glm::mat3_cast(view.sensor_pose.world_from_body) *
                                        glm::transpose(physics::sensor_from_body());
@@ -237,7 +240,7 @@ Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, Solv
       p.direction = direction;
       p.range_m = hit->distance_m;
       glm::dvec3 normal = solid ? hit->geometric_normal : hit->shading_normal;
-      // Interpolated normals may turn away from the side that is seen; the face's own does not.
+      // Take the face's own normal if the interpolated one turns away from the side that is seen.
       if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
       if (!hit->front) normal = -normal;
       p.point = {hit->position_world_m, normal, hit->material, hit->mover};
@@ -246,6 +249,7 @@ Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, Solv
       image.object_id[pixel] = static_cast<float>(hit->object + 1);
     }
   });
+  // Keep the pixels that show a surface.
   std::vector<PixelHit> hits;
   for (auto& hit : found) {
     if (hit) hits.push_back(*hit);
@@ -255,7 +259,7 @@ Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, Solv
   return hits;
 }
 
-/// Radiance at the aperture of the solved pixels and of the sky.
+/// Computes the radiance of the solved pixels and of the sky, at the aperture.
 void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit> hits,
                                 std::span<const double> kelvin,
                                 std::span<const glm::dvec3> sky_rays, SolvedImage& image) {
@@ -270,10 +274,11 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
     BandRadiance& band = bands[b];
     band.set_air(now.air_k, to_sun.z, cloud_frac_at(scenario, view.sim_time_ns),
                  now.direct_normal_w_m2 > 0.0);
+    // Compute the radiance that every patch sends out.
     const double around = band.black(now.surroundings_k);
     std::vector<double> patch;
     if (solid) {
-      // What a patch sends to others: its emission, and the surroundings mirrored once.
+      // The radiance is the patch's emission, and the surroundings mirrored once.
       std::vector<double> leaving(face_k.size());
       threads::parallel_indices(std::size_t{0}, face_k.size(), [&](std::size_t f) {
         const double e = band.emissivity(geometry.materials[solid->material_of(f)]);
@@ -287,6 +292,7 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
     threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
       const PixelHit& hit = hits[i];
       const double e = band.emissivity(geometry.materials[hit.point.material]);
+      // Sum what arrives at the surface: sky, surroundings, sun and patches.
       double incoming = hit.sky_frac * band.sky_mean() + hit.ground_frac * around +
                         band.sun_w_m2() / physics::kPi * hit.sun_frac *
                             std::max(0.0, glm::dot(hit.point.normal, to_sun));
@@ -295,10 +301,12 @@ void SceneSolver::Data::radiate(const SolveView& view, std::span<const PixelHit>
           incoming += static_cast<double>(link.share_frac) * patch[link.patch];
         }
       }
+      // Add emission and reflection, then pass the air to the camera.
       const double leaving = e * band.black(kelvin[i]) + (1.0 - e) * incoming;
       plane[hit.pixel] =
           static_cast<float>(band.at_aperture(leaving, hit.range_m, hit.direction.z));
     });
+    // Fill the pixels of the sky.
     for (std::size_t p = 0; p < sky_rays.size(); ++p) {
       if (sky_rays[p] == glm::dvec3(0.0)) continue;
       plane[p] = static_cast<float>(band.sky(sky_rays[p].z));
@@ -317,6 +325,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
     return make_error(ErrorCode::invalid_argument,
                       "solve: the history does not stand at the picture's instant");
   }
+  // Find what the pixels show.
   std::vector<glm::dvec3> sky_rays;
   auto seen = d.see(view, image, sky_rays);
   if (!seen) return tl::unexpected(std::move(seen.error()));
@@ -327,6 +336,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
 
   std::vector<double> kelvin(hits.size(), std::numeric_limits<double>::quiet_NaN());
   if (d.solid) {
+    // Look up the pixels on the faces of the model; drop those on none.
     std::vector<std::optional<std::uint32_t>> faces(hits.size());
     for (std::size_t i = 0; i < hits.size(); ++i) {
       faces[i] = d.solid->finder().find(hits[i].point.position_world_m, hits[i].point.normal);
@@ -344,6 +354,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
     hits.swap(on_model);
     kelvin.swap(their_k);
   } else {
+    // Solve a history in one dimension for every pixel.
     const PointHistories histories(d.scenario, d.geometry, *d.rays, *d.climate, d.options.rays);
     std::vector<SolvePoint> points;
     for (const PixelHit& hit : hits) points.push_back(hit.point);
@@ -353,6 +364,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
     });
     if (!solved) return tl::unexpected(std::move(solved.error()));
     kelvin = std::move(*solved);
+    // Trace the view of the sky of every pixel.
     threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
       hits[i].sky_frac = instant
                              .sky_view({hits[i].point.position_world_m, hits[i].point.normal, 1e-9},
@@ -362,6 +374,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
     });
   }
   if (now.direct_normal_w_m2 > 0.0) {
+    // Integrate the sun's disc of every pixel.
     threads::parallel_indices(std::size_t{0}, hits.size(), [&](std::size_t i) {
       hits[i].sun_frac =
           instant
@@ -370,6 +383,7 @@ Result<SolvedImage> SceneSolver::image(const SolveView& view) {
               .value_frac;
     });
   }
+  // Write the temperatures and the radiance.
   for (std::size_t i = 0; i < hits.size(); ++i) {
     image.temperature_k[hits[i].pixel] = static_cast<float>(kelvin[i]);
     if (std::isfinite(kelvin[i])) ++image.solved_px;
@@ -406,6 +420,7 @@ Result<std::vector<SolvedImage>> solve(const scene::ScenarioDesc& scenario,
                                        const scene::SceneGeometry& geometry,
                                        std::span<const SolveView> views,
                                        const SolveOptions& options, SolveReport* report) {
+  // Solve the views in the order of time.
   std::vector<std::size_t> order(views.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {

@@ -19,7 +19,7 @@ using physics::Result;
 constexpr std::array<char, 16> kMagic{'e', 'm', 'i', 't', '-',  's', 'o', 'l',
                                       'v', 'e', ' ', '1', '\n', 0,   0,   0};
 
-/// FNV-1a over the bytes of values.
+/// FNV-1a hash over the bytes of values.
 class Hash {
  public:
   Hash& add(const void* data, std::size_t size) {
@@ -41,6 +41,7 @@ class Hash {
   std::uint64_t value_ = 0xcbf29ce484222325ULL;
 };
 
+/// Adds the properties of a material that determine the result.
 void add_material(Hash& hash, const scene::Material& m) {
   hash.add(m.name).add(m.solar_absorptance_frac).add(m.emissivity_frac).add(m.base_k);
   hash.add(m.initial_k).add(m.prescribed_k).add(m.layers.size());
@@ -52,6 +53,7 @@ void add_material(Hash& hash, const scene::Material& m) {
   }
 }
 
+/// Header of a checkpoint file. The temperatures and slopes follow it.
 struct Header {
   std::array<char, 16> magic = kMagic;
   SolveFingerprint print;
@@ -68,6 +70,7 @@ struct Header {
 };
 static_assert(std::is_trivially_copyable_v<Header>);
 
+/// Returns the hash that detects damage of the data.
 std::uint64_t data_hash(const SolidState& state) {
   Hash hash;
   hash.add(state.node_k.data(), state.node_k.size() * sizeof(double));
@@ -75,6 +78,7 @@ std::uint64_t data_hash(const SolidState& state) {
   return hash.value();
 }
 
+/// Returns data as bytes.
 template <class T>
 const char* bytes_of(const T* data) {
   return static_cast<const char*>(static_cast<const void*>(data));
@@ -88,6 +92,7 @@ char* bytes_of(T* data) {
 
 SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
                              const scene::SceneGeometry& geometry, const SolveOptions& options) {
+  // Hash place and date.
   SolveFingerprint print;
   print.place_and_date = Hash()
                              .add(scenario.place.lat_rad)
@@ -95,8 +100,9 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
                              .add(scenario.place.height_m)
                              .add(scenario.epoch_utc_ns)
                              .value();
+  // Hash the weather.
   Hash weather;
-  const scene::ClearSkyDesc& sky = scenario.clear_sky;
+  const scene::ClearSky& sky = scenario.clear_sky;
   for (const double v : {sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k, sky.dew_point_k,
                          sky.wind_m_s, sky.cloud_frac}) {
     weather.add(v);
@@ -107,6 +113,7 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
     weather.add(w.environment_k).add(w.film_w_m2_k);
   }
   print.weather = weather.value();
+  // Hash the materials of the scene and of the surroundings.
   Hash materials;
   for (const scene::Material& m : geometry.materials) add_material(materials, m);
   const std::string& around = scenario.thermal.surroundings_material.empty()
@@ -116,6 +123,7 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
     if (m.name == around) add_material(materials, m);
   }
   print.materials = materials.value();
+  // Hash the geometry.
   Hash shape;
   for (const scene::Mesh& mesh : geometry.meshes) {
     shape.add(mesh.positions_m.data(), mesh.positions_m.size() * sizeof(glm::vec3));
@@ -126,6 +134,7 @@ SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
     shape.add(instance.mesh).add(&instance.world_from_mesh, sizeof(glm::dmat4));
   }
   print.geometry = shape.value();
+  // Hash the start of the history and the options.
   print.thermal = Hash()
                       .add(scenario.thermal.initial_k)
                       .add(scenario.thermal.history_start_ns)
@@ -148,6 +157,7 @@ Result<void> save_checkpoint(const std::filesystem::path& file, const SolveFinge
   std::error_code error;
   std::filesystem::create_directories(file.parent_path(), error);
   if (error) return fail(error.message());
+  // Fill the header.
   Header header;
   header.print = print;
   header.time_s = state.time_s;
@@ -160,6 +170,7 @@ Result<void> save_checkpoint(const std::filesystem::path& file, const SolveFinge
   header.nodes = state.node_k.size();
   header.free_nodes = state.slope_w.size();
   header.data_hash = data_hash(state);
+  // Write to another file and rename it, so that a failure leaves the old checkpoint.
   const std::filesystem::path part = file.string() + ".part";
   {
     std::ofstream out(part, std::ios::binary | std::ios::trunc);
@@ -180,6 +191,7 @@ Result<std::optional<Checkpoint>> load_checkpoint(const std::filesystem::path& f
                                                   const SolveFingerprint& print) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) return std::optional<Checkpoint>();
+  // Read the header and compare the fingerprints part by part.
   std::ifstream in(file, std::ios::binary);
   Header header;
   in.read(bytes_of(&header), sizeof(header));
@@ -204,12 +216,14 @@ Result<std::optional<Checkpoint>> load_checkpoint(const std::filesystem::path& f
                       fmt::format("{}: the checkpoint belongs to another run; what differs: {}",
                                   file.string(), differs));
   }
+  // Compare the size of the file with the header before taking memory.
   const auto size = std::filesystem::file_size(file, error);
   if (error || header.free_nodes > header.nodes || header.nodes > (1ULL << 31U) ||
       size != sizeof(header) + (header.nodes + header.free_nodes) * sizeof(double)) {
     return make_error(ErrorCode::parse,
                       fmt::format("{}: the checkpoint is damaged", file.string()));
   }
+  // Read the state and check its hash.
   Checkpoint checkpoint;
   SolidState& state = checkpoint.state;
   state.time_s = header.time_s;

@@ -13,7 +13,8 @@
 
 namespace emit::reference {
 
-/// Hashes of everything that decides the result, part by part, so that a misfit can be named.
+/// Hashes of everything that determines the result. There is one per part, so that the part that
+/// differs can be named.
 struct SolveFingerprint {
   std::uint64_t place_and_date = 0;
   std::uint64_t weather = 0;
@@ -22,24 +23,29 @@ struct SolveFingerprint {
   std::uint64_t thermal = 0;
   std::uint64_t options = 0;
 };
+/// Computes the fingerprint of a run.
 [[nodiscard]] SolveFingerprint fingerprint(const scene::ScenarioDesc& scenario,
                                            const scene::SceneGeometry& geometry,
                                            const SolveOptions& options);
 
+/// Returns the path of the checkpoint of a scenario.
 [[nodiscard]] std::filesystem::path checkpoint_file(const scene::ScenarioDesc& scenario,
                                                     const SolveOptions& options);
 
-/// Written beside and renamed, so that a broken run leaves the old one. Errors: io.
+/// Writes a checkpoint to another file and renames it, so that a failure leaves the old one.
+/// Errors: io.
 [[nodiscard]] physics::Result<void> save_checkpoint(const std::filesystem::path& file,
                                                     const SolveFingerprint& print,
                                                     const SolidState& state,
                                                     const SolidStats& spin_up);
+/// State that a checkpoint restores.
 struct Checkpoint {
   SolidState state;
   SolidStats spin_up;
 };
-/// Empty when there is no file. Errors: io, parse (not a checkpoint, damaged), config (of another
-/// scenario, or of other options: names what differs).
+/// Reads a checkpoint. The result is empty if there is no file. Errors: parse (the file is not a
+/// checkpoint, or is damaged), config (it belongs to another scenario or to other options; the
+/// message names what differs).
 [[nodiscard]] physics::Result<std::optional<Checkpoint>> load_checkpoint(
     const std::filesystem::path& file, const SolveFingerprint& print);
 

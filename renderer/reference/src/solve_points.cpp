@@ -18,14 +18,14 @@ namespace {
 using physics::Result;
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-/// Between these visibility is taken as linear, unless it changes: then the interval is halved down
-/// to the shortest.
+/// Times between samples of the visibility, which is linear between them. If the sun's share
+/// changes, the interval is halved down to the shortest one.
 constexpr std::int64_t kStaticStepNs = 60 * kSecondNs;
 constexpr std::int64_t kMovingStepNs = 4 * kSecondNs;
 constexpr std::int64_t kShortestStaticNs = 4 * kSecondNs;
 constexpr std::int64_t kShortestMovingNs = kSecondNs / 2;
 constexpr double kEvenFrac = 0.02;
-/// A mover further away than this leaves a point's view of the sky as it was.
+/// Distance beyond which an entity does not change a point's view of the sky.
 constexpr double kMoverReachM = 25.0;
 
 }  // namespace
@@ -35,6 +35,7 @@ PointHistories::PointHistories(const scene::ScenarioDesc& scenario,
                                const SurfaceClimate& climate, std::uint32_t rays)
     : scenario_(scenario), geometry_(geometry), scene_(scene), climate_(climate), rays_(rays) {}
 
+/// Returns true if an entity moves or switches between two instants.
 bool PointHistories::moves(const SceneInstant& a, const SceneInstant& b) const {
   for (std::uint32_t m = 0; m < scene_.desc().movers.size(); ++m) {
     if (a.mover_on(m) != b.mover_on(m)) return true;
@@ -48,14 +49,15 @@ bool PointHistories::moves(const SceneInstant& a, const SceneInstant& b) const {
   return false;
 }
 
-/// Instants at which every point is looked at: fine while anything moves.
+/// Chooses the instants at which every point is sampled. They are close together while anything
+/// moves.
 void PointHistories::choose_nodes(std::int64_t until_ns,
                                   std::vector<std::int64_t>& nodes_ns) const {
   std::int64_t t = climate_.history_start_ns();
   nodes_ns = {t};
   while (t < until_ns) {
     const std::int64_t next = std::min(until_ns, t + kStaticStepNs);
-    // A keyframe between the ends moves too: look in the middle as well.
+    // Look in the middle as well: a keyframe between the ends moves too.
     const SceneInstant here = scene_.at(t);
     bool moving = false;
     for (int part = 1; part <= 4 && !moving; ++part) {
@@ -66,11 +68,12 @@ void PointHistories::choose_nodes(std::int64_t until_ns,
   }
 }
 
+/// Computes the views of a point at the nodes and between them.
 std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
                                               std::span<const std::int64_t> nodes_ns,
                                               std::span<const SceneInstant> instants,
                                               std::int64_t sim_time_ns) const {
-  // A point of a mover is carried back with it.
+  // Find the point in the frame of its entity, so that it can be carried back in time with it.
   glm::dvec3 body_m(0.0);
   glm::dvec3 body_normal(0.0);
   if (point.mover != kNoMover) {
@@ -90,6 +93,7 @@ std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
     }
     return p;
   };
+  // Trace the sky again only if an entity near the point has moved.
   double last_sky = -1.0;
   std::vector<physics::Pose> last_poses(scene_.desc().movers.size());
   std::vector<char> last_on(last_poses.size(), 0);
@@ -117,12 +121,14 @@ std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
   };
 
   std::vector<ViewSample> out;
+  // Sample the view at one instant.
   const auto look = [&](std::int64_t t, const SceneInstant& instant) {
     ViewSample sample;
     sample.time_ns = t;
     const ClimateNode now = climate_.at(t);
     const glm::dvec3 to_sun = glm::normalize(now.to_sun);
     const SurfacePoint p = place(instant);
+    // An entity that is switched off stands in the open.
     const bool absent = point.mover != kNoMover && !instant.mover_on(point.mover);
     const double cosine = glm::dot(p.normal, to_sun);
     double sun = 0.0;
@@ -133,13 +139,15 @@ std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
     if (point.mover == kNoMover) {
       sample.sun_frac = sun;
     } else {
-      // The solver knows one direction of the face; a mover turns. Its sunlight goes in as a flux.
+      // Pass the sunlight on an entity as a flux: the solver knows only one direction of the face,
+      // but the entity turns.
       sample.sun_frac = 0.0;
       sample.scene_shortwave_w_m2 = now.direct_normal_w_m2 * sun * std::max(0.0, cosine);
     }
     return std::pair(sample, sun);
   };
   double last_sun = 0.0;
+  // Halve an interval until the sun's share is even over it.
   std::function<void(std::int64_t, double, std::int64_t, double, std::int64_t)> between =
       [&](std::int64_t from, double sun_from, std::int64_t to, double sun_to,
           std::int64_t shortest) {
@@ -150,6 +158,7 @@ std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
         out.push_back(sample);
         between(middle, sun, to, sun_to, shortest);
       };
+  // Sample at all nodes and refine between them.
   for (std::size_t i = 0; i < nodes_ns.size(); ++i) {
     const auto [sample, sun] = look(nodes_ns[i], instants[i]);
     if (i > 0) {
@@ -172,6 +181,7 @@ Result<std::vector<double>> PointHistories::temperatures(
   instants.reserve(nodes_ns.size());
   for (const std::int64_t t : nodes_ns) instants.push_back(scene_.at(t));
 
+  // Build one mesh per material.
   std::map<std::uint32_t, LayerMesh> meshes;
   for (const SolvePoint& point : points) {
     const scene::Material& material = geometry_.materials[point.material];
@@ -181,34 +191,38 @@ Result<std::vector<double>> PointHistories::temperatures(
     meshes.emplace(point.material, std::move(*mesh));
   }
 
+  // Solve the points in portions, in parallel, and report the progress after each.
   std::vector<double> kelvin(points.size(), std::numeric_limits<double>::quiet_NaN());
   tbb::enumerable_thread_specific<std::map<std::uint32_t, PointSolver>> solvers;
   const std::size_t portion = std::max<std::size_t>(64, points.size() / 100);
   for (std::size_t begin = 0; begin < points.size(); begin += portion) {
     const std::size_t end = std::min(points.size(), begin + portion);
-    threads::parallel_ranges(tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-        const SolvePoint& point = points[i];
-        const scene::Material& material = geometry_.materials[point.material];
-        if (material.prescribed_k) {
-          kelvin[i] = *material.prescribed_k;
-          continue;
-        }
-        auto& mine = solvers.local();
-        const auto solver = mine.try_emplace(point.material, climate_, meshes.at(point.material),
-                                             material, scenario_.thermal.initial_k)
-                                .first;
-        const std::vector<ViewSample> front = views(point, nodes_ns, instants, sim_time_ns);
-        std::vector<ViewSample> back;
-        if (material.sheet) {
-          SolvePoint behind = point;
-          behind.normal = -point.normal;
-          back = views(behind, nodes_ns, instants, sim_time_ns);
-        }
-        solver->second.run(point.normal, {front, back}, std::span(&sim_time_ns, 1),
-                           std::span(&kelvin[i], 1));
-      }
-    });
+    threads::parallel_ranges(
+        tbb::blocked_range<std::size_t>(begin, end, 4), [&](const auto& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) {
+            const SolvePoint& point = points[i];
+            const scene::Material& material = geometry_.materials[point.material];
+            if (material.prescribed_k) {
+              kelvin[i] = *material.prescribed_k;
+              continue;
+            }
+            // Keep one solver per thread and material.
+            auto& mine = solvers.local();
+            const auto solver =
+                mine.try_emplace(point.material, climate_, meshes.at(point.material), material,
+                                 scenario_.thermal.initial_k)
+                    .first;
+            const std::vector<ViewSample> front = views(point, nodes_ns, instants, sim_time_ns);
+            std::vector<ViewSample> back;
+            if (material.sheet) {
+              SolvePoint behind = point;
+              behind.normal = -point.normal;
+              back = views(behind, nodes_ns, instants, sim_time_ns);
+            }
+            solver->second.run(point.normal, {front, back}, std::span(&sim_time_ns, 1),
+                               std::span(&kelvin[i], 1));
+          }
+        });
     if (done && !done(static_cast<double>(end) / static_cast<double>(points.size()))) break;
   }
   return kelvin;

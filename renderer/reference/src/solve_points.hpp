@@ -12,23 +12,24 @@
 
 namespace emit::reference {
 
-/// A point of the surface at the instant of the picture.
+/// Point of a surface at the instant of the image.
 struct SolvePoint {
   glm::dvec3 position_world_m{0.0};
-  glm::dvec3 normal{0.0};  ///< unit, towards the side that is seen
+  glm::dvec3 normal{0.0};  ///< unit normal towards the visible side
   std::uint32_t material = 0;
   std::uint32_t mover = kNoMover;
 };
 
-/// One-dimensional histories behind points, with the visibility of sun and sky at their own past
-/// places. Owner: caller.
+/// One-dimensional histories of points, with the visibility of sun and sky at the places where the
+/// points were in the past. Owner: the caller.
 class PointHistories {
  public:
   PointHistories(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
                  const RayScene& scene, const SurfaceClimate& climate, std::uint32_t rays);
 
-  /// Temperature of every point at `sim_time_ns`; spread over the cores. `done` is called from the
-  /// calling thread between portions with the share done; false stops (the rest is NaN).
+  /// Returns the temperature of every point at `sim_time_ns`. The work is spread over the cores.
+  /// The calling thread calls `done` between portions with the share done; a return of false stops
+  /// the run, and the other points are NaN.
   /// Errors: those of material_mesh().
   [[nodiscard]] physics::Result<std::vector<double>> temperatures(
       std::span<const SolvePoint> points, std::int64_t sim_time_ns,

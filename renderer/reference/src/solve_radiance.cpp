@@ -13,7 +13,7 @@
 namespace emit::reference {
 namespace {
 
-// Gauss-Legendre of order 10 on (0, 1): five points, mirrored.
+// Gauss-Legendre rule of ten points on (0, 1). It is symmetric, so five are listed.
 constexpr std::array<double, 5> kAbscissa{0.0130467357414141, 0.0674683166555077,
                                           0.1602952158504878, 0.2833023029353764,
                                           0.4255628305091844};
@@ -21,6 +21,7 @@ constexpr std::array<double, 5> kWeight{0.0333356721543441, 0.0747256745752903, 
                                         0.1346333596549982, 0.1477621123573765};
 constexpr double kWidestPanelUm = 1.0;
 
+/// Returns the air mass at a sine of the elevation, at least 0.
 double air_mass(double sin_elevation) {
   return physics::relative_air_mass(
       physics::Radians(std::asin(std::clamp(sin_elevation, 0.0, 1.0))));
@@ -31,10 +32,13 @@ double air_mass(double sin_elevation) {
 BandIntegral::BandIntegral(const scene::SpectralBand& band) {
   std::vector<scene::ResponseSample> curve = band.response;
   if (curve.empty()) curve = {{band.lo_um, 1.0}, {band.hi_um, 1.0}};
+  // Cut every stretch of the response into panels and put the points of the rule on each.
   for (std::size_t i = 0; i + 1 < curve.size(); ++i) {
     const double low = curve[i].wavelength_um;
     const double width = curve[i + 1].wavelength_um - low;
     const double panels = std::max(1.0, std::ceil(width / kWidestPanelUm));
+    // Add one point: the exponent of Planck's law and all factors that do not depend on
+    // temperature.
     const auto add = [&](double share, double weight) {
       const double um = low + share * width;
       const double response =
@@ -54,6 +58,7 @@ BandIntegral::BandIntegral(const scene::SpectralBand& band) {
 
 double BandIntegral::radiance_w_m2_sr(double kelvin) const {
   if (!(kelvin > 0.0)) return kelvin == 0.0 ? 0.0 : std::nan("");
+  // Sum Planck's law over the points; the exponent is limited, because exp() overflows above.
   double sum = 0.0;
   for (const Point& p : points_)
     sum += p.weight / std::expm1(std::min(700.0, p.exponent_k / kelvin));
@@ -63,6 +68,7 @@ double BandIntegral::radiance_w_m2_sr(double kelvin) const {
 physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& scenario,
                                                    std::size_t band) {
   BandRadiance out(scenario.bands[band]);
+  // Take the band's air: a table, or terms of extinction.
   if (scenario.atmosphere.enabled) {
     for (const scene::BandAtmosphere& entry : scenario.atmosphere.bands) {
       if (entry.band != out.name_) continue;
@@ -80,7 +86,7 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
       break;
     }
   }
-  // Midpoint rule over elevation, weight 2 sin cos.
+  // Average the sky's emissivity by the midpoint rule over elevation, weight 2 sin cos.
   constexpr int kRings = 2000;
   for (int i = 0; i < kRings; ++i) {
     const double elevation = (i + 0.5) / kRings * physics::kPi / 2.0;
@@ -92,8 +98,10 @@ physics::Result<BandRadiance> BandRadiance::create(const scene::ScenarioDesc& sc
 }
 
 void BandRadiance::set_air(double air_k, double sin_sun, double cloud_frac, bool sun_shines) {
+  // The sky radiates like air of the opacity along its direction.
   air_ = black(air_k);
   sky_mean_ = table_ ? table_->sky_hemisphere_w_m2_sr() : air_ * sky_share_;
+  // The sun is a disc of a blackbody behind clouds and air.
   const double disc_sr = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
   const double through = table_ ? table_->out(sin_sun).transmittance_frac
                                 : std::pow(vertical_frac_, air_mass(sin_sun));
@@ -112,6 +120,7 @@ double BandRadiance::at_aperture(double leaving, double range_m, double sin_elev
     const auto air = table_->along(range_m, sin_elevation);
     return air.transmittance_frac * leaving + air.path_radiance_w_m2_sr;
   }
+  // Sum the transmittance of the terms; the air radiates with the rest.
   double tau = terms_.empty() ? 1.0 : 0.0;
   for (const scene::AtmosphereTerm& term : terms_) {
     tau += term.amplitude_frac * std::exp(-term.extinction_per_km * range_m * 1e-3);

@@ -9,36 +9,46 @@
 
 namespace emit::reference {
 
-/// Planck's law over a band: Gauss-Legendre panels in wavelength, cut at the response's points.
+/// Integral of Planck's law over a band, by Gauss-Legendre panels in wavelength that are cut at the
+/// points of the response.
 class BandIntegral {
  public:
   explicit BandIntegral(const scene::SpectralBand& band);
+  /// Returns the in-band radiance of a blackbody. A temperature of 0 gives 0; a negative one or NaN
+  /// gives NaN.
   [[nodiscard]] double radiance_w_m2_sr(double kelvin) const;
 
  private:
   struct Point {
     double exponent_k = 0.0;  ///< c2 / lambda
-    double weight = 0.0;      ///< c1 R / lambda^5 times the width
+    double weight = 0.0;      ///< c1 R / lambda^5 times the weight of the point
   };
   std::vector<Point> points_;
 };
 
-/// What leaves a surface and what arrives at the camera, in one band (pipeline as in the renderer,
-/// physics of the scenario's atmosphere).
+/// Radiance that leaves a surface and radiance that arrives at the camera, in one band. The stages
+/// are those of the renderer, with the scenario's atmosphere.
 class BandRadiance {
  public:
-  /// Errors: config (the band's atmosphere table).
+  /// Prepares a band. Errors: config (the band's atmosphere table).
   [[nodiscard]] static physics::Result<BandRadiance> create(const scene::ScenarioDesc& scenario,
                                                             std::size_t band);
 
+  /// Sets the air temperature, the sine of the sun's elevation and the share of the direct sun that
+  /// clouds take.
   void set_air(double air_k, double sin_sun, double cloud_frac, bool sun_shines);
+  /// Returns the in-band radiance of a blackbody, W m-2 sr-1.
   [[nodiscard]] double black(double kelvin) const { return integral_.radiance_w_m2_sr(kelvin); }
+  /// Returns the emissivity of a material in this band.
   [[nodiscard]] double emissivity(const scene::Material& material) const;
-  /// Cosine-weighted mean over the sky.
+  /// Cosine-weighted mean of the sky's radiance, W m-2 sr-1.
   [[nodiscard]] double sky_mean() const noexcept { return sky_mean_; }
+  /// Irradiance of the sun in the band, across its direction, W m-2.
   [[nodiscard]] double sun_w_m2() const noexcept { return sun_w_m2_; }
-  /// `leaving` seen through `range_m` of air along a line of sight with that sine of elevation.
+  /// Returns the radiance `leaving` as seen through `range_m` of air, along a line of sight with
+  /// this sine of the elevation.
   [[nodiscard]] double at_aperture(double leaving, double range_m, double sin_elevation) const;
+  /// Returns the radiance of the sky at a sine of the elevation, W m-2 sr-1.
   [[nodiscard]] double sky(double sin_elevation) const;
 
  private:

@@ -13,19 +13,22 @@ namespace {
 
 using physics::Result;
 
-/// Sun directions for the choice of cells: shadows move slowly against this.
+/// Interval of the sun's directions that choose the cells. Shadows move slowly against it.
 constexpr double kSunSampleS = 600.0;
-/// Lately they are followed closely.
+/// Interval of the sun's directions in the last time before the end, kLateS, in which edges are
+/// still sharp.
 constexpr double kLateSunSampleS = 60.0;
 constexpr double kLateS = 1200.0;
 constexpr double kMaxSpinUpStepS = 3600.0;
-/// Moving shadows are sampled at least this often.
+/// Largest step of the history at refine 1. Moving shadows are sampled at least this often.
 constexpr double kMaxHistoryStepS = 120.0;
 
+/// Converts seconds to nanoseconds.
 std::int64_t ns(double time_s) {
   return std::llround(time_s * 1e9);
 }
 
+/// Returns place and optics of a face.
 ExchangeFace surface_of(const VoxelModel& model, const SolidFace& face,
                         const scene::SceneGeometry& geometry) {
   const VoxelFace info = model.face(face);
@@ -34,7 +37,7 @@ ExchangeFace surface_of(const VoxelModel& model, const SolidFace& face,
           material.emissivity_frac, info.in_cavity};
 }
 
-/// Trilinear in the node temperatures of another solver's grid.
+/// Temperature field of another solver's grid, trilinear between its nodes.
 class NodeField {
  public:
   NodeField(const SolidGrid& grid, const SolidSolver& solver) : lines_m_(grid.lines_m) {
@@ -69,7 +72,7 @@ class NodeField {
         node[axis] += up ? 1 : 0;
       }
       const double value = kelvin_[index(node[0], node[1], node[2])];
-      // Places without a node are air; a point on a face has no weight there.
+      // Skip places without a node: they are air, and a point on a face has no weight there.
       if (!(weight > 0.0) || std::isnan(value)) continue;
       sum += weight * value;
       weights += weight;
@@ -81,7 +84,7 @@ class NodeField {
   [[nodiscard]] std::size_t index(std::size_t i, std::size_t j, std::size_t k) const {
     return i + lines_m_[0].size() * (j + lines_m_[1].size() * k);
   }
-  /// Last line at or below x, to rounding.
+  /// Returns the last line at or below x, to rounding.
   [[nodiscard]] std::size_t line(std::size_t axis, double x) const {
     const auto after = std::upper_bound(lines_m_[axis].begin(), lines_m_[axis].end(), x + 1e-9);
     return static_cast<std::size_t>(
@@ -109,6 +112,7 @@ Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::Scenario
                                                            double end_s) {
   auto history = std::unique_ptr<SolidHistory>(
       new SolidHistory(scenario, geometry, instant, climate, options));
+  // Sample the directions of the sun, for the choice of cells along its shadows.
   VoxelOptions voxels;
   voxels.refine = options.refine;
   const auto past_sun = [&](double t) {
@@ -123,6 +127,7 @@ Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::Scenario
     past_sun(t);
   }
   past_sun(end_s);
+  // Build the model and the solver.
   auto model = VoxelModel::build(scenario, geometry, voxels);
   if (!model) return tl::unexpected(std::move(model.error()));
   history->model_ = std::make_unique<VoxelModel>(std::move(*model));
@@ -132,6 +137,7 @@ Result<std::unique_ptr<SolidHistory>> SolidHistory::create(const scene::Scenario
       history->solid_options());
   if (!solver) return tl::unexpected(std::move(solver.error()));
   history->solver_ = std::make_unique<SolidSolver>(std::move(*solver));
+  // Prepare the radiation of its faces.
   const auto faces = history->solver_->faces();
   for (const SolidFace& face : faces) {
     history->surfaces_.push_back(surface_of(voxel, face, geometry));
@@ -164,7 +170,7 @@ Result<void> SolidHistory::spin_up() {
     solver_->set_temperature(history_s, steady);
     return {};
   }
-  // Nothing is shadowed yet, so no shadow's edge needs small cells.
+  // Build a coarser grid: nothing is shadowed yet, so no shadow's edge needs small cells.
   VoxelOptions voxels;
   voxels.refine = options_.refine;
   auto coarse = VoxelModel::build(scenario_, geometry_, voxels);
@@ -178,6 +184,7 @@ Result<void> SolidHistory::spin_up() {
   for (const SolidFace& face : solver->faces()) {
     surfaces.push_back(surface_of(*coarse, face, geometry_));
   }
+  // Drive every face as an open one, or by its cavity.
   const double cavity4 = std::pow(coarse->cavity_k(), 4);
   const DriveFunction drive_open = [&](double time_s, std::span<const double>,
                                        const FaceDrive& out) {
@@ -198,10 +205,12 @@ Result<void> SolidHistory::spin_up() {
       out.air_k[f] = face.air_k;
     }
   };
+  // Advance from the steady profile to the start of the history.
   solver->set_temperature(start_s, steady);
   const auto reached = solver->advance(
       history_s, drive_open, [&](double) { return !options_.progress || options_.progress(0.0); });
   if (!reached) return tl::unexpected(reached.error());
+  // Take over the temperatures.
   const NodeField field(coarse->grid(), *solver);
   solver_->set_temperature(history_s, [&](const glm::dvec3& p) { return field.at(p); });
   spin_up_stats_ = solver->stats();
@@ -212,6 +221,7 @@ void SolidHistory::drive(double time_s, std::span<const double> face_k, const Fa
   const ClimateNode now = climate_.at(ns(time_s));
   const glm::dvec3 to_sun = glm::normalize(now.to_sun);
   const std::size_t n = surfaces_.size();
+  // Compute the sun on every face.
   if (now.direct_normal_w_m2 > 0.0) {
     sun_->visible_frac(instant_, to_sun, sun_frac_);
   } else {
@@ -221,8 +231,10 @@ void SolidHistory::drive(double time_s, std::span<const double> face_k, const Fa
     direct_w_m2_[f] = now.direct_normal_w_m2 * sun_frac_[f] *
                       std::max(0.0, glm::dot(surfaces_[f].normal, to_sun));
   }
+  // Compute the radiation between the faces.
   exchange_->incoming(direct_w_m2_, face_k,
                       exchange_sky(now, climate_.surroundings_reflectance_frac()), incoming_);
+  // Set the drive of every face.
   const double cavity4 = std::pow(model_->cavity_k(), 4);
   for (std::size_t f = 0; f < n; ++f) {
     const ExchangeFace& s = surfaces_[f];

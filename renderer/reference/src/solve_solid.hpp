@@ -15,20 +15,23 @@
 
 namespace emit::reference {
 
-/// History of a voxel model under a scenario's forcing: unshadowed spin-up on a coarse grid, then
-/// true visibility and exchange. Times are s of simulated time.
+/// History of a voxel model under a scenario's forcing. It has an unshadowed spin-up on a coarse
+/// grid, then true visibility and exchange. Times are in s of simulated time.
 class SolidHistory {
  public:
-  /// `instant` and `climate` must outlive it. Errors: those of VoxelModel and SolidSolver.
+  /// Builds the model. `instant` and `climate` must outlive the history. Errors: those of
+  /// VoxelModel and SolidSolver.
   [[nodiscard]] static physics::Result<std::unique_ptr<SolidHistory>> create(
       const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry,
       const SceneInstant& instant, const SurfaceClimate& climate, const SolveOptions& options,
       double end_s);
 
-  /// Runs the spin-up and takes its temperatures over. Errors: internal.
+  /// Runs the spin-up and takes over its temperatures. Errors: internal.
   [[nodiscard]] physics::Result<void> spin_up();
+  /// Advances to a time. See SolidSolver::advance().
   [[nodiscard]] physics::Result<void> advance(double to_s,
                                               const std::function<bool(double)>& after_step);
+  /// Continues from a saved state.
   [[nodiscard]] physics::Result<void> restore(const SolidState& state, const SolidStats& spin_up);
 
   [[nodiscard]] const SolidSolver& solver() const noexcept { return *solver_; }
@@ -69,7 +72,7 @@ class SolidHistory {
   SolidStats spin_up_stats_;
 };
 
-/// What of sky and surroundings falls on faces at an instant.
+/// Returns the radiation of sky and surroundings on faces at an instant.
 [[nodiscard]] ExchangeSky exchange_sky(const ClimateNode& now,
                                        double surroundings_reflectance_frac);
 

@@ -21,39 +21,24 @@ using physics::Result;
 
 constexpr std::int64_t kNsPerS = 1'000'000'000;
 
-/// The scenario's weather as the shared input models take it.
+/// Weather of a scenario in the form that the shared input models take.
 struct Weather {
   physics::GeoPlace place;
   std::int64_t epoch_utc_ns = 0;
   physics::ClearSky clear_sky;
-  std::vector<physics::WeatherRow> rows;
+  std::vector<physics::WeatherSample> rows;
 
   explicit Weather(const scene::ScenarioDesc& scenario)
       : place{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
               physics::Metres(scenario.place.height_m)},
         epoch_utc_ns(scenario.epoch_utc_ns),
-        clear_sky{.linke_turbidity = scenario.clear_sky.linke_turbidity,
-                  .air_mean_k = scenario.clear_sky.air_mean_k,
-                  .air_amplitude_k = scenario.clear_sky.air_amplitude_k,
-                  .dew_point_k = scenario.clear_sky.dew_point_k,
-                  .wind_m_s = scenario.clear_sky.wind_m_s,
-                  .cloud_frac = scenario.clear_sky.cloud_frac} {
-    for (const scene::WeatherSample& sample : scenario.weather) {
-      rows.push_back({.time_ns = sample.sim_time_ns,
-                      .direct_normal_w_m2 = sample.direct_normal_w_m2,
-                      .diffuse_horizontal_w_m2 = sample.diffuse_horizontal_w_m2,
-                      .longwave_down_w_m2 = sample.longwave_down_w_m2,
-                      .air_k = sample.air_k,
-                      .wind_m_s = sample.wind_m_s,
-                      .cloud_frac = sample.cloud_frac,
-                      .environment_k = sample.environment_k,
-                      .film_w_m2_k = sample.film_w_m2_k});
-    }
-  }
+        clear_sky(scenario.clear_sky),
+        rows(scenario.weather) {}
 
-  /// `before`: the limit from earlier times where the table jumps. Sets `stated` to whether the
-  /// weather gives the temperature of the surroundings.
+  /// Returns the climate at a time. `before` gives the limit from earlier times at a jump of the
+  /// table. `stated` returns whether the weather gives the temperature of the surroundings.
   [[nodiscard]] ClimateNode at(std::int64_t time_ns, bool before, bool& stated) const {
+    // Evaluate the input models.
     const physics::SunPosition sun = physics::sun_position(epoch_utc_ns + time_ns, place);
     const physics::Forcing forcing =
         rows.empty()
@@ -62,6 +47,7 @@ struct Weather {
     ClimateNode node;
     node.time_ns = time_ns;
     node.to_sun = sun.direction_enu;
+    // Apply the clouds, and remove the sun below the horizon.
     node.direct_normal_w_m2 =
         node.to_sun.z > 0.0 ? forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) : 0.0;
     node.diffuse_horizontal_w_m2 = forcing.diffuse_horizontal_w_m2;
@@ -74,13 +60,15 @@ struct Weather {
   }
 };
 
-/// Where forcing bends or jumps within the run, and at most `step` apart in between.
+/// Returns the times of the nodes: all times at which the forcing bends or jumps within the run,
+/// and at most one step apart between them.
 std::vector<std::int64_t> node_times(const Weather& weather, std::int64_t start_ns,
                                      std::int64_t history_ns, std::int64_t end_ns,
                                      std::int64_t step_ns) {
+  // Collect the times that must have a node.
   std::vector<std::int64_t> marks{start_ns, history_ns, end_ns};
-  for (const physics::WeatherRow& row : weather.rows) {
-    if (row.time_ns > start_ns && row.time_ns < end_ns) marks.push_back(row.time_ns);
+  for (const physics::WeatherSample& row : weather.rows) {
+    if (row.sim_time_ns > start_ns && row.sim_time_ns < end_ns) marks.push_back(row.sim_time_ns);
   }
   std::sort(marks.begin(), marks.end());
   marks.erase(std::unique(marks.begin(), marks.end()), marks.end());
@@ -89,7 +77,7 @@ std::vector<std::int64_t> node_times(const Weather& weather, std::int64_t start_
     const std::int64_t length_ns = marks[i + 1] - marks[i];
     const std::int64_t parts = std::max<std::int64_t>(1, (length_ns + step_ns - 1) / step_ns);
     for (std::int64_t part = 0; part < parts; ++part) {
-      // Whole steps first: equal lengths let the solver meet its matrices again.
+      // Take whole steps first: with equal lengths the solver meets its matrices again.
       times.push_back(marks[i] + part * step_ns);
     }
   }
@@ -97,6 +85,7 @@ std::vector<std::int64_t> node_times(const Weather& weather, std::int64_t start_
   return times;
 }
 
+/// Returns the material of that name, or nullptr.
 const scene::Material* find_material(const scene::ScenarioDesc& scenario, const std::string& name) {
   const auto found = std::find_if(scenario.materials.begin(), scenario.materials.end(),
                                   [&](const scene::Material& m) { return m.name == name; });
@@ -107,6 +96,7 @@ const scene::Material* find_material(const scene::ScenarioDesc& scenario, const 
 
 FaceState face_state(const ClimateNode& climate, const SurfaceOptics& surface,
                      const ViewSample& view, double surroundings_reflectance_frac) noexcept {
+  // Sum short-wave and long-wave fluxes, physics.md eq. 16.
   const double facing = std::max(0.0, glm::dot(surface.normal, climate.to_sun));
   const double direct = climate.direct_normal_w_m2;
   const double global = direct * std::max(0.0, climate.to_sun.z) + climate.diffuse_horizontal_w_m2;
@@ -145,6 +135,7 @@ ClimateNode SurfaceClimate::at(std::int64_t time_ns) const noexcept {
                        [](std::int64_t t, const ClimateNode& node) { return t < node.time_ns; });
   if (after == nodes_.begin()) return nodes_.front();
   if (after == nodes_.end()) return nodes_.back();
+  // Interpolate between the nodes.
   const ClimateNode& a = *(after - 1);
   const ClimateNode& b = *after;
   const double f =
@@ -173,6 +164,7 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
                       "the climate's step must be positive and give less than 10 million nodes");
   }
 
+  // Add a node for every time, and two nodes at a jump.
   const Weather weather(scenario);
   bool all_stated = true;
   std::vector<bool> node_stated;
@@ -185,13 +177,14 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
   for (const std::int64_t time_ns :
        node_times(weather, start_ns, climate.history_start_ns_, end_ns,
                   static_cast<std::int64_t>(std::min(step_ns, 9e18)))) {
-    const auto rows_here =
-        std::count_if(weather.rows.begin(), weather.rows.end(),
-                      [time_ns](const physics::WeatherRow& row) { return row.time_ns == time_ns; });
+    const auto rows_here = std::count_if(
+        weather.rows.begin(), weather.rows.end(),
+        [time_ns](const physics::WeatherSample& row) { return row.sim_time_ns == time_ns; });
     if (rows_here > 1 && time_ns > start_ns) add(time_ns, true);
     add(time_ns, false);
   }
 
+  // Find the material of the surroundings.
   const std::string& name = scenario.thermal.surroundings_material.empty()
                                 ? scenario.default_material
                                 : scenario.thermal.surroundings_material;
@@ -203,7 +196,8 @@ Result<SurfaceClimate> SurfaceClimate::create(const scene::ScenarioDesc& scenari
   climate.reflectance_frac_ = 1.0 - ground->solar_absorptance_frac;
   if (all_stated) return climate;
 
-  // A level open surface sees no surroundings, so its history needs none.
+  // Solve for the surroundings where the weather does not give them. A level, open surface sees
+  // none itself.
   auto mesh =
       ground->prescribed_k ? Result<LayerMesh>(LayerMesh()) : material_mesh(*ground, options.mesh);
   if (!mesh) return tl::unexpected(std::move(mesh.error()));

@@ -104,6 +104,14 @@ std::vector<std::uint32_t> MaterialLookup::finish(SceneGeometry& geometry) {
       geometry.materials.push_back(library_[i]);
     }
   }
+  for (std::size_t i = 0; i < library_.size(); ++i) {
+    if (used_[i] && !library_[i].dry_layers_valid && !library_[i].prescribed_k) {
+      warnings_.push_back(fmt::format(
+          "material '{}' is more than dry layers (dry_layers_valid = false): its "
+          "temperatures are a guide only{}",
+          library_[i].name, library_[i].uncertainty.empty() ? "" : "; " + library_[i].uncertainty));
+    }
+  }
   for (std::size_t i = 0; i < mappings_.size(); ++i) {
     mappings_[i].index = index_of[mapping_positions_[i]];
   }

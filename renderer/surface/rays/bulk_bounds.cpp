@@ -19,7 +19,7 @@ constexpr double kStrayFrac = 0.01;
 /// Triangles that are looked at, evenly spread over all of them.
 constexpr std::size_t kMaxLooked = 100'000;
 
-double radius_m(const scene::Aabb& box) {
+double half_diagonal_m(const scene::Aabb& box) {
   return box.empty() ? 0.0 : 0.5 * glm::length(box.max_m - box.min_m);
 }
 
@@ -27,7 +27,7 @@ double radius_m(const scene::Aabb& box) {
 
 scene::Aabb bulk_bounds(std::span<const CasterPart> parts) {
   const scene::Aabb all = bounds_of(parts);
-  if (radius_m(all) <= kResolvedM) return all;
+  if (half_diagonal_m(all) <= kResolvedM) return all;
 
   // Collect the centres of some triangles, axis by axis.
   std::size_t triangles = 0;
@@ -75,7 +75,7 @@ scene::Aabb bulk_bounds(std::span<const CasterPart> parts) {
   const glm::dvec3 half_m = 0.5 * (high_m - low_m);
   bulk.add(low_m - half_m);
   bulk.add(high_m + half_m);
-  return radius_m(all) > kStrayWidths * radius_m(bulk) ? bulk : all;
+  return half_diagonal_m(all) > kStrayWidths * half_diagonal_m(bulk) ? bulk : all;
 }
 
 scene::Aabb bulk_bounds(const scene::SceneGeometry& geometry) {

@@ -61,8 +61,8 @@ struct PacketCone {
     const float along_m = std::max(glm::dot(to_centre_m, axis), 0.0F);
     // Rays matter as far as the ball reaches, and stray no farther from the axis than until there.
     const float far_m = distance_m + radius_m + apart_m;
-    constexpr float kRoundingFrac = 1e-5F;
-    const float reach_m = radius_m + apart_m + (spread + kRoundingFrac) * far_m;
+    constexpr float kRoom = 1e-5F;  // for rounding
+    const float reach_m = radius_m + apart_m + (spread + kRoom) * far_m;
     const glm::vec3 aside_m = to_centre_m - along_m * axis;
     return glm::dot(aside_m, aside_m) <= reach_m * reach_m;
   }

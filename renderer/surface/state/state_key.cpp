@@ -17,11 +17,9 @@ void add_optional(Fnv64& hash, const std::optional<double>& value) {
   add(hash, value.has_value(), value.value_or(0.0));
 }
 
-/// A row of the scenario's or of the host's.
-template <class Row>
-void add_weather(Fnv64& hash, std::int64_t time_ns, const Row& row) {
-  add(hash, time_ns, row.direct_normal_w_m2, row.diffuse_horizontal_w_m2, row.longwave_down_w_m2,
-      row.air_k, row.wind_m_s, row.cloud_frac);
+void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
+  add(hash, row.sim_time_ns, row.direct_normal_w_m2, row.diffuse_horizontal_w_m2,
+      row.longwave_down_w_m2, row.air_k, row.wind_m_s, row.cloud_frac);
   add_optional(hash, row.environment_k);
   add_optional(hash, row.film_w_m2_k);
 }
@@ -96,10 +94,8 @@ std::uint64_t place_hash(const scene::ScenarioDesc& scenario) {
 
 std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   Fnv64 hash;
-  for (const scene::WeatherSample& sample : scenario.weather) {
-    add_weather(hash, sample.sim_time_ns, sample);
-  }
-  const scene::ClearSkyDesc& sky = scenario.clear_sky;
+  for (const physics::WeatherSample& sample : scenario.weather) add_weather(hash, sample);
+  const scene::ClearSky& sky = scenario.clear_sky;
   add(hash, sky.linke_turbidity, sky.air_mean_k, sky.air_amplitude_k, sky.dew_point_k, sky.wind_m_s,
       sky.cloud_frac);
   return hash.value();
@@ -165,8 +161,8 @@ std::uint64_t live_hash(std::int64_t at_ns, const Environment& environment,
     const auto end = std::ranges::upper_bound(live, at_ns, {}, &scene::Keyframe::sim_time_ns);
     add_keys(hash, live.first(static_cast<std::size_t>(end - live.begin())));
   }
-  for (const physics::WeatherRow& row : environment.live()) {
-    if (row.time_ns <= at_ns) add_weather(hash, row.time_ns, row);
+  for (const physics::WeatherSample& row : environment.live()) {
+    if (row.sim_time_ns <= at_ns) add_weather(hash, row);
   }
   return hash.value();
 }

@@ -12,9 +12,10 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
+/// Model and its function.
 struct Model {
   ModelInfo info;
-  Result<std::string> (*run)(const EvaluateRequest&, const CsvTable&);
+  Result<std::string> (*run)(const EvaluateRequest&, const physics::CsvTable&);
 };
 
 constexpr Model kModels[] = {
@@ -95,7 +96,7 @@ Result<std::string> evaluate(const EvaluateRequest& request) {
     return make_error(ErrorCode::invalid_argument,
                       fmt::format("model '{}' runs on the CPU in float64 only", request.model));
   }
-  const auto table = CsvTable::read(request.table);
+  const auto table = physics::CsvTable::read(request.table);
   if (!table) return tl::unexpected(table.error());
   return model->run(request, *table);
 }

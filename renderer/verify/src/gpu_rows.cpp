@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "emit/physics/check.hpp"
 #include "gl/egl_context.hpp"
 #include "gl/objects.hpp"
 #include "gl/program.hpp"
@@ -12,7 +13,7 @@
 namespace emit::verify {
 namespace {
 
-// Rows per dispatch: within every driver's limit of work groups and of buffer size.
+// Number of rows per dispatch, within every driver's limits of work groups and buffer size.
 constexpr std::size_t kRowsPerDispatch = 1U << 20;
 constexpr std::size_t kGroupSize = 64;
 
@@ -21,6 +22,8 @@ enum Binding : GLuint { kInputs = 0, kOutputs = 1, kConstants = 2 };
 }  // namespace
 
 physics::Result<std::vector<float>> run_gpu_rows(const GpuRows& rows) {
+  EMIT_CHECK_OP(rows.input_stride, >, 0U);
+  EMIT_CHECK_OP(rows.output_stride, >, 0U);
   auto context = gl::EglContext::create(rows.gpu_index, false);
   if (!context) return tl::unexpected(std::move(context.error()));
   auto program = gl::Program::compute(rows.shader);

@@ -10,11 +10,11 @@
 
 namespace emit::verify {
 
-/// Float32 rows through one compute shader: row i of `inputs` (stride `input_stride`) becomes row i
-/// of the result (stride `output_stride`). The shader reads binding 0, writes binding 1, finds
-/// `constants` (may be empty) at binding 2 and the number of rows at uniform location 0.
+/// Float32 rows for one compute shader. Row i of `inputs` (stride `input_stride`) becomes row i of
+/// the result (stride `output_stride`). The shader reads binding 0 and writes binding 1.
+/// `constants` (may be empty) is at binding 2, and the number of rows at uniform location 0.
 struct GpuRows {
-  std::string_view shader;  ///< path under renderer/shaders
+  std::string_view shader;  ///< path relative to renderer/shaders
   std::span<const float> inputs;
   std::size_t input_stride = 1;
   std::size_t output_stride = 1;
@@ -22,8 +22,9 @@ struct GpuRows {
   int gpu_index = -1;
 };
 
-/// Creates a context, runs and destroys it. Errors: gpu; unsupported where the constants exceed a
-/// storage block.
+/// Creates a context, runs the shader and destroys the context. Errors: gpu; unsupported where the
+/// constants exceed a storage block.
+/// @pre input_stride > 0 and output_stride > 0
 [[nodiscard]] physics::Result<std::vector<float>> run_gpu_rows(const GpuRows& rows);
 
 }  // namespace emit::verify

@@ -7,10 +7,11 @@
 #include <string_view>
 #include <vector>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 
-/// One function per model: reads its columns from `table`, returns the result as CSV text.
+/// Functions of the models, one each. A function reads its columns from `table` and returns the
+/// result as CSV text. Errors are those of evaluate().
 namespace emit::verify {
 
 inline constexpr std::string_view kEquilibriumInputs = "lambda,d,eps,Ta,Tc,hc,Tair";
@@ -44,36 +45,36 @@ inline constexpr std::string_view kSurfaceHistoryInputs = "t_s,Tair,E0,E1,E2,E3"
 inline constexpr std::string_view kSurfaceHistoryOutputs = "Ts0,Ts1,Ts2,Ts3";
 
 [[nodiscard]] physics::Result<std::string> run_equilibrium(const EvaluateRequest& request,
-                                                           const CsvTable& table);
+                                                           const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_band_radiance(const EvaluateRequest& request,
-                                                             const CsvTable& table);
+                                                             const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_balance(const EvaluateRequest& request,
-                                                       const CsvTable& table);
+                                                       const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_relaxation(const EvaluateRequest& request,
-                                                          const CsvTable& table);
+                                                          const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sun_position(const EvaluateRequest& request,
-                                                            const CsvTable& table);
+                                                            const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sun_disc(const EvaluateRequest& request,
-                                                        const CsvTable& table);
+                                                        const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_wall_shadow(const EvaluateRequest& request,
-                                                           const CsvTable& table);
+                                                           const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_sky_view(const EvaluateRequest& request,
-                                                        const CsvTable& table);
+                                                        const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_slab(const EvaluateRequest& request,
-                                                               const CsvTable& table);
+                                                               const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_semi_infinite(
-    const EvaluateRequest& request, const CsvTable& table);
+    const EvaluateRequest& request, const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_layered(const EvaluateRequest& request,
-                                                                  const CsvTable& table);
+                                                                  const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_conduction_lateral(const EvaluateRequest& request,
-                                                                  const CsvTable& table);
+                                                                  const physics::CsvTable& table);
 [[nodiscard]] physics::Result<std::string> run_surface_history(const EvaluateRequest& request,
-                                                               const CsvTable& table);
+                                                               const physics::CsvTable& table);
 
 /// Values of several columns, each as long as the table.
 template <std::size_t N>
 [[nodiscard]] physics::Result<std::array<std::vector<double>, N>> read_columns(
-    const CsvTable& table, const std::array<std::string_view, N>& names) {
+    const physics::CsvTable& table, const std::array<std::string_view, N>& names) {
   std::array<std::vector<double>, N> columns;
   for (std::size_t i = 0; i < N; ++i) {
     auto column = table.numbers(names[i]);
@@ -83,11 +84,13 @@ template <std::size_t N>
   return columns;
 }
 
-/// A conduction column `d` and conductivity `lambda` that describe a body: both positive.
+/// Returns true when a conductivity `lambda` (not negative) and a thickness `d` (positive) describe
+/// a body.
 [[nodiscard]] inline bool is_body(double conductivity, double thickness) {
   return conductivity >= 0.0 && thickness > 0.0;
 }
 
+/// Value of a result that is not defined.
 template <class Real>
 inline constexpr Real kUndefined = std::numeric_limits<Real>::quiet_NaN();
 

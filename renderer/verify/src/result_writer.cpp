@@ -7,6 +7,8 @@
 #include <iterator>
 #include <limits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::verify {
 namespace {
 
@@ -15,6 +17,7 @@ std::string write(std::string_view header, std::span<const std::vector<Real>> co
   std::string text(header);
   text += '\n';
   const std::size_t rows = columns.empty() ? 0 : columns.front().size();
+  for (const auto& column : columns) EMIT_CHECK_OP(column.size(), ==, rows);
   for (std::size_t row = 0; row < rows; ++row) {
     for (std::size_t column = 0; column < columns.size(); ++column) {
       if (column > 0) text += ',';

@@ -7,8 +7,9 @@
 
 namespace emit::verify {
 
-/// Result columns as CSV text: `header`, then one line per row. `columns` have equal length.
-/// Round-trip digits: 17 for double, 9 for float; NaN of either sign is `nan`.
+/// Returns result columns as CSV text: `header`, then one line per row. Numbers have the digits of
+/// a round trip: 17 for double, 9 for float. NaN of either sign is `nan`.
+/// @pre all columns have the same length
 [[nodiscard]] std::string write_csv(std::string_view header,
                                     std::span<const std::vector<double>> columns);
 [[nodiscard]] std::string write_csv(std::string_view header,

@@ -245,10 +245,11 @@ void Conductor::issue_slotted() noexcept {
   }
   issued.header.host_received_ns = host_received_ns_;
   if (!have_host_frame_) {
-    // Until the host speaks: the scenario's own start, and the frame says that nobody steers it.
+    // Show the scenario's own start until the host speaks. The frame says that nobody steers it,
+    // unless it is a canned one, which no pose would change.
     job.request.sim_time_ns = 0;
     job.request.sensor_pose = scenario_.sensor_at(0);
-    issued.header.flags |= protocol::kFlagStale;
+    issued.header.flags |= options_.canned ? 0U : protocol::kFlagStale;
   } else {
     const std::int64_t display_ns = slot_begin_ns() + options_.pacing.display_delay_ns;
     // No overflow: host times stay within protocol::kMaxSimTimeNs, 1e18, and the instant between

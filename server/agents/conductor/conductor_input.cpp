@@ -43,7 +43,7 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   }
   if (gate.verdict == GateVerdict::old_run) {
     context_.counters.add(Counter::host_frames_old_run);
-    refuse(input.origin, StatusCode::not_allowed, frame.frame_number, kDetailOldRun);
+    refuse(input.origin, StatusCode::not_allowed, frame.frame_number, protocol::kDetailOldRun);
     return true;
   }
   // In lock step each input becomes a frame. With slots emitd takes inputs at any time,
@@ -217,7 +217,7 @@ void Conductor::refuse(const Origin& origin, StatusCode code, std::uint64_t host
                        std::uint64_t detail) noexcept {
   const std::uint64_t count = context_.counters.add(counter_of(code));
   context_.conductor_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
-                                 detail == kDetailOldRun ? "a host frame of a replaced run" : "");
+                                 detail == protocol::kDetailOldRun ? "a host frame of a replaced run" : "");
   reply(origin, code, host_frame_number, count, detail);
 }
 

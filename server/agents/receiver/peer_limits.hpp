@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "emit/config/daemon_config.hpp"
-#include "emit/config/network.hpp"
+#include "emit/protocol/ip_address.hpp"
 #include "rt/token_bucket.hpp"
 
 namespace emit::server {
@@ -20,25 +20,25 @@ class PeerLimits {
   explicit PeerLimits(const config::AccessConfig& access) noexcept : access_(access) {}
 
   /// `now_ns`: monotonic.
-  [[nodiscard]] bool take_host_frame(const config::IpAddress& peer, std::uint16_t port,
+  [[nodiscard]] bool take_host_frame(const protocol::IpAddress& peer, std::uint16_t port,
                                      std::int64_t now_ns) noexcept {
     return find(peer, port, now_ns).host_frames.take(now_ns);
   }
-  [[nodiscard]] bool take_control_record(const config::IpAddress& peer, std::uint16_t port,
+  [[nodiscard]] bool take_control_record(const protocol::IpAddress& peer, std::uint16_t port,
                                          std::int64_t now_ns) noexcept {
     return find(peer, port, now_ns).control_records.take(now_ns);
   }
 
  private:
   struct Entry {
-    config::IpAddress peer;
+    protocol::IpAddress peer;
     std::uint16_t port = 0;  ///< on this host, else 0
     std::int64_t heard_ns = INT64_MIN;
     TokenBucket host_frames;
     TokenBucket control_records;
   };
 
-  Entry& find(const config::IpAddress& peer, std::uint16_t source_port,
+  Entry& find(const protocol::IpAddress& peer, std::uint16_t source_port,
               std::int64_t now_ns) noexcept {
     const std::uint16_t port = peer.is_loopback() ? source_port : std::uint16_t{0};
     const auto is_peer = [&](const Entry& entry) {

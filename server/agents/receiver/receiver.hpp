@@ -69,7 +69,7 @@ class Receiver final : public Agent {
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
 
   /// Whether access.allow lets this address in. Any thread.
-  [[nodiscard]] bool may_connect(const config::IpAddress& peer) const noexcept;
+  [[nodiscard]] bool may_connect(const protocol::IpAddress& peer) const noexcept;
   /// Any thread: takes no further host frames, commands or connections.
   void drain() noexcept { draining_.store(true, std::memory_order_release); }
 
@@ -80,14 +80,14 @@ class Receiver final : public Agent {
 
   // Who may connect (receiver_access.cpp).
   [[nodiscard]] physics::Result<void> open_security();
-  void turn_away(PeerRefusal why, Counter counter, const config::IpAddress& peer,
+  void turn_away(PeerRefusal why, Counter counter, const protocol::IpAddress& peer,
                  const std::string& detail = {});
-  [[nodiscard]] std::size_t connections_from(const config::IpAddress& peer) const noexcept;
+  [[nodiscard]] std::size_t connections_from(const protocol::IpAddress& peer) const noexcept;
   [[nodiscard]] std::size_t handshakes() const noexcept;
   int handshake(Connection& connection, std::int64_t now_ns);
   void agree_on_key(Connection& connection);
   [[nodiscard]] std::optional<std::span<const std::byte>> authenticate(
-      std::span<const std::byte> datagram, const config::IpAddress& peer, Origin& origin);
+      std::span<const std::byte> datagram, const protocol::IpAddress& peer, Origin& origin);
 
   // UDP host port (receiver_udp.cpp).
   int receive_datagrams(std::int64_t now_ns) noexcept;

@@ -74,12 +74,12 @@ physics::Result<void> Receiver::open_security() {
   return {};
 }
 
-bool Receiver::may_connect(const config::IpAddress& peer) const noexcept {
+bool Receiver::may_connect(const protocol::IpAddress& peer) const noexcept {
   return config_.access.allow.empty() || peer.is_loopback() ||
-         config::any_contains(config_.access.allow, peer);
+         protocol::any_contains(config_.access.allow, peer);
 }
 
-void Receiver::turn_away(PeerRefusal why, Counter counter, const config::IpAddress& peer,
+void Receiver::turn_away(PeerRefusal why, Counter counter, const protocol::IpAddress& peer,
                          const std::string& detail) {
   context_.counters.add(counter);
   const std::int64_t now_ns = context_.clock.monotonic_ns();
@@ -91,7 +91,7 @@ void Receiver::turn_away(PeerRefusal why, Counter counter, const config::IpAddre
                                 to_string(peer) + (detail.empty() ? "" : ": " + detail));
 }
 
-std::size_t Receiver::connections_from(const config::IpAddress& peer) const noexcept {
+std::size_t Receiver::connections_from(const protocol::IpAddress& peer) const noexcept {
   return static_cast<std::size_t>(std::count_if(
       connections_.begin(), connections_.end(),
       [&](const auto& connection) { return connection->open() && connection->ip == peer; }));
@@ -104,7 +104,7 @@ std::size_t Receiver::handshakes() const noexcept {
 }
 
 bool Receiver::admit(TcpSocket socket, const SocketAddress& peer) {
-  const config::IpAddress ip = ip_of(peer);
+  const protocol::IpAddress ip = ip_of(peer);
   if (!may_connect(ip)) {
     turn_away(PeerRefusal::not_allowed, Counter::peers_refused, ip);
     return false;
@@ -225,7 +225,7 @@ void Receiver::agree_on_key(Connection& connection) {
 }
 
 std::optional<std::span<const std::byte>> Receiver::authenticate(
-    std::span<const std::byte> datagram, const config::IpAddress& peer, Origin& origin) {
+    std::span<const std::byte> datagram, const protocol::IpAddress& peer, Origin& origin) {
   using Verdict = HostSessions::Verdict;
   const HostSessions::Taken taken = sessions_->take(datagram);
   switch (taken.verdict) {

@@ -16,7 +16,7 @@ struct Receiver::Connection {
   std::uint32_t generation = 0;
   TcpSocket socket;
   SocketAddress peer;
-  config::IpAddress ip;
+  protocol::IpAddress ip;
   Role role = Role::none;
   bool welcomed = false;
   bool closing = false;      ///< to be closed as soon as nobody else uses the descriptor

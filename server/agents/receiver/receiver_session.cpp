@@ -413,7 +413,7 @@ physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connec
       // Otherwise anybody could have frames sent to anybody.
       return physics::make_error(ErrorCode::protocol, "'" + group + "' is not a multicast group");
     }
-    if (!config::any_contains(config_.access.multicast_groups, ip_of(target))) {
+    if (!protocol::any_contains(config_.access.multicast_groups, ip_of(target))) {
       return physics::make_error(ErrorCode::protocol,
                                  "group " + group + " is not in access.multicast_groups");
     }
@@ -434,11 +434,11 @@ physics::Result<UdpSocket> Receiver::open_stream_socket(const Connection& connec
     }
   }
   // From the address that the client knows: it takes frames from no other.
-  const config::IpAddress own = ip_of(connection.socket.local_address());
+  const protocol::IpAddress own = ip_of(connection.socket.local_address());
   if (own.v4 == ip_of(target).v4) {
     SocketAddress from = connection.socket.local_address();
     if (from.storage.ss_family != target.storage.ss_family) {
-      from = numeric_address(config::to_string(own), 0);
+      from = numeric_address(protocol::to_string(own), 0);
     }
     from.set_port(0);
     if (auto bound = socket->bind(from); !bound) {

@@ -78,7 +78,7 @@ void Receiver::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
     }
   }
 
-  const config::IpAddress peer = ip_of(memory.peers[index]);
+  const protocol::IpAddress peer = ip_of(memory.peers[index]);
   if (!may_connect(peer)) {
     turn_away(PeerRefusal::not_allowed, Counter::host_peers_refused, peer);
     return;

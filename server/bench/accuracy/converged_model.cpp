@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/equilibrium.hpp"
 #include "emit/physics/surface_balance.hpp"
 
@@ -19,8 +20,6 @@ using renderer::SurfaceForcing;
 constexpr std::int64_t kSpinUpStepNs = 120'000'000'000;
 /// Error of an interval of the history that halves its steps once more.
 constexpr double kToleranceK = 1e-3;
-/// Offsets are from here.
-constexpr double kReferenceK = 295.0;
 constexpr std::size_t kMaxModes = 2;
 
 double direct_on_face_w_m2(const SurfaceForcing& f, const PointView& view) noexcept {
@@ -62,7 +61,7 @@ physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& vie
   return {.absorbed_w_m2 = material.solar_absorptance_frac * short_wave_w_m2 +
                            material.emissivity_frac * long_wave_w_m2,
           .film_w_m2_k = f.film_w_m2_k,
-          .air_offset_k = f.air_k - kReferenceK};
+          .air_offset_k = f.air_k - physics::kReferenceK};
 }
 
 }  // namespace
@@ -150,7 +149,7 @@ double ConvergedModel::relaxed_k(std::uint32_t index, std::span<const PointView>
 double ConvergedModel::foster_k(std::uint32_t index, std::span<const PointView> view) const {
   const renderer::FosterMaterial& material = foster_[index];
   const auto surface = physics::foster_surface(material.network, material.emissivity_frac,
-                                               material.base_k, kReferenceK);
+                                               material.base_k, physics::kReferenceK);
   physics::FosterState<double> x = physics::foster_steady(
       (material.initial_k - material.base_k) / material.network.resistance_m2k_w(), surface);
   const glm::dvec3& normal = view.front().normal;
@@ -166,7 +165,7 @@ double ConvergedModel::foster_k(std::uint32_t index, std::span<const PointView> 
                             drive(forcing_[i].end, view[node + 1], material),
                             gains(index, i).ladder, surface, kToleranceK);
   }
-  return kReferenceK + physics::foster_offset_k(x, surface);
+  return physics::kReferenceK + physics::foster_offset_k(x, surface);
 }
 
 }  // namespace emit::tool

@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/trajectory.hpp"
 #include "emit/version.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/renderer_thread.hpp"
@@ -61,12 +61,7 @@ class CloudySky {
       : epoch_utc_ns_(scenario.epoch_utc_ns),
         place_{physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
                physics::Metres(scenario.place.height_m)},
-        clear_{.linke_turbidity = scenario.clear_sky.linke_turbidity,
-               .air_mean_k = scenario.clear_sky.air_mean_k,
-               .air_amplitude_k = scenario.clear_sky.air_amplitude_k,
-               .dew_point_k = scenario.clear_sky.dew_point_k,
-               .wind_m_s = scenario.clear_sky.wind_m_s,
-               .cloud_frac = scenario.clear_sky.cloud_frac},
+        clear_(scenario.clear_sky),
         start_ns_(start_ns),
         seconds_(seconds) {}
 

@@ -5,14 +5,14 @@
 #include <array>
 #include <optional>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "bench/accuracy/embree_yardstick.hpp"
-#include "emit/version.hpp"
-#include "tool/support/interrupt.hpp"
-#include "tool/support/json.hpp"
 #include "bench/frame_time/paper_errors.hpp"
 #include "bench/frame_time/paper_run.hpp"
+#include "emit/version.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/interrupt.hpp"
+#include "tool/support/json.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -218,8 +218,9 @@ int run_bench_paper(const BenchPaperCommand& command) {
   std::uint64_t done = 0;
   std::vector<Row> rows;
   for (const std::string& scene : scenes) {
-    std::vector<std::string> overrides;
-    if (!command.model.empty()) overrides.push_back("thermal.model=\"" + command.model + "\"");
+    // The paper's own model, whatever the scenarios say.
+    const std::string model = command.model.empty() ? "emit2014" : command.model;
+    const std::vector<std::string> overrides{"thermal.model=\"" + model + "\""};
     const auto scenario = load_scenario_choice({scene, overrides});
     if (!scenario) return fail_config(scenario.error());
     if (auto ran = run_scene(

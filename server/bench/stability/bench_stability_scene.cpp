@@ -72,31 +72,11 @@ physics::SunPosition sun_at(const scene::ScenarioDesc& scenario, std::int64_t si
 
 physics::Forcing forcing_at(const scene::ScenarioDesc& scenario, std::int64_t sim_time_ns) {
   if (scenario.weather.empty()) {
-    const scene::ClearSkyDesc& sky = scenario.clear_sky;
-    return physics::forcing_from_clear_sky({.linke_turbidity = sky.linke_turbidity,
-                                            .air_mean_k = sky.air_mean_k,
-                                            .air_amplitude_k = sky.air_amplitude_k,
-                                            .dew_point_k = sky.dew_point_k,
-                                            .wind_m_s = sky.wind_m_s,
-                                            .cloud_frac = sky.cloud_frac},
-                                           place_of(scenario), sun_at(scenario, sim_time_ns),
+    return physics::forcing_from_clear_sky(scenario.clear_sky, place_of(scenario),
+                                           sun_at(scenario, sim_time_ns),
                                            scenario.epoch_utc_ns + sim_time_ns);
   }
-  std::vector<physics::WeatherRow> rows;
-  for (const scene::WeatherSample& s : scenario.weather) {
-    physics::WeatherRow row;
-    row.time_ns = s.sim_time_ns;
-    row.direct_normal_w_m2 = s.direct_normal_w_m2;
-    row.diffuse_horizontal_w_m2 = s.diffuse_horizontal_w_m2;
-    row.longwave_down_w_m2 = s.longwave_down_w_m2;
-    row.air_k = s.air_k;
-    row.wind_m_s = s.wind_m_s;
-    row.cloud_frac = s.cloud_frac;
-    row.environment_k = s.environment_k;
-    row.film_w_m2_k = s.film_w_m2_k;
-    rows.push_back(row);
-  }
-  return physics::forcing_from_rows(rows, sim_time_ns);
+  return physics::forcing_from_rows(scenario.weather, sim_time_ns);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ void Tool::add_bench_commands() {
         ->allow_extra_args(false)
         ->check(CLI::IsMember({"per-frame", "cached"}))
         ->capture_default_str();
-    app.add_option("--model", o.model, "Thermal model; default that of the scene")
+    app.add_option("--model", o.model, "Thermal model; default emit2014, the paper's own")
         ->check(CLI::IsMember({"emit2014", "foster"}));
     app.add_option(
            "--pixels", o.pixels,

@@ -219,7 +219,7 @@ struct BenchPaperCommand {
   std::uint32_t width_px = 1024;
   std::uint32_t height_px = 768;
   std::vector<std::string> methods{"per-frame", "cached"};
-  std::string model;  ///< empty: that of the scenario
+  std::string model;  ///< empty: emit2014
   bool no_errors = false;
   std::uint32_t pixels = 20'000;
   int gpu_index = -1;

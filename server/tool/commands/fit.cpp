@@ -4,15 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <sstream>
 
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 #include "emit/config/load.hpp"
+#include "emit/physics/csv.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/library_edit.hpp"
 #include "tool/support/scenario_input.hpp"
@@ -27,51 +26,26 @@ using physics::Result;
 constexpr const char* kColumns[] = {"time_s", "absorbed_w_m2", "film_w_m2_k", "air_k",
                                     "temperature_k"};
 
-std::vector<std::string> cells_of(std::string line) {
-  while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
-  std::vector<std::string> cells;
-  std::stringstream stream(line);
-  for (std::string cell; std::getline(stream, cell, ',');) {
-    const auto first = cell.find_first_not_of(" \t");
-    const auto last = cell.find_last_not_of(" \t");
-    cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
-  }
-  return cells;
-}
-
 /// CSV with a header row; columns in any order, others are ignored.
 Result<std::vector<reference::CurvePoint>> read_curve(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  if (!stream)
-    return make_error(ErrorCode::not_found, fmt::format("{}: cannot open", file.string()));
+  const auto table = physics::CsvTable::read(file);
+  if (!table) return tl::unexpected(table.error());
+  std::array<std::vector<double>, std::size(kColumns)> columns;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    auto column = table->numbers(kColumns[i]);
+    if (!column) return tl::unexpected(std::move(column.error()));
+    columns[i] = std::move(*column);
+    for (std::size_t row = 0; row < columns[i].size(); ++row) {
+      if (std::isfinite(columns[i][row])) continue;
+      return make_error(ErrorCode::invalid_argument,
+                        fmt::format("{}:{}: column '{}': {} is not finite", file.string(),
+                                    table->line_of(row), kColumns[i], columns[i][row]));
+    }
+  }
   std::vector<reference::CurvePoint> curve;
-  std::vector<std::size_t> column;
-  std::string line;
-  for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    if (line.empty() || line[0] == '#' || line == "\r") continue;
-    const std::vector<std::string> cells = cells_of(line);
-    if (column.empty()) {
-      for (const char* name : kColumns) {
-        const auto found = std::find(cells.begin(), cells.end(), name);
-        if (found == cells.end()) {
-          return make_error(ErrorCode::invalid_argument,
-                            fmt::format("{}: there is no column '{}'", file.string(), name));
-        }
-        column.push_back(static_cast<std::size_t>(found - cells.begin()));
-      }
-      continue;
-    }
-    double value[std::size(kColumns)] = {};
-    for (std::size_t i = 0; i < std::size(kColumns); ++i) {
-      const std::string text = column[i] < cells.size() ? cells[column[i]] : "";
-      const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value[i]);
-      if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value[i])) {
-        return make_error(ErrorCode::invalid_argument,
-                          fmt::format("{}:{}: '{}' in column '{}' is not a number", file.string(),
-                                      number, text, kColumns[i]));
-      }
-    }
-    curve.push_back({value[0], value[1], value[2], value[3], value[4]});
+  for (std::size_t row = 0; row < table->rows(); ++row) {
+    curve.push_back(
+        {columns[0][row], columns[1][row], columns[2][row], columns[3][row], columns[4][row]});
   }
   return curve;
 }
@@ -152,6 +126,7 @@ int run_fit(const FitCommand& command) {
   auto scenario =
       curve_input ? library_scenario(command.input.set) : load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
+  for (const std::string& text : scenario->warnings) warn(text);
 
   std::vector<const scene::Material*> materials;
   for (const std::string& name : command.materials) {

@@ -5,10 +5,10 @@
 #include <chrono>
 #include <cmath>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "emit/scene/trajectory.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
@@ -130,7 +130,7 @@ int run_render(const RenderCommand& command) {
                         static_cast<double>(renderer.scene_stats().sample_bytes) / (1 << 20))
           : std::string(),
       frame_ms, renderer.device_name());
-  for (const std::string& text : renderer::sampling_warnings(renderer.scene_stats())) warn(text);
+  for (const std::string& text : renderer::warm_up_warnings(renderer.scene_stats())) warn(text);
   if (view.stats.nonfinite_px > 0) {
     warn(fmt::format("{} pixels were not finite and are written as 0", view.stats.nonfinite_px));
   }

@@ -46,6 +46,7 @@ int run_solve(const SolveCommand& command) {
   auto geometry = scene::load_scene(*scenario);
   if (!geometry) return fail_config(geometry.error());
   scene::adopt_sheets(*geometry);
+  for (const std::string& text : scenario->warnings) warn(text);
   for (const std::string& text : geometry->warnings) warn(text);
 
   std::optional<tbb::global_control> threads;

@@ -6,10 +6,10 @@
 #include <chrono>
 #include <thread>
 
-#include "tool/support/console.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/record/pose_pcap.hpp"
 #include "emit/v1/control.pb.h"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 
 namespace emit::tool {
@@ -67,7 +67,7 @@ physics::Result<JournalReplaySummary> replay_journal(
   if (!source) return tl::unexpected(source.error());
   const renderer::SceneStats& scene = (*source)->info().scene;
   for (const std::string& text : scene.warnings) warn(text);
-  for (const std::string& text : renderer::sampling_warnings(scene)) warn(text);
+  for (const std::string& text : renderer::warm_up_warnings(scene)) warn(text);
   summary.device = (*source)->info().device;
   summary.setup_s = seconds_since(start);
 

@@ -9,8 +9,8 @@
 #include <optional>
 #include <thread>
 
-#include "tool/support/console.hpp"
 #include "emit/renderer/renderer.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/view/frame_provider.hpp"
 #include "tool/view/view_control.hpp"
@@ -88,7 +88,7 @@ class ScenarioProvider final : public FrameProvider {
       return !stop_.load();
     });
     bar.finish();
-    for (const std::string& text : renderer::sampling_warnings(renderer.scene_stats())) warn(text);
+    for (const std::string& text : renderer::warm_up_warnings(renderer.scene_stats())) warn(text);
     return ready;
   }
 

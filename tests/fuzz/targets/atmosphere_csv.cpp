@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Atmospheres: tables by range and elevation, or terms.
+// Fuzz target: atmospheres, as tables by range and elevation or as terms.
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
 #include "resolve/resolve.hpp"

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Body of a control record, and what either side makes of its parts.
+// Fuzz target: the body of a control record, and the conversion of its parts at either end.
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "client/client_connection.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/sound_pose.hpp"
-#include "client/client_connection.hpp"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The daemon's configuration.
+// Fuzz target: the daemon's configuration.
 #include "emit/config/load.hpp"
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
@@ -10,7 +10,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   options.environment.emplace();
   const auto first = config::load_daemon(fuzz::file_of(fuzz::as_bytes(data, size)), {}, options);
   if (!first) return 0;
-  // What is printed loads again, and then prints the same.
+  // The printed configuration loads again and then prints the same.
   const std::string text = config::print_daemon(*first);
   const auto again =
       config::load_daemon(fuzz::file_of(std::as_bytes(std::span(text))), {}, options);

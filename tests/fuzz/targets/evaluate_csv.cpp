@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tables of emit evaluate.
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emit;
-  const auto table = verify::CsvTable::read(fuzz::file_of(fuzz::as_bytes(data, size)));
+  const auto table = physics::CsvTable::read(fuzz::file_of(fuzz::as_bytes(data, size)));
   if (!table) return 0;
   for (const char* column : {"T_K", "x", "kind"}) {
     const auto numbers = table->numbers(column);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// OpenEXR images and the frame metadata in them.
+// Fuzz target: OpenEXR images and the frame metadata in them.
 #include "emit/image/exr_image.hpp"
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// UDP fragments put together to frames. Input: datagrams, each behind a byte of instructions and
-// its length (u16). Bits of the byte: 1 seal the frame header in front (its checksum is made
-// right), 2 seal the one at the end, 4 take what is finished, 8 flush, 16 look at what is missing
-// and give the oldest up; of the first also 32: complete frames wait for older ones.
+// Fuzz target: UDP fragments put together to frames. The input is a sequence of datagrams, each
+// behind a byte of instructions and its length (u16). Bits of the byte: 1 corrects the checksum of
+// the frame header in front, 2 that of the one at the end, 4 takes the finished frames, 8 flushes,
+// 16 looks at missing ranges and gives the oldest frame up. Bit 32 of the first byte: complete
+// frames wait for older ones.
 #include <array>
 #include <cmath>
 #include <vector>
@@ -46,7 +47,8 @@ void drain(protocol::Reassembler& reassembler) {
   }
 }
 
-/// What a client would ask for lies within the frame, in order, and is not there.
+/// Checks that the ranges that a client would request lie within the frame, in order, and are
+/// missing.
 void look_at_missing(protocol::Reassembler& reassembler) {
   std::array<protocol::Reassembler::OpenFrame, 8> open;
   std::array<protocol::ByteRange, 16> ranges;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client that receives frames, from its hello to the end of the connection. Input: one byte, 1
-// for frames over UDP (of which none comes), then what the daemon says, as records; frame headers
-// are sealed where they stand.
+// Fuzz target: a client that receives frames, from its hello to the end of the connection. The
+// input is one byte, 1 for frames over UDP (none of which arrives), then the daemon's bytes as
+// records. The checksums of frame headers are corrected.
 #include <vector>
 
 #include "fuzz/daemon_peer.hpp"
@@ -11,7 +11,7 @@ namespace {
 
 using namespace emit;
 
-/// The input with the checksums of its frame headers made right.
+/// Returns the input with correct checksums of its frame headers.
 std::vector<std::byte> sealed(std::span<const std::byte> said) {
   std::vector<std::byte> out(said.begin(), said.end());
   std::span<std::byte> left(out);
@@ -40,7 +40,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (!frame || *frame == nullptr) break;
     fuzz::require((*frame)->pixels.size_bytes() == (*frame)->header.payload_bytes,
                   "a frame has the pixels of its header");
-    // Touches every pixel.
+    // The CRC reads every pixel.
     static_cast<void>(protocol::crc32c(std::as_bytes((*frame)->pixels)));
     static_cast<void>(client->take_statuses());
   }

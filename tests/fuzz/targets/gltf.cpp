@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scene files (.glb, .gltf), and what loading a scene does with their meshes.
+// Fuzz target: scene files (.glb, .gltf), and the processing of their meshes when a scene is
+// loaded.
 #include <cmath>
 #include <span>
 

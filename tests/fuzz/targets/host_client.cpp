@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A host that reads the daemon's answers over TCP. Input: what the daemon says.
+// Fuzz target: a host that reads the daemon's answers over TCP. The input is the daemon's bytes.
 #include "fuzz/daemon_peer.hpp"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One datagram to the host port.
+// Fuzz target: one datagram to the host port.
 #include <algorithm>
 #include <memory>
 #include <vector>
@@ -19,7 +19,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     return 0;
   }
   fuzz::require_sound(*frame);
-  // What was taken can be said again, and then reads the same.
+  // An accepted frame can be encoded again, and then decodes to the same.
   const auto encoded = encoder.encode(*frame);
   fuzz::require(!encoded.empty(), "an accepted host frame can be encoded");
   const std::vector<std::byte> first(encoded.begin(), encoded.end());

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Authenticated host datagrams as they meet the daemon, and as a host meets what comes back.
-// Input: pieces behind a byte of instructions and their length (u16). Bits of the byte: 1 the piece
-// is a payload that gets a genuine header and MAC of the session, 2 the piece's MAC is put right by
-// the key of openings, 4 by the session's key.
+// Fuzz target: authenticated host datagrams as the daemon receives them, and its answers as a host
+// receives them. The input is a sequence of pieces, each behind a byte of instructions and its
+// length (u16). Bits of the byte: 1 the piece is a payload that gets a genuine header and MAC of
+// the session, 2 the MAC of the piece is corrected by the opening key, 4 by the session's key.
 #include <memory>
 #include <vector>
 
@@ -15,7 +15,7 @@ using namespace emit;
 using server::HostSessions;
 using Verdict = HostSessions::Verdict;
 
-/// One that knows the key; what it seals is genuine.
+/// Peer that knows the key, so what it seals is genuine.
 struct Peer {
   protocol::SessionMac mac = std::move(*protocol::SessionMac::create());
   protocol::SharedKey shared = protocol::make_shared_key({}, mac);
@@ -29,8 +29,8 @@ struct Peer {
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Peer peer;
   static const protocol::SessionKey key{};
-  // Kept from input to input, because it takes long to make: each input is another session, and the
-  // oldest ones are forgotten.
+  // The table is kept from input to input, because creating it takes long. Each input is another
+  // session, and the oldest sessions are forgotten.
   static auto sessions = std::move(*HostSessions::create(std::span(&key, 1), 0));
   static std::uint64_t session_id = 0;
   ++session_id;
@@ -61,7 +61,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
           peer.space, piece.size());
       fuzz::require(sealed.size() == piece.size() + 48 || piece.size() > 65'459,
                     "whatever fits is sealed");
-      // A session stays while there are fewer than the table holds, which one host cannot exceed.
+      // A session stays while there are fewer than the table holds, and one host cannot exceed
+      // that.
       if (!sealed.empty()) {
         const auto taken = sessions->take(sealed);
         fuzz::require(taken.verdict == Verdict::host_frame || taken.verdict == Verdict::replayed,
@@ -77,7 +78,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     std::vector<std::byte> datagram(piece.begin(), piece.end());
     if ((instructions & 6) != 0 && datagram.size() >= 48) {
       peer.mac.set_key((instructions & 2) != 0 ? peer.shared.open_key : peer.session);
-      // seal() writes a header of its own: keep what the input says by sealing what it means.
+      // The call seal() writes a header of its own. Seal the header that the input holds, to keep
+      // it.
       if (auto read = protocol::parse_session_datagram(datagram)) {
         read->header.session_id = session_id;
         fuzz::require(!peer.mac.seal(read->header, datagram, read->payload.size()).empty(),

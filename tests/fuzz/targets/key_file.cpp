@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file of pre-shared keys.
+// Fuzz target: a file of pre-shared keys.
 #include "emit/protocol/host_session.hpp"
 #include "fuzz/fuzz_input.hpp"
 

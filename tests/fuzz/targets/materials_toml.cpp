@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A material library.
+// Fuzz target: a material library.
 #include <cmath>
 
 #include "fuzz/fuzz_input.hpp"

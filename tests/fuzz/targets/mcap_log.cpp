@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Logs and journals (MCAP), as records and as messages.
+// Fuzz target: logs and journals (MCAP), as records and as messages.
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/record/mcap_reader.hpp"
 #include "emit/v1/control.pb.h"

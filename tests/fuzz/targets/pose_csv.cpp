@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeker poses as CSV.
+// Fuzz target: seeker poses as CSV.
 #include "emit/protocol/record/pose_csv.hpp"
 
 #include <limits>

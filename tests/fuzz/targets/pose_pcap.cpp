@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Host frames in network captures (pcap and pcapng).
+// Fuzz target: host frames in network captures (pcap and pcapng).
 #include "emit/protocol/record/pose_pcap.hpp"
 
 #include "fuzz/fuzz_input.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An answer of ptp4l's management socket, behind its domain and sequence number.
+// Fuzz target: an answer of ptp4l's management socket, behind its domain and sequence number.
 #include "fuzz/fuzz_input.hpp"
 #include "telemetry/ptp_status.hpp"
 

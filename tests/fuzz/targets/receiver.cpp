@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The daemon's own end of a connection and of the host port: hello, subscriptions, commands and
-// host frames as they meet the receiver, stepped on one thread.
-// Input: pieces behind a byte of instructions and their length (u16). Bits of the byte: 1 a
-// datagram to the host port instead of bytes on the connection, 2 sender and recorder give back
-// first what they were lent, 4 the conductor takes nothing meanwhile, 8 the connection is reset
+// Fuzz target: the daemon's end of a connection and of the host port. Hello, subscriptions,
+// commands and host frames reach the receiver, stepped on one thread. The input is a sequence of
+// pieces, each behind a byte of instructions and its length (u16). Bits of the byte: 1 the piece is
+// a datagram to the host port instead of bytes on the connection, 2 sender and recorder first
+// return their connections, 4 the conductor takes nothing meanwhile, 8 the connection is reset
 // right behind the piece and another one opened.
 #include <netinet/in.h>
 #include <poll.h>
@@ -29,8 +29,8 @@ void check(bool done, const char* what) {
   std::exit(1);
 }
 
-/// A signal (the fuzzer's own alarm, a debugger) lets connect() return early; it goes on all the
-/// same.
+/// Connects a socket. A signal (the fuzzer's own alarm, a debugger) may let connect() return early,
+/// while the connection goes on.
 bool connected(int fd, const server::SocketAddress& to) {
   if (::connect(fd, to.get(), to.length) == 0) return true;
   pollfd writable{fd, POLLOUT, 0};
@@ -40,7 +40,7 @@ bool connected(int fd, const server::SocketAddress& to) {
   return false;
 }
 
-/// A receiver whose neighbours take everything and do nothing with it.
+/// Receiver whose neighbouring agents take everything and do nothing with it.
 class Rig {
  public:
   Rig() : context_(clock_, 1u << 16, 4) {
@@ -64,7 +64,8 @@ class Rig {
     tcp_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     const server::SocketAddress control = receiver_->control_address();
     check(tcp_ >= 0 && connected(tcp_, control), "connecting");
-    // Ends without a trace: thousands of connections a second would use up the ports.
+    // The connection ends by a reset, because thousands of closed connections a second would use up
+    // the ports.
     const linger abrupt{1, 0};
     ::setsockopt(tcp_, SOL_SOCKET, SO_LINGER, &abrupt, sizeof abrupt);
     step();
@@ -84,7 +85,8 @@ class Rig {
     static_cast<void>(::send(tcp_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL));
     step();
   }
-  /// Its words are read and answered when it is gone already.
+  /// Sends bytes and closes, so that the receiver reads and answers them after the connection is
+  /// gone.
   void say_and_reset(std::span<const std::byte> bytes) {
     static_cast<void>(::send(tcp_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL));
     ::close(tcp_);
@@ -98,13 +100,13 @@ class Rig {
   void disconnect() {
     ::close(tcp_);
     step();
-    // One that ends by itself.
+    // The advance of the clock ends a connection that times out.
     clock_.advance(60'000'000'000);
     step();
   }
 
  private:
-  /// Until nobody has anything to do.
+  /// Runs receiver and neighbours until none of them has work.
   void step() {
     for (int idle = 0; idle < 2;) {
       const int work = receiver_->do_work(clock_.tai_ns()) + play_the_others();

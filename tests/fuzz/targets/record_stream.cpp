@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Framing of a TCP connection, in whatever pieces it arrives, and what the records hold.
-// Input: one byte for the size of the pieces, then the stream.
+// Fuzz target: the framing of a TCP connection, in pieces of any size, and the contents of the
+// records. The input is one byte for the size of the pieces, then the stream.
 #include <memory>
 #include <vector>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recorder that reads the journal over TCP. Input: what the daemon says.
+// Fuzz target: a recorder that reads the journal over TCP. The input is the daemon's bytes.
 #include "fuzz/daemon_peer.hpp"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

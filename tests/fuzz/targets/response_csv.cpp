@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Spectral responses of bands.
+// Fuzz target: spectral responses of bands.
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
 #include "resolve/resolve.hpp"

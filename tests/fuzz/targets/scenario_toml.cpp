@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenarios. Their scene files need not exist; what they name else does not.
+// Fuzz target: scenarios. Their scene files need not exist; other files that they name do not
+// exist.
 #include "emit/config/load.hpp"
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
@@ -11,7 +12,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   options.environment.emplace();
   const auto first = config::load_scenario(fuzz::file_of(fuzz::as_bytes(data, size)), {}, options);
   if (!first) return 0;
-  // What is printed loads again, and then prints the same.
+  // The printed scenario loads again and then prints the same.
   const std::string text = config::print_scenario(*first);
   const auto again =
       config::load_scenario(fuzz::file_of(std::as_bytes(std::span(text))), {}, options);

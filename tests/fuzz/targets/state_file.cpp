@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Saved thermal states. The input is the file, sealed: sizes in the header and the checksum at the
-// end are made right, so that inputs get past them; its first byte, if it is not 'E', is dropped
-// and the rest taken as it stands.
+// Fuzz target: saved thermal states. The input is the file. Sizes in the header and the checksum at
+// the end are corrected, so that inputs pass their checks. When the first byte is not 'E', it is
+// dropped and the rest is taken unchanged.
 #include "surface/state/state_file.hpp"
 
 #include <vector>
@@ -52,7 +52,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
       }
     }
   }
-  // What frames do with it shows whether its tree hangs together.
+  // The operations of a frame show whether the tree is consistent.
   const renderer::RefinedMesh& mesh = model->meshes[0];
   for (std::uint32_t triangle = 0; triangle < geometry.meshes[0].indices.size() / 3; ++triangle) {
     for (const glm::vec2 place : {glm::vec2(0.0F), glm::vec2(0.2F, 0.7F), glm::vec2(1.0F, 0.0F)}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Trajectories.
+// Fuzz target: trajectories.
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
 #include "resolve/resolve.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One datagram to the trigger port, bare and sealed.
+// Fuzz target: one datagram to the trigger port, bare and with a MAC.
 #include <algorithm>
 #include <array>
 
@@ -11,8 +11,8 @@ namespace {
 
 using namespace emit;
 
-/// Of the datagrams whose bytes before the MAC are `bytes`, the genuine one is taken as what it
-/// holds, and any other refused.
+/// Checks that a datagram with these bytes before its MAC is accepted with the right MAC and
+/// refused with any other.
 void check_sealed(std::span<const std::byte> bytes, protocol::TriggerFault inside) {
   using Verdict = protocol::TriggerSeal::Verdict;
   static const protocol::SessionKey key{};

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A client's receiver of frames by UDP, through a real socket: payloads received to their place,
-// datagrams that the kernel joins, strangers. What it hands out is what a reassembler does that is
-// given the same datagrams one by one. Input: as of the target fragments, with two more bits: 64 in
-// one message with the datagram before, 128 from another machine; 16 means nothing.
+// Fuzz target: a client's receiver of frames by UDP, through a real socket. It covers payloads
+// received to their place, datagrams that the kernel joins, and other senders. The receiver must
+// hand out the same frames as a reassembler that gets the same datagrams one by one. The input is
+// that of the target fragments with two more bits: 64 sends the datagram in one message with the
+// one before, 128 sends it from another machine. Bit 16 has no meaning.
 #include <netinet/udp.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -14,23 +15,23 @@
 #include <memory>
 #include <vector>
 
+#include "client/udp_frame_receiver.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/reassembler.hpp"
 #include "fuzz/frame_seal.hpp"
 #include "fuzz/fuzz_input.hpp"
-#include "emit/client/client.hpp"
 #include "net/socket.hpp"
 #include "net/udp_batch.hpp"
-#include "client/udp_frame_receiver.hpp"
 
 namespace {
 
 using namespace emit;
 
 constexpr std::uint16_t kStream = 1;
-constexpr std::size_t kMostJoined = 64;
-constexpr std::size_t kMostJoinedBytes = 60'000;  // of what one message holds
+constexpr std::size_t kMaxJoined = 64;
+constexpr std::size_t kMaxJoinedBytes = 60'000;  // largest length of one message
 
-/// Sockets and their buffers, for all inputs.
+/// Sockets and their buffers, used for all inputs.
 struct Ends {
   server::SocketContext context;
   std::unique_ptr<client::UdpFrameReceiver> receiver;
@@ -80,20 +81,21 @@ void compare(protocol::Reassembler& received, protocol::Reassembler& reference) 
   }
 }
 
-/// Datagrams that go out as one message.
+/// Datagrams that are sent as one message.
 struct Message {
   std::vector<std::byte> bytes;
   std::vector<std::size_t> lengths;
 
-  /// All of one length but the last, which may be shorter.
+  /// Returns true when a datagram of this length fits: all have one length but the last, which may
+  /// be shorter.
   [[nodiscard]] bool takes(std::size_t length) const noexcept {
     return !lengths.empty() && length > 0 && lengths.back() == lengths.front() &&
-           length <= lengths.front() && lengths.size() < kMostJoined &&
-           bytes.size() + length <= kMostJoinedBytes;
+           length <= lengths.front() && lengths.size() < kMaxJoined &&
+           bytes.size() + length <= kMaxJoinedBytes;
   }
 };
 
-/// As segmentation offload does: what is not cut on the way arrives joined.
+/// Sends a message with segmentation offload. A message that is not cut on the way arrives joined.
 bool send_joined(int fd, Message& message) {
   alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(std::uint16_t))> control{};
   iovec all{message.bytes.data(), message.bytes.size()};
@@ -128,7 +130,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   client::ReceiveCounters counters;
   std::uint64_t foreign = 0;
   std::uint64_t sent = 0;
-  // All of it: a datagram may still be under way when sendmsg() has returned.
+  // The loop takes all datagrams, because one may still be under way when sendmsg() has returned.
   const auto take = [&] {
     const auto taken = [&] {
       std::uint64_t sum = counters.foreign_datagrams;
@@ -168,13 +170,13 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const std::vector<std::byte> datagram = fuzz::read_datagram(input, instructions);
     if ((instructions & 128u) != 0) {
       send();
-      if (datagram.size() <= kMostJoinedBytes) {
+      if (datagram.size() <= kMaxJoinedBytes) {
         fuzz::require(ends.stranger.send(datagram).status == server::IoStatus::done,
                       "a stranger's goes out");
         ++sent;
         ++foreign;
       }
-    } else if (datagram.size() <= kMostJoinedBytes) {
+    } else if (datagram.size() <= kMaxJoinedBytes) {
       if ((instructions & 64u) == 0 || !ends.joins || !message.takes(datagram.size())) send();
       message.bytes.insert(message.bytes.end(), datagram.begin(), datagram.end());
       message.lengths.push_back(datagram.size());

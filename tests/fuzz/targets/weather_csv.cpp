@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weather tables.
+// Fuzz target: weather tables.
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
 #include "resolve/resolve.hpp"

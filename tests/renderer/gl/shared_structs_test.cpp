@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The structs that C++ and GLSL share lie at the same offsets on both sides.
+// Tests that the structs shared by C++ and GLSL have the same offsets on both sides.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -24,7 +24,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   ASSERT_TRUE(thermal) << thermal.error().text;
   auto foster = gl::Program::compute("passes/thermal_foster.comp", taps);
   ASSERT_TRUE(foster) << foster.error().text;
-  // Bands of both kinds of air, so that nothing of BandParams is optimised away.
+  // The bands have both kinds of air, so that no part of BandParams is optimised away.
   const gl::Define content[] = {{"EMIT_BANDS", "4u"},      {"EMIT_AIR_TERMS", "5u"},
                                 {"EMIT_AIR_TABLE", "10u"}, {"EMIT_TERMS", "4"},
                                 {"EMIT_OUTPUTS", "0u"},    {"EMIT_ROWS", "1u"}};
@@ -73,7 +73,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_EQ(radiance->uniform_offset("band_uniforms[2].atmosphere_table"),
             static_cast<GLint>(2 * sizeof(gpu::BandParams) +
                                offsetof(gpu::BandParams, atmosphere_table)));
-  // Tables fetched as texels of four floats.
+  // Shaders fetch these tables as texels of four floats.
   EXPECT_EQ(sizeof(gpu::MaterialParams), 3U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, base_offset_k), 28U);

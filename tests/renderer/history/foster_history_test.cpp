@@ -14,7 +14,7 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 
 scene::Material material(const std::string& name, std::vector<scene::Layer> layers) {
   scene::Material out;
@@ -26,7 +26,8 @@ scene::Material material(const std::string& name, std::vector<scene::Layer> laye
   return out;
 }
 
-/// 21 June at 48.56 N under a clear sky; history starts at `start_s` after 06:00 UTC.
+/// Returns a scenario of 21 June at 48.56 N under a clear sky. Its history starts at `start_s`
+/// after 06:00 UTC.
 scene::ScenarioDesc scenario(double start_s) {
   scene::ScenarioDesc s;
   s.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
@@ -52,7 +53,7 @@ FosterHistory history_of(const scene::ScenarioDesc& s, const Environment& enviro
   return FosterHistory(s, *materials, surroundings, environment, kReferenceK);
 }
 
-/// What the shader does at the start of a frame: table, then the tail.
+/// Returns the temperature as the shader computes it at the start of a frame: table, then tail.
 double looked_up_k(const FosterHistory& history, std::size_t m, glm::dvec3 n) {
   const FosterMaterial& material = history.materials()[m];
   const auto nodes = static_cast<int>(history.grid_nodes());
@@ -87,7 +88,7 @@ double looked_up_k(const FosterHistory& history, std::size_t m, glm::dvec3 n) {
   return physics::foster_offset_k(state, surface);
 }
 
-/// The same from the definition: two days in steps of 20 s.
+/// Returns the same temperature from the definition: two days in steps of 20 s.
 double spun_up_k(const scene::ScenarioDesc& s, const Environment& environment,
                  const FosterMaterial& material, const FosterMaterial& surroundings,
                  const glm::dvec3& n) {
@@ -199,7 +200,7 @@ TEST(FosterHistory, SurroundingsFollowTheWeatherWhereItStatesTheirTemperature) {
   EXPECT_DOUBLE_EQ(history.surroundings_now_k(), 281.0);
   EXPECT_NEAR(history.intervals().back().end.environment_w_m2,
               physics::kStefanBoltzmannWPerM2K4 * std::pow(281.0, 4), 1e-9);
-  // Reflected sunlight of the ground: 1 - 0.8 of what falls on it.
+  // The ground reflects 1 - 0.8 of its sunlight.
   const double sine = plan.sun_now().direction_enu.z;
   EXPECT_NEAR(history.intervals().back().end.reflected_w_m2, 0.2 * 500.0 * sine, 1e-3);
 }
@@ -236,7 +237,8 @@ TEST(FosterHistory, WeatherBeforeTheStartRunsTheSpinUpAgain) {
   sample.air_k = 290.0;
   sample.longwave_down_w_m2 = 320.0;
   ASSERT_TRUE(environment.append(sample));
-  EXPECT_FALSE(history.update(plan, environment));  // after the start: the table stands
+  // The change is after the start, so the table stays.
+  EXPECT_FALSE(history.update(plan, environment));
 
   environment.reset();
   sample.sim_time_ns = -100'000 * kSecondNs;
@@ -247,6 +249,17 @@ TEST(FosterHistory, WeatherBeforeTheStartRunsTheSpinUpAgain) {
   environment.reset();
   EXPECT_TRUE(history.update(plan, environment));
   EXPECT_EQ(history.table()[7], before);
+}
+
+TEST(FosterHistoryContract, ForcingHasOneEntryPerInterval) {
+  scene::ScenarioDesc s = scenario(0.0);
+  s.thermal.spin_up_ns = 0;
+  const Environment environment(s);
+  FosterHistory history = history_of(s, environment);
+  const std::vector<std::int64_t> nodes_ns{0, kSecondNs, 2 * kSecondNs};
+  std::vector<IntervalForcing> out(3);
+  EXPECT_DEATH(history.forcing_over(nodes_ns, environment, out),
+               "nodes_ns.size\\(\\) \\(4 == 3\\)");
 }
 
 TEST(FosterMaterials, NameTheMaterialWithoutLayers) {

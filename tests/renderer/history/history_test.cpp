@@ -32,7 +32,8 @@ TEST(PoseHistory, interpolates_holds_and_jumps_as_scripted) {
   const PoseHistory history(scripted(), at_east(5.0));
   EXPECT_EQ(history.at(-kSecondNs).pose.position_world_m.x, 0.0);
   EXPECT_NEAR(history.at(105 * kSecondNs).pose.position_world_m.x, 50.0, 1e-9);
-  EXPECT_EQ(history.at(199 * kSecondNs).pose.position_world_m.x, 100.0);  // no drift to the jump
+  // The entity does not drift towards the jump.
+  EXPECT_EQ(history.at(199 * kSecondNs).pose.position_world_m.x, 100.0);
   EXPECT_EQ(history.at(200 * kSecondNs).pose.position_world_m.x, 0.0);
   EXPECT_EQ(history.at(999 * kSecondNs).pose.position_world_m.x, 0.0);
 }
@@ -98,7 +99,7 @@ TEST(PoseHistory, a_full_store_thins_the_oldest_poses_and_counts_them) {
   PoseHistory history(scripted(), at_east(0.0));
   std::int64_t t_ns = 0;
   for (std::size_t i = 0; i < PoseHistory::kMaxLivePoses + 100; ++i) {
-    t_ns += 2 * kSecondNs;  // too far apart to thin
+    t_ns += 2 * kSecondNs;  // too far apart to be thinned out
     ASSERT_TRUE(history.append(t_ns, at_east(static_cast<double>(i % 2)), true, false));
   }
   EXPECT_GT(history.dropped(), 0U);
@@ -112,7 +113,7 @@ TEST(PoseHistory, path_counts_motion_but_no_jumps) {
   const PoseHistory history(scripted(), at_east(0.0));
   EXPECT_NEAR(history.path_m(100 * kSecondNs, 110 * kSecondNs), 100.0, 1e-6);
   EXPECT_EQ(history.path_m(0, 90 * kSecondNs), 0.0);
-  EXPECT_NEAR(history.path_m(105 * kSecondNs, 300 * kSecondNs), 50.0, 1e-6);  // over the jump
+  EXPECT_NEAR(history.path_m(105 * kSecondNs, 300 * kSecondNs), 50.0, 1e-6);  // across the jump
   EXPECT_EQ(history.path_m(150 * kSecondNs, 200 * kSecondNs), 0.0);
 }
 
@@ -189,9 +190,9 @@ TEST(StepPlan, puts_nodes_on_the_events_of_entities) {
     nodes.push_back(interval.begin_ns);
     EXPECT_GE(interval.end_ns, interval.begin_ns);
   }
-  // Three events fall into the first, long interval: each takes one of the nodes nearby, in order.
+  // Three events lie in the first, long interval. Each takes one of the nodes nearby, in order.
   EXPECT_TRUE(std::find(nodes.begin(), nodes.end(), 200 * kSecondNs) != nodes.end());
-  // A few seconds after a stop all its events have nodes of their own.
+  // All events of a stop have nodes of their own a few seconds later.
   plan.update(130 * kSecondNs, environment, entities);
   nodes.clear();
   for (const auto& interval : plan.intervals()) nodes.push_back(interval.begin_ns);
@@ -215,7 +216,7 @@ TEST(Environment, takes_weather_with_every_pose_for_hours) {
   sample.air_k = 290.0;
   for (int i = 0; i < 100'000; ++i) {
     sample.sim_time_ns = i * 5'000'000LL;
-    ASSERT_TRUE(environment.append(sample));  // unchanged
+    ASSERT_TRUE(environment.append(sample));  // the weather is unchanged
   }
   EXPECT_EQ(environment.changes_ns().size(), 1U);
   for (int i = 100'000; i < 200'000; ++i) {
@@ -241,7 +242,7 @@ TEST(Environment, weather_from_the_host_holds_from_its_time_on) {
   EXPECT_EQ(environment.forcing_at(7200 * kSecondNs, sun).direct_normal_w_m2, 0.0);
   overcast.sim_time_ns = 7100 * kSecondNs;
   EXPECT_FALSE(environment.append(overcast));
-  // A step ends and begins exactly there, and the step before it still has the old weather.
+  // A step ends and another begins exactly there, and the step before it still has the old weather.
   StepPlan plan(scenario.thermal);
   plan.update(12600 * kSecondNs, environment, {});
   bool found = false;

@@ -15,6 +15,7 @@
 #include "emit/image/false_color.hpp"
 #include "emit/image/image_diff.hpp"
 #include "emit/image/png_image.hpp"
+#include "support/failed_check.hpp"
 
 namespace emit::image {
 namespace {
@@ -71,7 +72,8 @@ TEST(ExrImage, every_bit_survives_writing_and_reading) {
 TEST(ExrImage, frame_metadata_survives_exactly) {
   ExrImage image = sample_image();
   FrameMetadata metadata;
-  metadata.sim_time_ns = -9'007'199'254'740'993;  // needs more than the 53 bits of a double
+  // The number needs more than the 53 bits of a double.
+  metadata.sim_time_ns = -9'007'199'254'740'993;
   metadata.frame_number = 18'446'744'073'709'551'615U;
   metadata.sensor_pose.position_world_m = {1.0 / 3.0, -2.5e6, 17.0};
   metadata.sensor_pose.world_from_body = {0.5, -0.5, 0.5, 0.5};
@@ -161,7 +163,8 @@ TEST(ExrImage, unreadable_files_are_errors_that_name_them) {
   EXPECT_EQ(write_exr("/nowhere/at/all.exr", sample_image()).error().code, ErrorCode::io);
 }
 
-/// The file written by write_exr() with some bytes after `mark` replaced.
+/// Writes a file by write_exr() and replaces some bytes after `mark`. Returns the error of reading
+/// it.
 std::string error_after_damage(std::string_view mark, std::size_t skip, std::string_view bytes) {
   const auto file = scratch("damaged.exr");
   ExrImage image = sample_image();
@@ -218,7 +221,7 @@ TEST(FalseColor, lightness_never_falls_along_a_map) {
   for (const ColorMap map : {ColorMap::thermal, ColorMap::grey}) {
     const auto& table = color_table(map);
     for (std::size_t i = 1; i < table.size(); ++i) {
-      // One count of rounding per component; two entries apart it must rise.
+      // Allow one count of rounding per component. Two entries apart the lightness must rise.
       EXPECT_GE(luma(table[i]) + 1.0, luma(table[i - 1])) << i;
       if (i >= 8) {
         EXPECT_GT(luma(table[i]), luma(table[i - 8])) << i;
@@ -310,6 +313,14 @@ TEST(ImageDiff, pixels_not_finite_on_one_side_are_counted) {
   const DiffStats stats = diff_values(a, b, 6);
   EXPECT_EQ(stats.one_sided_nan, 4U);
   EXPECT_EQ(stats.pixels_compared, 0U);
+}
+
+TEST(ImageDiff, sizes_that_do_not_fit_stop_the_program) {
+  const std::vector<float> six(6, 1.0F);
+  const std::vector<float> four(4, 1.0F);
+  EXPECT_THAT(test::failed_check([&] { (void)diff_values(six, four, 2); }), HasSubstr("(6 == 4)"));
+  EXPECT_THAT(test::failed_check([&] { (void)diff_values(six, six, 0); }), HasSubstr("(0 > 0)"));
+  EXPECT_THAT(test::failed_check([&] { (void)diff_values(six, six, 4); }), HasSubstr("(2 == 0)"));
 }
 
 TEST(ImageDiff, radiance_is_reported_in_per_cent_and_kelvin) {

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kAirRadiance = 30.0;
 
-/// Homogeneous air: extinction per metre by elevation, path radiance (1 - tau) L.
+/// Returns a grid of homogeneous air: an extinction per metre for each elevation, and the path
+/// radiance (1 - tau) L.
 AtmosphereGrid homogeneous(const std::vector<double>& range_m,
                            const std::vector<double>& extinction_per_m) {
   AtmosphereGrid grid;
@@ -60,7 +61,7 @@ TEST(AtmosphereTable, GivesTheGridAtItsPointsAndLiesBetweenThemElsewhere) {
     before_tau = air.transmittance_frac;
     before_path = air.path_radiance_w_m2_sr;
   }
-  // Half way between two elevations in sine: the geometric mean of the transmittances.
+  // Half way between two elevations in sine, the transmittance is the geometric mean.
   const double middle = 0.5 * (std::sin(-30.0 * kDegree) + std::sin(10.0 * kDegree));
   EXPECT_NEAR(table->along(1000.0, middle).transmittance_frac,
               std::sqrt(std::exp(-0.5) * std::exp(-0.1)), 1e-14);
@@ -90,7 +91,7 @@ TEST(AtmosphereTable, OneElevationHoldsForAll) {
     EXPECT_NEAR(table->along(500.0, sine).transmittance_frac, std::exp(-0.05), 1e-14);
     EXPECT_FALSE(table->along(500.0, sine).clamped);
   }
-  // A uniform sky: its hemispherical mean is itself.
+  // A uniform sky is its own hemispherical mean.
   EXPECT_NEAR(table->sky_hemisphere_w_m2_sr(), (1.0 - std::exp(-0.1)) * kAirRadiance, 1e-12);
 }
 

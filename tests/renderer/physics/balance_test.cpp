@@ -44,7 +44,7 @@ TEST(SurfaceBalance, SunCountsOnlyWhereItIsSeenUncloudedAndInFront) {
 
 template <class Real>
 SurfaceBalance<Real> random_balance(std::mt19937_64& random) {
-  // Inputs are float32 values, so that float and double solve the same problem.
+  // The inputs are float32 values, so that float and double solve the same problem.
   const auto uniform = [&random](double lo, double hi) {
     return static_cast<double>(static_cast<float>(std::uniform_real_distribution(lo, hi)(random)));
   };
@@ -109,7 +109,7 @@ TEST(Equilibrium, InputsBelowTheGuardsAreClampedAndReported) {
   }
   EXPECT_TRUE(solve_equilibrium<float>({0.0F, 10.0F, 3000.0F}).clamped);
   EXPECT_FALSE(solve_equilibrium<float>({5e-8F, 0.0F, 400.0F}).clamped);
-  // Nothing in reach of a material overflows: metal foil, no emission, hardly any source.
+  // No material can make the solver overflow: test metal foil, no emission and hardly any source.
   const auto extreme = solve_equilibrium<float>({0.0F, 4e6F, 0.0F});
   EXPECT_TRUE(std::isfinite(extreme.temperature_k));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/physics/foster.hpp"
+#include "emit/physics/constants.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +15,6 @@ namespace {
 const std::vector<StackLayer> kRoad = {{0.15, 0.7, 1.95e6}, {0.3, 1.5, 1.9e6}, {1.55, 1.2, 2.2e6}};
 const std::vector<StackLayer> kThickConcrete = {{0.5, 1.7, 2.02e6}};
 const std::vector<StackLayer> kSheet = {{0.001, 45.0, 3.69e6}, {0.02, 0.16, 1.2e3}};
-constexpr double kReferenceK = 295.0;
 
 FosterNetwork network(const std::vector<StackLayer>& layers, std::size_t modes) {
   auto result = network_of_stack(layers, {.modes = modes});
@@ -22,7 +22,8 @@ FosterNetwork network(const std::vector<StackLayer>& layers, std::size_t modes) 
   return result.value_or(FosterNetwork{});
 }
 
-/// A summer morning on asphalt: sun rising over three and a half hours, in shade during part of it.
+/// Returns the drive of a summer morning on asphalt. The sun rises over three and a half hours,
+/// with shade during a part of them.
 FosterDrive<double> morning(double t_s, bool lit) {
   const double sun_w_m2 = lit ? 0.75 * (273.0 + 448.0 * t_s / 12600.0) : 0.0;
   return {.absorbed_w_m2 = sun_w_m2 + 60.0 + 0.93 * 330.0,
@@ -36,7 +37,8 @@ struct Interval {
   bool lit;
 };
 
-/// Two shadows pass; intervals grow into the past as those of the renderer.
+/// Returns the intervals of a history in which two shadows pass. They grow into the past like those
+/// of the renderer.
 std::vector<Interval> intervals() {
   return {{0, 1800, true},      {1800, 4500, true},  {4500, 6300, false},  {6300, 8100, true},
           {8100, 9000, false},  {9000, 10800, true}, {10800, 11700, true}, {11700, 12300, true},
@@ -84,7 +86,8 @@ TEST(FosterNetwork, ImpedanceOfAHomogeneousSlabIsTheClosedForm) {
   const std::complex<double> g = std::sqrt(std::complex<double>(0.0, angular * 2.02e6 / 1.7));
   const auto expected = std::tanh(g * 0.5) / (1.7 * g);
   EXPECT_NEAR(std::abs(stack_impedance_m2k_w(kThickConcrete, angular) - expected), 0.0, 1e-14);
-  // Cut into two layers of the same stuff nothing changes; at rest it is the resistance.
+  // A cut into two layers of the same material changes nothing. At rest the impedance is the
+  // resistance.
   const std::vector<StackLayer> cut = {{0.2, 1.7, 2.02e6}, {0.3, 1.7, 2.02e6}};
   EXPECT_NEAR(std::abs(stack_impedance_m2k_w(cut, angular) - expected), 0.0, 1e-14);
   EXPECT_NEAR(stack_impedance_m2k_w(kThickConcrete, 0.0).real(), 0.5 / 1.7, 1e-14);
@@ -134,7 +137,7 @@ TEST(FosterNetwork, MoreModesComeCloserToTheStack) {
       EXPECT_LT(rms, 0.6 * before) << modes;
       before = rms;
     }
-    // In kelvin per W/m2 of drive: 500 W/m2 of sun give less than 0.5 K.
+    // The bound is in kelvin per W/m2 of drive: 500 W/m2 of sun give less than 0.5 K.
     EXPECT_LT(before, 1e-3);
   }
 }
@@ -184,7 +187,7 @@ TEST(FosterStep, SteadyStateIsTheEquilibriumOverTheWholeResistance) {
     const auto expected = solve_equilibrium<double>(
         {surface.emission_w_m2_k4, 13.3 + conductance, 800 + 13.3 * 298 + conductance * 286.15});
     EXPECT_NEAR(kReferenceK + foster_offset_k(x, surface), expected.temperature_k, 1e-7);
-    // And it stays there, whatever the step.
+    // The state stays there, whatever the step is.
     foster_step(x, drive, drive, foster_gains(1.0, n), surface);
     EXPECT_NEAR(kReferenceK + foster_offset_k(x, surface), expected.temperature_k, 1e-7);
   }
@@ -207,7 +210,7 @@ TEST(FosterStep, StaysFiniteForAnyStepAndSheet) {
       FosterState<double> x = steady_start(n, surface);
       const auto gains = foster_gains(dt_s, n);
       for (int i = 0; i < 100; ++i) {
-        // Noon and night in turn: a step that overshoots would show.
+        // Noon and night take turns: a step that overshoots would show.
         foster_step(x, morning(12600, i % 2 == 0), morning(0, i % 3 == 0), gains, surface);
         const double t = kReferenceK + foster_offset_k(x, surface);
         ASSERT_GT(t, 230.0);
@@ -289,7 +292,7 @@ TEST(FosterStep, FloatFollowsDoubleWithinAMillikelvin) {
 }
 
 TEST(Relaxation, SplittingALinearStepAThousandTimesMovesNothing) {
-  // The rule of emit2014, float32 as on the device: offsets, gains from double.
+  // Test the rule of emit2014 in float32 as on the device: offsets, and gains from double.
   for (const double tau_s : {8.0, 609.0, 7259.0}) {
     for (const double dt_s : {20.0, 466.0, 3600.0}) {
       const auto whole = relaxation_gains(dt_s, tau_s);

@@ -14,7 +14,7 @@
 namespace emit::physics {
 namespace {
 
-// Rounding of a few products of unit quantities.
+// Bound for the rounding of a few products of unit quantities.
 constexpr double kTolerance = 1e-14;
 
 void expect_near(const glm::dvec3& a, const glm::dvec3& b, double tolerance = kTolerance) {

@@ -15,12 +15,13 @@ namespace {
 
 TEST(Planck, WholeSpectrumIsStefanBoltzmann) {
   for (const double t : {200.0, 300.0, 1000.0, 5772.0}) {
-    // 0.05..1000 um holds all but the long tail, which Rayleigh-Jeans closes: 2 c k T / (3 l^3).
+    // The band 0.05..1000 um holds all but the long tail, which Rayleigh-Jeans closes: 2 c k T / (3
+    // l^3).
     const Band all{0.05, 1000.0, {}};
     const double tail = 2.0 * kSpeedOfLightMPerS * kBoltzmannJPerK * t / (3.0 * 1e-9);
     const double total = band_radiance(all, Kelvin(t)).radiance_w_m2_sr + tail;
     const double expected = kStefanBoltzmannWPerM2K4 * t * t * t * t / kPi;
-    // First neglected term of the tail: a fraction 3 c2/(8 l T) of it.
+    // The first neglected term of the tail is a fraction 3 c2/(8 l T) of it.
     EXPECT_NEAR(total / expected, 1.0, 1e-9 + tail / expected * 0.03) << t;
   }
 }
@@ -70,7 +71,7 @@ TEST(Planck, ResponseTableIsLinearBetweenItsPointsAndZeroOutside) {
   EXPECT_NEAR(band_radiance(part, 300_K).radiance_w_m2_sr,
               band_radiance(plain, 300_K).radiance_w_m2_sr, 1e-14);
 
-  // A triangle against a midpoint sum; also at 60 K, where its foot carries the radiance.
+  // Compare a triangle with a midpoint sum, also at 60 K, at which its foot carries the radiance.
   const Band triangle{3.0, 5.0, {{3.0, 0.0}, {4.5, 1.0}, {5.0, 0.0}}};
   for (const double t : {60.0, 300.0, 3000.0}) {
     const int n = 200000;

@@ -14,7 +14,7 @@ TEST(Relaxation, GainsMatchLongDoubleFromTinyToHugeSteps) {
     const RelaxationGains<double> g = relaxation_gains(z, 1.0);
     const long double zl = z;
     const long double total = -std::expm1(-zl);
-    // The series needs no more than these terms below 1e-2; above, long double has bits to spare.
+    // The series needs no more than these terms below 1e-2. Above, long double has enough bits.
     const long double end =
         z < 1e-2 ? zl / 2 * (1 - zl / 3 * (1 - zl / 4 * (1 - zl / 5 * (1 - zl / 6 * (1 - zl / 7)))))
                  : 1.0L - total / zl;
@@ -37,7 +37,7 @@ TEST(Relaxation, ConstantDriveIsTheExponential) {
 }
 
 TEST(Relaxation, LinearDriveFollowsTheClosedFormRamp) {
-  // x(0) = 0, u = r t: x = r (t - tau + tau e^{-t/tau}).
+  // The solution for x(0) = 0 and u = r t is x = r (t - tau + tau e^{-t/tau}).
   const double rate = 0.02;
   const double tau = 300.0;
   for (const double t : {1.0, 100.0, 1000.0, 1e5}) {
@@ -60,7 +60,8 @@ TEST(Relaxation, SplittingAStepChangesNothing) {
 }
 
 TEST(Relaxation, FloatOffsetsDoNotStallAtSixtyHertz) {
-  // Half an hour at 60 Hz with a slow mode: a kelvin state in float32 would be a kelvin off.
+  // Step for half an hour at 60 Hz with a slow mode: a state in kelvin would be a kelvin off in
+  // float32.
   const auto g = relaxation_gains(1.0 / 60.0, 7259.0);
   const RelaxationGains<float> gains{static_cast<float>(g.start_frac),
                                      static_cast<float>(g.end_frac)};

@@ -32,7 +32,8 @@ TEST(Sun, JulianDaysOfKnownDates) {
 
 TEST(Sun, PosixTimeAgreesWithTheJulianDate) {
   const GeoPlace place{48.56_deg, 11.26_deg, 400_m};
-  // 2003-10-17 19:30:30 UTC and 1955-06-05 12:00 UTC, before the POSIX epoch.
+  // The instants are 2003-10-17 19:30:30 UTC and 1955-06-05 12:00 UTC, which is before the POSIX
+  // epoch.
   const SunPosition a = sun_position(1066419030 * kSecond, place);
   const SunPosition b = sun_position_ut1(julian_day_0h(2003, 10, 17), (19.5 * 3600 + 30) / 86400,
                                          delta_t_s(2003.8), place);
@@ -61,7 +62,7 @@ TEST(Sun, CulminatesInTheSouthOfTheNorthernTemperateZone) {
   const GeoPlace place{48.56_deg, 11.26_deg, 400_m};
   double highest = -1.0;
   double azimuth_deg = 0.0;
-  // 2026-06-21: the solstice sun stands at 90 - 48.56 + 23.44 deg.
+  // The sun of the solstice 2026-06-21 stands at 90 - 48.56 + 23.44 deg.
   for (std::int64_t minute = 0; minute < 1440; ++minute) {
     const SunPosition sun = sun_position(1781999999LL * kSecond + minute * 60 * kSecond, place);
     if (sun.elevation.value() > highest) {
@@ -90,8 +91,8 @@ TEST(Sun, MeanSolarTimeFollowsTheLongitude) {
 }
 
 TEST(ClearSky, IrradianceMatchesPublishedValuesAtThreeZenithAngles) {
-  // Ineichen with TL 3.5, 400 m above the sea at midsummer (sun at 1.0163 au), by an independent
-  // implementation that rounds to 1 W/m2: DNI/DHI at z = 25, 60, 75 deg.
+  // The reference is Ineichen with TL 3.5, 400 m above the sea at midsummer (sun at 1.0163 au), by
+  // an independent implementation that rounds to 1 W/m2: DNI/DHI at z = 25, 60, 75 deg.
   struct Row {
     double zenith_deg, direct, diffuse;
   };
@@ -133,7 +134,7 @@ TEST(ClearSky, AirMassIsOneOverheadAnd38AtTheHorizon) {
 }
 
 TEST(ClearSky, LongwaveMatchesTheRecalibratedFormAndCloudsCloseTheWindow) {
-  // T 293.15 K, dew point 285.15 K: 347.4 W/m2.
+  // Air of 293.15 K with a dew point of 285.15 K gives 347.4 W/m2.
   EXPECT_NEAR(sky_longwave_w_m2(Kelvin(293.15), Kelvin(285.15), 0.0), 347.4, 0.2);
   const double clear = sky_emissivity_frac(Kelvin(280.0), 0.0);
   EXPECT_NEAR(sky_emissivity_frac(Kelvin(280.0), 1.0), clear + 0.784 * (1.0 - clear), 1e-14);
@@ -148,10 +149,10 @@ TEST(ClearSky, AirIsWarmestAtThreeInTheAfternoon) {
 }
 
 TEST(Weather, RowsAreLinearBetweenAndConstantOutside) {
-  const std::array<WeatherRow, 3> rows = {
-      WeatherRow{100, 0.0, 10.0, 300.0, 280.0, 1.0, 0.0, 285.0, 7.0},
-      WeatherRow{200, 800.0, 110.0, 340.0, 290.0, 3.0, 0.5, std::nullopt, std::nullopt},
-      WeatherRow{300, 400.0, 60.0, 320.0, 288.0, 2.0, 0.0, std::nullopt, std::nullopt}};
+  const std::array<WeatherSample, 3> rows = {
+      WeatherSample{100, 0.0, 10.0, 300.0, 280.0, 1.0, 0.0, 285.0, 7.0},
+      WeatherSample{200, 800.0, 110.0, 340.0, 290.0, 3.0, 0.5, std::nullopt, std::nullopt},
+      WeatherSample{300, 400.0, 60.0, 320.0, 288.0, 2.0, 0.0, std::nullopt, std::nullopt}};
   const Forcing middle = forcing_from_rows(rows, 150);
   EXPECT_DOUBLE_EQ(middle.direct_normal_w_m2, 400.0);
   EXPECT_DOUBLE_EQ(middle.diffuse_horizontal_w_m2, 60.0);
@@ -167,7 +168,7 @@ TEST(Weather, RowsAreLinearBetweenAndConstantOutside) {
 }
 
 TEST(Weather, TwoRowsAtOneInstantAreAJump) {
-  std::array<WeatherRow, 3> rows;
+  std::array<WeatherSample, 3> rows;
   rows[0].air_k = rows[1].air_k = 280.0;
   rows[1].time_ns = rows[2].time_ns = 10;
   rows[2].air_k = 300.0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fitted modes against the reference solver: the bars of the shipped materials, and that the fit
-// finds what is there.
+// Fitted modes against the reference solver: the errors of the shipped materials stay within their
+// bounds, and a fit finds modes that are known.
 #include "emit/reference/fit.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace emit::reference {
 namespace {
 
-/// The summer morning of the shipped road scenario, with its materials.
+/// Returns the summer morning of the shipped road scenario, with its materials.
 scene::ScenarioDesc road_scenario() {
   config::LoadOptions options;
   options.require_scene_files = false;
@@ -39,7 +39,8 @@ const scene::Material& named(const scene::ScenarioDesc& scenario, const std::str
   return scenario.materials.front();
 }
 
-/// Modes well away from those of the layers, and what they do under a sun that comes and goes.
+/// Returns the curve of modes that differ clearly from those of the layers, under a sun that comes
+/// and goes.
 std::vector<CurvePoint> curve_of(const physics::FosterNetwork& network, double emissivity_frac,
                                  double base_k) {
   const auto surface = physics::foster_surface(network, emissivity_frac, base_k, 295.0);
@@ -127,7 +128,8 @@ TEST(Fit, TwoExponentialsOfTheEquilibriumAreKelvinsOff) {
   ASSERT_EQ(fit->modes.size(), 2U);
   EXPECT_NEAR(fit->modes[0].weight_frac + fit->modes[1].weight_frac, 1.0, 1e-12);
   EXPECT_LT(fit->modes[0].tau_s, fit->modes[1].tau_s);
-  // Convection and the ground below are missing: the paper's own comparison saw up to 3.5 K.
+  // The model has neither convection nor the ground below. The paper's own comparison saw up to 3.5
+  // K.
   EXPECT_GT(fit->rms_k, 0.5);
   EXPECT_LT(fit->rms_k, 5.0);
 }
@@ -147,7 +149,7 @@ TEST(Fit, EveryShippedMaterialMeetsTheBarOverTheFiveHistories) {
     ASSERT_TRUE(judged) << judged.error().text;
     EXPECT_LT(judged->rms_k, 0.4) << name;
     EXPECT_LT(judged->max_k, 1.5) << name;
-    // The library states what is true.
+    // The material library must state the true errors.
     EXPECT_NEAR(judged->rms_k, material.foster_fit->rms_k, 0.02) << name;
     EXPECT_NEAR(judged->max_k, material.foster_fit->max_k, 0.05) << name;
     RecordProperty(name, std::to_string(judged->rms_k) + " " + std::to_string(judged->max_k));
@@ -159,7 +161,7 @@ TEST(Fit, EveryShippedMaterialMeetsTheBarOverTheFiveHistories) {
 
 TEST(Fit, ModesBelongToTheMaterialAndHoldInOtherWeather) {
   scene::ScenarioDesc scenario = road_scenario();
-  scenario.epoch_utc_ns -= 95LL * 86'400 * 1'000'000'000;  // 18 March
+  scenario.epoch_utc_ns -= 95LL * 86'400 * 1'000'000'000;  // the date is 18 March
   scenario.clear_sky.wind_m_s = 7.0;
   scenario.clear_sky.air_mean_k = 281.0;
   scenario.clear_sky.dew_point_k = 276.0;

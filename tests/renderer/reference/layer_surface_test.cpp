@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surface points under a scenario's weather: balance, spin-up, shadows, surroundings.
+// Surface points under a scenario's weather: balance, spin-up, shadows and surroundings.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,11 +28,12 @@ double sigma_t4(double t_k) {
   return physics::kStefanBoltzmannWPerM2K4 * t_k * t_k * t_k * t_k;
 }
 
-/// A clear midsummer day in Bavaria, simulated time 0 at 0h UTC; history from 04:00.
+/// Returns a clear midsummer day in Bavaria. Simulated time 0 is 0h UTC, and the history starts at
+/// 04:00.
 scene::ScenarioDesc summer_day() {
   scene::ScenarioDesc scenario;
   scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 400.0};
-  scenario.epoch_utc_ns = 1'782'000'000'000'000'000;  // 2026-06-21 00:00
+  scenario.epoch_utc_ns = 1'782'000'000'000'000'000;  // the date is 2026-06-21 00:00
   scene::Material asphalt;
   asphalt.name = "asphalt";
   asphalt.solar_absorptance_frac = 0.9;
@@ -97,7 +98,7 @@ TEST(PointSolver, KeepsAnIsothermalWorldAtItsTemperature) {
   scenario.thermal.initial_k = 288.0;
   const SurfaceClimate climate = climate_of(scenario);
   const std::vector<std::int64_t> times{4 * kHourNs, 9 * kHourNs, 14 * kHourNs};
-  // A wall that sees some sky, some ground: every share radiates alike.
+  // A wall sees some sky and some ground, and every share radiates alike.
   for (const double t : history(scenario, climate, kEast, {{0, 1.0, 0.3}}, times)) {
     EXPECT_NEAR(t, 288.0, 1e-8);
   }
@@ -113,7 +114,7 @@ TEST(PointSolver, UnshadowedLevelPointOfTheSurroundingsIsTheSurroundings) {
     EXPECT_GT(t[i], 285.0);
     EXPECT_LT(t[i], 345.0);
   }
-  EXPECT_GT(t[1], t[0] + 5.0);  // the sun is felt
+  EXPECT_GT(t[1], t[0] + 5.0);  // the sun warms the point
 }
 
 TEST(PointSolver, ShadowActsFromItsEdgeOnAndNotBefore) {
@@ -126,7 +127,8 @@ TEST(PointSolver, ShadowActsFromItsEdgeOnAndNotBefore) {
       history(scenario, climate, kUp, {{0, 1.0, 0.9}, {edge, 1.0, 0.9}, {edge, 0.0, 0.9}}, times);
   EXPECT_NEAR(shade[0], sun[0], 1e-4);
   EXPECT_NEAR(shade[1], sun[1], 1e-4);
-  // One minute in, a half space under a film that stands for convection and radiation.
+  // One minute after the jump the solution is a half space under a film that stands for convection
+  // and radiation.
   const ClimateNode then = climate.at(edge);
   const double jump = 0.9 * then.direct_normal_w_m2 * then.to_sun.z;
   const double film = then.film_w_m2_k + 4.0 * 0.93 * sigma_t4(sun[1]) / sun[1];
@@ -214,13 +216,13 @@ TEST(PointSolver, SheetIsDrivenByBothOfItsFaces) {
   scene::Material& material = scenario.materials[0];
   constexpr double kHalfM = 0.0005;
   material.layers = {{kHalfM, 50.0, 7850.0, 470.0}};
-  material.base_k = 400.0;                              // which it knows nothing of
-  const SurfaceClimate climate = climate_of(scenario);  // whose ground is a sheet's half as well
+  material.base_k = 400.0;                              // a sheet must not use it
+  const SurfaceClimate climate = climate_of(scenario);  // its ground is half a sheet too
   material.sheet = true;
   const auto mesh = reference::material_mesh(material);
   ASSERT_TRUE(mesh);
   PointSolver solver(climate, *mesh, material, 292.0);
-  // The lower face lies in the shade; the upper one from 9 o'clock on.
+  // The lower face lies in the shade throughout, the upper one from 9 o'clock on.
   const std::vector<ViewSample> up{{0, 1.0, 0.8}, {9 * kHourNs, 1.0, 0.8}, {9 * kHourNs, 0.0, 0.8}};
   const std::vector<ViewSample> down{{0, 0.0, 0.1}};
   const std::vector<std::int64_t> times{9 * kHourNs, 9 * kHourNs + 60'000'000'000, 11 * kHourNs};
@@ -230,7 +232,7 @@ TEST(PointSolver, SheetIsDrivenByBothOfItsFaces) {
   solver.run(-kUp, {down, up}, times, from_below);
   for (std::size_t i = 0; i < times.size(); ++i) {
     EXPECT_NEAR(from_above[i], from_below[i], 1e-4);
-    // The balance of both faces, in steps of 0.1 s from an hour before.
+    // Integrate the balance of both faces in steps of 0.1 s from an hour before.
     const auto net = [&](double now_s, double k) {
       const ClimateNode now = climate.at(static_cast<std::int64_t>(now_s * 1e9));
       const double rho = climate.surroundings_reflectance_frac();

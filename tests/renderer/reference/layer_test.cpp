@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // The one-dimensional conduction solver by itself: order of convergence, conservation, steady
-// states, and input that no sane material has.
+// states, and extreme input.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <string>
 #include <vector>
 
 #include "emit/physics/constants.hpp"
 #include "emit/reference/layer_frequency.hpp"
 #include "emit/reference/layer_mesh.hpp"
 #include "emit/reference/layer_solver.hpp"
+#include "support/failed_check.hpp"
 
 namespace emit {
 namespace {
@@ -29,9 +31,9 @@ using reference::StepOptions;
 
 constexpr double kEmissivity = 0.93;
 
-/// Asphalt on gravel on soil: conductivity and heat capacity jump at the interfaces.
+/// Asphalt on gravel on soil. Conductivity and heat capacity jump at the interfaces.
 const std::vector<SolidLayer> kGround{{0.03, 0.7, 1.9504e6}, {0.3, 1.5, 1.9e6}, {1.55, 1.2, 2.2e6}};
-/// A contrast of 1000 in conductivity and 100 in heat capacity.
+/// Layers with a contrast of 1000 in conductivity and 100 in heat capacity.
 const std::vector<SolidLayer> kSandwich{
     {0.004, 50.0, 3.8e6}, {0.03, 0.04, 4.0e4}, {0.05, 1.28, 2.024e6}};
 
@@ -42,7 +44,8 @@ LayerMesh mesh_of(const std::vector<SolidLayer>& layers, const Base& base,
   return std::move(*mesh);
 }
 
-/// A smooth morning: the flux grows from what the start balances, so no stage sees a jump.
+/// A smooth morning. The flux grows from the value that balances the start, so no stage sees a
+/// jump.
 class Morning final : public reference::FaceModel {
  public:
   [[nodiscard]] reference::FaceFlux at(double time_s, double face_k) const noexcept override {
@@ -91,7 +94,7 @@ TEST_P(LayerStacks, ConvergeInTimeWithSecondOrder) {
 }
 
 TEST_P(LayerStacks, ConvergeInSpaceWithAtLeastSecondOrderAcrossInterfaces) {
-  // Face, first layer, its interface and below it.
+  // Compare the face, the first layer, its interface and two depths below it.
   const double layer_m = GetParam()->front().thickness_m;
   const double depths_m[] = {0.0, 0.5 * layer_m, layer_m, 1.5 * layer_m, 2.5 * layer_m};
   const auto at_refine = [&](std::uint32_t refine) {
@@ -134,11 +137,11 @@ TEST_P(LayerStacks, StoreWhatFlowsIn) {
     const FaceState night{300.0, 12.0, 281.0};
     const FaceState noon{900.0, 20.0, 295.0};
     solver.advance({0.0, 3600.0, night, noon}, kEmissivity);
-    solver.advance({3600.0, 9000.0, night, night}, kEmissivity);  // a shadow: the flux jumps
+    solver.advance({3600.0, 9000.0, night, night}, kEmissivity);  // a shadow makes the flux jump
     const double stored = solver.stored_heat_j_m2() - before;
     ASSERT_GT(std::abs(stored), 1.0e4);
     EXPECT_NEAR(solver.heat_in_j_m2() / stored, 1.0, 1e-9);
-    // A held face: the balance is what defines its flux, the change of heat must still add up.
+    // The flux of a held face follows from the balance. The change of heat must still add up.
     solver.advance_held(9600.0, 300.0, 310.0);
     EXPECT_NEAR(solver.heat_in_j_m2() / (solver.stored_heat_j_m2() - before), 1.0, 1e-9);
   }
@@ -233,8 +236,8 @@ TEST(LayerSolver, RepeatsItselfExactlyWhateverRanBefore) {
 }
 
 TEST(LayerSolver, AnswersThePeriodicStateOfItsOwnMatrices) {
-  // Frequency and time domain share mesh and matrices: a day's swing started on the periodic state
-  // must come back to it.
+  // Frequency and time domain share mesh and matrices. A day's swing that starts on the periodic
+  // state must therefore return to it.
   const LayerMesh mesh = mesh_of(kGround, {BaseKind::fixed_temperature, 290.0});
   const double angular = 2.0 * physics::kPi / 86400.0;
   const auto response = periodic_response(mesh, angular);
@@ -295,7 +298,7 @@ TEST(LayerSolver, SurvivesHostileBodiesStepsAndFluxes) {
                 solver.advance({1.0e8, 1.0e8 + length_s, face, face}, 1.0);
                 solver.advance({1.0e8 + length_s, 1.0e8 + 2.0 * length_s, dark, dark}, 0.02);
                 ASSERT_TRUE(std::isfinite(solver.face_k()));
-                // No hotter than the flux can hold, no colder than space.
+                // The face must not be hotter than the flux allows, nor colder than space.
                 ASSERT_GT(solver.face_k(), 0.0);
                 ASSERT_LT(solver.face_k(), 2100.0);
                 ASSERT_TRUE(std::isfinite(solver.temperature_k(0.4 * thickness_m)));
@@ -341,6 +344,26 @@ TEST(LayerMesh, MassRowsArePositiveDominantAndAddUpToTheBody) {
     }
     EXPECT_NEAR(sum / heat, 1.0, 1e-12);
   }
+}
+
+TEST(LayerSolver, InputAgainstTheContractStopsTheProgram) {
+  const LayerMesh mesh = mesh_of(kGround, {BaseKind::fixed_temperature, 290.0});
+  LayerSolver solver(mesh);
+  const auto starts = [&](const std::vector<ProfilePoint>& profile) {
+    return test::failed_check([&] { solver.start(profile, 0.0); });
+  };
+  EXPECT_NE(starts({}).find("!profile.empty()"), std::string::npos);
+  EXPECT_NE(starts({{0.1, 290.0}, {0.0, 290.0}}).find("is_sorted"), std::string::npos);
+  EXPECT_EQ(starts({{0.0, 290.0}}), "");
+  const std::vector<double> nodes(mesh.nodes() - 1, 290.0);
+  EXPECT_NE(test::failed_check([&] { solver.start_nodes(nodes, 0.0); }).find("node_k.size()"),
+            std::string::npos);
+  EXPECT_NE(test::failed_check([&] {
+              (void)reference::periodic_response(mesh, 0.0);
+            }).find("angular_per_s > 0.0 (0 > 0)"),
+            std::string::npos);
+  const FaceState face{100.0, 10.0, 290.0};
+  EXPECT_DEATH(solver.advance({60.0, 120.0, face, face}, kEmissivity), "segment.start_s");
 }
 
 }  // namespace

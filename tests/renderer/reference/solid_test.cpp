@@ -14,6 +14,7 @@
 #include "emit/reference/solid_grid.hpp"
 #include "emit/reference/solid_lateral.hpp"
 #include "emit/reference/solid_solver.hpp"
+#include "support/failed_check.hpp"
 #include "support/sanitizer.hpp"
 
 namespace emit::reference {
@@ -44,8 +45,8 @@ FaceCondition adiabatic(const SolidFace&) {
 }
 void no_drive(double, std::span<const double>, const FaceDrive&) {}
 
-/// A cosine along every axis of an insulated cube fades as a whole: T = e^(-3 a pi^2 t) cos cos
-/// cos.
+/// Test of a cosine along every axis of an insulated cube, which fades as a whole: T = e^(-3 a pi^2
+/// t) cos cos cos.
 struct Mode {
   double error_k = 0.0;
   double estimate_k = 0.0;
@@ -86,7 +87,7 @@ TEST(ReferenceSolid, ErrorFallsWithTheSquareOfTheCellLength) {
 }
 
 TEST(ReferenceSolid, ErrorFallsWithTheSquareOfTheStep) {
-  // Against many steps on the same grid: what is left is the error in time.
+  // Compare with many steps on the same grid. The difference is the error in time.
   const SolidMaterial material{1.0, 1000.0};
   const auto final_k = [&](std::size_t steps) {
     SolidOptions options;
@@ -103,7 +104,7 @@ TEST(ReferenceSolid, ErrorFallsWithTheSquareOfTheStep) {
     const auto faces = solver->faces();
     const DriveFunction drive = [faces](double t, std::span<const double>, const FaceDrive& out) {
       for (std::size_t f = 0; f < faces.size(); ++f) {
-        // Starts without a kink: the order is that of the scheme, not of the start.
+        // Start without a kink: the order must be that of the scheme, not of the start.
         out.absorbed_w_m2[f] = 413.0 + 300.0 * std::pow(std::sin(t / 40.0), 3) * faces[f].low_m.x;
         out.film_w_m2_k[f] = 12.0;
         out.air_k[f] = 300.0;
@@ -134,7 +135,8 @@ TEST(ReferenceSolid, BothLinearSolversGiveTheSameTemperatures) {
   EXPECT_NEAR(direct.error_k, iterated.error_k, 1e-6);
 }
 
-/// A wall of concrete that stands on asphalt, lit from above and by a flux that moves along.
+/// A wall of concrete that stands on asphalt. It is lit from above and by a flux that moves along
+/// it.
 class Corner {
  public:
   explicit Corner(double tolerance_k) {
@@ -339,6 +341,16 @@ TEST(ReferenceSolidLateral, ErrorFallsWithRefinement) {
   const double coarse = rms(0.5);
   const double fine = rms(1.0);
   EXPECT_GT(std::log2(coarse / fine), 1.8) << coarse << ", " << fine;
+}
+
+TEST(ReferenceSolidGrid, NeedsTwoFixedPlacesThatStayApart) {
+  GradedLines wanted;
+  EXPECT_NE(test::failed_check([&] { (void)graded_lines(wanted); }).find("fixed_m.empty()"),
+            std::string::npos);
+  wanted.fixed_m = {0.0, 1e-4};
+  EXPECT_NE(test::failed_check([&] { (void)graded_lines(wanted, 1e-3); }).find("(1 >= 2)"),
+            std::string::npos);
+  EXPECT_EQ(test::failed_check([&] { (void)graded_lines(wanted, 1e-5); }), "");
 }
 
 }  // namespace

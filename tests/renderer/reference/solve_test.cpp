@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The solution of a whole scene: a block on the ground, made here.
+// The solution of a whole scene: a block on the ground that the test builds.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +16,7 @@
 namespace emit::reference {
 namespace {
 
-/// Adds a rectangle a, b, c, d seen counter-clockwise from outside.
+/// Adds a rectangle a, b, c, d, counter-clockwise seen from outside.
 void add_quad(scene::Mesh& mesh, const std::array<glm::dvec3, 4>& corners) {
   const auto first = static_cast<std::uint32_t>(mesh.positions_m.size());
   const glm::dvec3 normal =
@@ -52,7 +52,7 @@ void finish_mesh(TestScene& t, scene::Mesh mesh, std::uint32_t material) {
   t.geometry.instances.push_back(instance);
 }
 
-/// A solid cube of 0.4 m on 6 m of asphalt, a summer's forenoon.
+/// Returns a solid cube of 0.4 m on 6 m of asphalt, on a summer's forenoon.
 TestScene block_scene() {
   TestScene t;
   scene::Material asphalt;
@@ -76,7 +76,7 @@ TestScene block_scene() {
 
   t.scenario.name = "test-block";
   t.scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
-  t.scenario.epoch_utc_ns = 1403330400LL * 1'000'000'000LL;  // 2014-06-21T06:00:00Z
+  t.scenario.epoch_utc_ns = 1403330400LL * 1'000'000'000LL;  // the date is 2014-06-21T06:00:00Z
   t.scenario.materials = t.geometry.materials;
   t.scenario.default_material = "asphalt";
   t.scenario.bands = {{"8-12", 8.0, 12.0, {}}};
@@ -113,7 +113,7 @@ TEST(ReferenceSolve, VoxelModelFindsCoreGroundAndOpenFaces) {
   EXPECT_NEAR(model->steady_k({2.0, 2.0, 0.0}, 303.15), 303.15, 1e-9);
   EXPECT_NEAR(model->steady_k({0.0, 0.0, 0.35}, 303.15), 298.15, 1e-9);
   EXPECT_NEAR(model->steady_k({0.0, 0.0, 0.2}, 303.15), 293.15, 1e-9);
-  // The core takes what lies more than the layers' thickness inside.
+  // The core takes everything that lies deeper than the layers' thickness.
   const SolidGrid& grid = model->grid();
   double core_m3 = 0.0;
   for (std::size_t k = 0; k < grid.count(2); ++k) {
@@ -130,7 +130,7 @@ TEST(ReferenceSolve, VoxelModelFindsCoreGroundAndOpenFaces) {
   EXPECT_NEAR(core_m3, 0.2 * 0.2 * 0.3, 1e-6);
 }
 
-/// Largest cell along an axis that reaches into [low, high].
+/// Returns the largest cell along an axis that reaches into [low, high].
 double widest_m(const SolidGrid& grid, std::size_t axis, double low, double high) {
   const std::vector<double>& lines = grid.lines_m[axis];
   double widest = 0.0;
@@ -143,7 +143,8 @@ double widest_m(const SolidGrid& grid, std::size_t axis, double low, double high
 TEST(ReferenceSolve, CellsAreSmallWhereAShadowEdgeIsStillSharp) {
   const TestScene t = block_scene();
   const glm::dvec3 to_sun = glm::normalize(glm::dvec3(1.0, 0.2, 1.0));
-  // The block, 0.4 m high, shades x from -0.2 to -0.6; the edge of its top's shadow lies at -0.6.
+  // The block is 0.4 m high and shades x from -0.2 to -0.6. The edge of its top's shadow lies at
+  // -0.6.
   VoxelOptions late;
   late.suns = {{to_sun, 0.0}};
   VoxelOptions old;
@@ -154,18 +155,18 @@ TEST(ReferenceSolve, CellsAreSmallWhereAShadowEdgeIsStillSharp) {
   EXPECT_LT(widest_m(sharp->grid(), 0, -0.605, -0.595), 1.2 * late.shadow_cell_m);
   EXPECT_GT(widest_m(soft->grid(), 0, -0.605, -0.595), 2.0 * late.shadow_cell_m);
   EXPECT_LT(widest_m(soft->grid(), 0, -0.605, -0.595), 1.2 * late.swept_cell_m);
-  // Along y: the edge of the top at -0.28, and the uprights' shadows from the foot to it.
+  // Along y there are the edge of the top at -0.28 and the uprights' shadows from the foot to it.
   EXPECT_LT(widest_m(sharp->grid(), 1, -0.285, -0.275), 1.2 * late.shadow_cell_m);
-  // The sides' shadows run nearly along x: their width is across y, x need not be fine.
+  // The sides' shadows run nearly along x. Their width is across y, so x need not be fine.
   EXPECT_GT(widest_m(sharp->grid(), 0, -0.45, -0.35), 2.0 * late.shadow_cell_m);
-  // Where no edge lies, nothing changes.
+  // Nothing changes in places without an edge.
   EXPECT_NEAR(widest_m(sharp->grid(), 0, 2.0, 2.5), widest_m(soft->grid(), 0, 2.0, 2.5), 0.05);
   EXPECT_GT(sharp->grid().cells.size(), soft->grid().cells.size());
 }
 
 TEST(ReferenceSolve, ShapesThatAreNotSolidsAreRefusedByName) {
   TestScene t = block_scene();
-  t.geometry.meshes[1].submeshes[0].index_count -= 6;  // one side is missing
+  t.geometry.meshes[1].submeshes[0].index_count -= 6;  // removes one side
   const auto open = VoxelModel::build(t.scenario, t.geometry, {});
   ASSERT_FALSE(open.has_value());
   EXPECT_NE(open.error().text.find("object 'scene'"), std::string::npos);
@@ -206,7 +207,7 @@ TEST(ReferenceSolve, FarFromTheBlockThreeDimensionsAgreeWithOne) {
 
 TEST(ReferenceSolve, ShadowLiesAwayFromTheSun) {
   const TestScene t = block_scene();
-  // Straight down on the block; north is at the top of the picture.
+  // The camera looks straight down on the block; north is at the top of the image.
   SolveView view = view_at(3600.0, {0.0, 0.0, 6.0}, {0.0, 0.0, 0.0});
   const auto images = solve(t.scenario, t.geometry, std::span(&view, 1), quick());
   ASSERT_TRUE(images.has_value()) << images.error().text;

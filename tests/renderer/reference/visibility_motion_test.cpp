@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Movers cast the shadow of where they stood, and answers do not depend on how work is split.
+// Entities cast the shadow of their pose at the instant asked for, and answers do not depend on how
+// work is split.
 #include <tbb/global_control.h>
 #include <glm/gtc/quaternion.hpp>
 
@@ -19,8 +20,8 @@ using test::sun_at;
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 
-/// A box on the ground driving east at 1 m/s from `start`, level; box in body axes (x forward, z
-/// down).
+/// Returns a level box that drives east at 1 m/s from `start`. The box is in body axes (x forward,
+/// z down).
 RayMover driving_east(const glm::dvec3& start) {
   const glm::dquat east = physics::world_from_body_heading_pitch_roll(0.5 * physics::kPi, 0.0, 0.0);
   RayMover mover{.entity_id = 5};
@@ -56,9 +57,9 @@ TEST_P(Movers, ShadeWhereTheyStoodAtTheInstant) {
   EXPECT_EQ(up(5.0, 0), 1.0);
   EXPECT_EQ(up(0.0, 5 * kSecondNs), 1.0);
   EXPECT_EQ(up(5.0, 5 * kSecondNs), 0.0);
-  EXPECT_NEAR(up(5.0, 3 * kSecondNs), 0.5, 5e-3);  // the front edge right overhead
-  EXPECT_EQ(up(10.0, 15 * kSecondNs), 0.0);        // parked
-  EXPECT_EQ(up(10.0, 20 * kSecondNs), 1.0);        // switched off
+  EXPECT_NEAR(up(5.0, 3 * kSecondNs), 0.5, 5e-3);  // the front edge is right overhead
+  EXPECT_EQ(up(10.0, 15 * kSecondNs), 0.0);        // the box is parked
+  EXPECT_EQ(up(10.0, 20 * kSecondNs), 1.0);        // the box is switched off
   EXPECT_FALSE(scene.at(20 * kSecondNs).mover_on(0));
 
   const auto hit =
@@ -67,7 +68,7 @@ TEST_P(Movers, ShadeWhereTheyStoodAtTheInstant) {
   EXPECT_EQ(hit->mover, 0U);
   EXPECT_EQ(hit->object, 1U);
   EXPECT_NEAR(hit->distance_m, 0.5, 1e-9);
-  EXPECT_NEAR(hit->geometric_normal.z, -1.0, 1e-12);  // the underside
+  EXPECT_NEAR(hit->geometric_normal.z, -1.0, 1e-12);  // the underside was hit
 }
 
 TEST_P(Movers, DoNotShadeTheirOwnOutside) {

@@ -25,7 +25,7 @@ inline reference::RayScene make_scene(
   return std::move(*scene);
 }
 
-/// Box with its faces outwards.
+/// Returns a box with its faces outwards.
 inline reference::RayMesh box_mesh(const glm::dvec3& low, const glm::dvec3& high) {
   reference::RayMesh mesh;
   for (int i = 0; i < 8; ++i) {
@@ -47,7 +47,7 @@ inline reference::RayMesh ground_mesh(double reach_m) {
   return mesh;
 }
 
-/// Closed, convex up to `ripple`, with long thin triangles at the poles.
+/// Returns a closed mesh that is convex up to `ripple`, with long thin triangles at the poles.
 inline reference::RayMesh sphere_mesh(double radius_m, std::uint32_t rings, std::uint32_t sectors,
                                       double ripple = 0.0) {
   reference::RayMesh mesh;

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays as the truth about visibility: no leak, no self-shading, the same answers anywhere in the
-// world, and an error that falls with the number of rays and is known.
+// Rays as the truth about visibility: no ray leaks, no surface shades itself, answers are the same
+// anywhere in the world, and the error is known and falls with the number of rays.
 #include <glm/ext/matrix_double4x4.hpp>
 #include <glm/ext/matrix_transform.hpp>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "emit/reference/sampling.hpp"
 #include "emit/reference/sun_disc.hpp"
 #include "renderer/reference/visibility_support.hpp"
+#include "support/failed_check.hpp"
 
 namespace emit {
 namespace {
@@ -54,7 +57,7 @@ TEST_P(ClosedSurface, IsNeverPassedAtEdgesAndVertices) {
       shoot(from, a, false);
       shoot(from, 0.5 * (a + b), false);
       shoot(from, a + share(random) * (b - a), false);
-      // From the middle nothing hides anything, and whole meridians are seen edge-on.
+      // A point in the middle sees everything, and it sees whole meridians edge-on.
       shoot(GetParam(), a, true);
     }
   }
@@ -84,7 +87,8 @@ TEST_P(ClosedSurface, DoesNotShadeItselfWhereConvex) {
 }
 
 TEST(ReferenceVisibility, AllQueriesAreTheSameAHundredKilometresAway) {
-  // Coordinates in 1/1024 m stay exact in double at 100 km: so must every answer.
+  // Coordinates in 1/1024 m stay exact in double at 100 km. Every answer must therefore be the
+  // same.
   const glm::dvec3 away{100000.0, -65536.0, 1024.0};
   std::vector<RayMesh> here{ground_mesh(64.0), box_mesh({-1.0, -0.5, 0.0}, {1.0, 0.5, 1.25})};
   std::vector<RayMesh> there = here;
@@ -139,7 +143,7 @@ TEST(ReferenceVisibility, TurningSceneAndSunTogetherChangesNothing) {
                 1e-10);
     EXPECT_NEAR(tumbled.at(0).sun_visible_frac_clipped(tumbled_point, tumble * to_sun).value_frac,
                 sun, 1e-10);
-    // Open share of the hemisphere, whatever is up.
+    // The open share of the hemisphere does not depend on which way is up.
     const auto a = upright.at(0).sky_view(point, 4096);
     const auto b = tumbled.at(0).sky_view(tumbled_point, 4096);
     EXPECT_NEAR(a.sky_cosine.value_frac + a.ground_cosine.value_frac,
@@ -150,7 +154,7 @@ TEST(ReferenceVisibility, TurningSceneAndSunTogetherChangesNothing) {
 }
 
 TEST(ReferenceVisibility, ErrorFallsWithTheNumberOfRaysAndStaysWithinItsEstimate) {
-  // Edge of a wall at 45 degrees, the sun's centre around it.
+  // The sun's centre passes the edge of a wall at 45 degrees.
   const auto scene = make_scene({box_mesh({-2.0, -1000.0, 0.0}, {-1.0, 1000.0, 1.0})});
   const auto now = scene.at(0);
   double last_rms = 1.0;
@@ -169,7 +173,7 @@ TEST(ReferenceVisibility, ErrorFallsWithTheNumberOfRaysAndStaysWithinItsEstimate
       outside += error > 3.0 * sampled.error_frac + 1.0 / rays ? 1 : 0;
     }
     const double rms = std::sqrt(sum2 / kEdges);
-    EXPECT_LT(rms, 0.4 * last_rms) << rays;  // eight times the rays: random ones would give 0.35
+    EXPECT_LT(rms, 0.4 * last_rms) << rays;  // eight times the rays; random ones would give 0.35
     EXPECT_LE(outside, 2) << rays;
     last_rms = rms;
   }
@@ -205,7 +209,8 @@ TEST(ReferenceVisibility, TangentPlaneCutsTheDisc) {
   for (const double elevation_deg : {-0.3, -0.2, -0.05, 0.0, 0.1, 0.26, 0.3}) {
     const double v = std::clamp(elevation_deg / 0.2666, -1.0, 1.0);
     const double half_plane =
-        0.5 + (std::asin(v) + v * std::sqrt(1.0 - v * v)) / physics::kPi;  // planar
+        // The planar approximation.
+        0.5 + (std::asin(v) + v * std::sqrt(1.0 - v * v)) / physics::kPi;
     const glm::dvec3 to_sun = sun_at(77.0, elevation_deg);
     EXPECT_NEAR(scene.at(0).sun_visible_frac_clipped(point, to_sun).value_frac, half_plane, 5e-7);
     EXPECT_NEAR(scene.at(0).sun_visible_frac(point, to_sun, {.rays = 16384}).value_frac, half_plane,
@@ -218,7 +223,7 @@ TEST(ReferenceVisibility, CoincidentAndDegenerateTrianglesAreHarmless) {
   const auto nan = std::numeric_limits<double>::quiet_NaN();
   mesh.positions_m.insert(mesh.positions_m.end(),
                           {{0.0, 0.0, 0.0}, {nan, 0.0, 0.0}, {1e300, 0.0, 0.0}});
-  // Twice the same, a point, a line, one with NaN.
+  // Add a triangle twice, a point, a line, and a triangle with NaN.
   mesh.indices.insert(mesh.indices.end(), {0, 1, 2, 0, 2, 3, 4, 4, 4, 0, 4, 2, 0, 1, 5});
   const auto scene = make_scene({mesh});
   EXPECT_EQ(scene.dropped_triangles(), 1U);
@@ -229,7 +234,7 @@ TEST(ReferenceVisibility, CoincidentAndDegenerateTrianglesAreHarmless) {
     const glm::dvec3 above{place(random), place(random), 2.0};
     const auto hit = scene.at(0).first_hit({above, {0.0, 0.0, -1.0}});
     ASSERT_TRUE(hit.has_value());
-    EXPECT_LT(hit->primitive, 2U);  // the first of the coincident ones
+    EXPECT_LT(hit->primitive, 2U);  // the first one of the coincident triangles
     EXPECT_NEAR(hit->distance_m, 2.0, 1e-12);
     // The doubled plane does not shade a point on it.
     EXPECT_FALSE(scene.at(0).occluded({{above.x, above.y, 0.0}, {0.6, 0.0, 0.8}}));
@@ -301,7 +306,7 @@ TEST(ReferenceVisibility, RefusesMeshesThatMakeNoSense) {
   mesh.mover = 0;
   EXPECT_FALSE(reference::RayScene::create({{mesh}, {}}).has_value());
   EXPECT_FALSE(reference::RayScene::create({{}, {reference::RayMover{}}}).has_value());
-  // No geometry at all is a scene: everything is open.
+  // A scene without geometry is valid: everything is open.
   const auto empty = make_scene({});
   EXPECT_EQ(empty.at(0).sky_view({.normal = {0.0, 0.0, 1.0}}, 64).sky_cosine.value_frac, 1.0);
 }
@@ -341,6 +346,28 @@ TEST(ReferenceSampling, DirectionsHaveTheirMoments) {
   }
   EXPECT_NEAR(cap / kRays, 0.5 * (1.0 + std::cos(semi_rad)), 1e-6);
   EXPECT_NEAR(cosine / kRays, 2.0 / 3.0, 1e-4);
+}
+
+TEST(Visibility, QueriesAgainstTheContractStopTheProgram) {
+  const auto scene = make_scene({ground_mesh(10.0)});
+  const auto now = scene.at(0);
+  const auto message_of = [](const auto& query) { return test::failed_check(query); };
+  std::vector<reference::HemisphereRay> rays(4);
+  EXPECT_NE(message_of([&] { now.hemisphere({}, rays); }).find("point.normal"), std::string::npos);
+  const std::vector<SurfacePoint> points(3);
+  std::vector<std::uint8_t> blocked(2);
+  EXPECT_NE(message_of([&] {
+              now.occluded(points, {0.0, 0.0, 1.0}, blocked);
+            }).find("(3 == 2)"),
+            std::string::npos);
+  std::vector<double> seen(4);
+  EXPECT_NE(message_of([&] {
+              now.sun_visible_frac(points, {0.0, 0.0, 1.0}, {}, false, seen);
+            }).find("(3 == 4)"),
+            std::string::npos);
+  EXPECT_NE(message_of([&] { (void)now.mover_pose(0); }).find("(0 < 0)"), std::string::npos);
+  EXPECT_NE(message_of([&] { (void)now.triangle(0, 2); }).find("(2 < 2)"), std::string::npos);
+  EXPECT_NE(message_of([&] { (void)now.triangle(1, 0); }).find("(1 < 1)"), std::string::npos);
 }
 
 }  // namespace

@@ -132,6 +132,17 @@ TEST(LoadScene, default_material_is_entry_zero_and_its_use_is_warned_of) {
   EXPECT_EQ(scene->mappings.at(0).by, MappedBy::fallback);
 }
 
+TEST(LoadScene, materials_in_use_that_are_more_than_dry_layers_are_warned_of_by_name) {
+  ScenarioDesc scenario = one_triangle(R"({"name":"steel"})", R"(,"material":0)");
+  EXPECT_TRUE(load_scene(scenario)->warnings.empty());
+  for (Material& material : scenario.materials) material.dry_layers_valid = false;
+  const auto scene = load_scene(scenario);
+  ASSERT_TRUE(scene);
+  ASSERT_EQ(scene->warnings.size(), 1U);
+  EXPECT_THAT(scene->warnings[0],
+              AllOf(HasSubstr("material 'steel'"), HasSubstr("dry_layers_valid = false")));
+}
+
 TEST(LoadScene, unknown_library_names_are_configuration_errors) {
   ScenarioDesc scenario = one_triangle();
   scenario.objects[0].material = "ashpalt";

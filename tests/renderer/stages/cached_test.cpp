@@ -171,7 +171,7 @@ TEST(RendererCached, WarmUpReportsAndStops) {
   EXPECT_EQ(last_frac, 1.0);
   EXPECT_GT(run.renderer().scene_stats().samples, 100U);
   EXPECT_FALSE(run.renderer().scene_stats().samples_full);
-  EXPECT_TRUE(sampling_warnings(run.renderer().scene_stats()).empty());
+  EXPECT_TRUE(warm_up_warnings(run.renderer().scene_stats()).empty());
 }
 
 TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
@@ -186,7 +186,7 @@ TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
   EXPECT_LE(run.renderer().scene_stats().samples, 300U);
   EXPECT_TRUE(run.renderer().scene_stats().samples_full);
   EXPECT_FALSE(run.renderer().scene_stats().coarse_meshes);
-  EXPECT_EQ(sampling_warnings(run.renderer().scene_stats()).size(), 1U);
+  EXPECT_EQ(warm_up_warnings(run.renderer().scene_stats()).size(), 1U);
 }
 
 TEST(RendererCached, AMeshFinerThanThePixelsIsSampledAsTheCameraNeedsIt) {

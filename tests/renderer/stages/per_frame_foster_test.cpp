@@ -6,15 +6,16 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "emit/physics/constants.hpp"
 #include "emit/physics/foster.hpp"
-#include "support/renderer_scene.hpp"
 #include "history/foster_history.hpp"
+#include "support/renderer_scene.hpp"
 
 namespace emit::test {
 namespace {
 
 constexpr std::int64_t kHourNs = 3'600'000'000'000;
-constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 constexpr std::uint32_t kWidth = 320;
 constexpr std::uint32_t kHeight = 256;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The driver names its threads as threads/software_threads expects, and frames place them.
+// Tests that the driver names its threads as threads/software_threads expects, and that frames
+// place them.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -21,9 +22,9 @@ TEST(SoftwareThreads, AreThoseOfTheDriver) {
     EXPECT_TRUE(context->threads().compute().empty());
     return;
   }
-  constexpr int kMostOfMesa = 16;
+  constexpr int kMaxOfMesa = 16;
   const int cores = CoreSet::of(0).count();
-  if (cores < 2 || cores > kMostOfMesa || std::getenv("LP_NUM_THREADS") != nullptr) {
+  if (cores < 2 || cores > kMaxOfMesa || std::getenv("LP_NUM_THREADS") != nullptr) {
     GTEST_SKIP() << "not one thread per core";
   }
   EXPECT_EQ(context->threads().raster().size(), static_cast<std::size_t>(cores));
@@ -33,7 +34,7 @@ TEST(SoftwareThreads, AreThoseOfTheDriver) {
 TEST(SoftwareThreads, ThoseThatDrawHaveACoreEachBehindAFrame) {
   const auto scenario =
       test::instant_scenario(test::write_quads("ground", {test::ground(10.0, 10.0)}));
-  std::vector<pid_t> drawing;  // the driver shares them among contexts
+  std::vector<pid_t> drawing;  // threads that draw; the driver shares them among contexts
   {
     const auto context = gl::EglContext::create(-1, false);
     ASSERT_TRUE(context) << context.error().text;

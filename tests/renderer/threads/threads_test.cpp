@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where threads run: the cores of helpers in frames and of the driver's threads.
+// Tests of the cores on which threads run: the helpers within frames and the driver's threads.
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <sched.h>
@@ -20,7 +20,7 @@
 namespace emit::threads {
 namespace {
 
-/// The calling thread on one core; where it was comes back.
+/// Restricts the calling thread to one core during its lifetime.
 class OnCore {
  public:
   OnCore(const CoreSet& all, std::size_t index) : before_(CoreSet::of(0)) {
@@ -52,7 +52,7 @@ TEST_F(Threads, SetsOfCoresSayWhereAThreadRuns) {
     const int core = ::sched_getcpu();
     EXPECT_EQ(here.without(core).count(), 0);
     EXPECT_EQ(all_.without(core).count(), all_.count() - 1);
-    // Nowhere to run: stays.
+    // An empty set leaves the thread where it is.
     here.without(core).give_to(0);
     EXPECT_EQ(CoreSet::of(0), here);
   }
@@ -60,7 +60,7 @@ TEST_F(Threads, SetsOfCoresSayWhereAThreadRuns) {
   EXPECT_EQ(all_.without(-1), all_);
 }
 
-/// Where the threads of a pool other than the caller may run.
+/// Returns the cores of a pool's threads other than the caller.
 CoreSet cores_of_helper(WorkerPool& pool) {
   CoreSet cores;
   const auto caller = std::this_thread::get_id();
@@ -77,7 +77,7 @@ TEST_F(Threads, HelpersStayOffTheCallersCore) {
   WorkerPool pool(2);
   for (const std::size_t index : {std::size_t{0}, std::size_t{1}, std::size_t{0}}) {
     const OnCore on(all_, index);
-    // The second time every helper has come up.
+    // All helpers have started at the second call.
     static_cast<void>(cores_of_helper(pool));
     EXPECT_EQ(cores_of_helper(pool), all_.without(::sched_getcpu())) << index;
   }
@@ -89,8 +89,8 @@ TEST_F(Threads, HelpersThatOutnumberTheCoresRunAnywhere) {
   for (int round = 0; round < 20; ++round) EXPECT_TRUE(cores_of_helper(pool) == all_);
 }
 
-/// Threads as Mesa starts them: those that draw give themselves names, as does one that does
-/// something else, and nobody waits for that; those that compute have none.
+/// Threads as Mesa starts them. Those that draw take their names later, as does one that does
+/// something else, and nothing waits for that. Those that compute have no name.
 class DriverThreads {
  public:
   DriverThreads(std::size_t raster, std::size_t compute)
@@ -179,6 +179,13 @@ TEST_F(Threads, ADriverWithAnotherNumberOfThreadsIsLeftAlone) {
   for (const auto& threads : {driver.raster(), driver.compute()}) {
     for (const pid_t thread : threads) EXPECT_EQ(CoreSet::of(thread), all_);
   }
+}
+
+TEST(ThreadsContract, CoresAndPartsMustExist) {
+  const CoreSet all = CoreSet::of(0);
+  EXPECT_DEATH(static_cast<void>(all.only(static_cast<std::size_t>(all.count()))), "index <");
+  WorkerPool pool(1);
+  EXPECT_DEATH(pool.run(10, 0, [](std::size_t, std::size_t) {}), "loop.grain > 0U");
 }
 
 }  // namespace

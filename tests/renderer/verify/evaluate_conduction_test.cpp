@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conduction models against exact tables, every row, as a user runs them.
+// Tests of the conduction models against exact tables, every row, through the evaluator as a user
+// runs it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,13 +26,13 @@ test::OracleRun run(const std::string& model, const std::string& table, std::uin
   request.history.modes = {{2181.0, 0.357}, {9438.0, 0.643}};
   const auto result = verify::evaluate(request);
   EXPECT_TRUE(result.has_value()) << result.error().text;
-  auto expected = verify::CsvTable::read(request.table);
-  auto got = verify::CsvTable::parse(result.value_or("empty\n"), "result");
+  auto expected = physics::CsvTable::read(request.table);
+  auto got = physics::CsvTable::parse(result.value_or("empty\n"), "result");
   EXPECT_TRUE(expected.has_value() && got.has_value());
   return {std::move(*expected), std::move(*got)};
 }
 
-/// Largest error of a column; `scale` divides row by row.
+/// Returns the largest error of a column; `scale` divides row by row.
 double worst(const test::OracleRun& run, const std::string& column,
              const std::vector<double>& scale = {}) {
   const auto values = run.column(column);
@@ -55,7 +56,7 @@ TEST_P(ConductionBodies, MeetTheBarAndConvergeUnderRefinement) {
   const auto [model, table] = GetParam();
   const double coarse = worst(run(model, table, 1), "T");
   const double fine = worst(run(model, table, 2), "T");
-  EXPECT_LT(coarse, 1e-3);  // a tenth of the 10 mK bar
+  EXPECT_LT(coarse, 1e-3);  // a tenth of the limit of 10 mK
   EXPECT_LT(fine, coarse / 3.0);
   RecordProperty("max_error_k", std::to_string(coarse));
 }
@@ -64,7 +65,7 @@ TEST(ConductionLayered, ImpedanceOfEveryRowConverges) {
   const auto coarse = run("conduction-layered", "cond_layered_periodic.csv", 1);
   const auto modulus = *coarse.expected.numbers("absZ");
   const double coarse_frac = worst(coarse, "absZ", modulus);
-  EXPECT_LT(coarse_frac, 1e-4);  // the bar is 1e-3
+  EXPECT_LT(coarse_frac, 1e-4);  // the limit is 1e-3
   EXPECT_LT(worst(coarse, "argZ"), 1e-4);
   const auto fine = run("conduction-layered", "cond_layered_periodic.csv", 2);
   EXPECT_LT(worst(fine, "absZ", modulus), coarse_frac / 3.5);
@@ -85,8 +86,8 @@ TEST(SurfaceHistory, ReferenceFollowsEveryRowOfTheTable) {
 }
 
 TEST(SurfaceHistory, ModelsOfTheFastPathStayWithinTheirKnownError) {
-  // Kelvin of model error over the four scenarios: the single layer without convection is far
-  // off, four states of the stack follow within a kelvin.
+  // These are the model errors in kelvin over the four scenarios. The single layer without
+  // convection is far off; four states of the stack follow within a kelvin.
   const auto worst_k = [](verify::HistoryModel model) {
     const auto history = run("surface-history", "fv_reference.csv", 1, model);
     double largest = 0.0;

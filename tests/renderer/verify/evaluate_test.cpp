@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 #include "result_writer.hpp"
 
@@ -15,63 +15,6 @@ namespace {
 
 using physics::ErrorCode;
 using testing::HasSubstr;
-
-CsvTable parse(const std::string& text) {
-  auto table = CsvTable::parse(text, "t.csv");
-  EXPECT_TRUE(table.has_value()) << table.error().text;
-  return std::move(*table);
-}
-
-physics::Error parse_error(const std::string& text) {
-  auto table = CsvTable::parse(text, "t.csv");
-  EXPECT_FALSE(table.has_value());
-  return table ? physics::Error{} : table.error();
-}
-
-TEST(CsvTable, ReadsColumnsByNameWithEitherLineEndCommentsAndBlanks) {
-  const CsvTable table =
-      parse("# a comment\r\n\r\nb, a,name\r\n1.5 ,-2e3,x\r\n#2,3,y\n\nnan,+4,z z");
-  ASSERT_EQ(table.rows(), 2U);
-  EXPECT_THAT(*table.numbers("a"), testing::ElementsAre(-2000.0, 4.0));
-  EXPECT_THAT(*table.numbers("b"), testing::ElementsAre(1.5, testing::IsNan()));
-  EXPECT_THAT(*table.texts("name"), testing::ElementsAre("x", "z z"));
-  EXPECT_EQ(table.line_of(0), 4U);
-  EXPECT_EQ(table.line_of(1), 7U);
-}
-
-TEST(CsvTable, KeepsItsCellsWhenMoved) {
-  CsvTable table = parse("a\n7\n");
-  const CsvTable moved = std::move(table);
-  EXPECT_THAT(*moved.texts("a"), testing::ElementsAre("7"));
-}
-
-TEST(CsvTable, NumbersOutsideDoubleBecomeZeroOrInfinity) {
-  EXPECT_THAT(*parse("a\n1e-400\n-1e400\n").numbers("a"),
-              testing::ElementsAre(0.0, -std::numeric_limits<double>::infinity()));
-}
-
-TEST(CsvTable, AMissingColumnIsBadUsageAndNamed) {
-  const auto result = parse("a,b\n1,2\n").numbers("lambda");
-  ASSERT_FALSE(result.has_value());
-  EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
-  EXPECT_THAT(result.error().text, HasSubstr("missing column 'lambda'"));
-}
-
-TEST(CsvTable, MalformedTablesNameFileAndLine) {
-  EXPECT_THAT(parse_error("a,b\n1,2\n3\n").text, HasSubstr("t.csv:3: 1 cells"));
-  EXPECT_THAT(parse_error("a,a\n").text, HasSubstr("column 'a' appears twice"));
-  EXPECT_THAT(parse_error("a,,b\n").text, HasSubstr("empty column name"));
-  EXPECT_THAT(parse_error("# only comments\n").text, HasSubstr("no header row"));
-  EXPECT_THAT(parse_error("").text, HasSubstr("no header row"));
-  for (const std::string bad : {"x", "1x", "", "0x10", "1 2", "--1"}) {
-    const auto result = parse("a,b\n" + bad + ",1\n").numbers("a");
-    ASSERT_FALSE(result.has_value()) << bad;
-    EXPECT_EQ(result.error().code, ErrorCode::parse);
-    EXPECT_THAT(result.error().text, HasSubstr("t.csv:2: column 'a'"));
-  }
-  EXPECT_EQ(CsvTable::read("/nonexistent/t.csv").error().code, ErrorCode::not_found);
-  EXPECT_EQ(CsvTable::read("/").error().code, ErrorCode::io);
-}
 
 TEST(ResultWriter, DigitsRoundTripAndNanHasNoSign) {
   const std::vector<double> exact[] = {{0.1, -std::numeric_limits<double>::quiet_NaN()}};
@@ -135,7 +78,8 @@ TEST_F(Evaluate, BalanceReadsBothSensesOfTheAlbedoColumn) {
   ASSERT_TRUE(result.has_value()) << result.error().text;
   EXPECT_THAT(*result, testing::StartsWith("E_abs,Ta,Ts,Ts_conv\n62.5,"));
   EXPECT_THAT(*result, HasSubstr("\n187.5,"));
-  // Emits more than conduction can bring: no radiative and no plain equilibrium temperature.
+  // The surface emits more than conduction can supply, so there is no radiative and no plain
+  // equilibrium temperature.
   EXPECT_THAT(*result, HasSubstr("\n-4000,nan,nan,"));
   EXPECT_THAT(*result, testing::Not(testing::EndsWith("nan\n")));
 
@@ -156,7 +100,8 @@ TEST_F(Evaluate, BandRadianceIsZeroAtZeroAndNanBelow) {
 const char* const kCaseHeader = "case,kind,n,tau1,tau2,tau3,w1,w2,w3,x0_1,x0_2,x0_3\n";
 
 TEST_F(Evaluate, RelaxationHoldsTheDriveOutsideItsNodes) {
-  // tau so short that the state is the drive: this shows which drive is used when.
+  // The time constant is so short that the state equals the drive, which shows the drive in use at
+  // each time.
   auto r = request("relaxation",
                    "t_s,case\n5,c\n15,c\n25,c\n99,c\n5,l\n15,l\n20,l\n99,l\n-1,l\n0,l\nnan,l\n");
   r.cases = write("cases.csv", std::string(kCaseHeader) +
@@ -165,18 +110,18 @@ TEST_F(Evaluate, RelaxationHoldsTheDriveOutsideItsNodes) {
   r.nodes = write("nodes.csv", "case,t_s,u_K\nc,10,300\nl,20,320\nc,20,310\nl,10,300\nother,0,1\n");
   const auto result = evaluate(r);
   ASSERT_TRUE(result.has_value()) << result.error().text;
-  auto lines = CsvTable::parse(*result, "out");
+  auto lines = physics::CsvTable::parse(*result, "out");
   const auto t = *lines->numbers("T_K");
   ASSERT_EQ(t.size(), 11U);
-  EXPECT_NEAR(t[0], 300.0, 1e-9);  // before the first node its drive holds
+  EXPECT_NEAR(t[0], 300.0, 1e-9);  // the first node's drive holds before it
   EXPECT_NEAR(t[1], 300.0, 1e-9);  // constant from node to node
   EXPECT_NEAR(t[2], 310.0, 1e-9);
-  EXPECT_NEAR(t[3], 310.0, 1e-9);  // and after the last
+  EXPECT_NEAR(t[3], 310.0, 1e-9);  // the last node's drive holds after it
   EXPECT_NEAR(t[4], 300.0, 1e-9);
-  EXPECT_NEAR(t[5], 310.0 - 0.002, 1e-9);  // a ramp is followed one tau behind
+  EXPECT_NEAR(t[5], 310.0 - 0.002, 1e-9);  // the state follows a ramp one tau behind
   EXPECT_NEAR(t[6], 320.0 - 0.002, 1e-9);
   EXPECT_NEAR(t[7], 320.0, 1e-9);
-  EXPECT_TRUE(std::isnan(t[8]));  // before the state is given
+  EXPECT_TRUE(std::isnan(t[8]));  // the time is before that of the given state
   EXPECT_EQ(t[9], 250.0);
   EXPECT_TRUE(std::isnan(t[10]));
 }
@@ -185,7 +130,7 @@ TEST_F(Evaluate, RelaxationTakesTwoNodesAtOneInstantAsAJump) {
   auto r = request("relaxation", "case,t_s\na,9.999\na,10.5\n");
   r.cases = write("cases.csv", std::string(kCaseHeader) + "a,linear,1,1e-3,1,1,1,0,0,300,0,0\n");
   r.nodes = write("nodes.csv", "case,t_s,u_K\na,0,300\na,10,300\na,10,320\na,20,320\n");
-  const auto t = *CsvTable::parse(*evaluate(r), "out")->numbers("T_K");
+  const auto t = *physics::CsvTable::parse(*evaluate(r), "out")->numbers("T_K");
   EXPECT_NEAR(t[0], 300.0, 1e-9);
   EXPECT_NEAR(t[1], 320.0, 1e-9);
 }
@@ -223,7 +168,7 @@ TEST_F(Evaluate, BadUsageIsTold) {
 
   auto missing = request("band-radiance", "T\n300\n");
   EXPECT_EQ(evaluate(missing).error().code, ErrorCode::invalid_argument);
-  EXPECT_THAT(evaluate(missing).error().text, HasSubstr("missing column 'T_K'"));
+  EXPECT_THAT(evaluate(missing).error().text, HasSubstr("column 'T_K' is missing"));
   missing.table = "/nonexistent.csv";
   EXPECT_EQ(evaluate(missing).error().code, ErrorCode::not_found);
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the two thermal methods see, by itself, on geometry built from rows: the frame's soft shadow
-// and obscurance, with bounds a little above what was measured over the whole tables, and the rays
-// of the method `cached` against every row of them.
+// Tests of the visibility of the two thermal methods, by itself, on geometry built from rows: the
+// frame's soft shadow and obscurance, with limits a little above the values measured over the whole
+// tables, and the rays of the method `cached` against every row.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>
 
-#include "csv_table.hpp"
+#include "emit/physics/csv.hpp"
 #include "emit/verify/evaluate.hpp"
 #include "support/oracle_check.hpp"
 
@@ -15,7 +15,7 @@ namespace emit {
 namespace {
 
 verify::EvaluateRequest gpu_request(const std::string& model, const std::filesystem::path& table,
-                                      const std::string& method) {
+                                    const std::string& method) {
   verify::EvaluateRequest request;
   request.model = model;
   request.table = table;
@@ -34,7 +34,7 @@ std::vector<double> on_gpu(const std::string& model, const std::string& text,
     ADD_FAILURE() << result.error().text;
     return {};
   }
-  const auto table = verify::CsvTable::parse(*result, "result");
+  const auto table = physics::CsvTable::parse(*result, "result");
   return table ? table->numbers(column).value_or(std::vector<double>{}) : std::vector<double>{};
 }
 
@@ -53,7 +53,7 @@ TEST(EvaluateVisibilityGpu, ShadowEdgeFollowsTheDisc) {
 }
 
 TEST(EvaluateVisibilityGpu, WallShadowIsNearTheExactShare) {
-  // Core shadow, a penumbra, full sun.
+  // The rows are core shadow, penumbra and full sun.
   const auto f = on_gpu("wall-shadow",
                         "H,e_deg,x\n1,45,0.8\n0.48371750116348267,31.859729766845703,"
                         "0.7844818234443665\n1,45,1.2\n",
@@ -76,14 +76,14 @@ TEST(EvaluateVisibilityGpu, ObscuranceKnowsFlatConcaveAndConvex) {
   EXPECT_NEAR(f[3], 0.875, 0.05);
 }
 
-/// Every row of a column against the exact value; rows without one must have none.
+/// Expects that every row of a column is near the exact value, and that rows without one have none.
 void expect_all_near(const std::string& model, const std::string& table, const std::string& column,
                      const std::string& exact, double bar) {
   const auto file = test::oracle_file(table);
   const auto result = verify::evaluate(gpu_request(model, file, "cached"));
   ASSERT_TRUE(result.has_value()) << result.error().text;
-  const auto rows = verify::CsvTable::read(file);
-  const auto found = verify::CsvTable::parse(*result, "result");
+  const auto rows = physics::CsvTable::read(file);
+  const auto found = physics::CsvTable::parse(*result, "result");
   ASSERT_TRUE(rows.has_value() && found.has_value());
   const auto expected = rows->numbers(exact);
   const auto got = found->numbers(column);

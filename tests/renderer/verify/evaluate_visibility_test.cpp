@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Visibility models against tables computed with 60 digits, through the evaluator as a user runs
-// it.
+// Tests of the visibility models against tables computed with 60 digits, through the evaluator as a
+// user runs it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 namespace emit {
 namespace {
 
-using verify::EvaluateRequest;
 using test::oracle_file;
+using verify::EvaluateRequest;
 
 test::OracleRun run(const std::string& model, const std::string& table,
                     std::optional<std::uint32_t> rays = std::nullopt) {
@@ -25,8 +25,8 @@ test::OracleRun run(const std::string& model, const std::string& table,
   request.rays = rays;
   auto result = verify::evaluate(request);
   EXPECT_TRUE(result.has_value()) << result.error().text;
-  auto expected = verify::CsvTable::read(request.table);
-  auto got = verify::CsvTable::parse(result.value_or("empty\n"), "result");
+  auto expected = physics::CsvTable::read(request.table);
+  auto got = physics::CsvTable::parse(result.value_or("empty\n"), "result");
   EXPECT_TRUE(expected.has_value() && got.has_value());
   return {std::move(*expected), std::move(*got)};
 }
@@ -60,12 +60,12 @@ TEST(EvaluateVisibility, SunDiscIsExactOnTheSphere) {
 }
 
 TEST(EvaluateVisibility, LimbDarkenedDiscMatchesThePlanarTable) {
-  const auto table = verify::CsvTable::read(oracle_file("sun_disc_edge.csv"));
+  const auto table = physics::CsvTable::read(oracle_file("sun_disc_edge.csv"));
   ASSERT_TRUE(table.has_value());
   const auto delta_deg = *table->numbers("delta_deg");
   const auto expected = *table->numbers("f_limb0.6");
   for (std::size_t i = 0; i < delta_deg.size(); ++i) {
-    // A wall below the horizon, seen from its foot's height.
+    // The wall is below the horizon, seen from the height of its foot.
     const double e = delta_deg[i] * physics::kDegree;
     const reference::SunDisc disc{.to_centre = {std::cos(e), 0.0, std::sin(e)},
                                   .semi_angle_rad = physics::kSunSemiAngleRad,

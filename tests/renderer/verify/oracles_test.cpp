@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The CPU models against tables computed with 60 digits, through the evaluator as a user runs it.
+// Tests of the CPU models against tables computed with 60 digits, through the evaluator as a user
+// runs it.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,27 +12,27 @@
 namespace emit {
 namespace {
 
+using test::run_oracle;
 using verify::Device;
 using verify::Precision;
-using test::run_oracle;
 
-/// Double must reach the rounding of the inputs; float32 the bars of the shader path, whose source
-/// it shares.
-struct Bars {
+/// Error limits. Double must reach the rounding of the inputs; float32 must reach the limits of the
+/// shader path, whose source it shares.
+struct Limits {
   Precision precision;
   double equilibrium_frac;  // relative error of T
   double equilibrium_k;
   double balance_k;
-  double radiance_frac;  // 200..3000 K
+  double radiance_frac;  // relative error within 200..3000 K
   double relaxation_k;
 };
-class PhysicsOracles : public testing::TestWithParam<Bars> {};
+class PhysicsOracles : public testing::TestWithParam<Limits> {};
 
 INSTANTIATE_TEST_SUITE_P(Cpu, PhysicsOracles,
-                         testing::Values(Bars{Precision::float64, 1e-14, 1e-9, 1e-9, 1e-13, 1e-9},
-                                         Bars{Precision::float32, 3e-7, 1e-3, 1e-3, 1e-4, 2e-3}),
-                         [](const auto& bars) {
-                           return bars.param.precision == Precision::float64 ? "double" : "float";
+                         testing::Values(Limits{Precision::float64, 1e-14, 1e-9, 1e-9, 1e-13, 1e-9},
+                                         Limits{Precision::float32, 3e-7, 1e-3, 1e-3, 1e-4, 2e-3}),
+                         [](const auto& limits) {
+                           return limits.param.precision == Precision::float64 ? "double" : "float";
                          });
 
 TEST_P(PhysicsOracles, EquilibriumTemperatureOfEveryRow) {
@@ -65,7 +66,7 @@ TEST_P(PhysicsOracles, BandRadianceOfEveryRow) {
       if (in_range) {
         EXPECT_NEAR(c.got[i] / c.expected[i], 1.0, GetParam().radiance_frac) << name << " " << i;
       } else if (GetParam().precision == Precision::float64 && c.expected[i] > 1e-300) {
-        // e^-x with x in the hundreds carries the rounding of x itself.
+        // The rounding of x itself shows in e^-x for x in the hundreds.
         EXPECT_NEAR(c.got[i] / c.expected[i], 1.0, 5e-13) << name << " " << i;
       } else {
         EXPECT_NEAR(c.got[i], c.expected[i], 1e-3 * c.expected[i] + 1e-30) << name << " " << i;
@@ -88,7 +89,7 @@ TEST(SunOracle, PositionOfEveryRow) {
   const auto elevation = run.column("elevation");
   const auto azimuth = run.column("azimuth");
   for (std::size_t i = 0; i < elevation.got.size(); ++i) {
-    // A tenth of the 0.01 deg that shadows need; the truncated series gives 0.0004.
+    // The limit is a tenth of the 0.01 deg that shadows need. The truncated series reaches 0.0004.
     EXPECT_NEAR(elevation.got[i], elevation.expected[i], 1e-3) << "row " << i;
     const double turn = std::remainder(azimuth.got[i] - azimuth.expected[i], 360.0);
     EXPECT_NEAR(turn * std::cos(elevation.expected[i] * physics::kDegree), 0.0, 1e-3)

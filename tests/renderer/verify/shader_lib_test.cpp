@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The GLSL physics functions on the device, against double on the CPU.
+// Tests of the GLSL physics functions on the device, against double on the CPU.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,9 +14,9 @@
 namespace emit {
 namespace {
 
+using test::run_oracle;
 using verify::Device;
 using verify::Precision;
-using test::run_oracle;
 
 TEST(ShaderLib, EquilibriumTemperatureOfEveryRowWithinAMillikelvin) {
   const auto run = run_oracle("equilibrium", "quartic_roots.csv", Precision::float32, Device::gpu);
@@ -47,7 +47,8 @@ TEST(ShaderLib, BandRadianceWithinOneInTenThousandFrom200KelvinUp) {
         EXPECT_NEAR(c.got[i] / c.expected[i], 1.0, 1e-4)
             << name << " at " << temperature[i] << " K";
       } else {
-        // Colder than any scene: the table is coarser there, the radiance next to nothing.
+        // The row is colder than any scene: the table is coarser there, and the radiance almost
+        // zero.
         EXPECT_NEAR(c.got[i], c.expected[i], 1e-3 * c.expected[i] + 1e-30)
             << name << " at " << temperature[i] << " K";
       }
@@ -64,8 +65,8 @@ TEST(ShaderLib, RelaxationAtEveryQueryWithinTwoMillikelvin) {
 }
 
 TEST(ShaderLib, EquilibriumOfAMillionRandomSurfacesIsFiniteAndWithinAMillikelvin) {
-  // lambda 0.02..400, d 1e-4..1, eps 0.02..1, Ta 0..1000, Tc 200..400; one in four draws on an
-  // edge.
+  // The inputs are lambda 0.02..400, d 1e-4..1, eps 0.02..1, Ta 0..1000, Tc 200..400. One in four
+  // draws lies on an edge.
   constexpr std::size_t kRows = 1000000;
   constexpr std::size_t kStride = 7;
   std::mt19937_64 random(20260621);
@@ -121,7 +122,8 @@ TEST(ShaderLib, EquilibriumOfAMillionRandomSurfacesIsFiniteAndWithinAMillikelvin
 }
 
 TEST(ShaderLib, SourcesThatGiveNoTemperatureStayFinite) {
-  // Columns lambda, d, eps, Ta, Tc, hc, Tair: no emission, no source, a negative source, foil.
+  // The columns are lambda, d, eps, Ta, Tc, hc, Tair; the rows no emission, no source, a negative
+  // source and a foil.
   const std::vector<float> rows = {1,   1,     0, 300, 300, 0, 0,  //
                                    1,   1,     1, 0,   0,   0, 0,  //
                                    1,   1,     1, 0,   -90, 0, 0,  //

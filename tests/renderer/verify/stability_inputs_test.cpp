@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inputs of the stability sweeps and the counting of their results, on the CPU.
+// Tests of the stability sweeps' inputs and of the counting of their results, on the CPU.
 #include <gtest/gtest.h>
 
 #include <cmath>

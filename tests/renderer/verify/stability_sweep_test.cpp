@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reduced runs of the stability sweeps: the shader functions themselves under random and hostile
-// input.
+// Short runs of the stability sweeps: the shader functions themselves under random and hostile
+// inputs.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ const SweepReport& equilibrium() {
 
 const std::vector<verify::NamedBand>& bands() {
   static const std::vector<verify::NamedBand> kBands{{"3-5", {3.0, 5.0, {}}},
-                                                       {"8-12", {8.0, 12.0, {}}}};
+                                                     {"8-12", {8.0, 12.0, {}}}};
   return kBands;
 }
 
@@ -75,7 +75,8 @@ TEST(StabilitySweep, HostileSurfacesAreFlaggedAndNeverGiveNaN) {
 }
 
 TEST(StabilitySweep, PublishedClosedFormFailsWhereTheSolverDoesNot) {
-  // As typeset it is wrong by tens of kelvin everywhere; corrected it loses its digits.
+  // The formula as typeset is wrong by tens of kelvin everywhere; the corrected one loses its
+  // digits.
   for (const char* by : {"shader", "cpu float32"}) {
     EXPECT_GT(row(equilibrium(), "printed-eq6", by).p99_error_k, 10.0) << by;
     const SweepResult& corrected = row(equilibrium(), "corrected-eq6", by);

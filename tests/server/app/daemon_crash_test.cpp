@@ -55,7 +55,7 @@ class Witness {
   Witness(const Witness&) = delete;
   Witness& operator=(const Witness&) = delete;
 
-  [[nodiscard]] bool client::wait_for(std::size_t frames) {
+  [[nodiscard]] bool wait_for(std::size_t frames) {
     for (int i = 0; i < 3000 && count() < frames; ++i) std::this_thread::sleep_for(10ms);
     return count() >= frames;
   }

@@ -287,7 +287,7 @@ TEST_F(DaemonFaults, ASilentHostIsFlaggedStaleUntilItSpeaksAgain) {
   start("mode = \"ig-clock\"\nrate_hz = 100\nhorizon_ms = 30");
   const auto client = open();
   ASSERT_NE(client, nullptr);
-  const auto client::wait_for = [&](bool stale) {
+  const auto wait_for = [&](bool stale) {
     for (int frames = 0; frames < 3000; ++frames) {
       const auto frame = client->receive(kLongNs);
       ASSERT_TRUE(frame.has_value() && *frame != nullptr);
@@ -300,9 +300,10 @@ TEST_F(DaemonFaults, ASilentHostIsFlaggedStaleUntilItSpeaksAgain) {
     }
     FAIL() << "never " << (stale ? "stale" : "fresh");
   };
+  ask();  // a canned frame is stale only once a host has spoken and fallen silent
   for (int round = 0; round < 3; ++round) {
-    ASSERT_NO_FATAL_FAILURE(client::wait_for(true));
-    ASSERT_NO_FATAL_FAILURE(client::wait_for(false));
+    ASSERT_NO_FATAL_FAILURE(wait_for(true));
+    ASSERT_NO_FATAL_FAILURE(wait_for(false));
   }
   EXPECT_EQ(client->counters().lost, 0U);
 }

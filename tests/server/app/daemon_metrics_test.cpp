@@ -77,6 +77,9 @@ class DaemonMetrics : public testing::Test {
 
 TEST_F(DaemonMetrics, TellFramesTimesClientsAndWarnings) {
   EXPECT_EQ(get("/metrics").status, 200);
+  EXPECT_EQ(get("/metrics?x=1&y=2").status, 200);
+  EXPECT_EQ(get("/healthz?").status, 200);
+  EXPECT_EQ(get("/metricsx").status, 404);
   EXPECT_EQ(get("/healthz").status, 200);
   auto client = client::FrameClient::connect("tcp://" + daemon_->control());
   ASSERT_TRUE(client.has_value());

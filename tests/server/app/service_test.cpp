@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "app/service_health.hpp"
-#include "rt/realtime.hpp"
+#include "host/realtime.hpp"
 #include "support/daemon_process.hpp"
 #include "support/notify_socket.hpp"
 

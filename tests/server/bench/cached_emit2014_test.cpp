@@ -71,15 +71,15 @@ struct Errors {
 Errors errors_of(const scene::ScenarioDesc& scenario, const physics::Pose& pose,
                  const std::vector<std::int64_t>& times_ns) {
   const auto shown = last_frame_k(scenario, pose, times_ns);
-  const auto converged = cli::ConvergedHistory::create(scenario);
+  const auto converged = tool::ConvergedHistory::create(scenario);
   EXPECT_TRUE(converged.has_value());
-  cli::ConvergedOptions options;
+  tool::ConvergedOptions options;
   options.steps = 360;
   const auto picture = converged->picture(
       {times_ns.back(), pose, kWidth, kHeight, scenario.sensor.fov_h_rad}, options);
   EXPECT_TRUE(picture.has_value());
   std::vector<double> errors;
-  for (const cli::ConvergedPixel& pixel : *picture) {
+  for (const tool::ConvergedPixel& pixel : *picture) {
     if (pixel.outline) continue;
     errors.push_back(std::abs(static_cast<double>(shown[pixel.pixel]) -
                               static_cast<double>(pixel.temperature_k)));

@@ -8,12 +8,12 @@
 namespace emit {
 namespace {
 
-cli::HostileFrameResult hostile(const std::string& test) {
-  cli::HostileFrameOptions options;
+tool::HostileFrameResult hostile(const std::string& test) {
+  tool::HostileFrameOptions options;
   options.width_px = 80;
   options.height_px = 64;
   options.only = {test};
-  const auto results = cli::run_hostile_frames(options);
+  const auto results = tool::run_hostile_frames(options);
   if (!results || results->size() != 1) {
     ADD_FAILURE() << (results ? "no result" : results.error().text);
     return {};
@@ -21,7 +21,7 @@ cli::HostileFrameResult hostile(const std::string& test) {
   return results->front();
 }
 
-void expect_finite(const cli::HostileFrameResult& r) {
+void expect_finite(const tool::HostileFrameResult& r) {
   EXPECT_GT(r.frames, 0U) << r.test;
   EXPECT_EQ(r.nan_count, 0U) << r.test;
   EXPECT_EQ(r.inf_count, 0U) << r.test;
@@ -81,9 +81,9 @@ TEST(StabilityFrames, HostileCamerasNeverGiveNaN) {
 }
 
 TEST(StabilityFrames, AnUnknownTestIsRefused) {
-  cli::HostileFrameOptions options;
+  tool::HostileFrameOptions options;
   options.only = {"frame-of-mind"};
-  EXPECT_FALSE(cli::run_hostile_frames(options).has_value());
+  EXPECT_FALSE(tool::run_hostile_frames(options).has_value());
 }
 
 }  // namespace

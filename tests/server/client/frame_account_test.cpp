@@ -14,7 +14,7 @@ protocol::FrameHeader header(std::uint64_t number, std::uint32_t flags = 0, std:
   return out;
 }
 
-TEST(client::FrameAccount, TellsSkippedFramesFromLostOnes) {
+TEST(FrameAccount, TellsSkippedFramesFromLostOnes) {
   client::FrameAccount account;
   account.take(header(5));
   EXPECT_EQ(account.counters.lost, 0U) << "the first one";
@@ -30,7 +30,7 @@ TEST(client::FrameAccount, TellsSkippedFramesFromLostOnes) {
   EXPECT_EQ(account.counters.lost, 5U) << "numbers of another run tell nothing, ids do";
 }
 
-TEST(client::FrameAccount, FramesWithoutANumberStandForOneEach) {
+TEST(FrameAccount, FramesWithoutANumberStandForOneEach) {
   client::FrameAccount account;
   account.set_every_nth(3);
   account.take(header(1));

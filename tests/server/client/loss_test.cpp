@@ -116,7 +116,7 @@ TEST(FaultInjector, DoublesHoldsBackAndSpoilsWhatItSays) {
 using OpenFrame = protocol::Reassembler::OpenFrame;
 using Kind = client::ResendPlanner::Step::Kind;
 
-TEST(client::ResendPlanner, AsksOnceAGapHasSettledThenAgainThenGivesUp) {
+TEST(ResendPlanner, AsksOnceAGapHasSettledThenAgainThenGivesUp) {
   client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
   std::vector<OpenFrame> open{{7, 10, true}};
   auto step = planner.next(open, 1000);
@@ -137,7 +137,7 @@ TEST(client::ResendPlanner, AsksOnceAGapHasSettledThenAgainThenGivesUp) {
   EXPECT_EQ(planner.next(open, 21'900).kind, Kind::give_up);
 }
 
-TEST(client::ResendPlanner, AFrameWhoseEndIsOutstandingIsGivenLongerTime) {
+TEST(ResendPlanner, AFrameWhoseEndIsOutstandingIsGivenLongerTime) {
   client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
   const std::vector<OpenFrame> open{{7, 10, false}};
   EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);
@@ -150,7 +150,7 @@ TEST(client::ResendPlanner, AFrameWhoseEndIsOutstandingIsGivenLongerTime) {
   EXPECT_TRUE(step.tail) << "nothing came for long";
 }
 
-TEST(client::ResendPlanner, AnAnswerThatWasLostInPartIsFollowedUntilNothingComes) {
+TEST(ResendPlanner, AnAnswerThatWasLostInPartIsFollowedUntilNothingComes) {
   client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
   std::vector<OpenFrame> open{{7, 10, true}};
   EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);
@@ -167,7 +167,7 @@ TEST(client::ResendPlanner, AnAnswerThatWasLostInPartIsFollowedUntilNothingComes
   EXPECT_EQ(planner.next(open, now_ns + 20'000).kind, Kind::give_up);
 }
 
-TEST(client::ResendPlanner, EveryFrameCountsForItself) {
+TEST(ResendPlanner, EveryFrameCountsForItself) {
   client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 1});
   std::vector<OpenFrame> open{{7, 10, true}};
   EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);

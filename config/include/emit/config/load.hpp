@@ -12,63 +12,65 @@
 #include "emit/physics/error.hpp"
 #include "emit/scene/scene_desc.hpp"
 
-/// Reading scenarios and daemon configurations. Setup only; any thread; no global state but the
-/// process environment, which is read once per call.
+/// Readers of scenarios and daemon configurations. Setup only; any thread. The only global state is
+/// the environment of the process, which is read once per call.
 ///
-/// Order of precedence: defaults < file < EMIT_* environment < overrides (`--set`). Environment
-/// names are the key in upper case with `_` for `.`: thermal.steps is EMIT_THERMAL_STEPS. Only
-/// known keys are looked up; other EMIT_* variables are left alone.
+/// Order of precedence: defaults < file < EMIT_* environment < overrides (`--set`). The name of a
+/// variable is the key in upper case with `_` for `.`: thermal.steps is EMIT_THERMAL_STEPS. An
+/// EMIT_* variable that names no key of a scenario or a daemon is an error.
 ///
-/// Overrides are "key=value": the value is read as TOML, and as plain text where that fails.
+/// An override is "key=value". The value is read as TOML, and as plain text where that fails.
 /// Elements of arrays of tables are addressed by index or name: `object[truck].scale=2`,
 /// `material[0].base_k=290`. Relative paths in overrides and in the environment start at the
 /// working directory, those in a file at that file's folder, and `share:` at the data folders.
 namespace emit::config {
 
 struct LoadOptions {
-  /// glTF files must exist. Off where a scenario is examined without its geometry.
+  /// glTF files have to exist. It is false where a scenario is examined without its geometry.
   bool require_scene_files = true;
-  /// "NAME=value" entries in place of the process environment.
+  /// Entries "NAME=value" in place of the environment of the process.
   std::optional<std::vector<std::string>> environment;
 };
 
-/// Errors: `config` with one line per fault, "file:line:column: text", in file order as far as
-/// they can be told apart; `not_found` when the file itself does not exist.
+/// Reads and checks a scenario. What is doubtful but no fault goes to ScenarioDesc::warnings.
+/// Errors: `config` with one line per fault, "file:line:column: text"; `not_found` when the file
+/// itself does not exist.
 [[nodiscard]] physics::Result<scene::ScenarioDesc> load_scenario(
     const std::filesystem::path& file, std::span<const std::string> overrides = {},
     const LoadOptions& options = {});
 
-/// The scenario named in the file is resolved (resolve_scenario) but not loaded.
+/// Reads and checks the configuration of emitd. The scenario that it names is found, but not read.
+/// Errors: as of load_scenario().
 [[nodiscard]] physics::Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
                                                         std::span<const std::string> overrides = {},
                                                         const LoadOptions& options = {});
 
-/// Effective configuration as TOML, every key written out. Loading the text again gives the same
-/// values; tables read from CSV files are written inline.
+/// Effective configuration as TOML with every key. Loading the text again gives the same values.
+/// Tables from CSV files stand in the text.
 [[nodiscard]] std::string print_scenario(const scene::ScenarioDesc& scenario);
 [[nodiscard]] std::string print_daemon(const DaemonConfig& daemon);
 
-/// Folders with shipped data, in order of search: EMIT_DATA_DIR, <executable>/../share/emit.
+/// Folders with shipped data in the order of search: EMIT_DATA_DIR, <executable>/../share/emit.
 [[nodiscard]] std::vector<std::filesystem::path> data_directories();
-/// First existing `relative` (such as "scenarios/box.toml") in the data folders. Errors: not_found
-/// naming every place that was tried.
+/// First file `relative` (such as "scenarios/box.toml") in the data folders. Errors: not_found,
+/// which names every place that was tried.
 [[nodiscard]] physics::Result<std::filesystem::path> find_data_file(
     const std::filesystem::path& relative);
-/// A path to an existing file, or the name of a shipped scenario ("box").
+/// Path of a scenario by its path or by the name of a shipped one ("box"). Errors: not_found.
 [[nodiscard]] physics::Result<std::filesystem::path> resolve_scenario(
     std::string_view name_or_path);
 /// Names of the shipped scenarios, sorted.
 [[nodiscard]] std::vector<std::string> shipped_scenarios();
 
-/// Sorts overrides by the file whose keys they name; what fits neither goes to `daemon`, whose
-/// loading then reports the unknown key.
+/// Sorts overrides by the file whose keys they name. Unknown keys go to `daemon`, whose loader
+/// reports them.
 struct SplitOverrides {
   std::vector<std::string> daemon;
   std::vector<std::string> scenario;
 };
 [[nodiscard]] SplitOverrides split_overrides(std::span<const std::string> overrides);
 
-/// The tables of config/README.md, from the one key table.
+/// The tables of config/README.md, made from the key table.
 [[nodiscard]] std::string key_reference_markdown();
 
 }  // namespace emit::config

@@ -6,32 +6,40 @@
 #include <span>
 #include <string_view>
 
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/version.hpp"
 
-/// Host frames: wire bytes (Protobuf emit.v1.HostFrame) to plain structs and back.
+/// Codec for host frames. It converts the wire bytes (Protobuf emit.v1.HostFrame, docs/wire.md
+/// section 5) to plain structs and back.
 namespace emit::protocol {
 
-/// Largest encoded host frame: one UDP datagram.
+/// Largest encoded host frame, bytes: the payload of one UDP datagram over IPv4.
 inline constexpr std::size_t kMaxHostFrameBytes = 65507;
 /// Positions farther from the origin are refused, m.
-inline constexpr double kMaxPositionM = 1e8;
+inline constexpr double kMaxPositionM = physics::limits::kMaxPositionM;
 /// Simulation times farther from the scenario's epoch are refused, ns: 1e9 s, as in scenarios.
-inline constexpr std::int64_t kMaxSimTimeNs = 1'000'000'000'000'000'000;
+inline constexpr auto kMaxSimTimeNs =
+    static_cast<std::int64_t>(physics::limits::kMaxSimTimeS * 1e9);
 
-/// Values are those of emit.v1.Status.Code.
+/// Result of decoding a host frame. The values are those of emit.v1.Status.Code.
 enum class DecodeStatus : std::uint8_t {
   ok = 1,
-  wrong_version = 2,         ///< protocol_version is not kProtocolVersion
-  oversize = 3,              ///< over kMaxHostFrameBytes or kMaxEntitiesPerFrame
-  malformed = 4,             ///< not a HostFrame, an entity id twice, or beyond kMaxSimTimeNs
-  invalid_pose = 6,          ///< missing part, NaN, infinite, not a unit quaternion, too far away,
-                             ///< or only one of the two rates
-  invalid_environment = 13,  ///< NaN, infinite or outside the ranges of docs/wire.md
+  wrong_version = 2,  ///< protocol_version is not kProtocolVersion
+  oversize = 3,       ///< over kMaxHostFrameBytes or kMaxEntitiesPerFrame
+  /// The bytes are not a HostFrame, an entity id stands twice, or the simulation time exceeds
+  /// kMaxSimTimeNs.
+  malformed = 4,
+  /// A part is missing, a number is NaN or infinite, the quaternion is not of unit length, the
+  /// position is too far away, or only one of the two rates is present.
+  invalid_pose = 6,
+  /// A value is NaN, infinite or outside the range that docs/wire.md gives.
+  invalid_environment = 13,
 };
+/// Returns the English name of a status, for messages. RT-safe.
 [[nodiscard]] std::string_view to_string(DecodeStatus status) noexcept;
 
-/// Memory for decoding, reused from message to message.
+/// Memory for decoding, used again for every message.
 /// Thread: one owner.  Real time: the constructor allocates.
 class HostFrameDecoder {
  public:
@@ -47,24 +55,25 @@ class HostFrameDecoder {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Decodes one emit.v1.HostFrame. `out` is written completely on ok (received_ns becomes 0); on an
-/// error only frame_number, sim_time_ns and run_id are, as far as they could be read, else 0.
-/// Quaternions off unit length by up to 1 % are normalised. Entity ids are not looked up.
-/// RT-safe for messages without unknown fields.
+/// Decodes one emit.v1.HostFrame. On ok `out` is written completely, and received_ns becomes 0. On
+/// an error only frame_number, sim_time_ns and run_id are written, as far as they could be read,
+/// else 0. Quaternions off unit length by up to 1 % are normalised. Entity ids are not looked up.
+/// Thread: the owner of `decoder`.  Real time: RT-safe for messages without unknown fields.
 [[nodiscard]] DecodeStatus decode_host_frame(std::span<const std::byte> bytes,
                                              HostFrameDecoder& decoder,
                                              HostFrameData& out) noexcept;
 
-/// True for an emit.v1.Status with a text, as emitd sends: no HostFrame of this version begins like
-/// one. RT-safe.
+/// Returns true for an emit.v1.Status with a text, which is what emitd sends. No HostFrame of this
+/// version begins like one. RT-safe.
 [[nodiscard]] bool looks_like_status(std::span<const std::byte> bytes) noexcept;
 
-/// Body of a control record that holds nothing but a HostFrame: the HostFrame's bytes, without
-/// parsing it. Empty when it is anything else. RT-safe.
+/// Returns the bytes of the HostFrame in the body of a control record that holds nothing else,
+/// without parsing it. Returns an empty span for any other body. RT-safe.
 [[nodiscard]] std::span<const std::byte> host_frame_in_control_record(
     std::span<const std::byte> body) noexcept;
 
-/// Memory for encoding, reused from message to message.
+/// Memory for encoding, used again for every message.
+/// Thread: one owner.  Real time: the constructor allocates.
 class HostFrameEncoder {
  public:
   HostFrameEncoder();
@@ -72,8 +81,10 @@ class HostFrameEncoder {
   HostFrameEncoder(HostFrameEncoder&&) noexcept;
   HostFrameEncoder& operator=(HostFrameEncoder&&) noexcept;
 
-  /// Bytes of an emit.v1.HostFrame with kProtocolVersion, valid until the next call. Does not check
-  /// the values: what is not valid is refused by the receiver. RT-safe after the first calls.
+  /// Returns the bytes of an emit.v1.HostFrame with kProtocolVersion. They stay valid until the
+  /// next call. The values are not checked: the receiver refuses what is not valid. RT-safe after
+  /// the first calls, which may allocate.
+  /// @pre frame.entity_count <= kMaxEntitiesPerFrame
   [[nodiscard]] std::span<const std::byte> encode(const HostFrameData& frame) noexcept;
 
  private:

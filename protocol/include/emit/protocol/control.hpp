@@ -30,12 +30,12 @@ enum class StatusCode : std::uint8_t {
   invalid_environment = 13,
 };
 
-/// The detail of a `not_allowed` status for a host frame whose run another host has replaced.
+/// Detail of a `not_allowed` status for a host frame whose run another host has replaced.
 inline constexpr std::uint64_t kDetailOldRun = 1U << 16;
 
-/// Returns the English text of a status.
+/// Returns the English text of a status. Thread: any. It allocates.
 /// @param detail  unknown_entity, overloaded: the entity's id; not_allowed: the command's kind or
-///                kDetailOldRun; other codes ignore it.
+///   kDetailOldRun; other codes ignore it.
 [[nodiscard]] std::string status_text(StatusCode code, std::uint64_t detail);
 
 }  // namespace emit::protocol

@@ -16,26 +16,31 @@ class HostFrame;
 class Pose;
 }  // namespace emit::v1
 
-/// Plain structs to and from Protobuf messages, for journal and control connection. The messages
-/// are only named here: who fills them includes "emit/v1/*.pb.h".
+/// Conversion between plain structs and Protobuf messages, for the journal and the control
+/// connection. The messages are only declared here; code that fills them includes "emit/v1/*.pb.h".
+/// Thread: any. These functions may allocate, unless a note says otherwise.
 namespace emit::protocol {
 
+/// Writes the struct into the message. Optional parts that the struct lacks are cleared.
 void to_proto(const physics::Pose& pose, const std::optional<PoseRates>& rates, v1::Pose& out);
 void to_proto(const EntityStateData& entity, v1::EntityState& out);
 void to_proto(const EnvironmentData& environment, v1::Environment& out);
 void to_proto(const HostFrameData& frame, v1::HostFrame& out);
 
-/// The from_proto functions check as decode_host_frame does; on an error `out` is unspecified.
+/// Reads the struct from the message and checks the values as decode_host_frame() does
+/// (docs/wire.md section 5). On an error `out` is unspecified. RT-safe.
 [[nodiscard]] DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose,
                                       std::optional<PoseRates>& rates) noexcept;
 [[nodiscard]] DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out) noexcept;
 [[nodiscard]] DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcept;
 [[nodiscard]] DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out) noexcept;
 
-/// Appends record header and message to `out`, ready for a TCP connection.
+/// Appends a record header and the message to `out`, ready for a TCP connection (docs/wire.md
+/// section 2).
 void append_control_record(const v1::ControlRecord& message, std::vector<std::byte>& out);
 
-/// Body of a control record. False: malformed, or no body is set (a newer peer's).
+/// Parses the body of a control record. Returns false when the body is malformed or holds no
+/// message that this version knows.
 [[nodiscard]] bool parse_control_record(std::span<const std::byte> body, v1::ControlRecord& out);
 
 }  // namespace emit::protocol

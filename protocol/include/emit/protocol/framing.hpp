@@ -9,46 +9,53 @@
 
 #include "emit/protocol/frame_header.hpp"
 
-/// Records on a TCP connection: 12-byte header, then the body (docs/wire.md).
+/// Records on a TCP connection: a 12-byte header, then the body (docs/wire.md section 2).
 namespace emit::protocol {
 
 inline constexpr std::uint32_t kRecordMagic = 0x43524D45;  ///< "EMRC" as bytes E M R C
 inline constexpr std::uint8_t kRecordVersion = 1;
 inline constexpr std::size_t kRecordHeaderBytes = 12;
+/// Default limit of the body of every record that holds no frame, bytes.
 inline constexpr std::uint32_t kDefaultMaxControlBytes = 1u << 20;
 
-/// What the body is. A receiver skips records of a kind that it does not know.
+/// Kind of a record's body. A receiver skips records of an unknown kind.
 enum class RecordKind : std::uint8_t {
   control = 1,  ///< Protobuf emit.v1.ControlRecord
-  frame = 2,    ///< frame header (320 bytes) + pixels, encoded as it says
-  host_frame =
-      3,       ///< Protobuf emit.v1.HostFrame without the envelope: no allocation at the receiver
-  resend = 4,  ///< resend.hpp: fragments that a client is missing; no allocation either
+  frame = 2,    ///< frame header (320 bytes), then the pixels in the encoding that it names
+  /// Protobuf emit.v1.HostFrame without the envelope; the receiver allocates nothing for it.
+  host_frame = 3,
+  /// Request for missing fragments (resend.hpp); the receiver allocates nothing for it.
+  resend = 4,
 };
 
-/// RT-safe.
+/// Writes a record header for a body of `body_bytes` bytes. RT-safe.
 void encode_record_header(RecordKind kind, std::uint32_t body_bytes,
                           std::span<std::byte, kRecordHeaderBytes> out) noexcept;
 
+/// Result of RecordParser::next().
 enum class ParseStatus : std::uint8_t {
-  record,         ///< `record` is filled
-  need_more,      ///< hand over more bytes
-  wrong_magic,    ///< not this protocol, or the stream lost its framing
-  wrong_version,  ///< peer speaks another record version
-  oversize,       ///< length over the limit of its kind
+  record,         ///< a record was taken off
+  need_more,      ///< more bytes are needed
+  wrong_magic,    ///< the peer speaks another protocol, or the stream lost its framing
+  wrong_version,  ///< the peer speaks another record version
+  oversize,       ///< the length exceeds the limit of its kind
 };
+/// Returns the English name of a status, for messages. RT-safe.
 [[nodiscard]] std::string_view to_string(ParseStatus status) noexcept;
 
+/// One record, as RecordParser::next() returns it.
 struct Record {
-  RecordKind kind{};                ///< may hold a value outside the enum
-  std::span<const std::byte> body;  ///< points into the parser
-  /// Frames: CRC-32C of what follows the frame header, summed as it arrived.
+  RecordKind kind{};                ///< kind of the body; it may hold a value outside the enum
+  std::span<const std::byte> body;  ///< body of the record, in the parser's memory
+  /// CRC-32C of the bytes behind the frame header of a frame record, computed as they arrived; 0
+  /// for other kinds.
   std::uint32_t payload_crc32c = 0;
 };
 
+/// Largest body lengths that a parser accepts.
 struct RecordLimits {
-  std::uint32_t max_control_bytes = kDefaultMaxControlBytes;  ///< every kind but frame
-  std::uint32_t max_frame_bytes = 0;  ///< body of a frame record; 0 = frames are refused
+  std::uint32_t max_control_bytes = kDefaultMaxControlBytes;  ///< limit of every kind but frame
+  std::uint32_t max_frame_bytes = 0;  ///< limit of a frame record; 0 refuses frames
 };
 
 /// Cuts a byte stream into records.
@@ -61,26 +68,31 @@ struct RecordLimits {
 /// @endcode
 class RecordParser {
  public:
-  /// Allocates two of the largest record, so that bytes are moved at most once per record.
+  /// Allocates two times the largest record, so that bytes are moved at most once per record.
   explicit RecordParser(const RecordLimits& limits);
 
-  /// Free space behind the bytes held. Invalidates earlier record bodies. Empty after an error.
-  /// Precondition for progress: next() was called until it gave need_more.
+  /// Returns the free space behind the bytes held. The call makes earlier record bodies invalid.
+  /// The span is empty after an error. It is never empty after next() returned need_more.
   [[nodiscard]] std::span<std::byte> writable() noexcept;
 
-  /// `count` bytes of writable() were filled. Precondition: count <= writable().size().
+  /// Takes over the first `count` bytes of writable(), which the caller has filled.
+  /// @pre count is at most the size of the span that writable() returned
   void commit(std::size_t count) noexcept;
 
-  /// Takes the next record off. An error is final until reset(): the framing is lost.
+  /// Takes the next record off the bytes held. An error is final until reset(), because the framing
+  /// is lost.
   [[nodiscard]] ParseStatus next(Record& record) noexcept;
 
-  /// The header at fault after wrong_version (its version) or oversize (its length).
+  /// Returns the field at fault: the magic after wrong_magic, the version after wrong_version, the
+  /// length after oversize.
   [[nodiscard]] std::uint32_t offending_value() const noexcept { return offending_value_; }
 
-  /// Bytes of an unfinished record held: not 0 at the end of a stream means it was cut.
+  /// Returns the number of bytes held of an unfinished record. A value other than 0 at the end of a
+  /// stream means that the stream was cut.
   [[nodiscard]] std::size_t pending_bytes() const noexcept { return end_ - begin_; }
 
-  /// What the record begun still lacks; 0 while its header is not complete. As of the last next().
+  /// Returns how many bytes the unfinished record still lacks, as of the last next(); 0 while its
+  /// header is not complete.
   [[nodiscard]] std::size_t missing_bytes() const noexcept { return missing_; }
 
   /// Forgets everything, for a new connection.
@@ -93,27 +105,29 @@ class RecordParser {
   RecordLimits limits_;
   std::size_t capacity_;
   std::unique_ptr<std::byte[]> buffer_;
-  std::size_t begin_ = 0;   // first byte not yet taken
-  std::size_t end_ = 0;     // behind the last byte held
-  std::size_t summed_ = 0;  // bytes of the record at begin_ that payload_crc32c_ has passed
+  std::size_t begin_ = 0;   // index of the first byte not yet taken
+  std::size_t end_ = 0;     // index behind the last byte held
+  std::size_t summed_ = 0;  // bytes of the record at begin_ that payload_crc32c_ covers
   std::uint32_t payload_crc32c_ = 0;
   std::size_t missing_ = 0;
   ParseStatus error_ = ParseStatus::need_more;
   std::uint32_t offending_value_ = 0;
 };
 
-/// Frame of a frame record or of a file: header and pixels, pointing into the body.
+/// Frame of a frame record or of a file. Its pixels point into the body.
 struct FrameView {
   FrameHeader header;
-  /// Unaligned: header.payload_bytes bytes or, encoded, header.encoded_bytes.
+  /// Pixels, not aligned: header.payload_bytes bytes or, when encoded, header.encoded_bytes.
   std::span<const std::byte> pixels;
 };
 
-/// Errors (protocol): as decode_frame_header, and a body whose length differs from 320 +
-/// payload_bytes or, encoded, encoded_bytes, which is less. Does not check the payload CRC.
+/// Decodes the body of a frame record. The CRC of the pixels is not checked.
+/// Errors (protocol): those of decode_frame_header(), a body length that differs from 320 +
+/// payload_bytes (encoded: 320 + encoded_bytes), or an encoding that is not smaller than the
+/// pixels.
 [[nodiscard]] physics::Result<FrameView> decode_frame_record(std::span<const std::byte> body);
 
-/// CRC-32C of raw pixels equals the header's. RT-safe.
+/// Returns true when the CRC-32C of a frame's raw pixels equals the one in its header. RT-safe.
 [[nodiscard]] bool payload_crc_matches(const FrameView& frame) noexcept;
 
 }  // namespace emit::protocol

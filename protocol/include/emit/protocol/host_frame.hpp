@@ -5,27 +5,33 @@
 #include <optional>
 #include <span>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/frames.hpp"
 
-/// Host frames as plain structs of fixed size: what travels on rings between agents.
+/// Host frames as plain structs of fixed size, which the rings between agents carry (docs/wire.md
+/// section 5).
 namespace emit::protocol {
 
+/// Largest number of entities in one host frame.
 inline constexpr std::size_t kMaxEntitiesPerFrame = 128;
 
+/// Rates of a pose, for prediction.
 struct PoseRates {
   glm::dvec3 velocity_world_m_s{0.0};
   glm::dvec3 angular_rate_body_rad_s{0.0};
 };
 
+/// State of one entity.
 struct EntityStateData {
   std::uint32_t entity_id = 0;
   physics::Pose pose;
-  bool has_pose = false;  ///< false: stays where it is, only on/off changes
+  bool has_pose = false;  ///< false: the entity stays where it is, and only on/off changes
   std::optional<PoseRates> rates;
-  bool on = true;
-  bool teleport = false;
+  bool on = true;         ///< false: the entity is hidden
+  bool teleport = false;  ///< true: the entity jumps to the pose without motion in between
 };
 
+/// Weather from a host frame's simulation time on. The ranges are in docs/wire.md section 5.
 struct EnvironmentData {
   double direct_normal_w_m2 = 0.0;
   double diffuse_horizontal_w_m2 = 0.0;
@@ -37,18 +43,22 @@ struct EnvironmentData {
   std::optional<double> film_w_m2_k;
 };
 
+/// One host frame.
 struct HostFrameData {
   std::uint64_t frame_number = 0;
   std::int64_t sim_time_ns = 0;
   std::uint64_t run_id = 0;
-  std::int64_t received_ns = 0;  ///< wall, TAI; not on the wire
+  std::int64_t received_ns = 0;  ///< wall instant of receipt, ns TAI; it is not on the wire
   physics::Pose seeker;
   std::optional<PoseRates> seeker_rates;
   std::array<EntityStateData, kMaxEntitiesPerFrame> entities;
   std::uint32_t entity_count = 0;
   std::optional<EnvironmentData> environment;
 
+  /// Returns the entities in use.
+  /// @pre entity_count <= kMaxEntitiesPerFrame
   [[nodiscard]] std::span<const EntityStateData> entity_span() const noexcept {
+    EMIT_CHECK_OP(entity_count, <=, kMaxEntitiesPerFrame);
     return {entities.data(), entity_count};
   }
 };

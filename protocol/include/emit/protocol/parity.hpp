@@ -6,31 +6,35 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/check.hpp"
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/fragment.hpp"
 
-/// Forward error correction of a frame's fragments (docs/wire.md section 4): Reed-Solomon erasure
+/// Forward error correction of a frame's fragments (docs/wire.md section 4): a Reed-Solomon erasure
 /// code over groups of fragments. Fragment i belongs to group i modulo the number of groups, so
-/// that datagrams lost in a row fall into different groups. Of a group of k fragments and m parity
-/// fragments any k are enough.
+/// datagrams lost in a row fall into different groups. Any k fragments restore a group of k data
+/// and m parity fragments.
 namespace emit::protocol {
 
-/// Fragments with another layout than kFragmentVersion's: receivers that do not know them drop and
-/// count them.
+/// Version byte of parity fragments. Their layout differs from kFragmentVersion's, so receivers
+/// that do not know them drop and count them.
 inline constexpr std::uint8_t kParityVersion = 2;
-inline constexpr std::uint32_t kMaxFecData = 128;
-inline constexpr std::uint32_t kMaxFecParity = 32;
+inline constexpr std::uint32_t kMaxFecData = physics::limits::kMaxFecData;
+inline constexpr std::uint32_t kMaxFecParity = physics::limits::kMaxFecParity;
 /// What is taken where only "with error correction" was said: at 1 % random loss fewer than one
 /// frame of 1 MB in a thousand stays incomplete.
 inline constexpr std::uint32_t kDefaultFecData = 48;
 inline constexpr std::uint32_t kDefaultFecParity = 5;
 
-/// What the two ends agree on when a client subscribes.
+/// Parameters of the error correction, which the two ends agree on when a client subscribes.
 struct FecParams {
-  std::uint32_t data_fragments = 0;    ///< of a group at most: 1 to kMaxFecData
-  std::uint32_t parity_fragments = 0;  ///< of a group: 1 to kMaxFecParity; 0: no error correction
+  /// Largest number of data fragments in a group: 1 to kMaxFecData.
+  std::uint32_t data_fragments = 0;
+  /// Parity fragments in a group: 1 to kMaxFecParity; 0: no error correction.
+  std::uint32_t parity_fragments = 0;
 
   [[nodiscard]] bool on() const noexcept { return parity_fragments != 0; }
-  /// Off, or within the limits.
+  /// Returns true when the error correction is off or its numbers are within the limits.
   [[nodiscard]] bool valid() const noexcept {
     return !on() || (data_fragments >= 1 && data_fragments <= kMaxFecData &&
                      parity_fragments <= kMaxFecParity);
@@ -38,58 +42,71 @@ struct FecParams {
   friend bool operator==(const FecParams&, const FecParams&) = default;
 };
 
-/// How one frame's fragments fall into groups. Follows from the parameters, the length of the byte
-/// stream and that of a fragment.
+/// Distribution of one frame's fragments over groups. It follows from the parameters, the length of
+/// the byte stream and that of a fragment.
 struct ParityGeometry {
   std::uint32_t total_bytes = 0;
-  std::uint32_t fragment_bytes = 0;  ///< payload of every fragment but the last
+  std::uint32_t fragment_bytes = 0;  ///< length of every payload but the last
   std::uint32_t fragments = 0;
   std::uint32_t groups = 0;
-  std::uint32_t parity_fragments = 0;  ///< per group
+  std::uint32_t parity_fragments = 0;  ///< parity fragments in each group
 
-  /// Precondition: params.on() and valid(); 0 < fragment_bytes <= total_bytes.
+  /// Computes the distribution. RT-safe.
+  /// @pre params.on() && params.valid() && 0 < fragment_bytes <= total_bytes
   [[nodiscard]] static ParityGeometry of(const FecParams& params, std::uint32_t total_bytes,
                                          std::uint32_t fragment_bytes) noexcept;
-  /// Data fragments of a group. Precondition: group < groups.
+  /// Returns the number of data fragments in a group.
+  /// @pre group < groups
   [[nodiscard]] std::uint32_t group_size(std::uint32_t group) const noexcept {
+    EMIT_DCHECK_OP(group, <, groups);
     return (fragments - group - 1) / groups + 1;
   }
+  /// Returns the index within the frame of the fragment at a position of a group.
   [[nodiscard]] std::uint32_t fragment(std::uint32_t group, std::uint32_t position) const noexcept {
     return group + position * groups;
   }
-  /// Payload of a fragment; the code sees shorter ones filled up with zeros.
+  /// Returns the payload length of a fragment. The code treats shorter ones as filled up with
+  /// zeros.
   [[nodiscard]] std::uint32_t bytes_of(std::uint32_t fragment) const noexcept {
     return fragment + 1 == fragments ? total_bytes - fragment * fragment_bytes : fragment_bytes;
   }
+  /// Returns the number of parity fragments of the frame.
   [[nodiscard]] std::uint32_t parity_count() const noexcept { return groups * parity_fragments; }
   friend bool operator==(const ParityGeometry&, const ParityGeometry&) = default;
 };
 
-/// Bytes of parity that a frame of up to `max_total_bytes` can have, whatever its fragments.
+/// Returns the largest number of parity bytes of a frame of up to `max_total_bytes`, for any
+/// fragment length. RT-safe.
+/// @pre params.on() && params.valid()
 [[nodiscard]] std::size_t max_parity_bytes(const FecParams& params,
                                            std::uint32_t max_total_bytes) noexcept;
-/// Groups that such a frame can have.
+/// Returns the largest number of groups of a frame of up to `max_total_bytes`, for any fragment
+/// length. RT-safe.
+/// @pre params.on() && params.valid()
 [[nodiscard]] std::size_t max_parity_groups(const FecParams& params,
                                             std::uint32_t max_total_bytes) noexcept;
 
-/// Header of a parity fragment, kFragmentHeaderBytes long; the payload follows.
+/// Header of a parity fragment. It takes kFragmentHeaderBytes; the payload follows.
 struct ParityHeader {
   std::uint16_t stream_id = 0;
   std::uint32_t frame_id = 0;
   std::uint16_t group = 0;
-  std::uint8_t index = 0;             ///< among the group's parity fragments
-  std::uint8_t parity_fragments = 0;  ///< of each group
-  std::uint32_t total_bytes = 0;      ///< of the frame's byte stream
-  std::uint16_t payload_bytes = 0;    ///< as every data fragment but the last
+  std::uint8_t index = 0;             ///< index among the group's parity fragments
+  std::uint8_t parity_fragments = 0;  ///< parity fragments in each group
+  std::uint32_t total_bytes = 0;      ///< length of the frame's byte stream
+  /// Payload length, the same as that of every data fragment but the last.
+  std::uint16_t payload_bytes = 0;
   std::uint16_t groups = 0;
   std::int64_t sim_time_ns = 0;
 };
 
-/// RT-safe.
+/// Writes the header of a parity fragment. RT-safe.
 void encode(const ParityHeader& header, std::span<std::byte, kFragmentHeaderBytes> out) noexcept;
-/// True when a datagram's header says that it is one of these. RT-safe.
+/// Returns true when a datagram's header is that of a parity fragment. RT-safe.
 [[nodiscard]] bool is_parity(std::span<const std::byte> header) noexcept;
-/// Checks what one datagram alone can tell, given what was agreed. RT-safe.
+/// Decodes the header of a parity fragment and checks everything that a single datagram can show,
+/// given the agreed parameters. RT-safe.
+/// @pre agreed.valid()
 [[nodiscard]] FragmentStatus decode_parity_header(std::span<const std::byte> header,
                                                   std::size_t payload_bytes,
                                                   const FecParams& agreed,
@@ -99,28 +116,33 @@ void encode(const ParityHeader& header, std::span<std::byte, kFragmentHeaderByte
 /// Thread: one owner.  Real time: the constructor allocates, everything else is RT-safe.
 class ParityEncoder {
  public:
-  /// For frames cut like `like`. Precondition: params.on() and valid().
+  /// Prepares for frames that are cut like `like`: the same total and payload length.
+  /// @pre params.on() && params.valid()
   ParityEncoder(const FecParams& params, const Fragmenter& like);
   ~ParityEncoder();
   ParityEncoder(ParityEncoder&&) noexcept;
   ParityEncoder& operator=(ParityEncoder&&) noexcept;
 
-  /// Begins a frame.
+  /// Begins a frame. The datagrams of the frame before become invalid.
   void begin() noexcept { encoded_groups_ = 0; }
-  /// Goes on with the frame of `fragments`, at least one group, until about `budget_bytes` of the
-  /// frame were read. True when every datagram is ready. Precondition: cut like the one before.
+  /// Encodes at least one more group of the frame of `fragments`, and further ones until about
+  /// `budget_bytes` of the frame were read. Returns true when every datagram is ready.
+  /// @pre total_bytes() and payload_bytes() of `fragments` are those of the constructor's `like`
   bool encode_some(const Fragmenter& fragments, std::size_t budget_bytes) noexcept;
 
   [[nodiscard]] const ParityGeometry& geometry() const noexcept { return geometry_; }
   [[nodiscard]] std::uint32_t datagram_count() const noexcept { return geometry_.parity_count(); }
-  /// Of every datagram.
+  /// Returns the length of every datagram.
   [[nodiscard]] std::uint32_t datagram_bytes() const noexcept {
     return geometry_.fragment_bytes + static_cast<std::uint32_t>(kFragmentHeaderBytes);
   }
-  /// Consecutive datagrams, header and payload each, one behind the other. Neighbours belong to
-  /// different groups. Precondition: encode_some() gave true.
+  /// Returns consecutive datagrams, one behind the other, each with header and payload. Neighbours
+  /// belong to different groups.
+  /// @pre encode_some() returned true for this frame, and first + count <= datagram_count()
   [[nodiscard]] std::span<const std::byte> datagrams(std::uint32_t first,
                                                      std::uint32_t count) const noexcept {
+    EMIT_CHECK_OP(encoded_groups_, ==, geometry_.groups);
+    EMIT_CHECK_OP(std::uint64_t{first} + count, <=, datagram_count());
     return std::span(memory_).subspan(std::size_t{first} * datagram_bytes(),
                                       std::size_t{count} * datagram_bytes());
   }
@@ -132,23 +154,26 @@ class ParityEncoder {
   ParityGeometry geometry_;
   std::uint32_t encoded_groups_ = 0;
   std::vector<std::byte> memory_;   // the datagrams, by index within the group, then by group
-  std::vector<std::byte> scratch_;  // fragments that do not lie in one piece
+  std::vector<std::byte> scratch_;  // fragments that do not lie in one piece in the frame
   std::unique_ptr<Code> code_;
 };
 
-/// Brings back the missing fragments of a group.
+/// Restores the missing fragments of a group.
 /// Thread: one owner.  Real time: the constructor allocates, decode() is RT-safe.
 class GroupDecoder {
  public:
-  /// Precondition: params.on() and valid().
+  /// Prepares for groups of these parameters.
+  /// @pre params.on() && params.valid()
   explicit GroupDecoder(const FecParams& params);
   ~GroupDecoder();
   GroupDecoder(GroupDecoder&&) noexcept;
   GroupDecoder& operator=(GroupDecoder&&) noexcept;
 
-  /// `data`: the group's fragments in order, null where missing; `parity`: likewise; `out`: where
-  /// the missing ones go, in order. All of `bytes` length; `out` overlaps none of the others.
-  /// False: fewer parity fragments than missing ones, or nothing is missing.
+  /// Restores the missing fragments of one group. Returns false when fewer parity fragments than
+  /// missing ones are present, or when nothing is missing. All memory is `bytes` long.
+  /// @param data    the group's fragments in order, null where missing
+  /// @param parity  the group's parity fragments in order, null where missing
+  /// @param out     memory for the missing fragments, in order; it overlaps none of the inputs
   [[nodiscard]] bool decode(std::size_t bytes, std::span<const std::byte* const> data,
                             std::span<const std::byte* const> parity,
                             std::span<std::byte* const> out) noexcept;

@@ -13,15 +13,19 @@
 
 namespace emit::protocol {
 
-/// One bit per pixel, row-major: set = received.
+/// Map of the pixels that have arrived: one bit per pixel, row-major. It points into the memory of
+/// the reassembler and is valid as long as its frame.
 class PixelValidity {
  public:
   PixelValidity() = default;
   PixelValidity(std::span<const std::uint64_t> words, std::size_t first_bit) noexcept
       : words_(words), first_bit_(first_bit) {}
-  /// Precondition: index < width_px * height_px of the frame.
+  /// Returns true when the pixel has arrived.
+  /// @pre index < width_px * height_px of the frame
   [[nodiscard]] bool pixel(std::size_t index) const noexcept;
-  /// True when every pixel of [begin, begin + count) arrived, for example of one row.
+  /// Returns true when every pixel of [begin, begin + count) has arrived, for example those of one
+  /// row.
+  /// @pre begin + count <= width_px * height_px of the frame
   [[nodiscard]] bool all(std::size_t begin, std::size_t count) const noexcept;
 
  private:
@@ -29,55 +33,63 @@ class PixelValidity {
   std::size_t first_bit_ = 0;
 };
 
-/// A frame put together from fragments; valid until it is released.
+/// Frame put together from fragments. It is valid until it is released.
 struct ReceivedFrame {
-  FrameHeader header;  ///< kFlagPartial: pixels are missing; kFlagLostBefore: frames_lost_before
+  /// kFlagPartial: pixels are missing; kFlagLostBefore: frames_lost_before > 0.
+  FrameHeader header;
   std::uint16_t stream_id = 0;
   std::uint32_t frame_id = 0;
-  /// False: both copies of the header were lost. Size, format, band and channel are then those of
-  /// the stream's previous frame, sim_time_ns is the fragments', everything else is 0.
+  /// False when both copies of the header were lost. Size, format, band and channel are then those
+  /// of the stream's previous frame, sim_time_ns is the one of the fragments, everything else is 0.
   bool header_known = false;
-  bool complete = false;  ///< every pixel arrived
-  bool crc_ok = false;    ///< complete and the payload CRC matches (when it was checked)
+  bool complete = false;  ///< true when every pixel arrived
+  /// True when the frame is complete and its payload CRC was checked and matches.
+  bool crc_ok = false;
   std::uint64_t missing_px = 0;
-  std::uint32_t frames_lost_before = 0;  ///< frame ids between this and the one handed out before
-  std::uint32_t repaired_fragments = 0;  ///< brought back by error correction
-  std::uint32_t resent_fragments = 0;    ///< that came because they were asked for
-  std::span<const float> pixels;         ///< missing ones are 0; aligned to 64 bytes
+  /// Number of frame ids between this frame and the one handed out before it.
+  std::uint32_t frames_lost_before = 0;
+  std::uint32_t repaired_fragments = 0;  ///< number of fragments that error correction restored
+  /// Number of fragments that arrived because they were requested.
+  std::uint32_t resent_fragments = 0;
+  std::span<const float> pixels;  ///< pixels, aligned to 64 bytes; missing ones are 0
   PixelValidity validity;
 };
 
-/// Counts since construction; plain numbers for the owner's thread.
+/// Counters since construction. They are plain numbers for the owner's thread.
 struct ReassemblerCounters {
-  std::array<std::uint64_t, kFragmentStatusCount> fragments{};  ///< by FragmentStatus
+  /// Number of fragments by FragmentStatus.
+  std::array<std::uint64_t, kFragmentStatusCount> fragments{};
   std::uint64_t frames_complete = 0;
-  std::uint64_t frames_partial = 0;   ///< handed out with missing pixels
-  std::uint64_t frames_unusable = 0;  ///< dropped: no header copy and no earlier frame to go by, or
-                                      ///< a header that contradicts the fragments
-  std::uint64_t frames_lost = 0;      ///< frame ids of which no fragment arrived
+  std::uint64_t frames_partial = 0;  ///< frames handed out with missing pixels
+  /// Frames dropped: no copy of the header arrived and no earlier frame gives the geometry, or the
+  /// header contradicts the fragments.
+  std::uint64_t frames_unusable = 0;
+  std::uint64_t frames_lost = 0;  ///< number of frame ids of which no fragment arrived
   std::uint64_t missing_px = 0;
   std::uint64_t crc_mismatches = 0;
-  std::uint64_t resyncs = 0;              ///< a stream's frame ids started again
-  std::uint64_t fragments_repaired = 0;   ///< brought back by error correction
-  std::uint64_t frames_repaired = 0;      ///< complete because of that
-  std::uint64_t groups_unrepairable = 0;  ///< of frames handed out: lost more than their parity
-  std::uint64_t fragments_resent = 0;     ///< accepted ones that had been asked for
+  std::uint64_t resyncs = 0;             ///< number of restarts of a stream's frame ids
+  std::uint64_t fragments_repaired = 0;  ///< fragments that error correction restored
+  std::uint64_t frames_repaired = 0;     ///< frames that are complete because of error correction
+  /// Groups of frames handed out that lost more fragments than they had parity fragments.
+  std::uint64_t groups_unrepairable = 0;
+  std::uint64_t fragments_resent = 0;  ///< accepted fragments that had been requested
 };
 
-/// Bytes of a frame's byte stream.
+/// Range of bytes in a frame's byte stream.
 struct ByteRange {
   std::uint32_t begin = 0;
   std::uint32_t bytes = 0;
   friend bool operator==(const ByteRange&, const ByteRange&) = default;
 };
 
-/// Puts frames together from fragments: lost, doubled, reordered, interleaved or corrupt ones.
+/// Puts frames together from fragments, which may be lost, doubled, reordered, interleaved or
+/// corrupt.
 ///
-/// Frames of one stream come out in order of frame id. A frame leaves as complete when its last
-/// byte arrives or error correction brings it back, as partial when a newer frame of its stream
-/// completes, when its buffer is needed, or on flush(). Trusts nothing: every offset and length is
-/// checked before a byte is copied. Thread: one owner.  Real time: the constructor allocates,
-/// everything else is RT-safe.
+/// Frames of one stream come out in the order of their frame ids. A frame leaves as complete when
+/// its last byte arrives or error correction restores it. It leaves as partial when a newer frame
+/// of its stream completes, when its buffer is needed, or on flush(). Nothing is trusted: every
+/// offset and length is checked before a byte is copied.
+/// Thread: one owner.  Real time: the constructor allocates, everything else is RT-safe.
 /// @code
 ///   reassembler.push(datagram);
 ///   while (const ReceivedFrame* frame = reassembler.pop()) {
@@ -87,15 +99,20 @@ struct ByteRange {
 /// @endcode
 class Reassembler {
  public:
+  /// Limits and options. Values out of range are raised to the lowest valid one.
   struct Params {
-    std::uint32_t max_payload_bytes = 0;    ///< largest frame accepted, pixels only
-    std::uint32_t buffers = 4;              ///< frames held at once, in work and handed out; >= 2
-    std::uint32_t max_open_per_stream = 2;  ///< newer frames push the oldest out beyond this; >= 1
-    std::uint32_t max_streams = 8;
-    bool check_crc = true;  ///< of complete frames
-    FecParams fec = {};     ///< as agreed with the sender; off: parity fragments are refused
-    /// A complete frame waits for older ones of its stream that may still be asked for: until they
-    /// are complete, given up, or their buffers are needed.
+    /// Largest number of pixel bytes of a frame that is accepted.
+    std::uint32_t max_payload_bytes = 0;
+    /// Number of frames held at once, in work or handed out; at least 2.
+    std::uint32_t buffers = 4;
+    /// Largest number of frames of a stream in work, at least 1. A further one pushes the oldest
+    /// out.
+    std::uint32_t max_open_per_stream = 2;
+    std::uint32_t max_streams = 8;  ///< largest number of streams; at least 1
+    bool check_crc = true;          ///< true: the payload CRC of complete frames is checked
+    FecParams fec = {};  ///< parameters agreed with the sender; off refuses parity fragments
+    /// True: a complete frame waits for older ones of its stream that may still be requested. It
+    /// waits until they are complete, given up, or their buffers are needed.
     bool wait_for_missing = false;
   };
   explicit Reassembler(const Params& params);
@@ -103,44 +120,50 @@ class Reassembler {
   Reassembler(Reassembler&&) noexcept;
   Reassembler& operator=(Reassembler&&) noexcept;
 
-  /// Takes one datagram; copies its payload.
+  /// Takes one datagram and copies its payload.
   FragmentStatus push(std::span<const std::byte> datagram) noexcept;
 
-  /// Where the next payloads belong if fragments go on coming in order: the part of the newest
-  /// frame behind what has arrived. A receiver may have the kernel write payloads there at once and
-  /// then push them from there, which spares the copy. Empty when fragments came out of order.
+  /// Place of the next payloads if fragments continue to arrive in order: the part of the newest
+  /// frame behind what has arrived. A receiver may let the kernel write payloads there and then
+  /// push them from there, which spares the copy. It is empty when fragments came out of order.
   struct Expected {
-    std::span<std::byte> rest;  ///< to the end of the frame's byte stream
-    FragmentHeader next;        ///< stream, frame, offset and length of the next fragment
+    /// Memory from the next payload to the end of the frame's byte stream.
+    std::span<std::byte> rest;
+    FragmentHeader next;  ///< stream, frame, offset and length of the next fragment
   };
+  /// Returns the place of the next payloads.
   [[nodiscard]] Expected expected() noexcept;
-  /// Header and payload apart; a payload that lies where it belongs is not copied.
+  /// Takes a datagram whose header and payload lie apart. A payload that already lies in its place
+  /// is not copied.
   FragmentStatus push(std::span<const std::byte> header,
                       std::span<const std::byte> payload) noexcept;
 
-  /// Hands out the next finished frame or nullptr. Keep it until release(); buffers held are
-  /// missing for new frames.
+  /// Hands out the next finished frame, or nullptr. The caller holds it until release(); its buffer
+  /// is not available to new frames until then.
   [[nodiscard]] const ReceivedFrame* pop() noexcept;
-  /// Precondition: `frame` came from pop() and was not released since.
+  /// Returns a frame to the reassembler.
+  /// @pre `frame` came from pop() and was not released since
   void release(const ReceivedFrame* frame) noexcept;
 
-  /// Finishes every frame in work as partial: the stream ended or fell silent.
+  /// Finishes every frame in work as partial. Call it when the stream ended or fell silent.
   void flush() noexcept;
 
-  /// A frame of which something is missing.
+  /// State of a frame in work that is not complete.
   struct OpenFrame {
     std::uint32_t frame_id = 0;
-    std::uint64_t arrivals = 0;  ///< goes up with everything that is taken for it
-    bool end_seen = false;       ///< its last byte has arrived, or one of a newer frame
+    std::uint64_t arrivals = 0;  ///< number of fragments taken for the frame
+    bool end_seen = false;  ///< true when its last byte has arrived, or a byte of a newer frame
   };
-  /// Frames of the stream in work and not complete, oldest first. Returns how many were written.
+  /// Writes the incomplete frames of the stream that are in work, oldest first. Returns how many
+  /// were written.
   [[nodiscard]] std::size_t open_frames(std::uint16_t stream_id,
                                         std::span<OpenFrame> out) const noexcept;
-  /// What is missing of one of them, front to back; without `tail` only in front of what arrived:
-  /// the rest may be on its way. Returns how many ranges were written.
+  /// Writes the missing ranges of such a frame, front to back. Returns how many were written.
+  /// @param tail  false: only ranges in front of bytes that arrived, because the rest may be on its
+  ///   way
   [[nodiscard]] std::size_t missing(std::uint16_t stream_id, std::uint32_t frame_id, bool tail,
                                     std::span<ByteRange> out) const noexcept;
-  /// Hands the frame out as it is, and older ones before it.
+  /// Finishes the frame as it is, after the older ones of its stream.
   void give_up(std::uint16_t stream_id, std::uint32_t frame_id) noexcept;
 
   [[nodiscard]] const ReassemblerCounters& counters() const noexcept { return counters_; }
@@ -149,7 +172,7 @@ class Reassembler {
   struct Slot;
   struct Stream;
 
-  /// What data and parity fragments alike say of their frame.
+  /// Fields that data fragments and parity fragments share.
   struct FrameKey {
     std::uint16_t stream_id = 0;
     std::uint32_t frame_id = 0;
@@ -178,13 +201,13 @@ class Reassembler {
   Params params_;
   std::vector<Slot> slots_;
   std::vector<Stream> streams_;
-  std::vector<Slot*> ready_;  // ring of finished frames
+  std::vector<Slot*> ready_;  // ring of finished frames, in the order of pop()
   std::size_t ready_begin_ = 0;
   std::size_t ready_count_ = 0;
   std::uint64_t arrivals_ = 0;
-  Slot* newest_ = nullptr;  // of the fragment accepted last
+  Slot* newest_ = nullptr;  // slot of the fragment accepted last
   std::optional<GroupDecoder> decoder_;
-  std::vector<std::byte> scratch_;  // the last fragment of a frame, filled up with zeros
+  std::vector<std::byte> scratch_;  // last fragment of a frame, filled up with zeros
   ReassemblerCounters counters_;
 };
 

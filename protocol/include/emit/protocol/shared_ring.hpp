@@ -5,27 +5,32 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/limits.hpp"
 #include "emit/protocol/frame_header.hpp"
 
-/// Ring of frames in memory that one daemon writes and readers on the same host map read-only
-/// (docs/wire.md). No system calls: whoever made the memory maps it, waits and wakes.
+/// Ring of frames in shared memory (docs/wire.md section 9). One daemon writes it; readers on the
+/// same host map it read-only. A publication is the set of all channels' images of one frame; it
+/// takes one slot. These classes make no system calls: the owner of the memory maps it, waits and
+/// wakes.
 namespace emit::protocol {
 
 inline constexpr std::uint32_t kRingMagic = 0x534D4645;  ///< "EFMS" as bytes E F M S
 inline constexpr std::uint16_t kRingVersion = 2;
-inline constexpr std::uint32_t kMinRingSlots = 3;
-inline constexpr std::uint32_t kMaxRingSlots = 1024;
+inline constexpr std::uint32_t kMinRingSlots = physics::limits::kRingSlots.lo;
+inline constexpr std::uint32_t kMaxRingSlots = physics::limits::kRingSlots.hi;
 inline constexpr std::uint32_t kMaxRingChannels = 1024;
 
 enum class RingState : std::uint32_t {
   running = 1,
-  ended = 2,  ///< the daemon stopped in order: nothing more comes
+  ended = 2,  ///< the daemon stopped in order: no more publications come
 };
 
-/// What the memory begins with. Everything but the three atomics is fixed before readers see it.
+/// Head of the ring, at offset 0. Everything but the three atomics is fixed before readers see it.
 struct RingHead {
   std::uint32_t magic;
   std::uint16_t version;
@@ -33,16 +38,17 @@ struct RingHead {
   std::uint32_t slot_count;
   std::uint32_t channel_count;
   std::uint64_t object_bytes;
-  std::uint64_t slot_bytes;  ///< from one slot to the next
+  std::uint64_t slot_bytes;  ///< distance from one slot to the next, bytes
   std::uint64_t slots_offset;
   std::uint64_t channels_offset;
   std::uint64_t welcome_offset;
   std::uint64_t welcome_bytes;
-  std::int64_t started_ns;  ///< wall instant: another one is another run of the daemon
+  /// Wall instant of the daemon's start, ns TAI. Another value means another run of the daemon.
+  std::int64_t started_ns;
   std::uint64_t reserved_1[7];
   std::atomic<std::uint32_t> signal;  ///< futex: goes up with every publication and at the end
   std::atomic<std::uint32_t> state;   ///< RingState
-  std::atomic<std::uint64_t> newest;  ///< publication that was completed last; 0 = none yet
+  std::atomic<std::uint64_t> newest;  ///< number of the publication completed last; 0 = none yet
   std::uint64_t reserved_2[6];
 };
 static_assert(sizeof(RingHead) == 192 && offsetof(RingHead, object_bytes) == 16 &&
@@ -51,7 +57,7 @@ static_assert(sizeof(RingHead) == 192 && offsetof(RingHead, object_bytes) == 16 
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
               std::atomic<std::uint64_t>::is_always_lock_free);
 
-/// Where a channel lies in every slot. Channels of one band share their pixels.
+/// Place of a channel within every slot. Channels of one band and window share their pixels.
 struct RingChannelEntry {
   std::uint64_t header_offset;
   std::uint64_t pixels_offset;
@@ -60,44 +66,56 @@ struct RingChannelEntry {
 };
 static_assert(sizeof(RingChannelEntry) == 32);
 
-/// What a slot begins with: 2 p when it holds publication p, 2 p - 1 while that is being written.
+/// Head of a slot. The sequence is 2 p when the slot holds publication p, and 2 p - 1 while p is
+/// being written.
 struct RingSlotHead {
   std::atomic<std::uint64_t> sequence;
   std::uint64_t reserved[7];
 };
 static_assert(sizeof(RingSlotHead) == 64);
 
+/// Layout of a ring.
 struct RingParams {
   std::uint32_t slots = 8;                      ///< kMinRingSlots .. kMaxRingSlots
-  std::vector<std::uint64_t> plane_bytes;       ///< pixels of each distinct image
-  std::vector<std::uint32_t> plane_of_channel;  ///< by channel index
-  std::span<const std::byte> welcome;           ///< emit.v1.Welcome
-  std::int64_t started_ns = 0;
+  std::vector<std::uint64_t> plane_bytes;       ///< pixel bytes of each distinct image
+  std::vector<std::uint32_t> plane_of_channel;  ///< index into plane_bytes, for each channel
+  std::span<const std::byte> welcome;           ///< encoded emit.v1.Welcome
+  std::int64_t started_ns = 0;                  ///< wall instant of the daemon's start, ns TAI
 };
-/// Bytes that a ring of these parameters takes. Precondition: the parameters make sense.
+/// Returns the length of a ring of these parameters, bytes.
+/// @pre slots is in [kMinRingSlots, kMaxRingSlots], there are 1 to kMaxRingChannels channels, and
+///   every entry of plane_of_channel is an index into plane_bytes
 [[nodiscard]] std::uint64_t ring_bytes(const RingParams& params) noexcept;
 
-/// The daemon's end. Publications count from 1 and take the slots in turn.
+/// Writer of the ring, in the daemon. Publications count from 1 and take the slots in turn.
 /// Thread: one owner.  Real time: RT-safe after construction.
 /// @code
 ///   writer.begin();
 ///   encode(header, writer.header(channel));
-///   memcpy(writer.plane(0).data(), ...);   // in as many pieces as one likes
-///   writer.commit();                       // then wake who waits on signal()
+///   memcpy(writer.plane(0).data(), ...);   // in any number of pieces
+///   writer.commit();                       // then wake the threads that wait on signal()
 /// @endcode
 class RingWriter {
  public:
-  /// Lays the ring out. Preconditions: `memory` is zero, aligned to 64 bytes and ring_bytes() long.
+  /// Lays the ring out in `memory`.
+  /// @pre the parameters are valid for ring_bytes(); `memory` is zero, aligned to 64 bytes and at
+  ///   least ring_bytes() long
   RingWriter(std::span<std::byte> memory, const RingParams& params);
 
-  /// Takes the oldest slot: from here on readers of it notice.
+  /// Takes the oldest slot for the next publication. Its readers notice from now on.
   void begin() noexcept;
+  /// Returns the memory of a channel's frame header in the slot taken.
+  /// @pre channel is an index into plane_of_channel
   [[nodiscard]] std::span<std::byte, kFrameHeaderBytes> header(std::size_t channel) noexcept;
+  /// Returns the memory of an image's pixels in the slot taken.
+  /// @pre plane is an index into plane_bytes
   [[nodiscard]] std::span<std::byte> plane(std::size_t plane) noexcept;
+  /// Completes the publication and raises signal().
   void commit() noexcept;
-  /// Nothing more comes.
+  /// Marks the end of the ring and raises signal(). Nothing is published after it.
   void end() noexcept;
 
+  /// Returns the futex that readers wait on.
   [[nodiscard]] std::atomic<std::uint32_t>& signal() noexcept { return head_->signal; }
 
  private:
@@ -107,11 +125,12 @@ class RingWriter {
   std::byte* memory_;
   std::vector<RingChannelEntry> channels_;
   std::vector<RingChannelEntry> planes_;  // header_offset unused
-  std::uint64_t publication_ = 0;         // being written, or completed last
+  // Number of the publication that is being written or was completed last.
+  std::uint64_t publication_ = 0;
 };
 
-/// A reader's end. Nothing that it reads is trusted; what was overwritten is noticed, because the
-/// slot's sequence is looked at again behind the last byte that was used.
+/// Reader of the ring. Nothing that it reads is trusted. It notices overwritten data by a second
+/// look at the slot's sequence, behind the last byte that was used.
 /// Thread: one owner.  Real time: RT-safe after opening.
 /// @code
 ///   if (const auto view = reader.view(publication, channel)) {
@@ -121,25 +140,31 @@ class RingWriter {
 /// @endcode
 class RingReader {
  public:
-  /// Errors (protocol): not a ring, another version, offsets outside `memory`.
-  /// Precondition: aligned to 64 bytes.
+  /// Opens a ring for reading.
+  /// Errors (protocol): the memory is no ring, the version differs, or an offset lies outside
+  /// `memory`.
+  /// @pre `memory` is aligned to 64 bytes
   [[nodiscard]] static physics::Result<RingReader> open(std::span<const std::byte> memory);
 
+  /// Header and pixels of one channel, in the shared memory.
   struct View {
-    std::span<const std::byte> header;  ///< kFrameHeaderBytes, not yet checked
+    std::span<const std::byte> header;  ///< kFrameHeaderBytes long, not yet checked
     std::span<const std::byte> pixels;  ///< aligned to 64 bytes
   };
-  /// Nothing when the publication is not there, not yet or no more. Precondition: channel <
-  /// channel_count().
+  /// Returns header and pixels of a channel. Returns nothing when the slot does not hold the
+  /// publication, because it is not complete yet or was overwritten.
+  /// @pre channel < channel_count()
   [[nodiscard]] std::optional<View> view(std::uint64_t publication,
                                          std::size_t channel) const noexcept;
-  /// False: since view() the slot was taken for a newer publication, so what was read from it may
-  /// be of both.
+  /// Returns false when the slot was taken for a newer publication since view(). The data read from
+  /// it may then belong to two frames.
   [[nodiscard]] bool intact(std::uint64_t publication) const noexcept;
 
+  /// Returns the number of the publication completed last; 0 = none yet.
   [[nodiscard]] std::uint64_t newest() const noexcept {
     return head_->newest.load(std::memory_order_acquire);
   }
+  /// Returns true when the daemon stopped in order.
   [[nodiscard]] bool ended() const noexcept {
     return head_->state.load(std::memory_order_acquire) ==
            static_cast<std::uint32_t>(RingState::ended);
@@ -147,10 +172,15 @@ class RingReader {
   [[nodiscard]] const std::atomic<std::uint32_t>& signal() const noexcept { return head_->signal; }
   [[nodiscard]] std::uint32_t slot_count() const noexcept { return slot_count_; }
   [[nodiscard]] std::size_t channel_count() const noexcept { return channels_.size(); }
+  /// Returns the length of a channel's pixels, bytes.
+  /// @pre channel < channel_count()
   [[nodiscard]] std::uint64_t pixel_bytes(std::size_t channel) const noexcept {
+    EMIT_CHECK_OP(channel, <, channels_.size());
     return channels_[channel].pixel_bytes;
   }
+  /// Returns the wall instant of the daemon's start, ns TAI.
   [[nodiscard]] std::int64_t started_ns() const noexcept { return head_->started_ns; }
+  /// Returns the encoded emit.v1.Welcome. Its contents are not checked.
   [[nodiscard]] std::span<const std::byte> welcome() const noexcept { return welcome_; }
 
  private:
@@ -159,10 +189,14 @@ class RingReader {
 
   const RingHead* head_ = nullptr;
   const std::byte* slots_ = nullptr;
-  std::uint32_t slot_count_ = 0;  // as checked: the memory itself is not asked twice
+  // Copies of the checked values: the shared memory is not read a second time.
+  std::uint32_t slot_count_ = 0;
   std::uint64_t slot_bytes_ = 0;
   std::vector<RingChannelEntry> channels_;
   std::span<const std::byte> welcome_;
 };
+
+/// 1 to 64 letters, digits, `_`, `-` and `.`, the first a letter or digit: no path can come of it.
+[[nodiscard]] bool is_shm_name(std::string_view text) noexcept;
 
 }  // namespace emit::protocol

@@ -129,11 +129,15 @@ struct SceneStats {
   bool samples_full = false;
   /// For want of samples meshes lost detail that pixels show (thermal.max_samples).
   bool coarse_meshes = false;
-  std::vector<std::string> warnings;  ///< unmapped materials and what else the loader could not map
+  /// Doubts of the scenario's and the scene's loaders: unmapped materials, gaps of the weather.
+  std::vector<std::string> warnings;
+  /// After warm_up(): what the first frame's history and weather lack, one sentence each.
+  std::vector<std::string> first_frame_warnings;
 };
 
-/// What `thermal.max_samples` is too small for, a sentence each; none where it is enough.
-[[nodiscard]] std::vector<std::string> sampling_warnings(const SceneStats& stats);
+/// Warnings that are known after warm_up(), one sentence each: what the first frame lacks, and what
+/// `thermal.max_samples` is too small for.
+[[nodiscard]] std::vector<std::string> warm_up_warnings(const SceneStats& stats);
 
 using SlotIndex = std::uint32_t;
 

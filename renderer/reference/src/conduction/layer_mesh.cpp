@@ -14,13 +14,14 @@ using physics::ErrorCode;
 using physics::make_error;
 
 constexpr double kMaxCells = 20000.0;
+/// Depth of the deep ground in diffusion lengths of the whole run.
 constexpr double kDeepGroundLengths = 10.0;
 
 bool positive(double value) noexcept {
   return std::isfinite(value) && value > 0.0;
 }
 
-/// Number of cells between the face and s, and its inverse: the cell length at s is
+/// Number of cells between the face and s, and the inverse function. The cell length at s is
 /// first + growth * (distance to the nearest fine end).
 class Grading {
  public:
@@ -36,9 +37,11 @@ class Grading {
   }
 
  private:
+  // Integrate 1 / (cell length) from a fine end.
   [[nodiscard]] double from_end(double s) const noexcept {
     return growth_ > 0.0 ? std::log1p(growth_ * s / first_) / growth_ : s / first_;
   }
+  // Invert from_end().
   [[nodiscard]] double to_s(double cells) const noexcept {
     return growth_ > 0.0 ? first_ * std::expm1(growth_ * cells) / growth_ : first_ * cells;
   }
@@ -49,6 +52,7 @@ class Grading {
   double half_;
 };
 
+/// Checks the ranges of layers, base and options.
 physics::Result<void> check(std::span<const SolidLayer> layers, const Base& base,
                             const MeshOptions& options) {
   if (layers.empty()) return make_error(ErrorCode::invalid_argument, "a body needs a layer");
@@ -88,6 +92,7 @@ std::vector<SolidLayer> solid_layers(std::span<const scene::Layer> layers) {
 physics::Result<LayerMesh> LayerMesh::build(std::span<const SolidLayer> given, const Base& base,
                                             const MeshOptions& options) {
   if (auto fine = check(given, base, options); !fine) return tl::unexpected(fine.error());
+  // Extend the last layer if it stands for the deep ground.
   std::vector<SolidLayer> layers(given.begin(), given.end());
   if (base.kind == BaseKind::deep_ground && !layers.empty()) {
     SolidLayer& last = layers.back();
@@ -96,8 +101,9 @@ physics::Result<LayerMesh> LayerMesh::build(std::span<const SolidLayer> given, c
         std::max(last.thickness_m, kDeepGroundLengths * std::sqrt(diffusivity * options.horizon_s));
   }
 
+  // Measure every layer in the diffusion coordinate s = integral dz / sqrt(a).
   double total_s = 0.0;
-  std::vector<double> length_s;  // of each layer, in sqrt(seconds)
+  std::vector<double> length_s;  // one per layer, s^0.5
   for (const SolidLayer& layer : layers) {
     length_s.push_back(layer.thickness_m *
                        std::sqrt(layer.heat_capacity_j_m3_k / layer.conductivity_w_m_k));
@@ -106,7 +112,7 @@ physics::Result<LayerMesh> LayerMesh::build(std::span<const SolidLayer> given, c
   const Grading grading(std::sqrt(options.shortest_time_s) / options.cells_per_length,
                         options.growth_frac, total_s, options.fine_base);
 
-  // Cells of each layer first, so that a senseless request costs no memory.
+  // Count the cells of each layer first, so that a senseless request costs no memory.
   std::vector<double> cells;
   double all_cells = 0.0;
   double top_s = 0.0;
@@ -123,6 +129,7 @@ physics::Result<LayerMesh> LayerMesh::build(std::span<const SolidLayer> given, c
         fmt::format("the mesh would have {:.0f} cells, more than {:.0f}", all_cells, kMaxCells));
   }
 
+  // Place the nodes of each layer at equal shares of its cells.
   LayerMesh mesh;
   mesh.base_ = base;
   mesh.face_effusivity_ =
@@ -135,13 +142,13 @@ physics::Result<LayerMesh> LayerMesh::build(std::span<const SolidLayer> given, c
     const double first = grading.cells_to(top_s);
     const double share = (grading.cells_to(top_s + length_s[i]) - first) / cells[i];
     const auto count = static_cast<std::size_t>(cells[i]);
-    double above_m = 0.0;  // within the layer, so that thin cells far down keep their digits
+    double above_m = 0.0;  // depth within the layer, so that thin cells far down keep their digits
     for (std::size_t j = 1; j <= count; ++j) {
       const double below_m = j == count
                                  ? layer.thickness_m
                                  : (grading.s_of(first + share * static_cast<double>(j)) - top_s) /
                                        length_s[i] * layer.thickness_m;
-      // Rounding of a far thin layer must not make an empty cell.
+      // Fall back to even cells if rounding in a far, thin layer would make an empty cell.
       const double even_m =
           above_m + (layer.thickness_m - above_m) / static_cast<double>(count - j + 1);
       const double next_m =
@@ -164,14 +171,16 @@ void LayerMesh::assemble_mass() {
   mass_above_.assign(cells + 1, 0.0);
   mass_own_.assign(cells + 1, 0.0);
   mass_below_.assign(cells + 1, 0.0);
+  // Choose the weights of every row of the mass matrix.
   for (std::size_t i = 0; i <= cells; ++i) {
     const double above = i > 0 ? capacity_j_m2_k_[i - 1] : 0.0;
     const double below = i < cells ? capacity_j_m2_k_[i] : 0.0;
-    // Exact for a rate of change linear in each cell.
+    // Start with the consistent mass: it is exact for a rate of change linear in each cell.
     double from_above = above / 6.0;
     double from_below = below / 6.0;
     if (i > 0 && i < cells) {
-      // Exact for u0 + F z/k + W z^2 rho c/(2 k) on both sides, F and W common to them.
+      // Improve inner rows: be exact for u0 + F z/k + W z^2 rho c/(2 k) on both sides, with F and W
+      // common to both.
       const double resist_above = 1.0 / conductance_w_m2_k_[i - 1];
       const double resist_below = 1.0 / conductance_w_m2_k_[i];
       const double time_above = above * resist_above;
@@ -181,12 +190,13 @@ void LayerMesh::assemble_mass() {
                        (both * resist_above);
       const double b = (below * time_below + 2.0 * above * time_below - above * time_above) /
                        (both * resist_below);
+      // Keep the consistent mass if the neighbours are too unlike for positive weights.
       if (a >= 0.0 && b >= 0.0 && a + b <= 0.2 * (above + below)) {
         from_above = a;
         from_below = b;
       }
     } else if (i == cells && !base_held()) {
-      from_above = above / 12.0;  // no flux: the profile is even about the base
+      from_above = above / 12.0;  // the profile is even about a base without flux
     }
     mass_above_[i] = from_above;
     mass_below_[i] = from_below;
@@ -196,6 +206,7 @@ void LayerMesh::assemble_mass() {
 
 std::vector<ProfilePoint> steady_profile(std::span<const SolidLayer> layers, double face_k,
                                          double base_k) {
+  // Divide the drop of temperature in proportion to the resistance passed.
   double resistance = 0.0;
   for (const SolidLayer& layer : layers) resistance += layer.thickness_m / layer.conductivity_w_m_k;
   std::vector<ProfilePoint> profile{{0.0, face_k}};

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 
 namespace emit::reference {
@@ -13,17 +14,19 @@ namespace {
 
 constexpr double kSigma = physics::kStefanBoltzmannWPerM2K4;
 
-// TR-BDF2 as a diagonally implicit method: stages at gamma and 1, weights w, w, d.
+// TR-BDF2 written as a diagonally implicit method: stages at gamma and 1, weights w, w, d.
 constexpr double kGamma = 2.0 - std::numbers::sqrt2;
 constexpr double kW = std::numbers::sqrt2 / 4.0;
 constexpr double kD = 0.5 * kGamma;
 
-/// Steps are length / 2^level; a position counts parts of length / 2^kFinest.
+/// Number of halvings of the finest step. A step is length / 2^level, and a position counts parts
+/// of length / 2^kFinest.
 constexpr int kFinest = 46;
 constexpr std::uint64_t kWhole = std::uint64_t{1} << kFinest;
 constexpr std::size_t kCachedSteps = 32;
 constexpr int kNewtonLimit = 60;
 
+/// Face with the balance of a FaceSegment.
 struct BalanceFace {
   static constexpr bool kHeld = false;
   const FaceSegment& segment;
@@ -34,7 +37,7 @@ struct BalanceFace {
     const FaceState& a = segment.start;
     const FaceState& b = segment.end;
     const double film = mix(a.film_w_m2_k, b.film_w_m2_k);
-    // Odd in T: a trial value below 0 K must push the iteration back up.
+    // Keep the emission odd in T, so that a trial value below 0 K pushes the iteration back up.
     const double cube = std::abs(face_k) * face_k * face_k;
     return {mix(a.absorbed_w_m2, b.absorbed_w_m2) + film * (mix(a.air_k, b.air_k) - face_k) -
                 emission_w_m2_k4 * cube * face_k,
@@ -42,6 +45,7 @@ struct BalanceFace {
   }
 };
 
+/// Face with the caller's own boundary condition.
 struct ModelFace {
   static constexpr bool kHeld = false;
   const FaceModel& model;
@@ -53,6 +57,7 @@ struct ModelFace {
   }
 };
 
+/// Face held at a temperature that is linear in time.
 struct HeldFace {
   static constexpr bool kHeld = true;
   double start_k;
@@ -63,11 +68,12 @@ struct HeldFace {
   }
 };
 
+/// Eliminates a right-hand side from the base upwards.
 void eliminate(const LayerSolver::Factors& factors, std::vector<double>& rhs) noexcept {
   for (std::size_t i = rhs.size() - 1; i-- > 0;) rhs[i] -= factors.raise[i] * rhs[i + 1];
 }
 
-/// Turns the eliminated right-hand side into the solution; node 0 is solved already.
+/// Turns the eliminated right-hand side into the solution. Node 0 must be solved already.
 void substitute(const LayerSolver::Factors& factors, std::vector<double>& x) noexcept {
   for (std::size_t i = 1; i < x.size(); ++i) {
     x[i] = x[i] * factors.pivot_inv[i] - factors.lower[i] * x[i - 1];
@@ -78,9 +84,11 @@ void substitute(const LayerSolver::Factors& factors, std::vector<double>& x) noe
 
 LayerSolver::LayerSolver(const LayerMesh& mesh, const StepOptions& options)
     : mesh_(&mesh), options_(options), unknowns_(mesh.nodes() - (mesh.base_held() ? 1 : 0)) {
+  // Divide tolerance and steps by the refinement.
   const double refine = std::max(1.0, static_cast<double>(options_.refine));
   options_.tolerance_k /= refine * refine * refine;
   options_.fixed_step_s /= refine;
+  // Allocate all work space here, so that the steps need none.
   theta_.assign(mesh.nodes(), 0.0);
   for (auto* work : {&conducted_, &stage_, &final_, &error_, &stage_mass_, &final_mass_}) {
     work->assign(unknowns_, 0.0);
@@ -99,11 +107,15 @@ void LayerSolver::reset(double time_s) {
   heat_in_j_m2_ = 0.0;
   held_ = false;
   counts_ = {};
+  // Hold the base and take the flux of the profile as the flux before the start.
   if (mesh_->base_held()) theta_.back() = mesh_->base().temperature_k - offset_k_;
   last_flux_w_m2_ = mesh_->conductance_w_m2_k()[0] * (theta_[0] - theta_[1]);
 }
 
 void LayerSolver::start(std::span<const ProfilePoint> profile, double time_s) {
+  EMIT_CHECK(!profile.empty());
+  EMIT_CHECK(std::ranges::is_sorted(profile, {}, &ProfilePoint::depth_m));
+  // Interpolate the profile at every node.
   offset_k_ = mesh_->base_held() ? mesh_->base().temperature_k : profile.back().temperature_k;
   std::size_t next = 0;
   for (std::size_t i = 0; i < theta_.size(); ++i) {
@@ -126,12 +138,15 @@ void LayerSolver::start(std::span<const ProfilePoint> profile, double time_s) {
 }
 
 void LayerSolver::start_nodes(std::span<const double> node_k, double time_s) {
+  EMIT_CHECK_OP(node_k.size(), ==, theta_.size());
   offset_k_ = mesh_->base_held() ? mesh_->base().temperature_k : node_k.back();
   for (std::size_t i = 0; i < theta_.size(); ++i) theta_[i] = node_k[i] - offset_k_;
   reset(time_s);
 }
 
 const LayerSolver::Factors& LayerSolver::factors_for(double step_s) noexcept {
+  // Look for factors of this step length, the last ones first. Note the entry that was unused for
+  // longest.
   ++cache_clock_;
   std::size_t oldest = 0;
   if (cache_[newest_].step_s == step_s) {
@@ -146,6 +161,7 @@ const LayerSolver::Factors& LayerSolver::factors_for(double step_s) noexcept {
     }
     if (cache_[i].used < cache_[oldest].used) oldest = i;
   }
+  // Replace that entry: factorise M + d dt K from the base upwards.
   Factors& factors = cache_[oldest];
   newest_ = oldest;
   factors.step_s = step_s;
@@ -184,7 +200,7 @@ void LayerSolver::conduct() noexcept {
 
 void LayerSolver::multiply_mass(const std::vector<double>& in,
                                 std::vector<double>& out) const noexcept {
-  // The node below the last unknown is held: its change is zero.
+  // Skip the node below the last unknown: it is held, so its change is zero.
   const auto above = mesh_->mass_above();
   const auto own = mesh_->mass_own();
   const auto below = mesh_->mass_below();
@@ -203,7 +219,8 @@ void LayerSolver::multiply_mass(const std::vector<double>& in,
 template <class Face>
 double LayerSolver::solve_face(const Face& face, double frac, double pivot, double rhs, double gain,
                                double guess_k, FaceFlux& flux) noexcept {
-  // pivot x = rhs + gain q(T + x): increasing and, for radiation, convex, so Newton cannot cycle.
+  // Solve pivot x = rhs + gain q(T + x) by Newton. The function is increasing and, for radiation,
+  // convex, so the iteration cannot cycle.
   const double base_k = offset_k_ + theta_[0];
   double x = guess_k;
   for (int i = 0; i < kNewtonLimit; ++i) {
@@ -213,7 +230,7 @@ double LayerSolver::solve_face(const Face& face, double frac, double pivot, doub
     const double change = (rhs + gain * flux.flux_w_m2 - pivot * x) / slope;
     x += change;
     if (std::abs(change) <= 4.0e-15 * (std::abs(base_k) + std::abs(x))) {
-      flux.flux_w_m2 += flux.slope_w_m2_k * change;
+      flux.flux_w_m2 += flux.slope_w_m2_k * change;  // the flux at the converged temperature
       return x;
     }
   }
@@ -232,9 +249,11 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
   FaceFlux flux_start;
   FaceFlux flux_stage;
   FaceFlux flux_end;
+  // Evaluate the flux at the start of the step.
   if constexpr (!Face::kHeld) flux_start = face.at(start_frac, offset_k_ + theta_[0]);
 
-  // Unknowns are increments on the start of the step: (M + b K) x = right-hand side.
+  // Solve the first stage, the trapezium to t + gamma dt. The unknowns are increments on the start
+  // of the step: (M + b K) x = right-hand side.
   for (std::size_t i = 0; i < n; ++i) stage_[i] = 2.0 * b * conducted_[i];
   stage_[0] += b * flux_start.flux_w_m2;
   eliminate(factors, stage_);
@@ -247,6 +266,7 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
   substitute(factors, stage_);
   multiply_mass(stage_, stage_mass_);
 
+  // Solve the second stage, BDF2 to the end of the step.
   for (std::size_t i = 0; i < n; ++i) final_[i] = kW / kD * stage_mass_[i] + b * conducted_[i];
   eliminate(factors, final_);
   if constexpr (Face::kHeld) {
@@ -258,6 +278,8 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
   substitute(factors, final_);
   outcome.face_flux_w_m2 = flux_end.flux_w_m2;
 
+  // Estimate the error by the embedded third-order method; the implicit matrix damps it like the
+  // step.
   if (estimate) {
     multiply_mass(final_, final_mass_);
     for (std::size_t i = 0; i < n; ++i) {
@@ -275,7 +297,9 @@ LayerSolver::StepOutcome LayerSolver::try_step(double start_frac, double step_fr
     for (const double e : error_) outcome.error_k = std::max(outcome.error_k, std::abs(e));
   }
 
+  // Sum the heat of the step with the weights of the method.
   const std::size_t last = mesh_->nodes() - 1;
+  // A held face takes the flux that the stored heat requires.
   if constexpr (Face::kHeld) {
     multiply_mass(final_, final_mass_);
     for (const double heat : final_mass_) outcome.heat_j_m2 += heat;
@@ -309,6 +333,7 @@ void LayerSolver::run(double end_s, const Face& face) noexcept {
   held_ = Face::kHeld;
   conduct();
 
+  // Take equal steps if the error control is off.
   if (options_.fixed_step_s > 0.0) {
     const double count = std::max(1.0, std::ceil(length_s / options_.fixed_step_s * (1.0 - 1e-12)));
     const double step_s = length_s / count;
@@ -321,25 +346,27 @@ void LayerSolver::run(double end_s, const Face& face) noexcept {
 
   double wanted_s = std::min(next_step_s_, options_.max_step_s);
   if constexpr (!Face::kHeld) {
-    // After a jump of the flux the face follows sqrt(t); the first step shall move it by some
-    // thirty tolerances, and not be shorter than what the first cell can resolve.
+    // Choose the first step after a jump of the flux. The face then follows sqrt(t); the step shall
+    // move it by some thirty tolerances, but not be shorter than the first cell can resolve.
     const double jump = std::abs(face.at(0.0, face_k()).flux_w_m2 - last_flux_w_m2_);
     const double rise = 30.0 * options_.tolerance_k * mesh_->face_effusivity() / jump;
     const double cell_s = mesh_->capacity_j_m2_k()[0] / mesh_->conductance_w_m2_k()[0];
     const double restart_s = std::max(0.785 * rise * rise, 0.05 * cell_s);
-    if (restart_s < wanted_s) wanted_s = restart_s;  // false for NaN
+    if (restart_s < wanted_s) wanted_s = restart_s;  // the comparison is false for NaN
   }
+  // Turn the wanted step into a level, at which a step is length / 2^level.
   int level = 0;
   if (wanted_s < length_s) {
     level = std::min(kFinest, static_cast<int>(std::ceil(std::log2(length_s / wanted_s) - 1e-9)));
   }
-  // At most this coarse.
+  // Find the coarsest level that the largest step allows.
   const int coarsest =
       options_.max_step_s < length_s
           ? std::min(kFinest,
                      static_cast<int>(std::ceil(std::log2(length_s / options_.max_step_s) - 1e-9)))
           : 0;
 
+  // Step through the segment.
   std::uint64_t position = 0;
   double error_k = 0.0;
   while (position < kWhole) {
@@ -349,6 +376,7 @@ void LayerSolver::run(double end_s, const Face& face) noexcept {
                  face, true);
     error_k = outcome.error_k;
     if (!(error_k <= options_.tolerance_k) && level < kFinest) {
+      // Reject the step and refine by the third-order rate of the error.
       ++counts_.rejected;
       const double excess = std::log2(error_k / options_.tolerance_k) / 3.0;
       level += std::isfinite(excess) ? std::clamp(static_cast<int>(std::ceil(excess)), 1, 8) : 1;
@@ -358,15 +386,18 @@ void LayerSolver::run(double end_s, const Face& face) noexcept {
     if (!(error_k <= options_.tolerance_k)) ++counts_.at_floor;
     accept(outcome);
     position += kWhole >> level;
+    // Coarsen when the error is small, but only where a step of twice the length would start.
     const bool aligned = level > 0 && ((position >> (kFinest - level)) & 1) == 0;
     if (aligned && level > coarsest && error_k < 0.1 * options_.tolerance_k) --level;
   }
+  // Remember the step length for the next segment.
   next_step_s_ = std::ldexp(length_s, -level);
   if (level == 0 && error_k < 0.1 * options_.tolerance_k) next_step_s_ *= 2.0;
   time_s_ = end_s;
 }
 
 void LayerSolver::advance(const FaceSegment& segment, double emissivity_frac) noexcept {
+  EMIT_CHECK(std::abs(segment.start_s - time_s_) <= 1e-6 * std::max(1.0, std::abs(time_s_)));
   run(segment.end_s, BalanceFace{segment, emissivity_frac * kSigma});
 }
 
@@ -376,6 +407,8 @@ void LayerSolver::advance(double end_s, const FaceModel& face) noexcept {
 
 void LayerSolver::advance_held(double end_s, double start_k, double end_k) noexcept {
   if (!(end_s > time_s_)) return;
+  // Apply a jump of the face temperature, with the heat that it stores, and restart with a small
+  // step.
   const double jump_k = start_k - offset_k_ - theta_[0];
   if (jump_k != 0.0) {
     theta_[0] += jump_k;
@@ -393,14 +426,16 @@ double LayerSolver::temperature_k(double depth_m) const noexcept {
   const auto capacity = mesh_->capacity_j_m2_k();
   if (!(depth_m > 0.0)) return face_k();
   if (depth_m >= depths.back()) return offset_k_ + theta_.back();
+  // Interpolate linearly in the cell that contains the depth.
   const auto above = static_cast<std::size_t>(
                          std::upper_bound(depths.begin(), depths.end(), depth_m) - depths.begin()) -
                      1;
   const double x = (depth_m - depths[above]) / (depths[above + 1] - depths[above]);
   const double linear = theta_[above] + x * (theta_[above + 1] - theta_[above]);
-  // A profile just set may have kinks inside a cell's neighbours: no curvature is known yet.
+  // A profile that was just set may have kinks next to the cell: no curvature is known yet.
   if (counts_.accepted == 0) return offset_k_ + linear;
 
+  // Add the curvature that the heat equation gives for the rates of change of both nodes.
   const auto rate_k_s = [&](std::size_t node) {
     const std::size_t last = theta_.size() - 1;
     if (node == 0 && held_) return face_rate_k_s_;
@@ -439,10 +474,15 @@ double LayerSolver::stored_heat_j_m2() const noexcept {
 void face_history(LayerSolver& solver, std::span<const ProfilePoint> profile,
                   std::span<const ForcingRow> rows, double emissivity_frac,
                   std::span<const double> times_s, std::span<double> out_k) noexcept {
+  EMIT_CHECK(!rows.empty());
+  EMIT_CHECK(std::ranges::is_sorted(rows, {}, &ForcingRow::time_s));
+  EMIT_CHECK(std::ranges::is_sorted(times_s));
+  EMIT_CHECK_OP(times_s.size(), ==, out_k.size());
   solver.start(profile, rows.front().time_s);
   std::size_t row = 0;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     while (solver.time_s() < times_s[i]) {
+      // Cut the time up to the next answer at the rows of the table.
       while (row + 1 < rows.size() && rows[row + 1].time_s <= solver.time_s()) ++row;
       const double now_s = solver.time_s();
       FaceSegment segment{now_s, times_s[i], rows[row].face, rows[row].face};

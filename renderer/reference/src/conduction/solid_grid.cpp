@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::reference {
 namespace {
 
+/// Returns the smallest wanted cell length at a place.
 double wanted_size(const GradedLines& wanted, double x) {
   double size = wanted.max_size_m;
   for (const SizeWish& wish : wanted.wishes) {
@@ -16,10 +19,11 @@ double wanted_size(const GradedLines& wanted, double x) {
   return size;
 }
 
-/// Lines after `from` up to `to`, at equal steps of the integral of 1 / size.
+/// Adds the lines after `from` up to `to`, at equal steps of the integral of 1 / size.
 void fill_span(const GradedLines& wanted, double from, double to, std::vector<double>& lines) {
   double smallest = to - from;
   for (const SizeWish& wish : wanted.wishes) smallest = std::min(smallest, wish.size_m);
+  // Tabulate the number of cells up to every sample by the midpoint rule.
   const auto samples =
       static_cast<std::size_t>(std::clamp(4.0 * (to - from) / smallest, 64.0, 200000.0));
   std::vector<double> cells(samples + 1, 0.0);
@@ -28,6 +32,7 @@ void fill_span(const GradedLines& wanted, double from, double to, std::vector<do
     const double middle = from + (static_cast<double>(i) + 0.5) * step;
     cells[i + 1] = cells[i] + wanted.refine * step / wanted_size(wanted, middle);
   }
+  // Invert the table at whole numbers of cells.
   const auto count = static_cast<std::size_t>(std::max(1.0, std::ceil(cells.back() - 1e-6)));
   std::size_t at = 0;
   for (std::size_t line = 1; line < count; ++line) {
@@ -42,12 +47,16 @@ void fill_span(const GradedLines& wanted, double from, double to, std::vector<do
 }  // namespace
 
 std::vector<double> graded_lines(const GradedLines& wanted, double merge_m) {
+  EMIT_CHECK(!wanted.fixed_m.empty());
+  // Merge fixed places that are too close together.
   std::vector<double> fixed = wanted.fixed_m;
   std::sort(fixed.begin(), fixed.end());
   std::vector<double> kept{fixed.front()};
   for (const double place : fixed) {
     if (place > kept.back() + merge_m) kept.push_back(place);
   }
+  EMIT_CHECK_OP(kept.size(), >=, 2U);
+  // Fill the spans between the fixed lines.
   std::vector<double> lines{kept.front()};
   for (std::size_t i = 0; i + 1 < kept.size(); ++i) fill_span(wanted, kept[i], kept[i + 1], lines);
   return lines;

@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "emit/physics/constants.hpp"
-#include "emit/threads/parallel.hpp"
 #include "emit/reference/solid_grid.hpp"
 #include "emit/reference/solid_solver.hpp"
+#include "emit/threads/parallel.hpp"
 
 namespace emit::reference {
 namespace {
@@ -17,21 +17,24 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-// In diffusion lengths sqrt(a t) of the whole run: how far the solid reaches beyond everything of
-// interest (exp(-5^2/4) of a unit step arrives there) and how fine it is near edges and the face.
+// Lengths of the grid in diffusion lengths sqrt(a t) of the whole run. kReach is how far the solid
+// extends beyond everything of interest: exp(-5^2/4) of a unit step arrives there. kFinest is the
+// cell near edges and the face.
 constexpr double kReach = 5.0;
 constexpr double kFinest = 0.06;
 constexpr double kGrowth = 0.16;
-constexpr double kGrowthRectangle = 0.22;  // cells of three axes multiply
+constexpr double kGrowthRectangle = 0.22;  // coarser, because the cells of three axes multiply
 constexpr double kCoarsest = 1.0;
-/// Steps at refine = 1; their ends stand at t (n/N)^3, for the face starts as the root of time.
+/// Number of steps at refine = 1. They end at t (n/N)^3, because the face starts as the root of
+/// time.
 constexpr double kSteps = 20.0;
 
-/// Share of [low, high] inside [from, to].
+/// Returns the share of [low, high] inside [from, to].
 double covered(double low, double high, double from, double to) {
   return std::clamp((std::min(high, to) - std::max(low, from)) / (high - low), 0.0, 1.0);
 }
 
+/// Checks the ranges of a case.
 bool valid(const LateralCase& c) {
   const bool patch = (c.patch != LitPatch::strip && c.patch != LitPatch::rectangle) ||
                      (c.half_x_m > 0.0 && (c.patch == LitPatch::strip || c.half_y_m > 0.0));
@@ -41,6 +44,7 @@ bool valid(const LateralCase& c) {
          std::isfinite(c.time_s);
 }
 
+/// Grid, drive and run of one case.
 class LateralModel {
  public:
   LateralModel(const LateralCase& c, double refine)
@@ -49,10 +53,12 @@ class LateralModel {
         length_m_(std::sqrt(c.conductivity_w_m_k / c.heat_capacity_j_m3_k * c.time_s)) {}
 
   Result<double> run() const {
+    // Build the grid of one material.
     SolidGrid grid;
     grid.materials = {{c_.conductivity_w_m_k, c_.heat_capacity_j_m3_k}};
     grid.lines_m = {x_lines(), y_lines(), z_lines()};
     grid.cells.assign(grid.count(0) * grid.count(1) * grid.count(2), 0);
+    // Scale the tolerance to the rise under a fully lit face, 2 q sqrt(t / (pi k rho c)).
     const double full_k = 2.0 * std::abs(c_.flux_w_m2) / c_.conductivity_w_m_k *
                           std::sqrt(length_m_ * length_m_ / physics::kPi);
     SolidOptions options;
@@ -66,6 +72,7 @@ class LateralModel {
         options);
     if (!solver) return tl::unexpected(std::move(solver.error()));
     const auto faces = solver->faces();
+    // Light every face by the share of it that lies in the patch.
     const DriveFunction drive = [&](double time_s, std::span<const double>, const FaceDrive& out) {
       for (std::size_t f = 0; f < faces.size(); ++f) {
         out.absorbed_w_m2[f] = c_.flux_w_m2 * lit_frac(faces[f], time_s);
@@ -74,13 +81,14 @@ class LateralModel {
       }
     };
     solver->set_uniform(0.0, 0.0);
+    // Take steps that grow with the cube of their number.
     const double steps = std::ceil(kSteps * refine_);
     for (double n = 1.0; n <= steps; n += 1.0) {
       const double share = n / steps;
       const auto done = solver->step(c_.time_s * share * share * share, drive);
       if (!done) return tl::unexpected(done.error());
     }
-    // A node stands at the point.
+    // Read the node at the point; the grid has a line there on every axis.
     const glm::dvec3 point(at_x(), at_y(), c_.depth_m);
     const auto nodes = solver->nodes_m();
     std::size_t nearest = 0;
@@ -100,12 +108,13 @@ class LateralModel {
   [[nodiscard]] bool half_plane() const {
     return c_.patch == LitPatch::half_plane || c_.patch == LitPatch::moving_half_plane;
   }
-  // Strip and rectangle are their own mirror images: one half, or quarter, is enough.
+  // Mirror the point: strip and rectangle are symmetric, so one half or quarter is solved.
   [[nodiscard]] double at_x() const { return half_plane() ? c_.x_m : std::abs(c_.x_m); }
   [[nodiscard]] double at_y() const {
     return c_.patch == LitPatch::rectangle ? std::abs(c_.y_m) : 0.0;
   }
 
+  // Common rules of all three axes.
   [[nodiscard]] GradedLines lines() const {
     GradedLines wanted;
     wanted.growth_frac = c_.patch == LitPatch::rectangle ? kGrowthRectangle : kGrowth;
@@ -113,10 +122,12 @@ class LateralModel {
     wanted.refine = refine_;
     return wanted;
   }
+  // Ask for the finest cells between two places.
   void fine(GradedLines& wanted, double low, double high) const {
     wanted.wishes.push_back({low, high, kFinest * length_m_});
   }
 
+  // Be fine where the edge lies or passes, and put lines at the edge and at the point.
   [[nodiscard]] std::vector<double> x_lines() const {
     GradedLines wanted = lines();
     const double x = at_x();

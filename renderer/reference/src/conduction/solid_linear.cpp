@@ -12,16 +12,17 @@
 namespace emit::reference {
 namespace {
 
-/// Nodes per block: large enough that the couplings dropped between blocks hardly matter, small
-/// enough to feed a handful of threads.
+/// Number of nodes of a block. It is large enough that the couplings dropped between blocks hardly
+/// matter, and small enough to feed a handful of threads.
 constexpr std::size_t kBlockNodes = 32768;
 constexpr std::size_t kMaxBlocks = 256;
 constexpr int kMaxIterations = 2000;
-/// Below these sizes a direct factor is taken as the preconditioner (chosen by judgement, not by a
-/// benchmark).
+/// Largest numbers of nodes for which a direct factor is the preconditioner, in a plane and in a
+/// solid. They were chosen by judgement, not by a benchmark.
 constexpr std::size_t kDirectPlane = 40000;
 constexpr std::size_t kDirectSolid = 3000;
 
+/// Calls body(block) for every block, in parallel.
 template <class Body>
 void for_blocks(std::size_t blocks, const Body& body) {
   threads::parallel_ranges(
@@ -34,9 +35,10 @@ void for_blocks(std::size_t blocks, const Body& body) {
 
 }  // namespace
 
+/// Sparse direct factor of the whole matrix.
 struct SolidLinear::Direct {
-  Eigen::SparseMatrix<double> matrix;  // lower triangle
-  std::vector<Eigen::Index> diagonal;  // places of the diagonal in matrix.valuePtr()
+  Eigen::SparseMatrix<double> matrix;  // only the lower triangle
+  std::vector<Eigen::Index> diagonal;  // places of the diagonal entries in matrix.valuePtr()
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor;
 };
 
@@ -45,6 +47,7 @@ SolidLinear::SolidLinear(const SolidMesh& mesh, LinearSolver kind) : mesh_(&mesh
   blocks_ = std::clamp<std::size_t>(n / kBlockNodes, 1, kMaxBlocks);
   for (auto* vector : {&residual_, &preconditioned_, &direction_, &product_}) vector->resize(n);
   partial_.resize(blocks_);
+  // Choose the preconditioner by the size of the problem.
   if (kind == LinearSolver::automatic) {
     kind = n <= (mesh.plane ? kDirectPlane : kDirectSolid) ? LinearSolver::ldlt : LinearSolver::cg;
   }
@@ -52,6 +55,7 @@ SolidLinear::SolidLinear(const SolidMesh& mesh, LinearSolver kind) : mesh_(&mesh
     inverse_pivot_.resize(n);
     return;
   }
+  // Fill the lower triangle and analyse its pattern once. Only the diagonal changes later.
   direct_ = std::make_unique<Direct>();
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(4 * n);
@@ -64,7 +68,7 @@ SolidLinear::SolidLinear(const SolidMesh& mesh, LinearSolver kind) : mesh_(&mesh
   }
   direct_->matrix.resize(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
   direct_->matrix.setFromTriplets(entries.begin(), entries.end());
-  // Lower triangle by columns: the diagonal comes first.
+  // Note the place of the diagonal: it comes first in each column of a lower triangle.
   for (std::size_t row = 0; row < n; ++row) {
     direct_->diagonal.push_back(direct_->matrix.outerIndexPtr()[row]);
   }
@@ -88,7 +92,8 @@ bool SolidLinear::factorise(std::span<const double> shift) {
     direct_->factor.factorize(direct_->matrix);
     return direct_->factor.info() == Eigen::Success;
   }
-  // A grid has no triangles of links: without fill only the pivots differ from the matrix.
+  // Factorise each block without fill. A grid has no triangles of links, so only the pivots differ
+  // from the matrix.
   std::vector<char> good(blocks_, 1);
   for_blocks(blocks_, [&](std::size_t block) {
     const std::size_t begin = block_begin(block);
@@ -96,6 +101,7 @@ bool SolidLinear::factorise(std::span<const double> shift) {
     for (std::size_t i = begin; i < end; ++i) {
       double pivot = mesh.conductance_sum_w_k[i] + shift[i];
       for (std::uint32_t at = mesh.row_start[i]; at < mesh.upper_start[i]; ++at) {
+        // Drop couplings to other blocks.
         if (mesh.columns[at] < begin) continue;
         const double g = mesh.conductance_w_k[at];
         pivot -= g * g * inverse_pivot_[mesh.columns[at]];
@@ -116,10 +122,12 @@ SolidLinear::Sums SolidLinear::precondition() {
     z = direct_->factor.solve(r);
     return {r.dot(z), z.lpNorm<Eigen::Infinity>()};
   }
+  // Solve both triangles of each block, and sum the product and the greatest value on the way.
   for_blocks(blocks_, [&](std::size_t block) {
     const std::size_t begin = block_begin(block);
     const std::size_t end = block_begin(block + 1);
     double* z = preconditioned_.data();
+    // Substitute forward.
     for (std::size_t i = begin; i < end; ++i) {
       double sum = residual_[i];
       for (std::uint32_t at = mesh.row_start[i]; at < mesh.upper_start[i]; ++at) {
@@ -128,6 +136,7 @@ SolidLinear::Sums SolidLinear::precondition() {
       }
       z[i] = sum * inverse_pivot_[i];
     }
+    // Substitute backward.
     Sums sums;
     for (std::size_t i = end; i-- > begin;) {
       double sum = 0.0;
@@ -141,6 +150,7 @@ SolidLinear::Sums SolidLinear::precondition() {
     }
     partial_[block] = sums;
   });
+  // Add the sums in the order of the blocks, so that the result does not depend on the threads.
   Sums total;
   for (const Sums& sums : partial_) {
     total.dot += sums.dot;
@@ -152,6 +162,7 @@ SolidLinear::Sums SolidLinear::precondition() {
 double SolidLinear::multiply(std::span<const double> shift) {
   const SolidMesh& mesh = *mesh_;
   const std::size_t n = mesh.free_count;
+  // Apply the matrix to the direction and sum their product.
   for_blocks(blocks_, [&](std::size_t block) {
     double dot = 0.0;
     for (std::size_t i = block_begin(block); i < block_begin(block + 1); ++i) {
@@ -172,6 +183,7 @@ double SolidLinear::multiply(std::span<const double> shift) {
 
 int SolidLinear::solve(std::span<const double> shift, std::span<const double> b,
                        std::span<double> x, double tolerance) {
+  // Start conjugate gradients from the guess zero.
   std::copy(b.begin(), b.end(), residual_.begin());
   std::fill(x.begin(), x.end(), 0.0);
   Sums now = precondition();
@@ -179,9 +191,9 @@ int SolidLinear::solve(std::span<const double> shift, std::span<const double> b,
   double rho = now.dot;
   std::copy(preconditioned_.begin(), preconditioned_.end(), direction_.begin());
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-    // The preconditioned residual stands for the error left in x.
+    // Stop on the preconditioned residual, which stands for the error left in x.
     if (!(now.greatest > tolerance)) {
-      // What is left is known well enough to be worth adding.
+      // Add it: it is known well enough to improve the result.
       for_blocks(blocks_, [&](std::size_t block) {
         for (std::size_t i = block_begin(block); i < block_begin(block + 1); ++i) {
           x[i] += preconditioned_[i];
@@ -191,6 +203,7 @@ int SolidLinear::solve(std::span<const double> shift, std::span<const double> b,
     }
     const double curvature = multiply(shift);
     if (!(curvature > 0.0)) return -1;
+    // Step along the direction.
     const double alpha = rho / curvature;
     for_blocks(blocks_, [&](std::size_t block) {
       for (std::size_t i = block_begin(block); i < block_begin(block + 1); ++i) {
@@ -200,6 +213,7 @@ int SolidLinear::solve(std::span<const double> shift, std::span<const double> b,
     });
     now = precondition();
     if (!std::isfinite(now.dot)) return -1;
+    // Choose the next direction, conjugate to the ones before.
     const double beta = now.dot / rho;
     rho = now.dot;
     for_blocks(blocks_, [&](std::size_t block) {

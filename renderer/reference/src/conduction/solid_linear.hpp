@@ -10,10 +10,10 @@
 
 namespace emit::reference {
 
-/// Solves (K + diag(shift)) x = b on the free nodes, K the conductance network, by conjugate
-/// gradients. Preconditioner: incomplete Cholesky, one factor per block of nodes, or a complete
-/// LDLT factor of an earlier shift. Sums run over fixed chunks, so the result does not depend on
-/// the number of threads.
+/// Solver of (K + diag(shift)) x = b on the free nodes, where K is the conductance network. The
+/// method is conjugate gradients. The preconditioner is an incomplete Cholesky factor per block of
+/// nodes, or a complete LDLT factor of an earlier shift. Sums run over fixed chunks, so the result
+/// does not depend on the number of threads.
 class SolidLinear {
  public:
   SolidLinear(const SolidMesh& mesh, LinearSolver kind);
@@ -21,13 +21,15 @@ class SolidLinear {
   SolidLinear(SolidLinear&&) noexcept;
   SolidLinear& operator=(SolidLinear&&) noexcept;
 
-  /// Builds the preconditioner for this shift. False when the matrix is not positive definite.
+  /// Builds the preconditioner for this shift, one value per free node, W/K. Returns false if the
+  /// matrix is not positive definite.
   [[nodiscard]] bool factorise(std::span<const double> shift);
-  /// `x` starts as the guess zero and ends as the solution. Stops when the preconditioned residual
-  /// is below `tolerance` everywhere. The number of iterations, or -1 when it did not converge.
+  /// Solves for `x`; all spans have one value per free node. It stops when the preconditioned
+  /// residual is below `tolerance` everywhere. Returns the number of iterations, or -1 if the
+  /// iteration did not converge.
   [[nodiscard]] int solve(std::span<const double> shift, std::span<const double> b,
                           std::span<double> x, double tolerance);
-  /// out = -K t over the free nodes; `t` holds all nodes.
+  /// Computes out = -K t on the free nodes. `t` holds all nodes.
   void flow(std::span<const double> t, std::span<double> out) const;
 
  private:

@@ -19,10 +19,11 @@ using physics::make_error;
 using physics::Result;
 
 constexpr std::uint32_t kNoNode = 0xffffffffU;
+/// Flags of a lattice node: it belongs to a solid cell, or it is held at a temperature.
 constexpr std::uint8_t kActive = 1;
 constexpr std::uint8_t kHeld = 2;
 
-/// Indices of the grid's nodes and cells; nodes run along z first, then x, then y.
+/// Indices of the nodes of a grid. Nodes run along z first, then x, then y.
 class Lattice {
  public:
   explicit Lattice(const SolidGrid& grid) : grid_(grid) {
@@ -52,6 +53,7 @@ bool is_solid(std::uint16_t cell) {
   return cell < kFixedCell;
 }
 
+/// Checks lines, materials and cells of a grid.
 Result<void> check(const SolidGrid& grid) {
   const auto fail = [](std::string text) {
     return make_error(ErrorCode::invalid_argument, "solid grid: " + std::move(text));
@@ -90,7 +92,7 @@ Result<void> check(const SolidGrid& grid) {
   return {};
 }
 
-/// Corner nodes of the face of cell (i, j, k) across `axis`, as lattice indices.
+/// Returns the corner nodes of the face of a cell across `axis`, as lattice indices.
 std::array<std::size_t, 4> face_corners(const Lattice& lattice, std::array<std::size_t, 3> cell,
                                         std::size_t axis, int sign) {
   if (sign > 0) ++cell[axis];
@@ -101,6 +103,7 @@ std::array<std::size_t, 4> face_corners(const Lattice& lattice, std::array<std::
           first + lattice.stride(u) + lattice.stride(v)};
 }
 
+/// Builds the network of a grid step by step.
 class MeshBuilder {
  public:
   MeshBuilder(const SolidGrid& grid,
@@ -123,6 +126,7 @@ class MeshBuilder {
   }
 
  private:
+  // Visit every cell with its indices and its content.
   template <class Visit>
   void for_cells(Visit visit) const {
     for (std::size_t k = 0; k < grid_.count(2); ++k) {
@@ -134,6 +138,7 @@ class MeshBuilder {
     }
   }
 
+  // Flag the corners of solid and of held cells.
   void mark_cells() {
     for_cells([&](const std::array<std::size_t, 3>& cell, std::uint16_t fill) {
       if (fill == kVoidCell) return;
@@ -148,7 +153,7 @@ class MeshBuilder {
         }
       }
     });
-    // A node of a core alone belongs to no solid cell.
+    // Release nodes that belong to held cells alone.
     std::erase_if(held_k_, [&](const auto& held) {
       if (flags_[held.first] != kHeld) return false;
       flags_[held.first] = 0;
@@ -156,6 +161,7 @@ class MeshBuilder {
     });
   }
 
+  // Make a face for every side of a solid cell that borders on no solid.
   Result<void> make_faces() {
     Result<void> result;
     for_cells([&](const std::array<std::size_t, 3>& cell, std::uint16_t fill) {
@@ -174,6 +180,7 @@ class MeshBuilder {
     SolidFace face;
     const bool rim = sign < 0 ? cell[axis] == 0 : cell[axis] + 1 == grid_.count(axis);
     face.outside_cell = kOutsideGrid;
+    // Skip a side that borders on another cell of material or on a held cell.
     if (!rim) {
       std::array<std::size_t, 3> across = cell;
       across[axis] += sign < 0 ? std::size_t(-1) : 1;
@@ -181,6 +188,7 @@ class MeshBuilder {
       if (grid_.cells[index] != kVoidCell) return {};
       face.outside_cell = static_cast<std::uint32_t>(index);
     }
+    // Describe the face: its place, its area and the cells on both sides.
     face.axis = static_cast<std::uint8_t>(axis);
     face.sign = static_cast<std::int8_t>(sign);
     face.material = fill;
@@ -198,6 +206,7 @@ class MeshBuilder {
         face.high_m[shift] = face.low_m[shift];
       }
     }
+    // Apply the boundary condition.
     const FaceCondition condition = condition_(face);
     const auto corners = face_corners(lattice_, cell, axis, sign);
     switch (condition.kind) {
@@ -226,6 +235,7 @@ class MeshBuilder {
     return {};
   }
 
+  // Number the free nodes first, then the held ones.
   void number_nodes() {
     number_.assign(lattice_.nodes(), kNoNode);
     std::uint32_t next = 0;
@@ -248,7 +258,8 @@ class MeshBuilder {
     }
   }
 
-  /// Material around a node: cell towards -/+ on each axis, or nothing.
+  /// Returns the material of the cell on one side of a node per axis (bit `axis` of `corner` is set
+  /// for the greater side), or nothing. Sets the size of that cell.
   [[nodiscard]] const SolidMaterial* cell_at(const std::array<std::size_t, 3>& node,
                                              unsigned corner, std::array<double, 3>& size_m) const {
     std::array<std::size_t, 3> cell = node;
@@ -262,7 +273,8 @@ class MeshBuilder {
     return is_solid(fill) ? &grid_.materials[fill] : nullptr;
   }
 
-  /// Links of one node towards -y, -x, -z, +z, +x, +y: ascending numbers among free nodes.
+  /// Heat capacity of one node and its conductances towards -y, -x, -z, +z, +x, +y. In this order
+  /// the numbers of free nodes ascend.
   struct Links {
     double capacity_j_k = 0.0;
     std::array<double, 6> conductance_w_k{};
@@ -271,6 +283,7 @@ class MeshBuilder {
     static constexpr std::array<std::array<std::size_t, 2>, 3> kSlot{{{1, 4}, {0, 5}, {2, 3}}};
     Links links;
     const auto at = lattice_.at(node);
+    // Collect an eighth of the capacity of each cell around the node.
     for (unsigned corner = 0; corner < 8; ++corner) {
       std::array<double, 3> size_m{};
       const SolidMaterial* material = cell_at(at, corner, size_m);
@@ -278,7 +291,7 @@ class MeshBuilder {
       const double volume = size_m[0] * size_m[1] * size_m[2];
       links.capacity_j_k += material->heat_capacity_j_m3_k * volume / 8.0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        // A quarter of the cell's section lies around this edge.
+        // Add the conductance of a quarter of the cell's section, which lies around this edge.
         links.conductance_w_k[kSlot[axis][corner >> axis & 1U]] +=
             material->conductivity_w_m_k * volume / (4.0 * size_m[axis] * size_m[axis]);
       }
@@ -290,6 +303,7 @@ class MeshBuilder {
     return slot < 3 ? number_[node - strides[slot]] : number_[node + strides[5 - slot]];
   }
 
+  // Assemble the sparse rows: count the links of every node, then fill them.
   void make_rows() {
     const std::size_t n = mesh_.free_count;
     mesh_.capacity_j_k.resize(n);
@@ -317,7 +331,7 @@ class MeshBuilder {
     mesh_.capacity_j_k[row] = links.capacity_j_k;
     std::uint32_t at = mesh_.row_start[row];
     double sum = 0.0;
-    // Fixed neighbours have numbers above all free ones and go last: rows stay in order.
+    // Put fixed neighbours last. Their numbers are above all free ones, so the row stays in order.
     for (const bool fixed : {false, true}) {
       for (std::size_t slot = 0; slot < 6; ++slot) {
         const double g = links.conductance_w_k[slot];
@@ -331,11 +345,14 @@ class MeshBuilder {
       }
     }
     mesh_.conductance_sum_w_k[row] = sum;
+    // Find the first entry above the diagonal.
     std::uint32_t upper = mesh_.row_start[row];
     while (upper < mesh_.row_start[row + 1] && mesh_.columns[upper] < row) ++upper;
     mesh_.upper_start[row] = upper;
   }
 
+  // Translate the corners of the faces to node numbers and list the faces around every surface
+  // node.
   void finish_faces() {
     const std::size_t n = mesh_.free_count;
     std::vector<std::uint32_t> slot(n, kNoNode);
@@ -352,6 +369,7 @@ class MeshBuilder {
         ++count[slot[node]];
       }
     }
+    // Turn the counts into the start of each node's list, then fill the lists.
     mesh_.face_start.assign(count.size() + 1, 0);
     for (std::size_t s = 0; s < count.size(); ++s) {
       mesh_.face_start[s + 1] = mesh_.face_start[s] + count[s];
@@ -363,6 +381,7 @@ class MeshBuilder {
       for (const std::uint32_t node : mesh_.faces[f].nodes) {
         if (node >= n) continue;
         mesh_.node_faces[at[slot[node]]++] = static_cast<std::uint32_t>(f);
+        // Give each corner a quarter of the emission of the face.
         mesh_.emission_w_k4[slot[node]] +=
             0.25 * mesh_.faces[f].area_m2 * emissivity_[f] * physics::kStefanBoltzmannWPerM2K4;
       }
@@ -376,8 +395,8 @@ class MeshBuilder {
   std::vector<std::uint8_t> flags_;
   std::vector<std::pair<std::size_t, double>> held_k_;
   std::vector<double> emissivity_;
-  std::vector<std::uint32_t> number_;        ///< lattice node to number
-  std::vector<std::uint32_t> lattice_node_;  ///< of free nodes
+  std::vector<std::uint32_t> number_;        ///< number of every lattice node
+  std::vector<std::uint32_t> lattice_node_;  ///< lattice node of every free node
 };
 
 }  // namespace

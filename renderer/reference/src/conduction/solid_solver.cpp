@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
 #include "solid_linear.hpp"
 #include "solid_mesh.hpp"
@@ -19,7 +20,7 @@ using physics::make_error;
 using physics::Result;
 
 // TR-BDF2 (Bank et al. 1985) with the third-order companion of Hosea and Shampine (1996): the
-// trapezium to t + gamma dt, then BDF2; both stages share the matrix M / (d dt) + K.
+// trapezium to t + gamma dt, then BDF2. Both stages share the matrix M / (d dt) + K.
 constexpr double kSqrt2 = 1.4142135623730950488;
 constexpr double kGamma = 2.0 - kSqrt2;
 constexpr double kD = kGamma / 2.0;
@@ -28,11 +29,12 @@ constexpr double kError0 = kW - (1.0 - kW) / 3.0;
 constexpr double kError1 = kW - (3.0 * kW + 1.0) / 3.0;
 constexpr double kError2 = kD - kD / 3.0;
 
-/// Linear systems are solved, and Newton's iteration stopped, at this share of the step tolerance.
+/// Share of the step tolerance at which linear solves and Newton's iteration stop.
 constexpr double kSolveShare = 1e-3;
 constexpr int kMaxNewton = 12;
 constexpr std::size_t kGrain = 8192;
 
+/// Calls body(i) for i < n, in parallel.
 template <class Body>
 void for_range(std::size_t n, const Body& body) {
   threads::parallel_ranges(tbb::blocked_range<std::size_t>(0, n, kGrain), [&](const auto& range) {
@@ -40,7 +42,7 @@ void for_range(std::size_t n, const Body& body) {
   });
 }
 
-/// In fixed chunks: the same bits for any number of threads.
+/// Sums term(i) for i < n in fixed chunks, which gives the same bits for any number of threads.
 template <class Term>
 double sum_of(std::size_t n, const Term& term) {
   const std::size_t chunks = (n + kGrain - 1) / kGrain;
@@ -60,6 +62,7 @@ double sum_of(std::size_t n, const Term& term) {
 
 }  // namespace
 
+/// Mesh, options, state and work space of a solver.
 struct SolidSolver::Data {
   SolidMesh mesh;
   SolidOptions options;
@@ -69,11 +72,11 @@ struct SolidSolver::Data {
   // Drive of the exposed faces, and its sums over the surface nodes.
   std::vector<double> face_k, absorbed_w_m2, film_w_m2_k, air_k;
   std::vector<double> supply_w, film_w_k;
-  // Per free node.
+  // Values per free node.
   std::vector<double> shift, base_k, right, delta, flow0_w, flow1_w, flow2_w;
-  // All nodes.
+  // Temperatures of all nodes at both stages.
   std::vector<double> stage1_k, stage2_k;
-  // Of the step last attempted.
+  // Heat and flow of the step that was attempted last.
   double pending_heat_j = 0.0;
   double pending_flow_w = 0.0;
 
@@ -97,6 +100,7 @@ struct SolidSolver::Data {
   Data(const Data&) = delete;
   Data& operator=(const Data&) = delete;
 
+  /// Sets the nodes of fixed temperature.
   void hold_fixed(std::vector<double>& kelvin) const {
     std::copy(mesh.fixed_k.begin(), mesh.fixed_k.end(),
               kelvin.begin() + static_cast<std::ptrdiff_t>(mesh.free_count));
@@ -111,14 +115,18 @@ struct SolidSolver::Data {
   void accept(double to_s);
 };
 
+/// Calls the drive for a time and sums its terms over the surface nodes. Errors: internal (the
+/// drive is not finite).
 Result<void> SolidSolver::Data::evaluate_drive(double time_s, const std::vector<double>& kelvin,
                                                const DriveFunction& drive) {
+  // Average the corners of every face.
   for_range(mesh.faces.size(), [&](std::size_t f) {
     double sum = 0.0;
     for (const std::uint32_t node : mesh.faces[f].nodes) sum += kelvin[node];
     face_k[f] = 0.25 * sum;
   });
   drive(time_s, face_k, {absorbed_w_m2, film_w_m2_k, air_k});
+  // Give a quarter of each face to each of its corners.
   for_range(mesh.surface_nodes.size(), [&](std::size_t s) {
     double supply = 0.0;
     double film = 0.0;
@@ -131,6 +139,7 @@ Result<void> SolidSolver::Data::evaluate_drive(double time_s, const std::vector<
     supply_w[s] = supply;
     film_w_k[s] = film;
   });
+  // Refuse a drive that is not finite.
   const double check =
       sum_of(supply_w.size(), [&](std::size_t s) { return supply_w[s] + film_w_k[s]; });
   if (!std::isfinite(check)) {
@@ -140,7 +149,7 @@ Result<void> SolidSolver::Data::evaluate_drive(double time_s, const std::vector<
   return {};
 }
 
-/// Power into every free node for the drive last evaluated.
+/// Computes the power into every free node under the drive that was evaluated last.
 void SolidSolver::Data::net_flow(const std::vector<double>& kelvin, std::vector<double>& out) {
   linear.flow(kelvin, out);
   for_range(mesh.surface_nodes.size(), [&](std::size_t s) {
@@ -150,12 +159,14 @@ void SolidSolver::Data::net_flow(const std::vector<double>& kelvin, std::vector<
   });
 }
 
-/// Power through exposed faces and from fixed nodes: what the free nodes gain as a whole.
+/// Returns the power through exposed faces and from fixed nodes. It is what all free nodes together
+/// gain.
 double SolidSolver::Data::boundary_flow_w(const std::vector<double>& kelvin) const {
   const double faces = sum_of(mesh.surface_nodes.size(), [&](std::size_t s) {
     const double t = kelvin[mesh.surface_nodes[s]];
     return supply_w[s] - film_w_k[s] * t - mesh.emission_w_k4[s] * t * t * t * t;
   });
+  // Fixed neighbours are the last ones of a row.
   const double fixed = sum_of(mesh.free_count, [&](std::size_t i) {
     double sum = 0.0;
     for (std::uint32_t at = mesh.row_start[i + 1]; at-- > mesh.row_start[i];) {
@@ -168,22 +179,25 @@ double SolidSolver::Data::boundary_flow_w(const std::vector<double>& kelvin) con
   return faces + fixed;
 }
 
-/// Newton on M (T - base) / (d dt) = net flow(T), from the guess in `kelvin`.
+/// Solves M (T - base) / (d dt) = net flow(T) by Newton, from the guess in `kelvin`.
 Result<void> SolidSolver::Data::solve_stage(double step_s, std::vector<double>& kelvin,
                                             bool factorise) {
   const double scale = 1.0 / (kD * step_s);
   const double tolerance = kSolveShare * options.tolerance_k;
   for (int iteration = 0; iteration < kMaxNewton; ++iteration) {
+    // Compute the residual and the diagonal that the time step adds to the matrix.
     net_flow(kelvin, right);
     for_range(mesh.free_count, [&](std::size_t i) {
       shift[i] = mesh.capacity_j_k[i] * scale;
       right[i] -= shift[i] * (kelvin[i] - base_k[i]);
     });
+    // Add the slope of the convection and of the emission at the surface.
     for_range(mesh.surface_nodes.size(), [&](std::size_t s) {
       const std::uint32_t node = mesh.surface_nodes[s];
       const double t = std::max(kelvin[node], 1.0);
       shift[node] += film_w_k[s] + 4.0 * mesh.emission_w_k4[s] * t * t * t;
     });
+    // Factorise once per step; later iterations reuse the factor as a preconditioner.
     if (factorise && iteration == 0) {
       ++state.stats.factorisations;
       if (!linear.factorise(shift)) {
@@ -197,9 +211,10 @@ Result<void> SolidSolver::Data::solve_stage(double step_s, std::vector<double>& 
     state.stats.linear_iterations += static_cast<std::uint64_t>(used);
     ++state.stats.newton_iterations;
     for_range(mesh.free_count, [&](std::size_t i) { kelvin[i] += delta[i]; });
+    // Stop when the linearised emission is accurate enough.
     double worst = 0.0;
     for (const std::uint32_t node : mesh.surface_nodes) {
-      // Left over by the linearised emission: at most 6 T^2 delta^2 of its 4 T^3.
+      // The linearisation leaves at most 6 T^2 delta^2 of the emission, whose slope is 4 T^3.
       const double left = 1.5 * delta[node] * delta[node] / std::max(kelvin[node], 1.0);
       worst = std::max(worst, left);
     }
@@ -209,11 +224,13 @@ Result<void> SolidSolver::Data::solve_stage(double step_s, std::vector<double>& 
   return make_error(ErrorCode::internal, "solid solver: Newton's iteration did not converge");
 }
 
-/// One step from the state; stages end in stage1_k and stage2_k. The error estimate, K.
+/// Attempts one step from the state. The stages end in stage1_k and stage2_k. Returns the error
+/// estimate, K.
 Result<double> SolidSolver::Data::attempt(double step_s, const DriveFunction& drive) {
   const double t0 = state.time_s;
   const std::vector<double>& start_k = state.node_k;
   const std::size_t n = mesh.free_count;
+  // Evaluate the flow at the start, unless the last step left it.
   if (!state.has_slope) {
     if (auto done = evaluate_drive(t0, start_k, drive); !done) return tl::unexpected(done.error());
     net_flow(start_k, state.slope_w);
@@ -222,13 +239,14 @@ Result<double> SolidSolver::Data::attempt(double step_s, const DriveFunction& dr
   }
   const std::vector<double>& flow0 = state.slope_w;
 
-  // An explicit prediction is wild where cells answer faster than the step; the emission needs a
-  // temperature near the truth, so it is kept within bounds.
+  // Bound the explicit prediction. It is wild in cells that answer faster than the step, but the
+  // emission needs a temperature near the truth.
   const auto bounded = [](double from, double change) {
     return from + std::clamp(change, -5.0, 5.0);
   };
   hold_fixed(stage1_k);
   hold_fixed(stage2_k);
+  // Stage 1: the trapezium to t + gamma dt.
   for_range(n, [&](std::size_t i) {
     const double rate = flow0[i] / mesh.capacity_j_k[i];
     base_k[i] = start_k[i] + kD * step_s * rate;
@@ -240,6 +258,7 @@ Result<double> SolidSolver::Data::attempt(double step_s, const DriveFunction& dr
   if (auto done = solve_stage(step_s, stage1_k, true); !done) return tl::unexpected(done.error());
   const double boundary1_w = boundary_flow_w(stage1_k);
 
+  // Stage 2: BDF2 to t + dt, predicted by the parabola through the start and stage 1.
   constexpr double kC1 = 1.0 / (kGamma * (2.0 - kGamma));
   constexpr double kC0 = (1.0 - kGamma) * (1.0 - kGamma) * kC1;
   for_range(n, [&](std::size_t i) {
@@ -255,21 +274,24 @@ Result<double> SolidSolver::Data::attempt(double step_s, const DriveFunction& dr
   }
   if (auto done = solve_stage(step_s, stage2_k, false); !done) return tl::unexpected(done.error());
   const double boundary2_w = boundary_flow_w(stage2_k);
+  // Combine the flows of the stages to the third-order estimate of the error.
   for_range(n, [&](std::size_t i) {
     flow2_w[i] = mesh.capacity_j_k[i] * (stage2_k[i] - base_k[i]) / (kD * step_s);
     right[i] = (kError0 * flow0[i] + kError1 * flow1_w[i] + kError2 * flow2_w[i]) / kD;
   });
-  // The implicit matrix takes from the estimate what the scheme itself damps.
+  // Solve with the implicit matrix: it removes from the estimate what the scheme itself damps.
   if (linear.solve(shift, right, delta, 0.05 * options.tolerance_k) < 0) {
     return make_error(ErrorCode::internal, "solid solver: the error estimate did not converge");
   }
   double worst = 0.0;
   for (std::size_t i = 0; i < n; ++i) worst = std::max(worst, std::abs(delta[i]));
+  // Keep the heat of the step until the step is accepted.
   pending_heat_j = step_s * (kW * state.flow_w + kW * boundary1_w + kD * boundary2_w);
   pending_flow_w = boundary2_w;
   return worst;
 }
 
+/// Takes over the step that was attempted last.
 void SolidSolver::Data::accept(double to_s) {
   state.time_s = to_s;
   state.node_k.swap(stage2_k);
@@ -336,7 +358,7 @@ Result<void> SolidSolver::advance(double to_s, const DriveFunction& drive,
     const double left = to_s - d.state.time_s;
     double step_s = std::clamp(d.state.step_s, options.min_step_s, options.max_step_s);
     const bool last = step_s >= left * (1.0 - 1e-9);
-    // No crumb is left over for the end.
+    // Stretch or halve the step near the end, so that no tiny step is left over.
     if (last) {
       step_s = left;
     } else if (step_s > 0.5 * left) {
@@ -344,6 +366,7 @@ Result<void> SolidSolver::advance(double to_s, const DriveFunction& drive,
     }
     const auto error_k = d.attempt(step_s, drive);
     const bool failed = !error_k || !std::isfinite(*error_k);
+    // Reject the step and repeat with a smaller one.
     if ((failed || *error_k > options.tolerance_k) && step_s > options.min_step_s) {
       ++d.state.stats.rejected;
       const double shrink =
@@ -355,10 +378,11 @@ Result<void> SolidSolver::advance(double to_s, const DriveFunction& drive,
       return error_k ? make_error(ErrorCode::internal, "solid solver: the result is not finite")
                      : tl::unexpected(error_k.error());
     }
+    // Accept the step and choose the next one by the error of third order.
     d.accept(last ? to_s : d.state.time_s + step_s);
     const double growth =
         std::clamp(0.9 * std::cbrt(options.tolerance_k / std::max(*error_k, 1e-12)), 0.2, 2.0);
-    // A step cut short by the end says little about the next one.
+    // Do not shrink the next step after one that the end cut short: it says little about the next.
     const double next_s = step_s * growth;
     d.state.step_s = std::min(options.max_step_s, step_s < 0.99 * d.state.step_s && growth > 1.0
                                                       ? std::max(d.state.step_s, next_s)
@@ -382,11 +406,6 @@ Result<double> SolidSolver::step(double to_s, const DriveFunction& drive) {
   return error_k;
 }
 
-void SolidSolver::note_jump(double next_step_s) {
-  data_->state.has_slope = false;
-  data_->state.step_s = next_step_s;
-}
-
 double SolidSolver::time_s() const noexcept {
   return data_->state.time_s;
 }
@@ -395,13 +414,16 @@ std::span<const double> SolidSolver::node_k() const noexcept {
 }
 
 double SolidSolver::face_k(std::size_t face) const noexcept {
+  EMIT_DCHECK_OP(face, <, data_->mesh.faces.size());
   double sum = 0.0;
   for (const std::uint32_t node : data_->mesh.faces[face].nodes) sum += data_->state.node_k[node];
   return 0.25 * sum;
 }
 
 double SolidSolver::face_k_at(std::size_t face, const glm::dvec3& point_m) const noexcept {
+  EMIT_DCHECK_OP(face, <, data_->mesh.faces.size());
   const SolidFace& f = data_->mesh.faces[face];
+  // Interpolate between the corners in the two axes of the face.
   const auto u = static_cast<glm::dvec3::length_type>(f.axis == 0 ? 1 : 0);
   const auto v = static_cast<glm::dvec3::length_type>(f.axis == 2 ? 1 : 2);
   const auto share = [&](glm::dvec3::length_type a) {

@@ -20,13 +20,15 @@ using physics::make_error;
 using physics::Result;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Below this elevation shadows are too faint and too long to be resolved sharply.
+/// Lowest elevation of the sun for fine cells. Below it shadows are too faint and too long to be
+/// resolved sharply.
 constexpr double kLowestSunRad = 8.0 * physics::kDegree;
-/// A shadow's edge this old has lost its sharpness.
+/// Age at which a shadow's edge has lost its sharpness.
 constexpr double kEdgeAgeS = 60.0;
-/// Thickness of the row of held cells under the ground; any will do.
+/// Thickness of the row of held cells under the ground. The value does not matter.
 constexpr double kHeldRowM = 0.01;
 
+/// Returns the cell that contains x, clamped to the grid.
 std::size_t cell_of(const std::vector<double>& lines, double x) {
   const auto after = std::upper_bound(lines.begin(), lines.end(), x);
   const auto index = after - lines.begin() - 1;
@@ -34,6 +36,7 @@ std::size_t cell_of(const std::vector<double>& lines, double x) {
       std::clamp<std::ptrdiff_t>(index, 0, static_cast<std::ptrdiff_t>(lines.size()) - 2));
 }
 
+/// Returns the thickness of all layers.
 double total_m(const scene::Material& material) {
   double sum = 0.0;
   for (const scene::Layer& layer : material.layers) sum += layer.thickness_m;
@@ -42,6 +45,7 @@ double total_m(const scene::Material& material) {
 
 }  // namespace
 
+/// Builds the grid of a scene step by step.
 class VoxelBuilder {
  public:
   VoxelBuilder(VoxelShape shape, const scene::SceneGeometry& geometry, const VoxelOptions& options)
@@ -54,6 +58,7 @@ class VoxelBuilder {
     find_hollow();
     for (std::size_t axis = 0; axis < 3; ++axis) model_.grid_.lines_m[axis] = lines(axis);
     SolidGrid& grid = model_.grid_;
+    // Refuse a grid with too many nodes before it takes memory.
     double nodes = 1.0;
     for (const auto& axis_lines : grid.lines_m) nodes *= static_cast<double>(axis_lines.size());
     if (nodes > static_cast<double>(options_.max_nodes)) {
@@ -70,6 +75,7 @@ class VoxelBuilder {
   }
 
  private:
+  /// Visits every cell of the feature grid.
   template <class Visit>
   void for_shape(Visit visit) const {
     for (std::size_t k = 0; k < shape_.count(2); ++k) {
@@ -81,6 +87,7 @@ class VoxelBuilder {
     }
   }
 
+  /// Checks that all solids and all ground have layers.
   Result<void> check_materials() const {
     const auto check = [&](std::uint32_t index) -> Result<void> {
       const scene::Material& material = model_.materials_[index];
@@ -100,12 +107,13 @@ class VoxelBuilder {
     return result;
   }
 
-  /// Materials of bodies that touch a cavity: their last layer goes through to it.
+  /// Finds the materials of solids that touch a cavity. Their last layer extends to the cavity.
   void find_hollow() {
     hollow_.assign(model_.materials_.size(), 0);
     for_shape([&](std::size_t i, std::size_t j, std::size_t k, std::size_t cell) {
       if (shape_.fill[cell] != ShapeFill::cavity) return;
       const std::array<std::size_t, 3> at{i, j, k};
+      // Look at all six neighbours of a cavity cell.
       for (std::size_t axis = 0; axis < 3; ++axis) {
         for (const int step : {-1, 1}) {
           if (step < 0 ? at[axis] == 0 : at[axis] + 1 == shape_.count(axis)) continue;
@@ -120,8 +128,8 @@ class VoxelBuilder {
     });
   }
 
-  /// Lines of one axis: on every plane where the filling changes and on every layer's boundary,
-  /// fine at faces and where shadows pass.
+  /// Returns the grid lines of one axis. Lines lie on every plane across which the filling changes
+  /// and on every boundary of a layer. They are dense at faces and in places that shadows pass.
   [[nodiscard]] std::vector<double> lines(std::size_t axis) const {
     GradedLines wanted;
     wanted.growth_frac = options_.growth_frac;
@@ -130,6 +138,7 @@ class VoxelBuilder {
     const std::vector<double>& planes = shape_.planes_m[axis];
     wanted.fixed_m = {planes.front(), planes.back()};
     const auto fine = [&](double at) { wanted.wishes.push_back({at, at, options_.normal_cell_m}); };
+    // Put lines at the sides of solids and at the layers behind them.
     for_shape([&](std::size_t i, std::size_t j, std::size_t k, std::size_t cell) {
       if (shape_.fill[cell] != ShapeFill::solid) return;
       const std::array<std::size_t, 3> at{i, j, k};
@@ -155,6 +164,7 @@ class VoxelBuilder {
         }
       }
     });
+    // Add the lines of the ground: its layers along z, its seams along x and y.
     if (axis == 2) {
       ground_lines(wanted);
     } else {
@@ -164,6 +174,7 @@ class VoxelBuilder {
     return graded_lines(wanted, 1e-5);
   }
 
+  /// Adds lines at the layers of the ground and below the deepest one.
   void ground_lines(GradedLines& wanted) const {
     if (!shape_.has_ground) return;
     double deepest = 0.0;
@@ -181,7 +192,7 @@ class VoxelBuilder {
     wanted.wishes.push_back({shape_.ground_z_m, shape_.ground_z_m, options_.normal_cell_m});
   }
 
-  /// Where ground of two materials meets, or ends.
+  /// Adds lines where ground of one material meets ground of another, or ends.
   void ground_seams(std::size_t axis, GradedLines& wanted) const {
     if (!shape_.has_ground) return;
     const std::size_t nx = shape_.count(0);
@@ -199,10 +210,12 @@ class VoxelBuilder {
     }
   }
 
+  /// Asks for fine cells along an axis over all places that shadows of the solids swept.
   void swept(std::size_t axis, GradedLines& wanted) const {
     double low = kInfinity;
     double high = -kInfinity;
     const double floor = shape_.has_ground ? shape_.ground_z_m : shape_.planes_m[2].front();
+    // Find the range of the solids and of their shadows on the floor.
     for_shape([&](std::size_t i, std::size_t j, std::size_t k, std::size_t cell) {
       if (shape_.fill[cell] != ShapeFill::solid) return;
       const std::size_t at = axis == 0 ? i : axis == 1 ? j : k;
@@ -219,6 +232,7 @@ class VoxelBuilder {
         }
       }
     });
+    // Ask for fine cells in this range, inside the scene.
     if (!(low < high)) return;
     low = std::max(low, shape_.planes_m[axis].front());
     high = std::min(high, shape_.planes_m[axis].back());
@@ -226,9 +240,8 @@ class VoxelBuilder {
     if (axis != 2) sharp_edges(axis, floor, wanted);
   }
 
-  /// Cells across the shadows' edges on the floor: small where the edge lay lately, for
-  /// conduction smooths what is older over sqrt(4 a t) of ground (a = 6e-7 m2/s: 12 mm in a
-  /// minute).
+  /// Asks for small cells across the edges of shadows on the floor that are still sharp. Conduction
+  /// smooths older edges over sqrt(4 a t) of ground (a = 6e-7 m2/s: 12 mm in a minute).
   void sharp_edges(std::size_t axis, double floor, GradedLines& wanted) const {
     const std::size_t other = 1 - axis;
     const auto along = static_cast<glm::dvec3::length_type>(axis);
@@ -239,11 +252,12 @@ class VoxelBuilder {
       return shape_.fill[shape_.index(at[0], at[1], at[2])] == ShapeFill::open;
     };
     for (std::size_t s = 0; s < options_.suns.size(); ++s) {
+      // Let the wanted cell grow with the age of the shadow.
       const double size =
           options_.shadow_cell_m * std::sqrt(1.0 + options_.suns[s].age_s / kEdgeAgeS);
       if (size >= options_.swept_cell_m) continue;
       const glm::dvec3& sun = options_.suns[s].to_sun;
-      // The edge has wandered from where it lay at the sun before.
+      // Cover the way of the edge since the sun sample before.
       const glm::dvec3& before = options_.suns[s > 0 ? s - 1 : 0].to_sun;
       if (std::min(sun.z, before.z) < std::sin(kLowestSunRad)) continue;
       const double level = std::hypot(sun.x, sun.y);
@@ -253,6 +267,7 @@ class VoxelBuilder {
         const double bottom = shape_.planes_m[2][k] - floor;
         const double top = shape_.planes_m[2][k + 1] - floor;
         if (!(top > 0.0)) return;
+        // Project a part of an edge to the floor from both positions of the sun.
         const auto wish = [&](double x, double low, double high, double cell_m) {
           if (cell_m >= options_.swept_cell_m) return;
           const std::array<double, 4> ends{
@@ -266,9 +281,9 @@ class VoxelBuilder {
           if (!open(at, axis, step)) continue;
           const double x = shape_.planes_m[axis][step < 0 ? at[axis] : at[axis] + 1];
           const bool lit = step * sun[along] > 0.0;
-          // Horizontal edges between the lit top and an unlit side.
+          // Horizontal edges lie between the lit top and an unlit side.
           if (!lit && open(at, 2, 1)) wish(x, top, top, size);
-          // Upright edges between a lit and an unlit side; their shadow runs away from the sun.
+          // Upright edges lie between a lit and an unlit side. Their shadow runs away from the sun.
           for (const int side : {-1, 1}) {
             if (!open(at, other, side) || (side * sun[across] > 0.0) == lit) continue;
             wish(x, std::max(bottom, 0.0), top,
@@ -279,7 +294,7 @@ class VoxelBuilder {
     }
   }
 
-  /// Grid material for a layer of a scene material.
+  /// Returns the grid material for a layer of a scene material.
   std::uint16_t solid(std::uint32_t material, std::size_t layer, bool ground) {
     const std::array<std::size_t, 3> key{material, layer, ground ? 1U : 0U};
     const auto [found, added] =
@@ -292,22 +307,27 @@ class VoxelBuilder {
     }
     return found->second;
   }
+  /// Returns the code of cells that are held at a temperature.
   std::uint16_t held(double kelvin) {
     auto& all = model_.grid_.fixed_cell_k;
     auto found = std::find(all.begin(), all.end(), kelvin);
     if (found == all.end()) {
-      // More base temperatures than codes do not occur; the last code then serves them all.
+      // Use the last code for all further temperatures. More base temperatures than codes do not
+      // occur.
       if (all.size() < 255) all.push_back(kelvin);
       found = all.end() - 1;
     }
     return static_cast<std::uint16_t>(kFixedCell + (found - all.begin()));
   }
 
+  /// Returns the middle of a grid cell along an axis.
   [[nodiscard]] double middle(std::size_t axis, std::size_t cell) const {
     const auto& axis_lines = model_.grid_.lines_m[axis];
     return 0.5 * (axis_lines[cell] + axis_lines[cell + 1]);
   }
 
+  /// Fills the cells below ground with the layers of the ground, and the cells below those with
+  /// held cells.
   void fill_ground() {
     if (!shape_.has_ground) return;
     SolidGrid& grid = model_.grid_;
@@ -321,6 +341,7 @@ class VoxelBuilder {
         for (std::size_t k = 0; k < grid.count(2); ++k) {
           const double depth = shape_.ground_z_m - middle(2, k);
           if (depth < 0.0) break;
+          // Find the layer at this depth.
           std::size_t layer = 0;
           double below = layers[0].thickness_m;
           while (layer + 1 < layers.size() && depth > below) below += layers[++layer].thickness_m;
@@ -331,9 +352,10 @@ class VoxelBuilder {
     }
   }
 
+  /// Fills the cells of the solids with their layers, from the open air inwards.
   void fill_solids() {
     SolidGrid& grid = model_.grid_;
-    // Shape cell of every grid cell along each axis.
+    // Map every grid cell to its cell of the feature grid, per axis.
     std::array<std::vector<std::size_t>, 3> to_shape;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t c = 0; c < grid.count(axis); ++c) {
@@ -342,6 +364,7 @@ class VoxelBuilder {
     }
     std::vector<std::uint8_t> open(grid.cells.size(), 0);
     std::vector<std::uint32_t> of_material(grid.cells.size(), VoxelShape::kNoGround);
+    // Mark the cells of open air, of cavities and of each material.
     for (std::size_t k = 0; k < grid.count(2); ++k) {
       if (shape_.has_ground && middle(2, k) < shape_.ground_z_m) continue;
       for (std::size_t j = 0; j < grid.count(1); ++j) {
@@ -354,6 +377,7 @@ class VoxelBuilder {
         }
       }
     }
+    // Fill each solid with its first layer and replace deeper cells layer by layer.
     for (std::uint32_t m = 0; m < model_.materials_.size(); ++m) {
       if (std::find(of_material.begin(), of_material.end(), m) == of_material.end()) continue;
       const scene::Material& material = model_.materials_[m];
@@ -364,6 +388,7 @@ class VoxelBuilder {
       for (std::size_t layer = 0; layer < material.layers.size(); ++layer) {
         depth += material.layers[layer].thickness_m;
         const bool last = layer + 1 == material.layers.size();
+        // Keep the last layer up to the cavity of a hollow solid.
         if (last && hollow_[m] != 0) break;
         const std::vector<std::uint8_t> near = grown(open, depth);
         const std::uint16_t deeper = last ? held(material.base_k) : solid(m, layer + 1, false);
@@ -374,7 +399,8 @@ class VoxelBuilder {
     }
   }
 
-  /// Cells closer than `depth` to the open air along every axis at once (a box around each).
+  /// Returns the cells that are closer than `depth` to the open air along every axis at once. The
+  /// region around each open cell is a box.
   [[nodiscard]] std::vector<std::uint8_t> grown(std::vector<std::uint8_t> open,
                                                 double depth) const {
     const SolidGrid& grid = model_.grid_;
@@ -384,13 +410,14 @@ class VoxelBuilder {
       const std::size_t u = (axis + 1) % 3;
       const std::size_t v = (axis + 2) % 3;
       const auto& axis_lines = grid.lines_m[axis];
-      // Beyond the rim lies open air, but not under the ground.
+      // Treat the space beyond the rim as open air, but not under the ground.
       const double first = axis == 2 && shape_.has_ground ? -kInfinity : axis_lines.front();
       std::vector<std::uint8_t> near(n[axis]);
       for (std::size_t b = 0; b < n[v]; ++b) {
         for (std::size_t a = 0; a < n[u]; ++a) {
           const std::size_t start = a * stride[u] + b * stride[v];
           double edge = first;
+          // Sweep up, then down, and mark cells whose middle is near the last open cell.
           for (std::size_t c = 0; c < n[axis]; ++c) {
             const bool source = open[start + c * stride[axis]] != 0;
             if (source) edge = axis_lines[c + 1];
@@ -435,9 +462,11 @@ bool VoxelModel::fits(const scene::ScenarioDesc& scenario, const scene::SceneGeo
 FaceCondition VoxelModel::condition(const SolidFace& face) const {
   const CellKind& kind = kinds_[face.material];
   const scene::Material& material = materials_[kind.material];
+  // Ground exposes only its upper face, inside the scene.
   if (kind.ground && !(face.axis == 2 && face.sign > 0 && face.outside_cell != kOutsideGrid)) {
     return {FaceKind::adiabatic, 0.0, 0.0};
   }
+  // The wall of a cavity is held at the base temperature.
   if (!kind.ground && face.outside_cell != kOutsideGrid && cavity_cell_[face.outside_cell] != 0) {
     return {FaceKind::fixed, 0.0, material.base_k};
   }
@@ -451,6 +480,7 @@ VoxelFace VoxelModel::face(const SolidFace& face) const {
 
 double VoxelModel::steady_k(const glm::dvec3& point_m, double initial_k) const {
   const VoxelShape& shape = *shape_;
+  // Find the cell of the feature grid.
   std::array<std::size_t, 3> at{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     at[axis] = cell_of(shape.planes_m[axis], point_m[static_cast<glm::dvec3::length_type>(axis)]);
@@ -462,7 +492,8 @@ double VoxelModel::steady_k(const glm::dvec3& point_m, double initial_k) const {
     index = shape.ground[at[0] + shape.count(0) * at[1]];
   }
   if (index == VoxelShape::kNoGround) {
-    // Nearest open air, by boxes; beyond the rim all is open except under the ground.
+    // Find the nearest open air by boxes. Everything beyond the rim is open, except under the
+    // ground.
     const auto away = [](double x, double low, double high) {
       return std::max({0.0, low - x, x - high});
     };
@@ -491,6 +522,7 @@ double VoxelModel::steady_k(const glm::dvec3& point_m, double initial_k) const {
   }
   if (index == VoxelShape::kNoGround) return initial_k;
   const scene::Material& material = materials_[index];
+  // Divide the steady drop of temperature by the resistance above the point.
   double whole = 0.0;
   double above = 0.0;
   double left = std::min(std::max(depth, 0.0), total_m(material));
@@ -517,6 +549,7 @@ FaceFinder::FaceFinder(const SolidGrid& grid, std::span<const SolidFace> faces)
 std::optional<std::uint32_t> FaceFinder::find(const glm::dvec3& point_m,
                                               const glm::dvec3& normal) const {
   constexpr double kNudgeM = 2e-5;
+  // Take the axis of the normal.
   std::size_t axis = 0;
   for (std::size_t a = 1; a < 3; ++a) {
     if (std::abs(normal[static_cast<glm::dvec3::length_type>(a)]) >
@@ -536,7 +569,7 @@ std::optional<std::uint32_t> FaceFinder::find(const glm::dvec3& point_m,
       {{0, 0}, {1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, 1}, {1, -1}, {-1, -1}}};
   for (const auto& nudge : kTries) {
     std::array<std::size_t, 3> cell{};
-    // Just inside the solid.
+    // Look just inside the solid; nudge the point sideways if it lies between two faces.
     cell[axis] = cell_of(lines_m_[axis], component(axis) + (up ? -kNudgeM : kNudgeM));
     cell[u] = cell_of(lines_m_[u], component(u) + kNudgeM * nudge[0]);
     cell[v] = cell_of(lines_m_[v], component(v) + kNudgeM * nudge[1]);

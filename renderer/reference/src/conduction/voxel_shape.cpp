@@ -15,9 +15,10 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Vertices are float32: planes closer together than this are one.
+/// Largest distance of two planes that count as one. Vertices are float32.
 constexpr double kMergeM = 2e-5;
 
+/// Triangle of a scene in world axes, with the axis and direction of its normal.
 struct Triangle {
   std::array<glm::dvec3, 3> p_m;
   std::size_t axis = 0;
@@ -31,6 +32,7 @@ glm::dvec3::length_type at(std::size_t axis) {
   return static_cast<glm::dvec3::length_type>(axis);
 }
 
+/// Builds the feature grid of a scene step by step.
 class ShapeBuilder {
  public:
   ShapeBuilder(const scene::ScenarioDesc& scenario, const scene::SceneGeometry& geometry)
@@ -48,6 +50,7 @@ class ShapeBuilder {
   }
 
  private:
+  /// Returns the error for a scene that is not handled, naming the object.
   [[nodiscard]] tl::unexpected<physics::Error> refuse(std::uint32_t object,
                                                       std::string text) const {
     const std::string name =
@@ -56,6 +59,7 @@ class ShapeBuilder {
                       fmt::format("three-dimensional solution: object '{}': {}", name, text));
   }
 
+  /// Collects the triangles and refuses what the model does not handle.
   Result<void> collect() {
     for (const scene::Instance& instance : geometry_.instances) {
       if (instance.entity_id != 0) return refuse(instance.object, "moving objects are not handled");
@@ -73,6 +77,7 @@ class ShapeBuilder {
                                                                static_cast<std::uint32_t>(c)]];
             t.p_m[c] = glm::dvec3(instance.world_from_mesh * glm::dvec4(glm::dvec3(p), 1.0));
           }
+          // Find the axis of the normal and check that the triangle lies across it.
           const glm::dvec3 normal = glm::cross(t.p_m[1] - t.p_m[0], t.p_m[2] - t.p_m[0]);
           if (glm::length(normal) < 1e-12) continue;
           for (std::size_t axis = 1; axis < 3; ++axis) {
@@ -84,7 +89,8 @@ class ShapeBuilder {
               std::abs(t.p_m[2][at(t.axis)] - a) > kMergeM) {
             return refuse(instance.object, "a face does not lie across one of the world's axes");
           }
-          // A node's primitives are one body; so are the nodes of a file that touch (see ground).
+          // Note the instance of the triangle, which find_ground() needs. A node's primitives form
+          // one solid.
           part_.push_back(part_of(instance));
           triangles_.push_back(t);
         }
@@ -99,7 +105,7 @@ class ShapeBuilder {
     return static_cast<std::size_t>(&instance - geometry_.instances.data());
   }
 
-  /// A part whose faces all look up from one height is a sheet of ground.
+  /// Finds the ground: an instance whose faces all look up from one height.
   void find_ground() {
     std::vector<char> sheet(geometry_.instances.size(), 1);
     std::vector<double> height(geometry_.instances.size(), std::nan(""));
@@ -112,19 +118,21 @@ class ShapeBuilder {
     for (std::size_t i = 0; i < triangles_.size(); ++i) triangles_[i].ground = sheet[part_[i]] != 0;
   }
 
+  /// Collects the planes of each axis and the height of the ground.
   Result<void> find_planes() {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       std::vector<double> all;
       for (const Triangle& t : triangles_) {
         for (const glm::dvec3& p : t.p_m) {
-          // Vertices inside a face are no planes: only what bounds a face along this axis is.
+          // Take every vertex. Planes inside a face do no harm: they only refine the feature grid.
           all.push_back(p[at(axis)]);
         }
       }
       std::sort(all.begin(), all.end());
       std::vector<double>& planes = shape_.planes_m[axis];
       for (const double x : all) {
-        // Coordinates are multiples of a micrometre in any scene made for this; float32 is not.
+        // Round to a micrometre, which removes the error of float32, and merge planes that are
+        // equal.
         const double rounded = std::round(x * 1e6) * 1e-6;
         if (planes.empty() || rounded > planes.back() + kMergeM) planes.push_back(rounded);
       }
@@ -133,10 +141,11 @@ class ShapeBuilder {
                           "three-dimensional solution: more than 400 planes along one axis");
       }
       if (planes.size() < 2) {
-        // Ground alone: one cell of air above it.
+        // Add a cell of air above ground that stands alone.
         planes.push_back(planes.back() + 1.0);
       }
     }
+    // Check that all ground lies at one height.
     for (const Triangle& t : triangles_) {
       if (!t.ground) continue;
       const double z = shape_.planes_m[2][plane(2, t.p_m[0].z)];
@@ -149,13 +158,15 @@ class ShapeBuilder {
     return {};
   }
 
+  /// Returns the index of the plane at x.
   [[nodiscard]] std::size_t plane(std::size_t axis, double x) const {
     const std::vector<double>& planes = shape_.planes_m[axis];
     const auto after = std::lower_bound(planes.begin(), planes.end(), x - kMergeM);
     return std::min(static_cast<std::size_t>(after - planes.begin()), planes.size() - 1);
   }
 
-  /// Marks which rectangles of the feature grid the triangles cover, by the rectangles' centres.
+  /// Marks the rectangles of the feature grid that triangles cover, by the centres of the
+  /// rectangles.
   void cover_faces() {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       std::array<std::size_t, 3> n{shape_.count(0), shape_.count(1), shape_.count(2)};
@@ -168,6 +179,7 @@ class ShapeBuilder {
       const std::size_t v = (t.axis + 2) % 3;
       std::array<std::size_t, 3> cell{};
       cell[t.axis] = plane(t.axis, t.p_m[0][at(t.axis)]);
+      // Visit the rectangles within the bounds of the triangle.
       const auto range = [&](std::size_t axis) {
         const auto [low, high] =
             std::minmax({t.p_m[0][at(axis)], t.p_m[1][at(axis)], t.p_m[2][at(axis)]});
@@ -190,15 +202,18 @@ class ShapeBuilder {
       }
     }
   }
+  /// Returns the middle of a cell along an axis.
   [[nodiscard]] double middle(std::size_t axis, std::size_t cell) const {
     return 0.5 * (shape_.planes_m[axis][cell] + shape_.planes_m[axis][cell + 1]);
   }
+  /// Returns the index of a rectangle across an axis.
   [[nodiscard]] std::size_t face_index(std::size_t axis,
                                        const std::array<std::size_t, 3>& cell) const {
     std::array<std::size_t, 3> n{shape_.count(0), shape_.count(1), shape_.count(2)};
     ++n[axis];
     return cell[0] + n[0] * (cell[1] + n[1] * cell[2]);
   }
+  /// Returns true if a triangle contains the point (x, y) of its plane.
   static bool inside(const Triangle& t, std::size_t u, std::size_t v, double x, double y) {
     double least = 0.0;
     double greatest = 0.0;
@@ -210,11 +225,12 @@ class ShapeBuilder {
       least = std::min(least, side);
       greatest = std::max(greatest, side);
     }
-    // A centre on the diagonal between two triangles may count for both.
+    // Accept a small error: a centre on the diagonal between two triangles may count for both.
     const double slack = 1e-9 * (greatest - least);
     return least >= -slack || greatest <= slack;
   }
 
+  /// Visits the six sides of a cell: their cover, and the cell across if there is one.
   template <class Visit>
   void for_neighbours(const std::array<std::size_t, 3>& cell, Visit visit) const {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -229,7 +245,8 @@ class ShapeBuilder {
     }
   }
 
-  /// Crossing a covered rectangle changes between inside and outside, from the rim on.
+  /// Fills the solids. Crossing a covered rectangle changes between inside and outside, starting at
+  /// the rim.
   Result<void> fill_cells() {
     const std::size_t cells = shape_.count(0) * shape_.count(1) * shape_.count(2);
     enum : char { kUnknown, kOut, kIn };
@@ -243,6 +260,8 @@ class ShapeBuilder {
       }
       return mine == value;
     };
+    // Start at the rim: a cover that faces one way separates the inside from the air around the
+    // scene.
     for (std::size_t k = 0; k < shape_.count(2); ++k) {
       for (std::size_t j = 0; j < shape_.count(1); ++j) {
         for (std::size_t i = 0; i < shape_.count(0); ++i) {
@@ -260,6 +279,7 @@ class ShapeBuilder {
       }
     }
     if (open.empty()) return refuse(0, "its faces do not close a solid");
+    // Walk inwards and change the state at every cover that faces one way.
     while (!open.empty()) {
       const auto cell = open.front();
       open.pop();
@@ -285,7 +305,8 @@ class ShapeBuilder {
     return {};
   }
 
-  /// Air that reaches the rim without crossing ground or a face is open.
+  /// Marks the air that reaches the rim without crossing ground or a face as open. All other air is
+  /// a cavity.
   void mark_cavities() {
     std::queue<std::array<std::size_t, 3>> open;
     const auto take = [&](const std::array<std::size_t, 3>& cell) {
@@ -294,6 +315,7 @@ class ShapeBuilder {
       fill = ShapeFill::open;
       open.push(cell);
     };
+    // Start at the open sides of the rim.
     for (std::size_t k = 0; k < shape_.count(2); ++k) {
       for (std::size_t j = 0; j < shape_.count(1); ++j) {
         for (std::size_t i = 0; i < shape_.count(0); ++i) {
@@ -301,13 +323,14 @@ class ShapeBuilder {
           for_neighbours(
               cell, [&](std::size_t axis, int step, const Cover& cover, bool outside, const auto&) {
                 if (!outside || cover.up || cover.down) return;
-                // The rim below is open only where no ground closes it.
+                // Skip the rim below a cell if ground closes it.
                 if (axis == 2 && step < 0 && ground_at(cell, k)) return;
                 take(cell);
               });
         }
       }
     }
+    // Walk through all air that is connected to it.
     while (!open.empty()) {
       const auto cell = open.front();
       open.pop();
@@ -319,12 +342,13 @@ class ShapeBuilder {
       });
     }
   }
+  /// Returns true if ground lies on a plane below or above a cell.
   [[nodiscard]] bool ground_at(const std::array<std::size_t, 3>& cell, std::size_t plane_z) const {
     return shape_.has_ground && shape_.planes_m[2][plane_z] == shape_.ground_z_m &&
            shape_.ground[cell[0] + shape_.count(0) * cell[1]] != VoxelShape::kNoGround;
   }
 
-  /// A solid takes the material of its faces, which has to be one.
+  /// Gives every solid the material of its faces, which must be a single one.
   Result<void> give_materials() {
     const std::size_t cells = shape_.fill.size();
     constexpr std::uint32_t kNone = 0xffffffffU;
@@ -335,6 +359,7 @@ class ShapeBuilder {
         for (std::size_t i = 0; i < shape_.count(0); ++i) {
           if (shape_.fill[shape_.index(i, j, k)] != ShapeFill::solid || seen[shape_.index(i, j, k)])
             continue;
+          // Gather the connected cells of the solid and the materials of all its faces.
           std::vector<std::array<std::size_t, 3>> body{{i, j, k}};
           seen[shape_.index(i, j, k)] = 1;
           std::uint32_t material = kNone;
@@ -367,8 +392,8 @@ class ShapeBuilder {
   }
 
   struct Cover {
-    bool up = false;  ///< a face whose outside lies towards greater coordinates
-    bool down = false;
+    bool up = false;    ///< the face's outside lies towards greater coordinates
+    bool down = false;  ///< the face's outside lies towards smaller coordinates
     std::uint32_t material = 0;
     std::uint32_t object = 0;
   };
@@ -377,7 +402,7 @@ class ShapeBuilder {
   const scene::SceneGeometry& geometry_;
   VoxelShape shape_;
   std::vector<Triangle> triangles_;
-  std::vector<std::size_t> part_;  ///< per triangle
+  std::vector<std::size_t> part_;  ///< instance of every triangle
   std::array<std::vector<Cover>, 3> faces_;
 };
 

@@ -10,16 +10,18 @@
 
 namespace emit::reference {
 
-/// What fills a cell of the feature grid.
+/// Filling of a cell of the feature grid.
 enum class ShapeFill : std::uint8_t { open, solid, cavity };
 
-/// A scene of axis-aligned faces as boxes: the planes of all faces cut space into a small grid, and
-/// every cell of it is open air, inside a closed solid, or a cavity that the air does not reach.
+/// Scene of axis-aligned faces as boxes. The planes of all faces cut space into a small feature
+/// grid. Every cell of it is open air, inside a closed solid, or a cavity that the open air does
+/// not reach.
 struct VoxelShape {
   std::array<std::vector<double>, 3> planes_m;
-  std::vector<ShapeFill> fill;          ///< at index(i, j, k), cells between the planes
-  std::vector<std::uint32_t> material;  ///< of solid cells: scene material
-  /// Ground: per column of cells i, j the scene material, or kNoGround; all at one height.
+  std::vector<ShapeFill> fill;  ///< filling of the cells between the planes, at index(i, j, k)
+  std::vector<std::uint32_t> material;  ///< scene material of solid cells
+  /// Scene material of the ground per column of cells i, j, or kNoGround. All ground lies at one
+  /// height.
   static constexpr std::uint32_t kNoGround = 0xffffffffU;
   std::vector<std::uint32_t> ground;
   bool has_ground = false;
@@ -33,7 +35,7 @@ struct VoxelShape {
   }
 };
 
-/// Errors as VoxelModel::build().
+/// Builds the feature grid of a scene. Errors: those of VoxelModel::build().
 [[nodiscard]] physics::Result<VoxelShape> voxel_shape(const scene::ScenarioDesc& scenario,
                                                       const scene::SceneGeometry& geometry);
 

@@ -14,16 +14,18 @@ namespace {
 
 constexpr std::uint32_t kLeafTriangles = 8;
 
+/// Rounds to float32 downwards.
 float below(double x) noexcept {
   const float f = static_cast<float>(x);
   return static_cast<double>(f) <= x ? f
                                      : std::nextafter(f, -std::numeric_limits<float>::infinity());
 }
+/// Rounds to float32 upwards.
 float above(double x) noexcept {
   return -below(-x);
 }
 
-/// Whether a cone may meet the ball around a box.
+/// Returns true if a cone may meet the ball around a box.
 bool may_meet(const glm::vec3& low_m, const glm::vec3& high_m, const glm::dvec3& apex_m,
               const glm::dvec3& axis, double sine, double cosine) noexcept {
   const glm::dvec3 centre = 0.5 * (glm::dvec3(low_m) + glm::dvec3(high_m)) - apex_m;
@@ -31,7 +33,7 @@ bool may_meet(const glm::vec3& low_m, const glm::vec3& high_m, const glm::dvec3&
   const double along_m = glm::dot(centre, axis);
   if (along_m < -radius_m) return false;
   const double across_m = std::sqrt(std::max(glm::dot(centre, centre) - along_m * along_m, 0.0));
-  // Slack for the rounding of `across_m`.
+  // Allow for the rounding of `across_m`.
   return across_m * cosine - along_m * sine <= radius_m + 1e-7 * (std::abs(along_m) + radius_m);
 }
 
@@ -43,12 +45,13 @@ ConeTree::ConeTree(std::span<const std::array<glm::dvec3, 3>> triangles) {
   order_.resize(count);
   std::iota(order_.begin(), order_.end(), 0U);
   std::vector<glm::vec3> centres(count);
+  // Sort by the centres of the triangles.
   for (std::uint32_t i = 0; i < count; ++i) {
     centres[i] = glm::vec3((triangles[i][0] + triangles[i][1] + triangles[i][2]) / 3.0);
   }
   nodes_.reserve(2 * (count / kLeafTriangles + 1));
 
-  // Halved at the median along the longest side of the box of centres; depth stays logarithmic.
+  // Split at the median along the longest side of the box of centres; the depth stays logarithmic.
   struct Range {
     std::uint32_t begin, end, parent;
     bool second;
@@ -59,6 +62,7 @@ ConeTree::ConeTree(std::span<const std::array<glm::dvec3, 3>> triangles) {
     open.pop_back();
     const auto index = static_cast<std::uint32_t>(nodes_.size());
     if (range.second) nodes_[range.parent].first = index;
+    // Bound the triangles and their centres.
     glm::dvec3 low{std::numeric_limits<double>::infinity()};
     glm::dvec3 high = -low;
     glm::vec3 centre_low{std::numeric_limits<float>::infinity()};
@@ -73,6 +77,7 @@ ConeTree::ConeTree(std::span<const std::array<glm::dvec3, 3>> triangles) {
     }
     Node node{.low_m = {below(low.x), below(low.y), below(low.z)},
               .high_m = {above(high.x), above(high.y), above(high.z)}};
+    // Make a leaf of a few triangles.
     if (range.end - range.begin <= kLeafTriangles) {
       node.first = range.begin;
       node.count = range.end - range.begin;
@@ -89,7 +94,8 @@ ConeTree::ConeTree(std::span<const std::array<glm::dvec3, 3>> triangles) {
           return centres[a][axis] != centres[b][axis] ? centres[a][axis] < centres[b][axis] : a < b;
         });
     open.push_back({middle, range.end, index, true});
-    open.push_back({range.begin, middle, index, false});  // next: follows its parent
+    // Push the first half last: it is taken next and thereby follows its parent.
+    open.push_back({range.begin, middle, index, false});
   }
 }
 
@@ -98,6 +104,7 @@ void ConeTree::query(const glm::dvec3& apex_m, const glm::dvec3& axis, double se
   if (nodes_.empty()) return;
   const double sine = std::sin(semi_angle_rad);
   const double cosine = std::cos(semi_angle_rad);
+  // Walk down all boxes that the cone may meet.
   std::array<std::uint32_t, 64> stack;
   std::size_t depth = 0;
   stack[depth++] = 0;

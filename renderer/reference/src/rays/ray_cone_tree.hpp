@@ -9,14 +9,15 @@
 
 namespace emit::reference {
 
-/// Box hierarchy that answers which triangles may lie within a cone: what stands between a point
-/// and the sun's disc. Boxes in float32, rounded outwards.
+/// Hierarchy of boxes that finds the triangles which may lie within a cone. The cone holds what
+/// stands between a point and the sun's disc. Boxes are float32, rounded outwards.
 class ConeTree {
  public:
   ConeTree() = default;
   explicit ConeTree(std::span<const std::array<glm::dvec3, 3>> triangles);
 
-  /// Appends the triangles whose boxes may touch the cone, in no order.
+  /// Appends the indices of the triangles whose boxes may touch the cone, in no order. The cone has
+  /// its apex at `apex_m` and opens by `semi_angle_rad` around the unit vector `axis`.
   void query(const glm::dvec3& apex_m, const glm::dvec3& axis, double semi_angle_rad,
              std::vector<std::uint32_t>& out) const;
 
@@ -24,8 +25,9 @@ class ConeTree {
   struct Node {
     glm::vec3 low_m;
     glm::vec3 high_m;
-    std::uint32_t first = 0;  ///< leaf: first entry of order_; inner: index of the second child
-    std::uint32_t count = 0;  ///< 0: inner, its first child follows
+    /// First entry of order_ (leaf), or index of the second child (inner node).
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;  ///< 0 marks an inner node, whose first child follows it
   };
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> order_;

@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 
+#include "emit/physics/check.hpp"
 #include "emit/reference/visibility.hpp"
 #include "emit/scene/trajectory.hpp"
 #include "ray_scene_impl.hpp"
@@ -26,6 +27,7 @@ bool finite(const glm::dvec3& p) noexcept {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
 
+/// Checks the arrays and indices of a description.
 Result<void> check(const RaySceneDesc& desc) {
   const auto fail = [](std::string text) {
     return make_error(ErrorCode::invalid_argument, std::move(text));
@@ -72,6 +74,7 @@ RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
     RayMesh out;
     out.object = instance.object;
     out.instance = static_cast<std::uint32_t>(i);
+    // Give every entity one mover, shared by its instances.
     if (instance.entity_id != 0) {
       const auto [entry, added] = mover_of_object.try_emplace(
           instance.object, static_cast<std::uint32_t>(desc.movers.size()));
@@ -85,6 +88,7 @@ RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
       }
       out.mover = entry->second;
     }
+    // Transform to the frame of the mesh: the body frame of an entity, else the world frame.
     const glm::dmat4& target_from_mesh =
         instance.entity_id != 0 ? instance.body_from_mesh : instance.world_from_mesh;
     const glm::dmat3 normal_matrix = glm::transpose(glm::inverse(glm::dmat3(target_from_mesh)));
@@ -97,6 +101,7 @@ RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
       out.normals.push_back(glm::normalize(normal_matrix * glm::dvec3(n)));
     }
     out.indices = mesh.indices;
+    // Spread the materials of the submeshes over their triangles.
     out.materials.resize(mesh.indices.size() / 3);
     for (const scene::Submesh& submesh : mesh.submeshes) {
       const std::size_t first = submesh.first_index / 3;
@@ -123,6 +128,7 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
   impl->desc = std::move(desc);
   impl->arithmetic = arithmetic;
 
+  // Sort the triangles into sets: one for everything static, one per entity.
   std::vector<RaySet::Builder> builders(1 + impl->desc.movers.size());
   for (std::size_t m = 0; m < impl->desc.meshes.size(); ++m) {
     const RayMesh& mesh = impl->desc.meshes[m];
@@ -140,6 +146,7 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
       ++impl->triangles;
     }
   }
+  // Build one hierarchy per set.
   for (std::size_t i = 0; i < builders.size(); ++i) {
     auto set = RaySet::create(impl->device.get(), std::move(builders[i]), arithmetic);
     if (!set) return tl::unexpected(std::move(set.error()));
@@ -155,6 +162,7 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
 SceneInstant RayScene::at(std::int64_t sim_time_ns) const {
   auto instant = std::make_shared<SceneInstant::Impl>();
   instant->scene = impl_.get();
+  // Place every entity at its pose and find the centre of its set.
   for (std::size_t i = 0; i < impl_->movers.size(); ++i) {
     const scene::TrajectoryState state =
         scene::trajectory_at(impl_->desc.movers[i].poses, sim_time_ns);
@@ -177,17 +185,21 @@ std::size_t RayScene::dropped_triangles() const noexcept {
   return impl_->dropped;
 }
 
-// --- One instant -----------------------------------------------------------------------------
+// --- queries at one instant ----------------------------------------------------------------------
 
 const physics::Pose& SceneInstant::mover_pose(std::uint32_t mover) const {
+  EMIT_CHECK_OP(mover, <, impl_->movers.size());
   return impl_->movers[mover].pose;
 }
 bool SceneInstant::mover_on(std::uint32_t mover) const {
+  EMIT_CHECK_OP(mover, <, impl_->movers.size());
   return impl_->movers[mover].on;
 }
 
 SceneInstant::Corners SceneInstant::triangle(std::uint32_t mesh, std::uint32_t primitive) const {
+  EMIT_CHECK_OP(mesh, <, impl_->scene->desc.meshes.size());
   const RayMesh& source = impl_->scene->desc.meshes[mesh];
+  EMIT_CHECK_OP(primitive, <, source.indices.size() / 3);
   std::array<glm::dvec3, 3> corners;
   for (std::size_t i = 0; i < 3; ++i) {
     corners[i] = source.positions_m[source.indices[3 * std::size_t{primitive} + i]];
@@ -202,7 +214,7 @@ SceneInstant::Corners SceneInstant::triangle(std::uint32_t mesh, std::uint32_t p
 double SceneInstant::Impl::plane_m(const glm::dvec3& point_world_m,
                                    double tolerance_m) const noexcept {
   // Point, corners, origins and turned poses each carry a rounding of half an ulp or two of the
-  // largest coordinate at hand.
+  // largest coordinate involved.
   constexpr double kRoundings = 16.0;
   const auto reach = [](const glm::dvec3& p) {
     return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
@@ -220,7 +232,7 @@ PreparedRay SceneInstant::Impl::in_fixed(const Ray& ray) const noexcept {
 }
 
 PreparedRay SceneInstant::Impl::in_mover(const PlacedMover& mover, const Ray& ray) const noexcept {
-  // vector * matrix is the transposed, that is the inverse, rotation.
+  // A product vector * matrix applies the transposed matrix, which is the inverse rotation.
   return {(ray.origin_world_m - mover.pose.position_world_m) * mover.world_from_body -
               mover.set->origin_m(),
           ray.direction * mover.world_from_body, plane_m(ray.origin_world_m, ray.tolerance_m)};
@@ -228,6 +240,7 @@ PreparedRay SceneInstant::Impl::in_mover(const PlacedMover& mover, const Ray& ra
 
 bool SceneInstant::Impl::near(const PlacedMover& mover, const Ray& ray) const noexcept {
   if (!mover.on || mover.set->empty()) return false;
+  // Test the ray against the ball around the entity.
   const glm::dvec3 to_centre = mover.centre_world_m - ray.origin_world_m;
   const double distance2 = glm::dot(to_centre, to_centre);
   const double radius_m = mover.set->radius_m() * 1.000001;
@@ -237,11 +250,14 @@ bool SceneInstant::Impl::near(const PlacedMover& mover, const Ray& ray) const no
 }
 
 std::uint32_t SceneInstant::Impl::blocked_16(std::span<const Ray> rays) const {
+  EMIT_DCHECK_OP(rays.size(), <=, 16U);
   std::array<PreparedRay, 16> prepared;
   const std::uint32_t all = (1U << rays.size()) - 1U;
   std::uint32_t blocked = 0;
+  // Test the static set with all rays at once.
   for (std::size_t i = 0; i < rays.size(); ++i) prepared[i] = in_fixed(rays[i]);
   scene->fixed->occluded_16({prepared.data(), rays.size()}, blocked);
+  // Test the remaining rays against the entities near them.
   for (const PlacedMover& mover : movers) {
     if (blocked == all) break;
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -254,6 +270,7 @@ std::uint32_t SceneInstant::Impl::blocked_16(std::span<const Ray> rays) const {
 
 RayHit SceneInstant::Impl::complete(const Ray& ray, const RaySet& set, const SetHit& hit,
                                     const PlacedMover* mover) const {
+  // Find the triangle in the description.
   const TriangleSource source = set.source(hit.index);
   const RayMesh& mesh = scene->desc.meshes[source.mesh];
   const auto& [a, b, c] = set.triangles()[hit.index];
@@ -274,12 +291,14 @@ RayHit SceneInstant::Impl::complete(const Ray& ray, const RaySet& set, const Set
   out.material = mesh.materials.empty()       ? 0
                  : mesh.materials.size() == 1 ? mesh.materials.front()
                                               : mesh.materials[source.primitive];
+  // Interpolate the position and move it to the world frame.
   const glm::dvec3 local_m = wa * a + wb * b + wc * c + set.origin_m();
   out.position_world_m = to_world(local_m);
   if (mover != nullptr) out.position_world_m += mover->pose.position_world_m;
   out.geometric_normal = to_world(glm::normalize(glm::cross(b - a, c - a)));
   out.front = glm::dot(out.geometric_normal, ray.direction) < 0.0;
   out.shading_normal = out.geometric_normal;
+  // Interpolate the normal, unless the vertex normals cancel.
   if (!mesh.normals.empty()) {
     const std::uint32_t* index = &mesh.indices[3 * std::size_t{source.primitive}];
     const glm::dvec3 mixed =
@@ -295,10 +314,12 @@ std::optional<RayHit> SceneInstant::first_hit(const Ray& ray) const {
   const RaySet* set = nullptr;
   const PlacedMover* from = nullptr;
   double limit_m = std::numeric_limits<double>::infinity();
+  // Take the hit on static geometry as the limit.
   if (impl_->scene->fixed->first_hit(impl_->in_fixed(ray), limit_m, hit)) {
     set = impl_->scene->fixed.get();
     limit_m = hit.triangle.distance_m;
   }
+  // Look for nearer hits on the entities.
   for (const PlacedMover& mover : impl_->movers) {
     SetHit nearer;
     if (!impl_->near(mover, ray)) continue;
@@ -325,7 +346,7 @@ void SceneInstant::Impl::gather(const SurfacePoint& point, const glm::dvec3& axi
                                 std::vector<std::array<glm::dvec3, 3>>& out) const {
   thread_local std::vector<std::uint32_t> found;
   const double bound_m = plane_m(point.position_world_m, point.tolerance_m);
-  // Rounding of the axis in another frame.
+  // Widen the cone by the rounding of its axis in another frame.
   const double wide_rad = semi_angle_rad * (1.0 + 1e-9) + 1e-12;
   const auto add = [&](const RaySet& set, const glm::dvec3& apex_m, const glm::dvec3& towards,
                        const glm::dmat3* world_from_set) {
@@ -333,6 +354,7 @@ void SceneInstant::Impl::gather(const SurfacePoint& point, const glm::dvec3& axi
     set.in_cone(apex_m, towards, wide_rad, found);
     for (const std::uint32_t index : found) {
       const auto& [a, b, c] = set.triangles()[index];
+      // Leave out triangles whose plane contains the point.
       if (plane_holds(apex_m, bound_m, a, b, c)) continue;
       std::array<glm::dvec3, 3> corners = {a - apex_m, b - apex_m, c - apex_m};
       if (world_from_set != nullptr) {
@@ -341,6 +363,7 @@ void SceneInstant::Impl::gather(const SurfacePoint& point, const glm::dvec3& axi
       out.push_back(corners);
     }
   };
+  // Search the static set, then every entity in its own frame.
   add(*scene->fixed, point.position_world_m - scene->fixed->origin_m(), axis, nullptr);
   for (const PlacedMover& mover : movers) {
     if (!mover.on || mover.set->empty()) continue;

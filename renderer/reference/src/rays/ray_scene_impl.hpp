@@ -12,8 +12,9 @@
 
 namespace emit::reference {
 
+/// Hierarchies of a scene.
 struct RayScene::Impl {
-  EmbreeDevice device;  // before the sets: released after them
+  EmbreeDevice device;  // declared before the sets, so that it is released after them
   RaySceneDesc desc;
   RayArithmetic arithmetic = RayArithmetic::exact;
   std::unique_ptr<RaySet> fixed;
@@ -22,6 +23,7 @@ struct RayScene::Impl {
   std::size_t dropped = 0;
 };
 
+/// Set of an entity at its pose of an instant.
 struct PlacedMover {
   const RaySet* set = nullptr;
   physics::Pose pose;
@@ -30,28 +32,36 @@ struct PlacedMover {
   glm::dvec3 centre_world_m{0.0};
 };
 
+/// Entities of a scene at an instant.
 struct SceneInstant::Impl {
   const RayScene::Impl* scene = nullptr;
   std::vector<PlacedMover> movers;
 
-  /// Distance to a plane that rounding alone may cause for a point with these world coordinates.
+  /// Returns the distance to a plane that rounding alone may cause, for a point with these world
+  /// coordinates.
   [[nodiscard]] double plane_m(const glm::dvec3& point_world_m, double tolerance_m) const noexcept;
+  /// Returns the ray relative to the static set.
   [[nodiscard]] PreparedRay in_fixed(const Ray& ray) const noexcept;
+  /// Returns the ray in the frame of an entity's set.
   [[nodiscard]] PreparedRay in_mover(const PlacedMover& mover, const Ray& ray) const noexcept;
+  /// Returns true if the ray may hit the entity.
   [[nodiscard]] bool near(const PlacedMover& mover, const Ray& ray) const noexcept;
 
-  /// Bit i is set where rays[i] is blocked. @pre at most 16 rays
+  /// Returns a mask whose bit i is set if rays[i] is blocked.
+  /// @pre at most 16 rays.
   [[nodiscard]] std::uint32_t blocked_16(std::span<const Ray> rays) const;
 
-  /// Triangles that may stand before a disc, relative to the point; those whose plane holds the
-  /// point are left out.
+  /// Collects the triangles that may stand before a disc, relative to the point. Triangles whose
+  /// plane contains the point are left out.
   void gather(const SurfacePoint& point, const glm::dvec3& axis, double semi_angle_rad,
               std::vector<std::array<glm::dvec3, 3>>& out) const;
 
+  /// Completes a hit of a set to a hit in the world frame.
   [[nodiscard]] RayHit complete(const Ray& ray, const RaySet& set, const SetHit& hit,
                                 const PlacedMover* mover) const;
 
-  /// In fast arithmetic the start is moved off the surface by the float32 error.
+  /// Returns the start of rays from a point. Fast arithmetic moves it off the surface by the
+  /// float32 error.
   [[nodiscard]] glm::dvec3 start_m(const SurfacePoint& point) const noexcept;
 };
 

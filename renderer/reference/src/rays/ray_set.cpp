@@ -11,6 +11,8 @@
 #include <cmath>
 #include <limits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::reference {
 namespace {
 
@@ -20,21 +22,22 @@ using physics::Result;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Error of float32 coordinates and of a traversal in float32, as a share of the set's radius:
-/// start and box rounded (2^-24 each), direction rounded over the whole chord, and a few
-/// operations.
+/// Error of float32 coordinates and of a traversal in float32, as a share of the set's radius. It
+/// covers the rounding of start and box (2^-24 each), of the direction over the whole chord, and of
+/// a few operations.
 constexpr double kFloatErrorFrac = 0x1p-20;
 
-/// Context of one call: the rays in double, by ray id.
+/// Context of one call: the rays in double, by the id of the ray.
 struct Query {
-  RTCIntersectContext context;  // first: Embree hands back a pointer to it
+  RTCIntersectContext context;  // first member, because Embree returns a pointer to it
   const PreparedRay* rays = nullptr;
   double skipped_m[16] = {};
-  double limit_m = 0.0;  ///< first_hit: distance of the best so far
+  double limit_m = 0.0;  ///< distance of the best hit so far, for first_hit
   SetHit* best = nullptr;
   std::uint32_t best_index = 0;
 };
 
+/// Returns a context for rays that are coherent or not.
 Query make_query(const PreparedRay* rays, bool coherent) noexcept {
   Query query;
   rtcInitIntersectContext(&query.context);
@@ -63,7 +66,7 @@ Result<EmbreeDevice> make_embree_device() {
   return device;
 }
 
-/// Embree's view of a set.
+/// Functions through which Embree reads a set. They decide every candidate in double.
 struct SetCallbacks {
   static void bounds(const RTCBoundsFunctionArguments* args) {
     const auto& set = *static_cast<const RaySet*>(args->geometryUserPtr);
@@ -108,7 +111,7 @@ struct SetCallbacks {
       query.limit_m = hit.distance_m;
       query.best_index = args->primID;
       *query.best = {hit, args->primID};
-      // Candidates as near as this one, to within the traversal's error, must still come.
+      // Let candidates come that are as near as this one to within the traversal's error.
       RTCRayN_tfar(ray, args->N, i) = static_cast<float>(
           (hit.distance_m - query.skipped_m[0]) * (1.0 + kFloatErrorFrac) + 2.0 * set.pad_m_);
       RTCHitN_geomID(record, args->N, i) = args->geomID;
@@ -128,6 +131,7 @@ Result<std::unique_ptr<RaySet>> RaySet::create(RTCDeviceTy* device, Builder buil
     return make_error(ErrorCode::invalid_argument, "more triangles than a hierarchy can number");
   }
 
+  // Move the origin to the middle of the triangles.
   glm::dvec3 low{std::numeric_limits<double>::infinity()};
   glm::dvec3 high = -low;
   for (const auto& triangle : set->triangles_) {
@@ -137,6 +141,7 @@ Result<std::unique_ptr<RaySet>> RaySet::create(RTCDeviceTy* device, Builder buil
     }
   }
   set->origin_m_ = low + 0.5 * (high - low);
+  // Compute the radius around the origin and the padding of the boxes.
   double radius2 = 0.0;
   for (auto& triangle : set->triangles_) {
     for (glm::dvec3& corner : triangle) {
@@ -150,6 +155,7 @@ Result<std::unique_ptr<RaySet>> RaySet::create(RTCDeviceTy* device, Builder buil
     return make_error(ErrorCode::invalid_argument, "a scene wider than 1e15 m cannot be traced");
   }
 
+  // Describe the triangles to Embree: by callbacks in exact arithmetic, else as float32 buffers.
   set->scene_.reset(rtcNewScene(device));
   rtcSetSceneFlags(set->scene_.get(), RTC_SCENE_FLAG_ROBUST);
   const auto count = static_cast<unsigned int>(set->triangles_.size());
@@ -195,11 +201,12 @@ Result<std::unique_ptr<RaySet>> RaySet::create(RTCDeviceTy* device, Builder buil
   return set;
 }
 
-/// Moves the start of a ray to where it enters the ball around the set, so that its coordinates fit
-/// float32 as well as those of the set. False where the ray misses the ball.
+/// Moves the start of a ray to the point where it enters the ball around the set, so that its
+/// coordinates fit float32 as well as those of the set. Returns false if the ray misses the ball.
 bool RaySet::enter(const PreparedRay& ray, glm::dvec3& start_m, double& skipped_m) const noexcept {
   const double radius_m = radius_m_ + pad_m_;
   const double length2 = glm::dot(ray.direction, ray.direction);
+  // Find the point of the ray nearest to the centre, then half the chord through the ball.
   const double along_m = -glm::dot(ray.origin_m, ray.direction) / length2;
   const glm::dvec3 nearest = ray.origin_m + along_m * ray.direction;
   const double room2 = radius_m * radius_m * (1.0 + 1e-9) - glm::dot(nearest, nearest);
@@ -215,6 +222,7 @@ bool RaySet::first_hit(const PreparedRay& ray, double limit_m, SetHit& hit) cons
   glm::dvec3 start_m;
   double skipped_m = 0.0;
   if (empty() || !enter(ray, start_m, skipped_m) || skipped_m > limit_m) return false;
+  // Traverse in float32 from the entry point; the callbacks decide in double.
   Query query = make_query(&ray, false);
   query.skipped_m[0] = skipped_m;
   query.limit_m = limit_m;
@@ -264,7 +272,9 @@ bool RaySet::occluded(const PreparedRay& ray) const {
 }
 
 void RaySet::occluded_16(std::span<const PreparedRay> rays, std::uint32_t& blocked) const {
+  EMIT_DCHECK_OP(rays.size(), <=, 16U);
   if (empty()) return;
+  // Pack the rays that are not blocked yet.
   alignas(64) int valid[16] = {};
   alignas(64) RTCRay16 record;
   const float near_m = arithmetic_ == RayArithmetic::fast ? static_cast<float>(pad_m_) : 0.0F;

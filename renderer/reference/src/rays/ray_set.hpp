@@ -16,6 +16,7 @@ struct RTCSceneTy;
 
 namespace emit::reference {
 
+/// Deleter of Embree's objects.
 struct EmbreeRelease {
   void operator()(RTCDeviceTy* device) const noexcept;
   void operator()(RTCSceneTy* scene) const noexcept;
@@ -23,48 +24,54 @@ struct EmbreeRelease {
 using EmbreeDevice = std::unique_ptr<RTCDeviceTy, EmbreeRelease>;
 using EmbreeScene = std::unique_ptr<RTCSceneTy, EmbreeRelease>;
 
+/// Creates an Embree device. Errors: internal.
 [[nodiscard]] physics::Result<EmbreeDevice> make_embree_device();
 
-/// Where a triangle of a set comes from.
+/// Mesh and triangle of a scene that a triangle of a set comes from.
 struct TriangleSource {
   std::uint32_t mesh = 0;
   std::uint32_t primitive = 0;
 };
 
-/// A ray in the frame of a set (world axes minus the set's origin).
+/// First hit of a ray on a set.
 struct SetHit {
   TriangleHit triangle;
-  std::uint32_t index = 0;  ///< of the set's triangles
+  std::uint32_t index = 0;  ///< index into the set's triangles
 };
 
-/// Triangles of one rigid frame, relative to an origin in their middle, under one hierarchy.
+/// Triangles of one rigid frame in one hierarchy, relative to an origin in their middle.
 class RaySet {
  public:
   struct Builder {
-    std::vector<std::array<glm::dvec3, 3>> triangles;  ///< in the frame's own coordinates
+    std::vector<std::array<glm::dvec3, 3>> triangles;  ///< coordinates of the frame, m
     std::vector<TriangleSource> sources;
   };
+  /// Builds the hierarchy. Errors: invalid_argument (too many triangles, wider than 1e15 m),
+  /// internal (Embree).
   [[nodiscard]] static physics::Result<std::unique_ptr<RaySet>> create(RTCDeviceTy* device,
                                                                        Builder builder,
                                                                        RayArithmetic arithmetic);
 
   [[nodiscard]] bool empty() const noexcept { return triangles_.empty(); }
   [[nodiscard]] const glm::dvec3& origin_m() const noexcept { return origin_m_; }
-  /// Of a ball around the origin that holds every triangle.
+  /// Returns the radius of a ball around the origin that contains every triangle.
   [[nodiscard]] double radius_m() const noexcept { return radius_m_; }
   [[nodiscard]] std::span<const std::array<glm::dvec3, 3>> triangles() const noexcept {
     return triangles_;  // relative to origin_m()
   }
   [[nodiscard]] TriangleSource source(std::uint32_t index) const { return sources_[index]; }
 
-  /// Nearest hit closer than `limit_m`; ties go to the first triangle. The ray is relative to
-  /// origin_m().
+  /// Finds the nearest hit closer than `limit_m`; the first triangle wins a tie. The ray is
+  /// relative to origin_m(). Returns false if there is none.
   [[nodiscard]] bool first_hit(const PreparedRay& ray, double limit_m, SetHit& hit) const;
+  /// Returns true if anything stops the ray, which is relative to origin_m().
   [[nodiscard]] bool occluded(const PreparedRay& ray) const;
-  /// Up to 16 rays at once, all of the same direction. `blocked` bits are or-ed.
+  /// Tests up to 16 rays of the same direction at once and sets their bits in `blocked`. It skips
+  /// rays whose bit is set.
+  /// @pre at most 16 rays.
   void occluded_16(std::span<const PreparedRay> rays, std::uint32_t& blocked) const;
 
-  /// Triangles that may lie within a cone, ascending.
+  /// Appends the triangles that may lie within a cone, in ascending order.
   void in_cone(const glm::dvec3& apex_m, const glm::dvec3& axis, double semi_angle_rad,
                std::vector<std::uint32_t>& out) const;
 

@@ -17,7 +17,8 @@ constexpr std::uint32_t reverse_bits(std::uint32_t x) noexcept {
   return ((x & 0x55555555U) << 1U) | ((x & 0xaaaaaaaaU) >> 1U);
 }
 
-constexpr std::uint32_t mix(std::uint32_t x) noexcept {  // a full-avalanche integer hash
+/// Integer hash with full avalanche.
+constexpr std::uint32_t mix(std::uint32_t x) noexcept {
   x ^= x >> 16U;
   x *= 0x7feb352dU;
   x ^= x >> 15U;
@@ -26,9 +27,9 @@ constexpr std::uint32_t mix(std::uint32_t x) noexcept {  // a full-avalanche int
 }
 
 /// Flips every bit by a random function of all bits above it. `x` holds the digits reversed, so
-/// that "above" is "below" and plain arithmetic carries the right way (Laine and Karras 2011; the
-/// constants of Burley 2020 keep each step a nested permutation: additions, odd multiplications and
-/// xor with even multiples let no bit act on a lower one).
+/// that "above" is "below" and plain arithmetic carries the right way (Laine and Karras 2011). With
+/// the constants of Burley 2020 each step stays a nested permutation: additions, odd
+/// multiplications and xor with even multiples let no bit act on a lower one.
 constexpr std::uint32_t nested_scramble_reversed(std::uint32_t x, std::uint32_t seed) noexcept {
   x ^= x * 0x3d20adeaU;
   x += seed;
@@ -38,7 +39,7 @@ constexpr std::uint32_t nested_scramble_reversed(std::uint32_t x, std::uint32_t 
   return x;
 }
 
-/// Second dimension of Sobol's sequence (primitive polynomial x + 1), digits reversed.
+/// Returns the second dimension of Sobol's sequence (primitive polynomial x + 1), digits reversed.
 constexpr std::uint32_t sobol_second_reversed(std::uint32_t index) noexcept {
   std::uint32_t result = 0;
   std::uint32_t column = 1U << 31U;
@@ -51,8 +52,9 @@ constexpr std::uint32_t sobol_second_reversed(std::uint32_t index) noexcept {
 }  // namespace
 
 glm::dvec2 sobol_owen_2d(std::uint32_t index, std::uint32_t seed) noexcept {
-  // The first dimension is the index with its bits reversed.
+  // Scramble the index itself: with its bits reversed it is the first dimension.
   const std::uint32_t x = reverse_bits(nested_scramble_reversed(index, mix(seed ^ 0x9e3779b9U)));
+  // Scramble the second dimension with another seed.
   const std::uint32_t y =
       reverse_bits(nested_scramble_reversed(sobol_second_reversed(index), mix(seed ^ 0x85ebca77U)));
   return {(x + 0.5) * 0x1p-32, (y + 0.5) * 0x1p-32};
@@ -62,6 +64,7 @@ glm::dvec2 disc_from_square(const glm::dvec2& square) noexcept {
   const double a = 2.0 * square.x - 1.0;
   const double b = 2.0 * square.y - 1.0;
   if (a == 0.0 && b == 0.0) return {0.0, 0.0};
+  // Map the square's rings to circles, quarter by quarter.
   const bool wide = std::abs(a) > std::abs(b);
   const double radius = wide ? a : b;
   const double angle_rad =
@@ -79,7 +82,8 @@ Tangents tangents_of(const glm::dvec3& axis) noexcept {
 
 glm::dvec3 cap_direction(const glm::dvec2& disc, const glm::dvec3& axis, const Tangents& tangents,
                          double semi_angle_rad) noexcept {
-  // 1 - cos(theta) = r^2 (1 - cos(semi)); by half angles, so that small caps keep their digits.
+  // Apply 1 - cos(theta) = r^2 (1 - cos(semi)) by half angles, so that small caps keep their
+  // digits.
   const double half = std::sin(0.5 * semi_angle_rad);
   const double r2 = disc.x * disc.x + disc.y * disc.y;
   const double versine = 2.0 * half * half * r2;

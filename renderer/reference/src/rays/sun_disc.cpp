@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/reference/sampling.hpp"
 
@@ -22,8 +23,9 @@ constexpr std::size_t kEvenChords = 1024;
 /// Half side of the square to which everything is clipped, in radii of the disc.
 constexpr double kClip = 2.0;
 
+/// Gauss-Legendre rule of kNodes points.
 struct GaussRule {
-  std::array<double, kNodes> node;  ///< in (-1, 1)
+  std::array<double, kNodes> node;  ///< abscissae in (-1, 1)
   std::array<double, kNodes> weight;
 };
 
@@ -32,7 +34,7 @@ GaussRule make_gauss_rule() noexcept {
   for (std::size_t i = 0; i < kNodes; ++i) {
     double x = std::cos(kPi * (static_cast<double>(i) + 0.75) / (kNodes + 0.5));
     double slope = 1.0;
-    for (int iteration = 0; iteration < 8; ++iteration) {  // Newton on Legendre's polynomial
+    for (int iteration = 0; iteration < 8; ++iteration) {  // solves Legendre's polynomial by Newton
       double p = 1.0;
       double before = 0.0;
       for (std::size_t k = 1; k <= kNodes; ++k) {
@@ -55,7 +57,8 @@ const GaussRule& gauss() noexcept {
   return rule;
 }
 
-/// Convex polygon on the projection plane, in radii of the disc; a triangle cut by four planes.
+/// Convex polygon on the projection plane, in radii of the disc. It is a triangle cut by four
+/// planes.
 struct Polygon {
   std::array<glm::dvec2, 7> corner;
   std::size_t count = 0;
@@ -63,18 +66,20 @@ struct Polygon {
   double high = 0.0;
 };
 
+/// Covered interval of a chord.
 struct Interval {
   double begin = 0.0;
   double end = 0.0;
 };
 
-/// A side of a triangle that enters the disc, with what identifies it among its neighbours.
+/// Side of a triangle that enters the disc, with the key that identifies it among its neighbours.
 struct Outline {
   glm::dvec2 a, b;
-  std::array<double, 6> key;  ///< both corners in space, in an order of their own
+  std::array<double, 6> key;  ///< both corners in space, in their own fixed order
   bool left = false;          ///< the triangle lies to the left of the key's direction
 };
 
+/// Integral of the brightness over the covered part of a disc.
 class DiscIntegral {
  public:
   DiscIntegral(const SunDisc& disc, std::vector<Polygon> polygons)
@@ -85,9 +90,10 @@ class DiscIntegral {
               [](const Polygon& a, const Polygon& b) { return a.low < b.low; });
   }
 
-  /// Whole disc, nothing before it.
+  /// Returns the integral over the whole disc with nothing in front of it.
   [[nodiscard]] double total() const noexcept {
-    // Rings r = sin(phi): the square root of the darkening becomes a cosine.
+    // Integrate over rings r = sin(phi), which turns the square root of the darkening into a
+    // cosine.
     double sum = 0.0;
     for (std::size_t i = 0; i < kNodes; ++i) {
       const double phi = 0.25 * kPi * (1.0 + gauss().node[i]);
@@ -99,7 +105,7 @@ class DiscIntegral {
     return 2.0 * kPi * 0.25 * kPi * sum;
   }
 
-  /// Covered part between two chords at sin(begin), sin(end), 16 chords.
+  /// Returns the covered part between two chords at sin(begin) and sin(end), by 16 chords.
   [[nodiscard]] double covered(double begin, double end) {
     double sum = 0.0;
     for (std::size_t i = 0; i < kNodes; ++i) {
@@ -109,11 +115,12 @@ class DiscIntegral {
     return 0.5 * (end - begin) * sum;
   }
 
-  /// Covered part of the chord at y = sin(s), times dy/ds.
+  /// Returns the covered part of the chord at y = sin(s), times dy/ds.
   [[nodiscard]] double covered_chord(double s) {
     const double y = std::sin(s);
     const double half = std::cos(s);
     intervals_.clear();
+    // Cut the chord with every polygon that reaches it. They are sorted by their lower end.
     for (const Polygon& polygon : polygons_) {
       if (polygon.low > y) break;
       if (polygon.high < y) continue;
@@ -122,6 +129,7 @@ class DiscIntegral {
       if (clipped.begin < clipped.end) intervals_.push_back(clipped);
     }
     if (intervals_.empty()) return 0.0;
+    // Merge overlapping intervals and integrate each of them.
     std::sort(intervals_.begin(), intervals_.end(),
               [](const Interval& a, const Interval& b) { return a.begin < b.begin; });
     double sum = 0.0;
@@ -138,13 +146,14 @@ class DiscIntegral {
   }
 
  private:
+  /// Returns the interval of the horizontal line at y inside a polygon.
   static Interval cut_at(const Polygon& polygon, double y) noexcept {
     Interval cut{kClip + 1.0, -kClip - 1.0};
     for (std::size_t i = 0; i < polygon.count; ++i) {
       const glm::dvec2& a = polygon.corner[i];
       const glm::dvec2& b = polygon.corner[i + 1 == polygon.count ? 0 : i + 1];
       if ((a.y < y && b.y < y) || (a.y > y && b.y > y)) continue;
-      // From the same end whichever way the side runs, so that neighbours meet.
+      // Interpolate from the same end whichever way the side runs, so that neighbours meet exactly.
       const bool up = a.y < b.y || (a.y == b.y && a.x < b.x);
       const glm::dvec2& from = up ? a : b;
       const glm::dvec2& to = up ? b : a;
@@ -160,14 +169,17 @@ class DiscIntegral {
     return cut;
   }
 
-  /// Integral over an interval of the chord, of solid angle times brightness (in squared radii).
+  /// Returns the integral of solid angle times brightness over an interval of a chord, in squared
+  /// radii.
   [[nodiscard]] double along_chord(const Interval& part, double y, double half) const noexcept {
     const double r2 = radius_ * radius_;
     const double row = 1.0 + r2 * y * y;
+    // Use the closed form for a uniform disc.
     if (limb_ == 0.0) {
       const auto primitive = [&](double x) { return x / (row * std::sqrt(row + r2 * x * x)); };
       return primitive(part.end) - primitive(part.begin);
     }
+    // Integrate along the chord by Gauss in x = half sin(t), which removes the root at the rim.
     const double begin = std::asin(std::clamp(part.begin / half, -1.0, 1.0));
     const double end = std::asin(std::clamp(part.end / half, -1.0, 1.0));
     double sum = 0.0;
@@ -187,7 +199,8 @@ class DiscIntegral {
   std::vector<Interval> intervals_;
 };
 
-/// Corners in the disc's frame (x, y across, z along the axis) inside the square pyramid around it.
+/// Polygon in the disc's frame (x, y across, z along the axis), which is cut to the square pyramid
+/// around the disc.
 struct Clipper {
   std::array<glm::dvec3, 8> corner;
   std::size_t count = 0;
@@ -202,7 +215,7 @@ struct Clipper {
       const double db = glm::dot(b, inward);
       if (da >= 0.0) kept[kept_count++] = a;
       if ((da >= 0.0) != (db >= 0.0)) {
-        // Always from the inside out: both triangles of an edge get the same point.
+        // Cut from the inside outwards: both triangles of an edge get the same point.
         kept[kept_count++] =
             da >= 0.0 ? a + (b - a) * (da / (da - db)) : b + (a - b) * (db / (db - da));
       }
@@ -213,10 +226,12 @@ struct Clipper {
   }
 };
 
+/// Clips and projects a triangle. Returns false if it does not reach the disc's height range.
 bool project(const std::array<glm::dvec3, 3>& triangle, double radius, Polygon& polygon) noexcept {
   Clipper clipper;
   for (std::size_t i = 0; i < 3; ++i) clipper.corner[i] = triangle[i];
   clipper.count = 3;
+  // Cut the triangle with the four planes of the pyramid.
   for (const glm::dvec3& inward :
        {glm::dvec3(1.0, 0.0, kClip * radius), glm::dvec3(-1.0, 0.0, kClip * radius),
         glm::dvec3(0.0, 1.0, kClip * radius), glm::dvec3(0.0, -1.0, kClip * radius)}) {
@@ -226,9 +241,10 @@ bool project(const std::array<glm::dvec3, 3>& triangle, double radius, Polygon& 
   polygon.low = kClip + 1.0;
   polygon.high = -kClip - 1.0;
   if (clipper.count < 3 || clipper.count > polygon.corner.size()) return false;
+  // Project the corners and bound their heights.
   for (std::size_t i = 0; i < clipper.count; ++i) {
     const glm::dvec3& p = clipper.corner[i];
-    if (!(p.z > 0.0)) return false;  // only the point itself lies on the apex
+    if (!(p.z > 0.0)) return false;  // only the point itself projects to the apex
     const glm::dvec2 at = glm::dvec2(p) / (p.z * radius);
     polygon.corner[polygon.count++] = at;
     polygon.low = std::min(polygon.low, at.y);
@@ -237,7 +253,7 @@ bool project(const std::array<glm::dvec3, 3>& triangle, double radius, Polygon& 
   return polygon.low < 1.0 && polygon.high > -1.0;
 }
 
-/// Least distance of a segment from the centre.
+/// Returns the least distance of a segment from the centre.
 double distance_to_centre(const glm::dvec2& a, const glm::dvec2& b) noexcept {
   const glm::dvec2 ab = b - a;
   const double length2 = glm::dot(ab, ab);
@@ -245,7 +261,8 @@ double distance_to_centre(const glm::dvec2& a, const glm::dvec2& b) noexcept {
   return glm::length(a + t * ab);
 }
 
-/// The whole straight line of a triangle's side across the clip square, as far as it lies in it.
+/// Projects the side of a triangle, as far as it lies in the clip square. Returns false if it lies
+/// outside.
 bool project_side(const glm::dvec3& a, const glm::dvec3& b, double radius, glm::dvec2& from,
                   glm::dvec2& to) noexcept {
   glm::dvec3 begin = a;
@@ -265,10 +282,12 @@ bool project_side(const glm::dvec3& a, const glm::dvec3& b, double radius, glm::
   return true;
 }
 
+/// Orders corners, so that both triangles of a side give it the same key.
 bool key_less(const glm::dvec3& a, const glm::dvec3& b) noexcept {
   return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
+/// Adds the sides of a triangle that enter the disc.
 void add_outlines(const std::array<glm::dvec3, 3>& triangle, double radius,
                   std::vector<Outline>& outlines) {
   for (std::size_t i = 0; i < 3; ++i) {
@@ -280,13 +299,14 @@ void add_outlines(const std::array<glm::dvec3, 3>& triangle, double radius,
     if (!project_side(*a, *b, radius, outline.a, outline.b)) continue;
     if (distance_to_centre(outline.a, outline.b) >= 1.0) continue;
     outline.key = {a->x, a->y, a->z, b->x, b->y, b->z};
-    // Side of the plane through the point and this edge on which the triangle lies.
+    // Note on which side of the plane through the point and this edge the triangle lies.
     outline.left = glm::dot(glm::cross(*a, *b), apex) > 0.0;
     outlines.push_back(outline);
   }
 }
 
-/// Drops sides shared by two triangles that lie on either side of it: the inside of a surface.
+/// Drops sides that two triangles share from opposite sides. They lie inside a surface and are no
+/// outline.
 void drop_inner_sides(std::vector<Outline>& outlines) {
   std::sort(outlines.begin(), outlines.end(),
             [](const Outline& a, const Outline& b) { return a.key < b.key; });
@@ -301,6 +321,7 @@ void drop_inner_sides(std::vector<Outline>& outlines) {
   outlines.resize(kept);
 }
 
+/// Adds the chords at which the covered length is not smooth, as s with y = sin(s).
 void add_breaks(const std::vector<Outline>& outlines, std::vector<double>& breaks) {
   const auto add = [&](double y) {
     if (y > -1.0 && y < 1.0) breaks.push_back(std::asin(y));
@@ -311,9 +332,10 @@ void add_breaks(const std::vector<Outline>& outlines, std::vector<double>& break
   for (std::size_t i = 0; i < outlines.size(); ++i) {
     const glm::dvec2 a = outlines[i].a;
     const glm::dvec2 ab = outlines[i].b - a;
+    // Add the ends of the outline.
     add_inside(a);
     add_inside(outlines[i].b);
-    // Where it meets the rim.
+    // Add the points at which the outline meets the rim.
     const double length2 = glm::dot(ab, ab);
     if (length2 > 0.0) {
       const double middle = -glm::dot(a, ab) / length2;
@@ -325,6 +347,7 @@ void add_breaks(const std::vector<Outline>& outlines, std::vector<double>& break
         }
       }
     }
+    // Add the crossings with the outlines before it.
     for (std::size_t k = 0; k < i; ++k) {
       const glm::dvec2 cd = outlines[k].b - outlines[k].a;
       const double cross = ab.x * cd.y - ab.y * cd.x;
@@ -337,16 +360,18 @@ void add_breaks(const std::vector<Outline>& outlines, std::vector<double>& break
   }
 }
 
-/// Three triangles' worth of plane: everything behind the tangent plane, as one triangle that
-/// covers the clip square on its dark side.
+/// Returns the region behind the tangent plane as one large triangle that covers the clip square on
+/// the dark side.
 std::array<glm::dvec3, 3> tangent_plane_cover(const glm::dvec3& normal, double radius) noexcept {
   const glm::dvec2 across(normal.x, normal.y);
   const double size = glm::length(across);
-  // On the plane z = 1 the light side is across . p + normal.z > 0.
+  // Find the line of the tangent plane on the plane z = 1; its light side is dot(across, p) +
+  // normal.z > 0.
   const glm::dvec2 inward = across / size;
   const glm::dvec2 along(-inward.y, inward.x);
   const glm::dvec2 foot = -inward * (normal.z / size);
-  // Only lines that pass near the disc come here, so that the foot is near as well.
+  // Make the triangle large. Only lines that pass near the disc occur, so that the foot is near as
+  // well.
   const double far = 8.0 * kClip * radius;
   const glm::dvec2 left = foot + along * far;
   const glm::dvec2 right = foot - along * far;
@@ -357,6 +382,8 @@ std::array<glm::dvec3, 3> tangent_plane_cover(const glm::dvec3& normal, double r
 }  // namespace
 
 double disc_brightness_frac(const SunDisc& disc, double angle_rad) noexcept {
+  EMIT_DCHECK_OP(angle_rad, >=, 0.0);
+  EMIT_DCHECK(angle_rad <= disc.semi_angle_rad * (1.0 + 1e-9));
   if (disc.limb_darkening_frac == 0.0) return 1.0;
   const double ratio = std::sin(angle_rad) / std::sin(disc.semi_angle_rad);
   return 1.0 - disc.limb_darkening_frac * (1.0 - std::sqrt(std::max(1.0 - ratio * ratio, 0.0)));
@@ -364,6 +391,7 @@ double disc_brightness_frac(const SunDisc& disc, double angle_rad) noexcept {
 
 DiscShare visible_disc_share(std::span<const std::array<glm::dvec3, 3>> triangles,
                              const glm::dvec3& normal, const SunDisc& disc) {
+  // Turn everything to the frame of the disc.
   const Tangents tangents = tangents_of(disc.to_centre);
   const auto turned = [&](const glm::dvec3& p) {
     return glm::dvec3(glm::dot(p, tangents.u), glm::dot(p, tangents.v),
@@ -378,18 +406,21 @@ DiscShare visible_disc_share(std::span<const std::array<glm::dvec3, 3>> triangle
     polygons.push_back(polygon);
     add_outlines(triangle, radius, outlines);
   };
+  // Treat the point's own surface: it hides the whole disc, nothing, or a part of it.
   if (glm::dot(normal, normal) > 0.0) {
     const glm::dvec3 n = turned(glm::normalize(normal));
     const double across = glm::length(glm::dvec2(n));
     if (n.z <= -across * radius) return {0.0, 0.0};
     if (n.z < across * radius) add(tangent_plane_cover(n, radius));
   }
+  // Project all triangles, then keep the true outlines.
   for (const auto& triangle : triangles) {
     add({turned(triangle[0]), turned(triangle[1]), turned(triangle[2])});
   }
   if (polygons.empty()) return {1.0, 0.0};
   drop_inner_sides(outlines);
 
+  // Integrate between all breaks.
   DiscIntegral integral(disc, std::move(polygons));
   const double total = integral.total();
   const double rim = 0.5 * kPi;
@@ -403,6 +434,7 @@ DiscShare visible_disc_share(std::span<const std::array<glm::dvec3, 3>> triangle
       if (breaks[i + 1] > breaks[i]) covered += integral.covered(breaks[i], breaks[i + 1]);
     }
   } else {
+    // Use even chords for too many outlines, and compare the two halves for an error estimate.
     double even = 0.0;
     double odd = 0.0;
     for (std::size_t i = 0; i < kEvenChords; ++i) {

@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <limits>
 
+#include "emit/physics/check.hpp"
 #include "emit/reference/surface_forcing.hpp"
 
 namespace emit::reference {
 namespace {
 
+/// Interpolates a climate.
 ClimateNode mix(const ClimateNode& a, const ClimateNode& b, double f) noexcept {
   const auto at = [f](double x, double y) { return x + f * (y - x); };
   return {a.time_ns,
@@ -19,6 +21,7 @@ ClimateNode mix(const ClimateNode& a, const ClimateNode& b, double f) noexcept {
           at(a.surroundings_k, b.surroundings_k)};
 }
 
+/// Interpolates a view.
 ViewSample mix(const ViewSample& a, const ViewSample& b, double f) noexcept {
   const auto at = [f](double x, double y) { return x + f * (y - x); };
   return {a.time_ns,
@@ -29,20 +32,21 @@ ViewSample mix(const ViewSample& a, const ViewSample& b, double f) noexcept {
           at(a.scene_longwave_w_m2, b.scene_longwave_w_m2)};
 }
 
-/// The last row at or before `now` (the later one of a jump), moving on from `row`.
+/// Moves `row` on to the last row at or before `now_ns`. At a jump this is the later one.
 template <class Rows>
 void seek(const Rows& rows, std::int64_t now_ns, std::size_t& row) noexcept {
   while (row + 1 < rows.size() && rows[row + 1].time_ns <= now_ns) ++row;
 }
 
-/// Next time at which the rows bend, after `row`.
+/// Returns the next time after `row` at which the rows bend.
 template <class Rows>
 std::int64_t next_time(const Rows& rows, std::int64_t now_ns, std::size_t row) noexcept {
   if (!rows.empty() && rows[row].time_ns > now_ns) return rows[row].time_ns;
   return row + 1 < rows.size() ? rows[row + 1].time_ns : std::numeric_limits<std::int64_t>::max();
 }
 
-/// Value at `time` of the stretch that starts with `row`; held outside the rows.
+/// Returns the value at a time in the stretch that starts with `row`. Outside the rows the first or
+/// last value holds.
 template <class Rows>
 auto value_at(const Rows& rows, std::int64_t time_ns, std::size_t row) noexcept {
   if (row + 1 >= rows.size() || time_ns <= rows[row].time_ns) return mix(rows[row], rows[row], 0.0);
@@ -74,15 +78,18 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
   const auto nodes = climate_->nodes();
   SurfaceOptics behind = surface;
   behind.normal = -surface.normal;
+  // Step to the next time at which climate or view bends.
   while (now_ns_ < until_ns) {
     seek(nodes, now_ns_, climate_row_);
     seek(views.front, now_ns_, view_row_);
     std::int64_t end_ns = std::min({until_ns, next_time(nodes, now_ns_, climate_row_),
                                     next_time(views.front, now_ns_, view_row_)});
+    // A sheet also has the bends of its back's view.
     if (material_->sheet) {
       seek(views.back, now_ns_, back_row_);
       end_ns = std::min(end_ns, next_time(views.back, now_ns_, back_row_));
     }
+    // Build the state of the face. A sheet takes the mean of both faces, physics.md eq. 24.
     const auto state = [&](std::int64_t time_ns) {
       const ClimateNode climate = value_at(nodes, time_ns, climate_row_);
       const double reflectance_frac = climate_->surroundings_reflectance_frac();
@@ -94,6 +101,7 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
       face.absorbed_w_m2 = 0.5 * (face.absorbed_w_m2 + other.absorbed_w_m2);
       return face;
     };
+    // Solve the stretch, which is linear in time.
     solver_.advance({solver_.time_s(), seconds(end_ns), state(now_ns_), state(end_ns)},
                     surface.emissivity_frac);
     now_ns_ = end_ns;
@@ -101,6 +109,7 @@ void PointSolver::advance(const SurfaceOptics& surface, const Views& views,
 }
 
 void PointSolver::spin_up(const SurfaceOptics& surface) {
+  // Run from the steady profile with an open view.
   now_ns_ = climate_->start_ns();
   climate_row_ = 0;
   view_row_ = 0;
@@ -109,6 +118,7 @@ void PointSolver::spin_up(const SurfaceOptics& surface) {
   const ViewSample open = open_view(surface.normal);
   const ViewSample open_behind = open_view(-surface.normal);
   advance(surface, {std::span(&open, 1), std::span(&open_behind, 1)}, climate_->history_start_ns());
+  // Store the profile for further points of this orientation.
   solver_.copy_nodes_k(spin_up_k_);
   spin_up_normal_ = surface.normal;
   has_spin_up_ = true;
@@ -116,12 +126,14 @@ void PointSolver::spin_up(const SurfaceOptics& surface) {
 
 void PointSolver::run(const glm::dvec3& normal, const Views& views,
                       std::span<const std::int64_t> times_ns, std::span<double> out_k) {
+  EMIT_CHECK_OP(out_k.size(), ==, times_ns.size());
   if (material_->prescribed_k) {
     std::fill(out_k.begin(), out_k.end(), *material_->prescribed_k);
     return;
   }
   const SurfaceOptics surface{normal, material_->solar_absorptance_frac,
                               material_->emissivity_frac};
+  // Repeat the spin-up only for another orientation.
   if (!has_spin_up_ || normal != spin_up_normal_) spin_up(surface);
   const std::int64_t start_ns = climate_->history_start_ns();
   solver_.start_nodes(spin_up_k_, seconds(start_ns));
@@ -129,10 +141,12 @@ void PointSolver::run(const glm::dvec3& normal, const Views& views,
   climate_row_ = 0;
   view_row_ = 0;
   back_row_ = 0;
+  // Replace empty views by open ones.
   const ViewSample open = open_view(normal);
   const ViewSample open_behind = open_view(-normal);
   const Views seen{views.front.empty() ? std::span(&open, 1) : views.front,
                    views.back.empty() ? std::span(&open_behind, 1) : views.back};
+  // Advance from answer to answer.
   for (std::size_t i = 0; i < times_ns.size(); ++i) {
     advance(surface, seen, times_ns[i]);
     out_k[i] = solver_.face_k();

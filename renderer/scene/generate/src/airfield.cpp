@@ -9,7 +9,8 @@
 namespace emit::scenegen {
 namespace {
 
-/// The same numbers with every library: the standard fixes the engine, not the distributions.
+/// Random numbers that are the same with every library: the standard defines the engine, but not
+/// the distributions.
 class Random {
  public:
   explicit Random(std::uint32_t seed) : engine_(seed) {}
@@ -26,7 +27,7 @@ void add_tree(MeshBuilder& builder, Random& random, double x, double y) {
   const double radius = height * random.between(0.18, 0.28);
   const double trunk = 0.22 * height;
   builder.material("wood").tube({x, y, 0.0}, {x, y, trunk + 0.3}, 0.25, 0.2, 5, false, false);
-  // A crown of three stacked cone stumps reads as a tree and costs 42 triangles.
+  // A crown of three stacked truncated cones looks like a tree and costs 42 triangles.
   builder.material("foliage");
   const double turn = random.between(0.0, 2.0);
   builder.origin({x, y, 0.0}, turn);
@@ -73,7 +74,7 @@ void add_trees_and_fence(Scene& scene, std::uint32_t seed) {
     add_tree(trees, random, -590.0 + 20.0 * i + random.between(-3.0, 3.0),
              -520.0 + random.between(-6.0, 6.0));
   }
-  for (int i = 0; i < 24; ++i) {  // between the buildings
+  for (int i = 0; i < 24; ++i) {  // single trees between the buildings
     add_tree(trees, random, random.between(-460.0, -330.0), random.between(20.0, 180.0));
   }
   scene.place(scene.add_mesh(trees.take()), "trees");

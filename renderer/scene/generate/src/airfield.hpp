@@ -15,11 +15,15 @@
 ///   fence along x, y = +-490; trees in the north and along the fence; fields out to 3 km.
 namespace emit::scenegen {
 
+/// Adds the ground: grass, asphalt, concrete and markings.
 void add_ground(Scene& scene);
+/// Adds the buildings.
 void add_buildings(Scene& scene);
+/// Adds trees and the fence. The same seed gives the same trees.
 void add_trees_and_fence(Scene& scene, std::uint32_t seed);
 
-/// File stem and scene of each vehicle, origin on the ground under its middle, +x forward.
+/// Returns file stem and scene of each vehicle. The origin is on the ground under the middle of the
+/// vehicle, +x is forward.
 [[nodiscard]] std::vector<std::pair<std::string, Scene>> vehicle_scenes();
 
 }  // namespace emit::scenegen

@@ -7,8 +7,8 @@
 namespace emit::scenegen {
 namespace {
 
-/// Open towards -y with two leaves pushed aside; origin in the middle of the doorway, on the
-/// ground.
+/// Returns a hangar, open towards -y, with two leaves pushed aside. The origin is on the ground in
+/// the middle of the doorway.
 SceneMesh hangar() {
   constexpr double kHalfWidthM = 21.0;
   constexpr double kDepthM = 42.0;
@@ -99,7 +99,7 @@ SceneMesh light_pole() {
   return b.take();
 }
 
-/// Things that stand about on an apron: crates and jersey barriers.
+/// Returns crates and jersey barriers for the apron.
 SceneMesh clutter() {
   MeshBuilder b("clutter");
   b.material("concrete");

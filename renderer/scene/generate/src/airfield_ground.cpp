@@ -15,8 +15,8 @@ struct Patch {
   const char* material;
 };
 
-/// Rectangles of one surface, later ones on top. The surface is cut along all their lines, so that
-/// nothing lies on anything and no edge meets another at a T.
+/// Plan of rectangles on one surface, where later ones lie on top. The surface is cut along all
+/// their lines, so that no rectangle lies on another and no edge meets another in a T.
 class PatchPlan {
  public:
   void add(double x0, double y0, double x1, double y1, const char* material) {
@@ -69,7 +69,7 @@ class PatchPlan {
       values.push_back(patch.*high);
     }
     std::sort(values.begin(), values.end());
-    // Lines nearer than a millimetre are the same one.
+    // Lines that are nearer than a millimetre become one.
     values.erase(std::unique(values.begin(), values.end(),
                              [](double a, double b) { return std::abs(a - b) < 1e-3; }),
                  values.end());
@@ -121,7 +121,7 @@ void add_taxiways(PatchPlan& plan) {
 
 void add_apron(PatchPlan& plan) {
   plan.add(-220.0, 20.0, 220.0, 140.0, "asphalt");
-  plan.add(-220.0, 138.0, 220.0, 146.0, "concrete");  // in front of the hangars
+  plan.add(-220.0, 138.0, 220.0, 146.0, "concrete");  // strip before the hangars
   for (const double x : {-150.0, -50.0, 50.0, 150.0}) {
     plan.add(x - 22.0, 144.0, x + 22.0, 190.0, "concrete");  // hangar floors
   }
@@ -131,7 +131,7 @@ void add_apron(PatchPlan& plan) {
     plan.add(x - 0.15, 40.0, x + 0.15, 110.0, kPaint);
     plan.add(x - 3.0, 109.7, x + 3.0, 110.0, kPaint);
   }
-  // The service bay of the demo's truck, and slabs of concrete among the asphalt.
+  // Add the service bay of the demo's truck, of concrete slabs within the asphalt.
   plan.add(-40.0, 95.0, 40.0, 115.0, "concrete");
 }
 
@@ -150,7 +150,7 @@ void add_roads(PatchPlan& plan) {
 
 void add_ground(Scene& scene) {
   PatchPlan plan;
-  // Fields far around the fence carry the view from high above; they cost a cell each.
+  // Add fields far around the fence for views from high above. They cost one cell each.
   plan.add(-3000.0, -3000.0, 3000.0, 3000.0, "grass");
   plan.add(-3000.0, 700.0, -600.0, 1900.0, "soil");
   plan.add(900.0, 600.0, 2400.0, 3000.0, "soil");

@@ -7,7 +7,7 @@
 namespace emit::scenegen {
 namespace {
 
-/// Pair of wheels on an axle across the vehicle.
+/// Adds a pair of wheels on an axle across the vehicle.
 void add_wheels(MeshBuilder& b, double x, double half_track_m, double radius_m, double width_m) {
   b.material("rubber");
   for (const double side : {-1.0, 1.0}) {
@@ -18,7 +18,7 @@ void add_wheels(MeshBuilder& b, double x, double half_track_m, double radius_m, 
   }
 }
 
-/// Lorry with a box body, 8.4 x 2.5 x 3.4 m. The floor hangs 0.9 m over the ground.
+/// Returns a lorry with a box body, 8.4 x 2.5 x 3.4 m. The floor is 0.9 m above the ground.
 SceneMesh truck() {
   MeshBuilder b("truck");
   b.material("painted_metal");
@@ -84,13 +84,14 @@ SceneMesh car() {
   return b.take();
 }
 
-/// Thin lifting surface: a plan outline (x, y), counter-clockwise from above, with a thickness.
+/// Adds a thin lifting surface from a plan outline (x, y), counter-clockwise seen from above.
 void add_fin(MeshBuilder& b, const std::vector<glm::dvec2>& outline, double z_m,
              double thickness_m) {
   b.prism(outline, z_m - 0.5 * thickness_m, z_m + 0.5 * thickness_m);
 }
 
-/// Single-engine jet, 11.4 m long, 8.6 m span, standing on its wheels. The engine runs.
+/// Returns a single-engine jet, 11.4 m long, 8.6 m span, that stands on its wheels with the engine
+/// running.
 SceneMesh jet() {
   MeshBuilder b("jet");
   const glm::dvec3 axis(0.0, 0.0, 1.75);
@@ -119,7 +120,7 @@ SceneMesh jet() {
   b.material("engine_warm").tube({-5.2, 0, 1.75}, {-4.6, 0, 1.75}, 0.53, 0.64, 20, false, false);
   b.material("nozzle_hot");
   b.tube({-5.6, 0, 1.75}, {-5.2, 0, 1.75}, 0.44, 0.52, 20, false, false);
-  // The glowing turbine seen through the nozzle, facing aft.
+  // Add the glowing turbine that shows through the nozzle, facing aft.
   std::vector<glm::dvec3> disc;
   for (int i = 0; i < 20; ++i) {
     const double angle = -2.0 * physics::kPi * i / 20.0;
@@ -137,7 +138,7 @@ SceneMesh jet() {
   return b.take();
 }
 
-/// Twin-engine airliner, 36 m long, 34 m span.
+/// Returns a twin-engine airliner, 36 m long, 34 m span.
 SceneMesh airliner() {
   MeshBuilder b("airliner");
   b.material("painted_metal");

@@ -28,7 +28,7 @@ constexpr std::array<std::pair<SceneKind, std::string_view>, 5> kKindNames{
      {SceneKind::ribbed, "ribbed"},
      {SceneKind::airfield, "airfield"}}};
 
-/// Error text when `valid` is false; `value` may be NaN.
+/// Returns an error that names the option when `valid` is false. `value` may be NaN.
 Result<void> require(bool valid, const char* option, double value, const char* rule) {
   if (valid) {
     return {};

@@ -26,7 +26,8 @@ constexpr int kElementBuffer = 34963;
 
 template <class Vector>
 Vector gltf_from(Axes axes, const Vector& v) {
-  // map: x east -> -x, y north -> z, z up -> y; vehicle: x forward -> z, y left -> x, z up -> y.
+  // The axes are, map: x east -> -x, y north -> z, z up -> y; vehicle: x forward -> z, y left -> x,
+  // z up -> y.
   return axes == Axes::map ? Vector(-v.x, v.z, v.y) : Vector(v.y, v.z, v.x);
 }
 

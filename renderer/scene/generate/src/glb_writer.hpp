@@ -8,7 +8,7 @@
 
 namespace emit::scenegen {
 
-/// Writes a scene as glTF 2.0 binary: the same scene gives the same bytes. Errors: io.
+/// Writes a scene as a glTF 2.0 binary file. The same scene gives the same bytes. Errors: io.
 [[nodiscard]] physics::Result<GeneratedFile> write_glb(const std::filesystem::path& file,
                                                        const Scene& scene);
 

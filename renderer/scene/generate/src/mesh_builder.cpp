@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 
 namespace emit::scenegen {
@@ -57,6 +58,7 @@ void MeshBuilder::triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
 }
 
 void MeshBuilder::polygon(const std::vector<glm::dvec3>& corners) {
+  EMIT_CHECK_OP(corners.size(), >=, 3U);
   glm::dvec3 area(0.0);
   for (std::size_t i = 1; i + 1 < corners.size(); ++i) {
     area += glm::cross(corners[i] - corners[0], corners[i + 1] - corners[0]);
@@ -146,6 +148,7 @@ void MeshBuilder::profile(const std::vector<glm::dvec2>& outline_xz, double y0_m
 
 void MeshBuilder::tube(const glm::dvec3& from, const glm::dvec3& to, double from_radius_m,
                        double to_radius_m, std::uint32_t sides, bool cap_from, bool cap_to) {
+  EMIT_CHECK_OP(sides, >=, 3U);
   const glm::dvec3 axis = glm::normalize(to - from);
   const glm::dvec3 helper = std::abs(axis.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
   const glm::dvec3 u = glm::normalize(glm::cross(helper, axis));
@@ -190,6 +193,8 @@ void MeshBuilder::tube(const glm::dvec3& from, const glm::dvec3& to, double from
 
 void MeshBuilder::lathe_x(const std::vector<glm::dvec2>& rings, const glm::dvec3& axis_point_m,
                           std::uint32_t sides, double scale_z) {
+  EMIT_CHECK_OP(rings.size(), >=, 2U);
+  EMIT_CHECK_OP(sides, >=, 3U);
   std::vector<std::vector<std::uint32_t>> lattice;
   for (std::size_t r = 0; r < rings.size(); ++r) {
     const glm::dvec2 before = rings[r == 0 ? 0 : r - 1];

@@ -11,6 +11,8 @@
 #include <glm/matrix.hpp>
 #include <unordered_map>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::scenegen {
 namespace {
 
@@ -18,11 +20,13 @@ using Index = std::array<int, 3>;
 
 constexpr int kLeafCells = 4;
 constexpr int kLeafPoints = kLeafCells + 1;
-/// Cut points keep this distance from lattice points, relative to the edge: no sliver of zero area.
+/// Smallest distance of a cut point from a lattice point, relative to the edge. It avoids slivers
+/// of zero area.
 constexpr double kMinCutFrac = 0.03;
 
-/// The six tetrahedra of a lattice cell, each along a path from corner 000 to corner 111 that adds
-/// the axes in one order. With the lattice below all are congruent and well shaped.
+/// Axis orders of the six tetrahedra of a lattice cell. Each tetrahedron lies along a path from
+/// corner 000 to corner 111 that adds the axes in one order. With the lattice below all are
+/// congruent and well shaped.
 constexpr std::array<std::array<int, 3>, 6> kAxisOrders{
     {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
 constexpr std::size_t kEvenOrders = 3;  // the first three are even permutations
@@ -54,7 +58,8 @@ class Polygoniser {
     const double half = 0.5 * cell_m;
     world_from_lattice_ = glm::dmat3(glm::dvec3(-half, half, half), glm::dvec3(half, -half, half),
                                      glm::dvec3(half, half, -half));
-    // Farthest corner of a lattice cube from its centre, per cell of edge length.
+    // The radius is that of the farthest corner of a lattice cube from its centre, per cell of edge
+    // length.
     radius_per_cell_m_ = 0.5 * glm::length(glm::dvec3(-half, -half, 3.0 * half));
     positive_ = glm::determinant(world_from_lattice_) > 0.0;
   }
@@ -136,7 +141,7 @@ class Polygoniser {
     }
   }
 
-  /// `corners` form a right-handed tetrahedron.
+  /// Cuts a right-handed tetrahedron with these corners.
   void cut_tetrahedron(const std::array<Corner, 4>& corners) {
     unsigned inside = 0;
     for (std::size_t c = 0; c < 4; ++c) {
@@ -171,7 +176,7 @@ class Polygoniser {
   }
 
   std::uint32_t cut_edge(const Corner& a, const Corner& b) {
-    const bool a_is_low = a.at <= b.at;  // componentwise along an edge, so lexicographic will do
+    const bool a_is_low = a.at <= b.at;  // corners of an edge are ordered componentwise
     const Corner& low = a_is_low ? a : b;
     const Corner& high = a_is_low ? b : a;
     std::uint64_t key = 0;
@@ -202,8 +207,9 @@ class Polygoniser {
 
 Surface polygonise(const SignedDistance& shape, const glm::dvec3& min_m, const glm::dvec3& max_m,
                    double cell_m) {
+  EMIT_CHECK_OP(cell_m, >, 0.0);
   Polygoniser polygoniser(shape, min_m, cell_m);
-  // Lattice coordinates are sums of two world coordinates over the cell edge, all from 0 upwards.
+  // Lattice coordinates are sums of two world coordinates over the cell edge, all from 0 on.
   const glm::dvec3 extent = (max_m - min_m) / cell_m;
   const double farthest = std::max({extent.y + extent.z, extent.x + extent.z, extent.x + extent.y});
   int size = kLeafCells;

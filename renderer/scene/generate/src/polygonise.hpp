@@ -6,7 +6,8 @@
 
 namespace emit::scenegen {
 
-/// Distance to a surface, negative inside. May overestimate by at most the factor kMaxSlope.
+/// Function that gives the distance to a surface, m; it is negative inside. It may overestimate by
+/// at most the factor kMaxSlope.
 class SignedDistance {
  public:
   virtual ~SignedDistance() = default;
@@ -14,19 +15,21 @@ class SignedDistance {
 };
 inline constexpr double kMaxSlope = 2.0;
 
+/// Triangle mesh of a surface.
 struct Surface {
   std::vector<glm::dvec3> positions_m;
   std::vector<std::uint32_t> indices;  ///< counter-clockwise from outside
 };
 
-/// Marching tetrahedra on a body-centred cubic lattice of the given cell edge. The result is
-/// closed, manifold and without zero-area triangles as long as the surface lies inside the box.
-/// Cells are visited along a space-filling curve, so that triangles near each other are near in the
-/// list.
+/// Returns the surface of a shape by marching tetrahedra on a body-centred cubic lattice of the
+/// given cell edge. The result is closed, manifold and without triangles of zero area as long as
+/// the surface lies inside the box. Cells are visited along a space-filling curve, so that
+/// neighbouring triangles are near each other in the list.
+/// @pre cell_m > 0
 [[nodiscard]] Surface polygonise(const SignedDistance& shape, const glm::dvec3& min_m,
                                  const glm::dvec3& max_m, double cell_m);
 
-/// Area-weighted unit normals.
+/// Returns unit normals of the vertices, weighted by area.
 [[nodiscard]] std::vector<glm::dvec3> smooth_normals(const Surface& surface);
 
 }  // namespace emit::scenegen

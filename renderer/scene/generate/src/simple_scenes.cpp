@@ -7,8 +7,8 @@
 namespace emit::scenegen {
 namespace {
 
-/// Horizontal grid at z with lines at the given coordinates; cells for which `leave_out` is true
-/// stay open.
+/// Adds a horizontal grid at z with lines at the given coordinates. Cells for which `leave_out` is
+/// true stay open.
 template <class Predicate>
 void grid_plane(MeshBuilder& builder, const std::vector<double>& xs, const std::vector<double>& ys,
                 double z, Predicate leave_out) {
@@ -22,7 +22,8 @@ void grid_plane(MeshBuilder& builder, const std::vector<double>& xs, const std::
   }
 }
 
-/// Plane around a box of half edge `h`, cut along its foot; nothing meets at a T.
+/// Adds a plane of half edge `p` around a box of half edge `h`, cut along its foot. No edge meets
+/// another in a T.
 void add_plane(Scene& scene, double h, double p) {
   MeshBuilder plane("plane");
   plane.material("asphalt");
@@ -50,8 +51,8 @@ Scene box_scene(const BoxOptions& options) {
   const double h = 0.5 * options.size_m;
   const double p = 0.5 * options.plane_m;
   Scene scene;
-  // A closed box has an even number of triangles: 20 here, sides fanned around their middles. The
-  // plane has the other 25.
+  // A closed box has an even number of triangles: 20 here, with sides fanned around their middles.
+  // The plane has the other 25.
   if (p > 0.0) add_plane(scene, h, p);
 
   MeshBuilder box("box");
@@ -87,7 +88,8 @@ Scene block_on_road_scene(const BlockOnRoadOptions& options) {
     xs = {-road_x, -half.x, -half.x + wall, half.x - wall, half.x, road_x};
     ys = {-road_y, -half.y, -half.y + wall, half.y - wall, half.y, road_y};
   }
-  // Cut along every line of contact, so that no face reaches from under the block into the open.
+  // The grid is cut along every line of contact, so that no face reaches from under the block into
+  // the open.
   grid_plane(road, xs, ys, 0.0, [](std::size_t, std::size_t) { return false; });
   scene.place(scene.add_mesh(road.take()), "road");
 

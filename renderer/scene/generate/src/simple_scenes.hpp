@@ -5,7 +5,7 @@
 
 namespace emit::scenegen {
 
-// Options are valid here; generate() has checked them.
+// Builders of the simple scenes. generate() has checked the options.
 [[nodiscard]] Scene box_scene(const BoxOptions& options);
 [[nodiscard]] Scene block_on_road_scene(const BlockOnRoadOptions& options);
 [[nodiscard]] Scene ribbed_scene(const RibbedOptions& options);

@@ -12,7 +12,8 @@
 namespace emit::scenegen {
 namespace {
 
-/// The triangle count goes with the inverse square of the cell: a coarse trial tells the cell.
+/// Returns the surface with at least this number of triangles. Their number is proportional to the
+/// inverse square of the cell edge, so a coarse trial gives the edge.
 physics::Result<Surface> at_least(const StatueShape& shape, std::uint32_t min_triangles) {
   constexpr double kTrialCellM = 0.06;
   constexpr double kMarginFrac = 0.012;

@@ -6,7 +6,8 @@
 
 namespace emit::scenegen {
 
-/// Options are valid here. Error: internal, when the triangle count cannot be reached.
+/// Builds the statue scene. generate() has checked the options. Errors (internal): the number of
+/// triangles cannot be reached.
 [[nodiscard]] physics::Result<Scene> statue_scene(const StatueOptions& options);
 
 }  // namespace emit::scenegen

@@ -13,20 +13,20 @@ namespace {
 using glm::dvec2;
 using glm::dvec3;
 
-/// Smooth minimum with a fillet of about k metres.
+/// Returns a smooth minimum with a fillet of about k metres.
 double blend(double a, double b, double k) {
   const double h = std::max(k - std::abs(a - b), 0.0) / k;
   return std::min(a, b) - 0.25 * h * h * k;
 }
 
-/// Limb: capsule whose radius runs from ra at a to rb at b.
+/// Returns the distance to a limb: a capsule whose radius changes from ra at a to rb at b.
 double limb(const dvec3& p, const dvec3& a, const dvec3& b, double ra, double rb) {
   const dvec3 along = b - a;
   const double t = std::clamp(glm::dot(p - a, along) / glm::dot(along, along), 0.0, 1.0);
   return glm::length(p - a - t * along) - glm::mix(ra, rb, t);
 }
 
-/// First-order distance to an ellipsoid.
+/// Returns the first-order distance to an ellipsoid.
 double ellipsoid(const dvec3& p, const dvec3& centre, const dvec3& radii) {
   const dvec3 q = (p - centre) / radii;
   const double k0 = glm::length(q);
@@ -34,7 +34,7 @@ double ellipsoid(const dvec3& p, const dvec3& centre, const dvec3& radii) {
   return k1 < 1e-9 ? -std::min({radii.x, radii.y, radii.z}) : k0 * (k0 - 1.0) / k1;
 }
 
-/// 1 inside [lo, hi], falling to 0 over `soft` on either side.
+/// Returns 1 inside [lo, hi], falling to 0 over `soft` on either side.
 double window(double value, double lo, double hi, double soft) {
   return std::clamp((value - lo) / soft + 1.0, 0.0, 1.0) *
          std::clamp((hi - value) / soft + 1.0, 0.0, 1.0);
@@ -44,7 +44,7 @@ class SeatedFigure final : public SignedDistance {
  public:
   [[nodiscard]] double at(const dvec3& p) const noexcept override {
     double d = pedestal(p);
-    // Far from the figure its bounding sphere is near enough.
+    // The bounding sphere is near enough far from the figure.
     const double sphere = glm::length(p - dvec3(0.0, -0.1, 1.45)) - 1.55;
     if (sphere > 0.5) {
       return std::min(d, sphere);
@@ -65,17 +65,18 @@ class SeatedFigure final : public SignedDistance {
            rounding;
   }
 
-  /// Trunk, shoulders, upper arms and legs under a robe whose folds shade each other.
+  /// Returns the distance to trunk, shoulders, upper arms and legs, under a robe whose folds shade
+  /// each other.
   static double clothed(const dvec3& p) {
     double d = ellipsoid(p, {0.0, 0.10, 0.62}, {0.56, 0.44, 0.34});
     d = blend(d, limb(p, {0.0, 0.14, 0.75}, {0.0, 0.10, 1.45}, 0.36, 0.37), 0.20);
     d = blend(d, limb(p, {-0.40, 0.10, 1.64}, {0.40, 0.10, 1.64}, 0.20, 0.20), 0.15);
-    // Knees out, shins crossed in front, the right one on top.
+    // The knees point outwards, the shins cross in front, the right one on top.
     d = blend(d, limb(p, {-0.30, 0.05, 0.58}, {-0.86, -0.36, 0.52}, 0.27, 0.20), 0.10);
     d = blend(d, limb(p, {0.30, 0.05, 0.58}, {0.86, -0.36, 0.52}, 0.27, 0.20), 0.10);
     d = blend(d, limb(p, {-0.86, -0.36, 0.50}, {0.22, -0.66, 0.46}, 0.18, 0.13), 0.06);
     d = blend(d, limb(p, {0.86, -0.36, 0.52}, {-0.18, -0.60, 0.66}, 0.18, 0.12), 0.05);
-    // Upper arms; sleeves hang wide.
+    // The sleeves of the upper arms hang wide.
     d = blend(d, limb(p, {-0.55, 0.08, 1.60}, {-0.74, -0.02, 1.12}, 0.16, 0.17), 0.08);
     d = blend(d, limb(p, {0.55, 0.08, 1.60}, {0.80, -0.12, 1.20}, 0.16, 0.17), 0.08);
     const double near = window(d, -0.1, 0.1, 0.3);
@@ -87,7 +88,7 @@ class SeatedFigure final : public SignedDistance {
                            0.011 * lap * std::sin(46.0 * (p.y + 0.4 * p.x * p.x) + 4.0 * p.z);
       d += near * folds;
     }
-    // A sash from the left shoulder to the right hip.
+    // A sash runs from the left shoulder to the right hip.
     const double band = std::abs(glm::dot(p - dvec3(0.0, 0.1, 1.2), dvec3(0.64, 0.0, 0.77))) - 0.09;
     const double trunk = limb(p, {0.0, 0.14, 0.75}, {0.0, 0.10, 1.45}, 0.40, 0.42);
     return blend(d, std::max(trunk, band), 0.03);
@@ -96,10 +97,10 @@ class SeatedFigure final : public SignedDistance {
   static double bare(const dvec3& p) {
     double d = limb(p, {0.0, 0.07, 1.72}, {0.0, 0.03, 2.02}, 0.14, 0.12);
     d = blend(d, head(p), 0.05);
-    // Left forearm and hand in the lap.
+    // The left forearm and hand lie in the lap.
     d = std::min(d, limb(p, {-0.74, -0.04, 1.10}, {-0.22, -0.46, 0.88}, 0.11, 0.08));
     d = blend(d, ellipsoid(p, {-0.06, -0.50, 0.86}, {0.16, 0.11, 0.05}), 0.04);
-    // Right forearm raised, palm forward.
+    // The right forearm is raised, with the palm forward.
     double right = limb(p, {0.80, -0.14, 1.18}, {0.66, -0.52, 1.56}, 0.11, 0.075);
     right = blend(right, ellipsoid(p, {0.65, -0.56, 1.68}, {0.09, 0.045, 0.11}), 0.04);
     for (int finger = 0; finger < 4; ++finger) {
@@ -117,7 +118,7 @@ class SeatedFigure final : public SignedDistance {
     for (const double side : {-1.0, 1.0}) {
       d = blend(d, limb(p, {side * 0.225, 0.02, 2.26}, {side * 0.235, 0.02, 2.07}, 0.04, 0.03),
                 0.02);
-      // Eye sockets: a smooth maximum with the outside of a sphere.
+      // The eye sockets are a smooth maximum with the outside of a sphere.
       d = -blend(-d, glm::length(p - dvec3(side * 0.085, -0.245, 2.245)) - 0.045, 0.03);
     }
     d = -blend(-d, limb(p, {-0.05, -0.245, 2.06}, {0.05, -0.245, 2.06}, 0.012, 0.012),

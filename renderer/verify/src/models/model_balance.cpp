@@ -35,12 +35,12 @@ constexpr std::array<std::string_view, kColumns> kNames = {"S_d",  "S_i", "R_e",
                                                            "d",    "Tc",  "hc",  "Tair"};
 enum Output : std::size_t { kEabs, kTa, kTs, kTsConv, kOutputs };
 
-/// Columns, with `alb` replaced by the solar absorptance it stands for.
+/// Columns of the table, in which the solar absorptance replaces `alb`.
 using Columns = std::array<std::vector<double>, kColumns>;
 template <class Real>
 using Results = std::array<std::vector<Real>, kOutputs>;
 
-Result<Columns> read(const CsvTable& table) {
+Result<Columns> read(const physics::CsvTable& table) {
   auto columns = read_columns(table, kNames);
   if (!columns) return tl::unexpected(std::move(columns.error()));
   const auto readings = table.texts("alb_reading");
@@ -63,7 +63,7 @@ bool is_defined(const Columns& in, std::size_t row) {
   return is_body(in[kLambda][row], in[kD][row]) && in[kEps][row] >= 0.0;
 }
 
-/// What is undefined becomes NaN, the same way for every device.
+/// Stores one row of results. Undefined values become NaN in the same way for every device.
 template <class Real>
 void store(const Columns& in, std::size_t row, Real absorbed_w_m2, Real radiative_k,
            Real plain_source, Real plain_k, Real film_source, Real film_k, Results<Real>& out) {
@@ -129,7 +129,7 @@ Result<Results<float>> on_gpu(const Columns& in, int gpu_index) {
 
 }  // namespace
 
-Result<std::string> run_balance(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_balance(const EvaluateRequest& request, const physics::CsvTable& table) {
   const auto columns = read(table);
   if (!columns) return tl::unexpected(columns.error());
   if (request.device == Device::gpu) {

@@ -18,22 +18,22 @@ constexpr std::size_t kBands = 4;
 template <class Real>
 using Results = std::array<std::vector<Real>, kBands>;
 
-/// In the order of the output columns.
+/// Returns the bands in the order of the output columns.
 std::array<physics::Band, kBands> bands() {
   return {physics::Band{3.0, 5.0, {}}, physics::Band{3.4, 4.1, {}}, physics::Band{8.0, 12.0, {}},
           physics::Band{7.7, 9.3, {}}};
 }
 
-/// The tables the renderer uses; hotter rows widen them at the same spacing.
+/// Returns the tables that the renderer uses. Hotter rows extend them with the same spacing.
 Result<std::vector<BandRadianceLut>> tables(const std::vector<double>& temperature_k) {
   BandRadianceLut::Options options;
   const double spacing_k = (options.max_k - options.min_k) / (options.nodes - 1);
   for (const double t : temperature_k) {
     if (std::isfinite(t)) options.max_k = std::max(options.max_k, t);
   }
-  constexpr double kMostNodes = 1 << 20;
+  constexpr double kMaxNodes = 1 << 20;
   options.nodes = static_cast<std::uint32_t>(
-      std::min(kMostNodes, std::ceil((options.max_k - options.min_k) / spacing_k) + 1.0));
+      std::min(kMaxNodes, std::ceil((options.max_k - options.min_k) / spacing_k) + 1.0));
   std::vector<BandRadianceLut> luts;
   for (const physics::Band& band : bands()) {
     auto lut = BandRadianceLut::build(band, options);
@@ -74,7 +74,7 @@ Results<float> looked_up(const std::vector<BandRadianceLut>& luts,
 
 Result<Results<float>> on_gpu(const std::vector<BandRadianceLut>& luts,
                               const std::vector<double>& temperature_k, int gpu_index) {
-  // Four layouts, then the four tables one after the other.
+  // The constants are four layouts, then the four tables one after the other.
   std::vector<float> constants;
   std::uint32_t first = 4 * kBands;
   for (const BandRadianceLut& lut : luts) {
@@ -106,7 +106,8 @@ Result<Results<float>> on_gpu(const std::vector<BandRadianceLut>& luts,
 
 }  // namespace
 
-Result<std::string> run_band_radiance(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_band_radiance(const EvaluateRequest& request,
+                                      const physics::CsvTable& table) {
   const auto temperature_k = table.numbers(kBandRadianceInputs);
   if (!temperature_k) return tl::unexpected(temperature_k.error());
   if (request.precision == Precision::float64) {

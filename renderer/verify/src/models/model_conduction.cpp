@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conduction cases with known solutions, answered by the reference solver itself: its mesh, its
-// time steps, its matrices. No closed form stands here.
+// Models of conduction with known solutions. The reference solver itself answers them: its mesh,
+// its time steps, its matrices. There is no closed form in this file.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -30,9 +30,10 @@ using reference::ProfilePoint;
 using reference::SolidLayer;
 using reference::StepOptions;
 
-/// At refine 1; the truth within a tenth of the bar of 10 mK.
+/// Tolerance at refine 1, K. The result is then within a tenth of the limit of 10 mK.
 constexpr double kToleranceK = 5.0e-5;
-/// Cells per diffusion length of the shortest time that matters, growth with depth.
+/// Number of cells per diffusion length of the shortest relevant time, and growth of the cells with
+/// depth.
 constexpr double kCellsPerLength = 20.0;
 constexpr double kGrowthFrac = 0.04;
 constexpr double kNan = kUndefined<double>;
@@ -42,13 +43,13 @@ Result<void> check_refine(const EvaluateRequest& request) {
   return make_error(ErrorCode::invalid_argument, "--refine must be 1, 2 or 4");
 }
 
-tl::unexpected<physics::Error> bad_kind(const CsvTable& table, std::size_t row,
+tl::unexpected<physics::Error> bad_kind(const physics::CsvTable& table, std::size_t row,
                                         std::string_view kind, std::string_view known) {
   return make_error(ErrorCode::parse, fmt::format("{}:{}: column 'kind': '{}' is none of {}",
                                                   table.name(), table.line_of(row), kind, known));
 }
 
-/// What happens to a body of one temperature from t = 0 on.
+/// Body of uniform temperature and what acts on it from t = 0 on.
 struct Case {
   std::vector<SolidLayer> layers;
   Base base;
@@ -56,7 +57,7 @@ struct Case {
   double flux_w_m2 = 0.0;
   double film_w_m2_k = 0.0;
   double ambient_k = 0.0;
-  std::optional<double> held_k;  ///< face temperature instead of a flux
+  std::optional<double> held_k;  ///< temperature that holds the face, instead of a flux
 };
 
 MeshOptions mesh_options(double scale_s, std::uint32_t refine) {
@@ -68,7 +69,8 @@ MeshOptions mesh_options(double scale_s, std::uint32_t refine) {
   return options;
 }
 
-/// Temperature at a depth and time; nan where the body or the question is not defined.
+/// Returns the temperature at a depth and time, or nan where the body or the request is not
+/// defined.
 double temperature_after(const Case& c, double depth_m, double time_s, std::uint32_t refine) {
   const bool bounded = c.base.kind != BaseKind::deep_ground;
   const SolidLayer& layer = c.layers.front();
@@ -79,7 +81,7 @@ double temperature_after(const Case& c, double depth_m, double time_s, std::uint
     return kNan;
   }
   if (time_s == 0.0) return c.held_k && depth_m == 0.0 ? *c.held_k : c.initial_k;
-  // A bounded body settles within its own diffusion time.
+  // A bounded body reaches its steady state within its own diffusion time.
   const double body_s =
       layer.thickness_m * layer.thickness_m * layer.heat_capacity_j_m3_k / layer.conductivity_w_m_k;
   MeshOptions options = mesh_options(0.04 * (bounded ? std::min(time_s, body_s) : time_s), refine);
@@ -102,8 +104,9 @@ double temperature_after(const Case& c, double depth_m, double time_s, std::uint
   return solver.temperature_k(depth_m);
 }
 
-/// Semi-infinite body whose face swings as amplitude cos(2 pi t / period) about its mean: started
-/// from the periodic state of the solver's matrices, stepped through one more period.
+/// Returns the temperature of a semi-infinite body whose face follows amplitude cos(2 pi t /
+/// period) about its mean. It starts from the periodic state of the solver's matrices and steps
+/// through one more period.
 double periodic_temperature(const Case& c, double amplitude_k, double period_s, double depth_m,
                             double time_s, std::uint32_t refine) {
   if (!(period_s > 0.0 && std::isfinite(period_s) && depth_m >= 0.0 && std::isfinite(depth_m) &&
@@ -129,7 +132,8 @@ double periodic_temperature(const Case& c, double amplitude_k, double period_s, 
   steps.refine = refine;
   LayerSolver solver(*mesh, steps);
   solver.start_nodes(nodes_k, start_s);
-  // The swing as a polygon: its sagitta falls with the square of the number of sides.
+  // The cosine is a polygon here. Its largest deviation falls with the square of the number of
+  // sides.
   const double sides = 512.0 * refine;
   const auto face_k = [&](double t) {
     return c.initial_k + amplitude_k * std::cos(angular_per_s * t);
@@ -144,7 +148,8 @@ double periodic_temperature(const Case& c, double amplitude_k, double period_s, 
 
 }  // namespace
 
-Result<std::string> run_conduction_slab(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_conduction_slab(const EvaluateRequest& request,
+                                        const physics::CsvTable& table) {
   if (auto fine = check_refine(request); !fine) return tl::unexpected(fine.error());
   const auto kinds = table.texts("kind");
   if (!kinds) return tl::unexpected(kinds.error());
@@ -178,7 +183,7 @@ Result<std::string> run_conduction_slab(const EvaluateRequest& request, const Cs
 }
 
 Result<std::string> run_conduction_semi_infinite(const EvaluateRequest& request,
-                                                 const CsvTable& table) {
+                                                 const physics::CsvTable& table) {
   if (auto fine = check_refine(request); !fine) return tl::unexpected(fine.error());
   const auto kinds = table.texts("kind");
   if (!kinds) return tl::unexpected(kinds.error());
@@ -190,7 +195,7 @@ Result<std::string> run_conduction_semi_infinite(const EvaluateRequest& request,
   for (std::size_t i = 0; i < result.size(); ++i) {
     const std::string_view kind = (*kinds)[i];
     Case c;
-    // The ground goes on below; the layer reaches at least past the point asked for.
+    // The ground continues below. The layer reaches beyond the requested point.
     c.layers = {{std::max(1.25 * x[i], 1e-9), k[i], rc[i]}};
     c.base = {BaseKind::deep_ground, t_i[i]};
     c.initial_k = t_i[i];
@@ -213,7 +218,8 @@ Result<std::string> run_conduction_semi_infinite(const EvaluateRequest& request,
   return write_csv(kConductionOutputs, std::span(&result, 1));
 }
 
-Result<std::string> run_conduction_layered(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_conduction_layered(const EvaluateRequest& request,
+                                           const physics::CsvTable& table) {
   if (auto fine = check_refine(request); !fine) return tl::unexpected(fine.error());
   const auto bases = table.texts("base");
   if (!bases) return tl::unexpected(bases.error());

@@ -29,7 +29,8 @@ constexpr std::array<std::pair<std::string_view, LitPatch>, 4> kPatches{{
 
 }  // namespace
 
-Result<std::string> run_conduction_lateral(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_conduction_lateral(const EvaluateRequest& request,
+                                           const physics::CsvTable& table) {
   const auto kinds = table.texts("kind");
   if (!kinds) return tl::unexpected(kinds.error());
   const auto columns =

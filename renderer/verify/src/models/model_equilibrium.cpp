@@ -16,7 +16,7 @@ constexpr std::array<std::string_view, kColumns> kNames = {"lambda", "d",  "eps"
                                                            "Tc",     "hc", "Tair"};
 using Columns = std::array<std::vector<double>, kColumns>;
 
-/// Temperatures and coefficients outside physics have no equilibrium.
+/// Returns true when a row has an equilibrium: no value is outside physics.
 bool is_defined(const Columns& in, std::size_t row) {
   return is_body(in[kLambda][row], in[kD][row]) && in[kEps][row] >= 0.0 && in[kTa][row] >= 0.0 &&
          in[kHc][row] >= 0.0;
@@ -50,7 +50,7 @@ Result<std::vector<float>> on_gpu(const Columns& in, int gpu_index) {
   job.shader = "passes/evaluate_equilibrium.comp";
   job.inputs = packed;
   job.input_stride = kColumns;
-  job.output_stride = 2;  // temperature, source
+  job.output_stride = 2;  // temperature and source term
   job.gpu_index = gpu_index;
   const auto raw = run_gpu_rows(job);
   if (!raw) return tl::unexpected(raw.error());
@@ -63,7 +63,8 @@ Result<std::vector<float>> on_gpu(const Columns& in, int gpu_index) {
 
 }  // namespace
 
-Result<std::string> run_equilibrium(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_equilibrium(const EvaluateRequest& request,
+                                    const physics::CsvTable& table) {
   const auto columns = read_columns(table, kNames);
   if (!columns) return tl::unexpected(columns.error());
   if (request.device == Device::gpu) {

@@ -20,15 +20,17 @@ using physics::make_error;
 using physics::Result;
 
 constexpr std::size_t kModes = 3;
-/// Mesa's software rasteriser leaves the loops of an invocation after 65535 turns without a word.
-constexpr std::size_t kMostGpuIntervals = 65'536;
+/// Number of intervals from which the GPU refuses a row. Mesa's software rasteriser leaves a loop
+/// of an invocation after 65535 iterations without any message.
+constexpr std::size_t kMaxGpuIntervals = 65'536;
 
 struct Node {
   double time_s = 0.0;
   double drive_k = 0.0;
 };
 
-/// One case: the state is given at t = 0, the drive by its nodes and constant outside them.
+/// Case of the table of cases. The state is given at t = 0. The drive is given by its nodes and
+/// constant outside them.
 struct Case {
   bool linear = false;
   std::size_t modes = 1;
@@ -39,7 +41,7 @@ struct Case {
 };
 using Cases = std::map<std::string, Case, std::less<>>;
 
-/// A stretch over which the drive is linear (or constant: both ends equal).
+/// Interval over which the drive is linear, or constant when both ends are equal.
 struct Interval {
   double length_s = 0.0;
   double drive_start_k = 0.0;
@@ -47,7 +49,7 @@ struct Interval {
 };
 
 Result<Cases> read_cases(const std::filesystem::path& file) {
-  const auto table = CsvTable::read(file);
+  const auto table = physics::CsvTable::read(file);
   if (!table) return tl::unexpected(table.error());
   const auto names = table->texts("case");
   if (!names) return tl::unexpected(names.error());
@@ -87,7 +89,7 @@ Result<Cases> read_cases(const std::filesystem::path& file) {
 }
 
 Result<void> read_nodes(const std::filesystem::path& file, Cases& cases) {
-  const auto table = CsvTable::read(file);
+  const auto table = physics::CsvTable::read(file);
   if (!table) return tl::unexpected(table.error());
   const auto names = table->texts("case");
   if (!names) return tl::unexpected(names.error());
@@ -99,21 +101,21 @@ Result<void> read_nodes(const std::filesystem::path& file, Cases& cases) {
       return make_error(ErrorCode::parse, fmt::format("{}:{}: column 't_s': must be finite",
                                                       table->name(), table->line_of(row)));
     }
-    // A node of a case that is not described is as harmless as a column that is not used.
+    // A node of an unknown case is ignored, like an unknown column.
     if (const auto found = cases.find((*names)[row]); found != cases.end()) {
       found->second.nodes.push_back({time_s, (*columns)[1][row]});
     }
   }
   for (auto& [name, c] : cases) {
-    // Stable: two nodes at one instant are a jump, in the order of the file.
+    // The sort is stable: two nodes at one instant are a jump, in the order of the file.
     std::stable_sort(c.nodes.begin(), c.nodes.end(),
                      [](const Node& a, const Node& b) { return a.time_s < b.time_s; });
   }
   return {};
 }
 
-/// The drive between 0 and `time_s`, cut at the nodes. Lengths are differences in double: for late
-/// times float32 would not resolve them.
+/// Returns the drive between 0 and `time_s`, cut at the nodes. Lengths are differences in double,
+/// because float32 would not resolve them for late times.
 std::vector<Interval> intervals_until(const Case& c, double time_s) {
   std::vector<Interval> intervals;
   const std::vector<Node>& nodes = c.nodes;
@@ -146,10 +148,10 @@ struct Query {
   const Case* c = nullptr;
   double time_s = 0.0;
   std::vector<Interval> intervals;
-  bool defined = false;  ///< time not before the state is given
+  bool defined = false;  ///< true when the time is not before that of the given state
 };
 
-Result<std::vector<Query>> read_queries(const CsvTable& table, const Cases& cases,
+Result<std::vector<Query>> read_queries(const physics::CsvTable& table, const Cases& cases,
                                         const std::filesystem::path& cases_file,
                                         const std::filesystem::path& nodes_file) {
   const auto names = table.texts("case");
@@ -175,7 +177,7 @@ Result<std::vector<Query>> read_queries(const CsvTable& table, const Cases& case
   return queries;
 }
 
-/// Offsets from this temperature stay small, so float32 keeps its digits.
+/// Returns the reference temperature, K. Offsets from it stay small, so float32 keeps its digits.
 double reference_k(const Case& c) {
   return c.nodes.front().drive_k;
 }
@@ -207,14 +209,15 @@ std::vector<Real> on_cpu(const std::vector<Query>& queries) {
 }
 
 Result<std::vector<float>> on_gpu(const std::vector<Query>& queries, int gpu_index) {
-  // Row: place of the first interval, number of intervals, kind, then weight and start per mode.
+  // A row is: index of the first interval, number of intervals, kind, then weight and start per
+  // mode.
   constexpr std::size_t kStride = 3 + 2 * kModes;
-  // Interval: drive at both ends, then the two gains of each mode.
+  // An interval is: the drive at both ends, then the two gains of each mode.
   constexpr std::size_t kIntervalStride = 2 + 2 * kModes;
   std::vector<float> rows;
   std::vector<float> intervals;
   for (const Query& query : queries) {
-    // Indices ride in float32, exact up to 2^24 intervals.
+    // Indices are float32, exact up to 2^24 intervals.
     rows.push_back(static_cast<float>(intervals.size() / kIntervalStride));
     rows.push_back(static_cast<float>(query.intervals.size()));
     rows.push_back(query.c->linear ? 1.0F : 0.0F);
@@ -237,11 +240,11 @@ Result<std::vector<float>> on_gpu(const std::vector<Query>& queries, int gpu_ind
     }
   }
   for (std::size_t i = 0; i < queries.size(); ++i) {
-    if (queries[i].intervals.size() < kMostGpuIntervals) continue;
+    if (queries[i].intervals.size() < kMaxGpuIntervals) continue;
     return make_error(ErrorCode::unsupported,
                       fmt::format("relaxation on the GPU: query {} spans {} intervals, {} are "
                                   "possible: use --device cpu",
-                                  i + 1, queries[i].intervals.size(), kMostGpuIntervals - 1));
+                                  i + 1, queries[i].intervals.size(), kMaxGpuIntervals - 1));
   }
   if (intervals.size() / kIntervalStride >= (1U << 24)) {
     return make_error(ErrorCode::unsupported,
@@ -268,7 +271,7 @@ Result<std::vector<float>> on_gpu(const std::vector<Query>& queries, int gpu_ind
 
 }  // namespace
 
-Result<std::string> run_relaxation(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_relaxation(const EvaluateRequest& request, const physics::CsvTable& table) {
   if (request.cases.empty() || request.nodes.empty()) {
     return make_error(ErrorCode::invalid_argument,
                       "model 'relaxation' needs --cases FILE and --nodes FILE");

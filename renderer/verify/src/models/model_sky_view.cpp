@@ -9,7 +9,8 @@
 namespace emit::verify {
 
 /// Rays (CPU) or the frame's own obscurance (GPU) around a point of geometry built from the row.
-physics::Result<std::string> run_sky_view(const EvaluateRequest& request, const CsvTable& table) {
+physics::Result<std::string> run_sky_view(const EvaluateRequest& request,
+                                          const physics::CsvTable& table) {
   if (auto ok = check_visibility_options(request); !ok) return tl::unexpected(ok.error());
   auto kinds = table.texts("kind");
   if (!kinds) return tl::unexpected(std::move(kinds.error()));
@@ -27,7 +28,7 @@ physics::Result<std::string> run_sky_view(const EvaluateRequest& request, const 
       table, make,
       [&](std::size_t i, const VisibilityRow& row, const reference::SceneInstant& scene) {
         const reference::SkyView view = scene.sky_view(surface_point(row), rays);
-        // Whatever leaves the geometry of the row counts as sky, below the horizon as well.
+        // Every ray that leaves the geometry of the row counts as sky, also below the horizon.
         if (glm::dot(row.normal, row.normal) > 0.0) {
           out[0][i] = view.sky_cosine.value_frac + view.ground_cosine.value_frac;
         }

@@ -9,7 +9,8 @@ namespace emit::verify {
 
 /// The disc behind the edge of a real wall. Integrated as the reference solver does it, by rays
 /// where --rays is given.
-physics::Result<std::string> run_sun_disc(const EvaluateRequest& request, const CsvTable& table) {
+physics::Result<std::string> run_sun_disc(const EvaluateRequest& request,
+                                          const physics::CsvTable& table) {
   if (auto ok = check_visibility_options(request); !ok) return tl::unexpected(ok.error());
   auto columns = read_columns<1>(table, {"delta_deg"});
   if (!columns) return tl::unexpected(std::move(columns.error()));

@@ -9,7 +9,8 @@
 
 namespace emit::verify {
 
-physics::Result<std::string> run_sun_position(const EvaluateRequest&, const CsvTable& table) {
+physics::Result<std::string> run_sun_position(const EvaluateRequest&,
+                                              const physics::CsvTable& table) {
   enum Column : std::size_t { kYear, kMonth, kDay, kHours, kLat, kLon, kHeight, kDeltaT };
   const auto columns =
       read_columns<8>(table, {"year", "month", "day", "hours_ut", "lat", "lon", "height", "dT"});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surface temperature of a layered body under absorbed flux, air and its own radiation.
+// Model of the surface temperature of a layered body under absorbed flux, air and its own
+// radiation.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,10 +27,10 @@ using reference::ProfilePoint;
 using reference::SolidLayer;
 
 constexpr std::size_t kScenarios = 4;
-/// At refine 1.
+/// Tolerance at refine 1, K.
 constexpr double kToleranceK = 1.0e-4;
 
-/// The request, checked.
+/// Checked request.
 struct History {
   std::vector<SolidLayer> layers;
   std::vector<ProfilePoint> initial;
@@ -42,7 +43,7 @@ struct History {
 };
 using Temperatures = std::array<std::vector<double>, kScenarios>;
 
-Result<History> read_history(const EvaluateRequest& request, const CsvTable& table) {
+Result<History> read_history(const EvaluateRequest& request, const physics::CsvTable& table) {
   const HistoryOptions& options = request.history;
   const auto missing = [](std::string_view option) {
     return make_error(ErrorCode::invalid_argument,
@@ -110,7 +111,7 @@ double start_k(const History& history) {
 Result<LayerMesh> history_mesh(const History& history, std::uint32_t refine) {
   reference::MeshOptions options;
   options.refine = refine;
-  // A base that starts at another temperature sends its own wave upwards.
+  // A base that starts at another temperature sends a wave of its own upwards.
   options.fine_base = history.initial.back().temperature_k != history.base_k;
   return LayerMesh::build(history.layers, {reference::BaseKind::fixed_temperature, history.base_k},
                           options);
@@ -137,8 +138,9 @@ Result<Temperatures> by_reference(const History& history, std::uint32_t refine) 
   return out;
 }
 
-/// The published model: Eq. 1-6 on the first layer over its core, no convection, relaxed by the
-/// material's modes, equilibrium linear between rows.
+/// Computes the temperatures by the published model: Eq. 1-6 on the first layer over its core,
+/// without convection, relaxed by the material's modes, with an equilibrium that is linear between
+/// rows.
 Result<Temperatures> by_emit2014(const History& history, const std::vector<HistoryMode>& modes) {
   double weights = 0.0;
   for (const HistoryMode& mode : modes) {
@@ -177,8 +179,8 @@ Result<Temperatures> by_emit2014(const History& history, const std::vector<Histo
   return out;
 }
 
-/// States whose free decay, face insulated, is nearest to that of the body from its initial
-/// profile; at t = 0 they add up to the face's temperature exactly.
+/// Returns states whose free decay with an insulated face is nearest to that of the body from its
+/// initial profile. At t = 0 their sum is exactly the face's temperature.
 Result<physics::FosterState<double>> initial_states(const History& history,
                                                     const physics::FosterNetwork& network) {
   const auto mesh = history_mesh(history, 1);
@@ -187,12 +189,13 @@ Result<physics::FosterState<double>> initial_states(const History& history,
   solver.start(history.initial, 0.0);
   const std::size_t n = network.count;
   const double total_k = start_k(history) - history.base_k;
-  // Unknowns: the states but the slowest, which takes the rest. Normal equations, by elimination.
+  // The unknowns are all states but the slowest, which takes the rest. Solve the normal equations
+  // by elimination.
   std::array<std::array<double, physics::kMaxFosterModes>, physics::kMaxFosterModes> a{};
   const std::size_t unknowns = n - 1;
   const double slow_tau_s = network.modes[n - 1].tau_s;
   for (int sample = 0; sample < 120; ++sample) {
-    const double time_s = 20.0 * std::pow(1.08, sample);  // 20 s to two days
+    const double time_s = 20.0 * std::pow(1.08, sample);  // samples from 20 s to two days
     solver.advance({solver.time_s(), time_s, {}, {}}, 0.0);
     const double slow = std::exp(-time_s / slow_tau_s);
     const double target = solver.face_k() - history.base_k - total_k * slow;
@@ -207,7 +210,7 @@ Result<physics::FosterState<double>> initial_states(const History& history,
   }
   physics::FosterState<double> x{};
   for (std::size_t i = 0; i < unknowns; ++i) {
-    a[i][i] += 1e-9;  // two states that decay alike share what they hold
+    a[i][i] += 1e-9;  // regularisation for two states that decay alike
     for (std::size_t j = i + 1; j < unknowns; ++j) {
       const double factor = a[j][i] / a[i][i];
       for (std::size_t c = i; c <= unknowns; ++c) a[j][c] -= factor * a[i][c];
@@ -261,7 +264,8 @@ Result<Temperatures> by_foster(const History& history, std::uint32_t refine) {
 
 }  // namespace
 
-Result<std::string> run_surface_history(const EvaluateRequest& request, const CsvTable& table) {
+Result<std::string> run_surface_history(const EvaluateRequest& request,
+                                        const physics::CsvTable& table) {
   if (request.refine != 1 && request.refine != 2 && request.refine != 4) {
     return make_error(ErrorCode::invalid_argument, "--refine must be 1, 2 or 4");
   }
@@ -280,7 +284,7 @@ Result<std::string> run_surface_history(const EvaluateRequest& request, const Cs
     return by_reference(*history, request.refine);
   }();
   if (!result) return tl::unexpected(std::move(result.error()));
-  // The first row is the start, not an answer.
+  // The first row is the start, so it has no result.
   for (auto& column : *result) {
     if (!column.empty()) column.front() = kUndefined<double>;
   }

@@ -7,9 +7,10 @@
 
 namespace emit::verify {
 
-/// Rays (CPU) or the frame's own soft shadow (GPU) behind a wall built from the row.
+/// Measures the visible part of the sun's disc behind a wall built from the row: by rays on the
+/// CPU, by the frame's own soft shadow on the GPU.
 physics::Result<std::string> run_wall_shadow(const EvaluateRequest& request,
-                                             const CsvTable& table) {
+                                             const physics::CsvTable& table) {
   if (auto ok = check_visibility_options(request); !ok) return tl::unexpected(ok.error());
   auto columns = read_columns<3>(table, {"H", "e_deg", "x"});
   if (!columns) return tl::unexpected(std::move(columns.error()));

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "emit/verify/stability.hpp"
 #include "emit/physics/band_radiance_lut.hpp"
+#include "emit/verify/stability.hpp"
 #include "shared/stability_inputs.glsl.h"
 #include "stability_device.hpp"
 #include "stability_parallel.hpp"
@@ -20,9 +20,9 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-constexpr double kLeastNormal = std::numeric_limits<float>::min();
+constexpr double kMinNormal = std::numeric_limits<float>::min();
 
-// Range of the accuracy promise, and that of the renderer's tables.
+// Temperature range of the accuracy promise, and that of the renderer's tables, K.
 constexpr double kPromiseLowK = 200.0, kPromiseHighK = 3000.0;
 constexpr double kTableLowK = 10.0, kTableHighK = 6000.0;
 
@@ -80,7 +80,7 @@ class BandSweep {
     Tally& whole = tallies[kWhole];
     whole.add_flag(result[1] != 0.0F, in_table(t));
     const auto truth = physics::band_radiance(band_.band, physics::Kelvin(static_cast<double>(t)));
-    if (!in_table(t) || truth.radiance_w_m2_sr < kLeastNormal) {
+    if (!in_table(t) || truth.radiance_w_m2_sr < kMinNormal) {
       whole.add_unknown(result[0]);
       return;
     }

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::verify {
 namespace {
 
@@ -47,6 +49,7 @@ void SweepProgram::set_steps(std::uint32_t first, std::uint32_t last) const {
 
 physics::Result<void> SweepProgram::run(std::uint32_t first_case, std::uint32_t count,
                                         std::uint32_t seed, std::vector<float>& words) {
+  EMIT_CHECK_OP(count, <=, kCasesPerChunk);
   words.resize(count * words_per_case_);
   program_.use();
   outputs_.bind_storage(kOutputs);

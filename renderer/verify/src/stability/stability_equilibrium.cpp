@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "emit/verify/stability.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/verify/stability.hpp"
 #include "shared/stability_inputs.glsl.h"
 #include "stability_device.hpp"
 #include "stability_parallel.hpp"
@@ -28,14 +28,14 @@ struct Quartic {
   double emission = 0.0;
   double conductance = 0.0;
   double source = 0.0;
-  double source_parts = 0.0;  ///< sum of the absolute terms of A
+  double source_parts = 0.0;  ///< sum of the magnitudes of the terms of A
 };
 
 float flushed(float value) {
   return std::abs(value) < std::numeric_limits<float>::min() ? 0.0F : value;
 }
 
-/// Devices may take numbers below the normal range for zero.
+/// Returns the surface with numbers below the normal range as zero, as devices may take them.
 SurfaceInput flushed(SurfaceInput s) {
   for (float* value : {&s.conductivity_w_m_k, &s.thickness_m, &s.emissivity_frac, &s.radiative_k,
                        &s.core_k, &s.film_w_m2_k, &s.air_k}) {
@@ -54,11 +54,13 @@ Quartic quartic_of(const SurfaceInput& s) {
           std::abs(terms[0]) + std::abs(terms[1]) + std::abs(terms[2])};
 }
 
-/// Positive root by Newton from above, where the convex left side makes it monotone: it converges
-/// from any start that is not below the root, and both asymptotes are such starts.
+/// Returns the positive root by Newton's method from above. The left side is convex, so the
+/// iteration is monotone and converges from any start that is not below the root. Both asymptotes
+/// are such starts.
 double root_k(const Quartic& b) {
   const double radiative_k = std::sqrt(std::sqrt(b.source / b.emission));
-  double t = std::min(radiative_k, b.source / b.conductance);  // G = 0 makes the second infinite
+  // When G = 0 the second value is infinite.
+  double t = std::min(radiative_k, b.source / b.conductance);
   for (int i = 0; i < 60; ++i) {
     const double t3 = t * t * t;
     const double step = ((b.emission * t3 + b.conductance) * t - b.source) /
@@ -69,12 +71,12 @@ double root_k(const Quartic& b) {
   return t;
 }
 
-/// Ranges that lib/equilibrium.glsl holds its arguments in.
-constexpr double kLeastEmission = 1e-20, kMostEmission = 1.0;
-constexpr double kMostConductance = 1e16;
-constexpr double kLeastSource = 1e-9, kMostSource = 1e18;
+/// Ranges to which lib/equilibrium.glsl limits its arguments.
+constexpr double kMinEmission = 1e-20, kMaxEmission = 1.0;
+constexpr double kMaxConductance = 1e16;
+constexpr double kMinSource = 1e-9, kMaxSource = 1e18;
 
-/// Values this close to a limit may round to its other side in float32.
+/// Relative distance from a limit within which float32 may round a value to its other side.
 constexpr double kMargin = 1e-5;
 
 bool surely_outside(double value, double low, double high, double rounding) {
@@ -82,9 +84,9 @@ bool surely_outside(double value, double low, double high, double rounding) {
 }
 
 bool clearly_invalid(const Quartic& b) {
-  return surely_outside(b.emission, kLeastEmission, kMostEmission, 0.0) ||
-         surely_outside(b.conductance, 0.0, kMostConductance, 1e-37) ||
-         surely_outside(b.source, kLeastSource, kMostSource, kMargin * b.source_parts);
+  return surely_outside(b.emission, kMinEmission, kMaxEmission, 0.0) ||
+         surely_outside(b.conductance, 0.0, kMaxConductance, 1e-37) ||
+         surely_outside(b.source, kMinSource, kMaxSource, kMargin * b.source_parts);
 }
 
 std::string describe(const SurfaceInput& s) {
@@ -95,7 +97,7 @@ std::string describe(const SurfaceInput& s) {
       s.film_w_m2_k, s.air_k);
 }
 
-/// The published closed form in IEEE float32, term by term as in the shader.
+/// Published closed form in IEEE float32, term by term as in the shader.
 struct ClosedForms {
   float typeset_k = 0.0F;
   float corrected_k = 0.0F;
@@ -129,7 +131,7 @@ struct Row {
   const char* note;
 };
 
-/// One domain: shader, words per case and rows of the table.
+/// Domain of inputs: shader, words per case and rows of the table.
 struct Domain {
   int id = 0;
   std::uint64_t cases = 0;
@@ -166,7 +168,7 @@ std::vector<Domain> domains(std::uint64_t cases) {
              "any three bit patterns as coefficients: flagged, never NaN out"}}}};
 }
 
-/// Error of a result against the root. A relative one says nothing next to 0 K.
+/// Adds the error of a result against the root. A relative error is meaningless near 0 K.
 void add(Tally& tally, float result, double truth_k, std::uint32_t index) {
   const double error_k = std::abs(static_cast<double>(result) - truth_k);
   tally.add(result, truth_k, error_k, truth_k > 1.0 ? error_k / truth_k : 0.0, index);
@@ -230,12 +232,12 @@ class EquilibriumSweep {
     if (domain_.id == EMIT_DOMAIN_HOSTILE || domain_.id == EMIT_DOMAIN_RAW) {
       const bool is_raw = domain_.id == EMIT_DOMAIN_RAW;
       const Quartic b = is_raw ? raw(index) : quartic_of(surface(index));
-      // Nonsense whichever way the device takes numbers below the normal range.
+      // The case is invalid in either treatment of numbers below the normal range.
       const bool nonsense =
           clearly_invalid(b) && (is_raw || clearly_invalid(quartic_of(flushed(surface(index)))));
       tallies[0].add_flag(clamped, !nonsense);
       if (is_raw && !clamped) {
-        // Relative alone: such coefficients give temperatures of any size.
+        // Only the relative error counts, because such coefficients give temperatures of any size.
         const double truth_k = root_k(b);
         tallies[0].add(words[0], truth_k, kNone, std::abs(words[0] - truth_k) / truth_k, index);
       } else {
@@ -245,7 +247,8 @@ class EquilibriumSweep {
     }
     const SurfaceInput s = surface(index);
     const Quartic b = quartic_of(s);
-    // Nothing absorbed and a core at 0 K: the root is 0 K and the guard's must be next to it.
+    // When nothing is absorbed and the core is at 0 K, the root is 0 K and the guarded result must
+    // be next to it.
     const double truth_k = b.source > 0.0 ? root_k(b) : 0.0;
     tallies[0].add_flag(clamped, !clearly_invalid(b));
     add(tallies[0], words[0], truth_k, index);
@@ -265,14 +268,14 @@ class EquilibriumSweep {
   std::vector<float> words_;
 };
 
-/// Every check hangs on it: device and CPU must draw the same bits.
+/// Checks that device and CPU draw the same bits, on which every other check relies.
 Result<void> compare_inputs(std::uint32_t seed, int domain) {
   constexpr std::uint32_t kCases = 4096;
   const gl::Define define{"EMIT_DOMAIN", fmt::format("{}", domain)};
   auto program = SweepProgram::create("passes/stability_inputs.comp", {&define, 1}, 8);
   if (!program) return tl::unexpected(std::move(program.error()));
   std::vector<float> words;
-  // The last cases of the range: index arithmetic that overflowed would show here.
+  // Use the last cases of the range, which show an overflow of index arithmetic.
   const std::uint32_t first = std::numeric_limits<std::uint32_t>::max() - kCases;
   if (auto ok = program->run(first, kCases, seed, words); !ok) return ok;
   for (std::uint32_t row = 0; row < kCases; ++row) {
@@ -290,7 +293,7 @@ Result<void> compare_inputs(std::uint32_t seed, int domain) {
       const std::uint32_t bits = inputs::floatBitsToUint(expected[i]);
       const std::uint32_t got = inputs::floatBitsToUint(words[8 * row + i]);
       if (bits == got) continue;
-      // A quiet NaN may lose its payload on the way through a register.
+      // A quiet NaN may lose its payload in a register.
       if (std::isnan(expected[i]) && std::isnan(words[8 * row + i])) continue;
       return make_error(ErrorCode::internal,
                         fmt::format("stability sweep: case {}, input {}: the device drew "

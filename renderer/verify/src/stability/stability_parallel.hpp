@@ -10,8 +10,9 @@
 
 namespace emit::verify {
 
-/// `check(row, tallies)` for every row of [0, count), shared by threads; every thread has its own
-/// tallies, `rows_of_table` of them, which are merged into `total` in a fixed order.
+/// Calls check(row, tallies) for every row of [0, count) on several threads; 0 threads mean one per
+/// processor. Each thread has tallies of its own, as many as `total`, which are merged into `total`
+/// in a fixed order.
 template <class Check>
 void check_in_parallel(std::uint32_t count, unsigned threads, std::vector<Tally>& total,
                        const Check& check) {

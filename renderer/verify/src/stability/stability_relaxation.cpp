@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "emit/verify/stability.hpp"
 #include "emit/physics/relaxation.hpp"
+#include "emit/verify/stability.hpp"
 #include "shared/stability_inputs.glsl.h"
 #include "stability_device.hpp"
 #include "stability_parallel.hpp"
@@ -22,11 +22,12 @@ using physics::Result;
 constexpr std::size_t kStepLengths = 4;
 constexpr std::size_t kWordsPerCase = 3 + 2 * kStepLengths;
 constexpr std::uint32_t kCasesPerChunk = 4096;
-constexpr std::uint32_t kMostSteps = 100'000;
+constexpr std::uint32_t kMaxSteps = 100'000;
 constexpr std::uint32_t kStepsPerDispatch = 32'768;
 constexpr double kYearS = 365.25 * 86400.0;
-/// Largest offset of drive and start; between drive and state at most twice as much.
-constexpr double kMostOffsetK = 128.0;
+/// Largest offset of drive and start, K. The offset between drive and state is at most twice as
+/// large.
+constexpr double kMaxOffsetK = 128.0;
 
 struct Case {
   double tau_s = 0.0;
@@ -36,7 +37,7 @@ struct Case {
   double start_k = 0.0;
 };
 
-/// Dimensions above the nodes of the drive.
+/// Dimensions of the random numbers above those of the drive's nodes.
 constexpr std::uint32_t kTau = 1U << 20, kStart = kTau + 1, kSteps = kTau + 2, kKind = kTau + 3,
                         kStep = kTau + 8;
 
@@ -46,7 +47,7 @@ Case draw(std::uint32_t seed, std::uint32_t index) {
   };
   Case c;
   c.tau_s = inputs::logarithmic_between(bits(kTau), 5.0F, 3e6F);
-  // One in four cases keeps one step length throughout: rounding then adds up in one direction.
+  // One in four cases has one step length throughout, so that rounding adds up in one direction.
   const bool uniform = (bits(kKind) & 6U) == 0;
   for (std::size_t i = 0; i < kStepLengths; ++i) {
     c.step_s[i] =
@@ -54,7 +55,7 @@ Case draw(std::uint32_t seed, std::uint32_t index) {
                                     1e-9F, static_cast<float>(kYearS));
   }
   c.steps = static_cast<std::uint32_t>(
-      inputs::logarithmic_between(bits(kSteps), 1.0F, static_cast<float>(kMostSteps)));
+      inputs::logarithmic_between(bits(kSteps), 1.0F, static_cast<float>(kMaxSteps)));
   c.linear = (bits(kKind) & 1U) != 0;
   c.start_k = inputs::drive_offset_k(seed, index, kStart);
   return c;
@@ -79,10 +80,10 @@ struct Truth {
   double bound_k = 0.0;
 };
 
-/// The recursion in double: E and the gains from expm1, not the increments that the shader adds.
-/// The bound carries the worst case of every rounding along: a unit in the last place of the offset
-/// (as float32 has it) per step, since compilers may add the two increments one by one, and the
-/// roundings of the increment, damped by what a step forgets.
+/// Computes the recursion in double, with E and the gains from expm1 instead of the increments that
+/// the shader adds. The bound adds up the worst case of every rounding: per step one unit in the
+/// last place of the offset (in float32), because compilers may add the two increments one by one,
+/// and the roundings of the increment, damped by the decay of a step.
 Truth truth_of(const Case& c, std::uint32_t seed, std::uint32_t index) {
   constexpr double kUlp = std::numeric_limits<float>::epsilon();
   struct Factors {
@@ -94,7 +95,7 @@ Truth truth_of(const Case& c, std::uint32_t seed, std::uint32_t index) {
   for (std::size_t i = 0; i < kStepLengths; ++i) {
     const double z = c.step_s[i] / c.tau_s;
     const double gain = -std::expm1(-z);
-    // 1 - phi cancels for small z, where two terms of its series are exact to 1e-13.
+    // 1 - phi loses digits for small z. Two terms of its series are exact to 1e-13 there.
     const double end = z < 1e-4 ? z * (0.5 - z / 6.0 * (1.0 - 0.25 * z)) : 1.0 - gain / z;
     factors[i] = {1.0 - gain, gain - end, end};
   }
@@ -113,7 +114,7 @@ Truth truth_of(const Case& c, std::uint32_t seed, std::uint32_t index) {
                                           truth.bound_k + 2.5 * increment_k);
     u0 = u1;
   }
-  // States below the normal range are flushed.
+  // Devices may flush states below the normal range.
   truth.bound_k = 1.01 * truth.bound_k + 1e-30;
   return truth;
 }
@@ -134,8 +135,8 @@ Result<SweepReport> sweep_relaxation(const SweepOptions& options) {
   std::vector<Tally> total(kRows);
   std::vector<float> constants;
   std::vector<float> words;
-  std::vector<double> shares(kCasesPerChunk);  // of the bound
-  std::array<double, kRows> most_of_bound{};
+  std::vector<double> shares(kCasesPerChunk);  // errors as a fraction of the bound
+  std::array<double, kRows> max_bound_frac{};
   std::uint64_t steps = 0;
   for (std::uint32_t first = 0; first < cases; first += kCasesPerChunk) {
     const std::uint32_t count = std::min(kCasesPerChunk, cases - first);
@@ -151,7 +152,7 @@ Result<SweepReport> sweep_relaxation(const SweepOptions& options) {
       }
     }
     program->set_constants(constants);
-    for (std::uint32_t step = 0; step < kMostSteps; step += kStepsPerDispatch) {
+    for (std::uint32_t step = 0; step < kMaxSteps; step += kStepsPerDispatch) {
       program->set_steps(step, step + kStepsPerDispatch);
       if (auto ok = program->run(first, count, options.seed, words); !ok) {
         return tl::unexpected(std::move(ok.error()));
@@ -164,13 +165,13 @@ Result<SweepReport> sweep_relaxation(const SweepOptions& options) {
           const Truth truth = truth_of(c, options.seed, index);
           const double error_k = std::abs(static_cast<double>(words[row]) - truth.offset_k);
           Tally& tally = tallies[c.linear ? kLinear : kConstant];
-          // Offsets may be negative: only counts and errors are of interest.
-          tally.add(words[row], truth.offset_k, error_k, error_k / kMostOffsetK, index);
+          // Offsets may be negative, so only counters and errors are of interest.
+          tally.add(words[row], truth.offset_k, error_k, error_k / kMaxOffsetK, index);
           tally.add_flag(false, error_k <= truth.bound_k);
           shares[row] = error_k / truth.bound_k;
         });
     for (std::uint32_t row = 0; row < count; ++row) {
-      double& most = most_of_bound[draw(options.seed, first + row).linear ? kLinear : kConstant];
+      double& most = max_bound_frac[draw(options.seed, first + row).linear ? kLinear : kConstant];
       most = std::max(most, shares[row]);
     }
     if (options.progress &&
@@ -184,13 +185,13 @@ Result<SweepReport> sweep_relaxation(const SweepOptions& options) {
   for (std::size_t i = 0; i < kRows; ++i) {
     SweepResult row{.test = kTests[i], .computed_by = "shader", .worst_input = {}, .note = {}};
     total[i].write(row);
-    // What failed the bound was counted as a flag that is missing.
+    // Cases beyond the bound were counted as missing flags.
     const std::uint64_t over_bound = row.unflagged_count;
     row.below_zero_count = 0;
     row.note = fmt::format(
         "{} cases over the bound of a unit in the last place per step; most of the bound "
         "used: {:.2f}; {} steps in both rows",
-        over_bound, most_of_bound[i], steps);
+        over_bound, max_bound_frac[i], steps);
     if (total[i].has_worst()) {
       row.worst_input = describe(draw(options.seed, total[i].worst_case()));
     }

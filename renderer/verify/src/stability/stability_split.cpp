@@ -5,8 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "emit/verify/stability.hpp"
+#include "emit/physics/constants.hpp"
 #include "emit/physics/relaxation.hpp"
+#include "emit/verify/stability.hpp"
 #include "gl/egl_context.hpp"
 #include "gpu_rows.hpp"
 #include "stability_tally.hpp"
@@ -18,18 +19,15 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-// Rows and intervals as passes/evaluate_relaxation.comp reads them.
+// Layout of rows and intervals for passes/evaluate_relaxation.comp.
 constexpr std::size_t kModes = 3;
 constexpr std::size_t kRowStride = 3 + 2 * kModes;
-constexpr std::uint32_t kMostSplits = 1000;
-constexpr std::size_t kMostIntervals = 65'535;
-/// Temperatures on the device are offsets from here, as in the renderer.
-constexpr double kReferenceK = 295.0;
-
+constexpr std::uint32_t kMaxSplits = 1000;
+constexpr std::size_t kMaxIntervals = 65'535;
 bool is_valid(const DriveHistory& h, std::uint32_t splits) {
   return h.node_s.size() >= 2 && h.node_s.size() == h.drive_k.size() && !h.tau_s.empty() &&
          h.tau_s.size() <= kModes && h.tau_s.size() == h.weight_frac.size() && splits >= 1 &&
-         splits <= kMostSplits && (h.node_s.size() - 1) * splits <= kMostIntervals;
+         splits <= kMaxSplits && (h.node_s.size() - 1) * splits <= kMaxIntervals;
 }
 
 void append_intervals(const DriveHistory& h, std::uint32_t splits, std::vector<float>& out) {
@@ -37,7 +35,7 @@ void append_intervals(const DriveHistory& h, std::uint32_t splits, std::vector<f
     const double length_s = (h.node_s[i + 1] - h.node_s[i]) / splits;
     const double slope_k = (h.drive_k[i + 1] - h.drive_k[i]) / splits;
     for (std::uint32_t part = 0; part < splits; ++part) {
-      const double from_k = h.drive_k[i] + slope_k * part - kReferenceK;
+      const double from_k = h.drive_k[i] + slope_k * part - physics::kReferenceK;
       out.push_back(static_cast<float>(from_k));
       out.push_back(static_cast<float>(from_k + slope_k));
       for (std::size_t mode = 0; mode < kModes; ++mode) {
@@ -51,7 +49,7 @@ void append_intervals(const DriveHistory& h, std::uint32_t splits, std::vector<f
   }
 }
 
-/// Surface offsets of all histories at their last node.
+/// Returns the surface offsets of all histories at their last node, K.
 Result<std::vector<float>> relaxed(std::span<const DriveHistory> histories, std::uint32_t splits,
                                    int gpu_index) {
   std::vector<float> rows;
@@ -63,7 +61,7 @@ Result<std::vector<float>> relaxed(std::span<const DriveHistory> histories, std:
     for (std::size_t mode = 0; mode < kModes; ++mode) {
       const bool used = mode < h.tau_s.size();
       rows.push_back(used ? static_cast<float>(h.weight_frac[mode]) : 0.0F);
-      rows.push_back(used ? static_cast<float>(h.start_k - kReferenceK) : 0.0F);
+      rows.push_back(used ? static_cast<float>(h.start_k - physics::kReferenceK) : 0.0F);
     }
     append_intervals(h, splits, intervals);
     first += count;
@@ -102,8 +100,9 @@ Result<SweepReport> sweep_split(std::span<const DriveHistory> histories,
     if (!cut) return tl::unexpected(cut.error());
     Tally tally;
     for (std::size_t i = 0; i < histories.size(); ++i) {
-      const double truth_k = kReferenceK + static_cast<double>((*whole)[i]);
-      const float result_k = static_cast<float>(kReferenceK + static_cast<double>((*cut)[i]));
+      const double truth_k = physics::kReferenceK + static_cast<double>((*whole)[i]);
+      const float result_k =
+          static_cast<float>(physics::kReferenceK + static_cast<double>((*cut)[i]));
       const double error_k =
           std::abs(static_cast<double>((*cut)[i]) - static_cast<double>((*whole)[i]));
       tally.add(result_k, truth_k, error_k, error_k / truth_k, static_cast<std::uint32_t>(i));

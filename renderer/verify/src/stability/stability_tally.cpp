@@ -9,7 +9,7 @@
 namespace emit::verify {
 namespace {
 
-constexpr unsigned kClassShift = 20;  // 8 exponent bits and 3 of the mantissa remain
+constexpr unsigned kClassShift = 20;  // keeps 8 exponent bits and 3 bits of the mantissa
 
 }  // namespace
 
@@ -40,7 +40,7 @@ void Tally::add(float result, double truth, double error_k, double error_frac,
     max_frac_ = error_frac;
     worst_frac_ = index;
   }
-  if (!std::isfinite(error_k)) return;  // the row states relative errors alone
+  if (!std::isfinite(error_k)) return;  // the row then states relative errors alone
   ++known_k_;
   over_1mk_ += error_k > 1e-3 ? 1U : 0U;
   if (error_k > max_error_k_) {
@@ -61,7 +61,8 @@ void Tally::merge(const Tally& other) noexcept {
   known_ += other.known_;
   known_k_ += other.known_k_;
   over_1mk_ += other.over_1mk_;
-  // Equal errors: the lower case number, so that the row does not hang on the number of threads.
+  // The lower case number wins between equal errors, so that the row does not depend on the number
+  // of threads.
   const auto larger = [](double error, std::uint32_t index, double& worst, std::uint32_t& at) {
     if (error > worst || (error == worst && index < at)) {
       worst = error;
@@ -90,7 +91,7 @@ void Tally::write(SweepResult& row) const {
   for (std::size_t i = 0; i < histogram_.size() && known_k_ > 0; ++i) {
     below += histogram_[i];
     if (static_cast<double>(below) < 0.99 * static_cast<double>(known_k_)) continue;
-    // Upper end of the class: never better than the true percentile.
+    // Use the upper end of the class, which is never better than the true percentile.
     const auto end = static_cast<std::uint32_t>(i + 1) << kClassShift;
     row.p99_error_k =
         i == 0 ? 0.0 : std::min(static_cast<double>(std::bit_cast<float>(end)), max_error_k_);

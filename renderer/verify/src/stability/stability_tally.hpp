@@ -7,24 +7,27 @@
 
 namespace emit::verify {
 
-/// Counts and errors of one row while it grows. One per thread, merged at the end.
+/// Counters and errors of one row of the result table. Each thread has its own; they are merged at
+/// the end.
 class Tally {
  public:
-  /// A result against its truth; NaN and Inf are counted and take no part in the errors. An error
-  /// in kelvin that is not finite leaves the row with relative errors.
+  /// Adds a result with its truth. NaN and infinity are counted and do not contribute to the
+  /// errors. An error in kelvin that is not finite contributes its relative error alone.
   void add(float result, double truth, double error_k, double error_frac,
            std::uint32_t index) noexcept;
-  /// A result of which no truth is known: finite or not is all there is to say.
+  /// Adds a result without a known truth. Only its finiteness is counted.
   void add_unknown(float result) noexcept;
+  /// Adds the clamped flag of a case; `valid` tells whether the input is in the valid range.
   void add_flag(bool clamped, bool valid) noexcept {
     clamped_ += clamped ? 1U : 0U;
     unflagged_ += !clamped && !valid ? 1U : 0U;
   }
+  /// Adds the counters and errors of another tally.
   void merge(const Tally& other) noexcept;
 
-  /// Fills the counts and errors of a row; `cases` is how many were added.
+  /// Writes the counters and errors to a row.
   void write(SweepResult& row) const;
-  /// Case where the largest error in kelvin (else the largest relative one) was met.
+  /// Returns the case with the largest error in kelvin (else the largest relative one).
   [[nodiscard]] std::uint32_t worst_case() const noexcept {
     return max_error_k_ > 0.0 ? worst_k_ : worst_frac_;
   }
@@ -39,14 +42,15 @@ class Tally {
   std::uint64_t below_zero_ = 0;
   std::uint64_t clamped_ = 0;
   std::uint64_t unflagged_ = 0;
-  std::uint64_t known_ = 0;    ///< finite results with a truth
-  std::uint64_t known_k_ = 0;  ///< ... of which the error is known in kelvin
+  std::uint64_t known_ = 0;    ///< number of finite results with a truth
+  std::uint64_t known_k_ = 0;  ///< number of these whose error in kelvin is known
   std::uint64_t over_1mk_ = 0;
   double max_error_k_ = 0.0;
   double max_frac_ = 0.0;
   std::uint32_t worst_k_ = 0;
   std::uint32_t worst_frac_ = 0;
-  /// Errors by the leading bits of their float32 form: 8 classes per factor of two.
+  /// Histogram of the errors by the leading bits of their float32 form: 8 classes per factor of
+  /// two.
   std::array<std::uint64_t, 2048> histogram_{};
 };
 

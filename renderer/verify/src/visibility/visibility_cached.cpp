@@ -13,15 +13,15 @@ namespace {
 
 using physics::Result;
 
-/// Ray starts off the surface, in units of the row's largest length. A scenario's own rule (half a
-/// millimetre, or 1e-6 of the scene) would lift them by 1.4 thousandths of a row's length, because
-/// a row is cut at 1000 of its lengths.
+/// Distance of ray starts from the surface, in units of the row's largest length. The rule of a
+/// scenario (half a millimetre, or 1e-6 of the scene) would give 1.4 thousandths of a row's length,
+/// because a row is cut at 1000 of its lengths.
 constexpr double kOffsetFrac = 1e-5;
 
-/// read(row, sight, set) calls set(column, value).
+/// Runs all rows. `read(row, sight, set)` calls set(column, value).
 template <std::size_t N, class Read>
 Result<std::string> run_rows(const VisibilityQuery& query, const Read& read) {
-  const CsvTable& table = query.table;
+  const physics::CsvTable& table = query.table;
   std::vector<std::vector<float>> out(N, std::vector<float>(table.rows(), kUndefined<float>));
   for (std::size_t i = 0; i < table.rows(); ++i) {
     const auto context = [&] { return fmt::format("{}:{}", table.name(), table.line_of(i)); };

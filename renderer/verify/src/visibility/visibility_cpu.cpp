@@ -14,7 +14,7 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-Result<void> for_each_row(const CsvTable& table,
+Result<void> for_each_row(const physics::CsvTable& table,
                           const std::function<Result<VisibilityRow>(std::size_t)>& make,
                           const std::function<void(std::size_t, const VisibilityRow&,
                                                    const reference::SceneInstant&)>& ask) {

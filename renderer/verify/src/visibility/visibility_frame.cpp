@@ -24,21 +24,22 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// How the point is looked at. Distances are in units of the row's largest length.
+/// View of the point. Distances are in units of the row's largest length.
 struct Look {
   double fov_h_rad = 0.0;
   double distance_frac = 0.0;
   double obscurance_radius_frac = 1.0;
 };
-// A seeker's narrow view for the shadow's edge; a wide one that holds the whole obscurance ball.
+// Views: a narrow one, like a seeker's, for the edge of the shadow, and a wide one that holds the
+// whole ball of the obscurance.
 constexpr Look kSunLook{20.0 * physics::kDegree, 3.0, 1.0};
 constexpr Look kSkyLook{70.0 * physics::kDegree, 3.0, 1.0};
-constexpr std::uint32_t kFormatPx = 513;  // odd: a pixel on the boresight
+constexpr std::uint32_t kFormatPx = 513;  // odd, so that a pixel lies on the boresight
 constexpr double kNearFrac = 0.02;
 constexpr std::uint32_t kViewRays = 16384;
 
-/// A camera that sees the point: in the middle of the directions in which it is open. None where
-/// the point is as good as closed.
+/// Returns a camera in the middle of the directions in which the point is open. Returns nothing
+/// where the point is almost closed.
 Result<std::optional<physics::Pose>> open_view(const VisibilityRow& row, double distance_m) {
   reference::RaySceneDesc desc;
   desc.meshes.push_back({.positions_m = row.positions_m, .indices = row.indices});
@@ -81,7 +82,7 @@ class RowProbe {
     return RowProbe(std::move(*probe), look);
   }
 
-  /// What the frame finds at the row's point; nothing where no camera can see it.
+  /// Returns the result of the frame at the row's point, or nothing where no camera can see it.
   Result<std::optional<renderer::VisibilityProbe::Answer>> ask(const VisibilityRow& row) {
     const double distance_m = look_.distance_frac * row.length_m;
     const auto pose = open_view(row, distance_m);
@@ -105,7 +106,7 @@ class RowProbe {
 
 template <std::size_t N, class Read>
 Result<std::string> run_rows(const VisibilityQuery& query, const Look& look, const Read& read) {
-  const CsvTable& table = query.table;
+  const physics::CsvTable& table = query.table;
   auto probe = RowProbe::create(query.request, look);
   if (!probe) return tl::unexpected(std::move(probe.error()));
   std::vector<std::vector<float>> out(N, std::vector<float>(table.rows(), kUndefined<float>));
@@ -133,8 +134,9 @@ Result<std::string> frame_sun_shares(const VisibilityQuery& query) {
 Result<std::string> frame_sky_views(const VisibilityQuery& query) {
   return run_rows<2>(query, kSkyLook,
                      [](const VisibilityRow& row, const auto& answer, const auto& set) {
-                       // The frame has one measure: the open share of a ball. On flat ground it is
-                       // 0.5, like the full-sphere share; twice it stands for the sky view factor.
+                       // The frame has one measure, the open fraction of a ball. On flat ground it
+                       // is 0.5, like the fraction of the full sphere; twice its value represents
+                       // the sky view factor.
                        if (on_face(row)) set(0, std::min(2.0 * answer.obscurance_frac, 1.0));
                        set(1, answer.obscurance_frac);
                      });

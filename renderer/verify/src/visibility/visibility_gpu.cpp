@@ -6,7 +6,7 @@
 namespace emit::verify {
 namespace {
 
-/// Nothing said: what a scenario has that says nothing.
+/// Returns true for the method `cached`. Without a method the default of a scenario applies.
 bool cached(const EvaluateRequest& request) {
   return request.method.empty() ? scene::ThermalOptions{}.method == scene::ThermalMethod::cached
                                 : request.method == "cached";

@@ -17,7 +17,8 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Corners of a circular disc. The polygon has the circle's area; what is left is 2e-6 of it.
+/// Number of corners of a circular disc. The polygon has the circle's area; the remaining error is
+/// 2e-6 of it.
 constexpr std::uint32_t kDiscSides = 1024;
 
 void add_quad(VisibilityRow& row, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
@@ -44,7 +45,8 @@ void add_box(VisibilityRow& row, const glm::dvec3& low, const glm::dvec3& high) 
   add_quad(row, at(1, 0, 0), at(1, 1, 0), at(1, 1, 1), at(1, 0, 1));
 }
 
-/// A prism along y between -reach_m and reach_m; `outline` (x, z) counter-clockwise seen from -y.
+/// Adds a prism along y between -reach_m and reach_m. `outline` (x, z) is counter-clockwise seen
+/// from -y.
 void add_prism(VisibilityRow& row, double reach_m, std::initializer_list<glm::dvec2> outline) {
   const std::vector<glm::dvec2> corners(outline);
   const auto at = [&](std::size_t i, double y_m) {
@@ -63,8 +65,8 @@ void add_prism(VisibilityRow& row, double reach_m, std::initializer_list<glm::dv
   }
 }
 
-/// Wall along y whose near face stands at x = near_m and which is as thick as high, away from the
-/// point at the origin.
+/// Adds a wall along y whose near face is at x = near_m. It is as thick as high and extends away
+/// from the point at the origin.
 void add_wall(VisibilityRow& row, double near_m, double height_m, double reach_m) {
   const double far_m = near_m + std::copysign(height_m, near_m);
   add_box(row, {std::min(near_m, far_m), -reach_m, 0.0},
@@ -113,7 +115,7 @@ Result<VisibilityRow> wall_shadow_row(double height_m, double elevation_rad, dou
 }
 
 VisibilityRow sun_disc_row(double delta_rad) {
-  // A wall as high as it is far.
+  // The wall is as high as its distance.
   VisibilityRow row;
   add_ground(row, kInfiniteFactor);
   add_wall(row, -1.0, 1.0, kInfiniteFactor);
@@ -153,7 +155,7 @@ Result<VisibilityRow> sky_view_row(std::string_view kind, const std::array<doubl
     row.sheets = true;
     const double reach_m = kInfiniteFactor * row.length_m;
     const double angle_rad = p[0] * physics::kDegree;
-    // The point's face lies level along +x from the apex at -s, the other rises from the apex.
+    // The point's face is level along +x from the apex at -s. The other face rises from the apex.
     const glm::dvec2 apex{-p[2], 0.0};
     const glm::dvec2 lip = apex + p[1] * glm::dvec2(std::cos(angle_rad), std::sin(angle_rad));
     add_quad(row, {apex.x, -reach_m, 0.0}, {p[1] - p[2], -reach_m, 0.0},
@@ -204,7 +206,7 @@ scene::SceneGeometry scene_geometry(const VisibilityRow& row) {
   }
   mesh.normals.resize(mesh.positions_m.size(), glm::vec3(0.0F, 0.0F, 1.0F));
   for (std::size_t i = 0; i + 2 < row.indices.size(); i += 3) {
-    // Corners are shared within a plane only.
+    // Corners are shared only within a plane.
     const glm::dvec3& a = row.positions_m[row.indices[i]];
     const glm::dvec3 normal = glm::normalize(glm::cross(row.positions_m[row.indices[i + 1]] - a,
                                                         row.positions_m[row.indices[i + 2]] - a));

@@ -20,7 +20,7 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 constexpr float kHeightM = 0.01F;
 constexpr float kPerM = 12.0F;  // of both waves
 

@@ -13,17 +13,17 @@
 
 #include "emit/physics/constants.hpp"
 #include "history/foster_setup.hpp"
+#include "renderer/surface/surface_scene.hpp"
 #include "support/heap_counter.hpp"
 #include "surface/run/cached_surface.hpp"
 #include "threads/worker_pool.hpp"
-#include "renderer/surface/surface_scene.hpp"
 
 namespace emit::renderer {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kStartNs = 7200 * kSecondNs;
-constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 
 /// Ground, a block, and a vehicle that drives by all the time.
 class SteadyState : public ::testing::TestWithParam<scene::ThermalModel> {

@@ -11,15 +11,15 @@
 
 #include "emit/physics/constants.hpp"
 #include "history/foster_setup.hpp"
-#include "surface/shade/shade_pages.hpp"
 #include "renderer/surface/surface_scene.hpp"
+#include "surface/shade/shade_pages.hpp"
 
 namespace emit::renderer {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kNoonNs = 4 * 3600 * kSecondNs;
-constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 constexpr float kHalfM = 2.0F;
 constexpr float kHeightM = 3.0F;
 

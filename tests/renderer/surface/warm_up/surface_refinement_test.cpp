@@ -13,14 +13,14 @@
 
 #include "emit/physics/constants.hpp"
 #include "history/foster_setup.hpp"
-#include "surface/run/cached_surface.hpp"
 #include "renderer/surface/surface_scene.hpp"
+#include "surface/run/cached_surface.hpp"
 
 namespace emit::renderer {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr double kReferenceK = 295.0;
+using physics::kReferenceK;
 constexpr double kPixelRad = 8e-3;
 
 TEST(SurfaceRefinement, StopsAtHalfAPixelWhereTheCameraComesClosest) {

@@ -33,6 +33,18 @@ TEST(IgClockPacing, SendsOneFramePerSlotFromTheFirstOn) {
   }
 }
 
+TEST(IgClockPacing, CannedFramesAreNotStaleBeforeTheHostHasSpoken) {
+  Rig rig(ig_clock(), std::nullopt, true);
+  rig.settle();
+  for (int slot = 0; slot < 3; ++slot) {
+    rig.next_slot();
+  }
+  ASSERT_EQ(rig.frames.size(), 4U);
+  for (const auto& frame : rig.frames) {
+    EXPECT_EQ(frame.header.flags, protocol::kFlagCanned);
+  }
+}
+
 TEST(IgClockPacing, ExtrapolatesTheNewestPoseToDisplayTime) {
   auto pacing = ig_clock();
   pacing.display_delay_ns = 10 * kMs;

@@ -213,8 +213,8 @@ TEST(PeerLimits, EachAddressHasItsOwn) {
   access.max_host_frames_hz = 4;
   access.max_control_records_hz = 8;
   PeerLimits limits(access);
-  const config::IpAddress a = *config::parse_ip("192.0.2.1");
-  const config::IpAddress b = *config::parse_ip("192.0.2.2");
+  const protocol::IpAddress a = *protocol::parse_ip("192.0.2.1");
+  const protocol::IpAddress b = *protocol::parse_ip("192.0.2.2");
   EXPECT_TRUE(limits.take_host_frame(a, 4000, 1));
   EXPECT_FALSE(limits.take_host_frame(a, 4000, 2));
   EXPECT_TRUE(limits.take_host_frame(b, 4000, 3));
@@ -230,7 +230,7 @@ TEST(PeerLimits, OnThisHostEachSocketHasItsOwn) {
   config::AccessConfig access;
   access.max_host_frames_hz = 4;
   PeerLimits limits(access);
-  const config::IpAddress here = *config::parse_ip("127.0.0.1");
+  const protocol::IpAddress here = *protocol::parse_ip("127.0.0.1");
   EXPECT_TRUE(limits.take_host_frame(here, 4000, 1));
   EXPECT_FALSE(limits.take_host_frame(here, 4000, 2));
   EXPECT_TRUE(limits.take_host_frame(here, 4001, 3));

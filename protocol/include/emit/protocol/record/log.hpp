@@ -17,48 +17,56 @@ class HostFrame;
 class JournalEntry;
 }  // namespace emit::v1
 
-/// emitd's own logs: MCAP files with the topics `host` (emit.v1.HostFrame) and `journal`
-/// (emit.v1.JournalEntry). They describe themselves; any MCAP tool reads them.
+/// Logs of emitd (docs/wire.md section 6): MCAP files with the topics `host` (emit.v1.HostFrame)
+/// and `journal` (emit.v1.JournalEntry). They describe themselves, so any MCAP tool reads them.
 namespace emit::protocol {
 
 inline constexpr const char* kHostTopic = "host";
 inline constexpr const char* kJournalTopic = "journal";
 
+/// Topic of a message in a log.
 enum class LogTopic : std::uint8_t { host, journal };
 
+/// Options of a log file.
 struct LogWriterOptions {
-  /// A chunk goes to the file when it holds this much, and when a message's log time is
-  /// flush_interval_ns after the first one's in it: a killed process loses no more. 0 = every
-  /// message goes to the file at once, without chunks.
+  /// Limits of a chunk, bytes and ns. A chunk goes to the file when it holds chunk_bytes, or when a
+  /// message's log time is flush_interval_ns after that of the chunk's first one. A killed process
+  /// loses no more than that. chunk_bytes = 0: every message goes to the file at once, without
+  /// chunks.
   std::uint32_t chunk_bytes = 256u << 10;
   std::int64_t flush_interval_ns = 100'000'000;
-  std::string software{};  ///< written to the file's header as the library that made it
+  std::string software{};  ///< name of the writing software, for the file's header
 };
 
-/// Thread: one owner.  Not RT-safe: writes to the file.
+/// Writes a log.
+/// Thread: one owner.  Real time: not RT-safe, it writes to the file.
 class LogWriter {
  public:
-  /// Creates or truncates `path`. Errors (io) name it.
+  /// Creates or truncates `path`. Errors (io) name the path.
   [[nodiscard]] static physics::Result<LogWriter> create(const std::filesystem::path& path,
                                                          const LogWriterOptions& options = {});
   LogWriter(LogWriter&&) noexcept;
   LogWriter& operator=(LogWriter&&) noexcept;
-  /// Closes as close() does, without telling of errors.
+  /// Closes the file as close() does; errors are lost.
   ~LogWriter();
 
-  /// log_time_ns: wall, TAI; in a log that was made rather than recorded, the sim time. >= 0.
+  /// Writes a host frame. Errors: io; invalid_argument (negative log time, closed log).
+  /// @param log_time_ns  wall instant of receipt, ns TAI; in a log that was made rather than
+  ///   recorded, the simulation time; not negative
   [[nodiscard]] physics::Result<void> write_host(const HostFrameData& frame,
                                                  std::int64_t log_time_ns);
   [[nodiscard]] physics::Result<void> write_host(const v1::HostFrame& frame,
                                                  std::int64_t log_time_ns);
-  /// Log time is the entry's wall_time_ns.
+  /// Writes a journal entry; its log time is wall_time_ns. Errors as for write_host().
   [[nodiscard]] physics::Result<void> write_journal(const v1::JournalEntry& entry);
-  /// As above for an entry already encoded, as a recorder gets it.
+  /// Writes a journal entry that is already encoded, as a recorder receives it. Errors as for
+  /// write_host().
   [[nodiscard]] physics::Result<void> write_journal(std::span<const std::byte> encoded_entry,
                                                     std::int64_t log_time_ns);
-  /// Hands everything to the kernel.
+  /// Hands all messages written so far to the kernel. Errors: io.
   [[nodiscard]] physics::Result<void> flush();
-  /// Writes index and footer. Further writes are errors; a second close does nothing.
+  /// Writes index and footer and closes the file. Further writes are errors; a second close does
+  /// nothing. Errors: io.
   [[nodiscard]] physics::Result<void> close();
 
  private:
@@ -67,30 +75,33 @@ class LogWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Reads messages of the two topics in file order; other topics are skipped.
-/// Thread: one owner.
+/// Reads the messages of the two topics in file order. Other topics are skipped.
+/// Thread: one owner.  Real time: not RT-safe.
 class LogReader {
  public:
-  /// Errors: not_found, io, parse (not an MCAP file; offset and reason).
+  /// Opens a log. Errors: not_found; io; parse (no MCAP file) names offset and reason.
   [[nodiscard]] static physics::Result<LogReader> open(const std::filesystem::path& path);
   LogReader(LogReader&&) noexcept;
   LogReader& operator=(LogReader&&) noexcept;
   ~LogReader();
 
-  /// Moves to the next message; false at the end. A tail cut off by a crash is an end, see
-  /// truncation(). Errors (parse, unsupported) name file and offset: bad CRC, bad length, a
+  /// Moves to the next message. Returns false at the end. A tail cut off by a crash is an end, see
+  /// truncation(). Errors (parse, unsupported) name file and offset: a wrong CRC or length, a
   /// compressed chunk, a message that is no HostFrame or JournalEntry, or an invalid host frame.
   [[nodiscard]] physics::Result<bool> next();
 
-  // Of the message that next() moved to:
+  // The functions below describe the message that next() moved to.
   [[nodiscard]] LogTopic topic() const noexcept;
   [[nodiscard]] std::int64_t log_time_ns() const noexcept;
-  /// Precondition: topic() is host.
+  /// Returns the host frame.
+  /// @pre topic() is host
   [[nodiscard]] const HostFrameData& host() const noexcept;
-  /// Precondition: topic() is journal.
+  /// Returns the journal entry.
+  /// @pre topic() is journal
   [[nodiscard]] const v1::JournalEntry& journal() const noexcept;
 
-  /// Set at the end of a file whose tail is missing: says where and what.
+  /// Returns a description of the missing tail, with its offset, at the end of a file that was cut
+  /// off.
   [[nodiscard]] const std::optional<std::string>& truncation() const noexcept;
 
  private:

@@ -12,49 +12,54 @@
 
 namespace emit::protocol {
 
+/// Schema record of an MCAP file.
 struct McapSchema {
   std::string name;
   std::string encoding;
   std::string data;
 };
+/// Channel record of an MCAP file.
 struct McapChannel {
   std::uint16_t schema_id = 0;  ///< 0 = none
   std::string topic;
   std::string message_encoding;
 };
+/// Message of an MCAP file.
 struct McapMessage {
   std::uint16_t channel_id = 0;
   std::uint32_t sequence = 0;
   std::uint64_t log_time_ns = 0;
   std::uint64_t publish_time_ns = 0;
   std::span<const std::byte> data;  ///< valid until the next call of next()
-  std::uint64_t file_offset = 0;    ///< of the message or of the chunk around it
+  std::uint64_t file_offset = 0;    ///< offset of the message or of the chunk that holds it
 };
 
-/// Reads MCAP files front to back, without need of summary or index: every uncompressed file, also
-/// one whose writer was killed.
+/// Reads MCAP files from front to back, without summary or index. It reads every uncompressed file,
+/// also one whose writer was killed.
 ///
-/// Checks every length before use and every chunk's CRC before its messages are handed out. Errors
-/// name file and offset. Reads one chunk at a time.
-/// Thread: one owner.  Not RT-safe.
+/// It checks every length before use, and every chunk's CRC before it hands out its messages.
+/// Errors name file and offset. One chunk at a time is in memory.
+/// Thread: one owner.  Real time: not RT-safe.
 class McapReader {
  public:
-  /// Errors: not_found, io, parse (no MCAP file).
+  /// Opens a file. Errors: not_found, io, parse (no MCAP file).
   [[nodiscard]] static physics::Result<McapReader> open(const std::filesystem::path& path);
   McapReader(McapReader&&) noexcept;
   McapReader& operator=(McapReader&&) noexcept;
   ~McapReader();
 
-  /// Moves to the next message; false at the end. Errors: io, parse, unsupported (compression);
-  /// an error is final.
+  /// Moves to the next message. Returns false at the end. Errors: io, parse, unsupported
+  /// (compression). An error is final.
   [[nodiscard]] physics::Result<bool> next();
+  /// Returns the message that next() moved to.
   [[nodiscard]] const McapMessage& message() const noexcept;
 
-  /// Of an id that a message carried; nullptr when unknown.
+  /// Returns the channel or schema of an id that a message carried; nullptr when the id is unknown.
   [[nodiscard]] const McapChannel* channel(std::uint16_t id) const noexcept;
   [[nodiscard]] const McapSchema* schema(std::uint16_t id) const noexcept;
 
-  /// Set at the end of a file that has no footer or ends within a record: where and what.
+  /// Returns a description of what is missing, with its offset, at the end of a file that has no
+  /// footer or ends within a record.
   [[nodiscard]] const std::optional<std::string>& truncation() const noexcept;
 
  private:

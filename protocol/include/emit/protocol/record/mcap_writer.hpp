@@ -12,11 +12,12 @@
 
 namespace emit::protocol {
 
+/// Options of an MCAP file.
 struct McapWriterOptions {
   std::string profile{};  ///< empty: none
   std::string library = "emitd";
-  std::uint32_t chunk_bytes = 256u << 10;        ///< 0 = plain messages, each written at once
-  std::int64_t flush_interval_ns = 100'000'000;  ///< longest log time that a chunk is held back
+  std::uint32_t chunk_bytes = 256u << 10;  ///< 0 = messages without chunks, each written at once
+  std::int64_t flush_interval_ns = 100'000'000;  ///< largest span of log time within a chunk
 };
 
 /// Writes MCAP files (public specification): uncompressed chunks with CRC-32, message and chunk
@@ -24,32 +25,35 @@ struct McapWriterOptions {
 ///
 /// Every chunk goes to the file in one write, so a killed process leaves whole chunks and a file
 /// that scanning readers accept. Errors (io) name file and offset and are final: after the first
-/// one every call returns it again. Thread: one owner.  Not RT-safe.
+/// one every call returns it again.
+/// Thread: one owner.  Real time: not RT-safe.
 class McapWriter {
  public:
-  /// Errors (io): the file cannot be written; no folder takes its index until close(), and an older
-  /// file is as it was.
+  /// Creates or overwrites the file. Errors (io): the file cannot be written, or no folder takes
+  /// the index that waits for close(). An existing file is then unchanged.
   [[nodiscard]] static physics::Result<McapWriter> create(const std::filesystem::path& path,
                                                           const McapWriterOptions& options);
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
-  ~McapWriter();  ///< close(), errors are lost
+  ~McapWriter();  ///< closes the file as close() does; errors are lost
 
-  /// Returns the id, from 1.
+  /// Adds a schema and returns its id, from 1. Errors: io; invalid_argument (closed writer).
   [[nodiscard]] physics::Result<std::uint16_t> add_schema(std::string_view name,
                                                           std::string_view encoding,
                                                           std::string_view data);
-  /// Returns the id, from 1. Errors (invalid_argument): unknown schema.
+  /// Adds a channel and returns its id, from 1. Errors: io; invalid_argument (unknown schema,
+  /// closed writer).
   [[nodiscard]] physics::Result<std::uint16_t> add_channel(std::uint16_t schema_id,
                                                            std::string_view topic,
                                                            std::string_view message_encoding);
-  /// Errors (invalid_argument): unknown channel, closed writer, negative time.
+  /// Writes a message. Errors: io; invalid_argument (unknown channel, closed writer, negative
+  /// time).
   [[nodiscard]] physics::Result<void> write(std::uint16_t channel_id, std::uint32_t sequence,
                                             std::int64_t log_time_ns, std::int64_t publish_time_ns,
                                             std::span<const std::byte> data);
-  /// Hands the open chunk to the kernel.
+  /// Hands the open chunk to the kernel. Errors: io; invalid_argument (closed writer).
   [[nodiscard]] physics::Result<void> flush();
-  /// Writes summary and footer. A second call does nothing.
+  /// Writes summary and footer and closes the file. A second call does nothing. Errors: io.
   [[nodiscard]] physics::Result<void> close();
 
  private:

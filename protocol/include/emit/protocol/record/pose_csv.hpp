@@ -9,19 +9,20 @@
 
 namespace emit::protocol {
 
-/// Reads seeker poses from CSV, one host frame per row (columns: docs/wire.md, section 6).
-/// Thread: one owner.  Not RT-safe.
+/// Reads seeker poses from CSV, one host frame per row (columns: docs/wire.md, section 6). The
+/// format is that of physics::CsvReader. Thread: one owner. Not RT-safe.
 class PoseCsvReader {
  public:
-  /// Errors: not_found, io, parse (no header row, a mandatory column missing or twice).
+  /// Errors: those of physics::CsvReader; parse, when a mandatory column is missing or twice there.
   [[nodiscard]] static physics::Result<PoseCsvReader> open(const std::filesystem::path& path);
   PoseCsvReader(PoseCsvReader&&) noexcept;
   PoseCsvReader& operator=(PoseCsvReader&&) noexcept;
   ~PoseCsvReader();
 
   /// Moves to the next row; false at the end. Errors (parse) name file, line and column: not a
-  /// number, missing value, invalid pose, time that goes back. An error is final.
+  /// number, missing value, invalid pose, time that is out of range or goes back. An error is final.
   [[nodiscard]] physics::Result<bool> next();
+  /// Returns the host frame of the row that next() moved to.
   [[nodiscard]] const HostFrameData& host() const noexcept;
 
  private:

@@ -11,31 +11,34 @@
 
 namespace emit::protocol {
 
-/// Port of host datagrams unless the daemon's configuration says otherwise.
+/// UDP port of host datagrams, unless the daemon's configuration names another one.
 inline constexpr std::uint16_t kDefaultHostPort = 7001;
 
-/// Host frames from a network capture (pcap or pcapng): the UDP datagrams to one port, in the order
-/// of the file (docs/wire.md, section 6).
-/// Thread: one owner.  Not RT-safe.
+/// Reads host frames from a network capture (pcap or pcapng): the UDP datagrams to one port, in the
+/// order of the file (docs/wire.md section 6).
+/// Thread: one owner.  Real time: not RT-safe.
 class PosePcapReader {
  public:
-  /// True when the file starts like a capture.
+  /// Returns true when the file begins like a capture.
   [[nodiscard]] static bool is_capture(const std::filesystem::path& path);
-  /// Errors: not_found, io, parse (no capture file), unsupported (a patched format).
+  /// Opens a capture. Errors: not_found, io, parse (no capture file), unsupported (a patched
+  /// format).
   [[nodiscard]] static physics::Result<PosePcapReader> open(const std::filesystem::path& path,
                                                             std::uint16_t udp_port);
   PosePcapReader(PosePcapReader&&) noexcept;
   PosePcapReader& operator=(PosePcapReader&&) noexcept;
   ~PosePcapReader();
 
-  /// Moves to the next host frame; false at the end. Datagrams that are no host frames, and those
-  /// that the capture holds twice in a row, are passed over and counted. Errors name file and
-  /// packet: parse (lengths that contradict), unsupported (link layer; a datagram in IP fragments
-  /// or not captured whole). An error is final.
+  /// Moves to the next host frame. Returns false at the end. Datagrams that are no host frames, and
+  /// those that the capture holds twice in a row, are skipped and counted. Errors name file and
+  /// packet: parse (lengths that contradict each other), unsupported (link layer; a datagram in IP
+  /// fragments or not captured whole). An error is final.
   [[nodiscard]] physics::Result<bool> next();
+  /// Returns the host frame that next() moved to.
   [[nodiscard]] const HostFrameData& host() const noexcept;
 
-  /// What was passed over or is missing at the end, for the user; absent when nothing was.
+  /// Returns a text for the user about datagrams that were skipped or are missing at the end;
+  /// nothing when there are none.
   [[nodiscard]] std::optional<std::string> notes() const;
 
  private:

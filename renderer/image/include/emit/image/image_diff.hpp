@@ -11,13 +11,14 @@
 
 namespace emit::image {
 
-/// Statistics of |a - b| over the pixels where both are finite.
+/// Statistics of the difference a - b over the pixels at which both values are finite.
 struct DiffStats {
   std::uint64_t pixels_compared = 0;
-  std::uint64_t one_sided_nan = 0;  ///< one not finite, the other finite or another non-finite kind
+  /// Number of pixels with one value not finite and the other finite or of another non-finite kind.
+  std::uint64_t one_sided_nan = 0;
   double max_abs = 0.0;
   double rms = 0.0;
-  double mean = 0.0;  ///< signed, a - b
+  double mean = 0.0;  ///< mean of a - b with its sign
   double mean_abs = 0.0;
   double p50 = 0.0;
   double p95 = 0.0;
@@ -27,31 +28,37 @@ struct DiffStats {
   std::uint32_t max_y_px = 0;
 };
 
-/// Precondition of all: equal sizes, width_px > 0 and a divisor of the size.
+/// Compares two images pixel by pixel. `a` and `b` are row-major with rows of `width_px` pixels.
+/// @pre the sizes are equal and a multiple of width_px, which is above 0.
 [[nodiscard]] DiffStats diff_values(std::span<const float> a, std::span<const float> b,
                                     std::uint32_t width_px);
 
+/// Difference of one channel of two images.
 struct ChannelDiff {
   std::string channel;
-  std::string unit;    ///< "K" for temperature, else "" (the channel's own)
-  DiffStats absolute;  ///< in `unit`
-  /// Per cent of |b|; radiance channels only, pixels_compared 0 otherwise and where b is 0.
+  std::string unit;    ///< "K" for temperature; empty if the channel has its own unit
+  DiffStats absolute;  ///< difference in `unit`
+  /// Difference in per cent of |b|, over the pixels with b != 0. Only radiance channels have it;
+  /// pixels_compared is 0 otherwise.
   DiffStats percent;
-  /// Radiance turned into kelvin; filled when a conversion was given.
+  /// Difference of a radiance channel in kelvin. It is filled if a conversion was given.
   DiffStats kelvin_equivalent;
 };
+/// Difference of two images.
 struct ImageDiff {
   std::vector<ChannelDiff> channels;
   std::vector<std::string> only_in_a;
   std::vector<std::string> only_in_b;
-  [[nodiscard]] bool identical() const noexcept;  ///< same channels, no pixel differs
+  /// Returns true if both images have the same channels and no pixel differs.
+  [[nodiscard]] bool identical() const noexcept;
 };
 
-/// Kelvin per W m-2 sr-1 (1 / (dL/dT)) at a radiance of the reference, for the band of the image.
+/// A function that returns kelvin per W m-2 sr-1, which is 1 / (dL/dT), at a radiance of the
+/// reference image, in the band of the images.
 using KelvinPerRadiance = std::function<double(double radiance_w_m2_sr)>;
 
-/// Compares each channel that both images have; `b` is the reference. "radiance" and names that
-/// begin with "radiance." count as radiance.
+/// Compares each channel that both images have; `b` is the reference. The channel "radiance" and
+/// names that begin with "radiance." count as radiance.
 /// Errors: invalid_argument (sizes differ, no common channel).
 [[nodiscard]] physics::Result<ImageDiff> compare_images(const ExrImage& a, const ExrImage& b,
                                                         const KelvinPerRadiance& conversion = {});

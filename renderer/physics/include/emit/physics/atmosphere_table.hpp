@@ -5,56 +5,65 @@
 
 #include "emit/physics/error.hpp"
 
-/// Tabulated air of one band: what lies between the sensor and a point `range` away along a line of
-/// sight of given elevation, seen from the sensor (physics.md section 9).
+/// Transmittance and path radiance of the air in one band, given as a table over range and
+/// elevation. Range is the distance from the sensor to a point; elevation is that of the line of
+/// sight, seen from the sensor (physics.md section 9).
 namespace emit::physics {
 
-/// Regular grid. Values are ordered elevation by elevation: [elevation][range].
+/// Regular grid of range and elevation. The two tables have ranges x elevations values, ordered
+/// elevation by elevation: [elevation][range].
 struct AtmosphereGrid {
   std::vector<double> range_m;                ///< ascending, >= 0
-  std::vector<double> elevation_rad;          ///< ascending, -pi/2..pi/2; one: every elevation
-  std::vector<double> transmittance_frac;     ///< 0..1, never rising with range
-  std::vector<double> path_radiance_w_m2_sr;  ///< in band, >= 0
+  std::vector<double> elevation_rad;          ///< ascending, -pi/2..pi/2; a single one fits all
+  std::vector<double> transmittance_frac;     ///< 0..1, must not rise with range
+  std::vector<double> path_radiance_w_m2_sr;  ///< >= 0, in the band
 
   [[nodiscard]] bool empty() const noexcept { return range_m.empty(); }
 };
 
-/// Errors: invalid_argument naming the element at fault.
+/// Checks the sizes, the order and the ranges of the values.
+/// Errors: invalid_argument, naming the element at fault.
 [[nodiscard]] Result<void> validate(const AtmosphereGrid& grid);
 
-/// The grid made ready for evaluation, in double; the shader does the same in float32 from
-/// shader_nodes() (shaders/lib/atmosphere_table.glsl).
+/// An AtmosphereGrid made ready for evaluation in double. The shader evaluates the same equations
+/// in float32 from shader_nodes() (shaders/lib/atmosphere_table.glsl). Rules (physics.md eq. 14,
+/// 15):
 ///   - along range the optical depth -ln(transmittance) is linear between rows (Beer-Lambert) and
-///     the path radiance linear in the transmittance (constant source between rows);
-///   - over elevation optical depth and path radiance are linear in the elevation's sine;
-///   - a first row beyond range 0 is preceded by no air at range 0;
+///     the path radiance is linear in the transmittance (constant source between rows);
+///   - over elevation both are linear in the sine of the elevation;
+///   - if the first row lies beyond range 0, the air at range 0 is clear;
 ///   - outside the grid its edge is used and reported;
-///   - the last range stands for the way out of the atmosphere: sky and sun.
-/// Owner: whoever builds it. Any thread after construction. Real time: along() and out() RT-safe;
-/// build() setup only.
+///   - the last range stands for the whole path out of the atmosphere, to the sky and the sun.
+/// Owner: the caller of build(). Any thread after construction. Real time: along() and out() are
+/// RT-safe, build() is setup only.
 class AtmosphereTable {
  public:
   struct Air {
     double transmittance_frac = 1.0;
     double path_radiance_w_m2_sr = 0.0;
-    bool clamped = false;  ///< outside the grid, or NaN
+    bool clamped = false;  ///< the point lies outside the grid, or an argument is NaN
   };
 
-  /// A transmittance below this counts as this: its logarithm must stay finite.
+  /// Smallest transmittance, used in place of smaller ones: the logarithm must stay finite.
   static constexpr double kLeastTransmittance = 1e-30;
 
   /// Errors: those of validate().
   [[nodiscard]] static Result<AtmosphereTable> build(const AtmosphereGrid& grid);
 
+  /// Returns the air between the sensor and a point at `range_m` metres. `sin_elevation` is the
+  /// sine of the elevation, -1..1.
   [[nodiscard]] Air along(double range_m, double sin_elevation) const noexcept;
+  /// Returns the air of the whole path out of the atmosphere: along() at the last range.
   [[nodiscard]] Air out(double sin_elevation) const noexcept;
 
-  /// Cosine-weighted mean of the sky's radiance over the upper hemisphere. Setup only.
+  /// Returns the cosine-weighted mean of the sky's in-band radiance over the upper hemisphere, W
+  /// m-2 sr-1. Setup only.
   [[nodiscard]] double sky_hemisphere_w_m2_sr() const;
 
   [[nodiscard]] std::size_t ranges() const noexcept { return range_m_.size(); }
   [[nodiscard]] std::size_t elevations() const noexcept { return sin_elevation_.size(); }
-  /// Ranges, sines of the elevations, then optical depth and path radiance of every grid point.
+  /// Returns the table for the shader: the ranges, the sines of the elevations, then the pair of
+  /// optical depth and path radiance of every grid point.
   [[nodiscard]] std::vector<float> shader_nodes() const;
 
  private:

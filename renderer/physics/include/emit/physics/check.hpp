@@ -3,25 +3,27 @@
 #include <sstream>
 #include <string>
 
-/// Checks of contracts. A failed check is an error in the program, not in its input, so the program
-/// ends: it logs the place and the operands through the panic handler and aborts.
+/// Checks of contracts. A failed check is an error in the program, not in its input. The program
+/// logs the place and the operands through the panic handler and aborts.
 ///
-///   EMIT_CHECK(ready)              always
-///   EMIT_CHECK_OP(index, <, size)  always; the message holds both operands
-///   EMIT_DCHECK(...), EMIT_DCHECK_OP(...)  only in debug, sanitizer and fuzzing builds, for the
-///                                  innermost loops; in other builds the operands are not evaluated
+///   EMIT_CHECK(ready)              is always on
+///   EMIT_CHECK_OP(index, <, size)  is always on; the message holds both operands
+///   EMIT_DCHECK(...), EMIT_DCHECK_OP(...)  are on only in debug, sanitizer and fuzzing builds, for
+///                                  the innermost loops; other builds do not evaluate the operands
 ///
 /// Every `@pre` of a public function is checked by one of these.
 namespace emit::physics {
 
-/// Takes the text of a failed check. It may throw (tests do); when it returns, the program aborts.
+/// A function that takes the text of a failed check. It may throw (tests do). If it returns, the
+/// program aborts.
 using PanicHandler = void (*)(const char* message);
 
-/// Replaces the handler, which at first writes to standard error. Returns the one before.
-/// Thread: any; the change is seen by all threads.
+/// Replaces the panic handler and returns the previous one. The default handler writes to standard
+/// error; nullptr restores it.
+/// Thread: any. All threads see the change.
 PanicHandler set_panic_handler(PanicHandler handler) noexcept;
 
-/// Hands `message` to the handler and aborts. Thread: any.
+/// Passes "file:line: message" to the handler and aborts. Thread: any.
 [[noreturn]] void panic(const char* file, int line, const std::string& message);
 
 namespace detail {

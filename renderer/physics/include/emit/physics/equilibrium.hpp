@@ -8,37 +8,41 @@
 ///   e T^4 + G T = A,      e = emissivity * sigma,  G = lambda/d + h_c,
 ///                         A = E_abs + lambda/d T_core + h_c T_air        (physics.md eq. 4)
 ///
-/// The printed closed form (Ferrari) loses up to hundreds of kelvin in float32. This one starts
+/// The printed closed form (Ferrari) loses up to hundreds of kelvin in float32. This solver starts
 /// from a rational approximation (relative error <= 3.5e-3 for every ratio of conduction to
-/// radiation), takes one Halley step (4.8e-8) and polishes in kelvin. No pow, no cube root.
-/// Header only, so that float and double run the same source; shaders/lib/equilibrium.glsl is the
-/// float32 twin. Any thread. RT-safe.
+/// radiation), takes one Halley step (4.8e-8) and then polishes in kelvin. It needs neither pow nor
+/// a cube root.
+/// The solver is header only, so that float and double run the same source.
+/// shaders/lib/equilibrium.glsl is the float32 twin. Any thread. RT-safe.
 namespace emit::physics {
 
-/// Coefficients of one surface balance. Raw SI values: this is the inner loop.
+/// Coefficients of one surface balance, as raw SI values because this is the inner loop.
 template <class Real>
 struct SurfaceBalance {
   Real emission_w_m2_k4 = 0;    ///< e, >= 0
   Real conductance_w_m2_k = 0;  ///< G, >= 0
-  Real source_w_m2 = 0;         ///< A; must be positive for a positive root to exist
+  Real source_w_m2 = 0;         ///< A; a positive root exists only if it is positive
 };
 
+/// Solution of one surface balance.
 template <class Real>
 struct EquilibriumResult {
   Real temperature_k = 0;
-  bool clamped = false;  ///< an input lay below its guard; the result is that of the guard
+  bool clamped = false;  ///< an input was below its guard; the temperature is that of the guard
 };
 
-/// Smallest emission coefficient and source the solver takes; below, it clamps and says so.
+/// Smallest emission coefficient that the solver takes. It clamps a smaller one and reports it.
 template <class Real>
 inline constexpr Real kMinEmissionWPerM2K4 = std::is_same_v<Real, float> ? Real(1e-12)
                                                                          : Real(1e-30);
+/// Smallest source that the solver takes, W m-2. It clamps a smaller one and reports it.
 template <class Real>
 inline constexpr Real kMinSourceWPerM2 = Real(1e-9);
 
-/// Solves the balance.
-/// Accuracy: float 0.2 mK over lambda 0.02..400 W/m/K, d 1e-4..1 m, emissivity 0.02..1, radiative
-/// temperature 0..1000 K, core 200..400 K; double 1e-14 relative everywhere. NaN in, NaN out.
+/// Solves the balance for its positive root, physics.md eq. 4.
+/// Accuracy in float: 0.2 mK over lambda 0.02..400 W/m/K, d 1e-4..1 m, emissivity 0.02..1,
+/// radiative temperature 0..1000 K and core 200..400 K. Accuracy in double: 1e-14 relative
+/// everywhere. A NaN input gives NaN.
 template <class Real>
 [[nodiscard]] EquilibriumResult<Real> solve_equilibrium(const SurfaceBalance<Real>& b) noexcept {
   EquilibriumResult<Real> result;
@@ -54,22 +58,24 @@ template <class Real>
     result.clamped = true;
   }
 
-  // T = r x with x^4 + k x = 1 and x in (0, 1].
+  // Scale the unknown: T = r x, where x solves x^4 + k x = 1 and lies in (0, 1].
   const Real r = std::sqrt(std::sqrt(a / e));
   const Real k = g * r / a;
-  // Minimax over all k >= 0; beyond 1e6 radiation is below rounding and k^3 could overflow.
+  // Start from a minimax fit over all k >= 0. Beyond 1e6 radiation is below rounding, and k^3 could
+  // overflow.
   constexpr Real c0 = Real(0.27628703);
   constexpr Real c1 = Real(0.36899182);
   constexpr Real c2 = Real(0.57870529);
   constexpr Real c3 = Real(0.32065439);
   Real x = k > Real(1e6) ? Real(1) / k
                          : (Real(1) + k * (c0 + k * c1)) / (Real(1) + k * (c2 + k * (c3 + k * c1)));
+  // Take one Halley step on x^4 + k x - 1.
   const Real f = x * x * x * x + k * x - Real(1);
   const Real f1 = Real(4) * x * x * x + k;
   x -= f * f1 / (f1 * f1 - Real(6) * x * x * f);
 
   Real t = r * x;
-  // Newton in kelvin on the balance itself removes the rounding of r and k.
+  // Polish in kelvin: Newton on the balance itself removes the rounding of r and k.
   constexpr int polish_steps = std::is_same_v<Real, float> ? 1 : 2;
   for (int i = 0; i < polish_steps; ++i) {
     const Real t3 = t * t * t;

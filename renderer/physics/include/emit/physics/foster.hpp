@@ -11,36 +11,40 @@
 #include "emit/physics/error.hpp"
 #include "emit/physics/relaxation.hpp"
 
-/// Conduction into a stack of layers as a few flux-driven states (a Foster network):
+/// Heat conduction into a stack of layers, modelled by a few flux-driven states (a Foster network):
 ///
 ///   T = T_base + sum x_i,   tau_i x_i' = r_i q - x_i,   sum r_i = sum d/lambda
 ///   q = A + h (T_air - T) - e T^4                           (physics.md eq. 16-18)
 ///
-/// x_i are kelvins above the base, q the net flux into the solid, A the absorbed flux. A step is
-/// implicit in the surface balance and exact for q linear over it; the new temperature is the root
-/// of the same quartic as eq. 4 with P for the core temperature and 1/R for its conductance. A
-/// steady state is that of eq. 4. shaders/lib/foster.glsl is the float32 twin of foster_step().
+/// x_i are kelvins above the base, q is the net flux into the solid and A is the absorbed flux. A
+/// step is implicit in the surface balance and exact for q linear over the step. The new
+/// temperature is the root of the quartic of eq. 4, with P in place of the core temperature and 1/R
+/// in place of its conductance. A steady state is that of eq. 4. shaders/lib/foster.glsl is the
+/// float32 twin of foster_step().
 namespace emit::physics {
 
+/// Largest number of modes of a network.
 inline constexpr std::size_t kMaxFosterModes = 4;
 
-/// One layer, outermost first in a stack.
+/// One layer of a stack. A stack lists its outermost layer first.
 struct StackLayer {
   double thickness_m = 0.0;
   double conductivity_w_m_k = 0.0;
   double volumetric_heat_j_m3_k = 0.0;  ///< density times specific heat
 };
 
+/// One mode of a network: its time constant tau_i and its resistance r_i.
 struct NetworkMode {
   double tau_s = 0.0;
   double resistance_m2k_w = 0.0;
 };
 
-/// Fastest mode first; entries from `count` on are zero.
+/// Modes of a network, fastest first. Entries from `count` on are zero.
 struct FosterNetwork {
   std::array<NetworkMode, kMaxFosterModes> modes{};
   std::size_t count = 0;
 
+  /// Returns sum r_i, m2 K/W.
   [[nodiscard]] double resistance_m2k_w() const noexcept {
     double sum = 0.0;
     for (const NetworkMode& mode : modes) sum += mode.resistance_m2k_w;
@@ -48,45 +52,56 @@ struct FosterNetwork {
   }
 };
 
-/// Surface temperature per surface flux at an angular frequency, m2 K/W, over an isothermal base.
-/// At 0 it is sum d/lambda. Any thread; RT-safe.
+/// Returns the impedance of a stack over an isothermal base: surface temperature per surface flux
+/// at an angular frequency, m2 K/W (physics.md eq. 19). At frequency 0 it is sum d/lambda. Any
+/// thread. RT-safe.
 [[nodiscard]] std::complex<double> stack_impedance_m2k_w(std::span<const StackLayer> layers,
                                                          double angular_rad_s) noexcept;
+/// Returns the impedance sum r_i / (1 + i w tau_i) of a network, m2 K/W. Any thread. RT-safe.
 [[nodiscard]] std::complex<double> network_impedance_m2k_w(const FosterNetwork& network,
                                                            double angular_rad_s) noexcept;
 
+/// Options of network_of_stack().
 struct NetworkOptions {
   std::size_t modes = 4;  ///< 1..kMaxFosterModes
   double shortest_period_s = 600.0;
   double longest_period_s = 172'800.0;
-  /// Part of the surface's heat exchange that the fit assumes, W/m2/K: convection plus linearised
-  /// radiation. The error of the temperature is that of 1/(h + 1/Z).
+  /// Conductance of the surface's heat exchange that the fit assumes, W/m2/K: convection plus
+  /// linearised radiation. The fit minimises the error of the temperature, which is that of 1/(h +
+  /// 1/Z).
   double film_w_m2_k = 19.0;
 };
 
-/// Network of a stack, from its impedance over the given periods: non-negative least squares on a
-/// fine grid of time constants, merged to the wanted number and refined with sum r_i held at the
-/// total resistance. Fewer modes come back where a thin stack supports no more. Setup only:
-/// milliseconds, allocates. Errors: config when a layer is not finite and positive.
+/// Derives the network of a stack from its impedance over the given periods. Non-negative least
+/// squares run on a fine grid of time constants; the modes are then merged to the wanted number and
+/// refined, with sum r_i held at the total resistance. A thin stack that supports fewer modes gets
+/// fewer.
+/// Setup only: it takes milliseconds and allocates. Errors: config if a layer is not finite and
+/// positive, or if the options are out of range.
 [[nodiscard]] Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
                                                      const NetworkOptions& options = {});
 
 // ---- one step -----------------------------------------------------------------------------------
 
+/// States x_i of a surface, K above the base.
 template <class Real>
-using FosterState = std::array<Real, kMaxFosterModes>;  ///< x_i, K above the base
+using FosterState = std::array<Real, kMaxFosterModes>;
 
-/// RelaxationGains of every mode over one step, and R = sum r_i end_i.
+/// RelaxationGains of every mode over one step.
 template <class Real>
 struct FosterGains {
   FosterState<Real> start_frac{};
   FosterState<Real> end_frac{};
 };
+/// Returns the gains of a step of `dt_s` (physics.md eq. 6).
+/// @pre dt_s >= 0 and all time constants are positive.
 [[nodiscard]] FosterGains<double> foster_gains(double dt_s, const FosterNetwork& network) noexcept;
-/// Gains of the step twice as long. Nothing cancels, so a ladder of steps starts at its finest.
+/// Returns the gains of a step twice as long. Nothing cancels, so a ladder of step lengths starts
+/// at its finest.
 [[nodiscard]] FosterGains<double> foster_doubled(const FosterGains<double>& gains) noexcept;
 
-/// What drives a surface at an instant. Offsets are from `reference_k` of the surface.
+/// Inputs that drive a surface at an instant. Temperature offsets are from `reference_k` of the
+/// surface.
 template <class Real>
 struct FosterDrive {
   Real absorbed_w_m2 = 0;  ///< A: absorbed short-wave and long-wave flux
@@ -94,7 +109,7 @@ struct FosterDrive {
   Real air_offset_k = 0;
 };
 
-/// What stays the same over the steps of one surface.
+/// Properties of one surface that stay the same over its steps.
 template <class Real>
 struct FosterSurface {
   Real emission_w_m2_k4 = 0;  ///< emissivity * sigma
@@ -103,14 +118,14 @@ struct FosterSurface {
   Real reference_k = 0;
 };
 
-/// Temperature as an offset from the surface's reference.
+/// Returns the surface temperature as an offset from the surface's reference, K.
 template <class Real>
 [[nodiscard]] constexpr Real foster_offset_k(const FosterState<Real>& x,
                                              const FosterSurface<Real>& s) noexcept {
   return s.base_offset_k + ((x[0] + x[1]) + (x[2] + x[3]));
 }
 
-/// Net flux into the solid at a temperature.
+/// Returns the net flux into the solid at a surface temperature, W/m2 (physics.md eq. 16).
 template <class Real>
 [[nodiscard]] constexpr Real foster_flux_w_m2(Real offset_k, const FosterDrive<Real>& d,
                                               const FosterSurface<Real>& s) noexcept {
@@ -120,15 +135,18 @@ template <class Real>
          s.emission_w_m2_k4 * t2 * t2;
 }
 
-/// Advances `x` by one step whose drive goes from `begin` to `end`. At the start of the step the
-/// temperature is continuous and the flux is that of `begin`: a shade that changes there acts at
-/// once. Returns true where the surface balance had to be clamped (see solve_equilibrium).
-/// Any thread; RT-safe. Unconditionally stable; second order in the step.
+/// Advances `x` by one step whose drive goes from `begin` to `end` (physics.md eq. 18). The
+/// temperature is continuous at the start of the step, and the flux there is that of `begin`: a
+/// change of shade acts at once.
+/// Returns true if the surface balance had to be clamped (see solve_equilibrium). The step is
+/// unconditionally stable and second order in its length. Any thread. RT-safe.
 template <class Real>
 bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const FosterDrive<Real>& end,
                  const FosterGains<Real>& g, const FosterSurface<Real>& s) noexcept {
+  // Advance the states with the flux at the start alone. P of eq. 18 is the temperature that this
+  // gives, R is what each W/m2 of the flux at the end adds to it.
   const Real q_begin = foster_flux_w_m2(foster_offset_k(x, s), begin, s);
-  FosterState<Real> partial;  // new states without the flux at the end
+  FosterState<Real> partial;  // new states before the flux at the end is added
   Real p_k = s.base_offset_k;
   Real r_m2k_w = 0;
   for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
@@ -137,15 +155,16 @@ bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const Fos
     p_k += partial[i];
     r_m2k_w += s.resistance_m2k_w[i] * g.end_frac[i];
   }
-  if (!(r_m2k_w > Real(0))) return false;  // no time passed
+  if (!(r_m2k_w > Real(0))) return false;  // the step has no length
   const Real conductance = Real(1) / r_m2k_w;
+  // Solve eq. 18 for the temperature at the end of the step.
   const SurfaceBalance<Real> balance{s.emission_w_m2_k4, end.film_w_m2_k + conductance,
                                      end.absorbed_w_m2 +
                                          end.film_w_m2_k * (s.reference_k + end.air_offset_k) +
                                          conductance * (s.reference_k + p_k)};
   const EquilibriumResult<Real> root = solve_equilibrium(balance);
-  // One Newton step on offsets: a kelvin temperature resolves only 3e-5 K in float32, which a short
-  // step (small R) would turn into a wrong flux.
+  // Take one Newton step on offsets. A temperature in kelvin resolves only 3e-5 K in float32, which
+  // a short step (small R) would turn into a wrong flux.
   Real offset_k = root.temperature_k - s.reference_k;
   const Real t3 = root.temperature_k * root.temperature_k * root.temperature_k;
   const Real slope = Real(4) * s.emission_w_m2_k4 * t3 + end.film_w_m2_k;
@@ -153,7 +172,7 @@ bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const Fos
     offset_k += (foster_flux_w_m2(offset_k, end, s) - (offset_k - p_k) * conductance) /
                 (slope + conductance);
   }
-  // The flux from whichever side loses less to rounding.
+  // Take the flux from the side of the balance that loses less to rounding.
   const Real q_end = slope * r_m2k_w > Real(1) ? (offset_k - p_k) * conductance
                                                : foster_flux_w_m2(offset_k, end, s);
   for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
@@ -162,8 +181,8 @@ bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const Fos
   return root.clamped;
 }
 
-/// Steady states under a flux: x_i = r_i q. With q = (T - T_base) / sum r_i this is the linear
-/// profile between surface and base.
+/// Returns the steady states under a flux, x_i = r_i q. With q = (T - T_base) / sum r_i they are
+/// the linear profile between surface and base.
 template <class Real>
 [[nodiscard]] constexpr FosterState<Real> foster_steady(Real flux_w_m2,
                                                         const FosterSurface<Real>& s) noexcept {
@@ -172,12 +191,15 @@ template <class Real>
   return x;
 }
 
+/// Returns the constants of a surface on a network. `base_k` and `reference_k` are absolute
+/// temperatures; `emissivity_frac` is 0..1.
 [[nodiscard]] FosterSurface<double> foster_surface(const FosterNetwork& network,
                                                    double emissivity_frac, double base_k,
                                                    double reference_k) noexcept;
 
 // ---- controlled steps ---------------------------------------------------------------------------
 
+/// Returns the drive between `a` (f = 0) and `b` (f = 1), linear in f.
 template <class Real>
 [[nodiscard]] constexpr FosterDrive<Real> lerp(const FosterDrive<Real>& a,
                                                const FosterDrive<Real>& b, Real f) noexcept {
@@ -186,25 +208,28 @@ template <class Real>
           a.air_offset_k + (b.air_offset_k - a.air_offset_k) * f};
 }
 
-/// Finest split of an interval: 2^kMaxFosterLevel equal steps.
+/// Finest split of an interval. It has 2^kMaxFosterLevel equal steps.
 inline constexpr int kMaxFosterLevel = 6;
 
 /// Gains of an interval split into 2^level equal steps, level 0..kMaxFosterLevel.
 struct FosterLadder {
   std::array<FosterGains<double>, kMaxFosterLevel + 1> level{};
 };
+/// Returns the gains of an interval of `dt_s` at every level.
+/// @pre dt_s >= 0 and all time constants are positive.
 [[nodiscard]] FosterLadder foster_ladder(double dt_s, const FosterNetwork& network) noexcept;
 
+/// Outcome of foster_advance().
 struct FosterAdvance {
-  double error_k = 0.0;  ///< estimate for the temperature at the end of the interval
+  double error_k = 0.0;  ///< estimated error of the temperature at the end of the interval, K
   int level = 0;         ///< the interval was split into 2^level steps
   bool clamped = false;
 };
 
-/// Advances over an interval with a drive linear in time, splitting it until halving the steps
-/// changes no state, and not the temperature, by more than `tolerance_k` (step doubling: the error
-/// of the finer result is a third of the difference). Keeps the finer result. Any thread; RT-safe:
-/// at most 2^(kMaxFosterLevel + 1) steps.
+/// Advances over an interval whose drive is linear in time. The interval is split until halving the
+/// steps changes neither a state nor the temperature by more than `tolerance_k`. By step doubling,
+/// the error of the finer result, which is kept, is a third of the change.
+/// Any thread. RT-safe: it takes at most 2^(kMaxFosterLevel + 1) steps.
 FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& begin,
                              const FosterDrive<double>& end, const FosterLadder& ladder,
                              const FosterSurface<double>& surface, double tolerance_k) noexcept;

@@ -4,9 +4,9 @@
 
 #include "emit/physics/constants.hpp"
 
-/// Boundary types: a number with its unit. Construction is explicit, there is no way back to a
-/// double except value(), and only quantities of one kind add. Inner loops and GPU structs use raw
-/// numbers with the unit in the name instead. Any thread. RT-safe.
+/// Quantity types for interfaces: a number with its unit. Construction is explicit, value() is the
+/// only way back to a double, and only quantities of one kind add. Inner loops and GPU structs use
+/// raw numbers with the unit in the name instead. Any thread. RT-safe.
 namespace emit::physics {
 
 /// A quantity of the kind `Tag`. Differences and scalings keep the kind; ratios are plain numbers.
@@ -16,7 +16,7 @@ class Quantity {
   constexpr Quantity() noexcept = default;
   constexpr explicit Quantity(double value) noexcept : value_(value) {}
 
-  /// The number in the unit the type is named after.
+  /// Returns the number in the unit that the type is named after.
   [[nodiscard]] constexpr double value() const noexcept { return value_; }
 
   [[nodiscard]] friend constexpr Quantity operator+(Quantity a, Quantity b) noexcept {
@@ -58,19 +58,22 @@ using Kelvin = Quantity<struct KelvinTag>;
 using Metres = Quantity<struct MetresTag>;
 using Micrometres = Quantity<struct MicrometresTag>;
 using Radians = Quantity<struct RadiansTag>;
-/// In-band radiance, W m-2 sr-1.
+/// Radiance in a band, W m-2 sr-1.
 using Radiance = Quantity<struct RadianceTag>;
-/// W m-2 sr-1 um-1.
+/// Spectral radiance, W m-2 sr-1 um-1.
 using SpectralRadiance = Quantity<struct SpectralRadianceTag>;
 
+/// Converts degrees to a Radians quantity.
 [[nodiscard]] constexpr Radians degrees(double angle_deg) noexcept {
   return Radians(angle_deg * kDegree);
 }
+/// Converts a Radians quantity to degrees.
 [[nodiscard]] constexpr double to_degrees(Radians angle) noexcept {
   return angle.value() / kDegree;
 }
 
-/// `using namespace emit::physics::literals;`  300.0_K, 1.5_m, 4_um, 0.1_rad, 45_deg
+/// Literals of the quantities: 300.0_K, 1.5_m, 4_um, 0.1_rad, 45_deg. Use them by `using namespace
+/// emit::physics::literals;`.
 inline namespace literals {
 constexpr Kelvin operator""_K(long double v) noexcept {
   return Kelvin(static_cast<double>(v));

@@ -10,14 +10,16 @@
 #include "emit/physics/foster.hpp"
 #include "emit/scene/scene_desc.hpp"
 
-/// Fits the real-time path's models of a material to the reference solver. This is the one place of
-/// the reference that runs the real-time path's own formulas: they are what is fitted, not what
-/// judges. Target emit::fit. Any thread; setup only.
+/// Fits of a material's real-time models to the reference solver. This is the only part of the
+/// reference that runs the formulas of the real-time path, because they are what is fitted; they do
+/// not judge the result. Target emit::fit. Any thread. Setup only.
 namespace emit::reference {
 
+/// Real-time model that is fitted.
 enum class FitModel : std::uint8_t { foster, emit2014 };
 
-/// What falls on level, open ground at an instant. Linear in between; two at one time are a jump.
+/// Fluxes that fall on level, open ground at an instant. Values are linear between two instants;
+/// two entries at one time make a jump.
 struct GroundForcing {
   double time_s = 0.0;
   double direct_w_m2 = 0.0;  ///< direct sun on level ground, after clouds
@@ -27,70 +29,74 @@ struct GroundForcing {
   double air_k = 0.0;
 };
 
-/// Forcing of a scenario every `step_s` between two sim times, its weather table or clear sky.
+/// Returns the forcing of a scenario every `step_s` between two simulated times, from its weather
+/// table or its clear sky.
 [[nodiscard]] std::vector<GroundForcing> ground_forcing(const scene::ScenarioDesc& scenario,
                                                         double begin_s, double end_s,
                                                         double step_s);
 
-/// A surface's history: what it absorbs, and how warm it truly was.
+/// Point of a surface's history: the absorbed flux and the true temperature.
 struct CurvePoint {
   double time_s = 0.0;
-  double absorbed_w_m2 = 0.0;  ///< short-wave and long-wave
+  double absorbed_w_m2 = 0.0;  ///< short-wave and long-wave flux
   double film_w_m2_k = 0.0;
   double air_k = 0.0;
   double temperature_k = 0.0;
 };
 
+/// Options of the fit functions.
 struct FitOptions {
   FitModel model = FitModel::foster;
-  std::size_t modes = 4;  ///< foster 1..4, emit2014 1..2
+  std::size_t modes = 4;  ///< 1..4 for foster, 1..2 for emit2014
   std::uint32_t starts = 4;
-  double spin_up_s = 172'800.0;  ///< unshadowed, before the histories
-  double history_s = 12'600.0;   ///< their length
+  double spin_up_s = 172'800.0;  ///< length of the unshadowed time before the histories
+  double history_s = 12'600.0;   ///< length of the histories
   double reference_tolerance_k = 1e-3;
 };
 
-/// How far the model is from the reference over one history.
+/// Error of the model against the reference over one history.
 struct FitResidual {
   std::string history;
   double rms_k = 0.0;
   double max_k = 0.0;
-  bool judged = true;  ///< false: fitted along, but not one of the five
+  bool judged = true;  ///< false if the history is fitted too but is not one of the five
 };
 
+/// Outcome of a fit.
 struct FitResult {
   std::string material;
-  physics::FosterNetwork network;            ///< foster
-  std::vector<scene::RelaxationMode> modes;  ///< emit2014
+  physics::FosterNetwork network;            ///< result of a fit of foster
+  std::vector<scene::RelaxationMode> modes;  ///< result of a fit of emit2014
   std::vector<FitResidual> residuals;
-  double rms_k = 0.0;  ///< worst history
+  double rms_k = 0.0;  ///< largest of all histories
   double max_k = 0.0;
-  double horizon_s = 0.0;      ///< length of what was fitted, spin-up included as far as it counted
-  double derived_rms_k = 0.0;  ///< the same with modes from the layers alone
+  /// Length of the fitted time, including the part of the spin-up that counted.
+  double horizon_s = 0.0;
+  double derived_rms_k = 0.0;  ///< rms_k of the modes derived from the layers alone
   double derived_max_k = 0.0;
   std::uint32_t iterations = 0;
   bool converged = false;
 };
 
-/// Over five histories of level ground that share the spin-up: sun all the time; shade all the
-/// time; shade from 75 minutes on; shade until two hours; two passing shadows (20 and 10 minutes).
-/// The day before counts a little, so that the slow modes are right too. `forcing` reaches from
-/// `start_s - spin_up_s` to `start_s + history_s`. Errors: invalid_argument (options, forcing),
-/// config (layers), naming the material.
+/// Fits a material over five histories of level ground that share the spin-up: sun all the time;
+/// shade all the time; shade from 75 minutes on; shade until two hours; two passing shadows of 20
+/// and 10 minutes. The day before has a small weight, so that the slow modes are right too.
+/// `forcing` must reach from `start_s - spin_up_s` to `start_s + history_s`. Errors:
+/// invalid_argument (options, forcing), config (layers); the message names the material.
 [[nodiscard]] physics::Result<FitResult> fit_material(const scene::Material& material,
                                                       std::span<const GroundForcing> forcing,
                                                       double start_s, double initial_k,
                                                       const FitOptions& options = {});
 
-/// The same comparison for modes as they are: the material's own, or those of its layers where it
-/// has none. Nothing is fitted.
+/// Makes the same comparison for the modes as they are: the material's own, or those derived from
+/// its layers. Nothing is fitted. Errors: those of fit_material().
 [[nodiscard]] physics::Result<FitResult> judge_material(const scene::Material& material,
                                                         std::span<const GroundForcing> forcing,
                                                         double start_s, double initial_k,
                                                         const FitOptions& options = {});
 
-/// To a measured or computed curve; the material gives emissivity, layers and base. Both models
-/// start at the curve's first temperature.
+/// Fits to a measured or computed curve. The material gives emissivity, layers and base; both
+/// models start at the first temperature of the curve. Errors: those of fit_material().
 [[nodiscard]] physics::Result<FitResult> fit_curve(const scene::Material& material,
                                                    std::span<const CurvePoint> curve,
                                                    const FitOptions& options = {});

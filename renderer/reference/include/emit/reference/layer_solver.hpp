@@ -9,15 +9,15 @@
 
 namespace emit::reference {
 
-/// What acts on the face at an instant:
-/// q = absorbed + film (air - T) - emissivity sigma T^4, W/m2 into the body.
+/// Values that act on the face at an instant. The flux into the solid is q = absorbed + film (air -
+/// T) - emissivity sigma T^4, W/m2.
 struct FaceState {
   double absorbed_w_m2 = 0.0;
   double film_w_m2_k = 0.0;
   double air_k = 0.0;
 };
 
-/// A stretch of time over which each of the face's values is linear.
+/// Stretch of time over which each value of the face is linear.
 struct FaceSegment {
   double start_s = 0.0;
   double end_s = 0.0;
@@ -25,53 +25,60 @@ struct FaceSegment {
   FaceState end;
 };
 
-/// Row of a forcing table: linear between rows, two rows at one time are a jump.
+/// Row of a forcing table. Values are linear between rows; two rows at one time make a jump.
 struct ForcingRow {
   double time_s = 0.0;
   FaceState face;
 };
 
-/// Net flux into the body for a face temperature, with its slope (<= 0 for a stable surface).
+/// Net flux into the solid at a face temperature, with its slope. The slope is <= 0 for a stable
+/// surface.
 struct FaceFlux {
   double flux_w_m2 = 0.0;
   double slope_w_m2_k = 0.0;
 };
-/// A boundary of the caller's own, smooth in time over the stretch it is used for.
+/// Boundary condition that a caller implements. It must be smooth in time over the stretch it is
+/// used for.
 class FaceModel {
  public:
   virtual ~FaceModel() = default;
+  /// Returns the flux at a time and a face temperature.
   [[nodiscard]] virtual FaceFlux at(double time_s, double face_k) const noexcept = 0;
 };
 
+/// Options of the time steps.
 struct StepOptions {
-  /// Largest error of one step, K (embedded third-order estimate); the temperature follows within a
-  /// few times this. refine divides it by refine^3, which divides the steps by refine.
+  /// Largest error of one step, K, by the embedded third-order estimate. The error of the
+  /// temperature is at most a few times this. `refine` divides it by refine^3, which divides the
+  /// steps by refine.
   double tolerance_k = 1.0e-3;
   double max_step_s = 3.0e7;
-  /// > 0: no error control, every segment is cut into equal steps of at most this (divided by
-  /// refine). For convergence studies.
+  /// A value > 0 turns the error control off: every segment is cut into equal steps of at most this
+  /// length, divided by `refine`. It is for convergence studies.
   double fixed_step_s = 0.0;
   std::uint32_t refine = 1;
 };
 
-/// Counters since start().
+/// Counters of a solver since start().
 struct StepCounts {
   std::uint64_t accepted = 0;
   std::uint64_t rejected = 0;
-  std::uint64_t at_floor = 0;  ///< accepted above the tolerance: no smaller step is resolved
+  /// Steps accepted above the tolerance, because no smaller step is resolved.
+  std::uint64_t at_floor = 0;
   std::uint64_t newton_unconverged = 0;
 };
 
-/// Transient conduction in a layered body under a radiating, convecting face.
+/// Solver of transient conduction in a stack of layers under a radiating, convecting face.
 ///
-/// TR-BDF2 (second order, L-stable), step control by its embedded third-order estimate. Steps are
-/// power-of-two parts of a segment, so they end exactly on its ends, where forcing may jump, and so
-/// that factorised matrices are met again. The tridiagonal system is eliminated from the base
-/// upwards, which leaves one scalar equation for the face; Newton solves it to rounding, so each
-/// stage satisfies the non-linear balance exactly. Temperatures are kept as offsets.
+/// The method is TR-BDF2 (second order, L-stable) with step control by its embedded third-order
+/// estimate. Steps are power-of-two parts of a segment. They therefore end exactly on its ends,
+/// where forcing may jump, and the same factorised matrices occur again. The tridiagonal system is
+/// eliminated from the base upwards, which leaves one scalar equation for the face. Newton solves
+/// it to rounding, so each stage satisfies the non-linear balance exactly. Temperatures are kept as
+/// offsets.
 ///
-/// Owner: caller, one per thread. The mesh must outlive it. No allocation after construction except
-/// in the functions that return vectors.
+/// Owner: the caller, one solver per thread. The mesh must outlive it. After construction only the
+/// functions that return vectors allocate.
 ///
 ///   LayerSolver solver(mesh, {.tolerance_k = 1e-3});
 ///   solver.start(profile, t0_s);
@@ -81,42 +88,46 @@ class LayerSolver {
  public:
   explicit LayerSolver(const LayerMesh& mesh, const StepOptions& options = {});
 
-  /// Sets the profile (constant beyond its ends) and the clock, forgets the step size. A held base
-  /// takes its own temperature. @pre profile is not empty, ascending in depth.
+  /// Sets the temperature profile, which is constant beyond its ends, and the clock. Forgets the
+  /// step size. A held base takes its own temperature.
+  /// @pre profile is not empty and ascending in depth.
   void start(std::span<const ProfilePoint> profile, double time_s);
-  /// The same with a temperature per node.
+  /// Sets the temperature of every node, and the clock.
+  /// @pre node_k has one value per node of the mesh.
   void start_nodes(std::span<const double> node_k, double time_s);
 
-  /// Steps to the end of the segment. @pre segment.start_s is the solver's time (to rounding).
+  /// Steps to the end of the segment.
+  /// @pre segment.start_s is time_s(), to rounding.
   void advance(const FaceSegment& segment, double emissivity_frac) noexcept;
-  /// The same with the caller's own boundary.
+  /// Steps to `end_s` under the caller's own boundary condition.
   void advance(double end_s, const FaceModel& face) noexcept;
-  /// Face held at a temperature, linear in time over the stretch; a jump at its start is taken.
+  /// Steps to `end_s` with the face held at a temperature that is linear in time. A jump of the
+  /// temperature at the start of the stretch is allowed.
   void advance_held(double end_s, double start_k, double end_k) noexcept;
 
   [[nodiscard]] double time_s() const noexcept { return time_s_; }
   [[nodiscard]] double face_k() const noexcept { return offset_k_ + theta_[0]; }
-  /// At any depth, clamped to the body: cubic in each cell, with the curvature that the heat
-  /// equation gives for the present rate of change.
+  /// Returns the temperature at a depth, which is clamped to the stack. It is cubic in each cell,
+  /// with the curvature that the heat equation gives for the present rate of change.
   [[nodiscard]] double temperature_k(double depth_m) const noexcept;
-  /// Per node of the mesh.
+  /// Copies the temperatures of the nodes, as many as `out` holds.
   void copy_nodes_k(std::span<double> out) const noexcept;
 
-  /// Heat above the reference temperature of the solver, J/m2: only differences mean something.
+  /// Heat above the reference temperature of the solver, J/m2. Only differences have a meaning.
   [[nodiscard]] double stored_heat_j_m2() const noexcept;
-  /// Integral since start() of the flux into the face less that out of the base, J/m2, with the
-  /// weights of the method: equals the change of stored_heat_j_m2() to rounding. A held face takes
-  /// what the balance leaves for it.
+  /// Integral since start() of the flux into the face minus the flux out of the base, J/m2, with
+  /// the weights of the method. It equals the change of stored_heat_j_m2() to rounding. A held face
+  /// takes the flux that the balance leaves for it.
   [[nodiscard]] double heat_in_j_m2() const noexcept { return heat_in_j_m2_; }
   [[nodiscard]] const StepCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] const LayerMesh& mesh() const noexcept { return *mesh_; }
 
-  /// Of one step length: the tridiagonal matrix M + d dt K, eliminated from the base upwards.
+  /// Factorised tridiagonal matrix M + d dt K of one step length, eliminated from the base upwards.
   struct Factors {
     double step_s = -1.0;
     std::uint64_t used = 0;
-    std::vector<double> raise;      ///< coupling of row i to node i + 1 over the pivot there
-    std::vector<double> lower;      ///< coupling of row i to node i - 1 over its pivot
+    std::vector<double> raise;      ///< coupling of row i to node i + 1 over the pivot of row i + 1
+    std::vector<double> lower;      ///< coupling of row i to node i - 1 over the pivot of row i
     std::vector<double> pivot_inv;  ///< 1 / pivot; node 0 holds the pivot itself
   };
 
@@ -143,13 +154,15 @@ class LayerSolver {
 
   const LayerMesh* mesh_;
   StepOptions options_;
-  std::size_t unknowns_ = 0;  ///< nodes less the held base
-  double offset_k_ = 0.0;     ///< nodes are offset_k_ + theta_
+  std::size_t unknowns_ = 0;  ///< number of nodes without a held base
+  double offset_k_ = 0.0;     ///< a node's temperature is offset_k_ + theta_
   double time_s_ = 0.0;
   double next_step_s_ = 0.0;
-  double last_flux_w_m2_ = 0.0;  ///< into the face at the end of the last stretch
+  /// Flux into the face at the end of the last stretch.
+  double last_flux_w_m2_ = 0.0;
   double heat_in_j_m2_ = 0.0;
-  double face_rate_k_s_ = 0.0;  ///< of the present stretch when the face is held
+  /// Rate of the present stretch if the face is held.
+  double face_rate_k_s_ = 0.0;
   bool held_ = false;
   StepCounts counts_;
   std::vector<double> theta_, conducted_, stage_, final_, error_, stage_mass_, final_mass_;
@@ -158,9 +171,9 @@ class LayerSolver {
   std::uint64_t cache_clock_ = 0;
 };
 
-/// Face temperatures at ascending times under a forcing table; times before the first row or after
-/// the last are answered with the face held by the first or last row's forcing. Starts at the first
-/// row's time from the profile. @pre rows not empty, ascending; times ascending; same size of out.
+/// Computes face temperatures at given times under a forcing table. The run starts from the profile
+/// at the time of the first row. Outside the table the first or the last row's forcing holds.
+/// @pre rows is not empty and ascending; times_s is ascending; out_k has the size of times_s.
 void face_history(LayerSolver& solver, std::span<const ProfilePoint> profile,
                   std::span<const ForcingRow> rows, double emissivity_frac,
                   std::span<const double> times_s, std::span<double> out_k) noexcept;

@@ -10,21 +10,23 @@
 #include "emit/reference/voxel_model.hpp"
 #include "emit/scene/scene_desc.hpp"
 
-/// Radiation between the faces of a voxel model, sky and surroundings. Faces are gathered into
-/// patches of about 20 cm that radiate evenly; every face sees them by rays of its own. Short-wave
-/// and long-wave are diffuse; reflections between patches are followed until they fade.
+/// Radiation between the faces of a voxel model, the sky and the surroundings. Faces are gathered
+/// into patches of about 20 cm that radiate evenly; every face sees the patches by rays of its own.
+/// Short-wave and long-wave radiation are diffuse, and reflections between patches are followed
+/// until they fade.
 namespace emit::reference {
 
+/// Place and optics of a face for the exchange.
 struct ExchangeFace {
   glm::dvec3 centre_m{0.0};
   glm::dvec3 normal{0.0};
   double area_m2 = 0.0;
   double solar_absorptance_frac = 0.0;
   double emissivity_frac = 0.0;
-  bool enclosed = false;  ///< looks into a closed cavity: no rays, no sky
+  bool enclosed = false;  ///< the face looks into a closed cavity: it gets no rays and no sky
 };
 
-/// What falls on a face besides direct sun, W/m2.
+/// Irradiance of a face apart from direct sun, W/m2.
 struct Incoming {
   double shortwave_w_m2 = 0.0;
   double longwave_w_m2 = 0.0;
@@ -32,28 +34,34 @@ struct Incoming {
 
 /// Sky and surroundings as the exchange needs them.
 struct ExchangeSky {
-  double diffuse_w_m2 = 0.0;       ///< short-wave irradiance of the open sky on level ground
-  double longwave_w_m2 = 0.0;      ///< the same, long-wave
-  double ground_short_w_m2 = 0.0;  ///< radiosity of what lies beyond the scene below the horizon
-  double ground_long_w_m2 = 0.0;
+  double diffuse_w_m2 = 0.0;   ///< short-wave irradiance of the open sky on level ground
+  double longwave_w_m2 = 0.0;  ///< long-wave irradiance of the open sky on level ground
+  /// short-wave radiosity of what lies beyond the scene below the horizon.
+  double ground_short_w_m2 = 0.0;
+  double ground_long_w_m2 = 0.0;  ///< long-wave radiosity of the same
 };
 
-/// Immutable after creation; any number of threads may ask.
+/// Exchange of radiation in a scene. It is immutable after creation; any number of threads may ask.
 class SceneExchange {
  public:
-  /// `rays` per face.
+  /// Gathers the patches and traces `rays` rays per face.
+  /// @pre faces and surfaces are of equal size.
   SceneExchange(std::span<const SolidFace> faces, std::span<const ExchangeFace> surfaces,
                 const FaceFinder& finder, const SceneInstant& scene, std::uint32_t rays);
 
-  /// `direct_w_m2`: sunlight that falls on each face. `face_k`: temperatures.
+  /// Computes the irradiance of every face. `direct_w_m2` is the direct sun on each face, `face_k`
+  /// its temperature.
+  /// @pre direct_w_m2, face_k and out have one entry per face.
   void incoming(std::span<const double> direct_w_m2, std::span<const double> face_k,
                 const ExchangeSky& sky, std::span<Incoming> out) const;
 
+  /// Cosine-weighted share of a face's hemisphere that is sky.
   [[nodiscard]] double sky_frac(std::size_t face) const noexcept { return sky_frac_[face]; }
-  /// Share of the hemisphere that leaves the scene below the horizon.
+  /// Share of a face's hemisphere that leaves the scene below the horizon.
   [[nodiscard]] double ground_frac(std::size_t face) const noexcept { return ground_frac_[face]; }
   [[nodiscard]] std::size_t patches() const noexcept { return patch_area_m2_.size(); }
 
+  /// Share of a face's hemisphere that shows a patch.
   struct Link {
     std::uint32_t patch = 0;
     float share_frac = 0.0F;
@@ -61,9 +69,9 @@ class SceneExchange {
   [[nodiscard]] std::span<const Link> links(std::size_t face) const noexcept {
     return {links_.data() + link_start_[face], link_start_[face + 1] - link_start_[face]};
   }
-  /// Area-weighted means over the patches of values per face.
+  /// Returns the area-weighted means over the patches of values per face.
+  /// @pre per_face has one value per face.
   [[nodiscard]] std::vector<double> patch_means(std::span<const double> per_face) const;
-  [[nodiscard]] std::uint32_t patch_of(std::size_t face) const noexcept { return patch_[face]; }
 
  private:
   void gather_patches(std::span<const SolidFace> faces);
@@ -80,12 +88,13 @@ class SceneExchange {
   std::vector<Link> patch_links_;
 };
 
-/// Share of the sun's disc that every face sees, averaged over the face where a shadow's edge
-/// crosses it.
+/// Visible share of the sun's disc for every face. The share is averaged over the face if the edge
+/// of a shadow crosses it.
 class SunOnFaces {
  public:
   SunOnFaces(std::span<const SolidFace> faces, std::span<const ExchangeFace> surfaces);
-  /// @pre out as long as the faces
+  /// Computes the visible share of every face.
+  /// @pre out has one entry per face.
   void visible_frac(const SceneInstant& scene, const glm::dvec3& to_sun,
                     std::span<double> out) const;
 
@@ -95,8 +104,8 @@ class SunOnFaces {
 
   std::span<const SolidFace> faces_;
   std::vector<ExchangeFace> surfaces_;
-  std::vector<std::uint32_t> node_start_;  ///< faces around every node
-  std::vector<std::uint32_t> node_faces_;
+  std::vector<std::uint32_t> node_start_;  ///< first entry of node_faces_ of every node
+  std::vector<std::uint32_t> node_faces_;  ///< faces around every node
 };
 
 }  // namespace emit::reference

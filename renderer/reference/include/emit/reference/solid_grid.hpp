@@ -5,25 +5,27 @@
 
 namespace emit::reference {
 
-/// Wanted cell length: `size_m` between low_m and high_m, growing with the distance outside.
+/// Wanted cell length along an axis. It is `size_m` between low_m and high_m and grows with the
+/// distance outside.
 struct SizeWish {
   double low_m = 0.0;
   double high_m = 0.0;
   double size_m = 0.0;
 };
 
-/// How the lines of one axis are spread.
+/// Rules by which the grid lines of one axis are spread.
 struct GradedLines {
-  std::vector<double> fixed_m;   ///< places where a line must be, any order; the ends included
-  std::vector<SizeWish> wishes;  ///< the smallest wish holds
-  double growth_frac = 0.2;      ///< growth of the wanted length per length of distance
+  std::vector<double> fixed_m;   ///< places that must have a line, in any order, both ends included
+  std::vector<SizeWish> wishes;  ///< the smallest wanted length counts
+  double growth_frac = 0.2;      ///< growth of the wanted length per distance
   double max_size_m = 1e9;
   double refine = 1.0;  ///< multiplies the number of cells everywhere
 };
 
-/// Lines whose spacing follows the wishes as a smooth function of place between the fixed ones:
-/// halving all wishes halves every cell, which second order needs. Fixed places closer together
-/// than `merge_m` become one. @pre at least two fixed places further apart than that.
+/// Returns grid lines whose spacing follows the wanted lengths as a smooth function of place
+/// between the fixed lines. Half the wanted lengths give half of every cell, which second order
+/// needs. Fixed places closer together than `merge_m` become one.
+/// @pre at least two fixed places are further apart than merge_m.
 [[nodiscard]] std::vector<double> graded_lines(const GradedLines& wanted, double merge_m = 1e-9);
 
 }  // namespace emit::reference

@@ -6,10 +6,11 @@
 
 #include "emit/physics/error.hpp"
 
-/// Heat that spreads sideways from a lit patch, by SolidSolver: the model behind
-/// `emit evaluate conduction-lateral`.
+/// Heat that spreads sideways from a lit patch, computed by SolidSolver. It is the model of `emit
+/// evaluate conduction-lateral`.
 namespace emit::reference {
 
+/// Shape of the lit patch.
 enum class LitPatch : std::uint8_t {
   half_plane,         ///< x > 0
   moving_half_plane,  ///< x > v t
@@ -17,8 +18,8 @@ enum class LitPatch : std::uint8_t {
   rectangle           ///< |x| < half_x, |y| < half_y
 };
 
-/// A semi-infinite solid at rest whose face z = 0 takes `flux_w_m2` over a patch from t = 0 on and
-/// is adiabatic elsewhere.
+/// A semi-infinite solid at rest. From t = 0 on its face z = 0 takes `flux_w_m2` over a patch; the
+/// rest of the face is adiabatic.
 struct LateralCase {
   LitPatch patch = LitPatch::half_plane;
   double conductivity_w_m_k = 0.0;
@@ -33,11 +34,12 @@ struct LateralCase {
   double time_s = 0.0;
 };
 
-/// Rise of temperature at the case's point and time, K. `refine` multiplies the cells per axis and
-/// the steps. Errors: invalid_argument (values outside their range).
+/// Returns the rise of temperature at the point and time of the case, K. `refine` multiplies the
+/// cells per axis and the number of steps, 0.25..16. Errors: invalid_argument (a value is out of
+/// range).
 [[nodiscard]] physics::Result<double> lateral_rise_k(const LateralCase& c, double refine);
 
-/// Many cases, spread over the cores. NaN where a case is not valid.
+/// Computes many cases, spread over the cores. The result of a case that is not valid is NaN.
 [[nodiscard]] std::vector<double> lateral_rises_k(std::span<const LateralCase> cases,
                                                   double refine);
 

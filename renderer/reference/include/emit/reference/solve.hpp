@@ -14,32 +14,38 @@
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/scene_desc.hpp"
 
-/// The true image of a scenario: temperatures by conduction in three dimensions (VoxelModel,
-/// SolidSolver, SceneExchange) or in one dimension behind every pixel (PointSolver), visibility by
-/// rays, radiance by its own quadrature of Planck's law. The camera is that of the renderer: rays
-/// go through the centres of the pixels.
+/// The true image of a scenario. Temperatures come from conduction in three dimensions (VoxelModel,
+/// SolidSolver, SceneExchange) or in one dimension below every pixel (PointSolver). Visibility
+/// comes from rays, and radiance from a quadrature of Planck's law of its own. The camera is that
+/// of the renderer: rays go through the centres of the pixels.
 namespace emit::reference {
 
+/// Number of dimensions in which conduction is solved.
 enum class SolveDimension : std::uint8_t {
-  automatic,  ///< three where VoxelModel takes the scene, else one
+  automatic,  ///< three if VoxelModel accepts the scene, else one
   one,
   three
 };
 
+/// Options of a SceneSolver.
 struct SolveOptions {
   SolveDimension dimension = SolveDimension::automatic;
-  std::uint32_t rays = 256;          ///< per face or pixel, for sky and surroundings
-  double refine = 1.0;               ///< three dimensions: multiplies cells per axis; steps follow
-  double tolerance_k = 0.02;         ///< error of one step at refine 1; falls with its square
-  std::uint64_t pixels = 0;          ///< of the surface, the same ones every time; 0: all
-  std::filesystem::path checkpoint;  ///< folder; empty: none. Three dimensions only.
+  std::uint32_t rays = 256;  ///< rays per face or pixel, for sky and surroundings
+  /// Multiplies the cells per axis of three dimensions; the steps follow.
+  double refine = 1.0;
+  /// Error of one step at refine 1, K; it falls with the square of refine.
+  double tolerance_k = 0.02;
+  /// Number of pixels of the surface that are solved, always the same ones; 0 solves all.
+  std::uint64_t pixels = 0;
+  /// Folder of the checkpoint; empty if there is none. Only three dimensions have one.
+  std::filesystem::path checkpoint;
   std::uint32_t checkpoint_steps = 25;
-  /// Called now and then with the share done, from the calling thread; false stops the run (what
-  /// was reached is in the checkpoint). May be empty.
+  /// Called from time to time with the share done, from the calling thread. A return of false stops
+  /// the run, and the checkpoint keeps what was reached. May be empty.
   std::function<bool(double done_frac)> progress;
 };
 
-/// One picture that is wanted.
+/// Request for one image.
 struct SolveView {
   std::int64_t sim_time_ns = 0;
   physics::Pose sensor_pose;
@@ -48,37 +54,41 @@ struct SolveView {
   double fov_h_rad = 0.0;
 };
 
-/// Planes as the renderer's frames have them; NaN where a pixel was not asked for.
+/// Solved image with the channels of a renderer's frame. A pixel that was not asked for is NaN in
+/// all channels.
 struct SolvedImage {
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
-  std::vector<float> temperature_k;                  ///< NaN: sky
-  std::vector<float> depth_m;                        ///< along the boresight, +Inf: sky
-  std::vector<float> object_id;                      ///< object index + 1, 0: sky
-  std::vector<std::vector<float>> radiance_w_m2_sr;  ///< per band of the scenario
-  std::uint64_t surface_px = 0;
-  std::uint64_t solved_px = 0;
+  std::vector<float> temperature_k;                  ///< K; NaN in the sky
+  std::vector<float> depth_m;                        ///< m along the boresight; +Inf in the sky
+  std::vector<float> object_id;                      ///< object index + 1; 0 in the sky
+  std::vector<std::vector<float>> radiance_w_m2_sr;  ///< one channel per band of the scenario
+  std::uint64_t surface_px = 0;                      ///< pixels that show a surface
+  std::uint64_t solved_px = 0;                       ///< pixels that were solved
 };
 
+/// Size and cost of a run.
 struct SolveReport {
   int dimension = 1;
   std::uint64_t nodes = 0;    ///< unknowns of the three-dimensional grid
-  std::uint64_t faces = 0;    ///< exposed ones
-  std::uint64_t patches = 0;  ///< of the radiative exchange
-  SolidStats stats;           ///< of the history; the spin-up apart
-  SolidStats spin_up;
-  bool resumed = false;  ///< from a checkpoint
+  std::uint64_t faces = 0;    ///< number of exposed faces
+  std::uint64_t patches = 0;  ///< number of patches of the radiative exchange
+  SolidStats stats;           ///< counters of the history, without the spin-up
+  SolidStats spin_up;         ///< counters of the spin-up
+  bool resumed = false;       ///< true if the run continued from a checkpoint
   std::vector<std::string> notes;
 };
 
-/// One history, any number of pictures along it. Owner: the caller; one thread at a time.
+/// Solver of a scenario's history, with any number of images along it. Owner: the caller. Thread:
+/// one at a time.
 ///   auto solver = SceneSolver::create(scenario, geometry, options, last_ns);
 ///   solver->advance_to(t1); solver->image({t1, ...}); solver->advance_to(t2); ...
 class SceneSolver {
  public:
-  /// `end_ns`: nothing later is asked for. Errors: unsupported or config (what VoxelModel refuses,
-  /// when three dimensions are demanded), config (checkpoint of another scenario or other options,
-  /// naming what differs), invalid_argument, io.
+  /// Creates a solver. No image after `end_ns` can be asked for. Errors: unsupported or config
+  /// (three dimensions are demanded and VoxelModel refuses the scene), config (the checkpoint
+  /// belongs to another scenario or other options; the message names what differs),
+  /// invalid_argument, io.
   [[nodiscard]] static physics::Result<SceneSolver> create(const scene::ScenarioDesc& scenario,
                                                            const scene::SceneGeometry& geometry,
                                                            const SolveOptions& options,
@@ -87,15 +97,18 @@ class SceneSolver {
   SceneSolver(SceneSolver&&) noexcept;
   SceneSolver& operator=(SceneSolver&&) noexcept;
 
-  /// Three dimensions: integrates to that instant (never back); one: nothing to do. Errors:
-  /// invalid_argument (back), internal (no convergence), io (checkpoint).
+  /// Integrates to an instant if the solution has three dimensions; does nothing in one dimension.
+  /// Errors: invalid_argument (the instant lies in the past), internal (no convergence), io
+  /// (checkpoint).
   [[nodiscard]] physics::Result<void> advance_to(std::int64_t sim_time_ns);
-  /// The picture at the instant reached (three dimensions), or at any instant up to end_ns (one).
+  /// Returns the image at the instant reached (three dimensions), or at any instant up to end_ns
+  /// (one dimension).
   [[nodiscard]] physics::Result<SolvedImage> image(const SolveView& view);
   [[nodiscard]] SolveReport report() const;
-  /// Three dimensions: temperatures of the grid's nodes at the instant reached; else empty.
+  /// Returns the temperatures of the grid's nodes at the instant reached. The result is empty in
+  /// one dimension.
   [[nodiscard]] std::span<const double> node_k() const noexcept;
-  /// True after `progress` stopped the run.
+  /// Returns true after `progress` has stopped the run.
   [[nodiscard]] bool stopped() const noexcept;
 
  private:
@@ -104,7 +117,8 @@ class SceneSolver {
   std::unique_ptr<Data> data_;
 };
 
-/// All views from one history, in ascending time. Errors as SceneSolver.
+/// Solves all views from one history. The views may be in any order; the result has theirs. Images
+/// that a stopped run did not reach are empty. Errors: those of SceneSolver.
 [[nodiscard]] physics::Result<std::vector<SolvedImage>> solve(const scene::ScenarioDesc& scenario,
                                                               const scene::SceneGeometry& geometry,
                                                               std::span<const SolveView> views,

@@ -9,6 +9,7 @@
 
 #include "emit/physics/atmosphere_table.hpp"
 #include "emit/physics/frames.hpp"
+#include "emit/physics/weather.hpp"
 
 /// Plain description of a scenario. `config` fills it from files, `renderer` and `reference` read
 /// it; it holds no loaded geometry and no GPU or parser types. All values SI, angles in radians.
@@ -139,28 +140,8 @@ struct ChannelDesc {
   std::uint32_t every_nth = 1;  ///< shows frames 1, 1 + n, 1 + 2 n, ... of every run
 };
 
-/// Forcing at one instant. Linear between samples, constant outside.
-struct WeatherSample {
-  std::int64_t sim_time_ns = 0;
-  double direct_normal_w_m2 = 0.0;
-  double diffuse_horizontal_w_m2 = 0.0;
-  double longwave_down_w_m2 = 0.0;
-  double air_k = 0.0;
-  double wind_m_s = 0.0;
-  double cloud_frac = 0.0;              ///< beta of Eq. 1 for clear-sky models; 0 for measured sun
-  std::optional<double> environment_k;  ///< surroundings; absent: air temperature
-  std::optional<double> film_w_m2_k;    ///< convection coefficient; not used by emit2014
-};
-
-/// Clear-sky models used when no weather table is given (PHYSICS 9).
-struct ClearSkyDesc {
-  double linke_turbidity = 3.5;
-  double air_mean_k = 290.0;
-  double air_amplitude_k = 6.0;  ///< daily, maximum at 15:00 local solar time
-  double dew_point_k = 282.0;
-  double wind_m_s = 2.0;
-  double cloud_frac = 0.0;
-};
+using physics::ClearSky;
+using physics::WeatherSample;
 
 /// Band transmittance by range: tau(R) = sum a_i exp(-k_i R), sum a_i = 1; path radiance
 /// (1 - tau) L_band(air). Sky radiance by elevation from the vertical transmittance.
@@ -230,7 +211,7 @@ struct ScenarioDesc {
   Place place;
   std::int64_t epoch_utc_ns = 0;       ///< POSIX ns (UTC) of sim time 0
   std::vector<WeatherSample> weather;  ///< empty: clear_sky
-  ClearSkyDesc clear_sky;
+  ClearSky clear_sky;
   AtmosphereDesc atmosphere;
   std::vector<SpectralBand> bands;
   std::vector<Material> materials;  ///< library plus the scenario's own
@@ -240,6 +221,8 @@ struct ScenarioDesc {
   std::vector<ChannelDesc> channels;
   ThermalOptions thermal;
   DisplayOptions display;
+  /// What the loader found doubtful, one sentence each, beginning with the file's name.
+  std::vector<std::string> warnings;
 };
 
 }  // namespace emit::scene

@@ -7,16 +7,19 @@
 #include <concepts>
 #include <cstddef>
 
-/// Parallel loops of set-up and of the reference. They run on oneTBB's threads and allocate, so a
-/// frame uses threads::WorkerPool instead.
+#include "emit/physics/check.hpp"
+
+/// Parallel loops for set-up and for the reference solver. They run on oneTBB's threads and
+/// allocate, so work within a frame uses threads::WorkerPool instead.
 ///
 /// Hand-over and completion are visible to race detectors, which cannot look into oneTBB: a body
 /// reads what the caller wrote before the loop, and the caller reads what the bodies wrote. oneTBB
 /// cuts the range differently in every run, so a result must not depend on the parts.
+/// Thread: any.  Real time: not RT-safe.
 namespace emit::threads {
 
 /// Calls body(part) for parts of `range` on all cores.
-/// @param range        as for tbb::parallel_for
+/// @param range        a range of tbb::parallel_for
 /// @param partitioner  none, or one of oneTBB's partitioners
 template <class Range, class Body, class... Partitioner>
 void parallel_ranges(const Range& range, const Body& body, const Partitioner&... partitioner) {
@@ -37,8 +40,9 @@ void parallel_ranges(const Range& range, const Body& body, const Partitioner&...
 /// @pre grain > 0
 template <class Body>
 void parallel_parts(std::size_t count, std::size_t grain, const Body& body) {
+  EMIT_CHECK_OP(grain, >, 0U);
   parallel_ranges(tbb::blocked_range<std::size_t>(0, count, grain),
-               [&body](const auto& part) { body(part.begin(), part.end()); });
+                  [&body](const auto& part) { body(part.begin(), part.end()); });
 }
 
 /// Calls body(i) for every i of [first, last).

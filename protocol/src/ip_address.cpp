@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/config/network.hpp"
+#include "emit/protocol/ip_address.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -8,7 +8,7 @@
 #include <charconv>
 #include <cstring>
 
-namespace emit::config {
+namespace emit::protocol {
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -22,7 +22,7 @@ std::size_t length_of(const IpAddress& address) noexcept {
   return address.v4 ? 4 : 16;
 }
 
-/// Keeps the first `bits` bits.
+/// Sets all bits behind the first `bits` to 0.
 void cut(std::array<std::uint8_t, 16>& bytes, unsigned bits) noexcept {
   for (unsigned i = 0; i < bytes.size(); ++i) {
     const unsigned kept = bits > i * 8 ? std::min(bits - i * 8, 8U) : 0U;
@@ -90,7 +90,7 @@ physics::Result<Network> parse_network(std::string_view text) {
   if (slash != std::string_view::npos) {
     const std::string_view digits = text.substr(slash + 1);
     const auto parsed = std::from_chars(digits.data(), digits.data() + digits.size(), bits);
-    // An IPv4 network spelled as IPv6 counts its bits from there.
+    // The prefix of an IPv4 network in IPv6 spelling counts the bits of IPv6.
     const bool mapped = address->v4 && host.find(':') != std::string_view::npos;
     if (parsed.ec != std::errc() || parsed.ptr != digits.data() + digits.size() || digits.empty() ||
         (mapped && bits < kMappedBits)) {
@@ -111,4 +111,4 @@ std::string to_string(const Network& network) {
   return fmt::format("{}/{}", to_string(network.first), network.prefix_bits);
 }
 
-}  // namespace emit::config
+}  // namespace emit::protocol

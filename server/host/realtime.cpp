@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "rt/realtime.hpp"
+#include "host/realtime.hpp"
 
 #include <fmt/format.h>
 #include <linux/capability.h>

@@ -9,37 +9,37 @@
 
 #include "emit/physics/error.hpp"
 
-namespace emit::config {
+namespace emit::protocol {
 
-/// An internet address without port. IPv4 in the first 4 bytes; an IPv4 address mapped into IPv6
-/// (::ffff:a.b.c.d) is the IPv4 address.
+/// An internet address without port. IPv4 addresses stand in the first 4 bytes. An IPv4 address
+/// mapped into IPv6 (::ffff:a.b.c.d) counts as the IPv4 address.
 struct IpAddress {
   bool v4 = true;
   std::array<std::uint8_t, 16> bytes{};
 
-  /// 127.0.0.0/8 and ::1.
+  /// True for 127.0.0.0/8 and ::1.
   [[nodiscard]] bool is_loopback() const noexcept;
   friend bool operator==(const IpAddress&, const IpAddress&) = default;
 };
 
-/// From the 4 or 16 bytes of an address in network order. Thread: any. RT-safe.
+/// Address from its 4 or 16 bytes in network order. Thread: any. RT-safe.
 [[nodiscard]] IpAddress ip_from_bytes(std::span<const std::uint8_t> bytes) noexcept;
-/// "10.1.2.3", "fd00::1". Empty when it is no address in numbers.
+/// Reads a numeric address such as "10.1.2.3" or "fd00::1". Empty when it is none.
 [[nodiscard]] std::optional<IpAddress> parse_ip(std::string_view text) noexcept;
 [[nodiscard]] std::string to_string(const IpAddress& address);
 
-/// The addresses that begin with the same bits (RFC 4632, RFC 4291 section 2.3).
+/// Set of the addresses that begin with the same bits (RFC 4632, RFC 4291 section 2.3).
 struct Network {
-  IpAddress first;                ///< bits behind the prefix are 0
+  IpAddress first;                ///< the bits behind the prefix are 0
   std::uint8_t prefix_bits = 32;  ///< 0..32, 0..128
 
-  /// Never true across families: ::/0 holds no IPv4 address. Thread: any. RT-safe.
+  /// True when the address is in the set. ::/0 contains no IPv4 address. Thread: any. RT-safe.
   [[nodiscard]] bool contains(const IpAddress& address) const noexcept;
   friend bool operator==(const Network&, const Network&) = default;
 };
 
-/// "10.0.0.0/8", "fd00::/8", or one address. Errors (config), naming the text: not an address, a
-/// prefix too long, bits set behind the prefix.
+/// Reads "10.0.0.0/8", "fd00::/8" or one address. Errors (config) name the text: it is no address,
+/// its prefix is too long, or bits behind the prefix are set.
 [[nodiscard]] physics::Result<Network> parse_network(std::string_view text);
 [[nodiscard]] std::string to_string(const Network& network);
 
@@ -51,4 +51,4 @@ struct Network {
   return false;
 }
 
-}  // namespace emit::config
+}  // namespace emit::protocol
