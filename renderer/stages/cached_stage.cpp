@@ -140,6 +140,7 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
                          std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
                          std::optional<ShadePass> shade_pass, bool software)
     : sensor_(scenario.sensor),
+      max_samples_(scenario.thermal.max_samples),
       software_(software),
       static_bounds_(static_bounds),
       detail_eyes_(std::move(detail_eyes)),
@@ -209,6 +210,7 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.samples = surface_->model().samples.samples.size();
   stats.sample_bytes = surface_->sample_bytes();
   stats.samples_full = surface_->model().full;
+  stats.max_samples = max_samples_;
   stats.coarse_meshes = visibly_simplified_;
 }
 

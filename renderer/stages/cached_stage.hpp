@@ -58,6 +58,7 @@ class CachedStage final : public ThermalStage {
               std::optional<ShadePass> shade_pass, bool software);
 
   scene::SensorDesc sensor_;
+  std::uint32_t max_samples_ = 0;  ///< thermal.max_samples
   bool software_ = false;  ///< the device is
   scene::Aabb static_bounds_;
   std::vector<Eye> detail_eyes_;   ///< meshes were simplified for these

@@ -8,7 +8,6 @@
 #include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/sheet_sides.hpp"
-#include "surface/warm_up/surface_partners.hpp"
 
 namespace emit::renderer {
 namespace {

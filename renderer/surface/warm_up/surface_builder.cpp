@@ -27,6 +27,9 @@ constexpr std::uint32_t kMaxRounds = 400;
 constexpr float kNeedStep = 4.0F;
 constexpr std::size_t kRoundShare = 8;
 constexpr std::size_t kLeastPerRound = 256;
+/// A round for which samples do not suffice is the last when it adds no more than that share of
+/// all.
+constexpr std::size_t kLastFraction = 256;
 constexpr std::size_t kGrain = 64;
 /// The full surface is looked for within this share of the halved edge.
 constexpr float kDetailReachFrac = 0.5F;
@@ -47,6 +50,7 @@ class Builder {
         progress_(progress),
         worth_(inputs),
         sampler_(inputs, worth_, options),
+        partners_(inputs, sampler_),
         refinement_(inputs, worth_, view, options) {}
 
   physics::Result<SurfaceModel> run();
@@ -78,11 +82,15 @@ class Builder {
   const SurfaceProgress& progress_;
   DriveWorth worth_;
   PatchSampler sampler_;
+  PartnerFinder partners_;  ///< used where heat moves across edges
   SurfaceRefinement refinement_;
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
   std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
-  std::size_t sample_count_ = 0;  ///< of all patches
+  std::size_t sample_count_ = 0;   ///< of all patches, with their partners
+  std::size_t partner_count_ = 0;  ///< of these, partners
+  std::size_t least_count_ = 0;    ///< of samples before anything is refined
+  bool short_of_samples_ = false;  ///< leaves stayed whole for want of samples in this round
   // By vertex of the mesh at hand, filled for those that have no sample yet:
   std::vector<glm::vec3> inward_;
   std::vector<glm::vec3> place_m_;  ///< of its samples
@@ -158,6 +166,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       }
       looked = true;
       patch.grow(vertices.size());
+      if (options_.lateral) partners_.grow(p, vertices.size());
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
         SurfaceSample& sample = patch.samples[v];
         const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
@@ -191,7 +200,10 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
     threads::parallel_parts(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
       PatchSampler::StartMemo memo;
       for (std::size_t j = begin + from; j < begin + to; ++j) {
-        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_stand_[j], memo);
+        const Job& job = jobs_[j];
+        SurfacePatch& patch = patches_[job.patch];
+        sampler_.evaluate(patch, job.index, job_stand_[j], memo);
+        if (options_.lateral) partners_.find(job.patch, job.index, patch.samples[job.index]);
       }
     });
     const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());
@@ -199,6 +211,11 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   }
   for (const Job& job : jobs_) {
     SurfacePatch& patch = patches_[job.patch];
+    if (options_.lateral) {
+      const std::size_t found = partners_.count(job.patch, job.index);
+      partner_count_ += found;
+      sample_count_ += found;
+    }
     const RefinedMesh::Vertex& vertex = model_.meshes[patch.mesh].vertices()[job.index];
     if (vertex.parent[0] == job.index) continue;
     const float mean_k = 0.5F * (patch.outputs[vertex.parent[0]].offset_k +
@@ -260,8 +277,15 @@ void Builder::split(std::uint32_t mesh, float above) {
       options_.max_samples > sample_count_ ? options_.max_samples - sample_count_ : 0;
   const std::size_t vertices = refined.vertices().size();
   const std::size_t samples = samples_of(mesh);
-  // A vertex of a sheet has two samples.
-  const std::size_t most = left / (samples > vertices ? 2 * uses : uses);
+  // Leave room for the partners of new samples: half as many again as those before them have. A
+  // vertex of a sheet has two samples.
+  constexpr double kMorePartners = 1.5;
+  const double partners_of_sample =
+      kMorePartners * static_cast<double>(partner_count_) /
+      static_cast<double>(std::max<std::size_t>(sample_count_ - partner_count_, 1));
+  const double samples_of_vertex = static_cast<double>(samples > vertices ? 2 * uses : uses);
+  const auto most = static_cast<std::size_t>(static_cast<double>(left) /
+                                             (samples_of_vertex * (1.0 + partners_of_sample)));
   refined.limit(vertices + most);
   if (needs_.size() > most) {
     std::ranges::sort(needs_, [](const auto& a, const auto& b) {
@@ -270,9 +294,13 @@ void Builder::split(std::uint32_t mesh, float above) {
   }
   slots_.clear();
   for (const SurfaceRefinement::Need& need : needs_) slots_.push_back(need.slot);
-  if (!refined.split(slots_)) model_.full = true;
+  const bool complete = refined.split(slots_);
   sample_count_ += (samples_of(mesh) - samples) * uses;
-  refinement_.leave(mesh, refined, slots_);
+  if (complete) {
+    refinement_.leave(mesh, refined, slots_);
+  } else {
+    short_of_samples_ = true;
+  }
 }
 
 float Builder::need_of_neediest() {
@@ -298,9 +326,11 @@ physics::Result<SurfaceModel> Builder::run() {
   make_patches();
   // How far refinement will go is not known: each round takes a share of what is left.
   double done_frac = 0.0;
+  std::size_t count_before = 0;  // of samples, in the round before
   const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
   double to_frac = next_frac();
   if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+  least_count_ = sample_count_;
   // Where need is greatest first: when samples run out, what is left matters least.
   for (std::uint32_t round = 0;; ++round) {
     SurfaceRefinement::Most most;
@@ -310,19 +340,31 @@ physics::Result<SurfaceModel> Builder::run() {
       most.need = std::max(most.need, here.need);
       most.in_view = std::max(most.in_view, here.in_view);
     }
-    if (model_.full || round == kMaxRounds) {
+    // Stop where samples have run out: what a round leaves room for the next one takes, until next
+    // to nothing is left.
+    const bool none_left = short_of_samples_ &&
+                           sample_count_ - count_before <= options_.max_samples / kLastFraction;
+    if (none_left || round == kMaxRounds) {
       model_.full = true;
       model_.full_in_view = most.in_view > 0.0F;
       break;
     }
     if (most.need == 0.0F) break;
+    short_of_samples_ = false;
+    count_before = sample_count_;
     const float above = std::min(most.need / kNeedStep, need_of_neediest());
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
     done_frac = to_frac;
     to_frac = next_frac();
     if (!sample_new_vertices(done_frac, to_frac)) return stopped();
   }
-  if (options_.lateral) add_partners(in_, sampler_, patches_);
+  if (options_.lateral) {
+    // The partners of the last samples may be more than room was left for.
+    if (sample_count_ > options_.max_samples && sample_count_ > least_count_) {
+      partners_.drop(sample_count_ - std::max(options_.max_samples, least_count_));
+    }
+    partners_.append(patches_);
+  }
   number_samples(in_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
   SampleHistories histories = take_histories(in_, patches_, model_);

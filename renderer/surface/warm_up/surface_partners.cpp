@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <tuple>
+#include <utility>
 
+#include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
 
 namespace emit::renderer {
@@ -23,31 +26,9 @@ constexpr float kFlatReaches = 5.5F;
 /// its face.
 constexpr float kBesideOffsets = 6.0F;
 
-class Partners {
- public:
-  Partners(const SurfaceInputs& inputs, const PatchSampler& sampler,
-           std::vector<SurfacePatch>& patches)
-      : in_(inputs), sampler_(sampler), patches_(patches) {}
+}  // namespace
 
-  /// Appends one patch with all partners.
-  void add();
-
- private:
-  void find(SurfacePatch& patch, std::uint32_t index);
-  [[nodiscard]] std::array<float, physics::kMaxFosterModes> weights(std::uint32_t material,
-                                                                    float distance_m) const;
-
-  const SurfaceInputs& in_;
-  const PatchSampler& sampler_;
-  std::vector<SurfacePatch>& patches_;
-  struct Found {
-    SurfaceSample sample;
-    float distance_m = 0.0F;
-  };
-  std::vector<std::vector<Found>> found_;  ///< by vertex of the patch at hand
-};
-
-std::array<float, physics::kMaxFosterModes> Partners::weights(std::uint32_t material,
+std::array<float, physics::kMaxFosterModes> PartnerFinder::weights(std::uint32_t material,
                                                               float distance_m) const {
   std::array<float, physics::kMaxFosterModes> out{};
   const double a = diffusivity_m2_s(in_.materials[material]);
@@ -60,8 +41,20 @@ std::array<float, physics::kMaxFosterModes> Partners::weights(std::uint32_t mate
   return out;
 }
 
-void Partners::find(SurfacePatch& patch, std::uint32_t index) {
-  const SurfaceSample& own = patch.samples[index];
+float PartnerFinder::greatest_weight(std::uint32_t material, float distance_m) const {
+  const auto weight = weights(material, distance_m);
+  return *std::ranges::max_element(weight);
+}
+
+void PartnerFinder::grow(std::size_t patch, std::size_t vertices) {
+  if (found_.size() <= patch) found_.resize(patch + 1);
+  found_[patch].resize(vertices);
+}
+
+void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceSample& own) {
+  EMIT_DCHECK_OP(patch, <, found_.size());
+  EMIT_DCHECK_OP(vertex, <, found_[patch].size());
+  std::vector<Found>& partners = found_[patch][vertex];
   const scene::Material& material = in_.materials[own.material];
   const double a = diffusivity_m2_s(material);
   const physics::FosterNetwork& network = in_.history.network(own.material);
@@ -82,7 +75,7 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
   const float offset_m = sampler_.tracer().offsets(own.position_m, -1).around_m;
   const ViewPoint point{own.position_m, own.normal, glm::vec3(0.0F), offset_m};
   const AdjacentFaces adjacent = adjacent_faces(in_.places, point, reach_m, selection);
-  for (std::uint32_t k = 0; k < adjacent.count && found_[index].size() < kMaxPartners; ++k) {
+  for (std::uint32_t k = 0; k < adjacent.count && partners.size() < kMaxPartners; ++k) {
     const glm::vec3 m = adjacent.faces[k].normal;
     const float x_m = std::max(adjacent.faces[k].distance_m, 0.0F);
     // Step to the point on the other face that is as far from the edge as the own one.
@@ -118,28 +111,50 @@ void Partners::find(SurfacePatch& patch, std::uint32_t index) {
         in_.places.first_hits({&beside, 1}, selection, hit) != 0U &&
         std::abs(hit[0].distance_m - x_m) < kBesideOffsets * offset_m &&
         glm::dot(hit[0].normal, m) < -0.9F;
-    const auto weight = weights(own.material, x_m);
-    if (*std::ranges::max_element(weight) < kMinWeightFrac) continue;
-    found_[index].push_back(found);
+    if (greatest_weight(own.material, x_m) < kMinWeightFrac) continue;
+    partners.push_back(found);
   }
 }
 
-void Partners::add() {
+void PartnerFinder::drop(std::size_t count) {
+  // List all partners by what they weigh; equal ones by the sample they belong to.
+  struct Place {
+    float weight_frac = 0.0F;
+    std::uint32_t patch = 0;
+    std::uint32_t vertex = 0;
+  };
+  std::vector<Place> places;
+  for (std::uint32_t p = 0; p < found_.size(); ++p) {
+    for (std::uint32_t v = 0; v < found_[p].size(); ++v) {
+      for (const Found& found : found_[p][v]) {
+        places.push_back({greatest_weight(found.sample.material, found.distance_m), p, v});
+      }
+    }
+  }
+  count = std::min(count, places.size());
+  std::ranges::sort(places, [](const Place& a, const Place& b) {
+    return std::tie(a.weight_frac, a.patch, a.vertex) < std::tie(b.weight_frac, b.patch, b.vertex);
+  });
+  // Take the farthest partner off each of the first ones' samples.
+  for (std::size_t i = 0; i < count; ++i) {
+    std::vector<Found>& partners = found_[places[i].patch][places[i].vertex];
+    partners.erase(std::ranges::max_element(partners, {}, &Found::distance_m));
+  }
+}
+
+void PartnerFinder::append(std::vector<SurfacePatch>& patches) const {
+  EMIT_CHECK_OP(found_.size(), ==, patches.size());
   SurfacePatch partners;
-  const std::size_t own_patches = patches_.size();
-  for (std::size_t p = 0; p < own_patches; ++p) {
-    SurfacePatch& patch = patches_[p];
-    found_.assign(patch.samples.size(), {});
-    threads::parallel_parts(patch.samples.size(), kGrain, [&](std::size_t from, std::size_t to) {
-      for (std::size_t i = from; i < to; ++i) find(patch, static_cast<std::uint32_t>(i));
-    });
-    for (std::size_t i = 0; i < found_.size(); ++i) {
-      for (std::size_t k = 0; k < found_[i].size(); ++k) {
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    SurfacePatch& patch = patches[p];
+    for (std::size_t i = 0; i < found_[p].size(); ++i) {
+      for (std::size_t k = 0; k < found_[p][i].size(); ++k) {
+        const Found& found = found_[p][i][k];
         Partner& own = patch.samples[i].partners[k];
         own.sample = static_cast<std::uint32_t>(partners.samples.size());
-        own.distance_m = found_[i][k].distance_m;
+        own.distance_m = found.distance_m;
         own.weight_frac = weights(patch.samples[i].material, own.distance_m);
-        SurfaceSample sample = found_[i][k].sample;
+        SurfaceSample sample = found.sample;
         // Note whom the partner belongs to, until samples are numbered.
         sample.partners[0] = {static_cast<std::uint32_t>(i), own.distance_m,
                               weights(sample.material, own.distance_m)};
@@ -149,9 +164,9 @@ void Partners::add() {
     }
   }
   const std::size_t count = partners.samples.size();
-  const std::size_t intervals = in_.record.size();
   std::vector<SurfaceSample> samples = std::move(partners.samples);
-  partners.begin(intervals, !in_.movers_now.empty(), sampler_.keeps_sent());
+  partners.samples = {};
+  partners.begin(in_.record.size(), !in_.movers_now.empty(), sampler_.keeps_sent());
   partners.grow(count);
   partners.samples = std::move(samples);
   threads::parallel_parts(count, kGrain, [&](std::size_t from, std::size_t to) {
@@ -161,14 +176,7 @@ void Partners::add() {
                         {partners.samples[i].position_m, glm::vec3(0.0F)}, memo);
     }
   });
-  patches_.push_back(std::move(partners));
-}
-
-}  // namespace
-
-void add_partners(const SurfaceInputs& inputs, const PatchSampler& sampler,
-                  std::vector<SurfacePatch>& patches) {
-  Partners(inputs, sampler, patches).add();
+  patches.push_back(std::move(partners));
 }
 
 }  // namespace emit::renderer

@@ -127,6 +127,7 @@ struct SceneStats {
   std::uint64_t samples = 0;
   std::uint64_t sample_bytes = 0;
   bool samples_full = false;
+  std::uint64_t max_samples = 0;  ///< thermal.max_samples; fewer than the meshes need do not bind
   /// For want of samples meshes lost detail that pixels show (thermal.max_samples).
   bool coarse_meshes = false;
   /// Doubts of the scenario's and the scene's loaders: unmapped materials, gaps of the weather.
