@@ -62,13 +62,14 @@ server/agents/recorder: server/agents server/net server/rt config/include protoc
 server/agents/render: server/agents server/pacing renderer/image renderer/physics
 server/app: server/host server/agents server/agents/conductor server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/tool/support: server/app server/pacing config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
-server/tool/streams: server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
+server/tool/command_line: server/tool/support renderer/physics
+server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
 server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
-server/bench/stability: server/tool/support renderer/image renderer/include renderer/physics renderer/scene renderer/verify
-server/bench/accuracy: server/tool/support server/bench/stability renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/threads renderer/verify
-server/bench/frame_time: server/tool/support server/bench/accuracy server/bench/stability server/pacing renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
-server/bench/stream: server/tool/support server/tool/streams server/agents server/client server/net server/rt config/include protocol renderer/physics
-server/tool/commands: server/tool/support server/tool/streams server/tool/view server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/verify
+server/bench/stability: server/tool/command_line server/tool/support renderer/image renderer/include renderer/physics renderer/scene renderer/verify
+server/bench/accuracy: server/tool/command_line server/tool/support server/bench/stability renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/threads renderer/verify
+server/bench/frame_time: server/tool/command_line server/tool/support server/bench/accuracy server/bench/stability server/pacing renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
+server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/rt config/include protocol renderer/physics
+server/tool/commands: server/tool/command_line server/tool/support server/tool/streams server/tool/view server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/support
 '
 
@@ -183,7 +184,7 @@ only Embree   'embree3/'          'renderer/reference/|renderer/surface/rays/cas
 only Eigen    'Eigen/'            'renderer/reference/'
 only Ceres    'ceres/'            'renderer/reference/'
 only OpenSSL  'openssl/'          'protocol/src/|server/net/tls_|server/app/sha256'
-only CLI11    'CLI/'              'server/'
+only CLI11    'CLI/'              'server/tool/command_line/command_line.cpp'
 
 missing=$(git ls-files -- '*.cpp' '*.hpp' '*.h' '*.glsl' '*.comp' '*.vert' '*.frag' '*.sh' '*.py' '*.cmake' \
     '*CMakeLists.txt' '*.proto' | xargs grep -L 'SPDX-License-Identifier: Apache-2.0' || true)

@@ -26,7 +26,8 @@ namespace limits = physics::limits;
 
 constexpr double kMaxSpeedMS = 1e6;
 constexpr double kMaxAngularRateRadS = 1e4;
-/// Squared norms nearer to 1 are left alone, so that decoding what was decoded changes no bit.
+/// Largest difference of a squared norm from 1 that is not normalised away, so that decoding a
+/// decoded value changes no bit.
 constexpr double kNormTolerance = 1e-12;
 
 glm::dvec3 from(const v1::Vector3& in) noexcept {
@@ -157,7 +158,8 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcep
   out.cloud_frac = in.cloud_frac();
   if (in.has_environment_k()) out.environment_k = in.environment_k();
   if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
-  // Live weather can do nothing that a scenario cannot: the ranges are those of both.
+  // The ranges are those of a scenario's weather, so that live weather can do nothing that a
+  // scenario cannot.
   const bool valid = limits::kDirectNormalWM2.contains(out.direct_normal_w_m2) &&
                      limits::kDiffuseHorizontalWM2.contains(out.diffuse_horizontal_w_m2) &&
                      limits::kLongwaveDownWM2.contains(out.longwave_down_w_m2) &&

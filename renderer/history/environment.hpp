@@ -52,7 +52,7 @@ class Environment {
   physics::ClearSky clear_sky_;
   std::vector<physics::WeatherSample> table_;
   std::vector<physics::WeatherSample> live_;
-  std::vector<std::int64_t> changes_ns_;  ///< times of live_
+  std::vector<std::int64_t> changes_ns_;  ///< times of the rows of live_
   std::vector<std::uint64_t> revisions_;  ///< revisions of the rows of live_, ascending
   std::uint64_t revision_ = 0;
   std::uint64_t reset_revision_ = 0;

@@ -6,7 +6,8 @@
 namespace emit::renderer {
 namespace {
 
-/// Surfaces show hardly any print of shadows sooner.
+/// Length of a short thermal history, ns. Shadows leave hardly any thermal trace on surfaces within
+/// it.
 constexpr std::int64_t kShortHistoryNs = 600'000'000'000;
 
 double seconds(std::int64_t ns) noexcept {
@@ -21,7 +22,7 @@ std::vector<std::string> first_frame_warnings(const scene::ScenarioDesc& scenari
   const scene::ThermalOptions& thermal = scenario.thermal;
   const std::string file = scenario.file.empty() ? "scenario" : scenario.file.string();
   const double frame_s = seconds(thermal_time_ns);
-  // One row is constant weather, at all times.
+  // A table of one row is constant weather, at all times.
   if (scenario.weather.size() > 1 && scenario.weather.back().sim_time_ns < thermal_time_ns) {
     out.push_back(
         fmt::format("{}: the weather covers {} s to {} s, but the frame at {} s needs it from {} s "

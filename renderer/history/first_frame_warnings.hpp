@@ -8,8 +8,9 @@
 
 namespace emit::renderer {
 
-/// What the scenario lacks for a first frame at that simulation time, one sentence each: weather up
-/// to the frame, and a thermal history before it. Setup only; any thread.
+/// Returns what the scenario lacks for a first frame at that simulation time, one sentence each:
+/// weather up to the frame, and a thermal history before it.
+/// Thread: any.  Real time: setup only.
 [[nodiscard]] std::vector<std::string> first_frame_warnings(const scene::ScenarioDesc& scenario,
                                                             std::int64_t thermal_time_ns);
 

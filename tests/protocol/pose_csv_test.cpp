@@ -72,7 +72,7 @@ TEST_F(PoseCsv, ErrorsNameFileLineAndColumn) {
               HasSubstr(":2:1: invalid pose: position 0, 0, 0 m"));
   EXPECT_THAT(outcome(head + "0,nan,0,0,1,0,0,0,7\n"), HasSubstr(":2:1: invalid pose"));
   EXPECT_THAT(outcome(head + "1e300,0,0,0,1,0,0,0,7\n"), HasSubstr("1e300 is out of range"));
-  // What a host may not send in a datagram cannot stand in a file either.
+  // A value that a host may not send in a datagram is refused in a file too.
   EXPECT_EQ(outcome(head + "1e9,0,0,0,1,0,0,0,7\n"), "1 rows");
   EXPECT_THAT(outcome(head + "1000000001,0,0,0,1,0,0,0,7\n"), HasSubstr("is out of range"));
   EXPECT_THAT(outcome(head + "1,0,0,0,1,0,0,0,7\n0,0,0,0,1,0,0,0,8\n"),

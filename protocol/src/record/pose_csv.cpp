@@ -33,7 +33,7 @@ constexpr std::size_t kMandatory = kFrame;
 
 struct PoseCsvReader::Impl {
   CsvReader csv;
-  std::array<std::optional<std::size_t>, kColumns> place;  ///< of each column in a row
+  std::array<std::optional<std::size_t>, kColumns> place;  ///< position of each column in a row
   HostFrameData host;
   bool has_row = false;
   std::optional<Error> failure;
@@ -108,7 +108,7 @@ struct PoseCsvReader::Impl {
     }
     const auto frame = frame_number();
     if (!frame) return tl::unexpected(frame.error());
-    // The same rules as for a pose from the wire.
+    // Apply the same rules as to a pose from the wire.
     const physics::Pose pose{{values[kEast], values[kNorth], values[kUp]},
                              {values[kQw], values[kQx], values[kQy], values[kQz]}};
     v1::Pose message;

@@ -8,19 +8,25 @@
 #include <functional>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
+#include "bench/accuracy/accuracy_benches.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/reference/layer_mesh.hpp"
 #include "emit/reference/layer_solver.hpp"
 #include "emit/reference/solid_solver.hpp"
 #include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/svg_plot.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct ConvergenceOptions {
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> plot;
+};
 
 using physics::Result;
 using reference::SolidSolver;
@@ -203,9 +209,7 @@ Plot diagram(const std::vector<Row>& rows) {
   return plot;
 }
 
-}  // namespace
-
-int run_bench_convergence(const BenchConvergenceCommand& command) {
+int run(const ConvergenceOptions& command) {
   const std::array<Study, 4> studies{{
       {"layer",
        "time",
@@ -278,6 +282,21 @@ int run_bench_convergence(const BenchConvergenceCommand& command) {
   json.set("results", std::move(results));
   if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   return kExitOk;
+}
+
+void add_options(CommandLine& line, ConvergenceOptions& options) {
+  line.path("--plot", options.plot, "Write the diagrams as SVG");
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_convergence(CommandLine& bench) {
+  bench.command<ConvergenceOptions>(
+      {.name = "convergence",
+       .text = "How the error of the reference solvers falls with their cells and steps",
+       .example = "emit bench convergence --plot convergence.svg"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -11,11 +11,12 @@
 #include <numeric>
 #include <optional>
 
+#include "bench/accuracy/accuracy_benches.hpp"
 #include "bench/accuracy/bench_rules.hpp"
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "bench/accuracy/converged_history.hpp"
 #include "bench/accuracy/embree_yardstick.hpp"
+#include "bench/accuracy/error_figures.hpp"
+#include "bench/accuracy/error_regions.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/reference/solve.hpp"
 #include "emit/reference/visibility.hpp"
@@ -23,8 +24,8 @@
 #include "emit/scene/mesh.hpp"
 #include "emit/scene/sheets.hpp"
 #include "emit/version.hpp"
-#include "bench/accuracy/error_figures.hpp"
-#include "bench/accuracy/error_regions.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/scenario_input.hpp"
@@ -33,6 +34,22 @@
 
 namespace emit::tool {
 namespace {
+
+struct ErrorOptions {
+  std::optional<std::filesystem::path> json;
+  std::optional<std::filesystem::path> csv;
+  std::optional<std::filesystem::path> plot;
+  std::optional<std::filesystem::path> figures;
+  std::vector<std::string> scenes;
+  bool quick = false;
+  std::uint32_t frames = 3;
+  std::uint32_t width_px = 320;
+  std::uint32_t height_px = 256;
+  std::uint32_t rays = 256;
+  double refine = 1.0;
+  std::uint64_t pixels = 0;
+  int gpu_index = -1;
+};
 
 using Clock = std::chrono::steady_clock;
 using physics::Result;
@@ -131,7 +148,7 @@ struct Shot {
 };
 
 Result<Shot> shoot(scene::ScenarioDesc scenario, const Setting& setting,
-                   const reference::SolveView& view, const BenchErrorCommand& command) {
+                   const reference::SolveView& view, const ErrorOptions& command) {
   scene::ThermalOptions& thermal = scenario.thermal;
   thermal.method = setting.method == Method::cached ? scene::ThermalMethod::cached
                                                     : scene::ThermalMethod::per_frame;
@@ -231,7 +248,7 @@ std::string describe(const reference::SolveReport& report, std::uint32_t rays) {
 }
 
 Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::SolveView& view,
-                          const BenchErrorCommand& command, const std::string& label) {
+                          const ErrorOptions& command, const std::string& label) {
   auto geometry = scene::load_scene(scenario);
   if (!geometry) return tl::unexpected(geometry.error());
   scene::adopt_sheets(*geometry);
@@ -306,7 +323,7 @@ std::uint32_t modes_of(const Setting& setting) {
   return setting.model == scene::ThermalModel::emit2014 ? 2 : setting.modes;
 }
 
-Json row_json(const Row& row, const BenchErrorCommand& command, const std::string& reference) {
+Json row_json(const Row& row, const ErrorOptions& command, const std::string& reference) {
   const Setting& s = row.setting;
   Json json = Json::object();
   json.set("scene", row.scene).set("region", name_of(row.region)).set("method", name_of(s.method));
@@ -407,79 +424,93 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
   return plot;
 }
 
-}  // namespace
-
-int run_bench_error(const BenchErrorCommand& command) {
-  const std::vector<std::string> scenes =
-      command.scenes.empty()
-          ? std::vector<std::string>{"block-on-road", "ribbed", "statue", "airfield"}
-          : command.scenes;
-  const std::vector<Setting> settings = sweep(command.quick);
-  const InterruptGuard interrupt;
+/// What the suite has found so far.
+struct Findings {
   std::vector<Row> rows;
-  std::map<std::string, std::string> reference_text;
+  std::map<std::string, std::string> reference_text;  ///< by scene
   std::string device;
-  TextTable references({"scene", "reference", "pixels", "solve s", "edge band m"});
-  for (const std::string& name : scenes) {
-    auto scenario = load_scenario_choice({name, {}});
-    if (!scenario) return fail_config(scenario.error());
-    scenario->sensor.width_px = command.width_px;
-    scenario->sensor.height_px = command.height_px;
-    scenario->thermal.model = scene::ThermalModel::foster;
-    if (scenario->thermal.spin_up_ns == 0) scenario->thermal.spin_up_ns = kSpinUpNs;
-    const std::int64_t now_ns = observation_ns(*scenario);
-    if (scenario->sensor.trajectory.empty()) {
-      return fail(kExitConfig, fmt::format("{}: the sensor has no trajectory", name));
-    }
-    const TrajectorySample sensor = sample_trajectory(scenario->sensor.trajectory, now_ns, now_ns);
-    const reference::SolveView view{now_ns, sensor.pose, command.width_px, command.height_px,
-                                    scenario->sensor.fov_h_rad};
-    const auto truth = solve_truth(*scenario, view, command, name);
-    if (!truth) return fail(truth.error());
-    reference_text[name] = describe(truth->report, command.rays);
-    references.add({name, reference_text[name], fmt::format("{}", truth->image.solved_px),
-                    fmt::format("{:.1f}", truth->solve_s), fmt::format("{:.3f}", truth->edge_m)});
+  TextTable references{{"scene", "reference", "pixels", "solve s", "edge band m"}};
+};
 
-    ProgressBar progress("settings of " + name, settings.size());
-    std::uint64_t done = 0;
-    ErrorFigures figures(name, view, truth->image);
-    for (const Setting& setting : settings) {
-      const auto shot = setting.method == Method::embree ? trace(*scenario, setting, view)
-                                                         : shoot(*scenario, setting, view, command);
-      if (!shot) return fail(shot.error());
-      if (!shot->device.empty()) device = shot->device;
-      if (setting.steps == 27 && setting.spacing == scene::StepSpacing::geometric &&
-          setting.shadow_map_px == 1024 && setting.filter_taps == 32 && setting.modes == 0 &&
-          setting.tolerance_k == 0.1 && setting.lateral) {
-        figures.add(setting.method == Method::cached ? std::string(name_of(setting.method))
-                                                     : std::string(name_of(setting.model)),
-                    shot->temperature_k);
-      }
-      for (std::size_t r = 0; r < kRegions.size(); ++r) {
-        Row row;
-        row.scene = name;
-        row.region = kRegions[r];
-        row.setting = setting;
-        row.frame_ms = shot->frame_ms;
-        row.warm_up_ms = shot->warm_up_ms;
-        row.kelvin = summarize_error(shot->temperature_k, truth->image.temperature_k,
-                                     truth->masks[r], false);
-        if (!shot->radiance_w_m2_sr.empty()) {
-          row.fraction = summarize_error(shot->radiance_w_m2_sr, truth->image.radiance_w_m2_sr[0],
-                                         truth->masks[r], true);
-        }
-        rows.push_back(std::move(row));
-      }
-      progress.advance_to(++done);
-    }
-    if (command.figures) {
-      if (auto written = figures.write(*command.figures, scenario->display); !written) {
-        return fail(written.error());
-      }
-    }
+/// The setting that the figures of every scene show.
+bool is_standard(const Setting& setting) {
+  return setting.steps == 27 && setting.spacing == scene::StepSpacing::geometric &&
+         setting.shadow_map_px == 1024 && setting.filter_taps == 32 && setting.modes == 0 &&
+         setting.tolerance_k == 0.1 && setting.lateral;
+}
+
+/// The shipped scenario as this suite looks at it. Errors: config.
+Result<scene::ScenarioDesc> suite_scenario(const std::string& name, const ErrorOptions& command) {
+  auto scenario = load_scenario_choice({name, {}});
+  if (!scenario) return scenario;
+  scenario->sensor.width_px = command.width_px;
+  scenario->sensor.height_px = command.height_px;
+  scenario->thermal.model = scene::ThermalModel::foster;
+  if (scenario->thermal.spin_up_ns == 0) scenario->thermal.spin_up_ns = kSpinUpNs;
+  if (scenario->sensor.trajectory.empty()) {
+    return physics::make_error(physics::ErrorCode::config,
+                               fmt::format("{}: the sensor has no trajectory", name));
   }
-  mark_pareto(rows);
+  return scenario;
+}
 
+/// One row per region.
+void add_rows(const std::string& scene, const Setting& setting, const Shot& shot,
+              const Truth& truth, std::vector<Row>& rows) {
+  for (std::size_t r = 0; r < kRegions.size(); ++r) {
+    Row row;
+    row.scene = scene;
+    row.region = kRegions[r];
+    row.setting = setting;
+    row.frame_ms = shot.frame_ms;
+    row.warm_up_ms = shot.warm_up_ms;
+    row.kelvin =
+        summarize_error(shot.temperature_k, truth.image.temperature_k, truth.masks[r], false);
+    if (!shot.radiance_w_m2_sr.empty()) {
+      row.fraction = summarize_error(shot.radiance_w_m2_sr, truth.image.radiance_w_m2_sr[0],
+                                     truth.masks[r], true);
+    }
+    rows.push_back(std::move(row));
+  }
+}
+
+/// The reference of one scene and all settings against it.
+Result<void> run_scene(const std::string& name, const std::vector<Setting>& settings,
+                       const ErrorOptions& command, Findings& findings) {
+  const auto scenario = suite_scenario(name, command);
+  if (!scenario) return tl::unexpected(scenario.error());
+  const std::int64_t now_ns = observation_ns(*scenario);
+  const TrajectorySample sensor = sample_trajectory(scenario->sensor.trajectory, now_ns, now_ns);
+  const reference::SolveView view{now_ns, sensor.pose, command.width_px, command.height_px,
+                                  scenario->sensor.fov_h_rad};
+  const auto truth = solve_truth(*scenario, view, command, name);
+  if (!truth) return tl::unexpected(truth.error());
+  const std::string& reference = findings.reference_text[name] =
+      describe(truth->report, command.rays);
+  findings.references.add({name, reference, fmt::format("{}", truth->image.solved_px),
+                           fmt::format("{:.1f}", truth->solve_s),
+                           fmt::format("{:.3f}", truth->edge_m)});
+
+  ProgressBar progress("settings of " + name, settings.size());
+  std::uint64_t done = 0;
+  ErrorFigures figures(name, view, truth->image);
+  for (const Setting& setting : settings) {
+    const auto shot = setting.method == Method::embree ? trace(*scenario, setting, view)
+                                                       : shoot(*scenario, setting, view, command);
+    if (!shot) return tl::unexpected(shot.error());
+    if (!shot->device.empty()) findings.device = shot->device;
+    if (is_standard(setting)) {
+      figures.add(setting.method == Method::cached ? std::string(name_of(setting.method))
+                                                   : std::string(name_of(setting.model)),
+                  shot->temperature_k);
+    }
+    add_rows(name, setting, *shot, *truth, findings.rows);
+    progress.advance_to(++done);
+  }
+  return command.figures ? figures.write(*command.figures, scenario->display) : Result<void>();
+}
+
+TextTable table_of(const std::vector<Row>& rows) {
   TextTable table({"scene", "method", "model", "spacing", "steps", "map", "taps", "tol K",
                    "lateral", "ms", "rms K", "p99 K", "max K", "sunlit max", "core max",
                    "penumbra p99", "edges p99"});
@@ -498,26 +529,83 @@ int run_bench_error(const BenchErrorCommand& command) {
                k(all.kelvin.p99), k(all.kelvin.max), k(rows[i + 1].kelvin.max),
                k(rows[i + 2].kelvin.max), k(rows[i + 3].kelvin.p99), k(rows[i + 4].kelvin.p99)});
   }
-  fmt::print(text_stream(command.json), "{}, commit {}, {}x{}, * = none faster and better\n{}{}",
-             device, kCommit, command.width_px, command.height_px, references.to_string(),
-             table.to_string());
+  return table;
+}
+
+/// The files that the command line asks for.
+Result<void> write_files(const std::vector<std::string>& scenes, const ErrorOptions& command,
+                         const Findings& findings) {
   if (command.csv) {
-    if (auto written = write_csv(*command.csv, rows); !written) return fail(written.error());
+    if (auto written = write_csv(*command.csv, findings.rows); !written) return written;
   }
   if (command.plot) {
     std::vector<Plot> plots;
-    for (const std::string& name : scenes) plots.push_back(plot_of(name, rows));
-    if (auto written = write_svg(*command.plot, plots); !written) return fail(written.error());
+    for (const std::string& name : scenes) plots.push_back(plot_of(name, findings.rows));
+    if (auto written = write_svg(*command.plot, plots); !written) return written;
   }
-  if (command.json) {
-    Json results = Json::array();
-    for (const Row& row : rows) results.push(row_json(row, command, reference_text[row.scene]));
-    Json json = Json::object();
-    json.set("device", device).set("commit", kCommit).set("suite", "error-vs-time");
-    json.set("results", std::move(results));
-    if (auto written = write_json(*command.json, json); !written) return fail(written.error());
+  if (!command.json) return {};
+  Json results = Json::array();
+  for (const Row& row : findings.rows) {
+    results.push(row_json(row, command, findings.reference_text.at(row.scene)));
   }
+  Json json = Json::object();
+  json.set("device", findings.device).set("commit", kCommit).set("suite", "error-vs-time");
+  json.set("results", std::move(results));
+  return write_json(*command.json, json);
+}
+
+int run(const ErrorOptions& command) {
+  const std::vector<std::string> scenes =
+      command.scenes.empty()
+          ? std::vector<std::string>{"block-on-road", "ribbed", "statue", "airfield"}
+          : command.scenes;
+  const std::vector<Setting> settings = sweep(command.quick);
+  const InterruptGuard interrupt;
+  Findings findings;
+  for (const std::string& name : scenes) {
+    if (auto ran = run_scene(name, settings, command, findings); !ran) return fail(ran.error());
+  }
+  mark_pareto(findings.rows);
+  fmt::print(text_stream(command.json), "{}, commit {}, {}x{}, * = none faster and better\n{}{}",
+             findings.device, kCommit, command.width_px, command.height_px,
+             findings.references.to_string(), table_of(findings.rows).to_string());
+  if (auto written = write_files(scenes, command, findings); !written) return fail(written.error());
   return kExitOk;
+}
+
+void add_options(CommandLine& line, ErrorOptions& options) {
+  line.option("--scene", options.scenes,
+              "Scenario; repeatable; default block-on-road, ribbed, statue, airfield")
+      .repeatable();
+  line.flag("--quick", options.quick, "Models, spacings and two step counts only");
+  line.path("--csv", options.csv, "Write the results as CSV");
+  line.path("--plot", options.plot, "Write the diagrams as SVG");
+  line.path("--figures", options.figures,
+            "Folder for pictures and profiles of reference and models")
+      .type_name("DIR");
+  line.option("--frames", options.frames, "Frames timed per setting").positive().show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  line.option("--rays", options.rays, "Rays per face or pixel of the reference")
+      .positive()
+      .show_default();
+  line.option("--refine", options.refine, "Refinement of the three-dimensional reference")
+      .positive()
+      .show_default();
+  line.option("--pixels", options.pixels,
+              "Surface pixels the reference solves (published figures: 20000 or more); 0: all")
+      .show_default();
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_error(CommandLine& bench) {
+  bench.command<ErrorOptions>(
+      {.name = "error-vs-time",
+       .text = "What every setting costs in time and in error against the reference solver",
+       .example = "emit bench error-vs-time --json error.json --csv error.csv --plot error.svg"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

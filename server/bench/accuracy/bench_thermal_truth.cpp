@@ -7,20 +7,31 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "bench/stability/bench_stability_scene.hpp"
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
+#include "bench/accuracy/accuracy_benches.hpp"
 #include "bench/accuracy/converged_history.hpp"
-#include "emit/verify/stability.hpp"
+#include "bench/stability/bench_stability_scene.hpp"
 #include "emit/image/false_color.hpp"
 #include "emit/physics/constants.hpp"
+#include "emit/verify/stability.hpp"
 #include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct ThermalTruthOptions {
+  std::optional<std::filesystem::path> json;
+  std::string method = "cached";
+  std::uint32_t steps = 90;
+  std::uint32_t width_px = 320;
+  std::uint32_t height_px = 256;
+  std::optional<std::filesystem::path> pictures;
+  int gpu_index = -1;
+};
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -55,7 +66,7 @@ struct Row {
 
 class ThermalTruth {
  public:
-  explicit ThermalTruth(const BenchThermalTruthCommand& command)
+  explicit ThermalTruth(const ThermalTruthOptions& command)
       : command_(command), progress_("bench thermal-truth", kWork) {}
 
   int run() {
@@ -96,7 +107,7 @@ class ThermalTruth {
 
   static void compare(const StoredFrame& a, const StoredFrame& b, Samples& errors);
 
-  const BenchThermalTruthCommand& command_;
+  const ThermalTruthOptions& command_;
   InterruptGuard interrupt_;
   ProgressBar progress_;
   TemporaryFolder folder_;
@@ -494,10 +505,32 @@ int ThermalTruth::write() {
   return kExitOk;
 }
 
+int run(const ThermalTruthOptions& command) {
+  return ThermalTruth(command).run();
+}
+
+void add_options(CommandLine& line, ThermalTruthOptions& options) {
+  line.option("--method", options.method, "thermal.method to judge")
+      .one_of({"per-frame", "cached"})
+      .show_default();
+  line.option("--steps", options.steps, "History steps").in_range(1U, 4096U).show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  line.path("--pictures", options.pictures, "Existing folder for the judged frames as PNG")
+      .type_name("DIR");
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
 }  // namespace
 
-int run_bench_thermal_truth(const BenchThermalTruthCommand& command) {
-  return ThermalTruth(command).run();
+void add_bench_thermal_truth(CommandLine& bench) {
+  bench.command<ThermalTruthOptions>(
+      {.name = "thermal-truth",
+       .text =
+           "Split steps, a moved camera, a parked vehicle's print and a restart: what the thermal "
+           "history must not depend on, and what it must show",
+       .example = "emit bench thermal-truth --json truth.json"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

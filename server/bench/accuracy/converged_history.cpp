@@ -9,8 +9,8 @@
 
 #include "bench/accuracy/converged_model.hpp"
 #include "bench/accuracy/converged_views.hpp"
-#include "emit/threads/parallel.hpp"
 #include "bench/accuracy/pixel_surface.hpp"
+#include "emit/threads/parallel.hpp"
 
 namespace emit::tool {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "bench/accuracy/converged_model.hpp"
+#include "bench/accuracy/pixel_surface.hpp"
 #include "emit/reference/visibility.hpp"
 #include "emit/scene/scene_desc.hpp"
-#include "bench/accuracy/pixel_surface.hpp"
 
 namespace emit::tool {
 

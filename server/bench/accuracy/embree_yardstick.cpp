@@ -4,10 +4,10 @@
 #include <chrono>
 #include <utility>
 
-#include "emit/physics/sun.hpp"
-#include "emit/threads/parallel.hpp"
-#include "emit/scene/mesh.hpp"
 #include "bench/accuracy/pixel_surface.hpp"
+#include "emit/physics/sun.hpp"
+#include "emit/scene/mesh.hpp"
+#include "emit/threads/parallel.hpp"
 
 namespace emit::tool {
 

@@ -9,19 +9,31 @@
 #include <utility>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
+#include "bench/frame_time/frame_time_benches.hpp"
 #include "emit/physics/apparent_temperature.hpp"
 #include "emit/renderer/renderer.hpp"
 #include "emit/version.hpp"
+#include "pacing/quality_policy.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
-#include "pacing/quality_policy.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct BudgetOptions {
+  std::optional<std::filesystem::path> json;
+  std::string scene = "airfield";
+  std::vector<std::string> set;
+  std::vector<double> budgets{0.8, 0.6, 0.1};  ///< of the free-running median
+  std::uint32_t frames = 500;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  int gpu_index = -1;
+};
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -45,7 +57,7 @@ struct Row {
 /// The scenario's own flight, again and again; the thermal clock runs on.
 class Flight {
  public:
-  static Result<Flight> create(const BenchBudgetCommand& command) {
+  static Result<Flight> create(const BudgetOptions& command) {
     std::vector<std::string> overrides{"thermal.method=\"cached\""};
     overrides.insert(overrides.end(), command.set.begin(), command.set.end());
     auto scenario = load_scenario_choice({command.scene, overrides});
@@ -194,8 +206,7 @@ class Flight {
   double warm_up_s_ = 0.0;
 };
 
-Json row_json(const Row& row, const BenchBudgetCommand& command, const Flight& flight,
-              double free_ms) {
+Json row_json(const Row& row, const BudgetOptions& command, const Flight& flight, double free_ms) {
   Json rungs = Json::array();
   for (const std::size_t count : row.of_rung) rungs.push(Json(count));
   Json json = Json::object();
@@ -215,9 +226,7 @@ Json row_json(const Row& row, const BenchBudgetCommand& command, const Flight& f
   return json;
 }
 
-}  // namespace
-
-int run_bench_budget(const BenchBudgetCommand& command) {
+int run(const BudgetOptions& command) {
   const InterruptGuard interrupt;
   auto flight = Flight::create(command);
   if (!flight) return fail(flight.error());
@@ -257,6 +266,34 @@ int run_bench_budget(const BenchBudgetCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, BudgetOptions& options) {
+  line.option("--scene", options.scene, "Scenario with a camera trajectory").show_default();
+  add_set(line, options.set);
+  line.option("--budget", options.budgets,
+              "Time per frame, as a part of the median at full quality; repeatable")
+      .repeatable()
+      .positive()
+      .show_default();
+  line.option("--frames", options.frames, "Frames of the flight")
+      .in_range(2U, 1'000'000U)
+      .show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_budget(CommandLine& bench) {
+  bench.command<BudgetOptions>(
+      {.name = "budget",
+       .text =
+           "The scenario's flight within less time per frame than full quality takes: frames that "
+           "keep to it, and what they get wrong beside what they say",
+       .example = "emit bench budget --budget 0.8 --json budget.json"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

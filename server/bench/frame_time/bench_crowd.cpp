@@ -9,20 +9,30 @@
 #include <utility>
 #include <vector>
 
+#include "bench/frame_time/frame_time_benches.hpp"
+#include "bench/frame_time/paired_frames.hpp"
 #include "bench/stability/bench_stability_scene.hpp"
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/scenegen/generate.hpp"
 #include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
-#include "bench/frame_time/paired_frames.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct CrowdOptions {
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> set;
+  std::uint32_t instances = 10'000;
+  std::uint32_t triangles = 1000;  ///< of each, at least
+  std::uint32_t pairs = 45;
+  int gpu_index = -1;
+};
 
 using physics::Result;
 
@@ -49,8 +59,7 @@ struct Row {
 };
 
 /// Rows of seated figures, each turned another way.
-Result<scene::ObjectDesc> crowd(const BenchCrowdCommand& command,
-                                const std::filesystem::path& folder) {
+Result<scene::ObjectDesc> crowd(const CrowdOptions& command, const std::filesystem::path& folder) {
   scenegen::GenerateOptions options;
   options.kind = scenegen::SceneKind::statue;
   options.directory = folder;
@@ -81,7 +90,7 @@ Row row_of(const char* scene, const SceneRunner& runner, const std::vector<doubl
   return row;
 }
 
-Result<std::vector<Row>> run(const BenchCrowdCommand& command, std::string& device) {
+Result<std::vector<Row>> run(const CrowdOptions& command, std::string& device) {
   const TemporaryFolder folder;
   if (folder.path().empty()) {
     return physics::make_error(physics::ErrorCode::io, "cannot create a temporary folder");
@@ -134,9 +143,7 @@ Json row_json(const Row& row) {
   return json;
 }
 
-}  // namespace
-
-int run_bench_crowd(const BenchCrowdCommand& command) {
+int run(const CrowdOptions& command) {
   const InterruptGuard interrupt;
   std::string device;
   const auto rows = run(command, device);
@@ -164,6 +171,30 @@ int run_bench_crowd(const BenchCrowdCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, CrowdOptions& options) {
+  add_set(line, options.set);
+  line.option("--instances", options.instances, "Figures").in_range(1U, 1'000'000U).show_default();
+  line.option("--triangles", options.triangles, "Of each figure, at least")
+      .in_range(1000U, 1'000'000U)
+      .show_default();
+  line.option("--pairs", options.pairs, "Frames of the two scenes that are shown in turn")
+      .in_range(15U, 100'000U)
+      .show_default();
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_crowd(CommandLine& bench) {
+  bench.command<CrowdOptions>({.name = "crowd",
+                               .text = "The airfield with and without ten thousand figures of a "
+                                       "thousand triangles: frame time, "
+                                       "thermal samples and their memory",
+                               .example = "emit bench crowd --json crowd.json"},
+                              add_options, run);
 }
 
 }  // namespace emit::tool

@@ -10,10 +10,11 @@
 #include <utility>
 #include <vector>
 
+#include "bench/frame_time/frame_time_benches.hpp"
 #include "emit/physics/weather.hpp"
 #include "emit/scene/trajectory.hpp"
 #include "emit/version.hpp"
-#include "tool/commands/commands.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
@@ -23,6 +24,22 @@
 
 namespace emit::tool {
 namespace {
+
+struct LiveOptions {
+  std::optional<std::filesystem::path> json;
+  std::string scene = "airfield";
+  std::vector<std::string> set;
+  double seconds = 60.0;  ///< of sim time
+  double rate_hz = 50.0;  ///< of frames and host poses, in sim time
+  double every_s = 2.0;   ///< between the pictures that are compared
+  double finest_s = 1.0;  ///< thermal.first_step_s of the reference
+  /// A cloud passes: the host tells the weather that often, the script has it from the start; 0:
+  /// none.
+  double weather_every_s = 0.0;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  int gpu_index = -1;
+};
 
 using physics::Result;
 
@@ -131,7 +148,7 @@ struct Row {
 
 class LiveBench {
  public:
-  static Result<LiveBench> create(const BenchLiveCommand& command) {
+  static Result<LiveBench> create(const LiveOptions& command) {
     const auto scenario_of = [&](bool reference) {
       std::vector<std::string> overrides{"thermal.method=\"cached\"", "thermal.model=\"foster\""};
       overrides.insert(overrides.end(), command.set.begin(), command.set.end());
@@ -213,7 +230,7 @@ class LiveBench {
   [[nodiscard]] const RendererThread& renderer(Who who) const noexcept { return *renderers_[who]; }
 
  private:
-  explicit LiveBench(const BenchLiveCommand& command) : command_(command) {}
+  explicit LiveBench(const LiveOptions& command) : command_(command) {}
 
   [[nodiscard]] renderer::FrameRequest request(std::uint64_t i) const {
     renderer::FrameRequest out;
@@ -266,7 +283,7 @@ class LiveBench {
     }
   }
 
-  BenchLiveCommand command_;
+  LiveOptions command_;
   std::int64_t start_ns_ = 0;
   physics::Pose eye_;
   std::vector<Driven> driven_;
@@ -279,9 +296,7 @@ class LiveBench {
   std::array<Row, kCount> rows_;
 };
 
-}  // namespace
-
-int run_bench_live(const BenchLiveCommand& command) {
+int run(const LiveOptions& command) {
   const InterruptGuard interrupt;
   auto bench = LiveBench::create(command);
   if (!bench) return fail(bench.error());
@@ -321,6 +336,41 @@ int run_bench_live(const BenchLiveCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, LiveOptions& options) {
+  line.option("--scene", options.scene, "Scenario whose entities move").show_default();
+  add_set(line, options.set);
+  line.option("--seconds", options.seconds, "Sim time, s").in_range(1.0, 86'400.0).show_default();
+  line.option("--rate", options.rate_hz, "Frames and host poses per second of sim time")
+      .in_range(0.1, 1000.0)
+      .show_default();
+  line.option("--every", options.every_s, "Sim time between pictures that are compared, s")
+      .in_range(0.001, 3600.0)
+      .show_default();
+  line.option("--finest", options.finest_s, "thermal.first_step_s of the reference, s")
+      .in_range(0.01, 3600.0)
+      .show_default();
+  line.option("--weather-every", options.weather_every_s,
+              "A cloud passes, of which the script knows and the host tells that often, s; "
+              "0: clear sky")
+      .in_range(0.0, 3600.0)
+      .show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_live(CommandLine& bench) {
+  bench.command<LiveOptions>(
+      {.name = "live",
+       .text =
+           "The scenario's entities driven by its script and by a host that tells the same poses: "
+           "frame times in turn, and temperatures beside those of the script in shorter intervals",
+       .example = "emit bench live --seconds 60 --json live.json"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

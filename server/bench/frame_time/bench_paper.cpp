@@ -6,10 +6,11 @@
 #include <optional>
 
 #include "bench/accuracy/embree_yardstick.hpp"
+#include "bench/frame_time/frame_time_benches.hpp"
 #include "bench/frame_time/paper_errors.hpp"
 #include "bench/frame_time/paper_run.hpp"
 #include "emit/version.hpp"
-#include "tool/commands/commands.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
@@ -17,6 +18,22 @@
 
 namespace emit::tool {
 namespace {
+
+struct PaperOptions {
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> scenes;
+  std::vector<std::uint32_t> steps;
+  PaperFrames frames;
+  std::vector<std::string> methods{"per-frame", "cached"};
+  std::string model;  ///< empty: emit2014
+  bool no_errors = false;
+  std::uint32_t pixels = 20'000;
+};
+std::string model;  ///< empty: emit2014
+bool no_errors = false;
+std::uint32_t pixels = 20'000;
+int gpu_index = -1;
+};
 
 using physics::Result;
 
@@ -137,17 +154,17 @@ std::vector<std::string> table_line(const Row& row) {
   return line;
 }
 
-bool wanted(const PaperMethod& method, const BenchPaperCommand& command) {
+bool wanted(const PaperMethod& method, const PaperOptions& command) {
   return std::ranges::find(command.methods, method.name) != command.methods.end();
 }
 
 /// All methods and step counts of one scene.
 Result<void> run_scene(const std::string& name, const scene::ScenarioDesc& scenario,
-                       std::span<const std::uint32_t> steps, const BenchPaperCommand& command,
+                       std::span<const std::uint32_t> steps, const PaperOptions& command,
                        const PaperProgress& progress, std::vector<Row>& rows) {
   // The shares hang on camera and sun, not on the number of steps: the cheapest tells.
-  const PaperRun cheapest = make_paper_run(scenario, kPaperMethods[0],
-                                           *std::min_element(steps.begin(), steps.end()), command);
+  const PaperRun cheapest = make_paper_run(
+      scenario, kPaperMethods[0], *std::min_element(steps.begin(), steps.end()), command.frames);
   const auto fill = check_fill(cheapest);
   if (!fill) return tl::unexpected(fill.error());
   for (const std::string& text : broken_rules(*fill, name == "statue")) {
@@ -170,7 +187,7 @@ Result<void> run_scene(const std::string& name, const scene::ScenarioDesc& scena
       row.scene = name;
       row.steps = count;
       row.fill = *fill;
-      row.run = make_paper_run(scenario, method, count, command);
+      row.run = make_paper_run(scenario, method, count, command.frames);
       for (const bool stages : {false, true}) {
         auto times = time_frames(row.run, stages, progress);
         if (!times) return tl::unexpected(std::move(times.error()));
@@ -197,22 +214,20 @@ Result<void> run_scene(const std::string& name, const scene::ScenarioDesc& scena
   return {};
 }
 
-}  // namespace
-
-int run_bench_paper(const BenchPaperCommand& command) {
+int run(const PaperOptions& command) {
   const std::vector<std::string> scenes =
       command.scenes.empty() ? std::vector<std::string>{"box", "statue"} : command.scenes;
   const std::vector<std::uint32_t> steps =
       command.steps.empty() ? std::vector<std::uint32_t>{27, 90} : command.steps;
   const auto too_little =
-      broken_rules(command.width_px, command.height_px,
+      broken_rules(command.frames.width_px, command.frames.height_px,
                    command.no_errors ? std::nullopt : std::optional(command.pixels));
   for (const std::string& text : too_little) warn(text);
   const InterruptGuard interrupt;
   std::uint64_t frames = 0;
   for (const PaperMethod& method : kPaperMethods) {
     if (!wanted(method, command)) continue;
-    frames += 2 * (std::uint64_t{std::max(command.frames, method.least_frames)} + 1);
+    frames += 2 * (std::uint64_t{std::max(command.frames.frames, method.least_frames)} + 1);
   }
   ProgressBar progress("bench paper", scenes.size() * steps.size() * frames);
   std::uint64_t done = 0;
@@ -240,8 +255,8 @@ int run_bench_paper(const BenchPaperCommand& command) {
     results.push(row_json(row, too_little.empty()));
   }
   if (command.json != std::filesystem::path("-")) {
-    fmt::print("{}, commit {}, {}x{}\n{}", device, kCommit, command.width_px, command.height_px,
-               table.to_string());
+    fmt::print("{}, commit {}, {}x{}\n{}", device, kCommit, command.frames.width_px,
+               command.frames.height_px, table.to_string());
     if (!rows[0].reference.empty()) fmt::print("errors against {}\n", rows[0].reference);
   }
   if (command.json) {
@@ -251,6 +266,42 @@ int run_bench_paper(const BenchPaperCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, PaperOptions& options) {
+  line.option("--scene", options.scenes, "box or statue; repeatable; default both").repeatable();
+  line.option("--steps", options.steps, "History steps; repeatable; default 27 and 90")
+      .repeatable()
+      .positive();
+  line.option("--frames", options.frames.frames,
+              "Frames per result, at least 5; cached takes at least 300")
+      .in_range(5U, 100000U)
+      .show_default();
+  add_image_size(line, options.frames.width_px, options.frames.height_px);
+  line.option("--method", options.methods, "Thermal method; repeatable; default both")
+      .repeatable()
+      .one_of({"per-frame", "cached"})
+      .show_default();
+  line.option("--model", options.model, "Thermal model; default emit2014, the paper's own")
+      .one_of({"emit2014", "foster"});
+  line.option(
+          "--pixels", options.pixels,
+          "Surface pixels per picture whose error is computed; published figures: 20000 or more")
+      .in_range(1U, 100'000'000U)
+      .show_default();
+  line.flag("--no-errors", options.no_errors, "Times only: spares the reference");
+  add_gpu(line, options.frames.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_paper(CommandLine& bench) {
+  bench.command<PaperOptions>(
+      {.name = "paper",
+       .text = "Scenes and step counts of the published tables, 1024x768",
+       .example = "emit bench paper --json paper.json --scene box --steps 27"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

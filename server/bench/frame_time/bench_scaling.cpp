@@ -10,19 +10,30 @@
 #include <string_view>
 #include <utility>
 
-#include "bench/stability/bench_stability_scene.hpp"
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
-#include "emit/version.hpp"
-#include "tool/support/interrupt.hpp"
-#include "tool/support/json.hpp"
+#include "bench/frame_time/frame_time_benches.hpp"
 #include "bench/frame_time/paired_frames.hpp"
 #include "bench/frame_time/scaling_axes.hpp"
+#include "bench/stability/bench_stability_scene.hpp"
+#include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/interrupt.hpp"
+#include "tool/support/json.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct ScalingOptions {
+  std::optional<std::filesystem::path> json;
+  std::vector<std::string> axes;     ///< of scaling_axes(); empty: all
+  std::vector<std::string> methods;  ///< empty: both
+  bool quick = false;
+  std::uint32_t pairs = 45;
+  std::uint32_t per_frame_frames = 3;
+  int gpu_index = -1;
+};
 
 using physics::Result;
 
@@ -59,7 +70,7 @@ Row row_of(const ScalingAxis& axis, const ScalingCase& made, const char* method,
 }
 
 /// Each case against the one before, which runs twice: what differs then is the machine.
-Result<void> run_cached(const ScalingAxis& axis, const BenchScalingCommand& command,
+Result<void> run_cached(const ScalingAxis& axis, const ScalingOptions& command,
                         ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
   std::optional<SceneRunner> before;
   for (const ScalingCase& made : axis.cases) {
@@ -87,7 +98,7 @@ Result<void> run_cached(const ScalingAxis& axis, const BenchScalingCommand& comm
 }
 
 /// A few frames of the published method beside them.
-Result<void> run_per_frame(const ScalingAxis& axis, const BenchScalingCommand& command,
+Result<void> run_per_frame(const ScalingAxis& axis, const ScalingOptions& command,
                            ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
   std::optional<double> before_ms;
   for (const ScalingCase& made : axis.cases) {
@@ -156,7 +167,7 @@ bool wanted(const std::vector<std::string>& choice, const std::string& name) {
   return choice.empty() || std::ranges::find(choice, name) != choice.end();
 }
 
-Result<void> run_axes(const BenchScalingCommand& command, std::vector<Row>& rows) {
+Result<void> run_axes(const ScalingOptions& command, std::vector<Row>& rows) {
   const TemporaryFolder folder;
   if (folder.path().empty()) {
     return physics::make_error(physics::ErrorCode::io, "cannot create a temporary folder");
@@ -183,9 +194,7 @@ Result<void> run_axes(const BenchScalingCommand& command, std::vector<Row>& rows
   return {};
 }
 
-}  // namespace
-
-int run_bench_scaling(const BenchScalingCommand& command) {
+int run(const ScalingOptions& command) {
   const InterruptGuard interrupt;
   std::vector<Row> rows;
   if (const auto ran = run_axes(command, rows); !ran) return fail(ran.error());
@@ -209,6 +218,36 @@ int run_bench_scaling(const BenchScalingCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, ScalingOptions& options) {
+  line.option("--axis", options.axes, "Axis; repeatable; default all")
+      .repeatable()
+      .one_of(scaling_axes());
+  line.option("--method", options.methods, "Thermal method; repeatable; default both")
+      .repeatable()
+      .one_of({"per-frame", "cached"});
+  line.flag("--quick", options.quick, "Small scenes and coarse pictures, in seconds");
+  line.option("--pairs", options.pairs, "cached: frames of two scenes that are shown in turn")
+      .in_range(15U, 100'000U)
+      .show_default();
+  line.option("--per-frame-frames", options.per_frame_frames, "per-frame: frames timed per scene")
+      .in_range(1U, 100'000U)
+      .show_default();
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_scaling(CommandLine& bench) {
+  bench.command<ScalingOptions>(
+      {.name = "scaling",
+       .text =
+           "How frame time grows with history steps, triangles, pixels, objects out of view and "
+           "thermal samples",
+       .example = "emit bench scaling --json scaling.json --axis steps"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -9,11 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
+#include "bench/frame_time/frame_time_benches.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/renderer_thread.hpp"
@@ -22,6 +23,19 @@
 
 namespace emit::tool {
 namespace {
+
+struct TurnOptions {
+  std::optional<std::filesystem::path> json;
+  std::string scene = "airfield";
+  std::vector<std::string> set;
+  std::vector<std::string> methods{"cached"};
+  std::uint32_t runs = 5;
+  std::uint32_t frames = 100;  ///< per turn
+  double budget_frac = 1.7;    ///< of the free-running median
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  int gpu_index = -1;
+};
 
 using physics::Result;
 
@@ -54,7 +68,7 @@ physics::Pose looking(const glm::dvec3& eye_m, double yaw_rad) {
 /// A camera that turns on the spot where the scenario's flight ends, in real time.
 class Turntable {
  public:
-  static Result<Turntable> create(const BenchTurnCommand& command, const std::string& method) {
+  static Result<Turntable> create(const TurnOptions& command, const std::string& method) {
     std::vector<std::string> overrides{"thermal.method=\"" + method + "\"",
                                        "thermal.model=\"foster\""};
     overrides.insert(overrides.end(), command.set.begin(), command.set.end());
@@ -112,7 +126,7 @@ class Turntable {
   [[nodiscard]] double warm_up_s() const noexcept { return warm_up_s_; }
 
  private:
-  Turntable(const BenchTurnCommand& command, const scene::ScenarioDesc& scenario,
+  Turntable(const TurnOptions& command, const scene::ScenarioDesc& scenario,
             std::unique_ptr<RendererThread> renderer)
       : renderer_(std::move(renderer)),
         frames_(command.frames),
@@ -137,8 +151,8 @@ class Turntable {
   double warm_up_s_ = 0.0;
 };
 
-Result<void> run_method(Turntable& table, const BenchTurnCommand& command,
-                        const std::string& method, std::vector<Row>& rows) {
+Result<void> run_method(Turntable& table, const TurnOptions& command, const std::string& method,
+                        std::vector<Row>& rows) {
   ProgressBar progress("bench turn", 4 * std::uint64_t{command.runs});
   std::uint64_t done = 0;
   const auto fly = [&](const char* name, bool jump,
@@ -169,7 +183,7 @@ Result<void> run_method(Turntable& table, const BenchTurnCommand& command,
   return {};
 }
 
-Json row_json(const Row& row, const BenchTurnCommand& command, const Turntable& table) {
+Json row_json(const Row& row, const TurnOptions& command, const Turntable& table) {
   const bool cached = row.method == "cached";
   Json json = Json::object();
   json.set("case", row.name).set("method", row.method);
@@ -188,9 +202,7 @@ Json row_json(const Row& row, const BenchTurnCommand& command, const Turntable& 
   return json;
 }
 
-}  // namespace
-
-int run_bench_turn(const BenchTurnCommand& command) {
+int run(const TurnOptions& command) {
   const InterruptGuard interrupt;
   TextTable text({"case", "method", "budget ms", "median ms", "worst ms, median of runs", "ratio",
                   "frames", "late", "shed", "coarse", "samples", "warm-up s"});
@@ -223,6 +235,39 @@ int run_bench_turn(const BenchTurnCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, TurnOptions& options) {
+  line.option("--scene", options.scene, "Scenario with a camera trajectory: turns at its end")
+      .show_default();
+  add_set(line, options.set);
+  line.option("--method", options.methods, "Thermal method; repeatable")
+      .repeatable()
+      .one_of({"per-frame", "cached"})
+      .show_default();
+  line.option("--runs", options.runs, "Turns, and jumps; all after one warm-up")
+      .in_range(1U, 1000U)
+      .show_default();
+  line.option("--frames", options.frames, "Frames per turn").in_range(2U, 100'000U).show_default();
+  line.option("--budget", options.budget_frac,
+              "Once more with a deadline: share of the free-running median")
+      .in_range(0.01, 100.0)
+      .show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_turn(CommandLine& bench) {
+  bench.command<TurnOptions>(
+      {.name = "turn",
+       .text = "Worst frame while the camera turns all round in a second, and after jumps to "
+               "places that "
+               "nobody announced",
+       .example = "emit bench turn --json turn.json --set thermal.tolerance_k=0.5"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

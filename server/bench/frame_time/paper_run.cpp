@@ -102,11 +102,11 @@ reference::SolveView view_of(const PaperRun& run, std::uint32_t frame, const phy
 }  // namespace
 
 PaperRun make_paper_run(scene::ScenarioDesc scenario, const PaperMethod& method,
-                        std::uint32_t steps, const BenchPaperCommand& command) {
+                        std::uint32_t steps, const PaperFrames& frames) {
   PaperRun run;
   run.method = method;
-  scenario.sensor.width_px = command.width_px;
-  scenario.sensor.height_px = command.height_px;
+  scenario.sensor.width_px = frames.width_px;
+  scenario.sensor.height_px = frames.height_px;
   scenario.thermal.method = method.method;
   scenario.thermal.steps = steps;
   // As published; cached spaces its steps as it does anywhere else.
@@ -122,9 +122,9 @@ PaperRun make_paper_run(scene::ScenarioDesc scenario, const PaperMethod& method,
   const double interval_s = method.method == scene::ThermalMethod::cached
                                 ? scenario.thermal.first_step_s
                                 : 1e-9 * static_cast<double>(run.start_ns - from_ns) / steps;
-  run.frames = std::max(command.frames, method.least_frames);
+  run.frames = std::max(frames.frames, method.least_frames);
   run.advance_ns = std::llround(1e9 * kPaperClosings * interval_s / (run.frames - 1));
-  run.gpu_index = command.gpu_index;
+  run.gpu_index = frames.gpu_index;
   run.scenario = std::move(scenario);
   return run;
 }

@@ -7,11 +7,10 @@
 #include <vector>
 
 #include "bench/accuracy/bench_rules.hpp"
-#include "tool/commands/commands.hpp"
+#include "bench/frame_time/paper_errors.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/reference/solve.hpp"
 #include "emit/scene/scene_desc.hpp"
-#include "bench/frame_time/paper_errors.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
@@ -32,6 +31,14 @@ struct PaperMethod {
 inline constexpr std::array kPaperMethods{
     PaperMethod{}, PaperMethod{scene::ThermalMethod::cached, "cached", 300, true}};
 
+/// Size and number of the frames of a run, and the device that renders them.
+struct PaperFrames {
+  std::uint32_t width_px = 1024;
+  std::uint32_t height_px = 768;
+  std::uint32_t frames = 5;  ///< at least; PaperMethod::least_frames may ask for more
+  int gpu_index = -1;        ///< EGL device; -1: the first hardware device, else Mesa
+};
+
 /// Frames of one scene, method and number of steps: a camera that pans to and fro and a clock that
 /// goes on.
 struct PaperRun {
@@ -43,7 +50,7 @@ struct PaperRun {
   int gpu_index = -1;
 };
 [[nodiscard]] PaperRun make_paper_run(scene::ScenarioDesc scenario, const PaperMethod& method,
-                                      std::uint32_t steps, const BenchPaperCommand& command);
+                                      std::uint32_t steps, const PaperFrames& frames);
 
 struct PaperTimes {
   Samples frame_ms;

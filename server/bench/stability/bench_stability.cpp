@@ -6,15 +6,26 @@
 #include <cmath>
 
 #include "bench/stability/bench_stability_frames.hpp"
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
+#include "bench/stability/stability_benches.hpp"
 #include "emit/verify/stability.hpp"
 #include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct StabilityOptions {
+  std::optional<std::filesystem::path> json;
+  std::uint64_t cases = 100'000'000;  ///< of the equilibrium sweep; the others follow
+  std::uint32_t seed = 20140621;
+  std::vector<std::string> parts;   ///< of stability_parts(); empty: all
+  std::vector<std::string> frames;  ///< names of hostile frame tests; empty: all
+  std::optional<std::filesystem::path> pictures;
+  int gpu_index = -1;
+};
 
 /// Shares of the progress bar, as the parts take their time with the default number of cases.
 struct Part {
@@ -64,7 +75,7 @@ std::string kelvin(double value) {
 
 class StabilityBench {
  public:
-  explicit StabilityBench(const BenchStabilityCommand& command)
+  explicit StabilityBench(const StabilityOptions& command)
       : command_(command), progress_("bench stability", 1000) {}
 
   int run() {
@@ -161,7 +172,7 @@ class StabilityBench {
     return kExitOk;
   }
 
-  const BenchStabilityCommand& command_;
+  const StabilityOptions& command_;
   InterruptGuard interrupt_;
   ProgressBar progress_;
   std::string device_;
@@ -170,16 +181,42 @@ class StabilityBench {
       {"test", "computed by", "cases", "NaN", "Inf", "clamped", "max K", "p99 K", "max rel."}};
 };
 
-}  // namespace
-
 std::vector<std::string> stability_parts() {
   std::vector<std::string> names;
   for (const Part& part : kParts) names.emplace_back(part.name);
   return names;
 }
 
-int run_bench_stability(const BenchStabilityCommand& command) {
+int run(const StabilityOptions& command) {
   return StabilityBench(command).run();
+}
+
+void add_options(CommandLine& line, StabilityOptions& options) {
+  line.count("--cases", options.cases,
+             "Random surfaces of the equilibrium sweep; the other sweeps follow in proportion")
+      .in_range(std::uint64_t{1000}, std::uint64_t{4'000'000'000})
+      .show_default();
+  line.option("--seed", options.seed, "Draws other cases").type_name("N").show_default();
+  line.option("--part", options.parts, "Part of the suite; repeatable; default all")
+      .repeatable()
+      .one_of(stability_parts());
+  line.option("--frame", options.frames, "Test of part frames, e.g. frame-zero-area; repeatable")
+      .repeatable();
+  line.path("--pictures", options.pictures, "Existing folder for the hostile frames as PNG")
+      .type_name("DIR");
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_stability(CommandLine& bench) {
+  bench.command<StabilityOptions>({.name = "stability",
+                                   .text = "Shader functions and whole frames under random and "
+                                           "hostile input, against double: NaN, Inf "
+                                           "and errors in kelvin",
+                                   .example = "emit bench stability --json stability.json"},
+                                  add_options, run);
 }
 
 }  // namespace emit::tool

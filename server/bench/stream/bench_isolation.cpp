@@ -12,19 +12,30 @@
 #include <thread>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
+#include "bench/stream/stream_benches.hpp"
+#include "bench/stream/stream_throughput.hpp"
+#include "client/client_connection.hpp"
+#include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/streams/stream_client.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
-#include "emit/version.hpp"
 #include "tool/support/frame_files.hpp"
-#include "client/client_connection.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/statistics.hpp"
-#include "tool/streams/stream_client.hpp"
-#include "bench/stream/stream_throughput.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct IsolationOptions {
+  std::optional<std::filesystem::path> json;
+  std::uint64_t frames = 400;  ///< per client and run
+  double rate_hz = 200.0;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  std::uint32_t clients = 4;  ///< of mixed transports; the disturbing ones are beside them
+  std::uint32_t pairs = 15;
+};
 
 using physics::Result;
 
@@ -103,7 +114,7 @@ struct RunResult {
 
 class IsolationBench {
  public:
-  explicit IsolationBench(const BenchIsolationCommand& command)
+  explicit IsolationBench(const IsolationOptions& command)
       : command_(command), shm_(own_shm_name()) {}
 
   Result<void> run(const std::filesystem::path& work);
@@ -127,7 +138,7 @@ class IsolationBench {
 
   static constexpr double kLimit = 0.05;
   static constexpr std::uint32_t kLeastPairs = 15;
-  const BenchIsolationCommand& command_;
+  const IsolationOptions& command_;
   std::string shm_;
   std::string control_;
   std::string device_;
@@ -272,9 +283,7 @@ void IsolationBench::print(std::FILE* out) const {
              sum_.unflagged_gaps, sum_.flood_records, sum_.flood_connections);
 }
 
-}  // namespace
-
-int run_bench_isolation(const BenchIsolationCommand& command) {
+int run(const IsolationOptions& command) {
   std::error_code error;
   const auto work =
       std::filesystem::temp_directory_path(error) /
@@ -293,6 +302,34 @@ int run_bench_isolation(const BenchIsolationCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return bench.sound() ? kExitOk : kExitFailure;
+}
+
+void add_options(CommandLine& line, IsolationOptions& options) {
+  line.count("--frames", options.frames, "Frames per client and run")
+      .in_range(10U, 1'000'000U)
+      .show_default();
+  line.option("--rate", options.rate_hz, "Frames a second").positive().show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  line.option("--clients", options.clients, "Clients that are watched: tcp, udp, shm in turn")
+      .in_range(1U, 8U)
+      .show_default();
+  line.option("--pairs", options.pairs,
+              "Pairs of runs; medians count; fewer than 15 are not judged")
+      .in_range(1U, 1000U)
+      .show_default();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_isolation(CommandLine& bench) {
+  bench.command<IsolationOptions>(
+      {.name = "isolation",
+       .text =
+           "What a stopped and a flooding client cost the others: p99 of their intervals between "
+           "frames, in interleaved pairs of runs with and without, beside a run against itself",
+       .example = "emit bench isolation --json isolation.json"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -6,6 +6,7 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,21 +15,42 @@
 #include <thread>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
-#include "tool/support/daemon_process.hpp"
-#include "emit/version.hpp"
-#include "tool/support/frame_files.hpp"
-#include "net/socket.hpp"
-#include "tool/support/json.hpp"
-#include "tool/support/statistics.hpp"
-#include "tool/streams/stream_client.hpp"
+#include "bench/stream/stream_benches.hpp"
 #include "bench/stream/stream_loss.hpp"
 #include "bench/stream/stream_throughput.hpp"
 #include "bench/stream/stream_yardstick.hpp"
+#include "emit/version.hpp"
+#include "net/socket.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/streams/stream_client.hpp"
+#include "tool/streams/stream_options.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/daemon_process.hpp"
+#include "tool/support/frame_files.hpp"
+#include "tool/support/json.hpp"
+#include "tool/support/statistics.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct StreamOptions {
+  std::optional<std::filesystem::path> json;
+  std::uint64_t frames = 1000;
+  double rate_hz = 200.0;
+  std::uint32_t width_px = 640;
+  std::uint32_t height_px = 512;
+  std::uint32_t clients = 4;
+  std::vector<std::string> transports{"tcp", "udp", "shm", "mixed"};
+  std::uint32_t repeats = 5;      ///< of the throughput measurements; 0: none
+  std::vector<std::string> only;  ///< of the throughput measurements; empty: all
+  std::string cpus;               ///< realtime.cpus of the daemons
+  /// Shares of datagrams lost on the way; not empty: nothing but lossy networks is measured.
+  std::vector<double> losses;
+  double burst_mean = 1.0;  ///< datagrams lost in a row
+  protocol::FecParams fec{protocol::kDefaultFecData, protocol::kDefaultFecParity};
+  std::uint32_t payload_bytes = 1400;  ///< of a fragment on lossy networks
+  std::uint64_t seed = 1;
+};
 
 using physics::Result;
 
@@ -50,9 +72,12 @@ struct Row {
   bool wrong = false;               ///< lossy: something came that was not as it said
 };
 
+struct Contender;
+struct Series;
+
 class StreamBench {
  public:
-  StreamBench(const BenchStreamCommand& command, std::filesystem::path work)
+  StreamBench(const StreamOptions& command, std::filesystem::path work)
       : command_(command), work_(std::move(work)) {
     yardstick_.frame_bytes =
         sizeof(float) * static_cast<std::size_t>(command.width_px) * command.height_px;
@@ -73,8 +98,17 @@ class StreamBench {
   Result<Row> bare_paced();
   Result<void> lossy();
   Result<void> throughput();
+  struct Daemons;
+  /// Errors: those of StreamThroughput::start().
+  [[nodiscard]] Result<Daemons> start_daemons() const;
+  /// One measurement of one contender.
+  Result<YardstickResult> measure(const std::string& name, Daemons& daemons) const;
+  /// One measurement of each contender; `progress` gets the index of the one that is next.
+  Result<void> measure_round(const std::vector<Contender>& contenders, Daemons& daemons,
+                             std::map<std::string, Series>& series,
+                             const std::function<void(std::size_t)>& progress) const;
 
-  const BenchStreamCommand& command_;
+  const StreamOptions& command_;
   std::filesystem::path work_;
   YardstickOptions yardstick_;
   std::string device_;
@@ -283,7 +317,7 @@ const std::vector<Contender>& contenders() {
   return all;
 }
 
-std::vector<Contender> contenders_of(const BenchStreamCommand& command) {
+std::vector<Contender> contenders_of(const StreamOptions& command) {
   std::vector<Contender> out = contenders();
   if (!command.only.empty()) {
     std::erase_if(out, [&](const Contender& contender) {
@@ -304,21 +338,20 @@ struct Series {
   std::string missing;  ///< why there is none
 };
 
-Result<void> StreamBench::throughput() {
-  // Long enough that starting up does not show.
-  constexpr double kBytes = 2e9;
-  constexpr std::uint64_t kLeastFrames = 200;
-  constexpr std::uint64_t kMostFrames = 4000;
-  yardstick_.frames =
-      std::clamp(static_cast<std::uint64_t>(kBytes / static_cast<double>(yardstick_.frame_bytes)),
-                 kLeastFrames, kMostFrames);
-  const std::string shm = own_shm_name();
-  // What the ring costs is the ring's: the others get a daemon without one.
-  const auto start = [&](const std::string& name,
+/// The daemons of the throughput measurements. A ring in shared memory costs only the daemon that
+/// has one.
+struct StreamBench::Daemons {
+  Result<StreamThroughput> plain;
+  Result<StreamThroughput> shared;
+  Result<StreamThroughput> secured;  ///< an error where no certificate can be made
+};
+
+Result<StreamBench::Daemons> StreamBench::start_daemons() const {
+  const auto start = [&](const std::string& shm,
                          const client::Security& security) -> Result<StreamThroughput> {
-    const auto directory = work_ / (name + (security.tls() ? "-tls" : "-plain"));
+    const auto directory = work_ / (shm + (security.tls() ? "-tls" : "-plain"));
     if (auto made = make_directory(directory); !made) return tl::unexpected(made.error());
-    auto config = canned_daemon(command_.width_px, command_.height_px, name);
+    auto config = canned_daemon(command_.width_px, command_.height_px, shm);
     config.realtime.cpus = command_.cpus;
     config.tls.certificate = security.tls_certificate;
     config.tls.key = security.tls_key;
@@ -327,111 +360,137 @@ Result<void> StreamBench::throughput() {
   };
   auto plain = start("", {});
   if (!plain) return tl::unexpected(plain.error());
-  auto shared = start(shm, {});
+  auto shared = start(own_shm_name(), {});
   if (!shared) return tl::unexpected(shared.error());
   const auto certificate = make_certificate(work_);
   auto secured = certificate ? start("", *certificate)
                              : Result<StreamThroughput>(tl::unexpected(certificate.error()));
   if (certificate && !secured) return tl::unexpected(secured.error());
-  const auto measure = [&](const std::string& name) -> Result<YardstickResult> {
-    if (name == "bare-tcp") return measure_bare_tcp(yardstick_, false);
-    if (name == "bare-tcp-crc") return measure_bare_tcp(yardstick_, true);
-    if (name == "bare-udp") return measure_bare_udp(yardstick_);
-    if (name == "zeromq") return measure_zeromq(yardstick_, false);
-    if (name == "zeromq-crc") return measure_zeromq(yardstick_, true);
-    if (name == "iceoryx") return measure_iceoryx(yardstick_, work_, false);
-    if (name == "iceoryx-crc") return measure_iceoryx(yardstick_, work_, true);
-    if (name == "iperf3") {
-      constexpr int kSeconds = 1;
-      const auto gbit_s = measure_iperf3_gbit_s(work_, kSeconds);
-      if (!gbit_s) return tl::unexpected(gbit_s.error());
-      YardstickResult result;
-      result.seconds = kSeconds;
-      result.frames = static_cast<std::uint64_t>(*gbit_s * 1e9 / 8.0 /
-                                                 static_cast<double>(yardstick_.frame_bytes));
-      return result;
+  return Daemons{std::move(plain), std::move(shared), std::move(secured)};
+}
+
+Result<YardstickResult> StreamBench::measure(const std::string& name, Daemons& daemons) const {
+  if (name == "bare-tcp") return measure_bare_tcp(yardstick_, false);
+  if (name == "bare-tcp-crc") return measure_bare_tcp(yardstick_, true);
+  if (name == "bare-udp") return measure_bare_udp(yardstick_);
+  if (name == "zeromq") return measure_zeromq(yardstick_, false);
+  if (name == "zeromq-crc") return measure_zeromq(yardstick_, true);
+  if (name == "iceoryx") return measure_iceoryx(yardstick_, work_, false);
+  if (name == "iceoryx-crc") return measure_iceoryx(yardstick_, work_, true);
+  if (name == "iperf3") {
+    constexpr int kSeconds = 1;
+    const auto gbit_s = measure_iperf3_gbit_s(work_, kSeconds);
+    if (!gbit_s) return tl::unexpected(gbit_s.error());
+    YardstickResult result;
+    result.seconds = kSeconds;
+    result.frames = static_cast<std::uint64_t>(*gbit_s * 1e9 / 8.0 /
+                                               static_cast<double>(yardstick_.frame_bytes));
+    return result;
+  }
+  if (name == "tls" && !daemons.secured) return tl::unexpected(daemons.secured.error());
+  return (name == "shm"   ? *daemons.shared
+          : name == "tls" ? *daemons.secured
+                          : *daemons.plain)
+      .measure(name, yardstick_.frames, yardstick_.window);
+}
+
+Result<void> StreamBench::measure_round(const std::vector<Contender>& contenders, Daemons& daemons,
+                                        std::map<std::string, Series>& series,
+                                        const std::function<void(std::size_t)>& progress) const {
+  std::map<std::string, double> of_round;
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
+    const Contender& contender = contenders[i];
+    Series& own = series[contender.name];
+    progress(i);
+    if (!own.missing.empty()) continue;
+    const auto result = measure(contender.name, daemons);
+    if (!result) {
+      const auto code = result.error().code;
+      if (code != physics::ErrorCode::not_found && code != physics::ErrorCode::unsupported) {
+        return tl::unexpected(result.error());
+      }
+      own.missing = result.error().text;
+      continue;
     }
-    if (name == "tls" && !secured) return tl::unexpected(secured.error());
-    return (name == "shm"   ? *shared
-            : name == "tls" ? *secured
-                            : *plain)
-        .measure(name, yardstick_.frames, yardstick_.window);
-  };
+    const double gbit_s =
+        8e-9 * static_cast<double>(result->frames * yardstick_.frame_bytes) / result->seconds;
+    of_round[contender.name] = gbit_s;
+    own.gbit_s.add(gbit_s);
+    if (result->cpu_s > 0.0) {
+      own.cpu_frac.add(result->cpu_s / result->seconds);
+      own.cpu_s_per_gbit.add(result->cpu_s / (gbit_s * result->seconds));
+    }
+    own.frames += result->frames;
+    own.lost += result->lost;
+  }
+  for (const Contender& contender : contenders) {
+    for (const char* yardstick : contender.yardsticks) {
+      if (of_round.count(contender.name) == 0 || of_round.count(yardstick) == 0) continue;
+      series[contender.name].ratios[yardstick].add(of_round[contender.name] / of_round[yardstick]);
+    }
+  }
+  return {};
+}
+
+Row throughput_row(const Contender& contender, const Series& own) {
+  Row row;
+  row.transport = contender.name;
+  row.frames = own.frames;
+  row.lost = own.lost;
+  row.more.set("repeats", own.gbit_s.count());
+  if (own.missing.empty()) {
+    row.gbit_s = own.gbit_s.median();
+    if (!own.cpu_frac.empty()) {
+      row.cpu_frac = own.cpu_frac.median();
+      row.more.set("cpu_s_per_gbit", own.cpu_s_per_gbit.median());
+    }
+    row.more.set("min_gbit_s", own.gbit_s.percentile(0.0)).set("max_gbit_s", own.gbit_s.max());
+  } else {
+    row.more.set("reason", own.missing);
+  }
+  Json ratios = Json::object();
+  for (const char* yardstick : contender.yardsticks) {
+    const auto found = own.ratios.find(yardstick);
+    if (found == own.ratios.end()) continue;
+    const double ratio = found->second.median();
+    row.ratios.push_back(fmt::format("{:.2f} of {}", ratio, yardstick));
+    ratios.set(yardstick, ratio);
+    if (yardstick == contender.yardsticks.front()) {
+      row.more.set("yardstick", yardstick).set("ratio", ratio);
+    }
+  }
+  if (!row.ratios.empty()) row.more.set("ratios", std::move(ratios));
+  row.more.set("cpu", "daemon and client, or sender and receiver; cores");
+  return row;
+}
+
+Result<void> StreamBench::throughput() {
+  // Long enough that starting up does not show.
+  constexpr double kBytes = 2e9;
+  constexpr std::uint64_t kLeastFrames = 200;
+  constexpr std::uint64_t kMostFrames = 4000;
+  yardstick_.frames =
+      std::clamp(static_cast<std::uint64_t>(kBytes / static_cast<double>(yardstick_.frame_bytes)),
+                 kLeastFrames, kMostFrames);
+  auto daemons = start_daemons();
+  if (!daemons) return tl::unexpected(daemons.error());
   const std::vector<Contender> contenders = contenders_of(command_);
   std::map<std::string, Series> series;
   ProgressBar progress("throughput", command_.repeats * contenders.size());
   for (std::uint32_t round = 0; round < command_.repeats; ++round) {
-    std::map<std::string, double> of_round;
-    for (std::size_t i = 0; i < contenders.size(); ++i) {
-      const Contender& contender = contenders[i];
-      Series& own = series[contender.name];
+    const auto measured = measure_round(contenders, *daemons, series, [&](std::size_t i) {
       progress.advance_to(round * contenders.size() + i);
-      if (!own.missing.empty()) continue;
-      const auto result = measure(contender.name);
-      if (!result) {
-        const auto code = result.error().code;
-        if (code != physics::ErrorCode::not_found && code != physics::ErrorCode::unsupported) {
-          return tl::unexpected(result.error());
-        }
-        own.missing = result.error().text;
-        continue;
-      }
-      const double gbit_s =
-          8e-9 * static_cast<double>(result->frames * yardstick_.frame_bytes) / result->seconds;
-      of_round[contender.name] = gbit_s;
-      own.gbit_s.add(gbit_s);
-      if (result->cpu_s > 0.0) {
-        own.cpu_frac.add(result->cpu_s / result->seconds);
-        own.cpu_s_per_gbit.add(result->cpu_s / (gbit_s * result->seconds));
-      }
-      own.frames += result->frames;
-      own.lost += result->lost;
-    }
-    for (const Contender& contender : contenders) {
-      for (const char* yardstick : contender.yardsticks) {
-        if (of_round.count(contender.name) == 0 || of_round.count(yardstick) == 0) continue;
-        series[contender.name].ratios[yardstick].add(of_round[contender.name] /
-                                                     of_round[yardstick]);
-      }
-    }
+    });
+    if (!measured) return measured;
   }
   progress.finish();
-  for (auto* daemon : {&plain, &shared, &secured}) {
+  for (auto* daemon : {&daemons->plain, &daemons->shared, &daemons->secured}) {
     if (!*daemon) continue;
     if (device_.empty()) device_ = (*daemon)->device();
     if (auto stopped = (*daemon)->stop(); !stopped) return stopped;
   }
   for (const Contender& contender : contenders) {
-    const Series& own = series[contender.name];
-    Row row;
-    row.transport = contender.name;
-    row.frames = own.frames;
-    row.lost = own.lost;
-    row.more.set("repeats", own.gbit_s.count());
-    if (own.missing.empty()) {
-      row.gbit_s = own.gbit_s.median();
-      if (!own.cpu_frac.empty()) {
-        row.cpu_frac = own.cpu_frac.median();
-        row.more.set("cpu_s_per_gbit", own.cpu_s_per_gbit.median());
-      }
-      row.more.set("min_gbit_s", own.gbit_s.percentile(0.0)).set("max_gbit_s", own.gbit_s.max());
-    } else {
-      row.more.set("reason", own.missing);
-    }
-    Json ratios = Json::object();
-    for (const char* yardstick : contender.yardsticks) {
-      const auto found = own.ratios.find(yardstick);
-      if (found == own.ratios.end()) continue;
-      const double ratio = found->second.median();
-      row.ratios.push_back(fmt::format("{:.2f} of {}", ratio, yardstick));
-      ratios.set(yardstick, ratio);
-      if (yardstick == contender.yardsticks.front()) {
-        row.more.set("yardstick", yardstick).set("ratio", ratio);
-      }
-    }
-    if (!row.ratios.empty()) row.more.set("ratios", std::move(ratios));
-    row.more.set("cpu", "daemon and client, or sender and receiver; cores");
-    rows_.push_back(std::move(row));
+    rows_.push_back(throughput_row(contender, series[contender.name]));
   }
   return {};
 }
@@ -497,15 +556,13 @@ void StreamBench::print(std::FILE* out) const {
   }
 }
 
-}  // namespace
-
 std::vector<std::string> stream_contenders() {
   std::vector<std::string> names;
   for (const Contender& contender : contenders()) names.emplace_back(contender.name);
   return names;
 }
 
-int run_bench_stream(const BenchStreamCommand& command) {
+int run(const StreamOptions& command) {
   if (!command.only.empty() && command.repeats == 0) {
     return fail(kExitUsage, "--only names what --repeats 0 leaves out");
   }
@@ -530,6 +587,69 @@ int run_bench_stream(const BenchStreamCommand& command) {
     if (auto written = write_json(*command.json, json); !written) return fail(written.error());
   }
   return bench.sound() ? kExitOk : kExitFailure;
+}
+
+void add_options(CommandLine& line, StreamOptions& options) {
+  line.count("--frames", options.frames, "Frames per client at the fixed rate")
+      .positive()
+      .show_default();
+  line.option("--rate", options.rate_hz, "Frames a second").positive().show_default();
+  add_image_size(line, options.width_px, options.height_px);
+  line.option("--clients", options.clients, "Clients at the fixed rate")
+      .in_range(1U, 8U)
+      .show_default();
+  const Option transport =
+      line.option("--transport", options.transports,
+                  "Transport at the fixed rate; repeatable; mixed: tcp, udp, shm in turn; tcp-lz4: "
+                  "compressed")
+          .repeatable()
+          .one_of({"tcp", "tcp-lz4", "udp", "shm", "mixed"})
+          .show_default();
+  line.option("--repeats", options.repeats,
+              "Interleaved measurements of throughput, medians of which count; 0: none")
+      .in_range(0U, 1000U)
+      .show_default();
+  const Option only =
+      line.option("--only", options.only,
+                  "Of the throughput measurements only this one, e.g. tcp, and nothing at a "
+                  "fixed rate; repeatable; default: all")
+          .repeatable()
+          .one_of(stream_contenders())
+          .type_name("NAME")
+          .excludes(transport);
+  line.option("--cpus", options.cpus,
+              "Cores of the daemon's agents, as realtime.cpus has them, e.g. \"sender=0, "
+              "render=1\"; default: wherever the kernel likes, like all yardsticks");
+  line.option("--loss", options.losses,
+              "Nothing but this: frames over UDP through a network that loses this share of "
+              "the datagrams: without help, with resend, with error correction; repeatable")
+      .repeatable()
+      .in_range(0.0, 0.9)
+      .type_name("FRAC")
+      .excludes(only);
+  line.option("--burst", options.burst_mean, "--loss: datagrams lost in a row, mean")
+      .in_range(1.0, 1000.0)
+      .show_default();
+  add_error_correction(line, options.fec);
+  line.option("--payload", options.payload_bytes, "--loss: bytes of a fragment")
+      .in_range(320U, 65000U)
+      .show_default();
+  line.option("--seed", options.seed, "--loss: loses other datagrams")
+      .type_name("N")
+      .show_default();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_bench_stream(CommandLine& bench) {
+  bench.command<StreamOptions>(
+      {.name = "stream",
+       .text =
+           "Transport alone: canned frames over loopback and shared memory, first at a fixed rate, "
+           "then as fast as they go, beside bare sockets in the same run",
+       .example = "emit bench stream --json stream.json --frames 1000 --rate 200"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

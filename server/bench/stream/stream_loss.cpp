@@ -14,12 +14,12 @@
 #include <vector>
 
 #include "agents/frame_source.hpp"
+#include "bench/stream/stream_throughput.hpp"
+#include "client/fault_relay.hpp"
+#include "tool/streams/error_correction.hpp"
+#include "tool/streams/stream_report.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
-#include "tool/streams/error_correction.hpp"
-#include "client/fault_relay.hpp"
-#include "tool/streams/stream_report.hpp"
-#include "bench/stream/stream_throughput.hpp"
 
 namespace emit::tool {
 namespace {

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <string>
 
+#include "emit/client/client.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/protocol/parity.hpp"
-#include "emit/client/client.hpp"
 #include "net/fault_injector.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/statistics.hpp"

@@ -5,11 +5,11 @@
 #include <memory>
 #include <string>
 
-#include "tool/support/daemon_process.hpp"
+#include "bench/stream/stream_yardstick.hpp"
+#include "emit/client/client.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/physics/error.hpp"
-#include "emit/client/client.hpp"
-#include "bench/stream/stream_yardstick.hpp"
+#include "tool/support/daemon_process.hpp"
 
 namespace emit::tool {
 

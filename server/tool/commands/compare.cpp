@@ -5,14 +5,22 @@
 #include <cmath>
 #include <optional>
 
+#include "emit/image/image_diff.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
-#include "emit/image/image_diff.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/json.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct CompareOptions {
+  std::filesystem::path a;
+  std::filesystem::path b;
+  std::optional<double> max_error_k;
+  std::optional<std::filesystem::path> json;
+};
 
 Json stats_json(const image::DiffStats& stats) {
   Json json = Json::object();
@@ -43,9 +51,7 @@ Json names_json(const std::vector<std::string>& names) {
   return json;
 }
 
-}  // namespace
-
-int run_compare(const CompareCommand& command) {
+int run(const CompareOptions& command) {
   const auto a = image::read_exr(command.a);
   if (!a) return fail(a.error());
   const auto b = image::read_exr(command.b);
@@ -118,6 +124,25 @@ int run_compare(const CompareCommand& command) {
                                           worst_k, one_sided, *command.max_error_k));
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, CompareOptions& options) {
+  line.path("a", options.a, "OpenEXR frame").required();
+  line.path("b", options.b, "OpenEXR frame, taken as the reference").required();
+  line.option("--max-error-k", options.max_error_k,
+              "Exit 1 when temperatures differ by more than this anywhere (radiance by the band "
+              "and response in b's attributes; without a response as of a rectangular band)")
+      .type_name("K");
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_compare(CommandLine& tool) {
+  tool.command<CompareOptions>({.name = "compare",
+                                .text = "Difference of two frames, in kelvin and per cent",
+                                .example = "emit compare a.exr b.exr --json diff.json"},
+                               add_options, run);
 }
 
 }  // namespace emit::tool

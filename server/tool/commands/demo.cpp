@@ -10,20 +10,32 @@
 #include <optional>
 #include <system_error>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
-#include "tool/support/daemon_process.hpp"
-#include "tool/commands/demo_report.hpp"
 #include "emit/config/load.hpp"
 #include "emit/protocol/record/log.hpp"
-#include "tool/support/frame_files.hpp"
-#include "tool/support/interrupt.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/commands/demo_report.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/streams/pose_plan.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/daemon_process.hpp"
+#include "tool/support/frame_files.hpp"
+#include "tool/support/interrupt.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct DemoOptions {
+  std::filesystem::path out = "emit-demo";
+  ScenarioChoice input{"airfield", {}};
+  std::optional<std::filesystem::path> log;
+  std::uint64_t frames = 0;  ///< 0: as many as fit the budget
+  bool all = false;
+  bool keep = false;
+  double budget_s = 45.0;
+  std::optional<std::filesystem::path> json;
+};
 
 using Clock = std::chrono::steady_clock;
 using physics::ErrorCode;
@@ -66,7 +78,7 @@ class WorkFolder {
 };
 
 /// The shipped log of a scenario, or one made from the scenario's trajectories where none ships.
-Result<std::filesystem::path> find_or_make_log(const DemoCommand& command,
+Result<std::filesystem::path> find_or_make_log(const DemoOptions& command,
                                                const scene::ScenarioDesc& scenario,
                                                const std::filesystem::path& work) {
   if (command.log) return *command.log;
@@ -144,7 +156,7 @@ constexpr std::uint32_t kDemoSamples = 100'000;
 
 class Demo {
  public:
-  Demo(const DemoCommand& command, scene::ScenarioDesc scenario, WorkFolder& work)
+  Demo(const DemoOptions& command, scene::ScenarioDesc scenario, WorkFolder& work)
       : command_(command), scenario_(std::move(scenario)), work_(work) {}
 
   int run();
@@ -160,7 +172,7 @@ class Demo {
   Result<void> replay();
   int report();
 
-  const DemoCommand& command_;
+  const DemoOptions& command_;
   scene::ScenarioDesc scenario_;
   WorkFolder& work_;
   Clock::time_point begin_ = Clock::now();
@@ -481,14 +493,42 @@ int Demo::run() {
   return report();
 }
 
-}  // namespace
-
-int run_demo(const DemoCommand& command) {
+int run(const DemoOptions& command) {
   const auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
   WorkFolder work(command.keep);
   const InterruptGuard interrupt;
   return Demo(command, *scenario, work).run();
+}
+
+void add_options(CommandLine& line, DemoOptions& options) {
+  line.path("--out", options.out, "Folder for the frames")
+      .type_name("DIR")
+      .default_text(options.out.string());
+  line.option("--scenario", options.input.scenario, "Shipped scenario or .toml file")
+      .show_default();
+  add_set(line, options.input.set);
+  line.path("--log", options.log, "Host log to play; default: the scenario's shipped log");
+  line.count("--frames", options.frames,
+             "Poses to play, evenly spaced over the log; 0: as many as fit");
+  line.flag("--all", options.all, "Play every pose of the log, however long it takes");
+  line.flag("--keep", options.keep, "Keep the recording, the daemon's configuration and its log");
+  line.seconds("--budget-s", options.budget_s, "Time that the chosen poses may take")
+      .positive()
+      .show_default();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_demo(CommandLine& tool) {
+  tool.command<DemoOptions>(
+      {.name = "demo",
+       .text =
+           "The main job end to end on loopback: daemon, pose log over UDP and TCP, two clients, "
+           "frames on disk, timing table, bit-exact replay",
+       .example = "emit demo --out frames"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "tool/streams/journal_replay.hpp"
-#include "tool/support/json.hpp"
 #include "tool/streams/pose_plan.hpp"
 #include "tool/streams/stream_client.hpp"
+#include "tool/support/json.hpp"
 
 namespace emit::tool {
 

@@ -9,12 +9,32 @@
 #include <utility>
 #include <vector>
 
+#include "emit/config/slab_modes.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
-#include "emit/config/slab_modes.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct EvaluateOptions {
+  std::string model;
+  std::filesystem::path input;
+  std::string precision = "float64";
+  std::string device = "cpu";
+  std::optional<std::filesystem::path> cases;
+  std::optional<std::filesystem::path> nodes;
+  std::optional<std::uint32_t> rays;
+  std::string method;  ///< empty: the default method
+  int gpu_index = -1;
+  std::uint32_t refine = 1;
+  std::string layers;   ///< surface-history: d:k:rc,...
+  std::string initial;  ///< surface-history: z:T,...
+  std::optional<double> base_k;
+  std::optional<double> emissivity_frac;
+  std::optional<double> film_w_m2_k;
+  std::string history_model = "reference";
+};
 
 /// "a:b,c:d" as rows of `columns` numbers; an empty text has no rows.
 physics::Result<std::vector<std::vector<double>>> parse_rows(std::string_view option,
@@ -46,7 +66,7 @@ physics::Result<std::vector<std::vector<double>>> parse_rows(std::string_view op
   return rows;
 }
 
-physics::Result<verify::HistoryOptions> history_options(const EvaluateCommand& command) {
+physics::Result<verify::HistoryOptions> history_options(const EvaluateOptions& command) {
   verify::HistoryOptions history;
   history.base_k = command.base_k;
   history.emissivity_frac = command.emissivity_frac;
@@ -76,9 +96,7 @@ physics::Result<verify::HistoryOptions> history_options(const EvaluateCommand& c
   return history;
 }
 
-}  // namespace
-
-int run_evaluate(const EvaluateCommand& command) {
+int run(const EvaluateOptions& command) {
   verify::EvaluateRequest request;
   request.model = command.model;
   request.table = command.input;
@@ -102,7 +120,8 @@ int run_evaluate(const EvaluateCommand& command) {
   return written ? kExitOk : fail(kExitFailure, "standard output: write failed");
 }
 
-std::string evaluate_models_text() {
+/// List of the models with their columns, for --help.
+std::string models_text() {
   std::string text;
   for (const auto& model : verify::models()) {
     text += "  " + std::string(model.name) + ": " + std::string(model.meaning) +
@@ -110,6 +129,62 @@ std::string evaluate_models_text() {
             std::string(model.inputs) + "\n      out " + std::string(model.outputs) + "\n";
   }
   return text;
+}
+
+void add_options(CommandLine& line, EvaluateOptions& options) {
+  line.footer(
+      "Models:\n" + models_text() +
+      "Example: emit evaluate equilibrium quartic_roots.csv --precision float32 --device gpu");
+  line.option("model", options.model, "Name of the model, see below").required().type_name("MODEL");
+  line.path("input", options.input, "CSV with a header row; columns in any order").required();
+  line.option("--precision", options.precision, "float64 or float32")
+      .one_of({"float32", "float64"})
+      .show_default();
+  line.option("--device", options.device, "cpu, or gpu: the shader code itself (float32)")
+      .one_of({"gpu", "cpu"})
+      .show_default();
+  line.path("--cases", options.cases, "relaxation: CSV of the cases");
+  line.path("--nodes", options.nodes, "relaxation: CSV of the history's nodes");
+  line.option("--refine", options.refine, "conduction-*, surface-history: scales cells and steps")
+      .one_of_numbers({1, 2, 4})
+      .show_default();
+  line.option("--layers", options.layers,
+              "surface-history: layers from the surface, thickness m : conductivity W/m/K : "
+              "heat capacity J/m3/K")
+      .type_name("D:K:RC,...");
+  line.option("--initial", options.initial,
+              "surface-history: profile at the first row, depth m : temperature K, linear")
+      .type_name("Z:T,...");
+  line.option("--base-k", options.base_k, "surface-history: temperature below the last layer")
+      .type_name("K");
+  line.option("--emissivity", options.emissivity_frac,
+              "surface-history: long-wave emissivity, 0..1")
+      .type_name("E");
+  line.option("--film-w-m2-k", options.film_w_m2_k, "surface-history: convection coefficient")
+      .type_name("H");
+  line.option("--model", options.history_model,
+              "surface-history: reference, emit2014 (first layer, no convection) or foster")
+      .one_of({"reference", "emit2014", "foster"})
+      .show_default();
+  line.option("--rays", options.rays,
+              "sun-disc, wall-shadow, sky-view on the cpu: rays per row and measure")
+      .type_name("N")
+      .in_range(1, 1 << 30);
+  line.option("--method", options.method,
+              "sun-disc, wall-shadow, sky-view with --device gpu: thermal method whose "
+              "visibility answers; default: cached")
+      .one_of({"per-frame", "cached"});
+  add_gpu(line, options.gpu_index);
+}
+
+}  // namespace
+
+void add_evaluate(CommandLine& tool) {
+  tool.command<EvaluateOptions>(
+      {.name = "evaluate",
+       .text = "Run one model on a table; CSV to standard output",
+       .example = "emit evaluate equilibrium quartic_roots.csv --precision float32 --device gpu"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -8,16 +8,29 @@
 #include <cmath>
 #include <cstdio>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/config/load.hpp"
 #include "emit/physics/csv.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/library_edit.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct FitOptions {
+  ScenarioChoice input;  ///< a scenario, or a curve (*.csv)
+  std::vector<std::string> materials;
+  std::optional<std::size_t> modes;
+  std::string model = "foster";
+  double spin_up_s = 172'800.0;
+  double history_s = 12'600.0;
+  std::filesystem::path library;  ///< empty: the shipped one
+  std::optional<std::filesystem::path> out;
+  std::optional<std::filesystem::path> json;
+};
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -109,9 +122,7 @@ Result<scene::ScenarioDesc> library_scenario(const std::vector<std::string>& set
   return config::load_scenario(*file, set, options);
 }
 
-}  // namespace
-
-int run_fit(const FitCommand& command) {
+int run(const FitOptions& command) {
   reference::FitOptions options;
   options.model =
       command.model == "emit2014" ? reference::FitModel::emit2014 : reference::FitModel::foster;
@@ -199,6 +210,44 @@ int run_fit(const FitCommand& command) {
     if (auto ok = write_json(*command.json, json); !ok) return fail(ok.error());
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, FitOptions& options) {
+  line.option("input", options.input.scenario,
+              "Scenario: its place, date, weather and materials, over five histories of sun and "
+              "shade. Or a curve, CSV with time_s, absorbed_w_m2, film_w_m2_k, air_k, "
+              "temperature_k")
+      .required()
+      .type_name("SCENARIO|CURVE.csv");
+  add_set(line, options.input.set);
+  line.option("--material", options.materials, "Material; repeatable; default: all of the scenario")
+      .repeatable()
+      .type_name("NAME");
+  line.option("--modes", options.modes, "foster: 2 to 4, default 4; emit2014: 1 or 2, default 2")
+      .type_name("N")
+      .in_range(1, 4);
+  line.option("--model", options.model, "Model whose modes are fitted")
+      .one_of({"foster", "emit2014"})
+      .show_default();
+  line.seconds("--spin-up-s", options.spin_up_s, "Unshadowed time before the histories")
+      .in_range(0.0, 3.2e7)
+      .show_default();
+  line.seconds("--history-s", options.history_s, "Length of a history")
+      .in_range(600.0, 864'000.0)
+      .show_default();
+  line.path("--library", options.library, "Library to start from; default: the shipped one");
+  line.path("--out", options.out, "Library to write: the same with the fitted modes");
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_fit(CommandLine& tool) {
+  tool.command<FitOptions>({.name = "fit",
+                            .text = "Fit a material's modes to the reference solver, or to a curve",
+                            .example = "emit fit block-on-road --material asphalt --modes 4 --json "
+                                       "fit.json --out library.toml"},
+                           add_options, run);
 }
 
 }  // namespace emit::tool

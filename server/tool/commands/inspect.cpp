@@ -4,14 +4,21 @@
 #include <cstdio>
 #include <fstream>
 
+#include "emit/scene/inspect.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
-#include "emit/scene/inspect.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
+namespace {
 
-int run_inspect(const InspectCommand& command) {
+struct InspectOptions {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> json;
+};
+
+int run(const InspectOptions& command) {
   const std::vector<scene::Material> library = material_library();
   const auto summary = scene::inspect_gltf(command.file, library);
   if (!summary) return fail(summary.error());
@@ -32,6 +39,20 @@ int run_inspect(const InspectCommand& command) {
   file.close();
   if (!file) return fail(kExitFailure, fmt::format("{}: cannot write", command.json->string()));
   return kExitOk;
+}
+
+void add_options(CommandLine& line, InspectOptions& options) {
+  line.path("scene", options.file, "glTF 2.0 file (.glb or .gltf)").required();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_inspect(CommandLine& tool) {
+  tool.command<InspectOptions>({.name = "inspect",
+                                .text = "Show what the loader sees in a glTF file",
+                                .example = "emit inspect scene.glb"},
+                               add_options, run);
 }
 
 }  // namespace emit::tool

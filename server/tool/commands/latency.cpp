@@ -9,20 +9,36 @@
 #include <utility>
 
 #include "agents/render/canned_marker.hpp"
-#include "tool/support/console.hpp"
-#include "tool/support/interrupt.hpp"
-#include "emit/client/client.hpp"
 #include "client/client_connection.hpp"
-#include "tool/support/json.hpp"
+#include "emit/client/client.hpp"
+#include "rt/clock.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
 #include "tool/streams/latency_marker.hpp"
 #include "tool/streams/latency_report.hpp"
 #include "tool/streams/pose_log.hpp"
-#include "rt/clock.hpp"
+#include "tool/streams/stream_options.hpp"
 #include "tool/streams/stream_report.hpp"
-#include "tool/commands/timing_commands.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/interrupt.hpp"
+#include "tool/support/json.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct LatencyOptions {
+  std::string url;  ///< frames
+  std::string to;   ///< poses; empty: TCP to where the frames come from
+  std::uint64_t frames = 1000;
+  double rate_hz = 20.0;
+  std::optional<std::uint32_t> entity;       ///< what is switched; absent: see --help
+  std::optional<std::filesystem::path> log;  ///< its first pose is held
+  double time_s = 0.0;
+  double timeout_s = 10.0;
+  std::uint32_t seed = 1;
+  client::Security security;
+  std::optional<std::filesystem::path> json;
+};
 
 using physics::ErrorCode;
 using physics::make_error;
@@ -39,7 +55,7 @@ std::string url_text(const char* scheme, const client::Url& url) {
 /// it. One thread: a pose at a time is on its way.
 class LatencyProbe {
  public:
-  LatencyProbe(const LatencyCommand& command, client::FrameClient& client, client::HostClient& host)
+  LatencyProbe(const LatencyOptions& command, client::FrameClient& client, client::HostClient& host)
       : command_(command), client_(client), host_(host), random_(command.seed) {
     frame_->run_id = static_cast<std::uint64_t>(clock_.tai_ns());
   }
@@ -67,7 +83,7 @@ class LatencyProbe {
     return static_cast<std::int64_t>(command_.timeout_s * 1e9);
   }
 
-  const LatencyCommand& command_;
+  const LatencyOptions& command_;
   client::FrameClient& client_;
   client::HostClient& host_;
   server::SystemClock clock_;
@@ -215,9 +231,7 @@ Result<void> LatencyProbe::run(ProgressBar& progress) {
   return {};
 }
 
-}  // namespace
-
-int run_latency(const LatencyCommand& command) {
+int run(const LatencyOptions& command) {
   const auto url = client::parse_frame_url(command.url);
   if (!url) return fail(kExitUsage, url.error().text);
   std::string to = command.to;
@@ -280,6 +294,53 @@ int run_latency(const LatencyCommand& command) {
   }
   if (report.total_us().empty()) return fail(kExitFailure, "nothing was measured");
   return probe.missed() > 0 ? kExitFailure : kExitOk;
+}
+
+void add_options(CommandLine& line, LatencyOptions& options) {
+  line.footer(
+      "Takes the host's place: a run of its own begins. The marker: --entity is switched on and "
+      "off and found\nin the pictures by itself; the canned test pattern has a marker of its "
+      "own; otherwise a frame shows\na pose when it carries its number. Delays across machines "
+      "hold as far as their clocks agree.\n"
+      "Example: emit latency udp://127.0.0.1:7000 --to udp://127.0.0.1:7001 --frames 1000");
+  line.option("url", options.url, "Frames: tcp://host:port, udp://host:port or shm://name")
+      .required()
+      .type_name("URL");
+  line.option("--to", options.to,
+              "Poses: udp://host:port (host port) or tcp://host:port (control port); "
+              "default: TCP to where the frames come from")
+      .type_name("URL");
+  line.count("--frames", options.frames, "Poses to measure").positive();
+  line.option("--rate", options.rate_hz,
+              "Poses a second at most, at random distances; the next one waits for the frame "
+              "of the last")
+      .type_name("HZ")
+      .in_range(0.01, 10'000.0)
+      .show_default();
+  line.option("--entity", options.entity, "Entity of the scenario to switch on and off")
+      .type_name("ID");
+  line.path("--log", options.log, "Pose log whose first pose is held; default: the daemon's view");
+  line.seconds("--time-s", options.time_s, "Simulated time of the first pose").show_default();
+  line.seconds("--timeout-s", options.timeout_s, "A pose not shown for this long is missed")
+      .positive()
+      .show_default();
+  line.option("--seed", options.seed, "Of the distances between poses").show_default();
+  line.path("--key-file", options.security.key_file,
+            "Poses by udp: pre-shared key, as in the daemon's host.key_file");
+  add_security(line, options.security);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_latency(CommandLine& tool) {
+  tool.command<LatencyOptions>(
+      {.name = "latency",
+       .text =
+           "Transport delay end to end: sends poses as the host, switches a marker with each, and "
+           "waits for the first frame that shows it; exits 1 when one was never shown",
+       .example = "emit latency udp://127.0.0.1:7000 --to udp://127.0.0.1:7001 --frames 1000"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -4,15 +4,25 @@
 #include <cmath>
 #include <memory>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
+namespace {
 
-int run_make_log(const MakeLogCommand& command) {
+struct MakeLogOptions {
+  ScenarioChoice input;
+  double rate_hz = 200.0;
+  std::optional<double> start_s;  ///< absent: first node of the sensor trajectory
+  double duration_s = 20.0;
+  std::filesystem::path out;
+};
+
+int run(const MakeLogOptions& command) {
   const auto scenario = load_scenario_choice(command.input);
   if (!scenario) return fail_config(scenario.error());
   if (auto fits = check_entities_fit(*scenario); !fits) return fail_config(fits.error());
@@ -44,6 +54,25 @@ int run_make_log(const MakeLogCommand& command) {
              command.out.string(), count, command.rate_hz, 1e-9 * static_cast<double>(start_ns),
              1e-9 * static_cast<double>(frame->sim_time_ns), frame->entity_count);
   return kExitOk;
+}
+
+void add_options(CommandLine& line, MakeLogOptions& options) {
+  add_scenario(line, options.input, "scenario");
+  line.option("--rate-hz", options.rate_hz, "Poses a second").positive().show_default();
+  line.option("--start-s", options.start_s,
+              "Simulated time of the first pose; default: the sensor trajectory's first node");
+  line.seconds("--duration-s", options.duration_s, "Length").positive().show_default();
+  line.path("--out", options.out, "MCAP log to write").required();
+}
+
+}  // namespace
+
+void add_make_log(CommandLine& tool) {
+  tool.command<MakeLogOptions>(
+      {.name = "make-log",
+       .text = "Make a host log from a scenario's own trajectories",
+       .example = "emit make-log airfield --rate-hz 200 --duration-s 20 --out airfield.mcap"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -3,18 +3,30 @@
 
 #include <chrono>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/version.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/streams/stream_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
-#include "emit/client/client.hpp"
 #include "tool/support/json.hpp"
 
 namespace emit::tool {
+namespace {
 
-int run_record(const RecordCommand& command) {
+struct RecordOptions {
+  std::string from;
+  std::filesystem::path out;
+  std::uint64_t frames = 0;
+  double duration_s = 0.0;
+  std::optional<std::filesystem::path> json;
+  client::Security security;
+};
+
+int run(const RecordOptions& command) {
   const auto url = client::parse_url(command.from);
   if (!url) return fail(kExitUsage, url.error().text);
   auto connected =
@@ -106,6 +118,27 @@ int run_record(const RecordCommand& command) {
     return fail(kExitFailure, "the log begins in the middle of a run, which does not replay");
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, RecordOptions& options) {
+  line.option("--from", options.from, "Control address of the daemon, tcp://host:port")
+      .required()
+      .type_name("URL");
+  line.path("--out", options.out, "MCAP log to write").required();
+  add_security(line, options.security);
+  line.count("--frames", options.frames, "Stop after this many frames; 0: no limit");
+  line.seconds("--duration-s", options.duration_s, "Stop after this long; 0: until interrupted");
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_record(CommandLine& tool) {
+  tool.command<RecordOptions>(
+      {.name = "record",
+       .text = "Fetch the daemon's journal into a log that replay can apply",
+       .example = "emit record --from tcp://127.0.0.1:7000 --out run.mcap"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -5,16 +5,26 @@
 #include <cmath>
 #include <optional>
 
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
+#include "tool/streams/journal_replay.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
-#include "tool/streams/journal_replay.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct ReplayOptions {
+  std::filesystem::path log;
+  ScenarioChoice input;
+  std::optional<std::filesystem::path> out;
+  std::string speed = "max";
+  int gpu_index = -1;
+  std::optional<std::filesystem::path> json;
+};
 
 /// 0 stands for "max". Empty: not a speed.
 std::optional<double> parse_speed(const std::string& text) {
@@ -26,9 +36,7 @@ std::optional<double> parse_speed(const std::string& text) {
   return value;
 }
 
-}  // namespace
-
-int run_replay(const ReplayCommand& command) {
+int run(const ReplayOptions& command) {
   const auto speed = parse_speed(command.speed);
   if (!speed) return fail(kExitUsage, "--speed: a positive number or max");
   const auto scenario = load_scenario_choice(command.input);
@@ -86,6 +94,28 @@ int run_replay(const ReplayCommand& command) {
                             summary->frames, summary->first_mismatch));
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, ReplayOptions& options) {
+  line.path("log", options.log, "MCAP log of emit record, or of the daemon's journal").required();
+  add_scenario(line, options.input, "--scenario");
+  line.path("--out", options.out, "Folder for frame_NNNNNN.exr and .png").type_name("DIR");
+  line.option("--speed", options.speed, "Multiple of the recorded pace, or max")
+      .type_name("X")
+      .show_default();
+  add_gpu(line, options.gpu_index);
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_replay(CommandLine& tool) {
+  tool.command<ReplayOptions>(
+      {.name = "replay",
+       .text =
+           "Apply a recorded journal and check every frame bit for bit; exits 1 on a difference",
+       .example = "emit replay run.mcap --scenario airfield --out frames"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -7,15 +7,32 @@
 #include <memory>
 #include <thread>
 
+#include "emit/client/client.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
+#include "tool/streams/pose_log.hpp"
+#include "tool/streams/stream_options.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
-#include "emit/client/client.hpp"
 #include "tool/support/json.hpp"
-#include "tool/streams/pose_log.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct SendOptions {
+  std::filesystem::path log;
+  std::string to;
+  std::string control;   ///< with step over UDP: where frames can be watched
+  double rate_hz = 0.0;  ///< 0: as recorded
+  bool step = false;
+  std::uint64_t frames = 0;  ///< 0: all
+  std::uint64_t every = 1;
+  double timeout_s = 60.0;
+  std::optional<std::uint64_t> run_id;  ///< absent: from the wall clock
+  std::uint16_t host_port = 7001;       ///< of captures: where the host's datagrams went
+  std::optional<std::filesystem::path> json;
+  client::Security security;
+};
 
 using Clock = std::chrono::steady_clock;
 
@@ -92,9 +109,7 @@ physics::Result<bool> wait_for_frame(client::FrameClient& watcher, client::HostC
   return false;
 }
 
-}  // namespace
-
-int run_send(const SendCommand& command) {
+int run(const SendOptions& command) {
   const auto url = client::parse_url(command.to);
   if (!url) return fail(kExitUsage, url.error().text);
   const bool udp = url->scheme == client::Url::Scheme::udp;
@@ -184,6 +199,54 @@ int run_send(const SendCommand& command) {
     return fail(kExitFailure, fmt::format("{}: no host frame in the log", command.log.string()));
   }
   return refusals.total > 0 ? kExitFailure : kExitOk;
+}
+
+void add_options(CommandLine& line, SendOptions& options) {
+  line.path("log", options.log,
+            "MCAP log with host frames, CSV with poses (*.csv), or a pcap/pcapng capture of a "
+            "host's datagrams")
+      .required();
+  line.option("--to", options.to, "udp://host:port (host port) or tcp://host:port (control port)")
+      .required()
+      .type_name("URL");
+  line.option("--rate", options.rate_hz, "Poses a second; default: as the log's sim times say")
+      .type_name("HZ")
+      .positive();
+  line.flag("--step", options.step,
+            "Wait until the daemon has sent the frame before the next pose");
+  line.count("--frames", options.frames, "Send at most this many poses; 0: all");
+  line.count("--every", options.every, "Send every Nth pose, numbered anew").positive();
+  line.option("--control", options.control,
+              "With udp: control port to watch the frames (--step) and to agree on a key over "
+              "TLS (--tls-*), tcp://host:port")
+      .type_name("URL");
+  line.path("--key-file", options.security.key_file,
+            "udp: pre-shared key (its first line) for the MAC of every datagram, as in the "
+            "daemon's host.key_file");
+  add_security(line, options.security);
+  line.option("--host-port", options.host_port, "Capture: UDP port the host sent to")
+      .type_name("PORT")
+      .in_range(1, 65535)
+      .show_default();
+  line.option("--run-id", options.run_id,
+              "Host run id, not 0; another run in the log counts up. Default: from the clock, "
+              "so that a run that follows another needs no reset")
+      .type_name("N")
+      .positive();
+  line.seconds("--timeout-s", options.timeout_s, "With --step: longest wait for a frame")
+      .positive()
+      .show_default();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_send(CommandLine& tool) {
+  tool.command<SendOptions>(
+      {.name = "send",
+       .text = "Host stand-in: plays the poses of a log to a daemon",
+       .example = "emit send airfield.mcap --to udp://127.0.0.1:7001 --rate 200"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -3,9 +3,17 @@
 #include "tool/commands/commands.hpp"
 
 namespace emit::tool {
+namespace {
 
-int run_serve(int argc, char** argv) {
+/// The daemon reads its own arguments.
+int run(int argc, char** argv) {
   return server::emitd_main(argc, argv, "emit serve");
+}
+
+}  // namespace
+
+void add_serve(CommandLine& tool) {
+  tool.raw_command("serve", "Run the daemon (same as emitd)", run);
 }
 
 }  // namespace emit::tool

@@ -7,15 +7,23 @@
 #include <cstdlib>
 #include <thread>
 
+#include "client/http_get.hpp"
+#include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
+#include "tool/streams/metrics_parse.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
-#include "client/http_get.hpp"
 #include "tool/support/json.hpp"
-#include "tool/streams/metrics_parse.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct StatOptions {
+  std::string url;
+  bool once = false;
+  double interval_s = 1.0;
+  std::optional<std::filesystem::path> json;  ///< one reading, then the end
+};
 
 using Clock = std::chrono::steady_clock;
 using Samples = std::vector<MetricSample>;
@@ -167,9 +175,7 @@ void print(const Reading& now, const std::optional<Reading>& before) {
   std::fflush(stdout);
 }
 
-}  // namespace
-
-int run_stat(const StatCommand& command) {
+int run(const StatOptions& command) {
   std::optional<Reading> before;
   const InterruptGuard interrupt;
   const bool live = ::isatty(STDOUT_FILENO) != 0 && !command.once;
@@ -190,6 +196,26 @@ int run_stat(const StatCommand& command) {
     std::this_thread::sleep_for(std::chrono::duration<double>(command.interval_s));
   }
   return kExitOk;
+}
+
+void add_options(CommandLine& line, StatOptions& options) {
+  line.option("url", options.url, "http://host:port of metrics.listen").required().type_name("URL");
+  line.flag("--once", options.once, "One table, then the end");
+  line.seconds("--interval-s", options.interval_s, "Time between two tables")
+      .in_range(0.1, 3600.0)
+      .show_default();
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_stat(CommandLine& tool) {
+  tool.command<StatOptions>(
+      {.name = "stat",
+       .text =
+           "Counters, times, clients and warnings of a daemon with metrics.listen, again and again",
+       .example = "emit stat http://127.0.0.1:7002"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

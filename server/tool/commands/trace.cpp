@@ -3,13 +3,20 @@
 
 #include <fstream>
 
-#include "tool/support/console.hpp"
 #include "client/http_get.hpp"
-#include "tool/commands/timing_commands.hpp"
+#include "tool/command_line/command_line.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
 
 namespace emit::tool {
+namespace {
 
-int run_trace(const TraceCommand& command) {
+struct TraceOptions {
+  std::string url;
+  std::filesystem::path out;
+};
+
+int run(const TraceOptions& command) {
   constexpr std::int64_t kTimeoutNs = 10'000'000'000;
   std::string url = command.url;
   while (url.ends_with('/')) url.pop_back();
@@ -25,6 +32,21 @@ int run_trace(const TraceCommand& command) {
   if (!file) return fail(kExitFailure, fmt::format("{}: cannot write", command.out.string()));
   fmt::print("{}: open it in https://ui.perfetto.dev or chrome://tracing\n", command.out.string());
   return kExitOk;
+}
+
+void add_options(CommandLine& line, TraceOptions& options) {
+  line.option("url", options.url, "http://host:port of metrics.listen").required().type_name("URL");
+  line.path("--out", options.out, "JSON file to write").required();
+}
+
+}  // namespace
+
+void add_trace(CommandLine& tool) {
+  tool.command<TraceOptions>(
+      {.name = "trace",
+       .text = "Stages of the frames sent last, as a Chrome trace for Perfetto or chrome://tracing",
+       .example = "emit trace http://127.0.0.1:7002 --out trace.json"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -6,20 +6,31 @@
 #include <cerrno>
 #include <chrono>
 
-#include "tool/support/console.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/trigger.hpp"
 #include "emit/protocol/trigger_seal.hpp"
-#include "tool/support/interrupt.hpp"
-#include "emit/client/client.hpp"
 #include "net/key_file.hpp"
 #include "net/socket.hpp"
-#include "tool/support/json.hpp"
 #include "rt/clock.hpp"
-#include "tool/commands/timing_commands.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/support/console.hpp"
+#include "tool/support/interrupt.hpp"
+#include "tool/support/json.hpp"
 
 namespace emit::tool {
+namespace {
 
-int run_trigger(const TriggerCommand& command) {
+struct TriggerOptions {
+  std::string to;
+  double rate_hz = 100.0;
+  std::uint64_t frames = 0;  ///< 0: until interrupted
+  bool stamp = false;
+  std::filesystem::path key_file;  ///< empty: bare
+  std::optional<std::filesystem::path> json;
+};
+
+int run(const TriggerOptions& command) {
   const auto url = client::parse_url(command.to);
   if (!url) return fail(kExitUsage, url.error().text);
   if (url->scheme != client::Url::Scheme::udp) {
@@ -80,6 +91,30 @@ int run_trigger(const TriggerCommand& command) {
     if (auto done = write_json(*command.json, json); !done) return fail(done.error());
   }
   return failed > 0 ? kExitFailure : kExitOk;
+}
+
+void add_options(CommandLine& line, TriggerOptions& options) {
+  line.option("to", options.to, "udp://host:port of trigger.udp").required().type_name("URL");
+  line.option("--rate", options.rate_hz, "Triggers a second, by an absolute timer on CLOCK_TAI")
+      .type_name("HZ")
+      .in_range(0.01, 10'000.0)
+      .show_default();
+  line.count("--frames", options.frames, "Triggers to send; 0: until interrupted");
+  line.flag("--stamp", options.stamp, "Say in each when it was sent, so that its delay is judged");
+  line.path(
+      "--key-file", options.key_file,
+      "A MAC in each by the file's first key, as in the daemon's host.key_file; implies --stamp");
+  add_json(line, options.json);
+}
+
+}  // namespace
+
+void add_trigger(CommandLine& tool) {
+  tool.command<TriggerOptions>(
+      {.name = "trigger",
+       .text = "Sync source stand-in: sends triggers to pacing.mode = \"trigger\"",
+       .example = "emit trigger udp://127.0.0.1:7003 --rate 100 --frames 1000"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

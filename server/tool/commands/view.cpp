@@ -7,15 +7,25 @@
 #include <span>
 #include <thread>
 
-#include "tool/commands/commands.hpp"
-#include "tool/support/console.hpp"
 #include "emit/image/false_color.hpp"
+#include "tool/command_line/common_options.hpp"
+#include "tool/commands/commands.hpp"
+#include "tool/streams/stream_options.hpp"
+#include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/view/frame_provider.hpp"
 #include "tool/view/window.hpp"
 
 namespace emit::tool {
 namespace {
+
+struct ViewOptions {
+  view::SourceOptions source;
+  std::optional<double> min_value;
+  std::optional<double> max_value;
+  std::uint64_t frames = 0;
+  std::optional<std::filesystem::path> screenshot;
+};
 
 using view::Key;
 using view::ViewControl;
@@ -29,7 +39,7 @@ struct Limits {
 /// State of the viewer: which quantity is shown between which limits, and the camera's commands.
 class Viewer {
  public:
-  Viewer(const ViewCommand& command, view::FrameProvider& provider, view::Window& window)
+  Viewer(const ViewOptions& command, view::FrameProvider& provider, view::Window& window)
       : command_(command), provider_(provider), window_(window) {
     provider.limits(temperature_.low, temperature_.high);
     if (command.min_value) temperature_.low = *command.min_value;
@@ -50,7 +60,7 @@ class Viewer {
   }
   Limits& limits() { return show_radiance_ ? radiance_ : temperature_; }
 
-  const ViewCommand& command_;
+  const ViewOptions& command_;
   view::FrameProvider& provider_;
   view::Window& window_;
   ViewFrame frame_;
@@ -246,12 +256,9 @@ int Viewer::run() {
   return kExitOk;
 }
 
-}  // namespace
-
-int run_view(const ViewCommand& command) {
-  const bool stream = command.source.find("://") != std::string::npos;
-  auto provider =
-      stream ? view::make_stream_provider(command) : view::make_scenario_provider(command);
+int run(const ViewOptions& command) {
+  auto provider = command.source.is_stream() ? view::make_stream_provider(command.source)
+                                             : view::make_scenario_provider(command.source);
   if (!provider) return fail_call(provider.error());
   constexpr std::uint32_t kWidth = 1056;  // 1.5 times 640 and the colour bar
   constexpr std::uint32_t kHeight = 768;
@@ -259,6 +266,47 @@ int run_view(const ViewCommand& command) {
   if (!window) return fail(window.error());
   const InterruptGuard interrupt;
   return Viewer(command, **provider, **window).run();
+}
+
+void add_options(CommandLine& line, ViewOptions& options) {
+  line.option("source", options.source.source,
+              "Scenario name, .toml file, tcp://, udp:// or shm:// URL")
+      .required()
+      .type_name("SCENARIO|URL");
+  add_set(line, options.source.set);
+  line.option("--time-s", options.source.time_s, "Scenario: simulated time to start from, s")
+      .type_name("S");
+  line.option("--min", options.min_value, "Lower limit of the colours, K or W m-2 sr-1");
+  line.option("--max", options.max_value, "Upper limit of the colours, K or W m-2 sr-1");
+  line.option("--name", options.source.channel_name, "URL: channel").type_name("NAME");
+  line.option("--channel", options.source.channel_kind, "URL: channel kind")
+      .one_of({"injection", "projector"});
+  line.option("--band", options.source.band, "Name of the band").type_name("NAME");
+  line.count("--frames", options.frames,
+             "Close after this many frames; 0: until the window closes");
+  add_security(line, options.source.security);
+  line.path("--screenshot", options.screenshot, "Write the window's last picture as PNG");
+  add_gpu(line, options.source.gpu_index);
+}
+
+}  // namespace
+
+void add_view(CommandLine& tool) {
+  tool.command<ViewOptions>(
+      {.name = "view",
+       .text = "Live window: a scenario, or the stream of a running daemon",
+       .example =
+           "emit view airfield    or    emit view tcp://127.0.0.1:7000\n"
+           "Keys, scenario only: arrows or dragging with the left button turn; W/S or the wheel "
+           "move\n"
+           "  forward/back along the view, A/D left/right, E/Q up/down; space pauses;\n"
+           "  ] or PgUp jumps 60 s ahead, [ or PgDn 60 s back; Home or H back to the scenario's "
+           "view\n"
+           "Keys, always: - = lower limit of the colours down/up, comma and period upper limit "
+           "down/up\n"
+           "  (number pad: - + and / *), R limits from the picture, T radiance or temperature, Esc "
+           "closes"},
+      add_options, run);
 }
 
 }  // namespace emit::tool

@@ -12,9 +12,9 @@
 #include <thread>
 #include <vector>
 
+#include "emit/client/client.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/protocol/frame_header.hpp"
-#include "emit/client/client.hpp"
 #include "tool/streams/stream_report.hpp"
 
 namespace emit::tool {

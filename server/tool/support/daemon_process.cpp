@@ -11,8 +11,8 @@
 #include <sstream>
 #include <thread>
 
-#include "tool/support/console.hpp"
 #include "emit/config/load.hpp"
+#include "tool/support/console.hpp"
 
 namespace emit::tool {
 namespace {

@@ -5,12 +5,17 @@
 #include <string_view>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "emit/scene/scene_desc.hpp"
 
 namespace emit::tool {
+
+/// A scenario by shipped name or file, with `--set key=value` applied in this order.
+struct ScenarioChoice {
+  std::string scenario;
+  std::vector<std::string> set;
+};
 
 /// Shipped name or file, with the overrides applied. Setup only. Errors: config.
 [[nodiscard]] physics::Result<scene::ScenarioDesc> load_scenario_choice(

@@ -8,11 +8,26 @@
 #include <string>
 #include <vector>
 
-#include "tool/commands/commands.hpp"
+#include "emit/client/security.hpp"
 #include "emit/physics/error.hpp"
 #include "tool/view/view_control.hpp"
 
 namespace emit::tool::view {
+
+/// What is viewed.
+struct SourceOptions {
+  std::string source;  ///< a scenario (name or .toml file), or the URL of a daemon's stream
+  std::vector<std::string> set;  ///< scenario: overrides of its keys
+  std::optional<double>
+      time_s;  ///< scenario: simulated time to start from; absent: the trajectory's start
+  std::string channel_name;   ///< URL; empty: the first that fits
+  std::string channel_kind;   ///< URL; empty: any
+  std::string band;           ///< empty: the first
+  int gpu_index = -1;         ///< scenario: EGL device; -1: the first hardware device, else Mesa
+  client::Security security;  ///< URL
+
+  [[nodiscard]] bool is_stream() const { return source.find("://") != std::string::npos; }
+};
 
 /// Picture handed from the thread that makes it to the window.
 struct ViewFrame {
@@ -69,9 +84,9 @@ class FrameProvider {
 /// Renders a scenario on a thread that owns the GL context of the renderer. Errors as
 /// load_scenario (code config) and Renderer::create.
 [[nodiscard]] physics::Result<std::unique_ptr<FrameProvider>> make_scenario_provider(
-    const ViewCommand& command);
+    const SourceOptions& options);
 /// Receives a daemon's stream.
 [[nodiscard]] physics::Result<std::unique_ptr<FrameProvider>> make_stream_provider(
-    const ViewCommand& command);
+    const SourceOptions& options);
 
 }  // namespace emit::tool::view

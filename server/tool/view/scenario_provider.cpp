@@ -161,17 +161,18 @@ class ScenarioProvider final : public FrameProvider {
 
 }  // namespace
 
-physics::Result<std::unique_ptr<FrameProvider>> make_scenario_provider(const ViewCommand& command) {
-  auto scenario = load_scenario_choice({command.source, command.set});
+physics::Result<std::unique_ptr<FrameProvider>> make_scenario_provider(
+    const SourceOptions& options) {
+  auto scenario = load_scenario_choice({options.source, options.set});
   if (!scenario) {
     return physics::make_error(physics::ErrorCode::config, std::move(scenario.error().text));
   }
-  const auto band = find_band(*scenario, command.band);
+  const auto band = find_band(*scenario, options.band);
   if (!band) return tl::unexpected(band.error());
   const double start_s =
-      command.time_s.value_or(1e-9 * static_cast<double>(trajectory_start_ns(*scenario)));
+      options.time_s.value_or(1e-9 * static_cast<double>(trajectory_start_ns(*scenario)));
   auto provider =
-      std::make_unique<ScenarioProvider>(std::move(*scenario), *band, start_s, command.gpu_index);
+      std::make_unique<ScenarioProvider>(std::move(*scenario), *band, start_s, options.gpu_index);
   if (auto started = provider->start(); !started) return tl::unexpected(started.error());
   return std::unique_ptr<FrameProvider>(std::move(provider));
 }

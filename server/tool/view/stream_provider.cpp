@@ -5,9 +5,9 @@
 #include <optional>
 #include <thread>
 
+#include "emit/client/client.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
-#include "emit/client/client.hpp"
 #include "tool/view/frame_provider.hpp"
 
 namespace emit::tool::view {
@@ -81,14 +81,14 @@ class StreamProvider final : public FrameProvider {
 
 }  // namespace
 
-physics::Result<std::unique_ptr<FrameProvider>> make_stream_provider(const ViewCommand& command) {
+physics::Result<std::unique_ptr<FrameProvider>> make_stream_provider(const SourceOptions& source) {
   auto client =
-      client::FrameClient::connect(command.source, client::kConnectTimeoutNs, command.security);
+      client::FrameClient::connect(source.source, client::kConnectTimeoutNs, source.security);
   if (!client) return tl::unexpected(client.error());
   client::SubscribeOptions options;
-  options.channel_name = command.channel_name;
-  options.channel_kind = command.channel_kind;
-  options.band = command.band;
+  options.channel_name = source.channel_name;
+  options.channel_kind = source.channel_kind;
+  options.band = source.band;
   auto channel = (*client)->subscribe(options);
   if (!channel) return tl::unexpected(channel.error());
   if (const std::string advice = (*client)->receive_buffer_advice(); !advice.empty()) warn(advice);

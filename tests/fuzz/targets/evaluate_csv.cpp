@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables of emit evaluate.
+// Fuzz target: tables of emit evaluate.
 #include "emit/physics/csv.hpp"
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"

@@ -16,9 +16,10 @@ namespace emit::protocol {
 
 /// Largest encoded host frame, bytes: the payload of one UDP datagram over IPv4.
 inline constexpr std::size_t kMaxHostFrameBytes = 65507;
-/// Positions farther from the origin are refused, m.
+/// Largest magnitude of a position coordinate, m. A larger one is refused.
 inline constexpr double kMaxPositionM = physics::limits::kMaxPositionM;
-/// Simulation times farther from the scenario's epoch are refused, ns: 1e9 s, as in scenarios.
+/// Largest distance of a simulation time from the scenario's epoch, ns: 1e9 s, the same limit as in
+/// scenarios. A larger one is refused.
 inline constexpr auto kMaxSimTimeNs =
     static_cast<std::int64_t>(physics::limits::kMaxSimTimeS * 1e9);
 

@@ -111,7 +111,7 @@ struct FrameHeader {
   std::uint32_t encoded_bytes = 0;  ///< length of the encoded pixels behind the header; 0 when raw
 };
 
-/// Most that a client may ask for as "every n-th frame".
+/// Largest n that a client may ask for in "every n-th frame".
 inline constexpr std::uint32_t kMaxEveryNth = physics::limits::kMaxEveryNth;
 
 /// Returns true for the frames 1, 1 + n, 1 + 2 n, ... of a run. All clients that take every n-th

@@ -11,29 +11,31 @@
 
 namespace emit::protocol {
 
-/// An internet address without port. IPv4 addresses stand in the first 4 bytes. An IPv4 address
-/// mapped into IPv6 (::ffff:a.b.c.d) counts as the IPv4 address.
+/// Internet address without port. IPv4 addresses use the first 4 bytes. An IPv4 address mapped into
+/// IPv6 (::ffff:a.b.c.d) counts as the IPv4 address.
 struct IpAddress {
   bool v4 = true;
   std::array<std::uint8_t, 16> bytes{};
 
-  /// True for 127.0.0.0/8 and ::1.
+  /// Returns true for 127.0.0.0/8 and ::1. RT-safe.
   [[nodiscard]] bool is_loopback() const noexcept;
   friend bool operator==(const IpAddress&, const IpAddress&) = default;
 };
 
-/// Address from its 4 or 16 bytes in network order. Thread: any. RT-safe.
+/// Returns the address of 4 or 16 bytes in network order. Thread: any. RT-safe.
 [[nodiscard]] IpAddress ip_from_bytes(std::span<const std::uint8_t> bytes) noexcept;
-/// Reads a numeric address such as "10.1.2.3" or "fd00::1". Empty when it is none.
+/// Reads a numeric address such as "10.1.2.3" or "fd00::1". Returns nothing when the text is none.
+/// Thread: any.
 [[nodiscard]] std::optional<IpAddress> parse_ip(std::string_view text) noexcept;
 [[nodiscard]] std::string to_string(const IpAddress& address);
 
 /// Set of the addresses that begin with the same bits (RFC 4632, RFC 4291 section 2.3).
 struct Network {
   IpAddress first;                ///< the bits behind the prefix are 0
-  std::uint8_t prefix_bits = 32;  ///< 0..32, 0..128
+  std::uint8_t prefix_bits = 32;  ///< length of the prefix, 0..32 for IPv4, 0..128 for IPv6
 
-  /// True when the address is in the set. ::/0 contains no IPv4 address. Thread: any. RT-safe.
+  /// Returns true when the address is in the set. ::/0 contains no IPv4 address. Thread: any.
+  /// RT-safe.
   [[nodiscard]] bool contains(const IpAddress& address) const noexcept;
   friend bool operator==(const Network&, const Network&) = default;
 };

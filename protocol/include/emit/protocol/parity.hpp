@@ -21,8 +21,8 @@ namespace emit::protocol {
 inline constexpr std::uint8_t kParityVersion = 2;
 inline constexpr std::uint32_t kMaxFecData = physics::limits::kMaxFecData;
 inline constexpr std::uint32_t kMaxFecParity = physics::limits::kMaxFecParity;
-/// What is taken where only "with error correction" was said: at 1 % random loss fewer than one
-/// frame of 1 MB in a thousand stays incomplete.
+/// Default group, taken where a client asks for error correction without numbers. At 1 % random
+/// loss fewer than one frame of 1 MB in a thousand stays incomplete.
 inline constexpr std::uint32_t kDefaultFecData = 48;
 inline constexpr std::uint32_t kDefaultFecParity = 5;
 

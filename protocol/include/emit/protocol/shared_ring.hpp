@@ -196,7 +196,8 @@ class RingReader {
   std::span<const std::byte> welcome_;
 };
 
-/// 1 to 64 letters, digits, `_`, `-` and `.`, the first a letter or digit: no path can come of it.
+/// Returns true for a valid name of a ring: 1 to 64 letters, digits, `_`, `-` and `.`, the first a
+/// letter or digit. Such a name cannot form a path. RT-safe.
 [[nodiscard]] bool is_shm_name(std::string_view text) noexcept;
 
 }  // namespace emit::protocol

@@ -8,7 +8,8 @@
 
 namespace emit::verify {
 
-/// Rays (CPU) or the frame's own obscurance (GPU) around a point of geometry built from the row.
+/// Measures the open sky around a point of geometry built from the row: by rays on the CPU, by the
+/// frame's own obscurance on the GPU.
 physics::Result<std::string> run_sky_view(const EvaluateRequest& request,
                                           const physics::CsvTable& table) {
   if (auto ok = check_visibility_options(request); !ok) return tl::unexpected(ok.error());

@@ -7,8 +7,8 @@
 
 namespace emit::verify {
 
-/// The disc behind the edge of a real wall. Integrated as the reference solver does it, by rays
-/// where --rays is given.
+/// Measures the visible part of the sun's disc behind the edge of a real wall. The disc is
+/// integrated as the reference solver does it, or sampled by rays when --rays is given.
 physics::Result<std::string> run_sun_disc(const EvaluateRequest& request,
                                           const physics::CsvTable& table) {
   if (auto ok = check_visibility_options(request); !ok) return tl::unexpected(ok.error());

@@ -19,7 +19,7 @@ using MakeRow = std::function<physics::Result<VisibilityRow>(std::size_t)>;
 struct VisibilityQuery {
   const EvaluateRequest& request;
   const physics::CsvTable& table;
-  std::string_view outputs;  ///< names of the columns
+  std::string_view outputs;  ///< names of the output columns
   const MakeRow& make;
 };
 

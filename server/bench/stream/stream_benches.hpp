@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "tool/command_line/command_line.hpp"
+
+/// Suites of `emit bench` that measure the transport of frames. Each is one file of this folder.
+namespace emit::tool {
+
+void add_bench_isolation(CommandLine& bench);
+void add_bench_stream(CommandLine& bench);
+
+}  // namespace emit::tool

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/command_line/command_line.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string_view>
+
+#include "tool/command_line/nearest_name.hpp"
+#include "tool/support/console.hpp"
+
+namespace emit::tool {
+
+namespace detail {
+
+/// What is known of a program's commands beside what CLI11 keeps.
+struct Registry {
+  struct Leaf {
+    CLI::App* app = nullptr;
+    std::function<int()> run;
+  };
+  struct Raw {
+    CLI::App* app = nullptr;
+    int (*run)(int argc, char** argv) = nullptr;
+  };
+
+  Registry(const std::string& name, const std::string& text) : root(text, name) {}
+
+  CLI::App root;
+  std::vector<Leaf> leaves;
+  std::vector<Raw> raw;
+  /// CLI11 keeps the choices of an option only as text.
+  std::map<const CLI::Option*, std::vector<std::string>> choices;
+};
+
+}  // namespace detail
+
+namespace {
+
+struct UnknownCommand {
+  std::string parent;      ///< with the program's name
+  std::string command;     ///< all words of it, without the program's name
+  std::string suggestion;  ///< the nearest command, all words of it; empty: none is near
+};
+
+/// The first word that should be a command and is none. Empty: something else is wrong with the
+/// arguments.
+std::optional<UnknownCommand> find_unknown_command(const CLI::App& root, int argc, char** argv) {
+  UnknownCommand out{root.get_name(), "", ""};
+  const CLI::App* app = &root;
+  for (int i = 1; i < argc && app->get_require_subcommand_min() > 0; ++i) {
+    const std::string word = argv[i];
+    if (word.starts_with('-')) return std::nullopt;
+    const std::string before = out.command.empty() ? "" : out.command + " ";
+    out.command = before + word;
+    std::vector<std::string> names;
+    const CLI::App* known = nullptr;
+    for (const CLI::App* each : app->get_subcommands([](const CLI::App*) { return true; })) {
+      names.push_back(each->get_name());
+      if (each->check_name(word)) known = each;
+    }
+    if (known == nullptr) {
+      const std::string near = nearest_name(word, names);
+      if (!near.empty()) out.suggestion = before + near;
+      return out;
+    }
+    out.parent += " " + word;
+    app = known;
+  }
+  return std::nullopt;
+}
+
+std::string text_of(const UnknownCommand& unknown) {
+  return fmt::format(
+      "there is no command '{}'{}; `{} --help` lists them", unknown.command,
+      unknown.suggestion.empty() ? "" : fmt::format(", did you mean '{}'?", unknown.suggestion),
+      unknown.parent);
+}
+
+OptionDescription description_of(const CLI::Option& option, const detail::Registry& registry) {
+  OptionDescription out;
+  out.positional = option.get_positional();
+  if (out.positional) {
+    out.names.push_back(option.get_name(true, false));
+  } else {
+    for (const std::string& name : option.get_snames()) out.names.push_back("-" + name);
+    for (const std::string& name : option.get_lnames()) out.names.push_back("--" + name);
+  }
+  out.required = option.get_required();
+  out.takes_value = option.get_items_expected_max() > 0;
+  out.repeatable = option.get_expected_max() > 1;
+  if (out.takes_value) {
+    // CLI11 writes the type and its checks as "TYPE:CHECK".
+    const std::string type = option.get_type_name();
+    out.value = type.substr(0, type.find(':'));
+    out.default_text = option.get_default_str();
+  }
+  if (const auto found = registry.choices.find(&option); found != registry.choices.end()) {
+    out.choices = found->second;
+  }
+  out.text = option.get_description();
+  return out;
+}
+
+CommandDescription description_of(const CLI::App& app, const detail::Registry& registry) {
+  CommandDescription out;
+  out.name = app.get_name();
+  out.text = app.get_description();
+  out.footer = app.get_footer();
+  for (const CLI::Option* option : app.get_options())
+    out.options.push_back(description_of(*option, registry));
+  for (const CLI::App* below : app.get_subcommands([](const CLI::App*) { return true; })) {
+    out.commands.push_back(description_of(*below, registry));
+  }
+  return out;
+}
+
+}  // namespace
+
+Option& Option::required() {
+  option_->required();
+  return *this;
+}
+
+Option& Option::type_name(const std::string& name) {
+  option_->type_name(name);
+  return *this;
+}
+
+Option& Option::in_range(int low, int high) {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+
+Option& Option::in_range(unsigned low, unsigned high) {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+
+Option& Option::in_range(std::uint64_t low, std::uint64_t high) {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+
+Option& Option::in_range(double low, double high) {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+
+Option& Option::positive() {
+  option_->check({[](std::string& text) -> std::string {
+                    double value = 0.0;
+                    const bool number = CLI::detail::lexical_cast(text, value);
+                    if (number && value > 0.0 && std::isfinite(value)) return {};
+                    return fmt::format("{} is not a number above 0", text);
+                  },
+                  "POSITIVE"});
+  return *this;
+}
+
+Option& Option::one_of(const std::vector<std::string>& values) {
+  option_->check(CLI::IsMember(values));
+  registry_->choices[option_] = values;
+  return *this;
+}
+
+Option& Option::one_of_numbers(const std::vector<int>& values) {
+  option_->check(CLI::IsMember(values));
+  for (const int value : values) registry_->choices[option_].push_back(fmt::format("{}", value));
+  return *this;
+}
+
+Option& Option::show_default() {
+  option_->capture_default_str();
+  return *this;
+}
+
+Option& Option::default_text(const std::string& text) {
+  option_->default_str(text);
+  return *this;
+}
+
+Option& Option::repeatable() {
+  option_->allow_extra_args(false);
+  return *this;
+}
+
+Option& Option::needs(const Option& other) {
+  option_->needs(other.option_);
+  return *this;
+}
+
+Option& Option::excludes(const Option& other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+Option CommandLine::option(const std::string& name, std::string& target, const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, int& target, const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::uint16_t& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::uint32_t& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::uint64_t& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, double& target, const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::optional<std::uint32_t>& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::optional<std::uint64_t>& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::optional<double>& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::vector<std::string>& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::vector<std::uint32_t>& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::option(const std::string& name, std::vector<double>& target,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option(name, target, text)};
+}
+
+Option CommandLine::parsed(const std::string& name,
+                           std::function<physics::Result<void>(const std::string&)> parse,
+                           const std::string& text) {
+  return {*registry_, *app_->add_option_function<std::string>(
+                          name,
+                          [name, parse = std::move(parse)](const std::string& value) {
+                            const auto done = parse(value);
+                            if (!done) throw CLI::ValidationError(name, done.error().text);
+                          },
+                          text)};
+}
+
+Option CommandLine::flag(const std::string& name, bool& target, const std::string& text) {
+  return {*registry_, *app_->add_flag(name, target, text)};
+}
+
+Option CommandLine::path(const std::string& name, std::filesystem::path& target,
+                         const std::string& text) {
+  return {*registry_, *app_->add_option_function<std::string>(
+                               name, [&target](const std::string& value) { target = value; }, text)
+                           ->type_name("FILE")};
+}
+
+Option CommandLine::path(const std::string& name, std::optional<std::filesystem::path>& target,
+                         const std::string& text) {
+  return {
+      *registry_,
+      *app_->add_option_function<std::string>(
+               name, [&target](const std::string& value) { target = std::filesystem::path(value); },
+               text)
+           ->type_name("FILE")};
+}
+
+Option CommandLine::count(const std::string& name, std::uint64_t& target, const std::string& text) {
+  return option(name, target, text).type_name("N");
+}
+
+Option CommandLine::seconds(const std::string& name, double& target, const std::string& text) {
+  return option(name, target, text).type_name("S");
+}
+
+void CommandLine::footer(const std::string& text) {
+  app_->footer(text);
+}
+
+CommandLine CommandLine::leaf(const CommandText& text, std::function<int()> run) {
+  CLI::App* app = app_->add_subcommand(text.name, text.text);
+  app->footer("Example: " + text.example);
+  registry_->leaves.push_back({app, std::move(run)});
+  return {*registry_, *app};
+}
+
+CommandLine CommandLine::group(const CommandText& text) {
+  CLI::App* app = app_->add_subcommand(text.name, text.text);
+  app->require_subcommand(1);
+  app->footer("Example: " + text.example);
+  return {*registry_, *app};
+}
+
+void CommandLine::raw_command(const std::string& name, const std::string& text,
+                              int (*run)(int argc, char** argv)) {
+  registry_->raw.push_back({app_->add_subcommand(name, text), run});
+}
+
+CommandDescription CommandLine::describe() const {
+  return description_of(*app_, *registry_);
+}
+
+Program::Program(const std::string& name, const std::string& text, const std::string& version,
+                 const std::string& footer)
+    : registry_(std::make_unique<detail::Registry>(name, text)) {
+  registry_->root.set_version_flag("--version", version);
+  registry_->root.require_subcommand(1);
+  registry_->root.footer(footer);
+}
+
+Program::~Program() = default;
+
+CommandLine Program::root() noexcept {
+  return {*registry_, registry_->root};
+}
+
+int Program::run(int argc, char** argv) {
+  // A raw command reads its own arguments: CLI11 does not see them.
+  for (const auto& [app, run] : registry_->raw) {
+    if (argc >= 2 && app->check_name(argv[1])) return run(argc - 1, argv + 1);
+  }
+  CLI::App& root = registry_->root;
+  try {
+    root.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (const auto unknown = find_unknown_command(root, argc, argv))
+      return fail(kExitUsage, text_of(*unknown));
+    return root.exit(error) == 0 ? kExitOk : kExitUsage;
+  }
+  for (const auto& [app, run] : registry_->leaves) {
+    if (app->parsed()) return run();
+  }
+  return kExitUsage;
+}
+
+}  // namespace emit::tool

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/command_line/common_options.hpp"
+
+namespace emit::tool {
+
+void add_json(CommandLine& line, std::optional<std::filesystem::path>& target) {
+  line.path("--json", target, "Write the results as JSON (- for standard output)");
+}
+
+void add_set(CommandLine& line, std::vector<std::string>& target) {
+  line.option("--set", target, "Override a key of the file, e.g. --set thermal.steps=90")
+      .repeatable()
+      .type_name("KEY=VALUE");
+}
+
+void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& name) {
+  line.option(name, target.scenario, "Shipped scenario (airfield, box, ...) or a .toml file")
+      .required()
+      .type_name("SCENARIO");
+  add_set(line, target.set);
+}
+
+void add_gpu(CommandLine& line, int& target) {
+  line.option("--gpu", target, "EGL device index; default: first hardware device, else Mesa")
+      .type_name("N");
+}
+
+void add_image_size(CommandLine& line, std::uint32_t& width_px, std::uint32_t& height_px) {
+  line.option("--width", width_px, "Image width, px").show_default();
+  line.option("--height", height_px, "Image height, px").show_default();
+}
+
+}  // namespace emit::tool

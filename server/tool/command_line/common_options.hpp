@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tool/command_line/command_line.hpp"
+#include "tool/support/scenario_input.hpp"
+
+/// Options that several commands have, so that they are called and explained alike.
+namespace emit::tool {
+
+/// --json FILE, with "-" for standard output.
+void add_json(CommandLine& line, std::optional<std::filesystem::path>& target);
+/// --set KEY=VALUE, repeatable.
+void add_set(CommandLine& line, std::vector<std::string>& target);
+/// The scenario under `name`, required, and --set.
+void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& name);
+/// --gpu N.
+void add_gpu(CommandLine& line, int& target);
+/// --width and --height of the image, px.
+void add_image_size(CommandLine& line, std::uint32_t& width_px, std::uint32_t& height_px);
+
+}  // namespace emit::tool

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/accuracy/accuracy_benches.hpp"
+#include "bench/frame_time/frame_time_benches.hpp"
+#include "bench/stability/stability_benches.hpp"
+#include "bench/stream/stream_benches.hpp"
+#include "tool/commands/commands.hpp"
+
+namespace emit::tool {
+namespace {
+
+/// In the order of `emit bench --help`.
+constexpr void (*kSuites[])(CommandLine&) = {
+    add_bench_paper,     add_bench_error,       add_bench_stream,        add_bench_isolation,
+    add_bench_stability, add_bench_convergence, add_bench_thermal_truth, add_bench_scaling,
+    add_bench_crowd,     add_bench_turn,        add_bench_live,          add_bench_budget};
+
+}  // namespace
+
+void add_bench(CommandLine& tool) {
+  CommandLine bench = tool.group({.name = "bench",
+                                  .text = "Benchmarks; results as JSON",
+                                  .example = "emit bench paper --json paper.json"});
+  for (const auto add : kSuites) add(bench);
+}
+
+}  // namespace emit::tool

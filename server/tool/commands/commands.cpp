@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tool/commands/commands.hpp"
+
+#include <fmt/format.h>
+
+#include "emit/version.hpp"
+
+namespace emit::tool {
+namespace {
+
+/// In the order of `emit --help`.
+constexpr void (*kCommands[])(CommandLine&) = {
+    add_render, add_solve,   add_inspect,  add_compare,  add_generate, add_view,    add_demo,
+    add_serve,  add_receive, add_stat,     add_send,     add_latency,  add_trigger, add_trace,
+    add_record, add_replay,  add_make_log, add_evaluate, add_fit,      add_bench};
+
+}  // namespace
+
+int run_tool(int argc, char** argv) {
+  Program program("emit",
+                  "emit: command-line tool of emitd, the real-time infrared image generator.",
+                  fmt::format("emit {} ({})", kVersion, kCommit),
+                  "Exit codes: 0 success, 2 bad usage, 78 bad configuration or scenario, 75 the "
+                  "device was lost "
+                  "(serve), 1 any other failure.\n"
+                  "Example: emit demo --out frames");
+  CommandLine tool = program.root();
+  for (const auto add : kCommands) add(tool);
+  return program.run(argc, argv);
+}
+
+}  // namespace emit::tool
