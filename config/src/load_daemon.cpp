@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <charconv>
 
-#include "keys/data_files.hpp"
 #include "emit/protocol/shared_ring.hpp"
+#include "keys/data_files.hpp"
 #include "overrides.hpp"
 #include "resolve/resolve.hpp"
 

@@ -19,7 +19,7 @@ renderer/reference: renderer/physics renderer/scene
 renderer/reference/src/rays: renderer/reference renderer/physics renderer/scene renderer/threads
 renderer/reference/src/conduction: renderer/reference renderer/reference/src/rays renderer/physics renderer/scene renderer/threads
 renderer/reference/src: renderer/reference renderer/reference/src/rays renderer/reference/src/conduction renderer/physics renderer/scene renderer/threads
-renderer/shaders/shared:
+renderer/shaders/shared: renderer/physics
 renderer/gl: renderer/physics renderer/threads
 renderer/include: renderer/physics renderer/scene
 renderer/history: renderer/include renderer/physics renderer/scene

@@ -2,21 +2,27 @@
 #include "budget/frame_cost.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/nnls.hpp"
 
 namespace emit::renderer {
 namespace {
 
-/// Triangles and pixels come by the hundred thousand: columns of like size.
+/// Unit of triangles and pixels that gives the columns of the fit similar sizes.
 constexpr double kUnit = 1e5;
-/// Below, it is the clock that is measured.
-constexpr double kLeastMs = 1e-3;
+/// Smallest time of a frame. Below it the clock is measured and not the frame.
+constexpr double kMinMs = 1e-3;
 
 }  // namespace
 
 void FrameCost::add(double triangles, double pixels, double frame_ms) {
-  const double weight = 1.0 / std::max(frame_ms, kLeastMs);
+  EMIT_CHECK(std::isfinite(triangles) && triangles >= 0.0);
+  EMIT_CHECK(std::isfinite(pixels) && pixels >= 0.0);
+  EMIT_CHECK(std::isfinite(frame_ms) && frame_ms >= 0.0);
+  // Divide the row by the time, so that the fit minimises relative errors.
+  const double weight = 1.0 / std::max(frame_ms, kMinMs);
   rows_.insert(rows_.end(), {weight, weight * triangles / kUnit, weight * pixels / kUnit});
 }
 

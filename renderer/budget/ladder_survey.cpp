@@ -8,6 +8,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/scene/trajectory.hpp"
 
@@ -18,16 +19,18 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Places on the camera's way: errors in between are interpolated.
+/// Number of positions along the trajectory that are measured.
 constexpr int kPlaces = 12;
-/// Directions of a camera that stands still.
+/// Number of directions that are measured for a camera without a trajectory.
 constexpr int kDirections = 4;
 
+/// Frame that is measured.
 struct Place {
   FrameRequest request;
-  bool on_the_way = true;  ///< where the scenario has the camera
+  bool on_trajectory = true;  ///< false: the camera is turned to a direction outside the scenario
 };
 
+/// Frames to measure: positions along the rest of the trajectory, or directions without one.
 std::vector<Place> places(const scene::SensorDesc& sensor, const FrameRequest& first) {
   std::vector<Place> out{{first}};
   if (sensor.trajectory.size() < 2) {
@@ -42,7 +45,8 @@ std::vector<Place> places(const scene::SensorDesc& sensor, const FrameRequest& f
   }
   const std::int64_t end_ns = sensor.trajectory[sensor.trajectory.size() - 1].sim_time_ns;
   for (int i = 1; i < kPlaces && first.sim_time_ns < end_ns; ++i) {
-    FrameRequest next = first;  // the thermal clock stands still meanwhile
+    // Keep the thermal instant, so that the surface is not advanced between the frames.
+    FrameRequest next = first;
     const double way = static_cast<double>(i) / (kPlaces - 1);
     next.sim_time_ns += std::llround(way * static_cast<double>(end_ns - first.sim_time_ns));
     next.sensor_pose = trajectory_at(sensor.trajectory, next.sim_time_ns).pose;
@@ -51,7 +55,8 @@ std::vector<Place> places(const scene::SensorDesc& sensor, const FrameRequest& f
   return out;
 }
 
-/// A frame in a slot of the renderer.
+/// Frame that is rendered and timed on construction. It occupies a slot of the renderer until it is
+/// destroyed.
 class Taken {
  public:
   Taken(Renderer& renderer, const FrameRequest& request) : renderer_(renderer) {
@@ -79,8 +84,10 @@ class Taken {
   double frame_ms_ = 0.0;
 };
 
+/// Largest RMS difference of the apparent temperature over the bands, K.
 double difference_k(const FrameView& full, const FrameView& shed,
                     std::span<const physics::ApparentTemperature> apparent) {
+  EMIT_CHECK_OP(apparent.size(), ==, full.radiance_w_m2_sr.size());
   double worst_k = 0.0;
   for (std::size_t band = 0; band < apparent.size(); ++band) {
     worst_k = std::max(worst_k, apparent[band].rms_difference_k(full.radiance_w_m2_sr[band],
@@ -93,12 +100,15 @@ double difference_k(const FrameView& full, const FrameView& shed,
 
 Result<LadderSurvey> survey_ladder(const LadderSubject& subject, const FrameRequest& first,
                                    const WarmUpProgress& progress) {
+  EMIT_CHECK(subject.triangles != nullptr);
   const std::vector<Place> at = places(subject.sensor, first);
   LadderSurvey survey;
   for (std::size_t p = 0; p < at.size(); ++p) {
     FrameRequest request = at[p].request;
-    LadderMap::OfRungs rungs{};
-    for (int round = 0; round < 2; ++round) {  // the first one also fills caches
+    LadderMap::PerLevel levels{};
+    // Render every level twice and keep the shorter time, because the first round also fills
+    // caches.
+    for (int round = 0; round < 2; ++round) {
       request.rung = 0;
       const Taken full(subject.renderer, request);
       for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
@@ -107,17 +117,20 @@ Result<LadderSurvey> survey_ladder(const LadderSubject& subject, const FrameRequ
         if (!full.good() || !shed.good()) {
           return make_error(ErrorCode::gpu, "the device failed in its first frames");
         }
-        rungs[r].error_k = difference_k(full.view(), shed.view(), subject.apparent);
-        rungs[r].frame_ms =
-            round == 0 ? shed.frame_ms() : std::min(rungs[r].frame_ms, shed.frame_ms());
+        // Compare the level with full quality.
+        levels[r].error_k = difference_k(full.view(), shed.view(), subject.apparent);
+        levels[r].frame_ms =
+            round == 0 ? shed.frame_ms() : std::min(levels[r].frame_ms, shed.frame_ms());
       }
     }
-    const TrianglesOfRungs triangles = subject.triangles(request);
-    for (std::size_t r = 0; r < rungs.size(); ++r) {
-      survey.cost.add(triangles[r], rendered_pixels(kQualityLadder[r], subject.picture_px),
-                      rungs[r].frame_ms);
+    // Add the times to the model of the cost.
+    const TrianglesPerLevel triangles = subject.triangles(request);
+    for (std::size_t r = 0; r < levels.size(); ++r) {
+      survey.cost.add(triangles[r], rendered_pixels(kQualityLadder[r], subject.output_px),
+                      levels[r].frame_ms);
     }
-    if (at[p].on_the_way) survey.map.add(request.sensor_pose, rungs);
+    // Add positions of the scenario to the map.
+    if (at[p].on_trajectory) survey.map.add(request.sensor_pose, levels);
     if (progress && !progress(static_cast<double>(p + 1) / static_cast<double>(at.size()))) {
       return make_error(ErrorCode::internal, "stopped while the quality ladder was measured");
     }

@@ -12,18 +12,21 @@
 
 namespace emit::renderer {
 
-/// What a frame of less than full quality sheds: pixels are rendered larger and interpolated, and
-/// surfaces are coarser, counted in these pixels.
-struct QualityRung {
-  double scale_frac = 1.0;  ///< of the picture's width and height
-  LevelLimits limits;       ///< but for pixel_rad
+/// Quality level of a frame. A lower level renders fewer, larger pixels and interpolates between
+/// them, and it draws coarser surfaces.
+struct QualityLevel {
+  double scale_frac =
+      1.0;             ///< width and height of the rendered image divided by the output image's
+  LevelLimits limits;  ///< error limits of surfaces in rendered pixels, without pixel_rad
 };
 
-/// Of triangles whose values do not matter: outlines alone keep them small.
+/// Limit in pixels that switches an error off, for triangles whose values do not matter. Their
+/// outlines alone keep them small.
 inline constexpr double kAnyPx = 1e6;
 
-/// Rung 0 is full quality. The numbers of the rungs are part of recordings: a replay renders them.
-inline constexpr std::array<QualityRung, 12> kQualityLadder = {{
+/// Quality levels from full quality, number 0, to the coarsest. The numbers (`rung` in the
+/// interface) are part of recordings, because a replay renders the level that was recorded.
+inline constexpr std::array<QualityLevel, 12> kQualityLadder = {{
     {1.0, {0.0, 0.25, 4.0, 0.5, 0}},
     {1.0, {0.0, 0.5, 8.0, 1.0, 1}},
     {1.0, {0.0, 1.0, 16.0, 2.0, 2}},
@@ -37,43 +40,47 @@ inline constexpr std::array<QualityRung, 12> kQualityLadder = {{
     {0.25, {0.0, 4.0, 64.0, 8.0, 4}},
     {0.25, {0.0, 4.0, kAnyPx, kAnyPx, 4}},
 }};
-/// Rungs that render another number of pixels need memory and a pass of their own.
-[[nodiscard]] constexpr bool is_scaled(const QualityRung& rung) noexcept {
-  return rung.scale_frac < 1.0;
+/// True when the level renders fewer pixels than the output image has. It then needs EnlargePass.
+[[nodiscard]] constexpr bool is_scaled(const QualityLevel& level) noexcept {
+  return level.scale_frac < 1.0;
 }
-/// Pixels that a rung renders of a picture.
-[[nodiscard]] glm::uvec2 rendered_px(const QualityRung& rung,
-                                     const glm::uvec2& picture_px) noexcept;
+/// Columns and rows of the image that a level renders for an output image, at least 1 x 1.
+[[nodiscard]] glm::uvec2 rendered_px(const QualityLevel& level,
+                                     const glm::uvec2& output_px) noexcept;
 
-[[nodiscard]] inline double rendered_pixels(const QualityRung& rung,
-                                            const glm::uvec2& picture_px) noexcept {
-  const glm::uvec2 px = rendered_px(rung, picture_px);
+/// Number of pixels of the image that a level renders for an output image.
+[[nodiscard]] inline double rendered_pixels(const QualityLevel& level,
+                                            const glm::uvec2& output_px) noexcept {
+  const glm::uvec2 px = rendered_px(level, output_px);
   return static_cast<double>(px.x) * px.y;
 }
-/// Triangles that each rung draws of a frame.
-using TrianglesOfRungs = std::array<std::uint32_t, kQualityLadder.size()>;
+/// Number of triangles that each quality level draws of a frame.
+using TrianglesPerLevel = std::array<std::uint32_t, kQualityLadder.size()>;
 
-/// What every rung is worth, measured where the camera is going to be.
+/// Times and errors of every quality level, measured where the camera is going to be.
 class LadderMap {
  public:
-  using OfRungs = std::array<RungStats, kQualityLadder.size()>;
+  using PerLevel = std::array<RungStats, kQualityLadder.size()>;
 
-  /// In the order of the camera's way. Setup only.
-  void add(const physics::Pose& camera, const OfRungs& rungs);
+  /// Adds a measured position of the camera, in the order of its trajectory. Setup only.
+  void add(const physics::Pose& camera, const PerLevel& levels);
   [[nodiscard]] bool empty() const noexcept { return places_.empty(); }
 
-  /// Between the two measured places that are nearest on the way. False where none was measured
-  /// near by, farther off than the way between places, or looking another way by more than half of
-  /// `fov_rad`: then medians of all places. RT-safe.
-  [[nodiscard]] bool at(const physics::Pose& camera, double fov_rad, OfRungs& rungs) const noexcept;
+  /// Interpolates between the measured position that is nearest to `camera` and its nearer
+  /// neighbour on the trajectory. Returns false, and the medians of all positions, when nothing was
+  /// measured near: the camera is farther away than these two are from each other, or it looks away
+  /// from the measured direction by more than half of `fov_rad`. RT-safe.
+  /// @pre fov_rad > 0
+  [[nodiscard]] bool at(const physics::Pose& camera, double fov_rad,
+                        PerLevel& levels) const noexcept;
 
  private:
   struct Place {
     physics::Pose camera;
-    OfRungs rungs;
+    PerLevel levels;
   };
   std::vector<Place> places_;
-  OfRungs medians_{};
+  PerLevel medians_{};
 };
 
 }  // namespace emit::renderer

@@ -7,11 +7,15 @@
 
 namespace emit::renderer {
 
-/// Camera part of FrameParams, and the same volume in double for culling and fitting.
+/// Camera of a frame in double precision, for culling and for fitting light frusta.
 struct CameraSetup {
   ViewVolume view;
-  double pixel_rad = 0.0;  ///< angle of one pixel at the boresight
+  double pixel_rad = 0.0;  ///< angle of one rendered pixel at the boresight
 };
+
+/// Sets up the camera for a sensor at a pose and fills the camera's part of `params`. The scene's
+/// boxes in the result stay at their defaults. RT-safe.
+/// @pre params.rendered_px and the sensor's format are at least 1 x 1 pixel.
 [[nodiscard]] CameraSetup set_camera(const scene::SensorDesc& sensor, const physics::Pose& pose,
                                      gpu::FrameParams& params) noexcept;
 

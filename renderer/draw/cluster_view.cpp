@@ -6,10 +6,12 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 namespace {
 
-/// Of float32, relative, several operations deep.
+/// Relative rounding error of float32 after several operations.
 constexpr float kRounding = 4e-6F;
 
 }  // namespace
@@ -25,6 +27,7 @@ std::array<glm::dvec3, 5> view_planes(const ViewVolume& view) noexcept {
 
 ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from_mesh,
                          const LevelLimits& limits) noexcept {
+  // Transform the planes of the view into the coordinates of the mesh.
   const glm::dmat3 linear(relworld_from_mesh);
   const glm::dvec3 origin_m(relworld_from_mesh[3]);
   const std::array<glm::dvec3, 5> normals = view_planes(view);
@@ -38,8 +41,9 @@ ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from
   eye_m_ = glm::vec3(eye_m);
   margin_m_ = kRounding * static_cast<float>(glm::length(eye_m));
   mirrored_ = glm::determinant(linear) < 0.0;
-  // The mesh's lengths against distances in its own axes: where it is stretched unequally, the
-  // error may lie along the axis that is stretched most and the distance along the other.
+  // Compare lengths of the mesh with distances in its own axes. Where the mesh is stretched
+  // unequally, an error may lie along the axis that is stretched most and the distance along the
+  // other one.
   const std::array<double, 3> scale = {glm::length(linear[0]), glm::length(linear[1]),
                                        glm::length(linear[2])};
   const auto [least, greatest] = std::ranges::minmax(scale);
@@ -48,6 +52,7 @@ ClusterView::ClusterView(const ViewVolume& view, const glm::dmat4& relworld_from
 }
 
 void ClusterView::set_limits(const LevelLimits& limits) noexcept {
+  EMIT_CHECK_OP(limits.difference, <, kLevelDifferencesK.size());
   const double pixel = limits.pixel_rad * evenness_;
   deviation_ = static_cast<float>(limits.deviation_px * pixel);
   size_ = static_cast<float>(limits.size_px * pixel);
@@ -62,18 +67,21 @@ bool ClusterView::fine(const LevelError& error) const noexcept {
 }
 
 bool ClusterView::shows(const scene::Cluster& cluster, bool double_sided) const noexcept {
+  // Compare the bounding sphere with the planes.
   const float reach_m =
       (1.0F + kRounding) * cluster.radius_m + margin_m_ + kRounding * glm::length(cluster.centre_m);
   for (const Plane& plane : planes_) {
     if (glm::dot(plane.normal, cluster.centre_m) + plane.offset_m < -reach_m) return false;
   }
+  // Compare the bounding box with the planes.
   const float box_margin_m = margin_m_ + kRounding * glm::length(cluster.box_centre_m);
   for (const Plane& plane : planes_) {
-    // Not a number where the box is infinite: then it shows.
+    // An infinite box gives NaN here, which makes the cluster visible.
     const float box_reach_m =
         (1.0F + kRounding) * glm::dot(glm::abs(plane.normal), cluster.box_half_m) + box_margin_m;
     if (glm::dot(plane.normal, cluster.box_centre_m) + plane.offset_m < -box_reach_m) return false;
   }
+  // Compare the cone of normals with the direction to the camera.
   if (double_sided || mirrored_ || cluster.cone_cutoff >= 1.0F) return true;
   const glm::vec3 way = cluster.cone_apex_m - eye_m_;
   return glm::dot(way, cluster.cone_axis) <

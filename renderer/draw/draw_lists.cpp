@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <array>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 namespace {
 
+/// Record of one draw. Normals transform by the cofactors of the matrix.
 DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& relworld_from_mesh,
                      std::uint32_t object, std::uint32_t material, bool moves) noexcept {
   DrawRecord record{};
@@ -20,11 +23,13 @@ DrawRecord record_of(const glm::dmat4& clip_from_relworld, const glm::dmat4& rel
   for (std::size_t column = 0; column < cofactors.size(); ++column) {
     record.params.normal_from_mesh[column] = glm::vec4(glm::vec3(cofactors[column]), 0.0F);
   }
-  record.params.ids = glm::uvec4(material, object + 1, moves ? 1U : 0U, 0U);
+  record.params.material = material;
+  record.params.object = object + 1;
+  record.params.moves = moves ? 1U : 0U;
   return record;
 }
 
-/// GL takes a number of bytes in the guise of an address.
+/// Offset of an index in the index buffer. GL takes the number of bytes as a pointer.
 const void* index_address(std::uint32_t first_index) noexcept {
   return reinterpret_cast<const void*>(std::uintptr_t{first_index} * sizeof(std::uint32_t));
 }
@@ -38,6 +43,7 @@ bool outside(std::span<const glm::dvec3> inward_normals, const glm::dvec3& centr
   return false;
 }
 
+/// True when the box lies beside the map of a light frustum.
 bool outside(const LightFrustum& frustum, const glm::dvec3& centre_m,
              const glm::dvec3& half_m) noexcept {
   for (glm::length_t axis = 0; axis < 2; ++axis) {
@@ -49,6 +55,7 @@ bool outside(const LightFrustum& frustum, const glm::dvec3& centre_m,
   return false;
 }
 
+/// Box moved by a vector; an empty box stays empty.
 scene::Aabb shifted(const scene::Aabb& box, const glm::dvec3& by_m) noexcept {
   return box.empty() ? box : scene::Aabb{box.min_m + by_m, box.max_m + by_m};
 }
@@ -57,18 +64,20 @@ scene::Aabb shifted(const scene::Aabb& box, const glm::dvec3& by_m) noexcept {
 
 DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> history_of_object,
                      std::uint32_t max_passes, TriangleCull* cull)
-    : scene_(scene), cull_(cull) {
+    : scene_(scene), cull_(cull), max_passes_(max_passes) {
   const auto instances = scene.instances();
   std::size_t view_ranges = 0;
   std::size_t submesh_instances = 0;
   for (const SceneBuffers::MeshRange& mesh : scene.meshes()) {
     submesh_instances += mesh.submeshes.size() * mesh.instance_count;
     for (const SceneBuffers::DrawRange& submesh : mesh.submeshes) {
-      // Every cluster alone, at worst.
+      // Count every cluster as a range of its own, which is the worst case.
       view_ranges += mesh.instance_count * (1 + submesh.cluster_count);
     }
   }
+  // Place all instances and separate entities from static objects.
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
+    EMIT_CHECK_OP(instances[i].object, <, history_of_object.size());
     const std::int32_t history = history_of_object[instances[i].object];
     history_of_instance_.push_back(history);
     const glm::dvec3 size = instances[i].world_bounds.empty()
@@ -78,11 +87,13 @@ DrawLists::DrawLists(const SceneBuffers& scene, std::span<const std::int32_t> hi
     view_placed_.push_back(place(i, instances[i].world_from_mesh, history < 0));
     if (history >= 0) {
       moving_.push_back(i);
+      entities_ = std::max(entities_, static_cast<std::size_t>(history) + 1);
     } else {
       static_bounds_world_.add(view_placed_.back().box_world);
     }
   }
   light_placed_ = view_placed_;
+  // Allocate for the worst case, so that a frame allocates nothing.
   records_.reserve(std::max<std::size_t>(1, submesh_instances));
   light_records_.reserve(std::max<std::size_t>(1, instances.size() * max_passes));
   view_draws_.reserve(submesh_instances);
@@ -107,7 +118,9 @@ glm::dmat4 DrawLists::relworld_from_mesh(const Placed& placed) const noexcept {
 
 void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns,
                       std::span<const PoseHistory> entities) noexcept {
+  EMIT_CHECK_OP(entities.size(), >=, entities_);
   camera_world_m_ = camera_world_m;
+  light_passes_ = 0;
   records_.clear();
   light_records_.clear();
   view_draws_.clear();
@@ -115,6 +128,7 @@ void DrawLists::begin(const glm::dvec3& camera_world_m, std::int64_t sim_time_ns
   view_ranges_.index_offset.clear();
   view_ranges_.base_vertex.clear();
   light_commands_.clear();
+  // Move the entities to the instant.
   bounds_ = shifted(static_bounds_world_, -camera_world_m);
   const auto instances = scene_.instances();
   for (const std::uint32_t i : moving_) {
@@ -142,7 +156,8 @@ void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange
     return;
   }
   std::uint32_t first_index = 0;
-  std::uint32_t index_count = 0;  // of clusters in a row
+  // Join clusters that follow each other in the index buffer to one range.
+  std::uint32_t index_count = 0;
   for (std::uint32_t c = submesh.first_cluster; c < submesh.first_cluster + submesh.cluster_count;
        ++c) {
     const scene::Cluster& cluster = scene_.clusters()[c];
@@ -158,9 +173,10 @@ void DrawLists::add_ranges(std::uint32_t instance, const SceneBuffers::DrawRange
     index_count += cluster.index_count;
   }
   if (index_count > 0) add_range(first_index, index_count, base_vertex);
+  // Reserve a range for the triangles that culling keeps; cull_view() fills it in.
   const auto range = static_cast<std::uint32_t>(view_ranges_.index_count.size());
   if (cull_ != nullptr && cull_->close(range)) {
-    add_range(0, 0, base_vertex);  // what is left is known later
+    add_range(0, 0, base_vertex);
   }
 }
 
@@ -175,6 +191,8 @@ void DrawLists::find_in_view(const ViewVolume& view) noexcept {
 
 void DrawLists::count_triangles(const ViewVolume& view, std::span<const LevelLimits> limits,
                                 std::span<std::uint32_t> triangles) noexcept {
+  EMIT_CHECK_OP(limits.size(), ==, triangles.size());
+  EMIT_CHECK_OP(limits.size(), >=, std::size_t{1});
   std::ranges::fill(triangles, 0U);
   find_in_view(view);
   for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
@@ -211,6 +229,7 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
                           CommandRange& double_sided) noexcept {
   find_in_view(view);
   if (cull_ != nullptr) cull_->begin(size_px);
+  // List single-sided submeshes first, then double-sided ones.
   for (const bool sheets : {false, true}) {
     CommandRange& range = sheets ? double_sided : single_sided;
     range.first = static_cast<std::uint32_t>(view_draws_.size());
@@ -220,6 +239,7 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
         for (std::uint32_t i = mesh.first_instance; i < mesh.first_instance + mesh.instance_count;
              ++i) {
           if (!view_placed_[i].in_view) continue;
+          // Append a record and the index ranges of the visible clusters.
           const glm::dmat4 matrix = relworld_from_mesh(view_placed_[i]);
           const auto first = static_cast<std::uint32_t>(view_ranges_.index_count.size());
           const auto record = static_cast<std::uint32_t>(records_.size());
@@ -229,6 +249,7 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
           add_ranges(i, submesh, ClusterView(view, matrix, limits),
                      records_.back().params.clip_from_mesh);
           const auto count = static_cast<std::uint32_t>(view_ranges_.index_count.size()) - first;
+          // Drop the record of an instance that shows nothing.
           if (count == 0) {
             records_.pop_back();
             continue;
@@ -239,6 +260,7 @@ void DrawLists::cull_view(const ViewVolume& view, const LevelLimits& limits,
     }
     range.count = static_cast<std::uint32_t>(view_draws_.size()) - range.first;
   }
+  // Cull single triangles and fill in the ranges that were reserved for them.
   if (cull_ == nullptr) return;
   cull_->run();
   for (const TriangleCull::Part& part : cull_->parts()) {
@@ -264,9 +286,10 @@ void DrawLists::drop_empty_ranges() noexcept {
   }
 }
 
-scene::Aabb DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_ns,
-                                    std::int64_t end_ns,
-                                    std::span<const PoseHistory> entities) noexcept {
+scene::Aabb DrawLists::pose_entities(std::int64_t sample_ns, std::int64_t begin_ns,
+                                     std::int64_t end_ns,
+                                     std::span<const PoseHistory> entities) noexcept {
+  EMIT_CHECK_OP(entities.size(), >=, entities_);
   scene::Aabb box;
   for (const std::uint32_t i : moving_) {
     const PoseHistory& entity = entities[static_cast<std::size_t>(history_of_instance_[i])];
@@ -281,13 +304,16 @@ scene::Aabb DrawLists::pose_casters(std::int64_t sample_ns, std::int64_t begin_n
 }
 
 CommandRange DrawLists::cull_light(const LightFrustum& frustum) noexcept {
-  // Rows of clip_from_relworld: light metres scaled to -1..1 across the map and 0..1 in depth.
+  EMIT_CHECK_OP(light_passes_, <, max_passes_);
+  ++light_passes_;
+  // Scale light metres to -1..1 across the map and 0..1 in depth: the rows of clip_from_relworld.
   glm::dvec4 clip_rows[3];
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     const double scale = (axis < 2 ? 2.0 : 1.0) / frustum.extent_m[axis];
     clip_rows[axis] = glm::dvec4(frustum.axes[static_cast<std::size_t>(axis)] * scale,
                                  frustum.offset_m[axis] * scale - (axis < 2 ? 1.0 : 0.0));
   }
+  // Append one instanced draw per mesh with the instances that reach the map.
   CommandRange range{static_cast<std::uint32_t>(light_commands_.size()), 0};
   for (const SceneBuffers::MeshRange& mesh : scene_.meshes()) {
     const auto first = static_cast<std::uint32_t>(light_records_.size());

@@ -9,6 +9,7 @@
 namespace emit::renderer {
 namespace {
 
+/// Normal as snorm16; the fourth is the share of the sky.
 using Normal = std::array<std::int16_t, 4>;
 
 std::int16_t snorm16(float value) noexcept {
@@ -19,7 +20,7 @@ Normal packed(const glm::vec3& n, float sky_frac) noexcept {
   return {snorm16(n.x), snorm16(n.y), snorm16(n.z), snorm16(sky_frac)};
 }
 
-/// GL knows no empty storage.
+/// Buffer that holds `data`, or one element if it is empty, because GL has no empty storage.
 template <class T>
 gl::Buffer storage(std::vector<T>& data) {
   if (data.empty()) data.emplace_back();
@@ -29,6 +30,7 @@ gl::Buffer storage(std::vector<T>& data) {
 }  // namespace
 
 void SceneBuffers::add_meshes(std::span<const scene::Mesh> meshes, std::size_t room) {
+  // Append the ranges and indices of each mesh. Its instances follow those of the mesh before.
   std::vector<std::uint32_t> indices;
   std::uint32_t next_instance = 0;
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
@@ -51,13 +53,20 @@ void SceneBuffers::add_meshes(std::span<const scene::Mesh> meshes, std::size_t r
     meshes_.push_back(std::move(range));
     mesh_bounds_.push_back(mesh.bounds);
   }
+  // Send the indices, with room behind them where culling writes.
   if (room == 0) {
     indices_ = storage(indices);
     return;
   }
   first_culled_ = static_cast<std::uint32_t>(indices.size());
+  culled_room_ = room;
   indices_ = gl::Buffer::dynamic((indices.size() + room) * sizeof(std::uint32_t));
   indices_.upload(std::span<const std::uint32_t>(indices));
+}
+
+void SceneBuffers::upload_culled(std::span<const std::uint32_t> indices) const noexcept {
+  EMIT_CHECK_OP(indices.size(), <=, culled_room_);
+  indices_.upload(indices, first_culled_);
 }
 
 SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
@@ -82,6 +91,7 @@ SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
 SceneBuffers::SceneBuffers(SampledScene scene, TriangleCull* cull)
     : instances_(std::move(scene.geometry.instances)) {
   std::vector<scene::Mesh>& meshes = scene.geometry.meshes;
+  // Build the levels of detail of each mesh from the temperatures of all instances that share it.
   std::vector<ClusterLevels> levels;
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
     VertexValues values;
@@ -92,7 +102,8 @@ SceneBuffers::SceneBuffers(SampledScene scene, TriangleCull* cull)
     }
     levels.push_back(build_cluster_levels(meshes[m], values));
   }
-  add_meshes(meshes, cull != nullptr ? TriangleCull::kMostIndices : 0);
+  add_meshes(meshes, cull != nullptr ? TriangleCull::kMaxIndices : 0);
+  // Append the clusters and let submeshes refer to them.
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     const std::uint32_t first_index = meshes_[m].whole.first_index;
     for (scene::Cluster& cluster : levels[m].clusters) cluster.first_index += first_index;
@@ -108,6 +119,7 @@ SceneBuffers::SceneBuffers(SampledScene scene, TriangleCull* cull)
   }
   if (cull != nullptr) cull->finish();
 
+  // Give each instance vertices of its own: vertex i is sample i.
   std::vector<glm::vec3> positions(scene.sky_frac.size());
   std::vector<Normal> normals(scene.sky_frac.size());
   for (std::size_t i = 0; i < instances_.size(); ++i) {

@@ -15,87 +15,101 @@
 
 namespace emit::renderer {
 
-/// Leaves out triangles that hold no pixel's middle, lie beside the picture or show their backs,
-/// and mixes what is left: software rasterisers sort each into tiles on one thread, at a tenth of a
-/// microsecond, before they find that nothing of it shows, and fill tiles on several threads, one
-/// tile on one. What is drawn stays the same, bit for bit, but for surfaces that coincide.
+/// Culling of single triangles for software rasterisers. It leaves out triangles that hold no
+/// centre of a pixel, lie outside the image or face away, and it mixes the order of the rest. A
+/// software rasteriser sorts triangles into screen tiles on one thread, at a tenth of a microsecond
+/// each, before it finds that nothing of a triangle shows; then it fills the tiles on several
+/// threads, one thread per tile. The image stays the same, bit for bit, except where surfaces
+/// coincide.
 ///
-/// Owner: DrawLists. Thread: the renderer's; computes on all cores. Real time: everything but the
-/// constructor is RT-safe.
+/// Call order: add() for every mesh, finish(), then for each frame begin(), take() and close(),
+/// run().
+///
+/// Owner: DrawnScene. Thread: the one of the renderer; run() computes on all cores. Real time:
+/// add() and finish() are setup only, all other functions are RT-safe.
 class TriangleCull {
  public:
-  /// Of all clusters in one frame; what comes on top of that is drawn as it is.
-  static constexpr std::size_t kMostIndices = std::size_t{3} << 18U;
+  /// Largest number of indices that a frame can take; further clusters are drawn without culling.
+  static constexpr std::size_t kMaxIndices = std::size_t{3} << 18U;
 
   TriangleCull() : workers_(threads::WorkerPool::all_cores()) {}
-  /// Adds the clusters of a mesh, whose indices start with number `first_index` of all: in the
-  /// order of the clusters that are asked for.
+  /// Adds the clusters of a mesh. `first_index` is the number of the mesh's first index among the
+  /// indices of all meshes. The order of the calls numbers the clusters, from 0.
+  /// @pre Every cluster lies within the indices that end with this mesh; finish() was not called.
   void add(const scene::Mesh& mesh, std::span<const scene::Cluster> clusters,
            std::uint32_t first_index);
-  /// After the last add(): takes the memory of a frame.
+  /// Allocates the memory of a frame, after the last add().
   void finish();
 
-  /// Starts a frame.
+  /// Starts a frame for a rendered image of `size_px`.
   void begin(const glm::uvec2& size_px) noexcept;
-  /// While memory is left: true, and run() does it. `clip_from_mesh`: as it is drawn, valid until
-  /// then.
+  /// Takes a cluster for run(). Returns false when the memory of the frame is used up; the caller
+  /// then draws the cluster itself. `number` is the number that add() gave the cluster.
+  /// `clip_from_mesh` is the matrix it is drawn with and must live until run() returns.
+  /// @pre finish() was called and `number` exists.
   [[nodiscard]] bool take(const scene::Cluster& cluster, std::uint32_t number,
                           const glm::mat4& clip_from_mesh, bool single_sided) noexcept;
-  /// What was taken since the last call becomes one part, `range` whatever the caller knows it by.
-  /// False where that is nothing.
+  /// Makes one part of all clusters that were taken since the last call. `range` is stored with the
+  /// part for the caller. Returns false, and makes no part, when no cluster was taken.
   [[nodiscard]] bool close(std::uint32_t range) noexcept;
-  /// What is left of the clusters that were taken together: neighbours among them lie apart, and
-  /// any piece of a part holds some from all of it. Parts follow each other in their order.
+  /// Triangles that are left of the clusters of one close(). Neighbours lie apart: every piece of a
+  /// part holds triangles from all of it. The parts follow each other in indices() without gaps.
   struct Part {
-    std::uint32_t range = 0;
-    std::uint32_t first = 0;  ///< of indices()
-    std::uint32_t count = 0;
-    std::uint32_t clusters = 0;
+    std::uint32_t range = 0;     ///< argument of close()
+    std::uint32_t first = 0;     ///< entry of indices()
+    std::uint32_t count = 0;     ///< number of entries
+    std::uint32_t clusters = 0;  ///< number of clusters that were taken
   };
+  /// Culls all clusters that were taken. parts() and indices() are valid from then on.
   void run() noexcept;
+  /// Parts of the frame in the order of close().
   [[nodiscard]] std::span<const Part> parts() const noexcept { return parts_; }
+  /// Vertex indices of the triangles that are left, three per triangle.
   [[nodiscard]] std::span<const std::uint32_t> indices() const noexcept {
     return std::span(indices_).first(used_);
   }
 
  private:
-  static constexpr std::size_t kMostVertices = 256;  ///< of a cluster: corners are bytes
+  /// Largest number of vertices of a cluster that is culled, because corners are bytes.
+  static constexpr std::size_t kMaxVertices = 256;
 
-  /// A cluster with its vertices to itself.
+  /// Vertices of one cluster.
   struct Local {
     std::uint32_t first_vertex = 0;
-    std::uint32_t vertices = 0;  ///< 0: too many
+    std::uint32_t vertices = 0;  ///< 0: the cluster is not culled, because it has too many
   };
+  /// One cluster of the frame.
   struct Job {
     const scene::Cluster* cluster = nullptr;
     const glm::mat4* clip_from_mesh = nullptr;
     std::uint32_t number = 0;
-    std::uint32_t first = 0;  ///< of uncut_
-    std::uint32_t count = 0;  ///< what is left of it
+    std::uint32_t first = 0;  ///< entry of uncut_
+    std::uint32_t count = 0;  ///< number of indices that are left
     bool single_sided = true;
   };
-  /// A cluster's vertices in GL's window, no farther than a rim from the picture.
+  /// Vertices of a cluster in GL's window, pixels, held within a rim around the image.
   struct Placed {
-    std::array<float, kMostVertices> x_px;
-    std::array<float, kMostVertices> y_px;
+    std::array<float, kMaxVertices> x_px;
+    std::array<float, kMaxVertices> y_px;
   };
-  /// False where some lie behind the camera, or there are too many.
+  /// Projects the vertices of a cluster. Returns false when some lie behind the camera or when the
+  /// cluster has too many vertices.
   [[nodiscard]] bool place(const Job& job, Placed& placed) const noexcept;
-  /// Writes the indices that are left of a cluster's; returns how many.
+  /// Writes the indices that are left of a cluster to `out` and returns their number.
   [[nodiscard]] std::uint32_t cull(const Job& job, std::uint32_t* out) const noexcept;
 
   threads::WorkerPool workers_;
-  std::vector<Local> locals_;  ///< by cluster
-  std::vector<float> x_m_;     ///< by local vertex
+  std::vector<Local> locals_;  ///< one entry per cluster
+  std::vector<float> x_m_;     ///< one entry per local vertex, mesh coordinates
   std::vector<float> y_m_;
   std::vector<float> z_m_;
-  std::vector<std::uint8_t> corners_;        ///< by index: local vertex
-  std::vector<std::uint32_t> mesh_indices_;  ///< by index
+  std::vector<std::uint8_t> corners_;        ///< local vertex of each index
+  std::vector<std::uint32_t> mesh_indices_;  ///< vertex of each index in its mesh
   glm::uvec2 size_px_{0};
   std::vector<Job> jobs_;
   std::uint32_t open_ = 0;  ///< jobs that are in no part yet
   std::vector<Part> parts_;
-  std::vector<std::uint32_t> uncut_;  ///< with gaps: each cluster has place for all its triangles
+  std::vector<std::uint32_t> uncut_;  ///< results by job, with a gap after each
   std::vector<std::uint32_t> indices_;
   std::size_t used_ = 0;
 };

@@ -21,9 +21,10 @@ class Environment {
   explicit Environment(const scene::ScenarioDesc& scenario);
 
   /// Adds a weather sample of the host. It holds from its time on until the next one. Returns false
-  /// when its time is before the newest one. A sample equal to the newest changes nothing. When the
+  /// when its time is before the newest one. A row equal to the newest changes nothing. When the
   /// store is full, its oldest half is thinned to every other sample.
   bool append(const physics::WeatherSample& row) noexcept;
+  /// Forgets the live samples.
   void reset() noexcept;
 
   /// Returns the instants at which live weather changes, ascending.

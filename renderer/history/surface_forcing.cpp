@@ -10,6 +10,8 @@
 #include "history/surface_history.hpp"
 
 namespace emit::renderer {
+namespace {}  // namespace
+
 physics::Result<std::vector<IntervalForcing>> surface_forcing(
     const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns) {
   if (nodes_ns.size() < 2 || !std::is_sorted(nodes_ns.begin(), nodes_ns.end())) {

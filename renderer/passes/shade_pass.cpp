@@ -10,8 +10,9 @@
 #include <limits>
 #include <tuple>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
-#include "passes/compute_passes.hpp"
+#include "passes/pixel_groups.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -19,34 +20,38 @@ namespace {
 constexpr auto kPageSide = static_cast<GLsizei>(ShadePages::kSide);
 constexpr auto kSilhouetteSide = static_cast<GLsizei>(Silhouettes::kSide);
 
-/// Part of the window that holds the convex hull of points in relworld axes; first = end: none.
+/// Smallest part of the frame's window that holds the convex hull of points in relworld axes: first
+/// column, first row, end column, end row. It is empty when the hull lies outside.
 glm::uvec4 part_of_window(std::span<const glm::dvec3> points_m, const CameraSetup& camera,
                           const gpu::FrameParams& frame) noexcept {
   const glm::dmat3 sensor_from_relworld = glm::transpose(camera.view.relworld_from_sensor);
   glm::dvec2 low(std::numeric_limits<double>::infinity());
   glm::dvec2 high = -low;
-  const glm::dvec4 ray(frame.ray);
+  const glm::dvec2 ray_per_px(frame.ray_per_px);
+  const glm::dvec2 ray_at_corner(frame.ray_at_corner);
   const auto add = [&](const glm::dvec3& at) {
-    const glm::dvec2 px((at.x / at.z - ray.z) / ray.x - 0.5, (at.y / at.z - ray.w) / ray.y - 0.5);
+    const glm::dvec2 px((at.x / at.z - ray_at_corner.x) / ray_per_px.x - 0.5,
+                        (at.y / at.z - ray_at_corner.y) / ray_per_px.y - 0.5);
     low = glm::min(low, px);
     high = glm::max(high, px);
   };
+  // Add the points in front of the near plane, and the points at which the hull crosses it.
   const double near_m = camera.view.near_m;
   for (std::size_t i = 0; i < points_m.size(); ++i) {
     const glm::dvec3 at = sensor_from_relworld * points_m[i];
     if (at.z >= near_m) add(at);
-    // Where a way between two of them leaves what lies before the camera.
     for (std::size_t j = i + 1; j < points_m.size(); ++j) {
       const glm::dvec3 other = sensor_from_relworld * points_m[j];
       if ((at.z >= near_m) == (other.z >= near_m)) continue;
       add(glm::mix(at, other, (near_m - at.z) / (other.z - at.z)));
     }
   }
-  const glm::uvec4& window_px = frame.format_window_px;
+  // Clamp the rectangle to the window.
+  const glm::uvec4& window_px = frame.rendered_window_px;
   if (!(low.x <= high.x)) return {0U, 0U, 0U, 0U};
-  const auto clamped = [](double value, std::uint32_t least, std::uint32_t most) {
+  const auto clamped = [](double value, std::uint32_t low_px, std::uint32_t high_px) {
     return static_cast<std::uint32_t>(
-        std::clamp(value, static_cast<double>(least), static_cast<double>(most)));
+        std::clamp(value, static_cast<double>(low_px), static_cast<double>(high_px)));
   };
   return {clamped(std::floor(low.x), window_px.x, window_px.z),
           clamped(std::floor(low.y), window_px.y, window_px.w),
@@ -70,16 +75,16 @@ ShadePass::ShadePass(std::size_t entities)
       page_table_(GL_RGBA32F, page_buffer_),
       silhouette_buffer_(gl::Buffer::dynamic(entities * sizeof(gpu::SilhouetteParams))),
       silhouette_table_(GL_RGBA32F, silhouette_buffer_),
-      tile_buffer_(gl::Buffer::dynamic(ShadeTiles::kMostTiles * sizeof(gpu::ShadeTile))),
+      tile_buffer_(gl::Buffer::dynamic(ShadeTiles::kMaxTiles * sizeof(gpu::ShadeTile))),
       tile_table_(GL_RGBA32UI, tile_buffer_),
-      list_buffer_(
-          gl::Buffer::dynamic(ShadeTiles::most_entries(ShadePages::kPages + entities) * 2)),
+      list_buffer_(gl::Buffer::dynamic(ShadeTiles::max_entries(ShadePages::kPages + entities) * 2)),
       list_table_(GL_R16UI, list_buffer_),
       sent_(entities, 0) {
   pages_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   pages_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   page_params_.reserve(ShadePages::kPages);
   silhouette_params_.reserve(entities);
+  // Pack two positions of taps into each entry.
   for (std::uint32_t tap = 0; tap < EMIT_SHADE_TAPS; tap += 2) {
     const auto [x, y] = shade_tap(tap);
     const auto [next_x, next_y] = shade_tap(tap + 1);
@@ -88,6 +93,7 @@ ShadePass::ShadePass(std::size_t entities)
 }
 
 physics::Result<ShadePass> ShadePass::create(std::size_t entities, bool software) {
+  EMIT_CHECK_OP(entities, >=, std::size_t{1});
   ShadePass pass(entities);
   pass.rows_ = software ? 2 : 1;
   const gl::Define rows = rows_define(pass.rows_);
@@ -106,8 +112,8 @@ void ShadePass::prepare(CachedSurface& surface, const glm::dvec3& camera_world_m
                         const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
   page_params_.clear();
   silhouette_params_.clear();
-  params_.slope = glm::vec4(surface.shade().slope(), 0.0F, 0.0F);
-  tiles_.begin(frame.format_window_px);
+  params_.slope = surface.shade().slope();
+  tiles_.begin(frame.rendered_window_px);
   const glm::dvec3 relworld_from_rel_m = surface.origin_world_m() - camera_world_m;
   prepare_pages(surface.shade(), relworld_from_rel_m, camera, frame);
   prepare_silhouettes(surface, relworld_from_rel_m, camera, frame);
@@ -120,6 +126,8 @@ void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworl
   for (std::size_t p = 0; p < pages.size(); ++p) {
     const ShadePages::Page& page = pages[p];
     if (!page.used || page.fine) continue;
+    // Find the part of the window that the tile may shade: from its lowest to its highest receiver,
+    // along the rays of the sun.
     const glm::dvec3 first_m = glm::dvec3(page.first_m, page.plane_m) + relworld_from_rel_m;
     const double side_m = page.texel_m * (ShadePages::kSide - 1);
     std::array<glm::dvec3, 8> corners_m;
@@ -131,10 +139,16 @@ void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworl
     }
     const glm::uvec4 px = part_of_window(corners_m, camera, frame);
     if (is_empty(px)) continue;
+    // Append its parameters.
     tiles_.add_page(px);
     gpu::PageParams& params = page_params_.emplace_back();
-    params.place = glm::vec4(glm::vec3(first_m), 1.0F / page.texel_m);
-    params.range = glm::vec4(page.reach_m, page.lowest_m, static_cast<float>(p), 0.0F);
+    params.first_x_m = static_cast<float>(first_m.x);
+    params.first_y_m = static_cast<float>(first_m.y);
+    params.plane_m = static_cast<float>(first_m.z);
+    params.texels_per_m = 1.0F / page.texel_m;
+    params.reach_m = page.reach_m;
+    params.lowest_m = page.lowest_m;
+    params.layer = static_cast<float>(p);
     params.left_frac = page.left_frac;
   }
 }
@@ -146,12 +160,14 @@ void ShadePass::prepare_silhouettes(CachedSurface& surface, const glm::dvec3& re
   for (std::size_t m = 0; m < shadows.size(); ++m) {
     const CachedSurface::Shadow& shadow = shadows[m];
     if (!shadow.on) continue;
+    // Find the part of the window that the shadow may reach.
     std::array<glm::dvec3, std::tuple_size_v<decltype(shadow.hull_m)>> corners_m;
     for (std::size_t k = 0; k < corners_m.size(); ++k) {
       corners_m[k] = glm::dvec3(shadow.hull_m[k]) + relworld_from_rel_m;
     }
     const glm::uvec4 px = part_of_window(corners_m, camera, frame);
     if (is_empty(px)) continue;
+    // Place the depth map at the pose of the frame and append its parameters.
     const PlacedSilhouette placed = surface.cast_shadow(m);
     tiles_.add_silhouette(px);
     gpu::SilhouetteParams& params = silhouette_params_.emplace_back();
@@ -162,13 +178,15 @@ void ShadePass::prepare_silhouettes(CachedSurface& surface, const glm::dvec3& re
     params.column = from_relworld(placed.column);
     params.row = from_relworld(placed.row);
     params.depth_m = from_relworld(placed.depth_m);
-    params.penumbra = glm::vec4(
-        placed.mean_m, static_cast<float>(std::tan(physics::kSunSemiAngleRad)) / placed.texel_m,
-        static_cast<float>(m), 0.0F);
+    params.mean_depth_m = placed.mean_m;
+    params.penumbra_texels_per_m =
+        static_cast<float>(std::tan(physics::kSunSemiAngleRad)) / placed.texel_m;
+    params.layer = static_cast<float>(m);
   }
 }
 
 void ShadePass::upload(const CachedSurface& surface) noexcept {
+  // Send the exposure tiles that changed.
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   const std::span<const ShadePages::Page> pages = surface.shade().pages();
   for (std::size_t p = 0; p < pages.size(); ++p) {
@@ -181,6 +199,7 @@ void ShadePass::upload(const CachedSurface& surface) noexcept {
     glTextureSubImage3D(pages_.id(), 0, 0, 0, static_cast<GLint>(p), kPageSide, kPageSide, 1,
                         GL_RGBA, GL_FLOAT, pages[p].shade.data());
   }
+  // Send the shadow depth maps that changed.
   const Silhouettes& silhouettes = surface.silhouettes();
   for (std::size_t m = 0; m < silhouettes.size(); ++m) {
     if (sent_[m] == silhouettes.revision(m)) continue;
@@ -188,6 +207,7 @@ void ShadePass::upload(const CachedSurface& surface) noexcept {
     glTextureSubImage3D(silhouettes_.id(), 0, 0, 0, static_cast<GLint>(m), kSilhouetteSide,
                         kSilhouetteSide, 1, GL_RED, GL_FLOAT, silhouettes.depths_m(m).data());
   }
+  // Send the parameters of the frame.
   params_buffer_.upload(std::span<const gpu::ShadeParams>(&params_, 1));
   page_buffer_.upload(std::span<const gpu::PageParams>(page_params_));
   silhouette_buffer_.upload(std::span<const gpu::SilhouetteParams>(silhouette_params_));

@@ -7,28 +7,36 @@
 #include <span>
 #include <vector>
 
+#include "draw/camera_setup.hpp"
 #include "gl/objects.hpp"
 #include "gl/program.hpp"
-#include "draw/camera_setup.hpp"
 #include "passes/shade_tiles.hpp"
 #include "shared/shade_params.glsl.h"
 #include "surface/run/cached_surface.hpp"
 
 namespace emit::renderer {
 
-/// Shade of entities by pixel, between geometry and radiance: only where pages and shadows lie in
-/// the picture. Owner: CachedStage. Real time: all but create() and resize() RT-safe.
+/// Shade of entities per pixel, between the geometry pass and the radiance pass. It works only in
+/// the part of the image that exposure tiles ("pages") and entity shadow depth maps ("silhouettes")
+/// reach. See passes/shade.comp. Owner: CachedStage. Thread: the one that owns the GL context. Real
+/// time: create() and begin() are setup only, the rest is RT-safe.
 class ShadePass {
  public:
-  /// `software`: the device is a CPU.
+  /// Compiles the pass and allocates the textures for `entities` entities. `software` says that the
+  /// device is a CPU. Errors: gpu (names the shader).
+  /// @pre entities >= 1
   [[nodiscard]] static physics::Result<ShadePass> create(std::size_t entities, bool software);
-  /// For another surface.
+  /// Reads the response of the materials of a new surface.
   void begin(const ShadePages& pages);
 
-  /// What a frame needs, from the surface as it is advanced to that.
+  /// Sets up the parameters of a frame from the surface, which has been advanced to the frame.
+  /// Fills only memory of the CPU.
   void prepare(CachedSurface& surface, const glm::dvec3& camera_world_m, const CameraSetup& camera,
                const gpu::FrameParams& frame) noexcept;
+  /// Sends the parameters, and the exposure tiles and shadow depth maps that changed, to the
+  /// device.
   void upload(const CachedSurface& surface) noexcept;
+  /// Applies the shade to the geometry buffer.
   void dispatch() const noexcept;
 
  private:
@@ -39,11 +47,11 @@ class ShadePass {
                            const CameraSetup& camera, const gpu::FrameParams& frame) noexcept;
 
   gl::Program program_;
-  std::uint32_t rows_ = 1;   ///< of groups of pixels, done by one
-  gl::Texture pages_;        ///< RGBA32F, a layer each
-  gl::Texture tops_;         ///< R32F, a layer each
-  gl::Texture silhouettes_;  ///< R32F, a layer each
-  gl::Buffer response_;      ///< by material, 4 floats
+  std::uint32_t rows_ = 1;  ///< blocks of 8 x 8 pixels per work group
+  gl::Texture pages_;       ///< RGBA32F, one layer per exposure tile: shade by mode
+  gl::Texture tops_;  ///< R32F, one layer per exposure tile: height at which the shade began, m
+  gl::Texture silhouettes_;  ///< R32F, one layer per entity: depth, m
+  gl::Buffer response_;      ///< weights of the four modes of each material, K
   gl::BufferTexture response_table_;
   gpu::ShadeParams params_{};
   std::vector<gpu::PageParams> page_params_;
@@ -58,7 +66,7 @@ class ShadePass {
   gl::BufferTexture tile_table_;
   gl::Buffer list_buffer_;
   gl::BufferTexture list_table_;
-  std::vector<std::uint32_t> sent_;  ///< by entity: revision of the silhouette on the device
+  std::vector<std::uint32_t> sent_;  ///< revision of each entity's depth map on the device
 };
 
 }  // namespace emit::renderer

@@ -7,12 +7,14 @@ namespace emit::renderer {
 
 ShadeTiles::ShadeTiles(std::size_t records) {
   rectangles_.reserve(records);
-  all_.reserve(kMostTiles);
-  tiles_.reserve(kMostTiles);
-  entries_.resize(most_entries(records));
+  all_.reserve(kMaxTiles);
+  tiles_.reserve(kMaxTiles);
+  entries_.resize(max_entries(records));
 }
 
 void ShadeTiles::begin(const glm::uvec4& window_px) noexcept {
+  EMIT_CHECK_OP(window_px.z, <=, 65536U);
+  EMIT_CHECK_OP(window_px.w, <=, 65536U);
   window_px_ = window_px;
   pages_ = 0;
   silhouettes_ = 0;
@@ -21,7 +23,16 @@ void ShadeTiles::begin(const glm::uvec4& window_px) noexcept {
   used_entries_ = 0;
 }
 
+void ShadeTiles::add_page(const glm::uvec4& px) noexcept {
+  EMIT_CHECK_OP(silhouettes_, ==, 0U);
+  add(px, pages_++);
+}
+
 void ShadeTiles::add(const glm::uvec4& px, std::uint32_t number) noexcept {
+  EMIT_CHECK_OP(number, <, 65536U);
+  EMIT_CHECK_OP(rectangles_.size(), <, rectangles_.capacity());
+  EMIT_CHECK(window_px_.x <= px.x && px.x < px.z && px.z <= window_px_.z);
+  EMIT_CHECK(window_px_.y <= px.y && px.y < px.w && px.w <= window_px_.w);
   rectangles_.push_back({px, number});
 }
 
@@ -41,12 +52,13 @@ std::size_t ShadeTiles::count_entries() const noexcept {
 
 void ShadeTiles::sort() noexcept {
   if (rectangles_.empty()) return;
+  // Choose the smallest screen tiles that keep to both limits.
   const glm::uvec2 size_px(window_px_.z - window_px_.x, window_px_.w - window_px_.y);
   std::size_t rows = 0;
-  for (tile_px_ = kLeastPx;; tile_px_ *= 2) {
+  for (tile_px_ = kMinPx;; tile_px_ *= 2) {
     columns_ = (size_px.x + tile_px_ - 1) / tile_px_;
     rows = (size_px.y + tile_px_ - 1) / tile_px_;
-    if (columns_ * rows <= kMostTiles && count_entries() <= entries_.size()) break;
+    if (columns_ * rows <= kMaxTiles && count_entries() <= entries_.size()) break;
   }
   all_.assign(columns_ * rows, {});
   const auto for_each = [this](const auto& visit) {
@@ -59,19 +71,23 @@ void ShadeTiles::sort() noexcept {
       }
     }
   };
+  // Count the rectangles of each screen tile.
   for_each([](gpu::ShadeTile& tile, bool page, std::uint32_t) {
     ++(page ? tile.pages : tile.silhouettes);
   });
+  // Give each screen tile its part of the list.
   std::uint32_t first = 0;
   for (gpu::ShadeTile& tile : all_) {
     tile.first = first;
     first += tile.pages + tile.silhouettes;
   }
   used_entries_ = first;
-  // Rectangles come in the order of their entries: `first` is where the next one goes.
+  // Fill in the numbers. Rectangles come in the order of their entries, and `first` is the next
+  // free one.
   for_each([this](gpu::ShadeTile& tile, bool, std::uint32_t number) {
     entries_[tile.first++] = static_cast<std::uint16_t>(number);
   });
+  // Keep the screen tiles that something reaches, with `first` set back to the first entry.
   for (std::size_t i = 0; i < all_.size(); ++i) {
     gpu::ShadeTile& tile = all_[i];
     const std::uint32_t count = tile.pages + tile.silhouettes;

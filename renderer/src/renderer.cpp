@@ -12,7 +12,8 @@
 
 #include "budget/ladder_survey.hpp"
 #include "budget/quality_ladder.hpp"
-#include "draw/picture_window.hpp"
+#include "draw/image_window.hpp"
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/limits.hpp"
 #include "emit/scene/mesh.hpp"
@@ -21,8 +22,9 @@
 #include "history/first_frame_warnings.hpp"
 #include "history/foster_setup.hpp"
 #include "history/pose_history.hpp"
-#include "passes/compute_passes.hpp"
-#include "passes/raster_passes.hpp"
+#include "passes/enlarge_pass.hpp"
+#include "passes/geometry_pass.hpp"
+#include "passes/radiance_pass.hpp"
 #include "passes/readback_ring.hpp"
 #include "stages/band_model.hpp"
 #include "stages/cached_stage.hpp"
@@ -43,9 +45,12 @@ static_assert(EMIT_MAX_TAPS == limits::kShadowTaps.hi);
 static_assert(EMIT_MAX_MODES == limits::kMaxRelaxationModes);
 static_assert(EMIT_MAX_ATMOSPHERE_TERMS == limits::kMaxAtmosphereTerms);
 
-constexpr std::size_t kBlockAlignment = 256;  // GL guarantees that no driver asks for more
-constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 3;  // temperature, depth, object
+/// Alignment of storage blocks. GL guarantees that no driver asks for more.
+constexpr std::size_t kBlockAlignment = 256;
+/// Largest number of planes: radiance of all bands, temperature, depth, object.
+constexpr std::size_t kMaxPlanes = EMIT_MAX_BANDS + 3;
 
+/// Checks the limits of the renderer. Errors: config, naming the value and the limit.
 Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   const scene::ThermalOptions& thermal = scenario.thermal;
   const auto fail = [](std::string text) { return make_error(ErrorCode::config, std::move(text)); };
@@ -82,19 +87,20 @@ Result<void> check_limits(const scene::ScenarioDesc& scenario, const OutputOptio
   return {};
 }
 
-/// What every method has on the device.
+/// Passes that every thermal method uses.
 struct FramePasses {
   GeometryPass geometry;
   RadiancePass radiance;
-  std::optional<EnlargePass> enlarge;  ///< with a quality ladder
+  std::optional<EnlargePass> enlarge;  ///< empty when no frame may shed work
 };
 
+/// Renderer on an OpenGL device.
 class GlRenderer final : public Renderer {
  public:
   GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext context,
              const scene::SceneGeometry& geometry, const OutputOptions& output, BandModel bands,
              FramePasses passes);
-  /// Before anything else: the method, which reads history().
+  /// Sets the thermal method, which reads history(). It is called before anything else.
   void set_stage(std::unique_ptr<ThermalStage> stage) { stage_ = std::move(stage); }
   [[nodiscard]] const SceneHistory& history() const noexcept { return history_; }
 
@@ -114,10 +120,13 @@ class GlRenderer final : public Renderer {
   const SceneStats& scene_stats() const noexcept override { return scene_stats_; }
   const std::string& device_name() const noexcept override { return context_.device_name(); }
 
+  /// False when the driver could not map the read-back memory.
   [[nodiscard]] bool memory_mapped() const noexcept { return readback_.mapped(); }
+  /// True when the device is a CPU.
   [[nodiscard]] bool software() const noexcept { return context_.software(); }
 
  private:
+  /// Warms the thermal method up and updates the statistics of the scene.
   [[nodiscard]] Result<void> warm_up_stage(const FrameRequest& first,
                                            const WarmUpProgress& progress) {
     auto ready = stage_->warm_up(first, progress);
@@ -126,23 +135,26 @@ class GlRenderer final : public Renderer {
     warm_ = warm_ || ready.has_value();
     return ready;
   }
-  [[nodiscard]] glm::uvec2 picture_px() const noexcept {
-    return glm::uvec2(frame_params_.picture_px);
-  }
-  /// Instances at the frame's instant around its camera; starts the draw lists anew.
+  [[nodiscard]] glm::uvec2 output_px() const noexcept { return frame_params_.output_px; }
+  /// Sets up the camera of a frame and starts its draw lists with all instances at its instant.
   [[nodiscard]] CameraSetup place_camera(const FrameRequest& request,
-                                         const QualityRung& rung) noexcept;
-  [[nodiscard]] TrianglesOfRungs count_triangles(const FrameRequest& request) noexcept;
-  void prepare(const FrameRequest& request, const QualityRung& rung) noexcept;
+                                         const QualityLevel& level) noexcept;
+  /// Number of triangles that each quality level draws of a frame. Starts the draw lists anew.
+  [[nodiscard]] TrianglesPerLevel count_triangles(const FrameRequest& request) noexcept;
+  /// Does the work of the CPU for a frame and sends its data to the device.
+  void prepare(const FrameRequest& request, const QualityLevel& level) noexcept;
   void upload_frame() noexcept;
   void bind_frame() const noexcept;
-  /// Of every plane the rows of the window, and the counters.
+  /// Issues the passes from geometry to the planes of the output image.
+  void draw_frame(const QualityLevel& level, StageTimes& stages) noexcept;
+  /// Copies the rows of the window of every plane, and the counters, into a slot.
   void read_back(std::uint32_t slot) noexcept;
+  /// Entry of the entity with an id in history_.entities; -1 for an unknown id.
   [[nodiscard]] int find_entity(std::uint32_t entity_id) const noexcept;
 
   scene::ScenarioDesc scenario_;
   OutputOptions output_;
-  gl::EglContext context_;  // before everything that owns GL objects
+  gl::EglContext context_;  ///< declared before every member that owns GL objects
   SceneStats scene_stats_;
   SceneHistory history_;
   std::vector<std::uint32_t> entity_ids_;
@@ -159,17 +171,18 @@ class GlRenderer final : public Renderer {
   gl::Buffer band_buffer_;
   gl::Buffer table_buffer_;
   gl::BufferTexture band_table_;
-  gl::Buffer output_buffer_;  ///< planes, then counters
+  gl::Buffer output_buffer_;  ///< planes of the output image, then counters
   std::size_t planes_ = 0;
-  std::size_t stats_offset_ = 0;
+  std::size_t stats_offset_ = 0;  ///< bytes from the start of output_buffer_ to the counters
   ReadbackRing readback_;
   std::vector<FrameView> views_;
   StageClock clock_;
   LadderMap ladder_;
   FrameCost frame_cost_;
-  LadderMap::OfRungs expected_rungs_{};  ///< scratch of expected_rungs()
+  LadderMap::PerLevel expected_rungs_{};  ///< result of the last call of expected_rungs()
 };
 
+/// Content that the radiance pass is compiled for.
 RadianceContent radiance_content(const BandModel& bands, const OutputOptions& output) {
   return {.bands = static_cast<std::uint32_t>(bands.params().size()),
           .air_terms = bands.air_terms(),
@@ -180,16 +193,19 @@ RadianceContent radiance_content(const BandModel& bands, const OutputOptions& ou
                      (output.object ? EMIT_OUTPUT_OBJECT : 0U)};
 }
 
+/// True when some object of the scenario is an entity.
 bool has_entities(const scene::ScenarioDesc& scenario) {
   return std::ranges::any_of(scenario.objects,
                              [](const scene::ObjectDesc& object) { return object.entity_id != 0; });
 }
 
+/// Number of planes of the output image.
 std::size_t plane_count(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   return scenario.bands.size() + (output.temperature ? 1U : 0U) + (output.depth ? 1U : 0U) +
          (output.object ? 1U : 0U);
 }
 
+/// Size of all planes, rounded up to the alignment of a storage block.
 std::size_t planes_bytes(const scene::ScenarioDesc& scenario, const OutputOptions& output) {
   const std::size_t bytes = plane_count(scenario, output) * scenario.sensor.width_px *
                             scenario.sensor.height_px * sizeof(float);
@@ -220,19 +236,23 @@ GlRenderer::GlRenderer(const scene::ScenarioDesc& scenario, gl::EglContext conte
       clock_(output.stage_timing) {
   scene_stats_.warnings.insert(scene_stats_.warnings.end(), geometry.warnings.begin(),
                                geometry.warnings.end());
+  // Give each entity a history of poses.
   for (const scene::ObjectDesc& object : scenario_.objects) {
     if (object.entity_id == 0) continue;
     entity_ids_.push_back(object.entity_id);
     history_.entities.emplace_back(object, object.instances.front());
   }
   const std::size_t plane_px = std::size_t{scenario_.sensor.width_px} * scenario_.sensor.height_px;
-  frame_params_.picture_px = glm::uvec4(scenario_.sensor.width_px, scenario_.sensor.height_px,
-                                        static_cast<std::uint32_t>(plane_px), 0U);
-  frame_params_.obscurance = glm::vec4(static_cast<float>(scenario_.thermal.obscurance_radius_m),
-                                       static_cast<float>(physics::kReferenceK),
-                                       static_cast<float>(scenario_.thermal.tolerance_k), 0.0F);
-  frame_params_.samples.y = static_cast<float>(scenario_.sensor.near_m);
-  frame_params_.bands = glm::uvec4(bands_.nodes_per_band(), bands_.first_emissivity(), 0U, 0U);
+  // Set the parameters that all frames share.
+  frame_params_.output_px = glm::uvec2(scenario_.sensor.width_px, scenario_.sensor.height_px);
+  frame_params_.output_plane_px = static_cast<std::uint32_t>(plane_px);
+  frame_params_.obscurance_radius_m = static_cast<float>(scenario_.thermal.obscurance_radius_m);
+  frame_params_.reference_k = static_cast<float>(physics::kReferenceK);
+  frame_params_.step_tolerance_k = static_cast<float>(scenario_.thermal.tolerance_k);
+  frame_params_.near_m = static_cast<float>(scenario_.sensor.near_m);
+  frame_params_.band_lut_nodes = bands_.nodes_per_band();
+  frame_params_.first_emissivity = bands_.first_emissivity();
+  // Let the view of each slot refer to the planes in its memory.
   for (std::uint32_t slot = 0; slot < output_.slots; ++slot) {
     FrameView& view = views_[slot];
     view.width_px = scenario_.sensor.width_px;
@@ -284,15 +304,16 @@ physics::Pose GlRenderer::scenario_sensor_pose_at(std::int64_t sim_time_ns) cons
 Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress& progress) {
   if (auto ready = warm_up_stage(first, progress); !ready) return ready;
   if (output_.ladder != Ladder::live || !passes_.enlarge) {
-    // Drivers compile when something is drawn for the first time.
+    // Render one frame, because drivers compile when something is drawn for the first time.
     if (const int slot = submit(first); slot >= 0) {
       (void)collect(static_cast<SlotIndex>(slot));
       release(static_cast<SlotIndex>(slot));
     }
     return {};
   }
+  // Measure the quality levels.
   auto survey =
-      survey_ladder({*this, scenario_.sensor, bands_.apparent_temperatures(), picture_px(),
+      survey_ladder({*this, scenario_.sensor, bands_.apparent_temperatures(), output_px(),
                      [this](const FrameRequest& request) { return count_triangles(request); }},
                     first, progress);
   if (!survey) return tl::unexpected(std::move(survey.error()));
@@ -302,23 +323,29 @@ Result<void> GlRenderer::warm_up(const FrameRequest& first, const WarmUpProgress
 }
 
 CameraSetup GlRenderer::place_camera(const FrameRequest& request,
-                                     const QualityRung& rung) noexcept {
-  const glm::uvec2 size_px = rendered_px(rung, picture_px());
-  const glm::uvec4 window_px = window_of(request.window_px, picture_px());
-  frame_params_.format_px = glm::uvec4(size_px, size_px.x * size_px.y, 0U);
-  frame_params_.picture_window_px = window_px;
-  frame_params_.format_window_px = rendered_window(window_px, picture_px(), size_px);
+                                     const QualityLevel& level) noexcept {
+  // Set the sizes of the images and the window of the request in both.
+  const glm::uvec2 size_px = rendered_px(level, output_px());
+  const glm::uvec4 window_px = window_of(request.window_px, output_px());
+  frame_params_.rendered_px = size_px;
+  frame_params_.rendered_plane_px = size_px.x * size_px.y;
+  frame_params_.output_window_px = window_px;
+  frame_params_.rendered_window_px = rendered_window(window_px, output_px(), size_px);
+  // Place the instances and the camera.
   DrawLists& lists = stage_->drawn().lists;
   lists.begin(request.sensor_pose.position_world_m, request.sim_time_ns, history_.entities);
   CameraSetup camera = set_camera(scenario_.sensor, request.sensor_pose, frame_params_);
-  if (!stage_->looks_around() && window_size_px(window_px) != picture_px()) {
-    // A pixel more on every side: what touches the window's outermost ones.
-    const glm::dvec4 px(glm::dvec4(frame_params_.format_window_px) +
+  if (!stage_->looks_around() && window_size_px(window_px) != output_px()) {
+    // Draw one pixel more on every side, because a triangle may touch the outermost pixels of the
+    // window.
+    const glm::dvec4 px(glm::dvec4(frame_params_.rendered_window_px) +
                         glm::dvec4(-1.0, -1.0, 1.0, 1.0));
-    const glm::dvec4 ray(frame_params_.ray);
-    camera.view.drawn_tan = glm::dvec4(ray.z + ray.x * px.x, ray.w + ray.y * px.y,
-                                       ray.z + ray.x * px.z, ray.w + ray.y * px.w);
+    const glm::dvec2 per_px(frame_params_.ray_per_px);
+    const glm::dvec2 corner(frame_params_.ray_at_corner);
+    camera.view.drawn_tan = glm::dvec4(corner.x + per_px.x * px.x, corner.y + per_px.y * px.y,
+                                       corner.x + per_px.x * px.z, corner.y + per_px.y * px.w);
   }
+  // Bound the view by the box around the scene.
   const scene::Aabb& bounds = lists.bounds();
   if (!bounds.empty()) {
     camera.view.scene_min_m = bounds.min_m;
@@ -329,18 +356,19 @@ CameraSetup GlRenderer::place_camera(const FrameRequest& request,
   return camera;
 }
 
-void GlRenderer::prepare(const FrameRequest& request, const QualityRung& rung) noexcept {
-  CameraSetup camera = place_camera(request, rung);
-  LevelLimits limits = rung.limits;
+void GlRenderer::prepare(const FrameRequest& request, const QualityLevel& level) noexcept {
+  // Cull the draws of the camera.
+  CameraSetup camera = place_camera(request, level);
+  LevelLimits limits = level.limits;
   limits.pixel_rad = camera.pixel_rad;
-  stage_->drawn().lists.cull_view(camera.view, limits, glm::uvec2(frame_params_.format_px),
+  stage_->drawn().lists.cull_view(camera.view, limits, frame_params_.rendered_px,
                                   view_single_sided_, view_double_sided_);
+  // Advance the thermal method, then set sun and bands to its instant.
   stage_->prepare(request, camera, frame_params_);
   const physics::SunPosition& sun = stage_->sun_now();
   const bool sun_up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
-  frame_params_.sun_now =
-      glm::vec4(static_cast<float>(sun.direction_enu.x), static_cast<float>(sun.direction_enu.y),
-                static_cast<float>(sun.direction_enu.z), sun_up ? 1.0F : 0.0F);
+  frame_params_.to_sun = glm::vec3(sun.direction_enu);
+  frame_params_.sun_up = sun_up ? 1.0F : 0.0F;
   bands_.update(stage_->forcing_now(), sun);
   upload_frame();
 }
@@ -362,9 +390,9 @@ void GlRenderer::bind_frame() const noexcept {
 }
 
 void GlRenderer::read_back(std::uint32_t slot) noexcept {
-  const glm::uvec4& window_px = frame_params_.picture_window_px;
-  const std::size_t row_bytes = frame_params_.picture_px.x * sizeof(float);
-  const std::size_t plane_bytes = frame_params_.picture_px.z * sizeof(float);
+  const glm::uvec4& window_px = frame_params_.output_window_px;
+  const std::size_t row_bytes = frame_params_.output_px.x * sizeof(float);
+  const std::size_t plane_bytes = frame_params_.output_plane_px * sizeof(float);
   std::array<ReadbackRing::Range, kMaxPlanes + 1> parts;
   for (std::size_t plane = 0; plane < planes_; ++plane) {
     parts[plane] = {plane * plane_bytes + window_px.y * row_bytes,
@@ -378,10 +406,11 @@ std::span<const RungStats> GlRenderer::expected_rungs(const FrameRequest& reques
   static constexpr std::array<RungStats, 1> kFullOnly{};
   if (ladder_.empty()) return kFullOnly;
   const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
-  // What was measured are whole pictures.
-  const glm::uvec2 window_px = window_size_px(window_of(request.window_px, picture_px()));
-  if (!known || window_px != picture_px()) {
-    const TrianglesOfRungs triangles = count_triangles(request);
+  // Estimate the times from triangles and pixels where nothing was measured. The measured frames
+  // are whole images.
+  const glm::uvec2 window_px = window_size_px(window_of(request.window_px, output_px()));
+  if (!known || window_px != output_px()) {
+    const TrianglesPerLevel triangles = count_triangles(request);
     for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
       expected_rungs_[r].frame_ms =
           frame_cost_.frame_ms(triangles[r], rendered_pixels(kQualityLadder[r], window_px));
@@ -390,20 +419,22 @@ std::span<const RungStats> GlRenderer::expected_rungs(const FrameRequest& reques
   return expected_rungs_;
 }
 
-TrianglesOfRungs GlRenderer::count_triangles(const FrameRequest& request) noexcept {
+TrianglesPerLevel GlRenderer::count_triangles(const FrameRequest& request) noexcept {
+  // Express the limits of every level in pixels of full quality.
   const CameraSetup camera = place_camera(request, kQualityLadder[0]);
   std::array<LevelLimits, kQualityLadder.size()> limits;
   for (std::size_t r = 0; r < limits.size(); ++r) {
     limits[r] = kQualityLadder[r].limits;
     limits[r].pixel_rad =
-        camera.pixel_rad * picture_px().x / rendered_px(kQualityLadder[r], picture_px()).x;
+        camera.pixel_rad * output_px().x / rendered_px(kQualityLadder[r], output_px()).x;
   }
-  TrianglesOfRungs triangles{};
+  TrianglesPerLevel triangles{};
   stage_->drawn().lists.count_triangles(camera.view, limits, triangles);
   return triangles;
 }
 
 int GlRenderer::submit(const FrameRequest& request) noexcept {
+  // Take a slot and describe the frame in its view.
   const int slot = readback_.acquire();
   if (slot < 0) return -1;
   FrameView& view = views_[static_cast<std::size_t>(slot)];
@@ -428,53 +459,67 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
     if (again) view.stats.rewarm_s = took.count();
   }
-  if (view.device_failed) {  // nothing can be drawn: what the planes held goes out, flagged
+  // If that fails, nothing can be drawn: the old content of the planes goes out, flagged as failed.
+  if (view.device_failed) {
     const ReadbackRing::Range all{0, output_buffer_.bytes()};
     readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot), {&all, 1});
     return slot;
   }
   clock_.start();
 
+  // Choose the quality level and state its expected error.
   view.rung = passes_.enlarge ? std::min<std::uint8_t>(request.rung, kQualityLadder.size() - 1) : 0;
   const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
   view.estimated_error_k = view.rung == 0 ? 0.0F
                            : known        ? static_cast<float>(expected_rungs_[view.rung].error_k)
                                           : std::numeric_limits<float>::quiet_NaN();
-  const QualityRung& rung = kQualityLadder[view.rung];
-  prepare(request, rung);
+  const QualityLevel& level = kQualityLadder[view.rung];
+  // Do the work of the CPU and bind everything.
+  prepare(request, level);
   view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0;
   bind_frame();
+  // Clear the counters, then issue all passes and the read-back.
   const std::uint32_t zero = 0;
   glClearNamedBufferSubData(output_buffer_.id(), GL_R32UI, static_cast<GLintptr>(stats_offset_),
                             sizeof(gpu::FrameStatsGpu), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
 
-  const DrawnScene& drawn = stage_->drawn();
-  const glm::uvec2 size_px(frame_params_.format_px);
-  const glm::uvec4& window_px = frame_params_.format_window_px;
-  passes_.geometry.draw(drawn.vertices, drawn.lists, drawn.record_buffer, view_single_sided_,
-                        view_double_sided_, size_px,
-                        stage_->looks_around() ? window_of({}, size_px) : window_px);
-  clock_.mark(stages.geometry_ms);
-  stage_->draw(window_size_px(window_px), stages, clock_);
-  if (is_scaled(rung)) {
-    passes_.enlarge->planes().bind_storage(EMIT_BIND_OUTPUT);
-    passes_.radiance.dispatch(window_size_px(window_px));
-    output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
-    passes_.enlarge->dispatch(window_size_px(frame_params_.picture_window_px));
-  } else {
-    passes_.radiance.dispatch(window_size_px(window_px));
-  }
-  clock_.mark(stages.radiance_ms);
+  draw_frame(level, stages);
   read_back(static_cast<std::uint32_t>(slot));
   clock_.mark(stages.readback_ms);
   return slot;
 }
 
+void GlRenderer::draw_frame(const QualityLevel& level, StageTimes& stages) noexcept {
+  // Draw the geometry buffer: the window, or everything if the method looks around it.
+  const DrawnScene& drawn = stage_->drawn();
+  const glm::uvec2 size_px(frame_params_.rendered_px);
+  const glm::uvec4& window_px = frame_params_.rendered_window_px;
+  passes_.geometry.draw(drawn.vertices, drawn.lists, drawn.record_buffer, view_single_sided_,
+                        view_double_sided_, size_px,
+                        stage_->looks_around() ? window_of({}, size_px) : window_px);
+  clock_.mark(stages.geometry_ms);
+  // Compute the temperatures.
+  stage_->draw(window_size_px(window_px), stages, clock_);
+  // Compute the radiance, and enlarge it if the level renders fewer pixels.
+  if (is_scaled(level)) {
+    passes_.enlarge->planes().bind_storage(EMIT_BIND_OUTPUT);
+    passes_.radiance.dispatch(window_size_px(window_px));
+    output_buffer_.bind_storage(EMIT_BIND_OUTPUT, 0, stats_offset_);
+    passes_.enlarge->dispatch(window_size_px(frame_params_.output_window_px));
+  } else {
+    passes_.radiance.dispatch(window_size_px(window_px));
+  }
+  clock_.mark(stages.radiance_ms);
+}
+
 const FrameView& GlRenderer::collect(SlotIndex slot) noexcept {
+  EMIT_CHECK_OP(slot, <, views_.size());
   FrameView& view = views_[slot];
+  // Wait for the frame and look for errors of the driver.
   view.device_failed = !readback_.wait(slot) || glGetError() != GL_NO_ERROR || view.device_failed;
   view.device_lost = glGetGraphicsResetStatus() != GL_NO_ERROR;
   view.device_failed = view.device_failed || view.device_lost;
+  // Read the counters behind the planes.
   gpu::FrameStatsGpu stats{};
   std::copy_n(readback_.data(slot) + stats_offset_, sizeof(stats),
               reinterpret_cast<std::byte*>(&stats));
@@ -491,6 +536,7 @@ const FrameView& GlRenderer::collect(SlotIndex slot) noexcept {
 Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& scenario,
                                                    const DeviceOptions& device,
                                                    const OutputOptions& output) {
+  // Check the limits and load the scene.
   if (auto ok = check_limits(scenario, output); !ok) return tl::unexpected(ok.error());
   auto geometry = scene::load_scene(scenario);
   if (!geometry) return tl::unexpected(std::move(geometry.error()));
@@ -501,6 +547,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
                       fmt::format("{} materials: {} are possible", geometry->materials.size(),
                                   EMIT_MAX_MATERIALS));
   }
+  // Build the tables on the CPU and create the context.
   auto bands = BandModel::build(scenario, geometry->materials);
   if (!bands) return tl::unexpected(std::move(bands.error()));
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
@@ -509,6 +556,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
   auto foster = build_foster_materials(scenario, geometry->materials);
   if (!foster) return tl::unexpected(std::move(foster.error()));
 
+  // Compile the passes that every method uses.
   const std::uint32_t width_px = scenario.sensor.width_px;
   const std::uint32_t height_px = scenario.sensor.height_px;
   using Content = GeometryPass::Content;
@@ -533,6 +581,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const scene::ScenarioDesc& sc
     passes.enlarge = std::move(*enlarge_pass);
   }
 
+  // Create the renderer, then the thermal method, which reads its history.
   auto renderer = std::make_unique<GlRenderer>(scenario, std::move(*context), *geometry, output,
                                                std::move(*bands), std::move(passes));
   auto stage = cached ? CachedStage::create(scenario, std::move(*geometry), std::move(*foster),

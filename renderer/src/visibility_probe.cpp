@@ -9,13 +9,17 @@
 #include <cmath>
 #include <vector>
 
-#include "gl/egl_context.hpp"
-#include "passes/compute_passes.hpp"
 #include "draw/draw_lists.hpp"
-#include "stages/frame_setup.hpp"
-#include "draw/picture_window.hpp"
-#include "passes/raster_passes.hpp"
+#include "draw/image_window.hpp"
 #include "draw/scene_buffers.hpp"
+#include "emit/physics/check.hpp"
+#include "emit/physics/constants.hpp"
+#include "gl/egl_context.hpp"
+#include "passes/geometry_pass.hpp"
+#include "passes/occlusion_pass.hpp"
+#include "passes/shadow_pass.hpp"
+#include "passes/thermal_pass.hpp"
+#include "stages/frame_setup.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -24,6 +28,7 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
+/// Buffer with `data`, or with one element of zeros, because GL has no empty storage.
 template <class T>
 gl::Buffer buffer_of(std::span<const T> data) {
   const T nothing{};
@@ -31,6 +36,7 @@ gl::Buffer buffer_of(std::span<const T> data) {
                       : gl::Buffer(data.size_bytes(), data.data(), 0);
 }
 
+/// Probe on an OpenGL device.
 class GlProbe final : public VisibilityProbe {
  public:
   GlProbe(const scene::SensorDesc& sensor, const scene::ThermalOptions& thermal,
@@ -52,7 +58,7 @@ class GlProbe final : public VisibilityProbe {
                            double obscurance_radius_m) override;
 
  private:
-  /// Middle pixel of the texture on a unit.
+  /// Value of the middle pixel of the texture on a texture unit.
   [[nodiscard]] double middle(unsigned int unit) const {
     std::vector<float> pixels(std::size_t{sensor_.width_px} * sensor_.height_px);
     glActiveTexture(GL_TEXTURE0 + unit);
@@ -63,7 +69,7 @@ class GlProbe final : public VisibilityProbe {
 
   scene::SensorDesc sensor_;
   scene::ThermalOptions thermal_;
-  gl::EglContext context_;  // before everything that owns GL objects
+  gl::EglContext context_;  ///< declared before every member that owns GL objects
   GeometryPass geometry_;
   OcclusionPass occlusion_;
   ShadowPass shadow_;
@@ -75,17 +81,21 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
                                                    const physics::Pose& sensor_pose,
                                                    const glm::dvec3& to_sun, double near_m,
                                                    double obscurance_radius_m) {
+  EMIT_CHECK_OP(std::abs(glm::dot(to_sun, to_sun) - 1.0), <, 1e-6);
+  EMIT_CHECK_OP(near_m, >, 0.0);
+  // Send the geometry to the device and start the draw lists.
   const SceneBuffers scene(std::move(geometry));
   const std::array<std::int32_t, 1> no_history{-1};
   DrawLists lists(scene, no_history, thermal_.max_cascades, nullptr);
   lists.begin(sensor_pose.position_world_m, 0, {});
 
+  // Set up the camera as a frame does.
   sensor_.near_m = near_m;
   gpu::FrameParams frame{};
-  frame.format_px = frame.picture_px =
-      glm::uvec4(sensor_.width_px, sensor_.height_px, sensor_.width_px * sensor_.height_px, 0U);
   const glm::uvec2 size_px(sensor_.width_px, sensor_.height_px);
-  frame.format_window_px = frame.picture_window_px = window_of({}, size_px);
+  frame.rendered_px = frame.output_px = size_px;
+  frame.rendered_plane_px = frame.output_plane_px = size_px.x * size_px.y;
+  frame.rendered_window_px = frame.output_window_px = window_of({}, size_px);
   CameraSetup camera = set_camera(sensor_, sensor_pose, frame);
   const scene::Aabb& bounds = lists.bounds();
   camera.view.scene_min_m = camera.view.casters_min_m = bounds.min_m;
@@ -95,8 +105,9 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   CommandRange single_sided;
   CommandRange double_sided;
   lists.cull_view(camera.view, {}, size_px, single_sided, double_sided);
-  frame.obscurance = glm::vec4(static_cast<float>(obscurance_radius_m), 0.0F, 0.0F, 0.0F);
+  frame.obscurance_radius_m = static_cast<float>(obscurance_radius_m);
 
+  // Set up one interval with a sun that stands still, and its shadow maps.
   HistoryInterval now;
   now.sun_begin.direction_enu = now.sun_sample.direction_enu = now.sun_end.direction_enu = to_sun;
   now.sun_up = to_sun.z > 0.0;
@@ -107,6 +118,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
     shadow_commands[c] = lists.cull_light(frusta.cascades[c]);
   }
 
+  // Send and bind everything.
   const gl::Buffer frame_buffer(sizeof(frame), &frame, 0);
   const gl::Buffer step_buffer(sizeof(step), &step, 0);
   const gl::Buffer tap_buffer(sizeof(taps_), &taps_, 0);
@@ -121,8 +133,9 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   shadow_.bind_texture();
   shade_.bind_textures();
 
+  // Run the visibility passes.
   geometry_.draw(vertices, lists, records, single_sided, double_sided, size_px,
-                 frame.format_window_px);
+                 frame.rendered_window_px);
   occlusion_.dispatch(size_px);
   for (std::uint32_t c = 0; c < frusta.count; ++c) {
     shadow_.draw(vertices, c, lists.light_commands(shadow_commands[c]));
@@ -130,6 +143,7 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
   shade_.dispatch_sun_only(size_px);
   glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);
 
+  // Read the middle pixel.
   Answer answer;
   answer.depth_m = middle(EMIT_TEX_DEPTH);
   answer.surface = answer.depth_m < static_cast<double>(EMIT_SKY_DEPTH_M);
@@ -148,6 +162,10 @@ Result<VisibilityProbe::Answer> GlProbe::at_middle(scene::SceneGeometry geometry
 Result<std::unique_ptr<VisibilityProbe>> VisibilityProbe::create(
     const scene::SensorDesc& sensor, const scene::ThermalOptions& thermal,
     const DeviceOptions& device) {
+  EMIT_CHECK(sensor.width_px >= 1 && sensor.width_px <= 8192);
+  EMIT_CHECK(sensor.height_px >= 1 && sensor.height_px <= 8192);
+  EMIT_CHECK(sensor.fov_h_rad > 0.0 && sensor.fov_h_rad < 0.95 * physics::kPi);
+  EMIT_CHECK(thermal.shadow_map_px >= 16 && thermal.shadow_map_px <= 16384);
   auto context = gl::EglContext::create(device.gpu_index, device.debug_context);
   if (!context) return tl::unexpected(std::move(context.error()));
   auto geometry = GeometryPass::create(*context, sensor.width_px, sensor.height_px,

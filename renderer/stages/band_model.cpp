@@ -15,9 +15,11 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-// Least texels of a buffer texture that OpenGL 4.5 allows (GL_MAX_TEXTURE_BUFFER_SIZE).
+/// Number of texels that every OpenGL 4.5 device takes in a buffer texture
+/// (GL_MAX_TEXTURE_BUFFER_SIZE).
 constexpr std::size_t kMaxTableFloats = 65536;
 
+/// Band with its spectral response.
 physics::Band band_from(const scene::SpectralBand& desc) {
   physics::Band band{desc.lo_um, desc.hi_um, {}};
   for (const scene::ResponseSample& sample : desc.response) {
@@ -26,7 +28,7 @@ physics::Band band_from(const scene::SpectralBand& desc) {
   return band;
 }
 
-/// Cosine-weighted mean over the sky of 1 - tau^m(elevation), by the midpoint rule in sin^2.
+/// Cosine-weighted mean of 1 - tau^m(elevation) over the sky, by the midpoint rule in sin^2.
 double sky_hemisphere_frac(double vertical_transmittance_frac) {
   constexpr int kRings = 256;
   double sum = 0.0;
@@ -38,6 +40,7 @@ double sky_hemisphere_frac(double vertical_transmittance_frac) {
   return sum / kRings;
 }
 
+/// Atmosphere of a band; null where the scenario has none.
 const scene::BandAtmosphere* atmosphere_of(const scene::ScenarioDesc& scenario,
                                            const std::string& band) {
   if (!scenario.atmosphere.enabled) return nullptr;
@@ -47,6 +50,7 @@ const scene::BandAtmosphere* atmosphere_of(const scene::ScenarioDesc& scenario,
   return nullptr;
 }
 
+/// Emissivity of a material in a band.
 double band_emissivity_frac(const scene::Material& material, const std::string& band) {
   for (const scene::BandEmissivity& entry : material.band_emissivity) {
     if (entry.band == band) return entry.emissivity_frac;
@@ -62,6 +66,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     return make_error(ErrorCode::config, fmt::format("{} bands: 1 to {} are possible",
                                                      scenario.bands.size(), EMIT_MAX_BANDS));
   }
+  // Set up each band: its T ln L table, then the air as a table or as a sum of terms.
   BandModel model;
   for (const scene::SpectralBand& desc : scenario.bands) {
     Entry entry{.band = band_from(desc)};
@@ -76,6 +81,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     params.lut_nodes_per_k = layout[1];
     params.lut_last_node = layout[2];
     params.vertical_transmittance_frac = 1.0F;
+    // Read the atmosphere.
     const scene::BandAtmosphere* atmosphere = atmosphere_of(scenario, desc.name);
     if (atmosphere != nullptr && !atmosphere->table.empty()) {
       auto air = physics::AtmosphereTable::build(atmosphere->table);
@@ -107,6 +113,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
       params.vertical_transmittance_frac =
           static_cast<float>(atmosphere->vertical_transmittance_frac);
     }
+    // Compute the constants of sun and sky.
     entry.sun_radiance_w_m2_sr =
         physics::band_radiance(entry.band, physics::Kelvin(physics::kSunTemperatureK))
             .radiance_w_m2_sr;
@@ -116,12 +123,13 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
     model.params_.push_back(params);
     model.entries_.push_back(std::move(entry));
   }
+  // Append the tables of the air behind those of the bands.
   for (std::size_t i = 0; i < model.entries_.size(); ++i) {
     if (!model.entries_[i].air) continue;
     const physics::AtmosphereTable& air = *model.entries_[i].air;
-    model.params_[i].atmosphere_table = glm::uvec4(
-        static_cast<std::uint32_t>(model.tables_.size()), static_cast<std::uint32_t>(air.ranges()),
-        static_cast<std::uint32_t>(air.elevations()), 0U);
+    model.params_[i].air_table_first = static_cast<std::uint32_t>(model.tables_.size());
+    model.params_[i].air_table_ranges = static_cast<std::uint32_t>(air.ranges());
+    model.params_[i].air_table_elevations = static_cast<std::uint32_t>(air.elevations());
     const std::vector<float> nodes = air.shader_nodes();
     model.tables_.insert(model.tables_.end(), nodes.begin(), nodes.end());
     if (model.tables_.size() > kMaxTableFloats) {
@@ -131,6 +139,7 @@ physics::Result<BandModel> BandModel::build(const scene::ScenarioDesc& scenario,
                                     scenario.bands[i].name, model.tables_.size(), kMaxTableFloats));
     }
   }
+  // Append the emissivities of all materials.
   model.first_emissivity_ = static_cast<std::uint32_t>(model.tables_.size());
   for (const scene::Material& material : materials) {
     for (const scene::SpectralBand& band : scenario.bands) {
@@ -153,11 +162,13 @@ std::vector<physics::ApparentTemperature> BandModel::apparent_temperatures() con
 }
 
 void BandModel::update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept {
+  // Compute the projected solid angle of the sun and the air mass on the way to it.
   const double disc_sr_projected = physics::kPi * std::pow(std::sin(physics::kSunSemiAngleRad), 2);
   const double air_mass = physics::relative_air_mass(sun.elevation);
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Entry& entry = entries_[i];
     gpu::BandParams& params = params_[i];
+    // Compute the radiance of air, surroundings and sky.
     const double air_w_m2_sr =
         physics::band_radiance(entry.band, physics::Kelvin(forcing.air_k)).radiance_w_m2_sr;
     params.air_radiance_w_m2_sr = static_cast<float>(air_w_m2_sr);
@@ -166,7 +177,7 @@ void BandModel::update(const physics::Forcing& forcing, const physics::SunPositi
             .radiance_w_m2_sr);
     params.sky_hemisphere_w_m2_sr = static_cast<float>(
         entry.air ? entry.air_hemisphere_w_m2_sr : air_w_m2_sr * entry.sky_hemisphere_frac);
-    // Without direct sun in the forcing (overcast) none is reflected either.
+    // Compute the irradiance of the sun. Without direct sun in the forcing (overcast) it is 0.
     const bool sun_shines =
         forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) > 0.0 && air_mass > 0.0;
     const double sun_transmittance_frac =
@@ -185,6 +196,7 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
   std::vector<gpu::MaterialParams> out;
   out.reserve(materials.size());
   for (const scene::Material& material : materials) {
+    // Copy the surface and its conductance to the core.
     gpu::MaterialParams params{};
     params.solar_absorptance_frac = static_cast<float>(material.solar_absorptance_frac);
     params.emissivity_frac = static_cast<float>(material.emissivity_frac);
@@ -194,6 +206,7 @@ std::vector<gpu::MaterialParams> material_params(std::span<const scene::Material
       params.conductance_w_m2_k = static_cast<float>(material.layers[0].conductivity_w_m_k /
                                                      material.layers[0].thickness_m);
     }
+    // Store temperatures as offsets from the reference.
     params.base_k = static_cast<float>(material.base_k);
     params.base_offset_k = static_cast<float>(material.base_k - reference_k);
     params.initial_offset_k =

@@ -14,39 +14,47 @@
 
 namespace emit::renderer {
 
-/// Blackbody tables and atmosphere of the scenario's bands.
-/// Owner: Renderer. Real time: update is RT-safe, build is setup only.
+/// Blackbody tables and atmosphere of the scenario's bands (physics.md sections 5 and 9).
+/// Owner: Renderer. Thread: the one of the renderer. Real time: build() and apparent_temperatures()
+/// are setup only, the rest is RT-safe.
 class BandModel {
  public:
-  /// Errors (config): more than EMIT_MAX_BANDS bands, a band or an atmosphere that is not valid.
+  /// Builds the tables of all bands and materials. Errors: config (no band or more than
+  /// EMIT_MAX_BANDS, a band or an atmosphere that is not valid, tables too large for a device).
   [[nodiscard]] static physics::Result<BandModel> build(const scene::ScenarioDesc& scenario,
                                                         std::span<const scene::Material> materials);
 
-  /// Air, surroundings and sun at the frame's instant.
+  /// Sets air, surroundings and sun to the instant of the frame.
   void update(const physics::Forcing& forcing, const physics::SunPosition& sun) noexcept;
 
+  /// Parameters by band, as the shaders read them.
   [[nodiscard]] std::span<const gpu::BandParams> params() const noexcept { return params_; }
-  /// T ln L tables, one band after the other, then the tables of the air, then emissivities.
+  /// Contents of the table buffer: T ln L tables band by band, then the tables of the air, then the
+  /// emissivities.
   [[nodiscard]] std::span<const float> tables() const noexcept { return tables_; }
+  /// Number of nodes of the T ln L table of one band.
   [[nodiscard]] std::uint32_t nodes_per_band() const noexcept { return nodes_per_band_; }
-  /// Bit per band whose air is a sum of exponential terms; a table.
+  /// Bits of the bands whose air is a sum of exponential terms.
   [[nodiscard]] std::uint32_t air_terms() const noexcept { return air_terms_; }
+  /// Bits of the bands whose air is a table.
   [[nodiscard]] std::uint32_t air_table() const noexcept { return air_table_; }
-  /// Most exponential terms of a band.
+  /// Largest number of exponential terms of a band.
   [[nodiscard]] std::uint32_t max_terms() const noexcept { return max_terms_; }
-  /// Place in tables() of the emissivities: by material, then by band.
+  /// Index of the first emissivity in tables(). Emissivities are ordered by material, then by band.
   [[nodiscard]] std::uint32_t first_emissivity() const noexcept { return first_emissivity_; }
-  [[nodiscard]] std::vector<physics::ApparentTemperature> apparent_temperatures()
-      const;  ///< Setup only.
+  /// Inverse of the band radiance, by band. Setup only.
+  [[nodiscard]] std::vector<physics::ApparentTemperature> apparent_temperatures() const;
 
  private:
+  /// Constants of one band.
   struct Entry {
     physics::Band band;
-    double sun_radiance_w_m2_sr = 0.0;  ///< photosphere, in band
-    double sky_hemisphere_frac = 0.0;   ///< hemisphere mean over blackbody at air temperature
+    double sun_radiance_w_m2_sr = 0.0;  ///< band radiance of the photosphere
+    /// Mean radiance of the sky over the hemisphere divided by a blackbody at air temperature.
+    double sky_hemisphere_frac = 0.0;
     double vertical_transmittance_frac = 1.0;
-    std::optional<physics::AtmosphereTable> air = std::nullopt;  ///< in place of the terms
-    double air_hemisphere_w_m2_sr = 0.0;                         ///< sky of that table
+    std::optional<physics::AtmosphereTable> air = std::nullopt;  ///< replaces the terms
+    double air_hemisphere_w_m2_sr = 0.0;                         ///< mean radiance of that sky
   };
   std::vector<Entry> entries_;
   std::vector<gpu::BandParams> params_;
@@ -58,7 +66,7 @@ class BandModel {
   std::uint32_t first_emissivity_ = 0;
 };
 
-/// Materials as the shaders read them. `reference_k` is what temperature offsets count from.
+/// Materials as the shaders read them. Temperature offsets count from `reference_k`. Setup only.
 [[nodiscard]] std::vector<gpu::MaterialParams> material_params(
     std::span<const scene::Material> materials, const scene::ScenarioDesc& scenario,
     double reference_k);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/scene/simplify.hpp"
 #include "history/foster_setup.hpp"
@@ -13,38 +14,42 @@
 namespace emit::renderer {
 namespace {
 
-/// A place stands for those around it, up to this share of its distance from the scene.
+/// A position of the camera stands for positions around it up to this share of its distance from
+/// the scene.
 constexpr double kReachFrac = 0.05;
-/// Places along a known trajectory of the camera that the refinement looks from.
+/// Number of positions along a known trajectory of the camera that the refinement uses.
 constexpr std::size_t kEyes = 16;
-/// Places of the sun that tell what it comes to.
+/// Number of intervals between positions of the sun that show which surfaces it reaches.
 constexpr std::size_t kSuns = 16;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
-/// The camera may point that share of its field of view aside of where it was said to.
+/// Share of the field of view by which the camera may point away from its planned direction.
 constexpr double kFieldMarginFrac = 0.5;
 /// The camera may point anywhere.
 constexpr double kAnyCosine = -2.0;
 
+/// Angle of one pixel at the boresight.
 double pixel_rad(const scene::SensorDesc& sensor) {
   return 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
 }
 
-/// From the boresight to a corner of the picture.
+/// Angle between the boresight and a corner of the image.
 double half_diagonal_rad(const scene::SensorDesc& sensor) {
   const double corner_px = std::hypot(sensor.width_px, sensor.height_px);
   return std::atan(std::tan(0.5 * sensor.fov_h_rad) * corner_px / sensor.width_px);
 }
 
+/// Position and boresight of a camera.
 RefineView::Eye eye_of(const physics::Pose& pose) {
   return {pose.position_world_m, pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0)};
 }
 
-/// Every place of the camera that the scenario tells.
+/// Positions of the camera along the whole trajectory of the scenario.
 std::vector<RefineView::Eye> all_eyes(const scene::Trajectory& keys) {
   std::vector<RefineView::Eye> eyes;
   for (std::size_t i = 0; i < keys.size(); ++i) {
     eyes.push_back(eye_of(keys[i].pose));
     if (i + 1 == keys.size()) break;
+    // Add positions between this key and the next.
     const std::int64_t length_ns = keys[i + 1].sim_time_ns - keys[i].sim_time_ns;
     for (std::size_t part = 1; part < kEyes; ++part) {
       const auto way = static_cast<double>(length_ns) * static_cast<double>(part) / kEyes;
@@ -54,13 +59,17 @@ std::vector<RefineView::Eye> all_eyes(const scene::Trajectory& keys) {
   return eyes;
 }
 
+/// View that the surface is refined for: the camera of the request and its positions along the rest
+/// of the trajectory.
 RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& request) {
   RefineView view;
   view.pixel_rad = pixel_rad(sensor);
   view.field_rad = (1.0 + kFieldMarginFrac) * half_diagonal_rad(sensor);
+  // Start with the camera of the request.
   view.eyes.push_back(eye_of(request.sensor_pose));
   const scene::Trajectory& keys = sensor.trajectory;
   if (keys.size() < 2) return view;
+  // Add positions along the rest of the trajectory.
   const std::int64_t end_ns = keys[keys.size() - 1].sim_time_ns;
   for (std::size_t i = 1; i <= kEyes && request.sim_time_ns < end_ns; ++i) {
     const auto way = static_cast<double>(end_ns - request.sim_time_ns) * static_cast<double>(i);
@@ -70,8 +79,8 @@ RefineView refine_view(const scene::SensorDesc& sensor, const FrameRequest& requ
   return view;
 }
 
-/// Where the sun stands from the history's start to the end of the camera's way; through a day
-/// where the way has no length.
+/// Directions to the sun from the start of the history to the end of the camera's trajectory, or
+/// over a day when the camera has no trajectory. Instants without sun are left out.
 std::vector<glm::vec3> suns(const scene::ScenarioDesc& scenario, const Environment& environment) {
   const std::int64_t begin_ns = scenario.thermal.history_start_ns;
   const scene::Trajectory& keys = scenario.sensor.trajectory;
@@ -92,7 +101,7 @@ std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineVie
                                                        const scene::Aabb& static_bounds) {
   std::vector<Eye> out;
   for (std::size_t i = 0; i < eyes.size(); ++i) {
-    // On the way to the next place, too.
+    // Reach as far as the next position, so that the way between them is covered.
     const double way_m =
         i + 1 < eyes.size() ? glm::distance(eyes[i].world_m, eyes[i + 1].world_m) : 0.0;
     const double around_m = kReachFrac * scene::distance_m(static_bounds, eyes[i].world_m);
@@ -104,25 +113,30 @@ std::vector<CachedStage::Eye> CachedStage::eyes_around(std::span<const RefineVie
 physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
     std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software) {
+  // Collect the positions that the scenario's camera takes.
   const std::vector<RefineView::Eye> eyes = all_eyes(scenario.sensor.trajectory);
   std::vector<glm::dvec3> eyes_world_m;
   for (const RefineView::Eye& eye : eyes) eyes_world_m.push_back(eye.world_m);
   const scene::Aabb bounds = geometry.static_bounds;
+  // Describe the state file. Its key is made before the meshes are simplified.
   std::optional<CachedSurface::Saved> saved;
   if (!scenario.thermal.state_file.empty()) {
     saved = {scenario.thermal.state_file, scenario_key(scenario, geometry), true};
   }
+  // Simplify the meshes as far as no position of the camera shows it.
   const scene::DetailView view{eyes_world_m, pixel_rad(scenario.sensor)};
   geometry = scene::separated(std::move(geometry), view);
   auto coarse = coarse_geometry(std::move(geometry), view, suns(scenario, history.environment),
                                 scenario.thermal.max_samples);
   if (!coarse) return tl::unexpected(std::move(coarse.error()));
+  // Create the surface. The last material is that of the surroundings and has no samples.
   const std::size_t simulated = foster_materials.empty() ? 0 : foster_materials.size() - 1;
   auto surface =
       CachedSurface::create(scenario, std::move(coarse->geometry), histories_of_objects(scenario),
                             std::span(foster_materials).first(simulated), physics::kReferenceK,
                             std::move(coarse->detail));
   if (!surface) return tl::unexpected(std::move(surface.error()));
+  // Compile the shade of entities if the scenario has entities.
   std::optional<ShadePass> shade_pass;
   if (!history.entities.empty()) {
     auto pass = ShadePass::create(history.entities.size(), software);
@@ -157,6 +171,7 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
 
 physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
                                            const WarmUpProgress& progress) {
+  // Sample the surface for the camera and integrate its history, or read the state file.
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
   const RefineView view = refine_view(sensor_, request);
   if (saved_) {
@@ -168,10 +183,13 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, surface_history_,
                                  saved_, progress);
   if (!ready) return ready;
-  if (saved_) saved_->start = false;  // after a jump of sim time the start's state need not fit
+  // Do not require the state file again: after a jump of sim time it need not fit.
+  if (saved_) saved_->start = false;
   refined_eyes_ = eyes_around(surface_->model().eyes, static_bounds_);
-  drawn_.reset();  // its device memory goes before that of the next one is taken
+  // Send the meshes to the device. Release the memory of the old ones first.
+  drawn_.reset();
   drawn_ = std::make_unique<DrawnScene>(surface_->drawn_scene(), history_of_object_, software_);
+  // Allocate the buffers of the samples.
   for (gl::Buffer& node : node_buffers_) {
     node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
   }
@@ -179,11 +197,17 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
     shade_pass_->begin(surface_->shade());
     shade_buffer_ = gl::Buffer::dynamic(surface_->shade().vertices_k().size_bytes());
   }
+  // Report a device that ran out of memory.
   if (glGetError() != GL_NO_ERROR) {
     return physics::make_error(physics::ErrorCode::gpu,
                                "the device cannot hold the samples of this scenario");
   }
   return {};
+}
+
+DrawnScene& CachedStage::drawn() noexcept {
+  EMIT_CHECK(drawn_ != nullptr);
+  return *drawn_;
 }
 
 bool CachedStage::stands_near(const std::vector<Eye>& eyes, const RefineView::Eye& here,
@@ -196,10 +220,12 @@ bool CachedStage::stands_near(const std::vector<Eye>& eyes, const RefineView::Ey
 
 bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   const RefineView::Eye here = eye_of(camera);
-  // Where samples ran out, they went to what was said to be in view.
+  // Compare the direction of the camera only if samples ran out. Then surfaces outside the planned
+  // view got none.
   const double least_cos =
       surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : kAnyCosine;
-  // Without known eyes no mesh was simplified.
+  // Check the flags of the surface, then the positions it was prepared for. Meshes were simplified
+  // only if the scenario has positions of the camera.
   return visibly_simplified_ || surface_->model().full_in_view ||
          surface_->shade().short_of_pages() || surface_->stale_shadow() || surface_->lags() ||
          !stands_near(refined_eyes_, here, least_cos) ||
@@ -217,12 +243,15 @@ void CachedStage::describe(SceneStats& stats) const noexcept {
 void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
                           gpu::FrameParams& frame) noexcept {
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
+  // Advance the samples to the thermal instant.
   surface_->advance(request.thermal_time_ns, inputs, surface_history_);
+  // Place the shadows of entities at their poses of the frame.
   if (shade_pass_) {
     surface_->place_shadows(request.sim_time_ns, request.thermal_time_ns, inputs);
     shade_pass_->prepare(*surface_, request.sensor_pose.position_world_m, camera, frame);
   }
-  frame.samples.x = surface_->fraction();
+  // Store the position between the two nodes, and sun and weather.
+  frame.node_frac = surface_->fraction();
   sun_now_ = history_.environment.sun_at(request.thermal_time_ns);
   forcing_now_ = history_.environment.forcing_at(request.thermal_time_ns, sun_now_);
   forcing_now_.environment_k = surface_->surroundings_now_k().value_or(forcing_now_.environment_k);
@@ -230,6 +259,7 @@ void CachedStage::prepare(const FrameRequest& request, CameraSetup& camera,
 
 void CachedStage::upload() noexcept {
   drawn_->upload();
+  // Send the parts of the samples that changed.
   for (std::size_t node = 0; node < node_buffers_.size(); ++node) {
     const std::size_t storage = surface_->storage(node);
     for (const ChangedRanges::Range& range : surface_->changes(storage)) {
@@ -237,6 +267,7 @@ void CachedStage::upload() noexcept {
                                     range.first);
     }
   }
+  // Send the shade of entities that changed.
   if (shade_pass_) {
     for (const ChangedRanges::Range& range : surface_->shade().changes()) {
       shade_buffer_.upload(surface_->shade().vertices_k().subspan(range.first, range.count),

@@ -13,11 +13,12 @@
 
 namespace emit::renderer {
 
-/// thermal.method = "cached": temperatures come from samples of the surface (surface/), drawn with
-/// the refined meshes they sit on.
+/// Stage of thermal.method = "cached". Temperatures live on samples of the surface
+/// (renderer/surface) and are drawn with the refined meshes that have the samples as vertices.
 class CachedStage final : public ThermalStage {
  public:
-  /// `software`: the device is. Errors: those of CachedSurface::create().
+  /// Simplifies the meshes, creates the surface and compiles the passes. `software` says that the
+  /// device is a CPU. Errors: those of CachedSurface::create(), gpu (names the shader).
   [[nodiscard]] static physics::Result<std::unique_ptr<ThermalStage>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
       std::vector<FosterMaterial> foster_materials, const SceneHistory& history, bool software);
@@ -27,7 +28,7 @@ class CachedStage final : public ThermalStage {
   bool cold(const FrameRequest& request) const noexcept override {
     return surface_->stale(request.thermal_time_ns);
   }
-  DrawnScene& drawn() noexcept override { return *drawn_; }
+  DrawnScene& drawn() noexcept override;
   void describe(SceneStats& stats) const noexcept override;
   bool coarse_from(const physics::Pose& camera) const noexcept override;
   void prepare(const FrameRequest& request, CameraSetup& camera,
@@ -36,14 +37,15 @@ class CachedStage final : public ThermalStage {
   const physics::Forcing& forcing_now() const noexcept override { return forcing_now_; }
   void upload() noexcept override;
   void bind() const noexcept override;
+  /// False, because a pixel depends on the samples of its own triangle alone.
   [[nodiscard]] bool looks_around() const noexcept override { return false; }
   void draw(const glm::uvec2& size_px, StageTimes& stages, StageClock& clock) noexcept override;
 
  private:
-  /// A place the surface was prepared for, and how far around it that holds.
+  /// Position of the camera that the surface was prepared for.
   struct Eye {
     RefineView::Eye eye;
-    double reach_m = 0.0;
+    double reach_m = 0.0;  ///< the preparation holds up to this distance from it
   };
   static std::vector<Eye> eyes_around(std::span<const RefineView::Eye> eyes,
                                       const scene::Aabb& static_bounds);
@@ -59,24 +61,24 @@ class CachedStage final : public ThermalStage {
 
   scene::SensorDesc sensor_;
   std::uint32_t max_samples_ = 0;  ///< thermal.max_samples
-  bool software_ = false;  ///< the device is
+  bool software_ = false;          ///< the device is a CPU
   scene::Aabb static_bounds_;
   std::vector<Eye> detail_eyes_;   ///< meshes were simplified for these
-  bool visibly_simplified_;        ///< for want of samples
-  std::vector<Eye> refined_eyes_;  ///< triangles were cut for these
+  bool visibly_simplified_;        ///< meshes lost visible detail because samples are too few
+  std::vector<Eye> refined_eyes_;  ///< triangles were refined for these
   std::vector<std::int32_t> history_of_object_;
   const SceneHistory& history_;
   StepPlan plan_;
   SurfaceHistory surface_history_;
   std::unique_ptr<CachedSurface> surface_;
   std::optional<CachedSurface::Saved> saved_;
-  std::unique_ptr<DrawnScene> drawn_;
+  std::unique_ptr<DrawnScene> drawn_;  ///< null before the first warm_up()
   physics::SunPosition sun_now_;
   physics::Forcing forcing_now_;
 
-  std::array<gl::Buffer, 3> node_buffers_;  ///< by storage of CachedSurface
-  std::optional<ShadePass> shade_pass_;     ///< where there are entities
-  gl::Buffer shade_buffer_;
+  std::array<gl::Buffer, 3> node_buffers_;  ///< one per storage of CachedSurface
+  std::optional<ShadePass> shade_pass_;     ///< empty when the scenario has no entities
+  gl::Buffer shade_buffer_;                 ///< recent shade of entities by vertex, K
 };
 
 }  // namespace emit::renderer

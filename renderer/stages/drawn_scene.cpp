@@ -23,6 +23,7 @@ DrawnScene::DrawnScene(SampledScene scene, std::span<const std::int32_t> history
       vertices(buffers, light_record_buffer) {}
 
 void DrawnScene::upload() const noexcept {
+  // Send the records of the camera, the triangles that culling kept, and the records of the light.
   record_buffer.upload(lists.records());
   if (cull) buffers.upload_culled(cull->indices());
   light_record_buffer.upload(lists.light_records());

@@ -5,28 +5,31 @@
 #include <span>
 #include <vector>
 
-#include "gl/objects.hpp"
 #include "draw/draw_lists.hpp"
-#include "passes/raster_passes.hpp"
 #include "draw/scene_buffers.hpp"
+#include "gl/objects.hpp"
+#include "passes/scene_vertex_arrays.hpp"
 
 namespace emit::renderer {
 
-/// Geometry on the device and what is drawn of it in a frame. Made anew when meshes change.
-/// Owner: Renderer.
+/// Geometry on the device and its draws of one frame. It is made anew when the meshes change.
+/// Owner: ThermalStage. Thread: the one that owns the GL context. Real time: constructors are setup
+/// only, upload() is RT-safe.
 struct DrawnScene {
-  /// `max_passes`: see DrawLists.
+  /// Scene whose meshes are drawn whole. `max_passes` and `history_of_object` are those of
+  /// DrawLists.
   DrawnScene(scene::SceneGeometry scene, std::span<const std::int32_t> history_of_object,
              std::uint32_t max_passes);
-  /// `software`: the device's rasteriser is, so that small triangles cost it as much as large ones.
+  /// Scene of thermal samples, without shadow maps. `software` says that the rasteriser runs on a
+  /// CPU, where a small triangle costs as much as a large one; then triangles are culled here.
   DrawnScene(SampledScene scene, std::span<const std::int32_t> history_of_object, bool software);
   DrawnScene(const DrawnScene&) = delete;
   DrawnScene& operator=(const DrawnScene&) = delete;
 
-  /// Sends the frame's records to the device.
+  /// Sends the records of the frame to the device.
   void upload() const noexcept;
 
-  std::unique_ptr<TriangleCull> cull;  ///< null: the device does that
+  std::unique_ptr<TriangleCull> cull;  ///< null: the device culls triangles itself
   SceneBuffers buffers;
   DrawLists lists;
   gl::Buffer record_buffer;

@@ -7,13 +7,16 @@
 #include "history/foster_history.hpp"
 #include "shared/frame_params.glsl.h"
 
-/// The part of the extended thermal model that shaders read.
+/// Data of the extended thermal model ("foster") that shaders read. `foster` is empty when the
+/// scenario uses the published model.
 namespace emit::renderer {
 
-/// Adds the resistances of the modes to the material table.
+/// Writes the resistances of the modes into the material table. RT-safe.
+/// @pre The extended model has at least as many materials as `params`.
 void add_resistances(const std::optional<FosterHistory>& foster,
                      std::span<gpu::MaterialParams> params) noexcept;
 
+/// Buffer of the spin-up table; one entry of zeros without the extended model. Setup only.
 [[nodiscard]] gl::Buffer make_spin_up_buffer(const std::optional<FosterHistory>& foster);
 
 }  // namespace emit::renderer

@@ -9,16 +9,19 @@
 namespace emit::renderer {
 namespace {
 
-// The newest interval's shade stands for "now" if it is at most this old: the sun moves by less
-// than its own radius.
+/// Largest length of the newest interval whose shade is used for the instant of the frame. The sun
+/// moves by less than its own radius in this time.
 constexpr std::int64_t kFreshShadeNs = 60'000'000'000;
+/// Largest way of an entity since the start of that interval for which its shade is used.
 constexpr double kFreshCasterM = 0.05;
 
+/// Buffer with the samples of the sun's disc.
 gl::Buffer make_tap_buffer(const scene::ThermalOptions& options) {
   const gpu::TapParams taps = shadow_taps(options.blocker_taps, options.filter_taps);
   return gl::Buffer(sizeof(taps), &taps, 0);
 }
 
+/// Material table of the shaders for either thermal model.
 std::vector<gpu::MaterialParams> make_material_params(const scene::ScenarioDesc& scenario,
                                                       std::span<const scene::Material> materials,
                                                       const std::optional<FosterHistory>& foster) {
@@ -76,38 +79,46 @@ PerFrameStage::PerFrameStage(const scene::ScenarioDesc& scenario, scene::SceneGe
 
 void PerFrameStage::prepare(const FrameRequest& request, CameraSetup& camera,
                             gpu::FrameParams& frame) noexcept {
+  // Plan the intervals of the history up to the thermal instant.
   plan_.update(request.thermal_time_ns, history_.environment, history_.entities);
   forcing_now_ = plan_.forcing_now();
+  // Advance the extended model on the CPU: surroundings and, if needed, the spin-up table.
   bool table_changed = false;
   if (foster_) {
     table_changed = foster_->update(plan_, history_.environment);
     forcing_now_.environment_k = foster_->surroundings_now_k();
-    frame.obscurance.w = static_cast<float>(foster_->grid_nodes());
+    frame.spin_up_nodes = foster_->grid_nodes();
   }
   prepare_steps(request, camera);
   if (foster_) prepare_foster(table_changed);
 }
 
 void PerFrameStage::prepare_foster(bool table_changed) noexcept {
+  // Define how one step is filled in: its drive, and gains in the part of the table that `entry`
+  // names.
   const auto materials = foster_->materials();
   const std::size_t stride = materials.size() * (EMIT_FOSTER_LEVELS + 1);
   const auto set = [&](const IntervalForcing& forcing, std::size_t entry, gpu::StepParams& params) {
     set_foster_forcing(forcing, physics::kReferenceK, params);
     set_foster_gains(forcing.dt_s, materials,
                      std::span(relaxation_params_).subspan(entry * stride, stride));
-    params.info.y = static_cast<std::uint32_t>(entry * stride);
+    params.relaxation_offset = static_cast<std::uint32_t>(entry * stride);
   };
+  // Fill in the intervals of the history.
   const auto intervals = foster_->intervals();
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     set(intervals[i], i, step_params_[i].params);
   }
+  // Fill in the steps between the spin-up table and the history, which have no shadow map.
   const auto tail = foster_->tail();
   for (std::size_t i = 0; i < tail.size(); ++i) {
     gpu::StepParams& params = step_params_[intervals.size() + 1 + i].params;
-    params.info = glm::uvec4(0, 0, EMIT_STEP_UNSHADED | (i == 0 ? EMIT_STEP_FIRST : 0U), 0);
+    params.cascade_count = 0;
+    params.flags = EMIT_STEP_UNSHADED | (i == 0 ? EMIT_STEP_FIRST : 0U);
     set(tail[i], intervals.size() + i, params);
   }
-  if (!tail.empty()) step_params_[0].params.info.z &= ~EMIT_STEP_FIRST;
+  // Let the states continue from the tail into the history.
+  if (!tail.empty()) step_params_[0].params.flags &= ~EMIT_STEP_FIRST;
   if (table_changed) spin_up_buffer_.upload(foster_->table());
 }
 
@@ -118,17 +129,19 @@ void PerFrameStage::prepare_steps(const FrameRequest& request, CameraSetup& came
   const auto intervals = plan_.intervals();
   const auto steps = static_cast<std::uint32_t>(intervals.size());
   const auto material_count = static_cast<std::uint32_t>(materials_.size());
+  // Define how one interval is filled in.
   const auto add_step = [&](const HistoryInterval& interval, std::uint32_t step, bool last) {
-    // Casters of the past may stand where, and as high as, nothing does now.
+    // Pose the casters of that time. They may have stood where nothing stands now, and higher.
     scene::Aabb casters = bounds;
     if (interval.sun_up) {
-      casters.add(drawn_.lists.pose_casters(interval.sample_ns, interval.begin_ns, interval.end_ns,
-                                            history_.entities));
+      casters.add(drawn_.lists.pose_entities(interval.sample_ns, interval.begin_ns, interval.end_ns,
+                                             history_.entities));
     }
     if (!casters.empty()) {
       camera.view.casters_min_m = casters.min_m;
       camera.view.casters_max_m = casters.max_m;
     }
+    // Fit the light frusta and list the draws into their maps.
     const LightFrusta frusta =
         set_step(interval, camera, options_, step == 0, last,
                  std::min(step, steps - 1) * material_count, step_params_[step].params);
@@ -138,6 +151,7 @@ void PerFrameStage::prepare_steps(const FrameRequest& request, CameraSetup& came
       shadow_commands_[step][c] = drawn_.lists.cull_light(frusta.cascades[c]);
     }
   };
+  // Fill in all intervals; the published model also needs their gains.
   for (std::uint32_t step = 0; step < steps; ++step) {
     add_step(intervals[step], step, step + 1 == steps);
     if (foster_) continue;
@@ -145,7 +159,8 @@ void PerFrameStage::prepare_steps(const FrameRequest& request, CameraSetup& came
                    std::span(relaxation_params_).subspan(step * material_count, material_count));
   }
 
-  // Reflected sunlight wants the shade of this very instant.
+  // Decide whether reflected sunlight needs the shade of the instant of the frame: the newest
+  // interval is too long, an entity appeared or vanished in it, or an entity moved too far.
   const HistoryInterval& newest = intervals.back();
   extra_sun_pass_ = sun_up && newest.end_ns - newest.begin_ns > kFreshShadeNs;
   for (const PoseHistory& history : history_.entities) {
@@ -157,20 +172,24 @@ void PerFrameStage::prepare_steps(const FrameRequest& request, CameraSetup& came
                       (sun_up && (changed || history.path_m(newest.begin_ns, request.sim_time_ns) >
                                                  kFreshCasterM));
   }
+  // Fill in the instant of the frame.
   if (extra_sun_pass_) add_step(instant_interval(plan_, request.sim_time_ns), steps, true);
 }
 
 void PerFrameStage::upload() noexcept {
+  // Send the draws, the steps and their gains.
   drawn_.upload();
   step_buffer_.upload(std::span<const StepSlot>(step_params_));
   relaxation_buffer_.upload(std::span<const gpu::RelaxationParams>(relaxation_params_));
 }
 
 void PerFrameStage::bind() const noexcept {
+  // Bind the tables.
   tap_buffer_.bind_uniform(EMIT_BIND_TAPS);
   material_table_.bind(EMIT_TEX_MATERIALS);
   relaxation_table_.bind(EMIT_TEX_RELAXATION);
   spin_up_table_.bind(EMIT_TEX_SPIN_UP);
+  // Bind the textures of the passes.
   passes_.occlusion.bind_texture();
   passes_.shadow.bind_texture();
   passes_.thermal.bind_textures();
@@ -182,27 +201,31 @@ void PerFrameStage::bind_step(std::uint32_t step) const noexcept {
 
 void PerFrameStage::draw_shadow(std::uint32_t step) noexcept {
   bind_step(step);
-  for (std::uint32_t c = 0; c < step_params_[step].params.info.x; ++c) {
+  for (std::uint32_t c = 0; c < step_params_[step].params.cascade_count; ++c) {
     passes_.shadow.draw(drawn_.vertices, c, drawn_.lists.light_commands(shadow_commands_[step][c]));
   }
 }
 
 void PerFrameStage::draw(const glm::uvec2& size_px, StageTimes& stages,
                          StageClock& clock) noexcept {
+  // Compute the obscurance once for all steps.
   passes_.occlusion.dispatch(size_px);
   clock.mark(stages.occlusion_ms);
   const auto steps = static_cast<std::uint32_t>(plan_.intervals().size());
+  // Advance through the spin-up tail.
   for (std::uint32_t i = 0; i < tail_steps_; ++i) {
     bind_step(steps + 1 + i);
     passes_.thermal.dispatch_step(size_px);
     clock.mark(stages.thermal_ms);
   }
+  // Advance through the history: one shadow map and one thermal step per interval.
   for (std::uint32_t step = 0; step < steps; ++step) {
     draw_shadow(step);
     clock.mark(stages.shadow_ms);
     passes_.thermal.dispatch_step(size_px);
     clock.mark(stages.thermal_ms);
   }
+  // Store the shade of the instant of the frame.
   if (extra_sun_pass_) {
     draw_shadow(steps);
     clock.mark(stages.shadow_ms);

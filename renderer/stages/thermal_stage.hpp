@@ -18,12 +18,14 @@
 
 namespace emit::renderer {
 
-/// Time per stage. Enabled, it waits for the device at every mark.
+/// Clock that measures the time of each stage of a frame. When it is enabled it waits for the
+/// device at every mark; otherwise it does nothing. Thread: the one that owns the GL context.
 class StageClock {
  public:
   explicit StageClock(bool enabled) : enabled_(enabled) {}
+  /// Starts the measurement of a frame.
   void start() noexcept;
-  /// Adds the time since the last call to `stage_ms`.
+  /// Adds the milliseconds since the last call of start() or mark() to `stage_ms`.
   void mark(double& stage_ms) noexcept;
 
  private:
@@ -31,15 +33,17 @@ class StageClock {
   std::chrono::steady_clock::time_point last_;
 };
 
-/// What the scene is like at any instant, as the host has it.
+/// State of the scene over time, from the scenario and from what the host has sent.
 struct SceneHistory {
   Environment environment;
   std::vector<PoseHistory> entities;
 };
 
-/// How surface temperatures come about: one implementation per thermal.method. It owns the geometry
-/// that is drawn, because the method decides how fine that is. Owner: Renderer. Real time: all but
-/// warm_up() RT-safe.
+/// Method that computes surface temperatures (thermal.method). It owns the geometry that is drawn,
+/// because the method decides how fine the meshes are.
+/// Call order of a frame: prepare(), upload(), bind(), draw().
+/// Owner: Renderer. Thread: the one that owns the GL context. Real time: warm_up() is setup only,
+/// all other functions are RT-safe.
 class ThermalStage {
  public:
   ThermalStage() = default;
@@ -47,38 +51,45 @@ class ThermalStage {
   ThermalStage& operator=(const ThermalStage&) = delete;
   virtual ~ThermalStage() = default;
 
-  /// Setup for frames from `request` on, where the method needs any. Errors as Renderer::warm_up().
+  /// Does the work that frames from `request` on need once. Errors: those of Renderer::warm_up().
   virtual physics::Result<void> warm_up(const FrameRequest& request,
                                         const WarmUpProgress& progress) = 0;
   /// True when a frame of that request would have to wait for warm_up().
   [[nodiscard]] virtual bool cold(const FrameRequest& request) const noexcept = 0;
 
+  /// Geometry that is drawn.
+  /// @pre warm_up() has succeeded, if cold() asks for it.
   [[nodiscard]] virtual DrawnScene& drawn() noexcept = 0;
-  /// Adds what the method knows about the scene.
+  /// Adds the figures of the method to the statistics of the scene.
   virtual void describe(SceneStats&) const noexcept {}
 
-  /// True when the surface was not prepared for a camera that stands so.
+  /// True when the surface was not prepared for a camera at this pose, so that the image may be
+  /// coarser than asked.
   [[nodiscard]] virtual bool coarse_from(const physics::Pose& /*camera*/) const noexcept {
     return false;
   }
 
-  /// CPU side of a frame; the lists have begun and the camera's draws are culled. Fills its part of
-  /// `frame`.
+  /// Does the work of the CPU for a frame and fills the method's part of `frame`. The draw lists
+  /// have begun and the draws of the camera are culled.
   virtual void prepare(const FrameRequest& request, CameraSetup& camera,
                        gpu::FrameParams& frame) noexcept = 0;
-  /// Sun and weather at the frame's thermal instant, the surroundings' temperature included.
+  /// Sun at the thermal instant of the frame, after prepare().
   [[nodiscard]] virtual const physics::SunPosition& sun_now() const noexcept = 0;
+  /// Weather at the thermal instant of the frame, with the temperature of the surroundings, after
+  /// prepare().
   [[nodiscard]] virtual const physics::Forcing& forcing_now() const noexcept = 0;
 
+  /// Sends the data of the frame to the device.
   virtual void upload() noexcept = 0;
+  /// Binds buffers and textures of the method.
   virtual void bind() const noexcept = 0;
-  /// True when pixels within FrameParams::format_window_px depend on what is seen around it.
+  /// True when pixels inside FrameParams::rendered_window_px depend on what is drawn outside it.
   [[nodiscard]] virtual bool looks_around() const noexcept = 0;
-  /// Everything between geometry and radiance; `size_px`: of FrameParams::format_window_px.
+  /// Issues the passes between geometry and radiance. The window of the frame has `size_px` pixels.
   virtual void draw(const glm::uvec2& size_px, StageTimes& stages, StageClock& clock) noexcept = 0;
 };
 
-/// Entries of SceneHistory::entities by object; -1: static.
+/// Entry of SceneHistory::entities for each object of the scenario; -1 for a static object.
 [[nodiscard]] std::vector<std::int32_t> histories_of_objects(const scene::ScenarioDesc& scenario);
 
 }  // namespace emit::renderer

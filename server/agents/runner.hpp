@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "agents/agent.hpp"
+#include "host/realtime.hpp"
 #include "rt/clock.hpp"
 #include "rt/fd.hpp"
-#include "host/realtime.hpp"
 #include "telemetry/duty_cycle.hpp"
 
 namespace emit::server {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "agents/conductor/conductor.hpp"
+#include "agents/context.hpp"
 #include "agents/receiver/receiver.hpp"
 #include "agents/recorder/recorder.hpp"
 #include "agents/render/render_agent.hpp"
@@ -16,7 +17,6 @@
 #include "agents/sender/sender.hpp"
 #include "agents/sender/shm_client.hpp"
 #include "app/clock_watch.hpp"
-#include "agents/context.hpp"
 #include "app/daemon.hpp"
 #include "app/service_health.hpp"
 #include "net/trigger_port.hpp"

@@ -9,8 +9,8 @@
 #include <cstring>
 #include <ctime>
 
-#include "emit/protocol/shared_ring.hpp"
 #include "emit/protocol/convert.hpp"
+#include "emit/protocol/shared_ring.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
 #include "rt/error_text.hpp"
@@ -134,8 +134,8 @@ physics::Result<Url> parse_url(const std::string& text) {
   return url;
 }
 
-ClientConnection::ClientConnection(server::SocketContext context, server::TcpSocket socket, server::SocketAddress peer,
-                                   const protocol::RecordLimits& limits)
+ClientConnection::ClientConnection(server::SocketContext context, server::TcpSocket socket,
+                                   server::SocketAddress peer, const protocol::RecordLimits& limits)
     : context_(std::move(context)),
       socket_(std::move(socket)),
       peer_(peer),
@@ -145,9 +145,11 @@ ClientConnection::ClientConnection(server::SocketContext context, server::TcpSoc
 namespace {
 
 /// TLS over a connected socket, until both sides have proved themselves.
-physics::Result<void> secure(server::TcpSocket& socket, const Security& security, const std::string& name,
-                             const server::SocketAddress& peer, std::int64_t end_ns) {
-  auto context = server::TlsContext::client({security.tls_ca, security.tls_certificate, security.tls_key});
+physics::Result<void> secure(server::TcpSocket& socket, const Security& security,
+                             const std::string& name, const server::SocketAddress& peer,
+                             std::int64_t end_ns) {
+  auto context =
+      server::TlsContext::client({security.tls_ca, security.tls_certificate, security.tls_key});
   if (!context) {
     return tl::unexpected<physics::Error>(std::move(context.error()));
   }
@@ -199,10 +201,9 @@ physics::Result<ClientConnection> ClientConnection::open(const Url& url, protoco
   return greet(std::move(context), std::move(*socket), peer, role, end_ns);
 }
 
-physics::Result<ClientConnection> ClientConnection::greet(server::SocketContext context, server::TcpSocket socket,
-                                                          server::SocketAddress peer, protocol::PeerRole role,
-                                                          std::int64_t end_ns,
-                                                          const protocol::RecordLimits& limits) {
+physics::Result<ClientConnection> ClientConnection::greet(
+    server::SocketContext context, server::TcpSocket socket, server::SocketAddress peer,
+    protocol::PeerRole role, std::int64_t end_ns, const protocol::RecordLimits& limits) {
   ClientConnection connection(std::move(context), std::move(socket), peer, limits);
   v1::ControlRecord request;
   v1::Hello& hello = *request.mutable_hello();

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "emit/client/client.hpp"
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/host_session.hpp"
-#include "emit/client/client.hpp"
 #include "net/socket.hpp"
 #include "net/tls_session.hpp"
 
@@ -34,20 +34,23 @@ namespace emit::client {
 class ClientConnection {
  public:
   /// Hello and Welcome. Errors: io, protocol (what the daemon answered instead).
-  [[nodiscard]] static physics::Result<ClientConnection> open(const Url& url, protocol::PeerRole role,
+  [[nodiscard]] static physics::Result<ClientConnection> open(const Url& url,
+                                                              protocol::PeerRole role,
                                                               std::int64_t timeout_ns,
                                                               const Security& security = {});
   /// The same over a stream that is connected already, until `end_ns` (monotonic). `limits`: of
   /// what the daemon may send.
   [[nodiscard]] static physics::Result<ClientConnection> greet(
-      server::SocketContext context, server::TcpSocket socket, server::SocketAddress peer, protocol::PeerRole role,
-      std::int64_t end_ns, const protocol::RecordLimits& limits = {});
+      server::SocketContext context, server::TcpSocket socket, server::SocketAddress peer,
+      protocol::PeerRole role, std::int64_t end_ns, const protocol::RecordLimits& limits = {});
 
   [[nodiscard]] int fd() const noexcept { return socket_.fd(); }
   [[nodiscard]] const server::SocketContext& context() const noexcept { return context_; }
   [[nodiscard]] const ServerInfo& server() const noexcept { return info_; }
   [[nodiscard]] const server::SocketAddress& peer() const noexcept { return peer_; }
-  [[nodiscard]] server::SocketAddress local_address() const noexcept { return socket_.local_address(); }
+  [[nodiscard]] server::SocketAddress local_address() const noexcept {
+    return socket_.local_address();
+  }
   /// Null: plain.
   [[nodiscard]] server::TlsSession* tls() const noexcept { return socket_.tls(); }
   /// True after the peer closed in order, between two records.
@@ -63,8 +66,8 @@ class ClientConnection {
   [[nodiscard]] physics::Result<void> send(const v1::ControlRecord& record, std::int64_t end_ns);
 
  private:
-  ClientConnection(server::SocketContext context, server::TcpSocket socket, server::SocketAddress peer,
-                   const protocol::RecordLimits& limits);
+  ClientConnection(server::SocketContext context, server::TcpSocket socket,
+                   server::SocketAddress peer, const protocol::RecordLimits& limits);
   void wake_at(std::size_t bytes) noexcept;
 
   server::SocketContext context_;

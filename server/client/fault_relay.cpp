@@ -20,7 +20,8 @@ constexpr std::uint64_t kBufferBytes = 64u << 20;
 
 }  // namespace
 
-physics::Result<std::unique_ptr<FaultRelay>> FaultRelay::start(const server::NetworkFaults& faults) {
+physics::Result<std::unique_ptr<FaultRelay>> FaultRelay::start(
+    const server::NetworkFaults& faults) {
   server::SocketContext context;
   const server::SocketAddress here = server::numeric_address("127.0.0.1", 0);
   auto in = server::UdpSocket::open_bound(context, here);
@@ -34,8 +35,8 @@ physics::Result<std::unique_ptr<FaultRelay>> FaultRelay::start(const server::Net
       new FaultRelay(faults, std::move(context), std::move(*in), std::move(*out)));
 }
 
-FaultRelay::FaultRelay(const server::NetworkFaults& faults, server::SocketContext context, server::UdpSocket in,
-                       server::UdpSocket out)
+FaultRelay::FaultRelay(const server::NetworkFaults& faults, server::SocketContext context,
+                       server::UdpSocket in, server::UdpSocket out)
     : injector_(faults),
       context_(std::move(context)),
       in_(std::move(in)),

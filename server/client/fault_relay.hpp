@@ -31,12 +31,15 @@ class FaultRelay {
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
   /// Ends the thread; what waits is gone. counts() are complete after it.
   void stop();
-  [[nodiscard]] const server::FaultInjector::Counts& counts() const noexcept { return injector_.counts(); }
+  [[nodiscard]] const server::FaultInjector::Counts& counts() const noexcept {
+    return injector_.counts();
+  }
   /// Datagrams that the kernel dropped here, or refused to take on: losses that are not injected.
   [[nodiscard]] std::uint64_t own_losses() const noexcept { return own_losses_.load(); }
 
  private:
-  FaultRelay(const server::NetworkFaults& faults, server::SocketContext context, server::UdpSocket in, server::UdpSocket out);
+  FaultRelay(const server::NetworkFaults& faults, server::SocketContext context,
+             server::UdpSocket in, server::UdpSocket out);
   void run();
   int receive();
   int pass_on();

@@ -8,15 +8,15 @@
 #include <cerrno>
 #include <cstring>
 
-#include "emit/protocol/convert.hpp"
-#include "emit/protocol/pixel_codec.hpp"
-#include "emit/protocol/resend.hpp"
-#include "emit/v1/control.pb.h"
 #include "client/client_connection.hpp"
 #include "client/frame_account.hpp"
 #include "client/resend_planner.hpp"
 #include "client/shm_frame_client.hpp"
 #include "client/udp_frame_receiver.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/protocol/pixel_codec.hpp"
+#include "emit/protocol/resend.hpp"
+#include "emit/v1/control.pb.h"
 #include "rt/clock.hpp"
 
 namespace emit::client {
@@ -504,7 +504,8 @@ physics::Result<std::unique_ptr<FrameClient>> FrameClient::connect(const std::st
   if (parsed->scheme == Url::Scheme::shm) {
     return open_shm_frame_client(parsed->host);
   }
-  auto connection = ClientConnection::open(*parsed, protocol::PeerRole::client, timeout_ns, security);
+  auto connection =
+      ClientConnection::open(*parsed, protocol::PeerRole::client, timeout_ns, security);
   if (!connection) {
     return tl::unexpected<physics::Error>(std::move(connection.error()));
   }

@@ -5,10 +5,10 @@
 #include <array>
 #include <cerrno>
 
+#include "client/client_connection.hpp"
 #include "emit/protocol/codec.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
-#include "client/client_connection.hpp"
 #include "net/key_file.hpp"
 #include "rt/error_text.hpp"
 
@@ -65,7 +65,8 @@ class TcpHost final : public HostClient {
 
 class UdpHost final : public HostClient {
  public:
-  UdpHost(server::UdpSocket socket, server::SocketAddress peer) : socket_(std::move(socket)), peer_(peer) {}
+  UdpHost(server::UdpSocket socket, server::SocketAddress peer)
+      : socket_(std::move(socket)), peer_(peer) {}
 
   physics::Result<void> send(const protocol::HostFrameData& frame,
                              std::int64_t timeout_ns) override {
@@ -85,12 +86,14 @@ class UdpHost final : public HostClient {
       }
       const bool full = sent.status == server::IoStatus::would_block;
       if (!full || !wait_for(socket_.fd(), POLLOUT, end_ns)) {
-        return make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(peer_),
-                                                     server::error_text(full ? EAGAIN : sent.error)));
+        return make_error(ErrorCode::io,
+                          fmt::format("udp {}: {}", to_string(peer_),
+                                      server::error_text(full ? EAGAIN : sent.error)));
       }
     }
   }
-  physics::Result<void> command(protocol::CommandKind /*command*/, std::int64_t /*timeout_ns*/) override {
+  physics::Result<void> command(protocol::CommandKind /*command*/,
+                                std::int64_t /*timeout_ns*/) override {
     return make_error(ErrorCode::unsupported, "commands need a tcp:// connection");
   }
   physics::Result<std::optional<ServerStatus>> receive_status(std::int64_t timeout_ns) override {
@@ -105,8 +108,8 @@ class UdpHost final : public HostClient {
         continue;
       }
       if (got.status != server::IoStatus::done) {
-        return make_error(ErrorCode::io,
-                          fmt::format("udp {}: {}", to_string(peer_), server::error_text(got.error)));
+        return make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(peer_),
+                                                     server::error_text(got.error)));
       }
       v1::Status status;
       if (status.ParseFromArray(bytes.data(), static_cast<int>(got.bytes))) {
@@ -134,7 +137,8 @@ physics::Result<std::unique_ptr<HostClient>> agree_and_connect(server::UdpSocket
                       "control port, not '" +
                           security.control + "'");
   }
-  auto connection = ClientConnection::open(*control, protocol::PeerRole::host, timeout_ns, security);
+  auto connection =
+      ClientConnection::open(*control, protocol::PeerRole::host, timeout_ns, security);
   if (!connection) {
     return tl::unexpected<physics::Error>(std::move(connection.error()));
   }
@@ -159,7 +163,8 @@ physics::Result<std::unique_ptr<HostClient>> HostClient::connect(const std::stri
     return tl::unexpected<physics::Error>(physics::Error(parsed.error()));
   }
   if (parsed->scheme == Url::Scheme::tcp) {
-    auto connection = ClientConnection::open(*parsed, protocol::PeerRole::host, timeout_ns, security);
+    auto connection =
+        ClientConnection::open(*parsed, protocol::PeerRole::host, timeout_ns, security);
     if (!connection) {
       return tl::unexpected<physics::Error>(std::move(connection.error()));
     }

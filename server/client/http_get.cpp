@@ -49,7 +49,8 @@ Result<void> send_all(server::TcpSocket& socket, std::string_view text, std::int
     const server::IoResult sent = socket.write_some(left);
     if (sent.status == server::IoStatus::done) {
       left = left.subspan(sent.bytes);
-    } else if (sent.status != server::IoStatus::would_block || !wait_for(socket.fd(), POLLOUT, end_ns)) {
+    } else if (sent.status != server::IoStatus::would_block ||
+               !wait_for(socket.fd(), POLLOUT, end_ns)) {
       return make_error(ErrorCode::io, "the request is not taken");
     }
   }
@@ -63,7 +64,8 @@ Result<std::string> receive_all(server::TcpSocket& socket, std::int64_t end_ns) 
   for (;;) {
     const server::IoResult got = socket.read_some(piece);
     if (got.status == server::IoStatus::closed) return text;
-    if (got.status == server::IoStatus::failed) return make_error(ErrorCode::io, server::error_text(got.error));
+    if (got.status == server::IoStatus::failed)
+      return make_error(ErrorCode::io, server::error_text(got.error));
     if (got.status == server::IoStatus::would_block) {
       if (!wait_for(socket.fd(), POLLIN, end_ns)) {
         return make_error(ErrorCode::io, "no answer within the timeout");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "client/client_connection.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"
-#include "client/client_connection.hpp"
 
 namespace emit::client {
 namespace {
@@ -50,7 +50,8 @@ physics::Result<std::unique_ptr<RecorderClient>> RecorderClient::connect(const s
     return physics::make_error(physics::ErrorCode::invalid_argument,
                                "'" + url + "': the journal comes over tcp://host:port");
   }
-  auto connection = ClientConnection::open(*parsed, protocol::PeerRole::recorder, timeout_ns, security);
+  auto connection =
+      ClientConnection::open(*parsed, protocol::PeerRole::recorder, timeout_ns, security);
   if (!connection) {
     return tl::unexpected<physics::Error>(std::move(connection.error()));
   }

@@ -8,11 +8,11 @@
 #include <cstring>
 #include <utility>
 
+#include "client/client_connection.hpp"
+#include "client/frame_account.hpp"
 #include "emit/protocol/shared_ring.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
-#include "client/client_connection.hpp"
-#include "client/frame_account.hpp"
 #include "net/shm_object.hpp"
 #include "rt/clock.hpp"
 #include "rt/futex.hpp"
@@ -28,7 +28,8 @@ constexpr std::int64_t kAliveCheckNs = 100'000'000;
 
 class ShmFrameClient final : public FrameClient {
  public:
-  ShmFrameClient(std::string name, server::ShmObject object, protocol::RingReader ring, ServerInfo info)
+  ShmFrameClient(std::string name, server::ShmObject object, protocol::RingReader ring,
+                 ServerInfo info)
       : name_(std::move(name)),
         object_(std::move(object)),
         ring_(std::move(ring)),

@@ -46,7 +46,8 @@ physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const server::SocketCon
                         fmt::format("'{}' is not a multicast group", options.multicast_group));
     }
   } else {
-    any = server::numeric_address(peer.storage.ss_family == AF_INET6 ? "::" : "0.0.0.0", options.udp_port);
+    any = server::numeric_address(peer.storage.ss_family == AF_INET6 ? "::" : "0.0.0.0",
+                                  options.udp_port);
   }
   auto socket = server::UdpSocket::open(context, any);
   if (!socket) {
@@ -60,8 +61,8 @@ physics::Result<UdpFrameReceiver> UdpFrameReceiver::open(const server::SocketCon
   }
   if (multicast) {
     if (const int error = socket->join_group(any, server::interface_of(local)); error != 0) {
-      return make_error(ErrorCode::io,
-                        fmt::format("joining {}: {}", options.multicast_group, server::error_text(error)));
+      return make_error(ErrorCode::io, fmt::format("joining {}: {}", options.multicast_group,
+                                                   server::error_text(error)));
     }
   }
   socket->set_option(SOL_SOCKET, SO_RXQ_OVFL, 1);

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "emit/client/client.hpp"
 #include "emit/protocol/ip_address.hpp"
 #include "emit/protocol/reassembler.hpp"
-#include "emit/client/client.hpp"
 #include "net/socket.hpp"
 
 namespace emit::client {

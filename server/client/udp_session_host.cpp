@@ -7,9 +7,9 @@
 #include <cerrno>
 #include <deque>
 
+#include "client/client_connection.hpp"
 #include "emit/protocol/codec.hpp"
 #include "emit/v1/status.pb.h"
-#include "client/client_connection.hpp"
 #include "rt/error_text.hpp"
 
 /// The host's end of authenticated datagrams (docs/wire.md, "Host sessions").
@@ -37,9 +37,9 @@ std::uint64_t random_number() noexcept {
 
 class SessionHost final : public HostClient {
  public:
-  SessionHost(server::UdpSocket socket, const server::SocketAddress& peer, const protocol::SessionKey& key,
-              std::optional<ClientConnection> control, protocol::SessionMac session_mac,
-              protocol::SessionMac open_mac)
+  SessionHost(server::UdpSocket socket, const server::SocketAddress& peer,
+              const protocol::SessionKey& key, std::optional<ClientConnection> control,
+              protocol::SessionMac session_mac, protocol::SessionMac open_mac)
       : socket_(std::move(socket)),
         peer_(peer),
         control_(std::move(control)),
@@ -86,7 +86,8 @@ class SessionHost final : public HostClient {
                           body.size()),
         end_ns);
   }
-  physics::Result<void> command(protocol::CommandKind /*command*/, std::int64_t /*timeout_ns*/) override {
+  physics::Result<void> command(protocol::CommandKind /*command*/,
+                                std::int64_t /*timeout_ns*/) override {
     return make_error(ErrorCode::unsupported, "commands need a tcp:// connection");
   }
   physics::Result<std::optional<ServerStatus>> receive_status(std::int64_t timeout_ns) override {
@@ -133,8 +134,9 @@ class SessionHost final : public HostClient {
       }
       const bool full = sent.status == server::IoStatus::would_block;
       if (!full || !wait_for(socket_.fd(), POLLOUT, end_ns)) {
-        return make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(peer_),
-                                                     server::error_text(full ? EAGAIN : sent.error)));
+        return make_error(ErrorCode::io,
+                          fmt::format("udp {}: {}", to_string(peer_),
+                                      server::error_text(full ? EAGAIN : sent.error)));
       }
     }
   }
@@ -145,8 +147,8 @@ class SessionHost final : public HostClient {
       if (got.status == server::IoStatus::would_block) return {};
       if (got.error == ECONNREFUSED) continue;
       if (got.status != server::IoStatus::done) {
-        return make_error(ErrorCode::io,
-                          fmt::format("udp {}: {}", to_string(peer_), server::error_text(got.error)));
+        return make_error(ErrorCode::io, fmt::format("udp {}: {}", to_string(peer_),
+                                                     server::error_text(got.error)));
       }
       take(std::span(received_).first(got.bytes));
     }

@@ -11,8 +11,8 @@
 #include <system_error>
 
 #include "net/socket_address.hpp"
-#include "rt/fd.hpp"
 #include "rt/error_text.hpp"
+#include "rt/fd.hpp"
 
 namespace emit::server {
 

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include "emit/protocol/ip_address.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/protocol/ip_address.hpp"
 #include "emit/protocol/trigger.hpp"
 #include "emit/protocol/trigger_seal.hpp"
 #include "net/socket.hpp"

@@ -152,7 +152,9 @@ EventText describe(const Event& event) {
     case EventKind::refused:
       return {LogLevel::warn,
               fmt::format("event=refused status={} text=\"{}\"", event.a,
-                          text.empty() ? protocol::status_text(static_cast<protocol::StatusCode>(event.a), 0) : text),
+                          text.empty()
+                              ? protocol::status_text(static_cast<protocol::StatusCode>(event.a), 0)
+                              : text),
               true};
     case EventKind::connected:
       return {LogLevel::info,

@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "host/realtime.hpp"
 #include "rt/client_counts.hpp"
 #include "rt/counters.hpp"
 #include "rt/histogram.hpp"
 #include "rt/prediction_error.hpp"
-#include "host/realtime.hpp"
 #include "telemetry/duty_cycle.hpp"
 #include "telemetry/ptp_status.hpp"
 #include "telemetry/status_board.hpp"

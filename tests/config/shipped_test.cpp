@@ -96,6 +96,7 @@ TEST_P(ShippedScenario, loads_prints_and_loads_again) {
   ASSERT_TRUE(first.has_value()) << first.error().text;
   EXPECT_FALSE(first->objects.empty());
   EXPECT_FALSE(first->sensor.trajectory.empty());
+  EXPECT_THAT(first->warnings, ::testing::IsEmpty());
   const std::string printed = print_scenario(*first);
   const auto second = load_scenario(write("printed.toml", printed), {}, options_);
   ASSERT_TRUE(second.has_value()) << second.error().text;

@@ -21,7 +21,7 @@ class PoseCsv : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove(path_); }
 
-  /// Returns the text of the first error, or "N rows".
+  /// Text of the first error, or "N rows".
   [[nodiscard]] std::string outcome(std::string_view text) const {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << text;
     auto reader = PoseCsvReader::open(path_);
@@ -82,12 +82,12 @@ TEST_F(PoseCsv, ErrorsNameFileLineAndColumn) {
 /// Logs as spreadsheets write them are read like plain ones.
 TEST_F(PoseCsv, SpreadsheetDialectsAreReadAlike) {
   const std::string head = "sim_time_s,east_m,north_m,up_m,qw,qx,qy,qz";
-  for (const std::string& text :
-       {"\xEF\xBB\xBF" + head + "\r\n0.5,1,2,3,0,0.6,0.8,0\r\n",
-        "\"sim_time_s\",\"east_m\",\"north_m\",\"up_m\",\"qw\",\"qx\",\"qy\",\"qz\"\n"
-        "\"0.5\",\"1\",2,3,0,0.6,0.8,0\n",
-        head + ",frame_number\n+0.5,+1,+2.0,+3e0,+0,+.6,+0.8,0,+1\n",
-        head + "\r0.5,1,2,3,0,0.6,0.8,0\r", head + ",,\n0.5,1,2,3,0,0.6,0.8,0,,\n,,,,,,,,,\n"}) {
+  for (const std::string& text : std::initializer_list<std::string>{
+           "\xEF\xBB\xBF" + head + "\r\n0.5,1,2,3,0,0.6,0.8,0\r\n",
+           "\"sim_time_s\",\"east_m\",\"north_m\",\"up_m\",\"qw\",\"qx\",\"qy\",\"qz\"\n"
+           "\"0.5\",\"1\",2,3,0,0.6,0.8,0\n",
+           head + ",frame_number\n+0.5,+1,+2.0,+3e0,+0,+.6,+0.8,0,+1\n",
+           head + "\r0.5,1,2,3,0,0.6,0.8,0\r", head + ",,\n0.5,1,2,3,0,0.6,0.8,0,,\n,,,,,,,,,\n"}) {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << text;
     auto reader = PoseCsvReader::open(path_);
     ASSERT_TRUE(reader) << reader.error().text;

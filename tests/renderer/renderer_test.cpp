@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The renderer against closed forms: geometry, shade, obscurance, thermal state, radiance.
+// The renderer against closed forms: geometry, shade, obscurance, thermal state and radiance.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -102,7 +102,7 @@ TEST(RendererGeometry, depth_and_object_match_a_plane_seen_at_an_angle) {
     for (std::uint32_t x = 0; x < 320; x += 5) {
       const std::size_t i = y * 320 + x;
       ASSERT_EQ(frame.object[i], 1.0F);
-      // The pixel's point lies on the ground: 1 mm at 10 m is what float32 depth leaves.
+      // Expect the pixel's point on the ground. Depth in float32 leaves 1 mm at 10 m.
       ASSERT_NEAR(world_point(scenario.sensor, pose, x, y, frame.depth_m[i]).z, 0.0, 1e-3);
     }
   }
@@ -124,7 +124,7 @@ TEST(RendererThermal, an_open_plane_reaches_the_equilibrium_of_eq_5) {
   const double expected = equilibrium_k(scenario.materials[0], scenario.weather[0],
                                         sun_at(scenario, 3 * kHourNs).z, 1.0, 0.5);
   for (std::size_t i = 0; i < frame.temperature_k.size(); ++i) {
-    // 2 mK: float32 quartic (0.2 mK) and the sun's cosine from a 16-bit normal.
+    // Allow 2 mK for the quartic in float32 (0.2 mK) and for the sun's cosine from a 16-bit normal.
     ASSERT_NEAR(frame.temperature_k[i], expected, 2e-3) << i;
   }
 }
@@ -150,7 +150,8 @@ TEST(RendererThermal, splitting_the_history_changes_an_unshaded_surface_by_littl
     Scene scene(scenario);
     centre.push_back(scene.render(pose, 3 * kHourNs).temperature_k[128 * 320 + 160]);
   }
-  // The drive is taken as linear inside an interval: second order, four times less per halving.
+  // The drive is linear inside an interval, so the method is of second order: each halving divides
+  // the error by four.
   EXPECT_NEAR(centre[0], centre[2], 0.02F);
   EXPECT_LT(std::abs(centre[1] - centre[2]), 0.4F * std::abs(centre[0] - centre[2]) + 1e-4F);
 }
@@ -162,7 +163,8 @@ TEST(RendererShadow, the_box_casts_its_shadow_where_the_sun_says) {
   quads.push_back(ground(30.0, 30.0));
   for (const std::int64_t hour : {1, 3, 5, 9}) {
     auto scenario = instant_scenario(write_quads("box", quads));
-    // One interval of a second: the sun stands still, shade is that of the instant.
+    // Use one interval of a second, in which the sun hardly moves and the shade is that of the
+    // instant.
     scenario.thermal.history_start_ns = hour * kHourNs - 1'000'000'000;
     scenario.thermal.obscurance_radius_m = 0.001;
     Scene scene(scenario);
@@ -173,8 +175,8 @@ TEST(RendererShadow, the_box_casts_its_shadow_where_the_sun_says) {
     const double lit_k = equilibrium_k(m, scenario.weather[0], sun.z, 1.0, 0.5);
     const double dark_k = equilibrium_k(m, scenario.weather[0], sun.z, 0.0, 0.5);
     ASSERT_GT(lit_k - dark_k, 5.0);
-    // A map texel here is about 2 cm; the filter spreads an edge over one on either side, and the
-    // sun's disc by another 1 cm.
+    // A texel of the map is about 2 cm wide here. The filter spreads an edge over one texel on
+    // either side, and the sun's disc spreads it by another 1 cm.
     const double edge_m = 0.06 / sun.z;
     int lit = 0;
     int dark = 0;
@@ -183,7 +185,7 @@ TEST(RendererShadow, the_box_casts_its_shadow_where_the_sun_says) {
         const std::size_t i = y * 320 + x;
         const glm::dvec3 p = world_point(scenario.sensor, pose, x, y, frame.depth_m[i]);
         if (std::abs(p.z) > 5e-3) continue;
-        // Where the ray towards the sun runs inside the box's shaft, by slabs.
+        // Find the part of the ray towards the sun that lies inside the box's shaft, slab by slab.
         const auto blocked = [&](double grow_m) {
           double enter = 0.0;
           double leave = 1e9;
@@ -237,8 +239,8 @@ TEST(RendererShadow, a_parked_caster_that_left_leaves_a_cool_print) {
   EXPECT_LT(under, open - 10.0F);
 }
 
-/// Share of pixels whose temperatures differ by more than a limit. Maps of other extents put the
-/// sharp edges along a caster's foot on other texels: a few pixels always do.
+/// Share of pixels whose temperatures differ by more than a limit. A few pixels always do, because
+/// maps of other extents put the sharp edges along a caster's foot on other texels.
 double share_apart(const Rendered& a, const Rendered& b, double limit_k) {
   std::size_t apart = 0;
   for (std::size_t i = 0; i < a.temperature_k.size(); ++i) {
@@ -271,14 +273,15 @@ TEST(RendererShadow, casters_of_the_past_count_in_full_though_nothing_as_high_is
       {{0, north_at(0.0, 0.0), true, false}, {off_ns, north_at(0.0, 0.0), false, false}}));
   const auto pose = looking({0.0, 0.0, 8.0}, {0.0, 0.0, 0.0});
   const auto alone = Scene(scenario).render(pose, 3 * kHourNs);
-  // A mast out of sight is as high as the truck was; its own shadow stays out of sight too.
+  // Add a mast out of sight that is as high as the truck was. Its own shadow stays out of sight
+  // too.
   scene::ObjectDesc mast;
   mast.name = "mast";
   mast.gltf = write_quads("mast", box({28.0, 28.0, 0.0}, {28.2, 28.2, 4.0}));
   mast.instances = {north_at(0.0, 0.0)};
   scenario.objects.push_back(mast);
   const auto beside_mast = Scene(scenario).render(pose, 3 * kHourNs);
-  // The ground is small, so that its own extent along the light does not hold the truck.
+  // Use a small ground, so that its own extent along the light does not hold the truck.
   double coldest_k = 1e9;
   double hottest_k = 0.0;
   for (std::size_t i = 0; i < alone.temperature_k.size(); ++i) {
@@ -331,8 +334,8 @@ TEST(RendererShadow, a_live_pose_moves_the_caster_from_then_on) {
   EXPECT_EQ(scene.render(pose, kHourNs).object[128 * 320 + 160], 2.0F);
 }
 
-/// Recovers f_i: with long-wave alone and surroundings near 0 K the equilibrium is
-/// eps sigma T^4 = 2 f_i eps L_down once conduction is negligible.
+/// Share f_i that a temperature stands for. With long-wave flux alone, surroundings near 0 K and
+/// negligible conduction the equilibrium is eps sigma T^4 = 2 f_i eps L_down.
 scene::ScenarioDesc obscurance_scenario(const std::vector<Quad>& quads, double radius_m) {
   auto scenario = instant_scenario(write_quads("world", quads));
   scenario.weather = {weather(0.0, 0.0, 400.0, 1.0)};
@@ -345,7 +348,7 @@ double sky_frac(double temperature_k) {
 }
 
 TEST(RendererObscurance, concave_is_below_flat_is_below_convex) {
-  // A step up at x = 0 and a drop at x = 2, seen from above.
+  // Look from above at a step up at x = 0 and a drop at x = 2.
   std::vector<Quad> quads = {
       {{-10, -10, 1}, {0, -10, 1}, {0, 10, 1}, {-10, 10, 1}},  // upper floor
       {{0, -10, 0}, {0, 10, 0}, {0, 10, 1}, {0, -10, 1}},      // its wall, facing east
@@ -376,17 +379,17 @@ TEST(RendererObscurance, a_tilted_plane_is_flat) {
   const auto frame = scene.render(looking({0.0, -6.0, 3.0}, {0.0, 0.0, 0.0}), kHourNs);
   for (std::uint32_t y = 20; y < 236; ++y) {
     for (std::uint32_t x = 20; x < 300; ++x) {
-      // Perspective makes the depths of a pair unequal by (radius / distance)^2.
+      // Allow for perspective, which makes the depths of a pair differ by (radius / distance)^2.
       ASSERT_NEAR(sky_frac(frame.temperature_k[y * 320 + x]), 0.5, 0.02);
     }
   }
 }
 
 TEST(RendererObscurance, follows_the_open_volume_of_a_ball_beside_a_wall_and_a_drop) {
-  // Open share of a ball whose centre lies on flat ground at s = u R from an infinite wall
-  // (concave) or a drop (convex): the wall takes half of the spherical cap beyond it, the drop
-  // opens it. The wall is taller than the ball, but not so tall that its top counts as something
-  // else in front.
+  // The closed form is the open share of a ball whose centre lies on flat ground at s = u R from an
+  // infinite wall (concave) or a drop (convex). The wall takes half of the spherical cap beyond it,
+  // and the drop opens it. The wall is taller than the ball, but not so tall that its top counts as
+  // something else in front.
   const double radius_m = 1.0;
   std::vector<Quad> quads = {{{-10, -10, 1.5}, {0, -10, 1.5}, {0, 10, 1.5}, {-10, 10, 1.5}},
                              {{0, -10, 0}, {0, 10, 0}, {0, 10, 1.5}, {0, -10, 1.5}},
@@ -409,7 +412,7 @@ TEST(RendererObscurance, follows_the_open_volume_of_a_ball_beside_a_wall_and_a_d
     ++compared;
   }
   EXPECT_GT(compared, 100);
-  EXPECT_LT(worst, 0.03);  // 13 line pairs
+  EXPECT_LT(worst, 0.03);  // the error of 13 pairs of lines
 }
 
 TEST(RendererRadiance, a_black_surface_without_air_radiates_planck_in_band) {
@@ -425,7 +428,8 @@ TEST(RendererRadiance, a_black_surface_without_air_radiates_planck_in_band) {
 }
 
 TEST(RendererRadiance, an_isothermal_world_looks_like_a_blackbody) {
-  // Surface, surroundings, air and sky at one temperature: emissivity and range cannot matter.
+  // Give surface, surroundings, air and sky one temperature, so that emissivity and range cannot
+  // matter.
   auto scenario = instant_scenario(write_quads("plane", {ground(500.0, 500.0)}));
   scenario.weather = {
       weather(0.0, 0.0, physics::kStefanBoltzmannWPerM2K4 * std::pow(300.0, 4), 300.0)};

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Windows of an image: their pixels have the bits of the whole image, and nothing else is drawn.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +15,7 @@ namespace emit::test {
 namespace {
 
 constexpr std::int64_t kNowNs = 3 * 3'600'000'000'000;
-constexpr std::uint32_t kWidthPx = 130;  // not a multiple of anything
+constexpr std::uint32_t kWidthPx = 130;  // not a multiple of the size of any work group
 constexpr std::uint32_t kHeightPx = 97;
 
 physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
@@ -23,7 +24,8 @@ physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
 const physics::Pose kHere = looking({-7.0, 9.0, 9.0}, {0.0, 0.0, 0.5});
 const physics::Pose kElsewhere = looking({6.0, 5.0, 7.0}, {0.0, 0.0, 0.5});
 
-/// A box on the ground: its shadow, its outline and the obscurance at its foot cross every window.
+/// Scenario with a box on the ground. Its shadow, its outline and the obscurance at its foot cross
+/// every window.
 scene::ScenarioDesc box_on_ground() {
   auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
   quads.push_back(ground(30.0, 30.0));
@@ -35,12 +37,14 @@ scene::ScenarioDesc box_on_ground() {
   return s;
 }
 
+/// Windows of different sizes and positions.
 const std::vector<scene::PixelRect>& windows() {
   static const std::vector<scene::PixelRect> all = {
       {41, 29, 37, 31}, {0, 0, 64, 48}, {65, 48, 65, 49}, {0, 40, kWidthPx, 9}, {64, 50, 1, 1}};
   return all;
 }
 
+/// Renderer that is warmed up for both poses.
 class Camera {
  public:
   explicit Camera(const scene::ScenarioDesc& scenario, renderer::Ladder ladder) {
@@ -80,7 +84,7 @@ class Camera {
   std::unique_ptr<renderer::Renderer> renderer_;
 };
 
-/// Pixels of `window` whose bits are not those of `whole`.
+/// Number of pixels of `window` whose bits differ between two images.
 std::size_t differing(const std::vector<float>& a, const std::vector<float>& b,
                       const scene::PixelRect& window) {
   std::size_t count = 0;
@@ -93,13 +97,14 @@ std::size_t differing(const std::vector<float>& a, const std::vector<float>& b,
   return count;
 }
 
+/// Expects the bits of the whole image in every window, at the given quality levels.
 void expect_windows_of(const scene::ScenarioDesc& scenario, renderer::Ladder ladder,
                        const std::vector<std::uint8_t>& rungs) {
   Camera camera(scenario, ladder);
   for (const std::uint8_t rung : rungs) {
     const auto whole = camera.render(kHere, rung);
     for (const scene::PixelRect& window : windows()) {
-      // What another frame left behind must not show.
+      // Fill the memory with another frame, which must not show through.
       const auto before = camera.render(kElsewhere, rung);
       ASSERT_GT(differing(whole.radiance, before.radiance, {0, 0, kWidthPx, kHeightPx}), 3000U);
       const auto part = camera.render(kHere, rung, window);
@@ -146,7 +151,8 @@ TEST(RendererWindow, NothingElseIsDrawn) {
     const scene::PixelRect window{41, 29, 37, 31};
     const auto elsewhere = camera.render(kElsewhere);
     const auto part = camera.render(kHere, 0, window);
-    // Of the ring's memory the rows of the window alone were written, and in them its columns.
+    // Expect that only the window's rows of the slot were written, and in them only its columns
+    // were drawn.
     const scene::PixelRect above{0, 0, kWidthPx, 29};
     const scene::PixelRect right{78, 29, kWidthPx - 78, 31};
     EXPECT_EQ(differing(part.radiance, elsewhere.radiance, above), 0U);

@@ -19,7 +19,7 @@
 #include "history/foster_history.hpp"
 #include "support/renderer_scene.hpp"
 
-/// Scenarios of the thermal method "cached" with the extended model, and a renderer to look at
+/// Scenarios of the thermal method "cached" with the extended model, and a renderer that shows
 /// them.
 namespace emit::test {
 
@@ -33,6 +33,7 @@ inline physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
   return {from, physics::world_from_body_look_at(from, at)};
 }
 
+/// Scenario around one static file with the method "cached", the extended model and layered ground.
 inline scene::ScenarioDesc cached_scenario(const std::filesystem::path& gltf) {
   scene::ScenarioDesc s = instant_scenario(gltf);
   s.weather.clear();
@@ -49,12 +50,13 @@ inline scene::ScenarioDesc cached_scenario(const std::filesystem::path& gltf) {
   return s;
 }
 
-/// Unit vector to the sun at a sim time.
+/// Unit vector towards the sun at a sim time in seconds.
 inline glm::dvec3 to_sun(const scene::ScenarioDesc& scenario, double seconds) {
   return renderer::Environment(scenario).sun_at(std::llround(seconds * 1e9)).direction_enu;
 }
 
-/// One renderer at a time: each has its own context, current in this thread.
+/// Renderer of one scenario. Only one session may exist at a time, because each has a context of
+/// its own that is current in this thread.
 class Session {
  public:
   explicit Session(const scene::ScenarioDesc& scenario, renderer::OutputOptions output = {}) {
@@ -66,6 +68,7 @@ class Session {
       ADD_FAILURE() << made.error().text;
     }
   }
+  /// Renders a frame at a quality level and returns its temperatures by pixel, K; NaN for sky.
   [[nodiscard]] std::vector<float> frame_k(std::int64_t sim_time_ns, const physics::Pose& pose,
                                            std::uint8_t rung = 0) {
     renderer::FrameRequest request;
@@ -82,9 +85,9 @@ class Session {
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
     return out;
   }
-  /// Of the latest frame, by pixel: 1 + index of the object, 0 for sky.
+  /// Objects of the latest frame by pixel: 1 + index of the object, 0 for sky.
   [[nodiscard]] const std::vector<float>& objects() const { return objects_; }
-  /// The latest frame is flagged degraded.
+  /// True when the latest frame is flagged as coarse.
   [[nodiscard]] bool coarse() const { return coarse_; }
   [[nodiscard]] renderer::Renderer& renderer() { return *renderer_; }
 
@@ -94,17 +97,18 @@ class Session {
   bool coarse_ = false;
 };
 
-/// While the sun does not shine.
+/// Interval in which the sun does not shine, sim time.
 struct Shade {
   double begin_s = 0.0;
   double end_s = 0.0;
 };
 
-/// Changes what reaches the ground from the history's start on.
+/// Function that changes the forcing of the ground from the start of the history on.
 using Screen = std::function<void(renderer::SurfaceForcing&)>;
 
-/// The same model in double on level ground that sees all of the sky and the sun, in steps that are
-/// short beside any change. At `begin_ns` at first; `screen` acts up to there.
+/// Thermal model in double for level ground that sees the whole sky and the sun, in steps that are
+/// short compared with every change. The constructor integrates up to `begin_ns`, with `screen`
+/// applied.
 class OpenGround {
  public:
   OpenGround(scene::ScenarioDesc s, std::span<const scene::WeatherSample> told,
@@ -123,7 +127,7 @@ class OpenGround {
     }
   }
 
-  /// In one interval.
+  /// Integrates up to `until_ns` in one interval.
   void go_on(std::int64_t until_ns, const Screen& screen = {}) {
     renderer::IntervalForcing interval = history_.extend(at_ns_, until_ns, environment_);
     if (screen) screen(interval.begin);
@@ -163,7 +167,8 @@ class OpenGround {
   std::int64_t at_ns_ = 0;
 };
 
-/// Under the scenario's weather, but for `shade` and `screen`.
+/// Temperature of open ground at `now_ns` under the scenario's weather, changed by `shade` and
+/// `screen`.
 inline double open_ground_k(const scene::ScenarioDesc& s, std::int64_t now_ns,
                             std::optional<Shade> shade = std::nullopt, const Screen& screen = {}) {
   OpenGround ground(s, {}, shade ? std::llround(shade->begin_s * 1e9) : now_ns, screen);
@@ -175,6 +180,8 @@ inline double open_ground_k(const scene::ScenarioDesc& s, std::int64_t now_ns,
   return ground.temperature_k();
 }
 
+/// Largest difference between two images and its 99th percentile, K. A pixel that is sky in only
+/// one of them counts as 1e9.
 struct Difference {
   double max_k = 0.0;
   double p99_k = 0.0;
@@ -193,7 +200,8 @@ inline Difference difference(const std::vector<float>& a, const std::vector<floa
   return {errors[errors.size() - 1], errors[errors.size() * 99 / 100]};
 }
 
-/// Ground in squares: where they are small, shade that comes after the warm-up finds samples, too.
+/// Ground that consists of squares. Small squares provide samples for shade that comes after the
+/// warm-up.
 inline std::vector<Quad> fine_ground(double half_m, double square_m) {
   std::vector<Quad> quads;
   const int squares = static_cast<int>(std::lround(2.0 * half_m / square_m));
@@ -208,13 +216,14 @@ inline std::vector<Quad> fine_ground(double half_m, double square_m) {
   return quads;
 }
 
+/// File with a box on the ground.
 inline std::filesystem::path box_on_ground() {
   auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
   quads.push_back(ground(12.0, 12.0));
   return write_quads("box", quads);
 }
 
-/// Ground and a box that stands on it until `leaves_ns`.
+/// Scenario of ground and a box that stands on it until `leaves_ns`.
 inline scene::ScenarioDesc parking_lot(std::int64_t leaves_ns) {
   scene::ScenarioDesc s = cached_scenario(write_quads("lot", {ground(14.0, 14.0)}));
   park_vehicle(s, leaves_ns);

@@ -139,8 +139,7 @@ class ConductorRig {
   std::vector<server::StatusReply> replies;
 
  private:
-  static server::Conductor::Options options(config::PacingConfig pacing,
-                                            bool canned) {
+  static server::Conductor::Options options(config::PacingConfig pacing, bool canned) {
     server::Conductor::Options out;
     out.canned = canned;
     out.pacing = pacing;

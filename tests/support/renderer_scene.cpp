@@ -38,7 +38,7 @@ std::filesystem::path write_quads(const std::string& name, const std::vector<Qua
   std::vector<float> positions;
   for (const Quad& q : quads) {
     for (const glm::dvec3& p : {q.a, q.b, q.c, q.a, q.c, q.d}) {
-      // Level, heading north: glTF x is west, y is up, z is north.
+      // Convert to the axes of glTF for an object that heads north: x is west, y is up, z is north.
       positions.push_back(static_cast<float>(-p.x));
       positions.push_back(static_cast<float>(p.z));
       positions.push_back(static_cast<float>(p.y));

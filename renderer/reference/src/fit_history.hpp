@@ -12,13 +12,12 @@ namespace emit::reference {
 /// end.
 struct FitStep {
   double dt_s = 0.0;
-  physics::FosterDrive<double> begin;  ///< air as an offset from physics::kReferenceK
+  physics::FosterDrive<double> begin;  ///< air_offset_k is an offset from physics::kReferenceK
   physics::FosterDrive<double> end;
   double truth_k = 0.0;     ///< temperature at the end of the step
   double weight = 0.0;      ///< weight of the residual; 0 if there is none
   std::uint32_t gains = 0;  ///< index of the step's length in step_lengths_s
 };
-
 /// History of a surface.
 struct FitHistory {
   std::string name;

@@ -2,10 +2,10 @@
 #ifndef EMIT_LIB_BALANCE
 #define EMIT_LIB_BALANCE
 
-// Twin of emit/physics/surface_balance.hpp. Fluxes in W/m2, fractions 0..1.
+// Heat balance of a surface. Twin of emit/physics/surface_balance.hpp. Fluxes are in W/m2, fractions in 0..1.
 
-// Eq. 1: absorbed flux. `direct` has max(0, cos) in it, `diffuse` is twice the diffuse horizontal
-// irradiance, `environment` is absorbed already, `longwave` is the input of reading B.
+// Absorbed flux (physics.md eq. 1). `direct` contains the factor max(0, cos). `diffuse` is twice the diffuse horizontal
+// irradiance. `environment` is absorbed already. `longwave` is a result of longwave_input_w_m2().
 float absorbed_flux_w_m2(float direct_w_m2, float diffuse_w_m2, float environment_w_m2,
                          float longwave_w_m2, float cloud_frac, float sun_frac, float sky_frac,
                          float solar_absorptance_frac, float emissivity_frac) {
@@ -14,13 +14,13 @@ float absorbed_flux_w_m2(float direct_w_m2, float diffuse_w_m2, float environmen
          (1.0 - sky_frac) * environment_w_m2 + emissivity_frac * sky_frac * longwave_w_m2;
 }
 
-// R_e = eps sigma T_env^4
+// Long-wave input of the surroundings, R_e = eps sigma T_env^4.
 float environment_input_w_m2(float emissivity_frac, float environment_k) {
   float t2 = environment_k * environment_k;
   return emissivity_frac * EMIT_STEFAN_BOLTZMANN_W_M2_K4 * t2 * t2;
 }
 
-// R_LW = 2 L_down - sigma T_env^4
+// Long-wave input of the sky, R_LW = 2 L_down - sigma T_env^4.
 float longwave_input_w_m2(float longwave_down_w_m2, float environment_k) {
   return 2.0 * longwave_down_w_m2 - environment_input_w_m2(1.0, environment_k);
 }
@@ -33,7 +33,7 @@ vec3 surface_balance(float absorbed_w_m2, float emissivity_frac, float core_cond
               absorbed_w_m2 + core_conductance_w_m2_k * core_k + film_w_m2_k * air_k);
 }
 
-// Eq. 2: temperature at which emission alone balances the absorbed flux; NaN where there is none.
+// Temperature in K at which emission alone balances the absorbed flux (physics.md eq. 2). NaN for a negative flux.
 float radiative_temperature_k(float absorbed_w_m2, float emissivity_frac) {
   return sqrt(sqrt(absorbed_w_m2 / (emissivity_frac * EMIT_STEFAN_BOLTZMANN_W_M2_K4)));
 }

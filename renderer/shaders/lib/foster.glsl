@@ -2,50 +2,55 @@
 #ifndef EMIT_LIB_FOSTER
 #define EMIT_LIB_FOSTER
 
-// Flux-driven thermal network of four modes. Twin of emit/physics/foster.hpp, which computes the
-// gains in double on the CPU. States are kelvins above the base.
+// Flux-driven thermal network of four modes (physics.md eq. 16 to 18). Twin of emit/physics/foster.hpp, which computes
+// the gains in double on the CPU. A state is the temperature of a mode above the base, in K.
+// A drive is a vec3: absorbed flux in W/m2, film coefficient in W/m2/K, air temperature minus the reference in K.
 #include "lib/equilibrium.glsl"
 
-// What stays the same over the steps of one surface.
+// Constants of one surface.
 struct FosterSurface {
   vec4 resistance_m2k_w;
   float emission_w_m2_k4;  // emissivity * sigma
-  float base_offset_k;     // from reference_k
+  float base_offset_k;     // base temperature minus reference_k
   float reference_k;
 };
 
-// A drive: absorbed flux in W/m2, film coefficient in W/m2/K, air temperature as an offset in K.
+// Surface temperature minus the reference, in K, for the states `x`.
 float foster_offset_k(vec4 x, FosterSurface s) { return s.base_offset_k + ((x.x + x.y) + (x.z + x.w)); }
 
+// Net flux into the surface in W/m2 at a temperature that is given as an offset from the reference.
 float foster_flux_w_m2(float offset_k, vec3 drive, FosterSurface s) {
   float t = s.reference_k + offset_k;
   float t2 = t * t;
   return drive.x + drive.y * (drive.z - offset_k) - s.emission_w_m2_k4 * t2 * t2;
 }
 
-// One step whose drive goes from `begin` to `end`; the flux at its start is that of `begin`.
+// States after one step whose drive goes from `begin` to `end`. The flux at its start is that of `begin`. Sets
+// `clamped` where an input lies outside its range.
 vec4 foster_step(vec4 x, vec3 begin, vec3 end, vec4 start_frac, vec4 end_frac, FosterSurface s,
                  inout bool clamped) {
+  // Advance the states with the flux at the start; the flux at the end is still missing.
   float q_begin = foster_flux_w_m2(foster_offset_k(x, s), begin, s);
   vec4 partial = x + ((s.resistance_m2k_w * q_begin - x) * start_frac - x * end_frac);
   float p_k = foster_offset_k(partial, s);
   vec4 gain = s.resistance_m2k_w * end_frac;
   float r_m2k_w = (gain.x + gain.y) + (gain.z + gain.w);
   if (!(r_m2k_w > 0.0)) return x;  // no time passed
+  // Solve for the temperature at the end (eq. 18).
   float conductance = 1.0 / r_m2k_w;
   bool guarded = false;
   float t = equilibrium_k(s.emission_w_m2_k4, end.y + conductance,
                           end.x + end.y * (s.reference_k + end.z) + conductance * (s.reference_k + p_k),
                           guarded);
   clamped = clamped || guarded;
-  // One Newton step on offsets: a kelvin temperature resolves only 3e-5 K, which a short step would
+  // Polish it by one Newton step on offsets. A temperature in kelvin resolves only 3e-5 K, which a short step would
   // turn into a wrong flux.
   float offset_k = t - s.reference_k;
   float slope = 4.0 * s.emission_w_m2_k4 * t * t * t + end.y;
   if (!guarded) {
     offset_k += (foster_flux_w_m2(offset_k, end, s) - (offset_k - p_k) * conductance) / (slope + conductance);
   }
-  // The flux from whichever side loses less to rounding.
+  // Add the flux at the end, from the side of the equation that loses less to rounding.
   float q_end = slope * r_m2k_w > 1.0 ? (offset_k - p_k) * conductance : foster_flux_w_m2(offset_k, end, s);
   return partial + gain * q_end;
 }

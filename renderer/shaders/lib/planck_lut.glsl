@@ -2,17 +2,16 @@
 #ifndef EMIT_LIB_PLANCK_LUT
 #define EMIT_LIB_PLANCK_LUT
 
-// In-band radiance of a blackbody from the table T ln L over T that
-// emit/physics/band_radiance_lut.hpp builds (physics.md eq. 8).
-// The including shader defines EMIT_PLANCK_LUT(index), the float at that place of its buffer, and
-// hands over the layout as the C++ side computed it:
+// Band radiance of a blackbody from a table of T ln L over T (physics.md eq. 8). emit/physics/band_radiance_lut.hpp
+// builds the table. The including shader defines EMIT_PLANCK_LUT(index), the float at that index of its buffer, and
+// passes the layout that the C++ side computed:
 //   layout.x  temperature of the first node, K
 //   layout.y  nodes per kelvin
 //   layout.z  number of nodes - 1
 //   layout.w  index of the first node in the buffer
-// Interpolation is done here: texture filters keep only 8 bits of the fraction.
+// The function interpolates itself, because texture filters keep only 8 bits of the fraction.
 
-// Radiance in W m-2 sr-1. Outside the table its nearest end is used and `clamped` is set (never
+// Band radiance of a blackbody in W m-2 sr-1. Outside the table its nearest end is used and `clamped` is set (never
 // cleared). NaN counts as below the table.
 float planck_lut_radiance_w_m2_sr(float temperature_k, vec4 layout_lut, inout bool clamped) {
   float wanted = (temperature_k - layout_lut.x) * layout_lut.y;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emit evaluate balance`: rows (S_d, S_i, R_e, R_LW, absorptance, beta, f_d, f_i, eps, lambda, d,
-// Tc, hc, Tair) -> (E_abs, Ta, source, Ts, source with convection, Ts with convection).
+// Shader of `emit evaluate balance`.
+// Input row: S_d, S_i, R_e, R_LW, absorptance, beta, f_d, f_i, eps, lambda, d, Tc, hc, Tair.
+// Output row: E_abs, Ta, source, Ts, source with convection, Ts with convection.
 #include "lib/balance.glsl"
 #include "lib/equilibrium.glsl"
 
@@ -10,6 +11,7 @@ layout(std430, binding = 1) writeonly buffer Outputs { float out_row[]; };
 layout(location = 0) uniform uint row_count;
 
 void main() {
+  // Compute the absorbed flux of the row.
   uint row = gl_GlobalInvocationID.x;
   if (row >= row_count) return;
   uint i = row * 14u;
@@ -19,10 +21,12 @@ void main() {
                          in_row[i + 6u], in_row[i + 7u], in_row[i + 4u], emissivity_frac);
   float conductance_w_m2_k = in_row[i + 9u] / in_row[i + 10u];
   float core_k = in_row[i + 11u];
+  // Set up the balance without and with convection.
   vec3 plain = surface_balance(absorbed_w_m2, emissivity_frac, conductance_w_m2_k, core_k, 0.0,
                                0.0);
   vec3 film = surface_balance(absorbed_w_m2, emissivity_frac, conductance_w_m2_k, core_k,
                               in_row[i + 12u], in_row[i + 13u]);
+  // Write the results.
   bool clamped = false;
   uint o = row * 6u;
   out_row[o] = absorbed_w_m2;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emit evaluate band-radiance`: rows (T) -> in-band radiance of four bands. The constants are four
-// layouts (four floats each) and then the tables they describe.
+// Shader of `emit evaluate band-radiance`. Input row: a temperature in K. Output row: in-band radiance of four bands in
+// W m-2 sr-1. The constants are four layouts of four floats each, then the tables that they describe.
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Inputs { float in_row[]; };
 layout(std430, binding = 1) writeonly buffer Outputs { float out_row[]; };
@@ -11,6 +11,7 @@ layout(location = 0) uniform uint row_count;
 #include "lib/planck_lut.glsl"
 
 void main() {
+  // Evaluate the table of each band.
   uint row = gl_GlobalInvocationID.x;
   if (row >= row_count) return;
   bool clamped = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emit evaluate equilibrium`: rows (lambda, d, eps, Ta, Tc, hc, Tair) -> (Ts, source).
+// Shader of `emit evaluate equilibrium`. Input row: lambda, d, eps, Ta, Tc, hc, Tair. Output row: Ts, source.
 #include "lib/balance.glsl"
 #include "lib/equilibrium.glsl"
 
@@ -9,6 +9,7 @@ layout(std430, binding = 1) writeonly buffer Outputs { float out_row[]; };
 layout(location = 0) uniform uint row_count;
 
 void main() {
+  // Set up the balance of the row and solve it.
   uint row = gl_GlobalInvocationID.x;
   if (row >= row_count) return;
   uint i = row * 7u;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Fragment shader of the geometry pass. It writes what later passes need of the visible surface.
 #include "shared/frame_params.glsl.h"
 #include "passes/octahedral.glsl"
 #include "passes/surface_texel.glsl"
@@ -13,11 +14,12 @@ layout(location = 1) out uint object;
 #endif
 
 void main() {
+  // Turn the cosine of the sun to the side that faces the camera, and pack what the pixel shows.
   float cosine = gl_FrontFacing ? sample_state.w : -sample_state.w;
-  surface = packed_surface_texel(sample_state.x, sample_state.y * max(cosine, 0.0), sample_state.z, draw.ids.x,
-                                 draw.ids.z != 0u);
+  surface = packed_surface_texel(sample_state.x, sample_state.y * max(cosine, 0.0), sample_state.z, draw.material,
+                                 draw.moves != 0u);
 #ifdef EMIT_OBJECTS
-  object = draw.ids.y;
+  object = draw.object;
 #endif
 }
 #else
@@ -27,9 +29,11 @@ layout(location = 1) out vec2 normal_octahedral;
 layout(location = 2) out uvec2 material_and_object;
 
 void main() {
-  depth_m = 1.0 / gl_FragCoord.w;  // clip w is the distance along the boresight
+  // Take the distance along the boresight from clip w.
+  depth_m = 1.0 / gl_FragCoord.w;
+  // Turn the normal to the side that faces the camera.
   vec3 n = normalize(normal_relworld);
   normal_octahedral = octahedral_from_unit(gl_FrontFacing ? n : -n);
-  material_and_object = draw.ids.xy;
+  material_and_object = uvec2(draw.material, draw.object);
 }
 #endif

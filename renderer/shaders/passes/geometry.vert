@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
+// Vertex shader of the geometry pass. With EMIT_CACHED a vertex is a thermal sample of the surface.
 #include "shared/frame_params.glsl.h"
 
-// What differs from vertex to vertex comes as an attribute, the rest as a uniform block: software rasterisers
-// fetch the former much faster than texels, and the latter not once per vertex.
+// A value that differs from vertex to vertex is an attribute; the rest is a uniform block. Software rasterisers fetch
+// attributes much faster than texels, and uniforms not once per vertex.
 layout(location = EMIT_ATTR_POSITION) in vec3 position_mesh_m;
-layout(location = EMIT_ATTR_NORMAL) in vec4 normal_mesh;  // cached: w = share of the sky
+layout(location = EMIT_ATTR_NORMAL) in vec4 normal_mesh;  // EMIT_CACHED: w = share of the sky
 
 layout(std140, binding = EMIT_BIND_FRAME) uniform Frame { FrameParams frame; };
 layout(std140, binding = EMIT_BIND_DRAW) uniform Draw { DrawParams draw; };
 
 #ifdef EMIT_CACHED
-// Temperature offset in K and visible share of the sun, at the two nodes of time around now.
+// State of the sample at the node of time before the frame and at the node after it: temperature offset in K, visible
+// share of the sun.
 layout(location = EMIT_ATTR_NODE_BEFORE) in vec2 node_before;
 layout(location = EMIT_ATTR_NODE_AFTER) in vec2 node_after;
 #ifdef EMIT_SHADE
-// What entities have taken off the temperature lately, in full sun, K: pixels have their own.
+// Temperature in K that recent shade of entities has taken off the sample in full sun. It is added back here, because
+// passes/shade.comp subtracts the shade of each pixel.
 layout(location = EMIT_ATTR_SHADE) in float shade_k;
 #endif
 // Temperature in K, share of the sun, share of the sky, cosine of the sun's incidence on the front.
@@ -24,15 +27,17 @@ out vec3 normal_relworld;
 #endif
 
 void main() {
+  // Turn the normal into relworld axes.
   vec3 n = draw.normal_from_mesh[0].xyz * normal_mesh.x + draw.normal_from_mesh[1].xyz * normal_mesh.y +
            draw.normal_from_mesh[2].xyz * normal_mesh.z;
 #ifdef EMIT_CACHED
-  float cosine = dot(n, frame.sun_now.xyz) * inversesqrt(max(dot(n, n), 1e-30)) * frame.sun_now.w;
-  vec2 now = mix(node_before, node_after, frame.samples.x);
+  // Interpolate the state of the sample between the two nodes of time.
+  float cosine = dot(n, frame.to_sun) * inversesqrt(max(dot(n, n), 1e-30)) * frame.sun_up;
+  vec2 now = mix(node_before, node_after, frame.node_frac);
 #ifdef EMIT_SHADE
   now.x += shade_k * now.y * max(cosine, 0.0);
 #endif
-  sample_state = vec4(frame.obscurance.y + now.x, now.y, normal_mesh.w, cosine);
+  sample_state = vec4(frame.reference_k + now.x, now.y, normal_mesh.w, cosine);
 #else
   normal_relworld = n;
 #endif

@@ -1,33 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
 // Percentage-closer soft shadows (Fernando 2005) for the sun's disc, in metres of light space.
-// Two things are added to the published method, at the same number of taps. Depths are compared on
-// the receiver's own plane at every texel, so that slopes need no bias. And the taps are spread along
-// the drift of the shadow over the interval (CascadeParams.drift), which turns the shade at one instant
-// into its mean over the interval and removes the bands of a coarse history.
+// Two things are added to the published method at the same number of taps. Depths are compared on the receiver's own
+// plane at every texel, so slopes need no bias. The taps are spread along the drift of the shadow over the interval
+// (CascadeParams.drift_frac). This turns the shade at one instant into its mean over the interval and removes the bands
+// of a coarse history.
 
 layout(binding = EMIT_TEX_SHADOW) uniform sampler2DArray shadow_maps;
 layout(std140, binding = EMIT_BIND_STEP) uniform Step { StepParams step_params; };
 layout(std140, binding = EMIT_BIND_TAPS) uniform Taps { TapParams taps; };
 
-// Radius in texels beyond which the search for blockers is too sparse to be trusted alone.
+// Search radius in texels above which the taps of the blocker search are too sparse to be trusted alone.
 const float kWideSearchPx = 16.0;
 
-// Share of the sun's disc seen from a point, 0..1.
+// Share of the sun's disc that a point sees, 0..1. `n` is the unit normal of the receiver, relworld. `boresight_m` is
+// the distance of the point along the boresight.
 float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
-  if (step_params.info.x == 0u) return 1.0;
+  // Choose the light frustum that serves the distance of the point.
+  if (step_params.cascade_count == 0u) return 1.0;
   uint cascade = 0u;
-  while (cascade + 1u < step_params.info.x && boresight_m > step_params.cascades[cascade].scale.w) ++cascade;
+  while (cascade + 1u < step_params.cascade_count && boresight_m > step_params.cascades[cascade].end_boresight_m) {
+    ++cascade;
+  }
   vec4 row0 = step_params.cascades[cascade].light_row0;
   vec4 row1 = step_params.cascades[cascade].light_row1;
   vec4 row2 = step_params.cascades[cascade].light_row2;
-  vec3 scale = step_params.cascades[cascade].scale.xyz;
-  vec2 drift = step_params.cascades[cascade].drift.xy;
-  vec2 casters = step_params.casters.xy;
+  vec3 scale = step_params.cascades[cascade].scale_per_m;
+  vec2 drift = step_params.cascades[cascade].drift_frac;
 
+  // Transform point and normal into light space.
   vec4 p = vec4(p_relworld_m, 1.0);
   vec3 light_m = vec3(dot(row0, p), dot(row1, p), dot(row2, p));
   vec3 n_light = vec3(dot(row0.xyz, n), dot(row1.xyz, n), dot(row2.xyz, n));
-  // Slope of the receiver's plane; the sun's height over the plane is held at 3 degrees or more.
+  // Compute the slope of the receiver's plane. The sun's height over the plane is held at 3 degrees or more.
   vec2 slope = -n_light.xy / min(n_light.z, -0.05);
 
   vec2 map_px = vec2(textureSize(shadow_maps, 0).xy);
@@ -37,20 +41,20 @@ float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
   float bias_m = 0.1 * texel_max_m * (1.0 + length(slope)) + 1e-3;
   float tan_sun = tan(EMIT_SUN_SEMI_ANGLE_RAD);
 
-  // From here on in texels across the map and in its own unit of depth.
+  // Convert lengths to texels across the map and depth to the map's own unit.
   vec2 at_px = light_m.xy * px_per_m;
   vec2 drift_px = drift * px_per_m;
   vec2 slope_px = slope * texel_m * scale.z;
   float limit = (light_m.z - bias_m) * scale.z;
 
-  // Blockers may stand anywhere below the highest caster, along the line to the sun.
-  float rise_to_top_m = max(casters.x - p_relworld_m.z, 0.0);
-  float max_gap_m = min(light_m.z, rise_to_top_m / max(casters.y, 1e-3) + texel_max_m);
+  // Search for blockers. They may stand anywhere below the highest caster, along the line to the sun.
+  float rise_to_top_m = max(step_params.casters_top_m - p_relworld_m.z, 0.0);
+  float max_gap_m = min(light_m.z, rise_to_top_m / max(step_params.casters_sun_sine, 1e-3) + texel_max_m);
   vec2 search_px = max(max_gap_m * tan_sun, 1.5 * texel_max_m) * px_per_m;
   float blocker_sum = 0.0;
   float blockers = 0.0;
   for (uint i = 0u; i < EMIT_BLOCKER_TAPS; ++i) {
-    // Near blockers drift little, far ones much: the taps try distances from near to far.
+    // Try distances from near to far, because near blockers drift little and far blockers much.
     vec4 tap = taps.blocker[i];
     vec2 texel = floor(at_px + tap.xy * search_px + drift_px * (tap.z * tap.w * max_gap_m));
     if (any(lessThan(texel, vec2(0.0))) || any(greaterThanEqual(texel, map_px))) continue;
@@ -60,8 +64,8 @@ float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
       blockers += 1.0;
     }
   }
-  // With something very tall in the scene (a mast, a mountain) the search is so wide that its taps
-  // step over what stands near: then the receiver's own line to the sun is looked along as well.
+  // Look along the receiver's own line to the sun too when the search is wide. With something very tall in the scene
+  // (a mast, a mountain) the taps step over things that stand near.
   if (blockers == 0.0 && max(search_px.x, search_px.y) > kWideSearchPx) {
     vec2 texel = floor(at_px);
     if (all(greaterThanEqual(texel, vec2(0.0))) && all(lessThan(texel, map_px))) {
@@ -74,15 +78,16 @@ float sun_visibility(vec3 p_relworld_m, vec3 n, float boresight_m) {
   }
   if (blockers == 0.0) return 1.0;
 
+  // Compute the radius of the filter from the mean distance of the blockers.
   float gap_m = max(light_m.z - blocker_sum / (blockers * scale.z), 0.0);
   vec2 filter_px = max(gap_m * tan_sun, 0.5 * texel_max_m) * px_per_m;
   vec2 gap_drift_px = drift_px * gap_m;
   vec2 texel_uv = 1.0 / map_px;
-  // Steps of the plane to the gathered texels, in the order (0,1) (1,1) (1,0) (0,0).
+  // Compute the steps of the plane to the gathered texels, in the order (0,1) (1,1) (1,0) (0,0).
   vec4 rise = vec4(slope_px.y, slope_px.x + slope_px.y, slope_px.x, 0.0);
   float lit = 0.0;
   for (uint i = 0u; i < EMIT_FILTER_TAPS; ++i) {
-    // Bilinear mean of four comparisons, each on the receiver's plane at its texel's centre.
+    // Take the bilinear mean of four comparisons, each on the receiver's plane at the centre of its texel.
     vec4 tap = taps.filter_[i];
     vec2 offset_px = tap.xy * filter_px + gap_drift_px * tap.z - 0.5;
     vec2 corner = floor(at_px + offset_px);

@@ -1,35 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
-// In-band radiance at the aperture: emission and reflection of the surface, through the atmosphere;
-// sky where there is no surface. Writes the planes that are read back, NaN and Inf counted and
-// replaced by zero. Compiled for what the scenario has:
+// Computes the in-band radiance at the aperture: emission and reflection of the surface through the atmosphere, and sky
+// where there is no surface. It writes the planes that are read back. NaN and Inf are counted and replaced by zero.
+// The scenario decides what the shader is compiled with:
 //   EMIT_BANDS      number of bands
-//   EMIT_AIR_TERMS  bit per band: exponential terms of the atmosphere, at most EMIT_TERMS of them
-//   EMIT_AIR_TABLE  bit per band: a table of the atmosphere in their place
-//   EMIT_OUTPUTS    EMIT_OUTPUT_* planes
-//   EMIT_ROWS       of 8 x 8 pixels that a group does, one above the other
+//   EMIT_AIR_TERMS  bit per band: the air is a sum of at most EMIT_TERMS exponential terms
+//   EMIT_AIR_TABLE  bit per band: the air is a table
+//   EMIT_OUTPUTS    planes besides radiance, EMIT_OUTPUT_*
+//   EMIT_ROWS       number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "passes/gbuffer.glsl"
 #include "passes/tables.glsl"
 #include "passes/surface_texel.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(std140, binding = EMIT_BIND_BANDS) uniform Bands { BandParams band_uniforms[EMIT_MAX_BANDS]; };
-BandParams bands[EMIT_BANDS];  // read once, as the frame's
+BandParams bands[EMIT_BANDS];  // copied once, like the parameters of the frame
 layout(binding = EMIT_TEX_BAND_LUT) uniform samplerBuffer band_lut;
 layout(std430, binding = EMIT_BIND_OUTPUT) writeonly buffer Planes { float planes[]; };
 layout(std430, binding = EMIT_BIND_STATS) buffer Stats { FrameStatsGpu stats; };
 
 #define EMIT_PLANCK_LUT(index) texelFetch(band_lut, index).r
 #include "lib/planck_lut.glsl"
-// Tables of the air lie behind those of the bands.
+// The tables of the air lie in the same buffer, behind those of the bands.
 #define EMIT_ATMOSPHERE_TABLE(index) texelFetch(band_lut, index).r
 #include "lib/atmosphere_table.glsl"
 
-// What a pixel shows; where that is sky only `boresight_m` counts.
+// Surface that a pixel shows. For a pixel of the sky only `boresight_m` is used.
 struct Seen {
   float boresight_m;
   float temperature_k;
   float open_frac;   // share of the hemisphere that shows sky, cosine-weighted
-  float sun_cosine;  // of the sun's incidence times its visible share
+  float sun_cosine;  // cosine of the sun's incidence times the visible share of the sun
   uint material;
   uint object;
 };
@@ -37,11 +37,12 @@ struct Seen {
 #ifdef EMIT_CACHED
 layout(binding = EMIT_TEX_SURFACE) uniform usampler2D surface_texture;
 
+// Reads what a pixel shows of the sampled surface.
 Seen seen_at(ivec2 px) {
   uvec2 texel = texelFetch(surface_texture, px, 0).rg;
-  // Reversed depth; where nothing was drawn it is 0, and the texel what it was.
+  // Convert the reversed depth. It is 0 where nothing was drawn; there the texel is left from an older frame.
   float depth = texelFetch(depth_texture, px, 0).r;
-  float boresight_m = depth > 0.0 ? frame.samples.y / depth : EMIT_SKY_DEPTH_M;
+  float boresight_m = depth > 0.0 ? frame.near_m / depth : EMIT_SKY_DEPTH_M;
   uint object = (EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u ? texelFetch(ids_texture, px, 0).r : 0u;
   return Seen(boresight_m, texel_temperature_k(texel), texel_open_frac(texel), texel_sun_cosine(texel),
               texel_material(texel), object);
@@ -51,41 +52,46 @@ layout(binding = EMIT_TEX_OCCLUSION) uniform sampler2D occlusion_texture;
 layout(binding = EMIT_TEX_STATE) uniform sampler2D state_texture;
 layout(binding = EMIT_TEX_SUN_NOW) uniform sampler2D sun_now_texture;
 
+// Surface temperature of a pixel in K, from the states of the thermal passes.
 float temperature_at(ivec2 px, int material) {
   vec4 start = material_start(material);
-  if (start.z > 0.5) return frame.obscurance.y + start.y;
+  if (start.z > 0.5) return frame.reference_k + start.y;
 #ifdef EMIT_FOSTER
   vec4 x = texelFetch(state_texture, px, 0);
-  return frame.obscurance.y + (start.w + ((x.x + x.y) + (x.z + x.w)));
+  return frame.reference_k + (start.w + ((x.x + x.y) + (x.z + x.w)));
 #else
   vec2 x = texelFetch(state_texture, px, 0).rg;
-  // Weights are the same in every interval: those of the first are read.
+  // Read the weights of the first interval. They are the same in every interval.
   float weight0_frac = relaxation_mode(material, 0).z;
   float weight1_frac = relaxation_mode(material, 1).z;
-  return frame.obscurance.y + (weight0_frac * x.x + weight1_frac * x.y);
+  return frame.reference_k + (weight0_frac * x.x + weight1_frac * x.y);
 #endif
 }
 
+// Reads what a pixel shows from the geometry buffer and the results of the thermal passes.
 Seen seen_at(ivec2 px) {
   uvec2 ids = gbuffer_ids(px);
   vec3 n = gbuffer_normal(px);
   float open_frac = min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0) * 0.5 * (1.0 + n.z);
-  float sun_frac = frame.sun_now.w > 0.0 ? texelFetch(sun_now_texture, px, 0).r : 0.0;
+  float sun_frac = frame.sun_up > 0.0 ? texelFetch(sun_now_texture, px, 0).r : 0.0;
   return Seen(gbuffer_depth_m(px), temperature_at(px, int(ids.x)), open_frac,
-              sun_frac * max(dot(n, frame.sun_now.xyz), 0.0), ids.x, ids.y);
+              sun_frac * max(dot(n, frame.to_sun), 0.0), ids.x, ids.y);
 }
 #endif
 
-// Relative air mass after Kasten and Young (1989), 1 at the zenith, 38 at the horizon.
+// Relative air mass of Kasten and Young (1989), physics.md eq. 10: 1 at the zenith, 38 at the horizon.
 float air_mass(float sin_elevation) {
   float elevation_deg = asin(clamp(sin_elevation, 0.0, 1.0)) * (180.0 / EMIT_PI);
   return 1.0 / (max(sin_elevation, 0.0) + 0.50572 * exp(-1.6364 * log(elevation_deg + 6.07995)));
 }
 
+// Band radiance of the sky in W m-2 sr-1, for air that is a sum of exponential terms.
 float sky_radiance_w_m2_sr(uint band, float sin_elevation) {
-  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log(max(bands[band].vertical_transmittance_frac, 1e-30)) * air_mass(sin_elevation)));
+  float log_vertical = log(max(bands[band].vertical_transmittance_frac, 1e-30));
+  return bands[band].air_radiance_w_m2_sr * (1.0 - exp(log_vertical * air_mass(sin_elevation)));
 }
 
+// Transmittance of the air over a range, 0..1, as a sum of exponential terms.
 float transmittance(uint band, float range_m) {
   float sum = 0.0;
   for (int term = 0; term < EMIT_TERMS; ++term) {
@@ -94,38 +100,49 @@ float transmittance(uint band, float range_m) {
   return sum;
 }
 
-// Leaves the surface in the band, W m-2 sr-1.
+// Place and size of the band's table of the air, as lib/atmosphere_table.glsl takes it.
+uvec4 air_table(uint band) {
+  return uvec4(bands[band].air_table_first, bands[band].air_table_ranges, bands[band].air_table_elevations, 0u);
+}
+
+// Band radiance that leaves the surface, W m-2 sr-1. Sets `clamped` where the temperature lies outside the table.
 float leaving_w_m2_sr(uint band, Seen seen, inout bool clamped) {
-  vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node, float(band * frame.bands.x));
-  float emissivity_frac = texelFetch(band_lut, int(frame.bands.y + seen.material * EMIT_BANDS + band)).r;
+  vec4 lut = vec4(bands[band].lut_first_k, bands[band].lut_nodes_per_k, bands[band].lut_last_node,
+                  float(band * frame.band_lut_nodes));
+  float emissivity_frac = texelFetch(band_lut, int(frame.first_emissivity + seen.material * EMIT_BANDS + band)).r;
   float emitted = emissivity_frac * planck_lut_radiance_w_m2_sr(seen.temperature_k, lut, clamped);
-  // Diffuse reflection: the open part of the hemisphere shows sky, the rest the surroundings.
+  // Add the diffuse reflection. The open part of the hemisphere shows sky, the rest the surroundings.
   float incoming = mix(bands[band].surroundings_radiance_w_m2_sr, bands[band].sky_hemisphere_w_m2_sr, seen.open_frac);
   incoming += bands[band].sun_irradiance_w_m2 / EMIT_PI * seen.sun_cosine;
   return emitted + (1.0 - emissivity_frac) * incoming;
 }
 
+// Computes and writes all planes of one pixel.
 void write_pixel(ivec2 px) {
-  if (any(greaterThanEqual(px, ivec2(frame.format_window_px.zw)))) return;
-  uint pixel = uint(px.y) * frame.format_px.x + uint(px.x);
-  uint plane_px = frame.format_px.z;
+  // Leave pixels outside the window.
+  if (any(greaterThanEqual(px, ivec2(frame.rendered_window_px.zw)))) return;
+  uint pixel = uint(px.y) * frame.rendered_px.x + uint(px.x);
+  uint plane_px = frame.rendered_plane_px;
+  // Read what the pixel shows and the elevation of its line of sight.
   Seen seen = seen_at(px);
   vec3 ray = sensor_ray(px);
   float ray_length = length(ray);
-  float sin_elevation = dot(vec3(frame.relworld_from_sensor[0].z, frame.relworld_from_sensor[1].z, frame.relworld_from_sensor[2].z), ray) / ray_length;
+  vec3 up = vec3(frame.relworld_from_sensor[0].z, frame.relworld_from_sensor[1].z, frame.relworld_from_sensor[2].z);
+  float sin_elevation = dot(up, ray) / ray_length;
   bool surface = seen.boresight_m < EMIT_SKY_DEPTH_M;
   bool clamped = false;
   bool nonfinite = false;
 
-  // Chosen between rather than branched to, where both sides are cheap: software rasterisers run both anyway.
+  // Compute the radiance of each band. Where both sides are cheap the code selects and does not branch, because
+  // software rasterisers run both sides of a branch anyway.
   for (uint i = 0u; i < EMIT_BANDS; ++i) {
     bool off_table = false;
     float leaving = leaving_w_m2_sr(i, seen, off_table);
     clamped = clamped || (surface && off_table);
     float radiance_w_m2_sr = surface ? leaving : 0.0;
     if ((EMIT_AIR_TABLE >> i & 1u) != 0u) {
-      vec2 air = surface ? atmosphere_table_air(bands[i].atmosphere_table, seen.boresight_m * ray_length, sin_elevation, clamped)
-                         : atmosphere_table_out(bands[i].atmosphere_table, sin_elevation, clamped);
+      vec2 air = surface ? atmosphere_table_air(air_table(i), seen.boresight_m * ray_length, sin_elevation, clamped)
+                         : atmosphere_table_out(air_table(i), sin_elevation, clamped);
       radiance_w_m2_sr = air.x * radiance_w_m2_sr + air.y;
     } else if ((EMIT_AIR_TERMS >> i & 1u) != 0u) {
       if (surface) {
@@ -140,6 +157,7 @@ void write_pixel(ivec2 px) {
     planes[i * plane_px + pixel] = finite ? radiance_w_m2_sr : 0.0;
   }
 
+  // Write the other planes that are asked for.
   uint plane = EMIT_BANDS;
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_TEMPERATURE) != 0u) {
     planes[plane++ * plane_px + pixel] = surface ? seen.temperature_k : uintBitsToFloat(0x7fc00000u);
@@ -147,14 +165,20 @@ void write_pixel(ivec2 px) {
   if ((EMIT_OUTPUTS & EMIT_OUTPUT_DEPTH) != 0u) {
     planes[plane++ * plane_px + pixel] = surface ? seen.boresight_m : uintBitsToFloat(0x7f800000u);
   }
-  if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
-  if (nonfinite || clamped) atomicAdd(stats.flagged_px[(nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0)], 1u);
+  if ((EMIT_OUTPUTS & EMIT_OUTPUT_OBJECT) != 0u) {
+    planes[plane++ * plane_px + pixel] = surface ? float(seen.object) : 0.0;
+  }
+  // Count the pixel if it is flagged.
+  int flags = (nonfinite ? EMIT_FLAG_NONFINITE : 0) + (clamped ? EMIT_FLAG_CLAMPED : 0);
+  if (flags != 0) atomicAdd(stats.flagged_px[flags], 1u);
 }
 
 void main() {
+  // Copy the uniforms once for all pixels of the invocation.
   read_frame();
   for (uint i = 0u; i < EMIT_BANDS; ++i) bands[i] = band_uniforms[i];
+  // Write one pixel in each block of the work group.
   uvec2 first_px = gl_WorkGroupID.xy * uvec2(8u, 8u * EMIT_ROWS) + gl_LocalInvocationID.xy;
-  ivec2 px = ivec2(first_px + frame.format_window_px.xy);
+  ivec2 px = ivec2(first_px + frame.rendered_window_px.xy);
   for (uint row = 0u; row < EMIT_ROWS; ++row) write_pixel(px + ivec2(0, 8 * int(row)));
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shade of entities on what stands still, where triangles are too large for it: changes the geometry buffer of
-// samples. Pages change the temperature, by what entities have shaded lately; silhouettes the sunlight, by where
-// they stand now. Only squares of the picture that some of them may reach are looked at, each with those alone.
-//   EMIT_ROWS  of 8 x 8 pixels that a group does, one above the other
+// Puts the shade of entities on static surfaces, where triangles are too large to show it. It changes the geometry
+// buffer of the samples. Exposure tiles ("pages") lower the temperature where entities have cast shade lately. Entity
+// shadow depth maps ("silhouettes") reduce the sunlight where entities stand now. Work is done only in the screen tiles
+// that some of them may reach, and each screen tile lists those that may reach it.
+//   EMIT_ROWS  number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "shared/shade_params.glsl.h"
 #include "passes/gbuffer.glsl"
 #include "passes/surface_texel.glsl"
@@ -19,20 +20,24 @@ layout(binding = EMIT_TEX_SILHOUETTE_PARAMS) uniform samplerBuffer silhouette_pa
 layout(binding = EMIT_TEX_SHADE_TILES) uniform usamplerBuffer shade_tiles;
 layout(binding = EMIT_TEX_SHADE_LIST) uniform usamplerBuffer shade_list;
 
-// Software rasterisers run both sides of a branch, but leave loops that nobody is in: those over one thing, too.
+// Loops with at most one turn stand for branches here: software rasterisers run both sides of a branch, but leave a
+// loop that no lane is in.
 
-// What entities have taken off the temperature of a surface that faces the sun.
+// Temperature in K that recent shade has taken off a surface that faces the sun, by exposure tile `page` (physics.md
+// eq. 25). `p` is the point in relworld axes.
 float cooler_k(vec3 p, uint material, int page) {
-  vec4 place = texelFetch(page_params, page * EMIT_PAGE_TEXELS);
+  // Follow the sun's ray from the point to the plane of the tile.
+  vec4 place = texelFetch(page_params, page * EMIT_PAGE_TEXELS);  // first_x_m, first_y_m, plane_m, texels_per_m
   float height_m = p.z - place.z;
-  vec2 at = (p.xy - height_m * shade.slope.xy - place.xy) * place.w;
-  // Own texels end half way to those of the rim.
+  vec2 at = (p.xy - height_m * shade.slope - place.xy) * place.w;
+  // Leave points outside the tile. Its own texels end half way to the texels of its rim.
   bool inside = all(greaterThanEqual(at, vec2(0.5))) && all(lessThan(at, vec2(float(EMIT_PAGE_SIDE) - 1.5)));
   float sum_k = 0.0;
   for (int looks = inside ? 1 : 0; looks > 0; --looks) {
-    vec4 range = texelFetch(page_params, page * EMIT_PAGE_TEXELS + 1);
-    // What lies between the sun and the entity takes nothing of it.
+    vec4 range = texelFetch(page_params, page * EMIT_PAGE_TEXELS + 1);  // reach_m, lowest_m, layer
+    // Leave points above the height at which the shade began: they lie between the sun and the entity.
     float top_m = texelFetch(tops_texture, ivec3(ivec2(at + 0.5), int(range.z)), 0).r;
+    // Weigh the modes of the response of the material.
     vec4 shaded = textureLod(pages_texture, vec3((at + 0.5) / float(EMIT_PAGE_SIDE), range.z), 0.0);
     vec4 left_frac = texelFetch(page_params, page * EMIT_PAGE_TEXELS + 2);
     vec4 weight_k = texelFetch(response_table, int(material));
@@ -42,16 +47,20 @@ float cooler_k(vec3 p, uint material, int page) {
   return sum_k;
 }
 
-// Share of the sun's disc that a silhouette leaves.
+// Share of the sun's disc that entity shadow depth map `silhouette` leaves at the point `p` (relworld), 0..1.
 float lit_frac(vec3 p, int silhouette) {
+  // Find the point on the map.
   int texel = silhouette * EMIT_SILHOUETTE_TEXELS;
   vec4 point = vec4(p, 1.0);
-  vec2 at = vec2(dot(texelFetch(silhouette_params, texel), point), dot(texelFetch(silhouette_params, texel + 1), point));
+  vec2 at = vec2(dot(texelFetch(silhouette_params, texel), point),
+                 dot(texelFetch(silhouette_params, texel + 1), point));
   float depth_m = dot(texelFetch(silhouette_params, texel + 2), point);
-  vec4 penumbra = texelFetch(silhouette_params, texel + 3);
+  // Compute the radius of the sun's disc on the map.
+  vec4 penumbra = texelFetch(silhouette_params, texel + 3);  // mean_depth_m, penumbra_texels_per_m, layer
   float radius = max(0.5, (depth_m - penumbra.x) * penumbra.y);
   float side = float(textureSize(silhouettes_texture, 0).x);
   bool within = all(greaterThan(at, vec2(-radius))) && all(lessThan(at, vec2(side + radius)));
+  // Count the taps whose texel lies in front of the point.
   int taps = within ? EMIT_SHADE_TAPS : 0;
   float shaded = 0.0;
   for (int i = 0; i < taps; ++i) {
@@ -64,13 +73,16 @@ float lit_frac(vec3 p, int silhouette) {
   return 1.0 - shaded / float(EMIT_SHADE_TAPS);
 }
 
+// Applies the entries of a screen tile to one pixel.
 void shade_pixel(ivec2 px, uvec4 tile) {
-  bool seen = all(lessThan(px, ivec2(frame.format_window_px.zw)));
+  // Read the surface of the pixel. Only a lit, static surface inside the window takes shade.
+  bool seen = all(lessThan(px, ivec2(frame.rendered_window_px.zw)));
   float depth = seen ? texelFetch(depth_texture, px, 0).r : 0.0;
   uvec2 texel = imageLoad(surface_image, px).rg;
-  vec3 p = view_ray(px) * (frame.samples.y / depth);
+  vec3 p = view_ray(px) * (frame.near_m / depth);
   float sun_cosine = texel_sun_cosine(texel);
   bool lit = depth > 0.0 && !texel_moves(texel) && sun_cosine > 0.0;
+  // Add up how much colder the exposure tiles make the surface.
   int first = int(tile.y);
   int behind_pages = lit ? first + int(tile.z) : first;
   int last = lit ? behind_pages + int(tile.w) : behind_pages;
@@ -78,9 +90,11 @@ void shade_pixel(ivec2 px, uvec4 tile) {
   for (int i = first; i < behind_pages; ++i) {
     colder_k += cooler_k(p, texel_material(texel), int(texelFetch(shade_list, i).r));
   }
-  // Temperatures go by the sun that what stands still leaves: this takes more of it away.
+  // Multiply the shares of the sun that the shadow depth maps leave. The texel holds the share that static surfaces
+  // leave.
   float left_frac = 1.0;
   for (int i = behind_pages; i < last; ++i) left_frac *= lit_frac(p, int(texelFetch(shade_list, i).r));
+  // Write the pixel if it changed.
   if (colder_k == 0.0 && left_frac == 1.0) return;
   texel = packed_surface_texel(texel_temperature_k(texel) - sun_cosine * colder_k, left_frac * sun_cosine,
                                texel_open_frac(texel), texel_material(texel), false);
@@ -88,6 +102,7 @@ void shade_pixel(ivec2 px, uvec4 tile) {
 }
 
 void main() {
+  // Find the screen tile of the work group and its first pixel.
   read_frame();
   uvec4 tile = texelFetch(shade_tiles, int(gl_WorkGroupID.z));
   uvec2 first_px = uvec2(tile.x & 0xffffu, tile.x >> 16) + gl_WorkGroupID.xy * uvec2(8u, 8u * EMIT_ROWS);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emit bench stability`: in-band radiance at random temperatures drawn from their numbers. Per
-// case: radiance, 1 if clamped. The constants are the band's table.
+// Shader of `emit bench stability`: in-band radiance at random temperatures. A case draws its temperature from its
+// number. Output row: radiance in W m-2 sr-1, 1 if clamped. The constants are the table of the band.
 #include "shared/stability_inputs.glsl.h"
 
 layout(local_size_x = 64) in;
@@ -15,6 +15,7 @@ layout(location = 3) uniform vec4 layout_lut;
 #include "lib/planck_lut.glsl"
 
 void main() {
+  // Draw the temperature of the case and evaluate the table.
   uint row = gl_GlobalInvocationID.x;
   if (row >= case_count) return;
   bool clamped = false;

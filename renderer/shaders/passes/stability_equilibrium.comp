@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emit bench stability`: equilibrium temperatures of random surfaces (EMIT_DOMAIN), drawn from
-// their numbers. Per case: temperature, 1 if clamped. With EMIT_CLOSED_FORMS also the published
-// Eq. 6 as typeset, with its outer root closed where the derivation closes it, and an equivalent
-// form that does not cancel.
+// Shader of `emit bench stability`: equilibrium temperatures of random surfaces. A case draws its surface from its
+// number in the domain EMIT_DOMAIN. Output row: temperature in K, 1 if clamped. With EMIT_CLOSED_FORMS the row also
+// holds the published Eq. 6 as typeset, Eq. 6 with its outer root closed where the derivation closes it, and an
+// equivalent form that does not cancel.
 #include "lib/balance.glsl"
 #include "lib/equilibrium.glsl"
 #include "shared/stability_inputs.glsl.h"
@@ -18,7 +18,7 @@ const uint kStride = 5u;
 
 float cube_root(float x) { return pow(x, 1.0 / 3.0); }
 
-// (as typeset, corrected, without cancellation), K
+// Three closed forms of the temperature in K: as typeset, corrected, without cancellation.
 vec3 closed_forms(SurfaceInput s) {
   float b = s.thickness_m * EMIT_STEFAN_BOLTZMANN_W_M2_K4 * s.emissivity_frac / s.conductivity_w_m_k;
   float t_b = 1.0 / cube_root(b);
@@ -44,6 +44,7 @@ const uint kStride = 2u;
 #endif
 
 void main() {
+  // Draw the surface of the case.
   uint row = gl_GlobalInvocationID.x;
   if (row >= case_count) return;
   uint index = first_case + row;
@@ -57,6 +58,7 @@ void main() {
                                  s.emissivity_frac, s.conductivity_w_m_k / s.thickness_m, s.core_k,
                                  s.film_w_m2_k, s.air_k);
 #endif
+  // Solve its balance.
   out_row[kStride * row] = equilibrium_k(balance.x, balance.y, balance.z, clamped);
   out_row[kStride * row + 1u] = clamped ? 1.0 : 0.0;
 #ifdef EMIT_CLOSED_FORMS

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows what the device draws for a case (EMIT_DOMAIN), as bits, so that the CPU can compare.
+// Shader of `emit bench stability`: the inputs that the device draws for a case in the domain EMIT_DOMAIN, as bits. The
+// CPU compares them with its own.
 #include "shared/stability_inputs.glsl.h"
 
 layout(local_size_x = 64) in;
@@ -9,6 +10,7 @@ layout(location = 1) uniform uint case_count;
 layout(location = 2) uniform uint seed;
 
 void main() {
+  // Draw all inputs of the case and write their bits.
   uint row = gl_GlobalInvocationID.x;
   if (row >= case_count) return;
   uint index = first_case + row;

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emit bench stability`: many relaxation steps per case, some per dispatch: Mesa's software
-// rasteriser leaves the loops of an invocation after 65535 turns without a word. The constants hold
-// per case the number of steps (as a float, exact), 1 for a linear drive, the start offset, and the
-// gains (start, end) of four step lengths that follow each other in turn. The drive is drawn from
-// case and node.
+// Shader of `emit bench stability`: many relaxation steps per case. A dispatch does some of them, because Mesa's
+// software rasteriser leaves the loops of an invocation after 65535 turns without an error. The constants hold for each
+// case the number of steps (as an exact float), 1 for a linear drive, the start offset in K, and the gains (start, end)
+// of four step lengths that take turns. The drive is drawn from the numbers of case and node.
 #include "lib/relaxation.glsl"
 #include "shared/stability_inputs.glsl.h"
 
@@ -14,9 +13,10 @@ layout(location = 0) uniform uint first_case;
 layout(location = 1) uniform uint case_count;
 layout(location = 2) uniform uint seed;
 layout(location = 4) uniform uint first_step;
-layout(location = 5) uniform uint last_step;  // one past it
+layout(location = 5) uniform uint last_step;  // one past the last step of the dispatch
 
 void main() {
+  // Read the case and the state that the previous dispatch left.
   uint row = gl_GlobalInvocationID.x;
   if (row >= case_count) return;
   uint index = first_case + row;
@@ -25,6 +25,7 @@ void main() {
   bool is_linear = case_row[at + 1u] != 0.0;
   float x = first_step == 0u ? case_row[at + 2u] : out_row[row];
   float u0 = drive_offset_k(seed, index, first_step);
+  // Step with drives drawn on the way.
   for (uint step = first_step; step < end; ++step) {
     uint gains = at + 3u + 2u * (step & 3u);
     vec2 gains_frac = vec2(case_row[gains], case_row[gains + 1u]);

@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables that every pixel reads at its own place.
-layout(binding = EMIT_TEX_MATERIALS) uniform samplerBuffer material_table;      // MaterialParams
+// Functions that read the material table and the relaxation table. Every pixel reads them at its own index.
+layout(binding = EMIT_TEX_MATERIALS) uniform samplerBuffer material_table;     // MaterialParams
 layout(binding = EMIT_TEX_RELAXATION) uniform samplerBuffer relaxation_table;  // RelaxationParams
 
-// solar absorptance, emissivity, conductance in W m-2 K-1, base temperature in K
+// Surface of a material: solar absorptance, emissivity, conductance in W m-2 K-1, base temperature in K.
 vec4 material_surface(int material) { return texelFetch(material_table, material * 3); }
 
-// initial offset in K, prescribed offset in K, 1 if prescribed, base offset in K
+// Temperatures of a material: initial offset in K, prescribed offset in K, 1 if prescribed, base offset in K.
 vec4 material_start(int material) { return texelFetch(material_table, material * 3 + 1); }
 
+// Resistances of the four modes of a material in m2 K W-1.
 vec4 material_resistance_m2k_w(int material) { return texelFetch(material_table, material * 3 + 2); }
 
-// gains at the start and the end, weight
+// Mode 0 or 1 of emit2014: gain at the start, gain at the end, weight, 0.
 vec4 relaxation_mode(int entry, int mode) { return texelFetch(relaxation_table, entry * 2 + mode); }
+
+// Gains of the four modes of foster for the flux at the start of a step.
+vec4 foster_start_frac(int entry) { return texelFetch(relaxation_table, entry * 2); }
+
+// Gains of the four modes of foster for the flux at the end of a step.
+vec4 foster_end_frac(int entry) { return texelFetch(relaxation_table, entry * 2 + 1); }

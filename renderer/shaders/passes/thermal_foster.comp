@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// One interval of the thermal history for every visible surface point, with convection, layers and
-// surroundings: soft shadow, surface balance, four flux-driven states. Inside an interval the shade
-// is constant (its mean) and everything else linear; the interval is split until step doubling finds
-// nothing above the tolerance.
+// Advances every visible surface point over one interval of the thermal history, with convection, layers and
+// surroundings: soft shadow, surface balance, four flux-driven states (physics.md eq. 16 to 18). Inside an interval the
+// shade is constant, at its mean, and everything else is linear. The interval is split until doubling the number of
+// steps changes nothing by more than the tolerance.
 #include "passes/gbuffer.glsl"
 #include "passes/pcss.glsl"
 #include "passes/tables.glsl"
@@ -15,9 +15,9 @@ layout(binding = EMIT_TEX_OCCLUSION) uniform sampler2D occlusion_texture;
 layout(binding = EMIT_TEX_SPIN_UP) uniform samplerBuffer spin_up_table;
 layout(rgba32f, binding = EMIT_IMG_STATE) uniform image2D state_image;
 
-// States before the first interval, by material and direction: bilinear over an octahedral grid.
+// States before the first interval for a material and a direction, bilinear over an octahedral grid of directions.
 vec4 spun_up_states(int material, vec3 n) {
-  int nodes = int(frame.obscurance.w);
+  int nodes = int(frame.spin_up_nodes);
   vec2 place = (octahedral_from_unit(n) * 0.5 + 0.5) * float(nodes - 1);
   ivec2 low = clamp(ivec2(floor(place)), ivec2(0), ivec2(nodes - 2));
   vec2 weight = place - vec2(low);
@@ -27,38 +27,43 @@ vec4 spun_up_states(int material, vec3 n) {
   return mix(south, north, weight.y);
 }
 
-// Absorbed flux but for the direct sun. `surface` is the first texel of the material.
-float absorbed_indirect_w_m2(vec4 surface, vec4 flux, float sky_frac) {
-  float short_wave = sky_frac * flux.x + (1.0 - sky_frac) * flux.z;
-  float long_wave = sky_frac * flux.y + (1.0 - sky_frac) * flux.w;
+// Absorbed flux without the direct sun. `surface` is the first texel of the material.
+float absorbed_indirect_w_m2(vec4 surface, float diffuse_w_m2, float longwave_w_m2, float reflected_w_m2,
+                             float environment_w_m2, float sky_frac) {
+  float short_wave = sky_frac * diffuse_w_m2 + (1.0 - sky_frac) * reflected_w_m2;
+  float long_wave = sky_frac * longwave_w_m2 + (1.0 - sky_frac) * environment_w_m2;
   return surface.x * short_wave + surface.y * long_wave;
 }
 
 void main() {
+  // Leave pixels outside the window and pixels of the sky.
   read_frame();
-  ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.format_window_px.xy);
-  if (any(greaterThanEqual(px, ivec2(frame.format_window_px.zw)))) return;
+  ivec2 px = ivec2(gl_GlobalInvocationID.xy + frame.rendered_window_px.xy);
+  if (any(greaterThanEqual(px, ivec2(frame.rendered_window_px.zw)))) return;
   float boresight_m = gbuffer_depth_m(px);
   if (boresight_m >= EMIT_SKY_DEPTH_M) return;
 
+  // Compute the direct flux on the face at the two ends. It is negative where the face is turned away.
   vec3 n = gbuffer_normal(px);
-  uint flags = step_params.info.z;
+  uint flags = step_params.flags;
   bool unshaded = (flags & EMIT_STEP_UNSHADED) != 0u;
-  // Direct normal flux on the face at the two ends, before the face turns away.
-  float sun_begin = step_params.sun_start.w * dot(n, step_params.sun_start.xyz);
-  float sun_end = step_params.sun_end.w * dot(n, step_params.sun_end.xyz);
-  bool faces_sun = max(dot(n, step_params.sun_start.xyz), dot(n, step_params.sun_end.xyz)) > 0.0;
+  float sun_begin = step_params.sun_start_w_m2 * dot(n, step_params.to_sun_start);
+  float sun_end = step_params.sun_end_w_m2 * dot(n, step_params.to_sun_end);
+  // Compute the visible share of the sun.
+  bool faces_sun = max(dot(n, step_params.to_sun_start), dot(n, step_params.to_sun_end)) > 0.0;
   float sun_frac = unshaded ? 1.0 : 0.0;
   if ((flags & EMIT_STEP_SUN_UP) != 0u && faces_sun) {
     sun_frac = sun_visibility(view_ray(px) * boresight_m, n, boresight_m);
   }
   if ((flags & EMIT_STEP_SUN_NOW) != 0u) imageStore(sun_now_image, px, vec4(sun_frac));
 
+  // Read the material. A prescribed temperature needs no step.
   int material = int(gbuffer_ids(px).x);
   vec4 surface = material_surface(material);
   vec4 start = material_start(material);
   if (start.z > 0.5) return;
-  // Cosine-weighted share of the sky: what the horizon leaves, times what near geometry leaves.
+  // Estimate the cosine-weighted share of the sky: the share above the horizon times the share that near geometry
+  // leaves.
   float sky_frac = 0.5 * (1.0 + n.z);
   if (!unshaded) sky_frac *= min(2.0 * texelFetch(occlusion_texture, px, 0).r, 1.0);
 
@@ -66,21 +71,29 @@ void main() {
   s.resistance_m2k_w = material_resistance_m2k_w(material);
   s.emission_w_m2_k4 = surface.y * EMIT_STEFAN_BOLTZMANN_W_M2_K4;
   s.base_offset_k = start.w;
-  s.reference_k = frame.obscurance.y;
+  s.reference_k = frame.reference_k;
 
-  vec3 begin = vec3(absorbed_indirect_w_m2(surface, step_params.flux_start, sky_frac), step_params.film_air.xy);
-  vec3 end = vec3(absorbed_indirect_w_m2(surface, step_params.flux_end, sky_frac), step_params.film_air.zw);
+  // Set up the drive at both ends: absorbed flux, film coefficient, air temperature.
+  vec3 begin = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_start_w_m2, step_params.longwave_start_w_m2,
+                                           step_params.reflected_start_w_m2, step_params.environment_start_w_m2,
+                                           sky_frac),
+                    step_params.film_start_w_m2_k, step_params.air_start_offset_k);
+  vec3 end = vec3(absorbed_indirect_w_m2(surface, step_params.diffuse_end_w_m2, step_params.longwave_end_w_m2,
+                                         step_params.reflected_end_w_m2, step_params.environment_end_w_m2, sky_frac),
+                  step_params.film_end_w_m2_k, step_params.air_end_offset_k);
   float absorbed_frac = surface.x * sun_frac;
   vec3 lit_begin = begin + vec3(absorbed_frac * max(sun_begin, 0.0), 0.0, 0.0);
   vec3 lit_end = end + vec3(absorbed_frac * max(sun_end, 0.0), 0.0, 0.0);
 
+  // Advance over the whole interval in one step.
   vec4 x0 = (flags & EMIT_STEP_FIRST) != 0u ? spun_up_states(material, n) : imageLoad(state_image, px);
   bool clamped = false;
-  int entry = int(step_params.info.y) + material * (EMIT_FOSTER_LEVELS + 1);
-  vec4 x = foster_step(x0, lit_begin, lit_end, relaxation_mode(entry, 0), relaxation_mode(entry, 1), s, clamped);
+  int entry = int(step_params.relaxation_offset) + material * (EMIT_FOSTER_LEVELS + 1);
+  vec4 x = foster_step(x0, lit_begin, lit_end, foster_start_frac(entry), foster_end_frac(entry), s, clamped);
+  // Double the number of steps until neither a state nor the temperature changes by more than the tolerance.
   for (int level = 1; level <= EMIT_FOSTER_LEVELS; ++level) {
-    vec4 gain_start = relaxation_mode(entry + level, 0);
-    vec4 gain_end = relaxation_mode(entry + level, 1);
+    vec4 gain_start = foster_start_frac(entry + level);
+    vec4 gain_end = foster_end_frac(entry + level);
     int steps = 1 << level;
     vec4 coarse = x;
     x = x0;
@@ -95,7 +108,7 @@ void main() {
     vec4 change_k = abs(x - coarse);
     float total_k = abs(foster_offset_k(x, s) - foster_offset_k(coarse, s));
     float worst_k = max(max(max(change_k.x, change_k.y), max(change_k.z, change_k.w)), total_k);
-    if (!(worst_k > frame.obscurance.z)) break;
+    if (!(worst_k > frame.step_tolerance_k)) break;
   }
   if (clamped) atomicAdd(stats.flagged_px[EMIT_FLAG_CLAMPED], 1u);
   imageStore(state_image, px, x);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every binding number of the GPU path, for C++ and GLSL.
+// Binding numbers, limits and flags of the GPU path, for C++ and GLSL.
 #pragma once
 
-// Uniform blocks: read with the same index by every pixel.
+// Uniform blocks. Every pixel reads them with the same index.
 #define EMIT_BIND_FRAME 0
 #define EMIT_BIND_STEP 1
 #define EMIT_BIND_BANDS 2
@@ -10,12 +10,12 @@
 #define EMIT_BIND_DRAW 4
 #define EMIT_BIND_SHADE 5
 
-// Shader storage blocks: written.
+// Shader storage blocks. Shaders write them.
 #define EMIT_BIND_OUTPUT 0
 #define EMIT_BIND_STATS 1
 
-// Texture units. Tables that every pixel reads at its own place are buffer textures: software
-// rasterisers fetch those much faster than storage blocks.
+// Texture units. A table that every pixel reads at its own index is a buffer texture, because software
+// rasterisers fetch from it much faster than from a storage block.
 #define EMIT_TEX_DEPTH 0
 #define EMIT_TEX_NORMAL 1
 #define EMIT_TEX_IDS 2
@@ -47,7 +47,7 @@
 // Vertex attributes.
 #define EMIT_ATTR_POSITION 0
 #define EMIT_ATTR_NORMAL 1
-#define EMIT_ATTR_ROW 2  // three of them
+#define EMIT_ATTR_ROW 2  // uses three locations: 2, 3 and 4
 #define EMIT_ATTR_NODE_BEFORE 5
 #define EMIT_ATTR_NODE_AFTER 6
 #define EMIT_ATTR_SHADE 7
@@ -57,25 +57,25 @@
 #define EMIT_MAX_MODES 2
 #define EMIT_MAX_ATMOSPHERE_TERMS 4
 #define EMIT_MAX_TAPS 256
-#define EMIT_MAX_MATERIALS 16384  // passes/surface_texel.glsl
+#define EMIT_MAX_MATERIALS 16384  // passes/surface_texel.glsl keeps 14 bits
 
-// Boresight distance in the geometry buffer where no surface is seen.
+// Boresight distance that the geometry buffer holds for a pixel without a surface.
 #define EMIT_SKY_DEPTH_M 1e30f
 
-// EMIT_OUTPUTS of passes/radiance.comp
+// Bits of EMIT_OUTPUTS, which passes/radiance.comp is compiled with.
 #define EMIT_OUTPUT_TEMPERATURE 1u
 #define EMIT_OUTPUT_DEPTH 2u
 #define EMIT_OUTPUT_OBJECT 4u
 
-// FrameStatsGpu.flagged_px
+// Indices of FrameStatsGpu.flagged_px.
 #define EMIT_FLAG_NONFINITE 1
 #define EMIT_FLAG_CLAMPED 2
 
-// StepParams.info.z
+// Bits of StepParams.flags.
 #define EMIT_STEP_FIRST 1u
 #define EMIT_STEP_SUN_UP 2u
 #define EMIT_STEP_SUN_NOW 4u
-#define EMIT_STEP_UNSHADED 8u  // foster: before the history, nothing stands in the way
+#define EMIT_STEP_UNSHADED 8u  // foster: the step lies before the history and takes the sun as unobstructed
 
-// foster: finest split of an interval is 2 to this power
+// foster: the finest split of an interval has 2 to this power parts.
 #define EMIT_FOSTER_LEVELS 6

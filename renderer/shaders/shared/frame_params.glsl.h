@@ -1,30 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
+// Structs that C++ fills for each frame and that shaders read.
+//
+// "relworld" is a frame of reference: the axes of the world (east, north, up) with the origin at the camera, in metres.
+// The "rendered image" holds the pixels that the passes compute. The "output image" holds the pixels that leave the
+// renderer. It is larger than the rendered image where a quality level renders fewer pixels. A member that one thermal
+// model or method alone uses names it: emit2014, foster (thermal.model), cached (thermal.method).
 #pragma once
 #include "shared/bindings.glsl.h"
 #include "shared/cpp_glsl.glsl.h"
-// "relworld": world axes (east, north, up), origin at the camera, metres.
 EMIT_SHARED_BEGIN
 
+// Uniform block of one frame.
 struct FrameParams {
-  mat4 relworld_from_sensor;  // rotation
-  vec4 ray;                   // tangents in the sensor's axes: xy = per pixel, zw = at the corner of pixel 0
-  uvec4 format_px;            // rendered: width, height, pixels per plane
-  uvec4 picture_px;           // what is sent: the same, larger where fewer pixels are rendered
-  uvec4 format_window_px;     // what is wanted of format_px: first column, first row, behind the last ones
-  uvec4 picture_window_px;    // likewise, of picture_px
-  vec4 obscurance;            // x = radius in m; y = reference temperature of offsets in K;
-                              // foster: z = tolerance of a step in K, w = nodes per axis of the spin-up table
-  uvec4 bands;                // x = nodes of a band's table, y = place of the emissivities behind the tables
-  vec4 samples;               // cached: x = way of now between the two nodes of the samples, 0..1;
-                              // y = boresight distance where the depth buffer holds 1, m
-  vec4 sun_now;               // xyz = unit vector towards the sun, w = 1 if it is up
+  mat4 relworld_from_sensor;  // rotation only
+  vec2 ray_per_px;            // step of a view ray's tangents to the next column and row, sensor axes
+  vec2 ray_at_corner;         // tangents at the outer corner of pixel (0, 0), sensor axes
+  uvec2 rendered_px;          // columns and rows of the rendered image
+  uint rendered_plane_px;     // number of its pixels
+  uint unused0;
+  uvec2 output_px;            // columns and rows of the output image
+  uint output_plane_px;       // number of its pixels
+  uint unused1;
+  uvec4 rendered_window_px;   // requested part of the rendered image: first column, first row, end column, end row
+  uvec4 output_window_px;     // the same part of the output image, in its pixels
+  float obscurance_radius_m;
+  float reference_k;          // temperature from which all offsets on the device count
+  float step_tolerance_k;     // foster: error at which the splitting of an interval stops
+  uint spin_up_nodes;         // foster: nodes per axis of the spin-up table
+  uint band_lut_nodes;        // nodes of the T ln L table of one band
+  uint first_emissivity;      // index of the first emissivity in the buffer of the tables
+  float node_frac;            // cached: position of the frame between the two nodes of the samples, 0..1
+  float near_m;               // cached: boresight distance at which the depth buffer holds 1
+  vec3 to_sun;                // unit vector towards the sun, relworld
+  float sun_up;               // 1: the sun is up; 0: it is not
 };
 
-// One drawn instance of a mesh's submesh.
+// Uniform block of one draw: one submesh of one instance.
 struct DrawParams {
-  mat4 clip_from_mesh;         // reversed z, infinite far plane; image row 0 at NDC y = -1
-  vec4 normal_from_mesh[3];    // columns; xyz = cofactors of relworld_from_mesh: right for unequal scales too
-  uvec4 ids;                   // x = material, y = 1 + index of the scenario's object, z = 1 if that is an entity
+  mat4 clip_from_mesh;       // reversed depth, infinite far plane; row 0 of the image lies at NDC y = -1
+  vec4 normal_from_mesh[3];  // columns in xyz: the cofactors of relworld_from_mesh, which hold for unequal scales too
+  uint material;
+  uint object;               // 1 + index of the scenario's object
+  uint moves;                // 1: the object is an entity; 0: it is static
+  uint unused0;
 };
 
 // Three texels of the material table.
@@ -33,67 +51,128 @@ struct MaterialParams {
   float emissivity_frac;
   float conductance_w_m2_k;   // lambda / d of Eq. 5
   float base_k;
-  float initial_offset_k;     // surface at history start, minus the reference temperature
-  float prescribed_offset_k;  // if prescribed
-  float prescribed;           // 1: temperature is given; 0: simulated
-  float base_offset_k;        // foster: base minus the reference temperature
-  vec4 resistance_m2k_w;      // foster: of the modes
+  float initial_offset_k;     // surface temperature at the start of the history minus the reference temperature
+  float prescribed_offset_k;  // prescribed temperature minus the reference temperature
+  float prescribed;           // 1: the temperature is prescribed; 0: it is simulated
+  float base_offset_k;        // foster: base temperature minus the reference temperature
+  vec4 resistance_m2k_w;      // foster: resistance of each mode
 };
 
-// One light frustum of a history step: light coordinates in metres.
+// One light frustum of a history interval. Its coordinates are in metres.
 struct CascadeParams {
-  vec4 light_row0;  // dot(row, vec4(p_relworld, 1)) = metres from the map's left edge
-  vec4 light_row1;  // ... from its first row
-  vec4 light_row2;  // ... behind the light's near plane
-  vec4 scale;       // x, y = 1 / extent; z = 1 / depth range; w = boresight distance where it ends
-  vec4 drift;       // xy = way of a shadow over the interval per metre between blocker and receiver
+  vec4 light_row0;        // dot(row, vec4(p_relworld, 1)) is the distance from the left edge of the map
+  vec4 light_row1;        // the same product is the distance from the first row of the map
+  vec4 light_row2;        // the same product is the depth behind the near plane of the light
+  vec3 scale_per_m;       // 1 / extent of the frustum: across, down, in depth
+  float end_boresight_m;  // the frustum serves receivers up to this boresight distance
+  vec2 drift_frac;        // shift of a shadow over the interval per metre between blocker and receiver: across, down
+  vec2 unused0;
 };
 
-// Disc samples of the soft shadows: xy = place in the unit disc, z = place along the drift (-0.5..0.5),
-// w = share of the greatest blocker distance that a search tap assumes for its drift.
+// Samples of the sun's disc for the soft shadows: xy = position in the unit disc, z = position along the drift
+// (-0.5..0.5), w = share of the largest possible blocker distance that a search tap assumes for its drift.
 struct TapParams {
   vec4 blocker[EMIT_MAX_TAPS];
   vec4 filter_[EMIT_MAX_TAPS];
 };
 
-// One interval of the thermal history; "start" and "end" are its two ends.
+// Uniform block of one interval of the thermal history. "start" and "end" are its two ends.
 struct StepParams {
   CascadeParams cascades[EMIT_MAX_CASCADES];
-  vec4 sun_start;   // xyz = unit vector towards the sun, w = direct normal flux after clouds, W m-2
-  vec4 sun_end;
-  vec4 flux_start;  // x = S_i, y = R_LW, z = exitance of the surroundings (R_e / emissivity), W m-2
-  vec4 flux_end;    // foster: x = diffuse, y = sky long-wave, both horizontal; z, w = reflected sun and
-                    // exitance of the surroundings
-  vec4 film_air;    // foster: film coefficient in W m-2 K-1 and air offset in K at the start, at the end
-  vec4 casters;     // x = height of the highest caster above the camera, m; y = sine of the sun's elevation
-  uvec4 info;       // x = number of cascades; y = offset into relaxation table; z = EMIT_STEP_* flags
+  vec3 to_sun_start;              // unit vector towards the sun, relworld
+  float sun_start_w_m2;           // direct normal flux below the clouds
+  vec3 to_sun_end;
+  float sun_end_w_m2;
+  float diffuse_start_w_m2;       // emit2014: S_i of Eq. 1; foster: diffuse flux on a level surface
+  float longwave_start_w_m2;      // emit2014: R_LW of Eq. 1; foster: long-wave flux of the sky on a level surface
+  float reflected_start_w_m2;     // foster: sunlight that the surroundings reflect
+  float environment_start_w_m2;   // long-wave exitance of the surroundings; emit2014: R_e / emissivity
+  float diffuse_end_w_m2;
+  float longwave_end_w_m2;
+  float reflected_end_w_m2;
+  float environment_end_w_m2;
+  float film_start_w_m2_k;        // foster: film coefficient
+  float air_start_offset_k;       // foster: air temperature minus the reference temperature
+  float film_end_w_m2_k;
+  float air_end_offset_k;
+  float casters_top_m;            // height of the highest caster above the camera
+  float casters_sun_sine;         // sine of the sun's elevation at the sample of the interval
+  float unused0;
+  float unused1;
+  uint cascade_count;             // entries of `cascades`; 0: nothing can be shaded
+  uint relaxation_offset;         // first entry of the interval in the relaxation table
+  uint flags;                     // EMIT_STEP_*
+  uint unused2;
 };
 
-// Two texels of the relaxation table: exact exponential step of one material over one interval (lib/relaxation.glsl).
-// foster: one entry per split of the interval; gains of four modes at the start, at the end (lib/foster.glsl).
+// Two texels of the relaxation table.
+// emit2014: the exact step of one material over one interval (lib/relaxation.glsl). A texel belongs to a mode and holds
+// the gain of the drive at the start, the gain at the end, the weight of the mode, 0.
+// foster: one entry per split of the interval (lib/foster.glsl). `first` holds the gains of the four modes for the flux
+// at the start, `second` those for the flux at the end.
 struct RelaxationParams {
-  vec4 mode0;  // gain of the drive at the start, at the end, weight of the mode, 0
-  vec4 mode1;
+  vec4 first;
+  vec4 second;
 };
 
+// Uniform block entry of one spectral band.
 struct BandParams {
-  vec4 terms_amplitude_frac;
+  vec4 terms_amplitude_frac;            // exponential terms of the air's transmittance
   vec4 terms_extinction_per_m;
-  float air_radiance_w_m2_sr;          // blackbody at air temperature
-  float surroundings_radiance_w_m2_sr; // blackbody at environment temperature
-  float sky_hemisphere_w_m2_sr;        // cosine-weighted mean over the sky
-  float vertical_transmittance_frac;   // ground to space
-  float sun_irradiance_w_m2;           // in band, normal to the sun, at the ground
-  float lut_first_k;                   // layout of the band's T ln L table
+  float air_radiance_w_m2_sr;           // blackbody at air temperature
+  float surroundings_radiance_w_m2_sr;  // blackbody at the temperature of the surroundings
+  float sky_hemisphere_w_m2_sr;         // cosine-weighted mean over the sky
+  float vertical_transmittance_frac;    // ground to space
+  float sun_irradiance_w_m2;            // in band, normal to the sun, at the ground
+  float lut_first_k;                    // temperature of the first node of the band's T ln L table
   float lut_nodes_per_k;
   float lut_last_node;
-  uvec4 atmosphere_table;              // lib/atmosphere_table.glsl: first float, ranges, elevations; z = 0: none
+  uint air_table_first;                 // index of the first float of the air's table (lib/atmosphere_table.glsl)
+  uint air_table_ranges;
+  uint air_table_elevations;            // 0: the band has no table of the air
+  uint unused0;
 };
 
-
-// Counters of one frame, written with atomics.
+// Counters of one frame. Shaders add to them with atomics.
 struct FrameStatsGpu {
-  uint flagged_px[4];  // by EMIT_FLAG_*; of a pixel with both, at their sum
+  uint flagged_px[4];  // pixels by EMIT_FLAG_*; a pixel with both flags counts at the sum of the two
 };
+
+#ifdef __cplusplus
+static_assert(sizeof(FrameParams) == 192);
+EMIT_SHARED_OFFSET(FrameParams, ray_per_px, 64);
+EMIT_SHARED_OFFSET(FrameParams, rendered_px, 80);
+EMIT_SHARED_OFFSET(FrameParams, output_px, 96);
+EMIT_SHARED_OFFSET(FrameParams, rendered_window_px, 112);
+EMIT_SHARED_OFFSET(FrameParams, output_window_px, 128);
+EMIT_SHARED_OFFSET(FrameParams, obscurance_radius_m, 144);
+EMIT_SHARED_OFFSET(FrameParams, band_lut_nodes, 160);
+EMIT_SHARED_OFFSET(FrameParams, to_sun, 176);
+EMIT_SHARED_OFFSET(FrameParams, sun_up, 188);
+static_assert(sizeof(DrawParams) == 128);
+EMIT_SHARED_OFFSET(DrawParams, material, 112);
+static_assert(sizeof(MaterialParams) == 48);
+EMIT_SHARED_OFFSET(MaterialParams, initial_offset_k, 16);
+EMIT_SHARED_OFFSET(MaterialParams, resistance_m2k_w, 32);
+static_assert(sizeof(CascadeParams) == 80);
+EMIT_SHARED_OFFSET(CascadeParams, scale_per_m, 48);
+EMIT_SHARED_OFFSET(CascadeParams, end_boresight_m, 60);
+EMIT_SHARED_OFFSET(CascadeParams, drift_frac, 64);
+static_assert(sizeof(TapParams) == 2 * EMIT_MAX_TAPS * 16);
+static_assert(sizeof(StepParams) == 80 * EMIT_MAX_CASCADES + 112);
+EMIT_SHARED_OFFSET(StepParams, to_sun_start, 80 * EMIT_MAX_CASCADES);
+EMIT_SHARED_OFFSET(StepParams, to_sun_end, 80 * EMIT_MAX_CASCADES + 16);
+EMIT_SHARED_OFFSET(StepParams, diffuse_start_w_m2, 80 * EMIT_MAX_CASCADES + 32);
+EMIT_SHARED_OFFSET(StepParams, diffuse_end_w_m2, 80 * EMIT_MAX_CASCADES + 48);
+EMIT_SHARED_OFFSET(StepParams, film_start_w_m2_k, 80 * EMIT_MAX_CASCADES + 64);
+EMIT_SHARED_OFFSET(StepParams, casters_top_m, 80 * EMIT_MAX_CASCADES + 80);
+EMIT_SHARED_OFFSET(StepParams, cascade_count, 80 * EMIT_MAX_CASCADES + 96);
+static_assert(sizeof(RelaxationParams) == 32);
+static_assert(sizeof(BandParams) == 80);
+EMIT_SHARED_OFFSET(BandParams, air_radiance_w_m2_sr, 32);
+EMIT_SHARED_OFFSET(BandParams, sun_irradiance_w_m2, 48);
+EMIT_SHARED_OFFSET(BandParams, air_table_first, 64);
+static_assert(sizeof(FrameStatsGpu) == 16);
+#endif
 
 EMIT_SHARED_END

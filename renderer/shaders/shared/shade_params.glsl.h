@@ -1,48 +1,72 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shade of entities, finer than samples lie: what C++ and GLSL must do alike.
+// Structs and constants of the shade of entities per pixel, for C++ and GLSL.
+// A "page" is an exposure tile: a level square of ground whose texels remember how long entities have shaded them.
+// A "silhouette" is an entity shadow depth map: depths of one entity along the direction of the sun.
 #pragma once
 #include "shared/bindings.glsl.h"
 #include "shared/cpp_glsl.glsl.h"
 
-// Places in the unit disc at which a silhouette is looked at.
+// Number of positions in the unit disc at which an entity shadow depth map is read.
 #define EMIT_SHADE_TAPS 16
-// What is shaded lies that much deeper than what shades.
+// A receiver counts as shaded where it lies this much deeper than the caster.
 #define EMIT_SHADE_LIFT_M 0.01f
-// Texels of a page's side; the outermost ones are those of its neighbours as well.
+// Texels along a side of an exposure tile. The outermost texels repeat those of the neighbouring tiles.
 #define EMIT_PAGE_SIDE 128
 #define EMIT_PAGE_TEXELS 3
 #define EMIT_SILHOUETTE_TEXELS 4
 
 EMIT_SHARED_BEGIN
 
-// What all pages and silhouettes of a frame share.
+// Uniform block that all exposure tiles and shadow depth maps of a frame share.
 struct ShadeParams {
-  vec4 slope;                      // xy = way of a shadow per m of height, towards the sun
-  vec4 taps[EMIT_SHADE_TAPS / 2];  // places in the unit disc, two each
+  vec2 slope;                      // shift of a shadow towards the sun per metre of height: east, north
+  vec2 unused0;
+  vec4 taps[EMIT_SHADE_TAPS / 2];  // positions in the unit disc, two in each entry
 };
 
-// A page: level ground in squares, "relworld". Read as EMIT_PAGE_TEXELS texels.
+// One exposure tile in relworld axes. Shaders read it as EMIT_PAGE_TEXELS texels.
 struct PageParams {
-  vec4 place;      // xy = middle of the first texel, z = height of the plane, m; w = texels per m
-  vec4 range;      // x = nothing higher above the plane is shaded, m; y = nor what lies lower, negative; z = layer
-  vec4 left_frac;  // by mode: share that is left of what the texels hold
+  float first_x_m;     // centre of the first texel
+  float first_y_m;
+  float plane_m;       // height of the tile's plane
+  float texels_per_m;
+  float reach_m;       // a point higher above the plane than this is not shaded by the tile
+  float lowest_m;      // a point lower than this above the plane is not shaded either; negative
+  float layer;         // layer of the texture array
+  float unused0;
+  vec4 left_frac;      // by mode: share of the stored value that is left at the time of the frame
 };
 
-// A silhouette where its body stands now, "relworld". Read as EMIT_SILHOUETTE_TEXELS texels.
+// One entity shadow depth map at the pose of the frame, in relworld axes. Shaders read it as EMIT_SILHOUETTE_TEXELS
+// texels. The dot product of a line with vec4(p, 1) gives the coordinate of the point p.
 struct SilhouetteParams {
-  vec4 column;    // dot with (p, 1): texels from the first column
-  vec4 row;
+  vec4 column;                   // texels from the first column
+  vec4 row;                      // texels from the first row
   vec4 depth_m;
-  vec4 penumbra;  // x = mean depth of what shades, m; y = texels per m of the disc's radius per m of depth; z = layer
+  float mean_depth_m;            // mean depth of the caster
+  float penumbra_texels_per_m;   // radius of the sun's disc on the map per metre of depth behind the caster
+  float layer;                   // layer of the texture array
+  float unused0;
 };
 
-// Square of a picture and what may shade there.
+// Square part of the rendered image, with the exposure tiles and shadow depth maps that may shade its pixels.
 struct ShadeTile {
-  uint place_px;      // first column, first row * 65536
-  uint first;         // of its entries in the list of pages and silhouettes; pages come first
-  uint pages;
-  uint silhouettes;
+  uint place_px;      // first column + 65536 * first row
+  uint first;         // index of its first entry in the list; exposure tiles come before shadow depth maps
+  uint pages;         // number of exposure tiles
+  uint silhouettes;   // number of shadow depth maps
 };
+
+#ifdef __cplusplus
+static_assert(sizeof(ShadeParams) == 16 + 8 * EMIT_SHADE_TAPS);
+EMIT_SHARED_OFFSET(ShadeParams, taps, 16);
+static_assert(sizeof(PageParams) == 16 * EMIT_PAGE_TEXELS);
+EMIT_SHARED_OFFSET(PageParams, reach_m, 16);
+EMIT_SHARED_OFFSET(PageParams, left_frac, 32);
+static_assert(sizeof(SilhouetteParams) == 16 * EMIT_SILHOUETTE_TEXELS);
+EMIT_SHARED_OFFSET(SilhouetteParams, mean_depth_m, 48);
+static_assert(sizeof(ShadeTile) == 16);
+#endif
 
 EMIT_SHARED_END
 
@@ -51,7 +75,8 @@ EMIT_SHARED_END
 #include <cstdint>
 #include <utility>
 namespace emit::renderer {
-/// Equal areas, golden angle.
+/// Position of tap `index` in the unit disc (x, y), 0 <= index < EMIT_SHADE_TAPS. All taps stand for
+/// equal areas; consecutive taps are a golden angle apart.
 [[nodiscard]] inline std::pair<float, float> shade_tap(std::uint32_t index) noexcept {
   const float radius = std::sqrt((static_cast<float>(index) + 0.5F) / EMIT_SHADE_TAPS);
   const float angle = 2.39996323F * static_cast<float>(index);

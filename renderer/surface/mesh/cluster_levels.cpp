@@ -8,10 +8,10 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "emit/threads/parallel.hpp"
 #include "surface/mesh/cluster_groups.hpp"
 #include "surface/mesh/edge_collapse.hpp"
 #include "surface/mesh/nearest_triangle.hpp"
-#include "emit/threads/parallel.hpp"
 
 namespace emit::renderer {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
-#include "surface/rays/interval_rays.hpp"
 #include "surface/heat/sample_heat.hpp"
+#include "surface/rays/interval_rays.hpp"
 
 namespace emit::renderer {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "emit/scene/mesh.hpp"
-#include "surface/rays/interval_rays.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/rays/interval_rays.hpp"
 
 namespace emit::renderer {
 

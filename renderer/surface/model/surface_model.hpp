@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "emit/scene/mesh.hpp"
-#include "surface/rays/caster_rays.hpp"
-#include "surface/model/history_record.hpp"
-#include "surface/mesh/refined_mesh.hpp"
 #include "surface/heat/sample_heat.hpp"
-#include "surface/rays/surface_detail.hpp"
 #include "surface/heat/surface_samples.hpp"
+#include "surface/mesh/refined_mesh.hpp"
+#include "surface/model/history_record.hpp"
+#include "surface/rays/caster_rays.hpp"
+#include "surface/rays/surface_detail.hpp"
 #include "surface/rays/surface_view.hpp"
 
 namespace emit::renderer {

@@ -10,8 +10,8 @@
 
 #include "history/environment.hpp"
 #include "history/pose_history.hpp"
-#include "surface/rays/caster_rays.hpp"
 #include "surface/heat/surface_samples.hpp"
+#include "surface/rays/caster_rays.hpp"
 
 namespace emit::renderer {
 

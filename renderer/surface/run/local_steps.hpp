@@ -11,9 +11,9 @@
 #include "history/pose_history.hpp"
 #include "history/surface_history.hpp"
 #include "surface/heat/heat_interval.hpp"
-#include "surface/rays/interval_rays.hpp"
 #include "surface/heat/sample_blocks.hpp"
 #include "surface/heat/surface_node.hpp"
+#include "surface/rays/interval_rays.hpp"
 #include "surface/run/surface_step.hpp"
 #include "threads/worker_pool.hpp"
 

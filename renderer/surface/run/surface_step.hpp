@@ -3,13 +3,13 @@
 #include <cstdint>
 #include <span>
 
-#include "surface/rays/caster_rays.hpp"
 #include "surface/heat/heat_interval.hpp"
-#include "surface/rays/interval_rays.hpp"
-#include "surface/model/mover_glow.hpp"
-#include "surface/rays/ray_offsets.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_samples.hpp"
+#include "surface/model/mover_glow.hpp"
+#include "surface/rays/caster_rays.hpp"
+#include "surface/rays/interval_rays.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 

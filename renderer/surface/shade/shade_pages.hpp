@@ -16,10 +16,10 @@
 #include "history/environment.hpp"
 #include "history/pose_history.hpp"
 #include "shared/shade_params.glsl.h"
-#include "surface/shade/shade_response.hpp"
-#include "surface/shade/silhouettes.hpp"
 #include "surface/heat/surface_node.hpp"
 #include "surface/heat/surface_samples.hpp"
+#include "surface/shade/shade_response.hpp"
+#include "surface/shade/silhouettes.hpp"
 
 namespace emit::renderer {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "agents/agent.hpp"
-#include "agents/journal_ring.hpp"
 #include "agents/context.hpp"
+#include "agents/journal_ring.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "net/trigger_port.hpp"
 #include "pacing/deadline_policy.hpp"

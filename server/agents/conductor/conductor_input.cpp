@@ -216,8 +216,9 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
 void Conductor::refuse(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
                        std::uint64_t detail) noexcept {
   const std::uint64_t count = context_.counters.add(counter_of(code));
-  context_.conductor_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
-                                 detail == protocol::kDetailOldRun ? "a host frame of a replaced run" : "");
+  context_.conductor_events.push(
+      EventKind::refused, static_cast<std::uint64_t>(code), count,
+      detail == protocol::kDetailOldRun ? "a host frame of a replaced run" : "");
   reply(origin, code, host_frame_number, count, detail);
 }
 

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "agents/agent.hpp"
+#include "agents/context.hpp"
 #include "agents/receiver/host_sessions.hpp"
 #include "agents/receiver/peer_limits.hpp"
 #include "agents/sender/socket_client.hpp"
-#include "agents/context.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/protocol/codec.hpp"
 #include "emit/protocol/framing.hpp"

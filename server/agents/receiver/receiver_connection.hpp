@@ -68,5 +68,4 @@ struct Receiver::UdpMemory {
   return out;
 }
 
-
 }  // namespace emit::server

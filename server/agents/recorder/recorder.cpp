@@ -7,8 +7,8 @@
 #include <array>
 #include <exception>
 
-#include "agents/recorder/journal_encode.hpp"
 #include "agents/journal_ring.hpp"
+#include "agents/recorder/journal_encode.hpp"
 #include "agents/recorder/older_journal.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/v1/control.pb.h"

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <system_error>
 
-#include "agents/render/canned_marker.hpp"
 #include "agents/frame_source.hpp"
 #include "agents/messages.hpp"
+#include "agents/render/canned_marker.hpp"
 #include "emit/image/exr_image.hpp"
 
 namespace emit::server {

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "agents/agent.hpp"
-#include "agents/frame_source.hpp"
 #include "agents/context.hpp"
+#include "agents/frame_source.hpp"
 #include "pacing/quality_policy.hpp"
 
 namespace emit::server {

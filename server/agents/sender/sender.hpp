@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "agents/agent.hpp"
-#include "agents/sender/sender_client.hpp"
 #include "agents/context.hpp"
+#include "agents/sender/sender_client.hpp"
 #include "emit/protocol/pixel_codec.hpp"
 
 namespace emit::server {

@@ -29,11 +29,6 @@ struct PaperOptions {
   bool no_errors = false;
   std::uint32_t pixels = 20'000;
 };
-std::string model;  ///< empty: emit2014
-bool no_errors = false;
-std::uint32_t pixels = 20'000;
-int gpu_index = -1;
-};
 
 using physics::Result;
 

@@ -29,7 +29,7 @@ TEST(FrameCost, FindsWhatATriangleAndAPixelTake) {
 TEST(FrameCost, MoreWorkNeverTakesLess) {
   FrameCost cost;
   for (const double triangles : kTriangles) {
-    // More pixels took less: caches, another program, the clock.
+    // Let more pixels take less time, as caches, another program or the clock may cause.
     for (const double pixels : kPixels) cost.add(triangles, pixels, 10.0 - 1e-5 * pixels);
   }
   cost.fit();

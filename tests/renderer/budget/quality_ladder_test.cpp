@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames that shed work: they are whole pictures, close to full quality, as far off as they say,
+// Frames of lower quality levels are whole images, close to full quality, as far off as they state,
 // and leave no trace in the frames that follow.
 #include <gtest/gtest.h>
 
@@ -23,13 +23,13 @@ physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
   return {from, physics::world_from_body_look_at(from, at)};
 }
 
-/// A box on the ground; the camera comes nearer for ten seconds.
+/// Scenario with a box on the ground that the camera approaches for ten seconds.
 scene::ScenarioDesc approach() {
   auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
   quads.push_back(ground(120.0, 120.0));
   scene::ScenarioDesc s = instant_scenario(write_quads("box", quads));
   s.weather.clear();
-  s.sensor.width_px = 130;  // not a multiple of anything
+  s.sensor.width_px = 130;  // not a multiple of the size of any work group
   s.sensor.height_px = 97;
   s.thermal.method = scene::ThermalMethod::cached;
   s.thermal.steps = 9;
@@ -46,6 +46,7 @@ struct Frame {
   float estimated_error_k = 0.0F;
 };
 
+/// Renderer of the approach, warmed up for its start.
 class Flight {
  public:
   explicit Flight(const scene::ScenarioDesc& scenario, renderer::Ladder ladder) {
@@ -105,7 +106,8 @@ TEST(RendererLadder, RungsAreWholePicturesAndAsFarOffAsTheySay) {
       const Frame shed = run.frame(run.request(seconds, rung));
       EXPECT_EQ(shed.rung, rung);
       const double difference_k = rms_k(scenario, full, shed);
-      // Off along edges only: the picture moved by a pixel of the coarsest rung is worse.
+      // Expect errors along edges only: the image shifted by a pixel of the coarsest level is
+      // worse.
       Frame moved = shed;
       for (std::size_t i = 0; i + kMovedPx < moved.radiance_w_m2_sr.size(); ++i) {
         moved.radiance_w_m2_sr[i] = shed.radiance_w_m2_sr[i + kMovedPx];
@@ -117,7 +119,7 @@ TEST(RendererLadder, RungsAreWholePicturesAndAsFarOffAsTheySay) {
       EXPECT_GE(estimate_k, 0.5 * difference_k - 0.03) << seconds << " s, rung " << int{rung};
       scaled_k = difference_k;
     }
-    EXPECT_GT(scaled_k, 0.1);  // the last has a sixteenth of the pixels
+    EXPECT_GT(scaled_k, 0.1);  // the last level renders a sixteenth of the pixels
   }
 }
 
@@ -129,7 +131,7 @@ TEST(RendererLadder, ShedFramesLeaveNoTrace) {
   EXPECT_NE(before.radiance_w_m2_sr, shed.radiance_w_m2_sr);
   const Frame after = run.frame(run.request(4.0, 0));
   EXPECT_EQ(before.radiance_w_m2_sr, after.radiance_w_m2_sr);
-  // A renderer that has measured nothing draws the same, as replays do.
+  // Expect the same images from a renderer that has measured nothing, as in a replay.
   Flight replay(scenario, renderer::Ladder::replayed);
   EXPECT_EQ(replay.frame(replay.request(4.0, kRungs - 1)).radiance_w_m2_sr, shed.radiance_w_m2_sr);
   EXPECT_EQ(replay.frame(replay.request(4.0, 0)).radiance_w_m2_sr, before.radiance_w_m2_sr);

@@ -15,12 +15,14 @@
 namespace emit::renderer {
 namespace {
 
+/// View and placement of a mesh.
 struct Look {
   ViewVolume view;
   glm::dmat4 relworld_from_mesh{1.0};
 };
 
-/// Sensor axes: x right, y down, z along the boresight, any way round; the mesh anywhere near.
+/// Random view in any direction and a mesh somewhere in front of it. The axes of the sensor are x
+/// right, y down, z along the boresight.
 Look random_look(std::mt19937& random, bool mirrored) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   Look look;
@@ -37,7 +39,7 @@ Look random_look(std::mt19937& random, bool mirrored) {
   return look;
 }
 
-/// True when part of a triangle faces the camera and a corner or the middle lies in the picture.
+/// True when a triangle faces the camera and a corner or its centre lies in the image.
 bool visible(const Look& look, const std::array<glm::dvec3, 3>& relworld_m, bool double_sided) {
   const glm::dvec3 normal =
       glm::cross(relworld_m[1] - relworld_m[0], relworld_m[2] - relworld_m[0]);
@@ -107,7 +109,7 @@ TEST(ClusterView, of_ground_at_a_flat_angle_shows_little_beyond_the_picture) {
   }
   const std::vector<scene::Cluster> clusters =
       scene::cut_into_clusters(mesh.positions_m, mesh.indices);
-  // From 20 m above the middle, 6 to 16 degrees down, wherever that looks.
+  // Look down by 6 to 16 degrees from 20 m above the centre, in every direction.
   std::size_t shown = 0;
   std::size_t needed = 0;
   for (int turn = 0; turn < 24; ++turn) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Light frusta hold what the camera sees and its casters, tightly.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,9 +12,10 @@
 namespace emit::renderer {
 namespace {
 
+/// View over a wide ground.
 ViewVolume view_at_ground() {
   ViewVolume view;
-  // Sensor looking north and down by 30 degrees: x = east, z along the boresight.
+  // Look north and down by 30 degrees: x is east, z is along the boresight.
   const glm::dvec3 right{1.0, 0.0, 0.0};
   const glm::dvec3 forward{0.0, std::cos(0.5236), -std::sin(0.5236)};
   view.relworld_from_sensor = glm::dmat3(right, glm::cross(forward, right), forward);
@@ -22,12 +24,13 @@ ViewVolume view_at_ground() {
   view.far_m = 2000.0;
   view.scene_min_m = {-500.0, -500.0, -60.0};
   view.scene_max_m = {500.0, 500.0, -40.0};
-  // A caster may stand higher than anything that is there now.
+  // Let a caster stand higher than everything that is in the scene now.
   view.casters_min_m = {-5.0, -5.0, -60.0};
   view.casters_max_m = {5.0, 5.0, -20.0};
   return view;
 }
 
+/// Coordinates of a point in a light frustum, m.
 glm::dvec3 light_coordinates(const LightFrustum& frustum, const glm::dvec3& p) {
   return glm::dvec3(glm::dot(frustum.axes[0], p), glm::dot(frustum.axes[1], p),
                     glm::dot(frustum.axes[2], p)) +
@@ -56,7 +59,7 @@ TEST(LightFit, holds_every_visible_point_and_every_caster_in_front_of_it) {
         ASSERT_GE(at[axis], -1e-6);
         ASSERT_LE(at[axis], frusta.cascades[c].extent_m[axis] + 1e-6);
       }
-      // A caster anywhere in the box towards the sun is nearer to the light, not cut off.
+      // Expect that a caster in the box, towards the sun, is nearer to the light and not cut off.
       const glm::dvec3 caster = p + to_sun * ((-20.0 - p.z) / to_sun.z);
       ASSERT_GE(light_coordinates(frusta.cascades[c], caster).z, -1e-6);
     }
@@ -69,7 +72,7 @@ TEST(LightFit, is_tight_around_a_small_view_of_a_large_scene) {
   const LightFrusta frusta =
       fit_light(view, glm::normalize(glm::dvec3(0.3, 0.2, 0.9)), 1024, 1, 0.5, 6e-4);
   ASSERT_EQ(frusta.count, 1U);
-  EXPECT_LT(frusta.cascades[0].extent_m.x, 250.0);  // of a scene of 1000 m
+  EXPECT_LT(frusta.cascades[0].extent_m.x, 250.0);  // the scene is 1000 m wide
   EXPECT_LT(frusta.cascades[0].extent_m.y, 250.0);
 }
 

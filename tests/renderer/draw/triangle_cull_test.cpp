@@ -22,30 +22,31 @@ using Corners = std::array<std::uint32_t, 3>;
 
 constexpr glm::uvec2 kSizePx{64, 48};
 
-/// A unit sphere at `centre_m` in sensor axes: x right, y down, z along the boresight.
+/// Matrix of a mesh that is turned and placed at `centre_m` in sensor axes: x right, y down, z
+/// along the boresight.
 glm::mat4 clip_from_mesh(const glm::dvec3& centre_m, double tan_half_h, double turn_rad) {
   glm::dmat4 clip_from_sensor(0.0);
   clip_from_sensor[0][0] = 1.0 / tan_half_h;
   clip_from_sensor[1][1] = static_cast<double>(kSizePx.x) / (kSizePx.y * tan_half_h);
-  clip_from_sensor[3][2] = 0.1;  // depth: no one asks for it
+  clip_from_sensor[3][2] = 0.1;  // depth, which no test reads
   clip_from_sensor[2][3] = 1.0;
   const glm::dmat4 sensor_from_mesh =
       glm::rotate(glm::translate(glm::dmat4(1.0), centre_m), turn_rad, glm::dvec3(0.6, 0.0, 0.8));
   return glm::mat4(clip_from_sensor * sensor_from_mesh);
 }
 
-/// Where a corner lies in the picture, pixels.
+/// Position of a corner in the image, pixels.
 glm::dvec2 window_px(const glm::mat4& matrix, const glm::vec3& position_m) {
   const glm::dvec4 clip = glm::dmat4(matrix) * glm::dvec4(position_m, 1.0);
   return (0.5 * glm::dvec2(clip) / clip.w + 0.5) * glm::dvec2(kSizePx);
 }
 
-/// Twice the area that a, b, c go around; fronts have less than 0.
+/// Twice the signed area of the triangle a, b, c. Front faces have less than 0.
 double around_px2(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c) {
   return (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
 }
 
-/// What a triangle shows in double precision.
+/// Visible parts of a triangle in double precision.
 struct Shown {
   Shown(const std::array<glm::dvec2, 3>& px, bool single_sided) {
     const double area_px2 = around_px2(px[0], px[1], px[2]);
@@ -72,11 +73,12 @@ struct Shown {
   }
   bool back = false;
   bool holds_middle = false;
-  std::set<int> columns;  ///< of the picture, whose middles lie in its box
-  std::set<int> rows;
+  std::set<int> columns;  ///< columns of pixels whose centres lie in the triangle's box
+  std::set<int> rows;     ///< rows of pixels whose centres lie in the triangle's box
 };
 
-/// As it is, or with corners as rasterisers round them: to 1/256 pixel.
+/// True when a triangle shows, either with its exact corners or with corners rounded to 1/256 pixel
+/// as rasterisers do it.
 bool may_show(const std::array<glm::dvec2, 3>& px, bool single_sided) {
   std::array<glm::dvec2, 3> rounded_px;
   for (std::size_t k = 0; k < 3; ++k) rounded_px[k] = glm::round(256.0 * px[k]) / 256.0;
@@ -86,7 +88,7 @@ bool may_show(const std::array<glm::dvec2, 3>& px, bool single_sided) {
   });
 }
 
-/// Clusters under a matrix, each a part or all of them one.
+/// Result of culling all clusters under one matrix. With `apart` each cluster is a part of its own.
 struct Culled {
   Culled(TriangleCull& cull, const scene::Mesh& mesh, const std::vector<scene::Cluster>& clusters,
          const glm::mat4& matrix, bool single_sided, bool apart = true) {
@@ -102,7 +104,7 @@ struct Culled {
     for (std::uint32_t p = 0; p < cull.parts().size(); ++p) {
       const TriangleCull::Part& part = cull.parts()[p];
       EXPECT_EQ(part.range, p);
-      EXPECT_EQ(part.first, next);  // without gaps
+      EXPECT_EQ(part.first, next);  // parts follow each other without gaps
       next += part.count;
       for (std::uint32_t i = part.first; i < part.first + part.count; i += 3) {
         const auto left = cull.indices().subspan(i, 3);
@@ -137,7 +139,8 @@ TEST_F(TriangleCullTest, WhatItLeavesOutHoldsNoPixelAndWhatItKeepsIsLittleMore) 
   std::size_t kept_for_nothing = 0;
   for (int round = 0; round < 400; ++round) {
     const bool single_sided = round % 3 != 2;
-    // Many reach over the picture's edge, or lie far beyond it: one pixel to 20 a triangle.
+    // Let triangles be 1 to 20 pixels large. Many reach over the edge of the image or lie far
+    // beyond it.
     const double tan_half_h = 0.3 * std::pow(0.03, 0.5 + 0.5 * unit(random));
     const glm::dvec2 place(1.3 * unit(random), unit(random));
     const double distance_m = 5.0 + unit(random);
@@ -154,7 +157,7 @@ TEST_F(TriangleCullTest, WhatItLeavesOutHoldsNoPixelAndWhatItKeepsIsLittleMore) 
       kept += stays ? 1 : 0;
       ASSERT_TRUE(stays || !may_show(px, single_sided))
           << "round " << round << ": a front over a pixel's middle was left out";
-      // But for the margins these could have been left out.
+      // Count kept triangles that only the margins keep.
       kept_for_nothing +=
           stays && (shown.back || (std::min(shown.columns.size(), shown.rows.size()) <= 2 &&
                                    !shown.holds_middle));
@@ -166,7 +169,7 @@ TEST_F(TriangleCullTest, WhatItLeavesOutHoldsNoPixelAndWhatItKeepsIsLittleMore) 
 }
 
 TEST(TriangleCull, KeepsWhatShowsHoweverThinItIsOrFarOverTheRim) {
-  // Triangles on top of each other in a plane, 2 m wide, that faces the camera.
+  // Stack triangles on a plane, 2 m wide, that faces the camera.
   std::mt19937 random(6);
   std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
   scene::Mesh mesh;
@@ -182,7 +185,7 @@ TEST(TriangleCull, KeepsWhatShowsHoweverThinItIsOrFarOverTheRim) {
   TriangleCull cull;
   cull.add(mesh, clusters, 0);
   cull.finish();
-  // The picture shows the middle half of it; all of it, eight pixels wide; or three.
+  // Show the middle half of the plane, then all of it at a width of eight and of three pixels.
   for (const double tan_half_h : {0.125, 2.0, 6.0}) {
     for (const bool single_sided : {true, false}) {
       const glm::mat4 matrix = clip_from_mesh({0.1, 0.0, 4.0}, tan_half_h, 0.0);
@@ -202,7 +205,8 @@ TEST(TriangleCull, KeepsWhatShowsHoweverThinItIsOrFarOverTheRim) {
 }
 
 TEST(TriangleCull, KeepsSliversThatHaveNoAreaInSinglePrecision) {
-  // Needles through middles of pixels, a quarter of a metre wide, in a plane that faces the camera.
+  // Put needles through centres of pixels, a quarter of a metre wide, in a plane that faces the
+  // camera.
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   scene::Mesh mesh;
@@ -253,7 +257,7 @@ TEST_F(TriangleCullTest, KeepsWholeWhatReachesBehindTheCamera) {
 }
 
 TEST_F(TriangleCullTest, KeepsLargeTrianglesOfThePictureAndNoneBesideIt) {
-  // Each covers hundreds of pixels.
+  // Come so near that each triangle covers hundreds of pixels.
   const glm::mat4 matrix = clip_from_mesh({0.0, 0.0, 1.5}, 0.002, 0.0);
   const Culled near(cull_, mesh_, clusters_, matrix, true);
   EXPECT_GT(near.kept.size(), 0U);
@@ -272,7 +276,7 @@ TEST_F(TriangleCullTest, EveryPieceOfAPartHasSomeFromAllOfIt) {
   const Culled culled(cull_, mesh_, clusters_, matrix, false, false);
   const auto indices = cull_.indices();
   EXPECT_EQ(indices.size(), 3 * culled.kept.size());
-  // Quarters of the picture against quarters of what is drawn.
+  // Expect that each quarter of the drawn triangles reaches all quarters of the image.
   constexpr std::size_t kPieces = 4;
   for (std::size_t piece = 0; piece < kPieces; ++piece) {
     std::array<std::size_t, 4> in_quarter{};
@@ -297,8 +301,8 @@ TEST_F(TriangleCullTest, TakesNoMoreThanAFrameHasMemoryFor) {
     if (!full) indices += clusters_[c].index_count;
   }
   EXPECT_TRUE(full);
-  EXPECT_GT(indices, TriangleCull::kMostIndices - 3 * scene::kClusterTriangles);
-  EXPECT_LE(indices, TriangleCull::kMostIndices);
+  EXPECT_GT(indices, TriangleCull::kMaxIndices - 3 * scene::kClusterTriangles);
+  EXPECT_LE(indices, TriangleCull::kMaxIndices);
   EXPECT_TRUE(cull_.close(0));
   cull_.run();
   EXPECT_GT(cull_.indices().size(), 0U);

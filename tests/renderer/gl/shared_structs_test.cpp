@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that the structs shared by C++ and GLSL have the same offsets on both sides.
+// Structs that C++ and GLSL share have the same offsets on both sides.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -24,7 +24,7 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   ASSERT_TRUE(thermal) << thermal.error().text;
   auto foster = gl::Program::compute("passes/thermal_foster.comp", taps);
   ASSERT_TRUE(foster) << foster.error().text;
-  // The bands have both kinds of air, so that no part of BandParams is optimised away.
+  // Use both kinds of air, so that no member of BandParams is optimised away.
   const gl::Define content[] = {{"EMIT_BANDS", "4u"},      {"EMIT_AIR_TERMS", "5u"},
                                 {"EMIT_AIR_TABLE", "10u"}, {"EMIT_TERMS", "4"},
                                 {"EMIT_OUTPUTS", "0u"},    {"EMIT_ROWS", "1u"}};
@@ -43,24 +43,39 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_OFFSET(*shade, "shade", gpu::ShadeParams, taps[0]);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, clip_from_mesh);
   EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, normal_from_mesh[0]);
-  EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, ids);
-  EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, samples);
+  EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, material);
+  EXPECT_OFFSET(*geometry, "draw", gpu::DrawParams, moves);
+  EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, node_frac);
+  EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, reference_k);
+  EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, to_sun);
+  EXPECT_OFFSET(*geometry, "frame", gpu::FrameParams, sun_up);
   EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, relworld_from_sensor);
-  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, ray);
-  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, format_window_px);
-  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, obscurance);
-  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, bands);
-  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, sun_now);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, ray_per_px);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, ray_at_corner);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, rendered_window_px);
+  EXPECT_OFFSET(*thermal, "frame_uniform", gpu::FrameParams, reference_k);
+  EXPECT_OFFSET(*foster, "frame_uniform", gpu::FrameParams, step_tolerance_k);
+  EXPECT_OFFSET(*foster, "frame_uniform", gpu::FrameParams, spin_up_nodes);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, rendered_px);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, rendered_plane_px);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, band_lut_nodes);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, first_emissivity);
+  EXPECT_OFFSET(*radiance, "frame_uniform", gpu::FrameParams, to_sun);
   EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].light_row0);
-  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].drift);
-  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[3].scale);
-  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, sun_start);
-  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, flux_end);
-  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, casters);
-  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, info);
-  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_air);
-  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, flux_end);
-  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, info);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[0].drift_frac);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[3].scale_per_m);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascades[2].end_boresight_m);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, to_sun_start);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, sun_end_w_m2);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, environment_end_w_m2);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, casters_top_m);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, casters_sun_sine);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, cascade_count);
+  EXPECT_OFFSET(*thermal, "step_params", gpu::StepParams, flags);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, film_start_w_m2_k);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, air_end_offset_k);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, reflected_end_w_m2);
+  EXPECT_OFFSET(*foster, "step_params", gpu::StepParams, relaxation_offset);
   EXPECT_EQ(thermal->uniform_offset("taps.blocker[0]"), 0);
   EXPECT_EQ(thermal->uniform_offset("taps.filter_[0]"),
             static_cast<GLint>(offsetof(gpu::TapParams, filter_)));
@@ -70,10 +85,10 @@ TEST(SharedStructs, have_the_offsets_that_the_driver_uses) {
   EXPECT_EQ(
       radiance->uniform_offset("band_uniforms[3].lut_last_node"),
       static_cast<GLint>(3 * sizeof(gpu::BandParams) + offsetof(gpu::BandParams, lut_last_node)));
-  EXPECT_EQ(radiance->uniform_offset("band_uniforms[2].atmosphere_table"),
+  EXPECT_EQ(radiance->uniform_offset("band_uniforms[2].air_table_elevations"),
             static_cast<GLint>(2 * sizeof(gpu::BandParams) +
-                               offsetof(gpu::BandParams, atmosphere_table)));
-  // Shaders fetch these tables as texels of four floats.
+                               offsetof(gpu::BandParams, air_table_elevations)));
+  // Check tables that shaders fetch as texels of four floats.
   EXPECT_EQ(sizeof(gpu::MaterialParams), 3U * 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, initial_offset_k), 16U);
   EXPECT_EQ(offsetof(gpu::MaterialParams, base_offset_k), 28U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rectangles by squares of a picture: each pixel finds those it lies in, in order and once.
+// ShadeTiles: each pixel finds the rectangles it lies in, in their order and once.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,11 +13,13 @@ namespace {
 
 using renderer::ShadeTiles;
 
+/// Rectangles of both kinds.
 struct Rectangles {
   std::vector<glm::uvec4> pages;
   std::vector<glm::uvec4> silhouettes;
 };
 
+/// Random rectangles within a window.
 Rectangles random_rectangles(const glm::uvec4& window_px, std::size_t pages,
                              std::size_t silhouettes, std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -38,6 +40,7 @@ Rectangles random_rectangles(const glm::uvec4& window_px, std::size_t pages,
   return out;
 }
 
+/// Sorts rectangles into screen tiles.
 void sort(ShadeTiles& tiles, const glm::uvec4& window_px, const Rectangles& rectangles) {
   tiles.begin(window_px);
   for (const glm::uvec4& px : rectangles.pages) tiles.add_page(px);
@@ -45,12 +48,13 @@ void sort(ShadeTiles& tiles, const glm::uvec4& window_px, const Rectangles& rect
   tiles.sort();
 }
 
+/// True when a rectangle holds a pixel.
 bool lies_in(const glm::uvec2& px, const glm::uvec4& rectangle_px) {
   return px.x >= rectangle_px.x && px.x < rectangle_px.z && px.y >= rectangle_px.y &&
          px.y < rectangle_px.w;
 }
 
-/// Rectangles that a tile names, of those given, and that they come in order.
+/// Expects that a screen tile names every rectangle that holds the pixel once, and all in order.
 void expect_named(std::span<const std::uint16_t> entries, const glm::uvec2& px,
                   const std::vector<glm::uvec4>& rectangles) {
   EXPECT_TRUE(std::ranges::is_sorted(entries, std::ranges::less_equal{}));
@@ -60,6 +64,7 @@ void expect_named(std::span<const std::uint16_t> entries, const glm::uvec2& px,
   for (const std::uint16_t entry : entries) EXPECT_LT(entry, rectangles.size());
 }
 
+/// Expects that every `stride`th pixel lies in at most one screen tile, which names its rectangles.
 void expect_every_pixel_finds_its_own(const ShadeTiles& tiles, const glm::uvec4& window_px,
                                       const Rectangles& rectangles, std::uint32_t stride) {
   const std::uint32_t tile_px = tiles.tile_px();
@@ -91,13 +96,13 @@ TEST(ShadeTiles, EveryPixelFindsWhatItLiesInOnceAndInOrder) {
     const Rectangles rectangles = random_rectangles(window_px, 7, 3, seed);
     ShadeTiles tiles(10);
     sort(tiles, window_px, rectangles);
-    EXPECT_EQ(tiles.tile_px(), ShadeTiles::kLeastPx);
+    EXPECT_EQ(tiles.tile_px(), ShadeTiles::kMinPx);
     expect_every_pixel_finds_its_own(tiles, window_px, rectangles, 1);
   }
 }
 
 TEST(ShadeTiles, SquaresThatNothingReachesAreLeftOut) {
-  constexpr std::uint32_t kPx = ShadeTiles::kLeastPx;
+  constexpr std::uint32_t kPx = ShadeTiles::kMinPx;
   ShadeTiles tiles(2);
   sort(tiles, {0, 0, 20 * kPx, 20 * kPx},
        {{{kPx, kPx, 3 * kPx, 2 * kPx}}, {{2 * kPx, kPx, 2 * kPx + 1, kPx + 1}}});
@@ -117,8 +122,8 @@ TEST(ShadeTiles, LargePicturesHaveLargerSquares) {
   const Rectangles rectangles = random_rectangles(window_px, 5, 2, 9);
   ShadeTiles tiles(7);
   sort(tiles, window_px, rectangles);
-  EXPECT_GT(tiles.tile_px(), ShadeTiles::kLeastPx);
-  EXPECT_LE(tiles.tiles().size(), ShadeTiles::kMostTiles);
+  EXPECT_GT(tiles.tile_px(), ShadeTiles::kMinPx);
+  EXPECT_LE(tiles.tiles().size(), ShadeTiles::kMaxTiles);
   expect_every_pixel_finds_its_own(tiles, window_px, rectangles, 97);
 }
 
@@ -132,7 +137,7 @@ TEST(ShadeTiles, WhereEntriesRunOutSquaresAreLargerAndNothingIsLost) {
   sort(tiles, window_px, rectangles);
   std::size_t entries = 0;
   for (const auto& tile : tiles.tiles()) entries += tile.pages + tile.silhouettes;
-  EXPECT_LE(tiles.entries().size(), ShadeTiles::most_entries(records));
+  EXPECT_LE(tiles.entries().size(), ShadeTiles::max_entries(records));
   EXPECT_EQ(entries, tiles.entries().size());
   ASSERT_EQ(tiles.tiles().size(), 1U);
   EXPECT_EQ(tiles.tiles()[0].pages, 128U);

@@ -55,8 +55,8 @@ TEST(Contracts, LeastSquaresNeedAWholeMatrix) {
 TEST(Contracts, InnerLoopsAreCheckedInDebugBuilds) {
   EXPECT_DEATH((void)relaxation_gains(-1.0, 10.0), "dt_s >= 0.0 \\(-1 >= 0\\)");
   EXPECT_DEATH((void)relaxation_gains(1.0, 0.0), "tau_s > 0.0 \\(0 > 0\\)");
-  std::vector<WeatherRow> rows(2);
-  rows[0].time_ns = 10;
+  std::vector<WeatherSample> rows(2);
+  rows[0].sim_time_ns = 10;
   EXPECT_DEATH((void)forcing_from_rows(rows, 0), "is_sorted");
 }
 #endif

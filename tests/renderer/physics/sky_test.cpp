@@ -170,7 +170,7 @@ TEST(Weather, RowsAreLinearBetweenAndConstantOutside) {
 TEST(Weather, TwoRowsAtOneInstantAreAJump) {
   std::array<WeatherSample, 3> rows;
   rows[0].air_k = rows[1].air_k = 280.0;
-  rows[1].time_ns = rows[2].time_ns = 10;
+  rows[1].sim_time_ns = rows[2].sim_time_ns = 10;
   rows[2].air_k = 300.0;
   EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 9).air_k, 280.0);
   EXPECT_DOUBLE_EQ(forcing_from_rows(rows, 10).air_k, 300.0);

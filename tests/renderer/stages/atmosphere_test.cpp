@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tabulated air: every pixel of the shader against the double-precision table.
+// Tabulated air: every pixel of the shader against the table in double precision.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSurfaceK = 350.0;
 
-/// Air that differs by range and elevation in ways no sum of exponentials has.
+/// Table of air that varies with range and elevation in a way that no sum of exponentials does.
 physics::AtmosphereGrid uneven_air() {
   physics::AtmosphereGrid grid;
   grid.range_m = {2.0, 5.0, 11.0, 40.0, 150.0, 900.0};
@@ -60,7 +60,8 @@ Frame render(const scene::ScenarioDesc& scenario, const physics::Pose& pose) {
           view.stats};
 }
 
-/// Two bands, so that the second one's table does not start where the first's would.
+/// Scenario with two bands, so that the table of the second does not start where that of the first
+/// does.
 scene::ScenarioDesc scenario_with(const physics::AtmosphereGrid& grid) {
   auto scenario = instant_scenario(write_quads("plane", {ground(200.0, 200.0)}));
   scenario.bands = {{"3-5", 3.0, 5.0, {}}, {"8-12", 8.0, 12.0, {}}};
@@ -106,11 +107,11 @@ TEST(RendererAtmosphere, every_pixel_sees_the_tabulated_air_of_its_line_of_sight
       outside_px += air.clamped ? 1U : 0U;
     }
   }
-  // 1e-4 relative: the bar of in-band radiance in float32.
+  // Allow the relative error of in-band radiance in float32, 1e-4.
   EXPECT_LT(worst, 1e-4);
   EXPECT_GT(sky_px, 1000U);
   EXPECT_GT(surface_px, 20000U);
-  // Pixels on the very edge of the grid may fall to either side in float32.
+  // Leave room for pixels on the edge of the grid, which may fall to either side in float32.
   EXPECT_GT(outside_px, 1000U);
   EXPECT_NEAR(frame.stats.clamped_px, outside_px, 5.0);
   RecordProperty("worst_relative", std::to_string(worst));
@@ -123,7 +124,7 @@ TEST(RendererAtmosphere, nothing_is_counted_where_the_grid_covers_the_view) {
   grid.transmittance_frac = {0.9, 0.1, 0.95, 0.2};
   grid.path_radiance_w_m2_sr = {2.0, 25.0, 1.0, 15.0};
   for (const glm::dvec3& at : {glm::dvec3{0.0, -30.0, 500.0}, glm::dvec3{0.0, -30.0, -500.0}}) {
-    // Straight up and straight down: rounding must not leave the grid at its ends.
+    // Look straight up and straight down, where rounding must not leave the grid.
     const glm::dvec3 eye{0.0, -30.0, 4.0};
     const Frame frame =
         render(scenario_with(grid), {eye, physics::world_from_body_look_at(eye, at)});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where thermal samples on surfaces could go wrong: instances that share a mesh, casters that move,
-// the change from one interval to the next, and ground under bodies.
+// Cases in which thermal samples on surfaces could go wrong: instances that share a mesh, entities
+// that move, the change from one interval to the next, and ground under entities.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,8 @@ namespace emit::test {
 namespace {
 
 TEST(RendererCachedBreaks, InstancesOfOneMeshHaveTheirOwnTemperatures) {
-  // Two plates, one in the shade of a wall; a few pixels wide, where they share a mesh, and wider.
+  // Set up two plates, one of them in the shade of a wall. They share a mesh when they are a few
+  // pixels wide, and have a mesh each when they are wider.
   const auto plate = write_quads("plate", {ground(1.0, 1.0)});
   const auto wall = write_quads("wall", box({2.0, -8.0, 0.0}, {3.0, 8.0, 4.0}));
   const glm::dvec3 open_m(-12.0, 0.0, 0.0);
@@ -77,11 +78,12 @@ TEST(RendererCachedBreaks, InstancesOfOneMeshHaveTheirOwnTemperatures) {
 }
 
 TEST(RendererCachedBreaks, ShadeOfAPassingBodyIsItsMeanOverTheInterval) {
-  // A plate flies over at constant speed; a place lies 8 s of an interval of 20 s in its shade.
+  // Let a plate fly over at constant speed. A point lies in its shade for 8 s of an interval of 20
+  // s.
   constexpr double kHalfLengthM = 4.0;
   constexpr double kHeightM = 10.0;
   constexpr double kSpeedMs = 1.0;
-  constexpr double kOverOriginS = 7270.0;  // the middle of its shade is
+  constexpr double kOverOriginS = 7270.0;  // time at which the centre of its shade is at the origin
   constexpr double kFromS = 7215.0;
   constexpr double kToS = 7325.0;
   auto scenario = cached_scenario(write_quads("ground", fine_ground(16.0, 0.5)));
@@ -129,11 +131,11 @@ TEST(RendererCachedBreaks, ShadeOfAPassingBodyIsItsMeanOverTheInterval) {
     }
     check(frame, 7305.0);
   }
-  // Likewise where the passage is part of the history that the warm-up integrates.
+  // Check a run whose warm-up integrates the passage as part of the history.
   check(Session(scenario).frame_k(7325 * kSecondNs, pose), 7325.0);
 }
 
-/// By pixel, how much it changes from one frame to the next.
+/// Change of each pixel from one frame to the next, K.
 std::vector<double> changes_k(const std::vector<float>& before, const std::vector<float>& after) {
   std::vector<double> out(before.size(), 0.0);
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -172,12 +174,12 @@ TEST(RendererCachedBreaks, ClosingTheNewestIntervalShowsInNoPixel) {
     most_k = std::max(most_k, changed_k[changed_k.size() - 1] - usual_k);
   }
   EXPECT_LT(most_k, 0.25 * scenario.thermal.tolerance_k);
-  // There is something to be seen: an edge of the shadow moved.
+  // Expect that the test could see a fault: an edge of the shadow moved.
   EXPECT_GT(std::ranges::max(changes_k(first, last)), 10.0 * scenario.thermal.tolerance_k);
 }
 
 TEST(RendererCachedBreaks, AnEventShowsNowhereButWhereItActs) {
-  // The host takes a vehicle away in the middle of an interval, which is computed anew.
+  // Let the host take a vehicle away in the middle of an interval, which is then computed anew.
   auto scenario = cached_scenario(box_on_ground());
   scene::ObjectDesc vehicle = scenario.objects.front();
   vehicle.name = "vehicle";
@@ -206,8 +208,9 @@ TEST(RendererCachedBreaks, AnEventShowsNowhereButWhereItActs) {
       keep_most(f == kEvent ? event_k : before_k, changes_k(last, frame));
       last = std::move(frame);
     }
-    // An instant changes no temperature: neither of what is bared nor, in the western half of the
-    // picture, of what has nothing to do with it, where there is the edge of another shadow.
+    // Expect that the event itself changes no temperature: neither of the ground that is uncovered
+    // nor of the western half of the image, which the event does not concern and where another
+    // shadow has its edge.
     double bared_k = 0.0;
     double aside_k = 0.0;
     for (std::size_t i = 0; i < event_k.size(); ++i) {
@@ -217,7 +220,7 @@ TEST(RendererCachedBreaks, AnEventShowsNowhereButWhereItActs) {
     }
     EXPECT_LT(aside_k, 0.25 * scenario.thermal.tolerance_k);
     EXPECT_LT(bared_k, 0.25 * scenario.thermal.tolerance_k);
-    // From then on the sun has what was bared, as in the model.
+    // Expect that the sun heats the uncovered ground from then on, as in the model.
     const std::int64_t later_ns = now_ns + 30 * kSecondNs;
     auto frame = last;
     while (now_ns < later_ns) frame = run.frame_k(now_ns += kStepNs, pose);
@@ -242,7 +245,7 @@ TEST(RendererCachedBreaks, WhatHappensInAHoldWaitsForTheClock) {
   const auto before = run.frame_k(held_ns, pose);
   const renderer::EntityUpdate gone{7, scenario.objects[1].instances.front(), false, false};
   EXPECT_EQ(run.renderer().apply_entities(held_ns + 5 * kSecondNs, {&gone, 1}), 1U);
-  // The thermal clock stands: nothing changes, and nothing is sampled anew.
+  // Expect that nothing changes and nothing is sampled anew while the thermal clock stands.
   const auto samples = run.renderer().scene_stats().samples;
   for (int i = 0; i < 3; ++i) {
     EXPECT_LT(difference(before, run.frame_k(held_ns, pose)).max_k, 0.025) << i;
@@ -253,7 +256,7 @@ TEST(RendererCachedBreaks, WhatHappensInAHoldWaitsForTheClock) {
 }
 
 TEST(RendererCachedBreaks, AScriptedEventActsFromItsInstantOn) {
-  // In the middle of an interval of 20 s.
+  // Put the event into the middle of an interval of 20 s.
   const std::int64_t leaves_ns = 2 * kHourNs + 30 * kSecondNs;
   const auto pose = looking({0.0, -0.01, 16.0}, {0.0, 0.0, 0.0});
   const auto frames = [&](std::int64_t at_ns) {
@@ -267,13 +270,13 @@ TEST(RendererCachedBreaks, AScriptedEventActsFromItsInstantOn) {
   const auto left = frames(leaves_ns);
   const auto stayed = frames(leaves_ns + kHourNs);
   for (std::size_t i = 0; i < 3; ++i) {
-    // Rays of intervals of different length are not the same.
+    // Allow for the rays, which differ between intervals of different length.
     EXPECT_LT(difference(left[i], stayed[i]).max_k, 0.025) << i;
   }
   EXPECT_GT(difference(left[3], stayed[3]).max_k, 0.2);
 }
 
-/// Share of a level point's hemisphere that a level square above its middle takes.
+/// Cosine-weighted share of a level point's hemisphere that a level square centred above it takes.
 double square_above_frac(double half_m, double up_m) {
   const double x = half_m / up_m;
   const double root = std::sqrt(1.0 + x * x);
@@ -281,7 +284,7 @@ double square_above_frac(double half_m, double up_m) {
 }
 
 TEST(RendererCachedBreaks, GroundUnderAParkedBodySeesItsUnderside) {
-  // A clear night. The body came at sunset, when the history starts.
+  // Use a clear night. The vehicle arrives at sunset, when the history starts.
   constexpr double kHalfM = 2.5;
   constexpr double kUpM = 0.4;
   const std::int64_t now_ns = 20 * kHourNs;
@@ -313,10 +316,10 @@ TEST(RendererCachedBreaks, GroundUnderAParkedBodySeesItsUnderside) {
     return static_cast<double>(frame[kMiddle]);
   };
   const double open_k = open_ground_k(parked(0, std::nullopt), now_ns);
-  // Scenery or entity: it keeps the sky off.
+  // Expect that the vehicle hides the sky, whether it is static or an entity.
   EXPECT_GT(under_k(parked(0, std::nullopt)), open_k + 2.0);
   EXPECT_GT(under_k(parked(7, std::nullopt)), open_k + 2.0);
-  // Either sends what its own underside does.
+  // Expect that the ground receives the radiation of the underside in both cases.
   for (const auto& [entity_id, hull_k] :
        {std::pair(0U, 280.0), {0U, 330.0}, {7U, 280.0}, {7U, 330.0}}) {
     const auto scenario = parked(entity_id, hull_k);
@@ -336,22 +339,22 @@ TEST(RendererCachedBreaks, GroundUnderAParkedBodySeesItsUnderside) {
   }
 }
 
-/// Before the foot of a box of 2 m whose faces, as exporters like to have them, may be
-/// double-sided.
+/// Expects ground as warm as open ground at the sunlit foot of a box of 2 m. Its faces may be
+/// double-sided, as many exporters write them.
 void expect_sunlit_foot(bool double_sided) {
-  // Ground of two triangles under a body: what it covers never had the sun of this morning.
+  // Put a box on ground of two triangles. The covered ground never saw the sun of this morning.
   auto scenario = cached_scenario(write_quads("lot", {ground(14.0, 14.0)}));
   scene::ObjectDesc body = scenario.objects.front();
   body.name = "body";
   body.gltf = write_quads("body", box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0}), double_sided);
   scenario.objects.push_back(body);
   const std::int64_t now_ns = 4 * kHourNs;
-  const auto pose = looking({3.5, -0.4, 1.6}, {1.2, 0.0, 0.0});  // before its sunlit side
+  const auto pose = looking({3.5, -0.4, 1.6}, {1.2, 0.0, 0.0});  // in front of its sunlit side
   Session run(scenario, {.object = true});
   const auto frame = run.frame_k(now_ns, pose);
   const auto& objects = run.objects();
   const double open_k = open_ground_k(scenario, now_ns);
-  // To the right lies its shadow.
+  // Leave out the right of the image, where its shadow lies.
   int ground_px = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     if (objects[i] != 1.0F || i % kWidth >= kWidth * 6 / 10) continue;

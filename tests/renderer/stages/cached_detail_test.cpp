@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How finely the thermal method "cached" samples what a camera sees, and that the pictures do not
-// tell: from near and far, and on the way between.
+// The thermal method "cached" samples a view as finely as it needs, and changes of detail do not
+// show: from near, from far, and on the way between.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,16 +13,16 @@
 #include <utility>
 #include <vector>
 
-#include "support/cached_session.hpp"
-#include "support/renderer_scene.hpp"
 #include "renderer/scene/gltf_builder.hpp"
 #include "renderer/scene/sphere.hpp"
+#include "support/cached_session.hpp"
+#include "support/renderer_scene.hpp"
 
 namespace emit::test {
 namespace {
 
 TEST(RendererCachedDetail, SamplesAreBoundedByThePixels) {
-  // However small the tolerance, triangles are not cut far below a pixel.
+  // Expect that triangles are not cut far below a pixel, however small the tolerance is.
   auto scenario = cached_scenario(box_on_ground());
   const auto pose = looking({-6.0, -9.0, 7.0}, {-1.0, 0.0, 0.0});
   scenario.sensor.trajectory = {{0, pose}};
@@ -38,12 +38,13 @@ TEST(RendererCachedDetail, SamplesAreBoundedByThePixels) {
   const double coarse = samples(1);
   const double fine = samples(2);
   EXPECT_LT(coarse, 3.0 * kWidth * kHeight);
-  EXPECT_GT(coarse, 0.5 * kWidth * kHeight);  // the limit is what stops it
+  EXPECT_GT(coarse, 0.5 * kWidth * kHeight);  // the limit stops the refinement
   EXPECT_LT(fine, 4.5 * coarse);
 }
 
-/// What a picture around its middle would be after moving away to `farther` times the distance of a
-/// plane that it looks down on: bilinear, one pixel inside the rim.
+/// Image that the centre of `picture` becomes when a camera that looks down on a plane recedes to
+/// `farther` times its distance. It is interpolated bilinearly and leaves out one pixel along the
+/// rim.
 std::vector<double> receded_k(const std::vector<float>& picture, std::uint32_t width_px,
                               double farther) {
   const std::size_t width = width_px;
@@ -72,8 +73,8 @@ std::vector<double> receded_k(const std::vector<float>& picture, std::uint32_t w
 }
 
 TEST(RendererCachedDetail, LevelsChangeWithoutAPop) {
-  // The shade of a plate high above, with a soft edge that has wandered over the ground. The camera
-  // recedes to four times the distance.
+  // Cast the shade of a plate high above, with a soft edge that has moved over the ground. Let the
+  // camera recede to four times the distance.
   constexpr double kUpM = 60.0;
   constexpr double kNearM = 8.0;
   constexpr int kFrames = 400;
@@ -119,13 +120,13 @@ TEST(RendererCachedDetail, LevelsChangeWithoutAPop) {
     over_k = std::max(over_k, most_k[f] - around_k[5]);
   }
   EXPECT_LT(over_k, scenario.thermal.tolerance_k);
-  // Coarser levels are there, and would be seen where they came in earlier.
+  // Expect that coarser levels exist and would show if they were drawn earlier.
   const auto coarse = run.frame_k(now_ns, at(kFrames), 3);
   EXPECT_GT(most_apart_k(receded_k(coarse, scenario.sensor.width_px, 1.0), last),
             scenario.thermal.tolerance_k);
 }
 
-/// A ball of radius 1 m with smooth normals.
+/// File with a ball of radius 1 m and smooth normals.
 std::filesystem::path write_ball(std::uint32_t rings) {
   const scene::Mesh mesh = scene::sphere(rings, false);
   GltfText text;
@@ -149,7 +150,7 @@ std::filesystem::path write_ball(std::uint32_t rings) {
   return write_file(test_folder() / "ball.gltf", text.json());
 }
 
-/// A hull with a turret that shades it, each face in `parts` x `parts` squares.
+/// File with a hull and a turret that shades it. Each face consists of `parts` x `parts` squares.
 std::filesystem::path write_vehicle(int parts) {
   auto faces = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 0.6});
   const auto turret = box({-0.1, -0.4, 0.6}, {0.7, 0.4, 1.2});
@@ -169,14 +170,14 @@ std::filesystem::path write_vehicle(int parts) {
   return write_quads("vehicle", squares);
 }
 
-/// What many pictures show of things.
+/// Means over many images of small objects.
 struct Shown {
   double mean_k = 0.0;
   double pixels = 0.0;
 };
 
-/// Nine things of 1 m in a row, the picture shifted by parts of a pixel; the camera may come near
-/// each of them later on.
+/// Renders nine objects of 1 m in a row, with the image shifted by parts of a pixel. With
+/// `comes_near` the camera passes each of them later on.
 Shown shown_from_afar(const std::filesystem::path& gltf, double thing_px, const glm::dvec3& from,
                       bool comes_near) {
   constexpr double kThingM = 1.0;
@@ -224,7 +225,8 @@ Shown shown_from_afar(const std::filesystem::path& gltf, double thing_px, const 
 }
 
 TEST(RendererCachedDetail, SmallThingsAreRightOnAverage) {
-  // Finely sampled, because the camera comes near them, or for their few pixels.
+  // Compare objects that are finely sampled, because the camera comes near them, with objects that
+  // are sampled for their few pixels.
   constexpr double kAreaFrac = 0.03;
   const double most_k = 2.0 * scene::ScenarioDesc{}.thermal.tolerance_k;
   const auto expect_alike = [&](const std::filesystem::path& gltf, double thing_px,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Entities that the host drives: their shade is where they are, not where they were when the rays
-// of an interval were sent.
+// Shade of entities that the host drives lies where they are, not where they were when the rays of
+// an interval were sent.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,18 +16,19 @@
 namespace emit::test {
 namespace {
 
-/// Tells where entity 7 is.
+/// Sends the pose of entity 7.
 void tell(Session& session, std::int64_t sim_time_ns, const physics::Pose& pose) {
   const renderer::EntityUpdate update{7, pose, true, false};
   EXPECT_EQ(session.renderer().apply_entities(sim_time_ns, {&update, 1}), 1U);
 }
 
-/// A plate flies over squares of ground at constant speed, along the middle row of the picture.
+/// Scenario in which a plate flies over squares of ground at constant speed, along the middle row
+/// of the image.
 struct Flyover {
   static constexpr double kHalfLengthM = 5.0;
   static constexpr double kHeightM = 10.0;
   static constexpr double kSpeedMs = 2.5;
-  static constexpr double kOverOriginS = 7270.0;  ///< the middle of its shade is
+  static constexpr double kOverOriginS = 7270.0;  ///< time at which its shade is over the origin
   static constexpr double kFromS = 7259.0;
   static constexpr double kToS = 7281.0;
   static constexpr double kEyeM = 28.0;
@@ -51,16 +52,17 @@ struct Flyover {
     pose.position_world_m.x += kSpeedMs * moving_s;
     return pose;
   }
-  /// Column of the track to metres from the origin.
+  /// Distance of a column of the track from the origin, m.
   [[nodiscard]] double track_m(std::uint32_t column) const {
     const double px_m = 2.0 * kEyeM * std::tan(0.5 * scenario.sensor.fov_h_rad) / kWidth;
     return (column + 0.5 - 0.5 * kWidth) * px_m;
   }
-  /// When the plate shades that column, if it moves over it.
+  /// Interval in which the plate shades a column, if it moves over it.
   [[nodiscard]] std::optional<Shade> passage(std::uint32_t column) const {
     const double middle_s = kOverOriginS + track_m(column) / kSpeedMs;
     constexpr double kHalfS = kHalfLengthM / kSpeedMs;
-    // Where it waits and where it stops, it hides some of the sky.
+    // Leave out the columns where it waits and where it stops, because it hides some of the sky
+    // there.
     if (std::abs(track_m(column)) > 8.0) return std::nullopt;
     return Shade{middle_s - kHalfS, middle_s + kHalfS};
   }
@@ -86,7 +88,7 @@ TEST(RendererCachedLive, ShadeGoesWithABodyThatTheHostMoves) {
       const double expected_k = now_s <= in_s ? open_ground_k(world.scenario, now_ns)
                                               : open_ground_k(world.scenario, now_ns,
                                                               Shade{in_s, std::min(out_s, now_s)});
-      // At the edges of the shade, mean over a step, is most of the difference.
+      // Allow more near the edges of the shade, because shade is the mean over a step.
       const double nearest_s = std::min(std::abs(now_s - in_s), std::abs(now_s - out_s));
       EXPECT_NEAR(Flyover::track(frame)[column], expected_k, nearest_s < 1.5 ? 0.08 : 0.03)
           << now_s << " s, column " << column << ", shade " << in_s << " to " << out_s;
@@ -97,7 +99,7 @@ TEST(RendererCachedLive, ShadeGoesWithABodyThatTheHostMoves) {
 }
 
 TEST(RendererCachedLive, WhatTheScriptPlannedDoesNotHappen) {
-  // The script moves the plate, the host keeps it where it is from before that on.
+  // Let the script move the plate, while the host keeps it in its place from before that time.
   Flyover world;
   scene::ObjectDesc& plate = world.scenario.objects.back();
   for (const double key_s : {0.0, Flyover::kFromS, Flyover::kToS}) {
@@ -121,7 +123,7 @@ TEST(RendererCachedLive, HeatGoesOnWithoutAStepWhenTheBodyHasStopped) {
   Session run(world.scenario);
   std::vector<float> last;
   std::vector<std::vector<float>> by_column_k(kWidth);
-  constexpr double kRestS = 2.0;  // after it the last of its edges is settled
+  constexpr double kRestS = 2.0;  // time after which the last edge of the shade has settled
   double now_s = 7245.0;
   for (; now_s <= 7345.0; now_s += 0.25) {
     const std::int64_t now_ns = std::llround(now_s * 1e9);
@@ -137,14 +139,15 @@ TEST(RendererCachedLive, HeatGoesOnWithoutAStepWhenTheBodyHasStopped) {
   }
   for (std::uint32_t column = 0; column < kWidth; ++column) {
     std::vector<float>& changes_k = by_column_k[column];
-    // Changes die away: none stands out from those right before and after it.
+    // Expect that changes die away: no change exceeds those right before and after it.
     for (std::size_t i = 2; i + 2 < changes_k.size(); ++i) {
       const float around_k = std::max(std::max(changes_k[i - 2], changes_k[i - 1]),
                                       std::max(changes_k[i + 1], changes_k[i + 2]));
       EXPECT_LT(changes_k[i], around_k + 0.025F) << "column " << column << ", frame " << i;
     }
   }
-  // What has been shaded since the stop is as cold as where a run starts that knows it all.
+  // Expect that ground shaded since the stop is as cold as in a run that knows all poses from the
+  // start.
   Session fresh(world.scenario);
   const std::int64_t now_ns = std::llround(now_s * 1e9);
   for (double told_s = Flyover::kFromS; told_s < now_s; told_s += 0.25) {
@@ -161,7 +164,7 @@ TEST(RendererCachedLive, HeatGoesOnWithoutAStepWhenTheBodyHasStopped) {
 }
 
 TEST(RendererCachedLive, FacesOfABodyThatTheHostTurnsFollowTheSun) {
-  // Scripted and live turns at the same time give the same temperatures.
+  // Expect the same temperatures from scripted turns and from live turns at the same time.
   auto live = cached_scenario(write_quads("ground", {ground(12.0, 12.0)}));
   scene::ObjectDesc body = live.objects.front();
   body.name = "body";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shade of entities on triangles that are far larger than it: by pixel, where it is and was.
+// Shade of entities on triangles that are far larger than the shade: each pixel has it where it is
+// and was.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 namespace emit::test {
 namespace {
 
-/// A plate that the host moves over one large square of ground.
+/// Scenario with a plate that the host moves over one large square of ground.
 struct Plate {
   static constexpr double kHalfEastM = 4.0;
   static constexpr double kHalfNorthM = 2.0;
@@ -30,14 +31,15 @@ struct Plate {
     plate.instances = {at(60.0)};
     scenario.objects.push_back(plate);
   }
-  /// The middle of its shade lies that far in the east of the origin at 7300 s.
+  /// Pose of the plate whose shade has its centre `east_m` east of the origin at 7300 s.
   [[nodiscard]] physics::Pose at(double east_m) const {
     const glm::dvec3 sun = to_sun(scenario, 7300.0);
     physics::Pose pose = scenario.objects.front().instances.front();
     pose.position_world_m = kHeightM / sun.z * sun + glm::dvec3(east_m, 0.0, 0.0);
     return pose;
   }
-  /// How far within the plate's shade a point of the ground lies; negative: outside.
+  /// Distance from the edge of the plate's shade to a point of the ground inside it; negative
+  /// outside.
   [[nodiscard]] double inside_m(const glm::dvec3& point_m, double east_m, double now_s) const {
     const glm::dvec3 sun = to_sun(scenario, now_s);
     const glm::dvec3 aside_m = point_m + kHeightM / sun.z * sun - at(east_m).position_world_m;
@@ -48,7 +50,7 @@ struct Plate {
     const auto y = static_cast<std::uint32_t>(pixel / kWidth);
     return world_point(scenario.sensor, eye, x, y, eye.position_world_m.z);
   }
-  /// The plate itself hides the ground there, or would if it were larger by `rim_m`.
+  /// True when the plate, made larger by `rim_m` on every side, hides a point of the ground.
   [[nodiscard]] bool hidden(const glm::dvec3& point_m, double east_m, double rim_m = 0.3) const {
     const glm::dvec3& eye_m = eye.position_world_m;
     const glm::dvec3 there_m = eye_m + (eye_m.z - kHeightM) / eye_m.z * (point_m - eye_m);
@@ -86,12 +88,12 @@ TEST(RendererCachedShade, WhatTheHostParksLeavesAPrintWithItsOwnEdges) {
     for (std::size_t i = 0; i < frame.size(); ++i) {
       const glm::dvec3 point_m = world.ground_at(i);
       if (parked && world.hidden(point_m, east_m, -0.3)) {
-        // Its own shade lies on the same lines to the sun.
+        // Expect no shade of the plate on itself, although it lies on the same rays to the sun.
         EXPECT_NEAR(frame[i], open_k, 0.1);
         ++own;
       }
       if (parked && world.hidden(point_m, east_m)) continue;
-      // Its shade creeps by a few centimetres.
+      // Leave out the edge, because the shade moves by a few centimetres.
       const double inside_m = world.inside_m(point_m, 0.0, 7270.0);
       if (std::abs(inside_m) < 0.3) continue;
       const double expected_k = inside_m > 0.0 ? shaded_k : open_k;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sheets with the method "cached": one body temperature, driven by what both faces receive.
+// Sheets with the method "cached" have one temperature, which the fluxes of both faces drive.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,14 +21,14 @@ constexpr std::uint32_t kHeight = 80;
 constexpr scene::Layer kSteel{0.002, 50.0, 7850.0, 470.0};
 constexpr double kUpM = 4.0;
 
-/// A level plate in the air whose front looks up or down, and what else is there.
+/// Scenario with a level plate in the air whose front faces up or down, and with other faces.
 scene::ScenarioDesc plate(bool faces_up, scene::ThermalModel model, std::vector<Quad> others = {}) {
   Quad quad = ground(3.0, 3.0, kUpM);
   if (!faces_up) std::swap(quad.b, quad.d);
   others.push_back(quad);
   scene::ScenarioDesc s = instant_scenario(write_quads("plate", others, true));
   s.materials[0].layers = {kSteel, {0.02, 0.16, 1.2, 1005.0}};
-  s.materials[0].base_k = 350.0;  // which no sheet has to do with
+  s.materials[0].base_k = 350.0;  // must not influence a sheet
   s.materials[0].emissivity_frac = 0.6;
   scene::Material soil = s.materials[0];
   soil.name = "soil";
@@ -48,7 +48,7 @@ scene::ScenarioDesc plate(bool faces_up, scene::ThermalModel model, std::vector<
   return s;
 }
 
-/// Temperatures seen from `from`, which looks at the plate's middle, and on for `seconds`.
+/// Temperatures of the plate as seen from `from`, after frames over `seconds`.
 std::vector<float> seen_k(renderer::Renderer& renderer, const glm::dvec3& from,
                           std::int64_t sim_time_ns) {
   renderer::FrameRequest request;
@@ -75,7 +75,7 @@ float middle_k(const std::vector<float>& picture) {
   return picture[kHeight / 2 * kWidth + kWidth / 2];
 }
 
-/// Heat balance of both faces of an open plate as one body, in steps of a second.
+/// Temperature of an open plate from the heat balance of both faces, in steps of a second.
 double balance_k(const scene::ScenarioDesc& s, std::int64_t end_ns) {
   std::vector<std::int64_t> nodes_ns;
   for (std::int64_t t = 0; t <= end_ns; t += 60 * kSecondNs) nodes_ns.push_back(t);
@@ -83,7 +83,7 @@ double balance_k(const scene::ScenarioDesc& s, std::int64_t end_ns) {
   EXPECT_TRUE(intervals.has_value());
   const scene::Material& m = s.materials[0];
   const double capacity = kSteel.thickness_m * kSteel.density_kg_m3 * kSteel.specific_heat_j_kg_k;
-  double t_k = 300.0;  // forgotten within the first of two hours
+  double t_k = 300.0;  // has no influence after the first of two hours
   for (const renderer::IntervalForcing& interval : *intervals) {
     for (int i = 0; i < 60; ++i) {
       const renderer::SurfaceForcing& f = i < 30 ? interval.begin : interval.end;
@@ -102,7 +102,7 @@ TEST(RendererSheet, HasTheTemperatureOfABodyBetweenTwoFaces) {
   for (const bool faces_up : {true, false}) {
     const auto scenario = plate(faces_up, scene::ThermalModel::foster);
     const auto run = renderer_of(scenario);
-    // Also as frames carry it on from the warm-up.
+    // Check the plate again after frames have advanced it from the warm-up.
     for (const std::int64_t now_ns : {2 * kHourNs, 2 * kHourNs + 90 * kSecondNs}) {
       const double expected_k = balance_k(scenario, now_ns);
       const float above_k = middle_k(seen_k(*run, {0.0, -3.0, kUpM + 4.0}, now_ns));
@@ -123,13 +123,13 @@ TEST(RendererSheet, OfThePublishedModelFollowsBothFacesToo) {
   };
   const float up_k = at(true);
   EXPECT_NEAR(up_k, at(false), 0.02);
-  // Between the sun on both faces and on none.
+  // Expect a temperature between those with the sun on both faces and on none.
   EXPECT_GT(up_k, 300.0F);
   EXPECT_LT(up_k, 350.0F);
 }
 
 TEST(RendererSheet, ShadeOnOneFaceShowsOnTheOther) {
-  // A bar above the plate; both faces lose the same heat under it.
+  // Put a bar above the plate. Under it both faces lose the same heat.
   const auto scenario = plate(false, scene::ThermalModel::foster,
                               {{{-0.5, -9.0, kUpM + 1.0},
                                 {0.5, -9.0, kUpM + 1.0},
@@ -137,7 +137,7 @@ TEST(RendererSheet, ShadeOnOneFaceShowsOnTheOther) {
                                 {-0.5, 9.0, kUpM + 1.0}}});
   const auto run = renderer_of(scenario);
   const auto below = seen_k(*run, {0.0, 0.1, kUpM - 6.0}, 2 * kHourNs);
-  std::vector<float> row;  // east to west through the middle
+  std::vector<float> row;  // from east to west through the centre
   for (std::uint32_t x = 0; x < kWidth; ++x) {
     const float k = below[kHeight / 2 * kWidth + x];
     if (!std::isnan(k)) row.push_back(k);
@@ -145,14 +145,14 @@ TEST(RendererSheet, ShadeOnOneFaceShowsOnTheOther) {
   ASSERT_GT(row.size(), 40U);
   const auto [low, high] = std::ranges::minmax(row);
   EXPECT_GT(high - low, 6.0F);
-  // The shade is as wide as the bar, 1 m of what the picture shows of the plate.
+  // Expect shade as wide as the bar, which is 1 m of the visible part of the plate.
   const double seen_m = 2.0 * 6.0 * std::tan(0.5 * scenario.sensor.fov_h_rad);
   const auto cool = std::ranges::count_if(row, [&](float k) { return k < 0.5F * (low + high); });
   EXPECT_NEAR(static_cast<double>(cool) / static_cast<double>(row.size()), 1.0 / seen_m, 0.02);
 }
 
 TEST(RendererSheet, WhatCoversAFaceLeavesTheOtherToDecide) {
-  // A plate on the closed face of a block, its front to the block or away from it.
+  // Put a plate on the closed face of a block, with its front to the block or away from it.
   const auto on_block_k = [](bool faces_up) {
     auto scenario = plate(faces_up, scene::ThermalModel::foster);
     scene::ObjectDesc block = scenario.objects.front();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// thermal.state_file: a run that reads the warmed-up state shows what the one that wrote it shows.
+// thermal.state_file: a run that reads the state of a warm-up shows the frames of the run that
+// wrote it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +24,7 @@ physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
   return {from, physics::world_from_body_look_at(from, at)};
 }
 
-/// A box on open ground and a vehicle that has left.
+/// Scenario with a box on open ground and a vehicle that has left.
 scene::ScenarioDesc saved_scenario(const std::filesystem::path& state_file) {
   auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
   quads.push_back(ground(12.0, 12.0));
@@ -59,7 +60,7 @@ scene::ScenarioDesc saved_scenario(const std::filesystem::path& state_file) {
 
 struct WarmUp {
   physics::Result<void> result;
-  std::size_t reports = 0;  ///< of progress: none when nothing was computed
+  std::size_t reports = 0;  ///< number of progress reports; 0 when nothing was computed
 };
 
 class Session {
@@ -89,7 +90,7 @@ class Session {
     return out;
   }
   WarmUp warm_up() { return warm_up(request(0.0)); }
-  /// All planes of a frame, one after the other.
+  /// Renders a frame and returns all its planes, one after the other.
   [[nodiscard]] std::vector<float> frame(const renderer::FrameRequest& request) {
     const int slot = renderer_->submit(request);
     const auto& view = renderer_->collect(static_cast<renderer::SlotIndex>(slot));
@@ -101,7 +102,7 @@ class Session {
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
     return out;
   }
-  /// Over the end of three intervals, while the vehicle leaves.
+  /// Renders frames over the end of three intervals, while the vehicle leaves.
   [[nodiscard]] std::vector<std::vector<float>> frames() {
     std::vector<std::vector<float>> out;
     for (const double seconds : {0.0, 2.0, 5.5, 8.0, 30.0, 65.0}) {
@@ -166,7 +167,7 @@ TEST(RendererStateFile, ARunThatReadsItShowsBitForBitWhatTheOneThatWroteItShows)
   Session run(scenario);
   const WarmUp warm = run.warm_up();
   ASSERT_TRUE(warm.result) << warm.result.error().text;
-  EXPECT_EQ(warm.reports, 0U);  // nothing was sampled
+  EXPECT_EQ(warm.reports, 0U);  // the surface was not sampled
   EXPECT_EQ(run.renderer().scene_stats().samples, samples);
   const auto read = run.frames();
   for (std::size_t i = 0; i < written.size(); ++i) EXPECT_TRUE(same_bits(written[i], read[i])) << i;
@@ -240,7 +241,7 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
     EXPECT_EQ(run.renderer().apply_entities(kHourNs, {&update, 1}), 1U);
   });
   EXPECT_EQ(std::filesystem::last_write_time(file), written);
-  EXPECT_TRUE(Session(scenario).warm_up().result);  // still good
+  EXPECT_TRUE(Session(scenario).warm_up().result);  // the file is still valid
   std::filesystem::remove(file);
 }
 
@@ -312,7 +313,7 @@ TEST(RendererStateFile, GoingBackInTimeStartsAfreshAndLeavesTheFileAsItIs) {
   ASSERT_TRUE(run.warm_up().result);
   const auto written = std::filesystem::last_write_time(file);
   const auto first = run.frame(run.request(0.0));
-  (void)run.frame(run.request(-3600.0));  // fails the test when refused
+  (void)run.frame(run.request(-3600.0));  // the test fails when the frame is refused
   EXPECT_EQ(std::filesystem::last_write_time(file), written);
   (void)run.frame(run.request(90.0));
   EXPECT_TRUE(same_bits(first, run.frame(run.request(0.0))));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The thermal method "cached" against the model in double precision, against "per-frame", and
-// against itself: nothing it shows may depend on where the camera was.
+// against itself: no frame may depend on where the camera was before.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -36,7 +36,8 @@ TEST(RendererCached, ShadowLiesWhereThePerFrameMethodPutsIt) {
     errors.push_back(std::abs(static_cast<double>(cached[i]) - static_cast<double>(per_frame[i])));
   }
   std::ranges::sort(errors);
-  // The box itself, what it hides of the sky and edges differ; shadow and open ground do not.
+  // Compare shadow and open ground only. The box, the sky that it hides and edges differ between
+  // the methods.
   EXPECT_LT(errors[errors.size() / 2], 0.05);
   EXPECT_LT(errors[errors.size() * 80 / 100], 0.4);
   const auto [low, high] = std::ranges::minmax(cached);
@@ -44,7 +45,7 @@ TEST(RendererCached, ShadowLiesWhereThePerFrameMethodPutsIt) {
 }
 
 TEST(RendererCached, ASmallBodyInALargeMeshCastsItsShade) {
-  // Nothing tells the ground's triangles of it but rays between their corners.
+  // Only rays between the corners of the ground's triangles can find the box.
   auto quads = box({6.8, 3.2, 0.0}, {7.4, 3.8, 1.0});
   quads.push_back(ground(60.0, 60.0));
   auto scenario = cached_scenario(write_quads("post", quads));
@@ -90,7 +91,7 @@ TEST(RendererCached, RunningOnEndsWhereAFreshStartBegins) {
     }
   }
   const Difference d = difference(last, Session(scenario).frame_k(end_ns, pose));
-  EXPECT_LT(d.p99_k, 0.5);  // samples stay where they were refined for the start
+  EXPECT_LT(d.p99_k, 0.5);  // samples stay where the start refined them
   EXPECT_LT(d.max_k, 4.0);
 }
 
@@ -122,7 +123,7 @@ TEST(RendererCached, AVehicleThatLeftLeavesItsPrint) {
 }
 
 TEST(RendererCached, AVehicleThatTheHostDrivesOffIsNotForgotten) {
-  // Scripted and live departures at the same time give the same print.
+  // Expect the same print from a scripted departure and from a live one at the same time.
   const auto scripted = parking_lot(2 * kHourNs + 30 * kSecondNs);
   auto live = scripted;
   live.objects[1].trajectory.resize(1);
@@ -239,9 +240,9 @@ TEST(RendererCached, ALimitBelowTheMeshesOwnVerticesSaysByHowMuchItDoesNotBind) 
 }
 
 TEST(RendererCached, AMeshFinerThanThePixelsIsSampledAsTheCameraNeedsIt) {
-  // Ground of 6 cm squares; a pixel is as wide as two or three of them.
+  // Use ground of squares of 6 cm. A pixel is as wide as two or three of them.
   std::vector<Quad> quads = box({-2.0, -2.0, 0.0}, {2.0, 2.0, 3.0});
-  constexpr double kSquareM = 0.0625;  // exact in float32: neighbours meet
+  constexpr double kSquareM = 0.0625;  // exact in float32, so that neighbours meet
   for (int i = 0; i < 200; ++i) {
     for (int j = 0; j < 200; ++j) {
       const glm::dvec3 low(kSquareM * (i - 100), kSquareM * (j - 100), 0.0);
@@ -269,13 +270,13 @@ TEST(RendererCached, AMeshFinerThanThePixelsIsSampledAsTheCameraNeedsIt) {
   }
   std::ranges::sort(errors);
   ASSERT_GT(errors.size(), 2500U);
-  // All but the shadow's edge, less than a pixel wide here.
+  // Leave out the edge of the shadow, which is less than a pixel wide here.
   EXPECT_LT(errors[errors.size() / 2], 0.02);
   EXPECT_LT(errors[errors.size() * 95 / 100], 0.2);
 }
 
 TEST(RendererCached, WhatNoEyeSeesIsNotRefined) {
-  // From below, the ground turns its back and hides what stands on it.
+  // Look from below, where the ground shows its back and hides everything that stands on it.
   const auto scenario = cached_scenario(box_on_ground());
   const auto samples_from = [&](double up_m) {
     Session run(scenario);
@@ -286,10 +287,10 @@ TEST(RendererCached, WhatNoEyeSeesIsNotRefined) {
 }
 
 TEST(RendererCached, GroundUnderABodyDoesNotShowThroughAtItsFoot) {
-  // Two hours into the morning the ground west of the box has lain in its shade since the start.
+  // Look at the ground west of the box, which has been in its shade since the start two hours ago.
   auto scenario = cached_scenario(box_on_ground());
   scenario.sensor.fov_h_rad = 0.35;
-  scenario.materials[0].base_k = 340.0;  // so that covered ground is hot
+  scenario.materials[0].base_k = 340.0;  // makes covered ground hot
   const auto seen_from = [&](const glm::dvec3& eye, const glm::dvec3& at) {
     return Session(scenario).frame_k(2 * kHourNs, looking(eye, at));
   };
@@ -330,7 +331,7 @@ TEST(RendererCachedSurface, PassesTemperaturesOnWithinAQuarterOfAMillikelvin) {
     scenario.materials[0].prescribed_k = prescribed_k;
     Session session(scenario);
     const auto frame_k = session.frame_k(2 * kHourNs, looking({0.0, -5.0, 5.0}, {0.0, 0.0, 0.0}));
-    const double floats_k = 3.0 * 1.2e-7 * prescribed_k;  // of interpolating in float32
+    const double floats_k = 3.0 * 1.2e-7 * prescribed_k;  // error of interpolation in float32
     for (const float k : frame_k) ASSERT_NEAR(k, prescribed_k, 0.5 / 2048.0 + floats_k);
   }
 }

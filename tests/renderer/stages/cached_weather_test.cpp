@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weather that the host changes: acts from its time stamp, over frames, and becomes history.
+// Weather that the host changes acts from its time stamp on, is taken in over some frames, and
+// becomes part of the history.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +19,8 @@ namespace {
 constexpr std::int64_t kFrameNs = kSecondNs / 4;
 constexpr std::size_t kMiddle = kHeight / 2 * kWidth + kWidth / 2;
 
-/// Clear sky of that instant, with that share of its direct sun and its air warmer by `air_k`.
+/// Weather of the clear sky at an instant, with a share of its direct sun and with air warmer by
+/// `air_k`.
 scene::WeatherSample weather_at(const scene::ScenarioDesc& scenario, std::int64_t at_ns,
                                 double sun_frac, double air_k = 0.0) {
   const renderer::Environment environment(scenario);
@@ -33,7 +35,8 @@ scene::WeatherSample weather_at(const scene::ScenarioDesc& scenario, std::int64_
   return out;
 }
 
-/// open_ground_k() under weather that is told, in steps that are short beside its changes.
+/// Temperature of open ground under weather that the host sends, in steps that are short compared
+/// with its changes.
 double told_ground_k(const scene::ScenarioDesc& s, std::span<const scene::WeatherSample> told,
                      std::int64_t now_ns) {
   OpenGround ground(s, told, told.front().sim_time_ns);
@@ -48,7 +51,7 @@ scene::ScenarioDesc open_ground() {
 TEST(RendererCachedWeather, ACloudActsFromItsInstantOn) {
   const auto scenario = open_ground();
   const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
-  // In the middle of an interval of 20 s, right before its end, and at it.
+  // Put the change into the middle of an interval of 20 s, right before its end, and at its end.
   for (const std::int64_t quarters : {28, 79, 80}) {
     SCOPED_TRACE(quarters);
     const std::int64_t event_ns = 2 * kHourNs + quarters * kFrameNs;
@@ -56,7 +59,7 @@ TEST(RendererCachedWeather, ACloudActsFromItsInstantOn) {
     Session run(scenario);
     std::int64_t now_ns = 2 * kHourNs + kFrameNs / 2;
     float last_k = run.frame_k(now_ns, pose)[kMiddle];
-    int after = 0;  // frames
+    int after = 0;  // number of frames since the change
     double most_step_k = 0.0;
     double most_off_k = 0.0;
     while (now_ns < event_ns + 60 * kSecondNs) {
@@ -69,14 +72,14 @@ TEST(RendererCachedWeather, ACloudActsFromItsInstantOn) {
       most_step_k = std::max(most_step_k, std::abs(static_cast<double>(is_k) - last_k));
       last_k = is_k;
       if (now_ns < event_ns) continue;
-      // No frame takes it in for all of the surface.
+      // Expect that ten frames take the change in, each for a part of the surface.
       ++after;
       EXPECT_EQ(run.coarse(), after <= 10) << after;
       if (after % 4 != 1) continue;
       const double off_k = std::abs(is_k - told_ground_k(scenario, told, now_ns));
       most_off_k = std::max(most_off_k, off_k);
     }
-    // What is lost meanwhile is kelvins; the tolerance is a tenth.
+    // Expect that the ground cools by kelvins meanwhile, while errors stay below a tenth.
     EXPECT_GT(open_ground_k(scenario, now_ns) - last_k, 2.0);
     EXPECT_LT(most_step_k, 0.05);
     EXPECT_LT(most_off_k, 0.06);
@@ -96,7 +99,7 @@ TEST(RendererCachedWeather, AfterAJumpItHasActedAsLongAsItWould) {
 }
 
 TEST(RendererCachedWeather, WhatIsToldEverySecondIsFollowed) {
-  // The sun fades within a minute; what is told meanwhile never lets an interval end.
+  // Let the sun fade within a minute, with updates so frequent that no interval ends meanwhile.
   const auto scenario = open_ground();
   const auto pose = looking({0.0, -0.01, 12.0}, {0.0, 0.0, 0.0});
   std::vector<scene::WeatherSample> told;
@@ -138,9 +141,9 @@ TEST(RendererCachedWeather, FramesSayWhileSomeSurfacesDoNotKnowYet) {
        {flagged(0.0, 0.0, 0), flagged(1.0, 0.8, 0), flagged(0.0, 0.0, 60 * kSecondNs)}) {
     EXPECT_TRUE(dark.front());
     EXPECT_TRUE(dark[8]);
-    EXPECT_FALSE(dark[12]);  // after an eighth of 20 s
+    EXPECT_FALSE(dark[12]);  // an eighth of 20 s has passed
   }
-  // Weather that is as it was is no news.
+  // Expect no flag for weather that does not differ from the weather before.
   EXPECT_EQ(std::ranges::count(flagged(1.0, 0.0, 0), true), 0);
 }
 
@@ -212,8 +215,8 @@ TEST(RendererCachedWeather, WhatIsToldAheadWaitsForItsInstant) {
 }
 
 TEST(RendererCachedWeather, BodiesThatTheHostMovesMeanwhileKeepTheirShade) {
-  // A plate that the host flies over the ground while clouds come and go, beside one that flies by
-  // script, in intervals of a second.
+  // Compare a plate that the host flies over the ground while clouds come and go with one that
+  // flies by script, in intervals of a second.
   auto scenario = cached_scenario(write_quads("ground", fine_ground(12.0, 0.5)));
   scene::ObjectDesc plate = scenario.objects.front();
   plate.name = "plate";
@@ -263,7 +266,7 @@ TEST(RendererCachedWeather, BodiesThatTheHostMovesMeanwhileKeepTheirShade) {
     const Difference off = difference(driven[i], scripted[i]);
     EXPECT_LT(off.p99_k, 0.06) << i;
   }
-  // The plate's shade is in the pictures.
+  // Expect that the shade of the plate is in the images.
   std::vector<float> ground_k = driven.back();
   std::erase_if(ground_k, [](float k) { return std::isnan(k); });
   const auto [coldest, warmest] = std::ranges::minmax(ground_k);
@@ -271,9 +274,9 @@ TEST(RendererCachedWeather, BodiesThatTheHostMovesMeanwhileKeepTheirShade) {
 }
 
 TEST(RendererCachedWeather, GroundThatAPlateHasJustLeftStartsFromItsOwnState) {
-  // The host holds a plate over the ground and takes it away right before an interval of 20 s
-  // ends; the ground is of the next one again when, within it, the sun goes. Beside a plate that
-  // flies by script, in intervals of a second.
+  // Let the host hold a plate over the ground and take it away right before an interval of 20 s
+  // ends. The ground has joined the next interval when the sun vanishes within it. Compare with a
+  // plate that flies by script, in intervals of a second.
   auto scenario = cached_scenario(write_quads("ground", fine_ground(12.0, 0.5)));
   scene::ObjectDesc plate = scenario.objects.front();
   plate.name = "plate";
@@ -322,10 +325,10 @@ TEST(RendererCachedWeather, GroundThatAPlateHasJustLeftStartsFromItsOwnState) {
   const auto driven = run_with(true);
   const auto scripted = run_with(false);
   const auto [coldest, warmest] = std::ranges::minmax(driven.front());
-  EXPECT_GT(warmest - coldest, 0.5F);  // the print is in the pictures
+  EXPECT_GT(warmest - coldest, 0.5F);  // the print of the plate is in the images
   for (std::size_t i = 1; i < driven.size(); ++i) {
     const Difference off = difference(driven[i], scripted[i]);
-    // Right after the event it is taken in, over frames.
+    // Allow more right after the event, while it is taken in over some frames.
     const bool settles = i == 2;
     EXPECT_LT(off.p99_k, settles ? 0.12 : 0.06) << i;
   }

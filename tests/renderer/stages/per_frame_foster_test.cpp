@@ -39,7 +39,7 @@ std::vector<float> render_k(const scene::ScenarioDesc& scenario, const physics::
   return {view.temperature_k.begin(), view.temperature_k.end()};
 }
 
-/// Clear morning, road-like stack, convection, two days of spin-up.
+/// Scenario of a clear morning with the layers of a road, convection and two days of spin-up.
 scene::ScenarioDesc foster_scenario(const std::filesystem::path& gltf) {
   scene::ScenarioDesc s = instant_scenario(gltf);
   s.weather.clear();
@@ -52,7 +52,7 @@ scene::ScenarioDesc foster_scenario(const std::filesystem::path& gltf) {
   return s;
 }
 
-/// The same steps in double, `sun_frac` and `sky_frac` of the hemisphere held throughout.
+/// Temperature after the same steps in double, with constant shares of sun and sky.
 double expected_k(const scene::ScenarioDesc& s, std::int64_t now_ns, const glm::dvec3& n,
                   double sun_frac = 1.0) {
   const renderer::Environment environment(s);
@@ -102,8 +102,9 @@ TEST(RendererFoster, OpenGroundFollowsTheModelInDoubleWithinTenMillikelvin) {
 }
 
 TEST(RendererFoster, TiltedFacesFollowTheModelInDouble) {
-  // A plate seen from its front; open, so that its obscurance is flat. None of them turns to or
-  // from the sun within an interval, where the shader's clamped cosine would be the better one.
+  // Look at a plate from its front. It is open, so its obscurance is that of flat ground. No plate
+  // turns to or from the sun within an interval, where the clamped cosine of the shader would be
+  // more exact.
   for (const glm::dvec3 direction : {glm::dvec3(0.3, -0.8, 0.5), glm::dvec3(-0.9, 0.2, 0.1),
                                      glm::dvec3(0.5, 0.7, 0.4), glm::dvec3(-0.5, 0.6, -0.6)}) {
     const glm::dvec3 n = glm::normalize(direction);
@@ -117,7 +118,8 @@ TEST(RendererFoster, TiltedFacesFollowTheModelInDouble) {
     for (const std::int64_t now_ns : {std::int64_t{0}, 3 * kHourNs}) {
       const auto frame = render_k(scenario, looking(c + 5.0 * n + 0.5 * u, c), now_ns);
       const double expected = expected_k(scenario, now_ns, n);
-      // The table of directions adds up to 50 mK right at the start, millikelvins later.
+      // Allow for the table of directions, which adds up to 50 mK at the start and millikelvins
+      // later.
       const double t = frame[kHeight / 2 * kWidth + kWidth / 2];
       EXPECT_NEAR(t, expected, now_ns == 0 ? 0.05 : 0.01) << n.x << " " << n.y << " " << n.z;
     }
@@ -168,8 +170,8 @@ TEST(RendererFoster, ShadeCoolsTheGroundAndPrescribedPartsKeepTheirTemperature) 
   }
   const double open_k = expected_k(scenario, 3 * kHourNs, {0.0, 0.0, 1.0});
   EXPECT_NEAR(highest, open_k, 0.3);
-  // Ground that the sun has not reached since the start is at most as cool as the model without
-  // direct sun, whose sky is whole.
+  // Ground that the sun has not reached since the start is not cooler than the model without direct
+  // sun, which sees the whole sky.
   const double shaded_k = expected_k(scenario, 3 * kHourNs, {0.0, 0.0, 1.0}, 0.0);
   EXPECT_LT(lowest, open_k - 4.0);
   EXPECT_GT(lowest, shaded_k - 1.0);

@@ -13,13 +13,13 @@
 #include <ostream>
 #include <random>
 
+#include "client/http_get.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/codec.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/host_session.hpp"
 #include "emit/v1/control.pb.h"
-#include "emit/client/client.hpp"
-#include "client/http_get.hpp"
 #include "net/socket_address.hpp"
 #include "rt/fd.hpp"
 #include "support/certificates.hpp"

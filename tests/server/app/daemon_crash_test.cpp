@@ -15,13 +15,13 @@
 #include <vector>
 
 #include "app/daemon.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
-#include "emit/client/client.hpp"
 #include "rt/clock.hpp"
 #include "support/daemon_process.hpp"
-#include "support/scripted_source.hpp"
 #include "support/emit_process.hpp"
+#include "support/scripted_source.hpp"
 
 namespace emit::server {
 namespace {

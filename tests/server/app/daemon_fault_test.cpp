@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "emit/protocol/framing.hpp"
-#include "emit/client/client.hpp"
 #include "client/client_connection.hpp"
+#include "emit/client/client.hpp"
+#include "emit/protocol/framing.hpp"
 #include "net/socket.hpp"
 #include "rt/fd.hpp"
 #include "support/daemon_process.hpp"
@@ -53,8 +53,8 @@ class DaemonFaults : public ::testing::Test {
       EXPECT_EQ(daemon_->wait(), 0) << folder_.read("stderr");
     }
   }
-  [[nodiscard]] std::unique_ptr<client::FrameClient> open(const std::string& url = {},
-                                                  client::SubscribeOptions options = {}) const {
+  [[nodiscard]] std::unique_ptr<client::FrameClient> open(
+      const std::string& url = {}, client::SubscribeOptions options = {}) const {
     auto client = client::FrameClient::connect(url.empty() ? control_ : url);
     EXPECT_TRUE(client.has_value()) << client.error().text;
     if (!client) {
@@ -166,7 +166,8 @@ TEST_F(DaemonFaults, FloodsOfEveryKindCostAWellBehavedClientNoFrame) {
   // Sends the same over and over, and comes again when it is thrown out.
   const auto flood = [&](std::vector<std::byte> records) {
     while (!over.load()) {
-      auto connection = client::ClientConnection::open(url, protocol::PeerRole::client, 1'000'000'000);
+      auto connection =
+          client::ClientConnection::open(url, protocol::PeerRole::client, 1'000'000'000);
       if (!connection) continue;
       connections.fetch_add(1);
       while (!over.load() &&

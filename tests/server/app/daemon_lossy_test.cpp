@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "agents/frame_source.hpp"
-#include "emit/client/client.hpp"
 #include "client/fault_relay.hpp"
+#include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
 
 namespace emit::server {

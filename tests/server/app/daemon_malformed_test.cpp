@@ -9,9 +9,9 @@
 #include <limits>
 #include <random>
 
+#include "emit/client/client.hpp"
 #include "emit/protocol/codec.hpp"
 #include "emit/protocol/framing.hpp"
-#include "emit/client/client.hpp"
 #include "net/socket.hpp"
 #include "rt/fd.hpp"
 #include "support/daemon_process.hpp"

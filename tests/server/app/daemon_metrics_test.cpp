@@ -6,9 +6,9 @@
 #include <csignal>
 #include <thread>
 
-#include "emit/client/client.hpp"
 #include "client/client_connection.hpp"
 #include "client/http_get.hpp"
+#include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
 
@@ -50,7 +50,8 @@ class DaemonMetrics : public testing::Test {
     for (;;) {
       const IoResult got = socket->read_some(piece);
       if (got.status == IoStatus::would_block) {
-        if (!client::wait_for(socket->fd(), POLLIN, client::monotonic_now_ns() + kLongNs)) return "silence";
+        if (!client::wait_for(socket->fd(), POLLIN, client::monotonic_now_ns() + kLongNs))
+          return "silence";
       } else if (got.status != IoStatus::done) {
         return out;
       } else {

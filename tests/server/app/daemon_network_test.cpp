@@ -14,8 +14,8 @@
 
 #include "emit/client/client.hpp"
 #include "net/socket.hpp"
-#include "support/daemon_process.hpp"
 #include "rt/error_text.hpp"
+#include "support/daemon_process.hpp"
 
 namespace emit::server {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <csignal>
 
+#include "emit/client/client.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
-#include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
 
 namespace emit::server {

@@ -10,10 +10,10 @@
 
 #include "app/daemon.hpp"
 #include "app/replay.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/trigger.hpp"
 #include "emit/v1/control.pb.h"
-#include "emit/client/client.hpp"
 #include "net/socket.hpp"
 #include "support/daemon_process.hpp"
 #include "support/scripted_source.hpp"

@@ -7,8 +7,8 @@
 #include "app/daemon.hpp"
 #include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
-#include "support/scripted_source.hpp"
 #include "support/emit_process.hpp"
+#include "support/scripted_source.hpp"
 
 namespace emit::server {
 namespace {

@@ -11,10 +11,10 @@
 #include <thread>
 
 #include "client/http_get.hpp"
+#include "renderer/scene/gltf_builder.hpp"
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
 #include "support/notify_socket.hpp"
-#include "renderer/scene/gltf_builder.hpp"
 
 namespace emit::server {
 namespace {

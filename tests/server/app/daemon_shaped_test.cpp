@@ -5,8 +5,8 @@
 #include <csignal>
 #include <string>
 
-#include "emit/client/client.hpp"
 #include "client/client_connection.hpp"
+#include "emit/client/client.hpp"
 #include "support/two_networks.hpp"
 
 namespace emit::server {

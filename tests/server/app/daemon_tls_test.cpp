@@ -9,13 +9,13 @@
 #include <csignal>
 #include <optional>
 
+#include "client/client_connection.hpp"
+#include "client/http_get.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/codec.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/host_session.hpp"
 #include "emit/v1/control.pb.h"
-#include "emit/client/client.hpp"
-#include "client/client_connection.hpp"
-#include "client/http_get.hpp"
 #include "rt/fd.hpp"
 #include "support/certificates.hpp"
 #include "support/daemon_process.hpp"

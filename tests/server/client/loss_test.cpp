@@ -10,8 +10,8 @@
 #include "agents/sender/resend_window.hpp"
 #include "agents/sender/sender.hpp"
 #include "agents/sender/socket_client.hpp"
-#include "net/fault_injector.hpp"
 #include "client/resend_planner.hpp"
+#include "net/fault_injector.hpp"
 #include "net/socket.hpp"
 #include "support/fake_clock.hpp"
 #include "support/heap_counter.hpp"
@@ -117,7 +117,8 @@ using OpenFrame = protocol::Reassembler::OpenFrame;
 using Kind = client::ResendPlanner::Step::Kind;
 
 TEST(ResendPlanner, AsksOnceAGapHasSettledThenAgainThenGivesUp) {
-  client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
+  client::ResendPlanner planner(
+      {.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
   std::vector<OpenFrame> open{{7, 10, true}};
   auto step = planner.next(open, 1000);
   EXPECT_EQ(step.kind, Kind::wait);
@@ -138,7 +139,8 @@ TEST(ResendPlanner, AsksOnceAGapHasSettledThenAgainThenGivesUp) {
 }
 
 TEST(ResendPlanner, AFrameWhoseEndIsOutstandingIsGivenLongerTime) {
-  client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
+  client::ResendPlanner planner(
+      {.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
   const std::vector<OpenFrame> open{{7, 10, false}};
   EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);
   EXPECT_EQ(planner.next(open, 3999).kind, Kind::wait);
@@ -151,7 +153,8 @@ TEST(ResendPlanner, AFrameWhoseEndIsOutstandingIsGivenLongerTime) {
 }
 
 TEST(ResendPlanner, AnAnswerThatWasLostInPartIsFollowedUntilNothingComes) {
-  client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
+  client::ResendPlanner planner(
+      {.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 2});
   std::vector<OpenFrame> open{{7, 10, true}};
   EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);
   std::int64_t now_ns = 1500;
@@ -168,7 +171,8 @@ TEST(ResendPlanner, AnAnswerThatWasLostInPartIsFollowedUntilNothingComes) {
 }
 
 TEST(ResendPlanner, EveryFrameCountsForItself) {
-  client::ResendPlanner planner({.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 1});
+  client::ResendPlanner planner(
+      {.settle_ns = 500, .quiet_ns = 3000, .answer_ns = 10'000, .requests = 1});
   std::vector<OpenFrame> open{{7, 10, true}};
   EXPECT_EQ(planner.next(open, 1000).kind, Kind::wait);
   EXPECT_EQ(planner.next(open, 1500).kind, Kind::ask);

@@ -20,9 +20,9 @@
 
 #include "agents/sender/sender.hpp"
 #include "agents/sender/shm_client.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
-#include "emit/client/client.hpp"
 #include "rt/futex.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"
@@ -115,7 +115,8 @@ class Ring {
   std::uint64_t number_ = 0;
 };
 
-std::unique_ptr<client::FrameClient> open_reader(const std::string& name, client::SubscribeOptions options = {}) {
+std::unique_ptr<client::FrameClient> open_reader(const std::string& name,
+                                                 client::SubscribeOptions options = {}) {
   auto client = client::FrameClient::connect("shm://" + name);
   EXPECT_TRUE(client.has_value()) << client.error().text;
   if (!client) {

@@ -20,11 +20,11 @@
 #include "agents/recorder/older_journal.hpp"
 #include "agents/render/render_agent.hpp"
 #include "app/daemon.hpp"
+#include "emit/client/client.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
 #include "emit/v1/host.pb.h"
 #include "emit/v1/status.pb.h"
-#include "emit/client/client.hpp"
 #include "net/socket.hpp"
 #include "rt/fd.hpp"
 #include "support/conductor_rig.hpp"
@@ -120,8 +120,8 @@ TEST(Journal, OfAnEarlierProcessIsKept) {
     stepped.clock.advance(50 * kMs);
     stepped.settle();
     if (process == 1) {
-      auto host =
-          client::HostClient::connect("udp://127.0.0.1:" + std::to_string(stepped.daemon->host_udp_port()));
+      auto host = client::HostClient::connect("udp://127.0.0.1:" +
+                                              std::to_string(stepped.daemon->host_udp_port()));
       ASSERT_TRUE(host.has_value()) << host.error().text;
       protocol::HostFrameData pose;
       pose.run_id = pose.frame_number = 1;

@@ -22,11 +22,11 @@
 #include <thread>
 #include <vector>
 
+#include "client/client_connection.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
-#include "client/client_connection.hpp"
 
 namespace emit::server {
 namespace {
@@ -237,14 +237,15 @@ int low_water_of(int fd) {
 
 /// The client's end, welcomed by what `server` writes.
 physics::Result<client::ClientConnection> greeted(TcpSocket& server, TcpSocket client,
-                                          const SocketAddress& peer) {
+                                                  const SocketAddress& peer) {
   std::vector<std::byte> welcome;
   v1::ControlRecord answer;
   answer.mutable_welcome()->set_protocol_version(protocol::kProtocolVersion);
   protocol::append_control_record(answer, welcome);
   EXPECT_EQ(server.write_some(std::span<const std::byte>(welcome)).bytes, welcome.size());
-  return client::ClientConnection::greet(SocketContext(), std::move(client), peer, protocol::PeerRole::client,
-                                 client::monotonic_now_ns() + kLongNs);
+  return client::ClientConnection::greet(SocketContext(), std::move(client), peer,
+                                         protocol::PeerRole::client,
+                                         client::monotonic_now_ns() + kLongNs);
 }
 
 /// A frame record with a body of zeros.

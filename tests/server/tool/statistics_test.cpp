@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "tool/support/console.hpp"
 #include "bench/frame_time/paired_frames.hpp"
+#include "tool/support/console.hpp"
 
 namespace emit::tool {
 namespace {

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "emit/protocol/ip_address.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/protocol/ip_address.hpp"
 
 /// Configuration that emitd reads from --config, as plain data. config/README.md documents the
 /// keys.
@@ -97,17 +97,16 @@ struct StreamConfig {
   std::uint32_t shm_mode = 0600;
 };
 
-
 struct MetricsConfig {
   std::string listen;  ///< address:port of the HTTP server; empty: off
 };
 
 /// Hosts that may connect, beside this one.
 struct AccessConfig {
-  std::vector<protocol::Network> allow;  ///< empty: whoever reaches the port
-  /// Groups that a client may ask for: site-local scopes (RFC 2365, RFC 4291).
+  std::vector<protocol::Network> allow;  ///< empty: every host
+  /// Multicast groups that a client may ask for: the site-local scopes (RFC 2365, RFC 4291).
   std::vector<protocol::Network> multicast_groups = default_multicast_groups();
-  std::uint32_t max_connections_per_peer = 8;  ///< peers on this host are not counted
+  std::uint32_t max_connections_per_peer = 8;  ///< this host is not limited
   std::uint32_t max_host_frames_hz = 20'000;   ///< per peer address
   std::uint32_t max_control_records_hz = 1000;
 

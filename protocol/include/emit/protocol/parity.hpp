@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "emit/physics/check.hpp"
-#include "emit/physics/limits.hpp"
 #include "emit/protocol/fragment.hpp"
 
 /// Forward error correction of a frame's fragments (docs/wire.md section 4): a Reed-Solomon erasure

@@ -12,58 +12,71 @@
 #include "emit/physics/frames.hpp"
 #include "emit/scene/scene_desc.hpp"
 
-/// The whole interface between the renderer and the rest of emitd.
+/// Interface of the renderer to the rest of emitd. One thread owns a Renderer from create() to its
+/// destruction, because it owns the GL context.
 ///
-/// Lifecycle (one thread owns a Renderer from create() to destruction, it owns the GL context):
-///   auto renderer = Renderer::create(scenario, options);
-///   renderer->apply_entities(sim_time_ns, updates);
-///   auto slot = renderer->submit(request);        // never blocks on the device
-///   const FrameView& frame = renderer->collect(*slot);   // or poll(*slot) first
-///   ... stream frame.planes ...                    // memory stays valid until
-///   renderer->release(*slot);                      // release, which any thread may call
+/// Example (tests/renderer/readme_example_test.cpp compiles and runs this text):
+/// @code
+///   auto created = Renderer::create(scenario, DeviceOptions{}, OutputOptions{});
+///   if (!created) return created.error().text;
+///   Renderer& renderer = **created;
+///   renderer.apply_entities(request.sim_time_ns, updates);
+///   const int slot = renderer.submit(request);  // does not wait for the device
+///   if (slot < 0) return "every slot is in use";
+///   const auto index = static_cast<SlotIndex>(slot);
+///   const FrameView& frame = renderer.collect(index);  // waits; poll(index) asks whether it would
+///   send(frame.radiance_w_m2_sr);  // the memory of the frame is valid until release()
+///   renderer.release(index);       // any thread may call it
+/// @endcode
 namespace emit::renderer {
 
+/// Choice of the device.
 struct DeviceOptions {
   int gpu_index = -1;          ///< EGL device; -1: first hardware device, else Mesa surfaceless
-  bool debug_context = false;  ///< GL debug output; slow
+  bool debug_context = false;  ///< turns the debug output of GL on, which is slow
 };
 
-/// Whether frames may shed work, see FrameRequest::rung. Takes memory for another picture. Without
-/// effect where the thermal method has nothing to shed: then there is one rung.
+/// Use of the quality levels of FrameRequest::rung. With `replayed` and `live` the renderer takes
+/// memory for a second image. Where the thermal method has nothing to shed there is one level,
+/// whatever is chosen.
 enum class Ladder : std::uint8_t {
-  none,
-  replayed,  ///< rungs as they were chosen before
-  live,      ///< warm_up() measures what the rungs are worth: another 200 frames
+  none,      ///< frames have full quality
+  replayed,  ///< frames have the levels of a recording
+  live,      ///< warm_up() also measures time and error of every level, in about 200 frames
 };
 
+/// Choice of the planes of a frame and of the read-back.
 struct OutputOptions {
-  bool temperature = false;  ///< surface temperature, K; NaN where there is only sky
-  bool depth = false;        ///< distance along the boresight, m; +Inf where there is only sky
-  bool object = false;  ///< 1 + index of the scenario's object, as float; 0 where there is only sky
+  bool temperature = false;  ///< surface temperature, K; NaN for sky
+  bool depth = false;        ///< distance along the boresight, m; +Inf for sky
+  bool object = false;       ///< 1 + index of the scenario's object, as float; 0 for sky
   Ladder ladder = Ladder::none;
-  std::uint32_t slots = 3;  ///< read-back ring, 2..16: frames in flight plus frames being streamed
-  bool stage_timing = false;  ///< waits for the device after each stage: fills stages_ms, slower
+  std::uint32_t slots = 3;    ///< read-back slots, 2..16: frames in flight plus frames being sent
+  bool stage_timing = false;  ///< fills FrameView::stages_ms; the renderer waits after each stage
 };
 
+/// Pose of an entity from the host.
 struct EntityUpdate {
   std::uint32_t entity_id = 0;
   physics::Pose pose;
-  bool on = true;
-  bool teleport = false;  ///< jump: no motion between the previous pose and this one
+  bool on = true;         ///< false: the entity is not in the scene
+  bool teleport = false;  ///< jump: there is no motion between the previous pose and this one
 };
 
+/// Request for one frame.
 struct FrameRequest {
   std::uint64_t frame_number = 0;
-  std::int64_t sim_time_ns = 0;      ///< what the image shows: entities at this instant
-  std::int64_t thermal_time_ns = 0;  ///< where the thermal clock stands; behind sim time in a hold
+  std::int64_t sim_time_ns = 0;      ///< instant that the image shows: entities at this time
+  std::int64_t thermal_time_ns = 0;  ///< instant of the temperatures; in a hold before sim_time_ns
   physics::Pose sensor_pose;         ///< body frame of the seeker head, x along the boresight
-  std::uint8_t rung = 0;  ///< of the quality ladder, 0 = full; one that does not exist: the last
-  /// The pixels that are wanted, which are those of the whole picture bit for bit; the others are
-  /// not drawn and hold nothing of meaning. Empty, or one that does not fit: all.
+  std::uint8_t rung = 0;  ///< quality level; 0 is full quality, a number too high is the last one
+  /// Part of the image that is requested. Its pixels have the bits of the whole image. The other
+  /// pixels are not drawn and have no meaning. An empty rectangle, or one that does not fit,
+  /// requests all.
   scene::PixelRect window_px;
 };
 
-/// Time per stage of Table 3; only with OutputOptions::stage_timing.
+/// Time of each stage of a frame. It is measured only with OutputOptions::stage_timing.
 struct StageTimes {
   double geometry_ms = 0.0;
   double occlusion_ms = 0.0;
@@ -73,64 +86,65 @@ struct StageTimes {
   double readback_ms = 0.0;
 };
 
-/// What a rung of the quality ladder is worth.
+/// Time and error of a quality level.
 struct RungStats {
-  double frame_ms =
-      0.0;  ///< from submit() to the end of collect(), with nothing else to do; 0: not measured
-  double error_k = 0.0;  ///< as FrameView::estimated_error_k
+  /// Time from submit() to the end of collect() without other load; 0: not measured.
+  double frame_ms = 0.0;
+  double error_k = 0.0;  ///< error as FrameView::estimated_error_k defines it
 };
 
-/// Counted on the device for every frame, of the pixels that are drawn: nothing is silently
-/// repaired.
+/// Counters of a frame, for the pixels that are drawn. Nothing is repaired silently.
 struct FrameStats {
-  std::uint32_t nonfinite_px = 0;  ///< NaN or Inf pixels, written as 0
-  std::uint32_t clamped_px = 0;    ///< model evaluations with an input outside the valid range
-  /// Live poses the entities' histories forgot since the last reset because their store was full:
-  /// shade of the distant past is coarser than it was sent.
+  std::uint32_t nonfinite_px = 0;  ///< pixels with NaN or Inf, which are written as 0
+  std::uint32_t clamped_px = 0;  ///< pixels for which a model got an input outside its valid range
+  /// Poses from the host that were dropped since the last reset because the store of an entity was
+  /// full. Shade of the distant past is coarser than it was sent.
   std::uint64_t dropped_poses = 0;
-  /// thermal.method = "cached": the camera stands where no one said it would, or samples ran out
-  /// before what it sees was fine enough: triangles may be wider than its pixels and shadows
-  /// coarser than thermal.tolerance_k. Or some surfaces do not know yet that the weather changed, or
-  /// the surface was prepared anew (rewarm_s).
+  /// The frame may be coarser than asked (thermal.method = "cached"). The camera is where nobody
+  /// planned it, or samples ran out before its view was fine enough: triangles may be wider than
+  /// pixels and shadows coarser than thermal.tolerance_k. The flag is also set while some surfaces
+  /// have not taken in a change of the weather or of an entity's shade, and in a frame that prepared
+  /// the surface anew (rewarm_s).
   bool coarse = false;
   /// How long it took to prepare the surface anew inside this frame, because the thermal time had
   /// jumped, in s of wall time; 0 in frames that did not. The frame is also `coarse`.
   double rewarm_s = 0.0;
 };
 
-/// One rendered frame. Rows go down, row-major, float32, no padding.
+/// One rendered frame. A plane holds rows from top to bottom, row-major, float32, without padding.
 struct FrameView {
   std::uint64_t frame_number = 0;
   std::int64_t sim_time_ns = 0;
   physics::Pose sensor_pose;
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
-  std::vector<std::span<const float>> radiance_w_m2_sr;  ///< one plane per scenario band, its order
+  std::vector<std::span<const float>> radiance_w_m2_sr;  ///< one plane per band, in their order
   std::span<const float> temperature_k;                  ///< empty unless asked for
-  std::span<const float> depth_m;
-  std::span<const float> object_id;
+  std::span<const float> depth_m;                        ///< empty unless asked for
+  std::span<const float> object_id;                      ///< empty unless asked for
   FrameStats stats;
-  std::uint8_t rung = 0;  ///< of the quality ladder that was rendered
-  /// Expected difference to full quality: RMS of the apparent temperature over the picture, K, of
-  /// the band where it is largest. NaN: not measured near this camera.
+  std::uint8_t rung = 0;  ///< quality level that was rendered
+  /// Expected difference from full quality: RMS of the apparent temperature over the image, K, in
+  /// the band where it is largest. NaN: nothing was measured near this camera.
   float estimated_error_k = 0.0F;
-  bool device_failed = false;  ///< the driver reported an error: pixels are not to be trusted
-  bool device_lost = false;    ///< the context was reset: nothing can be drawn with it any more
+  bool device_failed = false;  ///< the driver reported an error, and the pixels may be wrong
+  bool device_lost = false;    ///< the context was reset, and nothing can be drawn with it any more
   StageTimes stages_ms;
 };
 
+/// Figures of the loaded scene.
 struct SceneStats {
-  std::uint64_t triangles = 0;  ///< drawn when everything is in view, instances counted
+  std::uint64_t triangles = 0;  ///< drawn when everything is in view; each instance counts
   std::uint32_t instances = 0;
-  /// thermal.method "cached", after warm_up(): thermal samples, what they take of main memory, and
-  /// whether thermal.max_samples stopped their refinement.
+  /// Thermal samples of the method "cached", valid after warm_up(): their number, the main memory
+  /// they take, and whether thermal.max_samples stopped their refinement.
   std::uint64_t samples = 0;
   std::uint64_t sample_bytes = 0;
   bool samples_full = false;
   std::uint64_t max_samples = 0;  ///< thermal.max_samples; fewer than the meshes need do not bind
-  /// For want of samples meshes lost detail that pixels show (thermal.max_samples).
+  /// Meshes lost visible detail because thermal.max_samples is too small.
   bool coarse_meshes = false;
-  /// Doubts of the scenario's and the scene's loaders: unmapped materials, gaps of the weather.
+  /// Warnings of the scenario's and the scene's loaders: unmapped materials, gaps of the weather.
   std::vector<std::string> warnings;
   /// After warm_up(): what the first frame's history and weather lack, one sentence each.
   std::vector<std::string> first_frame_warnings;
@@ -140,59 +154,72 @@ struct SceneStats {
 /// `thermal.max_samples` is too small for.
 [[nodiscard]] std::vector<std::string> warm_up_warnings(const SceneStats& stats);
 
+/// Number of a read-back slot.
 using SlotIndex = std::uint32_t;
 
-/// Share done; false asks to stop.
+/// Function that takes the share of the work that is done, 0..1. It returns false to stop the work.
 using WarmUpProgress = std::function<bool(double done_frac)>;
 
+/// Renderer of one scenario on one device.
+/// Thread: the one that called create(), except where a function says otherwise.
 class Renderer {
  public:
-  /// Loads the scene, creates the GL context and takes all memory. Setup only.
-  /// Errors: gpu (no device, naming what was tried), those of scene::load_scene(), config.
+  /// Loads the scene, creates the GL context and allocates all memory. Setup only.
+  /// Errors: gpu (no device; the text names what was tried), config (a value outside its limits),
+  /// and those of scene::load_scene().
   [[nodiscard]] static physics::Result<std::unique_ptr<Renderer>> create(
       const scene::ScenarioDesc& scenario, const DeviceOptions& device,
       const OutputOptions& output);
   virtual ~Renderer() = default;
 
-  /// Appends poses to the entities' history at `sim_time_ns`; from then on they override the
-  /// scenario's trajectory. Unknown ids are not applied. Returns the number applied. RT-safe.
+  /// Appends poses at `sim_time_ns` to the histories of entities. From then on they replace the
+  /// trajectory of the scenario. An update is not applied when its id is unknown, its pose is not
+  /// valid, or it is older than the history. Returns the number of updates that were applied.
+  /// RT-safe.
   virtual std::size_t apply_entities(std::int64_t sim_time_ns,
                                      std::span<const EntityUpdate> updates) noexcept = 0;
 
-  /// Weather from `sample.sim_time_ns` on, overriding the scenario's. False when its store is full.
+  /// Sets the weather from `sample.sim_time_ns` on, in place of the scenario's weather. Returns
+  /// false when the store is full. RT-safe.
   virtual bool apply_weather(const scene::WeatherSample& sample) noexcept = 0;
 
-  /// Forgets live poses and weather: the state of create(). RT-safe.
+  /// Forgets all poses and weather from the host: the state after create(). RT-safe.
   virtual void reset() noexcept = 0;
 
-  /// Does what frames from `first` on need once: thermal.method "cached" samples the surface and
-  /// integrates its history, seconds to minutes on all cores. Call it before the first frame;
-  /// submit() does it otherwise, and again where sim time goes back behind it.
-  /// Errors: internal (stopped by `progress`), gpu (no memory for the samples).
+  /// Does the work that frames from `first` on need once. With thermal.method = "cached" it samples
+  /// the surface and integrates its history, which takes seconds to minutes on all cores. Call it
+  /// before the first frame; otherwise submit() does it, and does it again where sim time goes back
+  /// behind the samples. Setup only. Errors: internal (`progress` asked to stop), gpu (no memory
+  /// for the samples).
   [[nodiscard]] virtual physics::Result<void> warm_up(const FrameRequest& first,
                                                       const WarmUpProgress& progress = {}) = 0;
 
-  /// Records and issues a frame; -1 when every slot is in use. RT-safe after warm_up().
+  /// Issues a frame and returns its slot; -1 when every slot is in use. It does not wait for the
+  /// device. RT-safe after warm_up().
   [[nodiscard]] virtual int submit(const FrameRequest& request) noexcept = 0;
-  /// True when collect() would not wait.
+  /// True when collect() would not wait. RT-safe.
+  /// @pre submit() returned the slot, and it was not released.
   [[nodiscard]] virtual bool poll(SlotIndex slot) noexcept = 0;
-  /// Waits for the frame of a slot that submit() returned. The view lives until release().
+  /// Waits for the frame of a slot. The view is valid until release().
+  /// @pre submit() returned the slot, and it was not released.
   [[nodiscard]] virtual const FrameView& collect(SlotIndex slot) noexcept = 0;
-  /// What the rungs are expected to be worth in that frame, as measured by warm_up() where the
-  /// camera came nearest; where it came not near: times by what is in view, errors the median of
-  /// the way. [0] is full quality; without a ladder the only one. Holds until the next call.
-  /// RT-safe.
+  /// Expected time and error of every quality level for a frame, from the measurements of warm_up()
+  /// near the camera. Where nothing was measured near, times come from what is in view, and errors
+  /// are the medians of the trajectory. Entry 0 is full quality; without a ladder it is the only
+  /// one. The result is valid until the next call. RT-safe.
   [[nodiscard]] virtual std::span<const RungStats> expected_rungs(
       const FrameRequest& request) noexcept = 0;
-  /// Gives the slot back. Any thread.
+  /// Makes a slot free again. Thread: any. RT-safe.
+  /// @pre submit() returned the slot, and it was not released.
   virtual void release(SlotIndex slot) noexcept = 0;
 
-  /// Sensor pose of the scenario's own trajectory.
+  /// Pose of the sensor on the trajectory of the scenario; the default pose where it has none.
   [[nodiscard]] virtual physics::Pose scenario_sensor_pose_at(
       std::int64_t sim_time_ns) const noexcept = 0;
 
+  /// Figures of the scene. They grow in warm_up().
   [[nodiscard]] virtual const SceneStats& scene_stats() const noexcept = 0;
-  /// GL_RENDERER and GL_VERSION, for logs, goldens and benchmarks.
+  /// GL_RENDERER and GL_VERSION of the device, for logs, golden images and benchmarks.
   [[nodiscard]] virtual const std::string& device_name() const noexcept = 0;
 };
 

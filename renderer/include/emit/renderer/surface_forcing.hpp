@@ -9,52 +9,52 @@
 #include "emit/physics/foster.hpp"
 #include "emit/scene/scene_desc.hpp"
 
-/// What the thermal models of the renderer are driven by, for callers that integrate them by
-/// themselves: with other steps, or with another visibility. Setup class.
+/// Drive of the renderer's thermal models, for callers that integrate the models themselves with
+/// other steps or another visibility. Real time: setup only.
 namespace emit::renderer {
 
-/// Everything that drives surfaces at an instant, whatever their material and direction
-/// (physics.md eq. 16).
+/// Sun, sky, surroundings and air at an instant, independent of material and direction of a surface
+/// (physics.md eq. 16). Fluxes are in W m-2.
 struct SurfaceForcing {
-  glm::dvec3 sun_w_m2{0.0};     ///< towards the sun, as long as the direct normal flux after clouds
-  double diffuse_w_m2 = 0.0;    ///< horizontal
-  double longwave_w_m2 = 0.0;   ///< of the sky, horizontal
-  double reflected_w_m2 = 0.0;  ///< sunlight from the surroundings
+  glm::dvec3 sun_w_m2{0.0};       ///< vector towards the sun; its length is the direct normal flux
+  double diffuse_w_m2 = 0.0;      ///< diffuse sunlight on a level surface
+  double longwave_w_m2 = 0.0;     ///< long-wave flux of the sky on a level surface
+  double reflected_w_m2 = 0.0;    ///< sunlight that the surroundings reflect
   double environment_w_m2 = 0.0;  ///< long-wave exitance of the surroundings
-  double film_w_m2_k = 0.0;
-  double air_k = 0.0;
+  double film_w_m2_k = 0.0;       ///< film coefficient
+  double air_k = 0.0;             ///< air temperature
 };
-/// Linear in between.
+/// Forcing over an interval. It goes linearly from begin to end.
 struct IntervalForcing {
   SurfaceForcing begin;
   SurfaceForcing end;
-  double dt_s = 0.0;
+  double dt_s = 0.0;  ///< length of the interval, > 0
 };
 
-/// Forcing over the intervals between `nodes_ns` (sim time), entry i from node i to node i + 1.
-/// emit2014: the surroundings have the temperature that the weather gives them and reflect nothing.
-/// foster: they are an open, level surface that starts steady at the first node and is carried
-/// along.
-/// Errors: invalid_argument (fewer than two nodes, or not ascending), config (no such surroundings
-/// material).
+/// Forcing over the intervals between the instants `nodes_ns` (sim time). Entry i goes from node i
+/// to node i + 1. With the model emit2014 the surroundings have the temperature of the weather and
+/// reflect nothing. With foster they are an open, level surface that is steady at the first node
+/// and is integrated along. Thread: any. Errors: invalid_argument (fewer than two nodes, or nodes
+/// that do not ascend), config (the material of the surroundings does not exist).
 [[nodiscard]] physics::Result<std::vector<IntervalForcing>> surface_forcing(
     const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns);
 
-/// A surface that drives its states.
+/// Material of the extended thermal model.
 struct FosterMaterial {
-  physics::FosterNetwork network;  ///< no modes: its temperature is prescribed
+  physics::FosterNetwork network;  ///< no modes: the temperature is prescribed
   double solar_absorptance_frac = 0.0;
   double emissivity_frac = 1.0;
   double base_k = 0.0;
   double initial_k = 0.0;
   double prescribed_k = 0.0;
-  bool sheet = false;  ///< driven by the mean of what its two faces receive
+  bool sheet = false;  ///< driven by the mean of the fluxes that its two faces receive
 
   [[nodiscard]] bool prescribed() const noexcept { return network.count == 0; }
 };
 
-/// Networks and constants of materials: their own modes, or derived from their layers where they
-/// have none or the scenario asks for another number. Errors (config) name the material.
+/// Networks and constants of materials. A material uses its own modes; they are derived from its
+/// layers where it has none or where the scenario asks for another number of modes. Thread: any.
+/// Errors: config (names the material).
 [[nodiscard]] physics::Result<std::vector<FosterMaterial>> foster_materials(
     std::span<const scene::Material> materials, const scene::ThermalOptions& options);
 

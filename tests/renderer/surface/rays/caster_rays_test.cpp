@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "surface/rays/caster_rays.hpp"
 #include "renderer/surface/surface_scene.hpp"
+#include "surface/rays/caster_rays.hpp"
 
 namespace emit::renderer {
 namespace {

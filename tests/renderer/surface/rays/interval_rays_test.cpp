@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "emit/physics/constants.hpp"
-#include "surface/rays/ray_offsets.hpp"
 #include "renderer/surface/surface_scene.hpp"
+#include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
 namespace {

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "emit/physics/constants.hpp"
-#include "surface/rays/surface_view.hpp"
 #include "renderer/surface/surface_scene.hpp"
+#include "surface/rays/surface_view.hpp"
 
 namespace emit::renderer {
 namespace {

@@ -10,10 +10,10 @@
 
 #include "agents/sender/sender.hpp"
 #include "agents/sender/socket_client.hpp"
+#include "client/udp_frame_receiver.hpp"
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/reassembler.hpp"
 #include "net/socket.hpp"
-#include "client/udp_frame_receiver.hpp"
 #include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"

@@ -56,7 +56,7 @@ inline constexpr std::uint32_t kMaxAtmosphereTerms = 4;
 inline constexpr Count kHistorySteps{1, 4096};
 inline constexpr Count kShadowMapPx{16, 16384};
 inline constexpr Count kCascades{1, 4};
-inline constexpr Count kShadowTaps{1, 256};          ///< blocker search and filter, each
+inline constexpr Count kShadowTaps{1, 256};              ///< blocker search and filter, each
 inline constexpr std::uint32_t kMaxRelaxationModes = 2;  ///< emit2014: states per surface sample
 
 // Streams.

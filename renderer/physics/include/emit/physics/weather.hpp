@@ -12,7 +12,6 @@
 namespace emit::physics {
 
 /// Weather at one instant of simulation time: a row of a weather table, or what the host sent.
-/// A table is linear between its samples and constant outside.
 struct WeatherSample {
   std::int64_t sim_time_ns = 0;
   double direct_normal_w_m2 = 0.0;
@@ -20,9 +19,9 @@ struct WeatherSample {
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
   double wind_m_s = 0.0;
-  double cloud_frac = 0.0;              ///< beta of Eq. 1 for clear-sky models; 0 for measured sun
-  std::optional<double> environment_k;  ///< surroundings; absent: air temperature
-  std::optional<double> film_w_m2_k;    ///< absent: from the wind; not used by emit2014
+  double cloud_frac = 0.0;              ///< beta of eq. 1, 0..1; 0 for measured sun
+  std::optional<double> environment_k;  ///< surroundings; if absent, the air temperature
+  std::optional<double> film_w_m2_k;    ///< if absent, from the wind; not used by emit2014
 };
 
 /// Parameters of the clear-sky models.

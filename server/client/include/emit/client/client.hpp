@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "emit/client/security.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/physics/planck.hpp"
 #include "emit/protocol/control.hpp"
@@ -14,7 +15,6 @@
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/parity.hpp"
 #include "emit/protocol/reassembler.hpp"
-#include "emit/client/security.hpp"
 
 namespace emit::v1 {
 class JournalEntry;

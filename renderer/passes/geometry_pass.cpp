@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "passes/raster_passes.hpp"
+#include "passes/geometry_pass.hpp"
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
-#include "draw/picture_window.hpp"
+#include "draw/image_window.hpp"
+#include "passes/render_target.hpp"
 
 namespace emit::renderer {
 namespace {
 
-/// Mesa sorts triangles into tiles on the caller's thread; others fill these meanwhile, but only
-/// with what was flushed.
+/// Number of indices after which commands are flushed on a software rasteriser. Mesa sorts
+/// triangles into screen tiles on the caller's thread, and its other threads fill the tiles
+/// meanwhile, but only with commands that were flushed.
 constexpr std::int32_t kSoftwareBatchIndices = 12'000;
 
+/// Issues one multi-draw per record.
 void issue_at_once(std::span<const ViewDraw> draws, const ViewRanges& ranges,
                    const gl::Buffer& records) noexcept {
   for (const ViewDraw& draw : draws) {
@@ -26,7 +30,7 @@ void issue_at_once(std::span<const ViewDraw> draws, const ViewRanges& ranges,
   }
 }
 
-/// The same, flushed every so often.
+/// Issues the draws in pieces and flushes after every kSoftwareBatchIndices indices.
 void issue_in_batches(std::span<const ViewDraw> draws, const ViewRanges& ranges,
                       const gl::Buffer& records) noexcept {
   std::int32_t room = kSoftwareBatchIndices;
@@ -49,77 +53,7 @@ void issue_in_batches(std::span<const ViewDraw> draws, const ViewRanges& ranges,
   }
 }
 
-void issue(std::span<const LightCommand> commands) noexcept {
-  for (const LightCommand& command : commands) {
-    const auto offset = static_cast<std::uintptr_t>(command.range.first_index) * 4U;
-    glDrawElementsInstancedBaseVertexBaseInstance(
-        GL_TRIANGLES, static_cast<GLsizei>(command.range.index_count), GL_UNSIGNED_INT,
-        reinterpret_cast<const void*>(offset), static_cast<GLsizei>(command.count),
-        command.base_vertex, command.first_record);
-  }
-}
-
-constexpr GLuint kRecordBinding = 2;
-
-/// One record per instance.
-void read_records(GLuint array, const gl::Buffer& records) {
-  glVertexArrayVertexBuffer(array, kRecordBinding, records.id(), 0, sizeof(LightRecord));
-  for (GLuint row = 0; row < 3; ++row) {
-    const GLuint attribute = EMIT_ATTR_ROW + row;
-    glVertexArrayAttribFormat(array, attribute, 4, GL_FLOAT, GL_FALSE, row * 4 * sizeof(float));
-    glVertexArrayAttribBinding(array, attribute, kRecordBinding);
-    glEnableVertexArrayAttrib(array, attribute);
-  }
-  glVertexArrayBindingDivisor(array, kRecordBinding, 1);
-}
-
-physics::Result<void> check_complete(const gl::Framebuffer& framebuffer, const char* name) {
-  if (glCheckNamedFramebufferStatus(framebuffer.id(), GL_DRAW_FRAMEBUFFER) ==
-      GL_FRAMEBUFFER_COMPLETE) {
-    return {};
-  }
-  return physics::make_error(physics::ErrorCode::gpu,
-                             std::string(name) + ": the driver refuses the render target");
-}
-
 }  // namespace
-
-SceneVertexArrays::SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& light_records)
-    : view_(gl::VertexArray::make()), light_(gl::VertexArray::make()) {
-  for (const GLuint id : {view_.id(), light_.id()}) {
-    glVertexArrayElementBuffer(id, scene.indices());
-    glVertexArrayVertexBuffer(id, 0, scene.positions(), 0, 3 * sizeof(float));
-    glVertexArrayAttribFormat(id, EMIT_ATTR_POSITION, 3, GL_FLOAT, GL_FALSE, 0);
-    glVertexArrayAttribBinding(id, EMIT_ATTR_POSITION, 0);
-    glEnableVertexArrayAttrib(id, EMIT_ATTR_POSITION);
-  }
-  const GLuint view = view_.id();
-  glVertexArrayVertexBuffer(view, 1, scene.normals(), 0, 4 * sizeof(std::int16_t));
-  glVertexArrayAttribFormat(view, EMIT_ATTR_NORMAL, 4, GL_SHORT, GL_TRUE, 0);
-  glVertexArrayAttribBinding(view, EMIT_ATTR_NORMAL, 1);
-  glEnableVertexArrayAttrib(view, EMIT_ATTR_NORMAL);
-  read_records(light_.id(), light_records);
-}
-
-void SceneVertexArrays::read_nodes(const gl::Buffer& before,
-                                   const gl::Buffer& after) const noexcept {
-  const auto read = [this](GLuint attribute, GLuint binding, const gl::Buffer& node) {
-    glVertexArrayVertexBuffer(view_.id(), binding, node.id(), 0, 2 * sizeof(float));
-    glVertexArrayAttribFormat(view_.id(), attribute, 2, GL_FLOAT, GL_FALSE, 0);
-    glVertexArrayAttribBinding(view_.id(), attribute, binding);
-    glEnableVertexArrayAttrib(view_.id(), attribute);
-  };
-  read(EMIT_ATTR_NODE_BEFORE, 3, before);
-  read(EMIT_ATTR_NODE_AFTER, 4, after);
-}
-
-void SceneVertexArrays::read_shade(const gl::Buffer& shade) const noexcept {
-  constexpr GLuint kBinding = 5;
-  glVertexArrayVertexBuffer(view_.id(), kBinding, shade.id(), 0, sizeof(float));
-  glVertexArrayAttribFormat(view_.id(), EMIT_ATTR_SHADE, 1, GL_FLOAT, GL_FALSE, 0);
-  glVertexArrayAttribBinding(view_.id(), EMIT_ATTR_SHADE, kBinding);
-  glEnableVertexArrayAttrib(view_.id(), EMIT_ATTR_SHADE);
-}
 
 physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context,
                                                    std::uint32_t width_px, std::uint32_t height_px,
@@ -127,6 +61,7 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
   GeometryPass pass;
   pass.software_ = context.software();
   pass.threads_ = context.threads();
+  // Compile the program for the content.
   std::vector<gl::Define> defines;
   const bool sampled = content != Content::normals;
   const bool objects = content == Content::samples_and_objects;
@@ -136,6 +71,7 @@ physics::Result<GeometryPass> GeometryPass::create(const gl::EglContext& context
   auto program = gl::Program::graphics("passes/geometry.vert", "passes/geometry.frag", defines);
   if (!program) return tl::unexpected(std::move(program.error()));
   pass.program_ = std::move(*program);
+  // Make the textures of the content and attach them.
   const auto width = static_cast<GLsizei>(width_px);
   const auto height = static_cast<GLsizei>(height_px);
   pass.sampled_ = sampled;
@@ -172,13 +108,15 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
                         const gl::Buffer& records, CommandRange single_sided,
                         CommandRange double_sided, const glm::uvec2& size_px,
                         const glm::uvec4& window_px) const noexcept {
+  // Restrict drawing to the window. Pixels that are not drawn need not be cleared.
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
   glViewport(0, 0, static_cast<GLsizei>(size_px.x), static_cast<GLsizei>(size_px.y));
   const glm::uvec2 part_px = window_size_px(window_px);
   glScissor(static_cast<GLint>(window_px.x), static_cast<GLint>(window_px.y),
             static_cast<GLsizei>(part_px.x), static_cast<GLsizei>(part_px.y));
-  glEnable(GL_SCISSOR_TEST);      // what is not drawn need not be cleared
-  const GLfloat far_away = 0.0F;  // reversed z
+  glEnable(GL_SCISSOR_TEST);
+  // Clear to sky. Depth is reversed: 0 is infinitely far away.
+  const GLfloat far_away = 0.0F;
   if (!sampled_) {
     const GLfloat sky[4] = {EMIT_SKY_DEPTH_M, 0.0F, 0.0F, 0.0F};
     const GLfloat zero[4] = {0.0F, 0.0F, 0.0F, 0.0F};
@@ -188,12 +126,15 @@ void GeometryPass::draw(const SceneVertexArrays& vertices, const DrawLists& list
     glClearNamedFramebufferuiv(framebuffer_.id(), GL_COLOR, 2, none);
   }
   glClearNamedFramebufferfv(framebuffer_.id(), GL_DEPTH, 0, &far_away);
+  // Front faces turn clockwise, because row 0 of the image is at the bottom of GL's window and the
+  // view is mirrored.
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
-  glFrontFace(GL_CW);  // image row 0 is at the bottom of GL's window: the view is mirrored
+  glFrontFace(GL_CW);
   glCullFace(GL_BACK);
   program_.use();
   vertices.bind_view();
+  // Draw single-sided submeshes with culling, then double-sided ones without.
   glEnable(GL_CULL_FACE);
   threads_.leave_core_to_caller();
   const auto draw_all = software_ ? issue_in_batches : issue_at_once;
@@ -216,62 +157,6 @@ void GeometryPass::bind_textures() const noexcept {
   depth_m_.bind(EMIT_TEX_DEPTH);
   normal_.bind(EMIT_TEX_NORMAL);
   ids_.bind(EMIT_TEX_IDS);
-}
-
-physics::Result<ShadowPass> ShadowPass::create(std::uint32_t size_px, std::uint32_t layers) {
-  ShadowPass pass;
-  auto program = gl::Program::graphics("passes/shadow.vert", "");
-  if (!program) return tl::unexpected(std::move(program.error()));
-  pass.program_ = std::move(*program);
-  pass.size_px_ = static_cast<GLsizei>(size_px);
-  pass.maps_ = gl::Texture(GL_DEPTH_COMPONENT32F, pass.size_px_, pass.size_px_,
-                           static_cast<GLsizei>(layers));
-  for (std::uint32_t i = 0; i < layers; ++i) {
-    pass.framebuffers_[i] = gl::Framebuffer::make();
-    const GLuint id = pass.framebuffers_[i].id();
-    glNamedFramebufferTextureLayer(id, GL_DEPTH_ATTACHMENT, pass.maps_.id(), 0,
-                                   static_cast<GLint>(i));
-    glNamedFramebufferDrawBuffer(id, GL_NONE);
-    if (auto ok = check_complete(pass.framebuffers_[i], "shadow map"); !ok) {
-      return tl::unexpected(std::move(ok.error()));
-    }
-  }
-  return pass;
-}
-
-void ShadowPass::draw(const SceneVertexArrays& vertices, std::uint32_t cascade,
-                      std::span<const LightCommand> commands) const noexcept {
-  const gl::Framebuffer& framebuffer = framebuffers_[cascade];
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.id());
-  glViewport(0, 0, size_px_, size_px_);
-  const GLfloat far_away = 1.0F;
-  glClearNamedFramebufferfv(framebuffer.id(), GL_DEPTH, 0, &far_away);
-  glEnable(GL_DEPTH_TEST);
-  glDepthFunc(GL_LESS);
-  glFrontFace(GL_CW);  // row 0 of the map is at the bottom of GL's window as well
-  glCullFace(GL_BACK);
-  program_.use();
-  vertices.bind_light();
-  // The face of a closed body that is nearest to the sun looks at the sun: half of its triangles
-  // need no setup and no rasterisation. Sheets cast shadow with either side.
-  while (!commands.empty()) {
-    const bool both_sides = commands.front().range.double_sided;
-    const auto end = std::ranges::find_if(commands, [both_sides](const LightCommand& command) {
-      return command.range.double_sided != both_sides;
-    });
-    const auto count = static_cast<std::size_t>(end - commands.begin());
-    if (both_sides) {
-      glDisable(GL_CULL_FACE);
-    } else {
-      glEnable(GL_CULL_FACE);
-    }
-    issue(commands.first(count));
-    commands = commands.subspan(count);
-  }
-}
-
-void ShadowPass::bind_texture() const noexcept {
-  maps_.bind(EMIT_TEX_SHADOW);
 }
 
 }  // namespace emit::renderer

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <glm/ext/vector_uint2.hpp>
+#include <glm/ext/vector_uint4.hpp>
+
+#include "draw/draw_lists.hpp"
+#include "emit/physics/error.hpp"
+#include "gl/egl_context.hpp"
+#include "gl/objects.hpp"
+#include "gl/program.hpp"
+#include "passes/scene_vertex_arrays.hpp"
+
+namespace emit::renderer {
+
+/// Geometry buffer of the visible surface (part 1 of the paper). It holds linear depth, normal,
+/// material and object in three textures, or everything that the radiance pass needs of thermal
+/// samples. See passes/geometry.vert and passes/geometry.frag.
+/// Thread: the one that owns the GL context. Real time: create() is setup only, the rest is
+/// RT-safe.
+class GeometryPass {
+ public:
+  /// Content of the geometry buffer.
+  enum class Content {
+    normals,              ///< boresight distance, normal, material and object
+    samples,              ///< depth, material and the thermal state of the samples
+    samples_and_objects,  ///< samples and object
+  };
+  /// Shade that vertices of samples bring along (SceneVertexArrays::read_shade).
+  enum class Shade : std::uint8_t { none, of_entities };
+  /// Compiles the pass and makes the geometry buffer for images of up to `width_px` x `height_px`.
+  /// Errors: gpu (names the shader or the render target).
+  [[nodiscard]] static physics::Result<GeometryPass> create(const gl::EglContext& context,
+                                                            std::uint32_t width_px,
+                                                            std::uint32_t height_px,
+                                                            Content content, Shade shade);
+  /// Draws two parts of the camera's draws in `lists`. `records` holds the records of `lists` on
+  /// the device. The image has `size_px` pixels, and only its window is changed.
+  void draw(const SceneVertexArrays& vertices, const DrawLists& lists, const gl::Buffer& records,
+            CommandRange single_sided, CommandRange double_sided, const glm::uvec2& size_px,
+            const glm::uvec4& window_px) const noexcept;
+  /// Binds the geometry buffer to its texture units, and the texture of samples to
+  /// EMIT_IMG_SURFACE.
+  void bind_textures() const noexcept;
+
+ private:
+  gl::Program program_;
+  gl::Texture depth_m_;
+  gl::Texture normal_;
+  gl::Texture ids_;
+  gl::Texture surface_;  ///< state of samples as passes/surface_texel.glsl packs it
+  gl::Texture depth_buffer_;
+  gl::Framebuffer framebuffer_;
+  bool sampled_ = false;
+  bool software_ = false;
+  threads::SoftwareThreads threads_;
+};
+
+}  // namespace emit::renderer

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <glm/ext/vector_uint2.hpp>
+
+#include "emit/physics/error.hpp"
+#include "emit/scene/scene_desc.hpp"
+#include "gl/program.hpp"
+
+namespace emit::renderer {
+
+/// Content of a scenario that the radiance pass is compiled for.
+struct RadianceContent {
+  std::uint32_t bands = 0;
+  std::uint32_t air_terms = 0;  ///< bit per band: its air is a sum of exponential terms
+  std::uint32_t air_table = 0;  ///< bit per band: its air is a table
+  std::uint32_t terms = 0;      ///< largest number of exponential terms of a band
+  std::uint32_t outputs = 0;    ///< planes behind those of the bands, EMIT_OUTPUT_*
+};
+
+/// Radiance of every pixel in all bands (part 5 of the paper). See passes/radiance.comp.
+/// Thread: the one that owns the GL context. Real time: create() is setup only, the rest is
+/// RT-safe.
+class RadiancePass {
+ public:
+  /// Compiles the pass. `software` says that the device is a CPU. Errors: gpu (names the shader).
+  /// @pre content.bands is 1..EMIT_MAX_BANDS.
+  [[nodiscard]] static physics::Result<RadiancePass> create(const scene::ThermalOptions& options,
+                                                            const RadianceContent& content,
+                                                            bool software);
+  /// Writes all planes of the window of the frame, which has `size_px` pixels, to EMIT_BIND_OUTPUT.
+  void dispatch(const glm::uvec2& size_px) const noexcept;
+
+ private:
+  gl::Program program_;
+  std::uint32_t rows_ = 1;  ///< result of pixel_rows()
+};
+
+}  // namespace emit::renderer

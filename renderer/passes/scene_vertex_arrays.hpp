@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include "draw/scene_buffers.hpp"
+#include "gl/objects.hpp"
+
+namespace emit::renderer {
+
+/// Vertex arrays that read SceneBuffers. The camera's draws read all attributes; the draws into
+/// shadow maps read positions and one LightRecord per instance. Thread: the one that owns the GL
+/// context. Real time: the constructor is setup only, the rest is RT-safe.
+class SceneVertexArrays {
+ public:
+  SceneVertexArrays(const SceneBuffers& scene, const gl::Buffer& light_records);
+  /// Makes the vertex array of the camera's draws current.
+  void bind_view() const noexcept { glBindVertexArray(view_.id()); }
+  /// Makes the vertex array of the draws into shadow maps current.
+  void bind_light() const noexcept { glBindVertexArray(light_.id()); }
+  /// Sets the buffers that the camera's draws read the samples from, at the node of time before the
+  /// frame and at the node after it: two floats per vertex in each.
+  void read_nodes(const gl::Buffer& before, const gl::Buffer& after) const noexcept;
+  /// Sets the buffer that the camera's draws read the recent shade of entities from: one float per
+  /// vertex.
+  void read_shade(const gl::Buffer& shade) const noexcept;
+
+ private:
+  gl::VertexArray view_;
+  gl::VertexArray light_;
+};
+
+}  // namespace emit::renderer
