@@ -79,8 +79,8 @@ NearestTriangle::NearestTriangle(std::span<const glm::vec3> positions_m,
 float NearestTriangle::distance_m(std::uint32_t triangle, const glm::vec3& point_m) const noexcept {
   const std::array<glm::vec3, 3>& corner_m = triangles_[triangle].corner_m;
   const glm::vec3 weight = nearest_weight(corner_m, point_m);
-  return glm::distance(point_m, weight.x * corner_m[0] + weight.y * corner_m[1] +
-                                    weight.z * corner_m[2]);
+  return glm::distance(point_m,
+                       weight.x * corner_m[0] + weight.y * corner_m[1] + weight.z * corner_m[2]);
 }
 
 NearestTriangle::Hit NearestTriangle::find(const glm::vec3& point_m,

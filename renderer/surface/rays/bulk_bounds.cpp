@@ -56,9 +56,8 @@ scene::Aabb bulk_bounds(std::span<const CasterPart> parts) {
   if (centres_m[0].empty()) return all;
 
   // Cut the same share off both ends of every axis.
-  const std::size_t strays =
-      std::max<std::size_t>(1, static_cast<std::size_t>(
-                                   kStrayFrac * static_cast<double>(centres_m[0].size())));
+  const std::size_t strays = std::max<std::size_t>(
+      1, static_cast<std::size_t>(kStrayFrac * static_cast<double>(centres_m[0].size())));
   if (centres_m[0].size() <= 2 * strays) return all;
   glm::dvec3 low_m;
   glm::dvec3 high_m;
@@ -85,8 +84,8 @@ scene::Aabb bulk_bounds(const scene::SceneGeometry& geometry) {
   for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
     const scene::Instance& instance = geometry.instances[i];
     if (any_static && instance.entity_id != 0) continue;
-    parts.push_back({static_cast<std::uint32_t>(i), &geometry.meshes[instance.mesh],
-                     instance.world_from_mesh});
+    parts.push_back(
+        {static_cast<std::uint32_t>(i), &geometry.meshes[instance.mesh], instance.world_from_mesh});
   }
   return bulk_bounds(parts);
 }

@@ -89,10 +89,9 @@ struct CasterRays::Impl {
   /// False where no ray of the packet comes near the mover.
   [[nodiscard]] static bool comes_near(const Mover& mover, const MoverPlacement& placement,
                                        const PacketCone& cone) noexcept {
-    return placement.on &&
-           cone.may_meet(placement.rel_from_body * glm::vec3(mover.centre_body_m) +
-                             placement.position_m,
-                         mover.set.radius_m());
+    return placement.on && cone.may_meet(placement.rel_from_body * glm::vec3(mover.centre_body_m) +
+                                             placement.position_m,
+                                         mover.set.radius_m());
   }
   /// Bits of the rays that come near a mover which stands at one place for all of them.
   [[nodiscard]] static std::uint32_t enter_all(const Mover& mover, const MoverPlacement& placement,

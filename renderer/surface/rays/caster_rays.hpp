@@ -66,10 +66,10 @@ class CasterRays {
 
   /// Takes instances with entity_id 0 by world_from_mesh and the others by body_from_mesh. Setup
   /// only; seconds for 1e7 triangles. `origin_world_m`: where another one's is the same; none: the
-  /// centre of the geometry's bulk. `flat_triangles`: of larger rigid frames, meshes that stand more than
-  /// once are stored once, which is slower to trace.
-  /// Errors: invalid_argument (an index out of range, more than 2^31 triangles or a scene wider
-  /// than 1e8 m), internal (Embree ran out of memory).
+  /// centre of the geometry's bulk. `flat_triangles`: of larger rigid frames, meshes that stand
+  /// more than once are stored once, which is slower to trace. Errors: invalid_argument (an index
+  /// out of range, more than 2^31 triangles or a scene wider than 1e8 m), internal (Embree ran out
+  /// of memory).
   [[nodiscard]] static physics::Result<CasterRays> create(
       const scene::SceneGeometry& geometry,
       const std::optional<glm::dvec3>& origin_world_m = std::nullopt,

@@ -321,8 +321,8 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
     // Aim the rays when the first entity is near.
     if (above == 0) {
       for (std::size_t i = 0; i < kSkyRays; ++i) {
-        sent[i] = {start_m, local[i].x * tangents.u + local[i].y * tangents.v +
-                                local[i].z * sample.normal};
+        sent[i] = {start_m,
+                   local[i].x * tangents.u + local[i].y * tangents.v + local[i].z * sample.normal};
         if (sent[i].direction.z > 0.0F) above |= 1U << i;
       }
       if (above == 0) return {};

@@ -106,8 +106,8 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
           corners_m[k] = glm::vec3(to_rel * glm::vec4(mesh.positions_m[corner[k]], 1.0F));
         }
         if (mirrored) std::swap(corners_m[1], corners_m[2]);
-        const bool worth = seen_wide(corners_m, eyes_m, pixel_rad, rays) &&
-                           lit(corners_m, to_suns, offsets, rays);
+        const bool worth =
+            seen_wide(corners_m, eyes_m, pixel_rad, rays) && lit(corners_m, to_suns, offsets, rays);
         if (worth) keep[t] = 1;
       }
     });

@@ -175,9 +175,9 @@ std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns, std::int64_t now_
   return next_ns;
 }
 
-SurfaceInputs CachedSurface::surface_inputs(
-    const HistoryRecord& record, const SurfaceHistory& history,
-    std::span<const std::vector<glm::vec3>> ways_m) const {
+SurfaceInputs CachedSurface::surface_inputs(const HistoryRecord& record,
+                                            const SurfaceHistory& history,
+                                            std::span<const std::vector<glm::vec3>> ways_m) const {
   return {geometry_, materials_, mover_of_object_, rays(),      places_,
           heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr,
           ways_m};
@@ -201,8 +201,7 @@ physics::Result<SurfaceModel> CachedSurface::warm_up(const ModelWork& work) cons
 physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const ModelWork& work,
                                                                        const Saved& saved) const {
   const StateWanted wanted{saved.key, work.start_ns, [&work](std::int64_t at_ns) {
-                             return live_hash(at_ns, work.inputs.environment,
-                                              work.inputs.entities);
+                             return live_hash(at_ns, work.inputs.environment, work.inputs.entities);
                            }};
   auto read = read_state(saved.file, wanted, geometry_, movers_now_.size(), work.options);
   if (!read) {
@@ -234,8 +233,8 @@ physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const Mod
   plan.update(work.start_ns, work.inputs.environment, work.inputs.entities);
   const HistoryRecord record =
       extend_history_record(plan, work.history, record_inputs(work.inputs));
-  if (auto carried = carry_on(surface_inputs(record, work.history, {}), work.options, *read,
-                              work.progress);
+  if (auto carried =
+          carry_on(surface_inputs(record, work.history, {}), work.options, *read, work.progress);
       !carried) {
     return tl::unexpected(std::move(carried.error()));
   }
@@ -284,8 +283,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   // The published model conducts straight down and knows no other surface.
   options.lateral = extended_ && options_.lateral;
   options.exchange = extended_ && options_.exchange;
-  auto model =
-      make_model({start_ns, view, inputs, plan, history, options, progress}, saved);
+  auto model = make_model({start_ns, view, inputs, plan, history, options, progress}, saved);
   if (!model) return tl::unexpected(std::move(model.error()));
   offsets_ = ray_offsets(geometry_);
   model_ = std::move(*model);

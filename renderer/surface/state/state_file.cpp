@@ -251,9 +251,9 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   const std::string parts = different_parts(header.key, key);
   if (!parts.empty()) return "made for another scenario, different in: " + parts;
   if (header.at_ns > wanted.start_ns) {
-    return fmt::format("holds the surface at {:.3f} s, and this run starts at {:.3f} s, before that",
-                       1e-9 * static_cast<double>(header.at_ns),
-                       1e-9 * static_cast<double>(wanted.start_ns));
+    return fmt::format(
+        "holds the surface at {:.3f} s, and this run starts at {:.3f} s, before that",
+        1e-9 * static_cast<double>(header.at_ns), 1e-9 * static_cast<double>(wanted.start_ns));
   }
   return "";
 }

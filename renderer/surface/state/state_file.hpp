@@ -16,8 +16,8 @@
 #include "surface/model/surface_model.hpp"
 
 /// The surface after its history in a file (thermal.state_file), so that a run need not warm up
-/// what one before it did. The file holds the surface at an instant: a run that starts later goes on
-/// from it. Bands do not matter to it. Setup only.
+/// what one before it did. The file holds the surface at an instant: a run that starts later goes
+/// on from it. Bands do not matter to it. Setup only.
 ///
 /// Layout, little endian: 8 bytes "EMITSTAT", version u32, number of parts u32, the parts' hashes
 /// u64 each, the instant i64 in ns of sim time, size of the body u64, body (SurfaceModel member by

@@ -66,9 +66,8 @@ physics::Result<void> carry_on(const SurfaceInputs& inputs, const SurfaceModelOp
   // Integrate, with one sweep more than after a guess that knows each sample's own history.
   const bool exchanges = options.exchange || options.lateral;
   if (exchanges) histories.sent = sent_as_before(model, intervals);
-  const ExchangeOptions how{.sweeps = exchanges ? kExchangeSweeps + 1 : 1,
-                            .evaluated = false,
-                            .glow = options.exchange};
+  const ExchangeOptions how{
+      .sweeps = exchanges ? kExchangeSweeps + 1 : 1, .evaluated = false, .glow = options.exchange};
   const auto report = [&](double frac) {
     return !progress || progress(kTraceFrac + (1.0 - kTraceFrac) * frac);
   };

@@ -186,8 +186,7 @@ void Numbers::run() {
 
 void number_samples(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
                     std::vector<SurfacePatch>& patches, SurfaceModel& model) {
-  EMIT_CHECK_OP(patches.size(), ==,
-                inputs.geometry.instances.size() + (options.lateral ? 1U : 0U));
+  EMIT_CHECK_OP(patches.size(), ==, inputs.geometry.instances.size() + (options.lateral ? 1U : 0U));
   Numbers(inputs, options, patches, model).run();
 }
 

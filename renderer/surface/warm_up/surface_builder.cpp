@@ -173,7 +173,8 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         const float length = glm::length(inward);
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
         const glm::vec3 drawn_m(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F));
-        const glm::vec3 off_edge_m = sampler_.tracer().offsets(drawn_m, patch.mover).around_m * unit_inward;
+        const glm::vec3 off_edge_m =
+            sampler_.tracer().offsets(drawn_m, patch.mover).around_m * unit_inward;
         const auto to_rel = [&](const glm::vec3& at_m) {
           return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
         };
@@ -342,8 +343,8 @@ physics::Result<SurfaceModel> Builder::run() {
     }
     // Stop where samples have run out: what a round leaves room for the next one takes, until next
     // to nothing is left.
-    const bool none_left = short_of_samples_ &&
-                           sample_count_ - count_before <= options_.max_samples / kLastFraction;
+    const bool none_left =
+        short_of_samples_ && sample_count_ - count_before <= options_.max_samples / kLastFraction;
     if (none_left || round == kMaxRounds) {
       model_.full = true;
       model_.full_in_view = most.in_view > 0.0F;

@@ -294,8 +294,7 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
 bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,
               SampleHistories histories, SurfaceModel& model, const SurfaceProgress& report) {
   EMIT_CHECK_OP(histories.start.size(), ==, model.samples.samples.size());
-  EMIT_CHECK_OP(histories.sun_frac.size(), ==,
-                model.samples.samples.size() * inputs.record.size());
+  EMIT_CHECK_OP(histories.sun_frac.size(), ==, model.samples.samples.size() * inputs.record.size());
   Sweeper sweeper(inputs, options, std::move(histories), model);
   for (std::uint32_t i = 0; i < options.sweeps; ++i) {
     if (report && !report((i + 1.0) / (options.sweeps + 1.0))) return false;

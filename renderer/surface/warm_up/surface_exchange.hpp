@@ -11,7 +11,8 @@ struct SampleHistories {
   std::vector<SampleState> start;     ///< at the first node
   std::vector<float> sun_frac;        ///< by sample, then interval
   std::vector<HiddenSky> hidden_sky;  ///< likewise; empty without entities
-  /// What the samples send out, as far as it is known; it keeps nothing where they exchange nothing.
+  /// What the samples send out, as far as it is known; it keeps nothing where they exchange
+  /// nothing.
   SentHistory sent;
 };
 

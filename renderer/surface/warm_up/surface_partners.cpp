@@ -29,7 +29,7 @@ constexpr float kBesideOffsets = 6.0F;
 }  // namespace
 
 std::array<float, physics::kMaxFosterModes> PartnerFinder::weights(std::uint32_t material,
-                                                              float distance_m) const {
+                                                                   float distance_m) const {
   std::array<float, physics::kMaxFosterModes> out{};
   const double a = diffusivity_m2_s(in_.materials[material]);
   if (!(a > 0.0)) return out;
@@ -82,8 +82,7 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
     const float into = glm::dot(m, own.normal);
     const glm::vec3 along = own.normal - into * m;
     if (glm::length(along) < kMinSine) continue;
-    const glm::vec3 at_m =
-        own.position_m + x_m * m - (x_m + offset_m) * glm::normalize(along);
+    const glm::vec3 at_m = own.position_m + x_m * m - (x_m + offset_m) * glm::normalize(along);
     const float lift_m = 20.0F * offset_m;
     const CasterRay probe{at_m + lift_m * m, -m};
     std::array<CasterHit, 1> hit;
@@ -107,10 +106,9 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
     found.distance_m = x_m;
     // Find out whether the face stands on something: beside the body that lies in its plane.
     const CasterRay beside{own.position_m + kBesideOffsets * offset_m * own.normal, m};
-    found.sample.covered =
-        in_.places.first_hits({&beside, 1}, selection, hit) != 0U &&
-        std::abs(hit[0].distance_m - x_m) < kBesideOffsets * offset_m &&
-        glm::dot(hit[0].normal, m) < -0.9F;
+    found.sample.covered = in_.places.first_hits({&beside, 1}, selection, hit) != 0U &&
+                           std::abs(hit[0].distance_m - x_m) < kBesideOffsets * offset_m &&
+                           glm::dot(hit[0].normal, m) < -0.9F;
     if (greatest_weight(own.material, x_m) < kMinWeightFrac) continue;
     partners.push_back(found);
   }

@@ -110,9 +110,8 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
   const bool far_off =
       sample.mover >= 0 &&
       glm::length(in_.movers_now[static_cast<std::size_t>(sample.mover)].position_m) > kMaxWorldM;
-  const float offset_m =
-      far_off ? tracer_.bulk_offsets().around_m
-              : tracer_.offsets(sample.position_m, sample.mover).around_m;
+  const float offset_m = far_off ? tracer_.bulk_offsets().around_m
+                                 : tracer_.offsets(sample.position_m, sample.mover).around_m;
   ViewPoint point{sample.position_m, sample.normal, stand.inward, offset_m};
   ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offset_m};
   std::array<MoverPlacement, 1> self;
@@ -200,10 +199,9 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
         std::abs(glm::dot(above[k].normal, n)) > kWallCos) {
       continue;
     }
-    const CasterRay down{
-        rays[k].origin_m + 4.0F * offset_m * n +
-            (above[k].distance_m + kUnderOffsets * offset_m) * rays[k].direction,
-        -n};
+    const CasterRay down{rays[k].origin_m + 4.0F * offset_m * n +
+                             (above[k].distance_m + kUnderOffsets * offset_m) * rays[k].direction,
+                         -n};
     std::array<CasterHit, 1> under;
     if (in_.rays.first_hits({&down, 1}, selection, under) != 0U &&
         under[0].distance_m < kUnderOffsets * offset_m) {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "surface/model/drive_worth.hpp"
-#include "surface/rays/sphere_view.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/rays/sphere_view.hpp"
 #include "surface/warm_up/sent_history.hpp"
 #include "surface/warm_up/sun_tracer.hpp"
 
@@ -37,7 +37,7 @@ struct SurfacePatch {
   /// Views: what a vertex sees of faces, by rays of its own. Vertices that share another one's view
   /// have none. Weights add up to something: the share that is not open is spread over them.
   std::vector<std::vector<SeenPlace>> seen;
-  std::vector<std::uint32_t> view_of;  ///< vertex whose view it is
+  std::vector<std::uint32_t> view_of;                 ///< vertex whose view it is
   std::vector<physics::FosterState<double>> start_k;  ///< modes at the start of the history
   SentHistory sent;                                   ///< what it sends out over the history
   std::vector<SampleState> states;

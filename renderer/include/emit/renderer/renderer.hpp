@@ -103,8 +103,8 @@ struct FrameStats {
   /// The frame may be coarser than asked (thermal.method = "cached"). The camera is where nobody
   /// planned it, or samples ran out before its view was fine enough: triangles may be wider than
   /// pixels and shadows coarser than thermal.tolerance_k. The flag is also set while some surfaces
-  /// have not taken in a change of the weather or of an entity's shade, and in a frame that prepared
-  /// the surface anew (rewarm_s).
+  /// have not taken in a change of the weather or of an entity's shade, and in a frame that
+  /// prepared the surface anew (rewarm_s).
   bool coarse = false;
   /// How long it took to prepare the surface anew inside this frame, because the thermal time had
   /// jumped, in s of wall time; 0 in frames that did not. The frame is also `coarse`.
