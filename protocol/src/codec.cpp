@@ -104,6 +104,11 @@ bool read_outline(std::span<const std::byte> bytes, Outline& outline, HostFrameD
   return true;
 }
 
+DecodeFault out_of_range(DecodeFault::Part part, const char* field, double value, double lowest,
+                         double highest) noexcept {
+  return {DecodeFault::Kind::out_of_range, part, 0, field, value, lowest, highest};
+}
+
 }  // namespace
 
 bool looks_like_status(std::span<const std::byte> bytes) noexcept {
@@ -150,16 +155,32 @@ DecodeStatus decode_host_frame(std::span<const std::byte> bytes, HostFrameDecode
   out.sim_time_ns = 0;
   out.run_id = 0;
   out.entity_count = 0;
-  if (bytes.size() > kMaxHostFrameBytes) return DecodeStatus::oversize;
+  DecodeFault& fault = decoder.fault_;
+  fault = {};
+  if (bytes.size() > kMaxHostFrameBytes) {
+    fault = out_of_range(DecodeFault::Part::message, "bytes", static_cast<double>(bytes.size()),
+                         0.0, static_cast<double>(kMaxHostFrameBytes));
+    return DecodeStatus::oversize;
+  }
   Outline outline;
   if (!read_outline(bytes, outline, out)) return DecodeStatus::malformed;
-  if (outline.protocol_version != kProtocolVersion) return DecodeStatus::wrong_version;
-  if (outline.entities > kMaxEntitiesPerFrame) return DecodeStatus::oversize;
+  if (outline.protocol_version != kProtocolVersion) {
+    fault = out_of_range(DecodeFault::Part::message, "protocol_version",
+                         static_cast<double>(outline.protocol_version), kProtocolVersion,
+                         kProtocolVersion);
+    return DecodeStatus::wrong_version;
+  }
+  if (outline.entities > kMaxEntitiesPerFrame) {
+    fault = out_of_range(DecodeFault::Part::message, "number of entities",
+                         static_cast<double>(outline.entities), 0.0,
+                         static_cast<double>(kMaxEntitiesPerFrame));
+    return DecodeStatus::oversize;
+  }
   v1::HostFrame* message = decoder.impl_->arena.fresh_host_frame();
   if (!message->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
     return DecodeStatus::malformed;
   }
-  return from_proto(*message, out);
+  return from_proto(*message, out, &fault);
 }
 
 std::span<const std::byte> host_frame_in_control_record(std::span<const std::byte> body) noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/protocol/convert.hpp"
 
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -40,17 +41,51 @@ void set(const glm::dvec3& in, v1::Vector3& out) {
   out.set_z(in.z);
 }
 
-/// Returns true when every component is within [-limit, limit]; false for NaN.
-bool within(const glm::dvec3& vector, double limit) noexcept {
-  return std::abs(vector.x) <= limit && std::abs(vector.y) <= limit && std::abs(vector.z) <= limit;
+/// Checks values one after the other and notes the first one that is out of range.
+class RangeCheck {
+ public:
+  explicit RangeCheck(DecodeFault* fault) : fault_(fault) {}
+  bool in_range(const char* field, double value, const limits::Interval& range) noexcept {
+    if (range.contains(value)) return true;
+    note({DecodeFault::Kind::out_of_range, DecodeFault::Part::message, 0, field, value, range.lo,
+          range.hi});
+    return false;
+  }
+  /// `fields`: the names of the three components.
+  bool in_range(const std::array<const char*, 3>& fields, const glm::dvec3& vector,
+                double limit) noexcept {
+    const limits::Interval range{-limit, limit};
+    return in_range(fields[0], vector.x, range) && in_range(fields[1], vector.y, range) &&
+           in_range(fields[2], vector.z, range);
+  }
+  bool present(const char* field, bool is_there) noexcept {
+    if (!is_there) {
+      note({DecodeFault::Kind::missing, DecodeFault::Part::message, 0, field, 0.0, 0.0, 0.0});
+    }
+    return is_there;
+  }
+
+ private:
+  void note(const DecodeFault& fault) noexcept {
+    if (fault_ != nullptr) *fault_ = fault;
+  }
+  DecodeFault* fault_;
+};
+
+/// Says whose pose or weather the noted field belongs to.
+void set_part(DecodeFault* fault, DecodeFault::Part part, std::uint32_t entity_id = 0) noexcept {
+  if (fault != nullptr) {
+    fault->part = part;
+    fault->entity_id = entity_id;
+  }
 }
 
 /// Reads a quaternion and normalises it. Returns false when its norm is out of range.
-bool read_attitude(const v1::Quaternion& in, glm::dquat& out) noexcept {
+bool read_attitude(const v1::Quaternion& in, glm::dquat& out, RangeCheck& check) noexcept {
   out = glm::dquat(in.w(), in.x(), in.y(), in.z());
   const double squared = out.w * out.w + out.x * out.x + out.y * out.y + out.z * out.z;
   const double norm = std::sqrt(squared);
-  if (!limits::kQuaternionNorm.contains(norm)) return false;
+  if (!check.in_range("norm of world_from_body", norm, limits::kQuaternionNorm)) return false;
   if (std::abs(squared - 1.0) > kNormTolerance) {
     out = glm::dquat(out.w / norm, out.x / norm, out.y / norm, out.z / norm);
   }
@@ -118,20 +153,31 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out) {
   if (frame.environment) to_proto(*frame.environment, *out.mutable_environment());
 }
 
-DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose,
-                        std::optional<PoseRates>& rates) noexcept {
-  if (!in.has_position_m() || !in.has_world_from_body()) return DecodeStatus::invalid_pose;
+DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose, std::optional<PoseRates>& rates,
+                        DecodeFault* fault) noexcept {
+  RangeCheck check(fault);
+  if (!check.present("position_m", in.has_position_m()) ||
+      !check.present("world_from_body", in.has_world_from_body())) {
+    return DecodeStatus::invalid_pose;
+  }
   pose.position_world_m = from(in.position_m());
-  if (!within(pose.position_world_m, kMaxPositionM)) return DecodeStatus::invalid_pose;
-  if (!read_attitude(in.world_from_body(), pose.world_from_body)) {
+  if (!check.in_range({"position_m.x", "position_m.y", "position_m.z"}, pose.position_world_m,
+                      kMaxPositionM) ||
+      !read_attitude(in.world_from_body(), pose.world_from_body, check)) {
     return DecodeStatus::invalid_pose;
   }
   rates.reset();
-  if (in.has_velocity_m_s() != in.has_angular_rate_rad_s()) return DecodeStatus::invalid_pose;
-  if (in.has_velocity_m_s()) {
+  const bool has_rates = in.has_velocity_m_s() || in.has_angular_rate_rad_s();
+  if (has_rates) {
+    if (!check.present("velocity_m_s beside angular_rate_rad_s", in.has_velocity_m_s()) ||
+        !check.present("angular_rate_rad_s beside velocity_m_s", in.has_angular_rate_rad_s())) {
+      return DecodeStatus::invalid_pose;
+    }
     const PoseRates read{from(in.velocity_m_s()), from(in.angular_rate_rad_s())};
-    if (!within(read.velocity_world_m_s, kMaxSpeedMS) ||
-        !within(read.angular_rate_body_rad_s, kMaxAngularRateRadS)) {
+    if (!check.in_range({"velocity_m_s.x", "velocity_m_s.y", "velocity_m_s.z"},
+                        read.velocity_world_m_s, kMaxSpeedMS) ||
+        !check.in_range({"angular_rate_rad_s.x", "angular_rate_rad_s.y", "angular_rate_rad_s.z"},
+                        read.angular_rate_body_rad_s, kMaxAngularRateRadS)) {
       return DecodeStatus::invalid_pose;
     }
     rates = read;
@@ -139,16 +185,21 @@ DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose,
   return DecodeStatus::ok;
 }
 
-DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out) noexcept {
+DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out,
+                        DecodeFault* fault) noexcept {
   out = EntityStateData{};
   out.entity_id = in.entity_id();
   out.on = !in.off();
   out.teleport = in.teleport();
   out.has_pose = in.has_pose();
-  return out.has_pose ? from_proto(in.pose(), out.pose, out.rates) : DecodeStatus::ok;
+  if (!out.has_pose) return DecodeStatus::ok;
+  const DecodeStatus status = from_proto(in.pose(), out.pose, out.rates, fault);
+  if (status != DecodeStatus::ok) set_part(fault, DecodeFault::Part::entity, out.entity_id);
+  return status;
 }
 
-DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcept {
+DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
+                        DecodeFault* fault) noexcept {
   out = EnvironmentData{};
   out.direct_normal_w_m2 = in.direct_normal_w_m2();
   out.diffuse_horizontal_w_m2 = in.diffuse_horizontal_w_m2();
@@ -160,17 +211,24 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcep
   if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
   // The ranges are those of a scenario's weather, so that live weather can do nothing that a
   // scenario cannot.
-  const bool valid = limits::kDirectNormalWM2.contains(out.direct_normal_w_m2) &&
-                     limits::kDiffuseHorizontalWM2.contains(out.diffuse_horizontal_w_m2) &&
-                     limits::kLongwaveDownWM2.contains(out.longwave_down_w_m2) &&
-                     limits::kAirK.contains(out.air_k) && limits::kWindMS.contains(out.wind_m_s) &&
-                     limits::kCloudFrac.contains(out.cloud_frac) &&
-                     (!out.environment_k || limits::kEnvironmentK.contains(*out.environment_k)) &&
-                     (!out.film_w_m2_k || limits::kFilmWM2K.contains(*out.film_w_m2_k));
-  return valid ? DecodeStatus::ok : DecodeStatus::invalid_environment;
+  RangeCheck check(fault);
+  const bool valid =
+      check.in_range("direct_normal_w_m2", out.direct_normal_w_m2, limits::kDirectNormalWM2) &&
+      check.in_range("diffuse_horizontal_w_m2", out.diffuse_horizontal_w_m2,
+                     limits::kDiffuseHorizontalWM2) &&
+      check.in_range("longwave_down_w_m2", out.longwave_down_w_m2, limits::kLongwaveDownWM2) &&
+      check.in_range("air_k", out.air_k, limits::kAirK) &&
+      check.in_range("wind_m_s", out.wind_m_s, limits::kWindMS) &&
+      check.in_range("cloud_frac", out.cloud_frac, limits::kCloudFrac) &&
+      (!out.environment_k ||
+       check.in_range("environment_k", *out.environment_k, limits::kEnvironmentK)) &&
+      (!out.film_w_m2_k || check.in_range("film_w_m2_k", *out.film_w_m2_k, limits::kFilmWM2K));
+  if (valid) return DecodeStatus::ok;
+  set_part(fault, DecodeFault::Part::environment);
+  return DecodeStatus::invalid_environment;
 }
 
-DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out) noexcept {
+DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault* fault) noexcept {
   out.frame_number = in.frame_number();
   out.sim_time_ns = in.sim_time_ns();
   out.run_id = in.run_id();
@@ -181,24 +239,33 @@ DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out) noexcept {
   if (static_cast<std::size_t>(in.entities_size()) > kMaxEntitiesPerFrame) {
     return DecodeStatus::oversize;
   }
+  RangeCheck check(fault);
   if (out.sim_time_ns > kMaxSimTimeNs || out.sim_time_ns < -kMaxSimTimeNs) {
+    constexpr auto kLimit = static_cast<double>(kMaxSimTimeNs);
+    static_cast<void>(
+        check.in_range("sim_time_ns", static_cast<double>(out.sim_time_ns), {-kLimit, kLimit}));
     return DecodeStatus::malformed;
   }
-  if (!in.has_seeker()) return DecodeStatus::invalid_pose;
-  if (auto status = from_proto(in.seeker(), out.seeker, out.seeker_rates);
+  if (!check.present("seeker", in.has_seeker())) return DecodeStatus::invalid_pose;
+  if (auto status = from_proto(in.seeker(), out.seeker, out.seeker_rates, fault);
       status != DecodeStatus::ok) {
+    set_part(fault, DecodeFault::Part::seeker);
     return status;
   }
   for (const v1::EntityState& entity : in.entities()) {
     const std::uint32_t index = out.entity_count;
-    if (auto status = from_proto(entity, out.entities[index]); status != DecodeStatus::ok) {
+    if (auto status = from_proto(entity, out.entities[index], fault); status != DecodeStatus::ok) {
       return status;
     }
-    if (repeats_an_id(out, index)) return DecodeStatus::malformed;
+    if (repeats_an_id(out, index)) {
+      if (fault != nullptr) fault->kind = DecodeFault::Kind::repeated;
+      set_part(fault, DecodeFault::Part::entity, out.entities[index].entity_id);
+      return DecodeStatus::malformed;
+    }
     ++out.entity_count;
   }
   if (in.has_environment()) {
-    return from_proto(in.environment(), out.environment.emplace());
+    return from_proto(in.environment(), out.environment.emplace(), fault);
   }
   return DecodeStatus::ok;
 }

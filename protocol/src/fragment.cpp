@@ -129,9 +129,7 @@ Fragmenter::Fragmenter(const Params& params,
     : params_(params), frame_header_(frame_header), pixels_(pixels) {
   EMIT_CHECK_OP(pixels.size() % 4, ==, 0U);
   EMIT_CHECK_OP(pixels.size(), <=, kMaxFragmentedPixelBytes);
-  payload_bytes_ =
-      std::clamp(params.max_payload_bytes, kMinFragmentPayloadBytes, kMaxFragmentPayloadBytes) &
-      ~std::uint32_t{3};
+  payload_bytes_ = granted_fragment_payload_bytes(params.max_payload_bytes);
   const std::uint32_t body = kHeader + static_cast<std::uint32_t>(pixels.size());
   // Bytes used of the fragment in which the pixels end.
   const std::uint32_t used = body % payload_bytes_;

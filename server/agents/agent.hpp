@@ -21,12 +21,13 @@ class Agent {
 
   [[nodiscard]] virtual std::string_view name() const noexcept = 0;
 
-  /// On the agent's thread, before the first do_work. False: the daemon does not start.
+  /// Prepares the agent, on its thread, before the first do_work(). Returns false when the daemon
+  /// must not start.
   [[nodiscard]] virtual bool on_start() noexcept { return true; }
-  /// What there is to do now, without waiting. Returns the amount of work done; 0 = idle.
+  /// Does what there is to do now, without waiting. Returns the amount of work done; 0 = idle.
   /// RT-safe: no allocation, no lock, no log, unless the agent says otherwise.
   virtual int do_work(std::int64_t now_ns) noexcept = 0;
-  /// On the agent's thread, after the last do_work.
+  /// Ends the agent, on its thread, after the last do_work().
   virtual void on_stop() noexcept {}
 
   /// TAI instant at which do_work must be called even if nothing else happens.

@@ -11,7 +11,7 @@
 
 namespace emit::server {
 
-/// What clients subscribe to: one entry per channel, each with its picture.
+/// A channel that clients subscribe to, with the image that it shows.
 struct Channel {
   std::uint16_t index = 0;
   std::string name;
@@ -47,10 +47,10 @@ struct ChannelTable {
 [[nodiscard]] std::string_view to_string(scene::ChannelKind kind) noexcept;
 
 /// Channels of a scenario, or the one channel of canned frames without a scenario, with all memory
-/// that their pictures take. The sensor's size is the source's. A scenario without channels gets an
+/// that their images take. The sensor's size is the source's. A scenario without channels gets an
 /// injection channel per band.
 /// Errors (config): a channel whose band the scenario lacks or whose window the image, more bands,
-/// channels or pictures than fit.
+/// channels or images than fit.
 [[nodiscard]] physics::Result<ChannelTable> make_channels(
     const std::optional<scene::ScenarioDesc>& scenario, const SourceInfo& source);
 
@@ -67,8 +67,8 @@ struct ChannelTable {
 [[nodiscard]] scene::PixelRect window_around(const std::vector<Channel>& channels,
                                              ChannelSet of) noexcept;
 
-/// Pixels of a picture, row by row: in the source's memory where they lie in one piece there, else
-/// copied to the picture's memory for `slot`. RT-safe.
+/// Pixels of an image, row by row: in the source's memory where they lie in one piece there, else
+/// copied to the image's memory for `slot`. RT-safe.
 [[nodiscard]] std::span<const float> cut_out(Picture& picture, const renderer::FrameView& view,
                                              renderer::SlotIndex slot) noexcept;
 

@@ -77,11 +77,11 @@ struct Context {
         client_places_(max_clients),
         clients_(std::make_unique<ClientCounts[]>(max_clients)) {}
 
-  /// By place in the receiver's table. Any thread.
+  /// Counts of the connections, by place in the receiver's table. Thread: any.
   [[nodiscard]] std::span<ClientCounts> clients() const noexcept {
     return {clients_.get(), client_places_};
   }
-  /// Of a connection; nullptr when it has no place in the table.
+  /// Returns the counts of a connection; null when it has no place in the table.
   [[nodiscard]] ClientCounts* counts_of(std::uint32_t connection) const noexcept {
     const std::uint32_t place = connection_place(connection);
     return place < client_places_ ? &clients_[place] : nullptr;
@@ -96,9 +96,14 @@ struct Context {
   std::vector<Channel> channels;  ///< fixed before the agents run
   std::vector<Picture> pictures;  ///< likewise; their copies are the render agent's to fill
   std::atomic<std::uint64_t> run_id{0};
-  std::atomic<bool> device_lost{false};               ///< set by render: no frame comes any more
+  std::atomic<bool> device_lost{false};  ///< set by render: no frame comes any more
+  /// Since when the render agent has been submitting a frame behind a jump of simulation time,
+  /// monotonic; 0: it is not. See warms_up_again().
+  std::atomic<std::int64_t> jump_since_ns{0};
   std::atomic<std::uint64_t> frames_handed_over{0};   ///< put on `published` by the conductor
   std::atomic<std::uint64_t> journal_handed_over{0};  ///< lines put on `journal`
+  /// Memory of the entries that the recorder keeps for recorders that connect later.
+  std::atomic<std::uint64_t> journal_memory_bytes{0};
 
   SpscRing<HostInput> host_inputs{32};       // receiver -> conductor
   SpscRing<StatusReply> replies{256};        // conductor -> receiver
@@ -128,7 +133,7 @@ struct Context {
   std::unique_ptr<ClientCounts[]> clients_;
 };
 
-/// Counter of a refusal. Precondition: not ok.
+/// Returns the counter of a refusal; `ok` and `internal` share refused_internal.
 [[nodiscard]] constexpr Counter counter_of(StatusCode code) noexcept {
   switch (code) {
     case StatusCode::wrong_version:

@@ -22,12 +22,16 @@ struct SourceInfo {
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::uint32_t slots = 0;
-  std::size_t planes = 0;      ///< FrameView::radiance_w_m2_sr.size() of every frame
+  std::size_t planes = 0;  ///< FrameView::radiance_w_m2_sr.size() of every frame
+  /// A frame whose thermal clock is further than this from the frame before it may make the source
+  /// warm up again inside submit(), ns: the newest interval of the surface's history.
+  std::int64_t surface_step_ns = 20'000'000'000;
   renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
 };
 
-/// Where frames come from. The same calls, in the same order, give the same pixels: the journal
-/// and its player rely on it.
+/// Source of frames. The same calls, in the same order, give the same pixels: the journal and its
+/// player rely on it.
+///
 /// Thread: the render agent owns the source from its factory to destruction; release() and info()
 /// may be called by any thread. Real time: everything after construction is RT-safe.
 class FrameSource {
@@ -63,7 +67,8 @@ class FrameSource {
 /// Called once, on the thread that will own the source (a GL context is bound to its thread).
 using FrameSourceFactory = std::function<physics::Result<std::unique_ptr<FrameSource>>()>;
 
-/// Frames of emit::renderer. `progress` is told how far the warm-up is.
+/// Makes a source of frames of emit::renderer. `progress` is called with the part of the warm-up
+/// that is done.
 [[nodiscard]] physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
     const renderer::OutputOptions& output, const renderer::WarmUpProgress& progress = {});

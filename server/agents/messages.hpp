@@ -71,11 +71,11 @@ struct RenderJob {
   std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
 };
 
-/// Pixels of one image, in memory of the source or that of the pictures for the same slot.
+/// Pixels of one image, in memory of the source or that of the images for the same slot.
 struct Image {
   FrameSource* source = nullptr;
   renderer::SlotIndex slot = 0;
-  ChannelSet channels = kAllChannels;  ///< that show it; the pictures of others are not there
+  ChannelSet channels = kAllChannels;  ///< that show it; the images of others are not there
   std::array<std::span<const float>, kMaxPictures> pictures;
   std::array<std::uint32_t, kMaxPictures> crc32c{};
 };
@@ -87,6 +87,7 @@ struct RenderDone {
   std::uint32_t clamped_px = 0;
   std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
   bool coarse = false;              ///< the surface was not prepared for this camera
+  bool warmed_up = false;           ///< the surface warmed up again within this frame
   std::uint8_t rung = 0;            ///< of the quality ladder
   float estimated_error_k = 0.0F;   ///< of that rung; NaN: not known
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
@@ -97,7 +98,7 @@ struct RenderDone {
 
 /// conductor -> sender. The header lacks what depends on channel and client.
 struct PublishFrame {
-  /// The image published last, again, for those of image.channels that it has pictures for; else
+  /// The image published last, again, for those of image.channels that it has images for; else
   /// `image` is not set.
   bool repeat = false;
   Image image;

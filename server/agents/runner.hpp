@@ -26,7 +26,8 @@ class AgentRunner {
   AgentRunner& operator=(const AgentRunner&) = delete;
 
   /// Before start_thread(). Stepped mode asks nothing of the host.
-  /// What the host refuses of it is left out: the daemon has asked for the same before and told.
+  /// A setting that the host refuses is left out; the daemon has asked for the same before and
+  /// logged it.
   void set_realtime(ThreadRealtime wish) { realtime_ = std::move(wish); }
 
   /// Starts the thread and waits for on_start. False when on_start failed; the thread is gone then.

@@ -14,8 +14,8 @@ class ClockWatch {
  public:
   explicit ClockWatch(const Clock& clock) noexcept : clock_(clock) {}
 
-  /// By how much the wall clock was set since the last look, ns; 0: by less than 1 ms, or this
-  /// thread was interrupted at every attempt to tell.
+  /// Returns by how much the wall clock was set since the last call, ns. 0 means by less than 1 ms,
+  /// or that this thread was interrupted at every attempt to measure.
   [[nodiscard]] std::int64_t look() noexcept {
     constexpr std::int64_t kStepNs = 1'000'000;
     constexpr std::int64_t kTrustNs = 100'000;

@@ -20,12 +20,12 @@ namespace {
 using physics::Error;
 using physics::ErrorCode;
 
-/// A frame in work may be a slow one (a software renderer takes seconds); a client that does not
-/// read is given up soon.
+// Limits of an end in order. A frame in work may be a slow one (a software renderer takes seconds);
+// a client that does not read is given up soon.
 constexpr std::int64_t kFramesDrainNs = 60'000'000'000;
 constexpr std::int64_t kClientsDrainNs = 2'000'000'000;
 constexpr std::int64_t kJournalDrainNs = 5'000'000'000;
-/// After the device was lost a new process is wanted soon.
+/// Limit of each step after the device was lost: a new process is wanted soon.
 constexpr std::int64_t kLostDrainNs = 300'000'000;
 constexpr std::int64_t kLogEndNs = 2'000'000'000;
 
@@ -99,31 +99,16 @@ physics::Result<void> DaemonImpl::setup() {
   if (auto opened = open_clocks(); !opened) {
     return opened;
   }
-  // Ports first: an address in use shows at once, not after a scene has been loaded.
-  receiver_ = std::make_unique<Receiver>(context_, config_);
-  if (auto opened = receiver_->open(); !opened) {
-    return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
+  // The ports are opened first: an address in use shows at once, not after a scene was loaded.
+  if (auto opened = open_ports(); !opened) {
+    return opened;
   }
-  if (options_.drop_privileges) {
-    // While this thread is the only one: each has privileges of its own.
-    auto dropped = drop_privileges();
-    if (!dropped) {
-      return tl::unexpected<Error>(std::move(dropped.error()));
-    }
-    privileges_ = std::move(*dropped);
-  }
-  if (options_.on_log) {
-    log_ = make_log(options_.on_log);
-  } else {
-    auto log = make_log(config_.log);
-    if (!log) {
-      return tl::unexpected<Error>(std::move(log.error()));
-    }
-    log_ = std::move(*log);
+  if (auto opened = open_log(); !opened) {
+    return opened;
   }
   if (!options_.stepped) {
-    // With the privileges that stay, and before anything large is made: it comes from memory that
-    // is locked.
+    // Ask with the privileges that stay, and before anything large is made, so that it comes from
+    // memory that is locked.
     realtime_ = ask_for_realtime(config_.realtime);
     if (auto checked = check_realtime(); !checked) {
       return checked;
@@ -134,17 +119,53 @@ physics::Result<void> DaemonImpl::setup() {
       return tl::unexpected<Error>(std::move(free.error()).with_context("stream.shm"));
     }
   }
+  if (auto started = start_render(); !started) {
+    return started;
+  }
+  return make_agents(*render_->source_info());
+}
+
+physics::Result<void> DaemonImpl::open_ports() {
+  receiver_ = std::make_unique<Receiver>(context_, config_);
+  if (auto opened = receiver_->open(); !opened) {
+    return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
+  }
+  if (options_.drop_privileges) {
+    // While this thread is the only one, because each thread has privileges of its own.
+    auto dropped = drop_privileges();
+    if (!dropped) {
+      return tl::unexpected<Error>(std::move(dropped.error()));
+    }
+    privileges_ = std::move(*dropped);
+  }
+  return {};
+}
+
+physics::Result<void> DaemonImpl::open_log() {
+  if (options_.on_log) {
+    log_ = make_log(options_.on_log);
+    return {};
+  }
+  auto log = make_log(config_.log);
+  if (!log) {
+    return tl::unexpected<Error>(std::move(log.error()));
+  }
+  log_ = std::move(*log);
+  return {};
+}
+
+physics::Result<void> DaemonImpl::start_render() {
   render_ = std::make_unique<RenderAgent>(context_, source_factory());
   render_runner_ = std::make_unique<AgentRunner>(*render_, clock_);
   plan_realtime(*render_runner_);
   const bool started =
       options_.stepped ? render_runner_->start_stepped() : render_runner_->start_thread();
-  if (!started) {
-    return render_->source_info()
-               ? physics::make_error(ErrorCode::internal, "the render thread did not start")
-               : tl::unexpected<Error>(Error(render_->source_info().error()));
+  if (started) {
+    return {};
   }
-  return make_agents(*render_->source_info());
+  return render_->source_info()
+             ? physics::make_error(ErrorCode::internal, "the render thread did not start")
+             : tl::unexpected<Error>(Error(render_->source_info().error()));
 }
 
 physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
@@ -154,15 +175,37 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   }
   context_.channels = std::move(channels->channels);
   context_.pictures = std::move(channels->pictures);
+  const Names names{fmt::format("emitd {} ({})", kVersion, kCommit),
+                    scenario_ ? scenario_->name : std::string(),
+                    std::string(pacing_name(config_.pacing.mode)), source.device};
+  receiver_->set_identity({names.software, names.scenario, names.pacing, names.device});
+  if (auto made = make_recorder(names); !made) {
+    return made;
+  }
+  if (auto made = make_sender(source); !made) {
+    return made;
+  }
+  Conductor::Options options;
+  options.pacing = config_.pacing;
+  options.canned = source.canned;
+  conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers_.get());
+  log_start(names, source);
+  if (auto made = make_runners(); !made) {
+    return made;
+  }
+  return open_metrics({{"version", kVersion},
+                       {"commit", kCommit},
+                       {"device", names.device},
+                       {"scenario", names.scenario},
+                       {"pacing", names.pacing}});
+}
 
-  const std::string software = fmt::format("emitd {} ({})", kVersion, kCommit);
-  const std::string scenario_name = scenario_ ? scenario_->name : std::string();
-  const bool slotted = config_.pacing.mode != config::PacingMode::host_step;
+physics::Result<void> DaemonImpl::make_recorder(const Names& names) {
   Recorder::Identity identity;
-  identity.scenario_name = scenario_name;
-  identity.software = software;
-  identity.device = source.device;
-  identity.pacing = pacing_name(config_.pacing.mode);
+  identity.scenario_name = names.scenario;
+  identity.software = names.software;
+  identity.device = names.device;
+  identity.pacing = names.pacing;
   if (scenario_) {
     auto hash = scenario_sha256(*scenario_);
     if (!hash) {
@@ -172,16 +215,25 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   }
   recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
   recorder_->set_identity(std::move(identity));
-  const auto older = recorder_->open();
-  if (!older) {
-    return tl::unexpected<Error>(Error(older.error()).with_context("journal.file"));
+  const auto journal = recorder_->open();
+  if (!journal) {
+    return tl::unexpected<Error>(Error(journal.error()).with_context("journal.file"));
   }
-  if (!older->empty()) {
-    log_->write(LogLevel::info, fmt::format("event=journal_kept file={}", older->string()));
+  if (!journal->older.empty()) {
+    log_->write(LogLevel::info, fmt::format("event=journal_kept file={}", journal->older.string()));
   }
-  receiver_->set_identity(
-      {software, scenario_name, std::string(pacing_name(config_.pacing.mode)), source.device});
-  // Three slots beside the window: one being rendered, one on its way here, one free.
+  if (!journal->off.empty()) {
+    warn(
+        fmt::format("event=journal_off why=\"{}\" effect=\"no journal is written, every entry "
+                    "counts as dropped\" remedy=\"make room and start again, or set "
+                    "journal.required to have the start refused\"",
+                    journal->off));
+  }
+  return {};
+}
+
+physics::Result<void> DaemonImpl::make_sender(const SourceInfo& source) {
+  // Three slots beside the window: one is being rendered, one is on its way here, one is free.
   const std::uint32_t window =
       std::min(std::max(config_.stream.queue_frames, 1U), std::max(source.slots, 4U) - 3);
   if (!config_.stream.shm.empty()) {
@@ -192,24 +244,23 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
     }
     shm_ = std::move(*shm);
   }
+  const bool slotted = config_.pacing.mode != config::PacingMode::host_step;
   sender_ =
       std::make_unique<Sender>(context_, window, config_.control.max_clients, slotted, shm_.get());
   if (config_.stream.compression) {
     sender_->allow_compression();
   }
-  Conductor::Options options;
-  options.pacing = config_.pacing;
-  options.canned = source.canned;
-  conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers_.get());
+  return {};
+}
 
+void DaemonImpl::log_start(const Names& names, const SourceInfo& source) {
   log_->write(
       LogLevel::info,
       fmt::format("software=\"{}\" commit={} device=\"{}\" scenario=\"{}\" pacing={} "
                   "channels={} width_px={} height_px={}",
-                  software, kCommit, source.device, scenario_ ? scenario_->file.string() : "",
-                  pacing_name(config_.pacing.mode), context_.channels.size(), source.width_px,
-                  source.height_px));
-  tell_scene(source.scene);
+                  names.software, kCommit, names.device, scenario_ ? scenario_->file.string() : "",
+                  names.pacing, context_.channels.size(), source.width_px, source.height_px));
+  log_scene(source.scene);
   if (!privileges_.empty()) {
     log_->write(LogLevel::info, privileges_);
   }
@@ -218,34 +269,27 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                 fmt::format("event=shm url=shm://{} slots={} mode={:04o}", config_.stream.shm,
                             config_.stream.shm_slots, config_.stream.shm_mode));
   }
-  tell_congestion_control(receiver_->congestion_control());
+  log_congestion_control(receiver_->congestion_control());
   if (clock_.tai_offset_unset()) {
     warn(
         "event=tai_offset_unset effect=\"wall instants are UTC\" "
         "remedy=\"let ntpd, chronyd or phc2sys set the kernel's TAI offset\"");
   }
+}
+
+physics::Result<void> DaemonImpl::make_runners() {
   recorder_runner_ = std::make_unique<AgentRunner>(*recorder_, clock_);
   sender_runner_ = std::make_unique<AgentRunner>(*sender_, clock_);
   conductor_runner_ = std::make_unique<AgentRunner>(*conductor_, clock_);
   receiver_runner_ = std::make_unique<AgentRunner>(*receiver_, clock_);
-  for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(), conductor_runner_.get(),
-                              receiver_runner_.get()}) {
+  for (AgentRunner* runner : serving_runners()) {
     plan_realtime(*runner);
-  }
-  if (options_.stepped) {
-    for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(),
-                                conductor_runner_.get(), receiver_runner_.get()}) {
-      if (!runner->start_stepped()) {
-        return physics::make_error(ErrorCode::io,
-                                   fmt::format("the {} did not start", runner->agent().name()));
-      }
+    if (options_.stepped && !runner->start_stepped()) {
+      return physics::make_error(ErrorCode::io,
+                                 fmt::format("the {} did not start", runner->agent().name()));
     }
   }
-  return open_metrics({{"version", kVersion},
-                       {"commit", kCommit},
-                       {"device", source.device},
-                       {"scenario", scenario_name},
-                       {"pacing", std::string(pacing_name(config_.pacing.mode))}});
+  return {};
 }
 
 physics::Result<void> DaemonImpl::open_clocks() {
@@ -304,7 +348,7 @@ void DaemonImpl::warn(const std::string& text) {
   board_.set_warnings(LogLevel::warn, distinct_);
 }
 
-void DaemonImpl::tell_congestion_control(const CongestionControl& tcp) {
+void DaemonImpl::log_congestion_control(const CongestionControl& tcp) {
   if (tcp.chosen.starts_with("bbr")) {
     warn(
         fmt::format("event=bbr_kept congestion_control={} effect=\"frames over TCP are spread out "
@@ -318,7 +362,7 @@ void DaemonImpl::tell_congestion_control(const CongestionControl& tcp) {
                           tcp.chosen == tcp.system ? "" : " instead_of=" + tcp.system));
 }
 
-void DaemonImpl::tell_scene(const renderer::SceneStats& scene) {
+void DaemonImpl::log_scene(const renderer::SceneStats& scene) {
   if (scene.instances > 0) {
     log_->write(LogLevel::info,
                 fmt::format("event=scene triangles={} instances={} samples={} sample_bytes={}",
@@ -334,8 +378,7 @@ void DaemonImpl::tell_scene(const renderer::SceneStats& scene) {
 }
 
 int DaemonImpl::run() {
-  for (AgentRunner* runner : {recorder_runner_.get(), sender_runner_.get(), conductor_runner_.get(),
-                              receiver_runner_.get()}) {
+  for (AgentRunner* runner : serving_runners()) {
     if (!runner->start_thread()) {
       log_->write(LogLevel::error,
                   fmt::format("event=agent_failed agent={}", runner->agent().name()));
@@ -351,19 +394,28 @@ int DaemonImpl::run() {
     if (context_.device_lost.load(std::memory_order_acquire)) {
       return end_without_device();
     }
-    pollfd wait{stop_event_.get(), POLLIN, 0};
-    constexpr int kHousekeepingMs = 100;
-    ::poll(&wait, 1, kHousekeepingMs);
-    housekeep();
-    if (const auto stuck = health_.turn(sources_.agents, clock_.monotonic_ns()); !stuck.empty()) {
-      log_->write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
-                                               "watchdog, where there is one, ends the daemon\"",
-                                               stuck));
-    }
-    if (ptp_) {
-      watch_ptp();
-    }
+    watch_once();
   }
+  return end_in_order();
+}
+
+void DaemonImpl::watch_once() {
+  pollfd wait{stop_event_.get(), POLLIN, 0};
+  constexpr int kHousekeepingMs = 100;
+  ::poll(&wait, 1, kHousekeepingMs);
+  housekeep();
+  if (const auto stuck = health_.turn(sources_.agents, clock_.monotonic_ns()); !stuck.empty()) {
+    log_->write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
+                                             "watchdog, where there is one, ends the daemon\"",
+                                             stuck));
+  }
+  if (ptp_) {
+    watch_ptp();
+  }
+}
+
+/// Finishes the frames in work, lets clients read and closes the journal, each within its limit.
+int DaemonImpl::end_in_order() {
   serving_.store(false, std::memory_order_release);
   health_.stopping();
   log_->write(LogLevel::info, "event=stopping");
@@ -390,8 +442,7 @@ int DaemonImpl::run() {
   return 0;
 }
 
-/// What was rendered goes out and into the journal. The render thread is left alone: it may hang in
-/// the driver.
+/// Sends and records what was rendered. The render thread is left alone: it may hang in the driver.
 int DaemonImpl::end_without_device() {
   serving_.store(false, std::memory_order_release);
   housekeep();
@@ -445,8 +496,8 @@ void DaemonImpl::drain_stepped() {
 }
 
 void DaemonImpl::stop_agents() {
-  // Against the flow of lent things: slots go back to the source before it ends, descriptors to the
-  // receiver before it closes them.
+  // The order is against the flow of what is lent: slots go back to the source before it ends, and
+  // descriptors to the receiver before it closes them.
   for (AgentRunner* runner : {conductor_runner_.get(), sender_runner_.get(), recorder_runner_.get(),
                               receiver_runner_.get(), render_runner_.get()}) {
     if (runner != nullptr) {

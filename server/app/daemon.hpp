@@ -17,7 +17,7 @@ namespace emit::server {
 
 class ServiceNotifier;
 
-/// What a caller may replace: tests give a fake clock and a null source.
+/// Parts that a caller may replace. Tests give a fake clock and a null source.
 struct DaemonOptions {
   Clock* clock = nullptr;             ///< null: SystemClock; must outlive the daemon
   FrameSourceFactory source_factory;  ///< empty: what the configuration names

@@ -2,6 +2,7 @@
 #pragma once
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -28,8 +29,8 @@
 
 namespace emit::server {
 
-/// The daemon: makes the agents, turns or watches them, leads the shutdown (daemon.cpp), and tells
-/// about itself (daemon_telemetry.cpp).
+/// The daemon: makes the agents, turns or watches them, and leads the shutdown (daemon.cpp). It
+/// reports about itself in daemon_telemetry.cpp. Thread: main, unless a function says otherwise.
 class DaemonImpl final : public Daemon {
  public:
   DaemonImpl(const config::DaemonConfig& config, std::optional<scene::ScenarioDesc> scenario,
@@ -72,23 +73,49 @@ class DaemonImpl final : public Daemon {
 
  private:
   [[nodiscard]] FrameSourceFactory source_factory();
+  /// Names of this process that several parts state.
+  struct Names {
+    std::string software;
+    std::string scenario;
+    std::string pacing;
+    std::string device;
+  };
+  // Steps of setup(), in their order.
+  [[nodiscard]] physics::Result<void> open_clocks();
+  [[nodiscard]] physics::Result<void> open_ports();
+  [[nodiscard]] physics::Result<void> open_log();
+  [[nodiscard]] physics::Result<void> check_realtime();
+  [[nodiscard]] physics::Result<void> start_render();
   [[nodiscard]] physics::Result<void> make_agents(const SourceInfo& source);
+  [[nodiscard]] physics::Result<void> make_recorder(const Names& names);
+  [[nodiscard]] physics::Result<void> make_sender(const SourceInfo& source);
+  void log_start(const Names& names, const SourceInfo& source);
+  [[nodiscard]] physics::Result<void> make_runners();
+  [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
+  /// Runners that start after the render agent's, in the order of their start.
+  [[nodiscard]] std::array<AgentRunner*, 4> serving_runners() const noexcept {
+    return {recorder_runner_.get(), sender_runner_.get(), conductor_runner_.get(),
+            receiver_runner_.get()};
+  }
+  /// One turn of the main thread while serving: waits up to 100 ms, then looks after the others.
+  void watch_once();
+  [[nodiscard]] int end_in_order();
   template <class Predicate>
   bool wait_until(Predicate done, std::int64_t limit_ns);
   void drain_stepped();
   void stop_agents();
   [[nodiscard]] int end_without_device();
-  [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
   [[nodiscard]] MetricsMoment moment() const;
+  /// Returns true while host frames are taken and frames come: false while stopping, and while the
+  /// surface warms up again behind a jump of simulation time. Any thread.
+  [[nodiscard]] bool is_ready() const noexcept;
   void housekeep();
   void watch_ptp();
   void log_summary();
-  [[nodiscard]] physics::Result<void> open_clocks();
-  [[nodiscard]] physics::Result<void> check_realtime();
-  /// Written to the log, and kept among the warnings that the metrics tell. Setup only.
+  /// Writes a warning to the log and keeps it among those that /metrics shows. Setup only.
   void warn(const std::string& text);
-  void tell_congestion_control(const CongestionControl& tcp);
-  void tell_scene(const renderer::SceneStats& scene);
+  void log_congestion_control(const CongestionControl& tcp);
+  void log_scene(const renderer::SceneStats& scene);
   void plan_realtime(AgentRunner& runner) const {
     runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
   }

@@ -8,7 +8,7 @@
 #include "emit/version.hpp"
 #include "net/ip_address.hpp"
 
-/// What the daemon tells about itself: metrics over HTTP, the log, the state of the clocks.
+/// Reports of the daemon about itself: metrics over HTTP, the log, the state of the clocks.
 namespace emit::server {
 
 using physics::Error;
@@ -57,7 +57,7 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   MetricsServer::Answers answers;
   answers.metrics = [this] { return metrics_text(sources_, moment()); };
   answers.trace = [this] { return chrome_trace(context_.trace.entries()); };
-  answers.ready = [this] { return serving_.load(std::memory_order_acquire); };
+  answers.ready = [this] { return is_ready(); };
   answers.admits = [this](const SocketAddress& peer) {
     const protocol::IpAddress ip = ip_of(peer);
     if (receiver_->may_connect(ip)) {
@@ -83,10 +83,20 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   return {};
 }
 
+bool DaemonImpl::is_ready() const noexcept {
+  const std::int64_t since_ns = context_.jump_since_ns.load(std::memory_order_relaxed);
+  return serving_.load(std::memory_order_acquire) &&
+         !(since_ns != 0 && warms_up_again(clock_.monotonic_ns() - since_ns));
+}
+
 MetricsMoment DaemonImpl::moment() const {
   const std::int64_t now_ns = clock_.monotonic_ns();
-  return {context_.run_id.load(std::memory_order_relaxed), serving_.load(std::memory_order_acquire),
-          now_ns - started_ns_, now_ns, ptp_ ? std::optional(ptp_->status()) : std::nullopt};
+  return {context_.run_id.load(std::memory_order_relaxed),
+          is_ready(),
+          now_ns - started_ns_,
+          now_ns,
+          context_.journal_memory_bytes.load(std::memory_order_relaxed),
+          ptp_ ? std::optional(ptp_->status()) : std::nullopt};
 }
 
 void DaemonImpl::watch_ptp() {

@@ -182,6 +182,8 @@ int serve(const Arguments& arguments, const char* program) {
     files.rlim_cur = files.rlim_max;
     ::setrlimit(RLIMIT_NOFILE, &files);
   }
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files ends the journal, not the frames
   const ServiceNotifier notifier = ServiceNotifier::from_environment();
   DaemonOptions options;
   options.notifier = &notifier;
@@ -192,9 +194,6 @@ int serve(const Arguments& arguments, const char* program) {
   }
 
   g_daemon.store(daemon->get());
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit on the size of files ends the journal, not the frames
-
   fmt::print("{}\n", (*daemon)->ready_line());
   std::fflush(stdout);
   const int code = (*daemon)->run();

@@ -36,7 +36,7 @@ std::uint64_t capabilities() noexcept {
 
 void raise_limit(__rlimit_resource_t which, rlim_t wanted) noexcept {
   const rlimit limit{wanted, wanted};
-  // A wish: without CAP_SYS_RESOURCE the limits are the administrator's (LimitRTPRIO=).
+  // This may fail: without CAP_SYS_RESOURCE the limits are the administrator's (LimitRTPRIO=).
   static_cast<void>(::setrlimit(which, &limit));
 }
 

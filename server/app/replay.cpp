@@ -73,7 +73,7 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::apply(const v1::Jou
     return std::optional<ReplayedFrame>();
   }
   if (entry.has_command()) {
-    // What a command did shows in the frames and run starts behind it.
+    // The effect of a command shows in the frames and run starts that follow it.
     return std::optional<ReplayedFrame>();
   }
   if (entry.has_host_frame()) {
@@ -111,7 +111,8 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
     const auto later = std::find_if(weather_.begin(), weather_.end(), [&](const auto& pending) {
       return pending.host_frame_number > decision.host_frame_number();
     });
-    // Of more than fit into one frame the live run kept the first ones and the newest.
+    // When more changes came than fit into one frame, the live run kept the first ones and the
+    // newest.
     const auto count = static_cast<std::size_t>(later - weather_.begin());
     for (std::size_t i = 0; i < count; ++i) {
       if (i + 1 < kMaxWeatherPerFrame || i + 1 == count) {

@@ -58,7 +58,8 @@ class JournalPlayer {
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   [[nodiscard]] std::uint64_t mismatches() const noexcept { return mismatches_; }
-  /// Of the newest RunStart, for checks against the scenario at hand; empty before one.
+  /// Hash of the scenario in the newest RunStart, for a check against the scenario at hand; empty
+  /// before the first one.
   [[nodiscard]] const std::string& scenario_sha256() const noexcept { return scenario_sha256_; }
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
 

@@ -11,8 +11,8 @@
 
 namespace emit::server {
 
-/// What the service manager is told, and when: how far the start is, ready, alive as long as every
-/// agent comes round its loop, stopping. Main's, but for warming_up().
+/// Messages to the service manager: progress of the start, ready, alive as long as every agent
+/// comes round its loop, stopping. Thread: main, except warming_up().
 class ServiceHealth {
  public:
   /// An agent is stuck when it has not come round for so long. The render agent of a slow software
@@ -44,8 +44,8 @@ class ServiceHealth {
   void ready(std::string_view status) const { notifier_.ready(status); }
   void stopping() const { notifier_.stopping(); }
 
-  /// Each turn of main while serving. Tells the manager that the daemon lives, twice within the
-  /// time it waits, unless an agent is stuck.
+  /// Each turn of main while serving. Reports to the manager that the daemon lives, twice within
+  /// the time it waits, unless an agent is stuck.
   /// @return the agent that is stuck, once for each time it gets stuck; else empty.
   [[nodiscard]] std::string_view turn(const Agents& agents, std::int64_t now_ns) {
     const std::int64_t watchdog_ns = notifier_.watchdog_ns();
@@ -61,7 +61,7 @@ class ServiceHealth {
   }
 
  private:
-  /// What may pass between two pieces of news of the start.
+  /// Longest time between two progress messages of the start.
   static constexpr std::int64_t kStartPieceS = 300;
 
   const ServiceNotifier& notifier_;

@@ -8,14 +8,14 @@
 
 namespace emit::server {
 
-/// Tells a service manager how the daemon is: the datagrams of sd_notify(3) to $NOTIFY_SOCKET.
-/// Without that variable every call does nothing. Thread: any. Never blocks; a manager that does
-/// not read loses messages.
+/// Reports the state of the daemon to a service manager: the datagrams of sd_notify(3) to
+/// $NOTIFY_SOCKET. Without that variable every call does nothing. Thread: any. Never blocks; a
+/// manager that does not read loses messages.
 class ServiceNotifier {
  public:
-  /// Nobody to tell.
+  /// Makes a notifier without a service manager.
   ServiceNotifier() = default;
-  /// By NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID.
+  /// Makes a notifier from the variables NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID.
   [[nodiscard]] static ServiceNotifier from_environment();
   /// @param address  path, or @name for an abstract socket; others turn it off.
   ServiceNotifier(std::string_view address, std::int64_t watchdog_ns);

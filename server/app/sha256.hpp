@@ -10,7 +10,8 @@ struct evp_md_ctx_st;
 
 namespace emit::server {
 
-/// SHA-256 (FIPS 180-4) of bytes that come in parts. It tells scenarios apart. OpenSSL computes it.
+/// SHA-256 (FIPS 180-4) of bytes that come in parts. It distinguishes scenarios. OpenSSL computes
+/// it.
 class Sha256 {
  public:
   Sha256();

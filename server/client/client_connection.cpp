@@ -88,6 +88,7 @@ ServerInfo to_server_info(const v1::Welcome& welcome) {
   info.device = welcome.device();
   info.run_id = welcome.run_id();
   info.tai_offset_unset = welcome.tai_offset_unset();
+  info.sends_journal_end = welcome.sends_journal_end();
   for (const v1::ChannelInfo& channel : welcome.channels()) {
     info.channels.push_back(describe_channel(channel));
   }
@@ -251,8 +252,9 @@ void ClientConnection::allow_frames(std::uint32_t max_frame_bytes) {
 
 namespace {
 
-/// How much to read at a time where a record lacks `missing` bytes; 0: none is begun. What follows
-/// a long record stays in the socket, so that frames come to lie where they stay.
+/// Returns the number of bytes to read at a time where a record lacks `missing` bytes; 0 means that
+/// no record is begun. The bytes behind a long record stay in the socket, so that frames come to
+/// lie where they stay.
 std::size_t piece_bytes(std::size_t missing) noexcept {
   // Not more than the cache holds: the parser sums pixels behind every piece.
   constexpr std::size_t kPieceBytes = 256u << 10;

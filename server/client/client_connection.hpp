@@ -89,7 +89,7 @@ class ClientConnection {
     server::UdpSocket socket, const server::SocketAddress& peer, const protocol::SessionKey& key,
     std::optional<ClientConnection> control, std::int64_t timeout_ns);
 
-/// What client.hpp makes from a URL, over a connection that is open in that role.
+/// Makes the client of client.hpp over a connection that is open in that role.
 [[nodiscard]] std::unique_ptr<FrameClient> make_frame_client(ClientConnection connection, bool udp);
 [[nodiscard]] std::unique_ptr<HostClient> make_tcp_host(ClientConnection connection);
 [[nodiscard]] std::unique_ptr<RecorderClient> make_recorder(ClientConnection connection);

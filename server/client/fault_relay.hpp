@@ -25,9 +25,9 @@ class FaultRelay {
   FaultRelay(const FaultRelay&) = delete;
   FaultRelay& operator=(const FaultRelay&) = delete;
 
-  /// Where datagrams go from now on: a port of 127.0.0.1. Before, they wait.
+  /// Sets the port of 127.0.0.1 to which datagrams go from now on. Before, they wait.
   void forward_to(std::uint16_t port) noexcept { to_port_.store(port); }
-  /// Where it takes them.
+  /// Returns the port on which the relay takes datagrams.
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
   /// Ends the thread; what waits is gone. counts() are complete after it.
   void stop();

@@ -7,7 +7,8 @@
 
 namespace emit::client {
 
-/// What a client counts by the headers of its frames, whatever they came through. One owner.
+/// Counts that a client makes from the headers of its frames, over any transport. Thread: one
+/// owner.
 class FrameAccount {
  public:
   /// Frames in the order in which they are handed out. `lost_before`: that were sent before this

@@ -169,6 +169,7 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
                     answer.subscribed().error_correction().parity_fragments()};
       terms_.compression = !udp_ && answer.subscribed().compression() != v1::COMPRESSION_NONE;
       terms_.resend = udp_ && answer.subscribed().resend();
+      terms_.fragment_payload_bytes = udp_ ? answer.subscribed().fragment_payload_bytes() : 0;
       if (!udp_ || !terms_.fec.on()) {
         terms_.fec = {};
       } else if (!terms_.fec.valid() ||
@@ -312,7 +313,7 @@ physics::Result<const ReceivedFrame*> FrameClientImpl::receive_udp(std::int64_t 
     }
     const int taken = receiver_->take(*reassembler_, account_.counters);
     std::int64_t ask_ns = 0;
-    // What waits in the socket may be what seems to be missing.
+    // The socket may still hold the fragments that seem to be missing.
     if (terms_.resend && receiver_->drained()) {
       if (auto asked = ask_for_missing(monotonic_now_ns(), ask_ns); !asked) {
         return tl::unexpected<physics::Error>(std::move(asked.error()));

@@ -16,21 +16,40 @@ class TcpRecorder final : public RecorderClient {
     protocol::Record record;
     for (;;) {
       auto received = connection_.receive(record, end_ns);
-      if (!received || !*received) {
+      if (!received) {
+        if (connection_.closed() && !closed()) {
+          received.error().text +=
+              " without the end of the journal: the daemon was killed or dropped this recorder";
+        }
+        return received;
+      }
+      if (!*received) {
         return received;
       }
       v1::ControlRecord message;
-      if (record.kind == protocol::RecordKind::control &&
-          protocol::parse_control_record(record.body, message) && message.has_journal()) {
+      if (record.kind != protocol::RecordKind::control ||
+          !protocol::parse_control_record(record.body, message)) {
+        continue;
+      }
+      if (message.has_journal()) {
         entry.Swap(message.mutable_journal());
         return true;
       }
+      if (message.has_journal_gap()) {
+        gap_ = {message.journal_gap().first_sequence(), message.journal_gap().last_sequence()};
+      }
+      ended_ = ended_ || message.has_journal_end();
     }
   }
-  bool closed() const noexcept override { return connection_.closed(); }
+  bool closed() const noexcept override {
+    return connection_.closed() && (ended_ || !connection_.server().sends_journal_end);
+  }
+  const JournalGap& gap() const noexcept override { return gap_; }
 
  private:
   ClientConnection connection_;
+  JournalGap gap_;
+  bool ended_ = false;
 };
 
 }  // namespace

@@ -35,7 +35,8 @@ class ResendPlanner {
   ResendPlanner() = default;
   explicit ResendPlanner(const Params& params) : params_(params) {}
 
-  /// What to do now about the frames in work, oldest first; an ask counts as done.
+  /// Returns the next step for the frames in work, oldest first. A request that it returns counts
+  /// as sent.
   [[nodiscard]] Step next(std::span<const protocol::Reassembler::OpenFrame> frames,
                           std::int64_t now_ns) noexcept;
 

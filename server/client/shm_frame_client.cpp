@@ -23,7 +23,7 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-/// How long a daemon may be gone before its readers notice: a crash wakes nobody.
+/// Longest time until readers notice that the daemon is gone: a crash wakes nobody.
 constexpr std::int64_t kAliveCheckNs = 100'000'000;
 
 class ShmFrameClient final : public FrameClient {
@@ -60,7 +60,7 @@ class ShmFrameClient final : public FrameClient {
   bool subscribed_ = false;
   std::size_t channel_ = 0;
   std::uint64_t publication_ = 0;  // of the frame handed out last, or where reading began
-  bool gap_ = false;               // publications were overwritten before they were read
+  bool gap_ = false;               // frames were overwritten before they were read
   std::int64_t alive_at_ns_ = 0;
   std::vector<float> pixels_;  // unless in place
   StreamTerms terms_;
@@ -160,7 +160,7 @@ physics::Result<const ReceivedFrame*> ShmFrameClient::receive(std::int64_t timeo
   }
 }
 
-/// Everything up to `publication` is passed over.
+/// Everything up to `frame` is passed over.
 physics::Result<void> ShmFrameClient::skip_to(std::uint64_t publication) {
   if (options_.every_frame) {
     return make_error(ErrorCode::io,
@@ -213,7 +213,7 @@ physics::Result<ShmFrameClient::Taken> ShmFrameClient::take(std::uint64_t public
   publication_ = publication;
   frame_.header = *header;
   frame_.header.flags &= ~protocol::kReceiverFlags;
-  // Among the publications that were overwritten there may be none that this reader wanted. Nothing
+  // Among the frames that were overwritten there may be none that this reader wanted. Nothing
   // is lost on the way: what is missing was not ready for its channel.
   if ((std::exchange(gap_, false) && terms_.every_nth == 1) ||
       account_.missing_before(*header) > 0) {

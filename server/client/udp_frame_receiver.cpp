@@ -95,7 +95,7 @@ std::size_t UdpFrameReceiver::plan(std::size_t index, const Expected& expected,
     add(expected.rest.data() + from, length);
     from += length;
   }
-  // What does not fit the plan: behind the room that bring_together() needs.
+  // Datagrams that do not fit the plan go behind the room that bring_together() needs.
   add(data(index) + bytes, kDatagramBytes - bytes);
   msghdr& header = headers_[index].msg_hdr;
   header = {};
@@ -216,8 +216,8 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
   do {
     from[batch + 1] = plan(batch, expected, from[batch]);
     ++batch;
-    // Behind the frame's end nothing is expected: it would be received to one place and copied to
-    // another. Of single datagrams that is little, and calls count more.
+    // Expect nothing behind the frame's end: it would be received to one place and copied to
+    // another. With single datagrams that is little, and the number of calls counts more.
   } while (batch < (segments_ > 1 ? kJoinedBatch : kBatch) &&
            (segments_ == 1 || from[batch] < expected.rest.size()));
   // Natively: Asio knows neither many messages per call nor control messages (drops, UDP_GRO).
@@ -247,7 +247,7 @@ int UdpFrameReceiver::take(protocol::Reassembler& reassembler, ReceiveCounters& 
   }
   std::size_t joined = 0;
   for (std::size_t i = 0; i < taken; ++i) {
-    // What is left for a frame's last message says nothing about those to come.
+    // The rest of a frame's last message says nothing about the messages to come.
     if (i < in_place && from[i + 1] == expected.rest.size()) continue;
     const Message& message = messages_[i];
     const std::size_t bytes = std::max<std::size_t>(message.segment_bytes, 1);

@@ -39,7 +39,7 @@ class UdpFrameReceiver {
 
   static constexpr unsigned kBatch = 16;  ///< messages
   static constexpr std::size_t kDatagramBytes = 65536;
-  /// By one take().
+  /// Largest number of bytes that one take() receives.
   static constexpr std::uint64_t kMostTakenBytes = kBatch * kDatagramBytes;
 
   /// Takes what lies in the socket, at most one batch. Returns the datagrams taken.
@@ -50,8 +50,8 @@ class UdpFrameReceiver {
   [[nodiscard]] std::uint64_t misplaced() const noexcept { return misplaced_; }
 
  private:
-  // Of joined datagrams few are taken at a time, so that they are still in the cache when they are
-  // put together.
+  // Number of joined datagrams taken at a time. It is small, so that they are still in the cache
+  // when they are put together.
   static constexpr unsigned kJoinedBatch = 4;
   static constexpr std::size_t kControlBytes = 64;
   static constexpr std::size_t kMaxSegments = 64;  // datagrams that the kernel joins

@@ -20,10 +20,10 @@ using physics::ErrorCode;
 using physics::make_error;
 using protocol::SessionKind;
 
-/// How often a host asks whether the daemon still knows its session: a daemon that was started anew
-/// does not, and drops what comes until then.
+/// Time between two questions whether the daemon still knows the session. A daemon that was started
+/// anew does not, and drops datagrams until the host asks.
 constexpr std::int64_t kAskNs = 1'000'000'000;
-/// How long the first question waits before it is put again.
+/// Time until the first question is repeated.
 constexpr std::int64_t kRetryNs = 200'000'000;
 constexpr std::size_t kMaxDatagramBytes = 65'507;
 constexpr std::size_t kMaxStatuses = 256;

@@ -22,7 +22,8 @@
 namespace emit::server {
 namespace {
 
-/// How far below the conductor; what is not named is not real-time.
+/// Difference between the conductor's priority and that of an agent. An agent without an entry is
+/// not real-time.
 constexpr std::array<std::pair<std::string_view, int>, 4> kBelow{
     {{"conductor", 0}, {"receiver", 1}, {"sender", 2}, {"render", 3}}};
 

@@ -10,12 +10,12 @@
 
 namespace emit::server {
 
-/// What a bad network does to datagrams. Fractions 0..1, each datagram for itself unless stated.
+/// Faults of a network. Fractions are 0..1 and apply to each datagram by itself unless stated.
 struct NetworkFaults {
   std::uint64_t seed = 1;
   double loss_frac = 0.0;
-  /// Of losses in a row, by a Gilbert-Elliott chain: 1 = independent losses; loss_frac stays the
-  /// share that is lost.
+  /// Mean number of losses in a row, by a Gilbert-Elliott chain: 1 = independent losses. loss_frac
+  /// stays the share that is lost.
   double burst_mean = 1.0;
   double duplicate_frac = 0.0;
   double reorder_frac = 0.0;          ///< held back for reorder_ns

@@ -5,9 +5,9 @@
 
 namespace emit::server {
 
-/// Without the port. Thread: any. RT-safe.
+/// Returns the address without the port. Thread: any. RT-safe.
 [[nodiscard]] protocol::IpAddress ip_of(const SocketAddress& address) noexcept;
-/// From what the kernel filled in.
+/// Returns the address that the kernel filled in.
 [[nodiscard]] protocol::IpAddress ip_of(const sockaddr_storage& address) noexcept;
 
 }  // namespace emit::server

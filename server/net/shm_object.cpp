@@ -11,6 +11,9 @@
 #include <system_error>
 #include <utility>
 
+#include "emit/physics/check.hpp"
+#include "emit/protocol/shared_ring.hpp"
+
 namespace emit::server {
 namespace {
 
@@ -41,13 +44,13 @@ struct flock lock_of(off_t byte, short type) {
   return lock;
 }
 
-/// Of the open file description, so that it ends with the last descriptor of its process.
+/// Takes a lock of the open file description, which ends with the last descriptor of its process.
 bool take_lock(int fd, off_t byte, short type) {
   struct flock lock = lock_of(byte, type);
   return ::fcntl(fd, F_OFD_SETLK, &lock) == 0;
 }
 
-/// By another file description.
+/// Returns whether another file description holds a lock.
 bool is_locked(int fd, off_t byte) {
   struct flock lock = lock_of(byte, F_WRLCK);
   return ::fcntl(fd, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
@@ -140,6 +143,7 @@ physics::Result<ShmObject> ShmObject::create(std::uint64_t bytes, std::uint32_t 
 }
 
 physics::Result<void> ShmObject::publish(std::string_view name) {
+  EMIT_CHECK(protocol::is_shm_name(name));
   const std::string path = path_of(name);
   const std::string self = fmt::format("/proc/self/fd/{}", fd_.get());
   // Others may come and go under the same name meanwhile.
@@ -160,6 +164,7 @@ physics::Result<void> ShmObject::publish(std::string_view name) {
 }
 
 physics::Result<ShmObject> ShmObject::open(std::string_view name) {
+  EMIT_CHECK(protocol::is_shm_name(name));
   const std::string path = path_of(name);
   ShmObject out;
   out.fd_ = Fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
@@ -177,7 +182,7 @@ physics::Result<ShmObject> ShmObject::open(std::string_view name) {
   if (!out.alive()) {
     return make_error(ErrorCode::io, path + ": left behind by an emitd that is gone");
   }
-  // From here on its maker writes.
+  // The maker writes from here on.
   if (!take_lock(out.fd_.get(), kReaderByte, F_RDLCK)) {
     return make_error(ErrorCode::io, fmt::format("{}: {}", path, errno_text(errno)));
   }

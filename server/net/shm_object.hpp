@@ -25,20 +25,22 @@ class ShmObject {
   /// Zeroed, locked memory without a name yet; every page is taken here, so that none can be
   /// missing later. `mode`: permission bits. Errors (io): no room.
   [[nodiscard]] static physics::Result<ShmObject> create(std::uint64_t bytes, std::uint32_t mode);
-  /// Gives the memory its name: from here on readers find it, complete. What a crashed process left
-  /// under that name is replaced. Errors (io): a living process has it.
-  /// Precondition: protocol::is_shm_name(name).
+  /// Gives the memory its name: from here on readers find it, complete. An object that a crashed
+  /// process left under that name is replaced. Errors (io): a living process has the name.
+  /// @pre protocol::is_shm_name(name)
   [[nodiscard]] physics::Result<void> publish(std::string_view name);
 
-  /// Maps what is under that name, read-only, and tells its maker that somebody reads. Errors:
-  /// not_found, io (not permitted; its maker has gone). Precondition: protocol::is_shm_name(name).
+  /// Maps the object of that name for reading, and shows its maker that somebody reads. Errors:
+  /// not_found, io (not permitted; its maker has gone).
+  /// @pre protocol::is_shm_name(name)
   [[nodiscard]] static physics::Result<ShmObject> open(std::string_view name);
   /// True while the process that made it lives and has it open. One system call.
   [[nodiscard]] bool alive() const noexcept;
-  /// Of create(): true while somebody has it open by open(). One system call.
+  /// Returns true while somebody has the object open by open(). One system call.
+  /// @pre create() made the object
   [[nodiscard]] bool has_readers() const noexcept;
 
-  /// Of create().
+  /// Returns the memory for writing; empty unless create() made the object.
   [[nodiscard]] std::span<std::byte> writable() const noexcept { return {memory_, size_}; }
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept { return {memory_, size_}; }
 

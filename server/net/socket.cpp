@@ -65,7 +65,7 @@ class IntOption {
   int value_;
 };
 
-/// Errors are dropped: options are wishes.
+/// Errors are dropped: an option that the kernel refuses keeps its value.
 template <typename Socket, typename Option>
 void wish(Socket& socket, const Option& option) noexcept {
   error_code ignored;

@@ -22,7 +22,7 @@ class io_context;
 /// writing and the options are RT-safe.
 namespace emit::server {
 
-/// What Asio keeps beside the sockets; each socket keeps it alive. Thread: any.
+/// State that Asio keeps beside the sockets; each socket keeps it alive. Thread: any.
 class SocketContext {
  public:
   SocketContext();
@@ -60,18 +60,20 @@ class TcpSocket {
   /// -1 when closed.
   [[nodiscard]] int fd() const noexcept;
   [[nodiscard]] SocketAddress local_address() const noexcept;
-  /// Of the other end; not what was asked for where that was "any address".
+  /// Returns the address of the other end. It differs from the address that was asked for where
+  /// that was "any address".
   [[nodiscard]] SocketAddress peer_address() const noexcept;
   void close() noexcept;
   void shutdown_send() noexcept;
 
-  /// A wish; 0: the system goes on choosing.
+  /// The kernel may refuse. 0: the system goes on choosing.
   void set_send_buffer(std::uint64_t bytes) noexcept;
-  /// Readable only when so much waits, or the end. A wish.
+  /// Makes the socket readable only when this many bytes wait, or the end. The kernel may refuse.
   void set_receive_low_water(std::size_t bytes) noexcept;
 
-  /// From here on all goes through TLS; the handshake is the caller's to drive (tls()). `name`: of
-  /// the server, for clients. Errors: io.
+  /// Sends everything through TLS from here on; the caller drives the handshake by tls(). Errors:
+  /// io.
+  /// @param name  name of the server, for clients
   [[nodiscard]] physics::Result<void> start_tls(const TlsContext& context, const std::string& name);
   /// Null: plain.
   [[nodiscard]] TlsSession* tls() const noexcept;
@@ -102,7 +104,7 @@ struct CongestionControl {
   std::string chosen;
   std::string system;  ///< what it would have been
 };
-/// What new sockets have. Empty: unknown.
+/// Returns the congestion control that new sockets have; empty: unknown.
 [[nodiscard]] std::string system_congestion_control();
 
 /// Thread: one owner.
@@ -120,7 +122,7 @@ class TcpListener {
                                                          const SocketAddress& address);
   [[nodiscard]] int fd() const noexcept;
   [[nodiscard]] SocketAddress local_address() const noexcept;
-  /// Of its connections.
+  /// Returns the congestion control of its connections.
   [[nodiscard]] CongestionControl congestion_control() const;
   /// Next connection; closed when there is none now, or one cannot be taken: `error_number`, else
   /// 0. It waits in the kernel then, and the listener stays readable. Throws std::bad_alloc.
@@ -140,7 +142,7 @@ class UdpSocket {
   UdpSocket& operator=(UdpSocket&& other) noexcept;
   ~UdpSocket();
 
-  /// Of the family of `address`. Errors: io.
+  /// Opens a socket of the family of `address`. Errors: io.
   [[nodiscard]] static physics::Result<UdpSocket> open(const SocketContext& context,
                                                        const SocketAddress& address);
   /// open() and bind().
@@ -152,7 +154,8 @@ class UdpSocket {
   [[nodiscard]] physics::Result<void> connect(const SocketAddress& address);
 
   [[nodiscard]] explicit operator bool() const noexcept { return impl_ != nullptr; }
-  /// For the calls with control messages that Asio has no functions for. -1 when closed.
+  /// Returns the descriptor, for the calls with control messages that Asio has no functions for; -1
+  /// when closed.
   [[nodiscard]] int fd() const noexcept;
   [[nodiscard]] SocketAddress local_address() const noexcept;
 
@@ -165,7 +168,7 @@ class UdpSocket {
   void allow_shared_port() noexcept;
   /// Joins on an interface (interface_of(); 0: the system's choice). Returns 0 or an errno.
   [[nodiscard]] int join_group(const SocketAddress& group, unsigned interface) noexcept;
-  /// Where multicast of this socket goes out. Returns 0 or an errno.
+  /// Sets the interface by which multicast of this socket leaves. Returns 0 or an errno.
   [[nodiscard]] int set_multicast_interface(const SocketAddress& group,
                                             unsigned interface) noexcept;
   /// 0 to 255.

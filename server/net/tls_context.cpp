@@ -42,7 +42,7 @@ physics::Result<Fd> open_secret(const std::filesystem::path& file) {
 std::string tls_error_text() {
   const unsigned long code = ERR_get_error();
   ERR_clear_error();
-  // What the system said has no text there.
+  // OpenSSL has no text for an error of the system.
   if (ERR_SYSTEM_ERROR(code)) return std::generic_category().message(ERR_GET_REASON(code));
   const char* reason = code != 0 ? ERR_reason_error_string(code) : nullptr;
   return reason != nullptr ? reason : fmt::format("error {:08x}", code);

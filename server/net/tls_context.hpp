@@ -7,7 +7,7 @@
 
 #include "net/tls_session.hpp"
 
-/// For the tls_*.cpp alone: OpenSSL's types.
+/// OpenSSL's types, included by the tls_*.cpp alone.
 namespace emit::server {
 
 struct FreeTls {

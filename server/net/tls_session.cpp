@@ -21,7 +21,7 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-/// What one TLS record holds, and what a call writes at most.
+/// Largest payload of a TLS record, and of one call of write.
 constexpr std::size_t kRecordBytes = 16'384;
 constexpr std::size_t kMaxWriteBytes = 128u << 10;
 constexpr std::string_view kExporterLabel = "EXPORTER-emitd-host-datagrams";
@@ -77,7 +77,7 @@ class PieceReader {
  public:
   explicit PieceReader(std::span<const std::span<const std::byte>> pieces) noexcept
       : pieces_(pieces) {}
-  /// As many as there are and fit.
+  /// Copies as many bytes as there are and fit.
   std::size_t copy(std::span<std::byte> space) noexcept {
     return walk(space.size(), [&](std::span<const std::byte> part, std::size_t done) {
       std::copy(part.begin(), part.end(), space.begin() + static_cast<std::ptrdiff_t>(done));
@@ -170,7 +170,7 @@ physics::Result<std::unique_ptr<TlsSession>> TlsSession::create(const TlsContext
     // An address is checked against addresses in the certificate, all else against names.
     if (X509_VERIFY_PARAM_set1_ip_asc(rules, name.c_str()) != 1 &&
         (X509_VERIFY_PARAM_set1_host(rules, name.c_str(), 0) != 1 ||
-         // What the macro SSL_set_tlsext_host_name() says, without its cast.
+         // This is the macro SSL_set_tlsext_host_name() without its cast.
          SSL_ctrl(impl->ssl.get(), SSL_CTRL_SET_TLSEXT_HOSTNAME, TLSEXT_NAMETYPE_host_name,
                   const_cast<char*>(name.c_str())) != 1)) {
       return failed();
@@ -228,7 +228,7 @@ IoResult TlsSession::write(std::span<const std::span<const std::byte>> pieces) n
   PieceReader from(pieces);
   std::size_t total = 0;
   while (total < kMaxWriteBytes) {
-    // For one record at a time: the reader gets its turn in between.
+    // Lock for one record at a time: the reader gets its turn in between.
     const std::unique_lock lock(impl_->mutex, std::try_to_lock);
     IoResult result{IoStatus::busy, 0, 0};
     if (lock.owns_lock()) {
@@ -249,7 +249,7 @@ IoResult TlsSession::write(std::span<const std::span<const std::byte>> pieces) n
       result = impl_->outcome(returned, true);
       impl_->unfinished_bytes = length;
     }
-    // What went out counts; the caller meets the obstacle again when it goes on.
+    // Bytes that were sent count. The caller meets the obstacle again when it goes on.
     return total > 0 && result.status != IoStatus::failed ? IoResult{IoStatus::done, total, 0}
                                                           : result;
   }

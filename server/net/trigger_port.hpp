@@ -24,7 +24,7 @@ struct ReceivedTrigger {
   std::int64_t received_ns = 0;  ///< kernel stamp, wall ns
 };
 
-/// Where the conductor gets its triggers from; tests put one of their own in its place.
+/// Source of the conductor's triggers; tests put one of their own in its place.
 class TriggerInput {
  public:
   TriggerInput() = default;

@@ -2,14 +2,16 @@
 #pragma once
 #include <cstdint>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::server {
 
 /// Slots of the image generator's own clock: slot n begins at origin + n / rate, on the wall clock,
 /// without drift. Pure: the caller says what time it is. RT-safe.
 class IgClock {
  public:
-  /// Precondition: rate_hz > 0.
-  explicit IgClock(double rate_hz) noexcept : rate_hz_(rate_hz) {}
+  /// @pre rate_hz > 0
+  explicit IgClock(double rate_hz) noexcept : rate_hz_(rate_hz) { EMIT_CHECK_OP(rate_hz, >, 0.0); }
 
   /// Slot 0 begins now.
   void start(std::int64_t now_ns) noexcept {

@@ -103,6 +103,7 @@ PoseTrack::Motion PoseTrack::motion_at_newest() const noexcept {
 }
 
 PoseSample PoseTrack::sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) const noexcept {
+  EMIT_DCHECK_OP(horizon_ns, >=, 0);
   PoseSample out;
   const TimedPose& last = newest();
   out.newest_ns = last.sim_time_ns;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/frames.hpp"
 #include "emit/protocol/host_frame.hpp"
 
@@ -40,11 +41,16 @@ class PoseTrack {
 
   void clear() noexcept { count_ = 0; }
   [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
-  /// A pose of the newest instant replaces it; precondition: not older than the newest.
+  /// Adds a pose. A pose of the newest instant replaces that one.
+  /// @pre the pose is not older than the newest one
   void push(const TimedPose& pose) noexcept;
-  /// Precondition: not empty.
-  [[nodiscard]] const TimedPose& newest() const noexcept { return at(count_ - 1); }
-  /// Precondition: not empty, horizon_ns >= 0.
+  /// @pre !empty()
+  [[nodiscard]] const TimedPose& newest() const noexcept {
+    EMIT_DCHECK(!empty());
+    return at(count_ - 1);
+  }
+  /// Returns the pose at an instant, at most `horizon_ns` beyond the newest one.
+  /// @pre !empty() and horizon_ns >= 0
   [[nodiscard]] PoseSample sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) const noexcept;
 
  private:

@@ -46,11 +46,12 @@ class QualityPolicy {
  private:
   /// Enough to tell a disturbance that comes again and again from one that came once.
   static constexpr std::size_t kRemembered = 512;
-  /// Of so many frames alike the next one takes longer than all with a chance of one in so many.
+  /// Number of frames that are remembered. The next frame takes longer than all of them with a
+  /// chance of one in this number.
   static constexpr std::size_t kFramesPerLate = 128;
-  /// Of the time there is: costs are measured, and no better than this.
+  /// Part of the time left that a frame may use, because costs are measured no better than this.
   static constexpr double kUsedFrac = 0.92;
-  /// What a frame's share in the fit is worth one frame later.
+  /// Weight of a frame in the fit one frame later, relative to before.
   static constexpr double kKept = 0.95;
   /// The ladder's own word (pace 1, nothing beside) counts as this many frames.
   static constexpr double kPrior = 0.5;
@@ -62,8 +63,9 @@ class QualityPolicy {
     return pace_ * rung_ms + beside_ms_;
   }
 
-  /// What one remembered frame in kFramesPerLate exceeds, and no more than the most of the latest
-  /// kFramesPerLate, so that what came once is soon forgotten; never negative.
+  /// Returns the excess, ms, that one remembered frame in kFramesPerLate exceeds. It is not more
+  /// than the largest one of the latest kFramesPerLate frames, so that a single event is soon
+  /// forgotten, and never negative.
   [[nodiscard]] double excess_ms() const noexcept {
     std::array<float, kRemembered / kFramesPerLate> largest_ms{};  // of all, in order
     float latest_ms = 0.0F;

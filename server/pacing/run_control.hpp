@@ -55,8 +55,8 @@ class RunControl {
   [[nodiscard]] bool held() const noexcept { return held_; }
   [[nodiscard]] bool step_pending() const noexcept { return steps_ > 0; }
 
-  /// Where the thermal clock stands for a frame at `sim_time_ns`; call once per frame, in order.
-  /// `is_step`: the frame answers a step.
+  /// Returns the thermal clock of a frame at `sim_time_ns`. Call it once per frame, in order.
+  /// @param is_step  the frame answers a step
   [[nodiscard]] std::int64_t thermal_time_ns(std::int64_t sim_time_ns, bool is_step) noexcept {
     if (is_step && steps_ > 0) {
       --steps_;

@@ -9,8 +9,9 @@
 
 namespace emit::server {
 
-/// What the scenario itself says about the sensor and the entities that hosts may address.
-/// Thread: any (read only). Real time: const functions RT-safe.
+/// Sensor and entities as the scenario itself moves them.
+///
+/// Thread: any (read only). Real time: const functions are RT-safe.
 class ScenarioTracks {
  public:
   /// Absent scenario: no entity is unknown, everything starts at the origin.

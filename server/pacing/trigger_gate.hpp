@@ -12,7 +12,7 @@ namespace emit::server {
 class TriggerGate {
  public:
   /// @param rate_hz    what the source is set to; > 0. Triggers half a period or less behind the
-  ///                   last one are refused, those more than half a period late are told.
+  ///                   last one are refused, those more than half a period late are flagged.
   /// @param budget_ns  deadline behind the trigger; 0, or longer than a period: one period.
   TriggerGate(double rate_hz, std::int64_t budget_ns) noexcept
       : period_ns_(static_cast<std::int64_t>(1e9 / rate_hz)),
@@ -37,7 +37,7 @@ class TriggerGate {
     const std::int64_t since_ns = received_ns - received_ns_;
     if (started_ && same_run) {
       result.missing = trigger.number - number_ - 1;
-      // In double: numbers may skip by as much as they like.
+      // The product is computed in double, because numbers may skip by any amount.
       const double due_ns =
           static_cast<double>(trigger.number - used_number_) * static_cast<double>(period_ns_);
       result.late = static_cast<double>(since_ns) - due_ns > static_cast<double>(half_ns);
@@ -71,7 +71,7 @@ class TriggerGate {
   [[nodiscard]] std::int64_t begin_ns() const noexcept { return begin_ns_; }
   [[nodiscard]] std::int64_t end_ns() const noexcept { return begin_ns_ + budget_ns_; }
   [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
-  /// Of the last trigger used.
+  /// Arrival and number of the last trigger used.
   [[nodiscard]] std::int64_t received_ns() const noexcept { return received_ns_; }
   [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
 

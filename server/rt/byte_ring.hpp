@@ -12,8 +12,9 @@
 
 namespace emit::server {
 
-/// As SpscRing for records of any length: a journal line takes what it needs, not the room of the
-/// largest. Records are contiguous and aligned to 16 bytes.
+/// Ring like SpscRing for records of any length: a journal line takes the room that it needs, not
+/// that of the largest one. Records are contiguous and aligned to 16 bytes.
+///
 /// Real time: RT-safe after construction.
 class ByteRing {
  public:

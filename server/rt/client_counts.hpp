@@ -7,8 +7,8 @@
 
 namespace emit::server {
 
-/// What is counted for one connection, by its place in the receiver's table. The receiver says
-/// whose the place is, the sender counts, any thread reads. Real time: RT-safe.
+/// Counts of one connection, by its place in the receiver's table. The receiver sets whose the
+/// place is, the sender counts, and any thread reads. Real time: RT-safe.
 struct alignas(kCacheLineBytes) ClientCounts {
   std::atomic<std::uint32_t> connection{0};  ///< key of the connection that has the place; 0: none
   std::atomic<std::uint64_t> frames{0};      ///< sent completely
@@ -16,7 +16,7 @@ struct alignas(kCacheLineBytes) ClientCounts {
   std::atomic<std::int64_t> delay_ns{0};     ///< of the last frame: pose received to last byte sent
   std::atomic<std::int64_t> jitter_ns{0};    ///< of delay_ns, smoothed (FrameHeader)
 
-  /// For a connection that begins.
+  /// Begins the counts of a new connection.
   void begin(std::uint32_t key) noexcept {
     frames.store(0, std::memory_order_relaxed);
     skipped.store(0, std::memory_order_relaxed);

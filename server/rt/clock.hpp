@@ -15,7 +15,7 @@ class Clock {
 
   /// Wall instant, ns of CLOCK_TAI. Equal to UTC while tai_offset_unset().
   [[nodiscard]] virtual std::int64_t tai_ns() const noexcept = 0;
-  /// For durations; arbitrary origin, never steps.
+  /// Clock for durations, ns: its origin is arbitrary, and it never steps.
   [[nodiscard]] virtual std::int64_t monotonic_ns() const noexcept = 0;
   /// TAI - UTC as the kernel has it now, ns. 0 = unset.
   [[nodiscard]] virtual std::int64_t tai_from_utc_offset_ns() const noexcept = 0;

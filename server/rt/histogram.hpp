@@ -8,9 +8,10 @@
 
 namespace emit::server {
 
-/// How durations are distributed, in steps of 1, 2, 5 from 10 us to 10 s.
-/// Thread: any may record and read; a reader may see a count whose sum is still to come.
-/// Real time: RT-safe.
+/// Distribution of durations, in steps of 1, 2, 5 from 10 us to 10 s.
+///
+/// Thread: any may record and read; a reader may see a count whose sum is still to come. Real time:
+/// RT-safe.
 class Histogram {
  public:
   /// Upper ends of the buckets, ns, inclusive; one more bucket takes what is longer.
@@ -30,7 +31,7 @@ class Histogram {
     sum_ns_.fetch_add(static_cast<std::uint64_t>(counted_ns), std::memory_order_relaxed);
   }
 
-  /// Of one bucket alone.
+  /// Returns the count of one bucket alone.
   [[nodiscard]] std::uint64_t count(std::size_t bucket) const noexcept {
     return counts_[bucket].load(std::memory_order_relaxed);
   }
@@ -43,8 +44,8 @@ class Histogram {
   std::atomic<std::uint64_t> sum_ns_{0};
 };
 
-/// Where the time of frames goes. A frame counts once in the first four, and once for each client
-/// that it was sent to in those of sending; repeated frames count in these alone.
+/// Times of frames by stage. A frame counts once in the first four, and once per client that it was
+/// sent to in those of sending. Repeated frames count in the latter alone.
 struct FrameTimes {
   Histogram wait;               ///< pose received to start of rendering
   Histogram render;             ///< start of rendering to device finished

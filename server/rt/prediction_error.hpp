@@ -7,8 +7,8 @@
 
 namespace emit::server {
 
-/// How far predicted sensor poses were from the truth that came later. One writer, any reader.
-/// Real time: RT-safe.
+/// Distances of predicted sensor poses from the truth that came later. One thread writes, any
+/// reads. Real time: RT-safe.
 struct PredictionErrors {
   // A histogram holds 1e-9 of the unit, as it does for seconds: bounds from 1e-5 to 10 m or rad.
   Histogram position;  ///< nm

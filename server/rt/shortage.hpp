@@ -4,12 +4,12 @@
 
 namespace emit::server {
 
-/// That somebody waits for what others give back: who gives back rings only then. Both sides
-/// exchange the same atomic, so either the giver sees that it was wanted or the last look of who
-/// wants sees what was given. Thread: any. Real time: RT-safe.
+/// Set while a consumer is starved. The producer rings its doorbell only then. Both sides exchange
+/// the same atomic, so either the producer sees that it is needed, or the last look of the consumer
+/// sees what was produced. Thread: any. Real time: RT-safe.
 class Shortage {
  public:
-  /// What `look` finds; where it finds nothing, says so and looks once more.
+  /// Returns what `look` finds. Where it finds nothing, sets the shortage and looks once more.
   template <class Look>
   [[nodiscard]] auto look(Look look) noexcept {
     auto found = look();

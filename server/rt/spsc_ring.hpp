@@ -6,6 +6,8 @@
 #include <memory>
 #include <type_traits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::server {
 
 inline constexpr std::size_t kCacheLineBytes = 64;
@@ -40,8 +42,10 @@ class SpscRing {
     }
     return &slots_[tail & mask_];
   }
-  /// As claim(). Precondition: free() or claim() showed room.
+  /// Returns the next free element, like claim().
+  /// @pre free() or claim() showed room
   [[nodiscard]] T& claim_reserved() noexcept {
+    EMIT_DCHECK(claim() != nullptr);
     return slots_[tail_.load(std::memory_order_relaxed) & mask_];
   }
   void commit() noexcept {

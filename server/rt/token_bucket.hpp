@@ -5,8 +5,8 @@
 
 namespace emit::server {
 
-/// Lets a rate through and a burst of a quarter of a second's worth at once. Thread: one owner.
-/// Real time: RT-safe.
+/// Token bucket: lets a rate through, and a burst of a quarter of a second at once. Thread: one
+/// owner. Real time: RT-safe.
 class TokenBucket {
  public:
   /// `rate_hz`: 1 .. 1e7.

@@ -24,6 +24,7 @@ enum class EventKind : std::uint8_t {
   slots_missed,     ///< a = how many
   weather_lost,     ///< a = sim time of the sample, ns
   poses_dropped,    ///< a = how many
+  warmed_up,        ///< a = time it took, ns, b = jump of simulation time, ns
   trigger_silent,   ///< a = number of the last one
   peer_refused,     ///< text = address, a = PeerRefusal
   secured,          ///< a = connection, text = names in the peer's certificate

@@ -64,8 +64,8 @@ struct Stage {
   std::int64_t end_ns;
 };
 
-/// What the stages of one frame are: from the first instant that happened to the last, without
-/// steps back (a clock may have been set in between).
+/// Returns the stages of one frame, from the first instant that happened to the last, without steps
+/// back (a clock may have been set in between).
 std::vector<Stage> stages_of(const std::vector<std::pair<const char*, std::int64_t>>& instants) {
   std::vector<Stage> out;
   std::int64_t last_ns = 0;

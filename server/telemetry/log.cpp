@@ -225,6 +225,14 @@ EventText describe(const Event& event) {
                           "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
                           event.a),
               false};
+    case EventKind::warmed_up:
+      return {LogLevel::warn,
+              fmt::format("event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
+                          "meanwhile, this frame is flagged degraded\" remedy=\"move simulation "
+                          "time on in steps, or start at that time\"",
+                          static_cast<double>(event.a) * 1e-9,
+                          static_cast<double>(static_cast<std::int64_t>(event.b)) * 1e-9),
+              false};
     case EventKind::peer_refused: {
       static constexpr std::array kWhy{"not in access.allow", "TLS handshake failed",
                                        "host datagram without a valid MAC",

@@ -29,8 +29,8 @@ class Log {
   Log& operator=(const Log&) = delete;
   virtual ~Log() = default;
   virtual void write(LogLevel level, const std::string& text) = 0;
-  /// For the end of the program: waits, within the limit, until everything is written; what is
-  /// write()d afterwards is not. Nobody may write() meanwhile.
+  /// Waits, within the limit, until everything is written; for the end of the program. Lines of
+  /// later write() calls are lost. No thread may call write() meanwhile.
   /// @return false: nobody took the lines, as with a stopped terminal
   virtual bool finish(std::int64_t limit_ns) = 0;
 
@@ -67,7 +67,7 @@ class DistinctTable {
 
 /// The event's text without what would break a line or a quote: peers choose some of it.
 [[nodiscard]] std::string printable_text(const Event& event);
-/// Of emit.v1.Hello.Role.
+/// Returns the name of a value of emit.v1.Hello.Role.
 [[nodiscard]] std::string_view role_name(std::uint64_t role) noexcept;
 
 struct EventText {

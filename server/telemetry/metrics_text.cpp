@@ -39,6 +39,9 @@ void add_state(MetricsText& out, const MetricsSources& sources, const MetricsMom
   out.sample({}, std::uint64_t{moment.ready ? 1U : 0U});
   out.family("uptime_seconds", "gauge", "Time since the daemon began");
   out.sample({}, seconds(moment.uptime_ns));
+  out.family("journal_memory_bytes", "gauge",
+             "Memory of the run's journal entries, kept for recorders that connect later");
+  out.sample({}, moment.journal_memory_bytes);
 }
 
 void add_counters(MetricsText& out, const Counters& counters) {

@@ -40,7 +40,7 @@ class MetricsText {
   std::string text_;
 };
 
-/// Where the numbers come from; all of it is atomic, fixed after start or behind a lock.
+/// Sources of the numbers. All of them are atomic, fixed after start or behind a lock.
 struct MetricsSources {
   const Counters* counters = nullptr;
   const FrameTimes* times = nullptr;
@@ -51,13 +51,14 @@ struct MetricsSources {
   std::vector<std::pair<std::string, const DutyCycle*>> agents;  ///< by name
   MetricsText::Labels build;                                     ///< labels of emitd_build_info
 };
-/// What changes with the moment.
+/// Values that change with the moment of the scrape.
 struct MetricsMoment {
   std::uint64_t run_id = 0;
   bool ready = false;
   std::int64_t uptime_ns = 0;
-  std::int64_t now_ns = 0;       ///< monotonic
-  std::optional<PtpStatus> ptp;  ///< absent: not asked for
+  std::int64_t now_ns = 0;                 ///< monotonic
+  std::uint64_t journal_memory_bytes = 0;  ///< Context::journal_memory_bytes
+  std::optional<PtpStatus> ptp;            ///< absent: not asked for
 };
 
 [[nodiscard]] std::string metrics_text(const MetricsSources& sources, const MetricsMoment& moment);

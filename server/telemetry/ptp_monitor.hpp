@@ -22,7 +22,7 @@ class PtpMonitor {
   [[nodiscard]] static physics::Result<std::unique_ptr<PtpMonitor>> open(
       const std::filesystem::path& path, std::uint8_t domain);
 
-  /// What changed for the log: empty mostly.
+  /// Change that the log reports; mostly none.
   enum class Change : std::uint8_t { none, went_up, went_down, state };
   [[nodiscard]] Change turn(std::int64_t monotonic_ns);
 

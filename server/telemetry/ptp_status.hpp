@@ -25,7 +25,7 @@ enum class PtpState : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(PtpState state) noexcept;
 
-/// What ptp4l said last.
+/// Last answer of ptp4l.
 struct PtpStatus {
   bool up = false;  ///< it answers
   PtpState state = PtpState::unknown;

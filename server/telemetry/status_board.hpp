@@ -11,8 +11,8 @@
 
 namespace emit::server {
 
-/// What housekeeping has learnt from the agents' events and others ask for: who is connected, and
-/// what was warned of. Thread: any; takes a lock, so not for agents.
+/// State that housekeeping collects from the agents' events and that other threads ask for:
+/// connections and warnings. Thread: any. It takes a lock, so agents must not use it.
 class StatusBoard {
  public:
   struct Client {
@@ -33,7 +33,7 @@ class StatusBoard {
   /// The table as it stands now, in place of that level's earlier one.
   void set_warnings(LogLevel level, const DistinctTable& table);
 
-  /// By key of the connection.
+  /// Returns the clients by key of the connection.
   [[nodiscard]] std::map<std::uint32_t, Client> clients() const;
   [[nodiscard]] std::vector<Warning> warnings() const;
 

@@ -61,7 +61,7 @@ struct TableCase {
 const std::vector<TableCase>& table_cases() {
   static const std::vector<TableCase> all = {
       {"range_twice", "8-12,100,0,0.9,1\n# c\n8-12,200,0,0.8,2\n8-12,100,0,0.9,1\n",
-       "a.csv:5: band '8-12', elevation 0 deg, range 100 m stands already in line 2"},
+       "a.csv:5: band '8-12', elevation 0 deg, range 100 m is already in line 2"},
       {"range_descends", "8-12,200,0,0.9,1\n8-12,100,0,0.95,1\n",
        "a.csv:3: 'range_m' (100) is below that of line 2 (200) of the same band and elevation: "
        "ranges must ascend"},
@@ -107,8 +107,8 @@ TEST_F(ConfigTest, an_atmosphere_table_names_its_missing_columns) {
   write("a.csv", "band,range_m,elevation_deg,tau\n");
   const std::string error = scenario_error(kScenario);
   EXPECT_THAT(error, ::testing::HasSubstr("a.csv:1:28: unknown column 'tau'"));
-  EXPECT_THAT(error, ::testing::HasSubstr("column 'transmittance_frac' is missing"));
-  EXPECT_THAT(error, ::testing::HasSubstr("column 'path_radiance_w_m2_sr' is missing"));
+  EXPECT_THAT(error, ::testing::HasSubstr(
+                         "columns 'transmittance_frac', 'path_radiance_w_m2_sr' are missing"));
 }
 
 TEST_F(ConfigTest, a_band_without_rows_is_named_unless_a_model_stands_in) {

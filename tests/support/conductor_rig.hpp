@@ -52,7 +52,7 @@ class ConductorRig {
   }
   ~ConductorRig() { render_.on_stop(); }
 
-  /// Until nobody has anything left to do at this instant.
+  /// Turns both agents until neither has anything left to do at this instant.
   void settle() {
     for (int turn = 0; turn < 1000; ++turn) {
       int work = conductor_.do_work(clock.tai_ns());
@@ -76,13 +76,13 @@ class ConductorRig {
     FAIL() << "never idle";
   }
 
-  /// As settle(), with a render thread that does not come to its turn.
+  /// Does the same as settle(), with a render thread that does not come to its turn.
   void settle_without_render() {
     while (conductor_.do_work(clock.tai_ns()) > 0) {
     }
   }
 
-  /// As settle(), with a sender that does not come to its turn.
+  /// Does the same as settle(), with a sender that does not come to its turn.
   void settle_without_sender() {
     while (conductor_.do_work(clock.tai_ns()) + render_.do_work(clock.tai_ns()) > 0) {
     }

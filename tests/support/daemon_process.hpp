@@ -50,7 +50,7 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// In a child before exec.
+/// Limits the size of files; called in a child before exec.
 inline void limit_files(rlim_t bytes) {
   if (bytes != RLIM_INFINITY) {
     const rlimit limit{bytes, bytes};
@@ -132,7 +132,8 @@ class ToolProcess : public ChildProcess {
       : ChildProcess(folder, "emit", name + ".out", name + ".err", std::move(arguments),
                      file_limit_bytes) {}
 
-  /// Until standard error holds `text` this often. False: not within the limit, or it ended before.
+  /// Waits until standard error holds `text` this often. Returns false when that did not happen
+  /// within the limit, or the process ended before.
   [[nodiscard]] bool says(const std::string& text, std::size_t times = 1,
                           std::chrono::seconds limit = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + limit;

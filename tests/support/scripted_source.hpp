@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -12,7 +13,7 @@
 
 namespace emit::test {
 
-/// What a source was asked to do, kept by the test so that it outlives the source.
+/// Calls that a source received, kept by the test so that they outlive the source.
 struct SourceScript {
   bool ready = true;                       ///< poll(): false holds frames back
   bool weather_full = false;               ///< apply_weather(): no room
@@ -27,6 +28,8 @@ struct SourceScript {
   std::vector<std::string> order;  ///< kinds of calls, in order
   int resets = 0;
   std::atomic<int> held{0};  ///< slots not released
+  /// Called within submit(), such as to let time pass there.
+  std::function<void(const renderer::FrameRequest&)> on_submit;
 };
 
 /// A renderer without a device: pixels are a function of everything that was handed in so far, so
@@ -81,6 +84,9 @@ class ScriptedSource final : public server::FrameSource {
     for (std::size_t slot = 0; slot < views_.size(); ++slot) {
       if (used_[slot].load()) {
         continue;
+      }
+      if (script_.on_submit) {
+        script_.on_submit(request);
       }
       used_[slot].store(true);
       script_.held.fetch_add(1);

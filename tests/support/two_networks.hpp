@@ -65,7 +65,8 @@ class TwoNetworks {
     enter_here();
     return done ? "" : "ip(8) cannot set up the other end of the cable";
   }
-  /// What leaves "here" goes through this queueing discipline of tc(8); skips where there is none.
+  /// Sends everything that leaves "here" through this queueing discipline of tc(8). Skips the test
+  /// where there is none.
   void shape(const std::string& discipline) {
     enter_here();
     if (!run("tc qdisc add dev cable0 root " + discipline)) {

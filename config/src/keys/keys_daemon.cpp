@@ -211,6 +211,12 @@ const KeyTable<JournalConfig>& journal_keys() {
       integer<JournalConfig>(
           "ring_entries", "", 64, 1048576, EMIT_FIELD(ring_entries),
           "Number of entries between the frame loop and the writer of the journal."),
+      integer<JournalConfig>("memory_mib", "MiB", 1, 65536, EMIT_FIELD(memory_mib),
+                             "Memory for the entries of the run, for recorders that connect later. "
+                             "The oldest entries go first."),
+      boolean<JournalConfig>("required", EMIT_FIELD(required),
+                             "true: a start fails when the disk has no room for `file`; false: "
+                             "emitd warns and writes no journal."),
   };
   return keys;
 }

@@ -34,7 +34,7 @@ constexpr double kGapRatio = 2.5;
 constexpr std::int64_t kShortestGapNs = 1800 * kSecondNs;
 
 double seconds(std::int64_t ns) {
-  return static_cast<double>(ns) * 1e-9;
+  return static_cast<double>(ns) / 1e9;  // rounded once, so that whole seconds print as such
 }
 
 /// Duration in the unit a reader expects.
@@ -178,8 +178,18 @@ std::int64_t usual_spacing_ns(std::span<const WeatherSample> rows) {
   return *middle;
 }
 
-/// Pauses between rows from `from_ns` on that are much longer than usual. Nothing is missing where
-/// the weather is the same on both sides.
+/// Returns the usual pause around row i: the median of up to five pauses, of which the one before
+/// row i is the middle. A table may change from rows of a quarter of an hour to hourly rows.
+/// @pre 0 < i < rows.size()
+std::int64_t local_spacing_ns(std::span<const WeatherSample> rows, std::size_t i) {
+  EMIT_CHECK(i > 0 && i < rows.size());
+  const std::size_t first = i >= 3 ? i - 3 : 0;
+  const std::size_t last = std::min(i + 2, rows.size() - 1);
+  return usual_spacing_ns(rows.subspan(first, last - first + 1));
+}
+
+/// Reports pauses between rows from `from_ns` on that are much longer than usual. Nothing is
+/// missing where the weather is the same on both sides.
 void report_gaps(std::string_view name, std::int64_t from_ns, std::int64_t usual_ns,
                  scene::ScenarioDesc& scenario) {
   const std::vector<WeatherSample>& rows = scenario.weather;
@@ -190,6 +200,8 @@ void report_gaps(std::string_view name, std::int64_t from_ns, std::int64_t usual
     const std::int64_t pause_ns = rows[i].sim_time_ns - rows[i - 1].sim_time_ns;
     if (rows[i].sim_time_ns <= from_ns || pause_ns < kShortestGapNs ||
         static_cast<double>(pause_ns) <= kGapRatio * static_cast<double>(usual_ns) ||
+        static_cast<double>(pause_ns) <=
+            kGapRatio * static_cast<double>(local_spacing_ns(rows, i)) ||
         same_weather(rows[i - 1], rows[i])) {
       continue;
     }

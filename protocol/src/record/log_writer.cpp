@@ -64,18 +64,22 @@ LogWriter& LogWriter::operator=(LogWriter&&) noexcept = default;
 LogWriter::~LogWriter() = default;
 
 Result<LogWriter> LogWriter::create(const std::filesystem::path& path,
-                                    const LogWriterOptions& options) {
+                                    const LogWriterOptions& options, std::error_code* cause) {
   McapWriterOptions mcap_options;
   if (!options.software.empty()) mcap_options.library = options.software;
   mcap_options.chunk_bytes = options.chunk_bytes;
   mcap_options.flush_interval_ns = options.flush_interval_ns;
-  auto mcap = McapWriter::create(path, mcap_options);
+  auto mcap = McapWriter::create(path, mcap_options, cause);
   if (!mcap) return tl::unexpected(mcap.error());
   auto impl = std::make_unique<Impl>(std::move(*mcap));
+  const auto failed = [&](const physics::Error& error) {
+    if (cause != nullptr) *cause = impl->mcap.failure_cause();
+    return tl::unexpected(error);
+  };
   auto host = add_topic(impl->mcap, kHostTopic, *v1::HostFrame::descriptor());
-  if (!host) return tl::unexpected(host.error());
+  if (!host) return failed(host.error());
   auto journal = add_topic(impl->mcap, kJournalTopic, *v1::JournalEntry::descriptor());
-  if (!journal) return tl::unexpected(journal.error());
+  if (!journal) return failed(journal.error());
   impl->host_channel = *host;
   impl->journal_channel = *journal;
   return LogWriter(std::move(impl));
@@ -104,6 +108,10 @@ Result<void> LogWriter::write_journal(std::span<const std::byte> encoded_entry,
                                       std::int64_t log_time_ns) {
   return impl_->mcap.write(impl_->journal_channel, ++impl_->journal_sequence, log_time_ns,
                            log_time_ns, encoded_entry);
+}
+
+std::uint64_t LogWriter::messages_in_file() const noexcept {
+  return impl_->mcap.messages_in_file();
 }
 
 Result<void> LogWriter::flush() {

@@ -42,7 +42,9 @@ struct McapWriter::Impl {
   int fd = -1;
   std::uint64_t file_bytes = 0;
   bool closed = false;
+  bool removable = false;  // this writer made or truncated it: nothing else is lost with it
   std::optional<Error> failure;
+  std::error_code cause;  // the system's reason, where `failure` has one
 
   Output schemas;  // records as written, repeated in the summary
   Output channels;
@@ -58,6 +60,7 @@ struct McapWriter::Impl {
   SpillFile chunk_indexes;  // chunk index records for the summary, written with their chunks
 
   std::uint64_t message_count = 0;
+  std::uint64_t messages_in_file = 0;  // those that the kernel has taken whole
   std::uint64_t start_ns = 0;
   std::uint64_t end_ns = 0;
   std::map<std::uint16_t, std::uint64_t> channel_messages;
@@ -69,7 +72,18 @@ struct McapWriter::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
   ~Impl() {
+    if (failure && removable && messages_in_file == 0) remove_own_file();
     if (fd >= 0) ::close(fd);
+  }
+
+  /// Removes the file, unless somebody has put another one in its place.
+  void remove_own_file() const noexcept {
+    struct stat own {};
+    struct stat there {};
+    if (::fstat(fd, &own) == 0 && ::lstat(path.c_str(), &there) == 0 &&
+        own.st_dev == there.st_dev && own.st_ino == there.st_ino) {
+      ::unlink(path.c_str());
+    }
   }
 
   Result<void> put(std::span<const std::byte> bytes) {
@@ -77,9 +91,11 @@ struct McapWriter::Impl {
       const ssize_t written = ::write(fd, bytes.data(), bytes.size());
       if (written < 0 && errno == EINTR) continue;
       if (written <= 0) {
-        failure = Error{ErrorCode::io,
-                        fmt::format("{}: offset {}: cannot write: {}", path.string(), file_bytes,
-                                    std::generic_category().message(written < 0 ? errno : EIO))};
+        const int error = written < 0 ? errno : EIO;
+        cause = std::error_code(error, std::generic_category());
+        failure =
+            Error{ErrorCode::io, fmt::format("{}: offset {}: cannot write: {}", path.string(),
+                                             file_bytes, std::generic_category().message(error))};
         return tl::unexpected(*failure);
       }
       file_bytes += static_cast<std::uint64_t>(written);
@@ -156,6 +172,7 @@ struct McapWriter::Impl {
     chunk.clear();
     chunk_index.clear();
     if (auto written = put(scratch.bytes()); !written) return written;
+    messages_in_file = message_count;
     ++chunk_count;
     auto kept = chunk_indexes.append(index_record.bytes());
     if (!kept) failure = kept.error();
@@ -260,14 +277,26 @@ McapWriter::~McapWriter() {
 }
 
 Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
-                                      const McapWriterOptions& options) {
+                                      const McapWriterOptions& options, std::error_code* cause) {
+  const auto note = [cause](const std::error_code& error) {
+    if (cause != nullptr) *cause = error;
+  };
+  note({});
   auto impl = std::make_unique<Impl>(path, options);
   // Open the index first: a failure here leaves an older log unchanged.
-  if (auto opened = impl->chunk_indexes.open(path); !opened) return tl::unexpected(opened.error());
-  impl->fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  if (auto opened = impl->chunk_indexes.open(path); !opened) {
+    note(impl->chunk_indexes.cause());
+    return tl::unexpected(opened.error());
+  }
+  constexpr int kFlags = O_WRONLY | O_CREAT | O_CLOEXEC;
+  impl->fd = ::open(path.c_str(), kFlags | O_EXCL, 0644);
+  impl->removable = impl->fd >= 0;
+  if (impl->fd < 0 && errno == EEXIST) impl->fd = ::open(path.c_str(), kFlags, 0644);
   if (impl->fd < 0) {
-    return make_error(ErrorCode::io, fmt::format("{}: cannot create: {}", path.string(),
-                                                 std::generic_category().message(errno)));
+    const std::error_code error(errno, std::generic_category());
+    note(error);
+    return make_error(ErrorCode::io,
+                      fmt::format("{}: cannot create: {}", path.string(), error.message()));
   }
   struct stat status {};
   const bool regular = ::fstat(impl->fd, &status) == 0 && S_ISREG(status.st_mode);
@@ -276,9 +305,12 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
   if (regular && ::flock(impl->fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return make_error(ErrorCode::io, path.string() + ": another process writes it");
   }
-  if (regular && status.st_size > 0 && ::ftruncate(impl->fd, 0) != 0) {
-    return make_error(ErrorCode::io, fmt::format("{}: cannot be written over: {}", path.string(),
-                                                 std::generic_category().message(errno)));
+  if (regular && status.st_size > 0) {
+    if (::ftruncate(impl->fd, 0) != 0) {
+      return make_error(ErrorCode::io, fmt::format("{}: cannot be written over: {}", path.string(),
+                                                   std::generic_category().message(errno)));
+    }
+    impl->removable = true;
   }
   Output out;
   out.raw(mcap::kMagic);
@@ -286,7 +318,10 @@ Result<McapWriter> McapWriter::create(const std::filesystem::path& path,
   out.string(options.profile);
   out.string(options.library);
   out.end_record(record);
-  if (auto written = impl->put(out.bytes()); !written) return tl::unexpected(written.error());
+  if (auto written = impl->put(out.bytes()); !written) {
+    note(impl->cause);
+    return tl::unexpected(written.error());
+  }
   return McapWriter(std::move(impl));
 }
 
@@ -353,7 +388,9 @@ Result<void> McapWriter::write(std::uint16_t channel_id, std::uint32_t sequence,
   if (self.options.chunk_bytes == 0) {
     self.scratch.clear();
     Impl::append_message(self.scratch, channel_id, sequence, log_ns, publish_ns, data);
-    return self.put(self.scratch.bytes());
+    auto written = self.put(self.scratch.bytes());
+    if (written) self.messages_in_file = self.message_count;
+    return written;
   }
   if (self.chunk.size() == 0) {
     self.chunk_first_ns = self.chunk_start_ns = self.chunk_end_ns = log_ns;
@@ -369,6 +406,14 @@ Result<void> McapWriter::write(std::uint16_t channel_id, std::uint32_t sequence,
           static_cast<std::uint64_t>(std::max<std::int64_t>(self.options.flush_interval_ns, 0));
   if (full || due) return self.flush_chunk();
   return {};
+}
+
+std::error_code McapWriter::failure_cause() const noexcept {
+  return impl_->cause;
+}
+
+std::uint64_t McapWriter::messages_in_file() const noexcept {
+  return impl_->messages_in_file;
 }
 
 Result<void> McapWriter::flush() {

@@ -59,8 +59,12 @@ Result<void> SpillFile::open(const std::filesystem::path& beside) {
     if (folder.empty()) continue;
     name_ = fmt::format("{}: index in {}", beside.string(), folder.string());
     fd_ = open_nameless(folder);
-    if (fd_ >= 0) return {};
-    refusals += fmt::format("; {}: {}", folder.string(), std::generic_category().message(errno));
+    if (fd_ >= 0) {
+      cause_ = {};
+      return {};
+    }
+    cause_ = std::error_code(errno, std::generic_category());
+    refusals += fmt::format("; {}: {}", folder.string(), cause_.message());
   }
   if (no_temporary) refusals += "; temporary folder: " + no_temporary.message();
   return make_error(ErrorCode::io, fmt::format("{}: no folder takes the index of the file{}",

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "emit/physics/error.hpp"
@@ -24,6 +25,8 @@ class SpillFile {
   /// folder is that of the file `beside`, links followed, which need not exist yet; otherwise the
   /// one for temporary files.
   [[nodiscard]] physics::Result<void> open(const std::filesystem::path& beside);
+  /// Returns the system's reason why the last folder took no file; empty where open() succeeded.
+  [[nodiscard]] std::error_code cause() const noexcept { return cause_; }
   SpillFile() = default;
   SpillFile(const SpillFile&) = delete;
   SpillFile& operator=(const SpillFile&) = delete;
@@ -47,6 +50,7 @@ class SpillFile {
   std::vector<std::byte> block_;
   std::uint64_t spilled_bytes_ = 0;
   int fd_ = -1;
+  std::error_code cause_;
 };
 
 }  // namespace emit::protocol

@@ -49,7 +49,7 @@ class HostSessions {
   /// Answer to `open`. Valid until the next call.
   [[nodiscard]] std::span<const std::byte> challenge(const protocol::SessionHeader& open) noexcept;
 
-  /// Where to put an answer's payload, of at most kMaxAnswerBytes.
+  /// Returns the memory for an answer's payload, of at most kMaxAnswerBytes.
   static constexpr std::size_t kMaxAnswerBytes = 512;
   [[nodiscard]] std::span<std::byte> answer_payload() noexcept;
   /// Seals it. Empty: the session is gone. Valid until the next call.

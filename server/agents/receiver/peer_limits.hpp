@@ -10,9 +10,9 @@
 
 namespace emit::server {
 
-/// What one peer may send in a second: an address, over all its connections and datagrams; on this
-/// host, where all programs share an address, one connection or socket. Remembers the kPeers heard
-/// last. Thread: one owner. Real time: RT-safe.
+/// Rate limits of the peers, per second. A peer is an address, with all its connections and
+/// datagrams. On this host, where all programs share an address, it is one connection or socket.
+/// The kPeers peers that were heard last are remembered. Thread: one owner. Real time: RT-safe.
 class PeerLimits {
  public:
   static constexpr std::size_t kPeers = 64;

@@ -6,10 +6,10 @@
 
 namespace emit::server {
 
-/// How fast one connection is read. What it sends is paid for in time; a quarter of a second's
-/// worth may come at once. While in debt it is not read: its bytes wait in the kernel's buffers
-/// until the sender's own window is full, which costs nobody anything. Thread: one owner. Real
-/// time: RT-safe.
+/// Rate limiter (leaky bucket) of one connection, in nanoseconds of debt. Every message costs time,
+/// and the messages of a quarter of a second may come at once. A connection in debt is not read:
+/// its bytes wait in the kernel's buffers until the sender's own window is full, which costs nobody
+/// else anything. Thread: one owner. Real time: RT-safe.
 class ReadPace {
  public:
   static constexpr std::int64_t kBurstNs = 250'000'000;
@@ -32,7 +32,7 @@ class ReadPace {
   void refusal(std::int64_t now_ns) noexcept { pay(kRefusalNs, now_ns); }
 
   [[nodiscard]] bool in_debt(std::int64_t now_ns) const noexcept { return paid_ns_ > now_ns; }
-  /// Until it may be read again after it was in debt; 0 or less: now.
+  /// Returns the time until the connection may be read again after it was in debt; 0 or less: now.
   [[nodiscard]] std::int64_t wait_ns(std::int64_t now_ns) const noexcept {
     return paid_ns_ + kRestNs - now_ns;
   }

@@ -70,7 +70,9 @@ int rename_to_new(const std::filesystem::path& from, const std::filesystem::path
 
 }  // namespace
 
-physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem::path& file) {
+physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem::path& file,
+                                                          std::error_code* cause) {
+  if (cause != nullptr) *cause = {};
   const auto failure = [&](const std::string& what) {
     return physics::make_error(physics::ErrorCode::io, fmt::format("{}: {}", file.string(), what));
   };
@@ -119,6 +121,7 @@ physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem:
       return kept;
     }
     if (error != EEXIST) {
+      if (cause != nullptr) *cause = std::error_code(error, std::generic_category());
       return failure(fmt::format(
           "an older journal that cannot be kept as {}: {}; move it away, or give journal.file a "
           "folder of its own that emitd may write to",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <system_error>
 
 #include "emit/physics/error.hpp"
 
@@ -13,7 +14,8 @@ namespace emit::server {
 /// a symbolic link the file is renamed that it leads to.
 /// @return the new name; empty: nothing was renamed. Errors (io), naming the file: also one that
 /// another process is writing, one that cannot be read, and a folder that takes no new name.
+/// @param cause  becomes the system's reason where the folder takes no new name; null: not wanted
 [[nodiscard]] physics::Result<std::filesystem::path> keep_older_journal(
-    const std::filesystem::path& file);
+    const std::filesystem::path& file, std::error_code* cause = nullptr);
 
 }  // namespace emit::server

@@ -19,11 +19,12 @@ namespace emit::server {
 /// Writes the journal to a file and to the recorders connected. Not a real-time agent: it encodes,
 /// allocates and writes files, on a ring of its own that never holds the others up.
 ///
-/// The lines of the current run stay in memory up to a limit, so that a recorder that connects in
-/// the middle gets the run from its start.
+/// The entries of the current run stay in memory up to journal.memory_mib, so that a recorder that
+/// connects in the middle gets the run from its start. When the memory is full the oldest entries
+/// go; a recorder that connects later is sent the sequence numbers that it lacks.
 class Recorder final : public Agent {
  public:
-  /// What RunStart says beside the run id.
+  /// Members of RunStart beside the run id.
   struct Identity {
     std::string scenario_name;
     std::string scenario_sha256;
@@ -35,16 +36,23 @@ class Recorder final : public Agent {
 
   /// Before start.
   void set_identity(Identity identity) { identity_ = std::move(identity); }
-  /// Opens the journal file, if one is configured. Before start. Returns the name under which that
-  /// of an earlier process is kept, if there was one. Errors (io).
-  [[nodiscard]] physics::Result<std::filesystem::path> open();
+  /// State of the journal file after open().
+  struct Opened {
+    std::filesystem::path older;  ///< new name of an earlier process's journal; empty: none
+    std::string
+        off;  ///< why no journal is written: the disk is full or takes no writes; else empty
+  };
+  /// Opens the journal file, if one is configured. Call it before start.
+  /// Errors: config (the disk leaves no room and journal.required is set), io (anything else that
+  /// keeps the file from being written).
+  [[nodiscard]] physics::Result<Opened> open();
 
   [[nodiscard]] std::string_view name() const noexcept override { return "recorder"; }
   [[nodiscard]] bool on_start() noexcept override;
   int do_work(std::int64_t now_ns) noexcept override;
   void on_stop() noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
-  /// A frame's line is worth no wake-up of its own.
+  /// Lines of frames wait for each other; none wakes the recorder by itself.
   [[nodiscard]] std::int64_t rest_ns() const noexcept override { return 2'000'000; }
   [[nodiscard]] int wait_fd() const noexcept override { return epoll_.get(); }
 
@@ -55,8 +63,8 @@ class Recorder final : public Agent {
   }
 
  private:
-  /// Bytes of the current run kept for recorders that come later.
-  static constexpr std::size_t kKeptBytes = 64u << 20;
+  /// Memory of a kept entry beside its bytes: the element of the deque and the allocator's share.
+  static constexpr std::size_t kOverheadBytes = 48;
   /// A line waits no longer than this before the kernel has it: a killed process loses no more.
   /// Half of what is promised, the other half is for threads that wait for their core.
   static constexpr std::int64_t kFlushAfterNs = 50'000'000;
@@ -64,9 +72,11 @@ class Recorder final : public Agent {
   struct Peer {
     std::uint32_t connection = 0;
     int fd = -1;
-    TcpSocket* socket = nullptr;  // the receiver's
-    std::uint64_t next = 0;       // index of the record being sent
-    std::size_t offset = 0;       // bytes of it sent
+    TcpSocket* socket = nullptr;   // the receiver's
+    std::uint64_t next = 0;        // index of the record being sent
+    std::size_t offset = 0;        // bytes of it sent
+    std::vector<std::byte> first;  // goes out in front of the records: what is no longer held
+    std::size_t first_sent = 0;
     bool blocked = false;
     bool registered = false;
   };
@@ -77,22 +87,35 @@ class Recorder final : public Agent {
   int send_all() noexcept;
   bool send_some(Peer& peer, bool& failed) noexcept;
   void add_record(std::span<const std::byte> line);
+  void add_peer(const RecorderCommand& command);
+  void end_stream(Peer& peer) noexcept;
   void discard_old();
   void remove(std::size_t index) noexcept;
   void file_failed(const physics::Error& error) noexcept;
   void flush_when_due(std::int64_t now_ns);
+  /// Counts the entries that reached the file since the last call.
+  void count_written() noexcept;
 
   Context& context_;
   config::JournalConfig config_;
   Identity identity_;
   Fd epoll_;
   std::optional<protocol::LogWriter> file_;
+  std::uint64_t handed_to_file_ = 0;  // entries of this process
+  std::uint64_t in_file_ = 0;         // entries of them that are counted as written
   std::vector<Peer> peers_;
-  std::deque<std::vector<std::byte>> kept_;  // framed records, ready to send
-  std::uint64_t kept_first_ = 0;             // index of kept_.front()
-  std::uint64_t run_first_ = 0;              // index of the run's first record
-  std::size_t kept_bytes_ = 0;
-  std::int64_t unflushed_since_ns_ = 0;  // monotonic; 0: the kernel has everything
+  /// An entry as a framed record, ready to send.
+  struct Kept {
+    std::uint64_t sequence = 0;
+    std::vector<std::byte> bytes;
+  };
+  std::deque<Kept> kept_;
+  std::uint64_t kept_first_ = 0;          // index of kept_.front()
+  std::uint64_t run_first_ = 0;           // index of the run's first record
+  std::uint64_t run_first_sequence_ = 0;  // its sequence number
+  std::uint64_t last_sequence_ = 0;       // of the newest entry
+  std::size_t kept_bytes_ = 0;            // memory of kept_, overhead included
+  std::int64_t unflushed_since_ns_ = 0;   // monotonic; 0: the kernel has everything
   std::int64_t wake_at_ns_ = kNeverNs;
   std::uint64_t taken_ = 0;                 // lines taken so far
   std::atomic<std::uint64_t> finished_{0};  // taken_ when peers had everything; else the last such

@@ -2,6 +2,7 @@
 #include "agents/render/render_agent.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <span>
 
 namespace emit::server {
@@ -77,13 +78,8 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
         job_prepared_ = true;
       }
       const double expected_ms = choose_rung(*job, now_ns);
-      const auto slot = context_.of_slots.look([&]() -> std::optional<renderer::SlotIndex> {
-        const int free = source_->submit(job->request);
-        if (free < 0) {
-          return std::nullopt;
-        }
-        return static_cast<renderer::SlotIndex>(free);
-      });
+      bool warmed_up = false;
+      const auto slot = context_.of_slots.look([&] { return submit(job->request, warmed_up); });
       if (!slot) {
         // Whoever is done with one rings.
         if (!starved_) {
@@ -94,8 +90,8 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       }
       starved_ = false;
       job_prepared_ = false;
-      in_flight_[(first_ + count_) % kDepth] = {*slot, now_ns, expected_ms, begun_ns,
-                                                job->channels};
+      in_flight_[(first_ + count_) % kDepth] = {*slot,    now_ns,        expected_ms,
+                                                begun_ns, job->channels, warmed_up};
       ++count_;
       context_.counters.add(Counter::frames_submitted);
       break;
@@ -103,6 +99,35 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
   }
   context_.jobs.pop();
   return true;
+}
+
+std::optional<renderer::SlotIndex> RenderAgent::submit(const renderer::FrameRequest& request,
+                                                       bool& warmed_up) noexcept {
+  // The renderer does not report a warm-up inside submit(). It is recognised by its causes and its
+  // effect: the thermal clock jumped further than a step of the surface, and submit() took long.
+  const std::int64_t moved_ns =
+      request.thermal_time_ns - last_thermal_ns_.value_or(request.thermal_time_ns);
+  const bool jumped = std::abs(moved_ns) > info_->surface_step_ns;
+  const std::int64_t begun_ns = context_.clock.monotonic_ns();
+  if (jumped) {
+    context_.jump_since_ns.store(begun_ns, std::memory_order_relaxed);
+  }
+  const int slot = source_->submit(request);
+  if (jumped) {
+    context_.jump_since_ns.store(0, std::memory_order_relaxed);
+  }
+  if (slot < 0) {
+    return std::nullopt;
+  }
+  last_thermal_ns_ = request.thermal_time_ns;
+  const std::int64_t took_ns = context_.clock.monotonic_ns() - begun_ns;
+  if (jumped && warms_up_again(took_ns)) {
+    warmed_up = true;
+    context_.counters.add(Counter::frames_warmed_up);
+    context_.render_events.push(EventKind::warmed_up, static_cast<std::uint64_t>(took_ns),
+                                static_cast<std::uint64_t>(moved_ns));
+  }
+  return static_cast<renderer::SlotIndex>(slot);
 }
 
 double RenderAgent::choose_rung(RenderJob& job, std::int64_t now_ns) noexcept {
@@ -188,8 +213,11 @@ bool RenderAgent::finish_oldest() noexcept {
   }
   done->rung = view.rung;
   done->estimated_error_k = view.estimated_error_k;
-  // A wall clock that is set must not be taken for a slow device.
-  quality_.finished(context_.clock.monotonic_ns() - oldest.begun_ns, oldest.expected_ms);
+  done->warmed_up = oldest.warmed_up;
+  // Neither a wall clock that is set nor a warm-up must be taken for a slow device.
+  if (!oldest.warmed_up) {
+    quality_.finished(context_.clock.monotonic_ns() - oldest.begun_ns, oldest.expected_ms);
+  }
   done->device_failed = view.device_failed;
   note_device(view);
   done->image.source = source_.get();

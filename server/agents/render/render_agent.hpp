@@ -12,6 +12,14 @@
 
 namespace emit::server {
 
+/// Returns true where a frame behind a jump of simulation time takes so long to submit that the
+/// surface is warming up again. Without a warm-up submit() takes milliseconds.
+/// @param submitting_ns  time that submit() has taken, so far or in all
+[[nodiscard]] constexpr bool warms_up_again(std::int64_t submitting_ns) noexcept {
+  constexpr std::int64_t kLongestSubmitNs = 100'000'000;
+  return submitting_ns > kLongestSubmitNs;
+}
+
 /// Owns the frame source from its making to its end, carries out render jobs in order and hands
 /// finished images to the conductor. A frame is always collected before a later one.
 class RenderAgent final : public Agent {
@@ -36,6 +44,7 @@ class RenderAgent final : public Agent {
     double expected_ms = 0.0;   ///< for its rung, by the ladder
     std::int64_t begun_ns = 0;  ///< monotonic; render_start_ns is TAI
     ChannelSet channels = 0;
+    bool warmed_up = false;  ///< the surface warmed up again in its submit()
   };
   /// More than one in flight lets upload of the next overlap with read-back of the last.
   static constexpr std::size_t kDepth = 2;
@@ -45,15 +54,19 @@ class RenderAgent final : public Agent {
   static constexpr std::int64_t kLongestFrameNs = 60'000'000'000;
 
   bool take_job(std::int64_t now_ns) noexcept;
+  /// Hands a frame to the source; no slot: every slot is in use. `warmed_up` becomes true where the
+  /// surface warmed up again, which is then counted and logged.
+  [[nodiscard]] std::optional<renderer::SlotIndex> submit(const renderer::FrameRequest& request,
+                                                          bool& warmed_up) noexcept;
   bool finish_oldest() noexcept;
-  /// The pictures of image.channels, and their checksums.
+  /// The images of image.channels, and their checksums.
   void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
   /// Sets the job's rung; returns RungStats::frame_ms of it.
   double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;
-  /// No frame comes any more: the daemon is told, and ends.
+  /// No frame comes any more: sets Context::device_lost, upon which the daemon ends.
   void lose_device(std::string_view why) noexcept;
 
   Context& context_;
@@ -69,6 +82,8 @@ class RenderAgent final : public Agent {
   std::uint32_t failures_ = 0;  // of the device, in a row
   bool lost_ = false;
   bool starved_ = false;
+  /// Thermal clock of the frame submitted last; a reset of the run does not move the surface.
+  std::optional<std::int64_t> last_thermal_ns_;
   bool weather_lost_ = false;        // said so for this run
   std::uint64_t dropped_poses_ = 0;  // counted in this run
   bool job_prepared_ = false;  // entities of the job in front are applied; only submit is missing

@@ -57,6 +57,7 @@ physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
   info.height_px = scenario.sensor.height_px;
   info.slots = output.slots;
   info.planes = scenario.bands.size();
+  info.surface_step_ns = static_cast<std::int64_t>(scenario.thermal.first_step_s * 1e9);
   info.scene = (*renderer)->scene_stats();
   return std::make_unique<RendererSource>(std::move(*renderer), std::move(info));
 }

@@ -139,7 +139,7 @@ int Sender::take_published() noexcept {
     }
     context_.published.pop();
     ++work;
-    // Between two publications clients get a chance, so that a burst does not skip frames.
+    // Between two frames clients get a chance, so that a burst does not skip frames.
     if (work < 4) {
       static_cast<void>(send_all());
     } else {
@@ -166,7 +166,7 @@ void Sender::evict_oldest() noexcept {
         remove(i, true);
         continue;
       }
-      ++client.next;  // what it does not want is passed over when the new publication is in
+      ++client.next;  // what it does not want is passed over when the new frame is in
       client.gap = true;
       count_skipped(client);
     }
@@ -300,7 +300,8 @@ bool Sender::advance(SenderClient& client) noexcept {
     const Entry& next = entry(client.next);
     client.in_transit = client.next++;
     client.begin(next.header, next.image, context_.clock.tai_ns());
-    // Behind it: a gap there is for the frame that comes next to tell.
+    // Pass over frames that the client does not want only now: the next frame reports a gap among
+    // them.
     pass_over_unwanted(client);
     if (client.waits_for_encoding()) {
       return true;

@@ -15,11 +15,11 @@ namespace emit::server {
 /// Streams published frames to the clients, each at its own pace, straight from the source's
 /// memory.
 ///
-/// The newest `queue_frames` publications form the window. A client is a position in it. When a
-/// publication leaves the window although a client has not had it yet, that client skips it: the
+/// The newest `queue_frames` frames form the window. A client is a position in it. When a
+/// frame leaves the window although a client has not had it yet, that client skips it: the
 /// next frame it gets carries kFlagGapBefore (newest-wins), or it is disconnected (every_frame).
 /// What a client asked not to get (every_nth) it is never waited for, and no gap.
-/// Pictures are compressed block by block when nobody else has anything to do.
+/// Images are compressed block by block when nobody else has anything to do.
 /// What such a client has half sent moves to its own memory. So the sender holds at most
 /// queue_frames + 1 images, whatever clients do, and a source with queue_frames + 3 slots always
 /// has one to render into.
@@ -30,7 +30,7 @@ class Sender final : public Agent {
   Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients, bool keep_last,
          SenderClient* resident = nullptr);
 
-  /// Takes the memory to compress for clients that want it. The pictures are fixed by then.
+  /// Takes the memory to compress for clients that want it. The images are fixed by then.
   /// Not while running.
   void allow_compression();
 
@@ -52,7 +52,7 @@ class Sender final : public Agent {
     Image image;
     protocol::FrameHeader header;
   };
-  /// A picture of a publication, once for all clients.
+  /// An image of a frame, once for all clients.
   struct EncodedPicture {
     protocol::PixelEncoder encoder;
     bool begun = false;
@@ -64,11 +64,11 @@ class Sender final : public Agent {
   int take_writable() noexcept;
   int send_all() noexcept;
   bool advance(SenderClient& client) noexcept;
-  /// Of the publication on its way to a client that waits for it.
+  /// Returns the encoded image of the frame on its way to a client that waits for it.
   [[nodiscard]] EncodedPicture& encoded_for(const SenderClient& client) noexcept;
   /// Hands over what is encoded already. False: the client goes on waiting.
   bool take_encoded(SenderClient& client) noexcept;
-  /// Moves a client on to the next publication that it wants.
+  /// Moves a client on to the next frame that it wants.
   void pass_over_unwanted(SenderClient& client) noexcept;
   [[nodiscard]] ClientCounts* counts_of(const SenderClient& client) const noexcept;
   void account(SenderClient& client) noexcept;
@@ -92,14 +92,14 @@ class Sender final : public Agent {
   UdpBatch batch_;
   std::vector<SenderClient*> clients_;  // reserved at start
   std::vector<Entry> window_;
-  std::vector<EncodedPicture> encoded_;  // of each place of the window, by picture
-  std::uint64_t first_ = 1;              // oldest publication in the window
+  std::vector<EncodedPicture> encoded_;  // of each place of the window, by image
+  std::uint64_t first_ = 1;              // oldest frame in the window
   std::uint64_t end_ = 1;                // one past the newest
   std::array<std::uint32_t, kMaxSlots> holds_{};
   bool have_last_ = false;
   Image last_;
   std::int64_t wake_at_ns_ = kNeverNs;
-  std::uint64_t taken_ = 0;  // publications taken so far
+  std::uint64_t taken_ = 0;  // frames taken so far
   std::atomic<std::uint64_t> finished_{
       0};  // taken_ when nothing was left to send; else the last such
 };

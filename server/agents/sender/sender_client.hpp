@@ -11,7 +11,7 @@
 
 namespace emit::server {
 
-/// Somebody who gets every publication: what it gets next and how far the one on its way has got.
+/// A receiver of frames: the frame that it gets next, and the progress of the one on its way.
 ///
 /// Thread: its present owner's. Real time: RT-safe after construction.
 class SenderClient {
@@ -23,38 +23,44 @@ class SenderClient {
 
   enum class Progress : std::uint8_t { idle, more, blocked, retry_soon, finished, failed };
 
-  /// Begins a publication; `header` is the common part. Precondition: !busy().
+  /// Begins a frame; `header` is the part that all clients share.
+  /// @pre !busy()
   virtual void begin(const protocol::FrameHeader& header, const Image& image,
                      std::int64_t now_ns) noexcept = 0;
-  /// How much to move on: brief where others wait for their first byte.
+  /// Amount of work in one turn: brief while other clients wait for their first byte.
   enum class Turn : std::uint8_t { brief, full };
-  /// Moves a bounded amount on. `finished`: the last byte went; call complete().
+  /// Sends a bounded amount. `finished` means that the last byte was sent: call complete().
   [[nodiscard]] virtual Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept = 0;
-  /// Picture that is to be encoded before send() has anything to do; none: it has.
+  /// Returns the index of the image that must be encoded before send() has anything to do; none:
+  /// send() has something to do.
   [[nodiscard]] virtual std::optional<std::size_t> waits_for_encoding() const noexcept {
     return std::nullopt;
   }
-  /// Ends that: the encoded picture, which stays until the publication leaves the window, or
-  /// nothing, where it did not become smaller. Precondition: waits_for_encoding().
+  /// Takes the encoded image, which stays until the frame leaves the window, or nothing where it
+  /// did not become smaller.
+  /// @pre waits_for_encoding()
   virtual void take_encoded(std::span<const std::byte> /*bytes*/) noexcept {}
-  /// Makes what is left of the publication on its way independent of the source's memory, so that
-  /// the source gets its slot back however slow the client is. Precondition: busy().
+  /// Copies the rest of the frame on its way, so that the source gets its slot back however slow
+  /// the client is.
+  /// @pre busy()
   virtual void spill() noexcept = 0;
 
-  /// May ask for fragments again: the sender keeps publications as long as its window has room.
+  /// Returns whether the client may ask for fragments again. The sender then keeps frames as long
+  /// as its window has room.
   [[nodiscard]] virtual bool may_ask_again() const noexcept { return false; }
-  /// Takes a request on; what it may have goes out with the next send(). False: nothing of it.
+  /// Takes a request for missing fragments; those that are granted are sent by the next send().
+  /// Returns false when none is.
   [[nodiscard]] virtual bool ask_again(const protocol::ResendRequest& /*request*/) noexcept {
     return false;
   }
-  /// The publication leaves the window: its pixels are not to be touched any more.
+  /// The frame leaves the window: its pixels must not be touched any more.
   virtual void forget(std::uint64_t /*sequence*/) noexcept {}
 
-  /// Key of the connection it belongs to.
+  /// Key of the client's connection.
   [[nodiscard]] virtual std::uint32_t connection() const noexcept = 0;
-  /// Would rather be disconnected than skip a publication.
+  /// Returns whether the client wants to be disconnected rather than skip a frame.
   [[nodiscard]] virtual bool every_frame() const noexcept { return false; }
-  /// Whether a publication that `channels` show is to be sent.
+  /// Returns whether a frame that `channels` show must be sent.
   [[nodiscard]] virtual bool wants(const protocol::FrameHeader& /*header*/,
                                    ChannelSet /*channels*/) const noexcept {
     return true;
@@ -68,14 +74,15 @@ class SenderClient {
   /// Turns writable when a blocked client can go on.
   [[nodiscard]] virtual int fd() const noexcept { return -1; }
 
-  /// Accounts for the publication whose last byte left now.
+  /// Accounts for the frame whose last byte left now.
   void complete(std::int64_t now_ns) noexcept;
 
   [[nodiscard]] bool busy() const noexcept { return busy_; }
   [[nodiscard]] bool spilled() const noexcept { return spilled_; }
-  /// Of the publication begun last, as this client gets it.
+  /// Header of the frame begun last, as this client gets it.
   [[nodiscard]] const protocol::FrameHeader& header() const noexcept { return header_; }
-  // Of the publication completed last; a frame without a host frame changes nothing.
+  // The functions below describe the frame completed last. A frame without a host frame changes
+  // nothing.
   [[nodiscard]] std::int64_t delay_ns() const noexcept { return previous_delay_ns_; }
   [[nodiscard]] std::int64_t age_ns() const noexcept { return previous_age_ns_; }
   [[nodiscard]] std::int64_t jitter_ns() const noexcept {
@@ -89,9 +96,9 @@ class SenderClient {
   [[nodiscard]] int error() const noexcept { return error_; }
 
   // The sender's book-keeping.
-  std::uint64_t next = 0;        ///< sequence of the next publication this client is to get
+  std::uint64_t next = 0;        ///< sequence of the next frame this client is to get
   std::uint64_t in_transit = 0;  ///< sequence of the one on its way, while busy
-  bool gap = false;              ///< publications before `next` were skipped
+  bool gap = false;              ///< frames before `next` were skipped
   bool blocked = false;          ///< waits for its socket to take more
   bool registered = false;       ///< known to the sender's epoll descriptor
   bool closing = false;          ///< ends as soon as the sender sees it

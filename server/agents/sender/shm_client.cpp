@@ -9,8 +9,9 @@
 namespace emit::server {
 namespace {
 
-/// What one turn copies at most, so that the other clients advance beside it. More than a socket
-/// takes in a turn: a copy to memory is the quickest of all, and whoever is done first waits least.
+/// Largest number of bytes that one turn copies, so that the other clients advance beside it. It is
+/// more than a socket takes in a turn, because a copy to memory is the quickest of all and the
+/// client that is done first waits least.
 constexpr std::size_t kTurnBytes = 2u << 20;
 constexpr std::size_t kBriefBytes = 64u << 10;
 

@@ -11,7 +11,7 @@
 
 namespace emit::server {
 
-/// Writes every publication, with all channels, while somebody reads, into a ring of shared memory,
+/// Writes every frame, with all channels, while somebody reads, into a ring of shared memory,
 /// for clients on this host. Readers map it read-only: no reader, dead or alive, can delay or
 /// disturb anybody.
 ///
@@ -23,7 +23,7 @@ class ShmClient final : public SenderClient {
   [[nodiscard]] static physics::Result<std::unique_ptr<ShmClient>> create(
       const config::StreamConfig& config, const std::vector<Channel>& channels,
       std::span<const std::byte> welcome, std::int64_t now_ns);
-  /// Tells the readers that nothing more comes.
+  /// Marks the ring as ended for its readers.
   ~ShmClient() override;
 
   void begin(const protocol::FrameHeader& header, const Image& image,

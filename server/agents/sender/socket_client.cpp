@@ -7,11 +7,12 @@
 namespace emit::server {
 namespace {
 
-/// What one turn hands over at most, so that several clients advance side by side.
+/// Largest number of bytes that one turn hands to the kernel, so that several clients advance side
+/// by side.
 constexpr std::size_t kTcpTurnBytes = 512u << 10;
 constexpr std::size_t kTcpBriefBytes = 64u << 10;
 constexpr int kUdpTurnCalls = 6;
-/// Of a frame, read to make its parity in one turn.
+/// Bytes of a frame that one turn reads to make its parity.
 constexpr std::size_t kParityTurnBytes = 256u << 10;
 
 }  // namespace
@@ -148,7 +149,7 @@ SocketClient::Progress SocketClient::send_udp(UdpBatch& batch, Context& context,
   const int fd = params_.udp_socket.fd();
   const int calls = turn == Turn::brief ? 1 : kUdpTurnCalls;
   for (int call = 0; call < calls; ++call) {
-    // What somebody waits for goes first, then the frame, then its parity.
+    // Send fragments that somebody waits for first, then the frame, then its parity.
     const bool again = resend_ && resend_->pending();
     if (!again && !busy_) {
       return call == 0 ? Progress::idle : Progress::more;

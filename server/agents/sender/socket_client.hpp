@@ -27,14 +27,14 @@ class SocketClient final : public SenderClient {
     bool every_frame = false;
     std::uint32_t every_nth = 1;  ///< of the frames that the channel shows
     bool udp = false;
-    bool compression = false;         ///< tcp: waits for the encoded picture
+    bool compression = false;         ///< tcp: waits for the encoded image
     TcpSocket* tcp_socket = nullptr;  ///< of the control connection; stays the receiver's
     UdpSocket udp_socket;             ///< connected to the client's port or group
     std::uint16_t stream_id = 0;
     std::uint32_t fragment_payload_bytes = 0;
     std::vector<std::byte> first_bytes;  ///< tcp: goes out before any frame
     protocol::FecParams fec = {};        ///< udp
-    /// udp: publications that may be asked for again; 0: none
+    /// udp: frames that may be asked for again; 0: none
     std::uint32_t resend_frames = 0;
     double resend_max_frac = 0.0;  ///< of the bytes sent, that may be sent again
   };

@@ -83,11 +83,15 @@ int run(const RecordOptions& command) {
       lost_entries += entry.sequence() - last_sequence - 1;
     }
     if (entries == 0 && !entry.has_run_start()) {
-      // The daemon keeps some 64 MiB of a run for recorders that come later.
+      // The daemon keeps journal.memory_mib of a run for recorders that connect later.
       from_the_start = false;
-      warn(
-          "the run began longer ago than the daemon remembers: the log does not replay until the "
-          "next run begins");
+      const client::JournalGap& gap = recorder.gap();
+      warn(fmt::format(
+          "the run began longer ago than the daemon remembers (journal.memory_mib): {} the log "
+          "does not replay until the next run begins",
+          gap.entries() == 0 ? std::string()
+                             : fmt::format("{} entries, sequence {} to {}, are lost;",
+                                           gap.entries(), gap.first_sequence, gap.last_sequence)));
     }
     last_sequence = entry.sequence();
     ++entries;

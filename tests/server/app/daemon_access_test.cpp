@@ -93,7 +93,7 @@ std::uint16_t port_of(const std::string& endpoint) {
   return parse_host_port(endpoint)->port;
 }
 
-/// What the peer does and gets, from the other end of the cable.
+/// A peer at the other end of the cable.
 class Stranger {
  public:
   Stranger(TwoNetworks& networks, const DaemonProcess& daemon, std::string address)
@@ -274,7 +274,7 @@ bool is_host_frame(const Bytes& datagram) {
   return read && read->header.kind == protocol::SessionKind::host_frame;
 }
 
-/// Until the daemon has counted that many: it is through with what was sent.
+/// Waits until the daemon has counted that many: it has then handled what was sent.
 bool wait_counted(const DaemonProcess& daemon, const std::string& name, std::uint64_t at_least) {
   for (int i = 0; i < 3000; ++i, ::usleep(10'000)) {
     const auto page = client::http_get("http://" + daemon.metrics() + "/metrics", kLongNs);

@@ -122,7 +122,7 @@ bool wait_evenly(std::chrono::milliseconds time) {
   return longest < 25ms;
 }
 
-/// What a log holds: frames of the newest run, and whether the lines before the cut are all there.
+/// Contents of a log: frames of the newest run, and whether the lines before the cut are all there.
 struct LogContents {
   std::set<std::uint64_t> frames;
   std::uint64_t entries = 0;
@@ -355,6 +355,13 @@ TEST(Crash, AFullDiskEndsTheJournalLoudlyAndNoFrame) {
   EXPECT_NE(log.find("event=journal_failed"), std::string::npos) << log;
   EXPECT_NE(log.find("journal.mcap"), std::string::npos) << "names the file";
   EXPECT_NE(log.find(" journal_errors=1"), std::string::npos) << log;
+  const auto counted = [&](const std::string& name) {
+    const std::size_t at = log.find(" " + name + "=");
+    return at == std::string::npos ? 0 : std::stoull(log.substr(at + name.size() + 2));
+  };
+  constexpr std::uint64_t kEntries = 1 + 2 * kFrames;  // the start, host frames and frames
+  EXPECT_EQ(counted("journal_entries"), read_log(journal).entries);
+  EXPECT_EQ(counted("journal_entries") + counted("journal_dropped"), kEntries);
   for (const char* name : {"journal.mcap", "record.mcap"}) {
     const LogContents contents = read_log(folder.file(name));
     EXPECT_EQ(contents.fault, "") << name;

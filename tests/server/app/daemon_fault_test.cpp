@@ -284,6 +284,23 @@ TEST_F(DaemonFaults, ClientsThatWantEveryThirdFrameAllGetTheSameOnesWithoutAGap)
   EXPECT_FALSE((*client)->subscribe(options).has_value());
 }
 
+TEST_F(DaemonFaults, AUdpClientLearnsTheFragmentSizeThatItGets) {
+  start_host_step();
+  const std::string url = "udp://" + daemon_->control();
+  for (const auto& [asked, granted] : std::vector<std::pair<std::uint32_t, std::uint32_t>>{
+           {1000, 1000}, {1441, 1440}, {10, 320}, {100'000, 65472}}) {
+    client::SubscribeOptions options;
+    options.fragment_payload_bytes = asked;
+    const auto client = open(url, options);
+    ASSERT_NE(client, nullptr);
+    EXPECT_EQ(client->terms().fragment_payload_bytes, granted) << asked;
+    ASSERT_NO_FATAL_FAILURE(lock_step());
+    const auto frame = client->receive(kLongNs);
+    EXPECT_TRUE(frame.has_value() && *frame != nullptr) << asked;
+  }
+  EXPECT_EQ(good_->terms().fragment_payload_bytes, 0U) << "there are no fragments over TCP";
+}
+
 TEST_F(DaemonFaults, ASilentHostIsFlaggedStaleUntilItSpeaksAgain) {
   start("mode = \"ig-clock\"\nrate_hz = 100\nhorizon_ms = 30");
   const auto client = open();

@@ -100,7 +100,7 @@ void play(const Setup& setup, Outcome& out) {
       ++nameless;
       return;
     }
-    // Of what was lost before the first one nobody knows.
+    // Nobody knows what was lost before the first frame.
     if (newest > 0 && frame.header.frame_number > newest) {
       const std::uint64_t missing = frame.header.frame_number - newest - 1;
       out.untold_gaps += missing > nameless + lost_on_the_way ? 1 : 0;

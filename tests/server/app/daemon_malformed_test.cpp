@@ -120,6 +120,53 @@ TEST_F(MalformedTraffic, ANanPoseIsRefusedWithItsStatus) {
   EXPECT_EQ((*status)->code, 6U);
   EXPECT_EQ((*status)->host_frame_number, 77U);
   EXPECT_GE((*status)->count, 1U);
+  EXPECT_NE((*status)->text.find("seeker: position_m.y is nan, must be"), std::string::npos)
+      << (*status)->text;
+}
+
+TEST_F(MalformedTraffic, AnEntitysPoseOutOfRangeIsNamedOverTcpAsWell) {
+  auto host = client::HostClient::connect("tcp://" + daemon_->control());
+  ASSERT_TRUE(host.has_value());
+  protocol::HostFrameData frame;
+  frame.frame_number = 1;
+  frame.entity_count = 1;
+  frame.entities[0].entity_id = 12;
+  frame.entities[0].has_pose = true;
+  frame.entities[0].pose.position_world_m.x = 1e9;
+  ASSERT_TRUE((*host)->send(frame).has_value());
+  const auto status = (*host)->receive_status(kLongNs);
+  ASSERT_TRUE(status.has_value() && status->has_value());
+  EXPECT_NE((*status)->text.find("entity 12: position_m.x is 1000000000, must be"),
+            std::string::npos)
+      << (*status)->text;
+}
+
+/// Everything that comes on a connection until the daemon closes it; fails when it does not.
+void read_to_end(const TcpSocket& socket, std::string& answer) {
+  std::array<char, 1024> buffer;
+  for (;;) {
+    pollfd wait{socket.fd(), POLLIN, 0};
+    ASSERT_GT(::poll(&wait, 1, 20'000), 0) << "no end of the connection";
+    const ssize_t got = ::recv(socket.fd(), buffer.data(), buffer.size(), 0);
+    if (got <= 0) {
+      return;
+    }
+    answer.append(buffer.data(), static_cast<std::size_t>(got));
+  }
+}
+
+TEST_F(MalformedTraffic, AnyFirstRecordButAHelloIsAnsweredAndClosed) {
+  // A frame, a host frame, a resend request, and a kind that nobody knows.
+  for (const int kind : {2, 3, 4, 77}) {
+    SCOPED_TRACE(kind);
+    const TcpSocket socket = raw_tcp();
+    std::array<std::byte, protocol::kRecordHeaderBytes> record{};
+    protocol::encode_record_header(static_cast<protocol::RecordKind>(kind), 0, record);
+    ASSERT_GT(::send(socket.fd(), record.data(), record.size(), MSG_NOSIGNAL), 0);
+    std::string answer;
+    ASSERT_NO_FATAL_FAILURE(read_to_end(socket, answer));
+    EXPECT_NE(answer.find("hello comes first"), std::string::npos);
+  }
 }
 
 TEST_F(MalformedTraffic, RandomBytesOnTheControlPortEndOnlyTheirConnection) {
@@ -144,16 +191,7 @@ TEST_F(MalformedTraffic, AnOversizeRecordIsAnsweredAndClosed) {
   protocol::encode_record_header(protocol::RecordKind::control, 0xFFFFFFF0U, header);
   ASSERT_GT(::send(socket.fd(), header.data(), header.size(), MSG_NOSIGNAL), 0);
   std::string answer;
-  std::array<char, 1024> buffer;
-  for (;;) {
-    pollfd wait{socket.fd(), POLLIN, 0};
-    ASSERT_GT(::poll(&wait, 1, 20'000), 0) << "no answer and no end of the connection";
-    const ssize_t got = ::recv(socket.fd(), buffer.data(), buffer.size(), 0);
-    if (got <= 0) {
-      break;
-    }
-    answer.append(buffer.data(), static_cast<std::size_t>(got));
-  }
+  ASSERT_NO_FATAL_FAILURE(read_to_end(socket, answer));
   EXPECT_NE(answer.find("record:"), std::string::npos) << "a status comes before the end";
 }
 

@@ -38,7 +38,7 @@ class DaemonMetrics : public testing::Test {
     EXPECT_TRUE(answer.has_value()) << answer.error().text;
     return answer ? *answer : client::HttpAnswer{};
   }
-  /// What the daemon answers to raw bytes.
+  /// Returns the daemon's answer to raw bytes.
   [[nodiscard]] std::string answer_to(const std::string& request) const {
     const auto where = parse_host_port(daemon_->metrics());
     auto socket =

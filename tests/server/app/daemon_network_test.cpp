@@ -104,7 +104,8 @@ std::vector<std::string> own_addresses(bool v6) {
   return out;
 }
 
-/// What lets a program on this machine connect by an address that is not loopback's.
+/// Returns the configuration that lets a program on this machine connect by an address that is not
+/// loopback's.
 std::string allowed(std::string host) {
   std::erase_if(host, [](char c) { return c == '[' || c == ']'; });
   return "[access]\nallow = [\"" + host + "\"]\n";

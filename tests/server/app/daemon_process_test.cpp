@@ -125,7 +125,7 @@ TEST(DaemonProcess, CheckAndVersionExitZeroWithoutServing) {
     EXPECT_EQ(daemon.wait(), 0) << folder.read("stderr");
   }
   {
-    // What it names is read as well.
+    // The files that it names are read as well.
     DaemonProcess daemon(folder, {"--config", config, "--check", "--set",
                                   "host.key_file=" + folder.file("no.keys")});
     EXPECT_EQ(daemon.wait(), 78);

@@ -27,7 +27,7 @@ const char* const kWorld =
     "[[channel]]\nname = \"gate\"\nband = \"8-12\"\nwindow_px = [21, 10, 19, 13]\n"
     "[[channel]]\nname = \"all\"\nband = \"8-12\"\n";
 
-/// What one subscription got, by frame number.
+/// Frames that one subscription got, by frame number.
 struct Stream {
   std::unique_ptr<client::FrameClient> client;
   client::ChannelDescription channel;

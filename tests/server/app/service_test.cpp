@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the service manager is told, and what is asked of the host.
+// Messages to the service manager, and settings that are asked of the host.
 #include <gtest/gtest.h>
 #include <sched.h>
 

@@ -135,8 +135,8 @@ TEST(Soak, MemoryStaysFlatAndEveryGapIsFlagged) {
     receiver.process->signal(SIGINT);
     const int code = receiver.process->wait();
     const std::string json = folder.read(receiver.label + ".json");
-    // What is lost is the machine's where the kernel dropped datagrams for want of room in this
-    // process's buffer; the frame that comes next has to say so all the same.
+    // The machine is to blame for losses where the kernel dropped datagrams for want of room in
+    // this process's buffer. The next frame has to report them all the same.
     if (test::json_value(json, "os_drops") == "0") {
       EXPECT_EQ(code, 0) << receiver.label << receiver.process->err();
       EXPECT_EQ(test::json_value(json, "lost"), "0") << receiver.label;

@@ -31,7 +31,7 @@ std::uint32_t number_of(const std::vector<std::byte>& bytes) {
   return number;
 }
 
-/// What comes out, in order, when datagrams enter 1 us apart.
+/// Returns what comes out, in order, when datagrams enter 1 us apart.
 std::vector<std::vector<std::byte>> through(FaultInjector& injector, std::uint32_t count) {
   std::vector<std::vector<std::byte>> out;
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the daemon does about its own machine: journal, device, clock. On a fake clock, step by
-// step.
+// Faults of the daemon's own machine: journal, device, clock. The tests run on a fake clock, step
+// by step.
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
@@ -158,7 +158,7 @@ TEST(Journal, WhatIsNoLogIsKeptAsWell) {
   const auto second = keep_older_journal(file);
   ASSERT_TRUE(second.has_value()) << second.error().text;
   EXPECT_EQ(second->filename(), first->stem().string() + "-2.txt");
-  // By a link: its target, beside which the next one will be written.
+  // A link leads to the log: its target is renamed, and the next one will be written beside it.
   const std::string link = folder.file("link.txt");
   std::filesystem::create_directory(folder.file("target"));
   folder.write("target/notes.txt", "nor this\n");

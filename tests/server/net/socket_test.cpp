@@ -72,7 +72,7 @@ std::string congestion_control_of(int fd) {
                                                                                   : "?";
 }
 
-/// In a network of this thread's own the system's choice is this thread's to make.
+/// A network of this thread's own, in which it may set the choice of the system.
 class OwnNetwork {
  public:
   /// Why there is none; empty: there is one, with a loopback interface.
@@ -100,8 +100,8 @@ class OwnNetwork {
   static constexpr const char* kFile = "/proc/sys/net/ipv4/tcp_congestion_control";
 };
 
-/// What a connection has that a listener accepts: opened under one choice of the system, connected
-/// under another.
+/// Returns the congestion control of an accepted connection, whose listener was opened under one
+/// choice of the system and accepted under another.
 std::string accepted_congestion_control(const std::string& at_open, const std::string& at_accept,
                                         CongestionControl& told) {
   const SocketContext context;
@@ -298,7 +298,7 @@ TEST_F(TcpPair, FramesComeToLieInOnePlaceHoweverManyWait) {
   const std::byte* place = nullptr;
   std::span<const std::byte> rest(stream);
   for (int frames = 0; frames < kFrames;) {
-    // As much ahead of the client as the sockets hold.
+    // Write ahead of the client as much as the sockets hold.
     while (!rest.empty()) {
       const IoResult sent = server_.write_some(rest);
       if (sent.status != IoStatus::done) break;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whose triggers the port takes.
+// The port takes triggers from some senders only.
 #include <gtest/gtest.h>
 #include <poll.h>
 
@@ -30,7 +30,7 @@ class Port : public ::testing::Test {
     port_ = std::move(*port);
   }
 
-  /// What the port makes of a datagram once it is there.
+  /// Returns what the port makes of a datagram once it is there.
   std::optional<ReceivedTrigger> take(std::span<const std::byte> bytes) {
     EXPECT_EQ(source_.send_to(bytes, port_->address()).status, IoStatus::done);
     pollfd wait{port_->fd(), POLLIN, 0};

@@ -14,7 +14,7 @@ constexpr std::array<renderer::RungStats, 4> kRungs{
     {{10.0, 0.0}, {7.0, 0.2}, {7.5, 0.3}, {4.0, 2.0}}};
 constexpr std::int64_t kMs = 1'000'000;
 
-/// Until it has no doubt: what was wrong at first is forgotten.
+/// Runs frames until the policy has no doubt: wrong costs from the start are forgotten.
 void settle(QualityPolicy& policy, double rung_ms, double work_ms) {
   for (int i = 0; i < 600; ++i) policy.finished(std::llround(1e6 * work_ms), rung_ms);
 }

@@ -45,7 +45,7 @@ struct Sources {
     sources.build = {{"version", "1.2"}, {"device", "a \"b\" \\ c\nd"}};
     sources.prediction = &context.prediction;
     sources.realtime = &realtime;
-    return metrics_text(sources, {7, true, 1'500'000'000, 9'000'000'000, ptp});
+    return metrics_text(sources, {7, true, 1'500'000'000, 9'000'000'000, 4096, ptp});
   }
 };
 
@@ -81,6 +81,7 @@ TEST(MetricsText, IsSoundWhetherThereIsMuchToSayOrNothing) {
   EXPECT_EQ(metrics.value("emitd_run_info", {{"run_id", "7"}}), 1.0);
   EXPECT_EQ(metrics.value("emitd_ready"), 1.0);
   EXPECT_EQ(metrics.value("emitd_uptime_seconds"), 1.5);
+  EXPECT_EQ(metrics.value("emitd_journal_memory_bytes"), 4096.0);
   EXPECT_EQ(metrics.value("emitd_build_info", {{"device", "a \\\"b\\\" \\\\ c\\nd"}}), 1.0);
   EXPECT_EQ(metrics.value("emitd_frame_seconds_count"), 1.0);
   EXPECT_EQ(metrics.value("emitd_frame_seconds_sum"), 0.003);

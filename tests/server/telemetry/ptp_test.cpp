@@ -17,7 +17,7 @@ namespace {
 
 using test::from_hex;
 
-// What ptp4l of linuxptp 3.1.1 answered to sequence 7 while it listened alone.
+// Answer of ptp4l (linuxptp 3.1.1) to sequence 7 while it listened alone.
 constexpr std::string_view kPortData =
     "0d0200500000000000000000000000000000000042eaa5fffe1c149f00010007047f000000000000"
     "00000000000002000001001c200442eaa5fffe1c149f000104000000000000000000010300010002";
@@ -73,7 +73,7 @@ TEST(PtpStatus, IgnoresWhatIsNoAnswerToItsQuestion) {
   for (const std::string_view hex : {kPortData, kTimeStatus}) {
     const auto whole = from_hex(hex);
     for (std::size_t size = 0; size < whole.size(); ++size) {
-      // In memory of its own size, so that a sanitizer sees a read beyond it.
+      // The copy has memory of its own size, so that a sanitizer sees a read beyond it.
       const std::vector<std::byte> cut(whole.begin(),
                                        whole.begin() + static_cast<std::ptrdiff_t>(size));
       EXPECT_TRUE(ignored(cut)) << size;

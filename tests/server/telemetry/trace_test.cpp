@@ -73,7 +73,7 @@ struct Parsed {
   }
 };
 
-/// On every track two events either follow one another or one holds the other.
+/// Expects that on every track two events follow one another or one holds the other.
 void expect_nesting(const Parsed& trace) {
   for (const Event& a : trace.events) {
     for (const Event& b : trace.events) {

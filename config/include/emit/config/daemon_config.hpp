@@ -127,6 +127,8 @@ struct TlsConfig {
 struct JournalConfig {
   std::filesystem::path file;  ///< empty: only recorders get the journal
   std::uint32_t ring_entries = 4096;
+  std::uint32_t memory_mib = 64;  ///< entries of the run kept for recorders that connect later
+  bool required = false;          ///< a start without room for the file fails
 };
 
 struct DeviceConfig {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "emit/physics/limits.hpp"
+#include "emit/protocol/decode_fault.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/version.hpp"
 
@@ -49,11 +50,15 @@ class HostFrameDecoder {
   HostFrameDecoder(HostFrameDecoder&&) noexcept;
   HostFrameDecoder& operator=(HostFrameDecoder&&) noexcept;
 
+  /// Returns which field the last decode_host_frame() refused; kind none after a success.
+  [[nodiscard]] const DecodeFault& fault() const noexcept { return fault_; }
+
  private:
   friend DecodeStatus decode_host_frame(std::span<const std::byte> bytes, HostFrameDecoder& decoder,
                                         HostFrameData& out) noexcept;
   struct Impl;
   std::unique_ptr<Impl> impl_;
+  DecodeFault fault_;
 };
 
 /// Decodes one emit.v1.HostFrame. On ok `out` is written completely, and received_ns becomes 0. On

@@ -32,10 +32,13 @@ enum class StatusCode : std::uint8_t {
 
 /// Detail of a `not_allowed` status for a host frame whose run another host has replaced.
 inline constexpr std::uint64_t kDetailOldRun = 1U << 16;
+/// The detail of an `ok` status for a host frame that is stored, but makes no frame: emitd is
+/// stopped.
+inline constexpr std::uint64_t kDetailStopped = 1U << 17;
 
 /// Returns the English text of a status. Thread: any. It allocates.
 /// @param detail  unknown_entity, overloaded: the entity's id; not_allowed: the command's kind or
-///   kDetailOldRun; other codes ignore it.
+///   kDetailOldRun; ok: the command's kind or kDetailStopped; other codes ignore it.
 [[nodiscard]] std::string status_text(StatusCode code, std::uint64_t detail);
 
 }  // namespace emit::protocol

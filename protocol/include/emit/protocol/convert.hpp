@@ -28,12 +28,18 @@ void to_proto(const EnvironmentData& environment, v1::Environment& out);
 void to_proto(const HostFrameData& frame, v1::HostFrame& out);
 
 /// Reads the struct from the message and checks the values as decode_host_frame() does
-/// (docs/wire.md section 5). On an error `out` is unspecified. RT-safe.
+/// (docs/wire.md section 5). On an error `out` is unspecified, and `fault`, where it is not null,
+/// names the field and its value; a pose alone cannot know whether it is the seeker's or an
+/// entity's. RT-safe.
 [[nodiscard]] DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose,
-                                      std::optional<PoseRates>& rates) noexcept;
-[[nodiscard]] DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out) noexcept;
-[[nodiscard]] DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out) noexcept;
-[[nodiscard]] DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out) noexcept;
+                                      std::optional<PoseRates>& rates,
+                                      DecodeFault* fault = nullptr) noexcept;
+[[nodiscard]] DecodeStatus from_proto(const v1::EntityState& in, EntityStateData& out,
+                                      DecodeFault* fault = nullptr) noexcept;
+[[nodiscard]] DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
+                                      DecodeFault* fault = nullptr) noexcept;
+[[nodiscard]] DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out,
+                                      DecodeFault* fault = nullptr) noexcept;
 
 /// Appends a record header and the message to `out`, ready for a TCP connection (docs/wire.md
 /// section 2).

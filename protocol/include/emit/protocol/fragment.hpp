@@ -89,6 +89,14 @@ void encode(const FragmentHeader& header, std::span<std::byte, kFragmentHeaderBy
 [[nodiscard]] std::optional<std::uint16_t> stream_of_fragment(
     std::span<const std::byte> datagram) noexcept;
 
+/// Returns the payload of every fragment but the last where this much is asked for: within
+/// [kMinFragmentPayloadBytes, kMaxFragmentPayloadBytes] and a multiple of 4.
+[[nodiscard]] constexpr std::uint32_t granted_fragment_payload_bytes(
+    std::uint32_t wanted_bytes) noexcept {
+  return std::clamp(wanted_bytes, kMinFragmentPayloadBytes, kMaxFragmentPayloadBytes) &
+         ~std::uint32_t{3};
+}
+
 /// Cuts a frame into fragments without copying pixels.
 ///
 /// Every fragment but the last has the same size, so one call with UDP_SEGMENT = datagram_bytes()

@@ -78,6 +78,51 @@ TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCounted) {
   EXPECT_EQ(rig.count(Counter::frames_coarse), 1U);
 }
 
+TEST(RenderAgent, AFrameInWhichTheSurfaceWarmsUpAgainIsDegradedCountedAndLogged) {
+  constexpr std::int64_t kSecondNs = 1'000'000'000;
+  struct Case {
+    std::int64_t to_ns;    // simulation time of the second frame
+    std::int64_t took_ns;  // of its submit()
+    bool warm_up;
+  };
+  for (const Case& each :
+       {Case{3600 * kSecondNs, 400'000'000, true},      // forward
+        Case{-3600 * kSecondNs, 19'600'000'000, true},  // a new run that is earlier
+        Case{3600 * kSecondNs, 50'000'000, false},      // a source without surface
+        Case{10'000'000, 400'000'000, false}}) {        // a slow frame, no jump
+    SCOPED_TRACE(each.to_ns);
+    Rig rig;
+    std::int64_t passes_ns = 0;
+    bool ready_meanwhile = true;
+    rig.script.on_submit = [&](const renderer::FrameRequest&) {
+      rig.clock.advance(passes_ns);
+      const std::int64_t since_ns = rig.context().jump_since_ns.load();
+      ready_meanwhile = since_ns == 0 || !warms_up_again(rig.clock.monotonic_ns() - since_ns);
+    };
+    rig.send(1, 0);
+    rig.settle();
+    passes_ns = each.took_ns;
+    rig.send(2, each.to_ns, 0.0, each.to_ns < 0 ? 2 : 1);
+    rig.settle();
+    EXPECT_EQ(ready_meanwhile, !each.warm_up);
+    EXPECT_EQ(rig.context().jump_since_ns.load(), 0);
+    passes_ns = 0;
+    rig.send(3, each.to_ns + 1, 0.0, each.to_ns < 0 ? 2 : 1);
+    rig.settle();
+    ASSERT_EQ(rig.frames.size(), 3U);
+    for (const std::size_t i : {0U, 1U, 2U}) {
+      const bool degraded = (rig.frames[i].header.flags & protocol::kFlagDegraded) != 0U;
+      EXPECT_EQ(degraded, each.warm_up && i == 1U) << i;
+    }
+    EXPECT_EQ(rig.count(Counter::frames_warmed_up), each.warm_up ? 1U : 0U);
+    const Event* event = rig.context().render_events.ring().front();
+    ASSERT_EQ(event != nullptr, each.warm_up);
+    if (event != nullptr) {
+      EXPECT_NE(describe(*event).text.find("event=warmed_up_again"), std::string::npos);
+    }
+  }
+}
+
 TEST(RenderAgent, CountsForgottenPosesAndTheirFramesAreDegraded) {
   Rig rig;
   rig.send(1, 1);
@@ -155,8 +200,8 @@ TEST(Conductor, SaysWhichFramesHaveEntitiesOfAnOlderOne) {
       EXPECT_EQ(std::isnan(header.estimated_error_k), behind);
       EXPECT_EQ(rig.count(Counter::frames_entities_behind), behind ? 1U : 0U);
       if (stepped) continue;
-      // What stands still waits for nothing: the rest comes with the next frame, then nobody is
-      // behind, however many there are.
+      // Entities that stand still do not block: the rest comes with the next frame, and then no
+      // entity is behind, however many there are.
       for (int slot = 0; slot < 5; ++slot) {
         rig.next_slot();
         EXPECT_EQ(rig.frames.back().header.flags & protocol::kFlagDegraded, 0U) << slot;

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "agents/receiver/receiver_connection.hpp"
 #include "support/conductor_rig.hpp"
 
 namespace emit::server {
@@ -269,6 +268,11 @@ TEST(HostStep, StopTakesInputsButSendsNothingUntilStep) {
   rig.settle();
   EXPECT_EQ(rig.frames.size(), 1U);
   EXPECT_EQ(rig.count(Counter::host_frames_unused), 2U);
+  ASSERT_EQ(rig.replies.size(), 3U) << "the command and every pose have an answer";
+  EXPECT_EQ(rig.replies[2].code, StatusCode::ok);
+  EXPECT_EQ(rig.replies[2].host_frame_number, 3U);
+  EXPECT_NE(protocol::status_text(rig.replies[2].code, rig.replies[2].detail).find("stopped"),
+            std::string::npos);
   rig.command(CommandKind::step);
   rig.settle();
   ASSERT_EQ(rig.frames.size(), 2U);
@@ -291,6 +295,19 @@ TEST(HostStep, HoldFreezesThermalTimeAndFlagsFrames) {
   EXPECT_EQ(rig.script.submitted[1].thermal_time_ns, 10);
   EXPECT_EQ(rig.script.submitted[1].sim_time_ns, 20);
   EXPECT_EQ(rig.frames[1].header.flags, protocol::kFlagHold);
+}
+
+TEST(HostStep, StartEndsStopAndHold) {
+  Rig rig;
+  rig.send(1, 10);
+  rig.command(CommandKind::hold);
+  rig.command(CommandKind::stop);
+  rig.command(CommandKind::start);
+  rig.send(2, 20);
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 2U);
+  EXPECT_EQ(rig.frames[1].header.flags, 0U);
+  EXPECT_EQ(rig.script.submitted[1].thermal_time_ns, 20);
 }
 
 TEST(HostStep, ResetBeginsANewRunWithAFreshSource) {

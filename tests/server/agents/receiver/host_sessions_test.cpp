@@ -114,7 +114,7 @@ TEST(HostSessions, WhatIsNotGenuineIsToldApart) {
   forged = peer.open(1);
   forged.back() ^= std::byte{1};
   EXPECT_EQ(sessions->take(forged).verdict, Verdict::bad_mac);
-  // What the daemon says, sent back to it.
+  // An answer of the daemon is sent back to it.
   const auto challenge = sessions->challenge(sessions->take(peer.open(1)).header);
   EXPECT_EQ(sessions->take(Bytes(challenge.begin(), challenge.end())).verdict, Verdict::bad_mac);
   EXPECT_EQ(sessions->take(peer.frame(1)).verdict, Verdict::host_frame);

@@ -99,7 +99,7 @@ class FloodTest : public ::testing::Test {
     }
     say(bytes);
   }
-  /// Until there is nothing to do at this instant.
+  /// Turns the agents until there is nothing to do at this instant.
   void settle() {
     for (int turn = 0; receiver_->do_work(clock_.tai_ns()) > 0 || turn < 3; ++turn) {
       ASSERT_LT(turn, 100'000) << "never idle";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each frame says about the delay of the one before it on the same stream.
+// Each frame reports the delay of the frame before it on the same stream.
 #include <gtest/gtest.h>
 
 #include "agents/sender/sender_client.hpp"

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <system_error>
 
 #include "emit/physics/error.hpp"
 #include "emit/protocol/codec.hpp"
@@ -42,9 +43,13 @@ struct LogWriterOptions {
 /// Thread: one owner.  Real time: not RT-safe, it writes to the file.
 class LogWriter {
  public:
-  /// Creates or truncates `path`. Errors (io) name the path.
+  /// Creates or truncates `path`. Errors (io) name the path. A file that this call made is removed
+  /// again when it fails; so is one whose first message does not reach the disk.
+  /// @param cause  becomes the system's reason for the failure, such as ENOSPC; empty where there
+  ///   is none; null: not wanted
   [[nodiscard]] static physics::Result<LogWriter> create(const std::filesystem::path& path,
-                                                         const LogWriterOptions& options = {});
+                                                         const LogWriterOptions& options = {},
+                                                         std::error_code* cause = nullptr);
   LogWriter(LogWriter&&) noexcept;
   LogWriter& operator=(LogWriter&&) noexcept;
   /// Closes the file as close() does; errors are lost.
@@ -63,6 +68,9 @@ class LogWriter {
   /// write_host().
   [[nodiscard]] physics::Result<void> write_journal(std::span<const std::byte> encoded_entry,
                                                     std::int64_t log_time_ns);
+  /// Returns the number of messages that the kernel has taken. The others wait for flush() or are
+  /// lost by a failure.
+  [[nodiscard]] std::uint64_t messages_in_file() const noexcept;
   /// Hands all messages written so far to the kernel. Errors: io.
   [[nodiscard]] physics::Result<void> flush();
   /// Writes index and footer and closes the file. Further writes are errors; a second close does

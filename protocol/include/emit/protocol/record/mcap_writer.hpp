@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "emit/physics/error.hpp"
 
@@ -30,9 +31,13 @@ struct McapWriterOptions {
 class McapWriter {
  public:
   /// Creates or overwrites the file. Errors (io): the file cannot be written, or no folder takes
-  /// the index that waits for close(). An existing file is then unchanged.
+  /// the index that waits for close(); an existing file is then unchanged. A file that this call
+  /// made is removed again when it fails.
+  /// @param cause  becomes the system's reason for the failure, such as ENOSPC; empty where there
+  ///   is none; null: not wanted
   [[nodiscard]] static physics::Result<McapWriter> create(const std::filesystem::path& path,
-                                                          const McapWriterOptions& options);
+                                                          const McapWriterOptions& options,
+                                                          std::error_code* cause = nullptr);
   McapWriter(McapWriter&&) noexcept;
   McapWriter& operator=(McapWriter&&) noexcept;
   ~McapWriter();  ///< closes the file as close() does; errors are lost
@@ -51,6 +56,11 @@ class McapWriter {
   [[nodiscard]] physics::Result<void> write(std::uint16_t channel_id, std::uint32_t sequence,
                                             std::int64_t log_time_ns, std::int64_t publish_time_ns,
                                             std::span<const std::byte> data);
+  /// Returns the system's reason for the failure of a write; empty without a failure.
+  [[nodiscard]] std::error_code failure_cause() const noexcept;
+  /// Returns the number of messages that the kernel has taken. The others wait in the open chunk or
+  /// are lost by a failure.
+  [[nodiscard]] std::uint64_t messages_in_file() const noexcept;
   /// Hands the open chunk to the kernel. Errors: io; invalid_argument (closed writer).
   [[nodiscard]] physics::Result<void> flush();
   /// Writes summary and footer and closes the file. A second call does nothing. Errors: io.

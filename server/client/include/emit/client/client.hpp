@@ -36,7 +36,7 @@ struct Url {
 };
 /// tcp and udp. Errors (invalid_argument): anything else, naming the text.
 [[nodiscard]] physics::Result<Url> parse_url(const std::string& text);
-/// Where frames come from: tcp, udp and shm. Errors (invalid_argument): anything else.
+/// Parses the URL of a stream of frames: tcp, udp or shm. Errors (invalid_argument): anything else.
 [[nodiscard]] physics::Result<Url> parse_frame_url(const std::string& text);
 
 /// emit.v1.Status as plain data; `code` has the values of Status::Code (1 = OK).
@@ -66,12 +66,12 @@ struct ChannelDescription {
   std::uint32_t sensor_width_px = 0;  ///< 0: the daemon does not say
   std::uint32_t sensor_height_px = 0;
 
-  /// What radiances are converted with: where the response is not known, a rectangle. Absent for a
-  /// channel of no band, or one that makes no sense.
+  /// Returns the band with which radiances are converted: a rectangle where the response is not
+  /// known. Absent for a channel without a band, or with one that makes no sense.
   [[nodiscard]] std::optional<physics::Band> spectral_band() const;
 };
 
-/// What the daemon says about itself on connecting.
+/// Description of the daemon, received on connecting.
 struct ServerInfo {
   std::string software;
   std::string scenario;
@@ -79,6 +79,7 @@ struct ServerInfo {
   std::string device;
   std::uint64_t run_id = 0;
   bool tai_offset_unset = false;
+  bool sends_journal_end = false;  ///< RecorderClient can tell an end in order from a broken one
   std::vector<ChannelDescription> channels;
 };
 
@@ -98,23 +99,27 @@ struct SubscribeOptions {
   std::uint16_t udp_port = 0;                ///< UDP; 0 = any free port
   /// shm: pixels are not copied but stay where the daemon writes them: see FrameClient::intact().
   bool in_place = false;
-  /// UDP: error correction; absent = daemon's choice, off() = none. FrameClient::terms() tells what
+  /// UDP: error correction; absent = daemon's choice, off() = none. FrameClient::terms() has what
   /// came of it.
   std::optional<protocol::FecParams> fec;
   /// UDP unicast, daemon in host-step: missing fragments are asked for again.
   bool resend = false;
-  /// UDP: the port that the daemon is told, where a relay on this host takes the datagrams first;
+  /// UDP: the port that the daemon sends to, where a relay on this host takes the datagrams first;
   /// 0 = this client's own.
   std::uint16_t announced_udp_port = 0;
 };
 
-/// What the daemon granted a subscription.
+/// Terms that the daemon granted a subscription.
 struct StreamTerms {
   protocol::FecParams fec;
   bool resend = false;
   bool compression = false;
-  std::uint32_t every_nth = 1;  ///< of the daemon's frames: the wish times the channel's own
-  std::uint16_t udp_port = 0;   ///< where this client receives; 0: not over UDP
+  std::uint32_t every_nth =
+      1;  ///< of the daemon's frames: the requested step times the channel's own
+  std::uint16_t udp_port = 0;  ///< where this client receives; 0: not over UDP
+  /// UDP: payload of every fragment but the last, which need not be what was asked for; 0: TCP, or
+  /// an older daemon.
+  std::uint32_t fragment_payload_bytes = 0;
 };
 
 /// Pixels stay valid until the next receive().
@@ -154,7 +159,7 @@ struct ReceiveCounters {
   std::uint64_t resend_requests = 0;
   std::uint64_t resent = 0;  ///< fragments that came because they were asked for
 
-  /// Of two connections, one after the other.
+  /// Adds the counts of a second connection that followed the first one.
   ReceiveCounters& operator+=(const ReceiveCounters& other) noexcept;
 };
 
@@ -176,15 +181,16 @@ class FrameClient {
   [[nodiscard]] virtual physics::Result<ChannelDescription> subscribe(
       const SubscribeOptions& options) = 0;
 
-  /// What the daemon granted; after subscribe().
+  /// Returns what the daemon granted.
+  /// @pre subscribe() succeeded
   [[nodiscard]] virtual const StreamTerms& terms() const noexcept = 0;
 
   /// Next frame in order; null when the timeout ran out first. Errors: io (connection closed),
   /// protocol (stream broken). After an error the client is of no further use.
   [[nodiscard]] virtual physics::Result<const ReceivedFrame*> receive(std::int64_t timeout_ns) = 0;
-  /// With SubscribeOptions::in_place, to be asked after the last use of a frame's pixels. False:
-  /// the daemon has overwritten them meanwhile, so what was made of them is void. Without it,
-  /// always true.
+  /// Returns false when the daemon has overwritten a frame's pixels since receive(), so that
+  /// results made of them are void. Only with SubscribeOptions::in_place; call it after the last
+  /// use of the pixels. Without that option it is always true.
   [[nodiscard]] virtual bool intact() const noexcept = 0;
 
   [[nodiscard]] virtual const ReceiveCounters& counters() const noexcept = 0;
@@ -219,6 +225,15 @@ class HostClient {
   [[nodiscard]] virtual const ServerInfo* server() const noexcept = 0;
 };
 
+/// Entries of the run that a daemon no longer held when a recorder connected.
+struct JournalGap {
+  std::uint64_t first_sequence = 0;  ///< 0: nothing is missing
+  std::uint64_t last_sequence = 0;
+  [[nodiscard]] std::uint64_t entries() const noexcept {
+    return first_sequence == 0 ? 0 : last_sequence - first_sequence + 1;
+  }
+};
+
 /// Receives the journal over tcp://host:port, from the start of the current run as far as the
 /// daemon still holds it.
 class RecorderClient {
@@ -229,11 +244,18 @@ class RecorderClient {
   virtual ~RecorderClient() = default;
 
   [[nodiscard]] virtual const ServerInfo& server() const noexcept = 0;
-  /// False when the timeout ran out. Errors: io (connection closed; `closed()` tells), protocol.
+  /// False when the timeout ran out. Errors: io (connection closed; see closed()), protocol.
   [[nodiscard]] virtual physics::Result<bool> receive(v1::JournalEntry& entry,
                                                       std::int64_t timeout_ns) = 0;
-  /// True after the daemon closed the connection in order: the journal is complete.
+  /// Returns true after the daemon closed the connection in order: everything came that it had.
+  /// False after an error means that the connection broke: the daemon was killed, the network
+  /// failed, or this recorder fell behind. A daemon of version 0.1 does not send the end of the
+  /// journal (ServerInfo::sends_journal_end); any close between two records counts as in order
+  /// then.
   [[nodiscard]] virtual bool closed() const noexcept = 0;
+  /// Returns the entries of the run that came before the first one received and are lost. Valid
+  /// once receive() has returned an entry.
+  [[nodiscard]] virtual const JournalGap& gap() const noexcept = 0;
 };
 
 }  // namespace emit::client

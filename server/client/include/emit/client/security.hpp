@@ -5,7 +5,7 @@
 
 namespace emit::client {
 
-/// How a client proves who it is, and asks the same of the daemon. Empty: not at all.
+/// Files with which a client proves its identity and checks the daemon's. Empty: neither.
 struct Security {
   std::filesystem::path tls_ca;           ///< PEM: signs the daemon's certificate
   std::filesystem::path tls_certificate;  ///< PEM, this client's
