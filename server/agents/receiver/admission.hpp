@@ -9,6 +9,7 @@
 #include "agents/receiver/peer_limits.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/protocol/host_session.hpp"
 #include "net/tls_session.hpp"
 
 namespace emit::server {

@@ -11,7 +11,7 @@
 #include "agents/receiver/admission.hpp"
 #include "agents/receiver/connection_table.hpp"
 #include "agents/receiver/control_session.hpp"
-#include "agents/receiver/host_port.hpp"
+#include "agents/receiver/host_frame_port.hpp"
 #include "emit/config/daemon_config.hpp"
 #include "net/socket.hpp"
 
@@ -101,7 +101,7 @@ class Receiver final : public Agent {
   TcpListener listener_;
   Admission admission_;
   ConnectionTable connections_;
-  HostPort host_port_;
+  HostFramePort host_port_;
   ControlSession session_;
   std::int64_t accept_again_ns_ = 0;  // monotonic; 0: the listener is watched
   std::int64_t wake_at_ns_ = kNeverNs;

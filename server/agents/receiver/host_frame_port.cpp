@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "agents/receiver/host_port.hpp"
+#include "agents/receiver/host_frame_port.hpp"
 
 #include <sys/epoll.h>
 #include <sys/socket.h>
@@ -33,7 +33,7 @@ SocketAddress address_of(const Origin& origin) noexcept {
 }  // namespace
 
 /// Memory of one batch of datagrams.
-struct HostPort::Memory {
+struct HostFramePort::Memory {
   static constexpr std::size_t kBatch = 16;
   static constexpr std::size_t kDatagramBytes = 65536;
   static constexpr std::size_t kControlBytes = 128;
@@ -47,13 +47,14 @@ struct HostPort::Memory {
   std::array<mmsghdr, kBatch> messages{};
 };
 
-HostPort::HostPort(Context& context, Admission& admission)
+HostFramePort::HostFramePort(Context& context, Admission& admission)
     : context_(context), admission_(admission), memory_(std::make_unique<Memory>()) {}
 
-HostPort::~HostPort() = default;
+HostFramePort::~HostFramePort() = default;
 
-physics::Result<void> HostPort::open(const SocketContext& sockets, const SocketAddress& address,
-                                     const config::DaemonConfig& config) {
+physics::Result<void> HostFramePort::open(const SocketContext& sockets,
+                                          const SocketAddress& address,
+                                          const config::DaemonConfig& config) {
   if (config.authenticated_host()) {
     auto keys = load_host_keys(config);
     if (!keys) {
@@ -77,7 +78,7 @@ physics::Result<void> HostPort::open(const SocketContext& sockets, const SocketA
   return {};
 }
 
-bool HostPort::watch(int epoll_fd, std::uint64_t key) noexcept {
+bool HostFramePort::watch(int epoll_fd, std::uint64_t key) noexcept {
   epoll_fd_ = epoll_fd;
   key_ = key;
   epoll_event event{};
@@ -87,7 +88,7 @@ bool HostPort::watch(int epoll_fd, std::uint64_t key) noexcept {
   return watched_;
 }
 
-int HostPort::receive(std::size_t room, std::int64_t now_ns) noexcept {
+int HostFramePort::receive(std::size_t room, std::int64_t now_ns) noexcept {
   Memory& memory = *memory_;
   const bool reading = room > 0;
   if (reading != watched_) {
@@ -123,7 +124,7 @@ int HostPort::receive(std::size_t room, std::int64_t now_ns) noexcept {
   return std::max(count, 0);
 }
 
-std::int64_t HostPort::read_control_messages(std::size_t index, std::int64_t now_ns) noexcept {
+std::int64_t HostFramePort::read_control_messages(std::size_t index, std::int64_t now_ns) noexcept {
   msghdr& message = memory_->messages[index].msg_hdr;
   std::int64_t received_ns = now_ns;
   for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr;
@@ -146,7 +147,8 @@ std::int64_t HostPort::read_control_messages(std::size_t index, std::int64_t now
   return received_ns;
 }
 
-void HostPort::take_datagram(std::size_t index, std::size_t bytes, std::int64_t now_ns) noexcept {
+void HostFramePort::take_datagram(std::size_t index, std::size_t bytes,
+                                  std::int64_t now_ns) noexcept {
   Memory& memory = *memory_;
   context_.counters.add(Counter::host_datagrams);
   const std::int64_t received_ns = read_control_messages(index, now_ns);
@@ -197,9 +199,9 @@ void HostPort::take_datagram(std::size_t index, std::size_t bytes, std::int64_t 
   context_.bells.conductor.ring();
 }
 
-void HostPort::refuse(const Origin& origin, std::span<const std::byte> datagram, StatusCode code,
-                      std::uint64_t host_frame_number, std::string_view text,
-                      std::string_view event_text) {
+void HostFramePort::refuse(const Origin& origin, std::span<const std::byte> datagram,
+                           StatusCode code, std::uint64_t host_frame_number, std::string_view text,
+                           std::string_view event_text) {
   const std::uint64_t count = context_.counters.add(counter_of(code));
   if (!event_text.empty()) {
     context_.receiver_events.push(EventKind::refused, static_cast<std::uint64_t>(code), count,
@@ -213,7 +215,7 @@ void HostPort::refuse(const Origin& origin, std::span<const std::byte> datagram,
   }
 }
 
-std::optional<std::span<const std::byte>> HostPort::authenticate(
+std::optional<std::span<const std::byte>> HostFramePort::authenticate(
     std::span<const std::byte> datagram, const protocol::IpAddress& peer, Origin& origin) {
   using Verdict = HostSessions::Verdict;
   const HostSessions::Taken taken = sessions_->take(datagram);
@@ -253,8 +255,9 @@ std::optional<std::span<const std::byte>> HostPort::authenticate(
   return std::nullopt;
 }
 
-void HostPort::send_status(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
-                           std::uint64_t count, const std::string& text) noexcept {
+void HostFramePort::send_status(const Origin& origin, StatusCode code,
+                                std::uint64_t host_frame_number, std::uint64_t count,
+                                const std::string& text) noexcept {
   const std::int64_t now_ns = context_.clock.monotonic_ns();
   if (now_ns - status_window_ns_ >= kStatusWindowNs) {
     status_window_ns_ = now_ns;

@@ -18,10 +18,10 @@ namespace emit::server {
 /// The UDP port of host frames: takes datagrams with their arrival times, proves their origin where
 /// that is asked for, decodes them onto the conductor's ring, and sends the answers.
 /// Thread: the receiver's. Real time: sound datagrams are RT-safe; a refused one allocates.
-class HostPort {
+class HostFramePort {
  public:
-  HostPort(Context& context, Admission& admission);
-  ~HostPort();
+  HostFramePort(Context& context, Admission& admission);
+  ~HostFramePort();
 
   /// Opens the port. Errors: io (address in use), those of host.key_file.
   /// @param address  where to listen
