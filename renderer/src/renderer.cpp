@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
@@ -131,6 +132,7 @@ class GlRenderer final : public Renderer {
     auto ready = stage_->warm_up(first, progress);
     if (ready) stage_->describe(scene_stats_);
     scene_stats_.first_frame_warnings = first_frame_warnings(scenario_, first.thermal_time_ns);
+    warm_ = warm_ || ready.has_value();
     return ready;
   }
   [[nodiscard]] glm::uvec2 output_px() const noexcept { return frame_params_.output_px; }
@@ -159,6 +161,7 @@ class GlRenderer final : public Renderer {
   BandModel bands_;
   FramePasses passes_;
   std::unique_ptr<ThermalStage> stage_;
+  bool warm_ = false;  ///< the stage has been warmed up
 
   gpu::FrameParams frame_params_{};
   CommandRange view_single_sided_;
@@ -446,9 +449,17 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   view.rung = 0;
   view.estimated_error_k = 0.0F;
   StageTimes& stages = view.stages_ms;
-  // Warm up if the frame needs it. If that fails, nothing can be drawn: the old content of the
-  // planes goes out, and the frame is flagged as failed.
-  view.device_failed = stage_->cold(request) && !warm_up_stage(request, {});
+  // Prepare the surface where the thermal time has jumped, and measure how long that takes.
+  view.stats.rewarm_s = 0.0;
+  view.device_failed = false;
+  if (stage_->cold(request)) {
+    const bool again = warm_;
+    const auto begin = std::chrono::steady_clock::now();
+    view.device_failed = !warm_up_stage(request, {});
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+    if (again) view.stats.rewarm_s = took.count();
+  }
+  // If that fails, nothing can be drawn: the old content of the planes goes out, flagged as failed.
   if (view.device_failed) {
     const ReadbackRing::Range all{0, output_buffer_.bytes()};
     readback_.copy_from(output_buffer_, static_cast<std::uint32_t>(slot), {&all, 1});
@@ -465,7 +476,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   const QualityLevel& level = kQualityLadder[view.rung];
   // Do the work of the CPU and bind everything.
   prepare(request, level);
-  view.stats.coarse = stage_->coarse_from(request.sensor_pose);
+  view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0;
   bind_frame();
   // Clear the counters, then issue all passes and the read-back.
   const std::uint32_t zero = 0;

@@ -24,6 +24,8 @@ constexpr std::size_t kSuns = 16;
 constexpr std::int64_t kDayNs = 86'400'000'000'000;
 /// Share of the field of view by which the camera may point away from its planned direction.
 constexpr double kFieldMarginFrac = 0.5;
+/// The camera may point anywhere.
+constexpr double kAnyCosine = -2.0;
 
 /// Angle of one pixel at the boresight.
 double pixel_rad(const scene::SensorDesc& sensor) {
@@ -152,6 +154,7 @@ CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb&
                          std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
                          std::optional<ShadePass> shade_pass, bool software)
     : sensor_(scenario.sensor),
+      max_samples_(scenario.thermal.max_samples),
       software_(software),
       static_bounds_(static_bounds),
       detail_eyes_(std::move(detail_eyes)),
@@ -171,12 +174,18 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   // Sample the surface for the camera and integrate its history, or read the state file.
   const CachedSurface::Inputs inputs{history_.environment, history_.entities};
   const RefineView view = refine_view(sensor_, request);
+  if (saved_) {
+    const RefineView::Eye here = view.eyes.front();
+    saved_->fits_camera = [this, here](std::span<const RefineView::Eye> eyes) {
+      return stands_near(eyes_around(eyes, static_bounds_), here, kAnyCosine);
+    };
+  }
   auto ready = surface_->prepare(request.thermal_time_ns, view, inputs, plan_, surface_history_,
                                  saved_, progress);
   if (!ready) return ready;
   // Do not require the state file again: after a jump of sim time it need not fit.
   if (saved_) saved_->start = false;
-  refined_eyes_ = eyes_around(view.eyes, static_bounds_);
+  refined_eyes_ = eyes_around(surface_->model().eyes, static_bounds_);
   // Send the meshes to the device. Release the memory of the old ones first.
   drawn_.reset();
   drawn_ = std::make_unique<DrawnScene>(surface_->drawn_scene(), history_of_object_, software_);
@@ -201,30 +210,33 @@ DrawnScene& CachedStage::drawn() noexcept {
   return *drawn_;
 }
 
+bool CachedStage::stands_near(const std::vector<Eye>& eyes, const RefineView::Eye& here,
+                              double cos_at_least) noexcept {
+  return std::ranges::any_of(eyes, [&](const Eye& each) {
+    return glm::distance(each.eye.world_m, here.world_m) <= each.reach_m &&
+           glm::dot(each.eye.boresight, here.boresight) >= cos_at_least;
+  });
+}
+
 bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   const RefineView::Eye here = eye_of(camera);
   // Compare the direction of the camera only if samples ran out. Then surfaces outside the planned
   // view got none.
-  const double min_cos =
-      surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : -2.0;
-  const auto stands_near = [&](const std::vector<Eye>& eyes, double min_cosine) {
-    return std::ranges::any_of(eyes, [&](const Eye& each) {
-      return glm::distance(each.eye.world_m, here.world_m) <= each.reach_m &&
-             glm::dot(each.eye.boresight, here.boresight) >= min_cosine;
-    });
-  };
+  const double least_cos =
+      surface_->model().full ? std::cos(kFieldMarginFrac * half_diagonal_rad(sensor_)) : kAnyCosine;
   // Check the flags of the surface, then the positions it was prepared for. Meshes were simplified
   // only if the scenario has positions of the camera.
   return visibly_simplified_ || surface_->model().full_in_view ||
          surface_->shade().short_of_pages() || surface_->stale_shadow() || surface_->lags() ||
-         !stands_near(refined_eyes_, min_cos) ||
-         (!detail_eyes_.empty() && !stands_near(detail_eyes_, -2.0));
+         !stands_near(refined_eyes_, here, least_cos) ||
+         (!detail_eyes_.empty() && !stands_near(detail_eyes_, here, kAnyCosine));
 }
 
 void CachedStage::describe(SceneStats& stats) const noexcept {
   stats.samples = surface_->model().samples.samples.size();
   stats.sample_bytes = surface_->sample_bytes();
   stats.samples_full = surface_->model().full;
+  stats.max_samples = max_samples_;
   stats.coarse_meshes = visibly_simplified_;
 }
 

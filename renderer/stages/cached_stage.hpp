@@ -49,6 +49,9 @@ class CachedStage final : public ThermalStage {
   };
   static std::vector<Eye> eyes_around(std::span<const RefineView::Eye> eyes,
                                       const scene::Aabb& static_bounds);
+  /// True where the camera stands within reach of one of the places, and points as that does.
+  static bool stands_near(const std::vector<Eye>& eyes, const RefineView::Eye& here,
+                          double cos_at_least) noexcept;
 
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
@@ -57,7 +60,8 @@ class CachedStage final : public ThermalStage {
               std::optional<ShadePass> shade_pass, bool software);
 
   scene::SensorDesc sensor_;
-  bool software_ = false;  ///< the device is a CPU
+  std::uint32_t max_samples_ = 0;  ///< thermal.max_samples
+  bool software_ = false;          ///< the device is a CPU
   scene::Aabb static_bounds_;
   std::vector<Eye> detail_eyes_;   ///< meshes were simplified for these
   bool visibly_simplified_;        ///< meshes lost visible detail because samples are too few

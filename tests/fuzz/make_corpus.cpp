@@ -493,11 +493,13 @@ void make_state_seeds() {
     sample.mover = -1;
     sample.first_seen = i;
     sample.seen_count = 1;
+    sample.seen_scale = 1.0F;
     model.samples.samples.push_back(sample);
     model.samples.seen.push_back({model.drawn_samples - 1 - i, 0.5F});
     model.states.emplace_back();
     model.outputs.emplace_back();
   }
+  model.eyes = {{{1.0, -2.0, 3.0}, {0.0, 1.0, 0.0}}};
   if (!renderer::write_state(seed("state_file", "split.emitstate"), fuzz::state_key(), model)) {
     std::abort();
   }

@@ -15,7 +15,7 @@ inline constexpr std::uint32_t kNoSample = 0xffffffffU;
 /// Neighbouring faces across convex edges that a sample exchanges heat with.
 inline constexpr std::size_t kMaxPartners = 2;
 
-/// A sample one of whose hemisphere rays ended on it, and the share of those rays.
+/// A sample near which rays of a view ended, and the share of those rays.
 struct SeenSample {
   std::uint32_t sample = kNoSample;
   float weight_frac = 0.0F;
@@ -42,6 +42,8 @@ struct SurfaceSample {
   float sphere_sky_frac = 0.5F;
   std::uint32_t first_seen = 0;  ///< the rest: entries of SurfaceSamples::seen
   std::uint32_t seen_count = 0;
+  /// Their weights count that much: samples whose view is alike share its entries.
+  float seen_scale = 0.0F;
   /// Another face lies on it: no air and no radiation in between, and for want of a path between
   /// the two bodies no flux.
   bool covered = false;

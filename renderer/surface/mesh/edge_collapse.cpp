@@ -54,7 +54,10 @@ class Collapse {
     return place(c[0]) == at || place(c[1]) == at || place(c[2]) == at;
   }
   void lock_rims();
-  void gather_ring(std::uint32_t at, std::vector<std::uint32_t>& ring) const;
+  /// Lists the places that share a triangle with `at`, each once.
+  void gather_ring(std::uint32_t at, std::vector<std::uint32_t>& ring);
+  /// How many places share a triangle with `at` and are marked by `mark`.
+  [[nodiscard]] std::size_t count_marked(std::uint32_t at, std::uint32_t mark);
   /// Which vertex of `to` takes over from each one of `from`; false: not all have one.
   [[nodiscard]] bool pair_up(std::uint32_t from, std::uint32_t to);
   [[nodiscard]] std::uint32_t partner(std::uint32_t vertex) const noexcept;
@@ -71,8 +74,11 @@ class Collapse {
   std::vector<std::uint32_t> stamp_;              ///< by place
   std::priority_queue<Candidate> queue_;
   // Scratch.
+  std::vector<std::uint32_t> mark_;  ///< by place: the latest list that it is in
+  std::uint32_t latest_mark_ = 0;
+  std::uint32_t ring_mark_ = 0;  ///< that of ring_
   std::vector<std::uint32_t> ring_;
-  std::vector<std::uint32_t> other_ring_;
+  std::vector<std::uint32_t> counted_;
   std::vector<std::pair<float, std::uint32_t>> nearest_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> partners_;
   struct Turned {
@@ -90,7 +96,8 @@ Collapse::Collapse(const CollapseInput& input)
       left_(corners_.size()),
       star_(input.positions_m.size()),
       locked_(input.positions_m.size(), false),
-      stamp_(input.positions_m.size(), 0) {
+      stamp_(input.positions_m.size(), 0),
+      mark_(input.positions_m.size(), 0) {
   for (std::uint32_t t = 0; t < corners_.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
       corners_[t][k] = input.indices[3 * std::size_t{t} + k];
@@ -119,15 +126,32 @@ void Collapse::lock_rims() {
   }
 }
 
-void Collapse::gather_ring(std::uint32_t at, std::vector<std::uint32_t>& ring) const {
+void Collapse::gather_ring(std::uint32_t at, std::vector<std::uint32_t>& ring) {
   ring.clear();
+  ++latest_mark_;
   for (const std::uint32_t t : star_[at]) {
     for (const std::uint32_t v : corners_[t]) {
-      if (place(v) != at) ring.push_back(place(v));
+      const std::uint32_t other = place(v);
+      if (other == at || mark_[other] == latest_mark_) continue;
+      mark_[other] = latest_mark_;
+      ring.push_back(other);
     }
   }
-  std::ranges::sort(ring);
-  ring.erase(std::ranges::unique(ring).begin(), ring.end());
+}
+
+std::size_t Collapse::count_marked(std::uint32_t at, std::uint32_t mark) {
+  counted_.clear();
+  for (const std::uint32_t t : star_[at]) {
+    for (const std::uint32_t v : corners_[t]) {
+      const std::uint32_t other = place(v);
+      if (other == at || mark_[other] != mark) continue;
+      // Take the mark off, so that the place counts once.
+      mark_[other] = 0;
+      counted_.push_back(other);
+    }
+  }
+  for (const std::uint32_t other : counted_) mark_[other] = mark;
+  return counted_.size();
 }
 
 bool Collapse::pair_up(std::uint32_t from, std::uint32_t to) {
@@ -159,12 +183,7 @@ std::uint32_t Collapse::partner(std::uint32_t vertex) const noexcept {
 
 float Collapse::cost_m(std::uint32_t from, std::uint32_t to) {
   if (!pair_up(from, to)) return kNever;
-  gather_ring(to, other_ring_);
-  std::size_t common = 0;
-  for (const std::uint32_t at : ring_) {
-    common += std::ranges::binary_search(other_ring_, at) ? 1U : 0U;
-  }
-  if (common != 2) return kNever;  // the surface would branch
+  if (count_marked(to, ring_mark_) != 2) return kNever;  // the surface would branch
   turned_.clear();
   for (const std::uint32_t t : star_[from]) {
     if (has(t, to)) continue;
@@ -228,6 +247,7 @@ void Collapse::offer(std::uint32_t from) {
   ++stamp_[from];
   if (locked_[from] || star_[from].empty()) return;
   gather_ring(from, ring_);
+  ring_mark_ = latest_mark_;
   nearest_.clear();
   for (const std::uint32_t to : ring_) {
     nearest_.emplace_back(glm::distance(in_.positions_m[from], in_.positions_m[to]), to);

@@ -6,8 +6,16 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 namespace {
+
+/// Triangles whose distance differs by less than this share of their longest edge are as near as
+/// each other: that is rounding.
+constexpr float kSlackFrac = 1e-4F;
+/// What lies that many slacks behind the nearest one has no say in which of several is taken.
+constexpr float kFarSlacks = 16.0F;
 
 /// Share of the way along a-b that is nearest to p.
 float along(const glm::vec3& a, const glm::vec3& b, const glm::vec3& p) noexcept {
@@ -45,7 +53,9 @@ glm::vec3 nearest_weight(const std::array<glm::vec3, 3>& c, const glm::vec3& p) 
 
 NearestTriangle::NearestTriangle(std::span<const glm::vec3> positions_m,
                                  std::span<const std::uint32_t> indices) {
+  EMIT_CHECK_OP(indices.size(), >=, 3U);
   triangles_.resize(indices.size() / 3);
+  balls_m_.resize(triangles_.size());
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     Triangle& triangle = triangles_[t];
     for (std::size_t k = 0; k < 3; ++k) {
@@ -56,24 +66,47 @@ NearestTriangle::NearestTriangle(std::span<const glm::vec3> positions_m,
     const glm::vec3 across = glm::cross(c[1] - c[0], c[2] - c[0]);
     const float area = glm::length(across);
     if (area > 0.0F) triangle.normal = across / area;
+    float radius_m = 0.0F;
     for (std::size_t k = 0; k < 3; ++k) {
-      triangle.radius_m = std::max(triangle.radius_m, glm::distance(c[k], triangle.centre_m));
+      radius_m = std::max(radius_m, glm::distance(c[k], triangle.centre_m));
       triangle.longest_m = std::max(triangle.longest_m, glm::distance(c[k], c[(k + 1) % 3]));
     }
+    balls_m_[t] = glm::vec4(triangle.centre_m, radius_m);
+    longest_m_ = std::max(longest_m_, triangle.longest_m);
   }
+}
+
+float NearestTriangle::distance_m(std::uint32_t triangle, const glm::vec3& point_m) const noexcept {
+  const std::array<glm::vec3, 3>& corner_m = triangles_[triangle].corner_m;
+  const glm::vec3 weight = nearest_weight(corner_m, point_m);
+  return glm::distance(point_m,
+                       weight.x * corner_m[0] + weight.y * corner_m[1] + weight.z * corner_m[2]);
 }
 
 NearestTriangle::Hit NearestTriangle::find(const glm::vec3& point_m,
                                            const glm::vec3& normal) const {
+  // Find the ball whose middle is nearest: its triangle bounds how far away the nearest one can be.
+  std::uint32_t likely = 0;
+  float least_m2 = std::numeric_limits<float>::infinity();
+  for (std::uint32_t t = 0; t < balls_m_.size(); ++t) {
+    const glm::vec3 way_m = glm::vec3(balls_m_[t]) - point_m;
+    const float way_m2 = glm::dot(way_m, way_m);
+    if (way_m2 < least_m2) {
+      least_m2 = way_m2;
+      likely = t;
+    }
+  }
+  const float bound_m = distance_m(likely, point_m) + kFarSlacks * kSlackFrac * longest_m_;
+  // Measure those whose balls come as near as that.
   Hit best;
   best.distance_m = std::numeric_limits<float>::infinity();
   float best_facing = -2.0F;
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+    const glm::vec3 way_m = glm::vec3(balls_m_[t]) - point_m;
+    const float reach_m = bound_m + balls_m_[t].w;
+    if (glm::dot(way_m, way_m) > reach_m * reach_m) continue;
     const Triangle& triangle = triangles_[t];
-    // As near as each other, but for rounding.
-    const float slack_m = 1e-4F * triangle.longest_m;
-    const float least_m = glm::distance(point_m, triangle.centre_m) - triangle.radius_m;
-    if (least_m > best.distance_m + slack_m) continue;
+    const float slack_m = kSlackFrac * triangle.longest_m;
     const glm::vec3 weight = nearest_weight(triangle.corner_m, point_m);
     glm::vec3 there_m(0.0F);
     for (glm::length_t k = 0; k < 3; ++k) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/ext/vector_float3.hpp>
+#include <glm/ext/vector_float4.hpp>
 #include <span>
 #include <vector>
 
@@ -21,7 +22,7 @@ class NearestTriangle {
     float distance_m = 0.0F;
     glm::vec3 weight{0.0F};  ///< of its corners, at the nearest point; >= 0, add up to 1
   };
-  /// @pre at least one triangle; `indices` and `positions_m` outlive this.
+  /// @pre at least one triangle
   NearestTriangle(std::span<const glm::vec3> positions_m, std::span<const std::uint32_t> indices);
 
   /// Of triangles as near as each other the one that faces most like `normal`.
@@ -35,10 +36,14 @@ class NearestTriangle {
     std::array<glm::vec3, 3> corner_m;
     glm::vec3 normal{0.0F};
     glm::vec3 centre_m{0.0F};
-    float radius_m = 0.0F;
     float longest_m = 0.0F;
   };
+  /// Distance from the triangle, exact but for rounding.
+  [[nodiscard]] float distance_m(std::uint32_t triangle, const glm::vec3& point_m) const noexcept;
+
   std::vector<Triangle> triangles_;
+  std::vector<glm::vec4> balls_m_;  ///< by triangle: centre and radius of a ball that holds it
+  float longest_m_ = 0.0F;          ///< of all edges
 };
 
 }  // namespace emit::renderer

@@ -1,31 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "surface/model/history_record.hpp"
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
+namespace {
+
+HeatInterval heat_interval(const IntervalForcing& forcing, const SampleHeat& heat) {
+  HeatInterval interval = heat.sized_interval();
+  interval.forcing = forcing;
+  heat.prepare(interval);
+  return interval;
+}
+
+/// Appends an interval of the plan; `end_ns` is where the record ends.
+void append(HistoryRecord& record, const HistoryInterval& interval, const IntervalForcing& forcing,
+            std::int64_t end_ns, const RecordInputs& inputs) {
+  const auto turn = static_cast<std::uint32_t>(record.size());
+  record.intervals.push_back(heat_interval(forcing, inputs.heat));
+  IntervalRays& rays = record.rays.emplace_back(inputs.prototype);
+  rays.update(interval.begin_ns, interval.end_ns, turn, inputs.environment,
+              EntityPoses(inputs.entities), inputs.origin_world_m);
+  const std::int64_t middle_ns = interval.begin_ns + (interval.end_ns - interval.begin_ns) / 2;
+  record.lag_s.push_back(static_cast<float>(static_cast<double>(end_ns - middle_ns) * 1e-9));
+}
+
+}  // namespace
 
 HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,
-                                  const SampleHeat& heat, const Environment& environment,
-                                  std::span<const PoseHistory> entities,
-                                  const IntervalRays& prototype, const glm::dvec3& origin_world_m) {
-  HistoryRecord record;
-  const auto heat_interval = [&](const IntervalForcing& forcing) {
-    HeatInterval interval = heat.sized_interval();
-    interval.forcing = forcing;
-    heat.prepare(interval);
-    return interval;
-  };
-  for (const IntervalForcing& forcing : history.tail())
-    record.tail.push_back(heat_interval(forcing));
+                                  const RecordInputs& inputs) {
   const auto intervals = plan.intervals();
-  const std::int64_t now_ns = intervals.back().end_ns;
+  EMIT_CHECK_OP(history.intervals().size(), ==, intervals.size());
+  HistoryRecord record;
+  for (const IntervalForcing& forcing : history.tail()) {
+    record.tail.push_back(heat_interval(forcing, inputs.heat));
+  }
   for (std::size_t i = 0; i < intervals.size(); ++i) {
-    const HistoryInterval& interval = intervals[i];
-    record.intervals.push_back(heat_interval(history.intervals()[i]));
-    IntervalRays& rays = record.rays.emplace_back(prototype);
-    rays.update(interval.begin_ns, interval.end_ns, static_cast<std::uint32_t>(i), environment,
-                EntityPoses(entities), origin_world_m);
-    const std::int64_t middle_ns = interval.begin_ns + (interval.end_ns - interval.begin_ns) / 2;
-    record.lag_s.push_back(static_cast<float>(static_cast<double>(now_ns - middle_ns) * 1e-9));
+    append(record, intervals[i], history.intervals()[i], intervals.back().end_ns, inputs);
+  }
+  return record;
+}
+
+HistoryRecord extend_history_record(const StepPlan& plan, SurfaceHistory& history,
+                                    const RecordInputs& inputs) {
+  HistoryRecord record;
+  for (const HistoryInterval& interval : plan.intervals()) {
+    const IntervalForcing forcing =
+        history.extend(interval.begin_ns, interval.end_ns, inputs.environment);
+    append(record, interval, forcing, plan.intervals().back().end_ns, inputs);
   }
   return record;
 }

@@ -21,12 +21,23 @@ struct HistoryRecord {
   [[nodiscard]] std::size_t size() const noexcept { return intervals.size(); }
 };
 
-/// Record of the plan's intervals. Setup only. @pre history.update() has seen the plan
+/// What a record is made with.
+struct RecordInputs {
+  const SampleHeat& heat;
+  const Environment& environment;
+  std::span<const PoseHistory> entities;
+  const IntervalRays& prototype;
+  glm::dvec3 origin_world_m;
+};
+
+/// Record of the plan's intervals, from the start of the history. Setup only.
+/// @pre history.update() has seen the plan
 [[nodiscard]] HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,
-                                                const SampleHeat& heat,
-                                                const Environment& environment,
-                                                std::span<const PoseHistory> entities,
-                                                const IntervalRays& prototype,
-                                                const glm::dvec3& origin_world_m);
+                                                const RecordInputs& inputs);
+
+/// Record of the plan's intervals, which begin where `history` has been brought to. Brings it to
+/// their end. Setup only.
+[[nodiscard]] HistoryRecord extend_history_record(const StepPlan& plan, SurfaceHistory& history,
+                                                  const RecordInputs& inputs);
 
 }  // namespace emit::renderer

@@ -38,7 +38,9 @@ struct SurfaceModelOptions {
 
 /// Everything a sample carries after the history.
 struct SurfaceModel {
-  std::vector<RefinedMesh> meshes;  ///< as SceneGeometry::meshes
+  std::int64_t at_ns = 0;             ///< end of the record
+  std::vector<RefineView::Eye> eyes;  ///< places of the camera that the surface was refined for
+  std::vector<RefinedMesh> meshes;    ///< as SceneGeometry::meshes
   /// By instance; its samples are the mesh's vertices, then the backs of those on sheets.
   std::vector<std::uint32_t> first_sample;
   SurfaceSamples samples;  ///< drawn ones first, then partners across edges

@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "emit/physics/check.hpp"
+#include "surface/rays/bulk_bounds.hpp"
 #include "surface/rays/caster_set.hpp"
 
 namespace emit::renderer {
@@ -33,6 +35,39 @@ constexpr std::uint32_t all_of(std::span<const CasterRay> rays) noexcept {
 
 using Packet = std::array<CasterRay, CasterRays::kMaxRays>;
 
+/// A cone that holds the rays of a packet: they start within `apart_m` of `origin_m` and point
+/// within a chord of `spread` of `axis`.
+struct PacketCone {
+  glm::vec3 origin_m{0.0F};
+  glm::vec3 axis{0.0F};
+  float apart_m = 0.0F;
+  float spread = 0.0F;
+
+  explicit PacketCone(std::span<const CasterRay> rays) noexcept : origin_m(rays.front().origin_m) {
+    glm::vec3 sum(0.0F);
+    for (const CasterRay& ray : rays) sum += ray.direction;
+    const float length = glm::length(sum);
+    axis = length > 0.0F ? sum / length : rays.front().direction;
+    for (const CasterRay& ray : rays) {
+      apart_m = std::max(apart_m, glm::distance(ray.origin_m, origin_m));
+      spread = std::max(spread, glm::distance(ray.direction, axis));
+    }
+  }
+
+  /// False where no ray of the packet can meet a ball.
+  [[nodiscard]] bool may_meet(const glm::vec3& centre_m, float radius_m) const noexcept {
+    const glm::vec3 to_centre_m = centre_m - origin_m;
+    const float distance_m = glm::length(to_centre_m);
+    const float along_m = std::max(glm::dot(to_centre_m, axis), 0.0F);
+    // Rays matter as far as the ball reaches, and stray no farther from the axis than until there.
+    const float far_m = distance_m + radius_m + apart_m;
+    constexpr float kRoom = 1e-5F;  // for rounding
+    const float reach_m = radius_m + apart_m + (spread + kRoom) * far_m;
+    const glm::vec3 aside_m = to_centre_m - along_m * axis;
+    return glm::dot(aside_m, aside_m) <= reach_m * reach_m;
+  }
+};
+
 }  // namespace
 
 struct CasterRays::Impl {
@@ -47,30 +82,46 @@ struct CasterRays::Impl {
   CasterSet fixed;
   std::vector<Mover> movers;
 
-  /// Rays that come near the mover, moved to the axes and the origin of its set.
-  [[nodiscard]] std::uint32_t enter(const Mover& mover, const MoverPlacement& placement,
-                                    std::span<const CasterRay> rays, Packet& inside) const noexcept;
+  /// Moves ray i of `rays` to the axes and the origin of the mover's set, as lane i of `inside`.
+  /// False, and nothing is written, where it passes the mover by.
+  [[nodiscard]] static bool enter(const Mover& mover, const MoverPlacement& placement,
+                                  const CasterRay& ray, CasterRay& inside) noexcept;
+  /// False where no ray of the packet comes near the mover.
+  [[nodiscard]] static bool comes_near(const Mover& mover, const MoverPlacement& placement,
+                                       const PacketCone& cone) noexcept {
+    return placement.on && cone.may_meet(placement.rel_from_body * glm::vec3(mover.centre_body_m) +
+                                             placement.position_m,
+                                         mover.set.radius_m());
+  }
+  /// Bits of the rays that come near a mover which stands at one place for all of them.
+  [[nodiscard]] static std::uint32_t enter_all(const Mover& mover, const MoverPlacement& placement,
+                                               std::span<const CasterRay> rays,
+                                               Packet& inside) noexcept;
 };
 
-std::uint32_t CasterRays::Impl::enter(const Mover& mover, const MoverPlacement& placement,
-                                      std::span<const CasterRay> rays,
-                                      Packet& inside) const noexcept {
-  if (!placement.on) return 0;
-  std::uint32_t near = 0;
+bool CasterRays::Impl::enter(const Mover& mover, const MoverPlacement& placement,
+                             const CasterRay& ray, CasterRay& inside) noexcept {
+  if (!placement.on) return false;
   const glm::vec3 centre_m(mover.centre_body_m);
   const glm::vec3 centre_rel_m = placement.rel_from_body * centre_m + placement.position_m;
+  const glm::vec3 to_centre = centre_rel_m - ray.origin_m;
+  const float along_m = std::max(glm::dot(to_centre, ray.direction), 0.0F);
+  const glm::vec3 aside = to_centre - along_m * ray.direction;
+  // Leave room for the rounding of far-off origins.
+  const float reach_m = mover.set.radius_m() + 1e-6F * (along_m + glm::length(to_centre));
+  if (glm::dot(aside, aside) > reach_m * reach_m) return false;
+  // vector * matrix is the transposed, that is the inverse, rotation.
+  inside = {(ray.origin_m - placement.position_m) * placement.rel_from_body - centre_m,
+            ray.direction * placement.rel_from_body};
+  return true;
+}
+
+std::uint32_t CasterRays::Impl::enter_all(const Mover& mover, const MoverPlacement& placement,
+                                          std::span<const CasterRay> rays,
+                                          Packet& inside) noexcept {
+  std::uint32_t near = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const CasterRay& ray = rays[i];
-    const glm::vec3 to_centre = centre_rel_m - ray.origin_m;
-    const float along_m = std::max(glm::dot(to_centre, ray.direction), 0.0F);
-    const glm::vec3 aside = to_centre - along_m * ray.direction;
-    // Room for the rounding of far-off origins.
-    const float reach_m = mover.set.radius_m() + 1e-6F * (along_m + glm::length(to_centre));
-    if (glm::dot(aside, aside) > reach_m * reach_m) continue;
-    near |= 1U << i;
-    // vector * matrix is the transposed, that is the inverse, rotation.
-    inside[i] = {(ray.origin_m - placement.position_m) * placement.rel_from_body - centre_m,
-                 ray.direction * placement.rel_from_body};
+    if (enter(mover, placement, rays[i], inside[i])) near |= 1U << i;
   }
   return near;
 }
@@ -111,7 +162,7 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
     }
   }
   impl->origin_world_m =
-      origin_world_m ? *origin_world_m : centre(bounds_of(fixed.empty() ? everything : fixed));
+      origin_world_m ? *origin_world_m : centre(bulk_bounds(fixed.empty() ? everything : fixed));
 
   auto set = CasterSet::create(impl->device.get(), fixed, impl->origin_world_m, flat_triangles);
   if (!set) return tl::unexpected(std::move(set.error()).with_context("static geometry"));
@@ -138,15 +189,35 @@ std::uint32_t CasterRays::object_of_mover(std::size_t mover) const noexcept {
   return impl_->movers[mover].object;
 }
 
-std::uint32_t CasterRays::blocked_static(std::span<const CasterRay> rays) const noexcept {
-  return impl_->fixed.occluded(rays, all_of(rays));
+std::uint32_t CasterRays::blocked_static(std::span<const CasterRay> rays,
+                                         std::uint32_t wanted) const noexcept {
+  EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
+  return impl_->fixed.occluded(rays, all_of(rays) & wanted);
 }
 
 std::uint32_t CasterRays::blocked_mover(std::size_t mover, const MoverPlacement& placement,
                                         std::span<const CasterRay> rays) const noexcept {
   Packet inside;
   const Impl::Mover& body = impl_->movers[mover];
-  const std::uint32_t near = impl_->enter(body, placement, rays, inside);
+  const std::uint32_t near = Impl::enter_all(body, placement, rays, inside);
+  return near == 0 ? 0 : body.set.occluded({inside.data(), rays.size()}, near);
+}
+
+std::uint32_t CasterRays::blocked_moving(std::size_t mover,
+                                         std::span<const MoverPlacement> placements,
+                                         std::span<const CasterRay> rays,
+                                         std::uint32_t wanted) const noexcept {
+  EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
+  EMIT_DCHECK_OP(placements.size(), >=, rays.size());
+  // In the axes of the body all rays meet the same geometry: one packet does.
+  Packet inside;
+  std::uint32_t near = 0;
+  const Impl::Mover& body = impl_->movers[mover];
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (((wanted >> i) & 1U) != 0U && Impl::enter(body, placements[i], rays[i], inside[i])) {
+      near |= 1U << i;
+    }
+  }
   return near == 0 ? 0 : body.set.occluded({inside.data(), rays.size()}, near);
 }
 
@@ -159,7 +230,10 @@ std::uint32_t CasterRays::blocked(std::span<const CasterRay> rays,
                                   const CasterSelection& selection) const noexcept {
   std::uint32_t blocked = selection.fixed ? blocked_static(rays) : 0;
   const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
+  if (count == 0 || rays.empty()) return blocked;
+  const PacketCone cone(rays);
   for (std::size_t m = 0; m < count && blocked != all_of(rays); ++m) {
+    if (!Impl::comes_near(impl_->movers[m], selection.movers[m], cone)) continue;
     blocked |= blocked_mover(m, selection.movers[m], rays);
   }
   return blocked;
@@ -186,10 +260,13 @@ std::uint32_t CasterRays::first_hits(std::span<const CasterRay> rays,
   };
   if (selection.fixed) shorten(impl_->fixed.nearest(rays, all_of(rays), limits_m, hits));
   const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
+  if (count == 0 || rays.empty()) return found;
+  const PacketCone cone(rays);
   for (std::size_t m = 0; m < count; ++m) {
     Packet inside;
     const MoverPlacement& placement = selection.movers[m];
-    const std::uint32_t near = impl_->enter(impl_->movers[m], placement, rays, inside);
+    if (!Impl::comes_near(impl_->movers[m], placement, cone)) continue;
+    const std::uint32_t near = Impl::enter_all(impl_->movers[m], placement, rays, inside);
     if (near == 0) continue;
     const std::uint32_t nearer =
         impl_->movers[m].set.nearest({inside.data(), rays.size()}, near, limits_m, hits);

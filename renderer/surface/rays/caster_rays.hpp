@@ -61,14 +61,15 @@ struct CasterSelection {
 class CasterRays {
  public:
   static constexpr std::size_t kMaxRays = 16;                               ///< of one call
+  static constexpr std::uint32_t kAllRays = (1U << kMaxRays) - 1U;          ///< bits of `wanted`
   static constexpr std::uint64_t kFlatTriangles = std::uint64_t{1} << 24U;  ///< about 2 GB
 
   /// Takes instances with entity_id 0 by world_from_mesh and the others by body_from_mesh. Setup
   /// only; seconds for 1e7 triangles. `origin_world_m`: where another one's is the same; none: the
-  /// centre of the geometry. `flat_triangles`: of larger rigid frames, meshes that stand more than
-  /// once are stored once, which is slower to trace.
-  /// Errors: invalid_argument (an index out of range, more than 2^31 triangles or a scene wider
-  /// than 1e8 m), internal (Embree ran out of memory).
+  /// centre of the geometry's bulk. `flat_triangles`: of larger rigid frames, meshes that stand
+  /// more than once are stored once, which is slower to trace. Errors: invalid_argument (an index
+  /// out of range, more than 2^31 triangles or a scene wider than 1e8 m), internal (Embree ran out
+  /// of memory).
   [[nodiscard]] static physics::Result<CasterRays> create(
       const scene::SceneGeometry& geometry,
       const std::optional<glm::dvec3>& origin_world_m = std::nullopt,
@@ -77,19 +78,27 @@ class CasterRays {
   CasterRays& operator=(CasterRays&&) noexcept;
   ~CasterRays();
 
-  /// As asked for; else the centre of the static geometry's box, or of everything's where nothing
-  /// is static.
+  /// As asked for; else the centre of the bulk of the static geometry, or of everything where
+  /// nothing is static (bulk_bounds()).
   [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept;
   /// Moving objects that own an instance, ascending by Instance::object.
   [[nodiscard]] std::size_t movers() const noexcept;
   [[nodiscard]] std::uint32_t object_of_mover(std::size_t mover) const noexcept;
 
   /// Bit i is set where ray i (of at most kMaxRays; rays of one call should be alike in origin or
-  /// direction) meets static geometry.
-  [[nodiscard]] std::uint32_t blocked_static(std::span<const CasterRay> rays) const noexcept;
+  /// direction) meets static geometry. Only rays whose bit in `wanted` is set are asked for.
+  /// @pre rays.size() <= kMaxRays
+  [[nodiscard]] std::uint32_t blocked_static(std::span<const CasterRay> rays,
+                                             std::uint32_t wanted = kAllRays) const noexcept;
   /// The same for mover `mover` standing at `placement`.
   [[nodiscard]] std::uint32_t blocked_mover(std::size_t mover, const MoverPlacement& placement,
                                             std::span<const CasterRay> rays) const noexcept;
+  /// The same for a mover that stands elsewhere for every ray: ray i meets it at placements[i].
+  /// @pre placements.size() >= rays.size()
+  [[nodiscard]] std::uint32_t blocked_moving(std::size_t mover,
+                                             std::span<const MoverPlacement> placements,
+                                             std::span<const CasterRay> rays,
+                                             std::uint32_t wanted = kAllRays) const noexcept;
   /// The same for rays in the axes of the mover's body, relative to the body's origin: how a body
   /// shades itself, without the rounding of a far-off placement.
   [[nodiscard]] std::uint32_t blocked_in_body(std::size_t mover,

@@ -49,6 +49,27 @@ constexpr std::size_t place_in_disc(std::size_t ray) noexcept {
   return kSunRays - 1 - ray;
 }
 
+/// Directions of the sky rays in the axes (tangent, bitangent, normal) of a face.
+using SkyDirections = std::array<glm::vec3, kSkyRays>;
+
+SkyDirections make_sky_directions(SkyMeasure measure) noexcept {
+  SkyDirections out;
+  for (std::size_t i = 0; i < kSkyRays; ++i) {
+    const double share = (static_cast<double>(i) + 0.5) / kSkyRays;
+    const double r = std::sqrt(measure == SkyMeasure::cosine ? share : share * (2.0 - share));
+    const double angle = 2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(i) + 0.5));
+    out[i] = {static_cast<float>(r * std::cos(angle)), static_cast<float>(r * std::sin(angle)),
+              static_cast<float>(std::sqrt(1.0 - r * r))};
+  }
+  return out;
+}
+
+const SkyDirections& sky_directions(SkyMeasure measure) noexcept {
+  static const SkyDirections cosine = make_sky_directions(SkyMeasure::cosine);
+  static const SkyDirections sphere = make_sky_directions(SkyMeasure::sphere);
+  return measure == SkyMeasure::cosine ? cosine : sphere;
+}
+
 std::array<double, kSunRays> normal_deviates() noexcept {
   std::array<double, kSunRays> out{};
   for (std::size_t i = 0; i < kSunRays; ++i)
@@ -92,7 +113,7 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
     aim(i, turn, sun.direction_enu);
     for (std::size_t m = 0; m < movers; ++m) {
       const TrajectoryState state = poses.at(m, at_ns);
-      MoverPlacement& place = placements_[i * movers + m];
+      MoverPlacement& place = placements_[m * kSunRays + i];
       place.rel_from_body = glm::mat3(glm::mat3_cast(state.pose.world_from_body));
       place.position_m = glm::vec3(state.pose.position_world_m - origin_world_m);
       place.on = state.on;
@@ -166,9 +187,8 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
                                        std::span<const glm::vec3> starts_m,
                                        std::size_t first) const noexcept {
   std::array<CasterRay, kPacketRays> sent;
-  std::array<std::uint8_t, kPacketRays> start_of{};
-  std::uint32_t count = 0;
   Spots spots;
+  // Aim the rays of those points whose face looks towards the sun at their instant.
   for (std::size_t k = 0; k < starts_m.size(); ++k) {
     const std::size_t ray = first + k;
     glm::vec3 n = face.normal;
@@ -180,30 +200,24 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
     }
     if (!(glm::dot(n, direction_[ray]) > 0.0F)) continue;
     spots.faced |= 1U << k;
-    start_of[count] = static_cast<std::uint8_t>(k);
-    sent[count++] = {start_m, direction_[ray]};
+    sent[k] = {start_m, direction_[ray]};
   }
-  if (count == 0) return spots;
-  std::uint32_t blocked = rays.blocked_static({sent.data(), count});
-  const std::uint32_t blocked_for_good = blocked;
-  const std::uint32_t all = (1U << count) - 1U;
+  if (spots.faced == 0) return spots;
+  // Send them against what stands still.
+  const std::span<const CasterRay> packet(sent.data(), starts_m.size());
+  spots.open = spots.faced & ~rays.blocked_static(packet, spots.faced);
+  spots.lit = spots.open;
+  if (!any_mover_on_) return spots;
+  // Send those that are left against the entities whose ball they may meet.
+  const glm::vec3& from_m = sent[static_cast<std::size_t>(std::countr_zero(spots.faced))].origin_m;
   float apart_m = 0.0F;
-  if (any_mover_on_) {
-    for (std::size_t i = 1; i < count; ++i) {
-      apart_m = std::max(apart_m, glm::distance(sent[i].origin_m, sent[0].origin_m));
-    }
+  for (std::size_t k = 0; k < packet.size(); ++k) {
+    if (((spots.faced >> k) & 1U) == 0U) continue;
+    apart_m = std::max(apart_m, glm::distance(packet[k].origin_m, from_m));
   }
-  for (std::size_t m = 0; any_mover_on_ && m < mover_radius_m_.size() && blocked != all; ++m) {
-    if (!comes_near(sent[0].origin_m, apart_m, m, first / kPacketRays)) continue;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (((blocked >> i) & 1U) != 0U) continue;
-      const MoverPlacement& place = placed(m, first + start_of[i]);
-      if (place.on && rays.blocked_mover(m, place, {&sent[i], 1}) != 0U) blocked |= 1U << i;
-    }
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    if (((blocked >> i) & 1U) == 0U) spots.lit |= 1U << start_of[i];
-    if (((blocked_for_good >> i) & 1U) == 0U) spots.open |= 1U << start_of[i];
+  for (std::size_t m = 0; m < mover_radius_m_.size() && spots.lit != 0; ++m) {
+    if (!comes_near(from_m, apart_m, m, first / kPacketRays)) continue;
+    spots.lit &= ~rays.blocked_moving(m, placed_in_packet(m, first), packet, spots.lit);
   }
   return spots;
 }
@@ -293,6 +307,9 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
   if (!any_mover_on_ || sample.mover >= 0) return {};
   const Tangents tangents = tangents_of(sample.normal);
   const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
+  const SkyDirections& local = sky_directions(sky_);
+  std::array<CasterRay, kSkyRays> sent;
+  std::uint32_t above = 0;  // rays that leave upwards
   std::uint32_t hidden = 0;
   HiddenSky most;
   int by_most = 0;
@@ -301,24 +318,23 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
     const Reach& ball = reach(m, 0);
     const float away_m = glm::distance(ball.centre_m, start_m) * (1.0F - kRoundingFrac);
     if (ball.radius_m < 0.0F || away_m > reach_m + ball.way_m) continue;
-    const int by_others = std::popcount(hidden);
-    for (std::size_t i = 0; i < kSkyRays; ++i) {
-      const MoverPlacement& place = placed(m, i);
-      const glm::vec3 way = place.position_m - start_m;
-      if (!place.on || glm::dot(way, way) > reach_m * reach_m) continue;
-      const double share = (static_cast<double>(i) + 0.5) / kSkyRays;
-      const double r = std::sqrt(sky_ == SkyMeasure::cosine ? share : share * (2.0 - share));
-      const double angle =
-          2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(i) + 0.5));
-      const glm::vec3 direction = static_cast<float>(r * std::cos(angle)) * tangents.u +
-                                  static_cast<float>(r * std::sin(angle)) * tangents.v +
-                                  static_cast<float>(std::sqrt(1.0 - r * r)) * sample.normal;
-      const CasterRay ray{start_m, direction};
-      if (((hidden >> i) & 1U) == 0U && direction.z > 0.0F &&
-          rays.blocked_mover(m, place, {&ray, 1}) != 0U) {
-        hidden |= 1U << i;
+    // Aim the rays when the first entity is near.
+    if (above == 0) {
+      for (std::size_t i = 0; i < kSkyRays; ++i) {
+        sent[i] = {start_m,
+                   local[i].x * tangents.u + local[i].y * tangents.v + local[i].z * sample.normal};
+        if (sent[i].direction.z > 0.0F) above |= 1U << i;
       }
+      if (above == 0) return {};
     }
+    // Send those that are still free and at whose instant the entity is near.
+    std::uint32_t wanted = 0;
+    for (std::size_t i = 0; i < kSkyRays; ++i) {
+      const glm::vec3 way = placed(m, i).position_m - start_m;
+      if (glm::dot(way, way) <= reach_m * reach_m) wanted |= 1U << i;
+    }
+    const int by_others = std::popcount(hidden);
+    hidden |= rays.blocked_moving(m, placed_in_packet(m, 0), sent, wanted & above & ~hidden);
     if (const int by_this = std::popcount(hidden) - by_others; by_this > by_most) {
       by_most = by_this;
       most.mover = static_cast<std::uint32_t>(m);

@@ -103,7 +103,12 @@ class IntervalRays {
 
  private:
   [[nodiscard]] const MoverPlacement& placed(std::size_t mover, std::size_t ray) const noexcept {
-    return placements_[ray * mover_radius_m_.size() + mover];
+    return placements_[mover * kSunRays + ray];
+  }
+  /// Where an entity stands for each ray of the packet that begins with ray `first`.
+  [[nodiscard]] std::span<const MoverPlacement> placed_in_packet(std::size_t mover,
+                                                                 std::size_t first) const noexcept {
+    return std::span(placements_).subspan(mover * kSunRays + first, kPacketRays);
   }
 
   /// Sends a ray to its place in the disc around `to_sun`.
@@ -147,7 +152,7 @@ class IntervalRays {
 
   std::vector<float> mover_radius_m_;
   SkyMeasure sky_ = SkyMeasure::cosine;
-  std::vector<MoverPlacement> placements_;  ///< by ray, then entity
+  std::vector<MoverPlacement> placements_;  ///< by entity, then ray
   std::vector<Reach> reaches_;              ///< by packet, then entity
   std::array<glm::vec3, kSunRays> direction_{};
   std::array<float, kSunRays / kPacketRays> spread_sine_{};  ///< from a packet's first direction

@@ -63,10 +63,10 @@ bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::v
 
 /// Whether any of the directions is free.
 bool lit(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::vec3> to_suns,
-         float offset_m, const CasterRays& rays) {
+         const RayOffsets& offsets, const CasterRays& rays) {
   const glm::vec3 across_m2 = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
-  const glm::vec3 start_m = centre_m + offset_m * glm::normalize(across_m2);
+  const glm::vec3 start_m = centre_m + offsets.at(centre_m).sun_m * glm::normalize(across_m2);
   return std::ranges::any_of(to_suns, [&](const glm::vec3& to_sun) {
     const CasterRay ray{start_m, to_sun};
     return glm::dot(across_m2, to_sun) > 0.0F && rays.blocked_static({&ray, 1}) == 0U;
@@ -81,7 +81,7 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
                                            std::span<const glm::vec3> to_suns) {
   const std::vector<glm::vec3> eyes_m = some_eyes(view, rays.origin_world_m());
   const auto pixel_rad = static_cast<float>(view.pixel_rad);
-  const float offset_m = ray_offsets(geometry).sun_m;
+  const RayOffsets offsets = ray_offsets(geometry);
   std::vector<std::vector<bool>> kept(geometry.meshes.size());
   std::vector<std::vector<std::uint8_t>> at_vertex(geometry.meshes.size());
   const auto corners = [](const scene::Mesh& mesh, std::size_t triangle) {
@@ -106,8 +106,8 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
           corners_m[k] = glm::vec3(to_rel * glm::vec4(mesh.positions_m[corner[k]], 1.0F));
         }
         if (mirrored) std::swap(corners_m[1], corners_m[2]);
-        const bool worth = seen_wide(corners_m, eyes_m, pixel_rad, rays) &&
-                           lit(corners_m, to_suns, offset_m, rays);
+        const bool worth =
+            seen_wide(corners_m, eyes_m, pixel_rad, rays) && lit(corners_m, to_suns, offsets, rays);
         if (worth) keep[t] = 1;
       }
     });

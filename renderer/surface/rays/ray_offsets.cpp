@@ -4,23 +4,29 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
+#include "surface/rays/bulk_bounds.hpp"
+
 namespace emit::renderer {
 namespace {
 
-/// Of the scene's radius: some roundings of float32.
+/// Some roundings of float32, as a share of the distance from the origin.
 constexpr float kRoundingFrac = 1e-6F;
+
+RayOffsets at_least(const RayOffsets& offsets, float rounding_m) noexcept {
+  return {std::max(offsets.around_m, rounding_m), std::max(offsets.sun_m, rounding_m)};
+}
 
 }  // namespace
 
-RayOffsets ray_offsets(const scene::SceneGeometry& geometry) noexcept {
-  RayOffsets offsets;
-  const scene::Aabb& bounds = geometry.bounds;
-  if (bounds.empty()) return offsets;
+RayOffsets RayOffsets::at(const glm::vec3& rel_m) const noexcept {
+  return at_least(*this, kRoundingFrac * glm::length(rel_m));
+}
+
+RayOffsets ray_offsets(const scene::SceneGeometry& geometry) {
+  const scene::Aabb bounds = bulk_bounds(geometry);
+  if (bounds.empty()) return {};
   const double radius_m = 0.5 * glm::length(bounds.max_m - bounds.min_m);
-  const float rounding_m = kRoundingFrac * static_cast<float>(radius_m);
-  offsets.around_m = std::max(offsets.around_m, rounding_m);
-  offsets.sun_m = std::max(offsets.sun_m, rounding_m);
-  return offsets;
+  return at_least({}, kRoundingFrac * static_cast<float>(radius_m));
 }
 
 }  // namespace emit::renderer

@@ -13,6 +13,7 @@
 #include "emit/physics/surface_balance.hpp"
 #include "history/foster_history.hpp"
 #include "surface/mesh/sheet_sides.hpp"
+#include "surface/warm_up/carry_on.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -174,16 +175,81 @@ std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns, std::int64_t now_
   return next_ns;
 }
 
-physics::Result<SurfaceModel> CachedSurface::make_model(const SurfaceInputs& surface,
-                                                        const RefineView& view,
-                                                        const SurfaceModelOptions& options,
-                                                        const std::optional<Saved>& saved,
-                                                        const SurfaceProgress& progress) const {
-  // Whatever is in the way of looking is told by read_state().
+SurfaceInputs CachedSurface::surface_inputs(const HistoryRecord& record,
+                                            const SurfaceHistory& history,
+                                            std::span<const std::vector<glm::vec3>> ways_m) const {
+  return {geometry_, materials_, mover_of_object_, rays(),      places_,
+          heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr,
+          ways_m};
+}
+
+physics::Result<SurfaceModel> CachedSurface::warm_up(const ModelWork& work) const {
+  work.plan.update(work.start_ns, work.inputs.environment, work.inputs.entities);
+  work.history.update(work.plan, work.inputs.environment);
+  const HistoryRecord record =
+      make_history_record(work.plan, work.history, record_inputs(work.inputs));
+  const std::vector<std::vector<glm::vec3>> ways_m =
+      this->ways_m(work.start_ns, work.inputs.entities);
+  auto model = build_surface_model(surface_inputs(record, work.history, ways_m), work.view,
+                                   work.options, work.progress);
+  if (!model) return model;
+  model->at_ns = work.start_ns;
+  model->eyes = work.view.eyes;
+  return model;
+}
+
+physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const ModelWork& work,
+                                                                       const Saved& saved) const {
+  const StateWanted wanted{saved.key, work.start_ns, [&work](std::int64_t at_ns) {
+                             return live_hash(at_ns, work.inputs.environment, work.inputs.entities);
+                           }};
+  auto read = read_state(saved.file, wanted, geometry_, movers_now_.size(), work.options);
+  if (!read) {
+    if (!saved.start) return std::nullopt;
+    return tl::unexpected(std::move(read.error()));
+  }
+  if (!saved.start && read->at_ns != work.start_ns) return std::nullopt;
+  if (saved.fits_camera && !saved.fits_camera(read->eyes)) {
+    if (!saved.start) return std::nullopt;
+    return physics::make_error(
+        physics::ErrorCode::config,
+        fmt::format("thermal.state_file {}: the surface in it was refined for other places of the "
+                    "camera than that of the first frame. Remove it to have it made anew",
+                    saved.file.string()));
+  }
+
+  // Bring plan and history to the instant of the state.
+  work.plan.update(read->at_ns, work.inputs.environment, work.inputs.entities);
+  work.history.update(work.plan, work.inputs.environment);
+  if (read->at_ns == work.start_ns) return std::move(*read);
+
+  // Go on from there, in steps that are short near the end.
+  scene::ThermalOptions ahead = options_;
+  ahead.history_start_ns = read->at_ns;
+  const std::int64_t way_ns = work.start_ns - read->at_ns;
+  ahead.steps = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+      (way_ns + interval_ns_ - 1) / interval_ns_, 1, std::max<std::int64_t>(1, options_.steps)));
+  StepPlan plan(ahead);
+  plan.update(work.start_ns, work.inputs.environment, work.inputs.entities);
+  const HistoryRecord record =
+      extend_history_record(plan, work.history, record_inputs(work.inputs));
+  if (auto carried =
+          carry_on(surface_inputs(record, work.history, {}), work.options, *read, work.progress);
+      !carried) {
+    return tl::unexpected(std::move(carried.error()));
+  }
+  read->at_ns = work.start_ns;
+  return std::move(*read);
+}
+
+physics::Result<SurfaceModel> CachedSurface::make_model(const ModelWork& work,
+                                                        const std::optional<Saved>& saved) const {
+  // Whatever is in the way of looking is reported by read_state().
   std::error_code error;
   if (saved && (std::filesystem::exists(saved->file, error) || error)) {
-    auto read = read_state(saved->file, saved->key, geometry_, surface.movers_now.size(), options);
-    if (read || saved->start) return read;
+    auto taken = take_saved(work, *saved);
+    if (!taken) return tl::unexpected(std::move(taken.error()));
+    if (*taken) return std::move(**taken);
   }
   const bool writes = saved && saved->start;
   if (writes) {  // before the work, not after it
@@ -191,9 +257,12 @@ physics::Result<SurfaceModel> CachedSurface::make_model(const SurfaceInputs& sur
       return tl::unexpected(std::move(writable.error()));
     }
   }
-  auto model = build_surface_model(surface, view, options, progress);
+  auto model = warm_up(work);
   if (!model || !writes) return model;
-  if (auto written = write_state(saved->file, saved->key, *model); !written) {
+  StateKey key = saved->key;
+  key[static_cast<std::size_t>(StatePart::live)] =
+      live_hash(work.start_ns, work.inputs.environment, work.inputs.entities);
+  if (auto written = write_state(saved->file, key, *model); !written) {
     return tl::unexpected(std::move(written.error()));
   }
   return model;
@@ -208,25 +277,13 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
       options_.history_start_ns +
       std::max<std::int64_t>(0, now_ns - options_.history_start_ns) / interval_ns_ * interval_ns_;
   place_movers(start_ns, inputs.entities);
-  plan.update(start_ns, inputs.environment, inputs.entities);
-  history.update(plan, inputs.environment);
-  const HistoryRecord record =
-      make_history_record(plan, history, heat_, inputs.environment, inputs.entities,
-                          *interval_rays_, rays().origin_world_m());
-  const std::vector<std::vector<glm::vec3>> ways_m = this->ways_m(start_ns, inputs.entities);
-  const SurfaceInputs surface{
-      geometry_, materials_, mover_of_object_, rays(),      places_,
-      heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr,
-      ways_m};
   SurfaceModelOptions options;
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
   // The published model conducts straight down and knows no other surface.
   options.lateral = extended_ && options_.lateral;
   options.exchange = extended_ && options_.exchange;
-  std::optional<Saved> here = saved;
-  if (here) add_first_frame(here->key, start_ns, view, inputs.environment, inputs.entities);
-  auto model = make_model(surface, view, options, here, progress);
+  auto model = make_model({start_ns, view, inputs, plan, history, options, progress}, saved);
   if (!model) return tl::unexpected(std::move(model.error()));
   offsets_ = ray_offsets(geometry_);
   model_ = std::move(*model);
@@ -262,7 +319,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
                  LocalSteps::Setup{options_.history_start_ns, interval_ns_, inputs.entities.size()},
                  *interval_rays_, heat_.sized_interval());
   local_->restart(start_ns);
-  turn_ = static_cast<std::uint32_t>(record.size());
+  turn_ = static_cast<std::uint32_t>(plan.intervals().size());
   begin_anew(0, inputs, history);
   compute(0, static_cast<std::uint32_t>(count));
   // What the model says of the sun has the entities in it.

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -65,14 +66,18 @@ class CachedSurface {
   struct Saved {
     std::filesystem::path file;
     StateKey key{};  ///< of the scenario: scenario_key()
-    /// The start of a run: what does not fit is an error, what is not there is written. False: the
-    /// file is used where it fits and left as it is.
+    /// The start of a run: what does not fit is an error, what is not there is written, and what is
+    /// earlier is carried on. False: the file is used where it holds the very instant, and left as
+    /// it is.
     bool start = true;
+    /// Whether a surface that was refined for `eyes` will do for the first frame.
+    std::function<bool(std::span<const RefineView::Eye> eyes)> fits_camera;
   };
 
-  /// Samples the surface as it is to be seen at `now_ns`, or takes it from `saved`, and computes
-  /// the interval that holds it. `plan` and `history` are brought there. Setup: seconds.
-  /// Errors: those of build_surface_model(), read_state() and write_state().
+  /// Samples the surface as it is to be seen at `now_ns`, or takes it from `saved` and carries it
+  /// on to there, and computes the interval that holds it. `plan` and `history` are brought there.
+  /// Setup: seconds. Errors: those of build_surface_model(), read_state(), carry_on() and
+  /// write_state(); config (the saved surface was refined for another camera).
   [[nodiscard]] physics::Result<void> prepare(std::int64_t now_ns, const RefineView& view,
                                               const Inputs& inputs, StepPlan& plan,
                                               SurfaceHistory& history,
@@ -142,11 +147,28 @@ class CachedSurface {
                 std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
                 CasterRays places, std::optional<SurfaceDetail> detail, double reference_k);
 
-  [[nodiscard]] physics::Result<SurfaceModel> make_model(const SurfaceInputs& surface,
-                                                         const RefineView& view,
-                                                         const SurfaceModelOptions& options,
-                                                         const std::optional<Saved>& saved,
-                                                         const SurfaceProgress& progress) const;
+  /// What is known of the scene when a model is made: at the start of the first interval shown.
+  struct ModelWork {
+    std::int64_t start_ns = 0;
+    const RefineView& view;
+    const Inputs& inputs;
+    StepPlan& plan;
+    SurfaceHistory& history;
+    SurfaceModelOptions options;
+    const SurfaceProgress& progress;
+  };
+  [[nodiscard]] physics::Result<SurfaceModel> make_model(const ModelWork& work,
+                                                         const std::optional<Saved>& saved) const;
+  [[nodiscard]] physics::Result<SurfaceModel> warm_up(const ModelWork& work) const;
+  /// The saved model, carried on to the start; none: it does not fit, and need not.
+  [[nodiscard]] physics::Result<std::optional<SurfaceModel>> take_saved(const ModelWork& work,
+                                                                        const Saved& saved) const;
+  [[nodiscard]] SurfaceInputs surface_inputs(const HistoryRecord& record,
+                                             const SurfaceHistory& history,
+                                             std::span<const std::vector<glm::vec3>> ways_m) const;
+  [[nodiscard]] RecordInputs record_inputs(const Inputs& inputs) const {
+    return {heat_, inputs.environment, inputs.entities, *interval_rays_, rays().origin_world_m()};
+  }
   void place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities);
   [[nodiscard]] std::vector<std::vector<glm::vec3>> ways_m(
       std::int64_t from_ns, std::span<const PoseHistory> entities) const;

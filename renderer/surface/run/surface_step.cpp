@@ -8,10 +8,10 @@ namespace {
 
 SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
                      std::span<const SampleOutput> begin, const SurfaceSample& sample,
-                     const SunShare& sun) noexcept {
+                     const RayOffsets& offsets, const SunShare& sun) noexcept {
   SampleDrive drive;
   drive.sun_frac = sun.frac;
-  const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, step.offsets.around_m);
+  const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, offsets.around_m);
   drive.hidden_sky_frac = hidden.frac;
   if (hidden.frac > 0.0F && !step.faces.empty()) {
     const float sent_w_m2 = step.faces[hidden.mover].towards_w_m2(sample.normal);
@@ -20,12 +20,17 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
       drive.longwave_begin_w_m2 += sample.sky_frac * hidden.frac * sent_w_m2;
     }
   }
+  // Add what the samples send that it sees.
+  double longwave_w_m2 = 0.0;
+  double shortwave_w_m2 = 0.0;
   for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
     const SeenSample& seen = step.all.seen[sample.first_seen + k];
     const SampleOutput& other = begin[seen.sample];
-    drive.longwave_begin_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
-    drive.shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
+    longwave_w_m2 += seen.weight_frac * other.longwave_out_w_m2;
+    shortwave_w_m2 += seen.weight_frac * other.shortwave_out_w_m2;
   }
+  drive.longwave_begin_w_m2 += sample.seen_scale * longwave_w_m2;
+  drive.shortwave_w_m2 = sample.seen_scale * shortwave_w_m2;
   // Neighbours change by hundredths of a kelvin in an interval: their start stands for it.
   drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
   for (std::size_t p = 0; p < kMaxPartners; ++p) {
@@ -43,11 +48,19 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
                  const HeatInterval& interval, std::span<const SampleOutput> begin,
                  std::uint32_t index, SteppedSample& stepped) noexcept {
   const SurfaceSample& sample = step.all.samples[index];
+  RayOffsets offsets = step.offsets;
+  if (sample.mover < 0) {
+    offsets = offsets.at(sample.position_m);
+  } else if (const MoverPlacement& place =
+                 interval_rays.placement(static_cast<std::size_t>(sample.mover));
+             place.on) {
+    offsets = offsets.at(place.rel_from_body * sample.position_m + place.position_m);
+  }
   const auto sun_of = [&](const SurfaceSample& side) {
-    return interval_rays.sun_share(step.rays, side, step.offsets.sun_m, 0.0F);
+    return interval_rays.sun_share(step.rays, side, offsets.sun_m, 0.0F);
   };
   const SunShare sun = sun_of(sample);
-  const SampleDrive drive = drive_of(step, interval_rays, begin, sample, sun);
+  const SampleDrive drive = drive_of(step, interval_rays, begin, sample, offsets, sun);
   const glm::vec3 normal = interval_rays.normal(sample);
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
@@ -56,7 +69,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   }
   const SurfaceSample& behind = step.all.samples[sample.other_side];
   const SunShare sun_behind = sun_of(behind);
-  const SampleDrive back_drive = drive_of(step, interval_rays, begin, behind, sun_behind);
+  const SampleDrive back_drive = drive_of(step, interval_rays, begin, behind, offsets, sun_behind);
   const SheetBack back{behind, back_drive};
   stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state, &back);
   stepped.behind =

@@ -29,6 +29,11 @@ void visit_members(T& p, const Visit& visit) {
   visit(p.vertices), visit(p.leaves), visit(p.leaf_submesh), visit(p.leaf_node), visit(p.nodes);
 }
 template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, RefineView::Eye>
+void visit_members(T& e, const Visit& visit) {
+  visit(e.world_m), visit(e.boresight);
+}
+template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, Partner>
 void visit_members(T& p, const Visit& visit) {
   visit(p.sample), visit(p.distance_m), visit(p.weight_frac);
@@ -43,7 +48,8 @@ requires std::same_as<std::remove_const_t<T>, SurfaceSample>
 void visit_members(T& s, const Visit& visit) {
   visit(s.position_m), visit(s.normal), visit(s.mover), visit(s.material), visit(s.sky_frac),
       visit(s.sphere_sky_frac);
-  visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.covered);
+  visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
+  visit(s.covered);
   visit(s.open_frac), visit(s.open_before_frac), visit(s.flat_m), visit(s.partners);
   visit(s.other_side);
 }
@@ -66,12 +72,13 @@ using physics::make_error;
 using physics::Result;
 
 constexpr std::array<char, 8> kMagic{'E', 'M', 'I', 'T', 'S', 'T', 'A', 'T'};
-constexpr std::size_t kHeaderBytes =
-    kMagic.size() + 2 * sizeof(std::uint32_t) + sizeof(StateKey) + sizeof(std::uint64_t);
+constexpr std::size_t kHeaderBytes = kMagic.size() + 2 * sizeof(std::uint32_t) + sizeof(StateKey) +
+                                     sizeof(std::int64_t) + sizeof(std::uint64_t);
 constexpr std::size_t kHashBytes = sizeof(std::uint64_t);
 
 template <class Sink>
 void put_model(Sink& sink, const SurfaceModel& model) {
+  put_value(sink, model.eyes);
   put_value(sink, static_cast<std::uint64_t>(model.meshes.size()));
   for (const RefinedMesh& mesh : model.meshes) put_value(sink, mesh.parts());
   put_value(sink, model.first_sample);
@@ -199,6 +206,7 @@ struct Header {
   std::uint32_t version = 0;
   std::uint32_t parts = 0;
   StateKey key{};
+  std::int64_t at_ns = 0;
   std::uint64_t body_bytes = 0;
 };
 
@@ -211,11 +219,10 @@ std::string different_parts(const StateKey& a, const StateKey& b) {
   return text;
 }
 
-/// Why a file of that size whose first bytes, or all, are these is no state for the key; empty when
-/// nothing speaks against it.
+/// Why a file of that size whose first bytes, or all, are these is not the state that is wanted;
+/// empty when nothing speaks against it. Fills the header.
 std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_bytes,
-                      const StateKey& key) {
-  Header header;
+                      const StateWanted& wanted, Header& header) {
   ByteSource source(bytes.first(std::min(bytes.size(), kHeaderBytes)));
   take_value(source, header.magic);
   if (!source.ok() || header.magic != kMagic) return "not a state of the thermal simulation";
@@ -226,6 +233,7 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   }
   take_value(source, header.parts);
   take_value(source, header.key);
+  take_value(source, header.at_ns);
   take_value(source, header.body_bytes);
   if (!source.ok() || header.parts != kStateParts || file_bytes < kHeaderBytes + kHashBytes ||
       header.body_bytes != file_bytes - kHeaderBytes - kHashBytes) {
@@ -238,8 +246,16 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   ByteSource tail(bytes.last(kHashBytes));
   take_value(tail, stored);
   if (stored != hash.value()) return "damaged: the checksum is wrong";
+  StateKey key = wanted.key;
+  key[static_cast<std::size_t>(StatePart::live)] = wanted.live_hash(header.at_ns);
   const std::string parts = different_parts(header.key, key);
-  return parts.empty() ? "" : "made for another scenario, different in: " + parts;
+  if (!parts.empty()) return "made for another scenario, different in: " + parts;
+  if (header.at_ns > wanted.start_ns) {
+    return fmt::format(
+        "holds the surface at {:.3f} s, and this run starts at {:.3f} s, before that",
+        1e-9 * static_cast<double>(header.at_ns), 1e-9 * static_cast<double>(wanted.start_ns));
+  }
+  return "";
 }
 
 }  // namespace
@@ -253,6 +269,7 @@ Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
   put_value(store, kStateVersion);
   put_value(store, static_cast<std::uint32_t>(kStateParts));
   put_value(store, key);
+  put_value(store, model.at_ns);
   put_value(store, static_cast<std::uint64_t>(body.count()));
   put_model(store, model);
   Fnv64 hash;
@@ -277,7 +294,7 @@ Result<void> check_state_writable(const std::filesystem::path& file) {
   return {};
 }
 
-Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateKey& key,
+Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWanted& wanted,
                                 const scene::SceneGeometry& geometry, std::size_t movers,
                                 const SurfaceModelOptions& options) {
   const auto refuse = [&file](const std::string& why) {
@@ -289,15 +306,18 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateKe
   const auto head = read_bytes(file, kHeaderBytes);
   if (!head) return tl::unexpected(head.error());
   std::error_code error;
-  std::string why = objection(*head, std::filesystem::file_size(file, error), key);
+  Header header;
+  std::string why = objection(*head, std::filesystem::file_size(file, error), wanted, header);
   if (!why.empty()) return refuse(why);
   const auto bytes = read_bytes(file, std::numeric_limits<std::uintmax_t>::max());
   if (!bytes) return tl::unexpected(bytes.error());
-  why = objection(*bytes, bytes->size(), key);
+  why = objection(*bytes, bytes->size(), wanted, header);
   if (!why.empty()) return refuse(why);
   const std::span<const std::byte> all(*bytes);
   ByteSource source(all.subspan(kHeaderBytes, all.size() - kHeaderBytes - kHashBytes));
   SurfaceModel model;
+  model.at_ns = header.at_ns;
+  take_value(source, model.eyes);
   if (!take_meshes(source, geometry, options.max_samples, model)) {
     return refuse("damaged: its meshes are not those of the scene");
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a saved state hangs on, part by part.
+// Hashes of what a saved state depends on, part by part.
 #include <algorithm>
 
 #include "surface/state/state_bytes.hpp"
@@ -136,12 +136,8 @@ std::string_view describe(StatePart part) noexcept {
       return "thermal options";
     case StatePart::camera:
       return "sensor format, field of view or trajectory";
-    case StatePart::first_time:
-      return "time of the first frame";
-    case StatePart::first_camera:
-      return "camera of the first frame";
     case StatePart::live:
-      return "input of the host before the first frame";
+      return "input of the host before the state was saved";
   }
   return "?";
 }
@@ -157,21 +153,18 @@ StateKey scenario_key(const scene::ScenarioDesc& scenario, const scene::SceneGeo
   return key;
 }
 
-void add_first_frame(StateKey& key, std::int64_t start_ns, const RefineView& view,
-                     const Environment& environment, std::span<const PoseHistory> entities) {
-  Fnv64 time;
-  add(time, start_ns);
-  at(key, StatePart::first_time) = time.value();
-  Fnv64 camera;
-  for (const RefineView::Eye& eye : view.eyes) {
-    add(camera, eye.world_m);
-    add(camera, eye.boresight);
+std::uint64_t live_hash(std::int64_t at_ns, const Environment& environment,
+                        std::span<const PoseHistory> entities) {
+  Fnv64 hash;
+  for (const PoseHistory& entity : entities) {
+    const std::span<const scene::Keyframe> live = entity.live();
+    const auto end = std::ranges::upper_bound(live, at_ns, {}, &scene::Keyframe::sim_time_ns);
+    add_keys(hash, live.first(static_cast<std::size_t>(end - live.begin())));
   }
-  at(key, StatePart::first_camera) = camera.value();
-  Fnv64 live;
-  for (const PoseHistory& entity : entities) add_keys(live, entity.live());
-  for (const physics::WeatherSample& row : environment.live()) add_weather(live, row);
-  at(key, StatePart::live) = live.value();
+  for (const physics::WeatherSample& row : environment.live()) {
+    if (row.sim_time_ns <= at_ns) add_weather(hash, row);
+  }
+  return hash.value();
 }
 
 }  // namespace emit::renderer

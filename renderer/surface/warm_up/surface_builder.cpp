@@ -12,7 +12,9 @@
 #include "surface/mesh/refined_mesh_edges.hpp"
 #include "surface/mesh/sheet_sides.hpp"
 #include "surface/model/surface_model.hpp"
+#include "surface/warm_up/sample_numbers.hpp"
 #include "surface/warm_up/surface_exchange.hpp"
+#include "surface/warm_up/surface_partners.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 #include "surface/warm_up/surface_refinement.hpp"
 
@@ -25,6 +27,9 @@ constexpr std::uint32_t kMaxRounds = 400;
 constexpr float kNeedStep = 4.0F;
 constexpr std::size_t kRoundShare = 8;
 constexpr std::size_t kLeastPerRound = 256;
+/// A round for which samples do not suffice is the last when it adds no more than that share of
+/// all.
+constexpr std::size_t kLastFraction = 256;
 constexpr std::size_t kGrain = 64;
 /// The full surface is looked for within this share of the halved edge.
 constexpr float kDetailReachFrac = 0.5F;
@@ -45,6 +50,7 @@ class Builder {
         progress_(progress),
         worth_(inputs),
         sampler_(inputs, worth_, options),
+        partners_(inputs, sampler_),
         refinement_(inputs, worth_, view, options) {}
 
   physics::Result<SurfaceModel> run();
@@ -76,11 +82,15 @@ class Builder {
   const SurfaceProgress& progress_;
   DriveWorth worth_;
   PatchSampler sampler_;
+  PartnerFinder partners_;  ///< used where heat moves across edges
   SurfaceRefinement refinement_;
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
   std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
-  std::size_t sample_count_ = 0;  ///< of all patches
+  std::size_t sample_count_ = 0;   ///< of all patches, with their partners
+  std::size_t partner_count_ = 0;  ///< of these, partners
+  std::size_t least_count_ = 0;    ///< of samples before anything is refined
+  bool short_of_samples_ = false;  ///< leaves stayed whole for want of samples in this round
   // By vertex of the mesh at hand, filled for those that have no sample yet:
   std::vector<glm::vec3> inward_;
   std::vector<glm::vec3> place_m_;  ///< of its samples
@@ -111,6 +121,7 @@ void Builder::make_patches() {
       patch.back->object = patch.object;
       patch.back->mover = patch.mover;
     }
+    patch.begin(in_.record.size(), !in_.movers_now.empty(), sampler_.keeps_sent());
     patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
     sample_count_ += samples_of(patch.mesh);
     patches_.push_back(std::move(patch));
@@ -142,8 +153,6 @@ void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
 bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   jobs_.clear();
   job_stand_.clear();
-  const std::size_t intervals = in_.record.size();
-  const bool movers = !in_.movers_now.empty();
   for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
     const auto vertices = model_.meshes[mesh].vertices();
     bool looked = false;
@@ -156,13 +165,16 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         adopt_detail(mesh, first);
       }
       looked = true;
-      patch.grow(vertices.size(), intervals, movers);
+      patch.grow(vertices.size());
+      if (options_.lateral) partners_.grow(p, vertices.size());
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
         SurfaceSample& sample = patch.samples[v];
         const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
         const float length = glm::length(inward);
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
-        const glm::vec3 off_edge_m = sampler_.offset_m() * unit_inward;
+        const glm::vec3 drawn_m(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F));
+        const glm::vec3 off_edge_m =
+            sampler_.tracer().offsets(drawn_m, patch.mover).around_m * unit_inward;
         const auto to_rel = [&](const glm::vec3& at_m) {
           return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
         };
@@ -187,8 +199,12 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   for (std::size_t begin = 0; begin < jobs_.size(); begin += kSlice) {
     const std::size_t end = std::min(jobs_.size(), begin + kSlice);
     threads::parallel_parts(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
+      PatchSampler::StartMemo memo;
       for (std::size_t j = begin + from; j < begin + to; ++j) {
-        sampler_.evaluate(patches_[jobs_[j].patch], jobs_[j].index, job_stand_[j]);
+        const Job& job = jobs_[j];
+        SurfacePatch& patch = patches_[job.patch];
+        sampler_.evaluate(patch, job.index, job_stand_[j], memo);
+        if (options_.lateral) partners_.find(job.patch, job.index, patch.samples[job.index]);
       }
     });
     const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());
@@ -196,6 +212,11 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
   }
   for (const Job& job : jobs_) {
     SurfacePatch& patch = patches_[job.patch];
+    if (options_.lateral) {
+      const std::size_t found = partners_.count(job.patch, job.index);
+      partner_count_ += found;
+      sample_count_ += found;
+    }
     const RefinedMesh::Vertex& vertex = model_.meshes[patch.mesh].vertices()[job.index];
     if (vertex.parent[0] == job.index) continue;
     const float mean_k = 0.5F * (patch.outputs[vertex.parent[0]].offset_k +
@@ -219,7 +240,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
 void Builder::replace_covered() {
   SurfaceSamples& all = model_.samples;
   for (std::size_t p = 0; p < in_.geometry.instances.size(); ++p) {
-    const RefinedMesh& mesh = model_.meshes[patches_[p].mesh];
+    const RefinedMesh& mesh = model_.meshes[in_.geometry.instances[p].mesh];
     const std::uint32_t first = model_.first_sample[p];
     const auto vertices = mesh.vertices();
     std::vector<std::uint32_t> open(vertices.size(), kNoSample);
@@ -257,8 +278,15 @@ void Builder::split(std::uint32_t mesh, float above) {
       options_.max_samples > sample_count_ ? options_.max_samples - sample_count_ : 0;
   const std::size_t vertices = refined.vertices().size();
   const std::size_t samples = samples_of(mesh);
-  // A vertex of a sheet has two samples.
-  const std::size_t most = left / (samples > vertices ? 2 * uses : uses);
+  // Leave room for the partners of new samples: half as many again as those before them have. A
+  // vertex of a sheet has two samples.
+  constexpr double kMorePartners = 1.5;
+  const double partners_of_sample =
+      kMorePartners * static_cast<double>(partner_count_) /
+      static_cast<double>(std::max<std::size_t>(sample_count_ - partner_count_, 1));
+  const double samples_of_vertex = static_cast<double>(samples > vertices ? 2 * uses : uses);
+  const auto most = static_cast<std::size_t>(static_cast<double>(left) /
+                                             (samples_of_vertex * (1.0 + partners_of_sample)));
   refined.limit(vertices + most);
   if (needs_.size() > most) {
     std::ranges::sort(needs_, [](const auto& a, const auto& b) {
@@ -267,9 +295,13 @@ void Builder::split(std::uint32_t mesh, float above) {
   }
   slots_.clear();
   for (const SurfaceRefinement::Need& need : needs_) slots_.push_back(need.slot);
-  if (!refined.split(slots_)) model_.full = true;
+  const bool complete = refined.split(slots_);
   sample_count_ += (samples_of(mesh) - samples) * uses;
-  refinement_.leave(mesh, refined, slots_);
+  if (complete) {
+    refinement_.leave(mesh, refined, slots_);
+  } else {
+    short_of_samples_ = true;
+  }
 }
 
 float Builder::need_of_neediest() {
@@ -295,9 +327,11 @@ physics::Result<SurfaceModel> Builder::run() {
   make_patches();
   // How far refinement will go is not known: each round takes a share of what is left.
   double done_frac = 0.0;
+  std::size_t count_before = 0;  // of samples, in the round before
   const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
   double to_frac = next_frac();
   if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+  least_count_ = sample_count_;
   // Where need is greatest first: when samples run out, what is left matters least.
   for (std::uint32_t round = 0;; ++round) {
     SurfaceRefinement::Most most;
@@ -307,21 +341,38 @@ physics::Result<SurfaceModel> Builder::run() {
       most.need = std::max(most.need, here.need);
       most.in_view = std::max(most.in_view, here.in_view);
     }
-    if (model_.full || round == kMaxRounds) {
+    // Stop where samples have run out: what a round leaves room for the next one takes, until next
+    // to nothing is left.
+    const bool none_left =
+        short_of_samples_ && sample_count_ - count_before <= options_.max_samples / kLastFraction;
+    if (none_left || round == kMaxRounds) {
       model_.full = true;
       model_.full_in_view = most.in_view > 0.0F;
       break;
     }
     if (most.need == 0.0F) break;
+    short_of_samples_ = false;
+    count_before = sample_count_;
     const float above = std::min(most.need / kNeedStep, need_of_neediest());
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
     done_frac = to_frac;
     to_frac = next_frac();
     if (!sample_new_vertices(done_frac, to_frac)) return stopped();
   }
-  number_samples(in_, sampler_, options_, patches_, model_);
+  if (options_.lateral) {
+    // The partners of the last samples may be more than room was left for.
+    if (sample_count_ > options_.max_samples && sample_count_ > least_count_) {
+      partners_.drop(sample_count_ - std::max(options_.max_samples, least_count_));
+    }
+    partners_.append(patches_);
+  }
+  number_samples(in_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
-  if (!exchange(in_, sampler_, options_, patches_, model_, exchanged)) return stopped();
+  SampleHistories histories = take_histories(in_, patches_, model_);
+  const ExchangeOptions exchange_options{.sweeps = sampler_.keeps_sent() ? kExchangeSweeps : 0,
+                                         .evaluated = true,
+                                         .glow = options_.exchange};
+  if (!exchange(in_, exchange_options, std::move(histories), model_, exchanged)) return stopped();
   replace_covered();
   return std::move(model_);
 }

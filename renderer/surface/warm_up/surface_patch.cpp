@@ -5,7 +5,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numeric>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "surface/mesh/tangents.hpp"
 
@@ -13,6 +15,8 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::size_t kTangents = CasterRays::kMaxRays;
+/// An entity farther from the origin of rel than this does not see the world.
+constexpr float kMaxWorldM = 20'000.0F;
 /// A face stands upright on another when the cosine between their normals is smaller.
 constexpr float kWallCos = 0.3F;
 constexpr float kMaxFootM = 3.0F;
@@ -35,7 +39,7 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
       view_(kSampleViewRays),
       sky_(inputs.heat.sky_measure() == SkyMeasure::cosine ? kSampleSkyRays : kSampleViewRays),
       sphere_(kSampleViewRays),
-      offsets_(ray_offsets(inputs.geometry)) {
+      tracer_(inputs, options) {
   history_s_ = inputs.record.lag_s.empty() ? 0.0 : static_cast<double>(inputs.record.lag_s[0]);
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
@@ -47,9 +51,18 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
   }
 }
 
-SampleState PatchSampler::start_state(const SurfaceSample& sample) const noexcept {
-  return in_.heat.start_state(sample, in_.record.rays.front().normal(sample), in_.history,
-                              in_.record.tail);
+SampleState PatchSampler::start_state(const SurfaceSample& sample, StartMemo& memo) const noexcept {
+  const glm::vec3 normal = in_.record.rays.front().normal(sample);
+  const auto make = [&] {
+    return in_.heat.start_state(sample, normal, in_.history, in_.record.tail);
+  };
+  const bool whole =
+      std::ranges::all_of(sample.open_before_frac, [](float frac) { return frac == 1.0F; });
+  if (!whole) return make();
+  if (memo.material != sample.material || memo.normal != normal) {
+    memo = {sample.material, normal, make()};
+  }
+  return memo.state;
 }
 
 bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
@@ -81,14 +94,10 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
   patch.to_sky[index] = to_sky;
   patch.sky_surplus_frac[index] = surplus_frac;
   if (options_.exchange) {
-    // Of the faces they see either's will do; weights fill what is not open.
-    std::vector<SeenPlace>& seen = patch.seen[index];
-    seen = patch.seen[patch.seen[a].empty() ? b : a];
-    float seen_frac = 0.0F;
-    for (const SeenPlace& place : seen) seen_frac += place.weight_frac;
-    const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
-    for (SeenPlace& place : seen) place.weight_frac *= left_frac / seen_frac;
-    if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
+    // Share the view of whichever parent sees faces.
+    const std::uint32_t view = patch.view_of[patch.seen[patch.view_of[a]].empty() ? b : a];
+    patch.view_of[index] = view;
+    if (patch.seen[view].empty()) sample.far_frac = 1.0F - sample.sky_frac;
   }
   return true;
 }
@@ -96,15 +105,26 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
 void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
                                const SampleStand& stand) const {
   SurfaceSample& sample = patch.samples[index];
-  ViewPoint point{sample.position_m, sample.normal, stand.inward, offsets_.around_m};
-  ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offsets_.around_m};
+  // An entity sees the world from where it stands now, and its own hull always. Far off it sees its
+  // hull alone: float32 would not resolve the hull there.
+  const bool far_off =
+      sample.mover >= 0 &&
+      glm::length(in_.movers_now[static_cast<std::size_t>(sample.mover)].position_m) > kMaxWorldM;
+  const float offset_m = far_off ? tracer_.bulk_offsets().around_m
+                                 : tracer_.offsets(sample.position_m, sample.mover).around_m;
+  ViewPoint point{sample.position_m, sample.normal, stand.inward, offset_m};
+  ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offset_m};
   std::array<MoverPlacement, 1> self;
   CasterSelection selection{true, {}};
   std::vector<MoverPlacement> placed;
   if (sample.mover >= 0) {
-    // An entity sees the world from where it stands now, and its own hull always.
     placed.assign(in_.movers_now.begin(), in_.movers_now.end());
     MoverPlacement& own = placed[static_cast<std::size_t>(sample.mover)];
+    if (far_off) {
+      for (MoverPlacement& place : placed) place.on = false;
+      own.position_m = glm::vec3(0.0F);
+      selection.fixed = false;
+    }
     own.on = true;
     for (ViewPoint* each : {&point, &drawn}) {
       each->position_m = own.rel_from_body * each->position_m + own.position_m;
@@ -136,17 +156,13 @@ void PatchSampler::look_at_faces(SurfacePatch& patch, std::uint32_t index, const
   const SurfaceView view = view_.view(in_.places, point, selection);
   std::vector<SeenPlace>& seen = patch.seen[index];
   seen.clear();
-  float seen_frac = 0.0F;
+  seen.reserve(view.seen_count);
   for (std::uint32_t i = 0; i < view.seen_count; ++i) {
     const SeenFace& face = view.seen[i];
     seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac, !face.front});
-    seen_frac += face.weight_frac;
   }
-  // The shares that are open know better how much is left for faces.
   SurfaceSample& sample = patch.samples[index];
   if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
-  const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
-  for (SeenPlace& place : seen) place.weight_frac *= left_frac / seen_frac;
 }
 
 void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
@@ -154,17 +170,18 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   SurfaceSample& sample = patch.samples[index];
   const glm::vec3& n = point.normal;
   const auto [u, v] = tangents_of(n);
-  const glm::vec3 base_m = point.position_m + offsets_.around_m * point.inward;
+  const float offset_m = point.offset_m;
+  const glm::vec3 base_m = point.position_m + offset_m * point.inward;
   std::array<CasterRay, kTangents> rays;
   std::array<CasterHit, kTangents> above;
   std::array<CasterHit, kTangents> below;
   for (std::size_t k = 0; k < kTangents; ++k) {
     const auto angle =
         static_cast<float>(2.0 * physics::kPi * (static_cast<double>(k) + 0.5) / kTangents);
-    rays[k] = {base_m + 2.0F * offsets_.around_m * n, std::cos(angle) * u + std::sin(angle) * v};
+    rays[k] = {base_m + 2.0F * offset_m * n, std::cos(angle) * u + std::sin(angle) * v};
   }
   const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above, kFeelM);
-  for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offsets_.around_m * n;
+  for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offset_m * n;
   const std::uint32_t met_below = in_.rays.first_hits(rays, selection, below, kFeelM);
   sample.flat_m = kFeelM;
   for (std::size_t k = 0; k < kTangents; ++k) {
@@ -182,13 +199,12 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
         std::abs(glm::dot(above[k].normal, n)) > kWallCos) {
       continue;
     }
-    const CasterRay down{
-        rays[k].origin_m + 4.0F * offsets_.around_m * n +
-            (above[k].distance_m + kUnderOffsets * offsets_.around_m) * rays[k].direction,
-        -n};
+    const CasterRay down{rays[k].origin_m + 4.0F * offset_m * n +
+                             (above[k].distance_m + kUnderOffsets * offset_m) * rays[k].direction,
+                         -n};
     std::array<CasterHit, 1> under;
     if (in_.rays.first_hits({&down, 1}, selection, under) != 0U &&
-        under[0].distance_m < kUnderOffsets * offsets_.around_m) {
+        under[0].distance_m < kUnderOffsets * offset_m) {
       wall_m[k] = above[k].distance_m;
       any = true;
     }
@@ -222,28 +238,10 @@ bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
   });
 }
 
-void PatchSampler::trace(SurfacePatch& patch, std::uint32_t index) const {
-  const SurfaceSample& sample = patch.samples[index];
+void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const {
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();
-  const float max_blur_m =
-      options_.lateral ? std::min(static_cast<float>(options_.max_blur_m), 0.5F * sample.flat_m)
-                       : 0.0F;
-  for (std::size_t i = 0; i < count; ++i) {
-    const IntervalRays& rays = record.rays[i];
-    const float blur_m = std::min(
-        max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
-    patch.sun_frac[index * count + i] = rays.sun_frac(in_.rays, sample, offsets_.sun_m, blur_m);
-    if (!patch.hidden_sky.empty()) {
-      patch.hidden_sky[index * count + i] = rays.hidden_sky(in_.rays, sample, offsets_.around_m);
-    }
-  }
-}
-
-void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index) const {
-  const HistoryRecord& record = in_.record;
-  const std::size_t count = record.size();
-  // Before samples are numbered, what is seen counts as the surroundings.
+  // Take what is seen for the surroundings, as long as samples are not numbered.
   const auto alone = [index](const SurfacePatch& side) {
     SurfaceSample sample = side.samples[index];
     sample.far_frac = 1.0F - sample.sky_frac;
@@ -260,47 +258,82 @@ void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index) const {
   const SurfaceSample front = alone(patch);
   const bool sheet = patch.back && in_.materials[front.material].sheet;
   const SurfaceSample back = sheet ? alone(*patch.back) : SurfaceSample{};
-  SampleState state = start_state(front);
+  SampleState state = start_state(front, memo);
+  const bool keeps = patch.sent.keeps();
+  if (keeps) patch.start_k[index] = state.modes_k;
   SampleOutput output;
+  SampleOutput back_output;
   for (std::size_t i = 0; i < count; ++i) {
+    const HeatInterval& interval = record.intervals[i];
+    const SurfaceForcing& begin = interval.forcing.begin;
     const SampleDrive drive = drive_of(patch, i);
     const glm::vec3 normal = record.rays[i].normal(front);
+    if (keeps && i == 0) {
+      patch.sent.keep_begin(index, in_.heat.output(front, normal, begin, drive, state));
+    }
     if (sheet) {
       const SampleDrive back_drive = drive_of(*patch.back, i);
       const SheetBack other{back, back_drive};
-      output = in_.heat.advance(front, normal, record.intervals[i], drive, state, &other);
+      if (keeps && i == 0) {
+        patch.back->sent.keep_begin(index,
+                                    in_.heat.output(back, -normal, begin, back_drive, state));
+      }
+      output = in_.heat.advance(front, normal, interval, drive, state, &other);
+      if (keeps || i + 1 == count) {
+        back_output = in_.heat.output(back, -normal, interval.forcing.end, back_drive, state);
+      }
+      if (keeps) patch.back->sent.keep_end(index, i, back_output);
     } else {
-      output = in_.heat.advance(front, normal, record.intervals[i], drive, state);
+      output = in_.heat.advance(front, normal, interval, drive, state);
     }
+    if (keeps) patch.sent.keep_end(index, i, output);
   }
   patch.states[index] = state;
   patch.outputs[index] = output;
-  if (sheet) patch.back->outputs[index] = output;
+  if (sheet) patch.back->outputs[index] = back_output;
 }
 
-void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index,
-                            const SampleStand& stand) const {
+void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand,
+                            StartMemo& memo) const {
   const auto look = [&](SurfacePatch& side) {
     if (!inherit_view(side, index, stand)) look_around(side, index, stand);
-    trace(side, index);
+    const std::size_t count = in_.record.size();
+    const std::size_t first = index * count;
+    tracer_.trace(side.samples[index], std::span(side.sun_frac).subspan(first, count),
+                  side.hidden_sky.empty() ? std::span<HiddenSky>()
+                                          : std::span(side.hidden_sky).subspan(first, count));
   };
   look(patch);
   if (patch.back && in_.materials[patch.samples[index].material].sheet) look(*patch.back);
-  integrate(patch, index);
+  integrate(patch, index, memo);
 }
 
-void SurfacePatch::grow(std::size_t vertices, std::size_t intervals, bool movers) {
+void SurfacePatch::begin(std::size_t intervals, bool movers, bool keeps_sent) {
+  EMIT_CHECK(samples.empty());
+  intervals_ = intervals;
+  movers_ = movers;
+  sent = SentHistory(keeps_sent ? intervals : 0);
+  if (back) back->begin(intervals, movers, keeps_sent);
+}
+
+void SurfacePatch::grow(std::size_t vertices) {
   constexpr float kUnknown = std::numeric_limits<float>::infinity();
+  const std::size_t before = samples.size();
   samples.resize(vertices);
   seen.resize(vertices);
+  view_of.resize(vertices);
+  std::iota(view_of.begin() + static_cast<std::ptrdiff_t>(before), view_of.end(),
+            static_cast<std::uint32_t>(before));
+  sent.resize(vertices);
+  if (sent.keeps()) start_k.resize(vertices);
   states.resize(vertices);
   outputs.resize(vertices);
   surplus_k.resize(vertices, -1.0F);
   to_sky.resize(vertices);
   sky_surplus_frac.resize(vertices, kUnknown);
-  sun_frac.resize(vertices * intervals);
-  if (movers) hidden_sky.resize(vertices * intervals);
-  if (back) back->grow(vertices, intervals, movers);
+  sun_frac.resize(vertices * intervals_);
+  if (movers_) hidden_sky.resize(vertices * intervals_);
+  if (back) back->grow(vertices);
 }
 
 }  // namespace emit::renderer

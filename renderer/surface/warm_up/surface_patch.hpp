@@ -10,8 +10,9 @@
 
 #include "surface/model/drive_worth.hpp"
 #include "surface/model/surface_model.hpp"
-#include "surface/rays/ray_offsets.hpp"
 #include "surface/rays/sphere_view.hpp"
+#include "surface/warm_up/sent_history.hpp"
+#include "surface/warm_up/sun_tracer.hpp"
 
 namespace emit::renderer {
 
@@ -33,7 +34,12 @@ struct SurfacePatch {
   glm::mat3 normal_from_mesh{1.0F};
 
   std::vector<SurfaceSample> samples;
+  /// Views: what a vertex sees of faces, by rays of its own. Vertices that share another one's view
+  /// have none. Weights add up to something: the share that is not open is spread over them.
   std::vector<std::vector<SeenPlace>> seen;
+  std::vector<std::uint32_t> view_of;                 ///< vertex whose view it is
+  std::vector<physics::FosterState<double>> start_k;  ///< modes at the start of the history
+  SentHistory sent;                                   ///< what it sends out over the history
   std::vector<SampleState> states;
   std::vector<SampleOutput> outputs;
   /// Difference from the mean of the vertex's parents, K; negative where it has none.
@@ -47,8 +53,15 @@ struct SurfacePatch {
   /// The other faces of sheets, by the same vertices; null where the mesh has none.
   std::unique_ptr<SurfacePatch> back;
 
-  /// Makes room for samples of `vertices` vertices over `intervals`.
-  void grow(std::size_t vertices, std::size_t intervals, bool movers);
+  /// Sets what is kept of every vertex: over how many intervals, whether there are entities, and
+  /// whether what it sends is kept. @pre no vertices yet
+  void begin(std::size_t intervals, bool movers, bool keeps_sent);
+  /// Makes room for samples of `vertices` vertices. @pre begin()
+  void grow(std::size_t vertices);
+
+ private:
+  std::size_t intervals_ = 0;
+  bool movers_ = false;
 };
 
 /// Where a sample stands, beside its own place.
@@ -66,25 +79,34 @@ class PatchSampler {
   PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
                const SurfaceModelOptions& options);
 
-  /// Distance of ray starts from the surface.
-  [[nodiscard]] float offset_m() const noexcept { return offsets_.around_m; }
+  [[nodiscard]] const SunTracer& tracer() const noexcept { return tracer_; }
+  /// True where samples exchange heat with others, so that what they send must be known.
+  [[nodiscard]] bool keeps_sent() const noexcept { return options_.exchange || options_.lateral; }
+
+  /// The state that the latest sample started with: its neighbours, which face alike, start with
+  /// the same. Each thread has its own.
+  struct StartMemo {
+    std::uint32_t material = kNoSample;
+    glm::vec3 normal{0.0F};
+    SampleState state;
+  };
 
   /// Fills everything of sample `index`, whose position, normal, material and mover stand in
   /// patch.samples already, and of its other side. What it sees counts as the surroundings here.
-  void evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
-
-  /// State at the start of the record, as the thermal model has it.
-  [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
+  void evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand,
+                StartMemo& memo) const;
 
  private:
+  /// State at the start of the record, as the thermal model has it.
+  [[nodiscard]] SampleState start_state(const SurfaceSample& sample,
+                                        StartMemo& memo) const noexcept;
+
   /// Takes the view of its parents where theirs was what it would have been of their own; false,
   /// and nothing changed, where rays are needed.
   bool inherit_view(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
-  /// Shares of the sun's disc, and of the sky that entities hide, over the history.
-  void trace(SurfacePatch& patch, std::uint32_t index) const;
-  /// Temperature over the history.
-  void integrate(SurfacePatch& patch, std::uint32_t index) const;
+  /// Temperature over the history, and what the sample sends out.
+  void integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const;
 
   /// A face of the scene as loaded that is a sheet's: who sees its back is in no body.
   [[nodiscard]] bool of_a_sheet(const SeenFace& face) const noexcept;
@@ -105,7 +127,7 @@ class PatchSampler {
   ViewSampler view_;
   ViewSampler sky_;
   SphereSampler sphere_;
-  RayOffsets offsets_;
+  SunTracer tracer_;
   double history_s_ = 0.0;
   std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
   std::vector<float> sky_limit_frac_;    ///< by material: shares that differ less are alike

@@ -105,7 +105,7 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
       pixel_rad_(static_cast<float>(view.pixel_rad)),
       field_rad_(static_cast<float>(view.field_rad)),
       tolerance_k_(static_cast<float>(options.tolerance_k)),
-      sun_offset_m_(ray_offsets(inputs.geometry).sun_m),
+      offsets_(ray_offsets(inputs.geometry)),
       lateral_(options.lateral),
       judged_(inputs.geometry.meshes.size()) {
   for (const scene::Material& material : inputs.materials) {
@@ -240,6 +240,8 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
     }
     points_m[k] = (1.0F - u - v) * a.position_m + u * b.position_m + v * c.position_m;
   }
+  float sun_offset_m = offsets_.sun_m;
+  if (patch.mover < 0) sun_offset_m = offsets_.at(a.position_m).sun_m;
   std::array<float, kPacketRays> missed_k{};
   for (std::size_t i = 0; i < count; ++i) {
     const IntervalRays& rays = in_.record.rays[i];
@@ -251,7 +253,7 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
     if (!lit && high > kAgreeFrac) continue;
     const float worth_k =
         worth_.sun_k(face.material, i) * std::max(0.0F, glm::dot(rays.normal(face), rays.to_sun()));
-    const IntervalRays::Spots spots = rays.spots(in_.rays, face, points_m, sun_offset_m_);
+    const IntervalRays::Spots spots = rays.spots(in_.rays, face, points_m, sun_offset_m);
     const std::uint32_t odd = spots.faced & (lit ? ~spots.lit : spots.lit);
     for (std::size_t k = 0; k < points_m.size(); ++k) {
       if (((odd >> k) & 1U) != 0U) missed_k[k] += lit ? -worth_k : worth_k;

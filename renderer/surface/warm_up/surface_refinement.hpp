@@ -96,7 +96,7 @@ class SurfaceRefinement {
   float pixel_rad_ = 1e-3F;
   float field_rad_ = 0.0F;
   float tolerance_k_ = 0.1F;
-  float sun_offset_m_ = 0.0F;
+  RayOffsets offsets_;
   bool lateral_ = true;
   std::vector<float> diffusivity_m2_s_;  ///< by material
   std::size_t recent_ = 0;               ///< first of the intervals that count as lately

@@ -4,6 +4,7 @@
 // dropped and the rest is taken unchanged.
 #include "surface/state/state_file.hpp"
 
+#include <limits>
 #include <vector>
 
 #include "fuzz/fuzz_input.hpp"
@@ -15,7 +16,7 @@ namespace {
 
 using namespace emit;
 
-constexpr std::size_t kBodySizeAt = 8 + 4 + 4 + sizeof(renderer::StateKey);
+constexpr std::size_t kBodySizeAt = 8 + 4 + 4 + sizeof(renderer::StateKey) + 8;
 constexpr std::size_t kBodyAt = kBodySizeAt + 8;
 
 void seal(std::vector<std::byte>& file) {
@@ -41,8 +42,12 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   }
   renderer::SurfaceModelOptions options;
   options.max_samples = 1000;
-  const auto model = renderer::read_state(fuzz::file_of(file), fuzz::state_key(), geometry,
-                                          fuzz::kMovers, options);
+  const renderer::StateKey key = fuzz::state_key();
+  const renderer::StateWanted wanted{
+      key, std::numeric_limits<std::int64_t>::max(),
+      [&key](std::int64_t) { return key[static_cast<std::size_t>(renderer::StatePart::live)]; }};
+  const auto model =
+      renderer::read_state(fuzz::file_of(file), wanted, geometry, fuzz::kMovers, options);
   if (!model) return 0;
   fuzz::require(model->meshes.size() == geometry.meshes.size(), "a mesh for every mesh");
   for (const renderer::RefinedMesh& mesh : model->meshes) {

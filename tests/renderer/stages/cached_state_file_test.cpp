@@ -3,6 +3,8 @@
 // wrote it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -114,6 +116,27 @@ class Session {
   std::unique_ptr<renderer::Renderer> renderer_;
 };
 
+/// Greatest and mean difference of two frames' temperatures, K.
+struct Apart {
+  double max_k = 0.0;
+  double rms_k = 0.0;
+};
+Apart apart(const std::vector<float>& a, const std::vector<float>& b) {
+  Apart out;
+  const std::size_t px = a.size() / 2;  // the first plane is the temperature
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < px; ++i) {
+    if (std::isnan(a[i]) || std::isnan(b[i])) continue;
+    const double difference_k = std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i]));
+    out.max_k = std::max(out.max_k, difference_k);
+    squares += difference_k * difference_k;
+    ++count;
+  }
+  out.rms_k = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(count, 1)));
+  return out;
+}
+
 bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
@@ -207,11 +230,11 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
     ASSERT_FALSE(warm.result) << reason;
     EXPECT_NE(warm.result.error().text.find(reason), std::string::npos) << warm.result.error().text;
   };
-  refused("time of the first frame", [](Session&, renderer::FrameRequest& first) {
-    first.sim_time_ns = first.thermal_time_ns += 60 * kSecondNs;
+  refused("this run starts at", [](Session&, renderer::FrameRequest& first) {
+    first.sim_time_ns = first.thermal_time_ns -= 60 * kSecondNs;
   });
-  refused("camera of the first frame", [](Session&, renderer::FrameRequest& first) {
-    first.sensor_pose.position_world_m.x += 0.5;
+  refused("refined for other places of the camera", [](Session&, renderer::FrameRequest& first) {
+    first.sensor_pose.position_world_m.x += 3.0;
   });
   refused("input of the host", [&](Session& run, renderer::FrameRequest&) {
     const renderer::EntityUpdate update{7, scenario.objects[1].instances[0], true, false};
@@ -219,6 +242,52 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
   });
   EXPECT_EQ(std::filesystem::last_write_time(file), written);
   EXPECT_TRUE(Session(scenario).warm_up().result);  // the file is still valid
+  std::filesystem::remove(file);
+}
+
+TEST(RendererStateFile, ALaterRunGoesOnFromIt) {
+  const auto file = fresh_file();
+  const auto scenario = saved_scenario(file);
+  ASSERT_TRUE(Session(scenario).warm_up().result);
+  const auto written = std::filesystem::last_write_time(file);
+  auto afresh = scenario;
+  afresh.thermal.state_file.clear();
+  // Within the interval, minutes later, and after an hour in which the vehicle has left.
+  for (const double seconds : {5.0, 240.0, 3600.0}) {
+    Session later(scenario);
+    const auto first = later.request(seconds);
+    const WarmUp warm = later.warm_up(first);
+    ASSERT_TRUE(warm.result) << warm.result.error().text;
+    const auto shown = later.frame(first);
+    Session anew(afresh);
+    ASSERT_TRUE(anew.warm_up(first).result);
+    // Its triangles are those of the first time: edges of shadows lie between others by now.
+    const Apart difference = apart(shown, anew.frame(first));
+    EXPECT_LT(difference.rms_k, seconds < 1000.0 ? 0.1 : 0.3) << seconds;
+    EXPECT_LT(difference.max_k, seconds < 1000.0 ? 1.5 : 4.0) << seconds;
+    // It is the surface of then, not that of the file.
+    if (seconds > 1000.0) {
+      Session same(scenario);
+      ASSERT_TRUE(same.warm_up().result);
+      EXPECT_GT(apart(shown, same.frame(same.request(0.0))).rms_k, 1.0);
+    }
+  }
+  EXPECT_EQ(std::filesystem::last_write_time(file), written);
+  std::filesystem::remove(file);
+}
+
+TEST(RendererStateFile, BandsDoNotMatterToIt) {
+  const auto file = fresh_file();
+  auto scenario = saved_scenario(file);
+  ASSERT_TRUE(Session(scenario).warm_up().result);
+  scenario.bands = {{"3-5", 3.0, 5.0, {}}};
+  Session other(scenario);
+  const WarmUp warm = other.warm_up();
+  ASSERT_TRUE(warm.result) << warm.result.error().text;
+  EXPECT_EQ(warm.reports, 0U);
+  scenario.thermal.state_file.clear();
+  Session afresh(scenario);
+  EXPECT_TRUE(same_bits(other.frame(other.request(0.0)), afresh.frame(afresh.request(0.0))));
   std::filesystem::remove(file);
 }
 
@@ -249,6 +318,22 @@ TEST(RendererStateFile, GoingBackInTimeStartsAfreshAndLeavesTheFileAsItIs) {
   (void)run.frame(run.request(90.0));
   EXPECT_TRUE(same_bits(first, run.frame(run.request(0.0))));
   std::filesystem::remove(file);
+}
+
+TEST(RendererStateFile, AJumpOfTheThermalTimeIsFlaggedOnTheFrameThatPreparesTheSurfaceAnew) {
+  auto scenario = saved_scenario(fresh_file());
+  scenario.thermal.state_file.clear();
+  Session run(scenario);
+  ASSERT_TRUE(run.warm_up().result);
+  for (const double seconds : {0.0, 30.0, -1800.0, -1790.0, 1800.0, 1801.0}) {
+    const bool jumps = seconds == -1800.0 || seconds == 1800.0;
+    const int slot = run.renderer().submit(run.request(seconds));
+    ASSERT_GE(slot, 0);
+    const auto& view = run.renderer().collect(static_cast<renderer::SlotIndex>(slot));
+    EXPECT_EQ(view.stats.rewarm_s > 0.0, jumps) << seconds;
+    EXPECT_EQ(view.stats.coarse, jumps) << seconds;
+    run.renderer().release(static_cast<renderer::SlotIndex>(slot));
+  }
 }
 
 TEST(RendererStateFile, AFolderThatIsNotThereIsToldBeforeTheWork) {

@@ -187,7 +187,56 @@ TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
   EXPECT_LE(run.renderer().scene_stats().samples, 300U);
   EXPECT_TRUE(run.renderer().scene_stats().samples_full);
   EXPECT_FALSE(run.renderer().scene_stats().coarse_meshes);
-  EXPECT_EQ(warm_up_warnings(run.renderer().scene_stats()).size(), 1U);
+  const auto warnings = warm_up_warnings(run.renderer().scene_stats());
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("max_samples = 300 stopped"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find("600 or more"), std::string::npos) << warnings[0];
+}
+
+TEST(RendererCached, TheLimitOfSamplesHoldsWithThoseAcrossEdges) {
+  // Most samples of small blocks have partners across their edges.
+  std::vector<Quad> quads = box({-0.4, -0.4, 0.0}, {0.4, 0.4, 0.8});
+  for (int i = 0; i < 6; ++i) {
+    const double x_m = 1.5 * i - 4.0;
+    for (const Quad& quad : box({x_m, 1.0, 0.0}, {x_m + 0.4, 1.4, 0.5})) quads.push_back(quad);
+  }
+  quads.push_back(ground(12.0, 12.0));
+  for (const std::uint32_t max_samples : {1000U, 2000U, 4000U}) {
+    auto scenario = cached_scenario(write_quads("blocks", quads));
+    scenario.thermal.model = scene::ThermalModel::foster;
+    scenario.thermal.tolerance_k = 0.05;
+    scenario.thermal.max_samples = max_samples;
+    Session run(scenario);
+    renderer::FrameRequest request;
+    request.sim_time_ns = request.thermal_time_ns = kHourNs;
+    request.sensor_pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+    ASSERT_TRUE(run.renderer().warm_up(request));
+    const renderer::SceneStats& stats = run.renderer().scene_stats();
+    EXPECT_TRUE(stats.samples_full);
+    EXPECT_LE(stats.samples, max_samples);
+    EXPECT_GT(stats.samples, max_samples * 9 / 10);  // and is made use of
+  }
+}
+
+TEST(RendererCached, ALimitBelowTheMeshesOwnVerticesSaysByHowMuchItDoesNotBind) {
+  std::vector<Quad> quads;
+  for (int i = 0; i < 60; ++i) {
+    const double x_m = 0.4 * i - 12.0;
+    for (const Quad& quad : box({x_m, 1.0, 0.0}, {x_m + 0.2, 1.2, 0.5})) quads.push_back(quad);
+  }
+  auto scenario = cached_scenario(write_quads("blocks", quads));
+  scenario.thermal.max_samples = 1000;
+  Session run(scenario);
+  renderer::FrameRequest request;
+  request.sim_time_ns = request.thermal_time_ns = kHourNs;
+  request.sensor_pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
+  ASSERT_TRUE(run.renderer().warm_up(request));
+  const renderer::SceneStats& stats = run.renderer().scene_stats();
+  EXPECT_GE(stats.samples, 1200U);
+  const auto warnings = warm_up_warnings(stats);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("does not bind"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find(std::to_string(stats.samples)), std::string::npos) << warnings[0];
 }
 
 TEST(RendererCached, AMeshFinerThanThePixelsIsSampledAsTheCameraNeedsIt) {

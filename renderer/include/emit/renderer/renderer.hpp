@@ -103,8 +103,12 @@ struct FrameStats {
   /// The frame may be coarser than asked (thermal.method = "cached"). The camera is where nobody
   /// planned it, or samples ran out before its view was fine enough: triangles may be wider than
   /// pixels and shadows coarser than thermal.tolerance_k. The flag is also set while some surfaces
-  /// have not taken in a change of the weather or of an entity's shade.
+  /// have not taken in a change of the weather or of an entity's shade, and in a frame that
+  /// prepared the surface anew (rewarm_s).
   bool coarse = false;
+  /// How long it took to prepare the surface anew inside this frame, because the thermal time had
+  /// jumped, in s of wall time; 0 in frames that did not. The frame is also `coarse`.
+  double rewarm_s = 0.0;
 };
 
 /// One rendered frame. A plane holds rows from top to bottom, row-major, float32, without padding.
@@ -137,6 +141,7 @@ struct SceneStats {
   std::uint64_t samples = 0;
   std::uint64_t sample_bytes = 0;
   bool samples_full = false;
+  std::uint64_t max_samples = 0;  ///< thermal.max_samples; fewer than the meshes need do not bind
   /// Meshes lost visible detail because thermal.max_samples is too small.
   bool coarse_meshes = false;
   /// Warnings of the scenario's and the scene's loaders: unmapped materials, gaps of the weather.

@@ -60,6 +60,67 @@ TEST(CasterRays, one_bit_per_ray_of_any_packet_size) {
   EXPECT_EQ(casters.blocked_static({}), 0U);
 }
 
+TEST(CasterRays, one_packet_meets_a_mover_that_stands_elsewhere_for_every_ray) {
+  SurfaceScene scene;
+  scene.add_static(unit_plate(), glm::dvec3(0.0, 0.0, -50.0));
+  scene.add_mover(test::box_mesh(glm::vec3(-0.6F, -0.4F, 0.0F), glm::vec3(0.6F, 0.4F, 0.9F)));
+  const CasterRays casters = rays_of(scene);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> place(-1.5F, 1.5F);
+  std::size_t met = 0;
+  for (int turn = 0; turn < 300; ++turn) {
+    std::array<CasterRay, CasterRays::kMaxRays> rays;
+    std::array<MoverPlacement, CasterRays::kMaxRays> placements;
+    std::uint32_t expected = 0;
+    const auto wanted = static_cast<std::uint32_t>(random()) & CasterRays::kAllRays;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      rays[i] = {{place(random), place(random), -1.0F}, random_direction(random)};
+      placements[i].position_m = {place(random), place(random), place(random)};
+      placements[i].rel_from_body = glm::mat3(glm::rotate(
+          glm::dmat4(1.0), 3.0 * static_cast<double>(place(random)), glm::dvec3(0.0, 0.0, 1.0)));
+      placements[i].on = i % 5 != 2;
+      if (((wanted >> i) & 1U) == 0U) continue;
+      expected |= casters.blocked_mover(0, placements[i], {&rays[i], 1}) << i;
+    }
+    EXPECT_EQ(casters.blocked_moving(0, placements, rays, wanted), expected);
+    met += expected != 0 ? 1U : 0U;
+  }
+  EXPECT_GT(met, 50U);
+}
+
+TEST(CasterRays, a_packet_that_passes_a_mover_by_meets_what_single_rays_meet) {
+  SurfaceScene scene;
+  scene.add_static(unit_plate(), glm::dvec3(0.0, 0.0, -50.0));
+  scene.add_mover(test::box_mesh(glm::vec3(-0.6F, -0.4F, 0.0F), glm::vec3(0.6F, 0.4F, 0.9F)));
+  scene.add_mover(test::box_mesh(glm::vec3(-9.0F, -0.4F, 0.0F), glm::vec3(9.0F, 0.4F, 0.9F)));
+  const CasterRays casters = rays_of(scene);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> place(-30.0F, 30.0F);
+  for (int turn = 0; turn < 500; ++turn) {
+    std::array<MoverPlacement, 2> movers;
+    for (MoverPlacement& mover : movers) {
+      mover.position_m = {place(random), place(random), place(random)};
+    }
+    // From one point towards all sides, or side by side, as different queries send them.
+    std::array<CasterRay, CasterRays::kMaxRays> rays;
+    const glm::vec3 along = random_direction(random);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const float spread = turn % 3 == 0 ? 1.0F : 0.05F;
+      rays[i].direction = glm::normalize(along + spread * random_direction(random));
+      rays[i].origin_m = turn % 2 == 0 ? glm::vec3(0.0F) : 2.0F * random_direction(random);
+    }
+    std::array<CasterHit, CasterRays::kMaxRays> hits;
+    const CasterSelection selection{true, movers};
+    const std::uint32_t blocked = casters.blocked(rays, selection);
+    const std::uint32_t hit = casters.first_hits(rays, selection, hits);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      EXPECT_EQ((blocked >> i) & 1U, casters.blocked({&rays[i], 1}, selection));
+      CasterHit alone;
+      EXPECT_EQ((hit >> i) & 1U, casters.first_hits({&rays[i], 1}, selection, {&alone, 1}));
+    }
+  }
+}
+
 TEST(CasterRays, millimetres_hold_100_km_from_the_origin_of_the_world) {
   SurfaceScene scene;
   const glm::dvec3 place_m(1e5 + 0.125, -7.3e4, 900.0);

@@ -16,8 +16,9 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::size_t kMovers = 2;
-/// Magic, version, number of parts, hashes, size of the body.
-constexpr std::size_t kBodyAt = 8 + 4 + 4 + 8 * kStateParts + 8;
+/// Magic, version, number of parts, hashes, instant, size of the body.
+constexpr std::size_t kBodyAt = 8 + 4 + 4 + 8 * kStateParts + 8 + 8;
+constexpr std::int64_t kAtNs = 7'200'000'000'000;
 
 StateKey some_key() {
   StateKey key{};
@@ -54,6 +55,7 @@ struct World {
       sample.far_frac = number();
       sample.first_seen = i;
       sample.seen_count = 1;
+      sample.seen_scale = number();
       sample.covered = i % 2 == 0;
       sample.open_frac[2] = number();
       sample.open_before_frac[3] = number();
@@ -68,8 +70,17 @@ struct World {
       model.outputs.push_back({number(), number(), number(), number(), number()});
     }
     model.full = true;
+    model.at_ns = kAtNs;
+    model.eyes = {{{number(), number(), number()}, {number(), number(), number()}},
+                  {{number(), number(), number()}, {number(), number(), number()}}};
   }
 };
+
+/// A run that starts at `start_ns` and asks for that key.
+StateWanted wanted(const StateKey& key, std::int64_t start_ns = kAtNs) {
+  return {key, start_ns,
+          [live = key[static_cast<std::size_t>(StatePart::live)]](std::int64_t) { return live; }};
+}
 
 class StateFile : public testing::Test {
  protected:
@@ -98,7 +109,7 @@ class StateFile : public testing::Test {
     put(bytes);
   }
   [[nodiscard]] physics::Result<SurfaceModel> read(const StateKey& key = some_key()) const {
-    return read_state(file_, key, world_.geometry, kMovers, world_.options);
+    return read_state(file_, wanted(key), world_.geometry, kMovers, world_.options);
   }
   /// Text of the refusal; empty when the file was taken.
   [[nodiscard]] std::string refusal(const StateKey& key = some_key()) const {
@@ -128,6 +139,12 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
   const SurfaceModel& model = world_.model;
   EXPECT_TRUE(got->full);
   EXPECT_EQ(got->drawn_samples, model.drawn_samples);
+  EXPECT_EQ(got->at_ns, kAtNs);
+  ASSERT_EQ(got->eyes.size(), model.eyes.size());
+  for (std::size_t i = 0; i < model.eyes.size(); ++i) {
+    EXPECT_EQ(got->eyes[i].world_m, model.eyes[i].world_m);
+    EXPECT_EQ(got->eyes[i].boresight, model.eyes[i].boresight);
+  }
   for (std::size_t i = 0; i < model.states.size(); ++i) {
     const SurfaceSample& a = got->samples.samples[i];
     const SurfaceSample& b = model.samples.samples[i];
@@ -143,6 +160,7 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(a.far_frac, b.far_frac);
     EXPECT_EQ(a.first_seen, b.first_seen);
     EXPECT_EQ(a.seen_count, b.seen_count);
+    EXPECT_EQ(a.seen_scale, b.seen_scale);
     EXPECT_EQ(a.flat_m, b.flat_m);
     EXPECT_EQ(a.partners[0].sample, kNoSample);
     EXPECT_EQ(a.partners[1].sample, b.partners[1].sample);
@@ -210,6 +228,38 @@ TEST_F(StateFile, made_for_something_else_it_says_what_differs) {
           << text;
     }
   }
+}
+
+TEST_F(StateFile, serves_later_starts_and_says_so_where_it_is_later_itself) {
+  write();
+  const auto read_at = [this](std::int64_t start_ns) {
+    return read_state(file_, wanted(some_key(), start_ns), world_.geometry, kMovers,
+                      world_.options);
+  };
+  for (const std::int64_t after_ns : {0LL, 1LL, 3'600'000'000'000LL}) {
+    const auto got = read_at(kAtNs + after_ns);
+    ASSERT_TRUE(got) << got.error().text;
+    EXPECT_EQ(got->at_ns, kAtNs);
+  }
+  const auto early = read_at(kAtNs - 1'500'000'000);
+  ASSERT_FALSE(early);
+  EXPECT_EQ(early.error().code, physics::ErrorCode::config);
+  EXPECT_NE(early.error().text.find("surface at 7200.000 s"), std::string::npos)
+      << early.error().text;
+  EXPECT_NE(early.error().text.find("starts at 7198.500 s"), std::string::npos);
+}
+
+TEST_F(StateFile, asks_for_the_input_of_the_host_up_to_its_own_instant) {
+  write();
+  StateWanted later = wanted(some_key(), kAtNs + 5);
+  std::vector<std::int64_t> asked_ns;
+  later.live_hash = [&](std::int64_t at_ns) {
+    asked_ns.push_back(at_ns);
+    return some_key()[static_cast<std::size_t>(StatePart::live)];
+  };
+  EXPECT_TRUE(read_state(file_, later, world_.geometry, kMovers, world_.options));
+  ASSERT_FALSE(asked_ns.empty());
+  for (const std::int64_t at_ns : asked_ns) EXPECT_EQ(at_ns, kAtNs);
 }
 
 TEST_F(StateFile, of_another_kind_or_version_it_says_so) {

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/warm_up/sample_numbers.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+
+#include "emit/physics/check.hpp"
+#include "emit/threads/parallel.hpp"
+#include "surface/mesh/sheet_sides.hpp"
+
+namespace emit::renderer {
+namespace {
+
+constexpr std::size_t kGrain = 16;
+
+/// Most samples that a view can be made of: three corners for each face.
+constexpr std::size_t kMaxListed = 3 * SurfaceView::kMaxSeen;
+
+/// Samples that one view shows, each of them once, in the order in which they were met.
+class SeenList {
+ public:
+  void clear() noexcept {
+    count_ = 0;
+    slots_.fill(kFree);
+  }
+  void add(std::uint32_t sample, float weight_frac) noexcept {
+    // Walk from the number's own slot to its entry or to a free one: at most half of them are used.
+    std::size_t slot = (sample * 2654435761U) >> (32U - kBits);
+    while (slots_[slot] != kFree && list_[slots_[slot]].sample != sample) {
+      slot = (slot + 1) % slots_.size();
+    }
+    if (slots_[slot] != kFree) {
+      list_[slots_[slot]].weight_frac += weight_frac;
+      return;
+    }
+    EMIT_DCHECK_OP(count_, <, kMaxListed);
+    slots_[slot] = static_cast<std::uint8_t>(count_);
+    list_[count_++] = {sample, weight_frac};
+  }
+  [[nodiscard]] std::span<const SeenSample> list() const noexcept { return {list_.data(), count_}; }
+
+ private:
+  static constexpr unsigned kBits = 8;
+  static constexpr std::uint8_t kFree = 0xff;
+  static_assert(2 * kMaxListed < (std::size_t{1} << kBits));
+  std::array<std::uint8_t, std::size_t{1} << kBits> slots_{};
+  std::array<SeenSample, kMaxListed> list_;
+  std::size_t count_ = 0;
+};
+
+class Numbers {
+ public:
+  Numbers(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
+          std::vector<SurfacePatch>& patches, SurfaceModel& model)
+      : in_(inputs), options_(options), patches_(patches), model_(model) {}
+
+  void run();
+
+ private:
+  /// The sample of a vertex of an instance, on the side that is seen.
+  [[nodiscard]] std::uint32_t sample_of(std::uint32_t instance, std::uint32_t vertex,
+                                        bool behind) const;
+  /// Turns the views of one side of a patch into lists of samples, and frees them.
+  void list_views(SurfacePatch& side);
+  /// Appends the sample of a vertex on one side of a patch.
+  void append(const SurfacePatch& side, std::size_t vertex, SurfaceSample sample);
+
+  const SurfaceInputs& in_;
+  const SurfaceModelOptions& options_;
+  std::vector<SurfacePatch>& patches_;
+  SurfaceModel& model_;
+  std::vector<std::vector<std::uint32_t>> backs_;  ///< by mesh: vertices of sheets
+  std::vector<std::uint32_t> first_;               ///< by patch: its first sample
+  /// Where the list of a view lies in SurfaceSamples::seen, and what its weights add up to.
+  struct Listed {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    float weight_frac = 0.0F;
+  };
+  std::vector<Listed> listed_;  ///< by vertex of the side at hand
+};
+
+std::uint32_t Numbers::sample_of(std::uint32_t instance, std::uint32_t vertex, bool behind) const {
+  const std::uint32_t mesh = in_.geometry.instances[instance].mesh;
+  const auto back = std::ranges::lower_bound(backs_[mesh], vertex);
+  if (!behind || back == backs_[mesh].end() || *back != vertex) return first_[instance] + vertex;
+  return first_[instance] + static_cast<std::uint32_t>(model_.meshes[mesh].vertices().size()) +
+         static_cast<std::uint32_t>(back - backs_[mesh].begin());
+}
+
+void Numbers::list_views(SurfacePatch& side) {
+  listed_.assign(side.samples.size(), {});
+  if (options_.exchange) {
+    std::vector<std::uint32_t> views;
+    for (std::uint32_t v = 0; v < side.seen.size(); ++v) {
+      if (!side.seen[v].empty()) views.push_back(v);
+    }
+    // Find the samples around every place that is seen.
+    std::vector<std::vector<SeenSample>> lists(views.size());
+    threads::parallel_parts(views.size(), kGrain, [&](std::size_t from, std::size_t to) {
+      SeenList list;
+      for (std::size_t i = from; i < to; ++i) {
+        list.clear();
+        float sum_frac = 0.0F;
+        for (const SeenPlace& place : side.seen[views[i]]) {
+          sum_frac += place.weight_frac;
+          const RefinedMesh& mesh = model_.meshes[in_.geometry.instances[place.instance].mesh];
+          const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
+          for (glm::length_t k = 0; k < 3; ++k) {
+            const float weight_frac = place.weight_frac * at.weight[k];
+            if (!(weight_frac > 0.0F)) continue;
+            const std::uint32_t corner = at.vertex[static_cast<std::size_t>(k)];
+            list.add(sample_of(place.instance, corner, place.behind), weight_frac);
+          }
+        }
+        lists[i].assign(list.list().begin(), list.list().end());
+        listed_[views[i]].weight_frac = sum_frac;
+      }
+    });
+    // Append the lists one after the other.
+    std::vector<SeenSample>& seen = model_.samples.seen;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      listed_[views[i]].first = static_cast<std::uint32_t>(seen.size());
+      listed_[views[i]].count = static_cast<std::uint32_t>(lists[i].size());
+      seen.insert(seen.end(), lists[i].begin(), lists[i].end());
+    }
+  }
+  side.seen = {};
+}
+
+void Numbers::append(const SurfacePatch& side, std::size_t vertex, SurfaceSample sample) {
+  if (!options_.exchange) sample.far_frac = 1.0F - sample.sky_frac;
+  const Listed& view = listed_[side.view_of[vertex]];
+  sample.first_seen = view.first;
+  sample.seen_count = view.count;
+  // The faces fill what is not open.
+  const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
+  sample.seen_scale = view.count != 0 ? left_frac / view.weight_frac : 0.0F;
+  model_.samples.samples.push_back(sample);
+}
+
+void Numbers::run() {
+  for (const RefinedMesh& mesh : model_.meshes) {
+    backs_.push_back(back_vertices(mesh, in_.materials));
+  }
+  std::uint32_t next = 0;
+  for (const SurfacePatch& patch : patches_) {
+    first_.push_back(next);
+    next += static_cast<std::uint32_t>(patch.samples.size());
+    if (patch.back) next += static_cast<std::uint32_t>(backs_[patch.mesh].size());
+  }
+  const std::size_t instances = in_.geometry.instances.size();
+  model_.first_sample.assign(first_.begin(),
+                             first_.begin() + static_cast<std::ptrdiff_t>(instances));
+  model_.drawn_samples = first_.size() > instances ? first_[instances] : next;
+  model_.samples.samples.reserve(next);
+  for (std::size_t p = 0; p < patches_.size(); ++p) {
+    SurfacePatch& patch = patches_[p];
+    const bool partners = p >= instances;
+    list_views(patch);
+    for (std::size_t i = 0; i < patch.samples.size(); ++i) {
+      SurfaceSample sample = patch.samples[i];
+      if (partners) {
+        sample.partners[0].sample += first_[sample.first_seen];
+      } else {
+        for (Partner& partner : sample.partners) {
+          if (partner.sample != kNoSample) partner.sample += first_[instances];
+        }
+      }
+      append(patch, i, sample);
+    }
+    if (!patch.back) continue;
+    list_views(*patch.back);
+    for (const std::uint32_t v : backs_[patch.mesh]) {
+      SurfaceSample sample = patch.back->samples[v];
+      sample.other_side = first_[p] + v;
+      model_.samples.samples[sample.other_side].other_side =
+          static_cast<std::uint32_t>(model_.samples.samples.size());
+      append(*patch.back, v, sample);
+    }
+  }
+}
+
+}  // namespace
+
+void number_samples(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
+                    std::vector<SurfacePatch>& patches, SurfaceModel& model) {
+  EMIT_CHECK_OP(patches.size(), ==, inputs.geometry.instances.size() + (options.lateral ? 1U : 0U));
+  Numbers(inputs, options, patches, model).run();
+}
+
+}  // namespace emit::renderer

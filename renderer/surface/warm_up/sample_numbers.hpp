@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <vector>
+
+#include "surface/warm_up/surface_patch.hpp"
+
+namespace emit::renderer {
+
+/// Lays the patches' samples out in one array and turns what they see from places into samples.
+/// Samples that share a view share its list of seen samples. Frees the views of the patches. Setup
+/// only; uses all cores; deterministic.
+/// @pre where options.lateral is set, PartnerFinder::append() has appended its patch
+void number_samples(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
+                    std::vector<SurfacePatch>& patches, SurfaceModel& model);
+
+}  // namespace emit::renderer

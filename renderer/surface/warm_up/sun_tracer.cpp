@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/warm_up/sun_tracer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "emit/physics/check.hpp"
+
+namespace emit::renderer {
+
+SunTracer::SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& options)
+    : in_(inputs),
+      offsets_(ray_offsets(inputs.geometry)),
+      lateral_(options.lateral),
+      max_blur_m_(static_cast<float>(options.max_blur_m)) {
+  for (const scene::Material& material : inputs.materials) {
+    diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
+  }
+}
+
+RayOffsets SunTracer::offsets(const glm::vec3& place_m, std::int32_t mover) const noexcept {
+  if (mover < 0) return offsets_.at(place_m);
+  const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(mover)];
+  return place.on ? offsets_.at(place.rel_from_body * place_m + place.position_m) : offsets_;
+}
+
+void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
+                      std::span<HiddenSky> hidden_sky) const {
+  const HistoryRecord& record = in_.record;
+  EMIT_DCHECK_OP(sun_frac.size(), ==, record.size());
+  EMIT_DCHECK(hidden_sky.empty() || hidden_sky.size() == record.size());
+  const RayOffsets offsets = this->offsets(sample.position_m, sample.mover);
+  const float max_blur_m = lateral_ ? std::min(max_blur_m_, 0.5F * sample.flat_m) : 0.0F;
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    // Lateral conduction since then has blurred the edge of a shadow: spread the rays as far.
+    const IntervalRays& rays = record.rays[i];
+    const float blur_m = std::min(
+        max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));
+    sun_frac[i] = rays.sun_frac(in_.rays, sample, offsets.sun_m, blur_m);
+    if (!hidden_sky.empty()) {
+      hidden_sky[i] = rays.hidden_sky(in_.rays, sample, offsets.around_m);
+    }
+  }
+}
+
+}  // namespace emit::renderer

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "surface/warm_up/surface_patch.hpp"
+
+namespace emit::renderer {
+
+/// Finds, for samples near a convex edge, the points at the same distance from the edge on the
+/// neighbouring faces (their partners). Owner: the builder. find() may run on many threads for
+/// different vertices; everything else on one.
+class PartnerFinder {
+ public:
+  /// Both must outlive it.
+  PartnerFinder(const SurfaceInputs& inputs, const PatchSampler& sampler)
+      : in_(inputs), sampler_(sampler) {}
+
+  /// Makes room for so many vertices of a patch. @pre patches are numbered from 0
+  void grow(std::size_t patch, std::size_t vertices);
+  /// Finds the partners of an evaluated sample. @pre grow() has made room for it
+  void find(std::size_t patch, std::uint32_t vertex, const SurfaceSample& own);
+  /// How many partners it has.
+  [[nodiscard]] std::size_t count(std::size_t patch, std::uint32_t vertex) const noexcept {
+    return found_[patch][vertex].size();
+  }
+  /// Leaves out the `count` partners that drive their samples least.
+  void drop(std::size_t count);
+
+  /// Evaluates all partners and appends one patch that holds them. Until samples are numbered,
+  /// Partner::sample is an index into that patch, and a partner's own first_seen and
+  /// partners[0].sample are the patch and the vertex it belongs to.
+  void append(std::vector<SurfacePatch>& patches) const;
+
+ private:
+  struct Found {
+    SurfaceSample sample;
+    float distance_m = 0.0F;
+  };
+  [[nodiscard]] std::array<float, physics::kMaxFosterModes> weights(std::uint32_t material,
+                                                                    float distance_m) const;
+  [[nodiscard]] float greatest_weight(std::uint32_t material, float distance_m) const;
+
+  const SurfaceInputs& in_;
+  const PatchSampler& sampler_;
+  std::vector<std::vector<std::vector<Found>>> found_;  ///< by patch, then vertex
+};
+
+}  // namespace emit::renderer

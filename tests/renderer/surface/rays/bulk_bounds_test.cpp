@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/rays/bulk_bounds.hpp"
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+
+#include "renderer/surface/surface_scene.hpp"
+#include "surface/rays/ray_offsets.hpp"
+
+namespace emit::renderer {
+namespace {
+
+using test::SurfaceScene;
+
+/// A street of boxes on ground.
+SurfaceScene street() {
+  SurfaceScene scene;
+  scene.add_static(test::level_mesh(glm::vec3(-60.0F), glm::vec3(60.0F), 0.0F));
+  for (int i = 0; i < 12; ++i) {
+    scene.add_static(test::box_mesh(glm::vec3(-2.0F), glm::vec3(2.0F)),
+                     glm::dvec3(8.0 * i - 44.0, 5.0, 2.0));
+  }
+  return scene;
+}
+
+/// A triangle of one metre.
+scene::Mesh small_triangle() {
+  scene::Mesh mesh;
+  mesh.positions_m = {{0.0F, 0.0F, 0.0F}, {1.0F, 0.0F, 0.0F}, {0.0F, 1.0F, 0.0F}};
+  mesh.normals.assign(3, glm::vec3(0.0F, 0.0F, 1.0F));
+  mesh.indices = {0, 1, 2};
+  mesh.submeshes = {{0, 3, 0, false}};
+  for (const glm::vec3& p : mesh.positions_m) mesh.bounds.add(glm::dvec3(p));
+  return mesh;
+}
+
+TEST(BulkBounds, are_the_box_of_all_of_an_ordinary_scene) {
+  const scene::Aabb box = bulk_bounds(street().geometry);
+  EXPECT_EQ(box.min_m, glm::dvec3(-60.0, -60.0, 0.0));
+  EXPECT_EQ(box.max_m, glm::dvec3(60.0, 60.0, 4.0));
+  // A wide scene is wide.
+  SurfaceScene wide;
+  for (int i = 0; i < 50; ++i) {
+    wide.add_static(test::box_mesh(glm::vec3(-2.0F), glm::vec3(2.0F)), glm::dvec3(200.0 * i));
+  }
+  EXPECT_EQ(bulk_bounds(wide.geometry).max_m, glm::dvec3(9802.0));
+  EXPECT_TRUE(bulk_bounds(scene::SceneGeometry{}).empty());
+}
+
+TEST(BulkBounds, leave_strays_out_wherever_they_are) {
+  for (const glm::dvec3& far_m :
+       {glm::dvec3(0.0, 0.0, -6e6), glm::dvec3(2e5, 0.0, 0.0), glm::dvec3(-3e6, 4e6, 1e3)}) {
+    SurfaceScene scene = street();
+    scene.add_static(small_triangle(), far_m);
+    const scene::Aabb box = bulk_bounds(scene.geometry);
+    EXPECT_LT(glm::length(box.max_m - box.min_m), 300.0);
+    EXPECT_GT(glm::length(box.max_m - box.min_m), 80.0);
+    EXPECT_LT(glm::length(0.5 * (box.min_m + box.max_m)), 30.0);
+    EXPECT_LT(ray_offsets(scene.geometry).around_m, 6e-4F);
+    auto rays = CasterRays::create(scene.geometry);
+    ASSERT_TRUE(rays);
+    EXPECT_LT(glm::length(rays->origin_world_m()), 30.0);
+  }
+}
+
+TEST(BulkBounds, know_a_stray_inside_a_mesh) {
+  SurfaceScene scene;
+  scene::Mesh mesh = test::grid_mesh(16);
+  for (glm::vec3& p : mesh.positions_m) p *= 40.0F;
+  test::add_quad(mesh, {glm::vec3(5e6F, 0.0F, 0.0F), glm::vec3(5.00001e6F, 0.0F, 0.0F),
+                        glm::vec3(5.00001e6F, 9.0F, 0.0F), glm::vec3(5e6F, 9.0F, 0.0F)});
+  scene.add_static(mesh);
+  const scene::Aabb box = bulk_bounds(scene.geometry);
+  EXPECT_LT(box.max_m.x, 100.0);
+  EXPECT_GT(box.max_m.x, 38.0);
+}
+
+TEST(BulkBounds, of_a_scene_with_entities_are_those_of_what_stands_still) {
+  SurfaceScene scene = street();
+  scene.add_mover(small_triangle(), glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -6e6)));
+  EXPECT_EQ(bulk_bounds(scene.geometry).max_m, glm::dvec3(60.0, 60.0, 4.0));
+}
+
+TEST(RayOffsets, grow_with_the_distance_from_the_origin_where_float32_resolves_less) {
+  const RayOffsets offsets = ray_offsets(street().geometry);
+  EXPECT_EQ(offsets.at(glm::vec3(0.0F)).sun_m, offsets.sun_m);
+  EXPECT_EQ(offsets.at(glm::vec3(60.0F, 60.0F, 2.0F)).sun_m, offsets.sun_m);
+  EXPECT_FLOAT_EQ(offsets.at(glm::vec3(0.0F, 5e6F, 0.0F)).sun_m, 5.0F);
+  EXPECT_FLOAT_EQ(offsets.at(glm::vec3(0.0F, 5e6F, 0.0F)).around_m, 5.0F);
+}
+
+}  // namespace
+}  // namespace emit::renderer
