@@ -6,8 +6,10 @@
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/dynamic_message.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -403,6 +405,45 @@ TEST_F(LogFile, WriteErrorsAreReportedAndFinal) {
   auto writer = LogWriter::create("/dev/full");
   ASSERT_FALSE(writer);
   EXPECT_THAT(writer.error().text, HasSubstr("/dev/full: offset 0: cannot write"));
+}
+
+/// A disk may fill up at any byte of the file. The writer counts exactly the messages that a reader
+/// finds there.
+TEST_F(LogFile, CountsTheMessagesThatAFullDiskTook) {
+  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit old{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &old), 0);
+  for (const std::uint32_t chunk_bytes : {0U, 2048U, 6000U}) {
+    for (rlim_t limit_bytes = 1000; limit_bytes < 14'000; limit_bytes += 97) {
+      std::uint64_t counted = 0;
+      const rlimit small{limit_bytes, old.rlim_max};
+      ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+      {
+        McapWriterOptions options;
+        options.chunk_bytes = chunk_bytes;
+        auto writer = McapWriter::create(path_, options);
+        ASSERT_TRUE(writer);
+        const auto schema = writer->add_schema("pkg.Any", "protobuf", "");
+        const auto channel = writer->add_channel(*schema, "any", "protobuf");
+        ASSERT_TRUE(channel);
+        std::vector<std::byte> data;
+        for (std::uint32_t i = 0; writer->write(*channel, i, i, i, data); ++i) {
+          data.resize((i * 37) % 300);
+        }
+        counted = writer->messages_in_file();
+      }
+      ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &old), 0);
+      std::uint64_t found = 0;
+      if (std::filesystem::exists(path_)) {
+        auto reader = McapReader::open(path_);
+        ASSERT_TRUE(reader) << reader.error().text;
+        for (auto more = reader->next(); more && *more; more = reader->next()) ++found;
+      }
+      EXPECT_EQ(counted, found) << limit_bytes << " bytes, chunks of " << chunk_bytes;
+      std::filesystem::remove(path_);
+    }
+  }
+  std::signal(SIGXFSZ, old_handler);
 }
 
 /// The messages decode with nothing but the file's own description.
