@@ -33,7 +33,7 @@ struct DemoOptions {
   std::uint64_t frames = 0;  ///< 0: as many as fit the budget
   bool all = false;
   bool keep = false;
-  double budget_s = 45.0;
+  double budget_s = 20.0;
   std::optional<std::filesystem::path> json;
 };
 
@@ -151,9 +151,6 @@ config::DaemonConfig daemon_config(const scene::ScenarioDesc& scenario,
   return daemon;
 }
 
-/// Thermal samples of the demo where the scenario would take more: warmed up within its time.
-constexpr std::uint32_t kDemoSamples = 100'000;
-
 class Demo {
  public:
   Demo(const DemoOptions& command, scene::ScenarioDesc scenario, WorkFolder& work)
@@ -167,7 +164,7 @@ class Demo {
   Result<void> play();
   Result<void> play_pose(const protocol::HostFrameData& recorded, bool udp);
   Result<void> save_frame();
-  void replan(PosePlan& plan, double step_s) const;
+  void replan(PosePlan& plan, double played_s, double step_s) const;
   Result<void> finish();
   Result<void> replay();
   int report();
@@ -208,19 +205,7 @@ Result<void> Demo::start() {
              scenario_.file.string());
   const auto started = Clock::now();
   std::vector<std::string> set = command_.input.set;
-  const auto asked_for = [&](std::string_view key) {
-    return std::ranges::any_of(set,
-                               [&](const std::string& entry) { return entry.starts_with(key); });
-  };
   scene::ThermalOptions& thermal = scenario_.thermal;
-  if (thermal.method == scene::ThermalMethod::cached && !asked_for("thermal.max_samples=") &&
-      thermal.max_samples > kDemoSamples) {
-    fmt::print(text_stream(command_.json),
-               "with {} thermal samples instead of {}: frames are flagged degraded\n", kDemoSamples,
-               thermal.max_samples);
-    thermal.max_samples = kDemoSamples;
-    set.push_back(fmt::format("thermal.max_samples={}", kDemoSamples));
-  }
   if (thermal.method == scene::ThermalMethod::cached && thermal.state_file.empty()) {
     // The replay warms up from what the daemon has kept.
     std::error_code ignored;
@@ -340,13 +325,11 @@ Result<void> Demo::save_frame() {
   return {};
 }
 
-/// What is left of the budget is shared by the poses to come and the replay of all of them.
-void Demo::replan(PosePlan& plan, double step_s) const {
-  constexpr double kReserveS = 3.0;
-  const double render_s = step_s;
-  const double free_s = command_.budget_s - seconds_since(begin_) - setup_s_ - kReserveS -
-                        static_cast<double>(plan.played()) * render_s;
-  const double poses = std::floor(free_s / (step_s + render_s));
+/// Limits the plan to the poses that fit the rest of the budget, `played_s` after the first pose.
+/// Every pose costs `step_s` twice: once now and once in the replay.
+void Demo::replan(PosePlan& plan, double played_s, double step_s) const {
+  const double free_s = command_.budget_s - played_s - static_cast<double>(plan.played()) * step_s;
+  const double poses = std::floor(free_s / (2.0 * step_s));
   plan.limit_to(poses > 0.0 ? static_cast<std::uint64_t>(poses) : 0);
 }
 
@@ -360,7 +343,9 @@ Result<void> Demo::play() {
   HostFrameReader reader(std::move(*log));
 
   constexpr std::uint64_t kEvenSaves = 6;
+  constexpr std::size_t kTrialFrames = 8;
   std::uint64_t next_save = 0;
+  const auto begin = Clock::now();
   ProgressBar progress("poses", plan.left());
   Samples step_s;
   while (const auto index = plan.next()) {
@@ -377,7 +362,10 @@ Result<void> Demo::play() {
     const std::uint64_t share = results_.poses_in_log > 1
                                     ? *index * (kEvenSaves - 1) / (results_.poses_in_log - 1)
                                     : kEvenSaves;
-    replan(plan, step_s.count() == 1 ? step_s.values().front() : 1.1 * step_s.median());
+    // The first frames are slower than the rest and say little about it.
+    if (step_s.count() >= kTrialFrames) {
+      replan(plan, seconds_since(begin), 1.1 * step_s.median());
+    }
     if (share >= next_save || plan.left() <= 1) {
       next_save = share + 1;
       if (auto saved = save_frame(); !saved) return saved;
@@ -513,7 +501,8 @@ void add_options(CommandLine& line, DemoOptions& options) {
              "Poses to play, evenly spaced over the log; 0: as many as fit");
   line.flag("--all", options.all, "Play every pose of the log, however long it takes");
   line.flag("--keep", options.keep, "Keep the recording, the daemon's configuration and its log");
-  line.seconds("--budget-s", options.budget_s, "Time that the chosen poses may take")
+  line.seconds("--budget-s", options.budget_s,
+               "Time for the chosen poses and their replay, after the warm-up")
       .positive()
       .show_default();
   add_json(line, options.json);

@@ -71,6 +71,11 @@ std::vector<std::string> demo_losses(const std::vector<DemoClientView>& clients,
     if (counters.crc_errors > 0) {
       failures.push_back(fmt::format("{}: {} frames with a wrong CRC", name, counters.crc_errors));
     }
+    if (const auto degraded = client->report().flagged(protocol::kFlagDegraded); degraded > 0) {
+      warnings.push_back(fmt::format(
+          "{}: {} of {} frames are flagged degraded: they show less than the scenario's quality",
+          name, degraded, client->report().frames()));
+    }
     if (counters.lost == 0 && counters.partial == 0 && counters.gaps == 0 && unflagged == 0)
       continue;
     const std::string text =

@@ -8,7 +8,7 @@ namespace emit::tool {
 
 PosePlan::PosePlan(std::uint64_t poses, std::optional<std::uint64_t> count)
     : poses_(poses), fixed_(count.has_value()) {
-  left_ = std::clamp<std::uint64_t>(count.value_or(kMinimum), 1, poses);
+  left_ = std::clamp<std::uint64_t>(count.value_or(kFirstGuess), 1, poses);
 }
 
 std::optional<std::uint64_t> PosePlan::next() {
@@ -29,7 +29,8 @@ void PosePlan::limit_to(std::uint64_t left) {
   const std::uint64_t ahead = poses_ - 1 - current_;
   const std::uint64_t least = played_ < kMinimum ? kMinimum - played_ : (ahead > 0 ? 1U : 0U);
   const std::uint64_t wanted = std::clamp(left, std::min(least, ahead), ahead);
-  left_ = ++limit_calls_ <= 2 ? wanted : std::min(left_, wanted);
+  left_ = limited_ ? std::min(left_, wanted) : wanted;
+  limited_ = true;
 }
 
 std::vector<Departure> find_departures(const scene::ScenarioDesc& scenario, double min_stay_s) {

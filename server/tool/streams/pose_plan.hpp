@@ -13,15 +13,17 @@ namespace emit::tool {
 class PosePlan {
  public:
   /// @param poses  in the log, > 0.
-  /// @param count  poses to play; absent: as many as limit_to() allows, at least kMinimum.
+  /// @param count  poses to play; absent: kFirstGuess until limit_to() says how many.
   PosePlan(std::uint64_t poses, std::optional<std::uint64_t> count);
 
   static constexpr std::uint64_t kMinimum = 4;
+  static constexpr std::uint64_t kFirstGuess = 200;
 
   /// Index of the pose to play next; empty when the plan is done. Ascending.
   [[nodiscard]] std::optional<std::uint64_t> next();
-  /// Plans `left` more poses; without effect on a plan of fixed count. The first two calls set the
-  /// number, later ones only lower it, so that the spacing stays even.
+  /// Plans `left` more poses, at least as many as make kMinimum. It has no effect on a plan of
+  /// fixed count. The first call sets the number; later ones only lower it, so that the spacing
+  /// stays even.
   void limit_to(std::uint64_t left);
 
   [[nodiscard]] std::uint64_t played() const noexcept { return played_; }
@@ -30,7 +32,7 @@ class PosePlan {
  private:
   std::uint64_t poses_;
   bool fixed_;
-  int limit_calls_ = 0;
+  bool limited_ = false;  ///< limit_to() was called
   std::uint64_t played_ = 0;
   std::uint64_t left_ = 0;
   std::uint64_t current_ = 0;

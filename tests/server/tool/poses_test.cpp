@@ -37,11 +37,11 @@ TEST(CliPosePlan, limits_do_not_touch_a_fixed_count) {
   EXPECT_EQ(plan.left(), 4U);
 }
 
-TEST(CliPosePlan, the_first_frames_set_the_number_and_later_ones_only_lower_it) {
+TEST(CliPosePlan, the_first_limit_sets_the_number_and_later_ones_only_lower_it) {
   PosePlan plan(1001, std::nullopt);
   EXPECT_EQ(plan.next(), 0U);
-  plan.limit_to(4);
-  ASSERT_TRUE(plan.next().has_value());
+  EXPECT_EQ(plan.next(), 5U);
+  EXPECT_EQ(plan.left(), PosePlan::kFirstGuess - 2);
   plan.limit_to(20);
   EXPECT_EQ(plan.left(), 20U);
   ASSERT_TRUE(plan.next().has_value());
