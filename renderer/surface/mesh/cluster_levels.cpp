@@ -18,16 +18,13 @@ namespace {
 
 /// Largest number of clusters that are simplified together.
 constexpr std::size_t kGroupClusters = 8;
-/// Largest share of its triangles that a group may keep. A group that keeps more gets no coarser
-/// level.
+/// Largest share of its triangles that a group may keep to get a coarser level.
 constexpr double kWorthFrac = 0.75;
-/// Largest share of all triangles that a new level may have. The build ends with a level that saves
-/// less.
+/// Largest share of all triangles that a new level may have; the build ends with a larger one.
 constexpr double kLevelFrac = 0.95;
 /// Share of the surface of a group that may have larger errors than stated.
 constexpr float kRareFrac = 0.01F;
-/// Number of instances whose temperatures guide the collapse. All instances are measured
-/// afterwards.
+/// Number of instances whose temperatures guide the collapse; all are measured afterwards.
 constexpr std::size_t kGuides = 4;
 
 using Indices = std::vector<std::uint32_t>;

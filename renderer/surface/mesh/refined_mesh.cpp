@@ -20,8 +20,7 @@ constexpr float kMinEdge = 1e-6F;      ///< in the mesh's unit of length
 constexpr float kMinEdgeFrac = 0x1p-18F;
 constexpr std::size_t kMaxNodes = std::size_t{1} << 30U;  ///< an entry has 30 bits beside its tag
 
-/// Returns, after a cut along `half_edge`, the edge of the kept child from the midpoint to the
-/// apex.
+/// Returns the edge of the kept child from the midpoint to the apex, after a cut along `half_edge`.
 std::uint32_t inner_half_edge(std::uint32_t half_edge) noexcept {
   return half_edge - half_edge % 3 + (half_edge + 1) % 3;
 }
