@@ -64,8 +64,8 @@ struct SurfaceSample {
 
 /// Measure by which directions count when a sample looks for sky.
 enum class SkyMeasure : std::uint8_t {
-  cosine,  ///< by the cosine to the normal
-  sphere,  ///< all directions of the full sphere alike
+  cosine,  ///< directions count with the cosine to the normal
+  sphere,  ///< all directions of the full sphere count alike
 };
 
 /// Heat of a sample at the end of an interval, as values of the modes of its thermal model. With

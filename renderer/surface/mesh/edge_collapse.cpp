@@ -84,7 +84,7 @@ class Collapse {
   std::size_t left_ = 0;                          ///< number of triangles that are alive
   std::vector<std::vector<std::uint32_t>> star_;  ///< triangles of each place
   std::vector<bool> locked_;                      ///< by place; true: it must stay
-  std::vector<std::uint32_t> stamp_;              ///< by place
+  std::vector<std::uint32_t> stamp_;              ///< number of offers so far, by place
   std::priority_queue<Candidate> queue_;
   // Scratch of the calls, kept to save allocations.
   std::vector<std::uint32_t> mark_;  ///< by place; number of the latest list that holds it

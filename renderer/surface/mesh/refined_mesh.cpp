@@ -15,7 +15,7 @@ namespace {
 /// Mark of a vertex that no triangle has used yet.
 constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
 constexpr std::uint32_t kLeafTag = 3;  ///< low two bits of a node that is a leaf
-constexpr float kMinEdge = 1e-6F;      ///< in the mesh's unit of length
+constexpr float kMinEdge = 1e-6F;      ///< shortest edge to halve, in the mesh's unit of length
 /// Shortest edge to halve, as a share of the largest coordinate: 32 to 64 float32 steps.
 constexpr float kMinEdgeFrac = 0x1p-18F;
 constexpr std::size_t kMaxNodes = std::size_t{1} << 30U;  ///< an entry has 30 bits beside its tag

@@ -158,7 +158,7 @@ class RefinedMesh {
   // The next two are filled by the first split.
   std::vector<std::uint32_t> position_id_;  ///< by vertex; equal for equal positions
   /// Next half-edge between the same positions, by half-edge (3 slot + corner that it starts from).
-  /// They form a ring: of one at a border, of two inside a surface, of more where surfaces branch.
+  /// They form a ring of one at a border, of two inside a surface, of more where surfaces branch.
   std::vector<std::uint32_t> ring_;
   // Scratch of split(), kept to save allocations.
   std::vector<std::uint32_t> asked_nodes_;

@@ -50,10 +50,10 @@ struct SurfaceModel {
   std::vector<std::uint32_t> first_sample;
   SurfaceSamples samples;             ///< drawn samples first, then partners across convex edges
   std::uint32_t drawn_samples = 0;    ///< number of samples that belong to vertices and backs
-  std::vector<SampleState> states;    ///< at the end of the record
-  std::vector<SampleOutput> outputs;  ///< at the end of the record
+  std::vector<SampleState> states;    ///< states at the end of the record
+  std::vector<SampleOutput> outputs;  ///< outputs at the end of the record
   bool full = false;                  ///< the refinement stopped at max_samples
-  bool full_in_view = false;          ///< ... and left surfaces in the field of view too coarse
+  bool full_in_view = false;          ///< surfaces in the field of view were then still too coarse
 };
 
 /// Callback that receives the fraction done, 0 to 1. The builder stops if it returns false.

@@ -64,7 +64,7 @@ struct PacketCone {
     const float along_m = std::max(glm::dot(to_centre_m, axis), 0.0F);
     // Bound how far rays stray from the axis: they matter only up to the far side of the ball.
     const float far_m = distance_m + radius_m + apart_m;
-    constexpr float kRoom = 1e-5F;  // for rounding
+    constexpr float kRoom = 1e-5F;  // room for rounding
     const float reach_m = radius_m + apart_m + (spread + kRoom) * far_m;
     const glm::vec3 aside_m = to_centre_m - along_m * axis;
     return glm::dot(aside_m, aside_m) <= reach_m * reach_m;
@@ -149,7 +149,7 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
   }
   // Sort the instances: static ones, and those of each entity.
   std::vector<CasterPart> fixed;
-  std::vector<CasterPart> everything;  // at the placements of the scenario
+  std::vector<CasterPart> everything;  // parts at the placements of the scenario
   std::map<std::uint32_t, std::vector<CasterPart>> moving;
   for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
     const scene::Instance& instance = geometry.instances[i];

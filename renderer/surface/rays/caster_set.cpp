@@ -202,7 +202,7 @@ Result<void> CasterSet::add_shared(RTCDeviceTy* device, std::span<const CasterPa
   /// Mesh that is stored once.
   struct Stored {
     EmbreeScene scene;
-    glm::dvec3 centre_m{0.0};  ///< of the mesh: vertices are stored relative to it
+    glm::dvec3 centre_m{0.0};  ///< centre of the mesh; vertices are stored relative to it
   };
   std::map<const scene::Mesh*, Stored> stored;
   for (const CasterPart& part : parts) {

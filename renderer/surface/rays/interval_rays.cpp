@@ -322,7 +322,7 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
   const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
   const SkyDirections& local = sky_directions(sky_);
   std::array<CasterRay, kSkyRays> sent;
-  std::uint32_t above = 0;  // rays that leave upwards
+  std::uint32_t above = 0;  // bits of rays that leave upwards
   std::uint32_t hidden = 0;
   HiddenSky most;
   int by_most = 0;
