@@ -13,18 +13,22 @@ using physics::FosterDrive;
 using physics::FosterState;
 using physics::FosterSurface;
 
+/// Weights of modes that take the whole flux.
 constexpr std::array<float, physics::kMaxFosterModes> kWhole{1.0F, 1.0F, 1.0F, 1.0F};
 
+/// Adds all modes, in a fixed order.
 double sum(const FosterState<double>& x) noexcept {
   return (x[0] + x[1]) + (x[2] + x[3]);
 }
 
+/// Returns the exitance of a black surface.
 double exitance_w_m2(double temperature_k) noexcept {
   const double t2 = temperature_k * temperature_k;
   return physics::kStefanBoltzmannWPerM2K4 * t2 * t2;
 }
 
-/// States under a flux that goes linearly from `begin` to `end`: exact.
+/// Advances states under a flux that goes linearly from `begin` to `end`. The result is exact
+/// (physics.md eq. 6). Mode i takes the share `weight_frac[i]` of the flux.
 void relax(FosterState<double>& x, const FosterSurface<double>& surface,
            const std::array<float, physics::kMaxFosterModes>& weight_frac, double begin_w_m2,
            double end_w_m2, const physics::FosterGains<double>& gains) noexcept {
@@ -63,7 +67,8 @@ SampleState FosterHeat::start_state(const SurfaceSample& sample, const glm::vec3
   for (const HeatInterval& interval : tail) {
     advance_unshadowed(sample.material, normal, interval, state.modes_k);
   }
-  // What covers part of the ground did so before the history as well.
+  // Reduce the states next to a solid: it kept the sun from the ground before the history too
+  // (physics.md eq. 23).
   for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
     state.modes_k[i] *= sample.open_before_frac[i];
   }
@@ -73,6 +78,8 @@ SampleState FosterHeat::start_state(const SurfaceSample& sample, const glm::vec3
 FosterHeat::Incoming FosterHeat::incoming(const SurfaceSample& sample, const glm::vec3& normal,
                                           const SurfaceForcing& forcing, const SampleDrive& drive,
                                           double longwave_seen_w_m2) const noexcept {
+  // Split the sky into an open part and the part behind entities. The latter counts as
+  // surroundings, unless the radiation of the entities is in `longwave_seen_w_m2`.
   const double open_frac = sample.sky_frac * (1.0 - drive.hidden_sky_frac);
   const double hidden_frac = drive.hidden_is_seen ? 0.0 : sample.sky_frac * drive.hidden_sky_frac;
   const double sun_w_m2 = std::max(0.0, glm::dot(glm::dvec3(normal), forcing.sun_w_m2));
@@ -86,7 +93,7 @@ FosterHeat::Incoming FosterHeat::into_body(const Incoming& own, bool own_covered
                                            const glm::vec3& normal, const SurfaceForcing& forcing,
                                            const SheetBack* back,
                                            double SampleDrive::*longwave_w_m2) const noexcept {
-  // What covers a face of a sheet keeps its heat: the other one alone decides.
+  // Leave out a covered face: it keeps its heat, so the open one alone decides.
   if (back == nullptr || back->sample.covered) return own;
   const Incoming other =
       incoming(back->sample, -normal, forcing, back->drive, back->drive.*longwave_w_m2);
@@ -110,10 +117,12 @@ SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const SurfaceFor
   SampleOutput out;
   out.offset_k = static_cast<float>(offset_k);
   out.sun_frac = drive.sun_frac;
+  // Send out emission and the reflected rest of the incoming radiation.
   out.longwave_out_w_m2 =
       static_cast<float>(m.emissivity_frac * exitance_w_m2(reference_k_ + offset_k) +
                          (1.0 - m.emissivity_frac) * in.longwave_w_m2);
   out.shortwave_out_w_m2 = static_cast<float>((1.0 - m.solar_absorptance_frac) * in.shortwave_w_m2);
+  // Give the net flux to partners, which it drives. A covered face has none.
   if (!m.prescribed() && !sample.covered) {
     out.flux_w_m2 = static_cast<float>(physics::foster_flux_w_m2(
         offset_k, absorbed(sample.material, forcing, in), surfaces_[sample.material]));
@@ -123,6 +132,7 @@ SampleOutput FosterHeat::output_of(const SurfaceSample& sample, const SurfaceFor
 
 double FosterHeat::offset_k(std::uint32_t material, const SampleState& state) const noexcept {
   if (materials_[material].prescribed()) return materials_[material].prescribed_k - reference_k_;
+  // Add the modes of the sample and those that its partners drive (physics.md eq. 22).
   double offset_k = physics::foster_offset_k(state.modes_k, surfaces_[material]);
   for (const FosterState<double>& partner : state.partner_k) offset_k += sum(partner);
   return offset_k;
@@ -141,6 +151,7 @@ SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& n
   const IntervalForcing& forcing = interval.forcing;
   const Incoming end = incoming(sample, normal, forcing.end, drive, drive.longwave_end_w_m2);
   if (!materials_[sample.material].prescribed()) {
+    // Gather what drives the body at both ends of the interval.
     const Incoming begin =
         incoming(sample, normal, forcing.begin, drive, drive.longwave_begin_w_m2);
     const Incoming body_begin = into_body(begin, sample.covered, normal, forcing.begin, back,
@@ -148,12 +159,13 @@ SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& n
     const Incoming body_end =
         into_body(end, sample.covered, normal, forcing.end, back, &SampleDrive::longwave_end_w_m2);
     const physics::FosterLadder& ladder = interval.ladders[sample.material];
+    // Reduce the resistances at the foot of a solid (physics.md eq. 23).
     FosterSurface<double> surface = surfaces_[sample.material];
     for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
       surface.resistance_m2k_w[i] *= sample.open_frac[i];
     }
-    // What the partners conduct shifts the temperature under which the own flux flows: its mean
-    // over the interval does.
+    // Advance the modes that the partners drive. They shift the temperature above which the own
+    // flux acts, so their mean over the interval is added to the base.
     for (std::size_t p = 0; p < kMaxPartners; ++p) {
       if (sample.partners[p].sample == kNoSample) continue;
       const double before_k = sum(state.partner_k[p]);
@@ -161,6 +173,8 @@ SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& n
             drive.partner_begin_w_m2[p], drive.partner_end_w_m2[p], ladder.level[0]);
       surface.base_offset_k += 0.5 * (before_k + sum(state.partner_k[p]));
     }
+    // Advance the own modes: without any flux if all faces are covered, else by the surface
+    // balance.
     if (sample.covered && (back == nullptr || back->sample.covered)) {
       relax(state.modes_k, surface, kWhole, 0.0, 0.0, ladder.level[0]);
     } else {
@@ -189,16 +203,20 @@ void FosterHeat::step_response(std::uint32_t material, const ResponseConditions&
   const FosterMaterial& m = materials_[material];
   std::ranges::fill(response_m2k_w, 0.0);
   if (m.prescribed() || m.sheet) return;
+  // Linearise the losses: convection and the slope of thermal emission.
   const double t = around.surface_k;
   const double h_w_m2_k =
       around.film_w_m2_k + 4.0 * m.emissivity_frac * physics::kStefanBoltzmannWPerM2K4 * t * t * t;
-  // Per unit of flux, tau x' = r q - x with q = 1 - h sum x, in implicit steps.
+  // Integrate tau x' = r q - x with q = 1 - h sum x by implicit steps: they are stable for any
+  // ratio of step and time constant.
   constexpr int kParts = 16;
   FosterState<double> x{};
   double now_s = 0.0;
   for (std::size_t j = 0; j < times_s.size(); ++j) {
     const double dt_s = (times_s[j] - now_s) / kParts;
     for (int part = 0; part < kParts; ++part) {
+      // Solve the step for the flux at its end. `left` is what the old states leave of the
+      // temperature, `driven` what a unit of flux adds.
       double left = 0.0;
       double driven = 0.0;
       for (std::size_t i = 0; i < m.network.count; ++i) {
@@ -213,6 +231,7 @@ void FosterHeat::step_response(std::uint32_t material, const ResponseConditions&
       }
     }
     now_s = times_s[j];
+    // Scale by the absorbed share of the direct sunlight.
     response_m2k_w[j] = m.solar_absorptance_frac * sum(x);
   }
 }

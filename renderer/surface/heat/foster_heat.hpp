@@ -12,65 +12,79 @@
 
 namespace emit::renderer {
 
-/// The extended model on samples: surface balance and flux-driven states (physics.md eq. 16-18,
-/// extended by what a sample sees and by what its partners conduct). Immutable after construction;
-/// any thread; RT-safe.
+/// Extended thermal model on samples: surface balance and flux-driven states (physics.md eq. 16-18,
+/// with the radiation of other samples of eq. 20 and the conduction across edges of eq. 22).
+/// Immutable after construction; any thread; RT-safe except for the constructor and size().
 class FosterHeat {
  public:
+  /// Copies the properties of the materials. States are kelvins above the base of the material;
+  /// outputs are offsets from `reference_k`. An interval is split until halving its parts changes
+  /// the result by less than `tolerance_k`. It allocates.
   FosterHeat(std::span<const FosterMaterial> materials, double reference_k, double tolerance_k);
 
-  /// Gives `interval` room for the gains. Allocates.
+  /// Gives `interval` room for the gains. It allocates.
   void size(HeatInterval& interval) const { interval.ladders.resize(materials_.size()); }
+  /// Fills the gains of an interval whose forcing is already set.
   void prepare(HeatInterval& interval) const noexcept;
 
-  /// State at the history's start: `before_k` of an unshadowed face, carried over the tail of the
-  /// spin-up; `normal` in world axes.
+  /// Returns the state at the start of the history. It advances `before_k`, the state of an
+  /// unshadowed face, over the tail of the spin-up. `normal` is in world axes.
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample, const glm::vec3& normal,
                                         const physics::FosterState<double>& before_k,
                                         std::span<const HeatInterval> tail) const noexcept;
 
-  /// As SampleHeat::advance().
+  /// Advances a sample over an interval; see SampleHeat::advance().
   SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
                        const HeatInterval& interval, const SampleDrive& drive, SampleState& state,
                        const SheetBack* back) const noexcept;
 
+  /// Returns whether a material is a sheet.
   [[nodiscard]] bool is_sheet(std::uint32_t material) const noexcept {
     return materials_[material].sheet;
   }
 
-  /// As SampleHeat::output().
+  /// Returns the output of a sample in this state; see SampleHeat::output().
   SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
                       const SurfaceForcing& forcing, const SampleDrive& drive,
                       const SampleState& state) const noexcept;
 
-  /// As SampleHeat::step_response().
+  /// Computes the step response of a material; see SampleHeat::step_response().
   void step_response(std::uint32_t material, const ResponseConditions& around,
                      std::span<const double> times_s,
                      std::span<double> response_m2k_w) const noexcept;
 
  private:
-  /// Over an interval, for a face that sees sky and surroundings only.
+  /// Advances a face that sees the whole sun, and only sky and surroundings, over an interval.
   void advance_unshadowed(std::uint32_t material, const glm::vec3& normal,
                           const HeatInterval& interval,
                           physics::FosterState<double>& modes_k) const noexcept;
 
+  /// Radiation that arrives at a face, before absorption.
   struct Incoming {
     double shortwave_w_m2 = 0.0;
     double longwave_w_m2 = 0.0;
   };
+  /// Returns the radiation that arrives at one face (brackets of physics.md eq. 20).
+  /// `longwave_seen_w_m2` is the long-wave part from other samples and entities.
   [[nodiscard]] Incoming incoming(const SurfaceSample& sample, const glm::vec3& normal,
                                   const SurfaceForcing& forcing, const SampleDrive& drive,
                                   double longwave_seen_w_m2) const noexcept;
-  /// Of a sheet's two faces the mean.
+  /// Returns the radiation that drives the body: the mean of both faces of a sheet, else that of
+  /// the own face. `longwave_w_m2` selects the begin or the end of the interval in the input of the
+  /// back.
   [[nodiscard]] Incoming into_body(const Incoming& own, bool own_covered, const glm::vec3& normal,
                                    const SurfaceForcing& forcing, const SheetBack* back,
                                    double SampleDrive::*longwave_w_m2) const noexcept;
+  /// Returns the input of the surface balance: absorbed flux A, film and air.
   [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material,
                                                       const SurfaceForcing& forcing,
                                                       const Incoming& in) const noexcept;
+  /// Returns the output of a sample of known temperature.
   [[nodiscard]] SampleOutput output_of(const SurfaceSample& sample, const SurfaceForcing& forcing,
                                        const Incoming& in, const SampleDrive& drive,
                                        double offset_k) const noexcept;
+  /// Returns the surface temperature as an offset from the reference temperature, partners
+  /// included.
   [[nodiscard]] double offset_k(std::uint32_t material, const SampleState& state) const noexcept;
 
   std::vector<FosterMaterial> materials_;

@@ -11,45 +11,49 @@
 
 namespace emit::renderer {
 
-/// Relaxation modes of a material that count (physics.md eq. 5).
+/// Largest number of relaxation modes of a material (physics.md eq. 5). Further modes are ignored.
 inline constexpr std::size_t kMaxRelaxationModes = 2;
 
-/// What a sample receives over one interval beside the forcing that all share.
+/// Input of one sample over one interval, in addition to the forcing that all samples share.
 struct SampleDrive {
-  float sun_frac = 0.0F;         ///< visible share of the disc, mean
-  float hidden_sky_frac = 0.0F;  ///< share of the sample's sky behind entities, mean
-  /// What those entities send counts in the long wave below; else they send what the surroundings
-  /// do.
+  float sun_frac = 0.0F;  ///< visible share of the sun's disc, mean over the interval
+  /// Share of the sample's sky that entities hide, mean over the interval.
+  float hidden_sky_frac = 0.0F;
+  /// True if the long-wave terms below include what those entities send. Otherwise the hidden part
+  /// of the sky counts as surroundings.
   bool hidden_is_seen = false;
-  /// From the samples it sees, their weights included.
+  /// Radiation from other samples in view, already multiplied by their weights: long-wave at the
+  /// begin and the end of the interval, short-wave as one value for the interval.
   double longwave_begin_w_m2 = 0.0;
   double longwave_end_w_m2 = 0.0;
   double shortwave_w_m2 = 0.0;
-  /// Net fluxes into the partners' faces.
+  /// Net fluxes into the faces of the partners at the begin and the end of the interval (physics.md
+  /// eq. 22).
   std::array<double, kMaxPartners> partner_begin_w_m2{};
   std::array<double, kMaxPartners> partner_end_w_m2{};
 };
 
-/// What a step response is linearised around.
+/// State of the air and the surface around which a step response is linearised.
 struct ResponseConditions {
   double film_w_m2_k = 0.0;
   double surface_k = 300.0;
 };
 
-/// The other face of a sheet: its normal is opposite.
+/// Other face of a sheet: its sample and its input. Its normal is opposite to that of the first
+/// face.
 struct SheetBack {
   const SurfaceSample& sample;
   const SampleDrive& drive;
 };
 
-/// The forcing of an interval and, by material, the gains of the thermal model's steps; those of
-/// the other model are empty.
+/// Forcing of an interval and the gains of the thermal model over it, one entry per material. The
+/// vector of the model that is not in use stays empty.
 struct HeatInterval {
   using Relaxation = std::array<physics::RelaxationGains<double>, kMaxRelaxationModes>;
 
   IntervalForcing forcing;
-  std::vector<physics::FosterLadder> ladders;  ///< foster
-  std::vector<Relaxation> relaxation;          ///< emit2014
+  std::vector<physics::FosterLadder> ladders;  ///< gains of the model foster
+  std::vector<Relaxation> relaxation;          ///< gains of the model emit2014
 };
 
 }  // namespace emit::renderer

@@ -10,9 +10,9 @@
 namespace emit::renderer {
 namespace {
 
-constexpr int kBits = 16;  ///< of a coordinate
+constexpr int kBits = 16;  ///< bits of one coordinate on the curve
 
-/// Spreads the low 16 bits to every third bit.
+/// Spreads the low 16 bits of a number to every third bit of the result.
 std::uint64_t spread(std::uint64_t x) noexcept {
   x = (x | (x << 32U)) & 0xffff00000000ffffULL;
   x = (x | (x << 16U)) & 0x00ff0000ff0000ffULL;
@@ -21,7 +21,8 @@ std::uint64_t spread(std::uint64_t x) noexcept {
   return (x | (x << 2U)) & 0x9249249249249249ULL;
 }
 
-/// Place on a curve through the box that keeps near what is near (Morton).
+/// Returns the position on a curve through the box (Morton order). Points that are near in space
+/// are mostly near on it.
 std::uint64_t place_on_curve(const glm::vec3& at_m, const glm::vec3& low_m,
                              float width_m) noexcept {
   const float scale = static_cast<float>((1 << kBits) - 1) / width_m;
@@ -37,6 +38,7 @@ std::uint64_t place_on_curve(const glm::vec3& at_m, const glm::vec3& low_m,
 SampleBlocks::SampleBlocks(const SurfaceSamples& all) {
   const std::vector<SurfaceSample>& samples = all.samples;
   if (samples.empty()) return;
+  // Find the cube that holds all samples, for the scale of the curve.
   glm::vec3 low_m = samples.front().position_m;
   glm::vec3 high_m = low_m;
   for (const SurfaceSample& sample : samples) {
@@ -45,6 +47,7 @@ SampleBlocks::SampleBlocks(const SurfaceSamples& all) {
   }
   const glm::vec3 size_m = high_m - low_m;
   const float width_m = std::max({size_m.x, size_m.y, size_m.z, 1e-6F});
+  // Sort the samples by entity, then along the curve.
   using Key = std::tuple<std::int32_t, std::uint64_t, std::uint32_t>;
   std::vector<Key> keys;
   for (std::uint32_t i = 0; i < samples.size(); ++i) {
@@ -52,6 +55,8 @@ SampleBlocks::SampleBlocks(const SurfaceSamples& all) {
     keys.emplace_back(samples[i].mover, place_on_curve(samples[i].position_m, low_m, width_m), i);
   }
   std::ranges::sort(keys);
+  // Cut the sorted list into groups: a new one begins with another entity or when the last one is
+  // full.
   for (const auto& [mover, place, index] : keys) {
     if (blocks_.empty() || blocks_.back().mover != mover || blocks_.back().count == kBlockSamples) {
       blocks_.push_back({.mover = mover, .first = static_cast<std::uint32_t>(order_.size())});
@@ -59,6 +64,7 @@ SampleBlocks::SampleBlocks(const SurfaceSamples& all) {
     ++blocks_.back().count;
     order_.push_back(index);
   }
+  // Find the ball of every group. Its centre is that of the box around the positions.
   for (Block& block : blocks_) {
     const auto own = std::span(order_).subspan(block.first, block.count);
     std::ranges::sort(own);

@@ -16,14 +16,17 @@ void SampleHeat::prepare(HeatInterval& interval) const noexcept {
 SampleState SampleHeat::start_state(const SurfaceSample& sample, const glm::vec3& normal,
                                     const SurfaceHistory& history,
                                     std::span<const HeatInterval> tail) const noexcept {
+  // Start emit2014 from the temperature of the material alone: it has no spin-up.
   const auto* extended = std::get_if<FosterHeat>(&model_);
   if (extended == nullptr) return std::get_if<Emit2014Heat>(&model_)->start_state(sample);
+  // Start foster from the unshadowed spin-up of a face that looks in a direction.
   const auto facing = [&](const glm::vec3& direction) {
     return extended->start_state(
         sample, direction, history.start_states(sample.material, glm::dvec3(direction)), tail);
   };
   SampleState state = facing(normal);
   if (!extended->is_sheet(sample.material)) return state;
+  // Average both faces of a sheet: they share one state.
   const SampleState back = facing(-normal);
   for (std::size_t i = 0; i < state.modes_k.size(); ++i) {
     state.modes_k[i] = 0.5 * (state.modes_k[i] + back.modes_k[i]);
@@ -52,6 +55,8 @@ void SampleHeat::step_response(std::uint32_t material, const ResponseConditions&
 SampleOutput SampleHeat::output(const SurfaceSample& sample, const glm::vec3& normal,
                                 const SurfaceForcing& forcing, const SampleDrive& drive,
                                 const SampleState& state) const noexcept {
+  // Leave normal and forcing out for emit2014: its output depends on the state and the sun fraction
+  // alone.
   if (const auto* published = std::get_if<Emit2014Heat>(&model_)) {
     return published->output(sample, drive, state);
   }

@@ -13,43 +13,50 @@
 
 namespace emit::renderer {
 
-/// How the thermal model of the scenario carries a sample on. Chosen once, at construction.
-/// Immutable after construction; any thread; RT-safe where not said otherwise.
+/// Thermal model of the scenario, applied to single samples: emit2014 or foster, chosen once at
+/// construction. Immutable after construction; any thread; RT-safe if a function does not say
+/// otherwise.
 class SampleHeat {
  public:
   explicit SampleHeat(Emit2014Heat model) : model_(std::move(model)) {}
   explicit SampleHeat(FosterHeat model) : model_(std::move(model)) {}
 
-  /// An interval with room for the gains. Allocates.
+  /// Returns an interval with room for the gains of this model. It allocates.
   [[nodiscard]] HeatInterval sized_interval() const;
-  /// Fills the gains of an interval whose forcing stands.
+  /// Fills the gains of an interval whose forcing is already set. The interval must come from
+  /// sized_interval().
   void prepare(HeatInterval& interval) const noexcept;
 
-  /// Before the first interval of the record; `normal` in world axes at that time.
+  /// Returns the state of a sample at the start of the record. `normal` is in world axes at that
+  /// time. `tail` has the last intervals of the unshadowed spin-up, which only foster uses. A sheet
+  /// starts with the mean of its two faces.
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample, const glm::vec3& normal,
                                         const SurfaceHistory& history,
                                         std::span<const HeatInterval> tail) const noexcept;
 
-  /// Advances a sample over an interval; `normal` in world axes, in its middle. A sheet is driven
-  /// by the mean of what it and its other face receive; both have its state.
+  /// Advances a sample over an interval and returns its output at the end. `normal` is in world
+  /// axes, in the middle of the interval. `back` is given for a sheet: the mean of the inputs of
+  /// both faces drives the one state that they share (physics.md eq. 24).
   SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
                        const HeatInterval& interval, const SampleDrive& drive, SampleState& state,
                        const SheetBack* back = nullptr) const noexcept;
 
-  /// What a sample of that state sends out at an instant, which `drive` begins with.
+  /// Returns the output of a sample in this state at an instant, without a step. `drive` belongs to
+  /// an interval that begins at that instant.
   [[nodiscard]] SampleOutput output(const SurfaceSample& sample, const glm::vec3& normal,
                                     const SurfaceForcing& forcing, const SampleDrive& drive,
                                     const SampleState& state) const noexcept;
 
-  /// What a face of open ground gains by each of `times_s` (ascending) after the sun has come out,
-  /// K per W/m2 of direct sunlight on it, to first order; zero for sheets and where the temperature
-  /// is prescribed. @pre equal lengths
+  /// Computes the step response: the temperature that a face of open ground gains by each of
+  /// `times_s` (ascending) after the sun has come out, in K per W/m2 of direct sunlight on it, to
+  /// first order. The response is zero for sheets and for prescribed temperatures.
+  /// @pre `times_s` and `response_m2k_w` have equal lengths
   void step_response(std::uint32_t material, const ResponseConditions& around,
                      std::span<const double> times_s,
                      std::span<double> response_m2k_w) const noexcept;
 
-  /// Which sky a sample feels: every direction of the full sphere alike (emit2014), or by the
-  /// cosine to its normal (foster).
+  /// Returns the measure by which directions of the sky count: all directions of the full sphere
+  /// alike (emit2014), or by the cosine to the normal (foster).
   [[nodiscard]] SkyMeasure sky_measure() const noexcept {
     return std::holds_alternative<Emit2014Heat>(model_) ? SkyMeasure::sphere : SkyMeasure::cosine;
   }

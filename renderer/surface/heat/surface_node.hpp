@@ -11,14 +11,15 @@
 
 namespace emit::renderer {
 
-/// What the device interpolates between, by sample and node of time.
+/// Values of a drawn sample at one node of time. The device interpolates them over the surface and
+/// between nodes.
 struct SampleVertex {
-  float offset_k = 0.0F;
-  float sun_frac = 0.0F;
+  float offset_k = 0.0F;  ///< temperature from the reference temperature
+  float sun_frac = 0.0F;  ///< visible share of the sun's disc
 };
 
-/// Parts of a list that have changed: a bounded number of ranges that together hold them.
-/// Real time: everything but the constructor is RT-safe.
+/// Record of the parts of a list that have changed, as a bounded number of ranges that together
+/// hold them. Everything but the constructor is RT-safe.
 class ChangedRanges {
  public:
   struct Range {
@@ -26,12 +27,14 @@ class ChangedRanges {
     std::uint32_t count = 0;
   };
   static constexpr std::size_t kMaxRanges = 1024;
-  /// What lies between two parts so close to each other is sent along: a call costs as much.
+  /// Largest gap between two parts that are joined to one range. Sending the gap costs as much as
+  /// one more call.
   static constexpr std::uint32_t kGap = 64;
 
   ChangedRanges() { ranges_.reserve(kMaxRanges); }
 
-  /// Cheapest in ascending order.
+  /// Adds a part. Parts in ascending order join best. If all ranges are used, they become one that
+  /// covers them all.
   void add(std::uint32_t first, std::uint32_t count) noexcept {
     if (count == 0) return;
     if (!ranges_.empty()) {
@@ -48,6 +51,7 @@ class ChangedRanges {
   [[nodiscard]] std::span<const Range> ranges() const noexcept { return ranges_; }
 
  private:
+  /// Replaces all ranges by one that covers them.
   void cover() noexcept {
     std::uint32_t low = ranges_.front().first;
     std::uint32_t high = low;
@@ -62,19 +66,20 @@ class ChangedRanges {
   std::vector<Range> ranges_;
 };
 
-/// All samples at one node of time: what is needed to go on from there.
+/// State of all samples at one node of time: everything that the next interval starts from.
 struct SurfaceNode {
   std::vector<SampleState> states;
   std::vector<SampleOutput> outputs;
-  std::vector<SampleVertex> vertices;  ///< of the drawn samples
-  ChangedRanges changes;               ///< of the vertices
+  std::vector<SampleVertex> vertices;  ///< values of the drawn samples, for the device
+  ChangedRanges changes;               ///< ranges of `vertices` that have changed
   std::int64_t at_ns = 0;
-  IntervalForcing forcing;  ///< of the interval that ends there, as it was taken to be
-  physics::FosterState<double> surroundings{};
-  std::optional<double> surroundings_k;  ///< where the thermal model carries it
+  /// Forcing of the interval that ends at this node, as it was assumed when the node was computed.
+  IntervalForcing forcing;
+  physics::FosterState<double> surroundings{};  ///< state of the surroundings
+  std::optional<double> surroundings_k;  ///< set if the thermal model computes their temperature
 };
 
-/// Value on the way from a to b.
+/// Interpolates linearly from a (frac = 0) to b (frac = 1), member by member.
 template <class T>
 [[nodiscard]] T between(T a, T b, double frac) noexcept {
   return a + static_cast<T>(frac) * (b - a);

@@ -7,88 +7,98 @@
 
 #include "emit/physics/foster.hpp"
 
-/// Thermal samples: the points of a surface that remember. Plain arrays; who fills what is said at
-/// each member.
+/// Thermal samples: points of the surface that remember their temperature. They are plain data; a
+/// comment at a member says who fills it if that is not the warm-up.
 namespace emit::renderer {
 
+/// Index that stands for no sample.
 inline constexpr std::uint32_t kNoSample = 0xffffffffU;
-/// Neighbouring faces across convex edges that a sample exchanges heat with.
+/// Largest number of faces across convex edges with which a sample exchanges heat.
 inline constexpr std::size_t kMaxPartners = 2;
 
-/// A sample near which rays of a view ended, and the share of those rays.
+/// Sample in whose neighbourhood rays of a view ended, and the share of those rays.
 struct SeenSample {
   std::uint32_t sample = kNoSample;
   float weight_frac = 0.0F;
 };
 
-/// The point at the same distance from a convex edge on the other face.
+/// Partner of a sample: the point of the neighbouring face that has the same distance from their
+/// convex edge.
 struct Partner {
   std::uint32_t sample = kNoSample;
-  float distance_m = 0.0F;  ///< of both from the edge
-  /// Share of the partner's flux that drives each mode (physics.md eq. 22).
+  float distance_m = 0.0F;  ///< distance of either point from the edge
+  /// Share w_i of the partner's flux that drives each mode (physics.md eq. 22).
   std::array<float, physics::kMaxFosterModes> weight_frac{};
 };
 
-/// What a sample is: fixed while the scene's geometry stands. Coordinates are relative to the
-/// origin of CasterRays for static surfaces and in the body frame for those of entities.
+/// Place, material and view of a sample. They are fixed while the geometry of the scene stays the
+/// same. Coordinates are in rel for static surfaces and in the body frame for those of entities.
 struct SurfaceSample {
   glm::vec3 position_m{0.0F};
-  glm::vec3 normal{0.0F};
+  glm::vec3 normal{0.0F};   ///< outward, unit length
   std::int32_t mover = -1;  ///< entity, or -1: static
   std::uint32_t material = 0;
   float sky_frac = 1.0F;  ///< cosine-weighted share of the hemisphere that shows sky
-  float far_frac = 0.0F;  ///< ... and that leaves the scene below the horizon
-  /// Share of the full sphere that shows sky; filled where the thermal model has that measure.
+  float far_frac = 0.0F;  ///< share of the hemisphere whose rays leave the scene below the horizon
+  /// Share f_i of the full sphere that shows sky. Only the model emit2014 uses it; with other
+  /// models it keeps its default.
   float sphere_sky_frac = 0.5F;
-  std::uint32_t first_seen = 0;  ///< the rest: entries of SurfaceSamples::seen
+  std::uint32_t first_seen = 0;  ///< rest of the hemisphere: entries of SurfaceSamples::seen
   std::uint32_t seen_count = 0;
-  /// Their weights count that much: samples whose view is alike share its entries.
+  /// Factor on the weights of those entries. Samples with a similar view share the entries and
+  /// differ in this factor.
   float seen_scale = 0.0F;
-  /// Another face lies on it: no air and no radiation in between, and for want of a path between
-  /// the two bodies no flux.
+  /// True if another face lies on the surface. No air and no radiation reach it then, and because
+  /// contact between bodies is not modelled, it has no flux at all.
   bool covered = false;
-  /// Share of each mode's response that is left next to a body which keeps the sun, the sky and
-  /// the air from the surface beyond its foot (physics.md eq. 23): over the history, and over the
-  /// days before.
+  /// Share o_i of the response of each mode that remains next to a solid, which keeps sun, sky and
+  /// air from the ground under it (physics.md eq. 23). The first holds over the history, the second
+  /// for the states at its start.
   std::array<float, physics::kMaxFosterModes> open_frac{1.0F, 1.0F, 1.0F, 1.0F};
   std::array<float, physics::kMaxFosterModes> open_before_frac{1.0F, 1.0F, 1.0F, 1.0F};
-  /// Of a sheet: the sample of its other face at this place, which shares its state.
+  /// Sample of the other face of a sheet at the same place, which shares the state of this one.
   std::uint32_t other_side = kNoSample;
-  float flat_m = 0.0F;  ///< the surface is a plane at least this far in all directions
+  float flat_m = 0.0F;  ///< the surface is plane at least this far in all directions
   std::array<Partner, kMaxPartners> partners{};
 };
 
-/// Which directions count when a sample looks for sky.
+/// Measure by which directions count when a sample looks for sky.
 enum class SkyMeasure : std::uint8_t {
-  cosine,  ///< by the cosine to the normal
-  sphere,  ///< every direction of the full sphere alike
+  cosine,  ///< directions count with the cosine to the normal
+  sphere,  ///< all directions of the full sphere count alike
 };
 
-/// Heat of a sample at the end of an interval: modes of the thermal model, as offsets.
+/// Heat of a sample at the end of an interval, as values of the modes of its thermal model. With
+/// foster they are kelvins above the base (eq. 17), with emit2014 offsets from the reference
+/// temperature.
 struct SampleState {
-  /// foster: driven by the sample's own flux; emit2014: by its equilibrium temperature.
+  /// Modes of the sample itself. With foster its own flux drives them, with emit2014 its
+  /// equilibrium temperature.
   physics::FosterState<double> modes_k{};
-  /// Driven by the fluxes of its partners (physics.md, edges); all modes of one partner.
+  /// Modes y_i that the fluxes of each partner drive (physics.md eq. 22).
   std::array<physics::FosterState<double>, kMaxPartners> partner_k{};
 };
 
-/// What others and the device read of a sample at one node of time.
+/// Output of a sample at one node of time, which other samples and the device read.
 struct SampleOutput {
-  float offset_k = 0.0F;  ///< temperature from the renderer's reference
-  /// Visible share of the sun's disc in the interval before; in a step's output of static samples
-  /// by what stands still, because frames have their own shade of entities (ShadePages).
+  float offset_k = 0.0F;  ///< temperature from the reference temperature
+  /// Visible share of the sun's disc, mean over the interval before. In the output of a step of a
+  /// static sample it counts the shade of static geometry alone, because frames add the shade of
+  /// entities themselves (ShadePages).
   float sun_frac = 0.0F;
   float longwave_out_w_m2 = 0.0F;   ///< emitted and reflected
   float shortwave_out_w_m2 = 0.0F;  ///< reflected sunlight, mean of the interval before
-  float flux_w_m2 = 0.0F;           ///< net, into the solid
+  float flux_w_m2 = 0.0F;           ///< net flux into the solid
 };
 
+/// All samples of a scene and the lists of samples that they see.
 struct SurfaceSamples {
   std::vector<SurfaceSample> samples;
-  std::vector<SeenSample> seen;
+  std::vector<SeenSample> seen;  ///< lists of all samples, one after the other
 };
 
-/// False for the side of a sheet that is carried on with its other one.
+/// Returns whether a sample is advanced on its own. It is false for the second side of a sheet,
+/// which follows from the first one.
 [[nodiscard]] inline bool steps_itself(const SurfaceSamples& all, std::uint32_t index) noexcept {
   return all.samples[index].other_side >= index;
 }

@@ -9,17 +9,19 @@
 namespace emit::renderer {
 namespace {
 
+/// Member that shares places with another one.
 struct Neighbour {
   std::uint32_t member = 0;
-  std::uint32_t shared = 0;  ///< places
+  std::uint32_t shared = 0;  ///< number of places that both have
 };
 
-/// By member: those it shares places with.
+/// Returns, for each member, the members that share places with it.
 std::vector<std::vector<Neighbour>> find_neighbours(std::span<const GroupMember> members) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> uses;  // place, member
   for (std::uint32_t m = 0; m < members.size(); ++m) {
     for (const std::uint32_t place : members[m].places) uses.emplace_back(place, m);
   }
+  // Bring the users of each place together and note every pair of them.
   std::ranges::sort(uses);
   std::vector<std::vector<std::uint32_t>> met(members.size());
   for (std::size_t first = 0; first < uses.size();) {
@@ -32,6 +34,7 @@ std::vector<std::vector<Neighbour>> find_neighbours(std::span<const GroupMember>
     }
     first = end;
   }
+  // Count how often a pair was noted: that is the number of places that the two share.
   std::vector<std::vector<Neighbour>> neighbours(members.size());
   for (std::size_t m = 0; m < members.size(); ++m) {
     std::ranges::sort(met[m]);
@@ -54,6 +57,7 @@ std::vector<std::vector<std::uint32_t>> group_neighbours(std::span<const GroupMe
   const std::vector<std::vector<Neighbour>> neighbours = find_neighbours(members);
   std::vector<glm::vec3> centres_m;
   for (const GroupMember& member : members) centres_m.push_back(member.centre_m);
+  // Start groups in the order of a curve through space, so that what is left over lies together.
   const std::vector<std::uint32_t> order = scene::curve_order(centres_m);
   std::vector<bool> taken(members.size(), false);
   std::vector<Neighbour> rim;
@@ -67,6 +71,7 @@ std::vector<std::vector<std::uint32_t>> group_neighbours(std::span<const GroupMe
       taken[latest] = true;
       group.push_back(latest);
       if (group.size() == most) break;
+      // Add the neighbours of the latest member to the rim of the group.
       for (const Neighbour& neighbour : neighbours[latest]) {
         const auto known = std::ranges::find(rim, neighbour.member, &Neighbour::member);
         if (known == rim.end()) {
@@ -76,11 +81,13 @@ std::vector<std::vector<std::uint32_t>> group_neighbours(std::span<const GroupMe
         }
       }
       std::erase_if(rim, [&](const Neighbour& neighbour) { return taken[neighbour.member]; });
+      // Go on with the member that shares most places with the group.
       if (!rim.empty()) {
         latest = std::ranges::max_element(rim, {}, &Neighbour::shared)->member;
         continue;
       }
-      // Loose parts go with those nearby.
+      // Continue with the next free member along the curve if the group has no neighbour left:
+      // loose parts join what lies near them.
       while (next < order.size() && taken[order[next]]) ++next;
       if (next == order.size()) break;
       latest = order[next];

@@ -7,14 +7,16 @@
 
 namespace emit::renderer {
 
-/// A cluster as its neighbours see it.
+/// Cluster as group_neighbours() sees it: its places and its centre.
 struct GroupMember {
-  std::vector<std::uint32_t> places;  ///< ids of the places of its vertices, ascending, each once
+  /// Ids of the places of its vertices, ascending, each once.
+  std::vector<std::uint32_t> places;
   glm::vec3 centre_m{0.0F};
 };
 
-/// Puts clusters together in groups of up to `most`, those first that share many places. Indices
-/// into `members`; every member is in one group. O(n log n). Setup only.
+/// Puts clusters together in groups of up to `most`. Clusters that share many places come together
+/// first. Returns indices into `members`; every member is in exactly one group. O(n log n). Setup
+/// only.
 [[nodiscard]] std::vector<std::vector<std::uint32_t>> group_neighbours(
     std::span<const GroupMember> members, std::size_t most);
 

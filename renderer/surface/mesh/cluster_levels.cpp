@@ -16,33 +16,36 @@
 namespace emit::renderer {
 namespace {
 
+/// Largest number of clusters that are simplified together.
 constexpr std::size_t kGroupClusters = 8;
-/// Groups that keep more of their triangles are not worth a level.
+/// Largest share of its triangles that a group may keep to get a coarser level.
 constexpr double kWorthFrac = 0.75;
-/// Nor is a level that saves less than this of all triangles.
+/// Largest share of all triangles that a new level may have; the build ends with a larger one.
 constexpr double kLevelFrac = 0.95;
-/// Share of a group's surface that may differ more.
+/// Share of the surface of a group that may have larger errors than stated.
 constexpr float kRareFrac = 0.01F;
-/// Instances whose values guide the collapse; all are measured afterwards.
+/// Number of instances whose temperatures guide the collapse; all are measured afterwards.
 constexpr std::size_t kGuides = 4;
 
 using Indices = std::vector<std::uint32_t>;
 
-/// A cluster on its way up.
+/// Cluster during the build: its triangles (indices into the mesh), its bounds and its errors.
 struct Node {
   Indices indices;
   scene::Cluster bounds;
   ClusterLevel level;
-  bool finest = true;
+  bool finest = true;  ///< its triangles are those of the mesh
 };
 
-/// Triangles with their own numbering of the vertices, so that work is proportional to them.
+/// Triangles with a local numbering of their vertices, so that work is proportional to their number
+/// and not to that of the mesh.
 struct Local {
-  Indices global;  ///< by local vertex
+  Indices global;  ///< vertex of the mesh, by local vertex
   Indices indices;
   std::vector<glm::vec3> positions_m;
 };
 
+/// Numbers the vertices of some triangles from 0, in the order of the mesh.
 Local localised(const scene::Mesh& mesh, std::span<const std::uint32_t> indices) {
   Local local;
   local.global.assign(indices.begin(), indices.end());
@@ -57,33 +60,40 @@ Local localised(const scene::Mesh& mesh, std::span<const std::uint32_t> indices)
   return local;
 }
 
+/// Builds the levels of one mesh, submesh by submesh.
 class Builder {
  public:
   Builder(const scene::Mesh& mesh, const VertexValues& values)
       : mesh_(mesh), values_(values), place_(scene::place_numbers(mesh.positions_m, mesh.indices)) {
+    // Choose the guides evenly from all instances.
     const std::size_t guides = std::min(kGuides, values.size());
     for (std::size_t i = 0; i < guides; ++i) guides_.push_back(i * values.size() / guides);
   }
 
-  /// All levels of one submesh, the finest first and those of a group together.
+  /// Returns the clusters of all levels of one submesh, the finest first. Clusters of a group stay
+  /// together.
   [[nodiscard]] std::vector<Node> build(std::span<const std::uint32_t> indices) const;
 
  private:
-  /// What replaces a group; empty: nothing does, `own` and the rest of the group stay.
+  /// Coarser clusters that replace a group, and their error. They are empty if nothing replaces the
+  /// group and its clusters stay.
   struct Merged {
     std::vector<Node> nodes;
     LevelError error;
   };
   [[nodiscard]] std::vector<Node> cut(std::span<const std::uint32_t> indices) const;
+  /// Simplifies a group and cuts the result into clusters.
   [[nodiscard]] Merged merge(std::span<const Node> nodes,
                              std::span<const std::uint32_t> group) const;
+  /// Returns about half of the triangles, in local numbers.
   [[nodiscard]] Indices collapse(const Local& local) const;
+  /// Measures the error of `coarse` triangles (local numbers) against the finer ones in `local`.
   [[nodiscard]] LevelError measure(const Local& local, std::span<const std::uint32_t> coarse) const;
 
   const scene::Mesh& mesh_;
   const VertexValues& values_;
-  Indices place_;  ///< by vertex: equal for equal positions
-  std::vector<std::size_t> guides_;
+  Indices place_;                    ///< by vertex; equal for equal positions
+  std::vector<std::size_t> guides_;  ///< indices into `values_`
 };
 
 std::vector<Node> Builder::cut(std::span<const std::uint32_t> indices) const {
@@ -107,6 +117,7 @@ Indices Builder::collapse(const Local& local) const {
   for (std::uint32_t v = 0; v < place.size(); ++v) by_place[v] = {place_[local.global[v]], v};
   std::ranges::sort(by_place);
   for (std::size_t i = 0; i < by_place.size(); ++i) {
+    // Give all copies of a position the number of the first one.
     const bool copy = i > 0 && by_place[i].first == by_place[i - 1].first;
     place[by_place[i].second] = copy ? place[by_place[i - 1].second] : by_place[i].second;
   }
@@ -114,6 +125,7 @@ Indices Builder::collapse(const Local& local) const {
   input.place = place;
   input.indices = local.indices;
   input.tolerance_k = kLevelDifferencesK[1];
+  // Gather the temperatures of the guides at the local vertices.
   std::vector<std::vector<float>> values_k;
   for (const std::size_t i : guides_) {
     std::vector<float>& here_k = values_k.emplace_back();
@@ -124,6 +136,7 @@ Indices Builder::collapse(const Local& local) const {
 }
 
 LevelError Builder::measure(const Local& local, std::span<const std::uint32_t> coarse) const {
+  // Give each vertex a third of the area of its triangles: its share of the surface.
   std::vector<float> area_m2(local.global.size(), 0.0F);
   float whole_m2 = 0.0F;
   for (std::size_t i = 0; i < local.indices.size(); i += 3) {
@@ -133,17 +146,21 @@ LevelError Builder::measure(const Local& local, std::span<const std::uint32_t> c
     for (std::size_t k = 0; k < 3; ++k) area_m2[c[k]] += third_m2;
     whole_m2 += 3.0F * third_m2;
   }
-  for (const std::uint32_t v : coarse) area_m2[v] = -1.0F;  // still there
+  // Mark vertices that are still there: they have no error.
+  for (const std::uint32_t v : coarse) area_m2[v] = -1.0F;
   const NearestTriangle nearest(local.positions_m, coarse);
   LevelError error;
-  // Of each kind: edge, area. The last is that of all.
+  // Lists of (longest edge, area) of vertices with an error: one list for each of
+  // kLevelDifferencesK and one for all vertices that are gone.
   std::array<std::vector<std::pair<float, float>>, kLevelDifferencesK.size() + 1> wrong;
   for (std::uint32_t v = 0; v < area_m2.size(); ++v) {
     if (area_m2[v] < 0.0F) continue;
-    // Of faces that meet in one place the one that faces alike.
+    // Find the coarse triangle that stands for this vertex. If several meet at the place, take the
+    // one that faces alike.
     const auto hit = nearest.find(local.positions_m[v], mesh_.normals[local.global[v]]);
     error.deviation_m = std::max(error.deviation_m, hit.distance_m);
     const std::uint32_t* corner = &coarse[3 * std::size_t{hit.triangle}];
+    // Find the largest difference of temperature over all instances.
     float difference_k = 0.0F;
     for (const std::span<const float> value_k : values_) {
       float there_k = 0.0F;
@@ -158,6 +175,8 @@ LevelError Builder::measure(const Local& local, std::span<const std::uint32_t> c
       if (difference_k > kLevelDifferencesK[i]) wrong[i].push_back(here);
     }
   }
+  // Take the longest edge of each list after the largest ones have filled the rare share of the
+  // surface.
   for (std::size_t i = 0; i < wrong.size(); ++i) {
     std::ranges::sort(wrong[i], std::greater{});
     float above_m2 = 0.0F;
@@ -173,6 +192,7 @@ LevelError Builder::measure(const Local& local, std::span<const std::uint32_t> c
 
 Builder::Merged Builder::merge(std::span<const Node> nodes,
                                std::span<const std::uint32_t> group) const {
+  // Gather the triangles of the group and simplify them.
   Indices fine;
   for (const std::uint32_t n : group) {
     fine.insert(fine.end(), nodes[n].indices.begin(), nodes[n].indices.end());
@@ -186,7 +206,8 @@ Builder::Merged Builder::merge(std::span<const Node> nodes,
   Merged merged;
   LevelError& error = merged.error;
   error = measure(local, coarse);
-  // Errors add up, and a coarser level never looks better than what it stands for, from nowhere.
+  // Combine the errors with those of the finer clusters: deviations add up, and a coarser level
+  // must never look better than what it replaces, from no place.
   float deviation_m = 0.0F;
   glm::vec3 low_m(std::numeric_limits<float>::infinity());
   glm::vec3 high_m(-std::numeric_limits<float>::infinity());
@@ -201,13 +222,15 @@ Builder::Merged Builder::merge(std::span<const Node> nodes,
     high_m = glm::max(high_m, own.centre_m + own.radius_m);
   }
   error.deviation_m += deviation_m;
+  // Find a sphere that holds the spheres of all finer clusters.
   error.centre_m = 0.5F * (low_m + high_m);
   for (const std::uint32_t n : group) {
     const LevelError& own = nodes[n].level.own;
     error.radius_m =
         std::max(error.radius_m, glm::distance(own.centre_m, error.centre_m) + own.radius_m);
   }
-  error.radius_m *= 1.0F + 1e-5F;  // of what float32 rounds
+  error.radius_m *= 1.0F + 1e-5F;  // room for rounding in float32
+  // Cut the coarser triangles into clusters. They share one error, so that they appear together.
   for (std::uint32_t& v : coarse) v = local.global[v];
   merged.nodes = cut(coarse);
   for (Node& node : merged.nodes) {
@@ -221,6 +244,7 @@ std::vector<Node> Builder::build(std::span<const std::uint32_t> indices) const {
   std::vector<Node> done;
   std::vector<Node> nodes = cut(indices);
   for (;;) {
+    // Group neighbouring clusters of this level.
     std::vector<GroupMember> members(nodes.size());
     std::size_t before = 0;
     for (std::size_t n = 0; n < nodes.size(); ++n) {
@@ -232,15 +256,17 @@ std::vector<Node> Builder::build(std::span<const std::uint32_t> indices) const {
       before += nodes[n].indices.size();
     }
     const auto groups = group_neighbours(members, kGroupClusters);
+    // Simplify the groups on all cores.
     std::vector<Merged> merged(groups.size());
     threads::parallel_parts(groups.size(), 1, [&](std::size_t first, std::size_t last) {
       for (std::size_t g = first; g < last; ++g) merged[g] = merge(nodes, groups[g]);
     });
+    // Collect the next level: coarser clusters, and clusters that nothing replaces.
     std::vector<Node> next;
     std::size_t after = 0;
     for (std::size_t g = 0; g < groups.size(); ++g) {
       for (const std::uint32_t n : groups[g]) {
-        if (merged[g].nodes.empty()) {  // with other neighbours, perhaps
+        if (merged[g].nodes.empty()) {  // the next round may group it with other neighbours
           after += nodes[n].indices.size();
           next.push_back(std::move(nodes[n]));
           continue;
@@ -276,6 +302,8 @@ ClusterLevels build_cluster_levels(scene::Mesh& mesh, const VertexValues& values
     const ClusterLevels::Range range{static_cast<std::uint32_t>(out.clusters.size()), 0};
     out.of_submesh.push_back(range);
     if (submesh.index_count == 0) continue;
+    // Build the levels of the submesh and put the finest clusters first: they keep its range of
+    // indices.
     std::uint32_t place = submesh.first_index;
     std::vector<Node> nodes =
         builder.build(std::span(mesh.indices).subspan(submesh.first_index, submesh.index_count));

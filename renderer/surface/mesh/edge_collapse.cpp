@@ -14,32 +14,38 @@
 namespace emit::renderer {
 namespace {
 
-/// A place that lies off the surface counts from where this share of a pixel is as wide.
+/// Width in pixels that the distance of a lost place from the surface must reach to be visible.
 constexpr float kDeviationPx = 0.25F;
-/// A triangle that shows another value counts from where its longest edge is as wide.
+/// Width in pixels that the longest edge of a triangle with a wrong temperature must reach to be
+/// visible.
 constexpr float kEdgePx = 0.5F;
-/// Where nothing is missed a triangle counts from where its longest edge is as wide.
+/// Width in pixels that the longest edge of any new triangle must reach to be visible.
 constexpr float kSizePx = 4.0F;
-/// Cosine of the angle that a triangle may turn by.
+/// Smallest cosine of the angle by which a triangle may turn in a collapse.
 constexpr float kLeastTurnCosine = 0.25F;
 
-/// Neighbours that a place may be collapsed into: the nearest.
+/// Number of neighbours, the nearest ones, that a place may be collapsed into.
 constexpr std::size_t kTried = 4;
 
+/// Cost of a collapse that is not allowed.
 constexpr float kNever = std::numeric_limits<float>::infinity();
 
 using Corners = std::array<std::uint32_t, 3>;
 
+/// Collapse of a place into its best neighbour, as an entry of the queue.
 struct Candidate {
-  float cost_m = kNever;  ///< width of a pixel from which on nobody sees it
+  /// Width of a pixel, at the surface, from which on nobody sees the collapse.
+  float cost_m = kNever;
   std::uint32_t from = 0;
   std::uint32_t to = 0;
+  /// Entry of `stamp_` at the time of the offer. The offer is void once the two differ.
   std::uint32_t stamp = 0;
   bool operator<(const Candidate& other) const noexcept {  // the cheapest on top of a heap
     return std::pair(cost_m, from) > std::pair(other.cost_m, other.from);
   }
 };
 
+/// State of one call of collapse_edges().
 class Collapse {
  public:
   explicit Collapse(const CollapseInput& input);
@@ -49,42 +55,50 @@ class Collapse {
   [[nodiscard]] std::uint32_t place(std::uint32_t vertex) const noexcept {
     return in_.place[vertex];
   }
+  /// Returns whether a triangle has a corner at the place `at`.
   [[nodiscard]] bool has(std::uint32_t triangle, std::uint32_t at) const noexcept {
     const Corners& c = corners_[triangle];
     return place(c[0]) == at || place(c[1]) == at || place(c[2]) == at;
   }
+  /// Locks the places on edges that do not have exactly two triangles, and on degenerate triangles.
   void lock_rims();
-  /// Lists the places that share a triangle with `at`, each once.
+  /// Lists the places that share a triangle with `at`, each once, and marks them.
   void gather_ring(std::uint32_t at, std::vector<std::uint32_t>& ring);
-  /// How many places share a triangle with `at` and are marked by `mark`.
+  /// Returns how many places share a triangle with `at` and carry the mark `mark`.
   [[nodiscard]] std::size_t count_marked(std::uint32_t at, std::uint32_t mark);
-  /// Which vertex of `to` takes over from each one of `from`; false: not all have one.
+  /// Finds, for each vertex of the place `from`, the vertex of `to` that takes over from it.
+  /// Returns false if one of them has none or two.
   [[nodiscard]] bool pair_up(std::uint32_t from, std::uint32_t to);
+  /// Returns the vertex that takes over from `vertex` (see pair_up()), or `vertex` itself.
   [[nodiscard]] std::uint32_t partner(std::uint32_t vertex) const noexcept;
+  /// Returns the cost of collapsing `from` into `to`, or kNever.
   [[nodiscard]] float cost_m(std::uint32_t from, std::uint32_t to);
+  /// Puts the cheapest collapse of `from` into the queue; its earlier offers become void.
   void offer(std::uint32_t from);
+  /// Collapses `from` into `to`, which must be allowed.
   void collapse(std::uint32_t from, std::uint32_t to);
 
   const CollapseInput& in_;
   std::vector<Corners> corners_;
   std::vector<bool> alive_;
-  std::size_t left_ = 0;
-  std::vector<std::vector<std::uint32_t>> star_;  ///< by place: its triangles
-  std::vector<bool> locked_;                      ///< by place
-  std::vector<std::uint32_t> stamp_;              ///< by place
+  std::size_t left_ = 0;                          ///< number of triangles that are alive
+  std::vector<std::vector<std::uint32_t>> star_;  ///< triangles of each place
+  std::vector<bool> locked_;                      ///< by place; true: it must stay
+  std::vector<std::uint32_t> stamp_;              ///< number of offers so far, by place
   std::priority_queue<Candidate> queue_;
-  // Scratch.
-  std::vector<std::uint32_t> mark_;  ///< by place: the latest list that it is in
+  // Scratch of the calls, kept to save allocations.
+  std::vector<std::uint32_t> mark_;  ///< by place; number of the latest list that holds it
   std::uint32_t latest_mark_ = 0;
-  std::uint32_t ring_mark_ = 0;  ///< that of ring_
+  std::uint32_t ring_mark_ = 0;  ///< mark of the places in `ring_`
   std::vector<std::uint32_t> ring_;
   std::vector<std::uint32_t> counted_;
   std::vector<std::pair<float, std::uint32_t>> nearest_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> partners_;
+  /// Triangle of `from` after the collapse: its new corners.
   struct Turned {
     std::array<glm::vec3, 3> at_m;
     Corners corners;
-    std::uint32_t moved = 0;  ///< vertex that was there before
+    std::uint32_t moved = 0;  ///< vertex of `from` that it had before
   };
   std::vector<Turned> turned_;
 };
@@ -114,6 +128,7 @@ void Collapse::lock_rims() {
       edges.emplace_back(std::minmax(place(c[k]), place(c[(k + 1) % 3])));
     }
   }
+  // Sort the edges so that those between the same two places lie together, and count them.
   std::ranges::sort(edges);
   for (std::size_t first = 0; first < edges.size();) {
     std::size_t end = first;
@@ -159,6 +174,7 @@ bool Collapse::pair_up(std::uint32_t from, std::uint32_t to) {
   for (const std::uint32_t t : star_[from]) {
     for (const std::uint32_t v : corners_[t]) {
       if (place(v) != from) continue;
+      // Enter each copy of `from` once, without a partner yet.
       auto known = std::ranges::find(partners_, v, &std::pair<std::uint32_t, std::uint32_t>::first);
       if (known == partners_.end()) {
         partners_.emplace_back(v, v);
@@ -166,6 +182,7 @@ bool Collapse::pair_up(std::uint32_t from, std::uint32_t to) {
       }
       for (const std::uint32_t u : corners_[t]) {
         if (place(u) != to) continue;
+        // Refuse a second partner: a crease would be torn.
         if (known->second != v && known->second != u) return false;
         known->second = u;
       }
@@ -183,10 +200,11 @@ std::uint32_t Collapse::partner(std::uint32_t vertex) const noexcept {
 
 float Collapse::cost_m(std::uint32_t from, std::uint32_t to) {
   if (!pair_up(from, to)) return kNever;
-  if (count_marked(to, ring_mark_) != 2) return kNever;  // the surface would branch
+  if (count_marked(to, ring_mark_) != 2) return kNever;  // else the surface would branch
   turned_.clear();
   for (const std::uint32_t t : star_[from]) {
     if (has(t, to)) continue;
+    // Move the corner of every triangle that survives, and refuse triangles that turn too far.
     Turned turned;
     std::array<glm::vec3, 3> before_m;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -207,6 +225,8 @@ float Collapse::cost_m(std::uint32_t from, std::uint32_t to) {
     }
     turned_.push_back(turned);
   }
+  // Find the loss at every copy of `from`: it lies nearest to one of the new triangles of its own
+  // side.
   float cost_m = 0.0F;
   for (const auto& [vertex, heir] : partners_) {
     const glm::vec3& at_m = in_.positions_m[vertex];
@@ -222,6 +242,7 @@ float Collapse::cost_m(std::uint32_t from, std::uint32_t to) {
       }
       const float distance_m = glm::distance(there_m, at_m);
       if (distance_m >= best_m) continue;
+      // Compare the temperature at the nearest point with that of the vertex.
       best_m = distance_m;
       difference_k = 0.0F;
       for (const std::span<const float> value_k : in_.values_k) {
@@ -235,7 +256,8 @@ float Collapse::cost_m(std::uint32_t from, std::uint32_t to) {
         longest_m = std::max(longest_m, glm::distance(turned.at_m[k], turned.at_m[(k + 1) % 3]));
       }
     }
-    if (best_m == kNever) best_m = longest_m;  // all of its side vanishes
+    if (best_m == kNever) best_m = longest_m;  // all triangles of its side vanish
+    // Combine what may show: distance, wrong temperature, and the size of the triangles.
     const float share = std::min(1.0F, difference_k / in_.tolerance_k);
     cost_m =
         std::max({cost_m, best_m / kDeviationPx, share * longest_m / kEdgePx, longest_m / kSizePx});
@@ -248,6 +270,7 @@ void Collapse::offer(std::uint32_t from) {
   if (locked_[from] || star_[from].empty()) return;
   gather_ring(from, ring_);
   ring_mark_ = latest_mark_;
+  // Choose the nearest neighbours.
   nearest_.clear();
   for (const std::uint32_t to : ring_) {
     nearest_.emplace_back(glm::distance(in_.positions_m[from], in_.positions_m[to]), to);
@@ -255,6 +278,7 @@ void Collapse::offer(std::uint32_t from) {
   const auto tried = static_cast<std::ptrdiff_t>(std::min(kTried, nearest_.size()));
   std::ranges::partial_sort(nearest_, nearest_.begin() + tried);
   nearest_.resize(static_cast<std::size_t>(tried));
+  // Offer the cheapest collapse that is allowed.
   Candidate best;
   best.from = from;
   best.stamp = stamp_[from];
@@ -269,9 +293,10 @@ void Collapse::offer(std::uint32_t from) {
 }
 
 void Collapse::collapse(std::uint32_t from, std::uint32_t to) {
-  // The copies were paired when this was offered, and nothing around has changed since.
+  // Pair the copies as when this was offered: nothing around has changed since.
   (void)pair_up(from, to);
   for (const std::uint32_t t : star_[from]) {
+    // Remove triangles that have both places, and hand the others over to `to`.
     if (has(t, to)) {
       alive_[t] = false;
       --left_;
@@ -290,6 +315,7 @@ std::vector<std::uint32_t> Collapse::run(std::size_t triangles) {
   for (std::uint32_t at = 0; at < star_.size(); ++at) {
     if (!star_[at].empty()) offer(at);
   }
+  // Collapse the cheapest candidate, then offer its surroundings anew.
   std::vector<std::uint32_t> changed;
   while (left_ > triangles && !queue_.empty()) {
     const Candidate next = queue_.top();
@@ -300,6 +326,7 @@ std::vector<std::uint32_t> Collapse::run(std::size_t triangles) {
     changed.push_back(next.to);
     for (const std::uint32_t at : changed) offer(at);
   }
+  // Gather the triangles that are left.
   std::vector<std::uint32_t> indices;
   indices.reserve(3 * left_);
   for (std::size_t t = 0; t < corners_.size(); ++t) {

@@ -11,13 +11,13 @@
 namespace emit::renderer {
 namespace {
 
-/// Triangles whose distance differs by less than this share of their longest edge are as near as
-/// each other: that is rounding.
+/// Share of the longest edge below which a difference of distances is rounding. Such triangles
+/// count as equally near.
 constexpr float kSlackFrac = 1e-4F;
-/// What lies that many slacks behind the nearest one has no say in which of several is taken.
+/// Number of such slacks behind the nearest triangle within which others may still be chosen.
 constexpr float kFarSlacks = 16.0F;
 
-/// Share of the way along a-b that is nearest to p.
+/// Returns the share of the way from a to b at the point nearest to p, 0 to 1.
 float along(const glm::vec3& a, const glm::vec3& b, const glm::vec3& p) noexcept {
   const glm::vec3 way = b - a;
   const float length2 = glm::dot(way, way);
@@ -27,6 +27,7 @@ float along(const glm::vec3& a, const glm::vec3& b, const glm::vec3& p) noexcept
 }  // namespace
 
 glm::vec3 nearest_weight(const std::array<glm::vec3, 3>& c, const glm::vec3& p) noexcept {
+  // Try the foot of the perpendicular first: signed areas of the three parts are its weights.
   const glm::vec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
   const float area2 = glm::dot(normal, normal);
   if (area2 > 0.0F) {
@@ -35,6 +36,7 @@ glm::vec3 nearest_weight(const std::array<glm::vec3, 3>& c, const glm::vec3& p) 
                            glm::dot(glm::cross(c[0] - p, c[1] - p), normal) / area2);
     if (weight.x >= 0.0F && weight.y >= 0.0F && weight.z >= 0.0F) return weight;
   }
+  // Take the nearest point of the three edges if the foot lies outside or the triangle has no area.
   glm::vec3 best(1.0F, 0.0F, 0.0F);
   float best_m = std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < 3; ++i) {
@@ -66,6 +68,7 @@ NearestTriangle::NearestTriangle(std::span<const glm::vec3> positions_m,
     const glm::vec3 across = glm::cross(c[1] - c[0], c[2] - c[0]);
     const float area = glm::length(across);
     if (area > 0.0F) triangle.normal = across / area;
+    // Bound the triangle by a ball around its centre.
     float radius_m = 0.0F;
     for (std::size_t k = 0; k < 3; ++k) {
       radius_m = std::max(radius_m, glm::distance(c[k], triangle.centre_m));
@@ -85,7 +88,7 @@ float NearestTriangle::distance_m(std::uint32_t triangle, const glm::vec3& point
 
 NearestTriangle::Hit NearestTriangle::find(const glm::vec3& point_m,
                                            const glm::vec3& normal) const {
-  // Find the ball whose middle is nearest: its triangle bounds how far away the nearest one can be.
+  // Find the ball with the nearest centre: its triangle limits how far away the nearest one can be.
   std::uint32_t likely = 0;
   float least_m2 = std::numeric_limits<float>::infinity();
   for (std::uint32_t t = 0; t < balls_m_.size(); ++t) {
@@ -97,7 +100,7 @@ NearestTriangle::Hit NearestTriangle::find(const glm::vec3& point_m,
     }
   }
   const float bound_m = distance_m(likely, point_m) + kFarSlacks * kSlackFrac * longest_m_;
-  // Measure those whose balls come as near as that.
+  // Measure the triangles whose balls come as near as that.
   Hit best;
   best.distance_m = std::numeric_limits<float>::infinity();
   float best_facing = -2.0F;
@@ -114,6 +117,7 @@ NearestTriangle::Hit NearestTriangle::find(const glm::vec3& point_m,
     }
     const float distance_m = glm::distance(point_m, there_m);
     const float facing = glm::dot(triangle.normal, normal);
+    // Take a triangle that is clearly nearer, or equally near and better aligned.
     const bool nearer = distance_m < best.distance_m - slack_m;
     const bool as_near = distance_m <= best.distance_m + slack_m;
     if (nearer || (as_near && facing > best_facing)) {

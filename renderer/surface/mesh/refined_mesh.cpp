@@ -12,13 +12,15 @@
 namespace emit::renderer {
 namespace {
 
+/// Mark of a vertex that no triangle has used yet.
 constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
-constexpr std::uint32_t kLeafTag = 3;
-constexpr float kMinEdge = 1e-6F;         ///< in the mesh's unit of length
-constexpr float kMinEdgeFrac = 0x1p-18F;  ///< of the largest coordinate: 32 to 64 float32 steps
-constexpr std::size_t kMaxNodes = std::size_t{1} << 30U;  ///< two bits of an entry are its tag
+constexpr std::uint32_t kLeafTag = 3;  ///< low two bits of a node that is a leaf
+constexpr float kMinEdge = 1e-6F;      ///< shortest edge to halve, in the mesh's unit of length
+/// Shortest edge to halve, as a share of the largest coordinate: 32 to 64 float32 steps.
+constexpr float kMinEdgeFrac = 0x1p-18F;
+constexpr std::size_t kMaxNodes = std::size_t{1} << 30U;  ///< an entry has 30 bits beside its tag
 
-/// After a cut along `half_edge`: the kept child's edge from the midpoint to the apex.
+/// Returns the edge of the kept child from the midpoint to the apex, after a cut along `half_edge`.
 std::uint32_t inner_half_edge(std::uint32_t half_edge) noexcept {
   return half_edge - half_edge % 3 + (half_edge + 1) % 3;
 }
@@ -27,16 +29,17 @@ std::uint32_t leaf_entry(std::uint32_t slot) noexcept {
   return slot << 2U | kLeafTag;
 }
 
-/// Mean of two unit normals. Equal ones stay as they are, bit for bit, so that planes stay flat; of
-/// opposite ones the first counts.
+/// Returns the mean of two unit normals. Equal ones stay as they are, bit for bit, so that planes
+/// stay flat. The first one counts if they are opposite.
 glm::vec3 mean_normal(const glm::vec3& a, const glm::vec3& b) noexcept {
   const glm::vec3 sum = a + b;
   const float length = glm::length(sum);
   return a == b || length < 1e-3F ? a : sum / length;
 }
 
-/// Below this a midpoint's rounding shows in the shape of the halves, and edges of no clear order
-/// of length would be cut without end.
+/// Returns whether an edge is too short to be halved. Below this length the rounding of a midpoint
+/// shows in the shape of the halves, and edges without a clear order of length would be halved
+/// without end.
 bool too_short(const glm::vec3& a_m, const glm::vec3& b_m) noexcept {
   const glm::vec3 reach_m = glm::max(glm::abs(a_m), glm::abs(b_m));
   const float largest_m = std::max({reach_m.x, reach_m.y, reach_m.z});
@@ -53,7 +56,8 @@ RefinedMesh::RefinedMesh(const scene::Mesh& mesh, std::size_t max_vertices)
     vertices_[v].normal = mesh.normals[v];
     vertices_[v].parent = {v, v};
   }
-  // Copies of one vertex form a chain whose last link points at itself.
+  // Give each material and kind its own copy of a vertex. The copies form a chain whose last link
+  // points at itself.
   std::vector<std::uint32_t> next_copy(vertices_.size(), kUnused);
   const auto of_kind = [&](std::uint32_t vertex, const scene::Submesh& kind) {
     if (next_copy[vertex] == kUnused) {
@@ -79,6 +83,7 @@ RefinedMesh::RefinedMesh(const scene::Mesh& mesh, std::size_t max_vertices)
     }
   };
 
+  // Make every triangle of the mesh a leaf and the root of a tree.
   const std::size_t triangles = mesh.indices.size() / 3;
   leaves_.resize(triangles);
   leaf_submesh_.resize(triangles);
@@ -97,8 +102,9 @@ RefinedMesh::RefinedMesh(const scene::Mesh& mesh, std::size_t max_vertices)
   }
 }
 
-/// Half-edge of the leaf's longest edge. Equal lengths are decided by the positions' indices: all
-/// leaves agree on one order of all edges, along which a path to ever longer ones must end.
+/// Returns the half-edge of the leaf's longest edge. The indices of the positions decide between
+/// equal lengths: all leaves then agree on one order of all edges, and a path to ever longer ones
+/// must end.
 std::uint32_t RefinedMesh::longest_edge(std::uint32_t slot) const noexcept {
   const std::array<std::uint32_t, 3>& corner = leaves_[slot];
   std::uint32_t best = 0;
@@ -121,6 +127,7 @@ std::uint32_t RefinedMesh::longest_edge(std::uint32_t slot) const noexcept {
   return 3 * slot + best;
 }
 
+/// Returns whether two corners of a leaf are at one position.
 bool RefinedMesh::has_double_corner(std::uint32_t slot) const noexcept {
   const std::uint32_t a = position_id_[leaves_[slot][0]];
   const std::uint32_t b = position_id_[leaves_[slot][1]];
@@ -133,7 +140,8 @@ bool RefinedMesh::split(std::span<const std::uint32_t> slots) {
     position_id_ = weld_positions(vertices_);
     ring_ = link_edges(leaves_, position_id_);
   }
-  // A leaf that was halved has left its node: it has had its turn as a neighbour of an earlier one.
+  // Note the nodes now. A leaf that is halved as a neighbour of an earlier one leaves its node and
+  // must not be halved again.
   asked_nodes_.clear();
   for (const std::uint32_t slot : slots) asked_nodes_.push_back(leaf_node_[slot]);
   bool complete = true;
@@ -144,12 +152,13 @@ bool RefinedMesh::split(std::span<const std::uint32_t> slots) {
   return complete;
 }
 
-/// Follows longer and longer edges to one that is the longest of all its leaves, halves it, and
-/// goes back until the leaf's own longest edge is such a one.
+/// Follows longer and longer edges to one that is the longest of all its leaves and halves it, then
+/// goes back until the longest edge of the leaf itself is such an edge.
 RefinedMesh::Outcome RefinedMesh::split_leaf(std::uint32_t slot) {
   path_.assign(1, slot);
   while (!path_.empty()) {
     const std::uint32_t edge = longest_edge(path_[path_.size() - 1]);
+    // Look for a leaf on this edge that has a longer edge of its own: it comes first.
     std::uint32_t other = ring_[edge];
     while (other != edge && longest_edge(other / 3) == other) other = ring_[other];
     if (other != edge) {
@@ -163,11 +172,12 @@ RefinedMesh::Outcome RefinedMesh::split_leaf(std::uint32_t slot) {
   return Outcome::halved;
 }
 
-/// Halves an edge in all its leaves, whose longest edge it must be. Changes nothing unless it
+/// Halves an edge in all its leaves; it must be the longest edge of each. Nothing changes unless it
 /// returns `halved`.
 RefinedMesh::Outcome RefinedMesh::halve_edge(std::uint32_t half_edge) {
   cuts_.clear();
   midpoints_.clear();
+  // Collect the leaves on the edge and the midpoints that they need.
   for (std::uint32_t h = half_edge;;) {
     cuts_.push_back({h, midpoint_of(h)});
     h = ring_[h];
@@ -181,6 +191,7 @@ RefinedMesh::Outcome RefinedMesh::halve_edge(std::uint32_t half_edge) {
     return Outcome::full;
   }
 
+  // Add one vertex per side of a crease or seam, all at one position.
   const glm::vec3 middle_m = 0.5F * low_m + 0.5F * high_m;
   const auto first_vertex = static_cast<std::uint32_t>(vertices_.size());
   const std::uint32_t end_position = position_id_[midpoints_[0].low];
@@ -198,7 +209,8 @@ RefinedMesh::Outcome RefinedMesh::halve_edge(std::uint32_t half_edge) {
   return Outcome::halved;
 }
 
-/// Index into `midpoints_` of the one between this half-edge's vertices, added when not there.
+/// Returns the index into `midpoints_` of the midpoint between the vertices of this half-edge. It
+/// is added if it is not there yet.
 std::uint32_t RefinedMesh::midpoint_of(std::uint32_t half_edge) {
   const std::array<std::uint32_t, 3>& corner = leaves_[half_edge / 3];
   const auto [low, high] = std::minmax({corner[half_edge % 3], corner[(half_edge + 1) % 3]});
@@ -208,9 +220,9 @@ std::uint32_t RefinedMesh::midpoint_of(std::uint32_t half_edge) {
   return i;
 }
 
-/// Halves one leaf. The kept child takes the edge's start, the new one its end; both keep the
-/// corners' numbers, the midpoint standing in for the corner that is lost. The halves of the cut
-/// edge are left unlinked.
+/// Halves one leaf. The kept child takes the start of the edge, the new one its end. Both keep the
+/// numbers of the corners, and the midpoint replaces the corner that is lost. The halves of the cut
+/// edge are left without links.
 void RefinedMesh::cut(Cut& cut, std::uint32_t midpoint) {
   const std::uint32_t kept = cut.half_edge / 3;
   const auto added = static_cast<std::uint32_t>(leaves_.size());
@@ -224,6 +236,7 @@ void RefinedMesh::cut(Cut& cut, std::uint32_t midpoint) {
   leaves_[kept][end] = midpoint;
   leaf_submesh_.push_back(leaf_submesh_[kept]);
 
+  // Turn the node of the leaf into the parent of two leaves.
   const auto first_child = static_cast<std::uint32_t>(nodes_.size());
   nodes_[leaf_node_[kept]] = first_child << 2U | start;
   nodes_.push_back(leaf_entry(kept));
@@ -232,7 +245,8 @@ void RefinedMesh::cut(Cut& cut, std::uint32_t midpoint) {
   leaf_node_.push_back(first_child + 1);
 
   for (std::uint32_t k = 0; k < 3; ++k) ring_.push_back(3 * added + k);
-  // The edge from end to apex goes over to the new child; its number becomes the inner edge.
+  // Hand the edge from end to apex over to the new child; its old number becomes the inner edge.
+  // Then link the two sides of the inner edge.
   const std::uint32_t inner = 3 * kept + end;
   std::uint32_t before = inner;
   while (ring_[before] != inner) before = ring_[before];
@@ -247,9 +261,11 @@ void RefinedMesh::cut(Cut& cut, std::uint32_t midpoint) {
   cut.end_half = 3 * added + start;
 }
 
-/// Links the halves of the cut edge on either side of the midpoint, and the inner edges of leaves
+/// Links the halves of the cut edge on both sides of the midpoint, and the inner edges of leaves
 /// that lie on each other (both sides of a plate without thickness).
 void RefinedMesh::link_cuts(std::uint32_t end_position) noexcept {
+  // Turn all cuts the same way: leaves on the two sides of an edge run along it in opposite
+  // directions.
   for (Cut& each : cuts_) {
     const std::uint32_t start = leaves_[each.start_half / 3][each.start_half % 3];
     if (position_id_[start] != end_position) std::swap(each.start_half, each.end_half);
@@ -257,6 +273,7 @@ void RefinedMesh::link_cuts(std::uint32_t end_position) noexcept {
   const auto apex_position = [this](const Cut& each) {
     return position_id_[leaves_[each.half_edge / 3][(each.half_edge + 2) % 3]];
   };
+  // Join the halves, and the inner edges of leaves that have the same apex.
   for (std::size_t i = 1; i < cuts_.size(); ++i) {
     join_rings(cuts_[0].start_half, cuts_[i].start_half);
     join_rings(cuts_[0].end_half, cuts_[i].end_half);
@@ -273,9 +290,11 @@ RefinedMesh::Place RefinedMesh::locate(std::uint32_t triangle,
   const float second = std::clamp(barycentric.x, 0.0F, 1.0F);
   const float third = std::clamp(barycentric.y, 0.0F, 1.0F - second);
   Place place{{}, {1.0F - second - third, second, third}};
+  // Go down the tree to the half that holds the point.
   std::uint32_t entry = nodes_[triangle];
   while ((entry & 3U) != kLeafTag) {
-    // With M = (A + B) / 2 and wA >= wB:  wA A + wB B = (wA - wB) A + 2 wB M.
+    // Rewrite the weights for the half. If M = (A + B) / 2 and wA >= wB, then
+    // wA A + wB B = (wA - wB) A + 2 wB M.
     float& start = place.weight[static_cast<int>(entry & 3U)];
     float& end = place.weight[static_cast<int>(((entry & 3U) + 1) % 3)];
     const std::uint32_t child = entry >> 2U;
@@ -303,6 +322,7 @@ void RefinedMesh::write_indices(
   for (const scene::Submesh& submesh : submeshes_) {
     const auto first = static_cast<std::uint32_t>(indices.size());
     for (std::uint32_t t = 0; t < submesh.index_count / 3; ++t) {
+      // Walk the tree of each original triangle, so that its leaves stay together.
       open.assign(1, submesh.first_index / 3 + t);
       while (!open.empty()) {
         const std::uint32_t entry = nodes_[open[open.size() - 1]];

@@ -10,15 +10,17 @@
 namespace emit::renderer {
 namespace {
 
+/// Empty entry of the table.
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
-/// Bits of a position; adding zero turns -0 into +0.
+/// Returns the bits of a position. Adding zero turns -0 into +0.
 std::array<std::uint32_t, 3> position_bits(const glm::vec3& p_m) noexcept {
   return {std::bit_cast<std::uint32_t>(p_m.x + 0.0F), std::bit_cast<std::uint32_t>(p_m.y + 0.0F),
           std::bit_cast<std::uint32_t>(p_m.z + 0.0F)};
 }
 
-/// Multiply and fold, twice: coordinates of drawn scenes differ in few, high bits.
+/// Returns a hash of a position. It multiplies and folds twice, because coordinates of drawn scenes
+/// differ in few, high bits.
 std::size_t hash(const std::array<std::uint32_t, 3>& bits) noexcept {
   std::uint64_t h = (static_cast<std::uint64_t>(bits[1]) << 32U | bits[0]) * 0x9E3779B97F4A7C15ULL;
   h ^= h >> 32U;
@@ -26,12 +28,14 @@ std::size_t hash(const std::array<std::uint32_t, 3>& bits) noexcept {
   return static_cast<std::size_t>(h ^ h >> 32U);
 }
 
+/// Half-edge in the bucket of its position with the smaller index.
 struct HalfEdge {
   std::uint32_t to;  ///< position at the end with the larger index
   std::uint32_t index;
 };
 
-/// So that sums of different vertices differ (splitmix64, Steele et al. 2014).
+/// Returns a number that looks random, so that sums over different sets of vertices differ
+/// (splitmix64, Steele et al. 2014).
 std::uint64_t scrambled(std::uint32_t vertex) noexcept {
   std::uint64_t x = vertex + 0x9e3779b97f4a7c15U;
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9U;
@@ -43,7 +47,7 @@ std::uint64_t scrambled(std::uint32_t vertex) noexcept {
 
 std::vector<std::uint32_t> weld_positions(std::span<const RefinedMesh::Vertex> vertices) {
   std::vector<std::uint32_t> first(vertices.size());
-  // Open addressing, at most half full.
+  // Use a hash table with open addressing, at most half full.
   std::vector<std::uint32_t> table(std::bit_ceil(2 * vertices.size() + 1), kNone);
   const std::size_t mask = table.size() - 1;
   for (std::uint32_t v = 0; v < vertices.size(); ++v) {
@@ -63,7 +67,8 @@ std::vector<std::uint32_t> link_edges(std::span<const std::array<std::uint32_t, 
   std::vector<std::uint32_t> ring(3 * triangles.size());
   for (std::uint32_t h = 0; h < ring.size(); ++h) ring[h] = h;
 
-  // Bucket by the lower position (counting sort), then sort each short bucket by the upper one.
+  // Put half-edges into buckets by their lower position (counting sort), then sort each short
+  // bucket by the upper one.
   const auto each_half_edge = [&](const auto& visit) {
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       const std::array<std::uint32_t, 3> p{
@@ -80,7 +85,7 @@ std::vector<std::uint32_t> link_edges(std::span<const std::array<std::uint32_t, 
   for (std::size_t p = 1; p < end.size(); ++p) end[p] += end[p - 1];
   std::vector<HalfEdge> sorted(end.back());
   each_half_edge([&](std::uint32_t from, std::uint32_t to, std::uint32_t index) {
-    sorted[end[from]++] = {to, index};  // end[from] turns from the bucket's start into its end
+    sorted[end[from]++] = {to, index};  // end[from] turns from the start of the bucket into its end
   });
 
   std::size_t begin = 0;
@@ -90,6 +95,7 @@ std::vector<std::uint32_t> link_edges(std::span<const std::array<std::uint32_t, 
     std::ranges::sort(bucket, [](const HalfEdge& a, const HalfEdge& b) {
       return a.to != b.to ? a.to < b.to : a.index < b.index;
     });
+    // Link the half-edges with the same upper position to a ring.
     std::size_t first = 0;
     for (std::size_t i = 1; i <= bucket.size(); ++i) {
       if (i < bucket.size() && bucket[i].to == bucket[first].to) {
@@ -107,7 +113,8 @@ void find_inward(const RefinedMesh& mesh, std::uint32_t first, std::vector<glm::
   const auto vertices = mesh.vertices();
   inward.resize(vertices.size());
   std::fill(inward.begin() + first, inward.end(), glm::vec3(0.0F));
-  // Inside a surface each neighbour follows the vertex in one leaf and precedes it in another.
+  // Find rims by a sum that is zero inside a surface: there each neighbour follows the vertex in
+  // one leaf and precedes it in another.
   std::vector<std::uint64_t> open(vertices.size() - first, 0);
   for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
     const auto& leaf = mesh.leaf(slot);
@@ -123,6 +130,7 @@ void find_inward(const RefinedMesh& mesh, std::uint32_t first, std::vector<glm::
       open[v - first] += scrambled(leaf[(k + 1) % 3]) - scrambled(leaf[(k + 2) % 3]);
     }
   }
+  // Keep the directions of rims alone, with unit length.
   for (std::size_t v = first; v < inward.size(); ++v) {
     const float length = glm::length(inward[v]);
     inward[v] = open[v - first] != 0 && length > 0.0F ? inward[v] / length : glm::vec3(0.0F);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// RefinedMesh put together from parts that may come from a file: none is believed.
+// Construction of a RefinedMesh from parts that may come from a file. The parts are checked,
+// because a file may be damaged.
 #include <algorithm>
 #include <utility>
 
@@ -8,9 +9,11 @@
 namespace emit::renderer {
 namespace {
 
-constexpr std::uint32_t kTagBits = 3;
-constexpr std::uint32_t kLeafTag = 3;
+constexpr std::uint32_t kTagBits = 3;  ///< mask of the tag of a node
+constexpr std::uint32_t kLeafTag = 3;  ///< tag of a leaf
 
+/// Checks that the vertices begin with those of the mesh and that parents come before their
+/// children.
 bool vertices_fit(const scene::Mesh& mesh, const RefinedMesh::Parts& parts) {
   const std::size_t count = parts.vertices.size();
   if (count < mesh.positions_m.size()) return false;
@@ -25,6 +28,7 @@ bool vertices_fit(const scene::Mesh& mesh, const RefinedMesh::Parts& parts) {
   return true;
 }
 
+/// Checks that the lists of leaves have equal lengths and that their vertices and submeshes exist.
 bool leaves_fit(const scene::Mesh& mesh, const RefinedMesh::Parts& parts) {
   const std::size_t count = parts.leaves.size();
   if (count < mesh.indices.size() / 3 || parts.leaf_submesh.size() != count ||
@@ -38,7 +42,8 @@ bool leaves_fit(const scene::Mesh& mesh, const RefinedMesh::Parts& parts) {
                              [&](std::uint32_t s) { return s < mesh.submeshes.size(); });
 }
 
-/// Every node but the roots is the child of one before it, and every leaf has its own node.
+/// Checks that every node except the roots is the child of exactly one node before it, and that
+/// every leaf has its own node.
 bool nodes_fit(const scene::Mesh& mesh, const RefinedMesh::Parts& parts) {
   const std::size_t roots = mesh.indices.size() / 3;
   if (parts.nodes.size() < roots) return false;

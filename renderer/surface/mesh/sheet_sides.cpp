@@ -20,6 +20,7 @@ void add_backs(const RefinedMesh& refined, std::span<const scene::Material> mate
                scene::Mesh& mesh) {
   const std::vector<std::uint32_t> backs = back_vertices(refined, materials);
   if (backs.empty()) return;
+  // Add a vertex with the opposite normal for each vertex of a sheet.
   const auto first = static_cast<std::uint32_t>(mesh.positions_m.size());
   for (const std::uint32_t v : backs) {
     mesh.positions_m.push_back(mesh.positions_m[v]);
@@ -28,6 +29,7 @@ void add_backs(const RefinedMesh& refined, std::span<const scene::Material> mate
   const auto back_of = [&](std::uint32_t v) {
     return first + static_cast<std::uint32_t>(std::ranges::lower_bound(backs, v) - backs.begin());
   };
+  // Add a submesh with opposite winding for each submesh of a sheet.
   const std::size_t fronts = mesh.submeshes.size();
   for (std::size_t k = 0; k < fronts; ++k) {
     if (!materials[mesh.submeshes[k].material].sheet) continue;

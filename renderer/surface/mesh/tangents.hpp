@@ -5,13 +5,15 @@
 
 namespace emit::renderer {
 
-/// Two unit vectors that make a right-handed frame with a normal.
+/// Two unit vectors that form a right-handed frame (u, v, n) with a normal n.
 struct Tangents {
   glm::vec3 u;
   glm::vec3 v;
 };
 
-/// Duff et al. (2017), "Building an orthonormal basis, revisited". @pre n has unit length
+/// Returns tangents of a normal; see Duff et al. (2017), "Building an orthonormal basis,
+/// revisited".
+/// @pre n has unit length
 [[nodiscard]] inline Tangents tangents_of(const glm::vec3& n) noexcept {
   const float sign = std::copysign(1.0F, n.z);
   const float a = -1.0F / (sign + n.z);

@@ -7,18 +7,24 @@
 
 namespace emit::renderer {
 
-/// What sun and sky of the past are still worth, K of today's temperature: by first differences
-/// around half of what there is. Immutable; any thread.
+/// Sensitivity of today's temperature to the sun and the sky of the past, in kelvin, for every
+/// material. It is a finite difference around half of the sun in every interval and half of the
+/// sky. It is computed once at the warm-up: the time grows with the number of materials and with
+/// the square of the number of intervals. Immutable; any thread.
 class DriveWorth {
  public:
   explicit DriveWorth(const SurfaceInputs& inputs);
 
-  /// Per visible share of the sun's disc times the cosine to the face, in an interval of the
-  /// record; 0 at night.
+  /// Returns the kelvins that the whole sun of interval `interval` of the record, at normal
+  /// incidence, adds to the temperature at the end of the record. For another face multiply by the
+  /// visible share of the disc and by the cosine of incidence. It is 0 where the sun is down.
+  /// `material` and `interval` must exist.
   [[nodiscard]] float sun_k(std::uint32_t material, std::size_t interval) const noexcept {
     return sun_k_[material * intervals_ + interval];
   }
-  /// Per share of the hemisphere that shows sky.
+  /// Returns the kelvins that a hemisphere full of sky, seen throughout the record in place of
+  /// surroundings, adds to the temperature at its end. For a part of the hemisphere multiply by its
+  /// share. `material` must exist.
   [[nodiscard]] float sky_k(std::uint32_t material) const noexcept { return sky_k_[material]; }
 
  private:

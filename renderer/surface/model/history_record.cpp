@@ -6,6 +6,7 @@
 namespace emit::renderer {
 namespace {
 
+/// Makes an interval with this forcing and with the gains of the thermal model.
 HeatInterval heat_interval(const IntervalForcing& forcing, const SampleHeat& heat) {
   HeatInterval interval = heat.sized_interval();
   interval.forcing = forcing;
@@ -13,7 +14,8 @@ HeatInterval heat_interval(const IntervalForcing& forcing, const SampleHeat& hea
   return interval;
 }
 
-/// Appends an interval of the plan; `end_ns` is where the record ends.
+/// Appends an interval of the plan. `end_ns` is the instant at which the record ends; lags count to
+/// it.
 void append(HistoryRecord& record, const HistoryInterval& interval, const IntervalForcing& forcing,
             std::int64_t end_ns, const RecordInputs& inputs) {
   const auto turn = static_cast<std::uint32_t>(record.size());
@@ -21,6 +23,7 @@ void append(HistoryRecord& record, const HistoryInterval& interval, const Interv
   IntervalRays& rays = record.rays.emplace_back(inputs.prototype);
   rays.update(interval.begin_ns, interval.end_ns, turn, inputs.environment,
               EntityPoses(inputs.entities), inputs.origin_world_m);
+  // Measure the lag from the middle: the shadow of an interval counts as that of its middle.
   const std::int64_t middle_ns = interval.begin_ns + (interval.end_ns - interval.begin_ns) / 2;
   record.lag_s.push_back(static_cast<float>(static_cast<double>(end_ns - middle_ns) * 1e-9));
 }

@@ -11,32 +11,34 @@
 
 namespace emit::renderer {
 
-/// The past that all samples share: intervals with their forcing, gains and rays, the newest last.
+/// Past that all samples share: its intervals with their forcing, gains and rays. Plain data.
 struct HistoryRecord {
-  std::vector<HeatInterval> tail;  ///< unshadowed, before the history
-  std::vector<HeatInterval> intervals;
-  std::vector<IntervalRays> rays;  ///< of each interval
-  std::vector<float> lag_s;        ///< from each interval's middle to the end of the last one
+  std::vector<HeatInterval> tail;  ///< last intervals of the unshadowed spin-up, before the history
+  std::vector<HeatInterval> intervals;  ///< intervals of the history, the oldest first
+  std::vector<IntervalRays> rays;       ///< rays of each interval, in the same order
+  std::vector<float> lag_s;  ///< time from the middle of each interval to the end of the record
 
   [[nodiscard]] std::size_t size() const noexcept { return intervals.size(); }
 };
 
-/// What a record is made with.
+/// Inputs of make_history_record() and extend_history_record(). All of them must outlive the call.
 struct RecordInputs {
-  const SampleHeat& heat;
-  const Environment& environment;
-  std::span<const PoseHistory> entities;
-  const IntervalRays& prototype;
-  glm::dvec3 origin_world_m;
+  const SampleHeat& heat;                 ///< thermal model, which sizes and fills the gains
+  const Environment& environment;         ///< sun and weather
+  std::span<const PoseHistory> entities;  ///< poses of every entity
+  const IntervalRays& prototype;  ///< rays to copy for each interval, sized for the entities
+  glm::dvec3 origin_world_m;      ///< origin of rel
 };
 
-/// Record of the plan's intervals, from the start of the history. Setup only.
-/// @pre history.update() has seen the plan
+/// Makes the record of all intervals of the plan. The first one begins where the history does, and
+/// the record also holds the tail of the spin-up. Setup only: it allocates.
+/// @pre history.update() has been called with this plan
 [[nodiscard]] HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,
                                                 const RecordInputs& inputs);
 
-/// Record of the plan's intervals, which begin where `history` has been brought to. Brings it to
-/// their end. Setup only.
+/// Makes the record of the plan's intervals and extends `history` to their end. The first interval
+/// begins at the instant that `history` has reached, so the record has no tail. Setup only: it
+/// allocates.
 [[nodiscard]] HistoryRecord extend_history_record(const StepPlan& plan, SurfaceHistory& history,
                                                   const RecordInputs& inputs);
 

@@ -9,9 +9,11 @@
 namespace emit::renderer {
 namespace {
 
-/// A face that looks that little along an axis is not seen from there.
+/// Smallest cosine between a face and an axis with which the face counts. A flatter one is hardly
+/// seen from there.
 constexpr float kLeastCos = 0.3F;
 
+/// Index into MoverFaces of a direction along an axis.
 std::size_t face_of(glm::length_t axis, bool positive) noexcept {
   return 2 * static_cast<std::size_t>(axis) + (positive ? 0U : 1U);
 }
@@ -24,6 +26,8 @@ MoverGlow::MoverGlow(const SurfaceModel& model, const scene::SceneGeometry& geom
     const scene::Instance& instance = geometry.instances[p];
     if (mover_of_object[instance.object] < 0) continue;
     const RefinedMesh& mesh = model.meshes[instance.mesh];
+    // Give each vertex a third of the area of its triangles, measured in the body frame, where the
+    // instance has its true size.
     std::vector<float> area_m2(mesh.vertices().size());
     for (std::uint32_t slot = 0; slot < mesh.leaf_count(); ++slot) {
       std::array<glm::dvec3, 3> corner_m;
@@ -37,9 +41,10 @@ MoverGlow::MoverGlow(const SurfaceModel& model, const scene::SceneGeometry& geom
         area_m2[v] += static_cast<float>(twice_m2 / 6.0);
       }
     }
+    // List the samples that others can see. A sheet sends from both of its sides.
     const std::uint32_t first = model.first_sample[p];
     for (std::uint32_t v = 0; v < area_m2.size(); ++v) {
-      // What lies inside is not seen.
+      // Leave out samples that another face covers: they lie inside the body.
       const SurfaceSample& sample = model.samples.samples[first + v];
       if (sample.covered || !(area_m2[v] > 0.0F)) continue;
       parts_.push_back({first + v, area_m2[v]});
@@ -63,6 +68,8 @@ float MoverFaces::towards_w_m2(const glm::vec3& normal) const noexcept {
   float weight = 0.0F;
   float sum_w_m2 = 0.0F;
   for (glm::length_t axis = 0; axis < 3; ++axis) {
+    // Take the faces of the entity that look the other way: those are the ones that this surface
+    // sees.
     const std::size_t face = face_of(axis, normal[axis] < 0.0F);
     if (!(area_m2[face] > 0.0F)) continue;
     const float share = normal[axis] * normal[axis];

@@ -12,28 +12,34 @@
 
 namespace emit::renderer {
 
-/// What an entity's faces send in long wave, for each of the six directions of the world's axes.
+/// Long-wave radiation that leaves an entity, summed over its faces for each of the six directions
+/// of the world's axes. Faces count with the cosine to the axis.
 struct MoverFaces {
-  /// By axis: towards its positive direction, then its negative one.
-  std::array<float, 6> area_m2{};
-  std::array<float, 6> sent_w{};
+  /// Sums for each axis: first faces that look in its positive direction, then those that look in
+  /// its negative one.
+  std::array<float, 6> area_m2{};  ///< projected area
+  std::array<float, 6> sent_w{};   ///< power that leaves the projected area
 
-  /// Mean of the faces that look against a surface of that unit normal; negative where there are
-  /// none.
+  /// Returns the mean exitance, W/m2, of the faces that look against a surface with this unit
+  /// normal (world axes). The three axes count with the square of the normal. The result is
+  /// negative if the entity has no such faces.
   [[nodiscard]] float towards_w_m2(const glm::vec3& normal) const noexcept;
 };
 
-/// What entities send towards the surfaces near them: ground under a vehicle sees its underside.
-/// Immutable after construction; any thread.
+/// Long-wave radiation that entities send towards the surfaces near them (physics.md, section 10).
+/// The ground under a vehicle sees its underside, for example. Immutable after construction; any
+/// thread.
 class MoverGlow {
  public:
   MoverGlow() = default;
-  /// Weighs the samples of entities by their share of the surface.
+  /// Lists the samples of entities with the area that each stands for. Setup only: it allocates.
+  /// `mover_of_object` has the entity of every object, or -1 for a static one.
   MoverGlow(const SurfaceModel& model, const scene::SceneGeometry& geometry,
             std::span<const std::int32_t> mover_of_object);
 
-  /// `longwave_out_w_m2(i)`: of sample i. Entities stand as in the middle of the interval; `out` by
-  /// entity. RT-safe.
+  /// Sums over all faces of each entity as it stands in the middle of the interval.
+  /// `longwave_out_w_m2(i)` returns the exitance of sample i. Entry m of `out` receives entity m.
+  /// `out` must have an entry for every entity. RT-safe.
   template <class LongwaveOut>
   void measure(const SurfaceSamples& all, const IntervalRays& interval,
                const LongwaveOut& longwave_out_w_m2, std::span<MoverFaces> out) const noexcept {
@@ -46,10 +52,12 @@ class MoverGlow {
   }
 
  private:
+  /// Sample of an entity and the area that it stands for.
   struct Part {
     std::uint32_t sample = 0;
     float area_m2 = 0.0F;
   };
+  /// Adds the radiation of one sample to the axes that its face looks along.
   static void add(const glm::vec3& normal, float area_m2, float sent_w_m2,
                   MoverFaces& faces) noexcept;
 

@@ -17,66 +17,74 @@
 
 namespace emit::renderer {
 
-/// From where, and how finely, the surface will be looked at.
+/// Places of the camera and its resolution, which decide how finely the surface is refined.
 struct RefineView {
+  /// Place of the camera and the direction that it looks in.
   struct Eye {
     glm::dvec3 world_m{0.0};
-    glm::dvec3 boresight{0.0};  ///< unit length; zero: all around
+    glm::dvec3 boresight{0.0};  ///< unit length, world axes; zero: the camera looks all around
   };
-  std::vector<Eye> eyes;  ///< places of the camera; without any nothing is refined
-  double pixel_rad = 1e-3;
-  double field_rad = 3.1416;  ///< what lies within that angle of a boresight comes first
+  std::vector<Eye> eyes;    ///< places of the camera; empty: nothing is refined
+  double pixel_rad = 1e-3;  ///< angle of a pixel
+  /// Angle around a boresight in which surfaces are refined first. The default is all around.
+  double field_rad = 3.1416;
 };
 
+/// Options of build_surface_model(), from the scenario.
 struct SurfaceModelOptions {
-  double tolerance_k = 0.1;
-  std::size_t max_samples = 1'000'000;
-  double max_blur_m = 0.5;
-  bool lateral = true;   ///< heat moves along the surface and across convex edges
+  double tolerance_k = 0.1;             ///< largest error of linear interpolation between samples
+  std::size_t max_samples = 1'000'000;  ///< limit on samples; refinement stops there
+  double max_blur_m = 0.5;              ///< limit on the lateral blur of old shadows
+  bool lateral = true;                  ///< heat moves along the surface and across convex edges
   bool exchange = true;  ///< faces exchange radiation; false: what hides the sky is surroundings
 };
 
-/// Everything a sample carries after the history.
+/// Result of the warm-up: refined meshes, their samples, and the state of every sample at the end
+/// of the record.
 struct SurfaceModel {
   std::int64_t at_ns = 0;             ///< end of the record
   std::vector<RefineView::Eye> eyes;  ///< places of the camera that the surface was refined for
-  std::vector<RefinedMesh> meshes;    ///< as SceneGeometry::meshes
-  /// By instance; its samples are the mesh's vertices, then the backs of those on sheets.
+  std::vector<RefinedMesh> meshes;    ///< same order as SceneGeometry::meshes
+  /// Index of the first sample of each instance. One sample per vertex of its mesh comes first,
+  /// then one for the back of each vertex on a sheet.
   std::vector<std::uint32_t> first_sample;
-  SurfaceSamples samples;  ///< drawn ones first, then partners across edges
-  std::uint32_t drawn_samples = 0;
-  std::vector<SampleState> states;    ///< at the end of the record
-  std::vector<SampleOutput> outputs;  ///< at the end of the record
-  bool full = false;                  ///< max_samples stopped the refinement
-  bool full_in_view = false;          ///< ... also of what lies in the announced field of view
+  SurfaceSamples samples;             ///< drawn samples first, then partners across convex edges
+  std::uint32_t drawn_samples = 0;    ///< number of samples that belong to vertices and backs
+  std::vector<SampleState> states;    ///< states at the end of the record
+  std::vector<SampleOutput> outputs;  ///< outputs at the end of the record
+  bool full = false;                  ///< the refinement stopped at max_samples
+  bool full_in_view = false;          ///< surfaces in the field of view were then still too coarse
 };
 
-/// Fraction done; false stops.
+/// Callback that receives the fraction done, 0 to 1. The builder stops if it returns false.
 using SurfaceProgress = std::function<bool(double done_frac)>;
 
-/// What the builder works with; all outlive it.
+/// Inputs of build_surface_model(). All of them must outlive the call.
 struct SurfaceInputs {
   const scene::SceneGeometry& geometry;
   std::span<const scene::Material> materials;
-  std::span<const std::int32_t> mover_of_object;  ///< -1: static
-  const CasterRays& rays;                         ///< what shades, as loaded
-  const CasterRays& places;  ///< `geometry`, same origin: where on it a ray ends
+  std::span<const std::int32_t> mover_of_object;  ///< entity of each object; -1: static
+  const CasterRays& rays;                         ///< geometry that casts shade, as loaded
+  const CasterRays& places;  ///< `geometry` with the same origin: finds the place that a ray hits
   const SampleHeat& heat;
   const SurfaceHistory& history;
   const HistoryRecord& record;
+  /// Placements of the entities at the end of the record.
   std::span<const MoverPlacement> movers_now;
   const SurfaceDetail* detail = nullptr;  ///< null: no mesh has lost triangles
-  /// By entity: where it stands and where its script takes it, rel. None: it stays.
+  /// Places in rel where each entity stands now and where its script takes it. An empty span:
+  /// entities stay where they are.
   std::span<const std::vector<glm::vec3>> ways_m{};
 };
 
-/// Of the outermost layer; 0 for a prescribed material, and for a sheet, whose layers carry heat
-/// sideways over centimetres only.
+/// Returns the thermal diffusivity of the outermost layer. It is 0 for a prescribed material, and
+/// for a sheet, whose layers carry heat sideways over centimetres only.
 [[nodiscard]] double diffusivity_m2_s(const scene::Material& material) noexcept;
 
-/// Places samples on every surface, integrates their history, and adds samples until linear
-/// interpolation between them is good to the tolerance or the triangles are as small as a pixel.
-/// Deterministic. Setup only: uses all cores. Errors: `internal` when stopped by `progress`.
+/// Builds the cached surface: places samples on every surface, integrates their history, and adds
+/// samples until linear interpolation between them is good to the tolerance or the triangles are as
+/// small as a pixel. The result depends on the input alone. Setup only: it uses all cores. Errors:
+/// `internal` if `progress` stopped it.
 [[nodiscard]] physics::Result<SurfaceModel> build_surface_model(const SurfaceInputs& inputs,
                                                                 const RefineView& view,
                                                                 const SurfaceModelOptions& options,

@@ -10,15 +10,17 @@
 namespace emit::renderer {
 namespace {
 
-/// Up to this radius float32 resolves less than the distance at which rays start, in m.
+/// Largest radius, in m, at which float32 still resolves less than the distance at which rays
+/// start.
 constexpr double kResolvedM = 500.0;
-/// Strays make the box of all that many times as wide.
+/// Ratio of the box of all to the box without strays from which on strays are ignored.
 constexpr double kStrayWidths = 16.0;
-/// Share of the triangles that may be strays on either side of an axis.
+/// Share of the triangles that may be strays at either end of an axis.
 constexpr double kStrayFrac = 0.01;
-/// Triangles that are looked at, evenly spread over all of them.
+/// Number of triangles, evenly spread over all, that are looked at. At most twice as many are.
 constexpr std::size_t kMaxLooked = 100'000;
 
+/// Returns half the diagonal of a box, 0 for an empty one.
 double half_diagonal_m(const scene::Aabb& box) {
   return box.empty() ? 0.0 : 0.5 * glm::length(box.max_m - box.min_m);
 }
@@ -70,6 +72,7 @@ scene::Aabb bulk_bounds(std::span<const CasterPart> parts) {
     std::ranges::nth_element(along_m, high);
     high_m[axis] = *high;
   }
+  // Double the box, so that the wide ends of what is not stray are inside.
   scene::Aabb bulk;
   const glm::dvec3 half_m = 0.5 * (high_m - low_m);
   bulk.add(low_m - half_m);

@@ -7,13 +7,15 @@
 
 namespace emit::renderer {
 
-/// Box of the parts' triangles without strays: float32 coordinates relative to its centre resolve
-/// what matters. That is the box of all vertices, unless it is wider than float32 resolves and much
-/// wider than the box that holds all but a fiftieth of the triangles' centres along each axis; then
-/// it is the latter, doubled. Empty without any finite vertex. Setup only.
+/// Returns the box of the parts' triangles without strays, in their common frame: float32
+/// coordinates relative to its centre resolve what matters. It is the box of all finite vertices,
+/// with one exception: if that box is wider than float32 resolves and 16 times as wide as the
+/// doubled box of all but a fiftieth of the triangles' centres along each axis, it is that doubled
+/// box. The box is empty if no vertex is finite. Setup only.
 [[nodiscard]] scene::Aabb bulk_bounds(std::span<const CasterPart> parts);
 
-/// The same for the static geometry of a scene, or for all of it where nothing is static.
+/// Returns the same box for the static geometry of a scene, or for all geometry if nothing is
+/// static.
 [[nodiscard]] scene::Aabb bulk_bounds(const scene::SceneGeometry& geometry);
 
 }  // namespace emit::renderer

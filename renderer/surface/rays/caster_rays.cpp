@@ -25,18 +25,20 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
+/// Returns the centre of a box, the origin for an empty one.
 glm::dvec3 centre(const scene::Aabb& box) noexcept {
   return box.empty() ? glm::dvec3(0.0) : 0.5 * (box.min_m + box.max_m);
 }
 
+/// Returns a set bit for every ray.
 constexpr std::uint32_t all_of(std::span<const CasterRay> rays) noexcept {
   return (1U << rays.size()) - 1U;
 }
 
 using Packet = std::array<CasterRay, CasterRays::kMaxRays>;
 
-/// A cone that holds the rays of a packet: they start within `apart_m` of `origin_m` and point
-/// within a chord of `spread` of `axis`.
+/// Cone that holds the rays of a packet. They start within `apart_m` of `origin_m`, and their unit
+/// directions end within `spread` of that of `axis`.
 struct PacketCone {
   glm::vec3 origin_m{0.0F};
   glm::vec3 axis{0.0F};
@@ -47,6 +49,7 @@ struct PacketCone {
     glm::vec3 sum(0.0F);
     for (const CasterRay& ray : rays) sum += ray.direction;
     const float length = glm::length(sum);
+    // Take the mean direction as axis. Directions that cancel have none, so any of them serves.
     axis = length > 0.0F ? sum / length : rays.front().direction;
     for (const CasterRay& ray : rays) {
       apart_m = std::max(apart_m, glm::distance(ray.origin_m, origin_m));
@@ -54,14 +57,14 @@ struct PacketCone {
     }
   }
 
-  /// False where no ray of the packet can meet a ball.
+  /// Returns false if no ray of the packet can hit a ball.
   [[nodiscard]] bool may_meet(const glm::vec3& centre_m, float radius_m) const noexcept {
     const glm::vec3 to_centre_m = centre_m - origin_m;
     const float distance_m = glm::length(to_centre_m);
     const float along_m = std::max(glm::dot(to_centre_m, axis), 0.0F);
-    // Rays matter as far as the ball reaches, and stray no farther from the axis than until there.
+    // Bound how far rays stray from the axis: they matter only up to the far side of the ball.
     const float far_m = distance_m + radius_m + apart_m;
-    constexpr float kRoom = 1e-5F;  // for rounding
+    constexpr float kRoom = 1e-5F;  // room for rounding
     const float reach_m = radius_m + apart_m + (spread + kRoom) * far_m;
     const glm::vec3 aside_m = to_centre_m - along_m * axis;
     return glm::dot(aside_m, aside_m) <= reach_m * reach_m;
@@ -71,6 +74,7 @@ struct PacketCone {
 }  // namespace
 
 struct CasterRays::Impl {
+  /// Geometry of one entity, in its body axes.
   struct Mover {
     std::uint32_t object = 0;
     glm::dvec3 centre_body_m{0.0};  ///< origin of the set
@@ -82,18 +86,19 @@ struct CasterRays::Impl {
   CasterSet fixed;
   std::vector<Mover> movers;
 
-  /// Moves ray i of `rays` to the axes and the origin of the mover's set, as lane i of `inside`.
-  /// False, and nothing is written, where it passes the mover by.
+  /// Transforms a ray to the axes and the origin of the set of an entity. Returns false and writes
+  /// nothing if the ray passes the ball around the entity.
   [[nodiscard]] static bool enter(const Mover& mover, const MoverPlacement& placement,
                                   const CasterRay& ray, CasterRay& inside) noexcept;
-  /// False where no ray of the packet comes near the mover.
+  /// Returns false if no ray of the packet comes near the entity.
   [[nodiscard]] static bool comes_near(const Mover& mover, const MoverPlacement& placement,
                                        const PacketCone& cone) noexcept {
     return placement.on && cone.may_meet(placement.rel_from_body * glm::vec3(mover.centre_body_m) +
                                              placement.position_m,
                                          mover.set.radius_m());
   }
-  /// Bits of the rays that come near a mover which stands at one place for all of them.
+  /// Transforms all rays to the axes of an entity that stands at one place for all of them. Returns
+  /// the bits of those that come near it.
   [[nodiscard]] static std::uint32_t enter_all(const Mover& mover, const MoverPlacement& placement,
                                                std::span<const CasterRay> rays,
                                                Packet& inside) noexcept;
@@ -105,12 +110,13 @@ bool CasterRays::Impl::enter(const Mover& mover, const MoverPlacement& placement
   const glm::vec3 centre_m(mover.centre_body_m);
   const glm::vec3 centre_rel_m = placement.rel_from_body * centre_m + placement.position_m;
   const glm::vec3 to_centre = centre_rel_m - ray.origin_m;
+  // Find the point of the ray that is nearest to the centre of the ball.
   const float along_m = std::max(glm::dot(to_centre, ray.direction), 0.0F);
   const glm::vec3 aside = to_centre - along_m * ray.direction;
   // Leave room for the rounding of far-off origins.
   const float reach_m = mover.set.radius_m() + 1e-6F * (along_m + glm::length(to_centre));
   if (glm::dot(aside, aside) > reach_m * reach_m) return false;
-  // vector * matrix is the transposed, that is the inverse, rotation.
+  // Apply the inverse rotation: vector * matrix multiplies by the transpose.
   inside = {(ray.origin_m - placement.position_m) * placement.rel_from_body - centre_m,
             ray.direction * placement.rel_from_body};
   return true;
@@ -141,8 +147,9 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
                       fmt::format("Embree gave no device, error {}",
                                   static_cast<int>(rtcGetDeviceError(nullptr))));
   }
+  // Sort the instances: static ones, and those of each entity.
   std::vector<CasterPart> fixed;
-  std::vector<CasterPart> everything;  // at the placements of the scenario
+  std::vector<CasterPart> everything;  // parts at the placements of the scenario
   std::map<std::uint32_t, std::vector<CasterPart>> moving;
   for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
     const scene::Instance& instance = geometry.instances[i];
@@ -161,9 +168,11 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
       moving[instance.object].push_back(part);
     }
   }
+  // Choose the origin before the hierarchies: static geometry is stored relative to it.
   impl->origin_world_m =
       origin_world_m ? *origin_world_m : centre(bulk_bounds(fixed.empty() ? everything : fixed));
 
+  // Build one hierarchy for static geometry and one per entity.
   auto set = CasterSet::create(impl->device.get(), fixed, impl->origin_world_m, flat_triangles);
   if (!set) return tl::unexpected(std::move(set.error()).with_context("static geometry"));
   impl->fixed = std::move(*set);
@@ -209,7 +218,8 @@ std::uint32_t CasterRays::blocked_moving(std::size_t mover,
                                          std::uint32_t wanted) const noexcept {
   EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
   EMIT_DCHECK_OP(placements.size(), >=, rays.size());
-  // In the axes of the body all rays meet the same geometry: one packet does.
+  // Trace all rays in one packet: in the axes of the body they meet the same geometry, wherever the
+  // entity stands.
   Packet inside;
   std::uint32_t near = 0;
   const Impl::Mover& body = impl_->movers[mover];
@@ -228,6 +238,7 @@ std::uint32_t CasterRays::blocked_in_body(std::size_t mover,
 
 std::uint32_t CasterRays::blocked(std::span<const CasterRay> rays,
                                   const CasterSelection& selection) const noexcept {
+  // Try static geometry first, then the entities until every ray is blocked.
   std::uint32_t blocked = selection.fixed ? blocked_static(rays) : 0;
   const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
   if (count == 0 || rays.empty()) return blocked;
@@ -252,6 +263,7 @@ std::uint32_t CasterRays::first_hits(std::span<const CasterRay> rays,
   std::array<float, kMaxRays> limits_m;
   limits_m.fill(within_m);
   std::uint32_t found = 0;
+  // Limit each ray to the nearest hit so far, so that farther geometry is not traced.
   const auto shorten = [&](std::uint32_t lanes) {
     found |= lanes;
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -268,6 +280,7 @@ std::uint32_t CasterRays::first_hits(std::span<const CasterRay> rays,
     if (!Impl::comes_near(impl_->movers[m], placement, cone)) continue;
     const std::uint32_t near = Impl::enter_all(impl_->movers[m], placement, rays, inside);
     if (near == 0) continue;
+    // Trace in the axes of the body, then turn the normals back to rel.
     const std::uint32_t nearer =
         impl_->movers[m].set.nearest({inside.data(), rays.size()}, near, limits_m, hits);
     for (std::size_t i = 0; i < rays.size(); ++i) {

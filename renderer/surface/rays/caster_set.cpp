@@ -23,7 +23,7 @@ using physics::make_error;
 using physics::Result;
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// An instance in the hierarchy takes about as much memory as this many triangles.
+/// Number of triangles that take about as much memory as one instance in the hierarchy.
 constexpr std::uint64_t kTrianglesOfInstance = 8;
 
 struct GeometryRelease {
@@ -31,6 +31,7 @@ struct GeometryRelease {
 };
 using EmbreeGeometry = std::unique_ptr<RTCGeometryTy, GeometryRelease>;
 
+/// Returns whether all coordinates are finite. Others are left out of the bounds.
 bool finite(const glm::vec3& p) noexcept {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
@@ -39,6 +40,7 @@ std::uint64_t triangle_count(const scene::Mesh& mesh) noexcept {
   return mesh.indices.size() / 3;
 }
 
+/// Returns the box of the finite vertices of a mesh, in its own axes.
 scene::Aabb box_of(const scene::Mesh& mesh) {
   scene::Aabb box;
   for (const glm::vec3& p : mesh.positions_m) {
@@ -47,12 +49,14 @@ scene::Aabb box_of(const scene::Mesh& mesh) {
   return box;
 }
 
+/// Checks that every index exists and that Embree can number the triangles.
 Result<void> check(std::span<const CasterPart> parts) {
   std::uint64_t total = 0;
   std::set<const scene::Mesh*> checked;
   for (const CasterPart& part : parts) {
     const scene::Mesh& mesh = *part.mesh;
     total += triangle_count(mesh);
+    // Check each mesh once, however often it appears.
     if (!checked.insert(&mesh).second) continue;
     for (const std::uint32_t index : mesh.indices) {
       if (index >= mesh.positions_m.size()) {
@@ -69,7 +73,8 @@ Result<void> check(std::span<const CasterPart> parts) {
   return {};
 }
 
-/// Buffers of a triangle geometry, for the caller to fill; padded as Embree asks.
+/// Buffers of a triangle geometry, which the caller fills. Embree allocates them with the padding
+/// that it needs.
 struct TriangleBuffers {
   EmbreeGeometry geometry;
   glm::vec3* positions_m = nullptr;
@@ -92,15 +97,17 @@ Result<TriangleBuffers> new_triangles(RTCDeviceTy* device, std::size_t vertices,
   return out;
 }
 
+/// Returns an empty scene.
 EmbreeScene new_scene(RTCDeviceTy* device) {
   EmbreeScene scene(rtcNewScene(device));
-  // Robust: no ray slips through the edge between two faces.
+  // Ask for robust traversal: no ray then slips through the edge between two faces.
   rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
   return scene;
 }
 
-/// Fills one packet; lanes that are not wanted repeat the first that is.
+/// Fills one packet of 16 rays. Lanes that are not wanted are switched off and repeat the first
+/// wanted ray. Returns false if none is wanted.
 template <class Packet>
 bool fill(std::span<const CasterRay> rays, std::uint32_t wanted, Packet& packet,
           int* valid) noexcept {
@@ -126,6 +133,7 @@ bool fill(std::span<const CasterRay> rays, std::uint32_t wanted, Packet& packet,
   return true;
 }
 
+/// Returns the context for rays that are alike in origin or direction, which Embree traces faster.
 RTCIntersectContext coherent_context() noexcept {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -146,6 +154,7 @@ scene::Aabb bounds_of(std::span<const CasterPart> parts) {
   std::map<const scene::Mesh*, scene::Aabb> boxes;
   scene::Aabb all;
   for (const CasterPart& part : parts) {
+    // Measure each mesh once and transform its box.
     const auto [entry, added] = boxes.try_emplace(part.mesh);
     if (added) entry->second = box_of(*part.mesh);
     if (!entry->second.empty()) all.add(scene::transformed(entry->second, part.frame_from_mesh));
@@ -166,6 +175,7 @@ Result<void> CasterSet::add_flat(RTCDeviceTy* device, std::span<const CasterPart
     return make_error(ErrorCode::invalid_argument,
                       fmt::format("{} vertices are more than a hierarchy can number", vertices));
   }
+  // Copy all parts into one geometry, with vertices in double before they are rounded.
   auto buffers = new_triangles(device, vertices, triangles);
   if (!buffers) return tl::unexpected(std::move(buffers.error()));
   std::uint32_t vertex = 0;
@@ -189,14 +199,17 @@ Result<void> CasterSet::add_flat(RTCDeviceTy* device, std::span<const CasterPart
 
 Result<void> CasterSet::add_shared(RTCDeviceTy* device, std::span<const CasterPart> parts,
                                    const glm::dvec3& origin_m) {
+  /// Mesh that is stored once.
   struct Stored {
     EmbreeScene scene;
-    glm::dvec3 centre_m{0.0};  ///< of the mesh: vertices are stored relative to it
+    glm::dvec3 centre_m{0.0};  ///< centre of the mesh; vertices are stored relative to it
   };
   std::map<const scene::Mesh*, Stored> stored;
   for (const CasterPart& part : parts) {
     const auto [entry, added] = stored.try_emplace(part.mesh);
     Stored& mesh = entry->second;
+    // Store a new mesh as a scene of its own, relative to its centre: float32 then keeps its
+    // detail.
     if (added) {
       const scene::Aabb box = box_of(*part.mesh);
       if (!box.empty()) mesh.centre_m = 0.5 * (box.min_m + box.max_m);
@@ -213,6 +226,7 @@ Result<void> CasterSet::add_shared(RTCDeviceTy* device, std::span<const CasterPa
       rtcAttachGeometry(mesh.scene.get(), buffers->geometry.get());
       rtcCommitScene(mesh.scene.get());
     }
+    // Place it by an affine map whose offset includes that centre.
     const glm::dmat3 linear(part.frame_from_mesh);
     const glm::dvec3 position_m =
         glm::dvec3(part.frame_from_mesh * glm::dvec4(mesh.centre_m, 1.0)) - origin_m;
@@ -239,6 +253,7 @@ Result<CasterSet> CasterSet::create(RTCDeviceTy* device, std::span<const CasterP
   const scene::Aabb box = bounds_of(parts);
   if (box.empty()) return set;
   if (auto checked = check(parts); !checked) return tl::unexpected(std::move(checked.error()));
+  // Bound the set by a ball, with a little room for rounding.
   const double radius_m =
       glm::length(glm::max(glm::abs(box.min_m - origin_m), glm::abs(box.max_m - origin_m)));
   if (!(radius_m < 1e8)) {
@@ -246,6 +261,8 @@ Result<CasterSet> CasterSet::create(RTCDeviceTy* device, std::span<const CasterP
   }
   set.radius_m_ = static_cast<float>(radius_m * (1.0 + 1e-6));
 
+  // Decide which parts share their triangles: those of large sets that appear more than once and
+  // have more triangles than an instance costs.
   std::uint64_t total = 0;
   std::map<const scene::Mesh*, std::size_t> uses;
   for (const CasterPart& part : parts) {
@@ -263,6 +280,7 @@ Result<CasterSet> CasterSet::create(RTCDeviceTy* device, std::span<const CasterP
   }
   if (flat.empty() && shared.empty()) return set;
 
+  // Build the hierarchy. Embree keeps the failure of any step until it is asked.
   set.scene_ = new_scene(device);
   if (auto added = set.add_flat(device, flat, origin_m); !added) {
     return tl::unexpected(std::move(added.error()));
@@ -284,6 +302,7 @@ std::uint32_t CasterSet::occluded(std::span<const CasterRay> rays,
   alignas(64) int valid[CasterRays::kMaxRays];
   alignas(64) RTCRay16 packet;
   if (!scene_ || !fill(rays, wanted, packet, valid)) return 0;
+  // Trace the packet. Embree sets tfar of a blocked ray to minus infinity.
   RTCIntersectContext context = coherent_context();
   rtcOccluded16(valid, scene_.get(), &context, &packet);
   std::uint32_t blocked = 0;
@@ -300,6 +319,8 @@ std::uint32_t CasterSet::nearest(std::span<const CasterRay> rays, std::uint32_t 
   alignas(64) RTCRayHit16 packet;
   if (!scene_ || !fill(rays, wanted, packet.ray, valid)) return 0;
   for (std::size_t i = 0; i < CasterRays::kMaxRays; ++i) {
+    // Limit the length of each ray and clear the ids, so that a lane without a hit keeps the
+    // invalid id.
     if (i < limits_m.size()) packet.ray.tfar[i] = limits_m[i];
     packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
@@ -313,6 +334,8 @@ std::uint32_t CasterSet::nearest(std::span<const CasterRay> rays, std::uint32_t 
     CasterHit& hit = hits[i];
     glm::vec3 normal(packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]);
     hit.triangle = packet.hit.primID[i];
+    // Find the instance: by the id of a shared mesh, else by the range of the flat list that has
+    // the triangle.
     if (const unsigned int id = packet.hit.instID[0][i]; id != RTC_INVALID_GEOMETRY_ID) {
       const Shared& shared = shared_[id - 1];
       hit.instance = shared.instance;
@@ -325,7 +348,8 @@ std::uint32_t CasterSet::nearest(std::span<const CasterRay> rays, std::uint32_t 
       hit.instance = range.instance;
       hit.triangle -= range.first;
     }
-    // In two steps: the cross product of millimetre edges squared would leave float32's range.
+    // Scale by the largest component first: the squared length of a cross product of millimetre
+    // edges would leave the range of float32.
     normal /= std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z), 1e-37F});
     hit.normal = glm::normalize(normal);
     hit.front = glm::dot(hit.normal, rays[i].direction) < 0.0F;

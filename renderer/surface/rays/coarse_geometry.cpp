@@ -15,11 +15,13 @@
 namespace emit::renderer {
 namespace {
 
+/// Largest number of times that the errors double: from a quarter of a pixel to two.
 constexpr std::uint32_t kMostDoublings = 3;
-/// Meshes must lose this share of their vertices for it to be worth being seen.
+/// Smallest share of its vertices that a scene must lose to make visible errors acceptable.
 constexpr double kLeastGainFrac = 0.1;
 
-/// What sampling every instance of meshes that may change at its vertices takes.
+/// Returns the number of samples that all instances of meshes that may change take, with one at
+/// every vertex.
 std::size_t sampled_vertices(const scene::SceneGeometry& geometry, std::span<const double> errors) {
   std::size_t count = 0;
   for (const scene::Instance& instance : geometry.instances) {
@@ -28,7 +30,8 @@ std::size_t sampled_vertices(const scene::SceneGeometry& geometry, std::span<con
   return count;
 }
 
-/// With visible errors, as many as it takes for `most` vertices; nothing where that gains little.
+/// Simplifies with doubled errors until at most `most` vertices are left. Returns nothing if that
+/// removes too little. `unseen` is the number of vertices without visible errors.
 std::optional<scene::SceneGeometry> visibly_simplified(const scene::SceneGeometry& full,
                                                        std::vector<double> errors,
                                                        std::size_t unseen, std::size_t most) {
@@ -56,6 +59,7 @@ physics::Result<CoarseGeometry> coarse_geometry(scene::SceneGeometry geometry,
     out.geometry = std::move(geometry);
     return out;
   }
+  // Remove what no pixel shows. The full scene stays for rays.
   scene::SceneGeometry full = std::move(geometry);
   auto rays = CasterRays::create(full);
   if (!rays) return tl::unexpected(std::move(rays.error()));
@@ -63,18 +67,20 @@ physics::Result<CoarseGeometry> coarse_geometry(scene::SceneGeometry geometry,
   out.geometry = scene::simplified(full, errors);
   std::size_t unseen = sampled_vertices(out.geometry, errors);
   if (unseen > most) {
-    // Outlines of small bodies go first.
+    // Let the outlines of small bodies become coarser first.
     auto by_pixels = scene::simplify_errors(full, view, std::numeric_limits<double>::infinity());
     if (by_pixels != errors) {
       errors = std::move(by_pixels);
       out.geometry = scene::simplified(full, errors);
       unseen = sampled_vertices(out.geometry, errors);
     }
+    // Allow visible errors if there are still too many vertices.
     if (auto less = visibly_simplified(full, errors, unseen, most)) {
       out.geometry = std::move(*less);
       out.visibly = true;
     }
   } else {
+    // Keep facets that would have to be halved again, if that leaves enough samples.
     auto kept = scene::simplified(full, errors, kept_facets(full, errors, *rays, view, to_suns));
     if (sampled_vertices(kept, errors) <= most) out.geometry = std::move(kept);
   }

@@ -12,19 +12,21 @@
 
 namespace emit::renderer {
 
-/// A scene with fewer triangles, and what it was; `detail` is empty where it has lost none.
+/// Scene with fewer triangles, and the scene as loaded. `detail` is empty if no mesh has lost
+/// triangles.
 struct CoarseGeometry {
   scene::SceneGeometry geometry;
   std::optional<SurfaceDetail> detail;
-  bool visibly = false;  ///< for want of samples more went than no pixel shows
+  bool visibly = false;  ///< more was removed than no pixel shows, because samples ran short
 };
 
-/// What no pixel shows goes, but for facets that would have to be cut again (kept_facets()), which
-/// stay as long as the meshes' vertices leave half of `max_samples`: what lies between many small
-/// things needs samples as well. Where the vertices would take more without those facets, too,
-/// outlines of small bodies go (simplify_errors() by pixels alone), and then errors double up to
-/// three times, to two pixels, if that is of use. Only vertices of meshes that may change count.
-/// `to_suns`: unit directions in world axes. Setup only: seconds per million triangles. Errors:
+/// Removes detail that no pixel of the scenario can show, so that samples are not spent on it.
+/// Facets that the warm-up would have to halve again (kept_facets()) stay as long as the vertices
+/// of the meshes leave half of `max_samples` for what lies between many small things.
+/// If the vertices exceed that even without those facets, outlines of small bodies become coarser
+/// (simplify_errors() by pixels alone). After that the errors double up to three times, to two
+/// pixels, if that removes enough. Only vertices of meshes that may change are counted.
+/// `to_suns` are unit directions in world axes. Setup only: seconds per million triangles. Errors:
 /// those of CasterRays.
 [[nodiscard]] physics::Result<CoarseGeometry> coarse_geometry(scene::SceneGeometry geometry,
                                                               const scene::DetailView& view,

@@ -17,24 +17,24 @@ namespace emit::renderer {
 namespace {
 
 constexpr double kGolden = 0.6180339887498949;
-/// Entities farther than this many of their radii hide too little sky to matter (1/400).
+/// Distance, in radii of an entity, from which on it hides too little sky to matter (1/400).
 constexpr float kNearRadii = 10.0F;
-/// Share of the sky that may be hidden without being counted as touched.
+/// Largest share of the sky that an entity may hide without touching a place (touches()).
 constexpr float kMostHiddenFrac = 1.0F / 16.0F;
 constexpr std::size_t kSkyRays = 16;
 static_assert(kSkyRays == kPacketRays);
-/// Room for float32 far from the origin.
+/// Room for the rounding of float32, as a share of the distance.
 constexpr float kRoundingFrac = 1e-5F;
-/// No ray starts farther aside than that many standard deviations.
+/// Largest distance of the start of a ray from its place, in standard deviations of the blur.
 constexpr float kMostDeviates = 3.5F;
 
 double fraction_of(double x) noexcept {
   return x - std::floor(x);
 }
 
-/// Inverse of the normal distribution.
+/// Returns the inverse of the normal distribution, for u between 0 and 1.
 double normal_deviate(double u) noexcept {
-  // Bisection on erf: exact to double, set-up cost only.
+  // Bisect on erf: exact to double, and its cost is paid once, at the first use.
   double low = -6.0;
   double high = 6.0;
   for (int i = 0; i < 60; ++i) {
@@ -44,7 +44,8 @@ double normal_deviate(double u) noexcept {
   return 0.5 * (low + high);
 }
 
-/// From the disc's rim inwards: if the first packet agrees, so does next to all of the disc.
+/// Returns the place of a ray in the disc. Rays go from the rim inwards: if the first packet agrees
+/// at the rim, nearly all of the disc agrees.
 constexpr std::size_t place_in_disc(std::size_t ray) noexcept {
   return kSunRays - 1 - ray;
 }
@@ -52,6 +53,7 @@ constexpr std::size_t place_in_disc(std::size_t ray) noexcept {
 /// Directions of the sky rays in the axes (tangent, bitangent, normal) of a face.
 using SkyDirections = std::array<glm::vec3, kSkyRays>;
 
+/// Spreads directions over the hemisphere on a spiral, evenly by the measure.
 SkyDirections make_sky_directions(SkyMeasure measure) noexcept {
   SkyDirections out;
   for (std::size_t i = 0; i < kSkyRays; ++i) {
@@ -84,7 +86,7 @@ void IntervalRays::aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to
   const std::size_t place = place_in_disc(ray);
   const double radius = std::tan(physics::kSunSemiAngleRad) *
                         std::sqrt((static_cast<double>(place) + 0.5) / kSunRays);
-  // The golden ratio moves the pattern from turn to turn.
+  // Turn the spiral of the disc by another angle in every interval.
   const double angle =
       2.0 * physics::kPi * fraction_of(kGolden * (static_cast<double>(place) + 0.5) + 0.37 * turn);
   const glm::dvec3 u = glm::normalize(glm::cross(
@@ -92,6 +94,8 @@ void IntervalRays::aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to
   const glm::dvec3 v = glm::cross(to_sun, u);
   direction_[ray] =
       glm::vec3(glm::normalize(to_sun + radius * (std::cos(angle) * u + std::sin(angle) * v)));
+  // Permute the strata of both shifts by odd multipliers, so that they do not correlate with the
+  // place.
   spread_[ray] = glm::vec2(static_cast<float>(deviates[(place * 23 + turn * 3) % kSunRays]),
                            static_cast<float>(deviates[(place * 45 + 5 + turn * 9) % kSunRays]));
 }
@@ -103,7 +107,7 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
   any_mover_on_ = false;
   sun_up_ = false;
   for (std::size_t i = 0; i < kSunRays; ++i) {
-    // Odd multipliers permute the strata of time.
+    // Permute the strata of time by an odd multiplier.
     const std::size_t stratum = (place_in_disc(i) * 27 + turn * 5) % kSunRays;
     if (stratum == kSunRays / 2) middle_ray_ = i;
     const double t = (static_cast<double>(stratum) + 0.5) / kSunRays;
@@ -111,6 +115,7 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
     const physics::SunPosition sun = environment.sun_at(at_ns);
     sun_up_ = sun_up_ || sun.elevation.value() > StepPlan::kMinSunElevationRad;
     aim(i, turn, sun.direction_enu);
+    // Place every entity at the instant of the ray.
     for (std::size_t m = 0; m < movers; ++m) {
       const TrajectoryState state = poses.at(m, at_ns);
       MoverPlacement& place = placements_[m * kSunRays + i];
@@ -135,6 +140,8 @@ void IntervalRays::bound_packets() noexcept {
     for (std::size_t m = 0; m < movers; ++m) {
       Reach& ball = reaches_[packet * movers + m];
       ball = {};
+      // Enclose the origins of the body in a box, its corners in a sphere, and add the radius of
+      // the geometry.
       glm::vec3 low(std::numeric_limits<float>::infinity());
       glm::vec3 high = -low;
       for (std::size_t i = first; i < first + kPacketRays; ++i) {
@@ -175,7 +182,8 @@ bool IntervalRays::comes_near(const glm::vec3& start_m, float apart_m, std::size
   const glm::vec3 to_centre_m = ball.centre_m - start_m;
   const float distance_m = glm::length(to_centre_m);
   const float along_m = std::max(glm::dot(to_centre_m, direction), 0.0F);
-  // No farther along than that do its rays matter, and no more do they stray until there.
+  // Bound how far rays stray from the first direction: they matter only up to the far side of the
+  // ball.
   const float far_m = distance_m + ball.radius_m + apart_m;
   const float stray_m = apart_m + spread_sine_[packet] * far_m + kRoundingFrac * far_m;
   const glm::vec3 aside_m = to_centre_m - along_m * direction;
@@ -203,12 +211,12 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
     sent[k] = {start_m, direction_[ray]};
   }
   if (spots.faced == 0) return spots;
-  // Send them against what stands still.
+  // Trace them against static geometry.
   const std::span<const CasterRay> packet(sent.data(), starts_m.size());
   spots.open = spots.faced & ~rays.blocked_static(packet, spots.faced);
   spots.lit = spots.open;
   if (!any_mover_on_) return spots;
-  // Send those that are left against the entities whose ball they may meet.
+  // Trace those that are left against the entities whose ball they may hit.
   const glm::vec3& from_m = sent[static_cast<std::size_t>(std::countr_zero(spots.faced))].origin_m;
   float apart_m = 0.0F;
   for (std::size_t k = 0; k < packet.size(); ++k) {
@@ -251,7 +259,8 @@ bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float a
     const Carried from = carried(centre_m, own, packet);
     const float apart_m = around_m + from.way_m;
     if (sun_up_ && comes_near(from.at_m, apart_m, mover, packet)) return true;
-    // Of the sky that level ground sees a ball hides (radius / distance)^2 * height / distance.
+    // Compare the hidden share of the sky with its limit. A ball hides (radius / distance)^2 *
+    // height / distance of the sky of level ground.
     const glm::vec3 aside_m = ball.centre_m - from.at_m;
     const float away_m = std::max(glm::length(aside_m) - ball.way_m - apart_m, 0.0F);
     const float radius_m = mover_radius_m_[mover];
@@ -272,10 +281,12 @@ SunShare IntervalRays::sun_share(const CasterRays& rays, const SurfaceSample& sa
   int lit = 0;
   int open = 0;
   for (std::size_t first = 0; first < kSunRays; first += kPacketRays) {
+    // Stop after the first packet if its rays agree and no entity can pass.
     if (first == kPacketRays && (lit == 0 || lit == faced) &&
         !may_pass(sample, start_m, kMostDeviates * blur_m)) {
       break;
     }
+    // Spread the starts along the surface: lateral conduction has blurred old shadows.
     std::array<glm::vec3, kPacketRays> starts_m;
     for (std::size_t k = 0; k < kPacketRays; ++k) {
       starts_m[k] = start_m + spread_[first + k].x * u_m + spread_[first + k].y * v_m;
@@ -286,6 +297,7 @@ SunShare IntervalRays::sun_share(const CasterRays& rays, const SurfaceSample& sa
     open += std::popcount(sample.mover < 0 ? spots.open : spots.lit);
     if (faced == 0) return {};
   }
+  // Take the mean over the rays whose instant had the sun before the face.
   return {static_cast<float>(lit) / static_cast<float>(faced),
           static_cast<float>(open) / static_cast<float>(faced)};
 }
@@ -303,22 +315,24 @@ IntervalRays::Spots IntervalRays::spots(const CasterRays& rays, const SurfaceSam
 
 HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& sample,
                                    float start_offset_m) const noexcept {
-  // An entity's own surfaces carry its hull in sky_frac, seen where it stood when they were made.
+  // Leave out surfaces of entities: their sky_frac already lacks what their own body hides, seen
+  // from where it stood at the warm-up.
   if (!any_mover_on_ || sample.mover >= 0) return {};
   const Tangents tangents = tangents_of(sample.normal);
   const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
   const SkyDirections& local = sky_directions(sky_);
   std::array<CasterRay, kSkyRays> sent;
-  std::uint32_t above = 0;  // rays that leave upwards
+  std::uint32_t above = 0;  // bits of rays that leave upwards
   std::uint32_t hidden = 0;
   HiddenSky most;
   int by_most = 0;
   for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
+    // Skip entities that are too far away to hide much sky.
     const float reach_m = kNearRadii * mover_radius_m_[m];
     const Reach& ball = reach(m, 0);
     const float away_m = glm::distance(ball.centre_m, start_m) * (1.0F - kRoundingFrac);
     if (ball.radius_m < 0.0F || away_m > reach_m + ball.way_m) continue;
-    // Aim the rays when the first entity is near.
+    // Aim the rays once the first entity is near.
     if (above == 0) {
       for (std::size_t i = 0; i < kSkyRays; ++i) {
         sent[i] = {start_m,
@@ -327,7 +341,7 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
       }
       if (above == 0) return {};
     }
-    // Send those that are still free and at whose instant the entity is near.
+    // Trace rays that are still free and at whose instant the entity is near.
     std::uint32_t wanted = 0;
     for (std::size_t i = 0; i < kSkyRays; ++i) {
       const glm::vec3 way = placed(m, i).position_m - start_m;

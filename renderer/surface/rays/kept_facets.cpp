@@ -13,17 +13,19 @@
 namespace emit::renderer {
 namespace {
 
-/// Side of an equilateral triangle as large. Finer ones than this cannot be told apart.
+/// Smallest size of a triangle, as the side of an equilateral one of the same area. Finer ones
+/// cannot be told apart in the image.
 constexpr float kLeastEdgePx = 1.2F;
-/// Cosine of the angle between the normals of two corners: a degree is worth some tenths of a
-/// kelvin in the sun.
+/// Cosine between the normals of two corners below which the surface counts as bent. One degree
+/// changes the temperature in the sun by some tenths of a kelvin.
 constexpr float kEvenCos = 0.99985F;
-/// Places along the camera's way that are looked from.
+/// Number of places along the path of the camera that are looked from.
 constexpr std::size_t kEyes = 8;
 /// Share of the way to a point that must be free.
 constexpr float kSeenFrac = 0.999F;
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kGrain = 256;  ///< triangles of one unit of parallel work
 
+/// Chooses some places of the camera, evenly along its path, in rel.
 std::vector<glm::vec3> some_eyes(const scene::DetailView& view, const glm::dvec3& origin_world_m) {
   std::vector<glm::vec3> eyes_m;
   const std::size_t count = view.eyes_world_m.size();
@@ -35,6 +37,7 @@ std::vector<glm::vec3> some_eyes(const scene::DetailView& view, const glm::dvec3
   return eyes_m;
 }
 
+/// Returns whether the normals of the corners differ.
 bool bends(const scene::Mesh& mesh, const std::array<std::uint32_t, 3>& corner) noexcept {
   const auto cosine = [&](std::size_t a, std::size_t b) {
     return glm::dot(mesh.normals[corner[a]], mesh.normals[corner[b]]);
@@ -42,6 +45,7 @@ bool bends(const scene::Mesh& mesh, const std::array<std::uint32_t, 3>& corner) 
   return std::min({cosine(0, 1), cosine(1, 2), cosine(2, 0)}) < kEvenCos;
 }
 
+/// Returns whether some eye sees the front of the triangle wider than a pixel.
 bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::vec3> eyes_m,
                float pixel_rad, const CasterRays& rays) {
   const glm::vec3 across_m2 = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
@@ -61,7 +65,7 @@ bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::v
   });
 }
 
-/// Whether any of the directions is free.
+/// Returns whether the sun reaches the centre of the triangle from any of the directions.
 bool lit(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::vec3> to_suns,
          const RayOffsets& offsets, const CasterRays& rays) {
   const glm::vec3 across_m2 = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
@@ -97,6 +101,7 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
     const bool mirrored = glm::determinant(glm::dmat3(rel_from_mesh)) < 0.0;
     const std::size_t triangles = mesh.indices.size() / 3;
     std::vector<std::uint8_t> keep(triangles, 0);
+    // Judge every triangle of the instance, the cheapest condition first.
     threads::parallel_parts(triangles, kGrain, [&](std::size_t from, std::size_t to) {
       for (std::size_t t = from; t < to; ++t) {
         const std::array<std::uint32_t, 3> corner = corners(mesh, t);
@@ -111,13 +116,15 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
         if (worth) keep[t] = 1;
       }
     });
+    // Mark the corners of the triangles to keep.
     for (std::size_t t = 0; t < triangles; ++t) {
       if (keep[t] == 0) continue;
       at_vertex[instance.mesh].resize(mesh.positions_m.size(), 0);
       for (const std::uint32_t v : corners(mesh, t)) at_vertex[instance.mesh][v] = 1;
     }
   }
-  // All between kept vertices: a ragged border would hold the rest back.
+  // Keep all triangles between marked vertices: a ragged border would prevent the simplification of
+  // the rest.
   for (std::size_t m = 0; m < kept.size(); ++m) {
     if (at_vertex[m].empty()) continue;
     const scene::Mesh& mesh = geometry.meshes[m];

@@ -9,12 +9,15 @@
 
 namespace emit::renderer {
 
-/// Triangles that would only have to be halved again if a mesh lost them in simplification: they
-/// look wider than a pixel, some eye sees them, the sun has come to them, and the surface bends in
-/// them, so that it warmed their corners unequally. Small gaps between them are closed. By mesh,
-/// one entry per triangle; empty where none is kept, as where `errors`, of
-/// scene::simplify_errors(), is 0: such a mesh may lose its borders, too. `rays`: against
-/// `geometry`. `to_suns`: unit directions in world axes. Setup only: seconds per million triangles.
+/// Returns the triangles of each mesh that should survive simplification, because the warm-up would
+/// have to halve their replacement again. They look wider than a pixel, some eye sees them, the sun
+/// reaches them, and the surface bends in them, so that the sun warms their corners unequally.
+/// Small gaps between them are closed.
+/// The result has one entry per triangle for each mesh. The list is empty for a mesh whose entry of
+/// `errors` (scene::simplify_errors()) is 0, and for one of which nothing is kept: simplification
+/// may then move its outer borders too.
+/// `rays` must be against `geometry`. `to_suns` are unit directions in world axes. Setup only:
+/// seconds per million triangles.
 [[nodiscard]] std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
                                                          std::span<const double> errors,
                                                          const CasterRays& rays,

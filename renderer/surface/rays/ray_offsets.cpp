@@ -9,9 +9,10 @@
 namespace emit::renderer {
 namespace {
 
-/// Some roundings of float32, as a share of the distance from the origin.
+/// Room for several roundings of float32, as a share of the distance from the origin.
 constexpr float kRoundingFrac = 1e-6F;
 
+/// Returns offsets that are at least `rounding_m`.
 RayOffsets at_least(const RayOffsets& offsets, float rounding_m) noexcept {
   return {std::max(offsets.around_m, rounding_m), std::max(offsets.sun_m, rounding_m)};
 }

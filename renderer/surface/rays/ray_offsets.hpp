@@ -6,19 +6,21 @@
 
 namespace emit::renderer {
 
-/// How far off the surface rays start, along its normal, in metres: more where float32 resolves
-/// less.
+/// Distances from the surface at which rays start, along its normal, in metres. They grow with the
+/// distance from the origin, as float32 resolves less there.
 struct RayOffsets {
+  /// Offset of rays to the sky and to other faces.
   float around_m = 5e-4F;
-  /// Towards the sun less: half a millimetre moves the edge of a shadow by a tenth of a near pixel,
-  /// always to the same side.
+  /// Offset of rays to the sun. It is smaller: half a millimetre would move the edge of a shadow by
+  /// a tenth of a near pixel, always to the same side.
   float sun_m = 3e-5F;
 
-  /// Those of a place, which may be a stray far off. `rel_m`: in the axes of CasterRay.
+  /// Returns the offsets at a place, which may be a stray far off. `rel_m` is in the axes of
+  /// CasterRay.
   [[nodiscard]] RayOffsets at(const glm::vec3& rel_m) const noexcept;
 };
 
-/// Offsets of the bulk of a scene (bulk_bounds()). Setup only.
+/// Returns the offsets for the bulk of a scene (bulk_bounds()). Setup only.
 [[nodiscard]] RayOffsets ray_offsets(const scene::SceneGeometry& geometry);
 
 }  // namespace emit::renderer

@@ -9,7 +9,7 @@
 namespace emit::renderer {
 namespace {
 
-/// The full surface faces within 60 degrees of the coarse one.
+/// Smallest cosine between the normals of the full and the coarse surface (60 degrees).
 constexpr float kLeastCos = 0.5F;
 
 }  // namespace
@@ -19,7 +19,8 @@ SurfaceDetail::SurfaceDetail(scene::SceneGeometry full, CasterRays rays,
     : full_(std::move(full)),
       rays_(std::move(rays)),
       instance_of_mesh_(coarse.meshes.size(), kNone) {
-  // One instance of every mesh that has lost triangles, where it stands.
+  // Choose one static instance of every mesh that has lost triangles: rays find the surface of the
+  // mesh there.
   for (std::size_t i = 0; i < full_.instances.size(); ++i) {
     const std::uint32_t mesh = full_.instances[i].mesh;
     if (full_.instances[i].entity_id == 0 && instance_of_mesh_[mesh] == kNone &&
@@ -38,6 +39,7 @@ std::optional<SurfaceDetail::Place> SurfaceDetail::place(std::uint32_t mesh,
                                                          float reach_m) const noexcept {
   const std::uint32_t index = instance_of_mesh_[mesh];
   const glm::dmat4& world_from_mesh = full_.instances[index].world_from_mesh;
+  // Send a ray against the normal, from `reach_m` outside the surface to `reach_m` inside.
   const glm::dvec3 to_world = glm::dmat3(world_from_mesh) * glm::dvec3(normal);
   const double scale = glm::length(to_world);
   const glm::vec3 direction(-to_world / scale);
@@ -50,6 +52,7 @@ std::optional<SurfaceDetail::Place> SurfaceDetail::place(std::uint32_t mesh,
       hit[0].distance_m > 2.0F * reach_rel_m) {
     return std::nullopt;
   }
+  // Interpolate the normal of the full mesh at the hit.
   const scene::Mesh& full = full_.meshes[mesh];
   const std::size_t first = std::size_t{3} * hit[0].triangle;
   const auto corner = [&](std::size_t k) { return full.normals[full.indices[first + k]]; };
@@ -57,6 +60,7 @@ std::optional<SurfaceDetail::Place> SurfaceDetail::place(std::uint32_t mesh,
   const glm::vec3 sum = (1.0F - b.x - b.y) * corner(0) + b.x * corner(1) + b.y * corner(2);
   const float length = glm::length(sum);
   if (!(length > 0.0F) || glm::dot(sum, normal) < kLeastCos * length) return std::nullopt;
+  // Move the point along the normal by the distance to the hit, in lengths of the mesh.
   const auto to_full = static_cast<float>((reach_rel_m - hit[0].distance_m) / scale);
   return Place{position_m + to_full * normal, sum / length};
 }

@@ -10,38 +10,41 @@
 
 namespace emit::renderer {
 
-/// The scene as loaded, where what is drawn and sampled has fewer triangles: where its surface lies
-/// and which way it faces between the vertices that are left, and what it shades. Half a degree is
-/// worth a tenth of a kelvin in the sun, which no bound on the surface's place holds. Immutable;
-/// any thread; queries allocate nothing.
+/// Scene as loaded, for meshes that are drawn and sampled with fewer triangles. It knows where the
+/// surface lies and which way it faces between the vertices that are left. An error of half a
+/// degree changes the temperature in the sun by a tenth of a kelvin, and no bound on the place of
+/// the surface prevents it. Immutable; any thread; queries allocate nothing.
 class SurfaceDetail {
  public:
-  /// A point of the full surface, in axes of its mesh.
+  /// Point of the full surface, in the axes of its mesh.
   struct Place {
     glm::vec3 position_m{0.0F};
     glm::vec3 normal{0.0F};  ///< unit length
   };
 
-  /// `full` and `coarse` have the same instances; entities may not differ. `rays`: against `full`.
+  /// Takes the full scene and the rays against it. `full` and `coarse` must have the same
+  /// instances, and the meshes of entities must not differ.
   SurfaceDetail(scene::SceneGeometry full, CasterRays rays, const scene::SceneGeometry& coarse);
 
-  /// True when the coarse mesh has lost triangles and a static instance draws it.
+  /// Returns true if the coarse mesh has lost triangles and a static instance has it.
   [[nodiscard]] bool has(std::uint32_t mesh) const noexcept {
     return !instance_of_mesh_.empty() && instance_of_mesh_[mesh] != kNone;
   }
 
+  /// Returns the mesh as loaded.
   /// @pre has(mesh)
   [[nodiscard]] const scene::Mesh& full_mesh(std::uint32_t mesh) const noexcept {
     return full_.meshes[mesh];
   }
 
-  /// Where the full mesh lies next to a point of the coarse one, in axes of the mesh; none where
-  /// the full surface is farther than `reach_m` along the coarse normal, faces elsewhere or is
-  /// covered. @pre has(mesh)
+  /// Returns the point of the full mesh next to a point of the coarse one, in the axes of the mesh.
+  /// It returns nothing if the full surface is farther than `reach_m` along the coarse normal,
+  /// faces elsewhere or is covered.
+  /// @pre has(mesh)
   [[nodiscard]] std::optional<Place> place(std::uint32_t mesh, const glm::vec3& position_m,
                                            const glm::vec3& normal, float reach_m) const noexcept;
 
-  /// Against all of the full scene.
+  /// Returns the rays against the whole full scene.
   [[nodiscard]] const CasterRays& rays() const noexcept { return rays_; }
 
  private:
@@ -49,7 +52,8 @@ class SurfaceDetail {
 
   scene::SceneGeometry full_;
   CasterRays rays_;
-  std::vector<std::uint32_t> instance_of_mesh_;  ///< entry of full_.instances
+  /// Static instance of each mesh that has lost triangles, an entry of full_.instances, else kNone.
+  std::vector<std::uint32_t> instance_of_mesh_;
 };
 
 }  // namespace emit::renderer

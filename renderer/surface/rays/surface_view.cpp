@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kPacket = CasterRays::kMaxRays;
 
-/// Place along Hilbert's curve through a 32 x 32 grid over [-1, 1]^2.
+/// Returns the position on Hilbert's curve through a 32 x 32 grid over [-1, 1]^2.
 std::uint32_t hilbert_order(double px, double py) noexcept {
   constexpr std::uint32_t kSide = 32;
   const auto cell = [](double p) {
@@ -41,7 +41,7 @@ std::uint32_t hilbert_order(double px, double py) noexcept {
   return order;
 }
 
-/// Which of the six axis directions the normal is closest to.
+/// Returns the number of the axis direction, out of six, that the normal is closest to.
 std::uint32_t side_of(const glm::vec3& normal) noexcept {
   const glm::vec3 size = glm::abs(normal);
   const glm::length_t axis =
@@ -49,7 +49,8 @@ std::uint32_t side_of(const glm::vec3& normal) noexcept {
   return 2U * static_cast<std::uint32_t>(axis) + (normal[axis] < 0.0F ? 1U : 0U);
 }
 
-/// From (tangent, bitangent, normal) to the axes of those.
+/// Transforms a direction from the axes (tangent, bitangent, normal) to those in which they are
+/// given.
 glm::vec3 turned(const glm::vec3& local, const Tangents& tangents,
                  const glm::vec3& normal) noexcept {
   return glm::normalize(local.x * tangents.u + local.y * tangents.v + local.z * normal);
@@ -57,7 +58,7 @@ glm::vec3 turned(const glm::vec3& local, const Tangents& tangents,
 
 constexpr std::uint32_t kNone = ~0U;
 
-/// Hits side by side in the sorted list that one entry stands for.
+/// Group of hits that lie side by side in the sorted list and share one entry of the view.
 struct Group {
   std::uint32_t first = 0;
   std::uint32_t count = 0;
@@ -69,8 +70,9 @@ struct Group {
   std::uint32_t after = kNone;
 };
 
-/// Growth of the groups' spread by joining two (Ward's criterion), on the unit sphere of directions
-/// and of normals; other objects and the other side last.
+/// Returns the growth of the spread by joining two groups (Ward's criterion), on the unit spheres
+/// of directions and of normals. Other instances and the other side of faces cost more, so that
+/// they are joined last.
 float join_cost(const Group& a, const Group& b) noexcept {
   const auto mean = [](const glm::vec3& sum) { return sum / std::max(glm::length(sum), 1e-6F); };
   const glm::vec3 aside = mean(a.direction) - mean(b.direction);
@@ -82,21 +84,23 @@ float join_cost(const Group& a, const Group& b) noexcept {
   return spread * na * nb / (na + nb);
 }
 
-/// Costs of joining group i with the one after it; the least, and of equal ones the first, is found
-/// by blocks.
+/// Costs of joining group i with the one after it. Minima of blocks make it fast to find the
+/// smallest cost, and the first of equal ones.
 class JoinCosts {
  public:
-  /// All of `count` costs are infinite.
+  /// Starts with `count` infinite costs.
   explicit JoinCosts(std::size_t count) noexcept : blocks_((count + kBlock - 1) / kBlock) {
     std::fill_n(costs_.begin(), blocks_ * kBlock, kNever);
     std::fill_n(least_.begin(), blocks_, kNever);
   }
+  /// Sets a cost and updates the minimum of its block.
   void set(std::size_t i, float cost) noexcept {
     costs_[i] = cost;
     const auto begin = costs_.begin() + static_cast<std::ptrdiff_t>(i / kBlock * kBlock);
     least_[i / kBlock] = *std::min_element(begin, begin + kBlock);
   }
   void remove(std::size_t i) noexcept { set(i, kNever); }
+  /// Returns the index of the smallest cost.
   [[nodiscard]] std::size_t least() const noexcept {
     const auto block = static_cast<std::size_t>(
         std::min_element(least_.data(), least_.data() + blocks_) - least_.data());
@@ -121,8 +125,10 @@ struct Hits {
   std::size_t count = 0;
 };
 
+/// Joins hits to at most kMaxSeen groups.
 void join_neighbours(Hits& hits) noexcept {
-  // Hits come in the order of the rays, which the index keeps among equals.
+  // Sort the hits by instance, direction of the normal and side. The index keeps the order of the
+  // rays, and so neighbours in direction, among equals.
   std::array<std::pair<std::uint32_t, std::uint32_t>, ViewSampler::kMaxRays> order;
   for (std::uint32_t i = 0; i < hits.count; ++i) {
     order[i] = {2U * side_of(hits.faces[i].normal) + (hits.faces[i].front ? 1U : 0U), i};
@@ -137,6 +143,7 @@ void join_neighbours(Hits& hits) noexcept {
   for (std::size_t i = 0; i < hits.count; ++i) sorted[i] = hits.faces[order[i].second];
   hits.faces = sorted;
 
+  // Start with one group per hit.
   JoinCosts costs(hits.count);
   for (std::uint32_t i = 0; i < hits.count; ++i) {
     const SeenFace& face = hits.faces[i];
@@ -148,6 +155,7 @@ void join_neighbours(Hits& hits) noexcept {
   }
   std::size_t left = hits.count;
   for (; left > SurfaceView::kMaxSeen; --left) {
+    // Join the two neighbours that cost least. The larger one decides the instance and the side.
     const auto best = static_cast<std::uint32_t>(costs.least());
     Group& group = hits.groups[best];
     const Group& other = hits.groups[group.after];
@@ -158,6 +166,7 @@ void join_neighbours(Hits& hits) noexcept {
     group.count += other.count;
     group.direction += other.direction;
     group.normal += other.normal;
+    // Take the second group out of the list and update the costs on both sides of the new one.
     costs.remove(group.after);
     group.after = other.after;
     if (group.before != kNone) costs.set(group.before, join_cost(hits.groups[group.before], group));
@@ -169,7 +178,7 @@ void join_neighbours(Hits& hits) noexcept {
     costs.set(best, join_cost(group, hits.groups[group.after]));
   }
   if (left == hits.count || hits.count == 0) return;
-  // The first of the list is never joined to another.
+  // Move the groups that are left to the front. The first of the list is never joined to another.
   std::size_t to = 0;
   for (std::uint32_t from = 0; from != kNone; from = hits.groups[from].after) {
     hits.groups[to++] = hits.groups[from];
@@ -177,7 +186,7 @@ void join_neighbours(Hits& hits) noexcept {
   hits.count = left;
 }
 
-/// The hit of the group's object nearest to the middle of the group.
+/// Returns the hit of the instance of the group that is nearest to the middle of the group.
 const SeenFace& middle_of(const Group& group, std::span<const SeenFace> faces) noexcept {
   std::uint32_t best = group.first;
   float best_along = -2.0F * static_cast<float>(group.count);
@@ -201,17 +210,19 @@ ViewSampler::ViewSampler(std::uint32_t rays) {
     glm::dvec2 disc;
   };
   std::vector<Point> points;
-  // Golden angle: equal areas, no two points ever close (Vogel 1979, "A better way to construct the
-  // sunflower head").
+  // Turn by the golden angle from point to point: areas are equal, and no two points lie close
+  // together (Vogel 1979, "A better way to construct the sunflower head").
   const double turn_rad = physics::kPi * (3.0 - std::sqrt(5.0));
   for (std::uint32_t i = 0; i < rays; ++i) {
     const double radius = std::sqrt((i + 0.5) / rays);
     const glm::dvec2 disc{radius * std::cos(i * turn_rad), radius * std::sin(i * turn_rad)};
     points.push_back({hilbert_order(disc.x, disc.y), i, disc});
   }
+  // Sort the points along a curve, so that the rays of a packet are neighbours and trace fast.
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
     return std::tie(a.order, a.index) < std::tie(b.order, b.index);
   });
+  // Lift the disc to the hemisphere.
   for (const Point& point : points) {
     directions_.emplace_back(glm::vec2(point.disc),
                              std::sqrt(1.0 - glm::dot(point.disc, point.disc)));
@@ -236,6 +247,7 @@ bool ViewSampler::nothing_near(const CasterRays& casters, const ViewPoint& point
 
 ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point,
                                const CasterSelection& selection) const noexcept {
+  // Spare most rays on open ground.
   const bool open = nothing_near(casters, point, selection);
   const Tangents tangents = tangents_of(point.normal);
   const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
@@ -250,6 +262,7 @@ ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point
     const std::uint32_t blocked = open ? 0U : casters.blocked(rays, selection);
     for (std::size_t i = 0; i < kPacket; ++i) {
       if (((blocked >> i) & 1U) != 0U) continue;
+      // Sum the derivative of the cosine weight with the rays that see sky.
       const bool up = rays[i].direction.z >= 0.0F;
       ++(up ? sky : far);
       if (up) to_sky += rays[i].direction / directions_[begin + i].z;
@@ -273,6 +286,7 @@ SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
     for (std::size_t i = 0; i < kPacket; ++i) {
       rays[i] = {start_m, turned(directions_[begin + i], tangents, point.normal)};
     }
+    // Sort rays into sky, far surroundings and hits.
     const std::uint32_t hit_lanes = casters.first_hits(rays, selection, found);
     for (std::size_t i = 0; i < kPacket; ++i) {
       const glm::vec3& direction = rays[i].direction;
@@ -289,6 +303,7 @@ SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
   const float weight_frac = 1.0F / static_cast<float>(directions_.size());
   view.sky_frac = static_cast<float>(sky) * weight_frac;
   view.far_frac = static_cast<float>(far) * weight_frac;
+  // Join the hits and give each group the share of its rays.
   join_neighbours(hits);
   view.seen_count = static_cast<std::uint32_t>(hits.count);
   for (std::size_t i = 0; i < hits.count; ++i) {
@@ -305,6 +320,7 @@ AdjacentFaces adjacent_faces(const CasterRays& casters, const ViewPoint& point, 
   constexpr float kCosSameFace = 0.766F;  // 40 degrees
   const Tangents tangents = tangents_of(point.normal);
   const glm::vec3 start_offset_m = point.offset_m * (point.inward - point.normal);
+  // Send rays along eight tangents from a point just below the surface.
   std::array<CasterRay, kTangents> rays;
   std::array<CasterHit, kTangents> hits;
   for (std::size_t i = 0; i < kTangents; ++i) {
@@ -315,6 +331,7 @@ AdjacentFaces adjacent_faces(const CasterRays& casters, const ViewPoint& point, 
   }
   const std::uint32_t lanes = casters.first_hits(rays, selection, hits);
 
+  // Keep faces that are hit from behind, face elsewhere and are near.
   std::array<AdjacentFace, kTangents> found;
   std::size_t count = 0;
   for (std::size_t i = 0; i < kTangents; ++i) {
@@ -326,12 +343,14 @@ AdjacentFaces adjacent_faces(const CasterRays& casters, const ViewPoint& point, 
     if (distance_m > reach_m) continue;
     found[count++] = {hit.normal, std::max(distance_m, 0.0F)};
   }
-  // Equal distances keep the order of the tangents; eight entries need no better method.
+  // Sort by distance. Insertion keeps the order of the tangents among equals and is fast for eight
+  // entries.
   for (std::size_t i = 1; i < count; ++i) {
     for (std::size_t k = i; k > 0 && found[k].distance_m < found[k - 1].distance_m; --k) {
       std::swap(found[k], found[k - 1]);
     }
   }
+  // Drop faces that point nearly the same way as a nearer one.
   AdjacentFaces out;
   for (std::size_t i = 0; i < count && out.count < out.faces.size(); ++i) {
     const bool known = std::any_of(out.faces.begin(), out.faces.begin() + out.count,
