@@ -20,6 +20,7 @@ constexpr float kMixedM = -1e30F;
 /// Width of the empty rim around the entity, in texels.
 constexpr float kRim = 2.0F;
 
+/// Corners of a box.
 std::array<glm::vec3, 8> corners(const scene::Aabb& box) noexcept {
   std::array<glm::vec3, 8> out;
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -80,6 +81,7 @@ bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float mo
   if (looks_left_ == 0) return turned_rad < kStale * most_turn_rad;
   --looks_left_;
   tile.to_sun = to_sun_body;
+  // Count the revision, so that the device gets the new map.
   ++tile.revision;
   // Lay the map across the direction of the sun, around the projected box.
   const Tangents tangents = tangents_of(to_sun_body);
@@ -108,6 +110,7 @@ bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float mo
       for (std::size_t first = 0; first < kSide; first += CasterRays::kMaxRays) {
         std::array<CasterRay, CasterRays::kMaxRays> sent;
         std::array<CasterHit, CasterRays::kMaxRays> hits;
+        // Begin at the plane behind the deepest corner of the box, at the centre of each texel.
         for (std::size_t k = 0; k < sent.size(); ++k) {
           const glm::vec2 at_m =
               tile.corner_m + tile.texel_m * (glm::vec2(first + k, row) + glm::vec2(0.5F));

@@ -95,7 +95,7 @@ void put_model(Sink& sink, const SurfaceModel& model) {
 }
 
 /// Reads the meshes of a body. Returns false if they are not refinements of the meshes of
-/// `geometry` or have more than `max_vertices` vertices.
+/// `geometry`.
 bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::size_t max_vertices,
                  SurfaceModel& model) {
   std::uint64_t meshes = 0;

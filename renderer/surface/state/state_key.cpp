@@ -19,6 +19,7 @@ void add_optional(Fnv64& hash, const std::optional<double>& value) {
   add(hash, value.has_value(), value.value_or(0.0));
 }
 
+/// Adds a row of weather.
 void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
   add(hash, row.sim_time_ns, row.direct_normal_w_m2, row.diffuse_horizontal_w_m2,
       row.longwave_down_w_m2, row.air_k, row.wind_m_s, row.cloud_frac);
@@ -30,6 +31,7 @@ void add_pose(Fnv64& hash, const physics::Pose& pose) {
   add(hash, pose.position_world_m, pose.world_from_body);
 }
 
+/// Adds a trajectory, preceded by its length.
 void add_keys(Fnv64& hash, std::span<const scene::Keyframe> keys) {
   add(hash, keys.size());
   for (const scene::Keyframe& key : keys) {
@@ -98,6 +100,7 @@ std::uint64_t place_hash(const scene::ScenarioDesc& scenario) {
   return hash.value();
 }
 
+/// Hash of the weather table and of the clear-sky model, which counts where there is no table.
 std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   Fnv64 hash;
   for (const physics::WeatherSample& sample : scenario.weather) add_weather(hash, sample);
