@@ -157,13 +157,15 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
   show(std::span(blocks).first(stay), turn, at_ns, window, inputs);
   hand_back(std::span(blocks).subspan(stay), at_ns, window, inputs);
   blocks.resize(stay);
-  // Leave the surroundings as the computation of `next` needs them.
+  // Leave the surroundings at node `next`, to which the forcing of its interval had brought them.
   inputs.history.restore_surroundings(window.next.surroundings);
 }
 
 void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
                            const SurfaceSamples& all) noexcept {
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    // Put blocks that came back in this interval on their own again: they do not lie on the line
+    // between the nodes, so the moved node would hold wrong values of them.
     const bool came_back = state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns;
     if (came_back) turns_[b % kTurns].push_back(b);
     if (came_back || state_[b] == State::wanted) begin_alone(b, event_ns, window, all);
@@ -203,7 +205,7 @@ void LocalSteps::begin_alone(std::uint32_t block, std::int64_t at_ns, const Wind
 
 void LocalSteps::prepare(std::int64_t begin_ns, std::int64_t end_ns, const Window& window,
                          const Inputs& inputs) noexcept {
-  // Carry the surroundings from the nodes to the begin of the step.
+  // Interpolate the surroundings between the nodes, and advance them over the step.
   inputs.history.restore_surroundings(between(window.before.surroundings, window.after.surroundings,
                                               way_of(begin_ns, window.before, window.after)));
   interval_.forcing = inputs.history.extend(begin_ns, end_ns, inputs.environment);
@@ -353,7 +355,7 @@ void LocalSteps::rotated(const Window& window, const SurfaceSamples& all) noexce
   // Make the poses of the next interval those of the current one.
   std::swap(known_[0], known_[1]);
   std::ranges::fill(known_found_, std::uint8_t{0});
-  const SurfaceNode& old = window.next;  // the node before those two
+  const SurfaceNode& old = window.next;  // the node before the current interval
   const auto ways =
       static_cast<float>(static_cast<double>(window.after.at_ns - window.before.at_ns) /
                          static_cast<double>(window.before.at_ns - old.at_ns));

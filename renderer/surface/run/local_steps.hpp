@@ -149,16 +149,15 @@ class LocalSteps {
   IntervalRays known_rays_;
   HeatInterval interval_;
 
-  std::vector<State> state_;         ///< by block
-  std::vector<std::int64_t> at_ns_;  ///< by block: end of its latest step on its own
-  std::vector<std::int64_t>
-      touched_ns_;  ///< by block: latest instant at which an entity touched it
+  std::vector<State> state_;               ///< by block
+  std::vector<std::int64_t> at_ns_;        ///< by block: end of its latest step on its own
+  std::vector<std::int64_t> touched_ns_;   ///< by block: latest time at which an entity touched it
   std::vector<std::int64_t> foreseen_ns_;  ///< by block: end of its step ahead, which `after` holds
   /// Foreseen states of the entities at the end of the step ahead, by turn, then entity.
   std::array<std::vector<TrajectoryState>, kTurns> foreseen_;
-  std::vector<std::uint8_t>
-      known_found_;                      ///< by entity: 1 once the blocks it was to shade are found
-  std::vector<std::uint8_t> own_clock_;  ///< by sample: has_own_clock()
+  /// By entity: 1 once the blocks that it was to shade in this interval are found.
+  std::vector<std::uint8_t> known_found_;
+  std::vector<std::uint8_t> own_clock_;                   ///< by sample: has_own_clock()
   std::array<std::vector<std::uint32_t>, kTurns> turns_;  ///< by turn: blocks outside the interval
   std::vector<std::uint32_t> chosen_;
   std::vector<std::uint32_t> batch_;

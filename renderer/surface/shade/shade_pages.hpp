@@ -91,8 +91,7 @@ class ShadePages {
     std::int64_t members_ns = 0;  ///< time at which members were gathered
     std::int64_t at_turn = 0;     ///< turn up to which the tile has stepped
     std::int64_t cast_turn = 0;   ///< latest turn in which an entity cast on it
-    std::int64_t come_turn =
-        0;  ///< latest turn in which an entity cast that has moved since restart()
+    std::int64_t come_turn = 0;   ///< latest turn in which a moved entity cast on it
   };
   /// Data that a step reads, and the entity shadow depth maps that it makes anew where needed.
   struct Inputs {

@@ -68,7 +68,8 @@ Weights fitted(std::span<const double> times_s, std::span<const double> response
   for (std::uint32_t chosen = 1; chosen < 1U << kModes; ++chosen) {
     const Weights x = solve(a, b, chosen);
     if (std::ranges::any_of(x, [](double value) { return !(value >= 0.0); })) continue;
-    double error = 0.0;  // but for a constant
+    // Sum the squared error, but for a part that all sets share.
+    double error = 0.0;
     for (std::size_t k = 0; k < kModes; ++k) {
       error -= 2.0 * x[k] * b[k];
       for (std::size_t l = 0; l < kModes; ++l) error += x[k] * a[k][l] * x[l];

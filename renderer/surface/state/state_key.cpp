@@ -93,6 +93,7 @@ std::uint64_t materials_hash(const scene::ScenarioDesc& scenario,
   return hash.value();
 }
 
+/// Hash of place and date.
 std::uint64_t place_hash(const scene::ScenarioDesc& scenario) {
   Fnv64 hash;
   add(hash, scenario.place.lat_rad, scenario.place.lon_rad, scenario.place.height_m,
@@ -118,6 +119,7 @@ std::uint64_t thermal_hash(const scene::ThermalOptions& o) {
   return hash.value();
 }
 
+/// Hash of the sensor's format, field of view and trajectory.
 std::uint64_t camera_hash(const scene::SensorDesc& sensor) {
   Fnv64 hash;
   add(hash, sensor.width_px, sensor.height_px, sensor.fov_h_rad);

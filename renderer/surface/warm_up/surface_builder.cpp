@@ -239,7 +239,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
                                  patch.outputs[vertex.parent[1]].offset_k);
     patch.surplus_k[job.index] = std::abs(patch.outputs[job.index].offset_k - mean_k);
     for (SurfacePatch* side = &patch; side != nullptr; side = side->back.get()) {
-      if (!std::isinf(side->sky_surplus_frac[job.index])) continue;  // taken over
+      if (!std::isinf(side->sky_surplus_frac[job.index])) continue;  // the parents' view was taken
       const auto off_mean = [&](float SurfaceSample::*share) {
         const float mean = 0.5F * (side->samples[vertex.parent[0]].*share +
                                    side->samples[vertex.parent[1]].*share);
@@ -349,7 +349,7 @@ physics::Result<SurfaceModel> Builder::run() {
   // Let each round take a quarter of the progress that is left: nobody knows how many rounds
   // follow.
   double done_frac = 0.0;
-  std::size_t count_before = 0;  // of samples, in the round before
+  std::size_t count_before = 0;  // samples before the latest round
   const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
   double to_frac = next_frac();
   if (!sample_new_vertices(done_frac, to_frac)) return stopped();

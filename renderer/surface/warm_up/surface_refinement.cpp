@@ -81,7 +81,7 @@ float width_m(const scene::Aabb& box, const glm::dmat4& world_from_mesh) {
 /// as a place beside the entity where its way begins.
 glm::vec3 when_in_view(const glm::vec3& eye_m, const glm::vec3& boresight,
                        std::span<const glm::vec3> way_m) {
-  constexpr int kParts = 8;  // of a leg
+  constexpr int kParts = 8;  // places per leg of the way
   glm::vec3 found_m = way_m.front();
   float most = -std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < way_m.size(); ++i) {

@@ -94,7 +94,7 @@ class SurfaceRefinement {
   const DriveWorth& worth_;
   SurfaceBend bend_;
   std::vector<Eye> eyes_;
-  /// By entity: the places of the camera relative to it where its script brings it closest to the
+  /// Places of the camera relative to each entity where its script brings it closest to the
   /// middle of the image, moved so that the entity may stay where it is.
   std::vector<std::vector<Eye>> eyes_of_mover_;
   std::vector<float> body_m_;  ///< by instance: width of its body
