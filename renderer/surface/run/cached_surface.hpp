@@ -69,9 +69,9 @@ class CachedSurface {
   struct Saved {
     std::filesystem::path file;
     StateKey key{};  ///< hashes of the scenario, from scenario_key()
-    /// True at the start of a run: a file that does not fit is an error, a missing file is written,
-    /// and an earlier state is advanced. False after a jump of sim time: the file is used only if
-    /// it holds the very instant, and is left as it is.
+    /// The flag is true at the start of a run: a file that does not fit is an error, a missing file
+    /// is written, and an earlier state is advanced. It is false after a jump of sim time: the file
+    /// is used only if it holds the very instant, and is left as it is.
     bool start = true;
     /// Returns true if a surface that was refined for `eyes` will do for the first frame.
     std::function<bool(std::span<const RefineView::Eye> eyes)> fits_camera;
@@ -87,7 +87,7 @@ class CachedSurface {
                                               const std::optional<Saved>& saved,
                                               const SurfaceProgress& progress);
 
-  /// True if frames at `now_ns` need prepare() first: sim time went back behind the current
+  /// Returns true if frames at `now_ns` need prepare() first: sim time went back behind the current
   /// interval, or it jumped far ahead of it.
   [[nodiscard]] bool stale(std::int64_t now_ns) const noexcept;
 
@@ -111,7 +111,7 @@ class CachedSurface {
   void forget_changes() noexcept;
   /// Temperature of the surroundings in K; empty if the thermal model does not compute it.
   [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept;
-  /// True while some samples lack a change of the weather by the host that matters.
+  /// Returns true while some samples lack a change of the weather by the host that matters.
   [[nodiscard]] bool lags() const noexcept { return lags_; }
   /// Number of blocks of samples that do not follow the intervals, because the host moves an
   /// entity.
@@ -134,8 +134,8 @@ class CachedSurface {
   /// show in the frame.
   /// @pre place_shadows(); shadows()[mover].on
   [[nodiscard]] PlacedSilhouette cast_shadow(std::size_t mover) noexcept;
-  /// True if, since place_shadows(), more entities had turned than one frame can make maps for.
-  /// Then some shadow has an outline of a while ago.
+  /// Returns true if, since place_shadows(), more entities had turned than one frame can make maps
+  /// for. Then some shadow has an outline of a while ago.
   [[nodiscard]] bool stale_shadow() const noexcept { return stale_shadow_; }
   /// Origin of rel in the world, m.
   [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept {
@@ -169,7 +169,7 @@ class CachedSurface {
                                                          const std::optional<Saved>& saved) const;
   /// Samples the surface and integrates its history.
   [[nodiscard]] physics::Result<SurfaceModel> warm_up(const ModelWork& work) const;
-  /// The saved model, advanced to the start. Empty if it does not fit and this is no error.
+  /// The saved model, advanced to the start. It is empty if it does not fit and this is no error.
   [[nodiscard]] physics::Result<std::optional<SurfaceModel>> take_saved(const ModelWork& work,
                                                                         const Saved& saved) const;
   [[nodiscard]] SurfaceInputs surface_inputs(const HistoryRecord& record,
@@ -207,8 +207,8 @@ class CachedSurface {
                      SurfaceHistory& history) noexcept;
   /// Finishes node 1 and begins the next interval.
   void end_renewal(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
-  /// True if the weather of `now_ns` differs from what node 1 was computed with by more than the
-  /// tolerance allows.
+  /// Returns true if the weather of `now_ns` differs from what node 1 was computed with by more
+  /// than the tolerance allows.
   [[nodiscard]] bool matters(std::int64_t now_ns, const Environment& environment) const noexcept;
   /// Number of samples that are to be computed by `now_ns`.
   [[nodiscard]] std::uint32_t share_at(std::int64_t now_ns) const noexcept;

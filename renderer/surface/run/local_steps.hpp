@@ -59,7 +59,8 @@ class LocalSteps {
     SurfaceNode& after;
     SurfaceNode& next;
     std::uint32_t done = 0;  ///< number of samples of `next` that are computed
-    /// True while `after` is being computed anew: then values between it and `before` do not hold.
+    /// The flag is true while `after` is being computed anew: then values between it and `before`
+    /// do not hold.
     bool renewing = false;
     const IntervalRays& next_rays;
     const HeatInterval& next_interval;
@@ -90,8 +91,8 @@ class LocalSteps {
 
   /// Number of blocks that do not follow the interval, blocks about to leave it included.
   [[nodiscard]] std::size_t active() const noexcept;
-  /// True for samples of blocks that are on their own, or were in this interval: node `before` does
-  /// not hold them at its own instant.
+  /// Returns true for samples of blocks that are on their own, or were in this interval: node
+  /// `before` does not hold them at its own instant.
   [[nodiscard]] bool has_own_clock(std::uint32_t sample) const noexcept {
     return own_clock_[sample] != 0;
   }
@@ -120,7 +121,7 @@ class LocalSteps {
   /// Advances blocks one step ahead with foreseen poses, and draws their vertices on that line.
   void show(std::span<const std::uint32_t> blocks, std::size_t turn, std::int64_t at_ns,
             const Window& window, const Inputs& inputs) noexcept;
-  /// True if all entities stand at `at_ns` where they were foreseen to be.
+  /// Returns true if all entities stand at `at_ns` where they were foreseen to be.
   [[nodiscard]] bool came_true(std::size_t turn, std::int64_t at_ns,
                                const Inputs& inputs) const noexcept;
   /// Advances blocks to the end of the interval, and from there to `next` as far as it is computed.

@@ -125,9 +125,10 @@ class ShadePages {
   void forget_changes() noexcept;
   /// Horizontal shift of a shadow towards the sun per metre of height, in the latest step.
   [[nodiscard]] const glm::vec2& slope() const noexcept { return slope_; }
-  /// True if shade was lost in the latest ten seconds or in the latest run(): it found no tile, it
-  /// took a tile that held more than the tolerance, or an entity was too fast. Only entities that
-  /// have moved since restart() count. True as well after sim time went back.
+  /// Returns true if shade was lost in the latest ten seconds or in the latest run(): it found no
+  /// tile, it took a tile that held more than the tolerance, or an entity was too fast. Only
+  /// entities that have moved since restart() count. It returns true as well after sim time went
+  /// back.
   [[nodiscard]] bool short_of_pages() const noexcept {
     return short_turn_ > next_turn_ - kShortTurns || short_turn_ >= first_turn_;
   }
@@ -165,18 +166,18 @@ class ShadePages {
   void find_pages(std::size_t mover, std::int64_t turn, std::int64_t turns, bool come,
                   const PlacedSilhouette& placed, float ground_m, float top_m,
                   const Inputs& inputs) noexcept;
-  /// True if the shadow of an entity, penumbra included, may touch the cell of a tile.
+  /// Returns true if the shadow of an entity, penumbra included, may touch the cell of a tile.
   [[nodiscard]] static bool meets(const PlacedSilhouette& placed, float texel_m,
                                   const glm::ivec2& cell, float plane_m) noexcept;
   [[nodiscard]] Page* page_at(int level, const glm::ivec2& cell) noexcept;
   /// Height of the plane of a new tile, from five rays down. It is that of a neighbour if the two
-  /// are close to each other. Empty if the rays meet nothing.
+  /// are close to each other. It is empty if the rays meet nothing.
   [[nodiscard]] std::optional<float> plane_of(int level, const glm::ivec2& cell, float top_m,
                                               const CasterRays& rays) const noexcept;
   /// Returns an unused tile. If there is none, an entity that has `come` gets the tile that holds
   /// least. Returns null if no tile can be taken.
   [[nodiscard]] Page* take_page(std::int64_t turn, bool come) noexcept;
-  /// True if the entity stands elsewhere than at restart(), or has appeared or vanished.
+  /// Returns true if the entity stands elsewhere than at restart(), or has appeared or vanished.
   [[nodiscard]] bool has_come(std::size_t mover, const PoseHistory& entity,
                               std::int64_t at_ns) const noexcept;
   void give_back(Page& page) noexcept;

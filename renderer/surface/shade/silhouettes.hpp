@@ -74,7 +74,8 @@ class Silhouettes {
   [[nodiscard]] float shaded_frac(std::size_t mover, float column, float row, float depth_m,
                                   float radius_texels, std::uint32_t first = 0,
                                   std::uint32_t stride = 1) const noexcept;
-  /// Depth in m of the entity's surface at a place on the map. The mean depth if the texel is open.
+  /// Depth in m of the entity's surface at a place on the map. It is the mean depth if the texel is
+  /// open.
   [[nodiscard]] float caster_m(std::size_t mover, float column, float row) const noexcept;
   /// Depths of a map, kSide rows of kSide texels, in m.
   [[nodiscard]] std::span<const float> depths_m(std::size_t mover) const noexcept {

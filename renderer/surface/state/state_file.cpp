@@ -112,7 +112,7 @@ bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::
   return true;
 }
 
-/// True if the arrays of a model fit each other and no index leads out of its array.
+/// Returns true if the arrays of a model fit each other and no index leads out of its array.
 bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                 std::size_t movers) {
   const std::size_t count = model.samples.samples.size();

@@ -80,8 +80,8 @@ class Sweeper {
  private:
   /// Measures the radiation of the faces of entities at every node, from the latest sweep.
   void measure_faces();
-  /// True if no sweep changes the sample: it sees no other one, has no partner, and no entity that
-  /// sends radiation hides its sky.
+  /// Returns true if no sweep changes the sample: it sees no other one, has no partner, and no
+  /// entity that sends radiation hides its sky.
   [[nodiscard]] bool alone(std::size_t s) const noexcept;
   /// Input of sample `s` in interval j, without the fluxes of its partners.
   [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal,

@@ -32,8 +32,8 @@ inline constexpr std::uint32_t kExchangeSweeps = 3;
 /// Options of exchange().
 struct ExchangeOptions {
   std::uint32_t sweeps = kExchangeSweeps;
-  /// True if the first guess is each sample's own history among its surroundings and the model
-  /// holds its end. Then samples that exchange nothing are left as they are.
+  /// The flag is true if the first guess is each sample's own history among its surroundings and
+  /// the model holds its end. Then samples that exchange nothing are left as they are.
   bool evaluated = true;
   bool glow = true;  ///< entities send long-wave radiation to the surfaces whose sky they hide
 };

@@ -153,7 +153,8 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
   if (in_.heat.sky_measure() == SkyMeasure::sphere) {
     sample.sphere_sky_frac = sphere_.of_face(in_.rays, point, selection).sky_frac;
   }
-  // Mark the sample as covered if it sees nothing but backs of closed bodies: it lies inside one.
+  // Mark the sample as covered if it sees nothing but backs of faces, sheets aside: it lies inside
+  // a body.
   if (open.sky_frac + open.far_frac == 0.0F) {
     const SurfaceView view = view_.view(in_.rays, point, selection);
     const std::span<const SeenFace> faces(view.seen.data(), view.seen_count);

@@ -82,7 +82,8 @@ class PatchSampler {
                const SurfaceModelOptions& options);
 
   [[nodiscard]] const SunTracer& tracer() const noexcept { return tracer_; }
-  /// True if samples exchange heat with others, so that the histories of their output are needed.
+  /// Returns true if samples exchange heat with others, so that the histories of their output are
+  /// needed.
   [[nodiscard]] bool keeps_sent() const noexcept { return options_.exchange || options_.lateral; }
 
   /// Start state of the latest sample. Neighbours face alike and start with the same state. Each
@@ -110,8 +111,8 @@ class PatchSampler {
   /// Integrates the temperature over the history, and stores what the sample sends out.
   void integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const;
 
-  /// True if a face of the scene as loaded belongs to a sheet. A sample that sees its back is not
-  /// inside a body.
+  /// Returns true if a face of the scene as loaded belongs to a sheet. A sample that sees its back
+  /// is not inside a body.
   [[nodiscard]] bool of_a_sheet(const SeenFace& face) const noexcept;
 
   /// Finds the shares of sky and surroundings of a sample by rays, and whether it is covered.

@@ -68,7 +68,8 @@ class SurfaceRefinement {
   /// Need of a leaf on one patch. `body_m` is the width of the whole body in m.
   [[nodiscard]] Judged need(const RefinedMesh& refined, std::uint32_t slot,
                             const SurfacePatch& patch, float body_m) const;
-  /// True if rays from some place of the camera reach the triangle, or if it belongs to an entity.
+  /// Returns true if rays from some place of the camera reach the triangle, or if it belongs to an
+  /// entity.
   [[nodiscard]] bool seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
                           std::uint32_t slot, const SurfacePatch& patch) const;
   /// Greatest widths of a triangle in pixels over the places of the camera: of its longest edge, of
