@@ -156,7 +156,7 @@ class LocalSteps {
   std::vector<std::int64_t> foreseen_ns_;  ///< by block: end of its step ahead, which `after` holds
   /// Foreseen states of the entities at the end of the step ahead, by turn, then entity.
   std::array<std::vector<TrajectoryState>, kTurns> foreseen_;
-  /// By entity: 1 once the blocks that it was to shade in this interval are found.
+  /// Flag of each entity: 1 once the blocks that it was to shade in this interval are found.
   std::vector<std::uint8_t> known_found_;
   std::vector<std::uint8_t> own_clock_;                   ///< by sample: has_own_clock()
   std::array<std::vector<std::uint32_t>, kTurns> turns_;  ///< by turn: blocks outside the interval

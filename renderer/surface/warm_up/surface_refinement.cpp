@@ -40,8 +40,7 @@ constexpr float kBackSine = 0.2F;
 /// Share of the way to a point that must be free if the point is to be seen.
 constexpr float kSeenFrac = 0.999F;
 /// Allowed difference of the newest vertex from the mean of its parents, in tolerances, for large
-/// triangles and for those of a few pixels. The triangle's own error is about half of the
-/// difference.
+/// and for small triangles. The triangle's own error is about half of it.
 constexpr float kSurplusFrac = 1.2F;
 constexpr float kSharpSurplusFrac = 8.0F;
 /// Error of a triangle that a foot runs through, in tolerances.
@@ -150,8 +149,7 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
     const float distance_m = std::max(glm::length(way_m), kLeastM);
     const float px_m = std::max(pixel_rad_ * distance_m, kLeastM);
     least_px_m = std::min(least_px_m, px_m);
-    // Measure the square that is as large as the triangle looks; it is no wider than the longest
-    // edge.
+    // Measure the square that is as large as the triangle looks, up to the longest edge.
     const glm::vec3 ahead = way_m / distance_m;
     const float looks_px =
         std::min(std::sqrt(std::abs(glm::dot(twice_area_m2, ahead))) / px_m, longest_m / px_m);
@@ -185,8 +183,7 @@ bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const Re
     std::array<CasterRay, 4> rays;
     std::array<float, 4> distance_m{};
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      // Move the corners a little towards the middle, so that no neighbour across an edge hides
-      // them.
+      // Move the corners a little inwards, so that no neighbour across an edge hides them.
       const glm::vec3 point_m = i < 3 ? glm::mix(corners_m[i], centre_m, 0.1F) : centre_m;
       distance_m[i] = glm::distance(eye_m, point_m);
       rays[i] = {eye_m, (point_m - eye_m) / std::max(distance_m[i], 1e-6F)};
@@ -236,8 +233,7 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
   face.normal = normal / length;
   face.mover = patch.mover;
   face.material = a.material;
-  // Spread points evenly over the triangle (R2 sequence, Roberts 2018), at other places in every
-  // leaf.
+  // Spread points evenly (R2 sequence, Roberts 2018), at other places in every leaf.
   constexpr float kStepU = 0.7548776662F;
   constexpr float kStepV = 0.5698402910F;
   std::array<glm::vec3, kPacketRays> points_m;
@@ -325,8 +321,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const auto covered = [&](std::size_t i) { return patch.samples[leaf[i]].covered ? 1 : 0; };
   const int under = covered(0) + covered(1) + covered(2);
   if (smooth && under > 0 && under < 3) error_k = std::max(error_k, kFootFrac * tolerance_k_);
-  // Halve near edges and feet down to the depth that heat reaches in kCreaseS, because heat also
-  // moves along the surface there.
+  // Halve near edges and feet, because heat also moves along the surface there.
   const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
   const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
   if (smooth && lateral_ && longest_m > depth_m &&

@@ -17,8 +17,7 @@ namespace emit::renderer {
 /// is halved
 /// - while it is wider than some pixels, so that nothing slips between its corners unseen;
 /// - if rays from points between its corners meet shade or sun that the corners do not know of;
-/// - if its newest vertex differs from the mean of its parents: the error of a linear triangle is a
-/// quarter of its parent's;
+/// - if its newest vertex differs from the mean of its parents by more than the tolerance allows;
 /// - if the surface as loaded faces elsewhere than its corners;
 /// - near edges and feet of bodies, because heat moves along the surface there;
 /// - if sunlight fell on its corners unequally of late, because an edge of a shadow runs through.
