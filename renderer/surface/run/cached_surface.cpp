@@ -19,27 +19,33 @@
 namespace emit::renderer {
 namespace {
 
+/// Samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 32;
-/// What a tenth of the sun's light, reflected, is worth between 3 and 5 um on a surface of 300 K.
+/// Rise of apparent temperature in K that a tenth of the sun's light causes by reflection between 3
+/// and 5 um, on a surface of 300 K.
 constexpr float kSunK = 5.0F;
-/// Intervals that are made up for one by one after a jump of sim time.
+/// Largest number of intervals that are made up for one by one after a jump of sim time.
 constexpr std::int64_t kMostIntervals = 16;
-/// Events that follow a node sooner belong to it; those known before, in shares of an interval, so
-/// that many of them do not make for many intervals.
+/// Events closer than this after a node belong to the node. The second limit is a fraction of an
+/// interval and holds for events that are known in advance, so that many events do not make many
+/// intervals.
 constexpr std::int64_t kSameNs = 1'000'000;
 constexpr std::int64_t kSameFraction = 16;
-/// What the host's weather changes is computed anew over that share of an interval.
+/// Fraction of an interval over which node 1 is computed anew after the host has changed the
+/// weather.
 constexpr std::int64_t kRenewalFraction = 8;
-/// What follows a change of the weather that matters is an interval as short as that share.
+/// Fraction of an interval that is the length of the interval after such a change, if it matters.
 constexpr std::int64_t kAnswerFraction = 4;
-/// Fluxes that change a surface by no more than the tolerance, times that, however thin it is: it
-/// radiates as much by itself.
+/// Flux in W m-2 per kelvin of tolerance below which a change does not matter: however thin a
+/// surface is, its own radiation balances as much.
 constexpr double kLeastNewsWM2K = 5.0;
-/// What sunlit surfaces are warmer than the air by, more or less.
+/// Typical difference in K between sunlit surfaces and the air. It turns a change of the film
+/// coefficient into a flux.
 constexpr double kFilmK = 20.0;
-/// In a hold, in which the clock stands.
+/// Number of frames over which node 1 is computed anew while sim time stands still.
 constexpr std::int64_t kHeldFrames = 64;
 
+/// Box of each entity's geometry in the axes of its body.
 std::vector<scene::Aabb> mover_boxes_m(const scene::SceneGeometry& geometry, std::size_t movers,
                                        std::span<const std::int32_t> mover_of_object) {
   std::vector<scene::Aabb> boxes(movers);
@@ -52,6 +58,7 @@ std::vector<scene::Aabb> mover_boxes_m(const scene::SceneGeometry& geometry, std
   return boxes;
 }
 
+/// Radius of each entity's geometry around the origin of its body, in m.
 std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size_t movers,
                                  std::span<const std::int32_t> mover_of_object) {
   std::vector<float> radius_m(movers, 0.0F);
@@ -68,6 +75,7 @@ std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size
   return radius_m;
 }
 
+/// The thermal model that the scenario names.
 SampleHeat heat_of(const scene::ThermalOptions& options, std::span<const scene::Material> materials,
                    std::span<const FosterMaterial> networks, double reference_k) {
   if (options.model == scene::ThermalModel::emit2014) {
@@ -106,7 +114,7 @@ physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
   auto rays = CasterRays::create(
       geometry, detail ? std::optional(detail->rays().origin_world_m()) : std::nullopt);
   if (!rays) return tl::unexpected(std::move(rays.error()));
-  // Entities and what shades must be numbered alike.
+  // Check that the rays number the entities like the scenario does.
   std::size_t mover = 0;
   for (std::size_t object = 0; object < scenario.objects.size(); ++object) {
     if (scenario.objects[object].entity_id == 0) continue;
@@ -149,7 +157,7 @@ std::vector<std::vector<glm::vec3>> CachedSurface::ways_m(
 
 bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
   if (!model_) return true;
-  // Before the history starts nothing changes: its first interval stands for it.
+  // Let the first interval stand for all time before the history, because nothing changes there.
   const std::int64_t begin_ns = nodes_[storage(0)].at_ns;
   return (now_ns < begin_ns && begin_ns > options_.history_start_ns) ||
          now_ns > nodes_[storage(1)].at_ns + kMostIntervals * interval_ns_;
@@ -161,10 +169,12 @@ std::int64_t CachedSurface::take_news(const Environment& environment) noexcept {
 
 std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns, std::int64_t now_ns,
                                          const Inputs& inputs) const noexcept {
+  // Take the next instant of the grid, or the one after it if that is too close.
   const std::int64_t into_ns = (from_ns - options_.history_start_ns) % interval_ns_;
   std::int64_t next_ns = from_ns + interval_ns_ - into_ns;
   now_ns = std::clamp(now_ns, from_ns, next_ns);
   if (next_ns - now_ns < interval_ns_ / 4) next_ns += interval_ns_;
+  // Cut the interval at the first event that is known in advance.
   const auto cut = [&](std::span<const std::int64_t> instants_ns) {
     const auto after = std::ranges::lower_bound(
         instants_ns, now_ns + std::max(kSameNs, interval_ns_ / kSameFraction));
@@ -208,6 +218,7 @@ physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const Mod
     if (!saved.start) return std::nullopt;
     return tl::unexpected(std::move(read.error()));
   }
+  // Refuse a state of another instant, or for another camera.
   if (!saved.start && read->at_ns != work.start_ns) return std::nullopt;
   if (saved.fits_camera && !saved.fits_camera(read->eyes)) {
     if (!saved.start) return std::nullopt;
@@ -223,7 +234,7 @@ physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const Mod
   work.history.update(work.plan, work.inputs.environment);
   if (read->at_ns == work.start_ns) return std::move(*read);
 
-  // Go on from there, in steps that are short near the end.
+  // Advance the state from there, in steps that are short near the end.
   scene::ThermalOptions ahead = options_;
   ahead.history_start_ns = read->at_ns;
   const std::int64_t way_ns = work.start_ns - read->at_ns;
@@ -244,7 +255,7 @@ physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const Mod
 
 physics::Result<SurfaceModel> CachedSurface::make_model(const ModelWork& work,
                                                         const std::optional<Saved>& saved) const {
-  // Whatever is in the way of looking is reported by read_state().
+  // Read the file if it exists. An error of the look-up is left to read_state(), which reports it.
   std::error_code error;
   if (saved && (std::filesystem::exists(saved->file, error) || error)) {
     auto taken = take_saved(work, *saved);
@@ -252,7 +263,8 @@ physics::Result<SurfaceModel> CachedSurface::make_model(const ModelWork& work,
     if (*taken) return std::move(**taken);
   }
   const bool writes = saved && saved->start;
-  if (writes) {  // before the work, not after it
+  // Test the file before the long work, not after it.
+  if (writes) {
     if (auto writable = check_state_writable(saved->file); !writable) {
       return tl::unexpected(std::move(writable.error()));
     }
@@ -273,6 +285,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
                                              SurfaceHistory& history,
                                              const std::optional<Saved>& saved,
                                              const SurfaceProgress& progress) {
+  // Start at the node of the grid at or before now.
   const std::int64_t start_ns =
       options_.history_start_ns +
       std::max<std::int64_t>(0, now_ns - options_.history_start_ns) / interval_ns_ * interval_ns_;
@@ -280,7 +293,8 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   SurfaceModelOptions options;
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
-  // The published model conducts straight down and knows no other surface.
+  // Leave lateral conduction and exchange out of the published model: it conducts straight down and
+  // knows no other surface.
   options.lateral = extended_ && options_.lateral;
   options.exchange = extended_ && options_.exchange;
   auto model = make_model({start_ns, view, inputs, plan, history, options, progress}, saved);
@@ -292,13 +306,14 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
     faces_.assign(movers_now_.size(), {});
   }
 
+  // Take the memory of the nodes.
   const std::size_t count = model_->samples.samples.size();
   for (SurfaceNode& node : nodes_) {
     node.states.assign(count, {});
     node.outputs.assign(count, {});
     node.vertices.assign(model_->drawn_samples, {});
   }
-  // One interval before the first is shown: nodes 0 and 1 are complete, 2 is begun.
+  // Complete nodes 0 and 1, and begin node 2, before the first frame.
   ring_ = 0;
   SurfaceNode& first = node(0);
   first.states = std::move(model_->states);
@@ -322,7 +337,8 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   turn_ = static_cast<std::uint32_t>(plan.intervals().size());
   begin_anew(0, inputs, history);
   compute(0, static_cast<std::uint32_t>(count));
-  // What the model says of the sun has the entities in it.
+  // Replace the model's shares of the sun, which include the shade of entities, by those of the
+  // first interval, which do not.
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     if (inputs.entities.empty() || model_->samples.samples[i].mover >= 0) continue;
     first.outputs[i].sun_frac = node(1).outputs[i].sun_frac;
@@ -353,12 +369,14 @@ void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
                                    SurfaceHistory& history) noexcept {
   const SurfaceNode& from = node(index);
   SurfaceNode& to = node(index + 1);
+  // Fill the forcing, which also advances the surroundings to the end of the interval.
   history.restore_surroundings(from.surroundings);
   interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
   to.forcing = interval_.forcing;
   to.surroundings = history.surroundings();
   to.surroundings_k = history.surroundings_now_k();
   heat_.prepare(interval_);
+  // Send the rays with the poses that are known now.
   interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment,
                          EntityPoses(inputs.entities), rays().origin_world_m());
   local_->send_rays(index, inputs.entities);
@@ -379,6 +397,7 @@ void CachedSurface::compute(std::size_t index, std::uint32_t last) noexcept {
     to.outputs[i] = output;
     if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
   };
+  // Step the samples on all cores. During a renewal LocalSteps steps its own blocks.
   workers_.run(last - first, kGrain, [&](std::size_t begin, std::size_t end) {
     SteppedSample stepped;
     for (auto i = static_cast<std::uint32_t>(first + begin); i < first + end; ++i) {
@@ -402,6 +421,7 @@ void CachedSurface::cut_at(std::int64_t event_ns, std::int64_t end_ns) noexcept 
     return static_cast<double>(at_ns - first.at_ns) /
            static_cast<double>(second.at_ns - first.at_ns);
   };
+  // Move states, outputs and vertices of each sample along the line between the nodes.
   const double frac = way_of(event_ns);
   const double end_frac = way_of(end_ns);
   workers_.run(first.states.size(), kGrain, [&](std::size_t begin, std::size_t end) {
@@ -433,6 +453,7 @@ void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
                                SurfaceHistory& history) noexcept {
   const std::int64_t from_ns = node(index).at_ns;
   std::int64_t end_ns = next_node_ns(from_ns, from_ns, inputs);
+  // Answer a change of the weather with a short interval.
   if (std::ranges::binary_search(inputs.environment.changes_ns(), from_ns)) {
     end_ns = std::min(end_ns, from_ns + interval_ns_ / kAnswerFraction);
   }
@@ -451,6 +472,7 @@ bool CachedSurface::matters(std::int64_t now_ns, const Environment& environment)
   const auto off = [&](double SurfaceForcing::*value) {
     return std::abs(is.*value - between(taken.begin.*value, taken.end.*value, way));
   };
+  // Bound the change of the flux into a surface by the sum of the changes of all its parts.
   double change_w_m2 =
       glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
       off(&SurfaceForcing::diffuse_w_m2) + off(&SurfaceForcing::longwave_w_m2) +
@@ -467,13 +489,14 @@ void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, co
   if (event_ns < node(0).at_ns + kSameNs) event_ns = node(0).at_ns;
   lags_ = matters(now_ns, inputs.environment);
   std::int64_t end_ns = next_node_ns(event_ns, now_ns, inputs);
-  // Surfaces answer like the root of time at first, which a line over a whole interval does not.
+  // Shorten the interval after a change that matters: surfaces answer like the root of time at
+  // first, which a line over a whole interval does not follow.
   if (lags_) end_ns = std::min(end_ns, std::max(event_ns, now_ns) + interval_ns_ / kAnswerFraction);
   local_->take_news(event_ns, window(), model_->samples);
   cut_at(event_ns, end_ns);
   begin_interval(0, inputs, history);
   renewing_ = true;
-  // What sim time has left behind in one frame is made up for in that.
+  // Make up for the time since the latest frame in this frame.
   share_begin_ns_ = std::max(event_ns, last_now_ns_);
   share_end_ns_ =
       share_begin_ns_ + std::min(interval_ns_ / kRenewalFraction, (end_ns - now_ns) / 2);
@@ -481,6 +504,7 @@ void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, co
 
 void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
                                 SurfaceHistory& history) noexcept {
+  // Compute the rest of node 1, then begin node 2 anew from there.
   compute(0, static_cast<std::uint32_t>(model_->samples.samples.size()));
   renewing_ = false;
   lags_ = news_ns_ <= now_ns && matters(now_ns, inputs.environment);
@@ -492,10 +516,12 @@ void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
 
 void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
                                  SurfaceHistory& history) noexcept {
+  // Merge the newest change with what waits already.
   const std::int64_t newest_ns = take_news(inputs.environment);
   if (newest_ns != kNoNews) local_->doubt(newest_ns);
   news_ns_ = std::min(news_ns_, newest_ns);
   if (news_ns_ == kNoNews) return;
+  // Let a change wait while another one is being taken in.
   if (renewing_) {
     lags_ = lags_ || (news_ns_ <= now_ns && matters(now_ns, inputs.environment));
     return;
@@ -503,13 +529,14 @@ void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
   if (news_ns_ >= node(2).at_ns) {
     news_ns_ = kNoNews;
   } else if (news_ns_ >= node(1).at_ns) {
-    // Where the interval is about to end there is no time for that: it waits for the next one.
+    // Begin the next interval anew, unless the current one is about to end: then the change waits
+    // for the next one.
     if (node(1).at_ns - now_ns < interval_ns_ / kRenewalFraction) return;
     begin_anew(1, inputs, history);
     share_begin_ns_ = now_ns;
     share_end_ns_ = node(1).at_ns;
     news_ns_ = kNoNews;
-  } else if (news_ns_ <= now_ns) {  // what is to come waits for its instant
+  } else if (news_ns_ <= now_ns) {  // later weather waits for its instant
     const SurfaceStep step = this->step();
     local_->run(std::min(now_ns, node(1).at_ns), window(), local_inputs(inputs, history, step));
     begin_renewal(std::exchange(news_ns_, kNoNews), now_ns, inputs, history);
@@ -530,12 +557,13 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
   const SurfaceStep step = this->step();
   const LocalSteps::Inputs local = local_inputs(inputs, history, step);
+  // Take in new weather, then finish all intervals that end before now.
   take_weather(now_ns, inputs, history);
   while (now_ns > node(1).at_ns) {
     local_->run(node(1).at_ns, window(), local);
     if (renewing_) {
       end_renewal(node(1).at_ns, inputs, history);
-      take_weather(now_ns, inputs, history);  // of meanwhile, which moves the node
+      take_weather(now_ns, inputs, history);  // a change that came meanwhile moves the node
       continue;
     }
     local_->rotate(window(), model_->samples);
@@ -546,8 +574,9 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
     begin_anew(1, inputs, history);
     share_begin_ns_ = node(0).at_ns;
     share_end_ns_ = node(1).at_ns;
-    take_weather(now_ns, inputs, history);  // what had waited for this interval
+    take_weather(now_ns, inputs, history);  // a change may have waited for this interval
   }
+  // Advance blocks on their own and exposure tiles to now.
   local_->run(now_ns, window(), local);
   shade_->run(now_ns, model_->samples,
               {inputs.environment, inputs.entities, rays(), workers_, silhouettes_});
@@ -555,13 +584,13 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
                           static_cast<double>(node(1).at_ns - node(0).at_ns);
   fraction_ = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
   if (renewing_ && now_ns == last_now_ns_) {
-    // In a hold frames go on with what has been begun.
+    // Continue with node 1 while sim time stands still, by moving the time of its shares.
     const std::int64_t step_ns = (share_end_ns_ - share_begin_ns_) / kHeldFrames;
     share_begin_ns_ -= step_ns;
     share_end_ns_ -= step_ns;
   }
   last_now_ns_ = now_ns;
-  // As much as has gone by of the time for it.
+  // Compute the share of the samples that the passed time asks for.
   compute(renewing_ ? 0 : 1, share_at(now_ns));
   if (renewing_ && done_ == count) end_renewal(now_ns, inputs, history);
 }
@@ -581,6 +610,7 @@ void CachedSurface::forget_changes() noexcept {
 SampledScene CachedSurface::drawn_scene() const {
   SampledScene scene{geometry_, {}, {}, {}};
   scene::SceneGeometry& out = scene.geometry;
+  // Group the instances by mesh.
   std::vector<std::uint32_t> order(out.instances.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::ranges::stable_sort(order, {}, [&](std::uint32_t i) { return out.instances[i].mesh; });
@@ -588,6 +618,7 @@ SampledScene CachedSurface::drawn_scene() const {
     out.instances[i] = geometry_.instances[order[i]];
     scene.first_sample.push_back(model_->first_sample[order[i]]);
   }
+  // Replace the triangles and vertices of each mesh by the refined ones.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges;
   for (std::size_t m = 0; m < out.meshes.size(); ++m) {
     scene::Mesh& mesh = out.meshes[m];
@@ -605,6 +636,7 @@ SampledScene CachedSurface::drawn_scene() const {
     }
     add_backs(refined, materials_, mesh);
   }
+  // Add the values of the samples at node 0.
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     scene.sky_frac.push_back(model_->samples.samples[i].sky_frac);
     const SampleVertex& vertex = nodes_[storage(0)].vertices[i];

@@ -28,118 +28,125 @@
 
 namespace emit::renderer {
 
-/// A scene whose vertices are samples: every instance has its own.
+/// Scene whose vertices are samples; every instance has its own samples.
 struct SampledScene {
   scene::SceneGeometry geometry;            ///< instances grouped by mesh
   std::vector<std::uint32_t> first_sample;  ///< by instance: sample of its mesh's first vertex
   std::vector<float> sky_frac;              ///< by sample: share of the hemisphere that shows sky
-  /// By sample, K: what it shows, reflected sunlight counted in; tells what a coarser surface may
-  /// leave out.
+  /// Shown temperature by sample, K, with reflected sunlight counted in. It decides which
+  /// differences a coarser surface may leave out.
   std::vector<float> value_k;
 };
 
-/// The thermal method `cached`: temperatures live on samples of the surface. Time goes in intervals
-/// of thermal.first_step_s, cut where the script moves an entity or the weather changes. While
-/// frames interpolate between the two ends of the current one, the next is computed, as much per
-/// frame as sim time has moved: no frame does more than its share, and the result depends on the
-/// inputs alone. What the host does with an entity meanwhile is carried by LocalSteps; after it has
-/// changed the weather, the current interval is computed anew, over frames, before the next one.
+/// The thermal method `cached`: temperatures live on samples of the surface. Time advances in
+/// intervals of thermal.first_step_s, which are cut where the script moves an entity or the weather
+/// changes. Frames interpolate between the two nodes of the current interval. Meanwhile the next
+/// interval is computed, in each frame as much as sim time has moved. No frame does more than its
+/// share, and the result depends on the inputs alone. LocalSteps follows entities that the host
+/// moves. After the host has changed the weather, the current interval is computed anew, over
+/// several frames, before the next one.
 ///
 /// Owner: Renderer. Thread: the renderer's; computes on all cores. Real time: advance() allocates
 /// nothing, on any thread; everything else is setup.
 class CachedSurface {
  public:
+  /// Weather and poses. Both must outlive the call that gets them.
   struct Inputs {
     const Environment& environment;
     std::span<const PoseHistory> entities;
   };
 
-  /// `mover_of_object`: index of an object's PoseHistory, -1: static. `networks` by material, none
-  /// for emit2014. `detail`: where meshes were simplified. Errors: config (an entity without
-  /// triangles), those of CasterRays.
+  /// Makes the surface without samples. `mover_of_object` holds the index of each object's
+  /// PoseHistory, or -1 for static objects. `networks` are by material, and empty for emit2014.
+  /// `detail` is given if meshes were simplified. Errors: config (an entity without triangles),
+  /// those of CasterRays.
   [[nodiscard]] static physics::Result<std::unique_ptr<CachedSurface>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
       std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
       double reference_k, std::optional<SurfaceDetail> detail = std::nullopt);
 
-  /// thermal.state_file, and what the state in it must be made for.
+  /// The state file (thermal.state_file), and the requirements on the state in it.
   struct Saved {
     std::filesystem::path file;
-    StateKey key{};  ///< of the scenario: scenario_key()
-    /// The start of a run: what does not fit is an error, what is not there is written, and what is
-    /// earlier is carried on. False: the file is used where it holds the very instant, and left as
-    /// it is.
+    StateKey key{};  ///< hashes of the scenario, from scenario_key()
+    /// The flag is true at the start of a run: a file that does not fit is an error, a missing file
+    /// is written, and an earlier state is advanced. It is false after a jump of sim time: the file
+    /// is used only if it holds the very instant, and is left as it is.
     bool start = true;
-    /// Whether a surface that was refined for `eyes` will do for the first frame.
+    /// Returns true if a surface that was refined for `eyes` will do for the first frame.
     std::function<bool(std::span<const RefineView::Eye> eyes)> fits_camera;
   };
 
-  /// Samples the surface as it is to be seen at `now_ns`, or takes it from `saved` and carries it
-  /// on to there, and computes the interval that holds it. `plan` and `history` are brought there.
-  /// Setup: seconds. Errors: those of build_surface_model(), read_state(), carry_on() and
-  /// write_state(); config (the saved surface was refined for another camera).
+  /// Samples the surface for `now_ns`, or takes it from `saved` and advances it to there. It also
+  /// computes the interval that holds `now_ns`, and brings `plan` and `history` there. Setup:
+  /// seconds. Errors: those of build_surface_model(), read_state(), carry_on() and write_state();
+  /// config (the saved surface was refined for another camera).
   [[nodiscard]] physics::Result<void> prepare(std::int64_t now_ns, const RefineView& view,
                                               const Inputs& inputs, StepPlan& plan,
                                               SurfaceHistory& history,
                                               const std::optional<Saved>& saved,
                                               const SurfaceProgress& progress);
 
-  /// True when frames at `now_ns` need prepare() first: sim time went back behind the current
-  /// interval or jumped far ahead of it.
+  /// Returns true if frames at `now_ns` need prepare() first: sim time went back behind the current
+  /// interval, or it jumped far ahead of it.
   [[nodiscard]] bool stale(std::int64_t now_ns) const noexcept;
 
   /// Brings the samples to `now_ns`. @pre !stale(now_ns)
   void advance(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
 
-  /// Way of `now_ns` of the last advance() between the two nodes.
+  /// Place of the time of the latest advance() between the two nodes, 0 to 1.
   [[nodiscard]] float fraction() const noexcept { return fraction_; }
-  /// Values at the nodes before (0) and after (1) now, and at the one that is being computed (2).
+  /// Values at the nodes before now (0) and after now (1), and at the node that is being computed
+  /// (2).
   [[nodiscard]] std::span<const SampleVertex> vertices(std::size_t node) const noexcept {
     return nodes_[storage(node)].vertices;
   }
-  /// Index of the storage that node (0..2) has: rotates when an interval ends.
+  /// Index of the storage that node 0, 1 or 2 has. It rotates when an interval ends.
   [[nodiscard]] std::size_t storage(std::size_t node) const noexcept { return (ring_ + node) % 3; }
-  /// What has changed in that storage since forget_changes().
+  /// Ranges of vertices in a storage that have changed since forget_changes().
   [[nodiscard]] std::span<const ChangedRanges::Range> changes(std::size_t storage) const noexcept {
     return nodes_[storage].changes.ranges();
   }
+  /// Forgets the changes of all nodes and of shade().
   void forget_changes() noexcept;
-  /// Temperature of the surroundings where the thermal model carries it.
+  /// Temperature of the surroundings in K; empty if the thermal model does not compute it.
   [[nodiscard]] std::optional<double> surroundings_now_k() const noexcept;
-  /// True while some samples do not know yet of weather that the host has changed by more than
-  /// matters.
+  /// Returns true while some samples lack a change of the weather by the host that matters.
   [[nodiscard]] bool lags() const noexcept { return lags_; }
-  /// Blocks of samples that do not follow the intervals, because the host moves an entity.
+  /// Number of blocks of samples that do not follow the intervals, because the host moves an
+  /// entity.
   [[nodiscard]] std::size_t local_blocks() const noexcept { return local_->active(); }
 
-  /// What entities have shaded lately, finer than samples lie.
+  /// Exposure tiles: recent shade of entities, finer than samples lie.
   [[nodiscard]] const ShadePages& shade() const noexcept { return *shade_; }
-  /// Entities as the sun sees them, where they stand.
+  /// Entity shadow depth maps.
   [[nodiscard]] const Silhouettes& silhouettes() const noexcept { return silhouettes_; }
-  /// The shadow of an entity, on static surfaces.
+  /// Space that an entity may shade, down to static surfaces.
   struct Shadow {
-    bool on = false;
-    /// The convex hull of these, rel, holds what is shaded.
+    bool on = false;  ///< the entity is there and the sun is up
+    /// Points whose convex hull holds everything that is shaded, rel.
     std::array<glm::vec3, 12> hull_m;
   };
   [[nodiscard]] std::span<const Shadow> shadows() const noexcept { return shadows_; }
-  /// Finds shadows() of the entities as they are drawn, under the sun of `sun_ns`.
+  /// Finds shadows() for the poses of the entities at `drawn_ns` and the sun of `sun_ns`.
   void place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns, const Inputs& inputs) noexcept;
-  /// That of an entity, for those that show.
+  /// Brings the shadow depth map of an entity up to date, and places it. Call it for shadows that
+  /// show in the frame.
   /// @pre place_shadows(); shadows()[mover].on
   [[nodiscard]] PlacedSilhouette cast_shadow(std::size_t mover) noexcept;
-  /// Since place_shadows() too many bodies had turned to be looked at in one frame: a shadow has
-  /// the outline of a while ago.
+  /// Returns true if, since place_shadows(), more entities had turned than one frame can make maps
+  /// for. Then some shadow has an outline of a while ago.
   [[nodiscard]] bool stale_shadow() const noexcept { return stale_shadow_; }
-  /// Of rel axes.
+  /// Origin of rel in the world, m.
   [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept {
     return rays().origin_world_m();
   }
 
+  /// The samples. Their states have moved into the nodes. @pre prepare()
   [[nodiscard]] const SurfaceModel& model() const noexcept { return *model_; }
-  /// Main memory that the samples take, without the meshes between them.
+  /// Main memory of the samples in bytes, without the meshes between them.
   [[nodiscard]] std::uint64_t sample_bytes() const noexcept;
-  /// The refined meshes as a scene whose instances are grouped by mesh.
+  /// The refined meshes as a scene whose instances are grouped by mesh. @pre prepare()
   [[nodiscard]] SampledScene drawn_scene() const;
 
  private:
@@ -147,7 +154,7 @@ class CachedSurface {
                 std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
                 CasterRays places, std::optional<SurfaceDetail> detail, double reference_k);
 
-  /// What is known of the scene when a model is made: at the start of the first interval shown.
+  /// Input of making a model, for the start of the first interval shown.
   struct ModelWork {
     std::int64_t start_ns = 0;
     const RefineView& view;
@@ -157,10 +164,12 @@ class CachedSurface {
     SurfaceModelOptions options;
     const SurfaceProgress& progress;
   };
+  /// Takes a model from the state file, or makes it and writes the file.
   [[nodiscard]] physics::Result<SurfaceModel> make_model(const ModelWork& work,
                                                          const std::optional<Saved>& saved) const;
+  /// Samples the surface and integrates its history.
   [[nodiscard]] physics::Result<SurfaceModel> warm_up(const ModelWork& work) const;
-  /// The saved model, carried on to the start; none: it does not fit, and need not.
+  /// The saved model, advanced to the start. It is empty if it does not fit and this is no error.
   [[nodiscard]] physics::Result<std::optional<SurfaceModel>> take_saved(const ModelWork& work,
                                                                         const Saved& saved) const;
   [[nodiscard]] SurfaceInputs surface_inputs(const HistoryRecord& record,
@@ -169,40 +178,45 @@ class CachedSurface {
   [[nodiscard]] RecordInputs record_inputs(const Inputs& inputs) const {
     return {heat_, inputs.environment, inputs.entities, *interval_rays_, rays().origin_world_m()};
   }
+  /// Fills movers_now_ with the poses of the entities.
   void place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities);
+  /// Places of each entity from `from_ns` on, by its script, rel.
   [[nodiscard]] std::vector<std::vector<glm::vec3>> ways_m(
       std::int64_t from_ns, std::span<const PoseHistory> entities) const;
+  /// Makes the exposure tiles and the first shadow depth maps.
   void begin_shade(std::int64_t now_ns, const Inputs& inputs);
-  /// Forcing, gains and rays from `node` to the next one, which nothing has been computed of yet.
+  /// Fills forcing, gains and rays from `node` to the next node, of which nothing is computed yet.
   void begin_interval(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
   /// Advances the samples up to `last` from `node` to the next one.
   void compute(std::size_t node, std::uint32_t last) noexcept;
   void rotate() noexcept { ring_ = (ring_ + 1) % 3; }
-  /// begin_interval(), to the next node.
+  /// Chooses the time of the node after `node`, and begins the interval between them.
   void begin_anew(std::size_t node, const Inputs& inputs, SurfaceHistory& history) noexcept;
-  /// The next instant of the grid, or an earlier one after `now_ns` at which an entity or the
-  /// weather changes.
+  /// Time of the node after `from_ns`: the next instant of the grid, or an earlier one after
+  /// `now_ns` at which an entity or the weather changes.
   [[nodiscard]] std::int64_t next_node_ns(std::int64_t from_ns, std::int64_t now_ns,
                                           const Inputs& inputs) const noexcept;
-  /// Makes node 0 what lies between it and node 1 at `event_ns`, and node 1 the same line's point
-  /// at `end_ns`, but for what samples go on from.
+  /// Moves node 0 to `event_ns`, to the values between it and node 1. The vertices of node 1 move
+  /// to `end_ns` along the same line; its states and outputs stay, because they are computed anew.
   void cut_at(std::int64_t event_ns, std::int64_t end_ns) noexcept;
-  /// Takes in what the host has changed of the weather.
+  /// Reacts to weather that the host has changed.
   void take_weather(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
-  /// The weather has changed at `event_ns`: node 1 was computed without that, and is computed anew
-  /// over the next frames.
+  /// Begins to compute node 1 anew over the next frames, because the weather has changed at
+  /// `event_ns`.
   void begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
                      SurfaceHistory& history) noexcept;
+  /// Finishes node 1 and begins the next interval.
   void end_renewal(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
-  /// True where the weather of `now_ns` is not what node 1 was computed with, by more than changes
-  /// nothing.
+  /// Returns true if the weather of `now_ns` differs from what node 1 was computed with by more
+  /// than the tolerance allows.
   [[nodiscard]] bool matters(std::int64_t now_ns, const Environment& environment) const noexcept;
-  /// Samples that are to be computed by then.
+  /// Number of samples that are to be computed by `now_ns`.
   [[nodiscard]] std::uint32_t share_at(std::int64_t now_ns) const noexcept;
-  /// The earliest change of the weather by the host that was not known before; kNoNews: none.
+  /// Earliest time whose weather the host has changed since the last call; kNoNews if there is
+  /// none.
   [[nodiscard]] std::int64_t take_news(const Environment& environment) noexcept;
   static constexpr std::int64_t kNoNews = std::numeric_limits<std::int64_t>::max();
-  /// What shades.
+  /// Rays against everything that shades, as loaded.
   [[nodiscard]] const CasterRays& rays() const noexcept {
     return detail_ ? detail_->rays() : places_;
   }
@@ -237,27 +251,27 @@ class CachedSurface {
   std::vector<MoverPlacement> movers_now_;
   std::optional<SurfaceModel> model_;
   MoverGlow glow_;
-  std::vector<MoverFaces> faces_;  ///< by entity, at the node that an interval begins with
+  std::vector<MoverFaces> faces_;  ///< by entity, at the node with which the interval begins
 
   std::optional<LocalSteps> local_;
   Silhouettes silhouettes_;
   std::vector<Shadow> shadows_;
-  glm::vec3 to_sun_{0.0F, 0.0F, 1.0F};  ///< of shadows()
+  glm::vec3 to_sun_{0.0F, 0.0F, 1.0F};  ///< unit vector to the sun of shadows()
   bool stale_shadow_ = false;
   std::optional<ShadePages> shade_;
 
   std::array<SurfaceNode, 3> nodes_;
   std::size_t ring_ = 0;
-  std::uint32_t done_ = 0;           ///< samples of the node that is being computed which are
-  std::int64_t share_begin_ns_ = 0;  ///< time in which they are
-  std::int64_t share_end_ns_ = 0;
+  std::uint32_t done_ = 0;           ///< computed samples of the node that is being computed
+  std::int64_t share_begin_ns_ = 0;  ///< begin of the time in which the samples are computed
+  std::int64_t share_end_ns_ = 0;    ///< end of that time
   std::int64_t last_now_ns_ = 0;
-  bool renewing_ = false;           ///< that node is node 1, because the weather has changed
-  bool lags_ = false;               ///< ... by more than the tolerance
-  std::int64_t news_ns_ = kNoNews;  ///< the earliest change of the weather that is not taken in
+  bool renewing_ = false;           ///< node 1 is being computed, because the weather has changed
+  bool lags_ = false;               ///< a change that matters is not known to all samples
+  std::int64_t news_ns_ = kNoNews;  ///< earliest change of the weather that is not taken in
   std::uint32_t turn_ = 0;
   std::int64_t interval_ns_ = 0;
-  std::uint64_t revision_ = 0;  ///< of the weather
+  std::uint64_t revision_ = 0;  ///< revision of the weather that is taken in
   float fraction_ = 0.0F;
 };
 

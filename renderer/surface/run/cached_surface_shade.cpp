@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What entities shade, finer than samples lie: pages of the past and silhouettes of now.
+// Shade of entities in CachedSurface, finer than samples lie: exposure tiles hold past shade, and
+// entity shadow depth maps give the present one.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -13,14 +14,15 @@ namespace emit::renderer {
 void CachedSurface::begin_shade(std::int64_t now_ns, const Inputs& inputs) {
   const physics::Forcing forcing =
       inputs.environment.forcing_at(now_ns, inputs.environment.sun_at(now_ns));
-  constexpr double kSunlitK = 10.0;  // above the air
+  // Linearise the response around a sunlit surface in the weather of now.
+  constexpr double kSunlitK = 10.0;  // typical difference to the air
   shade_.emplace(
       model_->samples, model_->drawn_samples,
       ShadeResponse(heat_, materials_.size(), {forcing.film_w_m2_k, forcing.air_k + kSunlitK}),
       inputs.entities.size(), options_.history_start_ns, static_cast<float>(options_.tolerance_k));
   shade_->restart(now_ns, inputs.entities);
   shadows_.assign(inputs.entities.size(), {});
-  // Frames look at those again that have turned.
+  // Make all shadow depth maps now. Frames make those anew whose entity has turned.
   place_movers(now_ns, inputs.entities);
   const glm::vec3 to_sun(inputs.environment.sun_at(now_ns).direction_enu);
   for (std::size_t m = 0; m < movers_now_.size(); ++m) {
@@ -43,7 +45,8 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
     Shadow& shadow = shadows_[m];
     shadow.on = up && mover.on && diagonal_m > 0.0F;
     if (!shadow.on) continue;
-    // Down to the lowest that lies behind it, and to what lies a little lower.
+    // Find the end of the shadow: the lowest surface behind the entity, and a little lower. Without
+    // any surface the shadow ends after some diagonals.
     constexpr float kFarDiagonals = 20.0F;
     constexpr float kLowerDiagonals = 0.25F;
     std::array<CasterRay, 9> behind;
@@ -61,6 +64,7 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
       }
     }
     end_m -= kLowerDiagonals * diagonal_m;
+    // Bound the corners' shadows at that height, widened by the penumbra.
     glm::vec2 low_m(std::numeric_limits<float>::infinity());
     glm::vec2 high_m = -low_m;
     float farthest_m = 0.0F;
@@ -74,6 +78,7 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
     const float rim_m = silhouettes_.rim_m(m, farthest_m) / to_sun_.z;
     low_m -= rim_m;
     high_m += rim_m;
+    // Add the corners of that rectangle to those of the box.
     shadow.hull_m[8] = {low_m, end_m};
     shadow.hull_m[9] = {high_m, end_m};
     shadow.hull_m[10] = {low_m.x, high_m.y, end_m};

@@ -8,23 +8,25 @@
 namespace emit::renderer {
 namespace {
 
+/// Samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 32;
-/// Steps are that share of an interval, within these bounds.
+/// Number of steps in an interval, and limits of the length of a step.
 constexpr std::int64_t kStepsPerInterval = 16;
 constexpr std::int64_t kLeastStepNs = 250'000'000;
 constexpr std::int64_t kMostStepNs = 1'250'000'000;
-/// Closer than that to where it was foreseen, an entity's shade is as it was taken to be.
+/// Distance and turn from the foreseen pose within which an entity's shade counts as foreseen.
 constexpr double kForeseenM = 0.05;
 constexpr double kForeseenRad = 5e-3;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
+/// Place of an instant between two nodes: 0 at `before`, 1 at `after`.
 double way_of(std::int64_t at_ns, const SurfaceNode& before, const SurfaceNode& after) noexcept {
   return static_cast<double>(at_ns - before.at_ns) /
          static_cast<double>(after.at_ns - before.at_ns);
 }
 
-/// Vertices at both nodes such that the line between them leads through `offset_k` at `at_ns` and
-/// through `end` at `end_ns`.
+/// Sets the vertices of a sample at both nodes so that the line between them passes through
+/// `offset_k` at `at_ns` and through `end` at `end_ns`.
 void draw_line(std::uint32_t sample, std::int64_t at_ns, float offset_k, std::int64_t end_ns,
                const SampleOutput& end, const LocalSteps::Window& window) noexcept {
   if (sample >= window.before.vertices.size()) return;
@@ -99,6 +101,7 @@ void LocalSteps::run(std::int64_t until_ns, const Window& window, const Inputs& 
 
 void LocalSteps::look_around(std::int64_t at_ns, const Window& window,
                              const Inputs& inputs) noexcept {
+  // Find the blocks near entities that have departed, as they go on from now.
   const auto departs = [&](std::size_t m) {
     return inputs.entities[m].departs(known_[0][m], at_ns);
   };
@@ -106,12 +109,13 @@ void LocalSteps::look_around(std::int64_t at_ns, const Window& window,
   for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
     if (!departs(m)) continue;
     if (!std::exchange(ready, true)) {
-      // A step ahead, so that blocks are on their own before what comes is there.
+      // Look a step ahead, so that blocks are on their own before the entity arrives.
       rays_.update(at_ns - turn_ns_, at_ns + step_ns_, 0, inputs.environment,
                    EntityPoses::ahead(inputs.entities), inputs.origin_world_m);
     }
     want(m, rays_, at_ns);
   }
+  // Find once per interval the blocks that were to be shaded by such entities.
   ready = false;
   for (std::size_t m = 0; m < inputs.entities.size(); ++m) {
     if (known_found_[m] != 0 || !departs(m)) continue;
@@ -131,6 +135,7 @@ void LocalSteps::want(std::size_t entity, const IntervalRays& rays, std::int64_t
         !rays.touches(entity, block.centre_m, block.radius_m, block.mover)) {
       continue;
     }
+    // Mark the block as touched, and put it in its group unless it is there already.
     touched_ns_[b] = at_ns;
     if (state_[b] != State::of_interval) continue;
     state_[b] = State::wanted;
@@ -142,8 +147,9 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
                            const Inputs& inputs) noexcept {
   std::vector<std::uint32_t>& blocks = turns_[turn];
   if (blocks.empty()) return;
+  // Make up for the time that has passed.
   bring(blocks, at_ns, window, inputs);
-  // Right before an interval ends nothing is gained by going back to it.
+  // Return blocks that nothing touched in this interval, but not right before the interval ends.
   const bool may_leave = window.after.at_ns - at_ns > turn_ns_;
   const auto leaving = std::ranges::partition(
       blocks, [&](std::uint32_t b) { return !may_leave || touched_ns_[b] >= window.before.at_ns; });
@@ -151,12 +157,15 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
   show(std::span(blocks).first(stay), turn, at_ns, window, inputs);
   hand_back(std::span(blocks).subspan(stay), at_ns, window, inputs);
   blocks.resize(stay);
+  // Leave the surroundings at node `next`, to which the forcing of its interval had brought them.
   inputs.history.restore_surroundings(window.next.surroundings);
 }
 
 void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
                            const SurfaceSamples& all) noexcept {
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
+    // Put blocks that came back in this interval on their own again: they do not lie on the line
+    // between the nodes, so the moved node would hold wrong values of them.
     const bool came_back = state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns;
     if (came_back) turns_[b % kTurns].push_back(b);
     if (came_back || state_[b] == State::wanted) begin_alone(b, event_ns, window, all);
@@ -180,12 +189,13 @@ void LocalSteps::each_sample(std::uint32_t block, const SurfaceSamples& all,
 
 void LocalSteps::begin_alone(std::uint32_t block, std::int64_t at_ns, const Window& window,
                              const SurfaceSamples& all) noexcept {
-  // It may have come back to this interval: `before` holds it where it did.
+  // Begin where the block last came back: node `before` holds it at that instant.
   const std::int64_t from_ns = std::max(at_ns_[block], window.before.at_ns);
   state_[block] = State::on_its_own;
   at_ns_[block] = window.renewing ? from_ns : std::max(at_ns, from_ns);
   const double frac = static_cast<double>(at_ns_[block] - from_ns) /
                       static_cast<double>(window.after.at_ns - from_ns);
+  // Interpolate its states along the interval.
   each_sample(block, all, [&](std::uint32_t i) {
     own_clock_[i] = 1;
     window.before.states[i] = between(window.before.states[i], window.after.states[i], frac);
@@ -195,6 +205,7 @@ void LocalSteps::begin_alone(std::uint32_t block, std::int64_t at_ns, const Wind
 
 void LocalSteps::prepare(std::int64_t begin_ns, std::int64_t end_ns, const Window& window,
                          const Inputs& inputs) noexcept {
+  // Interpolate the surroundings between the nodes, and advance them over the step.
   inputs.history.restore_surroundings(between(window.before.surroundings, window.after.surroundings,
                                               way_of(begin_ns, window.before, window.after)));
   interval_.forcing = inputs.history.extend(begin_ns, end_ns, inputs.environment);
@@ -208,6 +219,8 @@ void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
                       const SurfaceNode& from, const IntervalRays& rays,
                       const HeatInterval& interval, const Inputs& inputs,
                       const Keep& keep) noexcept {
+  // Step a batch on all cores before anything is written, because samples read each other's
+  // outputs.
   const auto flush = [&] {
     inputs.workers.run(batch_.size(), kGrain, [&](std::size_t begin, std::size_t stop) {
       for (std::size_t k = begin; k < stop; ++k) {
@@ -222,6 +235,7 @@ void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
     }
     batch_.clear();
   };
+  // Fill batches block by block.
   for (const std::uint32_t block : blocks) {
     const auto samples = blocks_.samples(block);
     if (batch_.size() + samples.size() > kBatch) flush();
@@ -234,9 +248,11 @@ void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
 
 void LocalSteps::bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns,
                        const Window& window, const Inputs& inputs) noexcept {
+  // Take blocks that are new to the group out of the interval, one step ago.
   for (const std::uint32_t b : blocks) {
     if (state_[b] == State::wanted) begin_alone(b, to_ns - step_ns_, window, inputs.step.all);
   }
+  // Adopt the step ahead if the poses came as foreseen.
   const bool as_foreseen =
       came_true(static_cast<std::size_t>(blocks.front()) % kTurns, to_ns, inputs);
   for (const std::uint32_t b : blocks) {
@@ -247,7 +263,7 @@ void LocalSteps::bring(std::span<const std::uint32_t> blocks, std::int64_t to_ns
     });
     at_ns_[b] = to_ns;
   }
-  // Nearly all of the others stepped together before.
+  // Step the others in sets that begin at the same instant. Nearly all of them form one set.
   for (std::int64_t from_ns = kNever;;) {
     std::int64_t earliest_ns = to_ns;
     for (const std::uint32_t b : blocks) {
@@ -280,6 +296,7 @@ void LocalSteps::show(std::span<const std::uint32_t> blocks, std::size_t turn, s
          window.after.states[i] = state;
          window.after.outputs[i] = output;
        });
+  // Note the poses that the step ahead was made with.
   for (const std::uint32_t b : blocks) foreseen_ns_[b] = end_ns;
   for (std::size_t m = 0; m < foreseen_[turn].size(); ++m) {
     foreseen_[turn][m] = inputs.entities[m].ahead(end_ns);
@@ -302,6 +319,7 @@ bool LocalSteps::came_true(std::size_t turn, std::int64_t at_ns,
 void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t at_ns,
                            const Window& window, const Inputs& inputs) noexcept {
   if (blocks.empty()) return;
+  // Advance the blocks over the rest of the interval.
   prepare(at_ns, window.after.at_ns, window, inputs);
   step(blocks, std::numeric_limits<std::uint32_t>::max(), window.before, rays_, interval_, inputs,
        [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
@@ -309,7 +327,7 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
          window.after.states[i] = state;
          window.after.outputs[i] = output;
        });
-  // What has been computed of the next interval began without that.
+  // Repeat the part of the next interval that is computed already: it began without these states.
   step(blocks, window.done, window.after, window.next_rays, window.next_interval, inputs,
        [&](std::uint32_t i, const SampleState& state, const SampleOutput& output) {
          window.next.states[i] = state;
@@ -325,7 +343,7 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
 }
 
 void LocalSteps::rotate(const Window& window, const SurfaceSamples& all) noexcept {
-  // Where those begin must still lie between the two nodes.
+  // Take wanted blocks out now, while the instant at which they begin lies between the two nodes.
   for (const auto& turn : turns_) {
     for (const std::uint32_t b : turn) {
       if (state_[b] == State::wanted) begin_alone(b, window.after.at_ns - step_ns_, window, all);
@@ -334,16 +352,19 @@ void LocalSteps::rotate(const Window& window, const SurfaceSamples& all) noexcep
 }
 
 void LocalSteps::rotated(const Window& window, const SurfaceSamples& all) noexcept {
+  // Make the poses of the next interval those of the current one.
   std::swap(known_[0], known_[1]);
   std::ranges::fill(known_found_, std::uint8_t{0});
-  const SurfaceNode& old = window.next;  // the node before those two
+  const SurfaceNode& old = window.next;  // the node before the current interval
   const auto ways =
       static_cast<float>(static_cast<double>(window.after.at_ns - window.before.at_ns) /
                          static_cast<double>(window.before.at_ns - old.at_ns));
+  // Let blocks that came back follow the clock of the nodes again.
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
     if (state_[b] != State::of_interval || at_ns_[b] < old.at_ns) continue;
     each_sample(b, all, [&](std::uint32_t i) { own_clock_[i] = 0; });
   }
+  // Move blocks on their own back by one node, and extend their line to the new end.
   for (const auto& turn : turns_) {
     for (const std::uint32_t block : turn) {
       each_sample(block, all, [&](std::uint32_t i) {

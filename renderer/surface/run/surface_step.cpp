@@ -6,11 +6,13 @@
 namespace emit::renderer {
 namespace {
 
+/// Input of a sample over an interval. Other samples count with their output at its begin.
 SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
                      std::span<const SampleOutput> begin, const SurfaceSample& sample,
                      const RayOffsets& offsets, const SunShare& sun) noexcept {
   SampleDrive drive;
   drive.sun_frac = sun.frac;
+  // Replace the sky behind entities by the long-wave radiation of the one that hides most.
   const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, offsets.around_m);
   drive.hidden_sky_frac = hidden.frac;
   if (hidden.frac > 0.0F && !step.faces.empty()) {
@@ -20,7 +22,7 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
       drive.longwave_begin_w_m2 += sample.sky_frac * hidden.frac * sent_w_m2;
     }
   }
-  // Add what the samples send that it sees.
+  // Add the radiation of the samples that it sees.
   double longwave_w_m2 = 0.0;
   double shortwave_w_m2 = 0.0;
   for (std::uint32_t k = 0; k < sample.seen_count; ++k) {
@@ -31,7 +33,7 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
   }
   drive.longwave_begin_w_m2 += sample.seen_scale * longwave_w_m2;
   drive.shortwave_w_m2 = sample.seen_scale * shortwave_w_m2;
-  // Neighbours change by hundredths of a kelvin in an interval: their start stands for it.
+  // Let the start of the interval stand for all of it: neighbours change by hundredths of a kelvin.
   drive.longwave_end_w_m2 = drive.longwave_begin_w_m2;
   for (std::size_t p = 0; p < kMaxPartners; ++p) {
     const std::uint32_t partner = sample.partners[p].sample;
@@ -48,6 +50,7 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
                  const HeatInterval& interval, std::span<const SampleOutput> begin,
                  std::uint32_t index, SteppedSample& stepped) noexcept {
   const SurfaceSample& sample = step.all.samples[index];
+  // Take ray offsets for the place of the sample, of an entity for where it stands now.
   RayOffsets offsets = step.offsets;
   if (sample.mover < 0) {
     offsets = offsets.at(sample.position_m);
@@ -64,9 +67,11 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   const glm::vec3 normal = interval_rays.normal(sample);
   if (sample.other_side == kNoSample) {
     stepped.output = step.heat.advance(sample, normal, interval, drive, stepped.state);
+    // Show the sun that static geometry leaves, because frames have their own shade of entities.
     stepped.output.sun_frac = sun.fixed_frac;
     return;
   }
+  // Advance a sheet by the mean of what both faces receive.
   const SurfaceSample& behind = step.all.samples[sample.other_side];
   const SunShare sun_behind = sun_of(behind);
   const SampleDrive back_drive = drive_of(step, interval_rays, begin, behind, offsets, sun_behind);

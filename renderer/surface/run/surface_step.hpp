@@ -13,24 +13,26 @@
 
 namespace emit::renderer {
 
-/// What every step of a surface takes; all outlive it.
+/// Input that all steps of a surface share. Everything it refers to must outlive it.
 struct SurfaceStep {
   const SurfaceSamples& all;
   const SampleHeat& heat;
   const CasterRays& rays;
   RayOffsets offsets;
-  std::span<const MoverFaces> faces;  ///< by entity; empty: entities send what surroundings do
+  std::span<const MoverFaces> faces;  ///< by entity; if empty, entities send what surroundings do
 };
 
-/// A sample after a step, and of a sheet the other side, which has the same state.
+/// Result of a step of a sample. `behind` is the output of a sheet's other face, which has the same
+/// state.
 struct SteppedSample {
   SampleState state;
   SampleOutput output;
   SampleOutput behind;
 };
 
-/// Carries sample `index` on over an interval from the state in `sample`; of a sheet the side with
-/// the lower index. `begin`: all samples at the interval's begin. Any thread; RT-safe.
+/// Advances sample `index` over an interval, from the state in `sample`. Of a sheet, `index` must
+/// be the face with the lower index. `begin` holds the outputs of all samples at the begin of the
+/// interval. Any thread; RT-safe.
 void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
                  const HeatInterval& interval, std::span<const SampleOutput> begin,
                  std::uint32_t index, SteppedSample& sample) noexcept;

@@ -13,36 +13,45 @@
 namespace emit::renderer {
 namespace {
 
-/// Nearer to where it stood at the start an entity has not moved.
+/// An entity counts as not moved while it is closer than this to its pose at restart().
 constexpr double kStayedM = 0.05;
 constexpr double kStayedRad = 5e-3;
-/// Lower suns draw shadows too long for pages, and warm level ground little.
+/// Sine of the lowest sun that tiles are made for. A lower sun draws shadows too long for them and
+/// hardly warms level ground.
 constexpr double kLeastSunSine = 0.05;
+/// Least number of texels along the diagonal of an entity's box. The level of the tiles follows
+/// from it.
 constexpr float kTexelsPerDiagonal = 64.0F;
 constexpr int kFinestLevel = -8;
 constexpr int kCoarsestLevel = 10;
-/// Levels that a long shadow may be coarser than its body's diagonal asks.
+/// Number of levels by which tiles of a long shadow may be coarser than the entity's diagonal asks.
 constexpr int kMostCoarser = 4;
-/// Places farther apart than that share of the diagonal leave gaps.
+/// Places of an entity that are farther apart than this share of its diagonal would leave gaps in
+/// the shade.
 constexpr float kMostGapFrac = 0.5F;
-/// By less the tops of what is shaded do not change.
+/// Smallest rise of a shaded height that is recorded, in m.
 constexpr float kTopStepM = 0.02F;
-/// Vertices are told no smaller changes.
+/// Smallest change of a vertex that is sent to the device, in K.
 constexpr float kLeastChangeK = 5e-5F;
-/// An entity that comes farther within a step casts from several places.
+/// Longest way of an entity between two places of a step, in texels. A longer way takes more
+/// places.
 constexpr float kPlaceTexels = 4.0F;
-/// Shadows of what does not move creep over vertices that were not there before.
+/// Time after which the vertices of a tile are gathered anew: the shadow of a parked entity creeps
+/// over vertices that it did not reach before.
 constexpr std::int64_t kGatherNs = 10'000'000'000;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min() / 2;
+/// Margin above and below the heights that a tile covers, in m.
 constexpr float kReachMarginM = 0.5F;
-/// Ground that falls by more within a page, in sides of it, is not the page's.
+/// Depth below the plane, as a share of the tile's side, to which a tile shades ground. Lower
+/// ground belongs to another surface.
 constexpr float kLowestFrac = 0.25F;
+/// Limits of the squares by which vertices are found: smallest side, largest number along an axis.
 constexpr float kLeastSquareM = 4.0F;
 constexpr int kMostSquares = 1024;
-/// A page that is worth less, in tolerances, is given back.
+/// A tile that holds less than this, in tolerances, is given back.
 constexpr float kLeastWorthFrac = 0.5F;
 
-/// By mode: what is left of shade that is so much older.
+/// Share of older shade that is left after `turns` turns, by mode.
 glm::vec4 left_after(std::int64_t turns) noexcept {
   const double seconds = 1e-9 * static_cast<double>(turns * ShadePages::kTurnNs);
   glm::vec4 left;
@@ -53,6 +62,7 @@ glm::vec4 left_after(std::int64_t turns) noexcept {
   return left;
 }
 
+/// Level of the tiles for an entity of that diagonal: texels are 2^level m wide.
 int level_of(float diagonal_m) noexcept {
   return std::clamp(static_cast<int>(std::floor(std::log2(diagonal_m / kTexelsPerDiagonal))),
                     kFinestLevel, kCoarsestLevel);
@@ -74,9 +84,11 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
       place_count_(entities, 0),
       at_start_(entities) {
   if (entities == 0) return;
+  // Find the largest weight of each mode: with it worth_k() bounds all materials.
   for (const glm::vec4& weights : response_.weights_k()) {
     most_weight_k_ = glm::max(most_weight_k_, weights);
   }
+  // Take all memory now, because steps must not allocate.
   for (Page& page : pages_) {
     page.shade.assign(std::size_t{kSide} * kSide, glm::vec4(0.0F));
     page.target.assign(std::size_t{kSide} * kSide, 0.0F);
@@ -87,6 +99,7 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
   vertices_k_.assign(drawn, 0.0F);
   changes_.add(0, drawn);
 
+  // Find the box of the static vertices.
   glm::vec3 low_m(std::numeric_limits<float>::infinity());
   glm::vec3 high_m = -low_m;
   const auto counts = [&](std::uint32_t i) { return all.samples[i].mover < 0; };
@@ -107,6 +120,7 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
     return static_cast<std::size_t>(at.y) * static_cast<std::size_t>(squares_.x) +
            static_cast<std::size_t>(at.x);
   };
+  // Sort the vertices by square: count them, add the counts up, then fill.
   first_of_square_.assign(
       static_cast<std::size_t>(squares_.x) * static_cast<std::size_t>(squares_.y) + 1, 0);
   for (std::uint32_t i = 0; i < drawn; ++i) {
@@ -142,15 +156,18 @@ void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
   if (pages_.empty()) return;
   first_turn_ = next_turn_;
   const std::int64_t end = std::max<std::int64_t>(0, until_ns - start_ns_) / kTurnNs + 1;
+  // Forget everything if sim time went back.
   if (end < next_turn_) {
     restart(until_ns, inputs.entities);
     short_turn_ = next_turn_;
     return;
   }
+  // Do normal steps if sim time moves at about its normal rate.
   if (end - next_turn_ <= kTurnsPerFrame) {
     for (; next_turn_ < end; ++next_turn_) take_turn(next_turn_, kTurns, all, inputs);
     return;
   }
+  // After a long jump, let what the tiles hold fade over the part that is left out.
   if (end - next_turn_ > kMostWindows * kMostWindowTurns) {
     next_turn_ = end - kMostWindows * kMostWindowTurns;
     for (Page& page : pages_) {
@@ -158,6 +175,7 @@ void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
       page.at_turn = next_turn_ - 1;
     }
   }
+  // Step all tiles over the rest, in a few windows of about equal length.
   const std::int64_t due = end - next_turn_;
   const std::int64_t windows = std::min(kMostWindows, due / kTurns);
   for (std::int64_t w = windows; w > 0; --w) {
@@ -204,11 +222,13 @@ ShadePages::Page* ShadePages::take_page(std::int64_t turn, bool come) noexcept {
   Page* least = nullptr;
   const auto unused = std::ranges::find(keys_, kNoLevel, &Key::level);
   if (unused != keys_.end()) return &pages_[static_cast<std::size_t>(unused - keys_.begin())];
+  // Find the tile that holds least, among those on which no moved entity casts now.
   for (Page& page : pages_) {
     if (!come || page.come_turn > turn - kTurns) continue;
     if (least == nullptr || worth_k(page) < worth_k(*least)) least = &page;
   }
   if (!come) return nullptr;
+  // Report a loss if there is no such tile, or if it holds shade that matters.
   if (least == nullptr || (least->come_turn > kNever && worth_k(*least) > tolerance_k_)) {
     short_turn_ = turn;
   }
@@ -220,6 +240,7 @@ std::optional<float> ShadePages::plane_of(int level, const glm::ivec2& cell, flo
                                           const CasterRays& rays) const noexcept {
   const float own_m = std::ldexp(1.0F, level) * kOwnSide;
   const glm::vec2 middle_m = own_m * (glm::vec2(cell) + 0.5F);
+  // Send five rays down, to the centre of the square and to the centres of its quarters.
   std::array<CasterRay, 5> down;
   for (std::size_t i = 0; i < down.size(); ++i) {
     const glm::vec2 aside((i & 1U) != 0U ? 0.25F : -0.25F, (i & 2U) != 0U ? 0.25F : -0.25F);
@@ -228,12 +249,12 @@ std::optional<float> ShadePages::plane_of(int level, const glm::ivec2& cell, flo
   std::array<CasterHit, down.size()> hits;
   const std::uint32_t met = rays.first_hits(down, {true, {}}, hits);
   if (met == 0) return std::nullopt;
-  // What stands on the ground takes shade along the same rays.
+  // Take the lowest hit: things that stand on the ground are shaded along the same rays.
   float plane_m = std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < down.size(); ++i) {
     if (((met >> i) & 1U) != 0) plane_m = std::min(plane_m, top_m - hits[i].distance_m);
   }
-  // Rays belong to one page each where neighbours have one plane.
+  // Adopt the plane of a neighbour that is close, so that each ray of the sun belongs to one tile.
   float nearest_m = 0.5F * kLowestFrac * own_m;
   std::optional<float> neighbours_m;
   for (const Page& page : pages_) {
@@ -284,10 +305,13 @@ void ShadePages::cast(std::size_t mover, std::int64_t turn, std::int64_t turns, 
     return MoverPlacement{glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
                           glm::vec3(state.pose.position_world_m - origin_m), state.on};
   };
+  // Leave out an entity that is away or has no surface.
   place_count_[mover] = 0;
   const MoverPlacement middle = placement_at(begin_ns + (end_ns - begin_ns) / 2);
   const float diagonal_m = inputs.silhouettes.diagonal_m(mover);
   if (!middle.on || !(diagonal_m > 0.0F)) return;
+  // Leave out an entity that is so fast that its places would leave gaps. Report a loss if its
+  // shade would have changed the temperature by more than the tolerance.
   const float way_m =
       glm::distance(placement_at(begin_ns).position_m, placement_at(end_ns).position_m);
   if (way_m > kMostGapFrac * diagonal_m * kMostPlaces) {
@@ -295,10 +319,12 @@ void ShadePages::cast(std::size_t mover, std::int64_t turn, std::int64_t turns, 
     if (come && passing_k(window_s * diagonal_m / way_m) > tolerance_k_) short_turn_ = turn;
     return;
   }
+  // Bring its shadow depth map up to date for the middle of the step.
   const glm::vec3 sun(to_sun);
   const bool sharp = inputs.silhouettes.look(mover, sun * middle.rel_from_body,
                                              Silhouettes::kSmearedRad, inputs.rays, inputs.workers);
   if (!sharp && come) short_turn_ = turn;
+  // Choose the number of places, a power of two, so that they are a few texels apart.
   const float texel_m = std::ldexp(1.0F, level_of(diagonal_m));
   std::uint32_t places = 1;
   while (places < kMostPlaces && way_m > kPlaceTexels * texel_m * static_cast<float>(places)) {
@@ -311,7 +337,7 @@ void ShadePages::cast(std::size_t mover, std::int64_t turn, std::int64_t turns, 
     if (!placement.on) continue;
     const PlacedSilhouette placed = inputs.silhouettes.place(mover, placement, sun);
     places_[mover * kMostPlaces + place_count_[mover]++] = {placed, i, places};
-    // The ground behind it.
+    // Find the ground behind it, along the sun's rays.
     const CasterRay behind{inputs.silhouettes.middle_m(mover, placement), -sun};
     std::array<CasterHit, 1> hit;
     if (inputs.rays.first_hits({&behind, 1}, {true, {}}, hit) == 0) continue;
@@ -329,7 +355,7 @@ void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t t
   float texel_m = std::ldexp(1.0F, level);
   glm::ivec2 first(0);
   glm::ivec2 last(-1);
-  // Long shadows have wider texels.
+  // Widen the texels until few enough tiles hold the shadow: a long shadow needs coarser ones.
   for (int coarser = 0;; ++coarser) {
     const float own_m = texel_m * kOwnSide;
     const glm::vec2 size = (box.high_m - box.low_m) / own_m;
@@ -346,6 +372,7 @@ void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t t
     ++level;
     texel_m *= 2.0F;
   }
+  // List every tile that the shadow touches, and take new ones.
   for (int y = first.y; y <= last.y; ++y) {
     for (int x = first.x; x <= last.x; ++x) {
       if (!meets(placed, texel_m, {x, y}, ground_m)) continue;
@@ -354,7 +381,7 @@ void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t t
         page = take_page(turn, come);
         if (page == nullptr || !begin(*page, level, {x, y}, top_m, inputs.rays)) continue;
         keys_[static_cast<std::size_t>(page - pages_.data())] = {level, {x, y}};
-        // Its first turn will be of as much time as any.
+        // Set the tile back in time, so that its first step is as long as every other one.
         const auto group = static_cast<std::int64_t>(page - pages_.data()) % kTurns;
         const std::int64_t wait = turns == kTurns ? (group - turn % kTurns + kTurns) % kTurns : 0;
         page->at_turn = turn + wait - turns;
@@ -380,6 +407,7 @@ bool ShadePages::meets(const PlacedSilhouette& placed, float texel_m, const glm:
   const float own_m = texel_m * kOwnSide;
   glm::vec2 low(std::numeric_limits<float>::infinity());
   glm::vec2 high = -low;
+  // Project the cell's corners, its rim included, onto the entity shadow depth map.
   float depth_m = 0.0F;
   for (int i = 0; i < 4; ++i) {
     const glm::vec2 corner((i & 1) != 0 ? 1.0F : 0.0F, (i & 2) != 0 ? 1.0F : 0.0F);
@@ -390,6 +418,7 @@ bool ShadePages::meets(const PlacedSilhouette& placed, float texel_m, const glm:
     high = glm::max(high, at);
     depth_m = std::max(depth_m, glm::dot(placed.depth_m, p));
   }
+  // Compare with the box of the map's filled texels, widened by the penumbra.
   constexpr float kMiddle = 0.5F * Silhouettes::kSide;
   const glm::vec2 half = placed.half + penumbra_texels(placed, depth_m);
   return glm::all(glm::lessThanEqual(low, kMiddle + half)) &&
@@ -398,6 +427,8 @@ bool ShadePages::meets(const PlacedSilhouette& placed, float texel_m, const glm:
 
 void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const glm::vec4& gain,
                        const Silhouettes& silhouettes) noexcept {
+  // Add up the shaded share of each texel, over all entities that cast on the tile and all of their
+  // places.
   constexpr auto kLast = static_cast<int>(kSide) - 1;
   for (const Cast& cast : casts_) {
     if (cast.page != index) continue;
@@ -409,8 +440,10 @@ void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const g
       const auto texel_of = [&](const glm::vec2& at_m, float aside) {
         return glm::clamp((at_m - page.first_m) / page.texel_m + aside, -1.0F, kEnd);
       };
+      // Visit only the texels that this place may shade.
       const glm::ivec2 first = glm::max(floor_of(texel_of(box.low_m, -1.0F)), 0);
       const glm::ivec2 last = glm::min(floor_of(texel_of(box.high_m, 1.0F)), kLast);
+      // Express a texel's place on the depth map as origin + x * right + y * up.
       const auto line = [&](const glm::vec4& axis) {
         return glm::dot(axis, glm::vec4(page.first_m, page.plane_m, 1.0F));
       };
@@ -430,7 +463,7 @@ void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const g
           if (frac == 0.0F) continue;
           row[x] += frac;
           found += frac;
-          // Whatever lies deeper along this ray is in the shade.
+          // Record how high the shade begins: everything deeper along this ray is shaded.
           const float top_m =
               (silhouettes.caster_m(cast.mover, at.x, at.y) - at.z) * placed.depth_m.z;
           if (top_m > tops_m[x] + kTopStepM) raise(page, x, y, top_m);
@@ -439,6 +472,7 @@ void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const g
       }
     }
   }
+  // Advance the modes of the texels: exact for shade that is constant over the step.
   glm::vec4 most(0.0F);
   for (std::size_t y = 0; y < kSide; ++y) {
     if (page.marked[y] == 0) continue;
@@ -457,7 +491,7 @@ void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const g
 }
 
 void ShadePages::raise(Page& page, int x, int y, float top_m) noexcept {
-  // Neighbours too: between texels shade is that of both.
+  // Raise the neighbours too, because shade is interpolated between texels.
   constexpr auto kLast = static_cast<int>(kSide) - 1;
   for (int row = std::max(0, y - 1); row <= std::min(kLast, y + 1); ++row) {
     for (int column = std::max(0, x - 1); column <= std::min(kLast, x + 1); ++column) {
@@ -476,6 +510,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, const SurfaceS
   const physics::SunPosition sun = inputs.environment.sun_at(middle_ns);
   casts_.clear();
   float flux_frac = 0.0F;
+  // List who casts on which tile. Entities that have moved come first, so that they get tiles.
   if (sun.direction_enu.z > kLeastSunSine) {
     const physics::Forcing forcing = inputs.environment.forcing_at(middle_ns, sun);
     flux_frac = static_cast<float>(forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) /
@@ -489,7 +524,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, const SurfaceS
       }
     }
   }
-  // Within a frame's time pages take turns.
+  // Step one group of tiles in a step of normal length, so that frames share the work.
   const std::size_t stride = turns == kTurns ? kTurns : 1;
   const std::size_t first = static_cast<std::size_t>(turn) % stride;
   inputs.workers.run(pages_.size() / stride, 1, [&](std::size_t from, std::size_t to) {
@@ -506,6 +541,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, const SurfaceS
       }
     }
   });
+  // Give back tiles that hold next to nothing, and show the others at their vertices.
   for (std::size_t p = first; p < pages_.size(); p += stride) {
     Page& page = pages_[p];
     if (!page.used) continue;
@@ -518,6 +554,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, const SurfaceS
 }
 
 glm::vec4 ShadePages::at(const Page& page, const glm::vec3& position_m) const noexcept {
+  // Follow the sun's ray from the place to the plane.
   const float height_m = position_m.z - page.plane_m;
   const glm::vec2 at = (glm::vec2(position_m) - height_m * slope_ - page.first_m) / page.texel_m;
   constexpr float kLast = kSide - 1.001F;
@@ -540,6 +577,7 @@ void ShadePages::gather(Page& page, const SurfaceSamples& all, std::int64_t at_n
   const float own_m = page.texel_m * kOwnSide;
   const glm::vec2 low_m = own_m * glm::vec2(page.cell);
   const glm::vec2 high_m = low_m + own_m;
+  // Find the squares from which the sun's rays lead into the tile.
   const glm::vec2 reach_m = std::max(page.reach_m, -page.lowest_m) * glm::abs(slope_);
   const auto square_at = [&](const glm::vec2& at_m) {
     return glm::clamp(floor_of((at_m - squares_m_) / square_m_), glm::ivec2(0), squares_ - 1);
@@ -568,7 +606,7 @@ void ShadePages::gather(Page& page, const SurfaceSamples& all, std::int64_t at_n
       }
     }
   }
-  // Neighbours in memory go to the device together.
+  // Sort them, because neighbours in memory go to the device in one range.
   std::ranges::sort(page.members, {}, &Member::sample);
 }
 
@@ -582,10 +620,12 @@ void ShadePages::hide_vertices(Page& page) noexcept {
 
 void ShadePages::show_vertices(Page& page, const SurfaceSamples& all,
                                std::int64_t now_ns) noexcept {
+  // Gather the vertices again from time to time, because the sun moves on.
   if (page.members_ns <= now_ns - kGatherNs) {
     hide_vertices(page);
     gather(page, all, now_ns);
   }
+  // Correct each vertex whose value has changed by more than the device needs to know.
   for (Member& member : page.members) {
     const SurfaceSample& sample = all.samples[member.sample];
     if (page.changed) member.shade = at(page, sample.position_m);

@@ -23,16 +23,17 @@
 
 namespace emit::renderer {
 
-/// Where entities have shaded static surfaces lately, in texels of centimetres: triangles there are
-/// as large as the warm-up left them, because nobody knew. Level squares of ground, pages, are
-/// taken where shade falls and given back when nothing is left of it. A texel holds for each mode
-/// of ShadeResponse the mean of shade times direct sun with the weight exp(-age / tau), so that
-/// -sum w_k A_k, times the cosine and the share of the sun that what stands still leaves, is what
-/// entities have changed of the temperature there.
+/// Exposure tiles: squares of level ground that remember how long entities have shaded static
+/// surfaces. Their texels are centimetres wide, because triangles there are as large as the warm-up
+/// left them: nobody knew where an entity would go. A tile is taken where shade falls and given
+/// back when almost nothing of the shade is left. A texel holds A_k for each mode k of
+/// ShadeResponse: the mean of shaded share times direct sun with the weight exp(-age / tau_k)
+/// (physics.md eq. 25). Entities have changed the temperature at a place by -sum w_k A_k times the
+/// cosine to the sun times the share of the sun's disc that static geometry leaves.
 ///
-/// Frames add that by pixel, and take the same off by vertex, where samples hold it already in
-/// full: the sum is what samples have, with edges where they are. What the response gets wrong, it
-/// gets wrong between a pixel and its vertices only.
+/// Frames add this change per pixel and take it off again per vertex, because the samples hold the
+/// whole change already. The sum has the temperatures of the samples and the edges of the tiles. An
+/// error of the response shows only as a difference between a pixel and its vertices.
 ///
 /// Owner: CachedSurface. Thread: the renderer's; computes on all cores. Real time: everything but
 /// the constructor is RT-safe.
@@ -40,51 +41,59 @@ class ShadePages {
  public:
   static constexpr std::size_t kPages = 128;
   static constexpr std::uint32_t kSide = EMIT_PAGE_SIDE;
-  /// Texels of a page's own; the rim is its neighbours'.
+  /// Texels along a side that belong to the tile itself. The outermost texels repeat those of its
+  /// neighbours.
   static constexpr std::uint32_t kOwnSide = kSide - 2;
-  /// A page is carried on by so much at a time, as a rule; pages take turns.
+  /// Normal time step of a tile, in ns. In each turn of kTurnNs one of kTurns groups of tiles does
+  /// its step.
   static constexpr std::int64_t kStepNs = 200'000'000;
   static constexpr std::int64_t kTurns = 8;
   static constexpr std::int64_t kTurnNs = kStepNs / kTurns;
   static constexpr std::int64_t kShortTurns = 10'000'000'000 / kTurnNs;
-  /// Where sim time goes faster than that, all pages are carried on at a time, by so much at most,
-  /// so often at most; after a jump shade is made up for over the last of that.
+  /// Longest time, in turns, that run() covers in steps of normal length. For a longer time it
+  /// steps all tiles at once, in at most kMostWindows windows of at most kMostWindowTurns. After a
+  /// jump of sim time only the latest part, of that length in all, is made up for.
   static constexpr std::int64_t kTurnsPerFrame = 3 * kTurns;
   static constexpr std::int64_t kMostWindowTurns = 15'000'000'000 / kTurnNs;
   static constexpr std::int64_t kMostWindows = 4;
-  /// A page of so many vertices is fine enough as it is.
+  /// Largest number of vertices of a tile. Triangles of a tile with more vertices are fine enough
+  /// without it.
   static constexpr std::size_t kMostMembers = 4096;
 
+  /// A static vertex whose shade a tile holds.
   struct Member {
     std::uint32_t sample = 0;
-    glm::vec4 shade{0.0F};  ///< as the texels around it have it
-    float shown_k = 0.0F;   ///< of vertices_k(), by this page
+    glm::vec4 shade{0.0F};  ///< A_k of the texels around the vertex, by mode
+    float shown_k = 0.0F;   ///< this tile's part of vertices_k()
   };
+  /// One exposure tile. Coordinates are rel, in metres.
   struct Page {
     bool used = false;
-    bool changed = false;      ///< texels, since forget_changes()
-    bool top_changed = false;  ///< top_m, since forget_changes()
-    bool fine = false;         ///< has more vertices than kMostMembers: not shown
-    int level = 0;             ///< texels of 2^level m
-    glm::ivec2 cell{0};        ///< own squares of that level, from the origin of rel
+    bool changed = false;      ///< texels have changed since forget_changes()
+    bool top_changed = false;  ///< top_m has changed since forget_changes()
+    bool fine = false;         ///< it has more vertices than kMostMembers and is not shown
+    int level = 0;             ///< texels are 2^level m wide
+    glm::ivec2 cell{0};  ///< place in the grid of own squares of that level, from the origin of rel
     float texel_m = 1.0F;
-    glm::vec2 first_m{0.0F};       ///< middle of the first texel, rel
-    float plane_m = 0.0F;          ///< height of the plane, rel
-    float reach_m = 0.0F;          ///< nothing higher above the plane is shaded
-    float lowest_m = 0.0F;         ///< nor is it sought lower, negative
-    glm::vec4 left_frac{1.0F};     ///< of what texels and members hold, by mode
+    glm::vec2 first_m{0.0F};    ///< centre of the first texel
+    float plane_m = 0.0F;       ///< height of the tile's plane
+    float reach_m = 0.0F;       ///< points higher above the plane are not shaded
+    float lowest_m = 0.0F;      ///< points lower than this above the plane are not shaded; negative
+    glm::vec4 left_frac{1.0F};  ///< by mode: factor of what texels and members hold
     std::vector<glm::vec4> shade;  ///< kSide rows of kSide texels
-    std::vector<float> target;     ///< likewise: scratch of a step
-    /// Likewise: nothing higher above the plane was shaded along these rays, m.
+    std::vector<float> target;     ///< scratch of a step: shaded share, by texel
+    /// Height above the plane, in m, above which nothing was shaded along the sun's ray through a
+    /// texel, by texel.
     std::vector<float> top_m;
-    std::array<std::uint8_t, kSide> marked{};  ///< by row: something of it is not zero
+    std::array<std::uint8_t, kSide> marked{};  ///< by row: 1 where a texel may differ from 0
     std::vector<Member> members;
-    glm::vec4 most{0.0F};  ///< of the texels
-    std::int64_t members_ns = 0;
-    std::int64_t at_turn = 0;    ///< texels are those of then
-    std::int64_t cast_turn = 0;  ///< latest in which an entity cast on it
-    std::int64_t come_turn = 0;  ///< likewise, one that has come since the start
+    glm::vec4 most{0.0F};         ///< largest value of the texels, by mode
+    std::int64_t members_ns = 0;  ///< time at which members were gathered
+    std::int64_t at_turn = 0;     ///< turn up to which the tile has stepped
+    std::int64_t cast_turn = 0;   ///< latest turn in which an entity cast on it
+    std::int64_t come_turn = 0;   ///< latest turn in which a moved entity cast on it
   };
+  /// Data that a step reads, and the entity shadow depth maps that it makes anew where needed.
   struct Inputs {
     const Environment& environment;
     std::span<const PoseHistory> entities;
@@ -93,96 +102,116 @@ class ShadePages {
     Silhouettes& silhouettes;
   };
 
-  /// `drawn`: samples that are vertices. `start_ns`: a node of the grid that steps begin at.
+  /// Takes memory for all tiles where there are entities. `drawn` is the number of samples that are
+  /// vertices. `start_ns` is a node of the grid on which steps begin. `tolerance_k` is
+  /// thermal.tolerance_k.
   ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResponse response,
              std::size_t entities, std::int64_t start_ns, float tolerance_k);
 
-  /// Nothing has been shaded before `now_ns`; what the entities shade where they stand then, the
-  /// samples know.
+  /// Forgets all shade and begins at `now_ns`. The samples already know the shade that the entities
+  /// cast from where they stand at that time.
   void restart(std::int64_t now_ns, std::span<const PoseHistory> entities) noexcept;
-  /// Does the steps up to `until_ns`. Where that lies before the latest, it forgets all shade.
+  /// Does the steps up to `until_ns`. If `until_ns` lies before the latest step, all shade is
+  /// forgotten.
   void run(std::int64_t until_ns, const SurfaceSamples& all, const Inputs& inputs) noexcept;
 
   [[nodiscard]] std::span<const Page> pages() const noexcept { return pages_; }
   [[nodiscard]] const ShadeResponse& response() const noexcept { return response_; }
-  /// By vertex: sum w_k A_k, K.
+  /// Sum w_k A_k by vertex, in K.
   [[nodiscard]] std::span<const float> vertices_k() const noexcept { return vertices_k_; }
   [[nodiscard]] std::span<const ChangedRanges::Range> changes() const noexcept {
     return changes_.ranges();
   }
   void forget_changes() noexcept;
-  /// Way of a shadow per metre of height in the latest step, towards the sun.
+  /// Horizontal shift of a shadow towards the sun per metre of height, in the latest step.
   [[nodiscard]] const glm::vec2& slope() const noexcept { return slope_; }
-  /// In the latest ten seconds, or the latest run(), shade found no page, or took one that was
-  /// worth more than the tolerance, or something was too fast.
+  /// Returns true if shade was lost in the latest ten seconds or in the latest run(): it found no
+  /// tile, it took a tile that held more than the tolerance, or an entity was too fast. Only
+  /// entities that have moved since restart() count. It returns true as well after sim time went
+  /// back.
   [[nodiscard]] bool short_of_pages() const noexcept {
     return short_turn_ > next_turn_ - kShortTurns || short_turn_ >= first_turn_;
   }
 
  private:
-  /// An entity casts on a page.
+  /// Pair of a tile and an entity that casts on it.
   struct Cast {
     std::uint32_t page = 0;
     std::uint32_t mover = 0;
     [[nodiscard]] bool operator==(const Cast&) const noexcept = default;
   };
-  /// One of some places of an entity within a step.
+  /// Shadow depth map of an entity at one of its places within a step. The places share the taps:
+  /// place `number` of `of` takes every `of`th tap.
   struct Place {
     PlacedSilhouette silhouette;
     std::uint32_t number = 0;
     std::uint32_t of = 1;
   };
-  /// Of an entity within a step: shares of EMIT_SHADE_TAPS that are equal.
+  /// Largest number of places of an entity within a step. It divides EMIT_SHADE_TAPS, so that
+  /// places get equal shares of the taps.
   static constexpr std::size_t kMostPlaces = 8;
-  static constexpr std::size_t kMostCells = 24;  ///< that an entity at one place may shade
-  static constexpr std::size_t kMostCasts = 96;  ///< pages of an entity within a step
+  static constexpr std::size_t kMostCells = 24;  ///< tiles that an entity may shade from one place
+  static constexpr std::size_t kMostCasts = 96;  ///< tiles per entity in a step, on average
 
-  /// The pages whose turn it is, by what entities shaded in the latest kTurns; or all of them, by
-  /// what they shaded in the latest `turns`.
+  /// Steps the tiles to the end of `turn`. If `turns` is kTurns, it steps the group whose turn it
+  /// is, else all tiles. The shade is that of the latest `turns` turns.
   void take_turn(std::int64_t turn, std::int64_t turns, const SurfaceSamples& all,
                  const Inputs& inputs) noexcept;
+  /// Places an entity along its way in the latest `turns` turns and lists the tiles that it shades.
+  /// `come` says that the entity has moved since restart(): only such shade may take used tiles.
   void cast(std::size_t mover, std::int64_t turn, std::int64_t turns, bool come,
             const glm::dvec3& to_sun, const Inputs& inputs) noexcept;
-  /// Pages on which an entity casts from one place.
+  /// Lists the tiles on which an entity casts from one place, and takes new ones. `ground_m` is the
+  /// height of the ground behind the entity, and `top_m` is the height of its top, both rel.
   void find_pages(std::size_t mover, std::int64_t turn, std::int64_t turns, bool come,
                   const PlacedSilhouette& placed, float ground_m, float top_m,
                   const Inputs& inputs) noexcept;
-  /// A cell holds some of what a silhouette may shade.
+  /// Returns true if the shadow of an entity, penumbra included, may touch the cell of a tile.
   [[nodiscard]] static bool meets(const PlacedSilhouette& placed, float texel_m,
                                   const glm::ivec2& cell, float plane_m) noexcept;
   [[nodiscard]] Page* page_at(int level, const glm::ivec2& cell) noexcept;
-  /// Height of the ground of a page that begins: of its neighbours, where theirs will do.
+  /// Height of the plane of a new tile, from five rays down. It is that of a neighbour if the two
+  /// are close to each other. It is empty if the rays meet nothing.
   [[nodiscard]] std::optional<float> plane_of(int level, const glm::ivec2& cell, float top_m,
                                               const CasterRays& rays) const noexcept;
-  /// One that is not used; for an entity that has `come` since the start, else the one that
-  /// matters least; null: there is none.
+  /// Returns an unused tile. If there is none, an entity that has `come` gets the tile that holds
+  /// least. Returns null if no tile can be taken.
   [[nodiscard]] Page* take_page(std::int64_t turn, bool come) noexcept;
+  /// Returns true if the entity stands elsewhere than at restart(), or has appeared or vanished.
   [[nodiscard]] bool has_come(std::size_t mover, const PoseHistory& entity,
                               std::int64_t at_ns) const noexcept;
   void give_back(Page& page) noexcept;
   [[nodiscard]] bool begin(Page& page, int level, const glm::ivec2& cell, float top_m,
                            const CasterRays& rays) const noexcept;
-  /// Finds the vertices of a page.
+  /// Finds the vertices whose shade falls into a tile.
   void gather(Page& page, const SurfaceSamples& all, std::int64_t at_ns) const noexcept;
+  /// Advances the texels of a tile by one step: `flux_frac` is the direct sun as a share of
+  /// ShadeResponse::kFullSunWM2, and `gain` is 1 - exp(-dt / tau_k).
   void shade(Page& page, std::uint32_t index, float flux_frac, const glm::vec4& gain,
              const Silhouettes& silhouettes) noexcept;
-  /// A texel and its neighbours were shaded up to that height.
+  /// Records that points at a texel and at its neighbours are shaded up to a height above the
+  /// plane.
   static void raise(Page& page, int x, int y, float top_m) noexcept;
+  /// Brings the tile's part of vertices_k() up to date.
   void show_vertices(Page& page, const SurfaceSamples& all, std::int64_t now_ns) noexcept;
+  /// Takes the tile's part out of vertices_k() and forgets its vertices.
   void hide_vertices(Page& page) noexcept;
+  /// A_k at a place, interpolated between texels along the sun's ray; 0 above the shaded height.
   [[nodiscard]] glm::vec4 at(const Page& page, const glm::vec3& position_m) const noexcept;
-  /// What passes a place in that time is worth there, K.
+  /// Greatest change of temperature, in K, that full shade of this duration causes.
   [[nodiscard]] float passing_k(float seconds) const noexcept;
+  /// Upper bound, in K, of the change of temperature that a tile holds.
   [[nodiscard]] float worth_k(const Page& page) const noexcept;
 
   ShadeResponse response_;
   glm::vec4 most_weight_k_{0.0F};
   float tolerance_k_ = 0.0F;
   std::int64_t start_ns_ = 0;
-  std::int64_t next_turn_ = 0;   ///< at start_ns_ + next_turn_ * kTurnNs
-  std::int64_t first_turn_ = 0;  ///< of the latest run()
+  std::int64_t next_turn_ = 0;   ///< the turn that ends at start_ns_ + next_turn_ * kTurnNs
+  std::int64_t first_turn_ = 0;  ///< first turn of the latest run()
   std::vector<Page> pages_;
-  /// Of pages_, together: to be looked through often.
+  /// Level and cell of a tile. The keys of all tiles lie side by side, because they are searched
+  /// often.
   struct Key {
     int level = kNoLevel;
     glm::ivec2 cell{0};
@@ -190,16 +219,16 @@ class ShadePages {
   static constexpr int kNoLevel = 1000;
   std::array<Key, kPages> keys_;
   std::vector<Cast> casts_;
-  std::bitset<kPages> cast_on_;             ///< by the entity that is being cast
+  std::bitset<kPages> cast_on_;             ///< tiles on which the entity at hand casts already
   std::vector<Place> places_;               ///< by entity, then place
   std::vector<std::uint32_t> place_count_;  ///< by entity
   std::vector<TrajectoryState> at_start_;   ///< by entity
   glm::vec2 slope_{0.0F};
   std::vector<float> vertices_k_;
   ChangedRanges changes_;
-  std::int64_t short_turn_ = 0;  ///< latest in which there were too few pages
+  std::int64_t short_turn_ = 0;  ///< latest turn in which shade was lost
 
-  // Static vertices by square of the ground, and their heights.
+  // Static vertices, sorted into squares of the ground, and the range of their heights.
   float highest_m_ = 0.0F;
   float lowest_m_ = 0.0F;
   glm::vec2 squares_m_{0.0F};

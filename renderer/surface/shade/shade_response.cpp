@@ -10,12 +10,14 @@
 namespace emit::renderer {
 namespace {
 
+/// Number of times at which the fit reads the response.
 constexpr std::size_t kTimes = 48;
 constexpr std::size_t kModes = ShadeResponse::kModes;
 using Weights = std::array<double, kModes>;
 using Normal = std::array<std::array<double, kModes>, kModes>;
 
-/// Solves the normal equations of the chosen unknowns, the others being zero.
+/// Solves the normal equations for the unknowns whose bits are set in `chosen`; the others are 0.
+/// Gaussian elimination without pivoting, because the matrix is positive definite.
 Weights solve(Normal a, Weights b, std::uint32_t chosen) noexcept {
   const auto free = [chosen](std::size_t i) { return ((chosen >> i) & 1U) != 0U; };
   for (std::size_t i = 0; i < kModes; ++i) {
@@ -29,6 +31,7 @@ Weights solve(Normal a, Weights b, std::uint32_t chosen) noexcept {
       b[row] -= factor * b[i];
     }
   }
+  // Substitute from the last unknown back.
   Weights x{};
   for (std::size_t i = kModes; i-- > 0;) {
     if (!free(i)) continue;
@@ -39,12 +42,15 @@ Weights solve(Normal a, Weights b, std::uint32_t chosen) noexcept {
   return x;
 }
 
-/// Least squares of the relative error without negative weights: the best of all sets of modes.
+/// Weights of the least squares of the relative error, none negative. With four modes all 15 sets
+/// of modes are tried and the best one is taken. All weights are 0 if the response is 0.
 Weights fitted(std::span<const double> times_s, std::span<const double> response) noexcept {
   Normal a{};
   Weights b{};
   const double most = response.back();
   if (!(most > 0.0)) return {};
+  // Build the normal equations. The floor of the scale keeps small early values from ruling the
+  // fit.
   for (std::size_t j = 0; j < times_s.size(); ++j) {
     const double scale = 1.0 / std::max(response[j], 1e-3 * most);
     Weights term;
@@ -56,12 +62,14 @@ Weights fitted(std::span<const double> times_s, std::span<const double> response
       for (std::size_t l = 0; l < kModes; ++l) a[k][l] += term[k] * term[l];
     }
   }
+  // Try every set of modes, and keep the best one without a negative weight.
   Weights best{};
   double least = std::numeric_limits<double>::infinity();
   for (std::uint32_t chosen = 1; chosen < 1U << kModes; ++chosen) {
     const Weights x = solve(a, b, chosen);
     if (std::ranges::any_of(x, [](double value) { return !(value >= 0.0); })) continue;
-    double error = 0.0;  // but for a constant
+    // Sum the squared error, but for a part that all sets share.
+    double error = 0.0;
     for (std::size_t k = 0; k < kModes; ++k) {
       error -= 2.0 * x[k] * b[k];
       for (std::size_t l = 0; l < kModes; ++l) error += x[k] * a[k][l] * x[l];
@@ -79,6 +87,7 @@ Weights fitted(std::span<const double> times_s, std::span<const double> response
 ShadeResponse::ShadeResponse(const SampleHeat& heat, std::size_t materials,
                              const ResponseConditions& around) {
   std::array<double, kTimes> times_s;
+  // Spread the times evenly over the logarithm.
   for (std::size_t j = 0; j < kTimes; ++j) {
     times_s[j] = kFirstS * std::pow(kLastS / kFirstS, static_cast<double>(j) / (kTimes - 1));
   }

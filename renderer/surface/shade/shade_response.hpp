@@ -10,23 +10,26 @@
 
 namespace emit::renderer {
 
-/// How the temperature of open ground follows the sun, as a sum of exponentials of the same four
-/// time constants for all materials: sum w_k (1 - exp(-t / tau_k)).
+/// Response of the temperature of open ground to a step of direct sunlight, as a sum of
+/// exponentials: sum w_k (1 - exp(-t / tau_k)). All materials have the same four time constants
+/// (physics.md eq. 25).
 /// Immutable after construction; any thread.
 class ShadeResponse {
  public:
   static constexpr std::size_t kModes = 4;
+  /// Time constants tau_k, in s.
   static constexpr std::array<double, kModes> kTauS{1.0, 10.0, 100.0, 1000.0};
-  /// Direct normal flux that weights are given for: more than the sun ever sends.
+  /// Direct normal irradiance E_0 that the weights hold for, W m-2. The sun never sends more.
   static constexpr double kFullSunWM2 = 1280.0;
-  /// The sum of exponentials follows the response between these times.
+  /// Times between which the sum of exponentials follows the response, in s.
   static constexpr double kFirstS = 0.2;
   static constexpr double kLastS = 3600.0;
 
   ShadeResponse() = default;
+  /// Fits the weights of materials 0 to `materials` - 1, with the response linearised at `around`.
   ShadeResponse(const SampleHeat& heat, std::size_t materials, const ResponseConditions& around);
 
-  /// By material: w_k in K under kFullSunWM2, none negative.
+  /// Weights w_k by material, in K at kFullSunWM2. None is negative.
   [[nodiscard]] std::span<const glm::vec4> weights_k() const noexcept { return weights_k_; }
 
  private:

@@ -15,11 +15,12 @@
 namespace emit::renderer {
 namespace {
 
-/// Of a texel with open ones and others around it.
+/// Mark in Tile::around_m of a texel that has both open and filled texels around it.
 constexpr float kMixedM = -1e30F;
-/// Empty texels around the body.
+/// Width of the empty rim around the entity, in texels.
 constexpr float kRim = 2.0F;
 
+/// Corners of a box.
 std::array<glm::vec3, 8> corners(const scene::Aabb& box) noexcept {
   std::array<glm::vec3, 8> out;
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -30,6 +31,7 @@ std::array<glm::vec3, 8> corners(const scene::Aabb& box) noexcept {
   return out;
 }
 
+/// Positions of the taps in the unit disc, the same as in the shader.
 const std::array<glm::vec2, EMIT_SHADE_TAPS>& taps() noexcept {
   static const auto kTaps = [] {
     std::array<glm::vec2, EMIT_SHADE_TAPS> out;
@@ -42,7 +44,8 @@ const std::array<glm::vec2, EMIT_SHADE_TAPS>& taps() noexcept {
   return kTaps;
 }
 
-/// Where the line through a place of a silhouette meets the level plane.
+/// Point of the level plane on the sun's ray through a place on the map. Solves column(p) = column
+/// and row(p) = row for x and y by Cramer's rule.
 glm::vec2 on_plane(const PlacedSilhouette& silhouette, float column, float row,
                    float plane_m) noexcept {
   const glm::vec4& c = silhouette.column;
@@ -64,11 +67,13 @@ Silhouettes::Silhouettes(std::span<const scene::Aabb> bounds_m) : alone_(bounds_
     tile.depth_m.assign(std::size_t{kSide} * kSide, kOpenM);
     tile.around_m.assign(std::size_t{kSide} * kSide, kOpenM);
   }
+  // Make the table of taps now, because the first use must not be in a frame.
   (void)taps();
 }
 
 bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
                        const CasterRays& rays, threads::WorkerPool& workers) noexcept {
+  // Keep the map if it still fits, or if the frame may make no more of them.
   Tile& tile = tiles_[mover];
   const float turned_rad = glm::distance(tile.to_sun, to_sun_body);
   if (tile.box_m.empty() || turned_rad < most_turn_rad) return true;
@@ -76,7 +81,9 @@ bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float mo
   if (looks_left_ == 0) return turned_rad < kStale * most_turn_rad;
   --looks_left_;
   tile.to_sun = to_sun_body;
+  // Count the revision, so that the device gets the new map.
   ++tile.revision;
+  // Lay the map across the direction of the sun, around the projected box.
   const Tangents tangents = tangents_of(to_sun_body);
   tile.across = tangents.u;
   tile.along = tangents.v;
@@ -94,6 +101,7 @@ bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float mo
   tile.corner_m = 0.5F * (low_m + high_m) - 0.5F * kSide * tile.texel_m;
   tile.half = 0.5F * size_m / tile.texel_m + kRim;
 
+  // Trace each texel from behind the entity towards the sun: the first hit is the deepest surface.
   const float start_m = deepest_m + tile.texel_m;
   alone_[mover].on = true;
   const CasterSelection only{false, std::span(alone_).first(mover + 1)};
@@ -102,6 +110,7 @@ bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float mo
       for (std::size_t first = 0; first < kSide; first += CasterRays::kMaxRays) {
         std::array<CasterRay, CasterRays::kMaxRays> sent;
         std::array<CasterHit, CasterRays::kMaxRays> hits;
+        // Begin at the plane behind the deepest corner of the box, at the centre of each texel.
         for (std::size_t k = 0; k < sent.size(); ++k) {
           const glm::vec2 at_m =
               tile.corner_m + tile.texel_m * (glm::vec2(first + k, row) + glm::vec2(0.5F));
@@ -117,6 +126,7 @@ bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float mo
     }
   });
   alone_[mover].on = false;
+  // Find the mean depth of the filled texels.
   double sum_m = 0.0;
   std::size_t count = 0;
   for (const float depth_m : tile.depth_m) {
@@ -133,6 +143,7 @@ void Silhouettes::look_around(Tile& tile) noexcept {
   constexpr auto kEnd = static_cast<int>(kSide);
   for (int y = 0; y < kEnd; ++y) {
     for (int x = 0; x < kEnd; ++x) {
+      // Count the open texels of this 3 x 3 square, and find its deepest filled one.
       int open = 0;
       float deepest_m = -kOpenM;
       for (int dy = -1; dy <= 1; ++dy) {
@@ -162,6 +173,7 @@ PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& pla
     const glm::vec3 axis = placement.rel_from_body * axis_body;
     return glm::vec4(scale * axis, origin - scale * glm::dot(axis, placement.position_m));
   };
+  // Turn the map's axes into rel axes and scale them to texels.
   const float per_m = 1.0F / tile.texel_m;
   PlacedSilhouette placed{line(tile.across, per_m, -tile.corner_m.x * per_m),
                           line(tile.along, per_m, -tile.corner_m.y * per_m),
@@ -169,8 +181,8 @@ PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& pla
                           tile.mean_m,
                           tile.texel_m,
                           tile.half};
-  // The body may have turned a little since: rays go to the sun all the same, through the place
-  // that they have in the depth of what shades.
+  // Shear the map if the entity has turned a little since: rays must go to the sun of now, through
+  // the places that they have at the entity's mean depth.
   const glm::vec4 aside = (placed.depth_m - glm::vec4(0.0F, 0.0F, 0.0F, tile.mean_m)) /
                           glm::dot(glm::vec3(placed.depth_m), to_sun);
   placed.column -= glm::dot(glm::vec3(placed.column), to_sun) * aside;
@@ -183,10 +195,12 @@ float Silhouettes::shaded_frac(std::size_t mover, float column, float row, float
                                std::uint32_t stride) const noexcept {
   const std::vector<float>& depths_m = tiles_[mover].depth_m;
   constexpr auto kWidth = static_cast<float>(kSide);
+  // Return early if the whole disc lies outside the map.
   if (column < -radius_texels || row < -radius_texels || column >= kWidth + radius_texels ||
       row >= kWidth + radius_texels) {
     return 0.0F;
   }
+  // Skip the taps if the texels around a small disc agree that all of it is open or shaded.
   if (radius_texels <= kAround && column >= 0.0F && row >= 0.0F && column < kWidth &&
       row < kWidth) {
     const float around_m =
@@ -197,6 +211,7 @@ float Silhouettes::shaded_frac(std::size_t mover, float column, float row, float
       return 1.0F / static_cast<float>(stride);
     }
   }
+  // Count the taps that lie in the shade.
   int shaded = 0;
   for (std::size_t i = first; i < EMIT_SHADE_TAPS; i += stride) {
     const glm::vec2& tap = taps()[i];
@@ -225,7 +240,7 @@ float Silhouettes::diagonal_m(std::size_t mover) const noexcept {
 
 float Silhouettes::rim_m(std::size_t mover, float way_m) const noexcept {
   static const auto kTangent = static_cast<float>(std::tan(physics::kSunSemiAngleRad));
-  // Texels are no wider than the box's diagonal makes them, whichever way it is turned.
+  // Use the diagonal, because no turn of the box makes texels wider.
   return way_m * kTangent + diagonal_m(mover) * (kRim + 1.0F) / kSide;
 }
 
@@ -260,9 +275,11 @@ float penumbra_texels(const PlacedSilhouette& silhouette, float depth_m) noexcep
 
 ShadedBox shaded_box(const PlacedSilhouette& silhouette, float plane_m) noexcept {
   constexpr auto kEnd = static_cast<float>(Silhouettes::kSide);
+  // Find the depth of the shadow's middle on the plane, which gives the width of the penumbra.
   const glm::vec2 middle_m = on_plane(silhouette, 0.5F * kEnd, 0.5F * kEnd, plane_m);
   const float depth_m = glm::dot(silhouette.depth_m, glm::vec4(middle_m, plane_m, 1.0F));
   const float rim = penumbra_texels(silhouette, depth_m);
+  // Bound the corners of the filled part of the map, widened by the penumbra.
   ShadedBox box{middle_m, middle_m};
   const glm::vec2 half = silhouette.half + rim;
   for (const float column : {0.5F * kEnd - half.x, 0.5F * kEnd + half.x}) {

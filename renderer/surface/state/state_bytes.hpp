@@ -14,14 +14,15 @@
 #include <type_traits>
 #include <vector>
 
-/// Plain data as bytes, little endian, without padding: for a file and for a hash of it. Types are
-/// numbers, glm vectors, matrices and quaternions, arrays and vectors of such, and structs with a
-/// `visit_members(value, visitor)` that passes every member to the visitor, for const and others.
+/// Conversion of plain data to bytes and back, little endian, without padding. Files and hashes of
+/// their contents use it. Types may be numbers, glm vectors, matrices and quaternions, arrays and
+/// vectors of such types, and structs that have a function `visit_members(value, visitor)`. This
+/// function passes every member to the visitor, for const and for mutable values.
 namespace emit::renderer {
 
 static_assert(std::endian::native == std::endian::little, "files are little endian");
 
-/// FNV-1a, 64 bits: finds what was changed by accident, not by intent.
+/// FNV-1a hash of 64 bits. It detects accidental changes, not forgery.
 class Fnv64 {
  public:
   void put(const void* data, std::size_t bytes) noexcept {
@@ -34,6 +35,7 @@ class Fnv64 {
   std::uint64_t value_ = 0xcbf29ce484222325ULL;
 };
 
+/// Sink of put_value() that stores the bytes. It takes memory for the expected size at once.
 class ByteStore {
  public:
   explicit ByteStore(std::size_t expected_bytes) { bytes_.reserve(expected_bytes); }
@@ -47,6 +49,7 @@ class ByteStore {
   std::vector<std::byte> bytes_;
 };
 
+/// Sink of put_value() that counts the bytes only.
 class ByteCount {
  public:
   void put(const void*, std::size_t bytes) noexcept { count_ += bytes; }
@@ -59,6 +62,8 @@ class ByteCount {
 template <class T>
 concept Number = std::is_arithmetic_v<T> || std::is_enum_v<T>;
 
+/// Passes the bytes of a value to a sink with put(data, bytes). Strings and vectors are preceded by
+/// their size as u64; a bool takes one byte.
 template <class Sink, Number T>
 void put_value(Sink& sink, const T& value) {
   sink.put(&value, sizeof(value));
@@ -106,8 +111,8 @@ void put_value(Sink& sink, const std::vector<T>& value) {
   for (const T& item : value) put_value(sink, item);
 }
 
-/// Reads what put_value() has written. After the first value that is not there, ok() is false and
-/// nothing more is read. Memory is taken only for what the bytes can hold.
+/// Reader of what put_value() has written. Once a value is missing, ok() is false and nothing more
+/// is read. Memory is taken only for as much as the bytes can hold.
 class ByteSource {
  public:
   explicit ByteSource(std::span<const std::byte> bytes) : left_(bytes) {}
@@ -123,6 +128,7 @@ class ByteSource {
     std::memcpy(data, left_.data(), bytes);
     left_ = left_.subspan(bytes);
   }
+  /// Marks the data as wrong.
   void fail() noexcept { ok_ = false; }
 
  private:
@@ -130,6 +136,7 @@ class ByteSource {
   bool ok_ = true;
 };
 
+/// Reads a value; it is unspecified unless source.ok() afterwards. A bool must be 0 or 1.
 template <Number T>
 void take_value(ByteSource& source, T& value) {
   source.take(&value, sizeof(value));
@@ -163,6 +170,7 @@ template <class T>
 void take_value(ByteSource& source, std::vector<T>& value) {
   std::uint64_t count = 0;
   take_value(source, count);
+  // Refuse a count that the bytes cannot hold, before any memory is taken for it.
   ByteCount each;
   put_value(each, T{});
   if (!source.ok() || count > source.left() / each.count()) {

@@ -17,7 +17,8 @@
 
 namespace emit::renderer {
 
-// Members of what a file holds, in its order. Beside put_value(), so that it finds them.
+// Lists of members in the order of the file. They stand beside put_value() in the namespace, so
+// that it finds them.
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, RefinedMesh::Vertex>
 void visit_members(T& v, const Visit& visit) {
@@ -71,11 +72,13 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
+/// First bytes of a file.
 constexpr std::array<char, 8> kMagic{'E', 'M', 'I', 'T', 'S', 'T', 'A', 'T'};
 constexpr std::size_t kHeaderBytes = kMagic.size() + 2 * sizeof(std::uint32_t) + sizeof(StateKey) +
                                      sizeof(std::int64_t) + sizeof(std::uint64_t);
 constexpr std::size_t kHashBytes = sizeof(std::uint64_t);
 
+/// Passes the body of a file to a sink. read_state() reads in the same order.
 template <class Sink>
 void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.eyes);
@@ -91,6 +94,8 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.full_in_view);
 }
 
+/// Reads the meshes of a body. Returns false if they are not refinements of the meshes of
+/// `geometry`.
 bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::size_t max_vertices,
                  SurfaceModel& model) {
   std::uint64_t meshes = 0;
@@ -107,7 +112,7 @@ bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::
   return true;
 }
 
-/// No index leads out of its array.
+/// Returns true if the arrays of a model fit each other and no index leads out of its array.
 bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                 std::size_t movers) {
   const std::size_t count = model.samples.samples.size();
@@ -116,6 +121,7 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
       model.drawn_samples > count || model.first_sample.size() != geometry.instances.size()) {
     return false;
   }
+  // Check that vertices have materials of the scene, and that each triangle has one material.
   for (std::size_t m = 0; m < geometry.meshes.size(); ++m) {
     const RefinedMesh& mesh = model.meshes[m];
     for (const RefinedMesh::Vertex& vertex : mesh.vertices()) {
@@ -128,6 +134,8 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
       }
     }
   }
+  // Check that the samples of each instance belong to one body and that both sides of a sheet
+  // belong to the instance.
   const auto& all = model.samples.samples;
   for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
     const scene::Instance& instance = geometry.instances[i];
@@ -144,6 +152,8 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
       }
     }
   }
+  // Check each sample alone: the sides of a sheet name each other, and all other indices lie in
+  // their arrays.
   const auto sides_fit = [&](const SurfaceSample& s) {
     return s.other_side == kNoSample ||
            (s.other_side < model.drawn_samples && &all[s.other_side] != &s &&
@@ -162,7 +172,7 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                              [&](const SeenSample& s) { return s.sample < count; });
 }
 
-/// The first `most` bytes of a file, or all of them.
+/// Reads the first `most` bytes of a file, or all of them if it has fewer. Errors: io.
 Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file, std::uintmax_t most) {
   const auto unreadable = [&file] {
     return make_error(ErrorCode::io,
@@ -178,12 +188,14 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file, std
   return bytes;
 }
 
+/// Name of a temporary file in the folder of `file`, different for each process.
 std::filesystem::path temporary_beside(const std::filesystem::path& file) {
   std::filesystem::path temporary = file;
   temporary += fmt::format(".{}.tmp", ::getpid());
   return temporary;
 }
 
+/// Writes a file anew. The error code is empty on success.
 std::error_code write_bytes(const std::filesystem::path& file, std::span<const std::byte> bytes) {
   errno = 0;
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
@@ -200,7 +212,7 @@ tl::unexpected<physics::Error> cannot_write(const std::filesystem::path& file,
                                                file.string(), error.message()));
 }
 
-/// What stands before the body.
+/// The part of a file before the body, member by member.
 struct Header {
   std::array<char, 8> magic{};
   std::uint32_t version = 0;
@@ -210,6 +222,7 @@ struct Header {
   std::uint64_t body_bytes = 0;
 };
 
+/// Names of the parts whose hashes differ, separated by semicolons.
 std::string different_parts(const StateKey& a, const StateKey& b) {
   std::string text;
   for (std::size_t i = 0; i < kStateParts; ++i) {
@@ -219,8 +232,9 @@ std::string different_parts(const StateKey& a, const StateKey& b) {
   return text;
 }
 
-/// Why a file of that size whose first bytes, or all, are these is not the state that is wanted;
-/// empty when nothing speaks against it. Fills the header.
+/// Reason to refuse a file, as part of an error message; empty if there is none. `bytes` are its
+/// first bytes or all of them, and `file_bytes` is its size. Fills `header`. The checksum is tested
+/// only if `bytes` holds the whole file.
 std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_bytes,
                       const StateWanted& wanted, Header& header) {
   ByteSource source(bytes.first(std::min(bytes.size(), kHeaderBytes)));
@@ -246,6 +260,7 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   ByteSource tail(bytes.last(kHashBytes));
   take_value(tail, stored);
   if (stored != hash.value()) return "damaged: the checksum is wrong";
+  // Compare the parts. The input of the host counts up to the instant of the state.
   StateKey key = wanted.key;
   key[static_cast<std::size_t>(StatePart::live)] = wanted.live_hash(header.at_ns);
   const std::string parts = different_parts(header.key, key);
@@ -262,6 +277,7 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
 
 Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
                          const SurfaceModel& model) {
+  // Count the body first, because its size stands before it.
   ByteCount body;
   put_model(body, model);
   ByteStore store(kHeaderBytes + body.count() + kHashBytes);
@@ -272,10 +288,12 @@ Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
   put_value(store, model.at_ns);
   put_value(store, static_cast<std::uint64_t>(body.count()));
   put_model(store, model);
+  // Append the checksum of everything before it.
   Fnv64 hash;
   hash.put(store.bytes().data(), store.bytes().size());
   put_value(store, hash.value());
 
+  // Write beside the file and rename, so that no reader sees half a state.
   const std::filesystem::path temporary = temporary_beside(file);
   std::error_code error = write_bytes(temporary, store.bytes());
   if (!error) std::filesystem::rename(temporary, file, error);
@@ -302,17 +320,19 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
                       fmt::format("thermal.state_file {}: {}. Remove it to have it made anew",
                                   file.string(), why));
   };
-  // What is no state at all is not read whole.
+  // Check the header first, so that a large file that is no state is not read whole.
   const auto head = read_bytes(file, kHeaderBytes);
   if (!head) return tl::unexpected(head.error());
   std::error_code error;
   Header header;
   std::string why = objection(*head, std::filesystem::file_size(file, error), wanted, header);
   if (!why.empty()) return refuse(why);
+  // Read the whole file and check again, now with the checksum.
   const auto bytes = read_bytes(file, std::numeric_limits<std::uintmax_t>::max());
   if (!bytes) return tl::unexpected(bytes.error());
   why = objection(*bytes, bytes->size(), wanted, header);
   if (!why.empty()) return refuse(why);
+  // Take the body apart, in the order of put_model().
   const std::span<const std::byte> all(*bytes);
   ByteSource source(all.subspan(kHeaderBytes, all.size() - kHeaderBytes - kHashBytes));
   SurfaceModel model;
@@ -329,6 +349,7 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   take_value(source, model.outputs);
   take_value(source, model.full);
   take_value(source, model.full_in_view);
+  // Check all indices: a file with a matching checksum may still be made by a faulty program.
   if (!source.ok() || !source.at_end() || !consistent(model, geometry, movers)) {
     return refuse("damaged: its contents contradict each other");
   }

@@ -15,59 +15,64 @@
 #include "history/pose_history.hpp"
 #include "surface/model/surface_model.hpp"
 
-/// The surface after its history in a file (thermal.state_file), so that a run need not warm up
-/// what one before it did. The file holds the surface at an instant: a run that starts later goes
-/// on from it. Bands do not matter to it. Setup only.
+/// State file of a surface (thermal.state_file): the surface at one instant after its history, so
+/// that a later run need not repeat the warm-up. A run that starts at a later time than the state
+/// continues from it. A state does not depend on bands. Setup only.
 ///
 /// Layout, little endian: 8 bytes "EMITSTAT", version u32, number of parts u32, the parts' hashes
 /// u64 each, the instant i64 in ns of sim time, size of the body u64, body (SurfaceModel member by
 /// member, state_bytes.hpp), FNV-1a of everything before as u64.
 namespace emit::renderer {
 
-/// Goes up with every change of the layout, and of what the same inputs are turned into.
+/// Version of the format. It rises with every change of the layout, and with every change of the
+/// program that gives another state for the same inputs.
 inline constexpr std::uint32_t kStateVersion = 10;
 
-/// What a state depends on. A file that does not fit says which of these parts differ.
+/// Parts of the input on which a state depends. The error about a file that does not fit names the
+/// parts that differ.
 enum class StatePart : std::uint8_t {
   scene,      ///< geometry, placements and trajectories
-  materials,  ///< thermal properties of those in use
-  place,      ///< with the date
-  weather,    ///< of the scenario
-  thermal,    ///< options
-  camera,     ///< format, field of view, trajectory
+  materials,  ///< thermal properties of the materials in use
+  place,      ///< place and date
+  weather,    ///< weather of the scenario
+  thermal,    ///< thermal options
+  camera,     ///< format, field of view and trajectory of the sensor
   live,       ///< poses and weather of the host, up to the instant of the state
 };
 inline constexpr std::size_t kStateParts = 7;
+/// Name of a part for messages.
 [[nodiscard]] std::string_view describe(StatePart part) noexcept;
 
-/// A hash for each part.
+/// Hashes of all parts, by StatePart.
 using StateKey = std::array<std::uint64_t, kStateParts>;
 
-/// Hashes the parts that a scenario fixes. `geometry` is taken as loaded, before it is simplified.
+/// Hashes the parts that a scenario fixes; StatePart::live stays 0. `geometry` is the scene as
+/// loaded, before simplification.
 [[nodiscard]] StateKey scenario_key(const scene::ScenarioDesc& scenario,
                                     const scene::SceneGeometry& geometry);
 /// Hashes StatePart::live: what the host has sent for instants up to `at_ns`.
 [[nodiscard]] std::uint64_t live_hash(std::int64_t at_ns, const Environment& environment,
                                       std::span<const PoseHistory> entities);
 
-/// What a run asks of a state.
+/// Requirements of a run on a state.
 struct StateWanted {
-  StateKey key{};             ///< without StatePart::live
-  std::int64_t start_ns = 0;  ///< the state must not be later
-  /// Gives StatePart::live for the instant of a state.
+  StateKey key{};             ///< wanted hashes; StatePart::live is not used
+  std::int64_t start_ns = 0;  ///< latest allowed instant of the state
+  /// Function that returns the hash of StatePart::live for the instant of a state.
   std::function<std::uint64_t(std::int64_t at_ns)> live_hash;
 };
 
-/// Writes a temporary file beside `file` and renames it. Errors: io, naming the file.
+/// Writes a state. It writes a temporary file in the same folder and renames it. Errors: io, with
+/// the name of the file.
 [[nodiscard]] physics::Result<void> write_state(const std::filesystem::path& file,
                                                 const StateKey& key, const SurfaceModel& model);
 
-/// Errors: io, when write_state() would fail for want of the folder or of permission.
+/// Tests whether write_state() could write: the folder exists and permits it. Errors: io.
 [[nodiscard]] physics::Result<void> check_state_writable(const std::filesystem::path& file);
 
-/// Reads a state for that geometry, which has so many entities. Errors: io (cannot be read), config
-/// (truncated, damaged, of another version, later than the run starts, or made for something else:
-/// the text names the file and says why).
+/// Reads a state for a scene that has `geometry` and `movers` entities. Errors: io (the file cannot
+/// be read), config (the file is truncated, damaged, of another version, later than the start of
+/// the run, or made for something else). The message names the file and the reason.
 [[nodiscard]] physics::Result<SurfaceModel> read_state(const std::filesystem::path& file,
                                                        const StateWanted& wanted,
                                                        const scene::SceneGeometry& geometry,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hashes of what a saved state depends on, part by part.
+// Hashes of the parts of the input on which a saved state depends.
 #include <algorithm>
 
 #include "surface/state/state_bytes.hpp"
@@ -8,15 +8,18 @@
 namespace emit::renderer {
 namespace {
 
+/// Adds plain values to a hash, in their order.
 template <class... Values>
 void add(Fnv64& hash, const Values&... values) {
   (put_value(hash, values), ...);
 }
 
+/// Adds a value that may be absent; absent and 0 give different hashes.
 void add_optional(Fnv64& hash, const std::optional<double>& value) {
   add(hash, value.has_value(), value.value_or(0.0));
 }
 
+/// Adds a row of weather.
 void add_weather(Fnv64& hash, const physics::WeatherSample& row) {
   add(hash, row.sim_time_ns, row.direct_normal_w_m2, row.diffuse_horizontal_w_m2,
       row.longwave_down_w_m2, row.air_k, row.wind_m_s, row.cloud_frac);
@@ -28,6 +31,7 @@ void add_pose(Fnv64& hash, const physics::Pose& pose) {
   add(hash, pose.position_world_m, pose.world_from_body);
 }
 
+/// Adds a trajectory, preceded by its length.
 void add_keys(Fnv64& hash, std::span<const scene::Keyframe> keys) {
   add(hash, keys.size());
   for (const scene::Keyframe& key : keys) {
@@ -36,6 +40,7 @@ void add_keys(Fnv64& hash, std::span<const scene::Keyframe> keys) {
   }
 }
 
+/// Hash of meshes, instances and trajectories.
 std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
                          const scene::SceneGeometry& geometry) {
   Fnv64 hash;
@@ -55,6 +60,8 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
   return hash.value();
 }
 
+/// Adds the thermal properties of a material. Its name and its looks in the bands do not matter to
+/// the temperature.
 void add_material(Fnv64& hash, const scene::Material& material) {
   add(hash, material.solar_absorptance_frac, material.emissivity_frac, material.base_k,
       material.layers.size(), material.foster_modes.size(), material.modes.size());
@@ -77,6 +84,7 @@ std::uint64_t materials_hash(const scene::ScenarioDesc& scenario,
                              const scene::SceneGeometry& geometry) {
   Fnv64 hash;
   for (const scene::Material& material : geometry.materials) add_material(hash, material);
+  // Add the material of the surroundings, which need not occur in the scene.
   const std::string& surroundings = scenario.thermal.surroundings_material.empty()
                                         ? scenario.default_material
                                         : scenario.thermal.surroundings_material;
@@ -85,6 +93,7 @@ std::uint64_t materials_hash(const scene::ScenarioDesc& scenario,
   return hash.value();
 }
 
+/// Hash of place and date.
 std::uint64_t place_hash(const scene::ScenarioDesc& scenario) {
   Fnv64 hash;
   add(hash, scenario.place.lat_rad, scenario.place.lon_rad, scenario.place.height_m,
@@ -92,6 +101,7 @@ std::uint64_t place_hash(const scene::ScenarioDesc& scenario) {
   return hash.value();
 }
 
+/// Hash of the weather table and of the clear-sky model, which counts where there is no table.
 std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   Fnv64 hash;
   for (const physics::WeatherSample& sample : scenario.weather) add_weather(hash, sample);
@@ -101,7 +111,7 @@ std::uint64_t weather_hash(const scene::ScenarioDesc& scenario) {
   return hash.value();
 }
 
-/// Those that the method "cached" reads.
+/// Hash of the thermal options that the method `cached` reads.
 std::uint64_t thermal_hash(const scene::ThermalOptions& o) {
   Fnv64 hash;
   add(hash, o.model, o.tolerance_k, o.initial_k, o.history_start_ns, o.spin_up_ns, o.foster_modes,
@@ -109,6 +119,7 @@ std::uint64_t thermal_hash(const scene::ThermalOptions& o) {
   return hash.value();
 }
 
+/// Hash of the sensor's format, field of view and trajectory.
 std::uint64_t camera_hash(const scene::SensorDesc& sensor) {
   Fnv64 hash;
   add(hash, sensor.width_px, sensor.height_px, sensor.fov_h_rad);
@@ -157,10 +168,12 @@ std::uint64_t live_hash(std::int64_t at_ns, const Environment& environment,
                         std::span<const PoseHistory> entities) {
   Fnv64 hash;
   for (const PoseHistory& entity : entities) {
+    // Add the poses that the host has sent for instants up to `at_ns`.
     const std::span<const scene::Keyframe> live = entity.live();
     const auto end = std::ranges::upper_bound(live, at_ns, {}, &scene::Keyframe::sim_time_ns);
     add_keys(hash, live.first(static_cast<std::size_t>(end - live.begin())));
   }
+  // Add the weather that it has sent, likewise.
   for (const physics::WeatherSample& row : environment.live()) {
     if (row.sim_time_ns <= at_ns) add_weather(hash, row);
   }

@@ -11,11 +11,12 @@
 namespace emit::renderer {
 namespace {
 
+/// Samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 64;
-/// Share of the work that tracing is.
+/// Share of tracing in the whole work, for the progress.
 constexpr double kTraceFrac = 0.7;
 
-/// A first guess of what samples send: what they send at the begin.
+/// First guess of the radiation that samples send: at all times what they send at the begin.
 SentHistory sent_as_before(const SurfaceModel& model, std::size_t intervals) {
   SentHistory sent(intervals);
   sent.resize(model.outputs.size());
@@ -36,6 +37,7 @@ physics::Result<void> carry_on(const SurfaceInputs& inputs, const SurfaceModelOp
     return physics::make_error(physics::ErrorCode::internal,
                                "stopped while carrying the surface on");
   };
+  // Start from the states of the model.
   const std::size_t count = model.samples.samples.size();
   const std::size_t intervals = inputs.record.size();
   SampleHistories histories;
@@ -44,7 +46,7 @@ physics::Result<void> carry_on(const SurfaceInputs& inputs, const SurfaceModelOp
   histories.sun_frac.resize(count * intervals);
   if (!inputs.movers_now.empty()) histories.hidden_sky.resize(count * intervals);
 
-  // Trace the sun from where the samples are, in slices, so that a stop is heard.
+  // Trace the sun from the places of the samples, in slices, so that a stop is noticed soon.
   const SunTracer tracer(inputs, options);
   constexpr std::size_t kSlice = 16384;
   for (std::size_t first = 0; first < count; first += kSlice) {
@@ -63,7 +65,8 @@ physics::Result<void> carry_on(const SurfaceInputs& inputs, const SurfaceModelOp
     if (progress && !progress(kTraceFrac * done)) return stopped();
   }
 
-  // Integrate, with one sweep more than after a guess that knows each sample's own history.
+  // Integrate. The first guess here knows less than that of the builder, so one more sweep is
+  // needed.
   const bool exchanges = options.exchange || options.lateral;
   if (exchanges) histories.sent = sent_as_before(model, intervals);
   const ExchangeOptions how{

@@ -4,8 +4,8 @@
 
 namespace emit::renderer {
 
-/// Carries the samples of a model from the begin of `inputs.record`, where their states and outputs
-/// are, to its end. Samples stay where they are: what has been refined is kept. Setup only; uses
+/// Advances the samples of a model from the begin of `inputs.record`, where their states and
+/// outputs are, to its end. Samples stay where they are: the refinement is kept. Setup only; uses
 /// all cores; deterministic. Errors: `internal` when stopped by `progress`.
 [[nodiscard]] physics::Result<void> carry_on(const SurfaceInputs& inputs,
                                              const SurfaceModelOptions& options,

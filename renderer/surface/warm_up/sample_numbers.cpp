@@ -12,12 +12,14 @@
 namespace emit::renderer {
 namespace {
 
+/// Views in one task of a parallel loop.
 constexpr std::size_t kGrain = 16;
 
-/// Most samples that a view can be made of: three corners for each face.
+/// Largest number of samples in the list of a view: three corners for each seen face.
 constexpr std::size_t kMaxListed = 3 * SurfaceView::kMaxSeen;
 
-/// Samples that one view shows, each of them once, in the order in which they were met.
+/// List of the samples that one view shows, each of them once, in the order in which they were met.
+/// It finds entries by a hash table with open addressing.
 class SeenList {
  public:
   void clear() noexcept {
@@ -49,6 +51,7 @@ class SeenList {
   std::size_t count_ = 0;
 };
 
+/// Does the work of number_samples().
 class Numbers {
  public:
   Numbers(const SurfaceInputs& inputs, const SurfaceModelOptions& options,
@@ -58,7 +61,7 @@ class Numbers {
   void run();
 
  private:
-  /// The sample of a vertex of an instance, on the side that is seen.
+  /// Index of the sample of a vertex of an instance, on the side that is seen.
   [[nodiscard]] std::uint32_t sample_of(std::uint32_t instance, std::uint32_t vertex,
                                         bool behind) const;
   /// Turns the views of one side of a patch into lists of samples, and frees them.
@@ -70,9 +73,9 @@ class Numbers {
   const SurfaceModelOptions& options_;
   std::vector<SurfacePatch>& patches_;
   SurfaceModel& model_;
-  std::vector<std::vector<std::uint32_t>> backs_;  ///< by mesh: vertices of sheets
+  std::vector<std::vector<std::uint32_t>> backs_;  ///< by mesh: vertices of sheets, ascending
   std::vector<std::uint32_t> first_;               ///< by patch: its first sample
-  /// Where the list of a view lies in SurfaceSamples::seen, and what its weights add up to.
+  /// Place of the list of a view in SurfaceSamples::seen, and the sum of its weights.
   struct Listed {
     std::uint32_t first = 0;
     std::uint32_t count = 0;
@@ -82,6 +85,7 @@ class Numbers {
 };
 
 std::uint32_t Numbers::sample_of(std::uint32_t instance, std::uint32_t vertex, bool behind) const {
+  // Samples of an instance are those of its vertices, then the backs of the vertices on sheets.
   const std::uint32_t mesh = in_.geometry.instances[instance].mesh;
   const auto back = std::ranges::lower_bound(backs_[mesh], vertex);
   if (!behind || back == backs_[mesh].end() || *back != vertex) return first_[instance] + vertex;
@@ -96,7 +100,7 @@ void Numbers::list_views(SurfacePatch& side) {
     for (std::uint32_t v = 0; v < side.seen.size(); ++v) {
       if (!side.seen[v].empty()) views.push_back(v);
     }
-    // Find the samples around every place that is seen.
+    // Spread the weight of every seen place over the corners of the triangle there.
     std::vector<std::vector<SeenSample>> lists(views.size());
     threads::parallel_parts(views.size(), kGrain, [&](std::size_t from, std::size_t to) {
       SeenList list;
@@ -118,7 +122,7 @@ void Numbers::list_views(SurfacePatch& side) {
         listed_[views[i]].weight_frac = sum_frac;
       }
     });
-    // Append the lists one after the other.
+    // Append the lists one after the other, so that their order does not depend on the threads.
     std::vector<SeenSample>& seen = model_.samples.seen;
     for (std::size_t i = 0; i < views.size(); ++i) {
       listed_[views[i]].first = static_cast<std::uint32_t>(seen.size());
@@ -134,13 +138,14 @@ void Numbers::append(const SurfacePatch& side, std::size_t vertex, SurfaceSample
   const Listed& view = listed_[side.view_of[vertex]];
   sample.first_seen = view.first;
   sample.seen_count = view.count;
-  // The faces fill what is not open.
+  // Scale the weights so that the faces fill the part of the hemisphere that is not open.
   const float left_frac = 1.0F - sample.sky_frac - sample.far_frac;
   sample.seen_scale = view.count != 0 ? left_frac / view.weight_frac : 0.0F;
   model_.samples.samples.push_back(sample);
 }
 
 void Numbers::run() {
+  // Give each patch its range of samples.
   for (const RefinedMesh& mesh : model_.meshes) {
     backs_.push_back(back_vertices(mesh, in_.materials));
   }
@@ -155,12 +160,15 @@ void Numbers::run() {
                              first_.begin() + static_cast<std::ptrdiff_t>(instances));
   model_.drawn_samples = first_.size() > instances ? first_[instances] : next;
   model_.samples.samples.reserve(next);
+  // Append the samples patch by patch. The partners' patch comes last, after all drawn samples.
   for (std::size_t p = 0; p < patches_.size(); ++p) {
     SurfacePatch& patch = patches_[p];
     const bool partners = p >= instances;
     list_views(patch);
     for (std::size_t i = 0; i < patch.samples.size(); ++i) {
       SurfaceSample sample = patch.samples[i];
+      // Turn indices into a patch into indices of samples. Until now first_seen of a partner is the
+      // patch of the sample that it belongs to; append() overwrites it.
       if (partners) {
         sample.partners[0].sample += first_[sample.first_seen];
       } else {
@@ -170,6 +178,7 @@ void Numbers::run() {
       }
       append(patch, i, sample);
     }
+    // Append the backs of sheets, and link both sides.
     if (!patch.back) continue;
     list_views(*patch.back);
     for (const std::uint32_t v : backs_[patch.mesh]) {

@@ -9,14 +9,15 @@
 
 namespace emit::renderer {
 
-/// What samples send out over the whole history, one row of float32 numbers per sample. A row holds
-/// the long-wave exitance at every node, the reflected sunlight of every interval and the net flux
-/// into the solid at every node, all in W/m2. An interval lies between two nodes.
+/// Radiation and heat that samples send out over the whole history, one row of float32 numbers per
+/// sample. A row holds the long-wave exitance at every node, the reflected sunlight of every
+/// interval and the net flux into the solid at every node, all in W/m2. An interval lies between
+/// two nodes.
 /// Threads may write different rows at the same time.
 class SentHistory {
  public:
   SentHistory() = default;
-  /// No samples yet. `intervals` may be 0: then rows are empty and nothing is kept.
+  /// Begins with no samples. `intervals` may be 0: then rows are empty and nothing is stored.
   explicit SentHistory(std::size_t intervals)
       : intervals_(intervals), row_(intervals == 0 ? 0 : 3 * intervals + 2) {}
 
@@ -24,17 +25,18 @@ class SentHistory {
   [[nodiscard]] bool keeps() const noexcept { return row_ != 0; }
   [[nodiscard]] std::size_t intervals() const noexcept { return intervals_; }
 
-  /// Keeps what a sample sends at the first node. @pre keeps()
+  /// Stores the output of a sample at the first node. @pre keeps()
   void keep_begin(std::size_t sample, const SampleOutput& output) noexcept {
     keep_node(sample, 0, output);
   }
-  /// Keeps what a sample sends over `interval` and at the node where it ends. @pre keeps()
+  /// Stores the output of a sample over `interval` and at the node where it ends. @pre keeps()
   void keep_end(std::size_t sample, std::size_t interval, const SampleOutput& output) noexcept {
     keep_node(sample, interval + 1, output);
     at(sample, intervals_ + 1 + interval) = output.shortwave_out_w_m2;
   }
 
-  /// Numbers that others receive: all nodes of the long wave, then all intervals of the sunlight.
+  /// Part of a row that other samples receive: the long wave at all nodes, then the sunlight of all
+  /// intervals.
   [[nodiscard]] std::span<const float> radiation_w_m2(std::size_t sample) const noexcept {
     return std::span(values_).subspan(sample * row_, radiation_size());
   }
@@ -51,7 +53,7 @@ class SentHistory {
   [[nodiscard]] std::span<float> row(std::size_t sample) noexcept {
     return std::span(values_).subspan(sample * row_, row_);
   }
-  /// Gives the memory back.
+  /// Frees the memory.
   void clear() noexcept { values_ = {}; }
 
  private:

@@ -30,9 +30,12 @@ void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
   EMIT_DCHECK_OP(sun_frac.size(), ==, record.size());
   EMIT_DCHECK(hidden_sky.empty() || hidden_sky.size() == record.size());
   const RayOffsets offsets = this->offsets(sample.position_m, sample.mover);
+  // Limit the blur to half of the way over which the surface is a plane: rays must not start beyond
+  // an edge.
   const float max_blur_m = lateral_ ? std::min(max_blur_m_, 0.5F * sample.flat_m) : 0.0F;
   for (std::size_t i = 0; i < record.size(); ++i) {
-    // Lateral conduction since then has blurred the edge of a shadow: spread the rays as far.
+    // Spread the starts of the rays as far as lateral conduction has blurred the edge of a shadow
+    // since then (physics.md eq. 21).
     const IntervalRays& rays = record.rays[i];
     const float blur_m = std::min(
         max_blur_m, std::sqrt(2.0F * diffusivity_m2_s_[sample.material] * record.lag_s[i]));

@@ -8,22 +8,23 @@
 
 namespace emit::renderer {
 
-/// Traces what samples see of the sun and of the sky behind entities over a record. Immutable; any
-/// thread.
+/// Traces the shares of the sun and of the sky behind entities that samples see over a record.
+/// Immutable; any thread.
 class SunTracer {
  public:
-  /// `inputs` must outlive it.
+  /// Keeps a reference: `inputs` must outlive the tracer.
   SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& options);
 
-  /// Fills the visible share of the sun's disc and, where there are entities, the share of the sky
-  /// that they hide, interval by interval.
+  /// Fills the visible share of the sun's disc for each interval of the record and, if there are
+  /// entities, the share of the sky that they hide.
   /// @pre sun_frac.size() equals the record's intervals; so does hidden_sky.size(), or it is 0
   void trace(const SurfaceSample& sample, std::span<float> sun_frac,
              std::span<HiddenSky> hidden_sky) const;
 
-  /// Distances of ray starts from the surface at a place, which is in the body frame of an entity
-  /// where `mover` is not negative.
+  /// Distances of the starts of rays from the surface at a place. If `mover` is not negative, the
+  /// place is in the body frame of that entity.
   [[nodiscard]] RayOffsets offsets(const glm::vec3& place_m, std::int32_t mover) const noexcept;
+  /// Distances that hold for the bulk of the scene.
   [[nodiscard]] const RayOffsets& bulk_offsets() const noexcept { return offsets_; }
 
  private:
@@ -31,7 +32,7 @@ class SunTracer {
   RayOffsets offsets_;
   bool lateral_ = true;
   float max_blur_m_ = 0.0F;
-  std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
+  std::vector<float> diffusivity_m2_s_;  ///< diffusivity of the first layer, by material
 };
 
 }  // namespace emit::renderer

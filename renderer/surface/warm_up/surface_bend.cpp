@@ -8,7 +8,8 @@
 namespace emit::renderer {
 namespace {
 
-/// The full surface is looked for within this share of the triangle's longest edge.
+/// Distance within which the surface as loaded is searched, as a share of the triangle's longest
+/// edge.
 constexpr float kReachFrac = 0.25F;
 
 }  // namespace
@@ -23,6 +24,7 @@ float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined
   const float reach_m =
       kReachFrac * std::max({glm::distance(place(0), place(1)), glm::distance(place(1), place(2)),
                              glm::distance(place(2), place(0))});
+  // Interpolate the corners: place, normal in axes of the mesh, and normal in rel axes as drawn.
   glm::vec3 position_m(0.0F);
   glm::vec3 normal(0.0F);
   glm::vec3 drawn_facing(0.0F);
@@ -36,9 +38,12 @@ float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined
   }
   const float length = glm::length(normal);
   if (!(length > 0.0F)) return 0.0F;
+  // Find the surface as loaded next to that place.
   const auto full = in_.detail->place(patch.mesh, position_m, normal / length, reach_m);
   if (!full) return 0.0F;
   const glm::vec3 facing = glm::normalize(patch.normal_from_mesh * full->normal);
+  // Add up the differences that the other normal makes: of the sky, then of the sun in each
+  // interval.
   float cost_k = worth_.sky_k(material) * glm::dot(to_sky, facing - drawn_facing);
   for (std::size_t i = 0; i < count; ++i) {
     const glm::vec3& to_sun = in_.record.rays[i].to_sun();
@@ -60,7 +65,7 @@ float SurfaceBend::cost_k(const RefinedMesh& refined, std::uint32_t slot,
                           const SurfacePatch& patch) const {
   if (in_.detail == nullptr || !in_.detail->has(patch.mesh)) return 0.0F;
   constexpr float kThird = 1.0F / 3.0F;
-  // Near the middles of the edges, not on them: a crease has two normals.
+  // Take places near the middles of the edges, not on them: a crease has two normals.
   constexpr float kNear = 0.46F;
   constexpr float kFar = 1.0F - 2.0F * kNear;
   float greatest_k = 0.0F;

@@ -7,21 +7,22 @@
 
 namespace emit::renderer {
 
-/// What it costs that a surface, before it was simplified, faces elsewhere than the corners of a
-/// triangle make believe: in the sun and under the sky that they see. Immutable; any thread;
-/// allocates nothing after construction.
+/// Error in temperature that simplification causes: the surface as loaded faces elsewhere than the
+/// normals at the corners of a triangle say, so that it receives another share of sun and sky.
+/// Immutable; any thread; allocates nothing after construction.
 class SurfaceBend {
  public:
-  /// Both must outlive it.
+  /// Keeps references: both must outlive the object.
   SurfaceBend(const SurfaceInputs& inputs, const DriveWorth& worth) : in_(inputs), worth_(worth) {}
 
-  /// Greatest difference in temperature at the triangle's centre and at the middles of its edges,
-  /// K; 0 where the mesh has lost no triangle. By first-order worths of sun and sky.
+  /// Greatest difference in temperature at four places of a triangle, its centre and near the
+  /// middles of its edges, in K. It is 0 if the mesh has lost no triangle. It is computed to first
+  /// order, with the sensitivities to sun and sky.
   [[nodiscard]] float cost_k(const RefinedMesh& refined, std::uint32_t slot,
                              const SurfacePatch& patch) const;
 
  private:
-  /// The same at one place: weights of the corners.
+  /// The same difference at one place, which is given by the weights of the corners.
   [[nodiscard]] float cost_at_k(const glm::vec3& weight, const RefinedMesh& refined,
                                 std::uint32_t slot, const SurfacePatch& patch) const;
 

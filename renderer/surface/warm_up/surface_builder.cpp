@@ -21,26 +21,33 @@
 namespace emit::renderer {
 namespace {
 
+/// Largest number of rounds of refinement.
 constexpr std::uint32_t kMaxRounds = 400;
-/// What needs less than this share of the neediest waits for another round, unless few need more: a
-/// round takes a share of all, too, lest a single needy triangle after the other use them up.
+/// Limits of a round. It halves the leaves that need more than the greatest need divided by
+/// kNeedStep. If these are fewer than one in kRoundShare of all leaves in need, or than
+/// kLeastPerRound, it takes that many: otherwise a few needy triangles, one per round, would use up
+/// the rounds.
 constexpr float kNeedStep = 4.0F;
 constexpr std::size_t kRoundShare = 8;
 constexpr std::size_t kLeastPerRound = 256;
-/// A round for which samples do not suffice is the last when it adds no more than that share of
-/// all.
+/// A round for which samples do not suffice is the last one if it adds no more than max_samples /
+/// kLastFraction samples.
 constexpr std::size_t kLastFraction = 256;
+/// Samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 64;
-/// The full surface is looked for within this share of the halved edge.
+/// Distance within which the surface as loaded is searched, as a share of the halved edge.
 constexpr float kDetailReachFrac = 0.5F;
+/// Distance from a crease at which the surface as loaded is searched, as a share of the halved
+/// edge.
 constexpr float kOffCreaseFrac = 0.02F;
 
-/// A sample to be evaluated.
+/// Sample to be evaluated: vertex `index` of a patch.
 struct Job {
   std::uint32_t patch = 0;
   std::uint32_t index = 0;
 };
 
+/// Does the work of build_surface_model().
 class Builder {
  public:
   Builder(const SurfaceInputs& inputs, const RefineView& view, const SurfaceModelOptions& options,
@@ -56,21 +63,22 @@ class Builder {
   physics::Result<SurfaceModel> run();
 
  private:
+  /// Makes a patch for each instance, still without samples.
   void make_patches();
-  /// Halves the leaves of a mesh that need more than `above`, the neediest first, as far as samples
-  /// are left.
+  /// Halves the leaves of a mesh whose need is greater than `above`. If samples run short, it
+  /// begins with the neediest leaves.
   void split(std::uint32_t mesh, float above);
-  /// What the share of leaves that a round takes at least need more than.
+  /// Need above which lie about as many leaves as a round takes at least; 0 if there are fewer.
   [[nodiscard]] float need_of_neediest();
-  /// Gives every vertex that has no sample yet one; false when stopped.
+  /// Evaluates a sample for every vertex that has none yet. Returns false when stopped.
   bool sample_new_vertices(double begin_frac, double end_frac);
-  /// Vertices from `first` on face as the surface did before it was simplified, and their samples
-  /// lie on it.
+  /// Gives the vertices from `first` on the normals of the surface as loaded, and moves their
+  /// samples onto it.
   void adopt_detail(std::uint32_t mesh, std::uint32_t first);
-  /// Makes covered samples next to open ones copies of those: nobody sees them, but triangles that
-  /// a foot cuts would show a mixture of both.
+  /// Replaces covered samples next to open ones by copies of these. Nobody sees covered samples,
+  /// but triangles that the foot of a body cuts would show a mixture of both.
   void replace_covered();
-  /// Of each instance of a mesh.
+  /// Number of samples of each instance of a mesh, backs of sheets included.
   [[nodiscard]] std::size_t samples_of(std::uint32_t mesh) const {
     const RefinedMesh& refined = model_.meshes[mesh];
     return refined.vertices().size() + back_vertices(refined, in_.materials).size();
@@ -82,18 +90,18 @@ class Builder {
   const SurfaceProgress& progress_;
   DriveWorth worth_;
   PatchSampler sampler_;
-  PartnerFinder partners_;  ///< used where heat moves across edges
+  PartnerFinder partners_;  ///< used only where heat moves across edges
   SurfaceRefinement refinement_;
   SurfaceModel model_;
   std::vector<SurfacePatch> patches_;
   std::vector<std::vector<std::uint32_t>> patches_of_mesh_;
-  std::size_t sample_count_ = 0;   ///< of all patches, with their partners
-  std::size_t partner_count_ = 0;  ///< of these, partners
-  std::size_t least_count_ = 0;    ///< of samples before anything is refined
-  bool short_of_samples_ = false;  ///< leaves stayed whole for want of samples in this round
-  // By vertex of the mesh at hand, filled for those that have no sample yet:
+  std::size_t sample_count_ = 0;   ///< samples of all patches, partners included
+  std::size_t partner_count_ = 0;  ///< partners among these
+  std::size_t least_count_ = 0;    ///< samples before anything is refined
+  bool short_of_samples_ = false;  ///< leaves stayed whole in this round, because samples ran out
+  // Arrays by vertex of the mesh at hand, filled for the vertices that have no sample yet.
   std::vector<glm::vec3> inward_;
-  std::vector<glm::vec3> place_m_;  ///< of its samples
+  std::vector<glm::vec3> place_m_;  ///< place of the samples of the vertex, axes of the mesh
   std::vector<Job> jobs_;
   std::vector<SurfaceRefinement::Need> needs_;
   std::vector<float> ranked_;
@@ -108,6 +116,7 @@ void Builder::make_patches() {
     patch.mesh = instance.mesh;
     patch.object = instance.object;
     patch.mover = in_.mover_of_object[instance.object];
+    // Static patches lie in rel axes, and those of entities lie in the axes of their body.
     glm::dmat4 rel_from_mesh = instance.body_from_mesh;
     if (patch.mover < 0) {
       rel_from_mesh = instance.world_from_mesh;
@@ -115,6 +124,7 @@ void Builder::make_patches() {
     }
     patch.rel_from_mesh = glm::mat4(rel_from_mesh);
     patch.normal_from_mesh = glm::mat3(glm::transpose(glm::inverse(glm::dmat3(rel_from_mesh))));
+    // Give meshes with sheets a second patch for the other faces.
     if (!back_vertices(model_.meshes[patch.mesh], in_.materials).empty()) {
       patch.back = std::make_unique<SurfacePatch>();
       patch.back->mesh = patch.mesh;
@@ -133,6 +143,7 @@ void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
   const auto vertices = refined.vertices();
   place_m_.resize(vertices.size());
   for (std::size_t v = first; v < vertices.size(); ++v) place_m_[v] = vertices[v].position_m;
+  // Move vertices that halve an edge. Those of the simplified mesh lie on the surface already.
   if (in_.detail == nullptr || !in_.detail->has(mesh)) return;
   threads::parallel_parts(vertices.size() - first, kGrain, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = first + from; i < first + to; ++i) {
@@ -140,7 +151,7 @@ void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
       if (vertex.parent[0] == i) continue;
       const float edge_m = glm::distance(vertices[vertex.parent[0]].position_m,
                                          vertices[vertex.parent[1]].position_m);
-      // On a crease, of the face that the vertex belongs to.
+      // Step aside from a crease, onto the face that the vertex belongs to.
       const glm::vec3 place_m = vertex.position_m + kOffCreaseFrac * edge_m * inward_[i];
       const auto full = in_.detail->place(mesh, place_m, vertex.normal, kDetailReachFrac * edge_m);
       if (!full) continue;
@@ -151,6 +162,7 @@ void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
 }
 
 bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
+  // Place a sample at each new vertex of each instance.
   jobs_.clear();
   job_stand_.clear();
   for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
@@ -169,6 +181,8 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       if (options_.lateral) partners_.grow(p, vertices.size());
       for (std::uint32_t v = first; v < vertices.size(); ++v) {
         SurfaceSample& sample = patch.samples[v];
+        // Move the sample off the edge on which the vertex lies, by the distance at which rays
+        // start.
         const glm::vec3 inward = patch.normal_from_mesh * inward_[v];
         const float length = glm::length(inward);
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
@@ -182,6 +196,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         sample.normal = glm::normalize(patch.normal_from_mesh * vertices[v].normal);
         sample.mover = patch.mover;
         sample.material = vertices[v].material;
+        // Let the sample of a sheet's other face stand at the same place.
         if (in_.materials[sample.material].sheet) {
           SurfaceSample& back = patch.back->samples[v];
           back = sample;
@@ -194,7 +209,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
       }
     }
   }
-  // In slices, so that the progress moves and a stop is heard.
+  // Evaluate the samples in slices, so that the progress moves and a stop is noticed soon.
   constexpr std::size_t kSlice = 16384;
   for (std::size_t begin = 0; begin < jobs_.size(); begin += kSlice) {
     const std::size_t end = std::min(jobs_.size(), begin + kSlice);
@@ -210,6 +225,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
     const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());
     if (!report(begin_frac + (end_frac - begin_frac) * done)) return false;
   }
+  // Count the partners found, and compare each sample with the mean of its parents.
   for (const Job& job : jobs_) {
     SurfacePatch& patch = patches_[job.patch];
     if (options_.lateral) {
@@ -223,7 +239,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
                                  patch.outputs[vertex.parent[1]].offset_k);
     patch.surplus_k[job.index] = std::abs(patch.outputs[job.index].offset_k - mean_k);
     for (SurfacePatch* side = &patch; side != nullptr; side = side->back.get()) {
-      if (!std::isinf(side->sky_surplus_frac[job.index])) continue;  // taken over
+      if (!std::isinf(side->sky_surplus_frac[job.index])) continue;  // the parents' view was taken
       const auto off_mean = [&](float SurfaceSample::*share) {
         const float mean = 0.5F * (side->samples[vertex.parent[0]].*share +
                                    side->samples[vertex.parent[1]].*share);
@@ -243,6 +259,7 @@ void Builder::replace_covered() {
     const RefinedMesh& mesh = model_.meshes[in_.geometry.instances[p].mesh];
     const std::uint32_t first = model_.first_sample[p];
     const auto vertices = mesh.vertices();
+    // Find for each covered vertex the nearest open vertex of its triangles.
     std::vector<std::uint32_t> open(vertices.size(), kNoSample);
     const auto apart_m = [&](std::uint32_t a, std::uint32_t b) {
       return glm::distance(vertices[a].position_m, vertices[b].position_m);
@@ -260,6 +277,7 @@ void Builder::replace_covered() {
         }
       }
     }
+    // Copy the open ones.
     for (std::uint32_t v = 0; v < open.size(); ++v) {
       if (open[v] == kNoSample) continue;
       all.samples[first + v] = all.samples[first + open[v]];
@@ -278,7 +296,7 @@ void Builder::split(std::uint32_t mesh, float above) {
       options_.max_samples > sample_count_ ? options_.max_samples - sample_count_ : 0;
   const std::size_t vertices = refined.vertices().size();
   const std::size_t samples = samples_of(mesh);
-  // Leave room for the partners of new samples: half as many again as those before them have. A
+  // Leave room for the partners of new samples: half as many again per sample as those so far. A
   // vertex of a sheet has two samples.
   constexpr double kMorePartners = 1.5;
   const double partners_of_sample =
@@ -287,12 +305,14 @@ void Builder::split(std::uint32_t mesh, float above) {
   const double samples_of_vertex = static_cast<double>(samples > vertices ? 2 * uses : uses);
   const auto most = static_cast<std::size_t>(static_cast<double>(left) /
                                              (samples_of_vertex * (1.0 + partners_of_sample)));
+  // Take the neediest first if there are more leaves than new vertices.
   refined.limit(vertices + most);
   if (needs_.size() > most) {
     std::ranges::sort(needs_, [](const auto& a, const auto& b) {
       return a.need != b.need ? a.need > b.need : a.slot < b.slot;
     });
   }
+  // Halve them. Leaves that stayed whole for another reason than want of samples need no more.
   slots_.clear();
   for (const SurfaceRefinement::Need& need : needs_) slots_.push_back(need.slot);
   const bool complete = refined.split(slots_);
@@ -321,18 +341,20 @@ physics::Result<SurfaceModel> Builder::run() {
   const auto stopped = [] {
     return physics::make_error(physics::ErrorCode::internal, "stopped while sampling the surface");
   };
+  // Begin with the meshes as they are, one patch per instance.
   for (const scene::Mesh& mesh : in_.geometry.meshes) {
     model_.meshes.emplace_back(mesh, options_.max_samples);
   }
   make_patches();
-  // How far refinement will go is not known: each round takes a share of what is left.
+  // Let each round take a quarter of the progress that is left: nobody knows how many rounds
+  // follow.
   double done_frac = 0.0;
-  std::size_t count_before = 0;  // of samples, in the round before
+  std::size_t count_before = 0;  // samples before the latest round
   const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
   double to_frac = next_frac();
   if (!sample_new_vertices(done_frac, to_frac)) return stopped();
   least_count_ = sample_count_;
-  // Where need is greatest first: when samples run out, what is left matters least.
+  // Refine in rounds, the greatest need first: if samples run out, what is left matters least.
   for (std::uint32_t round = 0;; ++round) {
     SurfaceRefinement::Most most;
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) {
@@ -341,8 +363,8 @@ physics::Result<SurfaceModel> Builder::run() {
       most.need = std::max(most.need, here.need);
       most.in_view = std::max(most.in_view, here.in_view);
     }
-    // Stop where samples have run out: what a round leaves room for the next one takes, until next
-    // to nothing is left.
+    // Stop when samples have run out. The next round takes the room that this one leaves, until a
+    // round adds next to nothing.
     const bool none_left =
         short_of_samples_ && sample_count_ - count_before <= options_.max_samples / kLastFraction;
     if (none_left || round == kMaxRounds) {
@@ -353,6 +375,7 @@ physics::Result<SurfaceModel> Builder::run() {
     if (most.need == 0.0F) break;
     short_of_samples_ = false;
     count_before = sample_count_;
+    // Halve the neediest leaves of all meshes, and evaluate the new samples.
     const float above = std::min(most.need / kNeedStep, need_of_neediest());
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
     done_frac = to_frac;
@@ -360,12 +383,13 @@ physics::Result<SurfaceModel> Builder::run() {
     if (!sample_new_vertices(done_frac, to_frac)) return stopped();
   }
   if (options_.lateral) {
-    // The partners of the last samples may be more than room was left for.
+    // Drop the weakest partners if those of the last samples are more than room was left for.
     if (sample_count_ > options_.max_samples && sample_count_ > least_count_) {
       partners_.drop(sample_count_ - std::max(options_.max_samples, least_count_));
     }
     partners_.append(patches_);
   }
+  // Lay all samples out in one array, and integrate their history again with exchange.
   number_samples(in_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
   SampleHistories histories = take_histories(in_, patches_, model_);

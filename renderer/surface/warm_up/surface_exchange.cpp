@@ -13,15 +13,17 @@
 namespace emit::renderer {
 namespace {
 
+/// Samples in one task of a parallel loop.
 constexpr std::size_t kGrain = 64;
 constexpr std::uint32_t kNoList = 0xffffffffU;
 
-/// What the seen samples of every list send together, over the whole history: their weights are
+/// Sum of the radiation of the seen samples of every list, over the whole history. The weights are
 /// those of SurfaceSamples::seen.
 class SeenRadiation {
  public:
   SeenRadiation(const SurfaceSamples& all, std::size_t row_size)
       : all_(all), row_size_(row_size), list_of_entry_(all.seen.size(), kNoList) {
+    // Find the lists: samples that share a view share its first entry.
     for (const SurfaceSample& sample : all.samples) {
       if (sample.seen_count == 0 || list_of_entry_[sample.first_seen] != kNoList) continue;
       list_of_entry_[sample.first_seen] = static_cast<std::uint32_t>(lists_.size());
@@ -30,7 +32,7 @@ class SeenRadiation {
     sums_w_m2_.resize(lists_.size() * row_size_);
   }
 
-  /// Adds up what `sent` holds, list by list. Uses all cores.
+  /// Adds up the radiation of `sent`, list by list. Uses all cores.
   void gather(const SentHistory& sent) {
     constexpr std::size_t kListGrain = 16;
     threads::parallel_parts(lists_.size(), kListGrain, [&](std::size_t from, std::size_t to) {
@@ -47,45 +49,47 @@ class SeenRadiation {
     });
   }
 
-  /// Row of the list that the sample sees; empty where it sees nothing.
+  /// Row of the list that a sample sees. It is empty if the sample sees nothing.
   [[nodiscard]] std::span<const double> of(const SurfaceSample& sample) const noexcept {
     if (sample.seen_count == 0) return {};
     return std::span(sums_w_m2_).subspan(list_of_entry_[sample.first_seen] * row_size_, row_size_);
   }
 
  private:
+  /// Range of SurfaceSamples::seen.
   struct List {
     std::uint32_t first = 0;
     std::uint32_t count = 0;
   };
   const SurfaceSamples& all_;
   std::size_t row_size_;
-  std::vector<std::uint32_t> list_of_entry_;  ///< by entry of `seen` that begins a list
+  std::vector<std::uint32_t> list_of_entry_;  ///< list that begins with an entry of `seen`
   std::vector<List> lists_;
   std::vector<double> sums_w_m2_;  ///< by list: rows like SentHistory::radiation_w_m2()
 };
 
-/// Carries samples over the whole history, from what the others sent in the sweep before.
+/// Integrates samples over the whole history, with what the others sent in the sweep before.
 class Sweeper {
  public:
   Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options, SampleHistories histories,
           SurfaceModel& model);
 
-  /// `all`: also those that no sweep changes.
+  /// Does one sweep. With `all` it includes samples that no sweep changes.
   void sweep(bool all);
 
  private:
-  /// Measures what the faces of entities send at every node, as `before_` has it.
+  /// Measures the radiation of the faces of entities at every node, from the latest sweep.
   void measure_faces();
-  /// True where no sweep changes anything: the sample sees no other one, has no partner, and no
-  /// entity that sends anything hides its sky.
+  /// Returns true if no sweep changes the sample: it sees no other one, has no partner, and no
+  /// entity that sends radiation hides its sky.
   [[nodiscard]] bool alone(std::size_t s) const noexcept;
-  /// What sample `s` receives in interval j.
+  /// Input of sample `s` in interval j, without the fluxes of its partners.
   [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal,
                                   std::size_t j) const noexcept;
-  /// Adds what the entities send that hide the sample's sky in interval j.
+  /// Adds the radiation of the entity that hides most of the sample's sky in interval j.
   void add_glow(std::size_t s, const glm::vec3& normal, std::size_t j,
                 SampleDrive& drive) const noexcept;
+  /// Integrates sample `s`, and the other face of a sheet with it, over the record.
   void carry(std::uint32_t s);
 
   const SurfaceInputs& in_;
@@ -134,6 +138,7 @@ void Sweeper::measure_faces() {
 }
 
 void Sweeper::sweep(bool all) {
+  // Gather the radiation of the sweep before, then integrate every sample that it can change.
   seen_.gather(before_);
   threads::parallel_parts(start_.size(), kGrain, [&](std::size_t from, std::size_t to) {
     for (auto s = static_cast<std::uint32_t>(from); s < to; ++s) {
@@ -142,6 +147,7 @@ void Sweeper::sweep(bool all) {
       if (all || !alone(s) || (other != kNoSample && !alone(other))) carry(s);
     }
   });
+  // Make the result of this sweep the input of the next one.
   std::swap(before_, after_);
   measure_faces();
 }
@@ -162,6 +168,7 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j
   SampleDrive drive;
   drive.sun_frac = sun_frac_[s * intervals_ + j];
   if (!hidden_sky_.empty()) drive.hidden_sky_frac = hidden_sky_[s * intervals_ + j].frac;
+  // Add what the seen samples send, scaled to the share of the hemisphere that they fill.
   if (const std::span<const double> received_w_m2 = seen_.of(sample); !received_w_m2.empty()) {
     const double scale = sample.seen_scale;
     drive.longwave_begin_w_m2 = scale * received_w_m2[j];
@@ -177,6 +184,7 @@ void Sweeper::add_glow(std::size_t s, const glm::vec3& normal, std::size_t j,
   if (faces_.empty() || drive.hidden_sky_frac == 0.0F) return;
   const std::size_t mover = hidden_sky_[s * intervals_ + j].mover;
   const std::size_t movers = faces_.size() / nodes_;
+  // Leave the surroundings in place if no face of the entity looks towards the surface.
   const float begin_w_m2 = faces_[j * movers + mover].towards_w_m2(normal);
   const float end_w_m2 = faces_[(j + 1) * movers + mover].towards_w_m2(normal);
   if (begin_w_m2 < 0.0F || end_w_m2 < 0.0F) return;
@@ -195,7 +203,7 @@ void Sweeper::carry(std::uint32_t s) {
   SampleOutput output;
   SampleOutput back_output;
   for (std::size_t j = 0; j < intervals_; ++j) {
-    // Collect what the sample receives over the interval.
+    // Collect the input of the sample over the interval.
     const HeatInterval& interval = in_.record.intervals[j];
     const SurfaceForcing& begin = interval.forcing.begin;
     const glm::vec3 normal = in_.record.rays[j].normal(sample);
@@ -209,7 +217,7 @@ void Sweeper::carry(std::uint32_t s) {
     if (keeps && j == 0) {
       after_.keep_begin(s, in_.heat.output(sample, normal, begin, drive, state));
     }
-    // Advance it, together with its other face where it is a sheet.
+    // Advance it, together with its other face if it is a sheet.
     if (!sheet) {
       output = in_.heat.advance(sample, normal, interval, drive, state);
     } else {
@@ -226,6 +234,7 @@ void Sweeper::carry(std::uint32_t s) {
     }
     if (keeps) after_.keep_end(s, j, output);
   }
+  // Store the end of the record; both faces of a sheet have one state.
   model_.states[s] = state;
   model_.outputs[s] = output;
   if (sheet) {
@@ -251,7 +260,7 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
   out.sent.resize(count);
   model.states.resize(count);
   model.outputs.resize(count);
-  // Copy one side of a vertex to its sample.
+  // Copy the histories of one side of a vertex to its sample.
   const auto take = [&](const SurfacePatch& side, std::size_t vertex, std::size_t s) {
     const auto at = [&](std::size_t row) { return static_cast<std::ptrdiff_t>(row * intervals); };
     std::copy_n(side.sun_frac.begin() + at(vertex), intervals, out.sun_frac.begin() + at(s));
@@ -260,6 +269,7 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
     }
     if (keeps) std::ranges::copy(side.sent.row(vertex), out.sent.row(s).begin());
   };
+  // Copy patch by patch. The partners' patch follows the drawn samples.
   for (std::size_t p = 0; p < patches.size(); ++p) {
     SurfacePatch& patch = patches[p];
     const std::size_t first =
@@ -277,7 +287,8 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
     }
     patch = {};
   }
-  // Start the modes that a partner drives where its own modes start, scaled like its flux.
+  // Start the modes that a partner drives like that partner's own modes, with the weight of its
+  // flux (physics.md eq. 22).
   for (std::size_t s = 0; s < count; ++s) {
     for (std::size_t p = 0; p < kMaxPartners; ++p) {
       const Partner& partner = model.samples.samples[s].partners[p];
@@ -295,6 +306,7 @@ bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,
               SampleHistories histories, SurfaceModel& model, const SurfaceProgress& report) {
   EMIT_CHECK_OP(histories.start.size(), ==, model.samples.samples.size());
   EMIT_CHECK_OP(histories.sun_frac.size(), ==, model.samples.samples.size() * inputs.record.size());
+  // Sweep. The first sweep includes all samples unless the model holds their own histories already.
   Sweeper sweeper(inputs, options, std::move(histories), model);
   for (std::uint32_t i = 0; i < options.sweeps; ++i) {
     if (report && !report((i + 1.0) / (options.sweeps + 1.0))) return false;

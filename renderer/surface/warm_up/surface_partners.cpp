@@ -13,17 +13,19 @@
 namespace emit::renderer {
 namespace {
 
+/// Partners in one task of a parallel loop.
 constexpr std::size_t kGrain = 64;
 /// A partner that drives no mode by more than this share is left out.
 constexpr double kMinWeightFrac = 0.03;
+/// Greatest distance of a partner's face from its sample, in m.
 constexpr float kMaxReachM = 1.0F;
-/// The sine of the angle between two faces that exchange heat is at least this.
+/// Least sine of the angle between two faces that exchange heat.
 constexpr float kMinSine = 0.2F;
-/// One of eight tangents meets a face within reach after at most that many reaches: it points at
-/// most 22.5 degrees aside of the face, which slants by kMinSine at least.
+/// Distance, in reaches, within which one of eight tangents meets a face that lies within reach:
+/// the tangent points at most 22.5 degrees aside of the face, which slants by kMinSine at least.
 constexpr float kFlatReaches = 5.5F;
-/// Ground touches a body when it lies this many ray offsets beside it, and as near to the plane of
-/// its face.
+/// Distance, in ray offsets, that counts as touching: ground touches a body if it lies this close
+/// beside it, and this close to the plane of its face.
 constexpr float kBesideOffsets = 6.0F;
 
 }  // namespace
@@ -55,15 +57,16 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
   EMIT_DCHECK_OP(patch, <, found_.size());
   EMIT_DCHECK_OP(vertex, <, found_[patch].size());
   std::vector<Found>& partners = found_[patch][vertex];
+  // Reach as far as the slowest mode conducts: beyond five depths the weight is next to 0.
   const scene::Material& material = in_.materials[own.material];
   const double a = diffusivity_m2_s(material);
   const physics::FosterNetwork& network = in_.history.network(own.material);
   if (!(a > 0.0) || network.count == 0) return;
   const double slowest_s = network.modes[network.count - 1].tau_s;
   const float reach_m = std::min(kMaxReachM, 5.0F * static_cast<float>(std::sqrt(a * slowest_s)));
-  // Leave out what lies in a plane as far as the rays below would look.
+  // Leave out a sample around which the surface is a plane as far as the rays below would look.
   if (own.flat_m > kFlatReaches * reach_m) return;
-  // Look at the body alone, in its own axes.
+  // Look at the sample's own body alone, in the axes of the body.
   std::vector<MoverPlacement> alone(in_.movers_now.size());
   for (MoverPlacement& place : alone) place.on = false;
   CasterSelection selection{own.mover < 0, {}};
@@ -71,14 +74,15 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
     alone[static_cast<std::size_t>(own.mover)] = {};
     selection.movers = alone;
   }
-  // Inside a body's own axes float32 resolves more than where the body stands.
+  // Take the offset of the place in the body's axes: float32 resolves more there than where the
+  // body stands.
   const float offset_m = sampler_.tracer().offsets(own.position_m, -1).around_m;
   const ViewPoint point{own.position_m, own.normal, glm::vec3(0.0F), offset_m};
   const AdjacentFaces adjacent = adjacent_faces(in_.places, point, reach_m, selection);
   for (std::uint32_t k = 0; k < adjacent.count && partners.size() < kMaxPartners; ++k) {
     const glm::vec3 m = adjacent.faces[k].normal;
     const float x_m = std::max(adjacent.faces[k].distance_m, 0.0F);
-    // Step to the point on the other face that is as far from the edge as the own one.
+    // Step to the point on the other face that is as far from the edge as the sample is.
     const float into = glm::dot(m, own.normal);
     const glm::vec3 along = own.normal - into * m;
     if (glm::length(along) < kMinSine) continue;
@@ -90,6 +94,7 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
         std::abs(hit[0].distance_m - lift_m) > 0.5F * lift_m || glm::dot(hit[0].normal, m) < 0.9F) {
       continue;
     }
+    // Fill the partner's sample. Its material is that of the triangle that was hit.
     const scene::Instance& instance = in_.geometry.instances[hit[0].instance];
     const scene::Mesh& mesh = in_.geometry.meshes[instance.mesh];
     Found found;
@@ -104,7 +109,8 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
       }
     }
     found.distance_m = x_m;
-    // Find out whether the face stands on something: beside the body that lies in its plane.
+    // Find out whether the partner's face stands on ground: look for ground beside the body, in the
+    // plane of that face.
     const CasterRay beside{own.position_m + kBesideOffsets * offset_m * own.normal, m};
     found.sample.covered = in_.places.first_hits({&beside, 1}, selection, hit) != 0U &&
                            std::abs(hit[0].distance_m - x_m) < kBesideOffsets * offset_m &&
@@ -115,7 +121,7 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
 }
 
 void PartnerFinder::drop(std::size_t count) {
-  // List all partners by what they weigh; equal ones by the sample they belong to.
+  // List all partners by their greatest weight, equal ones by the sample they belong to.
   struct Place {
     float weight_frac = 0.0F;
     std::uint32_t patch = 0;
@@ -133,7 +139,7 @@ void PartnerFinder::drop(std::size_t count) {
   std::ranges::sort(places, [](const Place& a, const Place& b) {
     return std::tie(a.weight_frac, a.patch, a.vertex) < std::tie(b.weight_frac, b.patch, b.vertex);
   });
-  // Take the farthest partner off each of the first ones' samples.
+  // Remove the farthest partner of each of the first samples in the list.
   for (std::size_t i = 0; i < count; ++i) {
     std::vector<Found>& partners = found_[places[i].patch][places[i].vertex];
     partners.erase(std::ranges::max_element(partners, {}, &Found::distance_m));
@@ -153,7 +159,7 @@ void PartnerFinder::append(std::vector<SurfacePatch>& patches) const {
         own.distance_m = found.distance_m;
         own.weight_frac = weights(patch.samples[i].material, own.distance_m);
         SurfaceSample sample = found.sample;
-        // Note whom the partner belongs to, until samples are numbered.
+        // Note the sample that the partner belongs to, until samples are numbered.
         sample.partners[0] = {static_cast<std::uint32_t>(i), own.distance_m,
                               weights(sample.material, own.distance_m)};
         sample.first_seen = static_cast<std::uint32_t>(p);
@@ -161,6 +167,7 @@ void PartnerFinder::append(std::vector<SurfacePatch>& patches) const {
       }
     }
   }
+  // Evaluate the partners like other samples.
   const std::size_t count = partners.samples.size();
   std::vector<SurfaceSample> samples = std::move(partners.samples);
   partners.samples = {};

@@ -8,24 +8,24 @@
 
 namespace emit::renderer {
 
-/// Finds, for samples near a convex edge, the points at the same distance from the edge on the
-/// neighbouring faces (their partners). Owner: the builder. find() may run on many threads for
-/// different vertices; everything else on one.
+/// Finder of partners: for a sample near a convex edge, the points at the same distance from the
+/// edge on the neighbouring faces (physics.md eq. 22). Owner: the builder. find() may run on many
+/// threads for different vertices; everything else runs on one.
 class PartnerFinder {
  public:
-  /// Both must outlive it.
+  /// Keeps references: both must outlive the finder.
   PartnerFinder(const SurfaceInputs& inputs, const PatchSampler& sampler)
       : in_(inputs), sampler_(sampler) {}
 
-  /// Makes room for so many vertices of a patch. @pre patches are numbered from 0
+  /// Makes room for `vertices` vertices of a patch. @pre patches are numbered from 0
   void grow(std::size_t patch, std::size_t vertices);
   /// Finds the partners of an evaluated sample. @pre grow() has made room for it
   void find(std::size_t patch, std::uint32_t vertex, const SurfaceSample& own);
-  /// How many partners it has.
+  /// Number of partners that find() has found for a vertex.
   [[nodiscard]] std::size_t count(std::size_t patch, std::uint32_t vertex) const noexcept {
     return found_[patch][vertex].size();
   }
-  /// Leaves out the `count` partners that drive their samples least.
+  /// Removes the `count` partners that drive their samples least.
   void drop(std::size_t count);
 
   /// Evaluates all partners and appends one patch that holds them. Until samples are numbered,
@@ -34,10 +34,12 @@ class PartnerFinder {
   void append(std::vector<SurfacePatch>& patches) const;
 
  private:
+  /// A partner that was found, and its distance from the edge.
   struct Found {
     SurfaceSample sample;
     float distance_m = 0.0F;
   };
+  /// Share of the partner's flux that drives each mode of a sample of `material`.
   [[nodiscard]] std::array<float, physics::kMaxFosterModes> weights(std::uint32_t material,
                                                                     float distance_m) const;
   [[nodiscard]] float greatest_weight(std::uint32_t material, float distance_m) const;

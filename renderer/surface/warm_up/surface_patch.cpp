@@ -14,20 +14,26 @@
 namespace emit::renderer {
 namespace {
 
+/// Number of rays along the surface.
 constexpr std::size_t kTangents = CasterRays::kMaxRays;
-/// An entity farther from the origin of rel than this does not see the world.
+/// Distance from the origin of rel beyond which an entity sees its own hull only.
 constexpr float kMaxWorldM = 20'000.0F;
-/// A face stands upright on another when the cosine between their normals is smaller.
+/// Cosine between the normals of two faces below which one stands upright on the other.
 constexpr float kWallCos = 0.3F;
+/// Greatest distance of a wall that counts as a foot on the surface, in m.
 constexpr float kMaxFootM = 3.0F;
+/// Distance in ray offsets behind a wall at which the surface is sought under it, and its greatest
+/// depth there.
 constexpr float kUnderOffsets = 8.0F;
-/// What a share of sky may be wrong by, in tolerances; and what rays do not resolve anyway.
+/// Allowed error of a share of the sky: in tolerances of temperature, and at least the share that
+/// rays do not resolve.
 constexpr float kAlikeFrac = 0.25F;
 constexpr float kSkyNoiseFrac = 0.002F;
-/// Farther along the surface nobody looks: rays that graze it are dear, and only edges half as long
-/// could take over a view that is free farther.
+/// Length of the rays along the surface, in m. Rays that graze the surface are expensive, and a
+/// view that is free farther would help only edges longer than half of that.
 constexpr float kFeelM = 20.0F;
-/// Nothing stands up within that many lengths of an edge whose middle takes over the view.
+/// Distance around the parents, in lengths of the halved edge, within which nothing may stand up if
+/// a sample is to take the mean of their views.
 constexpr float kFreeLengths = 2.0F;
 
 }  // namespace
@@ -44,6 +50,7 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
   }
+  // Find by material the difference of shares of the sky that is a quarter of the tolerance.
   for (std::uint32_t m = 0; m < inputs.materials.size(); ++m) {
     const auto alike_k = kAlikeFrac * static_cast<float>(options.tolerance_k);
     sky_limit_frac_.push_back(
@@ -56,6 +63,8 @@ SampleState PatchSampler::start_state(const SurfaceSample& sample, StartMemo& me
   const auto make = [&] {
     return in_.heat.start_state(sample, normal, in_.history, in_.record.tail);
   };
+  // Use the memo only for samples without a wall beside them: others start with states of their
+  // own.
   const bool whole =
       std::ranges::all_of(sample.open_before_frac, [](float frac) { return frac == 1.0F; });
   if (!whole) return make();
@@ -72,6 +81,8 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
   SurfaceSample& sample = patch.samples[index];
   const SurfaceSample& low = patch.samples[a];
   const SurfaceSample& high = patch.samples[b];
+  // Demand rays where the parents' views were not smooth, where something stands near, or where the
+  // normal turns by more than the mean of views stands for.
   const float limit_frac = sky_limit_frac_[sample.material];
   const float surplus_frac = std::max(patch.sky_surplus_frac[a], patch.sky_surplus_frac[b]);
   if (surplus_frac > limit_frac || low.covered || high.covered) return false;
@@ -81,6 +92,7 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
   const glm::vec3 turn = sample.normal - 0.5F * (low.normal + high.normal);
   if (std::abs(glm::dot(to_sky, turn)) > limit_frac) return false;
 
+  // Take the means.
   const auto mean = [](float x, float y) { return 0.5F * (x + y); };
   sample.sky_frac = mean(low.sky_frac, high.sky_frac);
   sample.far_frac = mean(low.far_frac, high.far_frac);
@@ -89,12 +101,12 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
     sample.open_frac[i] = mean(low.open_frac[i], high.open_frac[i]);
     sample.open_before_frac[i] = mean(low.open_before_frac[i], high.open_before_frac[i]);
   }
-  // What is free around a point is free around its neighbour but for the way there.
+  // Take the greater free distance of the parents, less the way from there.
   sample.flat_m = std::max(low.flat_m, high.flat_m) - 0.5F * edge_m;
   patch.to_sky[index] = to_sky;
   patch.sky_surplus_frac[index] = surplus_frac;
   if (options_.exchange) {
-    // Share the view of whichever parent sees faces.
+    // Share the view of a parent that sees faces.
     const std::uint32_t view = patch.view_of[patch.seen[patch.view_of[a]].empty() ? b : a];
     patch.view_of[index] = view;
     if (patch.seen[view].empty()) sample.far_frac = 1.0F - sample.sky_frac;
@@ -105,8 +117,8 @@ bool PatchSampler::inherit_view(SurfacePatch& patch, std::uint32_t index,
 void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
                                const SampleStand& stand) const {
   SurfaceSample& sample = patch.samples[index];
-  // An entity sees the world from where it stands now, and its own hull always. Far off it sees its
-  // hull alone: float32 would not resolve the hull there.
+  // Let an entity see the world from where it stands now, and its own hull always. If it is far off
+  // it sees its hull alone, because float32 would not resolve the hull there.
   const bool far_off =
       sample.mover >= 0 &&
       glm::length(in_.movers_now[static_cast<std::size_t>(sample.mover)].position_m) > kMaxWorldM;
@@ -133,6 +145,7 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
     }
     selection.movers = placed;
   }
+  // Find the open shares.
   const ViewShares open = sky_.shares(in_.rays, point, selection);
   sample.sky_frac = open.sky_frac;
   sample.far_frac = open.far_frac;
@@ -140,6 +153,8 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
   if (in_.heat.sky_measure() == SkyMeasure::sphere) {
     sample.sphere_sky_frac = sphere_.of_face(in_.rays, point, selection).sky_frac;
   }
+  // Mark the sample as covered if it sees nothing but backs of faces, sheets aside: it lies inside
+  // a body.
   if (open.sky_frac + open.far_frac == 0.0F) {
     const SurfaceView view = view_.view(in_.rays, point, selection);
     const std::span<const SeenFace> faces(view.seen.data(), view.seen_count);
@@ -162,6 +177,7 @@ void PatchSampler::look_at_faces(SurfacePatch& patch, std::uint32_t index, const
     seen.push_back({face.instance, face.triangle, face.barycentric, face.weight_frac, !face.front});
   }
   SurfaceSample& sample = patch.samples[index];
+  // Let surroundings fill the rest if no face was met.
   if (seen.empty()) sample.far_frac = 1.0F - sample.sky_frac;
 }
 
@@ -172,6 +188,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   const auto [u, v] = tangents_of(n);
   const float offset_m = point.offset_m;
   const glm::vec3 base_m = point.position_m + offset_m * point.inward;
+  // Send rays in all tangent directions, first above the surface and then below it.
   std::array<CasterRay, kTangents> rays;
   std::array<CasterHit, kTangents> above;
   std::array<CasterHit, kTangents> below;
@@ -183,6 +200,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   const std::uint32_t met_above = in_.rays.first_hits(rays, selection, above, kFeelM);
   for (CasterRay& ray : rays) ray.origin_m -= 4.0F * offset_m * n;
   const std::uint32_t met_below = in_.rays.first_hits(rays, selection, below, kFeelM);
+  // Take the nearest hit of either set as the end of the plane.
   sample.flat_m = kFeelM;
   for (std::size_t k = 0; k < kTangents; ++k) {
     if (((met_above >> k) & 1U) != 0U) sample.flat_m = std::min(sample.flat_m, above[k].distance_m);
@@ -190,7 +208,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
   }
   if (!options_.lateral) return;
 
-  // Walls that stand on the surface: where it goes on under them, nothing reaches it.
+  // Find the walls that stand on the surface: if it continues under them, nothing reaches it there.
   std::array<float, kTangents> wall_m;
   wall_m.fill(-1.0F);
   bool any = false;
@@ -210,6 +228,7 @@ void PatchSampler::feel_along(SurfacePatch& patch, std::uint32_t index, const Vi
     }
   }
   if (!any) return;
+  // Reduce the response of each mode by the walls' shares, for its memory (physics.md eq. 23).
   const physics::FosterNetwork& network = in_.history.network(sample.material);
   const auto open = [&](double memory_s) {
     const double depth_m =
@@ -241,7 +260,7 @@ bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
 void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const {
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();
-  // Take what is seen for the surroundings, as long as samples are not numbered.
+  // Count everything seen as surroundings, because samples are not numbered yet.
   const auto alone = [index](const SurfacePatch& side) {
     SurfaceSample sample = side.samples[index];
     sample.far_frac = 1.0F - sample.sky_frac;
@@ -263,6 +282,7 @@ void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo
   if (keeps) patch.start_k[index] = state.modes_k;
   SampleOutput output;
   SampleOutput back_output;
+  // Advance over the intervals, and store what others will receive.
   for (std::size_t i = 0; i < count; ++i) {
     const HeatInterval& interval = record.intervals[i];
     const SurfaceForcing& begin = interval.forcing.begin;
@@ -295,6 +315,7 @@ void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo
 
 void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand,
                             StartMemo& memo) const {
+  // Find the view and the shade of each face, then the history of both.
   const auto look = [&](SurfacePatch& side) {
     if (!inherit_view(side, index, stand)) look_around(side, index, stand);
     const std::size_t count = in_.record.size();

@@ -16,16 +16,16 @@
 
 namespace emit::renderer {
 
-/// A seen face until samples are numbered.
+/// Place of a face that a sample sees. It stands for samples until these are numbered.
 struct SeenPlace {
   std::uint32_t instance = 0;
   std::uint32_t triangle = 0;
   glm::vec2 barycentric{0.0F};
   float weight_frac = 0.0F;
-  bool behind = false;  ///< from where the winding calls inside
+  bool behind = false;  ///< the side that its winding calls inside is seen
 };
 
-/// The samples of one instance while its mesh is being refined; arrays by vertex of the mesh.
+/// Samples of one instance while its mesh is being refined. Arrays are by vertex of the mesh.
 struct SurfacePatch {
   std::uint32_t mesh = 0;
   std::uint32_t object = 0;
@@ -34,29 +34,31 @@ struct SurfacePatch {
   glm::mat3 normal_from_mesh{1.0F};
 
   std::vector<SurfaceSample> samples;
-  /// Views: what a vertex sees of faces, by rays of its own. Vertices that share another one's view
-  /// have none. Weights add up to something: the share that is not open is spread over them.
+  /// Views: the faces that a vertex sees, by rays of its own. A vertex that shares the view of
+  /// another one has none. The sum of the weights is arbitrary: they are scaled to the share of the
+  /// hemisphere that is not open.
   std::vector<std::vector<SeenPlace>> seen;
-  std::vector<std::uint32_t> view_of;                 ///< vertex whose view it is
+  std::vector<std::uint32_t> view_of;                 ///< vertex whose view counts for this one
   std::vector<physics::FosterState<double>> start_k;  ///< modes at the start of the history
-  SentHistory sent;                                   ///< what it sends out over the history
+  SentHistory sent;  ///< radiation and heat sent out over the history
   std::vector<SampleState> states;
   std::vector<SampleOutput> outputs;
-  /// Difference from the mean of the vertex's parents, K; negative where it has none.
+  /// Difference of the temperature from the mean of the vertex's parents, K; negative if it has
+  /// none.
   std::vector<float> surplus_k;
   std::vector<glm::vec3> to_sky;  ///< ViewShares::to_sky
-  /// How far its shares of the sky were from the mean of the vertex's parents; infinite where it
-  /// has none, and until that is known.
+  /// Greatest difference of the shares of sky and surroundings from the mean of the vertex's
+  /// parents. It is infinite if the vertex has no parents, and until the difference is known.
   std::vector<float> sky_surplus_frac;
   std::vector<float> sun_frac;        ///< by vertex, then interval
-  std::vector<HiddenSky> hidden_sky;  ///< likewise; empty without entities
-  /// The other faces of sheets, by the same vertices; null where the mesh has none.
+  std::vector<HiddenSky> hidden_sky;  ///< by vertex, then interval; empty without entities
+  /// Patch of the other faces of sheets, with the same vertices; null if the mesh has no sheets.
   std::unique_ptr<SurfacePatch> back;
 
-  /// Sets what is kept of every vertex: over how many intervals, whether there are entities, and
-  /// whether what it sends is kept. @pre no vertices yet
+  /// Sets the number of intervals that arrays hold, whether there are entities, and whether `sent`
+  /// is stored. @pre the patch has no vertices
   void begin(std::size_t intervals, bool movers, bool keeps_sent);
-  /// Makes room for samples of `vertices` vertices. @pre begin()
+  /// Makes room for the samples of `vertices` vertices in all. @pre begin()
   void grow(std::size_t vertices);
 
  private:
@@ -64,61 +66,64 @@ struct SurfacePatch {
   bool movers_ = false;
 };
 
-/// Where a sample stands, beside its own place.
+/// Facts about the place of a sample that the sample itself does not hold.
 struct SampleStand {
-  glm::vec3 drawn_m{0.0F};  ///< its place on the surface as drawn, off edges
-  glm::vec3 inward{0.0F};   ///< unit tangent away from the edge it lies on; zero where on none
-  /// Vertices of the edge it halves, where both are evaluated.
+  glm::vec3 drawn_m{0.0F};  ///< place on the surface as drawn, moved off edges
+  glm::vec3 inward{0.0F};   ///< unit tangent away from the edge it lies on; zero inside a face
+  /// Vertices of the edge that it halves; empty unless both are evaluated already.
   std::optional<std::array<std::uint32_t, 2>> parents = std::nullopt;
 };
 
-/// Evaluates single samples of patches: view, visibility and history. Owner: the builder. Any
-/// thread.
+/// Evaluator of single samples of patches: view, shade and history. Owner: the builder. Any thread.
 class PatchSampler {
  public:
+  /// Keeps a reference to `inputs`, which must outlive it.
   PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
                const SurfaceModelOptions& options);
 
   [[nodiscard]] const SunTracer& tracer() const noexcept { return tracer_; }
-  /// True where samples exchange heat with others, so that what they send must be known.
+  /// Returns true if samples exchange heat with others, so that the histories of their output are
+  /// needed.
   [[nodiscard]] bool keeps_sent() const noexcept { return options_.exchange || options_.lateral; }
 
-  /// The state that the latest sample started with: its neighbours, which face alike, start with
-  /// the same. Each thread has its own.
+  /// Start state of the latest sample. Neighbours face alike and start with the same state. Each
+  /// thread has its own memo.
   struct StartMemo {
     std::uint32_t material = kNoSample;
     glm::vec3 normal{0.0F};
     SampleState state;
   };
 
-  /// Fills everything of sample `index`, whose position, normal, material and mover stand in
-  /// patch.samples already, and of its other side. What it sees counts as the surroundings here.
+  /// Evaluates sample `index` and its other face. Position, normal, material and mover must stand
+  /// in patch.samples already. Everything that the sample sees counts as surroundings here.
   void evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand,
                 StartMemo& memo) const;
 
  private:
-  /// State at the start of the record, as the thermal model has it.
+  /// State at the start of the record, by the thermal model.
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample,
                                         StartMemo& memo) const noexcept;
 
-  /// Takes the view of its parents where theirs was what it would have been of their own; false,
-  /// and nothing changed, where rays are needed.
+  /// Takes the mean of the parents' views if their own views were about the mean of their parents'.
+  /// Returns false, and changes nothing, if rays are needed.
   bool inherit_view(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
-  /// Temperature over the history, and what the sample sends out.
+  /// Integrates the temperature over the history, and stores what the sample sends out.
   void integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const;
 
-  /// A face of the scene as loaded that is a sheet's: who sees its back is in no body.
+  /// Returns true if a face of the scene as loaded belongs to a sheet. A sample that sees its back
+  /// is not inside a body.
   [[nodiscard]] bool of_a_sheet(const SeenFace& face) const noexcept;
 
+  /// Finds the shares of sky and surroundings of a sample by rays, and whether it is covered.
   void look_around(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
-  /// Faces that fill the part of the hemisphere which is not open.
+  /// Finds the faces that fill the part of the hemisphere which is not open.
   void look_at_faces(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
                      const CasterSelection& selection) const;
 
-  /// Rays along the surface, a little above and a little below: how far it is a plane, and which
-  /// walls stand on it.
+  /// Sends rays along the surface, a little above and a little below it. They show how far it is a
+  /// plane and which walls stand on it (physics.md eq. 23).
   void feel_along(SurfacePatch& patch, std::uint32_t index, const ViewPoint& point,
                   const CasterSelection& selection) const;
 
@@ -129,8 +134,8 @@ class PatchSampler {
   SphereSampler sphere_;
   SunTracer tracer_;
   double history_s_ = 0.0;
-  std::vector<float> diffusivity_m2_s_;  ///< by material, of its first layer
-  std::vector<float> sky_limit_frac_;    ///< by material: shares that differ less are alike
+  std::vector<float> diffusivity_m2_s_;  ///< diffusivity of the first layer, by material
+  std::vector<float> sky_limit_frac_;    ///< by material: difference up to which shares are alike
 };
 
 }  // namespace emit::renderer

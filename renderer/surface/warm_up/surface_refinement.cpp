@@ -12,56 +12,59 @@
 namespace emit::renderer {
 namespace {
 
-/// No triangle is wider, whether anything is known to lie in it or not: in view, and elsewhere. In
-/// pixels.
+/// Greatest width of any triangle in pixels, even if nothing is known to lie in it: in the field of
+/// view, and elsewhere.
 constexpr float kBasePx = 32.0F;
 constexpr float kBaseAsidePx = 128.0F;
-constexpr float kBaseNeed = 1e6F;  ///< of triangles wider than that
-/// What needs less is left as it is: an error of a tolerance in a triangle of so many pixels.
+constexpr float kBaseNeed = 1e6F;  ///< need of triangles wider than that
+/// Need below which a triangle is left as it is: an error of one tolerance in a triangle of that
+/// many pixels.
 constexpr float kLeastNeed = 3.0F;
-/// What the need of a triangle out of view counts.
+/// Share of its need that counts if a triangle is out of view.
 constexpr float kAsideFrac = 1.0F / 64.0F;
-/// What points between the corners may make of it, in tolerances.
+/// Allowed error from shade that points between the corners meet, in tolerances.
 constexpr float kMissedFrac = 2.0F;
-/// Edges of shadows this young are still sharp.
+/// Age in s up to which edges of shadows are still sharp.
 constexpr float kRecentS = 900.0F;
-/// Corners on which that much more of the sun's flux falls than on others have the edge of a shadow
-/// between them.
+/// Difference of the sun's flux between corners, as a share of full sun, from which the edge of a
+/// shadow lies between them.
 constexpr float kEdgeSunFrac = 0.2F;
-/// Down to so many pixels that alone is reason to cut; finer, only what interpolation gets wrong.
+/// Width in pixels down to which such an edge alone is reason to halve. Finer triangles are halved
+/// only for errors of interpolation.
 constexpr float kEdgeSunPx = 4.0F;
-/// Corners of which more or less of the sun's disc was visible do not agree on it.
+/// Corners agree on the sun if their visible shares of the disc are within this of 0 or of 1.
 constexpr float kAgreeFrac = 1e-3F;
-/// A triangle that turns its back to an eye by more than this sine is not seen from there, whatever
-/// curvature its vertices' normals stand for.
+/// Sine by which a triangle must turn its back to an eye to be unseen from there. It allows for the
+/// curvature that the normals of the vertices stand for.
 constexpr float kBackSine = 0.2F;
-/// Share of the way to a point that must be free.
+/// Share of the way to a point that must be free if the point is to be seen.
 constexpr float kSeenFrac = 0.999F;
-/// How far the newest vertex may lie from what its parents interpolate to, in tolerances: a
-/// triangle's own error is about half of that. Where triangles are large, and where they are down
-/// to some pixels.
+/// Allowed difference of the newest vertex from the mean of its parents, in tolerances, for large
+/// and for small triangles. The triangle's own error is about half of it.
 constexpr float kSurplusFrac = 1.2F;
 constexpr float kSharpSurplusFrac = 8.0F;
-/// What a foot in the middle of a triangle counts, in tolerances.
+/// Error of a triangle that a foot runs through, in tolerances.
 constexpr float kFootFrac = 30.0F;
-/// Samples lie as close as heat gets in this time, up to so many such depths from an edge.
+/// Time in s and distance from an edge within which samples lie as close as heat spreads in that
+/// time. The distance is in depths of that spread.
 constexpr float kCreaseS = 1000.0F;
 constexpr float kCreaseDepths = 3.0F;
-/// What facing elsewhere may cost in the middle of a triangle or of an edge, in tolerances: where
-/// triangles are large, and where they are down to some pixels.
+/// Allowed error from facing elsewhere, in tolerances, for large triangles and for those of a few
+/// pixels.
 constexpr float kBendFrac = 1.0F;
 constexpr float kSharpBendFrac = 4.0F;
-/// The shortest edges that are halved, in pixels: where temperature is smooth, and where an edge
-/// runs (finer ones change no pixel by more than a tenth of a kelvin, emit bench
+/// Shortest edges that are halved, in pixels: where the temperature is smooth, and where the edge
+/// of a shadow runs. Finer ones change no pixel by more than a tenth of a kelvin (emit bench
 /// error-vs-time).
 constexpr float kLeastEdgePx = 2.5F;
 constexpr float kLeastShadowEdgePx = 0.9F;
-/// Narrower bodies are cut as though they were so many pixels wide: what pixels show of them is a
-/// mean over all their faces. By so much at most, as what is far below a pixel hardly counts.
+/// Width in pixels that narrower bodies are taken for, because their pixels show a mean over all
+/// their faces; and the greatest factor, because a body far below a pixel hardly counts.
 constexpr float kLeastBodyPx = 16.0F;
 constexpr float kMostFiner = 12.0F;
 
-/// The middle one of a body's extents: of poles the thickness, of sheets not.
+/// Width of a body: the middle one of its three extents, in m. This is the thickness of a pole, but
+/// not that of a sheet.
 float width_m(const scene::Aabb& box, const glm::dmat4& world_from_mesh) {
   if (box.empty()) return 0.0F;
   std::array<double, 3> extent_m{};
@@ -73,11 +76,11 @@ float width_m(const scene::Aabb& box, const glm::dmat4& world_from_mesh) {
   return static_cast<float>(extent_m[1]);
 }
 
-/// What an eye is to a body that still stands where its way begins, when the body comes closest to
-/// the middle of the picture.
+/// Place of an eye relative to an entity when the entity comes closest to the middle of the image,
+/// as a place beside the entity where its way begins.
 glm::vec3 when_in_view(const glm::vec3& eye_m, const glm::vec3& boresight,
                        std::span<const glm::vec3> way_m) {
-  constexpr int kParts = 8;  // of a leg
+  constexpr int kParts = 8;  // places per leg of the way
   glm::vec3 found_m = way_m.front();
   float most = -std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < way_m.size(); ++i) {
@@ -111,6 +114,7 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
   for (const scene::Material& material : inputs.materials) {
     diffusivity_m2_s_.push_back(static_cast<float>(diffusivity_m2_s(material)));
   }
+  // Bring the eyes into rel axes, and for each entity to where its script brings it into view.
   for (const RefineView::Eye& eye : view.eyes) {
     eyes_.push_back(
         {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
@@ -125,6 +129,7 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
     body_m_.push_back(
         width_m(inputs.geometry.meshes[instance.mesh].bounds, instance.world_from_mesh));
   }
+  // Find the first interval in which edges of shadows are still sharp.
   const HistoryRecord& record = inputs.record;
   recent_ = record.size() - 1;
   while (recent_ > 0 && record.lag_s[recent_ - 1] < kRecentS) --recent_;
@@ -144,12 +149,14 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
     const float distance_m = std::max(glm::length(way_m), kLeastM);
     const float px_m = std::max(pixel_rad_ * distance_m, kLeastM);
     least_px_m = std::min(least_px_m, px_m);
+    // Measure the square that is as large as the triangle looks, up to the longest edge.
     const glm::vec3 ahead = way_m / distance_m;
     const float looks_px =
         std::min(std::sqrt(std::abs(glm::dot(twice_area_m2, ahead))) / px_m, longest_m / px_m);
     width.edge_px = std::max(width.edge_px, longest_m / px_m);
     width.anywhere_px = std::max(width.anywhere_px, looks_px);
     if (looks_px <= width.in_view_px) continue;
+    // Count it as in view if it reaches into the field around the boresight.
     const float cosine = std::clamp(glm::dot(ahead, eye.boresight), -1.0F, 1.0F);
     const bool in_view = eye.boresight == glm::vec3(0.0F) || distance_m < longest_m ||
                          std::acos(cosine) < field_rad_ + longest_m / distance_m;
@@ -176,7 +183,7 @@ bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const Re
     std::array<CasterRay, 4> rays;
     std::array<float, 4> distance_m{};
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      // Corners a little towards the middle, lest a neighbour across an edge hides them.
+      // Move the corners a little inwards, so that no neighbour across an edge hides them.
       const glm::vec3 point_m = i < 3 ? glm::mix(corners_m[i], centre_m, 0.1F) : centre_m;
       distance_m[i] = glm::distance(eye_m, point_m);
       rays[i] = {eye_m, (point_m - eye_m) / std::max(distance_m[i], 1e-6F)};
@@ -198,6 +205,7 @@ float SurfaceRefinement::shadow_edge_k(const RefinedMesh& refined, std::uint32_t
   const float range_k = std::max({offset_k(0), offset_k(1), offset_k(2)}) -
                         std::min({offset_k(0), offset_k(1), offset_k(2)});
   if (range_k < tolerance_k_) return 0.0F;
+  // Look for a recent interval in which the sun's flux differs between the corners.
   for (std::size_t i = recent_; i < count; ++i) {
     const auto sun = [&](std::size_t corner) {
       const glm::vec3 normal = in_.record.rays[i].normal(patch.samples[leaf[corner]]);
@@ -225,7 +233,7 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
   face.normal = normal / length;
   face.mover = patch.mover;
   face.material = a.material;
-  // Spread evenly (R2 sequence, Roberts 2018), from leaf to leaf at other places.
+  // Spread points evenly (R2 sequence, Roberts 2018), at other places in every leaf.
   constexpr float kStepU = 0.7548776662F;
   constexpr float kStepV = 0.5698402910F;
   std::array<glm::vec3, kPacketRays> points_m;
@@ -249,8 +257,10 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
     const auto frac = [&](std::size_t corner) { return patch.sun_frac[leaf[corner] * count + i]; };
     const float low = std::min({frac(0), frac(1), frac(2)});
     const float high = std::max({frac(0), frac(1), frac(2)});
+    // Skip the interval if the corners disagree: they know of the edge already.
     const bool lit = low > 1.0F - kAgreeFrac;
     if (!lit && high > kAgreeFrac) continue;
+    // Add the sensitivity to this interval at each point that finds the opposite.
     const float worth_k =
         worth_.sun_k(face.material, i) * std::max(0.0F, glm::dot(rays.normal(face), rays.to_sun()));
     const IntervalRays::Spots spots = rays.spots(in_.rays, face, points_m, sun_offset_m);
@@ -270,7 +280,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const auto vertices = refined.vertices();
   std::array<glm::vec3, 3> corners_m;
   for (std::size_t i = 0; i < 3; ++i) {
-    // Not the samples' own places: those are moved off edges.
+    // Take the vertices, because the samples' own places are moved off edges.
     corners_m[i] = glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[leaf[i]].position_m, 1.0F));
     if (patch.mover >= 0) {
       const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(patch.mover)];
@@ -286,8 +296,10 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
       this->width(corners_m, longest_m, body_m, goes ? eyes_of_mover_[mover] : eyes_);
   const float edge_px = width.finer * width.edge_px;
   Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
+  // Leave alone what is narrow enough, and what has a prescribed temperature.
   if (edge_px <= kLeastShadowEdgePx) return judged;
   if (in_.materials[vertices[leaf[0]].material].prescribed_k) return judged;
+  // Halve a triangle that is too wide, whatever lies in it.
   const float over_base = std::max(width.in_view_px / kBasePx, width.anywhere_px / kBaseAsidePx);
   if (over_base > 1.0F) {
     judged.need = kBaseNeed * over_base;
@@ -296,6 +308,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   }
   if (!seen(corners_m, refined, slot, patch)) return judged;
 
+  // Take the greatest of the errors that exceed their limits.
   const bool smooth = edge_px > kLeastEdgePx;
   float error_k = 0.0F;
   const auto count_in = [&](float found_k, float limit_frac) {
@@ -304,17 +317,18 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const std::uint32_t newest = std::max({leaf[0], leaf[1], leaf[2]});
   count_in(patch.surplus_k[newest], smooth ? kSurplusFrac : kSharpSurplusFrac);
   count_in(bend_.cost_k(refined, slot, patch), smooth ? kBendFrac : kSharpBendFrac);
-  // Where a foot runs through, covered corners will take the values of others.
+  // Halve a triangle that a foot runs through: its covered corners will take values of others.
   const auto covered = [&](std::size_t i) { return patch.samples[leaf[i]].covered ? 1 : 0; };
   const int under = covered(0) + covered(1) + covered(2);
   if (smooth && under > 0 && under < 3) error_k = std::max(error_k, kFootFrac * tolerance_k_);
-  // Near edges and feet heat also moves along the surface, over the depth it reaches in that time.
+  // Halve near edges and feet, because heat also moves along the surface there.
   const float depth_m = std::sqrt(diffusivity_m2_s_[vertices[leaf[0]].material] * kCreaseS);
   const auto flat_m = [&](std::size_t i) { return patch.samples[leaf[i]].flat_m; };
   if (smooth && lateral_ && longest_m > depth_m &&
       std::min({flat_m(0), flat_m(1), flat_m(2)}) < kCreaseDepths * depth_m) {
     error_k = std::max(error_k, tolerance_k_);
   }
+  // Look for edges of shadows, on both faces of a sheet. Rays come last because they are expensive.
   if (edge_px >= kEdgeSunPx) {
     const bool sheet = in_.materials[vertices[leaf[0]].material].sheet;
     const SurfacePatch* back = sheet ? patch.back.get() : nullptr;
@@ -352,7 +366,7 @@ SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const Refin
         uses += 1.0F;
         judged[i].in_view = judged[i].in_view || here.in_view;
       }
-      // A vertex costs a sample on every instance: what one gains counts that much less.
+      // Take the root mean square over the instances: a new vertex costs a sample on each of them.
       const auto mean = [uses](float sum) { return std::sqrt(sum / std::max(uses, 1.0F)); };
       if (mean(finer_squares) > kLeastNeed) judged[i].need = mean(squares);
     }
