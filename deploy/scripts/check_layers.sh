@@ -13,6 +13,8 @@ layers='
 renderer/physics:
 renderer/image: renderer/physics
 renderer/scene: renderer/physics
+renderer/scene/src/gltf: renderer/scene renderer/physics
+renderer/scene/src: renderer/scene renderer/scene/src/gltf renderer/physics
 renderer/scene/generate: renderer/physics
 renderer/threads: renderer/physics
 renderer/reference: renderer/physics renderer/scene
@@ -24,12 +26,12 @@ renderer/gl: renderer/physics renderer/threads
 renderer/include: renderer/physics renderer/scene
 renderer/history: renderer/include renderer/physics renderer/scene
 renderer/surface/heat: renderer/history renderer/include renderer/physics renderer/scene
-renderer/surface/mesh: renderer/scene renderer/threads
+renderer/surface/mesh: renderer/physics renderer/scene renderer/threads
 renderer/surface/rays: renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh
-renderer/surface/model: renderer/history renderer/scene renderer/surface/heat renderer/surface/mesh renderer/surface/rays
+renderer/surface/model: renderer/history renderer/physics renderer/scene renderer/surface/heat renderer/surface/mesh renderer/surface/rays
 renderer/surface/shade: renderer/history renderer/physics renderer/scene renderer/threads renderer/shaders/shared renderer/surface/heat renderer/surface/mesh renderer/surface/rays
 renderer/surface/state: renderer/history renderer/physics renderer/scene renderer/surface/mesh renderer/surface/model
-renderer/surface/warm_up: renderer/physics renderer/threads renderer/surface/mesh renderer/surface/model renderer/surface/rays
+renderer/surface/warm_up: renderer/physics renderer/threads renderer/surface/heat renderer/surface/mesh renderer/surface/model renderer/surface/rays
 renderer/surface/run: renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh renderer/surface/model renderer/surface/rays renderer/surface/shade renderer/surface/state renderer/surface/warm_up
 renderer/draw: renderer/gl renderer/history renderer/physics renderer/scene renderer/shaders/shared renderer/threads renderer/surface/mesh renderer/surface/run
 renderer/passes: renderer/draw renderer/gl renderer/physics renderer/scene renderer/shaders/shared renderer/surface/run
@@ -87,7 +89,7 @@ arrows=$(includes | awk -F: -v layers="$layers" '
     if (!sub(/\/[^\/]*$/, "", f)) f = ""
     if (f ~ /^renderer\/include/) return "renderer/include"
     if (f ~ /^config\/include/) return "config/include"
-    if (f ~ /^(renderer\/(physics|image|scene|scene\/generate)|protocol)\/(include|src)/) sub(/\/(include|src).*/, "", f)
+    if (f ~ /^(renderer\/(physics|image|scene\/generate)|protocol)\/(include|src)/) sub(/\/(include|src).*/, "", f)
     sub(/\/include\/emit\/.*/, "", f)
     return f
   }
@@ -123,7 +125,7 @@ arrows=$(includes | awk -F: -v layers="$layers" '
       to = owner[word[2]]
     } else if (header ~ /^\.\.\// || header !~ /\//) {
       to = from
-    } else if (from ~ /^(config|renderer\/reference|renderer\/verify)\/src/) {
+    } else if (from ~ /^(config|renderer\/reference|renderer\/scene|renderer\/verify)\/src/) {
       root = from; sub(/\/src.*/, "/src", root); to = header ~ /^shared\// ? "renderer/shaders/shared" : \
           header ~ /^(gl|threads)\// ? "renderer/" folder(header) : root "/" folder(header)
     } else if (from ~ /^protocol/) {

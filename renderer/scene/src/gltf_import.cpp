@@ -15,9 +15,9 @@
 
 #include "coplanar.hpp"
 #include "facing.hpp"
-#include "gltf_file.hpp"
-#include "gltf_mesh.hpp"
-#include "gltf_nodes.hpp"
+#include "gltf/gltf_file.hpp"
+#include "gltf/gltf_mesh.hpp"
+#include "gltf/gltf_nodes.hpp"
 
 namespace emit::scene {
 namespace {

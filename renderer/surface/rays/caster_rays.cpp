@@ -206,6 +206,7 @@ std::uint32_t CasterRays::blocked_static(std::span<const CasterRay> rays,
 
 std::uint32_t CasterRays::blocked_mover(std::size_t mover, const MoverPlacement& placement,
                                         std::span<const CasterRay> rays) const noexcept {
+  EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
   Packet inside;
   const Impl::Mover& body = impl_->movers[mover];
   const std::uint32_t near = Impl::enter_all(body, placement, rays, inside);
@@ -260,6 +261,8 @@ std::optional<CasterHit> CasterRays::first_hit(
 std::uint32_t CasterRays::first_hits(std::span<const CasterRay> rays,
                                      const CasterSelection& selection, std::span<CasterHit> hits,
                                      float within_m) const noexcept {
+  EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
+  EMIT_DCHECK_OP(hits.size(), >=, rays.size());
   std::array<float, kMaxRays> limits_m;
   limits_m.fill(within_m);
   std::uint32_t found = 0;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "history/step_plan.hpp"
 #include "surface/mesh/tangents.hpp"
@@ -305,6 +306,7 @@ SunShare IntervalRays::sun_share(const CasterRays& rays, const SurfaceSample& sa
 IntervalRays::Spots IntervalRays::spots(const CasterRays& rays, const SurfaceSample& face,
                                         std::span<const glm::vec3> points_m,
                                         float start_offset_m) const noexcept {
+  EMIT_DCHECK_OP(points_m.size(), <=, kPacketRays);
   if (!sun_up_) return {};
   std::array<glm::vec3, kPacketRays> starts_m;
   for (std::size_t k = 0; k < points_m.size(); ++k) {

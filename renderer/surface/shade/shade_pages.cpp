@@ -164,7 +164,9 @@ void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
   }
   // Do normal steps if sim time moves at about its normal rate.
   if (end - next_turn_ <= kTurnsPerFrame) {
-    for (; next_turn_ < end; ++next_turn_) take_turn(next_turn_, kTurns, all, inputs);
+    for (; next_turn_ < end; ++next_turn_) {
+      take_turn(next_turn_, kTurns, Pace::one_group, all, inputs);
+    }
     return;
   }
   // After a long jump, let what the tiles hold fade over the part that is left out.
@@ -181,7 +183,7 @@ void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
   for (std::int64_t w = windows; w > 0; --w) {
     const std::int64_t turns = (end - next_turn_) / w;
     next_turn_ += turns;
-    take_turn(next_turn_ - 1, turns, all, inputs);
+    take_turn(next_turn_ - 1, turns, Pace::all, all, inputs);
   }
 }
 
@@ -383,7 +385,8 @@ void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t t
         keys_[static_cast<std::size_t>(page - pages_.data())] = {level, {x, y}};
         // Set the tile back in time, so that its first step is as long as every other one.
         const auto group = static_cast<std::int64_t>(page - pages_.data()) % kTurns;
-        const std::int64_t wait = turns == kTurns ? (group - turn % kTurns + kTurns) % kTurns : 0;
+        const std::int64_t wait =
+            pace_ == Pace::one_group ? (group - turn % kTurns + kTurns) % kTurns : 0;
         page->at_turn = turn + wait - turns;
       }
       page->cast_turn = turn;
@@ -503,8 +506,9 @@ void ShadePages::raise(Page& page, int x, int y, float top_m) noexcept {
   page.top_changed = true;
 }
 
-void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, const SurfaceSamples& all,
-                           const Inputs& inputs) noexcept {
+void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, Pace pace,
+                           const SurfaceSamples& all, const Inputs& inputs) noexcept {
+  pace_ = pace;
   const std::int64_t end_ns = start_ns_ + turn * kTurnNs;
   const std::int64_t middle_ns = end_ns - turns * kTurnNs / 2;
   const physics::SunPosition sun = inputs.environment.sun_at(middle_ns);
@@ -525,7 +529,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, const SurfaceS
     }
   }
   // Step one group of tiles in a step of normal length, so that frames share the work.
-  const std::size_t stride = turns == kTurns ? kTurns : 1;
+  const std::size_t stride = pace == Pace::one_group ? kTurns : 1;
   const std::size_t first = static_cast<std::size_t>(turn) % stride;
   inputs.workers.run(pages_.size() / stride, 1, [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i) {

@@ -153,9 +153,14 @@ class ShadePages {
   static constexpr std::size_t kMostCells = 24;  ///< tiles that an entity may shade from one place
   static constexpr std::size_t kMostCasts = 96;  ///< tiles per entity in a step, on average
 
-  /// Steps the tiles to the end of `turn`. If `turns` is kTurns, it steps the group whose turn it
-  /// is, else all tiles. The shade is that of the latest `turns` turns.
-  void take_turn(std::int64_t turn, std::int64_t turns, const SurfaceSamples& all,
+  /// Which tiles a call of take_turn() steps.
+  enum class Pace : std::uint8_t {
+    one_group,  ///< the group whose turn it is: steps of normal length
+    all,        ///< every tile: windows that make up for a longer time
+  };
+
+  /// Steps tiles to the end of `turn`. The shade is that of the latest `turns` turns.
+  void take_turn(std::int64_t turn, std::int64_t turns, Pace pace, const SurfaceSamples& all,
                  const Inputs& inputs) noexcept;
   /// Places an entity along its way in the latest `turns` turns and lists the tiles that it shades.
   /// `come` says that the entity has moved since restart(): only such shade may take used tiles.
@@ -227,6 +232,7 @@ class ShadePages {
   std::vector<float> vertices_k_;
   ChangedRanges changes_;
   std::int64_t short_turn_ = 0;  ///< latest turn in which shade was lost
+  Pace pace_ = Pace::one_group;  ///< that of the turn at hand
 
   // Static vertices, sorted into squares of the ground, and the range of their heights.
   float highest_m_ = 0.0F;

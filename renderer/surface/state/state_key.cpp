@@ -64,7 +64,7 @@ std::uint64_t scene_hash(const scene::ScenarioDesc& scenario,
 /// the temperature.
 void add_material(Fnv64& hash, const scene::Material& material) {
   add(hash, material.solar_absorptance_frac, material.emissivity_frac, material.base_k,
-      material.layers.size(), material.foster_modes.size(), material.modes.size());
+      material.layers.size(), material.foster_modes.size(), material.modes.size(), material.sheet);
   for (const scene::Layer& layer : material.layers) {
     add(hash, layer.thickness_m, layer.conductivity_w_m_k, layer.density_kg_m3,
         layer.specific_heat_j_kg_k);

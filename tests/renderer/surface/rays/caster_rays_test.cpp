@@ -76,8 +76,8 @@ TEST(CasterRays, one_packet_meets_a_mover_that_stands_elsewhere_for_every_ray) {
     for (std::size_t i = 0; i < rays.size(); ++i) {
       rays[i] = {{place(random), place(random), -1.0F}, random_direction(random)};
       placements[i].position_m = {place(random), place(random), place(random)};
-      placements[i].rel_from_body = glm::mat3(glm::rotate(
-          glm::dmat4(1.0), 3.0 * static_cast<double>(place(random)), glm::dvec3(0.0, 0.0, 1.0)));
+      placements[i].rel_from_body = glm::mat3(
+          glm::rotate(glm::mat4(1.0F), 3.0F * place(random), glm::vec3(0.0F, 0.0F, 1.0F)));
       placements[i].on = i % 5 != 2;
       if (((wanted >> i) & 1U) == 0U) continue;
       expected |= casters.blocked_mover(0, placements[i], {&rays[i], 1}) << i;
