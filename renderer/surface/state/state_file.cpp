@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "surface/state/state_file.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <fstream>
 #include <limits>
 #include <string>
 #include <system_error>
@@ -197,13 +197,21 @@ std::filesystem::path temporary_beside(const std::filesystem::path& file) {
 
 /// Writes a file anew. The error code is empty on success.
 std::error_code write_bytes(const std::filesystem::path& file, std::span<const std::byte> bytes) {
-  errno = 0;
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(bytes.data()),
-            static_cast<std::streamsize>(bytes.size()));
-  out.close();
-  if (out) return {};
-  return {errno != 0 ? errno : EIO, std::generic_category()};
+  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) return {errno, std::generic_category()};
+  int error = 0;
+  while (!bytes.empty() && error == 0) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written > 0) {
+      bytes = bytes.subspan(static_cast<std::size_t>(written));
+    } else if (written == 0 || errno != EINTR) {
+      error = written == 0 ? EIO : errno;
+    }
+  }
+  // The file must be on the disk before its name is: a loss of power would leave half a state.
+  if (error == 0 && ::fsync(fd) != 0 && errno != EINVAL) error = errno;
+  if (::close(fd) != 0 && error == 0) error = errno;
+  return {error, std::generic_category()};
 }
 
 tl::unexpected<physics::Error> cannot_write(const std::filesystem::path& file,
