@@ -81,7 +81,8 @@ class ConnectionTable {
   [[nodiscard]] std::vector<std::unique_ptr<Connection>>& all() noexcept { return connections_; }
   /// Returns a free place; null: all are taken.
   [[nodiscard]] Connection* free_place() noexcept;
-  /// Returns the open connection with this key; null: it is gone. @pre the place of `key` exists
+  /// Returns the open connection with this key; null: it is closed.
+  /// @pre the place of `key` exists
   [[nodiscard]] Connection* find(std::uint64_t key) noexcept;
   [[nodiscard]] std::size_t open_from(const protocol::IpAddress& peer) const noexcept;
   [[nodiscard]] std::size_t handshakes() const noexcept;
@@ -90,7 +91,7 @@ class ConnectionTable {
   /// where that holds values of the message.
   void refuse(Connection& connection, StatusCode code, const std::string& text,
               std::uint64_t host_frame_number = 0, std::string_view event_text = {});
-  /// As refuse(), and closes the connection once the answer is sent.
+  /// Does what refuse() does, and closes the connection once the answer is sent.
   void refuse_and_close(Connection& connection, StatusCode code, const std::string& text);
   void send_status(Connection& connection, StatusCode code, const std::string& text,
                    std::uint64_t host_frame_number, std::uint64_t count);

@@ -106,8 +106,8 @@ struct FrameStats {
   /// have not taken in a change of the weather or of an entity's shade, and in a frame that
   /// prepared the surface anew (rewarm_s).
   bool coarse = false;
-  /// How long it took to prepare the surface anew inside this frame, because the thermal time had
-  /// jumped, in s of wall time; 0 in frames that did not. The frame is also `coarse`.
+  /// Wall time that this frame spent on preparing the surface anew because the thermal time had
+  /// jumped, s. It is 0 in other frames. Such a frame is also `coarse`.
   double rewarm_s = 0.0;
 };
 

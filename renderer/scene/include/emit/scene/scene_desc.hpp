@@ -240,7 +240,8 @@ struct ScenarioDesc {
   std::vector<ChannelDesc> channels;
   ThermalOptions thermal;
   DisplayOptions display;
-  /// What the loader found doubtful, one sentence each, beginning with the file's name.
+  /// Doubtful points that the loader found, one sentence each. A sentence begins with the file's
+  /// name.
   std::vector<std::string> warnings;
 };
 
