@@ -735,6 +735,7 @@ class CoplanarCutter {
 }  // namespace
 
 std::vector<std::string> cut_coplanar(std::vector<Mesh>& meshes, std::vector<CoplanarPart>& parts) {
+  for (const CoplanarPart& part : parts) EMIT_CHECK_OP(part.mesh, <, meshes.size());
   return CoplanarCutter(meshes, parts).run();
 }
 

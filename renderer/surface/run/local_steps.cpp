@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 namespace {
 
@@ -156,6 +158,8 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
 
 void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
                            const SurfaceSamples& all) noexcept {
+  EMIT_CHECK_OP(event_ns, >=, window.before.at_ns);
+  EMIT_CHECK_OP(event_ns, <=, window.after.at_ns);
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
     const bool came_back = state_[b] == State::of_interval && at_ns_[b] > window.before.at_ns;
     if (came_back) turns_[b % kTurns].push_back(b);
@@ -325,6 +329,7 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
 }
 
 void LocalSteps::rotate(const Window& window, const SurfaceSamples& all) noexcept {
+  EMIT_CHECK_OP(start_ns_ + next_turn_ * turn_ns_, >, window.after.at_ns);
   // Where those begin must still lie between the two nodes.
   for (const auto& turn : turns_) {
     for (const std::uint32_t b : turn) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "emit/physics/check.hpp"
 #include "rt/futex.hpp"
 
 namespace emit::server {
@@ -107,6 +108,7 @@ SenderClient::Progress ShmClient::send(UdpBatch& /*batch*/, Context& context, Tu
 }
 
 void ShmClient::spill() noexcept {
+  EMIT_CHECK(busy_);
   copy(SIZE_MAX);
   spilled_ = true;
 }

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::tool {
 namespace {
 
@@ -18,6 +20,9 @@ constexpr double kSweptK = 1.0;
 
 SceneFill measure_fill(const scene::SensorDesc& sensor, const physics::Pose& pose,
                        std::span<const float> depth_m, std::span<const float> temperature_k) {
+  const std::size_t count = std::size_t{sensor.width_px} * sensor.height_px;
+  EMIT_CHECK_OP(depth_m.size(), ==, count);
+  EMIT_CHECK_OP(temperature_k.size(), ==, count);
   const double scale = 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
   const glm::dvec3 forward = pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
   const glm::dvec3 right = pose.world_from_body * glm::dvec3(0.0, 1.0, 0.0);

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/equilibrium.hpp"
 #include "emit/physics/surface_balance.hpp"
@@ -123,6 +124,7 @@ const glm::dvec3& ConvergedModel::sun_w_m2(std::size_t node) const noexcept {
 
 double ConvergedModel::temperature_k(std::uint32_t material,
                                      std::span<const PointView> view) const {
+  EMIT_CHECK_OP(view.size(), ==, node_count());
   if (materials_[material].prescribed_k) return *materials_[material].prescribed_k;
   return model_ == scene::ThermalModel::foster ? foster_k(material, view)
                                                : relaxed_k(material, view);

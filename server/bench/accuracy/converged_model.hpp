@@ -30,6 +30,9 @@ class ConvergedModel {
       const scene::ScenarioDesc& scenario, std::span<const scene::Material> materials,
       std::span<const std::int64_t> nodes_ns);
 
+  /// Number of nodes of the history, those given to create().
+  [[nodiscard]] std::size_t node_count() const noexcept { return forcing_.size() + 1 - history_; }
+
   /// Returns the temperature at the last node, K. The visible shares are linear between the nodes,
   /// and so is the flux they let through (foster) or the equilibrium they lead to (emit2014).
   /// @pre one view per node

@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::tool {
 namespace {
 
@@ -177,6 +179,8 @@ void ConvergedViews::fill_sky(const PixelSurface& point, std::span<PointView> vi
 
 void ConvergedViews::see(const PixelSurface& point, const ConvergedModel& model,
                          std::span<PointView> view) const {
+  EMIT_CHECK_OP(view.size(), ==, nodes_ns_.size());
+  EMIT_CHECK_OP(model.node_count(), ==, nodes_ns_.size());
   fill_sky(point, view);
   for (const std::size_t node : coarse_) view[node].sun_frac = sun_frac(point, model, node);
   for (std::size_t i = 1; i < coarse_.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "bench/accuracy/pixel_surface.hpp"
+#include "emit/physics/check.hpp"
 
 namespace emit::tool {
 namespace {
@@ -167,6 +168,8 @@ std::array<std::vector<std::uint8_t>, kRegions.size()> classify_pixels(
 
 ErrorSummary summarize_error(std::span<const float> picture, std::span<const float> truth,
                              std::span<const std::uint8_t> mask, bool relative) {
+  EMIT_CHECK_OP(picture.size(), ==, truth.size());
+  EMIT_CHECK_OP(mask.size(), ==, truth.size());
   ErrorSummary summary;
   std::vector<double> errors;
   double sum = 0.0;

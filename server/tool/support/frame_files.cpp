@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "emit/image/png_image.hpp"
+#include "emit/physics/check.hpp"
 
 namespace emit::tool {
 namespace {
@@ -53,6 +54,7 @@ ApparentTemperature::ApparentTemperature(double lo_um, double hi_um)
     : ApparentTemperature(physics::Band{lo_um, hi_um, {}}) {}
 
 ApparentTemperature::ApparentTemperature(const physics::Band& band) {
+  EMIT_CHECK(physics::validate(band).has_value());
   // Every 2 K exactly, ln L between them linear in 1/T: below 1 mK in the thermal bands.
   constexpr double kAnchorK = 2.0;
   const auto count = static_cast<std::size_t>((kTableToK - kTableFromK) / kTableStepK) + 1;

@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "emit/config/load.hpp"
+#include "emit/physics/check.hpp"
 #include "emit/scene/trajectory.hpp"
 
 namespace emit::tool {
@@ -99,6 +100,7 @@ std::size_t band_of_channel(const scene::ScenarioDesc& scenario, scene::ChannelK
 
 TrajectorySample sample_trajectory(const scene::Trajectory& trajectory, std::int64_t sim_time_ns,
                                    std::int64_t previous_ns) noexcept {
+  EMIT_CHECK(!trajectory.empty());
   const scene::TrajectoryState state = scene::trajectory_at(trajectory, sim_time_ns);
   TrajectorySample sample;
   sample.pose = state.pose;
@@ -136,6 +138,7 @@ physics::Result<void> check_entities_fit(const scene::ScenarioDesc& scenario) {
 
 void make_host_frame(const scene::ScenarioDesc& scenario, std::int64_t start_ns, double rate_hz,
                      std::uint64_t index, protocol::HostFrameData& out) {
+  EMIT_CHECK(check_entities_fit(scenario).has_value());
   const auto time_of = [&](double count) {
     return start_ns + static_cast<std::int64_t>(std::llround(count * 1e9 / rate_hz));
   };

@@ -39,7 +39,8 @@ struct TrajectorySample {
   bool on = true;
   bool teleport = false;  ///< a jump lies in (previous_ns, sim_time_ns]
 };
-/// Precondition: the trajectory is not empty.
+/// Returns pose and rates of a trajectory at an instant.
+/// @pre the trajectory is not empty
 [[nodiscard]] TrajectorySample sample_trajectory(const scene::Trajectory& trajectory,
                                                  std::int64_t sim_time_ns,
                                                  std::int64_t previous_ns) noexcept;
@@ -51,8 +52,9 @@ struct TrajectorySample {
 /// where that is (nearly) the start of the history, three and a half hours later.
 [[nodiscard]] std::int64_t observation_ns(const scene::ScenarioDesc& scenario) noexcept;
 
-/// Host frame as a simulation host would send it for the scenario's own trajectories, with rates.
-/// `index` counts from 0, frame numbers from 1. Precondition: check_entities_fit().
+/// Makes the host frame that a simulation host would send for the scenario's own trajectories, with
+/// rates. `index` counts from 0, frame numbers from 1.
+/// @pre check_entities_fit(scenario) succeeds
 void make_host_frame(const scene::ScenarioDesc& scenario, std::int64_t start_ns, double rate_hz,
                      std::uint64_t index, protocol::HostFrameData& out);
 /// Errors: config when more entities move than a host frame holds.

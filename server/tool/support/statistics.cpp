@@ -8,12 +8,15 @@
 #include <cmath>
 #include <limits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::tool {
 namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 }
 
 Samples::Samples(std::size_t most) : most_(most) {
+  EMIT_CHECK(most > 0 && most % 2 == 0);
   values_.resize(most);  // written once, so that a long run does not look as if it leaked
   values_.clear();
 }

@@ -10,9 +10,9 @@ namespace emit::tool {
 class Samples {
  public:
   Samples() = default;
-  /// Keeps `most` samples at most, evenly spread over those that came: when there is no room, every
-  /// second goes. Number, sum and maximum stay exact. Takes its memory at once. Precondition: most
-  /// is even and not 0.
+  /// Keeps at most `most` samples, evenly spread over all. When there is no room, every second one
+  /// is dropped. Number, sum and maximum stay exact. The memory is taken at once.
+  /// @pre most is even and not 0
   explicit Samples(std::size_t most);
 
   void add(double value);
