@@ -15,16 +15,16 @@
 
 namespace emit::server {
 
-/// Sensor channels a source can fill, and what its images come from.
+/// Sensor channels that a source can fill, and the origin of its images.
 struct SourceInfo {
-  std::string device;   ///< GL renderer, or where canned frames come from
+  std::string device;   ///< GL renderer, or the origin of canned frames
   bool canned = false;  ///< pre-rendered pixels: frames carry kFlagCanned
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::uint32_t slots = 0;
   std::size_t planes = 0;  ///< FrameView::radiance_w_m2_sr.size() of every frame
-  /// A frame whose thermal clock is further than this from the frame before it may make the source
-  /// warm up again inside submit(), ns: the newest interval of the surface's history.
+  /// Step of the thermal clock from frame to frame beyond which the source may warm up again inside
+  /// submit(), ns: the newest interval of the surface's history.
   std::int64_t surface_step_ns = 20'000'000'000;
   renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
 };

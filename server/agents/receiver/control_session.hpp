@@ -41,7 +41,7 @@ class ControlSession {
         subscriptions_(context, config, sockets) {}
 
   void set_identity(Identity identity) { identity_ = std::move(identity); }
-  /// Hosts over TLS agree on keys with these; null: bare datagrams are taken.
+  /// Sets the sessions with which hosts over TLS agree on keys; null: bare datagrams are accepted.
   void set_host_sessions(HostSessions* sessions) noexcept { sessions_ = sessions; }
   /// Ignores host frames and commands from here on.
   void drain() noexcept { draining_ = true; }

@@ -66,7 +66,7 @@ class Receiver final : public Agent {
                                                               Transport transport,
                                                               config::Port port) const;
 
-  // Connecting.
+  // The functions below handle new connections.
   [[nodiscard]] bool watch_listener() noexcept;
   void pause_accepting(std::int64_t now_ns, int error) noexcept;
   void resume_accepting(std::int64_t now_ns) noexcept;
@@ -76,7 +76,7 @@ class Receiver final : public Agent {
   void refuse_place(TcpSocket socket, bool crowded);
   int handshake(Connection& connection, std::int64_t now_ns);
 
-  // Reading.
+  // The functions below read from connections.
   int take_events(std::int64_t now_ns);
   int take_connection_event(std::uint64_t key, std::uint32_t events, std::int64_t now_ns);
   /// Goes on with connections whose records waited for room or for their pace.
@@ -85,7 +85,7 @@ class Receiver final : public Agent {
   int parse(Connection& connection, std::int64_t now_ns);
   /// Ends a connection whose framing is lost, after an answer.
   void refuse_framing(Connection& connection, protocol::ParseStatus status);
-  /// Returns whether the connection may go on: what it waits for has come.
+  /// Returns true when the connection may go on, because what it waited for has come.
   [[nodiscard]] bool may_go_on(const Connection& connection) noexcept;
   int receive_datagrams(std::int64_t now_ns) noexcept;
   /// Returns the room on the conductor's ring; 0: the conductor rings when there is some.
