@@ -76,8 +76,7 @@ struct RenderJob {
 struct Image {
   FrameSource* source = nullptr;
   renderer::SlotIndex slot = 0;
-  ChannelSet channels =
-      kAllChannels;  ///< channels that show it; the images of others are not filled
+  ChannelSet channels = kAllChannels;  ///< channels that show it; others have no image
   std::array<std::span<const float>, kMaxPictures> pictures;
   std::array<std::uint32_t, kMaxPictures> crc32c{};
 };

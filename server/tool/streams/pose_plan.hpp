@@ -12,16 +12,16 @@ namespace emit::tool {
 /// Chooses which poses of a log the demo plays: the first, the last and some evenly in between.
 class PosePlan {
  public:
-  /// @param poses  in the log, > 0.
+  /// @param poses  number of poses in the log, > 0.
   /// @param count  poses to play; absent: as many as limit_to() allows, at least kMinimum.
   PosePlan(std::uint64_t poses, std::optional<std::uint64_t> count);
 
   static constexpr std::uint64_t kMinimum = 4;
 
-  /// Index of the pose to play next; empty when the plan is done. Ascending.
+  /// Returns the index of the pose to play next; empty when the plan is done. Indices ascend.
   [[nodiscard]] std::optional<std::uint64_t> next();
-  /// Plans `left` more poses; without effect on a plan of fixed count. The first two calls set the
-  /// number, later ones only lower it, so that the spacing stays even.
+  /// Plans `left` more poses. It has no effect on a plan of fixed count. The first two calls set
+  /// the number; later ones only lower it, so that the spacing stays even.
   void limit_to(std::uint64_t left);
 
   [[nodiscard]] std::uint64_t played() const noexcept { return played_; }
@@ -42,7 +42,7 @@ struct Departure {
   std::int64_t arrived_ns = 0;
   std::int64_t left_ns = 0;
 };
-/// Last stay of at least `min_stay_s` of every entity that leaves again.
+/// Returns the last stay of at least `min_stay_s` of every entity that leaves again.
 [[nodiscard]] std::vector<Departure> find_departures(const scene::ScenarioDesc& scenario,
                                                      double min_stay_s);
 

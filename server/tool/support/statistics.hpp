@@ -19,14 +19,14 @@ class Samples {
   void reserve(std::size_t count) { values_.reserve(count); }
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
   [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
-  /// `frac` in [0, 1]: the smallest sample that at least this share does not exceed. NaN when
+  /// Returns the smallest sample that at least the share `frac` in [0, 1] does not exceed; NaN when
   /// empty.
   [[nodiscard]] double percentile(double frac) const;
   [[nodiscard]] double median() const;  ///< mean of the two middle samples for an even count
   [[nodiscard]] double mean() const;
   [[nodiscard]] double max() const;
   [[nodiscard]] double sum() const;
-  /// Those kept, in the order in which they came.
+  /// Returns the samples kept, in the order in which they came.
   [[nodiscard]] const std::vector<double>& values() const noexcept { return values_; }
 
  private:
@@ -38,7 +38,8 @@ class Samples {
   double max_ = 0.0;
 };
 
-/// Histogram as text, logarithmic bins of the 1-2-5 series; `unit` follows the bin limits.
+/// Returns a histogram as text with logarithmic bins of the 1-2-5 series; `unit` follows the bin
+/// limits.
 [[nodiscard]] std::string histogram_text(const Samples& samples, const std::string& unit);
 
 }  // namespace emit::tool
