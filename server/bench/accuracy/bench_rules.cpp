@@ -12,7 +12,8 @@
 namespace emit::tool {
 namespace {
 
-/// Above it a surface belongs to the figure: far over float depth's error, far under its height.
+/// Height above which a surface belongs to the figure: far above the error of float depth, far
+/// below its height.
 constexpr double kGroundM = 0.02;
 constexpr double kSweptK = 1.0;
 

@@ -17,9 +17,9 @@ namespace {
 using physics::Result;
 using renderer::SurfaceForcing;
 
-/// Step of the spin-up: nothing shades it, so one step of second order does.
+/// Step of the spin-up. Nothing shades it, so a step of second order may be long.
 constexpr std::int64_t kSpinUpStepNs = 120'000'000'000;
-/// Error of an interval of the history that halves its steps once more.
+/// Error above which an interval of the history halves its steps once more.
 constexpr double kToleranceK = 1e-3;
 constexpr std::size_t kMaxModes = 2;
 
@@ -27,7 +27,7 @@ double direct_on_face_w_m2(const SurfaceForcing& f, const PointView& view) noexc
   return view.sun_frac * std::max(0.0, glm::dot(view.normal, f.sun_w_m2));
 }
 
-/// physics.md eq. 1 and 4.
+/// Computes eq. 1 and 4 of physics.md.
 double equilibrium_k(const SurfaceForcing& f, const PointView& view,
                      const scene::Material& material) noexcept {
   physics::SurfaceFluxes<double> in;
@@ -52,7 +52,7 @@ double equilibrium_k(const SurfaceForcing& f, const PointView& view,
       .temperature_k;
 }
 
-/// physics.md eq. 16.
+/// Computes eq. 16 of physics.md.
 physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& view,
                                    const renderer::FosterMaterial& material) noexcept {
   const double around_frac = 1.0 - view.sky_frac;

@@ -66,7 +66,8 @@ std::vector<PixelSurface> trace(const reference::SceneInstant& scene,
   return pixels;
 }
 
-/// Whether an edge of a body, a foot or an outline runs between two neighbouring pixels.
+/// Returns true when an edge of an object, a foot or an outline runs between two neighbouring
+/// pixels.
 bool is_edge(const PixelSurface& a, const PixelSurface& b, double width_rad) {
   if (is_outline(a, b, width_rad)) return true;
   return a.surface && glm::dot(a.normal, b.normal) < kCreaseCos;

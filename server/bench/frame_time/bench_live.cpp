@@ -31,7 +31,7 @@ struct LiveOptions {
   std::vector<std::string> set;
   double seconds = 60.0;  ///< of sim time
   double rate_hz = 50.0;  ///< of frames and host poses, in sim time
-  double every_s = 2.0;   ///< between the pictures that are compared
+  double every_s = 2.0;   ///< between the images that are compared
   double finest_s = 1.0;  ///< thermal.first_step_s of the reference
   /// Period of the host's weather updates while a cloud passes. The script has the weather from the
   /// start. With 0 there is no cloud.
@@ -142,7 +142,7 @@ struct Error {
 
 struct Row {
   Samples frame_ms;
-  Error error;  ///< where the picture has changed since the start
+  Error error;  ///< over the pixels that have changed since the start
   double warm_up_s = 0.0;
 };
 

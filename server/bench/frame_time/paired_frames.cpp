@@ -62,7 +62,7 @@ Result<SceneRunner> SceneRunner::start(const scene::ScenarioDesc& scenario,
 }
 
 Result<Rounds> take_turns(std::array<SceneRunner*, 3> runners, std::uint32_t rounds) {
-  // All at the same sim times, whatever a has shown before.
+  // All runners show the same sim times, whatever a has shown before.
   std::uint32_t first = 0;
   for (const SceneRunner* runner : runners) first = std::max(first, runner->next_frame());
   for (SceneRunner* runner : runners) runner->skip_to(first);

@@ -21,14 +21,15 @@ using physics::make_error;
 /// Largest half width of the central difference that gives a trajectory's rates.
 constexpr std::int64_t kRateStepNs = 500'000;
 
-/// Rates inside a segment: constant velocity and constant rotation axis, so the chord is exact.
+/// Returns rates inside a segment: constant velocity and constant rotation axis, so the chord is
+/// exact.
 protocol::PoseRates rates_at(const scene::Trajectory& trajectory,
                              std::int64_t sim_time_ns) noexcept {
   const auto after = std::upper_bound(
       trajectory.begin(), trajectory.end(), sim_time_ns,
       [](std::int64_t time, const scene::Keyframe& key) { return time < key.sim_time_ns; });
   if (after == trajectory.begin() || after == trajectory.end() || after->teleport) return {};
-  // The chord stays inside the segment: a neighbour moves otherwise.
+  // The chord stays inside the segment, because a neighbour moves otherwise.
   const std::int64_t from_ns = std::max(sim_time_ns - kRateStepNs, (after - 1)->sim_time_ns);
   const std::int64_t to_ns = std::min(sim_time_ns + kRateStepNs, after->sim_time_ns - 1);
   if (to_ns <= from_ns) return {};
