@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// emit latency, trigger and trace against a daemon with canned frames.
+// Commands emit latency, trigger and trace against a daemon with canned frames.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
