@@ -54,7 +54,7 @@ class FrameSource {
   [[nodiscard]] virtual const renderer::FrameView& collect(renderer::SlotIndex slot) noexcept = 0;
   virtual void release(renderer::SlotIndex slot) noexcept = 0;
 
-  /// Renderer::expected_rungs(); sources without a ladder have one rung.
+  /// Returns Renderer::expected_rungs(). Sources without a ladder have one quality level.
   [[nodiscard]] virtual std::span<const renderer::RungStats> expected_rungs(
       const renderer::FrameRequest& /*request*/) noexcept {
     static constexpr std::array<renderer::RungStats, 1> kFullOnly{};

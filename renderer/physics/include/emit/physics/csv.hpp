@@ -36,7 +36,7 @@ class CsvReader {
  public:
   /// Reads the header row. Errors: not_found; io; parse as above. Errors name the file.
   [[nodiscard]] static Result<CsvReader> open(const std::filesystem::path& file);
-  /// The same for text in memory; `name` stands for the file in messages.
+  /// Reads the header row of text in memory; `name` stands for the file in messages.
   [[nodiscard]] static Result<CsvReader> from_text(std::string text, std::string name);
   CsvReader(CsvReader&&) noexcept;
   CsvReader& operator=(CsvReader&&) noexcept;
@@ -68,7 +68,7 @@ class CsvTable {
  public:
   /// Errors: those of CsvReader.
   [[nodiscard]] static Result<CsvTable> read(const std::filesystem::path& file);
-  /// The same from text; `name` stands for the file in messages.
+  /// Reads a table from text in memory; `name` stands for the file in messages.
   [[nodiscard]] static Result<CsvTable> parse(std::string text, std::string name);
 
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }

@@ -223,7 +223,7 @@ struct DisplayOptions {
   double max_k = 330.0;
 };
 
-/// All that a scenario file says.
+/// Content of a scenario file.
 struct ScenarioDesc {
   std::string name;
   std::filesystem::path file;  ///< the file itself, for messages
