@@ -81,6 +81,11 @@ void set_fluxes(const Fluxes& start, const Fluxes& end, gpu::StepParams& params)
 LightFrusta set_step(const HistoryInterval& interval, const CameraSetup& camera,
                      const scene::ThermalOptions& options, bool first, bool last,
                      std::uint32_t relaxation_offset, gpu::StepParams& params) noexcept {
+  EMIT_CHECK_OP(options.shadow_map_px, >=, 1U);
+  const auto is_unit = [](const glm::dvec3& v) { return std::abs(glm::dot(v, v) - 1.0) < 1e-6; };
+  EMIT_CHECK(is_unit(interval.sun_begin.direction_enu));
+  EMIT_CHECK(is_unit(interval.sun_sample.direction_enu));
+  EMIT_CHECK(is_unit(interval.sun_end.direction_enu));
   // Write sun and fluxes at both ends.
   params.to_sun_start = vec3_from(interval.sun_begin.direction_enu);
   params.sun_start_w_m2 = sun_w_m2(interval.sun_begin, interval.forcing_begin);

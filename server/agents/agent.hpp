@@ -30,15 +30,17 @@ class Agent {
   /// Ends the agent, on its thread, after the last do_work().
   virtual void on_stop() noexcept {}
 
-  /// TAI instant at which do_work must be called even if nothing else happens.
+  /// Returns the TAI instant at which do_work must be called even if nothing else happens.
   [[nodiscard]] virtual std::int64_t wake_at_ns() const noexcept { return kNeverNs; }
-  /// Least time between work and the next look, 0 for most: who is not in a hurry lets work pile up
-  /// and spares those who bring it the waking.
+  /// Returns the shortest time between work and the next look; 0 for most agents. An agent that is
+  /// not urgent lets work pile up and spares its producers the waking.
   [[nodiscard]] virtual std::int64_t rest_ns() const noexcept { return 0; }
-  /// Readable when the outside world has work for this agent (an epoll descriptor); -1 = none.
+  /// Returns a descriptor that is readable when the outside world has work for this agent (an epoll
+  /// descriptor); -1: none.
   [[nodiscard]] virtual int wait_fd() const noexcept { return -1; }
 
-  /// Rung by whoever put something on one of this agent's rings.
+  /// Doorbell of this agent. A producer rings it after it put something on one of the agent's
+  /// rings.
   [[nodiscard]] Doorbell& doorbell() const noexcept { return doorbell_; }
 
  private:

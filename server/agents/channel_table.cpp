@@ -18,7 +18,7 @@ std::string_view to_string(scene::ChannelKind kind) noexcept {
 
 namespace {
 
-/// Memory of an image whose rows do not lie in one piece.
+/// Takes the memory of an image whose rows do not lie in one piece.
 void add_copies(Picture& picture, const SourceInfo& source) {
   const scene::PixelRect& window = picture.window_px;
   if (window.width_px != source.width_px) {

@@ -20,10 +20,10 @@ struct Channel {
   std::string band;
   double band_lo_um = 0.0;
   double band_hi_um = 0.0;
-  std::vector<scene::ResponseSample> response;  ///< of the band; empty: a rectangle
-  std::uint32_t width_px = 0;                   ///< of its frames
+  std::vector<scene::ResponseSample> response;  ///< response of the band; empty: a rectangle
+  std::uint32_t width_px = 0;                   ///< width of its frames
   std::uint32_t height_px = 0;
-  std::uint32_t window_x_px = 0;  ///< where they lie in the sensor's image
+  std::uint32_t window_x_px = 0;  ///< place of its frames in the sensor's image
   std::uint32_t window_y_px = 0;
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
@@ -34,8 +34,8 @@ struct Channel {
 /// Pixels that channels of one band and window share.
 struct Picture {
   std::size_t plane = 0;                   ///< index into FrameView::radiance_w_m2_sr
-  scene::PixelRect window_px;              ///< of the sensor's image
-  ChannelSet channels = 0;                 ///< that show it
+  scene::PixelRect window_px;              ///< part of the sensor's image
+  ChannelSet channels = 0;                 ///< channels that show it
   std::vector<std::vector<float>> copies;  ///< by slot; empty where the rows lie in one piece
 };
 
@@ -49,26 +49,26 @@ struct ChannelTable {
 /// Channels of a scenario, or the one channel of canned frames without a scenario, with all memory
 /// that their images take. The sensor's size is the source's. A scenario without channels gets an
 /// injection channel per band.
-/// Errors (config): a channel whose band the scenario lacks or whose window the image, more bands,
-/// channels or images than fit.
+/// Errors (config): the scenario lacks the band of a channel, a window does not fit the image, or
+/// there are more bands, channels or images than fit.
 [[nodiscard]] physics::Result<ChannelTable> make_channels(
     const std::optional<scene::ScenarioDesc>& scenario, const SourceInfo& source);
 
-/// First channel that fits; empty fields fit anything. nullptr: none.
+/// Returns the first channel that fits; empty fields fit anything; nullptr: none.
 [[nodiscard]] const Channel* find_channel(const std::vector<Channel>& channels,
                                           std::string_view name, std::string_view kind,
                                           std::string_view sensor, std::string_view band) noexcept;
 
-/// Channels that show the frame of that number. RT-safe.
+/// Returns the channels that show the frame of that number. RT-safe.
 [[nodiscard]] ChannelSet due_channels(const std::vector<Channel>& channels,
                                       std::uint64_t frame_number) noexcept;
 
-/// The smallest window that holds those of some channels. RT-safe.
+/// Returns the smallest window that holds those of some channels. RT-safe.
 [[nodiscard]] scene::PixelRect window_around(const std::vector<Channel>& channels,
                                              ChannelSet of) noexcept;
 
-/// Pixels of an image, row by row: in the source's memory where they lie in one piece there, else
-/// copied to the image's memory for `slot`. RT-safe.
+/// Returns the pixels of an image, row by row. They lie in the source's memory where they are in
+/// one piece there; else they are copied to the image's memory for `slot`. RT-safe.
 [[nodiscard]] std::span<const float> cut_out(Picture& picture, const renderer::FrameView& view,
                                              renderer::SlotIndex slot) noexcept;
 

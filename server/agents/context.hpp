@@ -27,24 +27,24 @@ class SenderClient;
 class RecorderPeer;
 class TcpSocket;
 
-/// receiver -> sender.
+/// Message of receiver to sender about a client.
 struct ClientCommand {
   enum class Kind : std::uint8_t { add, remove };
   Kind kind = Kind::add;
   std::uint32_t connection = 0;
   SenderClient* client = nullptr;  ///< add: lent until it comes back with ClientReleased
 };
-/// sender -> receiver: the client's socket and memory are the receiver's again.
+/// Message of sender to receiver: the receiver owns the client's socket and memory again.
 struct ClientReleased {
   std::uint32_t connection = 0;
   SenderClient* client = nullptr;
 };
-/// receiver -> sender: a client lacks parts of a frame.
+/// Message of receiver to sender: a client lacks parts of a frame.
 struct ResendCommand {
   std::uint32_t connection = 0;
   protocol::ResendRequest request;
 };
-/// receiver -> recorder, and back, as above.
+/// Message of receiver to recorder about a connection. It comes back like a client.
 struct RecorderCommand {
   ClientCommand::Kind kind = ClientCommand::Kind::add;
   std::uint32_t connection = 0;
@@ -56,7 +56,7 @@ struct RecorderReleased {
   std::uint32_t connection = 0;
 };
 
-/// One per agent: rung after something was put on one of its rings.
+/// Doorbells of the agents. Each is rung after something was put on one of the agent's rings.
 struct Doorbells {
   Doorbell conductor;
   Doorbell receiver;
@@ -65,7 +65,7 @@ struct Doorbells {
   Doorbell recorder;
 };
 
-/// Everything that more than one agent sees: rings, counters and what is fixed after start.
+/// Objects that more than one agent uses: rings, counters and what is fixed after start.
 struct Context {
   Context(const Clock& injected_clock, std::size_t journal_bytes, std::size_t max_clients)
       : clock(injected_clock),
@@ -94,15 +94,15 @@ struct Context {
   FrameTrace trace;
   Doorbells bells;
   std::vector<Channel> channels;  ///< fixed before the agents run
-  std::vector<Picture> pictures;  ///< likewise; their copies are the render agent's to fill
+  std::vector<Picture> pictures;  ///< fixed likewise; the render agent fills their copies
   std::atomic<std::uint64_t> run_id{0};
   std::atomic<bool> device_lost{false};  ///< set by render: no frame comes any more
-  /// Since when the render agent has been submitting a frame behind a jump of simulation time,
-  /// monotonic; 0: it is not. See warms_up_again().
+  /// Monotonic instant at which the render agent began to submit a frame after a jump of simulation
+  /// time; 0: it does not submit one. See warms_up_again().
   std::atomic<std::int64_t> jump_since_ns{0};
   std::atomic<std::uint64_t> frames_handed_over{0};   ///< put on `published` by the conductor
   std::atomic<std::uint64_t> journal_handed_over{0};  ///< lines put on `journal`
-  /// Memory of the entries that the recorder keeps for recorders that connect later.
+  /// Memory of the entries that are kept for recorders that connect later.
   std::atomic<std::uint64_t> journal_memory_bytes{0};
 
   SpscRing<HostInput> host_inputs{32};       // receiver -> conductor

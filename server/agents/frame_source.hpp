@@ -15,16 +15,16 @@
 
 namespace emit::server {
 
-/// Sensor channels a source can fill, and what its images come from.
+/// Sensor channels that a source can fill, and the origin of its images.
 struct SourceInfo {
-  std::string device;   ///< GL renderer, or where canned frames come from
+  std::string device;   ///< GL renderer, or the origin of canned frames
   bool canned = false;  ///< pre-rendered pixels: frames carry kFlagCanned
   std::uint32_t width_px = 0;
   std::uint32_t height_px = 0;
   std::uint32_t slots = 0;
   std::size_t planes = 0;  ///< FrameView::radiance_w_m2_sr.size() of every frame
-  /// A frame whose thermal clock is further than this from the frame before it may make the source
-  /// warm up again inside submit(), ns: the newest interval of the surface's history.
+  /// Step of the thermal clock from frame to frame beyond which the source may warm up again inside
+  /// submit(), ns: the newest interval of the surface's history.
   std::int64_t surface_step_ns = 20'000'000'000;
   renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
 };
@@ -54,7 +54,7 @@ class FrameSource {
   [[nodiscard]] virtual const renderer::FrameView& collect(renderer::SlotIndex slot) noexcept = 0;
   virtual void release(renderer::SlotIndex slot) noexcept = 0;
 
-  /// Renderer::expected_rungs(); sources without a ladder have one rung.
+  /// Returns Renderer::expected_rungs(). Sources without a ladder have one quality level.
   [[nodiscard]] virtual std::span<const renderer::RungStats> expected_rungs(
       const renderer::FrameRequest& /*request*/) noexcept {
     static constexpr std::array<renderer::RungStats, 1> kFullOnly{};

@@ -10,8 +10,8 @@
 #include "agents/messages.hpp"
 #include "rt/byte_ring.hpp"
 
-/// Journal lines on the way from conductor to recorder: a head, then the entities it counts, both
-/// copied byte by byte. The recorder turns them into emit.v1.JournalEntry.
+/// Journal lines on the way from conductor to recorder. A line is a head, then the entities it
+/// counts, both copied byte by byte. The recorder turns them into emit.v1.JournalEntry.
 namespace emit::server {
 
 enum class JournalKind : std::uint32_t { run_start, host_frame, command, frame };
@@ -32,7 +32,7 @@ struct JournalCommand {
   CommandKind command = CommandKind::start;
 };
 
-/// Followed by entity_count EntityStateData.
+/// Head of a line with a host frame. entity_count EntityStateData follow.
 struct JournalHostFrame {
   JournalHead head;
   std::uint64_t frame_number = 0;
@@ -45,7 +45,7 @@ struct JournalHostFrame {
   std::uint32_t entity_count = 0;
 };
 
-/// Followed by entity_count renderer::EntityUpdate.
+/// Head of a line with a frame. entity_count renderer::EntityUpdate follow.
 struct JournalFrame {
   JournalHead head;
   std::uint64_t frame_number = 0;
@@ -64,15 +64,15 @@ struct JournalFrame {
   std::uint32_t entity_count = 0;
 };
 
-/// Conductor's end. A line that finds no room is lost and counted; its sequence number stays
-/// unused, so that a reader sees the gap. RT-safe.
+/// Conductor's end of the ring. A line that finds no room is lost and counted. Its sequence number
+/// stays unused, so that a reader sees the gap. RT-safe.
 class JournalWriter {
  public:
   /// `written` counts the lines that found room.
   JournalWriter(ByteRing& ring, std::atomic<std::uint64_t>& written)
       : ring_(ring), written_(written) {}
 
-  /// Fills in the head's sequence. False when the line was lost.
+  /// Fills in the head's sequence and writes the line. It returns false when the line was lost.
   template <class Line, class Element = std::byte>
   bool write(Line& line, std::span<const Element> elements = {}) noexcept {
     static_assert(std::is_trivially_copyable_v<Line> && std::is_trivially_copyable_v<Element>);

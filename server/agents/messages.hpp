@@ -12,21 +12,22 @@
 #include "pacing/run_control.hpp"
 #include "rt/connection_key.hpp"
 
-/// Plain structs on the rings between agents; docs/threading.md shows who sends what to whom.
+/// Plain structs on the rings between agents; docs/threading.md shows the sender and receiver of
+/// each.
 namespace emit::server {
 
 inline constexpr std::size_t kMaxPlanes = 16;
 inline constexpr std::size_t kMaxSlots = 16;
 inline constexpr std::size_t kMaxPictures = 16;
 
-/// Bit k: channel k.
+/// Set of channels. Bit k stands for channel k.
 using ChannelSet = std::uint64_t;
 inline constexpr std::size_t kMaxChannels = 64;
 inline constexpr ChannelSet kAllChannels = ~ChannelSet{0};
 
 using protocol::StatusCode;
 
-/// Whom an answer goes to.
+/// Address of an answer.
 struct Origin {
   enum class Kind : std::uint8_t { none, udp, tcp };
   Kind kind = Kind::none;
@@ -36,7 +37,7 @@ struct Origin {
   alignas(8) std::array<std::byte, 32> address{};
 };
 
-/// receiver -> conductor, in order of arrival.
+/// Message of receiver to conductor, in order of arrival.
 struct HostInput {
   enum class Kind : std::uint8_t { frame, command };
   Kind kind = Kind::frame;
@@ -45,7 +46,7 @@ struct HostInput {
   protocol::HostFrameData frame;
 };
 
-/// conductor -> receiver: an answer to send.
+/// Message of conductor to receiver: an answer to send.
 struct StatusReply {
   Origin origin;
   StatusCode code = StatusCode::ok;
@@ -54,17 +55,17 @@ struct StatusReply {
   std::uint64_t detail = 0;  ///< unknown_entity: its id; ok: the command's kind; kDetailOldRun
 };
 
-/// Weather changes that come with one frame; further ones replace the newest.
+/// Largest number of weather changes that come with one frame. Further ones replace the newest.
 inline constexpr std::size_t kMaxWeatherPerFrame = 32;
 
-/// conductor -> render agent, in the order in which the source must see it. Of a frame, weather is
-/// applied first, then entities.
+/// Message of conductor to render agent, in the order in which the source must see it. The weather
+/// of a frame is applied first, then its entities.
 struct RenderJob {
   enum class Kind : std::uint8_t { frame, reset };
   Kind kind = Kind::frame;
-  renderer::FrameRequest request;      ///< its rung is the render agent's choice
+  renderer::FrameRequest request;      ///< the render agent chooses its quality level
   std::int64_t deadline_ns = 0;        ///< when the pixels are due; 0: whenever
-  ChannelSet channels = kAllChannels;  ///< that the frame is for
+  ChannelSet channels = kAllChannels;  ///< channels that the frame is for
   std::uint32_t weather_count = 0;
   std::array<scene::WeatherSample, kMaxWeatherPerFrame> weather;
   std::uint32_t entity_count = 0;
@@ -75,12 +76,12 @@ struct RenderJob {
 struct Image {
   FrameSource* source = nullptr;
   renderer::SlotIndex slot = 0;
-  ChannelSet channels = kAllChannels;  ///< that show it; the images of others are not there
+  ChannelSet channels = kAllChannels;  ///< channels that show it; others have no image
   std::array<std::span<const float>, kMaxPictures> pictures;
   std::array<std::uint32_t, kMaxPictures> crc32c{};
 };
 
-/// render agent -> conductor, in order of submission.
+/// Message of render agent to conductor, in order of submission.
 struct RenderDone {
   Image image;
   std::uint32_t nonfinite_px = 0;
@@ -88,18 +89,18 @@ struct RenderDone {
   std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
   bool coarse = false;              ///< the surface was not prepared for this camera
   bool warmed_up = false;           ///< the surface warmed up again within this frame
-  std::uint8_t rung = 0;            ///< of the quality ladder
-  float estimated_error_k = 0.0F;   ///< of that rung; NaN: not known
+  std::uint8_t rung = 0;            ///< quality level, an index into the quality ladder
+  float estimated_error_k = 0.0F;   ///< error of that level; NaN: not known
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
   std::int64_t render_start_ns = 0;
   std::int64_t render_end_ns = 0;
   std::int64_t readback_end_ns = 0;
 };
 
-/// conductor -> sender. The header lacks what depends on channel and client.
+/// Message of conductor to sender. The header lacks the fields that depend on channel and client.
 struct PublishFrame {
-  /// The image published last, again, for those of image.channels that it has images for; else
-  /// `image` is not set.
+  /// True when the image published last is shown again, by those of image.channels that it has
+  /// images for. The other members of `image` are not set then.
   bool repeat = false;
   Image image;
   protocol::FrameHeader header;

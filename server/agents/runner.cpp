@@ -64,7 +64,7 @@ int AgentRunner::turn() noexcept {
 }
 
 void AgentRunner::run() noexcept {
-  // Signals are the main thread's; a name helps in ps, perf and gdb.
+  // Signals belong to the main thread. A name helps in ps, perf and gdb.
   sigset_t all{};
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
@@ -101,7 +101,8 @@ void AgentRunner::run() noexcept {
 }
 
 void AgentRunner::rest() noexcept {
-  // The doorbell is not armed: whoever rings it goes on at once, and the next look sees the work.
+  // The doorbell is not armed: a producer that rings it goes on at once, and the next look sees the
+  // work.
   if (const std::int64_t rest_ns = agent_.rest_ns(); rest_ns > 0) {
     const timespec time{0, static_cast<long>(rest_ns)};
     ::nanosleep(&time, nullptr);
@@ -114,7 +115,7 @@ void AgentRunner::sleep() noexcept {
     agent_.doorbell().disarm();
     return;
   }
-  // Bounded, whatever happens to the clock.
+  // The rest is bounded, whatever happens to the clock.
   constexpr std::int64_t kLongestNs = 100'000'000;
   const std::int64_t wake_ns = agent_.wake_at_ns();
   std::int64_t wait_ns = kLongestNs;
@@ -134,7 +135,8 @@ void AgentRunner::sleep() noexcept {
                          static_cast<long>(wait_ns % 1'000'000'000)};
   ::ppoll(fds.data(), count, &timeout, nullptr);
   if (timed && fds[timer_at].revents != 0) {
-    // Gone off, or cancelled because the clock was set: the next instant is set anew.
+    // The timer has expired, or was cancelled because the clock was set. The next instant is set
+    // anew.
     std::uint64_t expirations = 0;
     [[maybe_unused]] const auto read = ::read(timer_.get(), &expirations, sizeof expirations);
     armed_utc_ns_ = 0;
@@ -156,7 +158,8 @@ bool AgentRunner::arm_timer(std::int64_t wake_ns) noexcept {
   at.it_value.tv_nsec = static_cast<long>(utc_ns % 1'000'000'000);
   if (::timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME | TFD_TIMER_CANCEL_ON_SET, &at, nullptr) !=
       0) {
-    // Cancelled by a clock that was set meanwhile, which setting it again has acknowledged.
+    // The timer was cancelled by a clock that was set meanwhile. Setting it again has acknowledged
+    // that.
     armed_utc_ns_ = 0;
     return false;
   }

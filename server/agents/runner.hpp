@@ -25,17 +25,18 @@ class AgentRunner {
   AgentRunner(const AgentRunner&) = delete;
   AgentRunner& operator=(const AgentRunner&) = delete;
 
-  /// Before start_thread(). Stepped mode asks nothing of the host.
-  /// A setting that the host refuses is left out; the daemon has asked for the same before and
-  /// logged it.
+  /// Sets the real-time settings of the thread. Call it before start_thread(); stepped mode asks
+  /// nothing of the host. A setting that the host refuses is left out. The daemon has asked for the
+  /// same before and logged it.
   void set_realtime(ThreadRealtime wish) { realtime_ = std::move(wish); }
 
-  /// Starts the thread and waits for on_start. False when on_start failed; the thread is gone then.
+  /// Starts the thread and waits for on_start. It returns false when on_start failed; the thread
+  /// has ended then.
   [[nodiscard]] bool start_thread();
-  /// Stepped mode: on_start on the caller's thread.
+  /// Starts the agent in stepped mode: on_start runs on the caller's thread.
   [[nodiscard]] bool start_stepped();
   int step() noexcept;
-  /// Ends after the current turn, runs on_stop, joins. Idempotent.
+  /// Ends the agent after the current turn, runs on_stop and joins the thread. Idempotent.
   void stop() noexcept;
 
   [[nodiscard]] Agent& agent() noexcept { return agent_; }
@@ -46,7 +47,8 @@ class AgentRunner {
   int turn() noexcept;
   void rest() noexcept;
   void sleep() noexcept;
-  /// Sets the timer to a wall instant, for good until it is set anew. False: there is none.
+  /// Sets the timer to a wall instant. It stays until it is set anew. Returns false when there is
+  /// none.
   [[nodiscard]] bool arm_timer(std::int64_t wake_ns) noexcept;
 
   Agent& agent_;

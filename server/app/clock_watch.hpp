@@ -8,8 +8,8 @@
 
 namespace emit::server {
 
-/// Notices when somebody sets the wall clock. Nothing hangs on it, pacing mends itself (IgClock);
-/// but whoever looks at late or repeated frames wants to know. Thread: one owner.
+/// Detects that somebody sets the wall clock. Pacing corrects itself (IgClock), but the cause of
+/// late or repeated frames should be known. Thread: one owner.
 class ClockWatch {
  public:
   explicit ClockWatch(const Clock& clock) noexcept : clock_(clock) {}

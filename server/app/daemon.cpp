@@ -131,7 +131,7 @@ physics::Result<void> DaemonImpl::open_ports() {
     return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
   }
   if (options_.drop_privileges) {
-    // While this thread is the only one, because each thread has privileges of its own.
+    // Privileges are dropped while this thread is the only one, because each thread has its own.
     auto dropped = drop_privileges();
     if (!dropped) {
       return tl::unexpected<Error>(std::move(dropped.error()));

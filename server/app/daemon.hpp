@@ -20,17 +20,17 @@ class ServiceNotifier;
 /// Parts that a caller may replace. Tests give a fake clock and a null source.
 struct DaemonOptions {
   Clock* clock = nullptr;             ///< null: SystemClock; must outlive the daemon
-  FrameSourceFactory source_factory;  ///< empty: what the configuration names
+  FrameSourceFactory source_factory;  ///< empty: the source that the configuration names
   bool stepped = false;               ///< no threads: the caller turns the crank with step()
   const ServiceNotifier* notifier = nullptr;  ///< null: nobody; must outlive the daemon
-  /// Gives up what the process could do beyond its user once the ports are open. For programs that
-  /// are the daemon: it does so for good.
+  /// Drops the privileges of the process beyond its user once the ports are open. It is for
+  /// programs that are the daemon, because it cannot be undone.
   bool drop_privileges = false;
   std::function<void(const std::string&)>
       on_log;  ///< null: spdlog as configured; set: log lines go here
 };
 
-/// Exit code when the device is lost, or fails again and again: EX_TEMPFAIL of sysexits.h, a new
+/// Exit code when the device is lost, or fails again and again: EX_TEMPFAIL of sysexits.h. A new
 /// process may well succeed.
 inline constexpr int kExitDeviceLost = 75;
 
@@ -54,16 +54,17 @@ class Daemon {
   virtual ~Daemon() = default;
 
   /// Runs until request_stop(), then drains: frames in flight are sent, the journal is flushed and
-  /// closed. Returns what a process exits with: 0, 1 when an agent failed, or kExitDeviceLost: then
-  /// the render thread may hang in the driver, and with it this object's destructor; a process
-  /// leaves by std::_Exit. Once per daemon.
+  /// closed. Returns the exit code of a process: 0, 1 when an agent failed, or kExitDeviceLost.
+  /// After a lost device the render thread may hang in the driver, and with it this object's
+  /// destructor, so the process leaves by std::_Exit. Call it once per daemon.
   [[nodiscard]] virtual int run() = 0;
-  /// After run(): false where nobody took its last lines, on which exit() would wait.
+  /// Returns false after run() when nobody took the last lines of the log, on which exit() would
+  /// wait.
   [[nodiscard]] virtual bool log_taken() const noexcept = 0;
-  /// Any thread, and signal handlers.
+  /// Asks the daemon to stop. Thread: any, and signal handlers.
   virtual void request_stop() noexcept = 0;
 
-  /// Stepped mode: every agent once, in a fixed order. Returns the work done (0 = idle).
+  /// Runs every agent once, in a fixed order, in stepped mode. Returns the work done (0 = idle).
   virtual int step() = 0;
 
   [[nodiscard]] virtual std::uint16_t control_port() const noexcept = 0;
@@ -71,13 +72,14 @@ class Daemon {
   [[nodiscard]] virtual std::uint16_t metrics_port() const noexcept = 0;   ///< 0 = off
   [[nodiscard]] virtual std::uint16_t trigger_port() const noexcept = 0;   ///< 0 = off
   [[nodiscard]] virtual std::uint64_t counter(Counter id) const noexcept = 0;
-  /// "ready control=HOST:PORT host_udp=HOST:PORT", then " trigger=HOST:PORT" and
-  /// " metrics=HOST:PORT" unless these are off.
+  /// Returns "ready control=HOST:PORT host_udp=HOST:PORT", then " trigger=HOST:PORT" and "
+  /// metrics=HOST:PORT" unless these are off.
   [[nodiscard]] virtual std::string ready_line() const = 0;
 };
 
-/// main() of emitd and of `emit serve`. Exit codes: 0 after SIGTERM or SIGINT, 2 usage, 75
-/// the device was lost, 78 bad configuration (file:line:column on standard error), 1 otherwise.
+/// The function main() of emitd and of `emit serve`. Exit codes: 0 after SIGTERM or SIGINT, 2
+/// usage, 75 the device was lost, 78 bad configuration (file:line:column on standard error), 1
+/// otherwise.
 /// @param program  name shown in messages, "emitd" or "emit serve"; argv[0] is skipped.
 [[nodiscard]] int emitd_main(int argc, char** argv, const char* program = "emitd");
 

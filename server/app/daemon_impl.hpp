@@ -80,7 +80,7 @@ class DaemonImpl final : public Daemon {
     std::string pacing;
     std::string device;
   };
-  // Steps of setup(), in their order.
+  // The functions below are the steps of setup(), in their order.
   [[nodiscard]] physics::Result<void> open_clocks();
   [[nodiscard]] physics::Result<void> open_ports();
   [[nodiscard]] physics::Result<void> open_log();
@@ -92,12 +92,12 @@ class DaemonImpl final : public Daemon {
   void log_start(const Names& names, const SourceInfo& source);
   [[nodiscard]] physics::Result<void> make_runners();
   [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
-  /// Runners that start after the render agent's, in the order of their start.
+  /// Returns the runners that start after the render agent's, in the order of their start.
   [[nodiscard]] std::array<AgentRunner*, 4> serving_runners() const noexcept {
     return {recorder_runner_.get(), sender_runner_.get(), conductor_runner_.get(),
             receiver_runner_.get()};
   }
-  /// One turn of the main thread while serving: waits up to 100 ms, then looks after the others.
+  /// Runs one turn of the main thread while serving: waits up to 100 ms, then checks the agents.
   void watch_once();
   [[nodiscard]] int end_in_order();
   template <class Predicate>

@@ -27,7 +27,7 @@ constexpr int kExitConfig = 78;  // EX_CONFIG of sysexits.h
 
 std::atomic<Daemon*> g_daemon{nullptr};
 std::atomic<bool> g_ran{false};
-std::atomic<int> g_exit_code{0};  ///< of run()
+std::atomic<int> g_exit_code{0};  ///< exit code of run()
 static_assert(std::atomic<Daemon*>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
 
 extern "C" void emit_on_stop_signal(int /*signal*/) {
@@ -35,8 +35,9 @@ extern "C" void emit_on_stop_signal(int /*signal*/) {
     daemon->request_stop();
     return;
   }
-  // Before: loading or warming up, nobody is served yet, and a driver may be busy for long. Behind:
-  // it is asked for once more, and taking down takes too long.
+  // The signal ends the process at once outside of run(). During loading or warming up nobody is
+  // served yet, and a driver may be busy for long. After run() it is a repeated signal, and
+  // cleaning up takes too long.
   if (!g_ran.load()) {
     constexpr std::string_view kText = "emitd: stopped before it was ready\n";
     [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kText.data(), kText.size());

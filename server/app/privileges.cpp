@@ -24,7 +24,8 @@ __user_cap_header_struct own_header() noexcept {
   return {_LINUX_CAPABILITY_VERSION_3, 0};
 }
 
-/// Effective and permitted ones together, one bit each. glibc has no wrapper for the call.
+/// Returns effective and permitted capabilities together, one bit each. glibc has no wrapper for
+/// the call.
 std::uint64_t capabilities() noexcept {
   CapabilityData data{};
   __user_cap_header_struct header = own_header();
@@ -55,10 +56,10 @@ physics::Result<std::string> drop_privileges() {
   raise_limit(RLIMIT_MEMLOCK, RLIM_INFINITY);
 
   for (int capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0; ++capability) {
-    // Needs CAP_SETPCAP; without it NO_NEW_PRIVS does the same.
+    // This needs CAP_SETPCAP. Without it NO_NEW_PRIVS does the same.
     static_cast<void>(::prctl(PR_CAPBSET_DROP, capability, 0, 0, 0));
   }
-  // EINVAL: a kernel without ambient capabilities has none to clear.
+  // The error EINVAL means a kernel without ambient capabilities, which has none to clear.
   if (::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0, 0, 0) != 0 && errno != EINVAL) {
     return physics::make_error(physics::ErrorCode::internal,
                                "ambient capabilities: " + error_text(errno));

@@ -6,12 +6,12 @@
 
 namespace emit::server {
 
-/// Gives up every capability of this thread, and with it of all threads it starts, for good: nor
-/// may a program that it executes gain any (PR_SET_NO_NEW_PRIVS). Beforehand a process that may do
-/// so raises its own limits for real-time priority and locked memory, so that agents can still be
-/// scheduled ahead of others; both are limits of this process alone.
-/// Returns a line for the log: what there was, what is kept. Errors (internal): the kernel kept
-/// something. Call it while the process has one thread. Not RT-safe.
+/// Drops every capability of this thread, and with it of all threads it starts. This cannot be
+/// undone, and programs that it executes gain none (PR_SET_NO_NEW_PRIVS). A process that may do so
+/// first raises its own limits for real-time priority and locked memory, so that agents can still
+/// be scheduled ahead of others. Both are limits of this process alone. Returns a line for the log
+/// with the old and the remaining capabilities. Errors (internal): the kernel kept some. Call it
+/// while the process has one thread. Not RT-safe.
 [[nodiscard]] physics::Result<std::string> drop_privileges();
 
 }  // namespace emit::server

@@ -19,8 +19,8 @@ using physics::make_error;
 
 namespace {
 
-/// The numbers as they were used. Inputs from a host are normalised on the way in; doing that again
-/// here could turn the last bit.
+/// Returns the pose with the numbers as they were used. Inputs from a host are normalised on
+/// reception; a second time could change the last bit.
 physics::Pose exact_pose(const v1::Pose& pose) {
   physics::Pose out;
   out.position_world_m = {pose.position_m().x(), pose.position_m().y(), pose.position_m().z()};

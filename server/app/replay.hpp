@@ -25,11 +25,12 @@ struct ReplayedFrame {
   std::int64_t sim_time_ns = 0;
   std::int64_t pose_sim_time_ns = 0;
   std::uint32_t flags = 0;  ///< protocol::FrameFlags of the live frame
-  bool repeated = false;    ///< the previous image again: nothing was rendered
-  /// Valid until the next apply(). Of a repeated frame: the image shown before it.
+  bool repeated = false;    ///< the previous image is shown again: nothing was rendered
+  /// Image of the frame, valid until the next apply(). A repeated frame has the image shown before
+  /// it.
   const renderer::FrameView* view = nullptr;
-  std::uint32_t crc32c = 0;          ///< of the first channel that showed it, computed here
-  std::uint32_t journal_crc32c = 0;  ///< what the live run sent
+  std::uint32_t crc32c = 0;          ///< CRC of the first channel that showed it, computed here
+  std::uint32_t journal_crc32c = 0;  ///< CRC that the live run sent
   bool matches = false;              ///< crc32c == journal_crc32c
 };
 
@@ -44,22 +45,23 @@ struct ReplayedFrame {
 /// Thread: the one that owns the source. Real time: no.
 class JournalPlayer {
  public:
-  /// `channels`: as the live run had them. Frames are rendered whole, whatever windows were due.
+  /// Creates a player. `channels` are those of the live run. Frames are rendered whole, whatever
+  /// windows were due.
   JournalPlayer(FrameSource& source, ChannelTable channels);
   ~JournalPlayer();
   JournalPlayer(const JournalPlayer&) = delete;
   JournalPlayer& operator=(const JournalPlayer&) = delete;
 
-  /// Empty optional: the entry changed state but is no frame.
-  /// Errors (protocol): the sequence has a gap (the live journal lost entries), a frame before any
-  /// run start, a repeated frame before any image, an entry without a body; (internal): no free
+  /// Applies an entry. The result is empty when the entry changed state but is no frame. Errors
+  /// (protocol): the sequence has a gap (the live journal lost entries), a frame comes before any
+  /// run start, a repeated frame comes before any image, an entry has no body; (internal): no free
   /// slot.
   [[nodiscard]] physics::Result<std::optional<ReplayedFrame>> apply(const v1::JournalEntry& entry);
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   [[nodiscard]] std::uint64_t mismatches() const noexcept { return mismatches_; }
-  /// Hash of the scenario in the newest RunStart, for a check against the scenario at hand; empty
-  /// before the first one.
+  /// Returns the hash of the scenario in the newest RunStart, to compare with the scenario at hand.
+  /// It is empty before the first one.
   [[nodiscard]] const std::string& scenario_sha256() const noexcept { return scenario_sha256_; }
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
 
@@ -77,7 +79,7 @@ class JournalPlayer {
   std::optional<renderer::SlotIndex> shown_;  ///< slot of the last image, kept for repeats
   const renderer::FrameView* view_ = nullptr;
   std::uint32_t view_crc_ = 0;
-  std::vector<PendingWeather> weather_;  ///< accepted, not yet used by a frame
+  std::vector<PendingWeather> weather_;  ///< accepted, but not used by a frame yet
   std::uint64_t render_number_ = 0;
   std::uint64_t frames_ = 0;
   std::uint64_t mismatches_ = 0;
@@ -85,10 +87,11 @@ class JournalPlayer {
   std::string device_;
 };
 
-/// Identity of a resolved scenario as written into RunStart, hex SHA-256: over its resolved values
-/// (tables that it names are among them) and, by path relative to the scenario file, over its glTF
-/// files and the buffers that these name. The same in every folder on every machine.
-/// Errors (io): a file that cannot be read, by name; (parse): a glTF file whose JSON is none.
+/// Returns the identity of a resolved scenario as RunStart has it, a SHA-256 in hex. It covers the
+/// resolved values, with the tables that the scenario names, the glTF files and their buffers.
+/// Files count by their path relative to the scenario file, so the result is the same in every
+/// folder on every machine. Errors (io): a file that cannot be read, by name; (parse): a glTF file
+/// whose JSON is invalid.
 [[nodiscard]] physics::Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario);
 
 }  // namespace emit::server

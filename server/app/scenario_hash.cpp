@@ -23,8 +23,8 @@ using physics::ErrorCode;
 using physics::make_error;
 using physics::Result;
 
-/// Name of a file that is the same wherever the scenario's folder lies. What lies elsewhere (data
-/// that came with the program) goes by its file name.
+/// Returns a name of a file that does not depend on the place of the scenario's folder. A file
+/// outside the folder (data that came with the program) goes by its file name.
 std::string label_of(const fs::path& file, const fs::path& folder) {
   std::error_code code;
   const fs::path relative =
@@ -33,8 +33,8 @@ std::string label_of(const fs::path& file, const fs::path& folder) {
   return (beneath ? relative : file.filename()).generic_string();
 }
 
-/// Label, content and length: neither moving bytes from one file to the next nor a new name goes
-/// unseen.
+/// Adds label, content and length of a file to the hash. Bytes that move from one file to the next,
+/// and new names, change it.
 Result<void> hash_file(const fs::path& file, const std::string& label, Sha256& hash) {
   std::error_code code;
   std::ifstream in(file, std::ios::binary);
@@ -57,7 +57,7 @@ Result<void> hash_file(const fs::path& file, const std::string& label, Sha256& h
   return {};
 }
 
-/// The JSON of a .gltf file, or the first chunk of a .glb file (glTF 2.0, section 4.4).
+/// Returns the JSON of a .gltf file, or the first chunk of a .glb file (glTF 2.0, section 4.4).
 std::string json_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::array<char, 20> head{};
@@ -93,8 +93,8 @@ std::string percent_decoded(const std::string& uri) {
   return out;
 }
 
-/// Files with the geometry of a glTF file that are not part of it. Images are not followed: nothing
-/// is rendered from them.
+/// Returns the files with the geometry of a glTF file that are not part of it. Images are not
+/// followed, because nothing is rendered from them.
 Result<std::vector<fs::path>> buffer_files(const fs::path& gltf) {
   std::vector<fs::path> out;
   google::protobuf::Struct root;
@@ -123,7 +123,7 @@ Result<std::string> scenario_sha256(const scene::ScenarioDesc& scenario) {
   Sha256 hash;
   std::error_code code;
   const fs::path folder = fs::absolute(scenario.file, code).lexically_normal().parent_path();
-  // Folders differ from machine to machine, contents must not.
+  // Folders differ from machine to machine, but the hash must not.
   scene::ScenarioDesc plain = scenario;
   plain.file.clear();
   plain.thermal.state_file.clear();  // holds what the rest makes, nothing of its own

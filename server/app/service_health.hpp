@@ -11,18 +11,18 @@
 
 namespace emit::server {
 
-/// Messages to the service manager: progress of the start, ready, alive as long as every agent
-/// comes round its loop, stopping. Thread: main, except warming_up().
+/// Messages to the service manager: progress of the start, ready, alive, stopping. Alive is sent as
+/// long as every agent completes its turns. Thread: main, except warming_up().
 class ServiceHealth {
  public:
-  /// An agent is stuck when it has not come round for so long. The render agent of a slow software
-  /// renderer may take seconds for a frame.
+  /// Time without a completed turn after which an agent is stuck. The render agent of a slow
+  /// software renderer may take seconds for a frame.
   static constexpr std::int64_t kStuckNs = 30'000'000'000;
 
   explicit ServiceHealth(const ServiceNotifier& notifier) : notifier_(notifier) {}
 
   using Agents = std::vector<std::pair<std::string, const DutyCycle*>>;
-  /// The first agent silent for longer than that; empty: none.
+  /// Returns the first agent silent for longer than that; empty: none.
   [[nodiscard]] static std::string_view stuck_agent(const Agents& agents, std::int64_t now_ns,
                                                     std::int64_t limit_ns) noexcept {
     for (const auto& [name, duty] : agents) {
@@ -32,7 +32,7 @@ class ServiceHealth {
   }
 
   void starting() const { notifier_.status("loading scene and device", kStartPieceS); }
-  /// Thread: the render agent's. Always goes on.
+  /// Reports the progress of the warm-up and returns true. Thread: the render agent's.
   bool warming_up(double done_frac) {
     const int percent = static_cast<int>(done_frac * 100.0);
     if (percent != told_percent_) {
@@ -44,8 +44,8 @@ class ServiceHealth {
   void ready(std::string_view status) const { notifier_.ready(status); }
   void stopping() const { notifier_.stopping(); }
 
-  /// Each turn of main while serving. Reports to the manager that the daemon lives, twice within
-  /// the time it waits, unless an agent is stuck.
+  /// Runs once per turn of main while serving. It reports to the manager that the daemon is alive,
+  /// twice within the time the manager waits, unless an agent is stuck.
   /// @return the agent that is stuck, once for each time it gets stuck; else empty.
   [[nodiscard]] std::string_view turn(const Agents& agents, std::int64_t now_ns) {
     const std::int64_t watchdog_ns = notifier_.watchdog_ns();

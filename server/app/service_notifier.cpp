@@ -29,7 +29,7 @@ std::int64_t number(std::string_view text) noexcept {
   return read.ec == std::errc() && read.ptr == text.data() + text.size() ? value : 0;
 }
 
-/// One line of what peers and files may have worded.
+/// Turns a text that peers and files may have worded into one line.
 std::string one_line(std::string_view text) {
   constexpr std::size_t kLongest = 300;
   std::string out(text.substr(0, kLongest));

@@ -21,13 +21,14 @@ class ServiceNotifier {
   ServiceNotifier(std::string_view address, std::int64_t watchdog_ns);
 
   [[nodiscard]] bool active() const noexcept { return static_cast<bool>(socket_); }
-  /// The manager ends the daemon when it hears no alive() for so long; 0: it does not wait.
+  /// Returns the time without alive() after which the manager ends the daemon; 0: it does not wait.
   [[nodiscard]] std::int64_t watchdog_ns() const noexcept { return watchdog_ns_; }
 
   void ready(std::string_view status) const noexcept;
   void alive() const noexcept { send("WATCHDOG=1"); }
   void stopping() const noexcept { send("STOPPING=1\nSTATUS=stopping"); }
-  /// `extend_s` > 0: starting or stopping may take so much longer from now on.
+  /// Reports a status text. With `extend_s` > 0 starting or stopping may take so much longer from
+  /// now on.
   void status(std::string_view text, std::int64_t extend_s = 0) const noexcept;
 
  private:

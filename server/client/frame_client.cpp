@@ -13,6 +13,7 @@
 #include "client/resend_planner.hpp"
 #include "client/shm_frame_client.hpp"
 #include "client/udp_frame_receiver.hpp"
+#include "emit/physics/check.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/pixel_codec.hpp"
 #include "emit/protocol/resend.hpp"
@@ -42,7 +43,10 @@ class FrameClientImpl final : public FrameClient {
   physics::Result<ChannelDescription> subscribe(const SubscribeOptions& options) override;
   physics::Result<const ReceivedFrame*> receive(std::int64_t timeout_ns) override;
   bool intact() const noexcept override { return true; }
-  const StreamTerms& terms() const noexcept override { return terms_; }
+  const StreamTerms& terms() const noexcept override {
+    EMIT_CHECK(subscribed_);
+    return terms_;
+  }
   const ReceiveCounters& counters() const noexcept override { return account_.counters; }
   std::vector<ServerStatus> take_statuses() override { return std::exchange(statuses_, {}); }
   std::uint64_t receive_buffer_bytes() const noexcept override {

@@ -10,6 +10,7 @@
 
 #include "client/client_connection.hpp"
 #include "client/frame_account.hpp"
+#include "emit/physics/check.hpp"
 #include "emit/protocol/shared_ring.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
@@ -41,7 +42,10 @@ class ShmFrameClient final : public FrameClient {
   bool intact() const noexcept override {
     return !options_.in_place || publication_ == 0 || ring_.intact(publication_);
   }
-  const StreamTerms& terms() const noexcept override { return terms_; }
+  const StreamTerms& terms() const noexcept override {
+    EMIT_CHECK(subscribed_);
+    return terms_;
+  }
   const ReceiveCounters& counters() const noexcept override { return account_.counters; }
   std::vector<ServerStatus> take_statuses() override { return {}; }
   std::uint64_t receive_buffer_bytes() const noexcept override { return 0; }

@@ -17,6 +17,7 @@
 #include <cstring>
 #include <thread>
 
+#include "emit/physics/check.hpp"
 #include "rt/error_text.hpp"
 
 namespace emit::server {
@@ -54,10 +55,10 @@ std::string remedy(std::string_view setting, int error) {
 ThreadRealtime thread_realtime(const config::RealtimeConfig& config, std::string_view agent) {
   ThreadRealtime out;
   out.touch_stack = config.lock_memory;
-  if (const auto cpus = config::parse_agent_cpus(config.cpus)) {
-    const auto found = std::ranges::find(*cpus, agent, &config::AgentCpus::agent);
-    if (found != cpus->end()) out.cpus = found->cpus;
-  }
+  const auto cpus = config::parse_agent_cpus(config.cpus);
+  EMIT_CHECK(cpus.has_value());
+  const auto found = std::ranges::find(*cpus, agent, &config::AgentCpus::agent);
+  if (found != cpus->end()) out.cpus = found->cpus;
   const auto* const below =
       std::ranges::find(kBelow, agent, &std::pair<std::string_view, int>::first);
   if (config.scheduler == config::SchedulerKind::fifo && below != kBelow.end()) {

@@ -197,6 +197,7 @@ bool ShmObject::alive() const noexcept {
 }
 
 bool ShmObject::has_readers() const noexcept {
+  EMIT_DCHECK((::fcntl(fd_.get(), F_GETFL) & O_ACCMODE) == O_RDWR);
   return is_locked(fd_.get(), kReaderByte);
 }
 

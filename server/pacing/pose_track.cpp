@@ -41,6 +41,7 @@ glm::dquat turned(const glm::dquat& attitude, const glm::dvec3& rate_body_rad_s,
 }  // namespace
 
 void PoseTrack::push(const TimedPose& pose) noexcept {
+  EMIT_CHECK(empty() || newest().sim_time_ns <= pose.sim_time_ns);
   if (pose.teleport) {
     // Nothing before a jump tells anything about the motion after it; one pose is kept so that
     // instants before the jump still show where the body was.

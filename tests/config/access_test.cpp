@@ -34,7 +34,7 @@ TEST(Network, MappedAddressesAreIpv4) {
   EXPECT_FALSE(holds("0.0.0.0/0", "::1"));
 }
 
-// Against arithmetic on the whole address.
+// The result is compared with arithmetic on the whole address.
 TEST(Network, EveryPrefixLengthCutsAtItsBit) {
   const protocol::IpAddress address = *protocol::parse_ip("170.170.170.170");
   for (unsigned bits = 1; bits <= 32; ++bits) {

@@ -15,7 +15,7 @@ constexpr const char* kHeader =
     "band,range_m,elevation_deg,transmittance_frac,path_radiance_w_m2_sr\n";
 
 TEST_F(ConfigTest, an_atmosphere_table_becomes_a_grid_per_band) {
-  // Bands and elevations in any order, columns too.
+  // Bands, elevations and columns may come in any order.
   write("a.csv",
         "# from a model run\r\nelevation_deg,band,range_m,path_radiance_w_m2_sr,transmittance_frac"
         "\r\n10,8-12,100,0.5,0.98\r\n10,8-12,2000,8,0.7\r\n-10,8-12,100,0.6,0.97\r\n"
@@ -148,9 +148,9 @@ TEST_F(ConfigTest, an_inline_table_must_hold_together) {
               ::testing::HasSubstr("rows of different length"));
 }
 
-/// The shipped example: level paths are those of the built-in fits, vertical ones meet LOWTRAN7's
-/// published transmittances (to 1 and 8 km) and the brightness of its zenith sky (240.8 K, 8-12
-/// um).
+/// Test of the shipped example. Level paths are those of the built-in fits. Vertical ones meet
+/// LOWTRAN7's published transmittances (to 1 and 8 km) and the brightness of its zenith sky (240.8
+/// K, 8-12 um).
 TEST_F(ConfigTest, the_shipped_atmosphere_table_agrees_with_what_it_was_made_from) {
   const auto file = std::filesystem::path(EMIT_TEST_SOURCE_DIR) /
                     "../config/atmospheres/midlatitude_summer_ground.csv";
@@ -170,7 +170,7 @@ TEST_F(ConfigTest, the_shipped_atmosphere_table_agrees_with_what_it_was_made_fro
       for (const scene::AtmosphereTerm& term : fitted->atmosphere.bands[b].terms) {
         tau += term.amplitude_frac * std::exp(-term.extinction_per_km * range_km);
       }
-      // Between rows the sum of exponentials is not one exponential: 0.01 is the cell's own error.
+      // The sum of exponentials is not one exponential between rows: 0.01 is the cell's own error.
       EXPECT_NEAR(table->along(range_km * 1e3, -0.1).transmittance_frac, tau, 0.01) << range_km;
       EXPECT_NEAR(table->along(range_km * 1e3, 0.0).transmittance_frac, tau, 0.01) << range_km;
     }

@@ -4,7 +4,8 @@
 namespace emit::config::testing {
 namespace {
 
-/// In every case line 1 is `materials = ["m.toml"]`, so the text starts on line 2.
+/// One wrong scenario and its error. Line 1 is always `materials = ["m.toml"]`, so the text starts
+/// on line 2.
 struct Case {
   const char* name;
   std::string text;

@@ -313,7 +313,7 @@ TEST_F(ConfigTest, a_minimal_scenario_has_sensible_defaults) {
   EXPECT_EQ(loaded->bands[1].name, "3-5");
   EXPECT_TRUE(loaded->sensor.trajectory.empty());
   EXPECT_GT(loaded->sensor.fov_h_rad, 0.0);
-  // Level, heading north.
+  // The object is level and heads north.
   const glm::dvec3 nose = loaded->objects[0].instances[0].world_from_body * glm::dvec3(1, 0, 0);
   EXPECT_NEAR(nose.y, 1.0, 1e-15);
 }
@@ -388,8 +388,8 @@ TEST_F(ConfigTest, a_scenario_material_replaces_the_library_one) {
   EXPECT_EQ(loaded->materials[0].solar_absorptance_frac, 0.1);
 }
 
-/// Share of each mode and its time constant as published with the slab formula; tolerance: the
-/// digits given.
+/// Test of each mode's share and time constant as published with the slab formula. The tolerance is
+/// that of the printed digits.
 TEST(SlabModes, agree_with_the_tabulated_roots) {
   const auto asphalt = slab_modes({0.15, 0.7, 1950.0, 1000.0}, 19.0, 16);
   ASSERT_EQ(asphalt.size(), 16U);
@@ -404,8 +404,8 @@ TEST(SlabModes, agree_with_the_tabulated_roots) {
   EXPECT_NEAR(concrete[1].weight_frac, 0.592 / (0.592 + 0.173), 0.002);
 }
 
-/// Thin or well conducting: one mode of tau = rho c d / (film + lambda / d), the lumped sheet, up
-/// to pi^2/4 where the film does not matter.
+/// Test of thin or well conducting layers: one mode of tau = rho c d / (film + lambda / d), the
+/// lumped sheet, up to pi^2/4 where the film does not matter.
 TEST(SlabModes, of_an_insulated_slab_tend_to_the_diffusive_limit) {
   const auto modes = slab_modes({0.1, 50.0, 7800.0, 500.0}, 1e-3, 1);
   const double diffusive_s = 4.0 * 0.01 * 7800.0 * 500.0 / 50.0 / (physics::kPi * physics::kPi);

@@ -90,7 +90,7 @@ TEST_P(CsvError, names_file_and_line) {
   EXPECT_THAT(scenario_error(kWeather), ::testing::StartsWith("s.toml:3:8: 'file': " + test.error));
 }
 
-/// A fault that every row has is one line.
+/// Test that a fault of every row gives one line.
 TEST_F(ConfigTest, faults_of_a_column_are_counted) {
   write("w.csv",
         std::string(kHeader) + "1,x,100,330,90,2,0\n2,y,100,330,90,2,0\n3,z,1,330,90,2,0\n");
@@ -99,7 +99,7 @@ TEST_F(ConfigTest, faults_of_a_column_are_counted) {
             "w.csv:2:13: 'air_k' is 90, must be 180 .. 340 (and 2 other rows)");
 }
 
-/// Tables as spreadsheets write them are read like plain ones.
+/// Test that tables as spreadsheets write them are read like plain ones.
 TEST_F(ConfigTest, weather_in_other_spellings_is_read_alike) {
   const std::string plain = std::string(kHeader) + "0,800,100,330,290,2,0\n";
   std::string cr = plain;
@@ -204,8 +204,8 @@ TEST_F(ConfigTest, atmosphere_csv_amplitudes_must_add_up) {
       "must be 1 over at most 4");
 }
 
-/// LOWTRAN7 horizontal transmittances of the mid-latitude summer, 23 km; tolerance: the fit's
-/// stated largest error.
+/// Test against LOWTRAN7's horizontal transmittances of the mid-latitude summer, 23 km. The
+/// tolerance is the fit's stated largest error.
 TEST_F(ConfigTest, built_in_atmosphere_meets_the_tabulated_transmittance) {
   const auto loaded = scenario("");
   ASSERT_TRUE(loaded.has_value()) << loaded.error().text;

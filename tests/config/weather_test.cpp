@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Weather tables that lack something: gaps, and spans that the thermal simulation needs.
+// Weather tables that are incomplete: gaps, and spans that the thermal simulation needs.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -85,7 +85,8 @@ TEST_F(Weather, one_row_is_constant_weather_at_all_times) {
   EXPECT_THAT(loaded.warnings, IsEmpty());
 }
 
-/// The models go on from the table: where the models made the table, they are found again.
+/// Test that the models go on from the table: where the models made the table, they are found
+/// again.
 TEST_F(Weather, what_a_table_lacks_before_its_first_row_the_clear_sky_models_make) {
   const physics::ClearSky model{.linke_turbidity = 3.5,
                                 .air_mean_k = 268.0,

@@ -72,7 +72,7 @@ TEST(DecodeFault, NamesEntityFieldValueAndRange) {
 }
 
 TEST(DecodeFault, NamesAMissingPart) {
-  // frame_number 1, protocol_version 1, nothing else.
+  // The bytes hold frame_number 1, protocol_version 1 and nothing else.
   const std::array bytes{std::byte{0x08}, std::byte{1}, std::byte{0x10}, std::byte{1}};
   HostFrameDecoder decoder;
   auto out = std::make_unique<HostFrameData>();

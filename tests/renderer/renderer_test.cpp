@@ -240,7 +240,7 @@ TEST(RendererShadow, a_parked_caster_that_left_leaves_a_cool_print) {
 }
 
 /// Share of pixels whose temperatures differ by more than a limit. A few pixels always do, because
-/// maps of other extents put the sharp edges along a caster's foot on other texels.
+/// maps of other extents put the sharp edges along an entity's foot on other texels.
 double share_apart(const Rendered& a, const Rendered& b, double limit_k) {
   std::size_t apart = 0;
   for (std::size_t i = 0; i < a.temperature_k.size(); ++i) {

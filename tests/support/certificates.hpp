@@ -21,7 +21,7 @@ class Authority {
 
   void write(const std::string& file) const { write_certificate(certificate_.get(), file); }
 
-  /// `alternatives`: subjectAltName, such as "DNS:rig,IP:127.0.0.1".
+  /// Issues a certificate. `alternatives` is its subjectAltName, such as "DNS:rig,IP:127.0.0.1".
   void issue(const std::string& name, const std::string& alternatives,
              const std::string& certificate_file, const std::string& key_file) const {
     const Key key(EVP_EC_gen("P-256"));

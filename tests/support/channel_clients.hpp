@@ -20,7 +20,7 @@ namespace emit::test {
 inline constexpr std::uint32_t kWidthPx = 8;  // of the rig's source
 inline constexpr std::uint32_t kHeightPx = 4;
 
-/// A whole field of view at a quarter of the rate beside two windows of it.
+/// Channels: a whole field of view at a quarter of the rate, and two windows of it.
 inline scene::ScenarioDesc seeker_channels() {
   scene::ScenarioDesc scenario;
   scenario.bands = {{"8-12", 8.0, 12.0, {}}};
@@ -86,7 +86,8 @@ class ChannelClients {
         context_.to_sender.push({server::ClientCommand::Kind::add, client.connection(), &client}));
     sender_.do_work(clock_.tai_ns());
   }
-  /// `channels`: that have pixels in it; `repeat`: the one before again, as far as it has them.
+  /// Publishes a frame. `channels` have pixels in it. With `repeat` the previous image is shown
+  /// again, as far as it has their pixels.
   void publish(server::ChannelSet channels, bool repeat = false) {
     server::PublishFrame frame;
     frame.repeat = repeat;
@@ -110,7 +111,7 @@ class ChannelClients {
     read();
     return work;
   }
-  /// Everything due, as the conductor does it.
+  /// Publishes every frame that is due, as the conductor does.
   void publish_due() {
     publish(server::due_channels(context_.channels, number_ + 1));
     settle();

@@ -16,7 +16,7 @@ namespace emit::test {
 
 inline constexpr std::int64_t kMs = 1'000'000;
 
-/// Triggers as the test hands them out.
+/// Source of the triggers that the test hands out.
 class FakeTriggers final : public server::TriggerInput {
  public:
   std::optional<server::ReceivedTrigger> next() noexcept override {
@@ -116,7 +116,7 @@ class ConductorRig {
     edit_ = std::move(edit);
     return *this;
   }
-  /// A trigger that arrives now.
+  /// Sends a trigger that arrives now.
   void trigger(std::uint64_t number, std::uint64_t run = 1, std::int64_t edge_ns = 0) {
     triggers_.waiting.push_back({{run, number, edge_ns}, clock.tai_ns()});
   }
@@ -155,7 +155,7 @@ class ConductorRig {
   std::function<void(protocol::HostFrameData&)> edit_;
 };
 
-/// One entity, placed at (5, 6, 0).
+/// Scenario tracks with one entity, placed at (5, 6, 0).
 inline scene::ScenarioDesc scenario_with_entity(std::uint32_t id) {
   scene::ScenarioDesc scenario;
   scene::ObjectDesc object;

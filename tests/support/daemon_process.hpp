@@ -62,7 +62,8 @@ inline void limit_files(rlim_t bytes) {
 /// killed at the end if need be.
 class ChildProcess {
  public:
-  /// `file_limit_bytes`: no file it writes gets longer (RLIMIT_FSIZE), as on a full disk.
+  /// Starts the program. With `file_limit_bytes` no file it writes gets longer (RLIMIT_FSIZE), as
+  /// on a full disk.
   ChildProcess(const ScratchFolder& folder, std::string program, std::string out_name,
                std::string err_name, std::vector<std::string> arguments, rlim_t file_limit_bytes)
       : folder_(folder), out_name_(std::move(out_name)), err_name_(std::move(err_name)) {
@@ -96,7 +97,7 @@ class ChildProcess {
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] std::string out() const { return folder_.read(out_name_); }
   [[nodiscard]] std::string err() const { return folder_.read(err_name_); }
-  /// Exit code, 128 + signal, or -1 when it does not end within the limit.
+  /// Returns the exit code, 128 + signal, or -1 when it does not end within the limit.
   [[nodiscard]] int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (!ended()) {
@@ -124,7 +125,7 @@ class ChildProcess {
   int exit_code_ = -1;
 };
 
-/// A real `emit`; it speaks to NAME.out and NAME.err.
+/// A real `emit`, which writes to NAME.out and NAME.err.
 class ToolProcess : public ChildProcess {
  public:
   ToolProcess(const ScratchFolder& folder, const std::string& name,
@@ -153,14 +154,14 @@ class ToolProcess : public ChildProcess {
   }
 };
 
-/// A real emitd; it speaks to `stdout` and `stderr`.
+/// A real emitd, which writes to `stdout` and `stderr`.
 class DaemonProcess : public ChildProcess {
  public:
   DaemonProcess(const ScratchFolder& folder, std::vector<std::string> arguments,
                 rlim_t file_limit_bytes = RLIM_INFINITY)
       : ChildProcess(folder, "emitd", "stdout", "stderr", std::move(arguments), file_limit_bytes) {}
 
-  /// Waits for the ready line. False when the process ended first.
+  /// Waits for the ready line. It returns false when the process ended first.
   [[nodiscard]] bool wait_ready(std::chrono::seconds limit = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + limit;
     while (std::chrono::steady_clock::now() < end) {
@@ -189,7 +190,7 @@ class DaemonProcess : public ChildProcess {
   }
   [[nodiscard]] const std::string& control() const { return control_; }
   [[nodiscard]] const std::string& host_udp() const { return host_udp_; }
-  /// Empty: off.
+  /// Returns the address; empty: it is off.
   [[nodiscard]] const std::string& metrics() const { return metrics_; }
 
  private:

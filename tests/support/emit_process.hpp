@@ -14,10 +14,10 @@ struct ProcessResult {
   std::string err;
 };
 
-/// Standard input is empty. The process is killed after `limit`.
+/// Runs the program with an empty standard input. The process is killed after `limit`.
 [[nodiscard]] ProcessResult run_process(const std::vector<std::string>& arguments,
                                         std::chrono::seconds limit = std::chrono::seconds(120));
-/// `emit` with these arguments.
+/// Runs `emit` with these arguments.
 [[nodiscard]] ProcessResult run_emit(const std::vector<std::string>& arguments,
                                      std::chrono::seconds limit = std::chrono::seconds(120));
 
@@ -38,7 +38,8 @@ class TemporaryFolder {
 void write_text(const std::string& file, const std::string& text);
 [[nodiscard]] std::string read_text(const std::string& file);
 
-/// Value after "key": in a JSON text, up to the next comma or end of line; "" when there is none.
+/// Returns the value after "key": in a JSON text, up to the next comma or end of line; "" when
+/// there is none.
 [[nodiscard]] std::string json_value(const std::string& json, const std::string& key);
 
 }  // namespace emit::test

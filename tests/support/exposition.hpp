@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-/// Prometheus' text format 0.0.4 as strictly as its own checker takes it, and stricter where this
-/// project promises more. Written apart from the code that makes it and from `emit stat`.
+/// Checker of Prometheus' text format 0.0.4, as strict as Prometheus' own, and stricter where this
+/// project promises more. It shares no code with the writer or with `emit stat`.
 namespace emit::test {
 
 class Exposition {
@@ -25,10 +25,10 @@ class Exposition {
 
   explicit Exposition(const std::string& text) { read(text); }
 
-  /// Empty: the text is sound.
+  /// Returns the first fault; empty: the text is sound.
   [[nodiscard]] const std::string& fault() const { return fault_; }
   [[nodiscard]] const std::vector<Sample>& samples() const { return samples_; }
-  /// NaN: there is none with that name and all of these labels.
+  /// Returns a value; NaN: there is none with that name and all of these labels.
   [[nodiscard]] double value(const std::string& name, const Labels& labels = {}) const {
     for (const Sample& sample : samples_) {
       bool fits = sample.name == name;
@@ -129,7 +129,7 @@ class Exposition {
     return labels;
   }
 
-  /// Histograms: buckets ascend, end in +Inf, which is the count; there is a sum.
+  /// Checks histograms: buckets ascend and end in +Inf, which is the count; there is a sum.
   void end_family() {
     struct Series {
       std::vector<std::pair<double, double>> buckets;

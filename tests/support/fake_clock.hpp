@@ -6,14 +6,14 @@
 
 namespace emit::test {
 
-/// Time moves when the test says so.
+/// Clock whose time moves when the test requests it.
 class FakeClock final : public server::Clock {
  public:
   explicit FakeClock(std::int64_t start_ns = 1'000'000'000'000) : now_ns_(start_ns) {}
 
   void advance(std::int64_t by_ns) noexcept { now_ns_.fetch_add(by_ns); }
   void set(std::int64_t now_ns) noexcept { now_ns_.store(now_ns); }
-  /// Somebody sets the wall clock; no time passes.
+  /// Sets the wall clock as somebody would; no time passes.
   void step_wall(std::int64_t by_ns) noexcept { wall_step_ns_.fetch_add(by_ns); }
 
   std::int64_t tai_ns() const noexcept override { return now_ns_.load() + wall_step_ns_.load(); }

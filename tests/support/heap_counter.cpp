@@ -43,7 +43,7 @@ void operator delete[](void* memory, std::size_t) noexcept {
 #else
 
 extern "C" {
-// glibc's own, under the names that stay when malloc is replaced.
+// These are glibc's own functions, under the names that stay when malloc is replaced.
 void* __libc_malloc(std::size_t bytes);
 void* __libc_calloc(std::size_t count, std::size_t bytes);
 void* __libc_realloc(void* memory, std::size_t bytes);

@@ -15,7 +15,7 @@ namespace emit::test {
 /// A service manager's end of sd_notify(3).
 class NotifySocket {
  public:
-  /// Path, or @name.
+  /// Address of the socket: a path, or @name.
   explicit NotifySocket(const std::string& address)
       : fd_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     sockaddr_un own{};
@@ -30,7 +30,7 @@ class NotifySocket {
   NotifySocket& operator=(const NotifySocket&) = delete;
 
   [[nodiscard]] bool bound() const { return bound_; }
-  /// The next message; empty when none comes in time.
+  /// Returns the next message; empty when none comes in time.
   [[nodiscard]] std::string next(int timeout_ms = 0) const {
     pollfd wait{fd_, POLLIN, 0};
     if (::poll(&wait, 1, timeout_ms) != 1) return {};
@@ -38,7 +38,8 @@ class NotifySocket {
     const ssize_t size = ::recv(fd_, text.data(), text.size(), 0);
     return size > 0 ? std::string(text.data(), static_cast<std::size_t>(size)) : std::string();
   }
-  /// Messages until one starts like that; all of them, one a line. Empty: it did not come.
+  /// Returns all messages until one starts like that, one a line. The result is empty when it did
+  /// not come.
   [[nodiscard]] std::string until(const std::string& start, int timeout_ms) const {
     std::string all;
     for (;;) {

@@ -3,8 +3,8 @@
 
 namespace emit::test {
 
-/// True where the thread sanitizer is on: numeric loops run about 15 times slower, so tests whose
-/// threads are also seen in a smaller problem take the smaller one.
+/// True where the thread sanitizer is on. Numeric loops run about 15 times slower there, so tests
+/// that show their threads in a smaller problem take the smaller one.
 #if defined(__SANITIZE_THREAD__)
 inline constexpr bool kThreadSanitizer = true;
 #else

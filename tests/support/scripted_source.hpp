@@ -28,7 +28,7 @@ struct SourceScript {
   std::vector<std::string> order;  ///< kinds of calls, in order
   int resets = 0;
   std::atomic<int> held{0};  ///< slots not released
-  /// Called within submit(), such as to let time pass there.
+  /// Called within submit(), for example to let time pass there.
   std::function<void(const renderer::FrameRequest&)> on_submit;
 };
 
@@ -135,7 +135,7 @@ class ScriptedSource final : public server::FrameSource {
   const server::SourceInfo& info() const noexcept override { return info_; }
 
  private:
-  /// Depends on the order of the values, stays small enough for float.
+  /// Returns a sum that depends on the order of the values and stays small enough for float.
   void mix(double value) noexcept {
     state_ = state_ * 0.61803 + value * 1e-3;
     state_ -= static_cast<double>(static_cast<std::int64_t>(state_ / 1000.0)) * 1000.0;

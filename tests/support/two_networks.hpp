@@ -17,14 +17,15 @@
 
 namespace emit::test {
 
-/// Two network namespaces joined by a virtual cable: "here" is 192.0.2.1 and fd00:77::1, "there"
-/// 192.0.2.2 and fd00:77::2. A socket belongs to the one that was entered when it was made, a
-/// process to the one in which it was started. Needs no privileges where user namespaces are open.
+/// Two network namespaces joined by a virtual cable: "here" is 192.0.2.1 and fd00:77::1, "there" is
+/// 192.0.2.2 and fd00:77::2. A socket belongs to the namespace that was entered when it was made. A
+/// process belongs to the one in which it was started. No privileges are needed where user
+/// namespaces are open.
 class TwoNetworks {
  public:
   static constexpr int kSkippedExit = 77;
 
-  /// `obstacle_file`: where skip() leaves the reason.
+  /// Sets up the networks. `obstacle_file` receives the reason of skip().
   explicit TwoNetworks(std::string obstacle_file) : obstacle_file_(std::move(obstacle_file)) {}
 
   /// Ends the process: the test is skipped.
@@ -32,8 +33,8 @@ class TwoNetworks {
     std::ofstream(obstacle_file_) << reason;
     ::_exit(kSkippedExit);
   }
-  /// Empty: ready. Else why this machine cannot do it. Changes the whole process: see
-  /// in_two_networks().
+  /// Returns an empty text when ready, else the reason why this machine cannot do it. It changes
+  /// the whole process: see in_two_networks().
   std::string setup() {
     const uid_t uid = ::getuid();
     const gid_t gid = ::getgid();

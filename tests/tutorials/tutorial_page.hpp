@@ -17,7 +17,7 @@ class TutorialPage {
     text_ = out.str();
   }
 
-  /// Returns all fenced blocks of a language, one after the other. Empty: there is none.
+  /// Returns all fenced blocks of a language, one after the other; empty: there is none.
   [[nodiscard]] std::string snippets(const std::string& language) const {
     std::istringstream in(text_);
     std::string line;

@@ -13,13 +13,13 @@
 namespace emit::test {
 namespace {
 
-/// Runs a command in the folder; what it says is added to the file "log".
+/// Runs a command in the folder. Its output is added to the file "log".
 int run(const ScratchFolder& folder, const std::string& command) {
   return std::system(
       ("cd '" + folder.path().string() + "' && (" + command + ") >> log 2>&1").c_str());
 }
 
-/// A TCP port that nobody uses at the moment.
+/// Returns a TCP port that nobody uses at the moment.
 std::string free_port() {
   const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
@@ -60,7 +60,7 @@ TEST(Tutorials, Rig) {
   run_shell_snippets("rig.md");
 }
 
-/// The client library as an integrator has it: installed, without the source tree.
+/// Fixture with the client library as an integrator has it: installed, without the source tree.
 class ClientTutorial : public ::testing::Test {
  protected:
   void SetUp() override {

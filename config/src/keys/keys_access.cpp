@@ -58,7 +58,7 @@ const KeyTable<AccessConfig>& access_keys() {
       networks(
           "allow", EMIT_FIELD(allow),
           "Networks whose hosts may reach the control, host and metrics ports, beside loopback. "
-          "Others are dropped before a byte is read. When it is empty, all hosts may."),
+          "Others are dropped before a byte is read. Empty: all hosts may."),
       networks("multicast_groups", EMIT_FIELD(multicast_groups),
                "Multicast groups that a client may have frames sent to. The default is the "
                "site-local scopes."),
@@ -68,7 +68,7 @@ const KeyTable<AccessConfig>& access_keys() {
       integer<AccessConfig>(
           "max_host_frames_hz", "1/s", 1, 10'000'000, EMIT_FIELD(max_host_frames_hz),
           "Largest rate of host frames from one address (on this host: one socket). More are "
-          "refused (`CODE_OVERLOADED`). A quarter of a second's number may come at once."),
+          "refused (`CODE_OVERLOADED`). A quarter second's number may come at once."),
       integer<AccessConfig>(
           "max_control_records_hz", "1/s", 1, 10'000'000, EMIT_FIELD(max_control_records_hz),
           "Largest rate of hello, subscribe and command records, in the same way."),
@@ -91,7 +91,7 @@ const KeyTable<TlsConfig>& tls_keys() {
           [](std::vector<std::string>& out, const std::string& word, const Location&,
              Diagnostics&) { out.push_back(word); },
           [](const std::string& name) { return name; },
-          "Names in a client's certificate (subject CN or a DNS name of subjectAltName) that may "
+          "Names in a client's certificate (subject CN or DNS name of subjectAltName) that may "
           "connect. When it is empty, every certificate of the authorities may."),
       integer<TlsConfig>("max_handshakes", "", 1, 1024, EMIT_FIELD(max_handshakes),
                          "Largest number of handshakes at a time. Further connections are closed."),

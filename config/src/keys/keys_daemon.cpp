@@ -44,13 +44,13 @@ const KeyTable<PacingConfig>& pacing_keys() {
                                                           {"trigger", PacingMode::trigger}},
           EMIT_FIELD(mode),
           "host-step: pose k starts frame k. ig-clock: frames start at a fixed rate with the "
-          "newest pose. trigger: a datagram of a sync source starts them."),
+          "newest pose. trigger: a sync source's datagram starts them."),
       number<PacingConfig>("rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
                            "ig-clock: frame rate. trigger: rate of the source, by which late and "
                            "spurious triggers are found."),
       nanoseconds<PacingConfig>(
           "budget_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(budget_ns),
-          "Deadline of a frame, after its pose (host-step) or trigger. With 0 it is none, or one "
+          "Deadline of a frame after its pose (host-step) or trigger. 0 means none, or one "
           "period with trigger. Frames lose quality to meet it (cached)."),
       nanoseconds<PacingConfig>(
           "horizon_ms", "ms", 1e6, between(0, 60000), EMIT_FIELD(horizon_ns),
@@ -120,8 +120,8 @@ const KeyTable<HostConfig>& host_keys() {
           "`address:port` for host frames as datagrams. When it is empty, none are received."),
       path<HostConfig>(
           "key_file", EMIT_FIELD(key_file),
-          "Pre-shared keys, one per line as 64 hexadecimal digits, in a file that others cannot "
-          "read. Host datagrams and triggers without a MAC by such a key are dropped."),
+          "File of pre-shared keys, 64 hexadecimal digits per line, unreadable for others. Host "
+          "datagrams and triggers without a MAC by such a key are dropped."),
   };
   return keys;
 }
@@ -151,8 +151,8 @@ const KeyTable<StreamConfig>& stream_keys() {
                             "1400 fits any Ethernet."),
       integer<StreamConfig>(
           "tcp_send_buffer_bytes", "bytes", 0, 1073741824, EMIT_FIELD(tcp_send_buffer_bytes),
-          "Socket send buffer of a TCP client, at most net.core.wmem_max. Long links need rate "
-          "times round trip. With 0 the system chooses, up to megabytes that are sent late."),
+          "Send buffer of a TCP client, at most net.core.wmem_max. Long links need rate times "
+          "round trip. With 0 the system chooses; megabytes may be late."),
       integer<StreamConfig>("udp_send_buffer_bytes", "bytes", 65536, 1073741824,
                             EMIT_FIELD(udp_send_buffer_bytes),
                             "Socket send buffer of a UDP client."),
@@ -163,7 +163,7 @@ const KeyTable<StreamConfig>& stream_keys() {
       integer<StreamConfig>("fec_parity_fragments", "", 0, limits::kMaxFecParity,
                             EMIT_FIELD(fec_parity_fragments),
                             "UDP: parity fragments of such a group. As many lost fragments come "
-                            "back: 5 for 48 suit 1 % loss. With 0 there is no error correction."),
+                            "back: 5 for 48 suit 1 % loss. 0 means no error correction."),
       number<StreamConfig>("fec_max_parity_frac", "", between(0, limits::kMaxFecParity),
                            EMIT_FIELD(fec_max_parity_frac),
                            "UDP: largest number of parity fragments per data fragment that a "

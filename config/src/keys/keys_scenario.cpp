@@ -236,8 +236,8 @@ const KeyTable<BandAtmosphere>& band_atmosphere_keys() {
       required(text<BandAtmosphere>("band", EMIT_FIELD(band), "Name of a band.")),
       custom<BandAtmosphere>(
           {"terms", "array of [a, k]", "1, km-1", "1 .. 4 terms, sum of a = 1, k >= 0",
-           "The transmittance over a range R is tau = sum of a exp(-k R). Path radiance is (1 - "
-           "tau) times that of a blackbody at air temperature.",
+           "Over range R the transmittance is tau = sum of a exp(-k R). Path radiance is (1 - "
+           "tau) times the blackbody's at air temperature.",
            false},
           [](BandAtmosphere& out, const Node& node, Diagnostics& diagnostics) {
             if (node.kind != Node::Kind::array || node.items.empty() ||
@@ -310,8 +310,8 @@ const KeyTable<AtmosphereDraft>& atmosphere_keys() {
               {"us_standard", "us_standard"},
               {"none", "none"}},
           EMIT_FIELD(model),
-          "Built-in terms of the built-in bands: fits to LOWTRAN7 with rural haze and 23 km "
-          "visibility (`hazy`: 5 km). With `none` only `file` and `[[atmosphere.band]]` count."),
+          "Terms of the built-in bands: fits to LOWTRAN7 with rural haze and 23 km visibility "
+          "(`hazy`: 5 km). With `none` only `file` and `[[atmosphere.band]]` count."),
       path<AtmosphereDraft>("file", EMIT_FIELD(file),
                             "CSV file of the air (see Atmosphere tables). It comes before the "
                             "model. Bands that a grid lacks need `model` written out."),
@@ -350,8 +350,8 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           std::vector<std::pair<std::string, ThermalMethod>>{
               {"per-frame", ThermalMethod::per_frame}, {"cached", ThermalMethod::cached}},
           EMIT_FIELD(method),
-          "cached: the history is evaluated once, on samples of the surface that go on from "
-          "interval to interval. per-frame: all steps again for every pixel of every frame."),
+          "cached: samples of the surface carry the history from interval to interval. "
+          "per-frame: every pixel of every frame evaluates all steps again."),
       number<ThermalOptions>(
           "tolerance_k", "K", above_to(0, 50), EMIT_FIELD(tolerance_k),
           "Error of surface temperatures to aim at. foster splits history steps for it, cached "
@@ -403,7 +403,7 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "per-frame: surfaces within this radius hide the sky from each other."),
       integer<ThermalOptions>(
           "max_samples", "", 1000, 100000000, EMIT_FIELD(max_samples),
-          "cached: largest number of thermal samples, of about 1.5 kB each. Meshes that need more "
+          "cached: largest number of thermal samples, about 1.5 kB each. Meshes that need more "
           "than half of them lose detail, and frames are flagged degraded."),
       boolean<ThermalOptions>("lateral", EMIT_FIELD(lateral),
                               "cached with foster: heat is also conducted along the surface and "
@@ -414,8 +414,8 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "temperature of the surroundings where others hide the sky."),
       path<ThermalOptions>(
           "state_file", EMIT_FIELD(state_file),
-          "cached: file that keeps the warmed-up surface. The first run writes it, later runs read "
-          "it. A file of another scenario or first frame is refused."),
+          "cached: file of the warmed-up surface. The first run writes it, later runs read it. A "
+          "file of another scenario or first frame is refused."),
   };
   return keys;
 }

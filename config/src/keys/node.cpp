@@ -80,7 +80,7 @@ physics::Error Diagnostics::error() const {
 
 std::string toml_number(double value) {
   std::string text = fmt::format("{}", value);
-  // In TOML a float has a point or an exponent.
+  // TOML requires a point or an exponent in a float.
   if (text.find_first_of(".en") == std::string::npos) {
     text += ".0";
   }

@@ -16,7 +16,7 @@ void wrong_type(const Node& node, const std::string& name, std::string_view want
                   fmt::format("'{}' must be {}, not {}", name, wanted, kind_name(node.kind)));
 }
 
-/// Takes a float or an integer as a number. False when the node is something else.
+/// Takes a float or an integer as a number. It returns false when the node is something else.
 bool as_number(const Node& node, double& out) {
   if (node.kind == Node::Kind::number) {
     out = node.number;
@@ -85,7 +85,7 @@ bool read_text(const Node& node, const std::string& name, std::string& out,
     out = node.text;
     return true;
   }
-  // In `--set sensor.name=7` the word 7 is meant.
+  // The command line may leave out the quotes: `--set sensor.name=7` means the word 7.
   if (!node.raw.empty() && node.kind != Node::Kind::array && node.kind != Node::Kind::table) {
     out = node.raw;
     return true;

@@ -6,10 +6,11 @@
 
 #include "emit/scene/scene_desc.hpp"
 
-/// What a weather table lacks for the thermal simulation, and what stands in for it.
+/// Rows and parameters that a weather table lacks for the thermal simulation, and their
+/// replacement.
 namespace emit::config {
 
-/// Which parameters of the clear-sky models the user states. The others follow the table.
+/// Parameters of the clear-sky models that the user states. The others follow the table.
 struct StatedClearSky {
   bool air_mean = false;
   bool air_amplitude = false;

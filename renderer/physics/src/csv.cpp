@@ -26,7 +26,7 @@ bool is_blank(int c) noexcept {
   return c == ' ' || c == '\t';
 }
 
-/// Text of a user's file as a message may show it: short, on one line.
+/// Shortens the text of a user's file to one short line for a message.
 std::string shown(std::string_view text) {
   constexpr std::size_t kMaxShownBytes = 60;
   std::string out(text.substr(0, kMaxShownBytes));
@@ -37,7 +37,8 @@ std::string shown(std::string_view text) {
   return out;
 }
 
-/// What a file that is not UTF-8 text is, by its first bytes; empty for text.
+/// Returns the name of the format of a file that is not UTF-8 text, judged by its first bytes. The
+/// result is empty for text.
 std::string_view foreign_format(std::string_view first) noexcept {
   if (first.starts_with("\xFF\xFE") || first.starts_with("\xFE\xFF")) {
     return "the file is UTF-16 text: save it as UTF-8";
@@ -52,7 +53,8 @@ std::string_view foreign_format(std::string_view first) noexcept {
   return {};
 }
 
-/// Name of a character that stands where commas are wanted; empty for others.
+/// Returns the name of a character that stands in place of a comma. The result is empty for other
+/// characters.
 std::string_view foreign_separator(int c) noexcept {
   switch (c) {
     case ';':
@@ -78,7 +80,7 @@ std::string separator_fault(std::string_view separator) {
 struct CsvReader::Impl {
   std::string name;
   std::unique_ptr<std::istream> stream;
-  std::string first;  ///< the first bytes, which tell what the file is
+  std::string first;  ///< the first bytes, which show the format of the file
   std::size_t first_at = 0;
   int ahead = kEnd;        ///< next character
   std::uint32_t line = 1;  ///< of `ahead`
@@ -102,7 +104,7 @@ struct CsvReader::Impl {
     const int c = stream->rdbuf()->sbumpc();
     return c == std::char_traits<char>::eof() ? kEnd : c;
   }
-  /// Takes the next character. Line ends of all three kinds come as '\n'.
+  /// Takes the next character. All three kinds of line ends become '\n'.
   int take() {
     const int c = ahead;
     if (c == kEnd) return kEnd;
@@ -113,7 +115,7 @@ struct CsvReader::Impl {
       column = 1;
       return '\n';
     }
-    // Bytes that continue a character of UTF-8 do not count.
+    // Bytes that continue a UTF-8 character do not count.
     if ((c & 0xC0) != 0x80) ++column;
     ++row_bytes;
     return c;
@@ -201,7 +203,7 @@ struct CsvReader::Impl {
     return {};
   }
 
-  /// Next row with content; false at the end.
+  /// Reads the next row with content. It returns false at the end.
   Result<bool> read_row() {
     while (true) {
       count = 0;
@@ -329,7 +331,7 @@ std::span<const CsvCell> CsvReader::header() const noexcept {
 
 namespace {
 
-/// Where `column` stands among `names`; the message begins with `place`.
+/// Finds the position of `column` among `names`. An error message begins with `place`.
 template <class Names>
 Result<std::size_t> find_column(const Names& names, std::string_view column, std::string_view place,
                                 ErrorCode missing) {
@@ -474,7 +476,7 @@ std::string unix_time_hint(double seconds) {
     const char* name;
     double per_s;
   };
-  // UNIX times from 2001 to 2286 have ten digits before the unit's own.
+  // UNIX times from 2001 to 2286 have ten digits in seconds, and more in smaller units.
   for (const Unit& unit :
        {Unit{"seconds", 1.0}, {"milliseconds", 1e3}, {"microseconds", 1e6}, {"nanoseconds", 1e9}}) {
     const double unix_s = seconds / unit.per_s;

@@ -19,7 +19,7 @@ PositionBits bits_of(const glm::vec3& p) {
           std::bit_cast<std::uint32_t>(p.z + 0.0F)};
 }
 
-/// For every vertex the lowest vertex at the same position.
+/// Gives every vertex the lowest vertex at the same position.
 std::vector<std::uint32_t> merged_by_position(const std::vector<glm::vec3>& positions_m) {
   std::vector<std::pair<PositionBits, std::uint32_t>> order;
   order.reserve(positions_m.size());
@@ -55,7 +55,8 @@ bool is_closed_surface(const Mesh& mesh) {
       if (from == to) return false;
       edges.push_back(from << 32U | to);
     }
-    // About the box's corner: far from the origin the sum would cancel.
+    // The corners are taken relative to the box's corner, because the sum would cancel far from the
+    // origin.
     const glm::dvec3 a = glm::dvec3(mesh.positions_m[corner[0]]) - mesh.bounds.min_m;
     const glm::dvec3 b = glm::dvec3(mesh.positions_m[corner[1]]) - mesh.bounds.min_m;
     const glm::dvec3 c = glm::dvec3(mesh.positions_m[corner[2]]) - mesh.bounds.min_m;

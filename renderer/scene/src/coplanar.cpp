@@ -32,7 +32,7 @@ constexpr double kNormalCell = 0.0137;
 constexpr double kOffsetCellM = 0.0113;
 /// An overlap narrower than this share of the covering triangle's size is a common edge.
 constexpr double kMinWidthFrac = 3e-4;
-/// How far a cut reaches under the covering triangle, as a share of its size.
+/// Distance that a cut reaches under the covering triangle, as a share of its size.
 constexpr double kUnderlapFrac = 1e-4;
 /// Pieces of one triangle beyond which their corners are not set into each other's edges.
 constexpr std::size_t kMaxMatchedPieces = 3000;
@@ -164,8 +164,9 @@ std::uint64_t plane_key(const glm::dvec3& normal, double offset_m, double shift)
   return hash;
 }
 
-/// Triangles out of a convex polygon, some of whose corners may lie on straight edges. The smallest
-/// corner triangle is cut off first: so no corner on an edge is left without a triangle.
+/// Cuts a convex polygon into triangles. Some of its corners may lie on straight edges. The
+/// smallest corner triangle is cut off first, so that no corner on an edge is left without a
+/// triangle.
 std::vector<std::array<std::size_t, 3>> triangulate(const Piece& piece) {
   std::vector<std::size_t> left(piece.size());
   for (std::size_t i = 0; i < left.size(); ++i) left[i] = i;
@@ -378,7 +379,7 @@ class CoplanarCutter {
     return edge_key(facet.corner_m[side], facet.corner_m[(side + 1) % 3], 0.1 * kPlaneM);
   }
 
-  /// What the covering facets leave of a facet: convex pieces.
+  /// Returns the convex pieces of a facet that the covering facets leave visible.
   [[nodiscard]] std::vector<Piece> remainder(const Facet& bottom,
                                              const std::set<std::uint32_t>& covering) const {
     const Projection flat(bottom.normal);
@@ -734,6 +735,7 @@ class CoplanarCutter {
 }  // namespace
 
 std::vector<std::string> cut_coplanar(std::vector<Mesh>& meshes, std::vector<CoplanarPart>& parts) {
+  for (const CoplanarPart& part : parts) EMIT_CHECK_OP(part.mesh, <, meshes.size());
   return CoplanarCutter(meshes, parts).run();
 }
 

@@ -293,7 +293,7 @@ class Facing {
     }
   }
 
-  /// In the meshes that were changed every normal looks to the side to which its triangles look.
+  /// Turns the normals of changed meshes to the side to which their triangles look.
   void turn_normals() {
     for (std::uint32_t m = 0; m < model_.meshes.size(); ++m) {
       if (!changes_[m].touched) continue;

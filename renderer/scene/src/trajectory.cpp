@@ -9,6 +9,7 @@ namespace emit::scene {
 
 TrajectoryState trajectory_at(const Trajectory& keyframes, std::int64_t sim_time_ns) noexcept {
   EMIT_DCHECK(!keyframes.empty());
+  EMIT_DCHECK(std::ranges::is_sorted(keyframes, {}, &Keyframe::sim_time_ns));
   const auto after = std::upper_bound(
       keyframes.begin(), keyframes.end(), sim_time_ns,
       [](std::int64_t time_ns, const Keyframe& key) { return time_ns < key.sim_time_ns; });

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "surface/heat/sample_heat.hpp"
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 
 HeatInterval SampleHeat::sized_interval() const {
@@ -47,6 +49,7 @@ SampleOutput SampleHeat::advance(const SurfaceSample& sample, const glm::vec3& n
 void SampleHeat::step_response(std::uint32_t material, const ResponseConditions& around,
                                std::span<const double> times_s,
                                std::span<double> response_m2k_w) const noexcept {
+  EMIT_CHECK_OP(times_s.size(), ==, response_m2k_w.size());
   std::visit(
       [&](const auto& model) { model.step_response(material, around, times_s, response_m2k_w); },
       model_);

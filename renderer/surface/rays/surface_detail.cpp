@@ -37,6 +37,7 @@ std::optional<SurfaceDetail::Place> SurfaceDetail::place(std::uint32_t mesh,
                                                          const glm::vec3& position_m,
                                                          const glm::vec3& normal,
                                                          float reach_m) const noexcept {
+  EMIT_DCHECK(has(mesh));
   const std::uint32_t index = instance_of_mesh_[mesh];
   const glm::dmat4& world_from_mesh = full_.instances[index].world_from_mesh;
   // Send a ray against the normal, from `reach_m` outside the surface to `reach_m` inside.

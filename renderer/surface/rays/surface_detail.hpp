@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/scene/mesh.hpp"
 #include "surface/rays/caster_rays.hpp"
 
@@ -34,6 +35,7 @@ class SurfaceDetail {
   /// Returns the mesh as loaded.
   /// @pre has(mesh)
   [[nodiscard]] const scene::Mesh& full_mesh(std::uint32_t mesh) const noexcept {
+    EMIT_DCHECK(has(mesh));
     return full_.meshes[mesh];
   }
 

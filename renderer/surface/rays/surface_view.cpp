@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "surface/mesh/tangents.hpp"
 
@@ -275,6 +276,7 @@ ViewShares ViewSampler::shares(const CasterRays& casters, const ViewPoint& point
 
 SurfaceView ViewSampler::view(const CasterRays& casters, const ViewPoint& point,
                               const CasterSelection& selection) const noexcept {
+  EMIT_DCHECK_OP(directions_.size(), <=, kMaxRays);
   const Tangents tangents = tangents_of(point.normal);
   const glm::vec3 start_m = point.position_m + point.offset_m * (point.normal + point.inward);
   Hits hits;

@@ -10,6 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/surface_balance.hpp"
 #include "history/foster_history.hpp"
 #include "surface/mesh/sheet_sides.hpp"
@@ -553,6 +554,7 @@ std::uint32_t CachedSurface::share_at(std::int64_t now_ns) const noexcept {
 
 void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
                             SurfaceHistory& history) noexcept {
+  EMIT_CHECK(!stale(now_ns));
   silhouettes_.begin_frame();
   const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
   const SurfaceStep step = this->step();

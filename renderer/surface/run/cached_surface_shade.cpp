@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <limits>
 
+#include "emit/physics/check.hpp"
 #include "surface/run/cached_surface.hpp"
 
 namespace emit::renderer {
@@ -87,6 +88,7 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
 }
 
 PlacedSilhouette CachedSurface::cast_shadow(std::size_t mover) noexcept {
+  EMIT_CHECK(mover < shadows_.size() && shadows_[mover].on);
   const MoverPlacement& now = movers_now_[mover];
   if (!silhouettes_.look(mover, to_sun_ * now.rel_from_body, Silhouettes::kSharpRad, rays(),
                          workers_)) {

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 namespace {
 
@@ -163,6 +165,8 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
 
 void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
                            const SurfaceSamples& all) noexcept {
+  EMIT_CHECK_OP(event_ns, >=, window.before.at_ns);
+  EMIT_CHECK_OP(event_ns, <=, window.after.at_ns);
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
     // Put blocks that came back in this interval on their own again: they do not lie on the line
     // between the nodes, so the moved node would hold wrong values of them.
@@ -343,6 +347,7 @@ void LocalSteps::hand_back(std::span<const std::uint32_t> blocks, std::int64_t a
 }
 
 void LocalSteps::rotate(const Window& window, const SurfaceSamples& all) noexcept {
+  EMIT_CHECK_OP(start_ns_ + next_turn_ * turn_ns_, >, window.after.at_ns);
   // Take wanted blocks out now, while the instant at which they begin lies between the two nodes.
   for (const auto& turn : turns_) {
     for (const std::uint32_t b : turn) {

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "shared/shade_params.glsl.h"
 #include "surface/mesh/tangents.hpp"
@@ -169,6 +170,7 @@ void Silhouettes::look_around(Tile& tile) noexcept {
 PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& placement,
                                     const glm::vec3& to_sun) const noexcept {
   const Tile& tile = tiles_[mover];
+  EMIT_DCHECK(tile.box_m.empty() || tile.revision > 0);
   const auto line = [&](const glm::vec3& axis_body, float scale, float origin) {
     const glm::vec3 axis = placement.rel_from_body * axis_body;
     return glm::vec4(scale * axis, origin - scale * glm::dot(axis, placement.position_m));

@@ -44,7 +44,7 @@ int Conductor::do_work(std::int64_t now_ns) noexcept {
     return work;
   }
   work += take_inputs(now_ns);
-  // Behind the inputs: the frame shows the newest pose that is there.
+  // Slots begin after the inputs are taken, so that the frame shows the newest pose.
   if (slots_ && slots_->begin(now_ns)) {
     begin_slot();
     ++work;
@@ -183,7 +183,7 @@ void Conductor::begin_slot() noexcept {
 int Conductor::take_images_and_slots(std::int64_t now_ns) noexcept {
   int work = 0;
   const bool slots_run = slots_ && !draining();
-  // In order of time: an image counts for the slot in which its pixels arrived.
+  // Images are taken in order of time: an image counts for the slot in which its pixels arrived.
   constexpr int kMaxPerTurn = 32;
   while (work < kMaxPerTurn) {
     const RenderDone* done = context_.done.front();

@@ -54,8 +54,8 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   if (refuse_frame(input, gate.verdict)) {
     return true;
   }
-  // In lock step each input becomes a frame. With slots emitd takes inputs at any time, so that the
-  // newest pose known is the newest that came.
+  // An input in lock step becomes one frame, so it waits until a frame can be issued. A daemon with
+  // slots takes inputs at any time, so that its newest pose is the newest that came.
   if (!slots_ && !can_issue() && !reset_pending_) {
     return false;
   }

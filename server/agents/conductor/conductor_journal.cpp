@@ -61,7 +61,7 @@ void ConductorJournal::written(bool found_room) noexcept {
   }
   context_.counters.add(Counter::journal_dropped);
   if (!lossy_) {
-    // Logged once: from here on the journal of this run does not replay.
+    // The loss is logged once: from here on the journal of this run does not replay.
     lossy_ = true;
     context_.conductor_events.push(EventKind::journal_overrun, writer_.sequence());
   }

@@ -20,7 +20,7 @@ class ConductorJournal {
   void run_start(std::uint64_t run_id, std::int64_t now_ns) noexcept;
   void command(CommandKind command, std::int64_t now_ns) noexcept;
   void host_frame(const protocol::HostFrameData& frame, std::int64_t now_ns) noexcept;
-  /// What a frame showed, beside its header.
+  /// Content of a frame that its header does not state.
   struct Shown {
     std::int64_t thermal_time_ns = 0;
     std::uint32_t crc32c = 0;   ///< of the pixels of `channel`

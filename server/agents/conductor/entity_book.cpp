@@ -76,8 +76,9 @@ void EntityBook::store(const protocol::EntityStateData& state, std::int64_t sim_
       entity.teleport_pending = true;
     }
   } else {
-    // It stays where it is: where a host put it last, else where the scenario has it at this
-    // instant. For the track that ends any motion; it is no jump of the entity.
+    // An entity without a pose stays where it is: at its last pose from a host, or else at its pose
+    // in the scenario at this instant. The track takes this as the end of any motion. It is no jump
+    // of the entity.
     const physics::Pose pose = entity.track.empty()
                                    ? scenario_.entity_at(entity.id, sim_time_ns).pose
                                    : entity.track.newest().pose;
@@ -96,7 +97,7 @@ void EntityBook::add_update(RenderJob& job, Entity& entity, const physics::Pose&
   update.entity_id = entity.id;
   update.pose = pose;
   update.on = entity.on;
-  // While the instant shown is still before the jump, so is the pose.
+  // The pose is still the one before the jump while the instant shown is before it.
   update.teleport = entity.teleport_pending && base_ns >= entity.first_teleport_ns;
   if (update.teleport) {
     entity.teleport_pending = base_ns < entity.last_teleport_ns;

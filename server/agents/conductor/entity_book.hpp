@@ -12,8 +12,8 @@
 
 namespace emit::server {
 
-/// The entities that hosts have moved in this run, with their poses, and what the next frames must
-/// still be sent of them. Thread: the conductor's. Real time: RT-safe after construction.
+/// The entities that hosts have moved in this run, with their poses and the updates that frames
+/// must still carry. Thread: the conductor's. Real time: RT-safe after construction.
 class EntityBook {
  public:
   /// Largest number of entities in a run.

@@ -90,8 +90,8 @@ void FrameLedger::note_quality(FrameHeader& header, const Issued& issued,
     context_.counters.add(Counter::frames_entities_behind);
   }
   if (done.dropped_poses > 0 || done.coarse || done.warmed_up || issued.entities_behind) {
-    // Nobody knows how much the coarser past or surface matters, or an entity that stands where it
-    // was a frame ago: that depends on what it shaded.
+    // The error is unknown when the past or the surface is coarser, or when an entity stands where
+    // it was a frame ago: it depends on the places that the entity shaded.
     header.flags |= protocol::kFlagDegraded;
     header.estimated_error_k = std::numeric_limits<float>::quiet_NaN();
   }

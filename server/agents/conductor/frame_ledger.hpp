@@ -16,7 +16,7 @@ namespace emit::server {
 /// without a new frame repeats. Thread: the conductor's. Real time: RT-safe after construction.
 class FrameLedger {
  public:
-  /// What was decided when a frame was issued, until its image comes back.
+  /// Decisions made when a frame was issued, kept until its image comes back.
   struct Issued {
     protocol::FrameHeader header;
     std::int64_t thermal_time_ns = 0;
@@ -36,32 +36,36 @@ class FrameLedger {
 
   [[nodiscard]] bool idle() const noexcept { return in_work_ == 0; }
   [[nodiscard]] bool full() const noexcept { return in_work_ == kMaxInWork; }
-  /// Number under which the next frame goes out if it is in time.
+  /// Returns the number under which the next frame goes out if it is in time.
   [[nodiscard]] std::uint64_t next_number() const noexcept { return frame_number_ + in_work_ + 1; }
-  /// Returns a cleared place for the next frame. @pre !full()
+  /// Returns a cleared place for the next frame.
+  /// @pre !full()
   [[nodiscard]] Issued& next() noexcept;
-  /// Takes the frame of next() into work: gives it a render number and fills in what the job has.
+  /// Takes the frame of next() into work: gives it a render number and fills in the job's fields.
   /// @pre !full()
   void issue(RenderJob& job, Issued& issued) noexcept;
-  /// Returns the frame whose image comes next. @pre !idle()
+  /// Returns the frame whose image comes next.
+  /// @pre !idle()
   [[nodiscard]] const Issued& oldest() const noexcept;
 
-  /// Writes the frame of oldest() with its image, and keeps it for repetition. @pre !idle()
+  /// Writes the frame of oldest() with its image, and keeps it for repetition.
+  /// @pre !idle()
   void fill_image(PublishFrame& out, const RenderDone& done, bool late) noexcept;
-  /// The frame of oldest() is published. @pre !idle()
+  /// Removes the frame of oldest(), which is published.
+  /// @pre !idle()
   void pop_oldest() noexcept;
-  /// Writes the frame published last once more, under a number of its own. The caller fills in
-  /// what belongs to the slot.
+  /// Writes the frame published last once more, under a number of its own. The caller fills in the
+  /// fields of the slot.
   void fill_repeat(PublishFrame& out) noexcept;
 
-  /// Header of the image published last.
+  /// Returns the header of the image published last.
   [[nodiscard]] const protocol::FrameHeader& shown() const noexcept { return shown_; }
   [[nodiscard]] const ConductorJournal::Shown& shown_for_journal() const noexcept {
     return shown_for_journal_;
   }
 
  private:
-  /// Flags and estimated error of a frame that has less than full quality.
+  /// Writes the flags and the estimated error of a frame that has less than full quality.
   void note_quality(protocol::FrameHeader& header, const Issued& issued,
                     const RenderDone& done) noexcept;
 

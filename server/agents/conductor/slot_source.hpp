@@ -11,8 +11,8 @@
 
 namespace emit::server {
 
-/// Strategy of a pacing mode whose frames belong to slots, not to poses: says when a slot begins
-/// and ends. Mode host-step has no slots and no such object.
+/// Strategy of a pacing mode whose frames belong to slots, not to poses. It decides when a slot
+/// begins and ends. Mode host-step has no slots and no such object.
 ///
 /// The virtual functions are called once a turn of the conductor or once a slot; what a frame needs
 /// is read from members. Thread: the conductor's. Real time: RT-safe after construction.
@@ -30,24 +30,25 @@ class SlotSource {
   SlotSource& operator=(const SlotSource&) = delete;
   virtual ~SlotSource() = default;
 
-  /// Takes what came from outside since the last turn, such as triggers.
+  /// Takes inputs from outside since the last turn, such as triggers.
   virtual void poll(std::int64_t now_ns) noexcept = 0;
   /// Begins a slot that does not follow the end of another one. Returns false when there is none to
   /// begin now.
   [[nodiscard]] virtual bool begin(std::int64_t now_ns) noexcept = 0;
   /// Ends the slot under way. Returns true when the next one has begun with it.
   [[nodiscard]] virtual bool end(std::int64_t now_ns) noexcept = 0;
-  /// Instant at which the conductor must turn again, wall; kNeverNs: none.
+  /// Returns the instant at which the conductor must turn again, wall; kNeverNs: none.
   [[nodiscard]] virtual std::int64_t wake_at_ns() const noexcept = 0;
-  /// Descriptor that becomes readable when poll() may find something; -1: none.
+  /// Returns the descriptor that becomes readable when poll() may find something; -1: none.
   [[nodiscard]] virtual int fd() const noexcept { return -1; }
-  /// The host has reset the run.
+  /// Resets the strategy after the host has reset the run.
   virtual void reset() noexcept {}
 
   [[nodiscard]] const Slot& slot() const noexcept { return slot_; }
-  /// End of the slot under way as far as it is known now, wall; kNeverNs: there is no slot.
+  /// Returns the end of the slot under way as far as it is known now, wall; kNeverNs: there is no
+  /// slot.
   [[nodiscard]] std::int64_t end_ns() const noexcept { return end_ns_; }
-  /// Whether a frame is late when it is done after its deadline, also within its slot.
+  /// Returns true when a frame after its deadline counts as late, even within its slot.
   [[nodiscard]] bool has_deadlines() const noexcept { return has_deadlines_; }
   /// Returns the flags that the next frame carries because of faults since the last call.
   [[nodiscard]] std::uint32_t take_flags() noexcept { return std::exchange(flags_, 0U); }

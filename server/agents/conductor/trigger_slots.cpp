@@ -6,8 +6,8 @@
 namespace emit::server {
 namespace {
 
-/// A trigger that is found this many periods after its arrival begins no slot: its frame would show
-/// what is long past, and delay the frames after it.
+/// Number of periods after its arrival at which a trigger is stale. It begins no slot then: its
+/// frame would show a time long past, and delay the frames after it.
 constexpr std::int64_t kStalePeriods = 4;
 constexpr std::int64_t kSilencePeriods = 10;
 /// Shortest time between two warnings of triggers without a valid MAC, so that a flood does not
@@ -76,7 +76,7 @@ void TriggerSlots::warn_of_strangers(std::int64_t now_ns) noexcept {
 }
 
 bool TriggerSlots::begin(std::int64_t /*now_ns*/) noexcept {
-  // The slot before ends first, in order of time with the images that belong to it.
+  // The previous slot ends first, in order of time with the images that belong to it.
   if (!pending_ || gate_.is_open()) {
     return false;
   }

@@ -24,7 +24,8 @@ class TriggerSlots final : public SlotSource {
   void reset() noexcept override { gate_.forget_source(); }
 
  private:
-  /// Returns false for a trigger that begins no slot. Counts and flags its faults.
+  /// Takes a trigger, and counts and flags its faults. Returns false for a trigger that begins no
+  /// slot.
   [[nodiscard]] bool use(const ReceivedTrigger& received, std::int64_t now_ns) noexcept;
   void warn_of_strangers(std::int64_t now_ns) noexcept;
   void watch_silence(std::int64_t now_ns) noexcept;
@@ -35,7 +36,7 @@ class TriggerSlots final : public SlotSource {
   TriggerInput& triggers_;
   TriggerGate gate_;
   std::optional<ReceivedTrigger> pending_;  // passed the gate; its slot has not begun
-  std::int64_t warned_ns_ = 0;              // of triggers that nobody sealed
+  std::int64_t warned_ns_ = 0;              // last warning of triggers without a MAC
   bool silent_ = false;
 };
 

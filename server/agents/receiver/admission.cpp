@@ -13,7 +13,7 @@ namespace {
 /// the log.
 constexpr std::int64_t kWarningGapNs = 100'000'000;
 
-/// Loads the certificates. Empty: no TLS.
+/// Loads the certificates. The result is empty without TLS.
 physics::Result<std::optional<TlsContext>> load_tls(const config::TlsConfig& tls) {
   if (!tls.enabled()) {
     return std::nullopt;

@@ -105,7 +105,7 @@ void ConnectionTable::queue(Connection& connection, const v1::ControlRecord& rec
 }
 
 void ConnectionTable::flush(Connection& connection) noexcept {
-  // A refusal that could not be written has ended the connection before its caller wants it ended.
+  // A refusal that could not be written may end the connection before the caller does.
   if (connection.write_lent || !connection.open()) {
     return;
   }
@@ -149,7 +149,8 @@ void ConnectionTable::watch(Connection& connection) noexcept {
   event.events = (reading ? std::uint32_t{EPOLLIN} : 0U) | (writing ? std::uint32_t{EPOLLOUT} : 0U);
   event.data.u64 = connection.key();
   if (connection.closing) {
-    // It waits for sender or recorder. A hang-up must not wake this agent over and over.
+    // The connection waits for sender or recorder. A hang-up must not wake this agent over and
+    // over.
     ::epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, connection.socket.fd(), nullptr);
     return;
   }
@@ -205,7 +206,7 @@ void ConnectionTable::released(std::uint32_t key) noexcept {
   connection->write_lent = false;
   connection->client.reset();
   if (!connection->closing) {
-    // Sender or recorder have ended it: it was too slow, or its socket failed.
+    // Sender or recorder have ended the connection: it was too slow, or its socket failed.
     context_.receiver_events.push(EventKind::disconnected, key, 0, "cannot keep up or failed");
     connection->closing = true;
   }

@@ -60,28 +60,29 @@ struct Connection {
   [[nodiscard]] std::uint32_t key() const noexcept {
     return generation << kConnectionPlaceBits | index;
   }
-  /// Fills a free place, except for the members that its new owner sets: nothing of the connection
-  /// before is left.
+  /// Fills a free place, except for the members that its new owner sets. Nothing of the previous
+  /// connection is left.
   void begin() noexcept;
 };
 
-/// The places of all connections: what is written to them, and how they end. Sender and recorder
-/// are lent a descriptor and give it back before it is closed. Thread: the receiver's. Real time:
-/// not RT-safe, answers allocate.
+/// The places of all connections: the answers written to them, and their ends. Sender and recorder
+/// borrow a descriptor and return it before it is closed. Thread: the receiver's. Real time: not
+/// RT-safe, because answers allocate.
 class ConnectionTable {
  public:
   explicit ConnectionTable(Context& context);
 
   /// Makes the places. Setup only.
   void make_places(std::uint32_t count);
-  /// Keys of closed connections are removed here; null: there are none.
+  /// Sets the sessions from which keys of closed connections are removed; null: there are none.
   void set_host_sessions(HostSessions* sessions) noexcept { sessions_ = sessions; }
   [[nodiscard]] int epoll_fd() const noexcept { return epoll_.get(); }
 
   [[nodiscard]] std::vector<std::unique_ptr<Connection>>& all() noexcept { return connections_; }
   /// Returns a free place; null: all are taken.
   [[nodiscard]] Connection* free_place() noexcept;
-  /// Returns the open connection with this key; null: it is gone. @pre the place of `key` exists
+  /// Returns the open connection with this key; null: it is closed.
+  /// @pre the place of `key` exists
   [[nodiscard]] Connection* find(std::uint64_t key) noexcept;
   [[nodiscard]] std::size_t open_from(const protocol::IpAddress& peer) const noexcept;
   [[nodiscard]] std::size_t handshakes() const noexcept;
@@ -90,7 +91,7 @@ class ConnectionTable {
   /// where that holds values of the message.
   void refuse(Connection& connection, StatusCode code, const std::string& text,
               std::uint64_t host_frame_number = 0, std::string_view event_text = {});
-  /// As refuse(), and closes the connection once the answer is sent.
+  /// Does what refuse() does, and closes the connection once the answer is sent.
   void refuse_and_close(Connection& connection, StatusCode code, const std::string& text);
   void send_status(Connection& connection, StatusCode code, const std::string& text,
                    std::uint64_t host_frame_number, std::uint64_t count);
@@ -98,7 +99,7 @@ class ConnectionTable {
   void flush(Connection& connection) noexcept;
   void close(Connection& connection, std::string_view why) noexcept;
   void finish_close(Connection& connection) noexcept;
-  /// Takes back what sender and recorder have given back. Returns their number.
+  /// Takes back the descriptors that sender and recorder have returned. Returns their number.
   int take_released() noexcept;
   /// Asks the kernel for the events that the connection waits for. Returns false when it refuses.
   [[nodiscard]] bool begin_watch(Connection& connection) noexcept;

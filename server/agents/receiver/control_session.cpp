@@ -239,7 +239,7 @@ void ControlSession::take_subscribe(Connection& connection, const v1::ControlRec
   const bool udp = params.udp;
   const std::uint32_t channel = params.channel->index;
   if (!udp) {
-    // From here on the sender writes. What is still queued goes first.
+    // The sender writes from here on. Answers that are still queued go first.
     params.first_bytes.assign(
         connection.out.begin() + static_cast<std::ptrdiff_t>(connection.out_sent),
         connection.out.end());

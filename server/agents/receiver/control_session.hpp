@@ -26,7 +26,7 @@ namespace emit::server {
 /// Thread: the receiver's. Real time: host frames and resend requests are RT-safe.
 class ControlSession {
  public:
-  /// What Welcome says beside channels and run id.
+  /// Fields of Welcome beside channels and run id.
   struct Identity {
     std::string software;
     std::string scenario;
@@ -41,15 +41,16 @@ class ControlSession {
         subscriptions_(context, config, sockets) {}
 
   void set_identity(Identity identity) { identity_ = std::move(identity); }
-  /// Hosts over TLS agree on keys with these; null: bare datagrams are taken.
+  /// Sets the sessions with which hosts over TLS agree on keys; null: bare datagrams are accepted.
   void set_host_sessions(HostSessions* sessions) noexcept { sessions_ = sessions; }
-  /// Host frames and commands are ignored from here on.
+  /// Ignores host frames and commands from here on.
   void drain() noexcept { draining_ = true; }
 
   /// Returns the serialised emit.v1.Welcome that a client would get now.
   [[nodiscard]] std::vector<std::byte> welcome() const;
-  /// Handles one record. @pre there is room for one input on the conductor's ring, if the role of
-  /// the connection is host and drain() was not called
+  /// Handles one record.
+  /// @pre there is room for one input on the conductor's ring, if the role of the connection is
+  /// host and drain() was not called
   /// @param now_ns  wall instant of arrival
   void take(Connection& connection, const protocol::Record& record, std::int64_t now_ns);
 

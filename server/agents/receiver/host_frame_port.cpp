@@ -17,12 +17,12 @@
 namespace emit::server {
 namespace {
 
-/// Answers over UDP per 100 ms: enough for every host, too few to be abused.
+/// Largest number of answers over UDP per 100 ms: enough for every host, too few to be abused.
 constexpr std::uint32_t kStatusesPerWindow = 100;
 constexpr std::int64_t kStatusWindowNs = 100'000'000;
 constexpr std::uint64_t kReceiveBufferBytes = 4u << 20;
 
-/// Returns where a datagram came from.
+/// Returns the source address of a datagram.
 SocketAddress address_of(const Origin& origin) noexcept {
   SocketAddress out;
   out.length = origin.address_bytes;

@@ -15,8 +15,8 @@
 
 namespace emit::server {
 
-/// The UDP port of host frames: takes datagrams with their arrival times, proves their origin where
-/// that is asked for, decodes them onto the conductor's ring, and sends the answers.
+/// The UDP port of host frames. It takes datagrams with their arrival times, checks their origin if
+/// that is required, decodes them onto the conductor's ring, and sends the answers.
 /// Thread: the receiver's. Real time: sound datagrams are RT-safe; a refused one allocates.
 class HostFramePort {
  public:
@@ -30,15 +30,15 @@ class HostFramePort {
                                            const SocketAddress& address,
                                            const config::DaemonConfig& config);
   [[nodiscard]] bool is_open() const noexcept { return static_cast<bool>(socket_); }
-  /// length 0: there is no host port.
+  /// Returns the address of the port; length 0: there is no host port.
   [[nodiscard]] SocketAddress address() const noexcept { return socket_.local_address(); }
-  /// Null: bare datagrams are taken.
+  /// Returns the sessions; null: bare datagrams are accepted.
   [[nodiscard]] HostSessions* sessions() noexcept { return sessions_.get(); }
 
   /// Watches the port with an epoll instance, under `key`. Returns false when the kernel refuses.
   [[nodiscard]] bool watch(int epoll_fd, std::uint64_t key) noexcept;
-  /// Whether the epoll instance reports datagrams. It does not while the ring is full; the receiver
-  /// then calls receive() by itself.
+  /// Returns true when the epoll instance reports datagrams. It does not while the ring is full;
+  /// the receiver then calls receive() by itself.
   [[nodiscard]] bool watched() const noexcept { return watched_; }
   /// Takes up to `room` datagrams; 0: stops watching the port. Returns the number taken.
   int receive(std::size_t room, std::int64_t now_ns) noexcept;

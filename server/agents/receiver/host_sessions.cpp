@@ -112,7 +112,7 @@ HostSessions::Session& HostSessions::begin(const SessionHeader& header,
 void HostSessions::forget(Session& session) noexcept {
   session.used = false;
   session.mac.set_key({});
-  // Take a new nonce: a recording of this session could begin it once more under the old one.
+  // Take a new nonce, because a recording of this session could begin it again under the old one.
   static_cast<void>(renew_nonce());
 }
 

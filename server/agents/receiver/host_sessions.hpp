@@ -11,13 +11,13 @@
 
 namespace emit::server {
 
-/// The daemon's end of authenticated host datagrams (docs/wire.md, "Host sessions"): which keys are
-/// known, which sessions run, what was seen of each.
+/// The daemon's end of authenticated host datagrams (docs/wire.md, "Host sessions"). It holds the
+/// known keys, the running sessions and the counters seen in each.
 ///
-/// A session's key comes of a shared key, the host's session id and the daemon's nonce. The nonce
-/// is new at every start and whenever a session is forgotten, so that nothing recorded earlier is
-/// ever taken again. A datagram with a wrong MAC changes nothing here.
-/// Thread: one owner. Real time: RT-safe but for keys that come and go.
+/// A session's key is derived from a shared key, the host's session id and the daemon's nonce. The
+/// nonce is new at every start and whenever a session is forgotten, so that no recorded datagram is
+/// ever accepted again. A datagram with a wrong MAC changes nothing here. Thread: one owner. Real
+/// time: RT-safe except for adding and removing keys.
 class HostSessions {
  public:
   static constexpr std::size_t kMaxSessions = 32;
@@ -40,23 +40,24 @@ class HostSessions {
     std::uint32_t generation = 0;
   };
 
-  /// `file_keys`: those of host.key_file; `max_agreed_keys`: how many add_key() may add.
-  /// Errors (internal): no cryptography, no randomness.
+  /// Creates the sessions. `file_keys` are those of host.key_file. `max_agreed_keys` is the largest
+  /// number of keys that add_key() may add. Errors (internal): no cryptography, no randomness.
   [[nodiscard]] static physics::Result<std::unique_ptr<HostSessions>> create(
       std::span<const protocol::SessionKey> file_keys, std::size_t max_agreed_keys);
 
   [[nodiscard]] Taken take(std::span<const std::byte> datagram) noexcept;
-  /// Answer to `open`. Valid until the next call.
+  /// Returns the answer to `open`. It is valid until the next call.
   [[nodiscard]] std::span<const std::byte> challenge(const protocol::SessionHeader& open) noexcept;
 
   /// Returns the memory for an answer's payload, of at most kMaxAnswerBytes.
   static constexpr std::size_t kMaxAnswerBytes = 512;
   [[nodiscard]] std::span<std::byte> answer_payload() noexcept;
-  /// Seals it. Empty: the session is gone. Valid until the next call.
+  /// Seals the answer. The result is empty when the session is gone. It is valid until the next
+  /// call.
   [[nodiscard]] std::span<const std::byte> answer(std::uint32_t place, std::uint32_t generation,
                                                   std::size_t payload_bytes) noexcept;
 
-  /// A key agreed over the TLS connection `owner`, known until remove_key().
+  /// Adds a key agreed over the TLS connection `owner`. It is known until remove_key().
   void add_key(std::uint32_t owner, const protocol::SessionKey& key);
   void remove_key(std::uint32_t owner) noexcept;
 

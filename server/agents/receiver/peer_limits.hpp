@@ -19,7 +19,7 @@ class PeerLimits {
 
   explicit PeerLimits(const config::AccessConfig& access) noexcept : access_(access) {}
 
-  /// `now_ns`: monotonic.
+  /// Returns false when the peer is over its rate. `now_ns` is monotonic.
   [[nodiscard]] bool take_host_frame(const protocol::IpAddress& peer, std::uint16_t port,
                                      std::int64_t now_ns) noexcept {
     return find(peer, port, now_ns).host_frames.take(now_ns);

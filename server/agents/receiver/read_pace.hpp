@@ -13,18 +13,18 @@ namespace emit::server {
 class ReadPace {
  public:
   static constexpr std::int64_t kBurstNs = 250'000'000;
-  /// An answer costs a system call and more: 100 a second.
+  /// Cost of a refusal: an answer takes a system call and more, so there may be 100 a second.
   static constexpr std::int64_t kRefusalNs = 10'000'000;
-  /// About 64 MiB a second.
+  /// Cost of a byte: about 64 MiB a second.
   static constexpr std::int64_t kByteNs = 15;
-  /// Goes on when this much is to spare, so that it seldom stops.
+  /// Time to spare before reading goes on, so that it seldom stops.
   static constexpr std::int64_t kRestNs = 10'000'000;
 
-  /// `records_hz`: not 0.
+  /// `records_hz` is not 0.
   explicit ReadPace(std::uint32_t records_hz = 1) noexcept
       : record_ns_(1'000'000'000 / records_hz) {}
 
-  // `now_ns`: monotonic.
+  // Costs are charged at `now_ns`, monotonic.
   void bytes(std::size_t count, std::int64_t now_ns) noexcept {
     pay(static_cast<std::int64_t>(count) * kByteNs, now_ns);
   }
@@ -39,7 +39,7 @@ class ReadPace {
 
  private:
   void pay(std::int64_t cost_ns, std::int64_t now_ns) noexcept {
-    // Kept as the instant at which everything so far is paid for.
+    // The debt is stored as the instant at which everything so far is paid for.
     paid_ns_ = std::max(paid_ns_, now_ns - kBurstNs) + cost_ns;
   }
 

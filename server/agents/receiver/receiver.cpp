@@ -242,8 +242,8 @@ int Receiver::accept_connections(std::int64_t now_ns) {
   return work;
 }
 
-/// Without descriptors or memory, new peers wait in the kernel. The listener stays readable and
-/// must not keep this agent turning.
+/// Pauses the listener. Without descriptors or memory, new peers wait in the kernel. The listener
+/// stays readable and must not wake this agent again and again.
 void Receiver::pause_accepting(std::int64_t now_ns, int error) noexcept {
   ::epoll_ctl(connections_.epoll_fd(), EPOLL_CTL_DEL, listener_.fd(), nullptr);
   accept_again_ns_ = context_.clock.monotonic_ns() + kAcceptPauseNs;
@@ -285,7 +285,7 @@ void Receiver::admit(TcpSocket socket, const SocketAddress& peer) {
     return;
   }
   Connection& connection = *place;
-  // First what may throw, so that a place is never half taken.
+  // Steps that may throw come first, so that a place is never half taken.
   protocol::RecordLimits limits;
   limits.max_control_bytes = config_.control.max_record_bytes;
   connection.parser.emplace(limits);

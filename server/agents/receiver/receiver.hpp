@@ -21,8 +21,8 @@ namespace emit::server {
 /// conductor in order of arrival. Its parts are the admission of peers, the table of connections,
 /// the conversation on them, and the host port; this class is the loop that turns them.
 ///
-/// When the conductor's ring is full it stops reading, so that the kernel's buffers fill. So it
-/// does with a connection that sends more than its pace.
+/// The receiver stops reading when the conductor's ring is full, so that the kernel's buffers fill.
+/// It also stops reading a connection that sends more than its pace.
 /// Real time: host frames are RT-safe; connecting, subscribing and leaving allocate.
 class Receiver final : public Agent {
  public:
@@ -32,7 +32,7 @@ class Receiver final : public Agent {
 
   /// Opens the ports. Errors (config, io).
   [[nodiscard]] physics::Result<void> open();
-  /// What Welcome says. Call it before start.
+  /// Sets the fields of Welcome. Call it before start.
   void set_identity(Identity identity) { session_.set_identity(std::move(identity)); }
   /// Returns the serialised emit.v1.Welcome that a client would get now.
   [[nodiscard]] std::vector<std::byte> welcome() const { return session_.welcome(); }
@@ -41,7 +41,7 @@ class Receiver final : public Agent {
   [[nodiscard]] CongestionControl congestion_control() const {
     return listener_.congestion_control();
   }
-  /// length 0: no host port.
+  /// Returns the address of the host port; length 0: there is no host port.
   [[nodiscard]] SocketAddress host_address() const noexcept { return host_port_.address(); }
 
   [[nodiscard]] std::string_view name() const noexcept override { return "receiver"; }
@@ -59,14 +59,14 @@ class Receiver final : public Agent {
   void drain() noexcept { drain_.store(true, std::memory_order_release); }
 
  private:
-  /// Address of a key of the configuration. Errors (config, io) name the key; also an address that
-  /// other hosts reach without the protection that the port needs.
+  /// Returns the address that a key of the configuration states. Errors (config, io) name the key.
+  /// An address that other hosts reach without the protection that the port needs is an error too.
   [[nodiscard]] physics::Result<SocketAddress> listen_address(std::string_view key,
                                                               const std::string& endpoint,
                                                               Transport transport,
                                                               config::Port port) const;
 
-  // Connecting.
+  // The functions below handle new connections.
   [[nodiscard]] bool watch_listener() noexcept;
   void pause_accepting(std::int64_t now_ns, int error) noexcept;
   void resume_accepting(std::int64_t now_ns) noexcept;
@@ -76,7 +76,7 @@ class Receiver final : public Agent {
   void refuse_place(TcpSocket socket, bool crowded);
   int handshake(Connection& connection, std::int64_t now_ns);
 
-  // Reading.
+  // The functions below read from connections.
   int take_events(std::int64_t now_ns);
   int take_connection_event(std::uint64_t key, std::uint32_t events, std::int64_t now_ns);
   /// Goes on with connections whose records waited for room or for their pace.
@@ -85,10 +85,10 @@ class Receiver final : public Agent {
   int parse(Connection& connection, std::int64_t now_ns);
   /// Ends a connection whose framing is lost, after an answer.
   void refuse_framing(Connection& connection, protocol::ParseStatus status);
-  /// Returns whether the connection may go on: what it waits for has come.
+  /// Returns true when the connection may go on, because what it waited for has come.
   [[nodiscard]] bool may_go_on(const Connection& connection) noexcept;
   int receive_datagrams(std::int64_t now_ns) noexcept;
-  /// Room on the conductor's ring; 0: the conductor rings when there is some.
+  /// Returns the room on the conductor's ring; 0: the conductor rings when there is some.
   [[nodiscard]] std::size_t room_for_inputs() noexcept;
 
   int take_replies();

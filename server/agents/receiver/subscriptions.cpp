@@ -93,8 +93,8 @@ physics::Result<void> Subscriptions::grant_udp(const Caller& caller, const v1::S
     return tl::unexpected<physics::Error>(std::move(fec.error()));
   }
   params.fec = *fec;
-  // Not for groups, where all members would have to lose the same, and not with ig-clock, whose
-  // pixels are soon replaced.
+  // Resend is not granted to groups, whose members would all have to lose the same fragments. It is
+  // not granted with ig-clock, whose images are soon replaced.
   if (subscribe.resend() && subscribe.multicast_group().empty() &&
       config_.pacing.mode == config::PacingMode::host_step &&
       config_.stream.resend_max_frac > 0.0) {
@@ -153,7 +153,7 @@ physics::Result<SocketAddress> Subscriptions::target_of(const Caller& caller, st
     // Names are not looked up on a client's behalf.
     target = numeric_address(group, static_cast<std::uint16_t>(port));
     if (!target.is_multicast()) {
-      // Otherwise anybody could have frames sent to anybody.
+      // Other addresses would let anybody have frames sent to anybody.
       return physics::make_error(ErrorCode::protocol, "'" + group + "' is not a multicast group");
     }
     if (!protocol::any_contains(config_.access.multicast_groups, ip_of(target))) {
@@ -179,7 +179,7 @@ physics::Result<UdpSocket> Subscriptions::open_stream_socket(const Caller& calle
   socket->set_send_buffer(config_.stream.udp_send_buffer_bytes);
   if (!group.empty()) {
     socket->set_multicast_hops(static_cast<int>(config_.stream.multicast_ttl));
-    // Frames leave by the interface on which the client is, not by the default route.
+    // Frames leave by the interface of the client, not by the default route.
     const unsigned interface = interface_of(caller.socket->local_address());
     if (const int error = socket->set_multicast_interface(*target, interface); error != 0) {
       return physics::make_error(ErrorCode::protocol,

@@ -17,8 +17,8 @@ class Subscribed;
 
 namespace emit::server {
 
-/// Turns what a client asks for into what it is granted: channel, transport, error correction,
-/// resend, compression. Thread: the receiver's. Real time: not RT-safe, subscribing allocates.
+/// Decides on the requests of clients: channel, transport, error correction, resend, compression.
+/// Thread: the receiver's. Real time: not RT-safe, because subscribing allocates.
 class Subscriptions {
  public:
   Subscriptions(Context& context, const config::DaemonConfig& config, const SocketContext& sockets)
@@ -30,7 +30,7 @@ class Subscriptions {
     SocketAddress peer;
     TcpSocket* socket = nullptr;
   };
-  /// Why a subscription is refused.
+  /// Reason for the refusal of a subscription.
   struct Refusal {
     StatusCode code = StatusCode::not_allowed;
     std::string text;
@@ -44,7 +44,7 @@ class Subscriptions {
  private:
   [[nodiscard]] tl::expected<const Channel*, Refusal> channel_for(
       const v1::Subscribe& subscribe) const;
-  /// Fills in what a subscription over UDP has.
+  /// Fills in the terms of a subscription over UDP.
   [[nodiscard]] physics::Result<void> grant_udp(const Caller& caller,
                                                 const v1::Subscribe& subscribe,
                                                 SocketClient::Params& params) const;
@@ -54,7 +54,8 @@ class Subscriptions {
   [[nodiscard]] physics::Result<UdpSocket> open_stream_socket(const Caller& caller,
                                                               std::uint32_t port,
                                                               const std::string& group) const;
-  /// Returns where frames go: the caller's address, or a group that the configuration allows.
+  /// Returns the destination of frames: the caller's address, or a group that the configuration
+  /// allows.
   [[nodiscard]] physics::Result<SocketAddress> target_of(const Caller& caller, std::uint32_t port,
                                                          const std::string& group) const;
 

@@ -21,7 +21,8 @@ bool read(std::span<const std::byte> bytes, Line& line) {
   return true;
 }
 
-/// The elements behind a line; false when the line does not hold as many as it says.
+/// Returns the elements behind a line. It returns false when the line does not hold as many as it
+/// says.
 template <class Line, class Element>
 bool read_elements(std::span<const std::byte> bytes, std::uint32_t count, Element* out) {
   if (count > protocol::kMaxEntitiesPerFrame ||

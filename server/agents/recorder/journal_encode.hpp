@@ -11,7 +11,8 @@ class JournalEntry;
 
 namespace emit::server {
 
-/// Message of a line from the journal ring. False: not a line (a defect).
+/// Makes the message of a line from the journal ring. It returns false when the bytes are no line,
+/// which is a defect.
 [[nodiscard]] bool to_journal_entry(std::span<const std::byte> line,
                                     const Recorder::Identity& identity, v1::JournalEntry& out);
 

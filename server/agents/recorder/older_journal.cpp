@@ -23,7 +23,8 @@
 namespace emit::server {
 namespace {
 
-/// False only where it was read to its end: what cannot be read may be somebody's.
+/// Returns false only when the file was read to its end without a run. A file that cannot be read
+/// may be somebody's.
 bool holds_a_run(const std::filesystem::path& file, std::uint64_t bytes) {
   constexpr std::uint64_t kMostOfNone = 256u << 10;
   if (bytes > kMostOfNone) {
@@ -47,7 +48,7 @@ bool holds_a_run(const std::filesystem::path& file, std::uint64_t bytes) {
   }
 }
 
-/// Not over another file, as rename() would. 0 or errno.
+/// Renames a file without replacing another one, as rename() would. Returns 0 or errno.
 int rename_to_new(const std::filesystem::path& from, const std::filesystem::path& to) noexcept {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) {
     return 0;
@@ -59,7 +60,7 @@ int rename_to_new(const std::filesystem::path& from, const std::filesystem::path
   if (::link(from.c_str(), to.c_str()) != 0) {
     return errno;
   }
-  // Gone: a network file system may answer so when it asked twice.
+  // The link is already gone when a network file system asked twice and answers ENOENT.
   if (::unlink(from.c_str()) != 0 && errno != ENOENT) {
     const int error = errno;
     ::unlink(to.c_str());
@@ -86,8 +87,8 @@ physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem:
                            : failure("an older journal that cannot be read, so not written over: " +
                                      std::generic_category().message(errno));
   }
-  // Whoever writes a log holds it locked, and whoever keeps one meanwhile. Network file systems
-  // give a reader no lock but a shared one.
+  // A writer locks its log, and so does a process that is renaming it. Network file systems give a
+  // reader no lock but a shared one.
   if (::flock(opened.get(), LOCK_EX | LOCK_NB) != 0 &&
       (errno == EWOULDBLOCK ||
        (errno == EBADF && ::flock(opened.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK))) {
@@ -98,7 +99,7 @@ physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem:
   }
   std::tm changed{};
   ::gmtime_r(&status.st_mtime, &changed);
-  // The log itself, not a link to it: the new one goes where the old one is.
+  // The log itself is renamed, not a link to it: the new one goes where the old one is.
   std::error_code unresolved;
   const std::filesystem::path real = std::filesystem::canonical(file, unresolved);
   struct stat now {};

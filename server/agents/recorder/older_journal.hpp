@@ -7,11 +7,11 @@
 
 namespace emit::server {
 
-/// A journal that an earlier process left at `file` is renamed to NAME.YYYYMMDDThhmmssZ.EXT, the
-/// time of its last change (-2, -3 ... behind it where that exists), so that a restart does not
-/// write over the run that crashed. One that holds no frame and no host's word is left to be
-/// written over: a daemon that cannot start tries every second. What is no regular file is left. Of
-/// a symbolic link the file is renamed that it leads to.
+/// Renames a journal that an earlier process left at `file` to NAME.YYYYMMDDThhmmssZ.EXT, so that a
+/// restart does not overwrite the run that crashed. The time is that of its last change; -2, -3 ...
+/// follow it where that name exists. A journal without a frame and without a host's message may be
+/// overwritten, because a daemon that cannot start tries every second. A file that is not regular
+/// is left alone. If `file` is a symbolic link, its target is renamed.
 /// @return the new name; empty: nothing was renamed. Errors (io), naming the file: also one that
 /// another process is writing, one that cannot be read, and a folder that takes no new name.
 /// @param cause  becomes the system's reason where the folder takes no new name; null: not wanted

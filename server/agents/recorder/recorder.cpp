@@ -207,7 +207,7 @@ void Recorder::flush_when_due(std::int64_t now_ns) {
   if (!file_ || unflushed_since_ns_ == 0) {
     return;
   }
-  // Steps of the wall clock must not stretch it.
+  // The monotonic clock is used, so that steps of the wall clock do not stretch the age.
   const std::int64_t age_ns = context_.clock.monotonic_ns() - unflushed_since_ns_;
   if (age_ns < kFlushAfterNs) {
     wake_at_ns_ = now_ns + kFlushAfterNs - age_ns;
@@ -240,7 +240,7 @@ void Recorder::file_failed(const physics::Error& error) noexcept {
 }
 
 void Recorder::discard_old() {
-  // Records of runs gone by stay only while a peer is still being sent them.
+  // Records of earlier runs stay only while a peer is still being sent them.
   std::uint64_t needed = run_first_;
   for (const Peer& peer : peers_) {
     needed = std::min(needed, peer.next);

@@ -34,7 +34,7 @@ class Recorder final : public Agent {
   };
   Recorder(Context& context, config::JournalConfig config, std::size_t max_peers);
 
-  /// Before start.
+  /// Sets the members of RunStart. Call it before start.
   void set_identity(Identity identity) { identity_ = std::move(identity); }
   /// State of the journal file after open().
   struct Opened {
@@ -52,11 +52,12 @@ class Recorder final : public Agent {
   int do_work(std::int64_t now_ns) noexcept override;
   void on_stop() noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
-  /// Lines of frames wait for each other; none wakes the recorder by itself.
+  /// The recorder waits for several lines of frames; none wakes it by itself.
   [[nodiscard]] std::int64_t rest_ns() const noexcept override { return 2'000'000; }
   [[nodiscard]] int wait_fd() const noexcept override { return epoll_.get(); }
 
-  /// Any thread; true when every line that the conductor handed over reached file and peers.
+  /// Returns true when every line that the conductor handed over reached file and peers. Thread:
+  /// any.
   [[nodiscard]] bool idle() const noexcept {
     return finished_.load(std::memory_order_acquire) ==
            context_.journal_handed_over.load(std::memory_order_acquire);
@@ -65,8 +66,8 @@ class Recorder final : public Agent {
  private:
   /// Memory of a kept entry beside its bytes: the element of the deque and the allocator's share.
   static constexpr std::size_t kOverheadBytes = 48;
-  /// A line waits no longer than this before the kernel has it: a killed process loses no more.
-  /// Half of what is promised, the other half is for threads that wait for their core.
+  /// Longest time until the kernel has a line. A killed process loses no more than that. It is half
+  /// of the promised time; the other half is for threads that wait for their core.
   static constexpr std::int64_t kFlushAfterNs = 50'000'000;
 
   struct Peer {

@@ -5,7 +5,7 @@
 namespace emit::server {
 
 /// An entity that the canned test pattern knows: while a host has it on, the upper left eighth of
-/// the picture is at kCannedMarkerRadiance. It shows from pixels alone when a pose came through.
+/// the image is at kCannedMarkerRadiance. The pixels alone then show when a pose was received.
 inline constexpr std::uint32_t kCannedMarkerEntity = 0xFFFFFFFFU;
 inline constexpr float kCannedMarkerRadiance = 200.0F;  ///< W m-2 sr-1
 

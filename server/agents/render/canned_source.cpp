@@ -19,11 +19,12 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-/// Shows image (frame number - 1) mod count, of a second set while the marker entity is on; a slot
-/// is a ticket for it, so that the slot rules of a real renderer apply here as well.
+/// Source that shows image (frame number - 1) mod count, from a second set while the marker entity
+/// is on. A slot stands for one image, so that the slot rules of a real renderer apply here as
+/// well.
 class CannedSource final : public FrameSource {
  public:
-  /// `marked`: as many as `images`, or none.
+  /// `marked` has as many images as `images`, or none.
   CannedSource(std::vector<std::vector<float>> images, std::vector<std::vector<float>> marked,
                SourceInfo info)
       : images_(std::move(images)),
@@ -140,8 +141,8 @@ physics::Result<std::vector<std::vector<float>>> load_folder(const std::filesyst
 
 }  // namespace
 
-/// A ramp of plausible radiance with a hot disc that walks along the diagonal: every frame differs,
-/// and rows, columns and order can be told by eye and by program.
+/// A ramp of plausible radiance with a hot disc that walks along the diagonal. Every frame differs,
+/// and rows, columns and order can be recognised by eye and by program.
 std::vector<std::vector<float>> canned_pattern(const config::SourceConfig& source) {
   std::vector<std::vector<float>> images(source.canned_frames);
   const double width = source.canned_width_px;

@@ -81,7 +81,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       bool warmed_up = false;
       const auto slot = context_.of_slots.look([&] { return submit(job->request, warmed_up); });
       if (!slot) {
-        // Whoever is done with one rings.
+        // The agent that releases a slot rings the doorbell.
         if (!starved_) {
           context_.counters.add(Counter::no_free_slot);
           starved_ = true;
@@ -148,7 +148,7 @@ void RenderAgent::apply_weather(const RenderJob& job) noexcept {
     }
     context_.counters.add(Counter::weather_lost);
     if (!weather_lost_) {
-      // Once per run: from here on its weather stands still.
+      // The warning is logged once per run: from here on its weather stands still.
       weather_lost_ = true;
       context_.render_events.push(EventKind::weather_lost,
                                   static_cast<std::uint64_t>(job.weather[i].sim_time_ns));

@@ -34,19 +34,21 @@ class RenderAgent final : public Agent {
   void on_stop() noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
 
-  /// After on_start: the source's description, or why there is none. Not while running.
+  /// Returns the source's description, or the reason why there is none. Call it after on_start, and
+  /// not while the agent runs.
   [[nodiscard]] const physics::Result<SourceInfo>& source_info() const noexcept { return info_; }
 
  private:
   struct InFlight {
     renderer::SlotIndex slot = 0;
     std::int64_t render_start_ns = 0;
-    double expected_ms = 0.0;   ///< for its rung, by the ladder
+    double expected_ms = 0.0;   ///< time of its quality level, by the ladder
     std::int64_t begun_ns = 0;  ///< monotonic; render_start_ns is TAI
     ChannelSet channels = 0;
     bool warmed_up = false;  ///< the surface warmed up again in its submit()
   };
-  /// More than one in flight lets upload of the next overlap with read-back of the last.
+  /// Number of frames in flight. With more than one, upload of the next overlaps with read-back of
+  /// the last.
   static constexpr std::size_t kDepth = 2;
   /// Frames in a row with an error of the driver, and how long one may be in work, before the
   /// device counts as lost. A software renderer may take seconds for a frame.
@@ -59,14 +61,14 @@ class RenderAgent final : public Agent {
   [[nodiscard]] std::optional<renderer::SlotIndex> submit(const renderer::FrameRequest& request,
                                                           bool& warmed_up) noexcept;
   bool finish_oldest() noexcept;
-  /// The images of image.channels, and their checksums.
+  /// Takes the images of image.channels, and their checksums.
   void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
-  /// Sets the job's rung; returns RungStats::frame_ms of it.
+  /// Chooses the quality level of the job. Returns its RungStats::frame_ms.
   double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;
-  /// No frame comes any more: sets Context::device_lost, upon which the daemon ends.
+  /// Sets Context::device_lost, upon which the daemon ends. No frame comes any more.
   void lose_device(std::string_view why) noexcept;
 
   Context& context_;

@@ -45,7 +45,7 @@ physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
   if (!renderer) {
     return tl::unexpected<physics::Error>(std::move(renderer.error()));
   }
-  // The first frame shall be as fast as the thousandth.
+  // The warm-up makes the first frame as fast as the thousandth.
   renderer::FrameRequest first;
   first.sensor_pose = (*renderer)->scenario_sensor_pose_at(0);
   if (auto warm = (*renderer)->warm_up(first, progress); !warm) {

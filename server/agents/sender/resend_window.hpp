@@ -13,11 +13,11 @@
 
 namespace emit::server {
 
-/// The frames that one client got last, as it got them, and what it wants of them once more.
+/// The frames that one client got last, as it got them, and the fragments that it requested again.
 ///
-/// What may be sent again is bounded twice: no fragment of a frame more often than once on average,
-/// and never more bytes than a part of what was sent in the first place, saved up to one frame.
-/// Thread: one owner.  Real time: RT-safe after construction.
+/// Two limits apply to resends. A fragment is sent again at most once on average over a frame. The
+/// bytes sent again are at most a share of the bytes sent first; unused share is saved up to one
+/// frame. Thread: one owner. Real time: RT-safe after construction.
 class ResendWindow {
  public:
   struct Params {
@@ -27,24 +27,25 @@ class ResendWindow {
   };
   explicit ResendWindow(const Params& params);
 
-  /// A frame goes out for the first time. `pixels` live until forget(sequence).
+  /// Adds a frame that goes out for the first time. `pixels` live until forget(sequence).
   void add(std::uint64_t sequence, const protocol::Fragmenter::Params& cut,
            std::span<const std::byte, protocol::kFrameHeaderBytes> header,
            std::span<const std::byte> pixels) noexcept;
   void forget(std::uint64_t sequence) noexcept;
 
-  /// Marks what is asked for. `on_its_way`: the frame that is being sent now, if one is, and how
-  /// many of its fragments have gone: the others need no second copy yet.
-  /// False: the frame is gone, or nothing of the request is granted.
+  /// The frame that is being sent now, and the number of its fragments that have gone. The others
+  /// need no second copy yet.
   struct OnItsWay {
     std::uint32_t frame_id = 0;
     std::uint32_t fragments_sent = 0;
   };
+  /// Marks the requested fragments. It returns false when the frame is no longer available, or when
+  /// nothing of the request is granted. `on_its_way` is empty while no frame is being sent.
   [[nodiscard]] bool ask(const protocol::ResendRequest& request,
                          const std::optional<OnItsWay>& on_its_way) noexcept;
 
   [[nodiscard]] bool pending() const noexcept { return pending_ > 0; }
-  /// One call's worth of what was asked for. Of failed the first fragment
+  /// Sends one call's amount of the requested fragments. If the call fails, its first fragment
   /// counts as gone.
   [[nodiscard]] UdpBatch::Result send(int fd, UdpBatch& batch) noexcept;
 

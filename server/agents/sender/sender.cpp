@@ -139,7 +139,7 @@ int Sender::take_published() noexcept {
     }
     context_.published.pop();
     ++work;
-    // Between two frames clients get a chance, so that a burst does not skip frames.
+    // Clients get a chance between two frames, so that a burst does not skip frames.
     if (work < 4) {
       static_cast<void>(send_all());
     } else {
@@ -294,7 +294,8 @@ int Sender::send_all() noexcept {
 bool Sender::advance(SenderClient& client) noexcept {
   auto turn = SenderClient::Turn::full;
   if (!client.busy() && client.next < end_) {
-    // The others begin at about this time: nobody's first byte waits for somebody else's frame.
+    // The other clients begin at about this time. A brief turn keeps their first bytes from
+    // waiting.
     turn = clients_.size() > 1 ? SenderClient::Turn::brief : turn;
     client.next = std::max(client.next, first_);
     const Entry& next = entry(client.next);
@@ -330,7 +331,7 @@ bool Sender::advance(SenderClient& client) noexcept {
 }
 
 ClientCounts* Sender::counts_of(const SenderClient& client) const noexcept {
-  // The ring in shared memory is nobody's connection.
+  // The ring in shared memory belongs to no connection.
   return client.fd() >= 0 ? context_.counts_of(client.connection()) : nullptr;
 }
 
@@ -364,8 +365,8 @@ void Sender::block(SenderClient& client) noexcept {
   epoll_event event{};
   event.events = EPOLLOUT | EPOLLONESHOT;
   event.data.ptr = &client;
-  // Not before the first block: epoll reports errors and hang-ups even of sockets nobody asks
-  // about.
+  // The socket is registered only at the first block, because epoll reports errors and hang-ups
+  // even of sockets nobody asks about.
   ::epoll_ctl(epoll_.get(), client.registered ? EPOLL_CTL_MOD : EPOLL_CTL_ADD, client.fd(), &event);
   client.registered = true;
 }

@@ -18,20 +18,21 @@ namespace emit::server {
 /// The newest `queue_frames` frames form the window. A client is a position in it. When a
 /// frame leaves the window although a client has not had it yet, that client skips it: the
 /// next frame it gets carries kFlagGapBefore (newest-wins), or it is disconnected (every_frame).
-/// What a client asked not to get (every_nth) it is never waited for, and no gap.
-/// Images are compressed block by block when nobody else has anything to do.
-/// What such a client has half sent moves to its own memory. So the sender holds at most
-/// queue_frames + 1 images, whatever clients do, and a source with queue_frames + 3 slots always
-/// has one to render into.
+/// Frames that a client did not ask for (every_nth) are no gap, and the sender does not wait for
+/// them. Images are compressed block by block when no other client has work. The unsent rest of a
+/// frame moves to the client's own memory when the frame leaves the window. So the sender retains
+/// at most queue_frames + 1 images, whatever clients do, and a source with queue_frames + 3 slots
+/// always has one to render into.
 class Sender final : public Agent {
  public:
-  /// `keep_last`: the newest image stays held, because it may have to be sent again (ig-clock).
-  /// `resident`: a client that is served from start to end and belongs to no connection, or null.
+  /// Creates the sender. `keep_last` retains the newest image, because it may have to be sent again
+  /// (ig-clock). `resident` is a client that is served from start to end and belongs to no
+  /// connection, or null.
   Sender(Context& context, std::uint32_t queue_frames, std::size_t max_clients, bool keep_last,
          SenderClient* resident = nullptr);
 
-  /// Takes the memory to compress for clients that want it. The images are fixed by then.
-  /// Not while running.
+  /// Takes the memory to compress for clients that want it. The images are fixed by then. Do not
+  /// call it while the agent runs.
   void allow_compression();
 
   [[nodiscard]] std::string_view name() const noexcept override { return "sender"; }
@@ -41,7 +42,7 @@ class Sender final : public Agent {
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override { return wake_at_ns_; }
   [[nodiscard]] int wait_fd() const noexcept override { return epoll_.get(); }
 
-  /// Any thread; true when every client has everything that the conductor has handed over.
+  /// Returns true when every client has everything that the conductor has handed over. Thread: any.
   [[nodiscard]] bool idle() const noexcept {
     return finished_.load(std::memory_order_acquire) ==
            context_.frames_handed_over.load(std::memory_order_acquire);
@@ -66,7 +67,7 @@ class Sender final : public Agent {
   bool advance(SenderClient& client) noexcept;
   /// Returns the encoded image of the frame on its way to a client that waits for it.
   [[nodiscard]] EncodedPicture& encoded_for(const SenderClient& client) noexcept;
-  /// Hands over what is encoded already. False: the client goes on waiting.
+  /// Hands over the image if it is encoded already. It returns false when the client must wait on.
   bool take_encoded(SenderClient& client) noexcept;
   /// Moves a client on to the next frame that it wants.
   void pass_over_unwanted(SenderClient& client) noexcept;

@@ -3,9 +3,12 @@
 
 #include <cstdlib>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::server {
 
 void SenderClient::start(const protocol::FrameHeader& header, std::int64_t now_ns) noexcept {
+  EMIT_CHECK(!busy_);
   header_ = header;
   if (gap) {
     header_.flags |= protocol::kFlagGapBefore;

@@ -53,10 +53,10 @@ class SenderClient {
   [[nodiscard]] virtual bool ask_again(const protocol::ResendRequest& /*request*/) noexcept {
     return false;
   }
-  /// The frame leaves the window: its pixels must not be touched any more.
+  /// Notes that the frame leaves the window: its pixels must not be touched any more.
   virtual void forget(std::uint64_t /*sequence*/) noexcept {}
 
-  /// Key of the client's connection.
+  /// Returns the key of the client's connection.
   [[nodiscard]] virtual std::uint32_t connection() const noexcept = 0;
   /// Returns whether the client wants to be disconnected rather than skip a frame.
   [[nodiscard]] virtual bool every_frame() const noexcept { return false; }
@@ -65,21 +65,21 @@ class SenderClient {
                                    ChannelSet /*channels*/) const noexcept {
     return true;
   }
-  /// Whether one that is not wanted leaves a gap: it would have been, had it been ready for its
-  /// channel.
+  /// Returns true when a frame that is not wanted leaves a gap, because it would be wanted if it
+  /// had been ready for its channel.
   [[nodiscard]] virtual bool misses(const protocol::FrameHeader& /*header*/,
                                     ChannelSet /*channels*/) const noexcept {
     return false;
   }
-  /// Turns writable when a blocked client can go on.
+  /// Returns the descriptor that turns writable when a blocked client can go on.
   [[nodiscard]] virtual int fd() const noexcept { return -1; }
 
-  /// Accounts for the frame whose last byte left now.
+  /// Records the times of the frame whose last byte left now.
   void complete(std::int64_t now_ns) noexcept;
 
   [[nodiscard]] bool busy() const noexcept { return busy_; }
   [[nodiscard]] bool spilled() const noexcept { return spilled_; }
-  /// Header of the frame begun last, as this client gets it.
+  /// Returns the header of the frame begun last, as this client gets it.
   [[nodiscard]] const protocol::FrameHeader& header() const noexcept { return header_; }
   // The functions below describe the frame completed last. A frame without a host frame changes
   // nothing.
@@ -88,14 +88,14 @@ class SenderClient {
   [[nodiscard]] std::int64_t jitter_ns() const noexcept {
     return static_cast<std::int64_t>(jitter_ns_);
   }
-  /// |delay_ns() less the one before|; absent for the first, and without a host frame.
+  /// Returns |delay_ns() less the previous one|; absent for the first, and without a host frame.
   [[nodiscard]] std::optional<std::int64_t> delay_change_ns() const noexcept {
     return delay_change_ns_;
   }
-  /// Why send() failed; for the log.
+  /// Returns the reason why send() failed, for the log.
   [[nodiscard]] int error() const noexcept { return error_; }
 
-  // The sender's book-keeping.
+  // The sender keeps its records of the client in the members below.
   std::uint64_t next = 0;        ///< sequence of the next frame this client is to get
   std::uint64_t in_transit = 0;  ///< sequence of the one on its way, while busy
   bool gap = false;              ///< frames before `next` were skipped
@@ -104,9 +104,9 @@ class SenderClient {
   bool closing = false;          ///< ends as soon as the sender sees it
 
  protected:
-  /// Takes the common header over as this client's and marks it busy.
+  /// Copies the common header to this client and marks it busy.
   void start(const protocol::FrameHeader& header, std::int64_t now_ns) noexcept;
-  /// This client's header as it is for one channel.
+  /// Returns this client's header for one channel.
   [[nodiscard]] protocol::FrameHeader header_for(const Channel& channel,
                                                  const Image& image) const noexcept;
 

@@ -4,14 +4,15 @@
 #include <algorithm>
 #include <cstring>
 
+#include "emit/physics/check.hpp"
 #include "rt/futex.hpp"
 
 namespace emit::server {
 namespace {
 
 /// Largest number of bytes that one turn copies, so that the other clients advance beside it. It is
-/// more than a socket takes in a turn, because a copy to memory is the quickest of all and the
-/// client that is done first waits least.
+/// more than a socket takes in a turn, because a copy to memory is the quickest, and serving the
+/// quickest client first keeps waits short.
 constexpr std::size_t kTurnBytes = 2u << 20;
 constexpr std::size_t kBriefBytes = 64u << 10;
 
@@ -107,6 +108,7 @@ SenderClient::Progress ShmClient::send(UdpBatch& /*batch*/, Context& context, Tu
 }
 
 void ShmClient::spill() noexcept {
+  EMIT_CHECK(busy_);
   copy(SIZE_MAX);
   spilled_ = true;
 }

@@ -11,9 +11,9 @@
 
 namespace emit::server {
 
-/// Writes every frame, with all channels, while somebody reads, into a ring of shared memory,
-/// for clients on this host. Readers map it read-only: no reader, dead or alive, can delay or
-/// disturb anybody.
+/// Writes every frame with all channels into a ring of shared memory, for clients on this host. It
+/// writes only while somebody reads. Readers map the memory read-only: no reader, dead or alive,
+/// can delay or disturb anybody.
 ///
 /// Owner: the daemon. Thread: the sender's between construction and destruction.
 class ShmClient final : public SenderClient {
@@ -29,10 +29,10 @@ class ShmClient final : public SenderClient {
   void begin(const protocol::FrameHeader& header, const Image& image,
              std::int64_t now_ns) noexcept override;
   [[nodiscard]] Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept override;
-  /// Copies the rest now: that is all the source has to wait for.
+  /// Copies the rest at once, so that the source waits for no more than that.
   void spill() noexcept override;
   [[nodiscard]] std::uint32_t connection() const noexcept override { return 0; }
-  /// Nothing is copied that nobody reads.
+  /// Returns false while nobody reads, so that nothing is copied then.
   [[nodiscard]] bool wants(const protocol::FrameHeader& /*header*/,
                            ChannelSet /*channels*/) const noexcept override {
     return object_.has_readers();

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::server {
 namespace {
 
@@ -66,6 +68,7 @@ void SocketClient::begin(const protocol::FrameHeader& header, const Image& image
 }
 
 void SocketClient::take_encoded(std::span<const std::byte> bytes) noexcept {
+  EMIT_CHECK(waits_);
   waits_ = false;
   if (!bytes.empty()) {
     pixels_ = bytes;
@@ -221,6 +224,7 @@ void SocketClient::forget(std::uint64_t sequence) noexcept {
 }
 
 void SocketClient::spill() noexcept {
+  EMIT_CHECK(busy_);
   if (waits_) {
     take_encoded({});  // the pixels leave before they are encoded
   }

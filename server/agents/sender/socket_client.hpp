@@ -16,16 +16,16 @@
 
 namespace emit::server {
 
-/// One subscriber over TCP or UDP, who gets one channel.
+/// A subscriber over TCP or UDP that gets one channel.
 ///
-/// Made by the receiver with all memory, lent to the sender, given back when it ends.
+/// The receiver makes it with all memory. The sender borrows it and gives it back when it ends.
 class SocketClient final : public SenderClient {
  public:
   struct Params {
     std::uint32_t connection = 0;
     const Channel* channel = nullptr;
     bool every_frame = false;
-    std::uint32_t every_nth = 1;  ///< of the frames that the channel shows
+    std::uint32_t every_nth = 1;  ///< shows every n-th of the channel's frames
     bool udp = false;
     bool compression = false;         ///< tcp: waits for the encoded image
     TcpSocket* tcp_socket = nullptr;  ///< of the control connection; stays the receiver's
@@ -43,7 +43,7 @@ class SocketClient final : public SenderClient {
   void begin(const protocol::FrameHeader& header, const Image& image,
              std::int64_t now_ns) noexcept override;
   [[nodiscard]] Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept override;
-  /// Moves what is left of the frame into this client's own memory.
+  /// Moves the rest of the frame into this client's own memory.
   void spill() noexcept override;
   [[nodiscard]] bool may_ask_again() const noexcept override { return params_.resend_frames > 0; }
   [[nodiscard]] bool ask_again(const protocol::ResendRequest& request) noexcept override;
@@ -56,7 +56,7 @@ class SocketClient final : public SenderClient {
   [[nodiscard]] bool every_frame() const noexcept override { return params_.every_frame; }
   [[nodiscard]] bool wants(const protocol::FrameHeader& header,
                            ChannelSet channels) const noexcept override {
-    // A frame that was late for its number comes under another one.
+    // A frame that missed its number is shown under another one.
     return shows(channels) && (params_.every_nth == 1 || in_turn(header));
   }
   [[nodiscard]] bool misses(const protocol::FrameHeader& header,

@@ -34,8 +34,8 @@ using reference::SolidSolver;
 constexpr double kEmissivityFrac = 0.93;
 constexpr double kStartK = 290.0;
 
-/// An hour of a morning that starts in balance and without a kink, so that the order is that of the
-/// scheme and not of the start.
+/// Absorbed flux of an hour of a morning. It starts in balance and without a kink, so that the
+/// order is that of the scheme and not of the start.
 double absorbed_w_m2(double time_s) {
   const double swing = std::sin(time_s * physics::kPi / 7200.0);
   return physics::kStefanBoltzmannWPerM2K4 * kEmissivityFrac * std::pow(kStartK, 4) +
@@ -54,11 +54,11 @@ class Morning final : public reference::FaceModel {
   }
 };
 
-/// Asphalt on gravel on soil.
+/// The ground is asphalt on gravel on soil.
 const std::vector<reference::SolidLayer> kGround{
     {0.03, 0.7, 1.9504e6}, {0.3, 1.5, 1.9e6}, {1.55, 1.2, 2.2e6}};
 
-/// Temperatures at fixed places after the hour.
+/// Returns temperatures at fixed places after the hour.
 Result<std::vector<double>> layers_k(std::uint32_t refine, std::uint32_t steps) {
   reference::MeshOptions options;
   options.shortest_time_s = 100.0;
@@ -82,7 +82,8 @@ Result<std::vector<double>> layers_k(std::uint32_t refine, std::uint32_t steps) 
   return kelvin;
 }
 
-/// Ground half in the sun: a strip 0.32 m wide and 0.16 m deep, one cell across.
+/// Returns temperatures of ground half in the sun: a strip 0.32 m wide and 0.16 m deep, one cell
+/// across.
 Result<std::vector<double>> solid_k(std::uint32_t cells, std::uint32_t steps) {
   constexpr double kWidthM = 0.32;
   constexpr double kDepthM = 0.16;
@@ -113,7 +114,7 @@ Result<std::vector<double>> solid_k(std::uint32_t cells, std::uint32_t steps) {
   const reference::DriveFunction drive = [faces](double time_s, std::span<const double>,
                                                  const reference::FaceDrive& out) {
     for (std::size_t f = 0; f < faces.size(); ++f) {
-      // A smooth edge of light: what a grid cannot resolve has no order.
+      // The edge of light is smooth, because a function that a grid cannot resolve has no order.
       const double x = faces[f].centre_m().x / kWidthM;
       const double lit_frac = 0.5 - 0.5 * std::cos(physics::kPi * x);
       out.absorbed_w_m2[f] =
@@ -126,7 +127,7 @@ Result<std::vector<double>> solid_k(std::uint32_t cells, std::uint32_t steps) {
     auto done = solver->step(kEndS * i / steps, drive);
     if (!done) return tl::unexpected(std::move(done.error()));
   }
-  // Places that are nodes of every grid of this family.
+  // The places are nodes of every grid of this family.
   std::vector<double> kelvin;
   const auto places = solver->nodes_m();
   const auto on_coarsest = [](double x_m) {
@@ -148,7 +149,7 @@ struct Study {
   const char* unit;
   double size_at_one;  ///< step or cell of refinement 1
   std::vector<std::uint32_t> refinements;
-  std::uint32_t finest;  ///< stands for the truth
+  std::uint32_t finest;  ///< refinement of the reference
   std::function<Result<std::vector<double>>(std::uint32_t)> run;
 };
 
@@ -157,7 +158,7 @@ struct Row {
   std::uint32_t refinement = 0;
   double size = 0.0;
   double max_error_k = 0.0;
-  double order = 0.0;  ///< against the row before; NaN in the first
+  double order = 0.0;  ///< against the previous row; NaN in the first
 };
 
 Result<std::vector<Row>> converge(const Study& study, ProgressBar& progress, std::uint64_t& done) {

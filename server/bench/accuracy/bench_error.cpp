@@ -54,11 +54,12 @@ struct ErrorOptions {
 using Clock = std::chrono::steady_clock;
 using physics::Result;
 
-/// Spin-up of the scenarios that do not state one, so that every model is judged by one truth.
+/// Spin-up of the scenarios that do not state one, so that all models are compared with the same
+/// reference.
 constexpr std::int64_t kSpinUpNs = 172'800'000'000'000;
 
-/// Who computes temperatures: the renderer by either method, or a ray tracer (Embree) anew for
-/// every frame, with one ray to the sun per pixel and step.
+/// Model that computes temperatures: the renderer by either method, or a ray tracer (Embree) that
+/// starts anew for every frame, with one ray to the sun per pixel and step.
 enum class Method : std::uint8_t { per_frame, cached, embree };
 
 /// One point of the sweep.
@@ -126,7 +127,7 @@ std::vector<Setting> sweep(bool quick) {
   if (quick) return settings;
   for (const std::uint32_t count : {13U, 54U, 90U}) cached().steps = count;
   for (const double tolerance_k : {1.0, 0.3, 0.03}) cached().tolerance_k = tolerance_k;
-  // One thing at a time around foster, geometric, 27.
+  // The settings below change one parameter at a time from foster, geometric, 27.
   for (const std::uint32_t map_px : {256U, 512U, 2048U, 4096U}) {
     settings.emplace_back().shadow_map_px = map_px;
   }
@@ -141,7 +142,7 @@ std::vector<Setting> sweep(bool quick) {
 
 struct Shot {
   std::vector<float> temperature_k;
-  std::vector<float> radiance_w_m2_sr;  ///< none of a ray tracer
+  std::vector<float> radiance_w_m2_sr;  ///< empty for a ray tracer
   double frame_ms = 0.0;
   double warm_up_ms = 0.0;
   std::string device;  ///< empty: the CPU
@@ -206,7 +207,8 @@ Result<Shot> shoot(scene::ScenarioDesc scenario, const Setting& setting,
   return shot;
 }
 
-/// The time is that of the sun's rays alone: what sky and models take comes on top.
+/// Renders with the ray tracer. The time covers the sun's rays alone, without sky and thermal
+/// model.
 Result<Shot> trace(scene::ScenarioDesc scenario, const Setting& setting,
                    const reference::SolveView& view) {
   scenario.thermal.model = setting.model;
@@ -232,7 +234,7 @@ Result<Shot> trace(scene::ScenarioDesc scenario, const Setting& setting,
   return shot;
 }
 
-/// The truth of one scene and what every pixel is.
+/// Reference of one scene, with the class of every pixel.
 struct Truth {
   reference::SolvedImage image;
   reference::SolveReport report;
@@ -275,7 +277,8 @@ Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::
       {physics::Radians(scenario.place.lat_rad), physics::Radians(scenario.place.lon_rad),
        physics::Metres(scenario.place.height_m)});
   RegionOptions regions;
-  // Lateral conduction is in the three-dimensional truth alone: there its reach is set apart.
+  // Only the three-dimensional reference has lateral conduction: its reach is a region of its own
+  // there.
   if (truth.report.dimension == 3) {
     for (const scene::Material& material : geometry->materials) {
       if (!material.layers.empty()) {
@@ -300,8 +303,8 @@ struct Row {
   bool pareto = false;
 };
 
-/// No other setting of the same scene and region is both faster and more accurate. A ray tracer
-/// stands aside: its time lacks a part.
+/// Marks the rows for which no other setting of the same scene and region is both faster and more
+/// accurate. A ray tracer is left out, because its time lacks a part.
 void mark_pareto(std::vector<Row>& rows) {
   const auto counts = [](const Row& row) {
     return row.kelvin.pixels > 0 && row.setting.method != Method::embree;
@@ -424,7 +427,7 @@ Plot plot_of(const std::string& scene, const std::vector<Row>& rows) {
   return plot;
 }
 
-/// What the suite has found so far.
+/// Results of the suite so far.
 struct Findings {
   std::vector<Row> rows;
   std::map<std::string, std::string> reference_text;  ///< by scene
@@ -432,14 +435,14 @@ struct Findings {
   TextTable references{{"scene", "reference", "pixels", "solve s", "edge band m"}};
 };
 
-/// The setting that the figures of every scene show.
+/// Returns true for the setting that the figures of every scene show.
 bool is_standard(const Setting& setting) {
   return setting.steps == 27 && setting.spacing == scene::StepSpacing::geometric &&
          setting.shadow_map_px == 1024 && setting.filter_taps == 32 && setting.modes == 0 &&
          setting.tolerance_k == 0.1 && setting.lateral;
 }
 
-/// The shipped scenario as this suite looks at it. Errors: config.
+/// Loads the shipped scenario with the changes of this suite. Errors: config.
 Result<scene::ScenarioDesc> suite_scenario(const std::string& name, const ErrorOptions& command) {
   auto scenario = load_scenario_choice({name, {}});
   if (!scenario) return scenario;
@@ -454,7 +457,7 @@ Result<scene::ScenarioDesc> suite_scenario(const std::string& name, const ErrorO
   return scenario;
 }
 
-/// One row per region.
+/// Adds one row per region.
 void add_rows(const std::string& scene, const Setting& setting, const Shot& shot,
               const Truth& truth, std::vector<Row>& rows) {
   for (std::size_t r = 0; r < kRegions.size(); ++r) {
@@ -474,7 +477,7 @@ void add_rows(const std::string& scene, const Setting& setting, const Shot& shot
   }
 }
 
-/// The reference of one scene and all settings against it.
+/// Computes the reference of one scene and compares all settings with it.
 Result<void> run_scene(const std::string& name, const std::vector<Setting>& settings,
                        const ErrorOptions& command, Findings& findings) {
   const auto scenario = suite_scenario(name, command);
@@ -532,7 +535,7 @@ TextTable table_of(const std::vector<Row>& rows) {
   return table;
 }
 
-/// The files that the command line asks for.
+/// Writes the files that the command line asks for.
 Result<void> write_files(const std::vector<std::string>& scenes, const ErrorOptions& command,
                          const Findings& findings) {
   if (command.csv) {

@@ -7,10 +7,13 @@
 #include <cmath>
 #include <cstddef>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::tool {
 namespace {
 
-/// Above it a surface belongs to the figure: far over float depth's error, far under its height.
+/// Height above which a surface belongs to the figure: far above the error of float depth, far
+/// below its height.
 constexpr double kGroundM = 0.02;
 constexpr double kSweptK = 1.0;
 
@@ -18,6 +21,9 @@ constexpr double kSweptK = 1.0;
 
 SceneFill measure_fill(const scene::SensorDesc& sensor, const physics::Pose& pose,
                        std::span<const float> depth_m, std::span<const float> temperature_k) {
+  const std::size_t count = std::size_t{sensor.width_px} * sensor.height_px;
+  EMIT_CHECK_OP(depth_m.size(), ==, count);
+  EMIT_CHECK_OP(temperature_k.size(), ==, count);
   const double scale = 2.0 * std::tan(0.5 * sensor.fov_h_rad) / sensor.width_px;
   const glm::dvec3 forward = pose.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
   const glm::dvec3 right = pose.world_from_body * glm::dvec3(0.0, 1.0, 0.0);

@@ -12,37 +12,41 @@
 
 namespace emit::tool {
 
-/// How the benchmark scene fills the picture, as shares of all its pixels.
+/// Shares of all pixels of the image that parts of the benchmark scene fill.
 struct SceneFill {
   double surface_frac = 0.0;  ///< anything but sky
-  double figure_frac = 0.0;   ///< what rises above the ground plane z = 0
-  /// Ground more than 1 K below the warmest ground in the picture: shaded now or some time before.
+  double figure_frac = 0.0;   ///< all that rises above the ground plane z = 0
+  /// Ground more than 1 K below the warmest ground in the image: shaded now or some time before.
   double swept_ground_frac = 0.0;
 };
 
-/// What the published tables ask of a picture. The figure counts for the statue alone.
+/// Smallest shares that the published tables require of an image. The figure counts for the statue
+/// alone.
 inline constexpr double kLeastSurfaceFrac = 0.80;
 inline constexpr double kLeastFigureFrac = 0.25;
 inline constexpr double kLeastSweptFrac = 0.15;
-/// Of every picture, and of those whose error is computed.
+/// Smallest size of every image, and the smallest number of pixels whose error is computed.
 inline constexpr std::uint32_t kLeastWidthPx = 1024;
 inline constexpr std::uint32_t kLeastHeightPx = 768;
 inline constexpr std::uint32_t kLeastErrorPixels = 20'000;
-/// A per-frame picture may take this many times what Embree takes to trace its history's steps.
+/// Largest ratio of the time of a per-frame image to the time in which Embree traces the steps of
+/// its history.
 inline constexpr double kMostEmbreeRatio = 6.0;
 
-/// Shares in one picture. `depth_m` along the boresight, +Inf in the sky; `temperature_k` as
-/// rendered. Precondition: both have width_px * height_px values.
+/// Measures the shares in one image. `depth_m` is the distance along the boresight, +Inf in the
+/// sky; `temperature_k` is as rendered.
+/// @pre both have width_px * height_px values
 [[nodiscard]] SceneFill measure_fill(const scene::SensorDesc& sensor, const physics::Pose& pose,
                                      std::span<const float> depth_m,
                                      std::span<const float> temperature_k);
 
-/// The smallest shares over some frames: the camera and the clock move.
+/// Returns the smaller of each share, for frames between which the camera and the clock move.
 [[nodiscard]] SceneFill least_of(const SceneFill& a, const SceneFill& b) noexcept;
 
-/// One line per rule that is not met; empty when all are.
+/// Returns one line per rule that the image breaks; empty when it meets all.
 [[nodiscard]] std::vector<std::string> broken_rules(const SceneFill& fill, bool statue);
-/// Of what a run is asked for. `error_pixels` per picture; none where no error is computed.
+/// Returns one line per rule that the options of a run break. `error_pixels` is the number per
+/// image; empty where no error is computed.
 [[nodiscard]] std::vector<std::string> broken_rules(std::uint32_t width_px, std::uint32_t height_px,
                                                     std::optional<std::uint32_t> error_pixels);
 

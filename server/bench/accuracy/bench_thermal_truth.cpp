@@ -38,8 +38,8 @@ using physics::make_error;
 using physics::Result;
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-// 08:00 local time the history begins with the vehicle parked; it drives off after three hours and
-// the picture shows its print two minutes later.
+// The history begins at 08:00 local time with the vehicle parked. It drives off after three hours,
+// and the image shows its print two minutes later.
 constexpr std::int64_t kLeavesNs = 10'800 * kSecondNs;
 constexpr std::int64_t kAwayNs = kLeavesNs + 10 * kSecondNs;
 constexpr std::int64_t kShownNs = kLeavesNs + 120 * kSecondNs;
@@ -49,11 +49,12 @@ constexpr std::int64_t kLongestStepS = 200;
 constexpr double kDriveM = 120.0;
 const glm::dvec3 kBoxLowM{-3.0, -1.25, 0.0};
 const glm::dvec3 kBoxHighM{3.0, 1.25, 2.5};
-/// Intervals of the history in double: 5 s each.
+/// Number of intervals of the history in double: 5 s each.
 constexpr std::uint32_t kTrueSteps = 2184;
-/// Rays over the sun's disc.
+/// Number of rays over the sun's disc.
 constexpr int kDiscRays = 24;
-/// Too small to cover a neighbouring pixel: the sky factor is that of a flat face.
+/// Obscurance radius that is too small to cover a neighbouring pixel: the sky factor is that of a
+/// flat face.
 constexpr double kNoObscuranceM = 1e-6;
 
 /// One row; errors in kelvin over pixels.
@@ -74,7 +75,8 @@ class ThermalTruth {
       return fail(physics::Error{ErrorCode::io, "no temporary folder can be created"});
     }
     using Step = Result<void> (ThermalTruth::*)();
-    // The cached method knows that the vehicle hides part of the sky: so must its judge.
+    // The cached method knows that the vehicle hides part of the sky, so its reference must know
+    // too.
     const Step print = cached() ? &ThermalTruth::fading_print : &ThermalTruth::parked_and_left;
     for (const Step step :
          {&ThermalTruth::split, &ThermalTruth::moved_camera, print, &ThermalTruth::restart}) {
@@ -88,7 +90,7 @@ class ThermalTruth {
   static constexpr std::uint64_t kWork = 39;
 
   [[nodiscard]] bool cached() const { return command_.method == "cached"; }
-  /// Ground and a vehicle that stood there since the history began.
+  /// Makes ground and a vehicle that stood there since the history began.
   Result<scene::ScenarioDesc> parking_lot();
   [[nodiscard]] physics::Pose camera() const {
     return looking_at({4.0, -12.0, 9.0}, {0.0, 1.5, 0.0});
@@ -167,13 +169,13 @@ void ThermalTruth::compare(const StoredFrame& a, const StoredFrame& b, Samples& 
   for (std::size_t i = 0; i < a.temperature_k.size(); ++i) {
     if (!(a.object_id[i] > 0.0F && b.object_id[i] > 0.0F)) continue;
     const double error_k = std::abs(static_cast<double>(a.temperature_k[i]) - b.temperature_k[i]);
-    // NaN must not pass for agreement.
+    // An error of NaN must not pass for agreement.
     errors.add(std::isfinite(error_k) ? error_k : std::numeric_limits<double>::infinity());
   }
 }
 
-/// Frames with ever more steps against the one with the fewest. Under a sky that does not change
-/// more steps are pure splitting; under the sun they also sample sun and shade more finely.
+/// Compares frames with ever more steps with the frame with the fewest. Under a constant sky more
+/// steps only split intervals. Under the sun they also sample sun and shade more finely.
 Result<void> ThermalTruth::split_frames(bool overcast, const std::vector<std::uint32_t>& steps,
                                         Samples& errors) {
   auto scenario = parking_lot();
@@ -203,8 +205,8 @@ Result<void> ThermalTruth::split_frames(bool overcast, const std::vector<std::ui
 }
 
 Result<void> ThermalTruth::split() {
-  // Equilibria of faces in the sun, in the shade and with shade that comes and goes, at the nodes
-  // of the renderer's own intervals.
+  // The equilibria are those of faces in the sun, in the shade and with intermittent shade, at the
+  // nodes of the renderer's own intervals.
   auto scenario = parking_lot();
   if (!scenario) return tl::unexpected(std::move(scenario.error()));
   constexpr std::uint32_t kNodes = 27;
@@ -299,7 +301,7 @@ Result<void> ThermalTruth::moved_camera() {
   return {};
 }
 
-/// Whether a ray from `p` along `d` meets the vehicle's box moved by `shift_m` east.
+/// Returns true when a ray from `p` along `d` meets the vehicle's box moved by `shift_m` east.
 bool meets_box(const glm::dvec3& p, const glm::dvec3& d, double shift_m) {
   double near = 0.0;
   double far = std::numeric_limits<double>::infinity();
@@ -372,7 +374,7 @@ Result<void> ThermalTruth::parked_and_left() {
   const std::size_t width = frame->width_px;
   std::vector<double> fractions(history.intervals());
   for (std::size_t i = 0; i < frame->temperature_k.size(); ++i) {
-    // Every third pixel both ways, the ground alone.
+    // Only every third pixel of the ground counts, in both directions.
     if (frame->object_id[i] != 1.0F || (i % width) % kStride != 0 || (i / width) % kStride != 0) {
       continue;
     }
@@ -383,7 +385,7 @@ Result<void> ThermalTruth::parked_and_left() {
     const double error_k = std::abs(frame->temperature_k[i] - truth_k);
     row.errors_k.add(error_k);
     deepest_k = std::max(deepest_k, never_shaded_k - truth_k);
-    // All the time until it left, never, or something in between.
+    // The place was shaded all the time until the vehicle left, never, or part of the time.
     const auto parked =
         static_cast<std::size_t>(static_cast<double>(fractions.size()) *
                                  static_cast<double>(kLeavesNs) / static_cast<double>(kShownNs));
@@ -407,8 +409,8 @@ Result<void> ThermalTruth::parked_and_left() {
   return {};
 }
 
-/// One renderer that runs on from before the vehicle left: samples are those of the parked
-/// vehicle's shade, while the sun wanders on.
+/// Runs one renderer from before the vehicle left. Its samples follow the parked vehicle's shade,
+/// while the sun moves on.
 Result<void> ThermalTruth::fading_print() {
   const auto scenario = parking_lot();
   if (!scenario) return tl::unexpected(scenario.error());

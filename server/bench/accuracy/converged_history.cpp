@@ -17,7 +17,7 @@ namespace {
 
 using physics::Result;
 
-/// A point to solve for.
+/// Point to solve for.
 struct Sample {
   ConvergedPixel result;
   PixelSurface surface;
@@ -42,8 +42,8 @@ Sample sample_pixel(const reference::SceneInstant& scene, const reference::Solve
   return sample;
 }
 
-/// Pixels in the order of the additive sequence of the plastic number, each once: any first part of
-/// them covers the picture evenly.
+/// Returns the pixels in the order of the additive sequence of the plastic number, each once. Every
+/// first part of them covers the image evenly.
 std::vector<std::uint32_t> even_order(std::uint32_t width_px, std::uint32_t height_px) {
   constexpr double kStepX = 0.7548776662466927;
   constexpr double kStepY = 0.5698402909980532;
@@ -70,7 +70,8 @@ std::vector<std::uint32_t> even_order(std::uint32_t width_px, std::uint32_t heig
   return order;
 }
 
-/// Surface pixels until `wanted` of them lie away from outlines; those near one come along.
+/// Returns surface pixels until `wanted` of them lie away from outlines. The pixels near outlines
+/// come along.
 std::vector<Sample> choose_samples(const reference::SceneInstant& scene,
                                    const reference::SolveView& view, std::uint32_t wanted) {
   const std::vector<std::uint32_t> order = even_order(view.width_px, view.height_px);

@@ -15,15 +15,16 @@
 namespace emit::tool {
 
 struct ConvergedOptions {
-  /// Surface pixels away from outlines, spread evenly over the picture. A picture that has fewer is
+  /// Surface pixels away from outlines, spread evenly over the image. An image that has fewer is
   /// taken whole.
   std::uint32_t pixels = 20'000;
-  /// Intervals of the history, uniform, 1 or more. Where a caster moves they are cut finer.
+  /// Number of uniform intervals of the history, 1 or more. Intervals in which an entity moves are
+  /// cut finer.
   std::uint32_t steps = 1440;
   std::uint32_t sun_rays = 64;  ///< over the sun's disc
-  /// Over the hemisphere; 256 would leave 0.05 K RMS on a statue's folds.
+  /// Rays over the hemisphere; 256 would leave 0.05 K RMS on a statue's folds.
   std::uint32_t sky_rays = 4096;
-  /// Called now and then with the share done; false stops. May be empty.
+  /// Called now and then with the share done. It returns false to stop. May be empty.
   std::function<bool(double done_frac)> progress;
 };
 
@@ -34,9 +35,9 @@ struct ConvergedPixel {
   bool outline = false;  ///< an outline passes within a pixel
 };
 
-/// Temperatures that the scenario's own thermal model takes with time steps short enough not to
-/// matter, and with sun and sky by rays against every triangle: what is left out of the model stays
-/// out, what is lost by its steps and by its visibility does not. Owner: the caller; setup class.
+/// Temperatures by the scenario's own thermal model with converged time steps, and with sun and sky
+/// by rays against every triangle. Errors of the model itself remain. Errors of its steps and of
+/// its visibility do not. Owner: the caller; setup class.
 class ConvergedHistory {
  public:
   /// Loads the scene. `scenario` gives model, materials and history; steps, spacing and method of
@@ -44,13 +45,14 @@ class ConvergedHistory {
   [[nodiscard]] static physics::Result<ConvergedHistory> create(
       const scene::ScenarioDesc& scenario);
 
-  /// At the points that the pixels' centres see, in order of pixel; points of a moving body are
-  /// followed back with it. The same whatever the number of threads. Errors: config (materials),
-  /// invalid_argument (before the history's start), io (stopped by `progress`).
+  /// Computes temperatures at the points that the pixels' centres see, in order of pixel. Points of
+  /// a moving entity are followed back with it. The result does not depend on the number of
+  /// threads. Errors: config (materials), invalid_argument (before the history's start), io
+  /// (stopped by `progress`).
   [[nodiscard]] physics::Result<std::vector<ConvergedPixel>> picture(
       const reference::SolveView& view, const ConvergedOptions& options) const;
 
-  /// One line for a report.
+  /// Returns one line for a report.
   [[nodiscard]] std::string describe(const ConvergedOptions& options) const;
 
  private:

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 
+#include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
 #include "emit/physics/equilibrium.hpp"
 #include "emit/physics/surface_balance.hpp"
@@ -16,9 +17,9 @@ namespace {
 using physics::Result;
 using renderer::SurfaceForcing;
 
-/// Step of the spin-up: nothing shades it, so one step of second order does.
+/// Step of the spin-up. Nothing shades it, so a step of second order may be long.
 constexpr std::int64_t kSpinUpStepNs = 120'000'000'000;
-/// Error of an interval of the history that halves its steps once more.
+/// Error above which an interval of the history halves its steps once more.
 constexpr double kToleranceK = 1e-3;
 constexpr std::size_t kMaxModes = 2;
 
@@ -26,7 +27,7 @@ double direct_on_face_w_m2(const SurfaceForcing& f, const PointView& view) noexc
   return view.sun_frac * std::max(0.0, glm::dot(view.normal, f.sun_w_m2));
 }
 
-/// physics.md eq. 1 and 4.
+/// Computes eq. 1 and 4 of physics.md.
 double equilibrium_k(const SurfaceForcing& f, const PointView& view,
                      const scene::Material& material) noexcept {
   physics::SurfaceFluxes<double> in;
@@ -51,7 +52,7 @@ double equilibrium_k(const SurfaceForcing& f, const PointView& view,
       .temperature_k;
 }
 
-/// physics.md eq. 16.
+/// Computes eq. 16 of physics.md.
 physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& view,
                                    const renderer::FosterMaterial& material) noexcept {
   const double around_frac = 1.0 - view.sky_frac;
@@ -123,6 +124,7 @@ const glm::dvec3& ConvergedModel::sun_w_m2(std::size_t node) const noexcept {
 
 double ConvergedModel::temperature_k(std::uint32_t material,
                                      std::span<const PointView> view) const {
+  EMIT_CHECK_OP(view.size(), ==, node_count());
   if (materials_[material].prescribed_k) return *materials_[material].prescribed_k;
   return model_ == scene::ThermalModel::foster ? foster_k(material, view)
                                                : relaxed_k(material, view);

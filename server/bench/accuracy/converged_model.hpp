@@ -13,28 +13,33 @@
 
 namespace emit::tool {
 
-/// What a surface point sees at an instant.
+/// Sun and sky that a surface point sees at an instant.
 struct PointView {
   glm::dvec3 normal{0.0, 0.0, 1.0};
   double sun_frac = 0.0;  ///< of the sun's disc
   double sky_frac = 0.0;  ///< emit2014: of the full sphere; foster: cosine-weighted
 };
 
-/// The renderer's thermal models in double, with time steps of one's own: their formulas without
-/// the renderer's shadow maps and history steps. Immutable: any number of threads.
+/// The renderer's thermal models in double, with other time steps: their formulas without the
+/// renderer's shadow maps and history steps. Immutable: any number of threads.
 class ConvergedModel {
  public:
-  /// Unshadowed from the spin-up's start on (foster alone), then over the intervals between
-  /// `nodes_ns`, the first of which is the history's start. Errors: config (materials).
+  /// Integrates from the spin-up's start on without shadows (foster alone), then over the intervals
+  /// between `nodes_ns`, the first of which is the history's start. Errors: config (materials).
   [[nodiscard]] static physics::Result<ConvergedModel> create(
       const scene::ScenarioDesc& scenario, std::span<const scene::Material> materials,
       std::span<const std::int64_t> nodes_ns);
 
-  /// Temperature at the last node, K. What is seen is linear between the nodes, and so is the flux
-  /// it lets through (foster) or the equilibrium it leads to (emit2014). @pre one view per node
+  /// Number of nodes of the history, those given to create().
+  [[nodiscard]] std::size_t node_count() const noexcept { return forcing_.size() + 1 - history_; }
+
+  /// Returns the temperature at the last node, K. The visible shares are linear between the nodes,
+  /// and so is the flux they let through (foster) or the equilibrium they lead to (emit2014).
+  /// @pre one view per node
   [[nodiscard]] double temperature_k(std::uint32_t material, std::span<const PointView> view) const;
 
-  /// Direct sun at a node, W/m2 across its direction; towards the sun. Zero at night.
+  /// Returns the direct sun at a node, W/m2 across its direction. The vector points towards the
+  /// sun. Zero at night.
   [[nodiscard]] const glm::dvec3& sun_w_m2(std::size_t node) const noexcept;
 
  private:

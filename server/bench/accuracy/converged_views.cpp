@@ -6,17 +6,20 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::tool {
 namespace {
 
-/// The sun's disc moves by half its width in 64 s: what passes before it is seen from one of two
-/// looks that are no further apart than this.
+/// Longest time between two traced nodes. The sun's disc moves by half its width in 64 s, so an
+/// occluder is seen at one of two such nodes.
 constexpr std::int64_t kLookNs = 70'000'000'000;
-/// Steps while a caster moves.
+/// Length of a step while an entity moves.
 constexpr std::int64_t kMovingStepNs = 500'000'000;
-/// First rays over the disc; where they do not agree, all are traced.
+/// Number of first rays over the disc. All rays are traced where these do not agree.
 constexpr std::uint32_t kFirstRays = 16;
-/// A mover farther away leaves a point's view of the sky as it was; a nearer one may move this far.
+/// Distance beyond which a moving entity leaves a point's view of the sky unchanged. A nearer one
+/// may move and turn by the two values below.
 constexpr double kMoverReachM = 25.0;
 constexpr double kMoverShiftM = 0.25;
 constexpr double kMoverTurnCos = 0.9998;  // of half the angle
@@ -35,7 +38,7 @@ ConvergedViews::ConvergedViews(const reference::RayScene& scene, std::int64_t st
   choose_nodes(start_ns, end_ns, extra_ns);
   instants_.reserve(nodes_ns_.size());
   for (const std::int64_t t : nodes_ns_) instants_.push_back(scene_.at(t));
-  // While something moves every node is looked at.
+  // Every node is traced while something moves.
   const std::int64_t step_ns = std::max<std::int64_t>(1, (end_ns - start_ns) / options_.steps);
   coarse_.push_back(0);
   for (std::size_t i = 1; i < nodes_ns_.size(); ++i) {
@@ -118,7 +121,8 @@ double ConvergedViews::sun_frac(const PixelSurface& point, const ConvergedModel&
   return instants_[node].sun_visible_frac(here.point, to_sun, query).value_frac;
 }
 
-/// Nodes between two that are known: all alike where those see all of the sun or nothing of it.
+/// Fills the nodes between two known ones. All are alike where those see all of the sun or nothing
+/// of it.
 void ConvergedViews::fill_sun(const PixelSurface& point, const ConvergedModel& model,
                               std::size_t first, std::size_t last,
                               std::span<PointView> view) const {
@@ -175,6 +179,8 @@ void ConvergedViews::fill_sky(const PixelSurface& point, std::span<PointView> vi
 
 void ConvergedViews::see(const PixelSurface& point, const ConvergedModel& model,
                          std::span<PointView> view) const {
+  EMIT_CHECK_OP(view.size(), ==, nodes_ns_.size());
+  EMIT_CHECK_OP(model.node_count(), ==, nodes_ns_.size());
   fill_sky(point, view);
   for (const std::size_t node : coarse_) view[node].sun_frac = sun_frac(point, model, node);
   for (std::size_t i = 1; i < coarse_.size(); ++i) {

@@ -12,7 +12,8 @@
 
 namespace emit::tool {
 
-/// What surface points see at each node of a history, by rays. Immutable: any number of threads.
+/// Views of sun and sky from surface points at each node of a history, by rays. Immutable: any
+/// number of threads.
 class ConvergedViews {
  public:
   struct Options {
@@ -22,21 +23,22 @@ class ConvergedViews {
     bool uniform_sky = false;  ///< share of the full sphere instead of the cosine-weighted one
   };
 
-  /// From `start_ns` to `end_ns`, of which `extra_ns` must be nodes. The scene must outlive it.
+  /// Chooses the nodes from `start_ns` to `end_ns`; `extra_ns` become nodes as well. The caller
+  /// keeps the scene alive.
   ConvergedViews(const reference::RayScene& scene, std::int64_t start_ns, std::int64_t end_ns,
                  std::span<const std::int64_t> extra_ns, const Options& options);
 
   [[nodiscard]] std::span<const std::int64_t> nodes_ns() const noexcept { return nodes_ns_; }
 
-  /// One entry per node. The point stands where it does at the last node. @pre as many views as
-  /// nodes; `model` has these nodes
+  /// Computes one entry per node. The point is given where it lies at the last node.
+  /// @pre as many views as nodes; `model` has these nodes
   void see(const PixelSurface& point, const ConvergedModel& model, std::span<PointView> view) const;
 
  private:
-  /// A point as it was at a node.
+  /// Position of a point at a node.
   struct Placed {
     reference::SurfacePoint point;
-    bool absent = false;  ///< its body was not there
+    bool absent = false;  ///< its entity was not in the scene
   };
 
   void choose_nodes(std::int64_t start_ns, std::int64_t end_ns,

@@ -12,18 +12,19 @@
 
 namespace emit::tool {
 
-/// How long a ray tracer (Embree, float32, packets of 16, all cores) takes for what the per-frame
-/// method does with one shadow map: whether the sun is seen, one ray for every surface pixel.
-/// Neither the pixels' points nor the thermal model are in that time. Owner: the caller.
+/// Time of a ray tracer (Embree, float32, packets of 16, all cores) for the work that the per-frame
+/// method does with one shadow map: visibility of the sun, with one ray for every surface pixel.
+/// The time covers neither the pixels' points nor the thermal model. Owner: the caller.
 class EmbreeYardstick {
  public:
-  /// Loads the scene and finds the points that the picture shows. Errors: those of
+  /// Loads the scene and finds the points that the image shows. Errors: those of
   /// scene::load_scene().
   [[nodiscard]] static physics::Result<EmbreeYardstick> create(const scene::ScenarioDesc& scenario,
                                                                const reference::SolveView& view);
 
-  /// One sample per daylight step of a history cut into `steps` equal intervals up to the picture's
-  /// instant, ms; empty where the sun never shines. The casters stand where they stood.
+  /// Returns one sample per daylight step of a history cut into `steps` equal intervals up to the
+  /// image's instant, ms; empty where the sun never shines. Entities stand where they stood at each
+  /// step.
   [[nodiscard]] Samples step_ms(std::uint32_t steps) const;
 
  private:

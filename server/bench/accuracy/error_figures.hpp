@@ -11,9 +11,9 @@
 
 namespace emit::tool {
 
-/// Pictures that show where a model errs: temperatures of the truth and of each model side by side,
-/// their differences, and temperature profiles along one row and one column of the picture. Setup
-/// only. The truth must outlive the object.
+/// Figures that show where a model errs: temperatures of the reference and of each model side by
+/// side, their differences, and temperature profiles along one row and one column of the image.
+/// Setup only. The caller keeps the reference alive.
 class ErrorFigures {
  public:
   ErrorFigures(std::string scene, const reference::SolveView& view,
@@ -22,8 +22,8 @@ class ErrorFigures {
 
   void add(std::string model, std::span<const float> temperature_k);
 
-  /// SCENE_images.png (truth, models; below them the differences on a scale of +-3 K) and
-  /// SCENE_profiles.svg. Errors: io.
+  /// Writes SCENE_images.png (reference, models; below them the differences on a scale of +-3 K)
+  /// and SCENE_profiles.svg. Errors: io.
   [[nodiscard]] physics::Result<void> write(const std::filesystem::path& directory,
                                             const scene::DisplayOptions& display) const;
 
@@ -32,7 +32,7 @@ class ErrorFigures {
     std::string model;
     std::vector<float> temperature_k;
   };
-  /// Row and column with the largest spread of true temperatures.
+  /// Finds the row and column with the largest spread of reference temperatures.
   void choose_lines(std::uint32_t& row, std::uint32_t& column) const;
 
   std::string scene_;

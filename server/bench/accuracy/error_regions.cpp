@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "bench/accuracy/pixel_surface.hpp"
+#include "emit/physics/check.hpp"
 
 namespace emit::tool {
 namespace {
@@ -65,7 +66,8 @@ std::vector<PixelSurface> trace(const reference::SceneInstant& scene,
   return pixels;
 }
 
-/// Whether an edge of a body, a foot or an outline runs between two neighbouring pixels.
+/// Returns true when an edge of an object, a foot or an outline runs between two neighbouring
+/// pixels.
 bool is_edge(const PixelSurface& a, const PixelSurface& b, double width_rad) {
   if (is_outline(a, b, width_rad)) return true;
   return a.surface && glm::dot(a.normal, b.normal) < kCreaseCos;
@@ -167,6 +169,8 @@ std::array<std::vector<std::uint8_t>, kRegions.size()> classify_pixels(
 
 ErrorSummary summarize_error(std::span<const float> picture, std::span<const float> truth,
                              std::span<const std::uint8_t> mask, bool relative) {
+  EMIT_CHECK_OP(picture.size(), ==, truth.size());
+  EMIT_CHECK_OP(mask.size(), ==, truth.size());
   ErrorSummary summary;
   std::vector<double> errors;
   double sum = 0.0;

@@ -13,32 +13,32 @@
 
 namespace emit::tool {
 
-/// Parts of a picture whose errors have different causes and are reported apart.
+/// Parts of an image whose errors have different causes and are reported apart.
 enum class Region : std::uint8_t {
   all,       ///< every surface pixel
   sunlit,    ///< the whole sun is seen, away from shadow boundaries and edges
   core,      ///< none of the sun is seen, away from shadow boundaries and edges
   penumbra,  ///< part of the sun is seen, or a shadow boundary is near; away from edges
-  edges      ///< near an edge, a corner or a foot of a body, or an outline in the picture
+  edges      ///< near an edge, a corner or a foot of an object, or an outline in the image
 };
 inline constexpr std::array<Region, 5> kRegions{Region::all, Region::sunlit, Region::core,
                                                 Region::penumbra, Region::edges};
 [[nodiscard]] std::string_view name_of(Region region) noexcept;
 
 struct RegionOptions {
-  /// Distance from an edge within which lateral conduction counts: a layer's thickness. 0: only the
-  /// pixels that touch one.
+  /// Distance from an edge within which lateral conduction counts: a layer's thickness. With 0 only
+  /// the pixels that touch an edge count.
   double edge_m = 0.0;
-  double shadow_boundary_m = 0.05;  ///< from a partly lit point
+  double shadow_boundary_m = 0.05;  ///< distance from a partly lit point
 };
 
-/// One mask per entry of kRegions, each as long as the picture. Rays through the pixels' centres
-/// find point and normal; `to_sun` with the sun below the horizon makes every pixel core.
+/// Returns one mask per entry of kRegions, each as long as the image. Rays through the pixels'
+/// centres find point and normal. If `to_sun` is below the horizon, every pixel is core.
 [[nodiscard]] std::array<std::vector<std::uint8_t>, kRegions.size()> classify_pixels(
     const reference::SceneInstant& scene, const reference::SolveView& view,
     const glm::dvec3& to_sun, const RegionOptions& options);
 
-/// Differences of a picture to the truth over a mask.
+/// Differences of an image to the reference over a mask.
 struct ErrorSummary {
   std::uint64_t pixels = 0;
   std::uint64_t not_finite =
@@ -48,7 +48,8 @@ struct ErrorSummary {
   double p99 = 0.0;
   double mean = 0.0;  ///< signed
 };
-/// Absolute differences, or relative to the truth. Pixels whose truth is not finite do not count.
+/// Computes absolute differences, or differences relative to the reference. Pixels whose reference
+/// is not finite do not count.
 /// @pre equal sizes
 [[nodiscard]] ErrorSummary summarize_error(std::span<const float> picture,
                                            std::span<const float> truth,

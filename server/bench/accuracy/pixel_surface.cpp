@@ -9,7 +9,7 @@
 namespace emit::tool {
 namespace {
 
-/// A step in depth beyond the tangent plane, in footprints of a pixel.
+/// Smallest step in depth beyond the tangent plane, in footprints of a pixel.
 constexpr double kStepPx = 3.0;
 
 }  // namespace
@@ -44,8 +44,8 @@ bool is_outline(const PixelSurface& a, const PixelSurface& b, double width_rad) 
   if (a.surface != b.surface) return true;
   if (!a.surface) return false;
   if (a.object != b.object) return true;
-  // Along either normal: where a body turns away from the eye its own is next to square to the way
-  // to what lies behind it.
+  // The step is measured along either normal. The normal of a surface that turns away from the eye
+  // is nearly square to the way to the surface behind it.
   const glm::dvec3 way_m = b.position_m - a.position_m;
   const double step_m =
       std::max(std::abs(glm::dot(way_m, a.normal)), std::abs(glm::dot(way_m, b.normal)));

@@ -8,7 +8,7 @@
 
 namespace emit::tool {
 
-/// What the ray through a pixel's centre meets.
+/// Surface point that the ray through a pixel's centre meets.
 struct PixelSurface {
   bool surface = false;  ///< false: sky
   std::uint32_t object = 0;
@@ -23,11 +23,11 @@ struct PixelSurface {
                                        const reference::SolveView& view, std::uint32_t column,
                                        std::uint32_t row);
 
-/// Angle that a pixel in the middle of the picture covers.
+/// Returns the angle that a pixel in the middle of the image covers.
 [[nodiscard]] double pixel_rad(const reference::SolveView& view) noexcept;
 
-/// Whether an outline runs between two neighbouring pixels: another object, or a step in depth
-/// beyond the tangent plane.
+/// Returns true when an outline runs between two neighbouring pixels: another object, or a step in
+/// depth beyond the tangent plane.
 [[nodiscard]] bool is_outline(const PixelSurface& a, const PixelSurface& b,
                               double width_rad) noexcept;
 

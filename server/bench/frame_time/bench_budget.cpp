@@ -40,7 +40,7 @@ using physics::make_error;
 using physics::Result;
 using Clock = std::chrono::steady_clock;
 
-/// One flight within one budget.
+/// Result of one flight within one budget.
 struct Row {
   double budget_frac = 0.0;  ///< of the free-running median
   double budget_ms = 0.0;
@@ -54,7 +54,7 @@ struct Row {
   std::vector<std::size_t> of_rung;
 };
 
-/// The scenario's own flight, again and again; the thermal clock runs on.
+/// The scenario's own flight, which repeats. The thermal clock runs on.
 class Flight {
  public:
   static Result<Flight> create(const BudgetOptions& command) {
@@ -97,7 +97,7 @@ class Flight {
     return ready;
   }
 
-  /// At full quality.
+  /// Renders the flight at full quality.
   Result<Samples> free_run() {
     Samples frame_ms;
     for (std::uint32_t i = 0; i < frames_; ++i) {

@@ -36,10 +36,11 @@ struct CrowdOptions {
 
 using physics::Result;
 
-/// What a frame may take of what it takes without the crowd.
+/// Largest ratio of the frame time with the crowd to the time without it.
 constexpr double kLimitRatio = 3.0;
 constexpr double kFigureM = 2.0;
-/// All over the southern half of the field, from the western end of the row next to the apron on.
+/// The crowd covers the southern half of the field. It begins at the western end of the row next to
+/// the apron.
 constexpr double kApartEastM = 9.0;
 constexpr double kApartNorthM = 4.4;
 constexpr double kFirstEastM = -445.0;
@@ -58,7 +59,7 @@ struct Row {
   std::optional<PairedRatio> pairs;
 };
 
-/// Rows of seated figures, each turned another way.
+/// Places rows of seated figures, each turned another way.
 Result<scene::ObjectDesc> crowd(const CrowdOptions& command, const std::filesystem::path& folder) {
   scenegen::GenerateOptions options;
   options.kind = scenegen::SceneKind::statue;

@@ -31,10 +31,10 @@ struct LiveOptions {
   std::vector<std::string> set;
   double seconds = 60.0;  ///< of sim time
   double rate_hz = 50.0;  ///< of frames and host poses, in sim time
-  double every_s = 2.0;   ///< between the pictures that are compared
+  double every_s = 2.0;   ///< between the images that are compared
   double finest_s = 1.0;  ///< thermal.first_step_s of the reference
-  /// A cloud passes: the host tells the weather that often, the script has it from the start; 0:
-  /// none.
+  /// Period of the host's weather updates while a cloud passes. The script has the weather from the
+  /// start. With 0 there is no cloud.
   double weather_every_s = 0.0;
   std::uint32_t width_px = 640;
   std::uint32_t height_px = 512;
@@ -46,11 +46,11 @@ using physics::Result;
 enum Who : std::size_t { kScript, kHost, kReference, kCount };
 constexpr std::array<const char*, kCount> kNames{"script", "host", "reference"};
 
-/// Pixels that at least this much of their temperature's change since the start sets apart from
-/// those far from anything that moves.
+/// Smallest change of a pixel's temperature since the start that separates it from pixels far from
+/// anything that moves.
 constexpr float kTouchedK = 0.05F;
 
-/// What a host tells of an entity: where its script would have it.
+/// Entity whose poses the host sends: it stands where its script would have it.
 struct Driven {
   std::uint32_t entity_id = 0;
   scene::Trajectory script;
@@ -61,7 +61,7 @@ std::vector<Driven> take_scripts(scene::ScenarioDesc& scenario, std::int64_t sta
   for (scene::ObjectDesc& object : scenario.objects) {
     if (object.entity_id == 0 || object.trajectory.size() < 2) continue;
     out.push_back({object.entity_id, object.trajectory});
-    // What has been is known, what will be is not.
+    // The host knows the past of the entity and not its future.
     const scene::TrajectoryState now = scene::trajectory_at(object.trajectory, start_ns);
     std::erase_if(object.trajectory,
                   [&](const scene::Keyframe& key) { return key.sim_time_ns >= start_ns; });
@@ -70,8 +70,8 @@ std::vector<Driven> take_scripts(scene::ScenarioDesc& scenario, std::int64_t sta
   return out;
 }
 
-/// A scenario's clear sky, under which a cloud passes that leaves a fifth of the direct sun: it
-/// comes after a quarter of the time and goes after three quarters, in 5 s each.
+/// A scenario's clear sky, under which a cloud passes that leaves a fifth of the direct sun. The
+/// cloud comes after a quarter of the time and goes after three quarters, in 5 s each.
 class CloudySky {
  public:
   CloudySky(const scene::ScenarioDesc& scenario, std::int64_t start_ns, double seconds)
@@ -100,7 +100,7 @@ class CloudySky {
     out.wind_m_s = clear.wind_m_s;
     return out;
   }
-  /// From what the thermal history starts with up to `end_ns`.
+  /// Returns the weather from the first instant of the thermal history up to `end_ns`.
   [[nodiscard]] std::vector<scene::WeatherSample> table(const scene::ThermalOptions& thermal,
                                                         std::int64_t end_ns) const {
     constexpr std::int64_t kRowNs = 300'000'000'000;
@@ -124,7 +124,7 @@ class CloudySky {
   double seconds_;
 };
 
-/// Differences of a renderer's pictures from the reference's, of all pictures.
+/// Differences of a renderer's images from the reference's, over all images.
 struct Error {
   double sum_k2 = 0.0;
   std::uint64_t count = 0;
@@ -142,7 +142,7 @@ struct Error {
 
 struct Row {
   Samples frame_ms;
-  Error error;  ///< where the picture has changed since the start
+  Error error;  ///< over the pixels that have changed since the start
   double warm_up_s = 0.0;
 };
 
@@ -175,7 +175,7 @@ class LiveBench {
       }
       scenario->sensor.width_px = command.width_px;
       scenario->sensor.height_px = command.height_px;
-      // One place, so that what changes in a pixel is its temperature.
+      // The camera stands still, so that what changes in a pixel is its temperature.
       scenario->sensor.trajectory = {{out.start_ns_, out.eye_}};
       auto renderer =
           RendererThread::create(*scenario, command.gpu_index, renderer::Ladder::none, true);
@@ -203,7 +203,7 @@ class LiveBench {
     for (std::uint64_t i = 0; i <= frames; ++i) {
       const bool compared = i % every == 0;
       tell(i);
-      // Who begins changes, so that what differs is not the machine.
+      // The order alternates, so that drifts of the machine favour neither.
       const std::array<Who, 2> order =
           i % 2 == 0 ? std::array{kScript, kHost} : std::array{kHost, kScript};
       for (const Who who : order) {
@@ -251,7 +251,7 @@ class LiveBench {
     const std::int64_t now_ns = time_ns(i);
     if (now_ns < next_weather_ns_) return;
     next_weather_ns_ = now_ns + period_ns;
-    // It holds until the next one.
+    // The update takes the middle of its period, because it applies until the next one.
     scene::WeatherSample sample = sky_->at(now_ns + period_ns / 2);
     sample.sim_time_ns = now_ns;
     renderers_[kHost]->apply_weather(sample);
@@ -265,8 +265,8 @@ class LiveBench {
     }
     renderers_[kHost]->apply_entities(time_ns(i), updates_);
   }
-  /// Where the reference's picture has changed since the start and shows the same now as before,
-  /// less what the two differed by then: meshes are not the same.
+  /// Compares the pixels that have changed in the reference since the start. The difference at the
+  /// start is subtracted, because the meshes of the two differ.
   void compare() {
     for (const Who who : {kScript, kHost}) {
       for (std::size_t p = 0; p < shown_k_[who].size(); ++p) {

@@ -47,7 +47,8 @@ struct Row {
   Samples embree_step_ms;
   SceneFill fill;
 
-  /// Times a frame takes of what Embree takes for the steps alone; nothing without sun.
+  /// Returns the ratio of the frame time to the time that Embree takes for the steps alone; empty
+  /// without sun.
   [[nodiscard]] std::optional<double> embree_ratio() const {
     if (embree_step_ms.empty()) return std::nullopt;
     return free_run.frame_ms.median() / (steps * embree_step_ms.median());
@@ -153,11 +154,12 @@ bool wanted(const PaperMethod& method, const PaperOptions& command) {
   return std::ranges::find(command.methods, method.name) != command.methods.end();
 }
 
-/// All methods and step counts of one scene.
+/// Runs all methods and step counts of one scene.
 Result<void> run_scene(const std::string& name, const scene::ScenarioDesc& scenario,
                        std::span<const std::uint32_t> steps, const PaperOptions& command,
                        const PaperProgress& progress, std::vector<Row>& rows) {
-  // The shares hang on camera and sun, not on the number of steps: the cheapest tells.
+  // The shares depend on camera and sun, not on the number of steps, so the cheapest run is
+  // measured.
   const PaperRun cheapest = make_paper_run(
       scenario, kPaperMethods[0], *std::min_element(steps.begin(), steps.end()), command.frames);
   const auto fill = check_fill(cheapest);
@@ -228,7 +230,7 @@ int run(const PaperOptions& command) {
   std::uint64_t done = 0;
   std::vector<Row> rows;
   for (const std::string& scene : scenes) {
-    // The paper's own model, whatever the scenarios say.
+    // The model is the paper's own, whatever the scenarios say.
     const std::string model = command.model.empty() ? "emit2014" : command.model;
     const std::vector<std::string> overrides{"thermal.model=\"" + model + "\""};
     const auto scenario = load_scenario_choice({scene, overrides});

@@ -69,7 +69,8 @@ Row row_of(const ScalingAxis& axis, const ScalingCase& made, const char* method,
   return row;
 }
 
-/// Each case against the one before, which runs twice: what differs then is the machine.
+/// Compares each case with the case before, which runs twice: its twin shows the noise of the
+/// machine.
 Result<void> run_cached(const ScalingAxis& axis, const ScalingOptions& command,
                         ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
   std::optional<SceneRunner> before;
@@ -97,7 +98,7 @@ Result<void> run_cached(const ScalingAxis& axis, const ScalingOptions& command,
   return {};
 }
 
-/// A few frames of the published method beside them.
+/// Adds a few frames of the published method.
 Result<void> run_per_frame(const ScalingAxis& axis, const ScalingOptions& command,
                            ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
   std::optional<double> before_ms;

@@ -40,9 +40,9 @@ struct TurnOptions {
 using physics::Result;
 
 constexpr double kTurnS = 1.0;
-/// Boresight under the horizon: ground and sky are both in the picture.
+/// Boresight below the horizon, so that ground and sky are both in the image.
 constexpr double kDownRad = 5.0 * physics::kDegree;
-/// A jump goes this far, each in another direction.
+/// Length of a jump. Each goes in another direction.
 constexpr double kJumpM = 100.0;
 
 /// One line of the result: some turns in one place, or each in a new one.
@@ -79,7 +79,7 @@ class Turntable {
       return physics::make_error(physics::ErrorCode::config,
                                  fmt::format("{}: the sensor has no trajectory", scenario->name));
     }
-    // The place is announced, the turn is not.
+    // The renderer knows the place in advance, but not the turn.
     keys.erase(keys.begin(), keys.end() - 1);
     scenario->sensor.width_px = command.width_px;
     scenario->sensor.height_px = command.height_px;
@@ -95,7 +95,7 @@ class Turntable {
     return {};
   }
 
-  /// A full turn; what it shows goes into `row`.
+  /// Renders a full turn and adds its figures to `row`.
   Result<void> turn(const glm::dvec3& eye_m, Row& row) {
     Samples frame_ms;
     for (std::uint32_t i = 0; i < frames_; ++i) {
@@ -112,7 +112,7 @@ class Turntable {
     row.worst_ms.add(frame_ms.max());
     return {};
   }
-  /// An untimed frame in the known place.
+  /// Renders an untimed frame in the known place.
   Result<void> settle() {
     const auto frame = renderer_->render(request(eye_m_, 0));
     if (!frame) return tl::unexpected(frame.error());

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 
@@ -61,7 +62,7 @@ Result<SceneRunner> SceneRunner::start(const scene::ScenarioDesc& scenario,
 }
 
 Result<Rounds> take_turns(std::array<SceneRunner*, 3> runners, std::uint32_t rounds) {
-  // All at the same sim times, whatever a has shown before.
+  // All runners show the same sim times, whatever a has shown before.
   std::uint32_t first = 0;
   for (const SceneRunner* runner : runners) first = std::max(first, runner->next_frame());
   for (SceneRunner* runner : runners) runner->skip_to(first);
@@ -83,6 +84,13 @@ bool PairedRatio::within(double limit_ratio) const noexcept {
 
 PairedRatio paired_ratio(std::span<const double> a_ms, std::span<const double> twin_ms,
                          std::span<const double> b_ms) {
+  EMIT_CHECK_OP(a_ms.size(), >=, 3U);
+  EMIT_CHECK_OP(twin_ms.size(), ==, a_ms.size());
+  EMIT_CHECK_OP(b_ms.size(), ==, a_ms.size());
+  const auto is_positive = [](double ms) { return ms > 0.0; };
+  EMIT_CHECK(std::ranges::all_of(a_ms, is_positive));
+  EMIT_CHECK(std::ranges::all_of(twin_ms, is_positive));
+  EMIT_CHECK(std::ranges::all_of(b_ms, is_positive));
   PairedRatio out;
   out.pairs = a_ms.size();
   out.ratio = median(ratios(b_ms, a_ms));

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "emit/physics/check.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 
@@ -54,6 +55,8 @@ Result<PaperErrors> PaperReference::judge(std::span<const JudgedFrame> frames) {
   std::vector<std::uint8_t> surface;
   std::vector<std::uint8_t> outline;
   for (const JudgedFrame& frame : frames) {
+    EMIT_CHECK_OP(frame.temperature_k.size(), ==,
+                  std::size_t{frame.view.width_px} * frame.view.height_px);
     const auto index = picture_of(frame.view);
     if (!index) return tl::unexpected(index.error());
     for (const ConvergedPixel& pixel : pictures_[*index].pixels) {

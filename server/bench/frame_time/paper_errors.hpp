@@ -10,27 +10,28 @@
 
 namespace emit::tool {
 
-/// A picture of a run that is compared with the converged history.
+/// Image of a run that is compared with the converged history.
 struct JudgedFrame {
   reference::SolveView view;
   std::vector<float> temperature_k;
 };
 
-/// Over all frames of a run together.
+/// Errors over all frames of a run together.
 struct PaperErrors {
   ErrorSummary surface;  ///< away from outlines
   ErrorSummary outline;  ///< within a pixel of one
 };
 
-/// Converged pictures of one scene. Each is computed once, however many runs share it.
+/// Converged images of one scene. Each is computed once, however many runs share it.
 class PaperReference {
  public:
-  /// Errors: as ConvergedHistory.
+  /// Creates the reference. Errors: those of ConvergedHistory.
   [[nodiscard]] static physics::Result<PaperReference> create(const scene::ScenarioDesc& scenario,
                                                               std::string label,
                                                               std::uint32_t pixels);
 
-  /// @pre a temperature for every pixel of the views. Errors: as ConvergedHistory::picture().
+  /// Compares frames with the reference. Errors: those of ConvergedHistory::picture().
+  /// @pre every frame has a temperature for every pixel of its view
   [[nodiscard]] physics::Result<PaperErrors> judge(std::span<const JudgedFrame> frames);
 
   [[nodiscard]] std::string describe() const { return history_.describe(options_); }
@@ -42,7 +43,7 @@ class PaperReference {
   };
 
   PaperReference(ConvergedHistory history, std::string label, std::uint32_t pixels);
-  /// Index into pictures_.
+  /// Returns an index into pictures_.
   [[nodiscard]] physics::Result<std::size_t> picture_of(const reference::SolveView& view);
 
   ConvergedHistory history_;

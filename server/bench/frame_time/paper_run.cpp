@@ -34,7 +34,7 @@ double pan_rad(const scene::SensorDesc& sensor, std::uint32_t frame) {
 
 physics::Pose panned(const physics::Pose& base, double yaw_rad) {
   physics::Pose pose = base;
-  // About the camera's own vertical: the picture moves sideways whatever the pitch.
+  // The camera pans about its own vertical, so that the image moves sideways whatever the pitch.
   pose.world_from_body =
       glm::normalize(base.world_from_body * glm::angleAxis(yaw_rad, glm::dvec3(0.0, 0.0, 1.0)));
   return pose;
@@ -54,7 +54,7 @@ class PaperCamera {
     return panned(base_, pan_rad(run_.scenario.sensor, frame));
   }
 
-  /// Submits a frame, waits for it, hands it to `take` with the time that took, and releases it.
+  /// Submits a frame, waits for it, hands it to `take` with its time, and releases it.
   template <class Take>
   Result<void> render(std::uint32_t frame, const Take& take) {
     if (InterruptGuard::interrupted()) {
@@ -109,14 +109,14 @@ PaperRun make_paper_run(scene::ScenarioDesc scenario, const PaperMethod& method,
   scenario.sensor.height_px = frames.height_px;
   scenario.thermal.method = method.method;
   scenario.thermal.steps = steps;
-  // As published; cached spaces its steps as it does anywhere else.
+  // The spacing is as published. The method cached spaces its steps as it does anywhere else.
   scenario.thermal.spacing = method.method == scene::ThermalMethod::cached
                                  ? scene::StepSpacing::geometric
                                  : scene::StepSpacing::uniform;
   const std::int64_t from_ns = scenario.thermal.history_start_ns;
   run.start_ns = observation_ns(scenario);
-  // One thermal model for both methods and the reference: heat is conducted straight down, and what
-  // hides the sky has the surroundings' temperature, as in the published one.
+  // Both methods and the reference share one thermal model: heat is conducted straight down, and
+  // whatever hides the sky has the surroundings' temperature, as in the published one.
   scenario.thermal.lateral = false;
   scenario.thermal.exchange = false;
   const double interval_s = method.method == scene::ThermalMethod::cached

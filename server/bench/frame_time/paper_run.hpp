@@ -15,7 +15,7 @@
 
 namespace emit::tool {
 
-/// Horizontal motion of the picture's centre per frame, px; elsewhere in the picture it is more.
+/// Horizontal motion of the image's centre per frame, px. It is larger elsewhere in the image.
 inline constexpr double kPaperPanPx = 2.5;
 /// Closings of the newest history interval that a run crosses.
 inline constexpr double kPaperClosings = 3.2;
@@ -25,7 +25,7 @@ struct PaperMethod {
   scene::ThermalMethod method = scene::ThermalMethod::per_frame;
   const char* name = "per-frame";
   std::uint32_t least_frames = 5;
-  /// False: what a frame shows does not hang on the frames before it.
+  /// False: the content of a frame does not depend on the frames before it.
   bool carries_state = false;
 };
 inline constexpr std::array kPaperMethods{
@@ -62,21 +62,21 @@ struct PaperTimes {
 /// Called after every frame.
 using PaperProgress = std::function<void()>;
 
-/// One pass over the frames of a run after a warm-up frame. With `stages` the device is waited for
-/// after each stage, so that the stages can be told apart. Errors: gpu, io (interrupted), those of
-/// Renderer::create().
+/// Times one pass over the frames of a run after a warm-up frame. With `stages` the renderer waits
+/// for the device after each stage, so that stages are timed apart. Errors: gpu, io (interrupted),
+/// those of Renderer::create().
 [[nodiscard]] physics::Result<PaperTimes> time_frames(const PaperRun& run, bool stages,
                                                       const PaperProgress& progress);
 
-/// Shares of the picture over the run's first frame and the one after half a pan: not timed, so
-/// that the planes it needs cost the measured frames nothing.
+/// Measures the shares of the image over the run's first frame and the frame after half a pan.
+/// These frames are not timed, so that the channels they need cost the measured frames nothing.
 [[nodiscard]] physics::Result<SceneFill> check_fill(const PaperRun& run);
 
-/// Temperatures of the run's first and last frame, not timed either. A method that carries state
-/// renders every frame in between as well.
+/// Returns the temperatures of the run's first and last frame, which are not timed either. A method
+/// that carries state renders every frame in between as well.
 [[nodiscard]] physics::Result<std::vector<JudgedFrame>> judged_frames(const PaperRun& run);
 
-/// What the first frame looks at.
+/// Returns the view of the first frame.
 [[nodiscard]] physics::Result<reference::SolveView> first_view(const PaperRun& run);
 
 }  // namespace emit::tool

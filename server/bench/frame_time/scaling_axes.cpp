@@ -18,7 +18,8 @@ namespace {
 using physics::Result;
 using Path = std::filesystem::path;
 
-/// Where the claims lie: twice the steps, ten times the triangles, ten times the instances.
+/// Limits of the ratios that the project claims: twice the steps, ten times the triangles, ten
+/// times the instances.
 constexpr double kStepsLimit = 1.02;
 constexpr double kTrianglesLimit = 1.5;
 constexpr double kObjectsLimit = 1.1;
@@ -28,7 +29,7 @@ struct Format {
   std::uint32_t height_px = 256;
 };
 
-/// A shipped scene with the method "cached".
+/// Loads a shipped scene with the method "cached".
 Result<scene::ScenarioDesc> cached_scene(const std::string& name, bool quick) {
   auto scenario = load_scenario_choice(
       {name,
@@ -59,7 +60,7 @@ Result<void> add_steps(ScalingAxis& axis, bool quick) {
   return {};
 }
 
-/// The shipped figure with fewer and more triangles, seen from the same place.
+/// Adds the shipped figure with fewer and more triangles, seen from the same place.
 Result<void> add_triangles(ScalingAxis& axis, bool quick, const Path& folder) {
   auto scenario = cached_scene("statue", quick);
   if (!scenario) return tl::unexpected(std::move(scenario.error()));
@@ -92,7 +93,7 @@ Result<void> add_pixels(ScalingAxis& axis, bool quick) {
   return {};
 }
 
-/// Places in rows behind the camera, so far apart that none shades another nor what is in view.
+/// Returns places in rows behind the camera, so far apart that none shades another nor the view.
 std::vector<physics::Pose> places_behind(const physics::Pose& camera, std::uint32_t count) {
   constexpr double kApartM = 10.0;
   constexpr double kBehindM = 100.0;
@@ -112,7 +113,7 @@ std::vector<physics::Pose> places_behind(const physics::Pose& camera, std::uint3
   return places;
 }
 
-/// A box many times behind the camera.
+/// Adds the same box many times behind the camera.
 Result<void> add_objects(ScalingAxis& axis, bool quick, const Path& folder) {
   auto scenario = cached_scene("box", quick);
   if (!scenario) return tl::unexpected(std::move(scenario.error()));

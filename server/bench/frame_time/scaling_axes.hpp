@@ -20,15 +20,15 @@ struct ScalingCase {
 struct ScalingAxis {
   std::string name;
   std::vector<ScalingCase> cases;
-  /// Most that a frame may take of what it takes in the case before.
+  /// Largest ratio of the frame time to that of the case before.
   std::optional<double> limit_ratio;
 };
 
-/// steps, triangles, pixels, objects, samples.
+/// Returns the names of the axes: steps, triangles, pixels, objects, samples.
 [[nodiscard]] std::vector<std::string> scaling_axes();
 
-/// Makes the scenes of an axis. Geometry that no shipped scene has is generated into `folder`.
-/// `quick`: small ones. Setup only. Errors: those of the scenario's loader and of the generator.
+/// Makes the scenes of an axis. Geometry that no shipped scene has is generated into `folder`. With
+/// `quick` they are small. Setup only. Errors: those of the scenario's loader and of the generator.
 [[nodiscard]] physics::Result<ScalingAxis> make_scaling_axis(const std::string& name, bool quick,
                                                              const std::filesystem::path& folder);
 

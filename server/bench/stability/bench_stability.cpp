@@ -27,7 +27,7 @@ struct StabilityOptions {
   int gpu_index = -1;
 };
 
-/// Shares of the progress bar, as the parts take their time with the default number of cases.
+/// Shares of the progress bar by the time that the parts take with the default number of cases.
 struct Part {
   const char* name;
   double share;
@@ -35,8 +35,8 @@ struct Part {
 constexpr std::array<Part, 4> kParts{
     {{"equilibrium", 0.55}, {"band-radiance", 0.1}, {"relaxation", 0.1}, {"frames", 0.25}}};
 
-/// A quadrature in double is thousands of times dearer than the table, and a relaxation case takes
-/// 9000 steps on average.
+/// Number of equilibrium cases per case of a dearer part. A quadrature in double is thousands of
+/// times dearer than the table, and a relaxation case takes 9000 steps on average.
 constexpr std::uint64_t kCasesPerBandCase = 200;
 constexpr std::uint64_t kCasesPerRelaxationCase = 20'000;
 

@@ -70,7 +70,8 @@ Result<void> HostileFrames::grazing_sun() {
     const glm::dvec3 normal = std::cos(angle_rad) * upright + std::sin(angle_rad) * sun;
     world.parts.push_back(
         tilted_part(fmt::format("{:g} rad", angle_rad), across * (3.0 * (i++ - 3.5)), normal, 1.2));
-    // The sun moves: what is edge-on now was lit before. Nothing stands between any of them and it.
+    // The sun moves: a face that is edge-on now was lit before. Nothing stands between the faces
+    // and the sun.
     world.parts.back().open = true;
   }
   world.camera = looking_at(upright * 30.0, glm::dvec3(0.0));
@@ -155,7 +156,7 @@ Result<void> HostileFrames::far_vertices() {
   return judged_by(world, "100 km", *harmless);
 }
 
-/// The yard in front of a wall 100 km away that faces the camera.
+/// Adds a wall 100 km behind the yard that faces the camera.
 static void add_far_wall(World& world) {
   world.parts.push_back(tilted_part("wall at 100 km", {0.0, 1e5, 2e4}, {0.0, -1.0, 0.0}, 2e4));
   world.parts.back().open = true;
@@ -233,7 +234,7 @@ Result<void> HostileFrames::short_history() {
 
 Result<void> HostileFrames::many_steps() {
   World world = yard();
-  // Few pixels of map: thousands of shadow maps are drawn for this one frame.
+  // The maps have few pixels, because thousands of them are drawn for this one frame.
   world.scenario.thermal.shadow_map_px = 64;
   world.scenario.thermal.blocker_taps = 1;
   world.scenario.thermal.filter_taps = 1;

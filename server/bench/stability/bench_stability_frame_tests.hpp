@@ -14,7 +14,8 @@ namespace emit::tool {
 inline constexpr std::int64_t kSecondNs = 1'000'000'000;
 inline constexpr std::int64_t kMorningNs = 12'600 * kSecondNs;  // 08:00 to 11:30 local time
 inline constexpr std::int64_t kYearNs = 31'557'600 * kSecondNs;
-/// Too small to cover a neighbouring pixel: the sky factor is that of a flat face.
+/// Obscurance radius that is too small to cover a neighbouring pixel: the sky factor is that of a
+/// flat face.
 inline constexpr double kNoObscuranceM = 1e-6;
 
 /// A scene ready to be rendered.
@@ -25,7 +26,7 @@ struct World {
   std::int64_t time_ns = kMorningNs;
 };
 
-/// The tests by name: one object runs one of them. Single thread.
+/// Tests by name. One object runs one of them. Single thread.
 class HostileFrames {
  public:
   explicit HostileFrames(const HostileFrameOptions& options) : options_(options) {}
@@ -42,9 +43,9 @@ class HostileFrames {
   static const std::vector<Entry>& entries();
   friend std::vector<std::string> hostile_frame_tests();
 
-  /// Ground, a box and a slab, seen from above.
+  /// Makes ground, a box and a slab, seen from above.
   [[nodiscard]] World yard() const;
-  /// Writes the files and renders; counts what is not finite.
+  /// Writes the files and renders. It counts values that are not finite.
   physics::Result<StoredFrame> frame(World& world, const std::string& name,
                                      const std::function<void(renderer::Renderer&)>& prepare = {});
   physics::Result<void> judged_by_model(World& world, const std::string& name);

@@ -10,20 +10,20 @@
 
 namespace emit::tool {
 
-/// Whole frames under hostile scenes, through the renderer's public interface: geometry,
-/// obscurance, soft shadows, thermal history and radiance together.
+/// Options of a run of whole frames under hostile scenes, through the renderer's public interface.
+/// The run covers geometry, obscurance, soft shadows, thermal history and radiance together.
 struct HostileFrameOptions {
   std::uint32_t width_px = 160;
   std::uint32_t height_px = 128;
   int gpu_index = -1;
   std::vector<std::string> only;      ///< names of tests; empty: all
   std::filesystem::path picture_dir;  ///< every frame's temperature as PNG; empty: none
-  /// Share done, 0..1; false stops with an error.
+  /// Called with the share done, 0..1. It returns false to stop with an error.
   std::function<bool(double)> progress;
 };
 
-/// What a test found over all its frames. An error is the distance to the temperature that the
-/// test's note names; NaN where no temperature is judged.
+/// Result of a test over all its frames. An error is the distance to the temperature that the
+/// test's note names. It is NaN where no temperature is judged.
 struct HostileFrameResult {
   std::string test;
   std::string device;
@@ -41,7 +41,7 @@ struct HostileFrameResult {
 
 [[nodiscard]] std::vector<std::string> hostile_frame_tests();
 
-/// Errors: gpu, io, invalid_argument for a test that does not exist.
+/// Runs the tests. Errors: gpu, io, invalid_argument for a test that does not exist.
 [[nodiscard]] physics::Result<std::vector<HostileFrameResult>> run_hostile_frames(
     const HostileFrameOptions& options);
 

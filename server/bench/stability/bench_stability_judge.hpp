@@ -12,18 +12,18 @@ namespace emit::tool {
 /// Gathers one row from the frames of a test.
 class FrameJudge {
  public:
-  /// NaN, Inf and the renderer's own counters.
+  /// Counts NaN, Inf and the renderer's own counters.
   void count(const StoredFrame& frame);
 
-  /// Against the published model in double at every pixel: on open parts the sunlit temperature
-  /// itself, elsewhere the distance to the range between never and always lit. Parts with a sky
-  /// factor of 0.5 only: the obscurance radius must be next to nothing.
+  /// Compares a frame with the published model in double at every pixel: on open parts with the
+  /// sunlit temperature, elsewhere with the range between never and always lit. It takes only parts
+  /// with a sky factor of 0.5: the obscurance radius must be next to nothing.
   void against_model(const StoredFrame& frame, const scene::ScenarioDesc& scenario,
                      std::span<const FlatPart> parts, std::int64_t sim_time_ns,
                      const std::string& frame_name);
 
-  /// Pixel by pixel against a frame of a harmless variant. Pixels that show another part count as
-  /// moved edges, not as errors.
+  /// Compares a frame pixel by pixel with a frame of a harmless variant. Pixels that show another
+  /// part count as moved edges, not as errors.
   void against_frame(const StoredFrame& frame, const StoredFrame& harmless,
                      const std::string& frame_name);
 

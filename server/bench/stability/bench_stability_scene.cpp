@@ -37,7 +37,7 @@ Result<std::filesystem::path> write_part(const FlatPart& part, std::size_t numbe
   std::vector<float> positions;
   for (const FlatFace& face : part.faces) {
     for (const std::size_t corner : {0U, 1U, 2U, 0U, 2U, 3U}) {
-      // Level, heading north: glTF x is west, y is up, z is north.
+      // The part is level and heads north: glTF x is west, y is up, z is north.
       const glm::dvec3 p = (face.corners[corner] - part.placed_at_m) / part.scale;
       for (const double v : {-p.x, p.z, p.y}) positions.push_back(static_cast<float>(v));
     }

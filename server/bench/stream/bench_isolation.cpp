@@ -39,8 +39,8 @@ struct IsolationOptions {
 
 using physics::Result;
 
-/// Sends records that are taken without an answer as fast as the daemon lets it; thrown out, it
-/// comes again at once.
+/// Client that sends records without an answer as fast as the daemon takes them. It reconnects at
+/// once after the daemon closes the connection.
 class FloodingClient {
  public:
   explicit FloodingClient(const std::string& url) : url_(url) {
@@ -80,7 +80,7 @@ class FloodingClient {
         continue;
       }
       connections_.fetch_add(1);
-      // A daemon that reads slowly is what the flood is up against: no reason to come anew.
+      // A daemon that reads slowly is what the flood meets; that is no reason to reconnect.
       std::span<const std::byte> rest;
       while (!stop_.load()) {
         if (rest.empty()) rest = records_;
@@ -101,7 +101,7 @@ class FloodingClient {
   std::thread thread_;
 };
 
-/// What the watched clients of one run say.
+/// Results of the watched clients of one run.
 struct RunResult {
   double p99_ms = 0.0;
   std::uint64_t frames = 0;
@@ -126,11 +126,12 @@ class IsolationBench {
  private:
   Result<RunResult> measure(bool disturbed);
   void add(const RunResult& run);
-  /// Half the distance between the 16th and the 84th percentile: how far a run against itself goes.
+  /// Half the distance between the 16th and the 84th percentile. It is the spread of a run against
+  /// itself.
   [[nodiscard]] static double spread(const Samples& ratios) {
     return 0.5 * (ratios.percentile(0.84) - ratios.percentile(0.16));
   }
-  /// Nothing where so few pairs say nothing about the spread.
+  /// Returns an empty result where there are too few pairs to know the spread.
   [[nodiscard]] std::optional<bool> met() const {
     if (command_.pairs < kLeastPairs) return std::nullopt;
     return std::abs(ratio_.median() - 1.0) <= std::max(kLimit, spread(self_ratio_));
@@ -156,11 +157,11 @@ Result<void> IsolationBench::run(const std::filesystem::path& work) {
   auto daemon = DaemonProcess::start(config, {}, work, std::chrono::seconds(60));
   if (!daemon) return tl::unexpected(daemon.error());
   control_ = "tcp://" + daemon->control_address();
-  // The first run of all pays for what is done once.
+  // The first run is not counted, because it pays for work that is done once.
   if (auto first = measure(true); !first) return tl::unexpected(first.error());
   ProgressBar progress("pairs", command_.pairs);
   for (std::uint32_t pair = 0; pair < command_.pairs; ++pair) {
-    // Which one comes first changes, so that a drift of the machine favours neither.
+    // The order changes, so that a drift of the machine favours neither.
     std::array<double, 3> p99_ms{};
     constexpr std::size_t kQuiet = 0;
     constexpr std::size_t kDisturbed = 1;

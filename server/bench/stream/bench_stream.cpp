@@ -44,7 +44,8 @@ struct StreamOptions {
   std::uint32_t repeats = 5;      ///< of the throughput measurements; 0: none
   std::vector<std::string> only;  ///< of the throughput measurements; empty: all
   std::string cpus;               ///< realtime.cpus of the daemons
-  /// Shares of datagrams lost on the way; not empty: nothing but lossy networks is measured.
+  /// Shares of datagrams that the network loses. If it is not empty, only lossy networks are
+  /// measured.
   std::vector<double> losses;
   double burst_mean = 1.0;  ///< datagrams lost in a row
   protocol::FecParams fec{protocol::kDefaultFecData, protocol::kDefaultFecParity};
@@ -54,7 +55,7 @@ struct StreamOptions {
 
 using physics::Result;
 
-/// One row of the results; the keys that every result has.
+/// One row of the results, with the keys that every result has.
 struct Row {
   std::string transport;
   std::uint32_t clients = 1;
@@ -87,7 +88,7 @@ class StreamBench {
   [[nodiscard]] const std::string& device() const { return device_; }
   [[nodiscard]] Json json() const;
   void print(std::FILE* out) const;
-  /// Nothing was lost or torn.
+  /// Returns true when nothing was lost or torn.
   [[nodiscard]] bool sound() const {
     return std::all_of(rows_.begin(), rows_.end(),
                        [](const Row& row) { return row.lossy ? !row.wrong : row.lost == 0; });
@@ -99,11 +100,11 @@ class StreamBench {
   Result<void> lossy();
   Result<void> throughput();
   struct Daemons;
-  /// Errors: those of StreamThroughput::start().
+  /// Starts the daemons. Errors: those of StreamThroughput::start().
   [[nodiscard]] Result<Daemons> start_daemons() const;
-  /// One measurement of one contender.
+  /// Makes one measurement of one contender.
   Result<YardstickResult> measure(const std::string& name, Daemons& daemons) const;
-  /// One measurement of each contender; `progress` gets the index of the one that is next.
+  /// Makes one measurement of each contender; `progress` gets the index of the one that is next.
   Result<void> measure_round(const std::vector<Contender>& contenders, Daemons& daemons,
                              std::map<std::string, Series>& series,
                              const std::function<void(std::size_t)>& progress) const;
@@ -131,7 +132,7 @@ Result<void> StreamBench::run() {
   return command_.repeats > 0 ? throughput() : Result<void>();
 }
 
-/// Sums over clients what the paced results say beside delays.
+/// Sums over clients of the paced results beside delays.
 struct PacedCounts {
   std::uint64_t partial = 0;
   std::uint64_t gaps = 0;
@@ -236,7 +237,7 @@ Result<Row> StreamBench::paced(const std::string& transport) {
   return row;
 }
 
-/// Each share of losses without help, with resend and with error correction.
+/// Measures each share of losses without help, with resend and with error correction.
 Result<void> StreamBench::lossy() {
   for (const double loss : command_.losses) {
     for (const bool fec : {false, true}) {
@@ -292,14 +293,15 @@ Result<Row> StreamBench::bare_paced() {
   return row;
 }
 
-/// What is measured in turn, and beside what it is put.
+/// Contender of the measurements, and the yardsticks it is compared with.
 struct Contender {
   const char* name;
-  /// The first is "the" yardstick; none: is one itself.
+  /// Yardsticks to compare with; the first is "the" yardstick. It is empty for a yardstick itself.
   std::vector<const char*> yardsticks;
 };
 
-/// TCP and what it is put beside follow each other: the machine moves from second to second.
+/// Returns the contenders. TCP and its yardsticks follow each other, because the speed of the
+/// machine changes within seconds.
 const std::vector<Contender>& contenders() {
   static const std::vector<Contender> all{
       {"iperf3", {}},
@@ -338,8 +340,8 @@ struct Series {
   std::string missing;  ///< why there is none
 };
 
-/// The daemons of the throughput measurements. A ring in shared memory costs only the daemon that
-/// has one.
+/// Daemons of the throughput measurements. A ring in shared memory costs only the daemon that has
+/// one.
 struct StreamBench::Daemons {
   Result<StreamThroughput> plain;
   Result<StreamThroughput> shared;
@@ -465,7 +467,7 @@ Row throughput_row(const Contender& contender, const Series& own) {
 }
 
 Result<void> StreamBench::throughput() {
-  // Long enough that starting up does not show.
+  // The run is long enough to hide the time of starting up.
   constexpr double kBytes = 2e9;
   constexpr std::uint64_t kLeastFrames = 200;
   constexpr std::uint64_t kMostFrames = 4000;

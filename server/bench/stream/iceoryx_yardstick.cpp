@@ -35,7 +35,7 @@ using physics::Result;
 
 namespace {
 
-/// In front of the pixels.
+/// Header before the pixels of a frame.
 struct Header {
   std::uint32_t crc32c = 0;
 };
@@ -48,8 +48,8 @@ std::string text_of(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// The library's daemon, and this process as its client. Until the process ends: the library has
-/// one runtime, which leaves its daemon when static objects go.
+/// The library's daemon, with this process as its client. It lives until the process ends: the
+/// library has one runtime, which leaves its daemon when static objects are destroyed.
 class Runtime {
  public:
   static Result<void> start(const std::filesystem::path& directory) {
@@ -60,7 +60,7 @@ class Runtime {
     if (!daemon) return tl::unexpected(daemon.error());
     constexpr auto kPatience = std::chrono::seconds(10);
     const auto end = std::chrono::steady_clock::now() + kPatience;
-    // Its clients wait for ever, or abort.
+    // The library's clients wait without end, or abort, when the daemon is not ready.
     while (text_of(log).find("ready for clients") == std::string::npos) {
       constexpr int kNotFound = 127;  // of env
       const auto status = daemon->wait(std::chrono::milliseconds(20));
@@ -93,7 +93,7 @@ class Runtime {
   Subprocess daemon_;
 };
 
-/// False: no chunk is left.
+/// Sends a frame. It returns false when no chunk is left.
 bool send_frame(iox::popo::UntypedPublisher& publisher, std::span<const std::byte> image,
                 bool sum) {
   bool sent = false;
@@ -114,7 +114,8 @@ bool send_frame(iox::popo::UntypedPublisher& publisher, std::span<const std::byt
 
 Result<YardstickResult> measure_iceoryx(const YardstickOptions& options,
                                         const std::filesystem::path& directory, bool sum) {
-  // What is too large for any chunk ends the process.
+  // The library ends the process when a frame is too large for any chunk, so the size is checked
+  // here.
   constexpr std::size_t kLargestChunk = 4U << 20;
   constexpr std::size_t kChunkHeader = 256;  // at most
   if (options.frame_bytes + kPixelsAt + kChunkHeader > kLargestChunk) {
@@ -157,7 +158,7 @@ Result<YardstickResult> measure_iceoryx(const YardstickOptions& options,
   constexpr auto kPatience = std::chrono::seconds(10);
   auto last = start;
   while (result.frames < options.frames) {
-    // It may wake for nothing; in vain where the sender has given up.
+    // The wait may end without a frame, or in vain after the sender has given up.
     if (waiting.timedWait(iox::units::Duration::fromSeconds(1)).empty() &&
         std::chrono::steady_clock::now() - last > kPatience) {
       break;

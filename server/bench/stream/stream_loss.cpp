@@ -26,7 +26,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Receives on a thread of its own and looks at every pixel.
+/// Client that receives on a thread of its own and checks every pixel.
 class LossClient {
  public:
   LossClient(client::FrameClient& client, std::vector<std::vector<float>> images)
@@ -46,7 +46,7 @@ class LossClient {
     return newest_ >= host_frame;
   }
 
-  // After stop().
+  // Valid after stop().
   LossyStream::Result counted;
   StreamReport report;
   std::uint64_t frames = 0;
@@ -83,7 +83,7 @@ class LossClient {
       counted.wrong_px += wrong_px(frame, partial, images_[shown]);
       return;
     }
-    // Without its number it may be any of them.
+    // A frame without its number may be any of the images, so the closest one counts.
     std::uint64_t least = ~std::uint64_t{0};
     for (const auto& image : images_) least = std::min(least, wrong_px(frame, partial, image));
     counted.wrong_px += least;
@@ -120,7 +120,8 @@ physics::Result<LossyStream::Result> LossyStream::measure(const Options& options
                                                           const std::filesystem::path& directory) {
   config::DaemonConfig config = canned_daemon(options.width_px, options.height_px, "");
   config.stream.fec_max_parity_frac = protocol::kMaxFecParity;
-  // Longer than the frames under way here, so that what is asked for is still held.
+  // The queue is longer than the frames under way here, so that requested fragments are still
+  // available.
   config.stream.queue_frames = 8;
   auto daemon = DaemonProcess::start(config, {}, directory, std::chrono::seconds(60));
   if (!daemon) return tl::unexpected(daemon.error());
@@ -144,9 +145,9 @@ physics::Result<LossyStream::Result> LossyStream::measure(const Options& options
   if (const std::string advice = (*client)->receive_buffer_advice(); !advice.empty()) warn(advice);
 
   LossClient receiver(**client, server::canned_pattern(config.source));
-  // A partial frame comes out when the second one behind it begins.
+  // A partial frame is delivered when the second frame after it begins.
   constexpr std::uint64_t kWindow = 4;
-  // A frame may be lost altogether; but nothing may pile up where the machine is slow.
+  // A frame may be lost altogether, but frames must not pile up where the machine is slow.
   constexpr auto kPatience = std::chrono::seconds(2);
   const double cpu_before_s = daemon->cpu_seconds();
   const auto start = Clock::now();

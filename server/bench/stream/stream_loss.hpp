@@ -13,9 +13,9 @@
 
 namespace emit::tool {
 
-/// Frames over UDP through a bad network (FaultRelay), each pixel of each held against the canned
-/// pattern. Poses go out in step with the frames, so that no buffer of this machine runs over and
-/// what is lost is what the relay loses.
+/// Measurement of frames over UDP through a bad network (FaultRelay). Every pixel is compared with
+/// the canned pattern. Poses are sent in step with the frames, so that no buffer of this machine
+/// overflows and only the relay loses datagrams.
 class LossyStream {
  public:
   struct Options {
@@ -29,26 +29,26 @@ class LossyStream {
   };
   struct Result {
     std::string device;
-    std::uint64_t frames = 0;     ///< asked for
+    std::uint64_t frames = 0;     ///< requested
     std::uint64_t whole = 0;      ///< came with every pixel and the right checksum
     std::uint64_t lost = 0;       ///< never came, not even in part
     std::uint64_t late = 0;       ///< flagged late
-    std::uint64_t unflagged = 0;  ///< came incomplete or corrupt without saying so
-    std::uint64_t wrong_px = 0;   ///< said to be valid, of frames not flagged corrupt, and wrong
-    std::uint64_t corrupt = 0;    ///< flagged so
+    std::uint64_t unflagged = 0;  ///< arrived incomplete or corrupt without a flag
+    std::uint64_t wrong_px = 0;   ///< marked as valid, in frames not flagged corrupt, and wrong
+    std::uint64_t corrupt = 0;    ///< flagged corrupt
     client::ReceiveCounters counters;
     server::FaultInjector::Counts network;
     std::uint64_t relay_drops = 0;  ///< losses of the measurement itself
     double seconds = 0.0;
-    double cpu_s = 0.0;  ///< of the daemon
+    double cpu_s = 0.0;  ///< CPU time of the daemon
     Samples ready_to_received_ms;
   };
-  /// Errors: those of the daemon's start; io (no frame came).
+  /// Measures one network. Errors: those of the daemon's start; io (no frame came).
   [[nodiscard]] static physics::Result<Result> measure(const Options& options,
                                                        const std::filesystem::path& directory);
 };
 
-/// The keys of a row beside the common ones.
+/// Returns the keys of a row beside the common ones.
 [[nodiscard]] Json loss_json(const LossyStream::Options& options,
                              const LossyStream::Result& result);
 

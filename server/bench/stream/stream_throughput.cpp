@@ -84,8 +84,8 @@ Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std
     ++asked;
     if (auto result = host_->send(frame); !result) sent = std::move(result);
   };
-  // By half a window: the yardsticks need not be asked at all, and what asking costs, a wake-up at
-  // every stage, is no part of a transport.
+  // Frames are requested by half a window. The yardsticks need no requests, and the cost of a
+  // request, a wake-up at every stage, is not part of a transport.
   const std::uint64_t at_once = std::max(window / 2, 1U);
   const auto ask_ahead = [&] {
     if (asked > 0 && asked + at_once > taken + window) return;
@@ -96,7 +96,8 @@ Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std
                 (scheme == "shm" ? shm_ : daemon_.control_address());
   options.security = security_;
   options.subscribe.in_place = true;
-  // At once where the frame is taken: another thread between the two would be no part of a stream.
+  // The next frames are requested on the thread that takes them, because another thread in between
+  // is not part of a stream.
   options.on_frame = [&](std::uint64_t count) {
     const std::lock_guard lock(mutex);
     if (!measuring || count <= before) return;
@@ -106,7 +107,7 @@ Result<YardstickResult> StreamThroughput::measure(const std::string& scheme, std
   auto client = StreamClient::start(options);
   if (!client) return tl::unexpected(client.error());
   device_ = (*client)->server().device;
-  // The first one shows that the subscription has reached the sender.
+  // The first frame shows that the subscription has reached the sender.
   do {
     const std::lock_guard lock(mutex);
     ask();

@@ -13,36 +13,36 @@
 
 namespace emit::tool {
 
-/// Canned frames of this size, as `emit bench stream` shows them. `shm` names the ring; empty:
-/// none.
+/// Returns a configuration that serves canned frames of this size, as `emit bench stream` uses it.
+/// `shm` names the ring; empty: there is none.
 [[nodiscard]] config::DaemonConfig canned_daemon(std::uint32_t width_px, std::uint32_t height_px,
                                                  const std::string& shm);
-/// A name for shared memory that no other process uses.
+/// Returns a name for shared memory that no other process uses.
 [[nodiscard]] std::string own_shm_name();
 
-/// A certificate for 127.0.0.1 that is its own authority, and its key, made in `directory` by
-/// openssl(1): for both ends. Errors: not_found (no such program), io.
+/// Makes a certificate for 127.0.0.1 that is its own authority, and its key, in `directory` by
+/// openssl(1). Both ends use it. Errors: not_found (no such program), io.
 [[nodiscard]] physics::Result<client::Security> make_certificate(
     const std::filesystem::path& directory);
 
-/// As fast as one client takes frames: the host asks for the next ones as soon as half of `window`
-/// are under way, up to all of it, so that nothing is ever skipped or dropped and every transport
-/// is held back by its client alone. Owns a daemon. One thread.
+/// Measurement of the largest frame rate that one client takes. The host requests frames as soon as
+/// half of `window` are under way, up to all of it, so that nothing is ever skipped or dropped and
+/// only the client limits the transport. Owns a daemon. Thread: one owner.
 class StreamThroughput {
  public:
-  /// `security`: of host and clients, where the daemon has certificates.
+  /// Starts the daemon. `security` is that of host and clients, where the daemon has certificates.
   /// Errors: those of DaemonProcess::start() and HostClient::connect().
   [[nodiscard]] static physics::Result<StreamThroughput> start(
       const config::DaemonConfig& config, const std::filesystem::path& directory,
       const client::Security& security = {});
 
-  /// One measurement with a client of its own. `scheme`: tcp, tls, udp or shm.
-  /// Errors: io (the stream ended or stood still).
+  /// Makes one measurement with a client of its own. `scheme` is tcp, tls, udp or shm. Errors: io
+  /// (the stream ended or stood still).
   [[nodiscard]] physics::Result<YardstickResult> measure(const std::string& scheme,
                                                          std::uint64_t frames,
                                                          std::uint32_t window);
   [[nodiscard]] physics::Result<void> stop();
-  /// What the daemon shows; known once something has been measured.
+  /// Device name that the daemon reports. It is known once something has been measured.
   [[nodiscard]] const std::string& device() const { return device_; }
 
  private:

@@ -41,7 +41,8 @@ constexpr int UDP_SEGMENT = 103;
 constexpr int UDP_GRO = 104;
 #endif
 
-/// As many as the canned source shows in turn: the same memory is read.
+/// Number of images: the canned source shows as many in turn, so that the same amount of memory is
+/// read.
 constexpr std::size_t kImages = 16;
 
 double thread_cpu_s() {
@@ -73,7 +74,7 @@ const sockaddr* as_sockaddr(const sockaddr_in& address) {
   return reinterpret_cast<const sockaddr*>(&address);
 }
 
-/// A socket on a free port of 127.0.0.1; invalid when there is none.
+/// Opens a socket on a free port of 127.0.0.1; invalid when there is none.
 Fd bound_socket(int type, sockaddr_in& address) {
   Fd fd(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
   address = {};
@@ -117,7 +118,7 @@ bool send_all(int fd, std::span<const std::byte> bytes, int flags = 0) {
   return true;
 }
 
-/// `crc32c`, where wanted: of the bytes, summed as they come, while the cache has them.
+/// Receives bytes. `crc32c`, unless null, gets their sum, computed while they are in the cache.
 bool receive_all(int fd, std::span<std::byte> bytes, std::uint32_t* crc32c = nullptr) {
   for (std::size_t at = 0; at < bytes.size();) {
     const ssize_t got = ::recv(fd, bytes.data() + at, bytes.size() - at, 0);
@@ -168,14 +169,15 @@ physics::Result<YardstickResult> measure_bare_tcp(const YardstickOptions& option
 
 namespace {
 
-/// Sends one frame's datagrams, as many per call as segmentation takes. False: refused.
+/// Sends one frame's datagrams, as many per call as segmentation takes. It returns false when the
+/// kernel refuses.
 bool send_segmented(int fd, const std::vector<std::byte>& bytes, std::uint32_t datagram_bytes) {
   constexpr std::size_t kMaxCallBytes = 65507;
   const std::size_t per_call =
       std::min<std::size_t>(kMaxCallBytes / datagram_bytes, 64) * datagram_bytes;
   alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(std::uint16_t))> control{};
   for (std::size_t at = 0; at < bytes.size(); at += per_call) {
-    // sendmsg only reads what iov_base points at.
+    // The kernel only reads the memory of iov_base in sendmsg().
     iovec iov{const_cast<std::byte*>(bytes.data()) + at, std::min(per_call, bytes.size() - at)};
     msghdr message{};
     message.msg_iov = &iov;
@@ -193,12 +195,12 @@ bool send_segmented(int fd, const std::vector<std::byte>& bytes, std::uint32_t d
   return true;
 }
 
-/// Takes datagrams and counts their bytes.
+/// Receives datagrams and counts their bytes.
 class BareReceiver {
  public:
   explicit BareReceiver(int fd) : fd_(fd), data_(kBatch * kBytes) {}
 
-  /// Bytes of one call; 0 when nothing came within the socket's timeout.
+  /// Returns the bytes of one call; 0 when nothing came within the socket's timeout.
   std::size_t take() {
     std::array<mmsghdr, kBatch> messages{};
     std::array<iovec, kBatch> iov{};
@@ -317,7 +319,7 @@ physics::Result<BareDelays> measure_bare_delays(const YardstickOptions& options,
       std::vector<std::byte> frame(options.frame_bytes);
       while (arrived[i].size() < frames && receive_all(pairs[i].receiver.get(), frame)) {
         arrived[i].push_back(Clock::now());
-        // Emitd's clients do so too: it keeps the cores as busy.
+        // The clients of emitd sum the bytes too, so the cores are equally busy.
         static_cast<void>(protocol::crc32c(frame));
       }
     });
@@ -328,7 +330,7 @@ physics::Result<BareDelays> measure_bare_delays(const YardstickOptions& options,
       for (std::size_t seen = published.load(); seen <= k; seen = published.load()) {
         published.wait(seen);
       }
-      // A piece for everybody first.
+      // Every client gets its first piece before the rest follows.
       const std::span<const std::byte> image(images[k % kImages]);
       const auto first = image.first(std::min<std::size_t>(image.size(), 64u << 10));
       for (const TcpPair& pair : pairs) {
@@ -363,7 +365,7 @@ double process_cpu_s() noexcept {
 
 namespace {
 
-/// Number behind "bits_per_second" in the object of that name.
+/// Returns the number behind "bits_per_second" in the object of that name.
 std::optional<double> bits_per_second(const std::string& json, const std::string& object) {
   const std::size_t at = json.find('"' + object + '"');
   const std::string key = "\"bits_per_second\":";

@@ -41,7 +41,8 @@ tl::unexpected<physics::Error> zeromq_error(const char* what) {
 /// The memory lives longer than any message.
 void keep(void* /*data*/, void* /*hint*/) {}
 
-/// One frame; with `sum`, its CRC-32C in a part before it. False: refused.
+/// Sends one frame, with its CRC-32C in a part before it if `sum` is set. It returns false when it
+/// is refused.
 bool send_frame(void* socket, std::vector<std::byte>& image, bool sum) {
   if (sum) {
     const std::uint32_t crc32c = protocol::crc32c(image);
@@ -54,7 +55,7 @@ bool send_frame(void* socket, std::vector<std::byte>& image, bool sum) {
   return false;
 }
 
-/// False: nothing came, or with `sum` not what was sent.
+/// Receives one frame. It returns false when nothing came, or when `sum` does not match.
 bool receive_frame(void* socket, zmq_msg_t& message, bool sum) {
   std::uint32_t crc32c = 0;
   if (sum && zmq_recv(socket, &crc32c, sizeof(crc32c), 0) < 0) return false;
@@ -67,8 +68,8 @@ bool receive_frame(void* socket, zmq_msg_t& message, bool sum) {
 }  // namespace
 
 physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options, bool sum) {
-  // One for each, as programs of their own have: one thread of the library that serves both ends
-  // would find everything it reads in its cache, and never wait for itself.
+  // Each end has a context of its own, as separate programs have. One thread of the library that
+  // serves both ends would find everything it reads in its cache, and never wait for itself.
   const Context sending_context(zmq_ctx_new());
   const Context context(zmq_ctx_new());
   const Socket sender(zmq_socket(sending_context.get(), ZMQ_XPUB));
@@ -89,7 +90,7 @@ physics::Result<YardstickResult> measure_zeromq(const YardstickOptions& options,
       zmq_connect(receiver.get(), endpoint.data()) != 0) {
     return zeromq_error("loopback TCP");
   }
-  // The subscription arrives as a message: nothing is published to nobody.
+  // The subscription arrives as a message. Frames sent before it would reach nobody.
   std::array<char, 16> subscription{};
   if (zmq_recv(sender.get(), subscription.data(), subscription.size(), 0) < 0) {
     return zeromq_error("no subscription");

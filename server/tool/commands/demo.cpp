@@ -213,7 +213,7 @@ Result<void> Demo::start() {
     set.push_back(fmt::format("thermal.state_file=\"{}\"", thermal.state_file.string()));
   }
   auto daemon = DaemonProcess::start(daemon_config(scenario_, work_.path()), set, work_.path(),
-                                     std::chrono::seconds(120));
+                                     std::chrono::minutes(15));
   if (!daemon) return tl::unexpected(daemon.error());
   daemon_.emplace(std::move(*daemon));
   setup_s_ = seconds_since(started);

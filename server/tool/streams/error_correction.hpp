@@ -7,7 +7,7 @@
 
 namespace emit::tool {
 
-/// "K+M", or "off". Errors (invalid_argument): anything else, naming the limits.
+/// Parses "K+M" or "off". Errors (invalid_argument) name the limits.
 [[nodiscard]] physics::Result<protocol::FecParams> parse_error_correction(const std::string& text);
 [[nodiscard]] std::string to_string(const protocol::FecParams& fec);
 

@@ -15,13 +15,13 @@ struct JournalReplayOptions {
   std::filesystem::path log;
   double speed = 0.0;  ///< multiple of the recorded pace; 0: as fast as it goes
   int gpu_index = -1;
-  bool temperature = false;           ///< the views carry temperature, depth and object too
+  bool temperature = false;           ///< the views also carry temperature, depth and object
   std::uint64_t expected_frames = 0;  ///< for the progress bar only
 };
 
 struct JournalReplaySummary {
   std::uint64_t frames = 0;
-  std::uint64_t rendered = 0;  ///< the rest were repeats
+  std::uint64_t rendered = 0;  ///< other frames were repeats
   std::uint64_t mismatches = 0;
   std::uint64_t first_mismatch = 0;  ///< frame number; meaningful when mismatches > 0
   std::string device;

@@ -51,7 +51,7 @@ std::optional<bool> PictureMarker::shows(std::span<const float> pixels) const {
     if (std::abs(beyond) < 0.5F * each.margin) continue;
     ((beyond > 0.0F) == each.on_is_brighter ? on : off) += 1;
   }
-  // Nine in ten agree: a picture is either, or it is not to be trusted.
+  // An image is trusted only if nine in ten pixels agree.
   const std::size_t most = std::max(on, off);
   if (2 * (on + off) < telling_.size() || 10 * most < 9 * (on + off)) return std::nullopt;
   return on > off;

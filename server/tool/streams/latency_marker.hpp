@@ -8,17 +8,18 @@
 
 namespace emit::tool {
 
-/// Tells from pixels alone whether something that was switched shows: learns from pictures of both
-/// states which pixels tell, then judges pictures. One thread, setup only.
+/// Detects from pixels alone whether a switched entity shows. It learns from images of both states
+/// which pixels differ, then judges images. Thread: one owner. Setup only.
 class PictureMarker {
  public:
-  /// A picture known to show the state; all of one size.
+  /// Learns from an image known to show the state. All images have one size.
   void learn(std::span<const float> pixels, bool on);
-  /// Ends learning. False: no pixel tells the states apart in all pictures learnt.
+  /// Ends learning. It returns false when no pixel separates the states in all images.
   [[nodiscard]] bool ready();
-  /// Pixels that tell.
+  /// Returns the number of pixels that separate the states.
   [[nodiscard]] std::size_t pixels() const noexcept { return telling_.size(); }
-  /// Empty: half of the telling pixels or more are closer to neither, as in a partial frame.
+  /// Returns the state of an image. The result is empty when at least half of those pixels are
+  /// close to neither state, as in a partial frame.
   [[nodiscard]] std::optional<bool> shows(std::span<const float> pixels) const;
 
  private:

@@ -18,7 +18,7 @@ void LatencyReport::add(const protocol::FrameHeader& header, std::int64_t sent_n
   add(kInbound, sent_ns, received_ns);
   std::int64_t begin_ns = received_ns;
   if (header.slot_begin_ns != 0) {
-    // A pose may be taken in the instants between the slot's begin and the render's.
+    // A pose may arrive in the instants between the slot's begin and the render's.
     begin_ns = std::max(begin_ns, header.slot_begin_ns);
     add(kSampling, received_ns, begin_ns);
   }

@@ -10,21 +10,22 @@
 
 namespace emit::tool {
 
-/// Where the time between a pose's sending and the first frame that shows it went, by the header's
-/// instants; all clocks TAI. One thread.
+/// Splits the time between the sending of a pose and the first frame that shows it into stages, by
+/// the header's instants. All clocks are TAI. Thread: one owner.
 class LatencyReport {
  public:
-  /// `sent_ns`: before the pose was given to the kernel; `last_byte_ns`: when the frame was whole
-  /// here.
+  /// Adds a frame. `sent_ns` is the instant before the pose was given to the kernel. `last_byte_ns`
+  /// is the instant when the frame was complete here.
   void add(const protocol::FrameHeader& header, std::int64_t sent_ns, std::int64_t last_byte_ns);
 
   [[nodiscard]] const Samples& total_us() const noexcept { return stages_[kTotal]; }
-  /// Sampling is there only where frames belong to slots (ig-clock, trigger).
+  /// Returns true when frames belong to slots (ig-clock, trigger). Only then is there a sampling
+  /// stage.
   [[nodiscard]] bool slotted() const noexcept { return !stages_[kSampling].empty(); }
   [[nodiscard]] std::string table() const;
-  /// `p50_us,p99_us,p999_us,max_us` and mean of one stage.
+  /// Returns `p50_us,p99_us,p999_us,max_us` and mean of one stage.
   [[nodiscard]] static Json figures(const Samples& samples_us);
-  /// A list of objects: `stage` and its figures; the last is `total`.
+  /// Returns a list of objects: `stage` and its figures; the last is `total`.
   [[nodiscard]] Json stages_json() const;
 
  private:

@@ -14,7 +14,7 @@ bool is_name(char c) {
          c == ':';
 }
 
-/// What is left of a line.
+/// Rest of a line that is not parsed yet.
 class Line {
  public:
   explicit Line(std::string_view text) : left_(text) {}
@@ -29,7 +29,7 @@ class Line {
     left_.remove_prefix(what.size());
     return true;
   }
-  /// Between quotes, with \\, \" and \n.
+  /// Takes a text between quotes, with \\, \" and \n.
   std::optional<std::string> quoted() {
     if (!skip("\"")) return std::nullopt;
     std::string out;

@@ -14,16 +14,17 @@ struct MetricSample {
   std::map<std::string, std::string> labels;
   double value = 0.0;
 
-  /// Empty when there is none of that name.
+  /// Returns the value of a label; empty when there is none of that name.
   [[nodiscard]] std::string label(const std::string& key) const;
 };
 
-/// Samples of Prometheus' text format, in their order; comments and time stamps are passed over.
-/// Errors (parse), naming the line.
+/// Parses samples of Prometheus' text format, in their order. Comments and time stamps are ignored.
+/// Errors (parse) name the line.
 [[nodiscard]] physics::Result<std::vector<MetricSample>> parse_metrics(std::string_view text);
 
-/// Value below which this share of a histogram's samples lies: the upper end of the bucket that it
-/// falls into. `buckets`: upper end and count up to it, ascending. 0 without samples.
+/// Returns the value below which this share of a histogram's samples lies: the upper end of the
+/// bucket that holds it. `buckets` has upper ends and counts up to them, ascending. The result is 0
+/// without samples.
 [[nodiscard]] double quantile_bound(const std::vector<std::pair<double, double>>& buckets,
                                     double share);
 

@@ -14,8 +14,8 @@
 
 namespace emit::tool {
 
-/// Host frames of a log in file order: CSV where the name ends in .csv, a network capture where the
-/// file starts like one, else MCAP. One owner.
+/// Host frames of a log in file order. The file is CSV where the name ends in .csv, a network
+/// capture where the file starts like one, else MCAP. Thread: one owner.
 class PoseLog {
  public:
   /// @param host_port  of captures: where the host sent its datagrams to.
@@ -26,7 +26,8 @@ class PoseLog {
   /// Moves to the next host frame; false at the end. Errors: those of the reader.
   [[nodiscard]] physics::Result<bool> next();
   [[nodiscard]] const protocol::HostFrameData& host() const noexcept;
-  /// At the end: what is missing of a log that was cut off, what of a capture was passed over.
+  /// Returns notes after the end: frames missing from a log that was cut off, packets of a capture
+  /// that were ignored.
   [[nodiscard]] std::optional<std::string> notes() const;
 
  private:

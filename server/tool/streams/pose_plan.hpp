@@ -12,14 +12,14 @@ namespace emit::tool {
 /// Chooses which poses of a log the demo plays: the first, the last and some evenly in between.
 class PosePlan {
  public:
-  /// @param poses  in the log, > 0.
+  /// @param poses  number of poses in the log, > 0.
   /// @param count  poses to play; absent: kFirstGuess until limit_to() says how many.
   PosePlan(std::uint64_t poses, std::optional<std::uint64_t> count);
 
   static constexpr std::uint64_t kMinimum = 4;
   static constexpr std::uint64_t kFirstGuess = 200;
 
-  /// Index of the pose to play next; empty when the plan is done. Ascending.
+  /// Returns the index of the pose to play next; empty when the plan is done. Indices ascend.
   [[nodiscard]] std::optional<std::uint64_t> next();
   /// Plans `left` more poses, at least as many as make kMinimum. It has no effect on a plan of
   /// fixed count. The first call sets the number; later ones only lower it, so that the spacing
@@ -44,7 +44,7 @@ struct Departure {
   std::int64_t arrived_ns = 0;
   std::int64_t left_ns = 0;
 };
-/// Last stay of at least `min_stay_s` of every entity that leaves again.
+/// Returns the last stay of at least `min_stay_s` of every entity that leaves again.
 [[nodiscard]] std::vector<Departure> find_departures(const scene::ScenarioDesc& scenario,
                                                      double min_stay_s);
 

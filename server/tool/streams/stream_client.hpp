@@ -19,16 +19,16 @@
 
 namespace emit::tool {
 
-/// A subscribed client that receives on a thread of its own, for `demo` and `bench stream`.
-/// The member functions are for the thread that made it.
+/// A subscribed client that receives on a thread of its own, for `demo` and `bench stream`. Only
+/// the thread that made it calls its member functions.
 class StreamClient {
  public:
   struct Options {
     std::string url;
     client::SubscribeOptions subscribe;
     client::Security security;
-    bool keep_pixels = false;  ///< of the newest frame, for last_frame()
-    /// On the client's thread, behind each frame: how many have come.
+    bool keep_pixels = false;  ///< keep those of the newest frame, for last_frame()
+    /// Called on the client's thread after each frame, with the number of frames so far.
     std::function<void(std::uint64_t)> on_frame;
   };
   [[nodiscard]] static physics::Result<std::unique_ptr<StreamClient>> start(const Options& options);
@@ -42,17 +42,17 @@ class StreamClient {
   /// Waits until this many frames have come. False: timeout or stream ended.
   [[nodiscard]] bool wait_for_frames(std::uint64_t frames, std::chrono::milliseconds timeout);
 
-  /// Frames that have come so far.
+  /// Returns the number of frames that have come so far.
   [[nodiscard]] std::uint64_t frames();
 
   struct Snapshot {
     protocol::FrameHeader header;
     std::vector<float> pixels;
   };
-  /// Newest frame; header.width_px is 0 before the first.
+  /// Returns the newest frame; header.width_px is 0 before the first.
   [[nodiscard]] Snapshot last_frame();
 
-  /// While set the thread does not read from its socket: a client that stands still.
+  /// Stops or resumes reading from the socket, as a client does that stands still.
   void pause(bool paused) noexcept { paused_.store(paused); }
   /// Ends the thread. The reports below are complete after it.
   void stop();
@@ -64,11 +64,12 @@ class StreamClient {
   [[nodiscard]] const client::ReceiveCounters& counters() const noexcept {
     return client_->counters();
   }
-  /// CRC of the pixels by frame number: computed here when pixels are kept, else the header's.
+  /// CRC of the pixels by frame number: computed here when pixels are kept, else taken from the
+  /// header.
   [[nodiscard]] const std::map<std::uint64_t, std::uint32_t>& crcs() const noexcept {
     return crcs_;
   }
-  /// Why the stream ended; empty while it did not.
+  /// Returns the reason why the stream ended; empty while it has not ended.
   [[nodiscard]] std::string error();
 
  private:
@@ -91,7 +92,7 @@ class StreamClient {
   bool ended_ = false;
   std::string error_;
 
-  // Owned by the thread until stop().
+  // The thread owns these until stop().
   StreamReport report_;
   std::map<std::uint64_t, std::uint32_t> crcs_;
   std::thread thread_;

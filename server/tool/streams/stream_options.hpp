@@ -9,10 +9,10 @@
 /// Options of the commands that talk to a daemon.
 namespace emit::tool {
 
-/// --tls-* of every command that connects to a control port.
+/// Adds the options --tls-* of every command that connects to a control port.
 void add_security(CommandLine& line, client::Security& target);
 
-/// --fec K+M: groups of up to K fragments with M of parity, or off.
+/// Adds the option --fec K+M: groups of up to K fragments with M of parity, or off.
 void add_error_correction(CommandLine& line, protocol::FecParams& target);
 void add_error_correction(CommandLine& line, std::optional<protocol::FecParams>& target);
 

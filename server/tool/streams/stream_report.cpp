@@ -39,7 +39,7 @@ StreamReport::StreamReport(std::uint32_t every_nth) : every_nth_(every_nth) {
 void StreamReport::add(const client::ReceivedFrame& frame) {
   const protocol::FrameHeader& header = frame.header;
   const bool continues = last_run_ != 0 && header.run_id == last_run_;
-  // One that came late for its number may stand anywhere between two others.
+  // A frame that was late for its number may stand anywhere between two others.
   const std::uint64_t missing = (header.frame_number - last_number_ - 1) / every_nth_;
   if (continues && missing > frame.frames_lost_before &&
       (header.flags & protocol::kFlagGapBefore) == 0) {
@@ -60,7 +60,8 @@ void StreamReport::add(const client::ReceivedFrame& frame) {
   };
   add_span(interval_ms_, last_byte_ns_, frame.last_byte_ns);
   last_byte_ns_ = frame.last_byte_ns;
-  // A repeated frame's render instants are those of the image shown before: not this frame's.
+  // A repeated frame's render instants are those of the image shown before, so they are not
+  // counted.
   if ((header.flags & protocol::kFlagRepeated) == 0) {
     add_span(stages_[kQueue], header.host_received_ns, header.render_start_ns);
     add_span(stages_[kRender], header.render_start_ns, header.render_end_ns);

@@ -10,45 +10,49 @@
 
 namespace emit::tool {
 
-/// What the headers of one client's frames say: stage times, total delays, flags. The header's
-/// instants and this machine's are both TAI; across machines the delays hold only as far as the
-/// clocks agree. One thread.
+/// Statistics of the headers of one client's frames: stage times, total delays, flags. The header's
+/// instants and this machine's are both TAI. Across machines the delays are only as exact as the
+/// clocks agree. Thread: one owner.
 class StreamReport {
  public:
-  /// @param every_nth  which frames were asked for: the others are no gap.
+  /// @param every_nth  every n-th frame was requested; the frames in between are no gap
   explicit StreamReport(std::uint32_t every_nth = 1);
 
   void add(const client::ReceivedFrame& frame);
-  /// What comes next comes over another connection: numbers missing in between are no gap, the
-  /// client was not there.
+  /// Begins a new connection. Numbers that are missing before its first frame are no gap, because
+  /// the client was not connected.
   void begin_connection() noexcept {
     last_run_ = 0;
     last_byte_ns_ = 0;
   }
-  /// Runs of the daemon that frames came from, one after the other.
+  /// Returns the number of daemon runs that frames came from.
   [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
-  /// Of all frames, and what of it travelled: less where it was compressed.
+  /// Bytes of pixels in all frames, and the bytes that were sent for them. Compression makes the
+  /// second number smaller.
   [[nodiscard]] std::uint64_t pixel_bytes() const noexcept { return pixel_bytes_; }
   [[nodiscard]] std::uint64_t sent_pixel_bytes() const noexcept { return sent_pixel_bytes_; }
   [[nodiscard]] std::uint64_t flagged(protocol::FrameFlags flag) const;
-  /// Frames before which more numbers are missing than were lost on the way, without gap_before.
+  /// Returns the number of frames with more numbers missing before them than were lost on the way,
+  /// and without the flag gap_before.
   [[nodiscard]] std::uint64_t unflagged_gaps() const noexcept { return unflagged_gaps_; }
 
-  /// Pose received to last byte of the frame here, ms; frames without a pose are left out.
+  /// Time from the reception of the pose to the last byte of the frame here, ms. Frames without a
+  /// pose are left out.
   [[nodiscard]] const Samples& pose_to_received_ms() const noexcept { return stages_[kTotal]; }
-  /// First byte given to the kernel to last byte here, ms.
+  /// Time from the first byte given to the kernel to the last byte here, ms.
   [[nodiscard]] const Samples& send_to_received_ms() const noexcept { return stages_[kTransport]; }
-  /// Pixels in CPU memory to this client's turn, ms: the daemon's own share.
+  /// Time from pixels in CPU memory to this client's turn, ms: the daemon's own share.
   [[nodiscard]] const Samples& ready_to_send_ms() const noexcept { return stages_[kHandOver]; }
-  /// Pixels in CPU memory to last byte here, ms: what the daemon and the wire add to a render.
+  /// Time from pixels in CPU memory to the last byte here, ms: the share of the daemon and the
+  /// wire.
   [[nodiscard]] const Samples& ready_to_received_ms() const noexcept { return ready_ms_; }
 
-  /// Last byte of one frame to last byte of the next, ms.
+  /// Time from the last byte of one frame to the last byte of the next, ms.
   [[nodiscard]] const Samples& interval_ms() const noexcept { return interval_ms_; }
 
-  /// Table of stages: median, p99 and largest, ms.
+  /// Returns the table of stages: median, p99 and largest, ms.
   [[nodiscard]] std::string stage_table() const;
   [[nodiscard]] Json stages_json() const;
   [[nodiscard]] Json flags_json() const;
@@ -61,7 +65,7 @@ class StreamReport {
   static constexpr std::array<const char*, kStages> kKeys{
       "queue_ms", "render_ms", "readback_ms", "hand_over_ms", "transport_ms", "total_ms"};
 
-  /// A client may run for weeks.
+  /// The number of samples is limited because a client may run for weeks.
   static constexpr std::size_t kMostSamples = 1u << 18;
 
   std::array<Samples, kStages> stages_;

@@ -10,8 +10,7 @@
 
 namespace emit::tool {
 
-/// A subscription that can be taken up again after the daemon, or the way to it, went away.
-/// One thread.
+/// A subscription that can be resumed after the daemon or the network failed. Thread: one owner.
 class StreamSubscription {
  public:
   /// Errors: those of FrameClient::connect() and subscribe().
@@ -19,14 +18,14 @@ class StreamSubscription {
       const std::string& url, const client::SubscribeOptions& options,
       const client::Security& security = {});
 
-  /// After an error of client(): tries again and again, every 100 ms, while `go_on` says so. The
-  /// channel may be another one then: the daemon may have started with another scenario.
+  /// Reconnects after an error of client(): tries every 100 ms while `go_on` returns true. The
+  /// channel may be another one then, because the daemon may have started with another scenario.
   /// Errors: that of the last attempt.
   [[nodiscard]] physics::Result<void> reopen(const std::function<bool()>& go_on);
 
   [[nodiscard]] client::FrameClient& client() noexcept { return *client_; }
   [[nodiscard]] const client::ChannelDescription& channel() const noexcept { return channel_; }
-  /// Of all connections so far.
+  /// Returns the counters of all connections so far.
   [[nodiscard]] client::ReceiveCounters counters() const noexcept;
   [[nodiscard]] std::uint64_t reconnects() const noexcept { return reconnects_; }
 

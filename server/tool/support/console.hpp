@@ -11,7 +11,7 @@
 
 #include "emit/physics/error.hpp"
 
-/// What every subcommand shares towards the terminal. Single thread, setup only.
+/// Terminal output that every subcommand uses. Single thread, setup only.
 namespace emit::tool {
 
 enum ExitCode : int {
@@ -21,20 +21,21 @@ enum ExitCode : int {
   kExitConfig = 78,  ///< EX_CONFIG of sysexits.h
 };
 
-/// Prints "emit: error: ..." to standard error; `code` goes back to the caller.
+/// Prints "emit: error: ..." to standard error and returns `code`.
 int fail(int code, std::string_view text);
-/// Exit code by the kind of error: config is 78, everything else 1.
+/// Prints an error. The exit code follows its kind: config is 78, everything else 1.
 int fail(const physics::Error& error);
-/// The same of something that judges what the command was called with: invalid_argument is 2.
+/// Prints an error in the arguments of a command: invalid_argument is 2, other kinds as in fail().
 int fail_call(const physics::Error& error);
-/// For errors met while reading a scenario or daemon configuration: always 78.
+/// Prints an error found while reading a scenario or daemon configuration. The exit code is always
+/// 78.
 int fail_config(const physics::Error& error);
 void warn(std::string_view text);
-/// Where a command's text for people goes: standard output, or standard error when `--json -` takes
-/// standard output.
+/// Returns the stream for a command's text for people: standard output, or standard error when
+/// `--json -` takes standard output.
 [[nodiscard]] std::FILE* text_stream(const std::optional<std::filesystem::path>& json);
 
-/// Bar on standard error; silent unless that is a terminal.
+/// Progress bar on standard error. It is silent unless that is a terminal.
 class ProgressBar {
  public:
   ProgressBar(std::string label, std::uint64_t total);
@@ -43,7 +44,7 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void advance_to(std::uint64_t done);
-  /// Clears the line; called by the destructor too.
+  /// Clears the line. The destructor calls it too.
   void finish();
 
  private:

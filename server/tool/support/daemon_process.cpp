@@ -20,7 +20,7 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-/// Word after "key=" in a line, empty when the key is not there.
+/// Returns the word after "key=" in a line; empty when the key is not there.
 std::string value_of(const std::string& line, const std::string& key) {
   const std::size_t at = line.find(key);
   if (at == std::string::npos) return "";

@@ -16,9 +16,9 @@ namespace emit::tool {
 class DaemonProcess {
  public:
   /// Writes `config` to directory/emitd.toml, starts emitd with it and the overrides `set`, and
-  /// waits until it says that it is ready. What it prints goes to directory/emitd.log.
-  /// Errors: not_found (no emitd), config (it refused the configuration), io (ended or not ready in
-  /// time); the text carries the last lines of its log.
+  /// waits until it reports that it is ready. Its output goes to directory/emitd.log. Errors:
+  /// not_found (no emitd), config (it refused the configuration), io (ended or not ready in time).
+  /// The text carries the last lines of its log.
   [[nodiscard]] static physics::Result<DaemonProcess> start(const config::DaemonConfig& config,
                                                             const std::vector<std::string>& set,
                                                             const std::filesystem::path& directory,
@@ -26,11 +26,12 @@ class DaemonProcess {
 
   [[nodiscard]] const std::string& control_address() const noexcept { return control_; }
   [[nodiscard]] const std::string& host_udp_address() const noexcept { return host_udp_; }
-  /// Error when it has ended by itself.
+  /// Returns an error when the process has ended by itself.
   [[nodiscard]] physics::Result<void> check_alive();
-  /// CPU time of all its threads so far, s.
+  /// Returns the CPU time of all its threads so far, s.
   [[nodiscard]] double cpu_seconds() const;
-  /// SIGTERM, then waits; error when it does not end in time (it is killed) or not with 0.
+  /// Sends SIGTERM and waits. Errors: the process does not end in time (it is killed), or not with
+  /// 0.
   [[nodiscard]] physics::Result<void> stop(std::chrono::milliseconds timeout);
 
  private:

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "emit/image/png_image.hpp"
+#include "emit/physics/check.hpp"
 
 namespace emit::tool {
 namespace {
@@ -53,7 +54,9 @@ ApparentTemperature::ApparentTemperature(double lo_um, double hi_um)
     : ApparentTemperature(physics::Band{lo_um, hi_um, {}}) {}
 
 ApparentTemperature::ApparentTemperature(const physics::Band& band) {
-  // Every 2 K exactly, ln L between them linear in 1/T: below 1 mK in the thermal bands.
+  EMIT_CHECK(physics::validate(band).has_value());
+  // The table is exact every 2 K. In between ln L is linear in 1/T, with an error below 1 mK in the
+  // thermal bands.
   constexpr double kAnchorK = 2.0;
   const auto count = static_cast<std::size_t>((kTableToK - kTableFromK) / kTableStepK) + 1;
   radiance_.reserve(count);
@@ -143,7 +146,7 @@ physics::Result<void> write_frame_png(const std::filesystem::path& file, const F
       apparent = ApparentTemperature(*band).kelvin(frame.radiance_w_m2_sr);
       values = apparent;
     } else {
-      // A canned picture of no band: its own range of radiance.
+      // A canned image of no band is scaled by its own range of radiance.
       values = frame.radiance_w_m2_sr;
       options.unit.assign(1, 'W');
       const auto range = image::percentile_range(values, 1.0, 99.0);

@@ -15,16 +15,19 @@
 
 namespace emit::tool {
 
-/// In-band radiance to the temperature of a blackbody of the same radiance, by a table of 0.05 K
-/// over 150..1500 K; outside it the end of the table. Setup only to build; lookup any thread.
+/// Converts in-band radiance to the temperature of a blackbody of the same radiance. It uses a
+/// table of 0.05 K steps over 150..1500 K; a radiance outside gets the end of the table.
+/// Construction: setup only. Lookup: any thread.
 class ApparentTemperature {
  public:
-  /// Of a band with its response. Precondition: physics::validate().
+  /// Makes the table of a band with its response.
+  /// @pre physics::validate(band) succeeds
   explicit ApparentTemperature(const physics::Band& band);
-  /// Of a rectangular band. Precondition: 0 < lo_um < hi_um.
+  /// Makes the table of a rectangular band.
+  /// @pre 0 < lo_um < hi_um
   ApparentTemperature(double lo_um, double hi_um);
   [[nodiscard]] double kelvin(double radiance_w_m2_sr) const noexcept;
-  /// dT/dL there, K per W m-2 sr-1.
+  /// Returns dT/dL at that radiance, K per W m-2 sr-1.
   [[nodiscard]] double kelvin_per_radiance(double radiance_w_m2_sr) const noexcept;
   [[nodiscard]] std::vector<float> kelvin(std::span<const float> radiance_w_m2_sr) const;
 
@@ -33,15 +36,15 @@ class ApparentTemperature {
   std::vector<double> radiance_;  ///< ascending
 };
 
-/// The scenario's band as the radiometry takes it, response included.
+/// Returns the scenario's band in the form of the radiometry, response included.
 [[nodiscard]] physics::Band spectral_band(const scene::SpectralBand& band);
 
-/// The band of a frame's attributes; where they do not give the response, a rectangle. Absent for a
-/// frame of no band, or of one that fails physics::validate().
+/// Returns the band of a frame's attributes; a rectangle where they do not give the response. The
+/// result is empty for a frame without a band, or with one that fails physics::validate().
 [[nodiscard]] std::optional<physics::Band> spectral_band(const image::FrameMetadata& metadata);
-/// The response for a frame's attributes.
+/// Returns the response for a frame's attributes.
 [[nodiscard]] std::vector<physics::ResponsePoint> response_of(const scene::SpectralBand& band);
-/// How radiances become kelvins, for the user: "band 3-5 um by its response of 12 points".
+/// Describes for the user how radiances become kelvins: "band 3-5 um by its response of 12 points".
 [[nodiscard]] std::string conversion_text(const physics::Band& band, bool response_known);
 
 /// Planes of one frame on their way to disk; empty planes are left out.
@@ -52,19 +55,21 @@ struct FramePlanes {
   std::span<const float> temperature_k;
   std::span<const float> depth_m;
   std::span<const float> object_id;
-  /// 1 where a pixel arrived, else 0; not empty: the frame is marked as partial.
+  /// Mask of the pixels: 1 where a pixel arrived, else 0. If it is not empty, the frame is marked
+  /// as partial.
   std::span<const float> valid;
-  /// For pictures of frames without temperature; absent: built from the metadata's band, which
-  /// costs a second or so. Callers of many frames set it.
+  /// Table for frames without temperature. If it is null, it is built from the metadata's band,
+  /// which takes about a second. Callers with many frames set it.
   const ApparentTemperature* apparent = nullptr;
   image::FrameMetadata metadata;
-  /// Where the pixels lie in the sensor's image, if that is larger; sensor of size 0: not known.
+  /// Place of the pixels in the sensor's image, if that is larger. A sensor of size 0 means that it
+  /// is not known.
   scene::PixelRect window_px;
   std::uint32_t sensor_width_px = 0;
   std::uint32_t sensor_height_px = 0;
 };
 
-/// Limits of the false colours, with a colour bar beside the picture.
+/// Limits of the false colours, with a colour bar beside the image.
 struct ColorLimits {
   double min_k = 280.0;
   double max_k = 330.0;
@@ -72,12 +77,13 @@ struct ColorLimits {
 
 [[nodiscard]] physics::Result<void> write_frame_exr(const std::filesystem::path& file,
                                                     const FramePlanes& frame);
-/// Surface temperature where the frame has it, else the apparent temperature of the radiance; for a
-/// frame of no band, radiance between its 1st and 99th percentile.
+/// Writes a false-colour PNG: the surface temperature where the frame has it, else the apparent
+/// temperature of the radiance. For a frame without a band it shows radiance between its 1st and
+/// 99th percentile.
 [[nodiscard]] physics::Result<void> write_frame_png(const std::filesystem::path& file,
                                                     const FramePlanes& frame,
                                                     const ColorLimits& limits);
-/// frame_NNNNNN.exr and .png in `directory`, numbered by the metadata's frame number.
+/// Writes frame_NNNNNN.exr and .png into `directory`, numbered by the metadata's frame number.
 [[nodiscard]] physics::Result<void> write_frame_files(const std::filesystem::path& directory,
                                                       const FramePlanes& frame,
                                                       const ColorLimits& limits);

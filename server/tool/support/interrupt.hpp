@@ -4,8 +4,8 @@
 
 namespace emit::tool {
 
-/// From construction to destruction SIGINT and SIGTERM only set a flag, so that a long command can
-/// finish its files and print what it has. One instance at a time.
+/// Guard that turns SIGINT and SIGTERM into a flag while it exists, so that a long command can
+/// finish its files and print its results. One instance at a time.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -25,7 +25,7 @@ class Json {
   Json(bool value) : value_(value) {}
   Json(std::integral auto value) : value_(static_cast<std::int64_t>(value)) {}
   Json(std::uint64_t value) : value_(value) {}
-  /// NaN and infinities have no JSON form and are written as null.
+  /// Makes a number. NaN and infinities have no JSON form and are written as null.
   Json(std::floating_point auto value) : value_(static_cast<double>(value)) {}
   Json(std::string value) : value_(std::move(value)) {}
   Json(std::string_view value) : value_(std::string(value)) {}
@@ -41,7 +41,7 @@ class Json {
   /// Appends to an array.
   Json& push(Json value);
 
-  /// Indented text, UTF-8, newline at the end. Doubles survive a round trip.
+  /// Returns indented text, UTF-8, with a newline at the end. Doubles survive a round trip.
   [[nodiscard]] std::string dump() const;
 
  private:

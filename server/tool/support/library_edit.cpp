@@ -24,14 +24,15 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-/// True for the line "key = ..." at the left margin.
+/// Returns true for the line "key = ..." at the left margin.
 bool assigns(std::string_view line, std::string_view key) {
   if (!line.starts_with(key)) return false;
   const std::string_view rest = trimmed(line.substr(key.size()));
   return rest.starts_with("=");
 }
 
-/// Lines of a value from `begin` on: until brackets balance. Strings in library values hold none.
+/// Returns the end of a value that begins at line `begin`: brackets must balance. Strings in
+/// library values hold none.
 std::size_t value_end(const std::vector<std::string>& lines, std::size_t begin) {
   int depth = 0;
   for (std::size_t i = begin; i < lines.size(); ++i) {
@@ -83,7 +84,7 @@ void replace_in_block(std::vector<std::string>& lines, std::size_t begin, std::s
       break;
     }
   }
-  // Before the source, else at the end of the block's text.
+  // The modes go before the source, else at the end of the block's text.
   auto at = std::find_if(block.begin(), block.end(),
                          [](const std::string& line) { return assigns(line, "source"); });
   if (at == block.end()) {

@@ -9,20 +9,20 @@
 
 namespace emit::tool {
 
-/// Fitted modes of one material on their way into a library file.
+/// Fitted modes of one material that are written into a library file.
 struct LibraryEntry {
   reference::FitResult fit;
   bool foster = true;  ///< otherwise the modes of emit2014
 };
 
-/// Text of a material library (TOML) with the modes of the named materials replaced; everything
-/// else, comments included, stays as it is. Errors: not_found, naming a material that the text
-/// lacks.
+/// Returns the text of a material library (TOML) with the modes of the named materials replaced.
+/// Everything else, comments included, stays as it is. Errors: not_found, naming a material that
+/// the text lacks.
 [[nodiscard]] physics::Result<std::string> with_fitted_modes(const std::string& library,
                                                              std::span<const LibraryEntry> entries);
 
-/// The same from file to file (they may be one). An empty `library` is the shipped one. Errors: io,
-/// not_found.
+/// Replaces the modes from file to file (they may be one). An empty `library` is the shipped one.
+/// Errors: io, not_found.
 [[nodiscard]] physics::Result<void> write_library(const std::filesystem::path& library,
                                                   std::span<const LibraryEntry> entries,
                                                   const std::filesystem::path& out);

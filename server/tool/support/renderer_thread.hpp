@@ -17,19 +17,21 @@
 
 namespace emit::tool {
 
-/// A frame from submit() until its pixels are there.
+/// Result of a frame, from submit() until its pixels are in memory.
 struct TimedFrame {
   double frame_ms = 0.0;
   bool coarse = false;  ///< renderer::FrameStats::coarse
   std::uint8_t rung = 0;
 };
 
-/// A renderer on a thread of its own, so that several, each with its own GL context, are alive at
-/// once and render in turn. Calls block until the thread has done them: at most one renderer works
-/// at a time when one thread calls. Setup class; the frames themselves are those of Renderer.
+/// A renderer on a thread of its own, so that several renderers, each with its own GL context,
+/// exist at once and render in turn. Calls block until the thread has done them, so at most one
+/// renderer works at a time when one thread calls. Setup class; the frames themselves are those of
+/// Renderer.
 class RendererThread {
  public:
-  /// `temperature`: frames carry that plane. Errors: those of Renderer::create().
+  /// Creates the renderer. With `temperature` frames carry that channel. Errors: those of
+  /// Renderer::create().
   [[nodiscard]] static physics::Result<std::unique_ptr<RendererThread>> create(
       const scene::ScenarioDesc& scenario, int gpu_index,
       renderer::Ladder ladder = renderer::Ladder::none, bool temperature = false);
@@ -37,19 +39,21 @@ class RendererThread {
   RendererThread(const RendererThread&) = delete;
   RendererThread& operator=(const RendererThread&) = delete;
 
-  /// Renderer::warm_up(); returns the seconds it took. Stops with an error (io) on an interrupt.
+  /// Calls Renderer::warm_up() and returns the seconds it took. An interrupt ends it with an error
+  /// (io).
   [[nodiscard]] physics::Result<double> warm_up(const renderer::FrameRequest& first);
-  /// `temperature_k`: not null: gets that plane, which is not timed. Errors: io (interrupted), gpu
-  /// (the device failed), internal.
+  /// Renders a frame. `temperature_k`, unless null, gets the temperatures; copying them is not
+  /// timed. Errors: io (interrupted), gpu (the device failed), internal.
   [[nodiscard]] physics::Result<TimedFrame> render(const renderer::FrameRequest& request,
                                                    std::vector<float>* temperature_k = nullptr);
-  /// As the daemon does with a deadline: the rung by server::QualityPolicy, its time included.
+  /// Renders a frame within a deadline as the daemon does: server::QualityPolicy chooses the
+  /// quality level, and its time is included.
   [[nodiscard]] physics::Result<TimedFrame> render_within(renderer::FrameRequest request,
                                                           double budget_ms);
 
-  /// Renderer::apply_entities().
+  /// Calls Renderer::apply_entities().
   void apply_entities(std::int64_t sim_time_ns, std::span<const renderer::EntityUpdate> updates);
-  /// Renderer::apply_weather().
+  /// Calls Renderer::apply_weather().
   void apply_weather(const scene::WeatherSample& sample);
 
   [[nodiscard]] physics::Pose scenario_pose_at(std::int64_t sim_time_ns) const noexcept {

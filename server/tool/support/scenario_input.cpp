@@ -9,6 +9,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "emit/config/load.hpp"
+#include "emit/physics/check.hpp"
 #include "emit/scene/trajectory.hpp"
 
 namespace emit::tool {
@@ -20,14 +21,15 @@ using physics::make_error;
 /// Largest half width of the central difference that gives a trajectory's rates.
 constexpr std::int64_t kRateStepNs = 500'000;
 
-/// Rates inside a segment: constant velocity and constant rotation axis, so the chord is exact.
+/// Returns rates inside a segment: constant velocity and constant rotation axis, so the chord is
+/// exact.
 protocol::PoseRates rates_at(const scene::Trajectory& trajectory,
                              std::int64_t sim_time_ns) noexcept {
   const auto after = std::upper_bound(
       trajectory.begin(), trajectory.end(), sim_time_ns,
       [](std::int64_t time, const scene::Keyframe& key) { return time < key.sim_time_ns; });
   if (after == trajectory.begin() || after == trajectory.end() || after->teleport) return {};
-  // The chord stays inside the segment: a neighbour moves otherwise.
+  // The chord stays inside the segment, because a neighbour moves otherwise.
   const std::int64_t from_ns = std::max(sim_time_ns - kRateStepNs, (after - 1)->sim_time_ns);
   const std::int64_t to_ns = std::min(sim_time_ns + kRateStepNs, after->sim_time_ns - 1);
   if (to_ns <= from_ns) return {};
@@ -99,6 +101,7 @@ std::size_t band_of_channel(const scene::ScenarioDesc& scenario, scene::ChannelK
 
 TrajectorySample sample_trajectory(const scene::Trajectory& trajectory, std::int64_t sim_time_ns,
                                    std::int64_t previous_ns) noexcept {
+  EMIT_CHECK(!trajectory.empty());
   const scene::TrajectoryState state = scene::trajectory_at(trajectory, sim_time_ns);
   TrajectorySample sample;
   sample.pose = state.pose;
@@ -136,6 +139,7 @@ physics::Result<void> check_entities_fit(const scene::ScenarioDesc& scenario) {
 
 void make_host_frame(const scene::ScenarioDesc& scenario, std::int64_t start_ns, double rate_hz,
                      std::uint64_t index, protocol::HostFrameData& out) {
+  EMIT_CHECK(check_entities_fit(scenario).has_value());
   const auto time_of = [&](double count) {
     return start_ns + static_cast<std::int64_t>(std::llround(count * 1e9 / rate_hz));
   };

@@ -9,7 +9,7 @@
 
 namespace emit::tool {
 
-/// Scene names that `generate` knows, in the order of `all`.
+/// Returns the scene names that `generate` knows, in the order of `all`.
 [[nodiscard]] std::vector<scenegen::SceneKind> all_scene_kinds();
 
 /// Applies KEY=VALUE, e.g. "block_east_m=2", to the options of `options.kind`.

@@ -8,12 +8,15 @@
 #include <cmath>
 #include <limits>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::tool {
 namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 }
 
 Samples::Samples(std::size_t most) : most_(most) {
+  EMIT_CHECK(most > 0 && most % 2 == 0);
   values_.resize(most);  // written once, so that a long run does not look as if it leaked
   values_.clear();
 }
@@ -69,7 +72,7 @@ std::string histogram_text(const Samples& samples, const std::string& unit) {
   while (decade > smallest) decade /= 10.0;
   while (decade * 10.0 <= smallest) decade *= 10.0;
 
-  // At most 40 decades of doubles lie between the smallest and the largest sample.
+  // The smallest and the largest sample are at most 40 decades apart.
   std::vector<double> edges(1, 0.0);
   for (int step = 0; step < 120 && edges.back() <= largest; ++step) {
     edges.push_back(decade * kSteps[static_cast<std::size_t>(step % 3)]);

@@ -10,23 +10,23 @@ namespace emit::tool {
 class Samples {
  public:
   Samples() = default;
-  /// Keeps `most` samples at most, evenly spread over those that came: when there is no room, every
-  /// second goes. Number, sum and maximum stay exact. Takes its memory at once. Precondition: most
-  /// is even and not 0.
+  /// Keeps at most `most` samples, evenly spread over all. When there is no room, every second one
+  /// is dropped. Number, sum and maximum stay exact. The memory is taken at once.
+  /// @pre most is even and not 0
   explicit Samples(std::size_t most);
 
   void add(double value);
   void reserve(std::size_t count) { values_.reserve(count); }
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
   [[nodiscard]] bool empty() const noexcept { return values_.empty(); }
-  /// `frac` in [0, 1]: the smallest sample that at least this share does not exceed. NaN when
+  /// Returns the smallest sample that at least the share `frac` in [0, 1] does not exceed; NaN when
   /// empty.
   [[nodiscard]] double percentile(double frac) const;
   [[nodiscard]] double median() const;  ///< mean of the two middle samples for an even count
   [[nodiscard]] double mean() const;
   [[nodiscard]] double max() const;
   [[nodiscard]] double sum() const;
-  /// Those kept, in the order in which they came.
+  /// Returns the samples kept, in the order in which they came.
   [[nodiscard]] const std::vector<double>& values() const noexcept { return values_; }
 
  private:
@@ -38,7 +38,8 @@ class Samples {
   double max_ = 0.0;
 };
 
-/// Histogram as text, logarithmic bins of the 1-2-5 series; `unit` follows the bin limits.
+/// Returns a histogram as text with logarithmic bins of the 1-2-5 series; `unit` follows the bin
+/// limits.
 [[nodiscard]] std::string histogram_text(const Samples& samples, const std::string& unit);
 
 }  // namespace emit::tool

@@ -16,7 +16,8 @@ namespace emit::tool {
 /// The destructor kills and reaps a child that still runs.
 class Subprocess {
  public:
-  /// Errors: not_found (no such executable), io. `log` receives both output streams.
+  /// Starts a program. `log` receives both output streams. Errors: not_found (no such executable),
+  /// io.
   [[nodiscard]] static physics::Result<Subprocess> start(const std::vector<std::string>& arguments,
                                                          const std::filesystem::path& log);
   Subprocess(Subprocess&& other) noexcept;
@@ -25,9 +26,9 @@ class Subprocess {
   Subprocess& operator=(const Subprocess&) = delete;
   ~Subprocess();
 
-  /// Exit status once it has ended: 0..255, or 128 + signal. Does not wait.
+  /// Returns the exit status once the child has ended: 0..255, or 128 + signal. Does not wait.
   [[nodiscard]] std::optional<int> poll();
-  /// Waits at most `timeout`; nothing when it still runs.
+  /// Waits at most `timeout`. The result is empty when the child still runs.
   [[nodiscard]] std::optional<int> wait(std::chrono::milliseconds timeout);
   void send_signal(int signal_number) noexcept;
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
@@ -38,7 +39,7 @@ class Subprocess {
   std::optional<int> status_;
 };
 
-/// Folder of the running executable. Errors: io.
+/// Returns the folder of the running executable. Errors: io.
 [[nodiscard]] physics::Result<std::filesystem::path> executable_dir();
 
 }  // namespace emit::tool

@@ -21,7 +21,7 @@ constexpr double kTop = 34.0;
 constexpr double kBottom = 58.0;
 constexpr double kLegendLine = 15.0;
 
-/// Okabe and Ito's palette: told apart with any colour vision.
+/// Palette of Okabe and Ito, whose colours differ for any colour vision.
 constexpr std::array<const char*, 7> kColors{"#0072b2", "#e69f00", "#009e73", "#cc79a7",
                                              "#56b4e9", "#d55e00", "#8c6d1f"};
 
@@ -171,7 +171,7 @@ class PlotWriter {
         plot_.series, [](const PlotSeries& series) { return !series.label.empty(); });
     return kLegendLine * static_cast<double>(named);
   }
-  /// Where the legend hides the fewest points; the first of equals.
+  /// Returns the corner in which the legend hides the fewest points; the first of equals.
   [[nodiscard]] Corner emptiest_corner() const {
     constexpr double kCharPx = 6.5;
     std::size_t longest = 0;

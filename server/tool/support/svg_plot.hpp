@@ -26,7 +26,7 @@ struct PlotSeries {
   std::vector<PlotPoint> points;
   bool line = false;      ///< joined in the order given
   bool markers = true;    ///< a dot at every point
-  bool emphasis = false;  ///< thick and dark, for what the reader should see first
+  bool emphasis = false;  ///< thick and dark, for the data that the reader should see first
 };
 
 /// One diagram. Points that an axis cannot show (NaN, or not positive on a logarithmic axis) are
@@ -38,10 +38,10 @@ struct Plot {
   std::vector<PlotSeries> series;
 };
 
-/// Diagrams side by side as one SVG document, `columns` in a row. Setup only; any thread.
+/// Returns diagrams side by side as one SVG document, `columns` in a row. Setup only; any thread.
 [[nodiscard]] std::string svg_document(const std::vector<Plot>& plots, std::size_t columns = 2);
 
-/// Errors: io, naming the file.
+/// Writes an SVG document. Errors: io, naming the file.
 [[nodiscard]] physics::Result<void> write_svg(const std::filesystem::path& file,
                                               const std::vector<Plot>& plots,
                                               std::size_t columns = 2);

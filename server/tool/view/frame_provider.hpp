@@ -14,7 +14,7 @@
 
 namespace emit::tool::view {
 
-/// What is viewed.
+/// Choice of the source that is viewed.
 struct SourceOptions {
   std::string source;  ///< a scenario (name or .toml file), or the URL of a daemon's stream
   std::vector<std::string> set;  ///< scenario: overrides of its keys
@@ -29,7 +29,7 @@ struct SourceOptions {
   [[nodiscard]] bool is_stream() const { return source.find("://") != std::string::npos; }
 };
 
-/// Picture handed from the thread that makes it to the window.
+/// Image that the thread that makes it hands to the window.
 struct ViewFrame {
   std::uint64_t serial = 0;  ///< counts up; 0: none yet
   std::uint32_t width_px = 0;
@@ -43,20 +43,20 @@ struct ViewFrame {
   double frame_ms = 0.0;  ///< time to make it, or pose to reception
 };
 
-/// Why no more frames come.
+/// Reason why no more frames come.
 struct ViewEnd {
   std::string reason;
   bool failure = false;  ///< an error of ours; else the other side ended a stream
 };
 
-/// Newest-wins slot between a producer thread and the window's thread.
+/// Slot between a producer thread and the window's thread that keeps only the newest frame.
 class FrameSlot {
  public:
-  /// Producer: swaps the frame in; `frame` gets an old buffer back for reuse.
+  /// Swaps the frame in. `frame` gets an old buffer back for reuse. Thread: the producer.
   void put(ViewFrame& frame);
-  /// Window: true when `frame` was exchanged for a newer one.
+  /// Exchanges `frame` for a newer one. It returns false when there is none. Thread: the window's.
   bool take(ViewFrame& frame);
-  /// Producer: ends the stream of frames with a reason.
+  /// Ends the stream of frames with a reason. Thread: the producer.
   void end(std::string reason, bool failure);
   [[nodiscard]] std::optional<ViewEnd> ended();
 
@@ -67,22 +67,22 @@ class FrameSlot {
   std::optional<ViewEnd> end_;
 };
 
-/// Source of pictures with a thread of its own. The window's thread calls everything.
+/// Source of images with a thread of its own. The window's thread calls everything.
 class FrameProvider {
  public:
   virtual ~FrameProvider() = default;
   [[nodiscard]] virtual bool take(ViewFrame& frame) = 0;
   virtual void control(const ViewControl& control) = 0;
   [[nodiscard]] virtual std::optional<ViewEnd> ended() = 0;
-  /// Name, channel or scenario, for the window's title.
+  /// Returns the channel or the scenario, for the window's title.
   [[nodiscard]] virtual std::string title() const = 0;
   [[nodiscard]] virtual std::string band() const = 0;
-  /// Limits to begin with, K.
+  /// Returns the initial limits of the false colours, K.
   virtual void limits(double& min_k, double& max_k) const = 0;
 };
 
-/// Renders a scenario on a thread that owns the GL context of the renderer. Errors as
-/// load_scenario (code config) and Renderer::create.
+/// Renders a scenario on a thread that owns the GL context of the renderer. Errors: those of
+/// load_scenario (code config) and of Renderer::create().
 [[nodiscard]] physics::Result<std::unique_ptr<FrameProvider>> make_scenario_provider(
     const SourceOptions& options);
 /// Receives a daemon's stream.

@@ -25,7 +25,8 @@ class ScenarioProvider final : public FrameProvider {
   ScenarioProvider(scene::ScenarioDesc scenario, std::size_t band, double start_s, int gpu_index)
       : scenario_(std::move(scenario)), band_(band), sim_time_s_(start_s), gpu_index_(gpu_index) {}
 
-  /// The renderer's context lives on the thread: it is made there, and its failure told here.
+  /// Starts the thread that owns the renderer's context. The context is made there, and its failure
+  /// is returned here.
   physics::Result<void> start() {
     std::promise<physics::Result<void>> made;
     auto result = made.get_future();
@@ -40,7 +41,7 @@ class ScenarioProvider final : public FrameProvider {
   bool take(ViewFrame& frame) override { return slot_.take(frame); }
   void control(const ViewControl& control) override {
     const std::lock_guard lock(control_mutex_);
-    // Steps and jumps that the loop has not seen yet stay; going home cancels the steps before it.
+    // Steps and jumps that the loop has not seen yet stay. Going home cancels the steps before it.
     const ViewControl pending = control_;
     control_ = control;
     control_.jump_s += pending.jump_s;
@@ -105,7 +106,7 @@ class ScenarioProvider final : public FrameProvider {
         control_.home = false;
       }
       const auto now = Clock::now();
-      // A slow device skips simulated time rather than falling behind for ever.
+      // A slow device skips simulated time, so that it does not fall behind for ever.
       const double wall_s = std::min(1.0, std::chrono::duration<double>(now - last).count());
       last = now;
       if (!control.paused && number > 0) sim_time_s_ += wall_s;

@@ -17,7 +17,7 @@ class StreamProvider final : public FrameProvider {
  public:
   StreamProvider(std::unique_ptr<client::FrameClient> client, client::ChannelDescription channel)
       : client_(std::move(client)), channel_(std::move(channel)) {
-    // Canned streams may name no band: they have a radiance alone.
+    // Canned streams may name no band. They have a radiance alone.
     if (const auto band = channel_.spectral_band()) {
       apparent_.emplace(*band);
       fmt::print(stderr, "emit: apparent temperature, {}\n",

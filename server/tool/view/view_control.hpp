@@ -6,13 +6,13 @@
 
 namespace emit::tool::view {
 
-/// What the user asks of the camera and the clock; streams ignore it.
+/// Motion of camera and clock that the user requests. Streams ignore it.
 struct ViewControl {
   double yaw_rad = 0.0;    ///< added to the scenario's heading, clockwise
   double pitch_rad = 0.0;  ///< added to its elevation, up
   bool paused = false;
 
-  /// Once, not a state: the provider consumes what follows.
+  /// The members below are single steps, not a state. The provider consumes them.
   double jump_s = 0.0;     ///< seconds to add to the simulated time
   double forward_m = 0.0;  ///< steps along the view's boresight as it is turned now
   double right_m = 0.0;    ///< to its right
@@ -20,12 +20,12 @@ struct ViewControl {
   bool home = false;       ///< forget earlier steps
 };
 
-/// The scenario's attitude turned: yaw about the world's vertical, clockwise seen from above, pitch
-/// about the body's y axis.
+/// Returns the scenario's attitude after a turn: yaw about the world's vertical, clockwise seen
+/// from above, pitch about the body's y axis.
 [[nodiscard]] physics::Pose turned_pose(const physics::Pose& base,
                                         const ViewControl& control) noexcept;
 
-/// World metres of the control's steps, taken in the turned attitude.
+/// Returns the control's steps in world metres, taken in the turned attitude.
 [[nodiscard]] glm::dvec3 step_world_m(const physics::Pose& base,
                                       const ViewControl& control) noexcept;
 

@@ -180,7 +180,8 @@ class GlfwWindow final : public Window {
   struct Area {
     double x, y, width, height;
   };
-  /// Largest centred rectangle of the picture's aspect; symmetric, so up or down does not matter.
+  /// Returns the largest centred rectangle of the image's aspect. It is symmetric, so up or down
+  /// does not matter.
   [[nodiscard]] Area area(int width, int height) const {
     const double scale = std::min(static_cast<double>(width) / std::max(1U, picture_width_),
                                   static_cast<double>(height) / std::max(1U, picture_height_));

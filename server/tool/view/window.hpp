@@ -35,10 +35,10 @@ enum class Key : std::uint8_t {
   close
 };
 
-/// What happened since the last poll().
+/// Input since the last poll().
 struct WindowInput {
   std::vector<Key> keys;   ///< presses and repeats, in order
-  double drag_x_px = 0.0;  ///< left button, in picture pixels
+  double drag_x_px = 0.0;  ///< left button, in image pixels
   double drag_y_px = 0.0;
   double wheel = 0.0;  ///< positive: away from the user
   bool closed = false;
@@ -49,9 +49,9 @@ struct PicturePosition {
   std::uint32_t y_px = 0;
 };
 
-/// A window that shows one RGB picture, scaled with its aspect kept. It has an OpenGL 3.3 context
-/// of its own, used to put the picture on the screen and for nothing else. Main thread only, one at
-/// a time.
+/// A window that shows one RGB image, scaled with its aspect kept. It has an OpenGL 3.3 context of
+/// its own, used to put the image on the screen and for nothing else. Main thread only, one at a
+/// time.
 class Window {
  public:
   /// Errors: gpu (no display, no context), with GLFW's reason.
@@ -62,9 +62,9 @@ class Window {
 
   [[nodiscard]] virtual WindowInput poll() = 0;
   virtual void set_title(const std::string& title) = 0;
-  /// Uploads and shows. With `read_back` the pixels of the window are copied into it.
+  /// Uploads and shows an image. With `read_back` the pixels of the window are copied into it.
   virtual void show(const image::RgbImage& picture, image::RgbImage* read_back) = 0;
-  /// Picture pixel under the cursor; empty when the cursor is elsewhere.
+  /// Returns the image pixel under the cursor; empty when the cursor is elsewhere.
   [[nodiscard]] virtual std::optional<PicturePosition> cursor() const = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light frusta hold what the camera sees and its casters, tightly.
+// Light frusta hold all that the camera sees and the entities that shade it, tightly.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +24,7 @@ ViewVolume view_at_ground() {
   view.far_m = 2000.0;
   view.scene_min_m = {-500.0, -500.0, -60.0};
   view.scene_max_m = {500.0, 500.0, -40.0};
-  // Let a caster stand higher than everything that is in the scene now.
+  // Let an entity stand higher than everything that is in the scene now.
   view.casters_min_m = {-5.0, -5.0, -60.0};
   view.casters_max_m = {5.0, 5.0, -20.0};
   return view;
@@ -59,7 +59,7 @@ TEST(LightFit, holds_every_visible_point_and_every_caster_in_front_of_it) {
         ASSERT_GE(at[axis], -1e-6);
         ASSERT_LE(at[axis], frusta.cascades[c].extent_m[axis] + 1e-6);
       }
-      // Expect that a caster in the box, towards the sun, is nearer to the light and not cut off.
+      // Expect that an entity in the box, towards the sun, is nearer to the light and not cut off.
       const glm::dvec3 caster = p + to_sun * ((-20.0 - p.z) / to_sun.z);
       ASSERT_GE(light_coordinates(frusta.cascades[c], caster).z, -1e-6);
     }

@@ -29,7 +29,7 @@ Triangles triangles(const Mesh& mesh, const Submesh& submesh) {
   return out;
 }
 
-/// Indices that one of the 48 before them repeats.
+/// Counts indices that one of the 48 before them repeats.
 std::size_t repeats(const Mesh& mesh) {
   std::size_t near = 0;
   for (std::size_t i = 48; i < mesh.indices.size(); ++i) {
@@ -39,7 +39,7 @@ std::size_t repeats(const Mesh& mesh) {
   return near;
 }
 
-/// A sphere whose neighbouring triangles lie far apart in the list.
+/// Makes a sphere whose neighbouring triangles lie far apart in the list.
 Mesh shuffled_sphere() {
   Mesh mesh = sphere(60, true);
   for (const Submesh& submesh : mesh.submeshes) {
@@ -53,7 +53,7 @@ Mesh shuffled_sphere() {
   return mesh;
 }
 
-/// With indices counted from the mesh's first.
+/// Cuts a submesh into clusters whose indices count from the mesh's first.
 std::vector<Cluster> cut(Mesh& mesh, const Submesh& submesh) {
   std::vector<Cluster> clusters = cut_into_clusters(
       mesh.positions_m, std::span(mesh.indices).subspan(submesh.first_index, submesh.index_count));

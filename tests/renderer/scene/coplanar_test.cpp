@@ -36,7 +36,7 @@ std::map<std::uint32_t, double> areas(const GltfModel& model) {
   return area;
 }
 
-/// Materials whose triangles hold the point, seen from above.
+/// Returns the materials whose triangles hold the point, seen from above.
 std::vector<std::uint32_t> materials_at(const GltfModel& model, double x, double z) {
   std::vector<std::uint32_t> found;
   for (const PlacedTriangle& t : test::triangles_of(model)) {
@@ -52,7 +52,7 @@ std::vector<std::uint32_t> materials_at(const GltfModel& model, double x, double
 }
 
 TEST(Coplanar, a_marking_in_the_plane_of_its_road_cuts_the_road) {
-  // In both orders the smaller surface wins.
+  // The smaller surface wins in both orders.
   const Shape road = Shape::ground(-12, -12, 12, 12);
   const Shape marking = Shape::ground(-0.5F, -10, 0.5F, 10);
   for (const bool road_first : {true, false}) {

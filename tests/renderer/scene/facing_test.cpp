@@ -24,7 +24,8 @@ GltfModel load(std::initializer_list<std::pair<std::string, Shape>> shapes) {
   return model ? std::move(*model) : GltfModel{};
 }
 
-/// Front and normals of every triangle look away from the middle of the box, or up on the ground.
+/// Expects that front and normals of every triangle look away from the middle of the box, or up on
+/// the ground.
 void expect_right(const GltfModel& model) {
   for (const PlacedTriangle& t : test::triangles_of(model)) {
     EXPECT_GT(glm::dot(t.area, t.normal), 0.0);

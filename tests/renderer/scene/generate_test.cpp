@@ -58,8 +58,8 @@ const Mesh& mesh_named(const GltfModel& model, const std::string& name) {
 
 enum class Identity : std::uint8_t { position, index };
 
-/// Edges that are not used exactly once in each direction. Flat-shaded corners are one point by
-/// position; where vertices are shared, the index is enough and much faster.
+/// Counts edges that are not used exactly once in each direction. Flat-shaded corners are one point
+/// by position. Where vertices are shared, the index is enough and much faster.
 std::size_t open_edges(const Mesh& mesh, Identity identity = Identity::position) {
   using Point = std::tuple<float, float, float>;
   std::map<Point, std::uint32_t> points;

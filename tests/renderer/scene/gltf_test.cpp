@@ -33,7 +33,7 @@ glm::dvec3 corner(const GltfModel& model, std::size_t placement, std::size_t ind
   return glm::dvec3(p.gltf_from_mesh *
                     glm::dvec4(glm::dvec3(mesh.positions_m.at(mesh.indices.at(index))), 1.0));
 }
-/// Unit normal by winding of a placed triangle.
+/// Returns the unit normal of a placed triangle by its winding.
 glm::dvec3 facing(const GltfModel& model, std::size_t placement, std::size_t triangle) {
   const glm::dvec3 a = corner(model, placement, 3 * triangle);
   return glm::normalize(glm::cross(corner(model, placement, 3 * triangle + 1) - a,
@@ -142,8 +142,8 @@ TEST(GltfImport, node_hierarchies_multiply_from_the_root_down) {
          {"name":"c","matrix":[2,0,0,0, 0,2,0,0, 0,0,2,0, 0,0,5,1],"mesh":0})";
   const GltfModel model = load(text);
   EXPECT_EQ(model.nodes, 3U);
-  // Corner (1,0,0): doubled and lifted, shifted by (1,0,0), turned by 90 degrees, shifted by
-  // (10,0,0).
+  // The corner (1,0,0) is doubled and lifted, shifted by (1,0,0), turned by 90 degrees, and shifted
+  // by (10,0,0).
   expect_near(corner(model, 0, 1), {10, 3, 5});
 }
 
@@ -174,7 +174,7 @@ TEST(GltfImport, default_scene_is_shown) {
 TEST(GltfImport, primitives_keep_their_materials_and_sides) {
   GltfText text;
   text.materials = R"({"name":"steel"},{"doubleSided":true})";
-  // Three triangles, one above the other: in one plane they would be cut.
+  // The three triangles lie one above the other, because in one plane they would be cut.
   text.buffer += packed<float>({0, 0, 1, 1, 0, 1, 0, 1, 1, 0, 0, 2, 1, 0, 2, 0, 1, 2});
   text.views += R"(,{"buffer":0,"byteOffset":44,"byteLength":72})";
   text.accessors += R"(,{"bufferView":2,"componentType":5126,"count":3,"type":"VEC3"},

@@ -27,7 +27,7 @@ Material named(const std::string& name) {
   return material;
 }
 
-/// Level and heading north.
+/// Returns a pose that is level and heads north.
 physics::Pose north(const glm::dvec3& position = {0, 0, 0}) {
   return {position, glm::dquat(0.0, std::sqrt(0.5), std::sqrt(0.5), 0.0)};
 }
@@ -104,7 +104,8 @@ TEST(SceneOrientation, scale_applies_to_the_geometry_not_to_the_place) {
 TEST(SceneOrientation, a_model_is_turned_and_offset_in_its_body) {
   ScenarioDesc scenario = one_triangle();
   ObjectDesc& object = scenario.objects[0];
-  // Its nose lies along glTF +x, which is left: a quarter turn to the right brings it forward.
+  // The model's nose lies along glTF +x, which is left. A quarter turn to the right brings it
+  // forward.
   object.model_rotation_rad = {std::acos(0.0), 0.0, 0.0};
   object.model_offset_m = {0.0, 2.0, -1.0};
   object.scale = 3.0;

@@ -25,13 +25,13 @@ struct Shape {
       normals.push_back(normal);
     }
   }
-  /// Level, facing up.
+  /// Makes a level rectangle that faces up.
   static Shape ground(float x0, float z0, float x1, float z1, float y = 0.0F) {
     Shape shape;
     shape.add_quad({x0, y, z0}, {x0, y, z1}, {x1, y, z1}, {x1, y, z0});
     return shape;
   }
-  /// A box of 2 m that faces outwards; without a floor on demand.
+  /// Makes a box of 2 m that faces outwards; without a floor on demand.
   static Shape box(bool with_floor) {
     Shape shape;
     shape.add_quad({-1, 2, -1}, {-1, 2, 1}, {1, 2, 1}, {1, 2, -1});

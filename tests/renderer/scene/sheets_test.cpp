@@ -45,7 +45,7 @@ TEST(SheetOf, is_half_of_the_body_without_what_lies_behind_it) {
 
 TEST(SheetOf, is_nothing_where_heat_takes_long_to_get_through) {
   EXPECT_FALSE(sheet_of(material({kConcrete})));
-  // Steel in front of what is no gas.
+  // The steel lies in front of a layer that is no gas.
   EXPECT_FALSE(sheet_of(material({kSteel, kConcrete, kAir})));
   EXPECT_FALSE(sheet_of(material({kAir, kSteel})));
   EXPECT_FALSE(sheet_of(material({})));
@@ -54,7 +54,7 @@ TEST(SheetOf, is_nothing_where_heat_takes_long_to_get_through) {
   EXPECT_FALSE(sheet_of(hot));
 }
 
-/// Four faces of a tetrahedron, or the first `count` of them.
+/// Makes four faces of a tetrahedron, or the first `count` of them.
 Mesh tetrahedron(std::uint32_t count, std::uint32_t material_index, bool double_sided) {
   Mesh mesh;
   mesh.positions_m = {

@@ -35,7 +35,7 @@ SceneGeometry simplified_for(const SceneGeometry& geometry, const DetailView& vi
   return simplified(geometry, simplify_errors(geometry, view));
 }
 
-/// Edges that not exactly two triangles share.
+/// Counts edges that are not shared by exactly two triangles.
 std::size_t open_edges(const Mesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
   for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
@@ -46,7 +46,7 @@ std::size_t open_edges(const Mesh& mesh) {
       std::ranges::count_if(uses, [](const auto& use) { return use.second != 2; }));
 }
 
-/// Greatest depth of a triangle of the unit sphere's mesh below the sphere.
+/// Returns the greatest depth of a triangle of the unit sphere's mesh below the sphere.
 double sag_m(const Mesh& mesh) {
   double worst = 0.0;
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
@@ -67,10 +67,10 @@ TEST(Simplify, a_far_sphere_keeps_its_shape_to_half_a_pixel) {
   EXPECT_LT(coarse.triangles, fine.triangles / 20);
   EXPECT_EQ(coarse.triangles, mesh.indices.size() / 3);
   EXPECT_EQ(mesh.submeshes[0].index_count, mesh.indices.size());
-  // 20 m to the nearer eye: 20 mm a pixel.
+  // A pixel covers 20 mm at the nearer eye, which is 20 m away.
   EXPECT_LT(sag_m(mesh), 0.5 * 0.020);
   EXPECT_GT(sag_m(mesh), 0.1 * 0.020);  // and it uses what it may
-  // Vertices are old ones, with their normals, none unused.
+  // Vertices are old ones with their normals, and none is unused.
   ASSERT_EQ(mesh.positions_m.size(), mesh.normals.size());
   std::vector<char> used(mesh.positions_m.size(), 0);
   for (const std::uint32_t v : mesh.indices) used[v] = 1;
@@ -81,7 +81,7 @@ TEST(Simplify, a_far_sphere_keeps_its_shape_to_half_a_pixel) {
 }
 
 TEST(Simplify, a_sphere_of_few_pixels_keeps_its_outline) {
-  // Three pixels wide, one, and a fifth.
+  // The instances are three pixels wide, one, and a fifth.
   std::vector<std::size_t> triangles;
   for (const double away_m : {667.0, 2000.0, 10'000.0}) {
     const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 1.0 + away_m)};
@@ -139,7 +139,7 @@ TEST(Simplify, kept_triangles_stay_and_the_rest_meets_them) {
     std::ranges::rotate(out, std::ranges::min_element(out));  // which corner is first is free
     return out;
   };
-  // The upper half.
+  // Only the upper half is kept.
   std::vector<std::vector<bool>> kept(1);
   std::set<Corners> missing;
   for (std::size_t t = 0; t < before.indices.size() / 3; ++t) {
@@ -179,7 +179,8 @@ TEST(Separated, far_instances_share_with_those_whose_pixels_are_as_wide) {
   SceneGeometry geometry = scene_of(sphere(8, false));
   const Instance near = geometry.instances[0];
   geometry.instances.clear();
-  // Too narrow for meshes of their own; two within an octave, one beyond, and one that moves.
+  // The instances are too narrow for meshes of their own: two within an octave, one beyond, one
+  // that moves.
   for (const double x_m : {2100.0, 9000.0, 3900.0, 2200.0, 8500.0}) {
     Instance instance = near;
     instance.world_bounds.min_m.x += x_m;
@@ -193,7 +194,8 @@ TEST(Separated, far_instances_share_with_those_whose_pixels_are_as_wide) {
   EXPECT_EQ(shared.instances[0].mesh, shared.instances[2].mesh);
   EXPECT_EQ(shared.instances[1].mesh, shared.instances[4].mesh);
   EXPECT_NE(shared.instances[0].mesh, shared.instances[1].mesh);
-  // What moves comes as close as it likes: nothing that shares with it could lose triangles.
+  // An entity may come as close as it likes, so instances that share its mesh could lose no
+  // triangles.
   EXPECT_EQ(shared.instances[3].mesh, 0U);
   EXPECT_NE(shared.instances[0].mesh, 0U);
   EXPECT_NE(shared.instances[1].mesh, 0U);
@@ -223,7 +225,7 @@ TEST(Separated, copies_have_a_limit) {
   }
   const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 31.0)};
   const SceneGeometry own = separated(geometry, {eyes, kPixelRad});
-  // Six of instances of their own, and the classes of six octaves.
+  // There are six meshes of single instances, and the classes of six octaves.
   EXPECT_LE(own.meshes.size(), 1U + 6U + 6U);
   EXPECT_GT(own.meshes.size(), 1U + 6U);
 }

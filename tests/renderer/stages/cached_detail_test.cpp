@@ -42,9 +42,9 @@ TEST(RendererCachedDetail, SamplesAreBoundedByThePixels) {
   EXPECT_LT(fine, 4.5 * coarse);
 }
 
-/// Image that the centre of `picture` becomes when a camera that looks down on a plane recedes to
-/// `farther` times its distance. It is interpolated bilinearly and leaves out one pixel along the
-/// rim.
+/// Returns the image that the centre of `picture` becomes when a camera that looks down on a plane
+/// recedes to `farther` times its distance. It is interpolated bilinearly and leaves out one pixel
+/// along the rim.
 std::vector<double> receded_k(const std::vector<float>& picture, std::uint32_t width_px,
                               double farther) {
   const std::size_t width = width_px;

@@ -252,7 +252,8 @@ TEST(RendererStateFile, ALaterRunGoesOnFromIt) {
   const auto written = std::filesystem::last_write_time(file);
   auto afresh = scenario;
   afresh.thermal.state_file.clear();
-  // Within the interval, minutes later, and after an hour in which the vehicle has left.
+  // The frames are within the interval, minutes later, and after an hour in which the vehicle has
+  // left.
   for (const double seconds : {5.0, 240.0, 3600.0}) {
     Session later(scenario);
     const auto first = later.request(seconds);
@@ -261,11 +262,11 @@ TEST(RendererStateFile, ALaterRunGoesOnFromIt) {
     const auto shown = later.frame(first);
     Session anew(afresh);
     ASSERT_TRUE(anew.warm_up(first).result);
-    // Its triangles are those of the first time: edges of shadows lie between others by now.
+    // The triangles are those of the first time, so edges of shadows lie between others by now.
     const Apart difference = apart(shown, anew.frame(first));
     EXPECT_LT(difference.rms_k, seconds < 1000.0 ? 0.1 : 0.3) << seconds;
     EXPECT_LT(difference.max_k, seconds < 1000.0 ? 1.5 : 4.0) << seconds;
-    // It is the surface of then, not that of the file.
+    // The surface is that of the later time, not that of the file.
     if (seconds > 1000.0) {
       Session same(scenario);
       ASSERT_TRUE(same.warm_up().result);

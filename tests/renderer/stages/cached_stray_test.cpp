@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is far off changes nothing that is near.
+// Geometry that is far away changes nothing that is near.
 #include <gtest/gtest.h>
 
 #include "support/cached_session.hpp"
@@ -40,7 +40,7 @@ TEST(RendererStray, AnEntityThatIsOffAndFarAwayChangesNothing) {
     entity.on = false;
     entity.instances.front().position_world_m = place_m;
     with.objects.push_back(entity);
-    // Its own samples count as well.
+    // The samples of the entity itself count as well.
     Seen other = seen(with);
     const double own = static_cast<double>(other.samples) - static_cast<double>(clean.samples);
     EXPECT_LT(own, 200.0);
@@ -50,7 +50,7 @@ TEST(RendererStray, AnEntityThatIsOffAndFarAwayChangesNothing) {
 }
 
 TEST(RendererStray, AFewTrianglesFarAwayChangeNothing) {
-  // As many triangles as keep the stray ones a small share.
+  // The number of triangles keeps the stray ones a small share.
   auto quads = box({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0});
   for (int i = -8; i < 8; ++i) {
     for (int j = -8; j < 8; ++j) {

@@ -117,7 +117,8 @@ class Stranger {
     if (::connect(fd.get(), control_.get(), control_.length) != 0) fd.reset();
     return fd;
   }
-  /// Connects, says these and hears what comes until the daemon closes. Empty: no connection.
+  /// Connects, sends these bytes and returns the daemon's until it closes. The result is empty
+  /// without a connection.
   std::optional<Bytes> say(const std::vector<Bytes>& pieces) {
     const Fd fd = connect();
     if (!fd) return std::nullopt;
@@ -136,7 +137,7 @@ class Stranger {
   void datagram(const Bytes& bytes) {
     ::sendto(frames_.get(), bytes.data(), bytes.size(), 0, host_.get(), host_.length);
   }
-  /// Datagrams that came back: answers or frames.
+  /// Returns the datagrams that came back: answers or frames.
   std::size_t datagrams_heard() {
     std::size_t count = 0;
     std::array<std::byte, 65536> space;
@@ -144,7 +145,7 @@ class Stranger {
     return count;
   }
 
-  /// Everything one can think of without a certificate, a key or an allowed address.
+  /// Tries everything without a certificate, a key or an allowed address.
   void try_everything(const std::vector<Bytes>& recorded) {
     const Bytes client = hello(v1::Hello::ROLE_CLIENT);
     const Bytes host = hello(v1::Hello::ROLE_HOST);
@@ -204,7 +205,7 @@ class Stranger {
   std::size_t longest_heard_ = 0;
 };
 
-/// Copies of the datagrams that a program on this host sends to the host port.
+/// Records copies of the datagrams that a program on this host sends to the host port.
 class Recording {
  public:
   explicit Recording(std::uint16_t port)
@@ -235,7 +236,7 @@ class Recording {
   Fd fd_;
 };
 
-/// The rightful host and client beside it, by way of this host's own address.
+/// The rightful host and client, which connect by this host's own address.
 class Rightful {
  public:
   Rightful(const DaemonProcess& daemon, const client::Security& security) {
@@ -247,7 +248,7 @@ class Rightful {
     EXPECT_TRUE(host.has_value()) << host.error().text;
     host_ = std::move(*host);
   }
-  /// One frame per pose, of consecutive numbers and one run.
+  /// Checks one frame per pose, of consecutive numbers and one run.
   void expect_frames(std::uint64_t count) {
     for (std::uint64_t i = 0; i < count; ++i) {
       ASSERT_TRUE(host_->send(host_frame(++number_)).has_value());
@@ -274,7 +275,7 @@ bool is_host_frame(const Bytes& datagram) {
   return read && read->header.kind == protocol::SessionKind::host_frame;
 }
 
-/// Waits until the daemon has counted that many: it has then handled what was sent.
+/// Waits until the daemon has counted that many, because it has then handled them.
 bool wait_counted(const DaemonProcess& daemon, const std::string& name, std::uint64_t at_least) {
   for (int i = 0; i < 3000; ++i, ::usleep(10'000)) {
     const auto page = client::http_get("http://" + daemon.metrics() + "/metrics", kLongNs);
@@ -286,7 +287,7 @@ bool wait_counted(const DaemonProcess& daemon, const std::string& name, std::uin
   return false;
 }
 
-/// Value of a counter in the summary that a daemon logs at its end.
+/// Returns the value of a counter in the summary that a daemon logs at its end.
 std::uint64_t counted(const ScratchFolder& folder, const std::string& name) {
   const std::string log = folder.read("stderr");
   const std::size_t at = log.find(" " + name + "=");
@@ -334,7 +335,7 @@ TEST(DaemonAccess, AStrangerGetsNothingFromADaemonWithTlsAndKeys) {
       rightful.expect_frames(10);
       EXPECT_TRUE(wait_counted(daemon, "host_datagrams", 10 + 5 + 5 * recorded.size()));
       expect_end(daemon, folder);
-      // A TLS alert is all that is ever said to a stranger; to who repeats the opening, the nonce.
+      // A stranger gets a TLS alert at most. A peer that repeats the opening gets the nonce.
       EXPECT_LT(stranger.longest_heard(), 64U);
       EXPECT_LE(stranger.datagrams_heard(), recorded.size() - frames);
     }
@@ -349,7 +350,7 @@ TEST(DaemonAccess, AStrangerGetsNothingFromADaemonWithTlsAndKeys) {
     EXPECT_EQ(counted(folder, "handshakes_done"), 1U);
     EXPECT_EQ(counted(folder, "host_sessions"), 1U);
 
-    // A daemon that has seen nothing yet takes nothing that was recorded before, either.
+    // A daemon that has seen nothing yet does not accept recorded datagrams either.
     folder.write("stdout", "");
     DaemonProcess daemon(folder, {"--config", folder.write("emitd.toml", text)});
     ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
@@ -433,7 +434,7 @@ TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
     EXPECT_EQ(counted(folder, "host_frames_accepted"), 0U);
     EXPECT_NE(folder.read("stderr").find("not in access.allow"), std::string::npos);
 
-    // The same from an address that is listed: so it was the list that kept it out.
+    // The same bytes from a listed address are accepted, so it was the list that kept the peer out.
     ScratchFolder second;
     DaemonProcess daemon(
         second,
@@ -446,7 +447,7 @@ TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
     const auto welcome = neighbour.say({hello(v1::Hello::ROLE_CLIENT)});
     ASSERT_TRUE(welcome.has_value());
     EXPECT_GT(welcome->size(), 64U);
-    // The second one is refused, which is answered.
+    // The second connection is refused with an answer.
     neighbour.datagram(bare_datagram(1, 5));
     neighbour.datagram(bare_datagram(1, 5));
     std::size_t answers = 0;
@@ -454,7 +455,7 @@ TEST_P(DaemonAllowList, WhoIsNotListedIsClosedUnread) {
       answers = neighbour.datagrams_heard();
     }
     EXPECT_EQ(answers, 1U);
-    // One connection at a time from there, of which the second is told.
+    // One connection at a time is allowed from there. The second one gets an answer.
     const Fd first = neighbour.connect();
     const auto refusal = neighbour.say({});
     ASSERT_TRUE(refusal.has_value());

@@ -36,7 +36,8 @@ constexpr std::int64_t kLongNs = 30'000'000'000;
 constexpr std::int64_t kMayBeLostNs = 100'000'000;
 constexpr int kKills = 20;
 
-/// Takes frames of a daemon and answers each with a pose: what was published, and when it was here.
+/// Receives frames of a daemon and answers each with a pose. It notes each frame with its instant
+/// of arrival.
 class Witness {
  public:
   explicit Witness(const DaemonProcess& daemon) {
@@ -59,7 +60,7 @@ class Witness {
     for (int i = 0; i < 3000 && count() < frames; ++i) std::this_thread::sleep_for(10ms);
     return count() >= frames;
   }
-  /// Numbers of the frames of the newest run that were here by then.
+  /// Returns the numbers of the newest run's frames that had arrived by then.
   [[nodiscard]] std::vector<std::uint64_t> seen_by(std::int64_t tai_ns) {
     const std::lock_guard lock(mutex_);
     std::vector<std::uint64_t> out;
@@ -108,7 +109,8 @@ class Witness {
   std::thread thread_;
 };
 
-/// Waits. False: this machine stood still meanwhile, so that the instant proves nothing.
+/// Waits. It returns false when this machine stood still meanwhile, so that the instant proves
+/// nothing.
 bool wait_evenly(std::chrono::milliseconds time) {
   const auto end = std::chrono::steady_clock::now() + time;
   auto last = std::chrono::steady_clock::now();
@@ -122,7 +124,7 @@ bool wait_evenly(std::chrono::milliseconds time) {
   return longest < 25ms;
 }
 
-/// Contents of a log: frames of the newest run, and whether the lines before the cut are all there.
+/// Contents of a log: frames of the newest run, and whether the lines before the cut are complete.
 struct LogContents {
   std::set<std::uint64_t> frames;
   std::uint64_t entries = 0;
@@ -284,7 +286,7 @@ TEST(Crash, AReceiverGoesOnByItselfWithTheNextDaemon) {
   ASSERT_TRUE(witness.wait_for(30));
   for (auto& receiver : receivers) {
     receiver->signal(SIGINT);
-    // A frame cut off by the end of the first daemon may be partial over UDP, and is counted.
+    // A frame that the end of the first daemon cuts off may be partial over UDP, and is counted.
     const int code = receiver->wait();
     EXPECT_TRUE(code == 0 || (code == 1 && &receiver == &receivers[1])) << receiver->err();
   }
@@ -402,7 +404,7 @@ class LostDevice : public ::testing::Test {
       thread_.join();
     }
   }
-  /// Null: the stream ended.
+  /// Returns the next frame; null: the stream ended.
   const client::ReceivedFrame* step() {
     protocol::HostFrameData frame;
     frame.run_id = 1;

@@ -71,7 +71,7 @@ class DaemonFaults : public ::testing::Test {
     frame.sim_time_ns = static_cast<std::int64_t>(asked_) * 5'000'000;
     ASSERT_TRUE(host_->send(frame).has_value());
   }
-  /// One frame, and the well-behaved client has it whole and in order.
+  /// Checks one frame: the well-behaved client has it whole and in order.
   void lock_step() {
     ask();
     const auto frame = good_->receive(kLongNs);
@@ -124,7 +124,7 @@ TEST_F(DaemonFaults, KilledReceiversLeaveTheirPlaces) {
       receivers.push_back(std::make_unique<ToolProcess>(
           folder_, "receive" + std::to_string(i),
           std::vector<std::string>{"receive", scheme + daemon_->control()}));
-      // The daemon learns of the ends of the round before in its own time.
+      // The daemon notices the ends of the previous round in its own time.
       for (int attempt = 0; attempt < 200 && !receivers.back()->says("channel 0"); ++attempt) {
         ASSERT_NE(receivers.back()->err().find("max_clients"), std::string::npos)
             << receivers.back()->err();
@@ -142,7 +142,7 @@ TEST_F(DaemonFaults, KilledReceiversLeaveTheirPlaces) {
   }
 }
 
-/// `count` records of one kind and body, one behind the other.
+/// Returns `count` records of one kind and body, one after the other.
 std::vector<std::byte> records_of(protocol::RecordKind kind, std::span<const std::byte> body,
                                   std::size_t count) {
   std::vector<std::byte> out;
@@ -163,7 +163,7 @@ TEST_F(DaemonFaults, FloodsOfEveryKindCostAWellBehavedClientNoFrame) {
   std::atomic<bool> over{false};
   std::atomic<std::uint64_t> bytes{0};
   std::atomic<std::uint64_t> connections{0};
-  // Sends the same over and over, and comes again when it is thrown out.
+  // Sends the same bytes again and again, and reconnects when the daemon closes the connection.
   const auto flood = [&](std::vector<std::byte> records) {
     while (!over.load()) {
       auto connection =
@@ -208,7 +208,7 @@ TEST_F(DaemonFaults, FloodsOfEveryKindCostAWellBehavedClientNoFrame) {
   ASSERT_FALSE(HasFatalFailure());
   RecordProperty("flood_bytes", std::to_string(bytes.load()));
   RecordProperty("flood_connections", std::to_string(connections.load()));
-  // Whoever behaves gets a place again.
+  // A client that behaves gets a place again.
   for (int attempt = 0; attempt < 200; ++attempt) {
     if (client::FrameClient::connect(control_)) {
       ASSERT_NO_FATAL_FAILURE(lock_step());

@@ -35,7 +35,8 @@ struct Outcome {
   std::uint64_t whole = 0;  ///< neither flagged partial nor corrupt, every pixel right
   std::uint64_t partial = 0;
   std::uint64_t corrupt = 0;
-  /// Frames with a valid pixel that is wrong and neither flag; with it and the flag partial.
+  /// Numbers of frames with a valid pixel that is wrong: those without a flag, then those with the
+  /// flag partial.
   std::uint64_t wrong_unflagged = 0;
   std::uint64_t wrong_in_partial = 0;
   std::uint64_t unflagged_missing = 0;
@@ -48,7 +49,7 @@ struct Outcome {
   std::uint64_t relay_drops = 0;
 };
 
-/// Plays poses, up to `ahead` of the frames, and looks at what comes.
+/// Sends poses, up to `ahead` of the frames, and checks the frames.
 void play(const Setup& setup, Outcome& out) {
   const ScratchFolder folder;
   DaemonProcess daemon(
@@ -100,7 +101,7 @@ void play(const Setup& setup, Outcome& out) {
       ++nameless;
       return;
     }
-    // Nobody knows what was lost before the first frame.
+    // The losses before the first frame are unknown.
     if (newest > 0 && frame.header.frame_number > newest) {
       const std::uint64_t missing = frame.header.frame_number - newest - 1;
       out.untold_gaps += missing > nameless + lost_on_the_way ? 1 : 0;
@@ -214,7 +215,7 @@ TEST(DaemonLossy, FramesOfWhichNothingCameAreToldByTheNextOne) {
   EXPECT_GT(out.lost_before, 5U);
   EXPECT_LE(out.lost_before, kFrames - out.came) << "each for one that is missing, at least";
   EXPECT_EQ(out.untold_gaps + out.unflagged_lost, 0U);
-  // But for the last ones, after which nothing came.
+  // The last ones are left out, because nothing came after them.
   EXPECT_LE(out.counters.lost, kFrames - out.came);
   EXPECT_GE(out.counters.lost + 12, kFrames - out.came);
   EXPECT_EQ(out.counters.skipped, 0U);
@@ -230,13 +231,13 @@ TEST(DaemonLossy, ReorderedDoubledAndDelayedDatagramsMakeNoFrameWrong) {
   faults.reorder_ns = 500'000;
   faults.jitter_ns = 300'000;
   for (const protocol::FecParams fec : {protocol::FecParams{}, protocol::FecParams{48, 5}}) {
-    // One at a time, a frame waits for its last datagram.
+    // Each frame waits for its last datagram, because only one is under way.
     Outcome alone;
     play({faults, fec, false, kFrames, 0}, alone);
     ASSERT_FALSE(HasFatalFailure());
     EXPECT_GT(alone.network.held_back, 0U);
     EXPECT_GE(alone.whole + alone.relay_drops, kFrames);
-    // Several at once overtake each other; how many then come out partial is a matter of speed.
+    // Several frames at once overtake each other. The number of partial ones depends on speed.
     Outcome out;
     play({faults, fec, false, kFrames}, out);
     ASSERT_FALSE(HasFatalFailure());
@@ -249,7 +250,7 @@ TEST(DaemonLossy, ReorderedDoubledAndDelayedDatagramsMakeNoFrameWrong) {
   }
 }
 
-/// Bits turned over behind UDP's own checksum: header and payload alike.
+/// Bits are turned over behind UDP's own checksum, in header and payload alike.
 TEST(DaemonLossy, NoSpoiltPixelGoesUnflagged) {
   for (const bool fec : {false, true}) {
     Outcome out;

@@ -42,7 +42,7 @@ class MalformedTraffic : public ::testing::Test {
     }
   }
 
-  /// A well-behaved client gets its frame.
+  /// Checks that a well-behaved client gets its frame.
   void expect_serving() {
     ASSERT_FALSE(daemon_->ended()) << folder_.read("stderr");
     auto client = client::FrameClient::connect("tcp://" + daemon_->control());
@@ -97,7 +97,7 @@ TEST_F(MalformedTraffic, RandomDatagramsAreCountedAndAnswered) {
   for (int i = 0; i < 2000; ++i) {
     auto bytes = random_bytes(random, 1500);
     if (i % 2 == 0) {
-      // A valid message with a few bytes turned.
+      // The bytes are a valid message with a few of them changed.
       bytes.assign(good.begin(), good.end());
       for (int k = 0; k < 3; ++k) {
         bytes[random() % bytes.size()] = static_cast<std::byte>(random() & 0xFF);
@@ -141,7 +141,8 @@ TEST_F(MalformedTraffic, AnEntitysPoseOutOfRangeIsNamedOverTcpAsWell) {
       << (*status)->text;
 }
 
-/// Everything that comes on a connection until the daemon closes it; fails when it does not.
+/// Returns everything that comes on a connection until the daemon closes it. The test fails when it
+/// does not.
 void read_to_end(const TcpSocket& socket, std::string& answer) {
   std::array<char, 1024> buffer;
   for (;;) {
@@ -156,7 +157,7 @@ void read_to_end(const TcpSocket& socket, std::string& answer) {
 }
 
 TEST_F(MalformedTraffic, AnyFirstRecordButAHelloIsAnsweredAndClosed) {
-  // A frame, a host frame, a resend request, and a kind that nobody knows.
+  // The records are a frame, a host frame, a resend request, and an unknown kind.
   for (const int kind : {2, 3, 4, 77}) {
     SCOPED_TRACE(kind);
     const TcpSocket socket = raw_tcp();
@@ -175,7 +176,7 @@ TEST_F(MalformedTraffic, RandomBytesOnTheControlPortEndOnlyTheirConnection) {
     const TcpSocket socket = raw_tcp();
     auto bytes = random_bytes(random, 4000);
     if (i % 3 == 0 && bytes.size() >= protocol::kRecordHeaderBytes) {
-      // Right framing, random body: reaches the parser of control records.
+      // A record with right framing and a random body reaches the parser of control records.
       protocol::encode_record_header(
           protocol::RecordKind::control,
           static_cast<std::uint32_t>(bytes.size() - protocol::kRecordHeaderBytes),
@@ -220,7 +221,7 @@ TEST_F(MalformedTraffic, MoreConnectionsThanAllowedAreRefusedWithAReason) {
   EXPECT_EQ(hosts.size(), 16U);
   EXPECT_NE(refusal.find("max_clients"), std::string::npos) << refusal;
   hosts.clear();
-  // The daemon learns of the ends in its own time.
+  // The daemon notices the ends in its own time.
   for (int attempt = 0; attempt < 200; ++attempt) {
     if (client::FrameClient::connect("tcp://" + daemon_->control())) {
       return;

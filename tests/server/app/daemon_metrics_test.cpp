@@ -139,9 +139,9 @@ TEST_F(DaemonMetrics, IdleConnectionsAreLimitedAndEnd) {
     ASSERT_TRUE(socket.has_value());
     idle.push_back(std::move(*socket));
   }
-  // One more is closed without an answer.
+  // One more connection is closed without an answer.
   EXPECT_FALSE(client::http_get("http://" + daemon_->metrics() + "/healthz", kLongNs).has_value());
-  // Who asks for nothing is closed after a while.
+  // A connection without a request is closed after a while.
   for (TcpSocket& socket : idle) {
     std::array<std::byte, 1> byte;
     EXPECT_TRUE(client::wait_for(socket.fd(), POLLIN, client::monotonic_now_ns() + kLongNs));

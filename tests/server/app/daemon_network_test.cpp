@@ -38,7 +38,8 @@ std::string config_at(const std::string& host, const std::string& pacing) {
   return text;
 }
 
-/// Why this machine cannot do it: sends itself a datagram, by the group if one is given.
+/// Returns the reason why this machine cannot do it. It sends itself a datagram, by the group if
+/// one is given.
 std::optional<std::string> obstacle(const std::string& host, const std::string& group) {
   const SocketContext context;
   const SocketAddress local = numeric_address(host, 0);
@@ -77,8 +78,8 @@ std::optional<std::string> obstacle(const std::string& host, const std::string& 
   return std::nullopt;
 }
 
-/// This machine's addresses of a family, the loopback interface's first. A route for groups is
-/// often missing there in IPv6; with a hop limit of 0 nothing leaves the machine by the others
+/// Returns this machine's addresses of a family, the loopback interface's first. A route for groups
+/// is often missing there in IPv6. With a hop limit of 0 nothing leaves the machine by the others
 /// either.
 std::vector<std::string> own_addresses(bool v6) {
   std::vector<std::string> out{v6 ? "::1" : "127.0.0.1"};
@@ -111,12 +112,12 @@ std::string allowed(std::string host) {
   return "[access]\nallow = [\"" + host + "\"]\n";
 }
 
-/// ":7000" of "address:7000".
+/// Returns ":7000" of "address:7000".
 std::string port_of(const std::string& address) {
   return address.substr(address.rfind(':'));
 }
 
-/// Takes frames until kFrames came; all complete, none lost.
+/// Takes frames until kFrames came, and checks that all are complete and none is lost.
 void expect_frames(client::FrameClient& client) {
   std::uint64_t newest = 0;
   for (std::uint64_t i = 0; i < kFrames; ++i) {

@@ -20,7 +20,8 @@ std::string field(const std::filesystem::path& status, const std::string& name) 
   return "absent";
 }
 
-// Started by root it would show; by anybody else there is nothing to give up, and the same holds.
+// The test shows the effect only if root starts it. Any other user has no privileges to drop, and
+// the same holds.
 TEST(DaemonPrivileges, NoThreadKeepsACapabilityOrMayGainOne) {
   test::ScratchFolder folder;
   const std::string config = folder.write(
@@ -32,7 +33,7 @@ TEST(DaemonPrivileges, NoThreadKeepsACapabilityOrMayGainOne) {
   const auto count = [&tasks] {
     return std::distance(std::filesystem::directory_iterator(tasks), {});
   };
-  // Ready says that its ports are open; some threads may still be on their way.
+  // The daemon is ready when its ports are open. Some threads may still be starting.
   constexpr auto kPatience = std::chrono::seconds(20);
   const auto end = std::chrono::steady_clock::now() + kPatience;
   while (count() < 7 && std::chrono::steady_clock::now() < end) {

@@ -102,7 +102,8 @@ class Triggers {
   std::thread thread_;
 };
 
-/// Everything that a journal must carry: entities, jumps, weather, hold, stop and step, reset, a
+/// Sends everything that a journal must carry: entities, jumps, weather, hold, stop and step,
+/// reset, a restart of the host.
 /// restart of the host.
 void drive(client::HostClient& host, client::FrameClient& frames) {
   std::uint64_t number = 0;
@@ -162,7 +163,7 @@ void drive(client::HostClient& host, client::FrameClient& frames) {
   ASSERT_NO_FATAL_FAILURE(send_some(30));
 }
 
-/// Applies entries to a fresh source; every frame must come out as it went out live.
+/// Applies entries to a fresh source. Every frame must have the pixels of the live run.
 struct Replay {
   SourceScript script;
   ScriptedSource source{script, 32, 16, 2};
@@ -192,7 +193,7 @@ TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
   Replay from_stream;
   std::uint64_t published = 0;
   {
-    // Frames shed work, lock-step ones always: which did is for the journal to tell.
+    // Frames lose quality, in lock step always; the journal tells which.
     live_script.rungs = {{1.0, 0.0}, {0.5, 0.1}};
     auto config = configuration(GetParam(), folder.file("run.mcap"));
     if (lock_step) config.pacing.budget_ns = 1;
@@ -241,7 +242,7 @@ TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
   EXPECT_EQ(from_file.player.mismatches(), 0U);
   EXPECT_EQ(from_file.rendered, live_script.submitted.size());
   EXPECT_EQ(live_script.held.load(), 0) << "every slot went back to the source";
-  // Weather that no frame came to use before the end, or before a reset, is not applied again.
+  // Weather that no frame used before the end, or before a reset, is not applied again.
   EXPECT_LE(from_file.script.weather.size(), live_script.weather.size());
   EXPECT_GT(from_file.script.weather.size(), 0U);
   if (lock_step) {

@@ -54,7 +54,7 @@ class OneRun {
     const auto received = client_->receive(kLongNs);
     ASSERT_TRUE(received.has_value() && *received != nullptr);
   }
-  /// Waits until it ends.
+  /// Waits until the daemon ends.
   int wait() {
     if (thread_.joinable()) thread_.join();
     return code_;

@@ -29,7 +29,7 @@ constexpr int kLongMs = 30'000;
 constexpr std::int64_t kLongNs = 30'000'000'000;
 const std::string kMetrics = "[metrics]\nlisten = \"127.0.0.1:0\"\n";
 
-/// Environment for the processes started within its life.
+/// Environment for the processes that are started while it exists.
 class Variable {
  public:
   Variable(const char* name, const std::string& value) : name_(name) {
@@ -68,7 +68,7 @@ TEST(DaemonService, AStopDuringTheStartIsNoCrash) {
     ScratchFolder folder;
     const NotifySocket manager(folder.file("notify"));
     const Variable socket("NOTIFY_SOCKET", folder.file("notify"));
-    // Its pictures take seconds to paint.
+    // The device takes seconds to draw its images.
     DaemonProcess daemon(
         folder, {"--config",
                  folder.write("emitd.toml", canned_config(4096, 4096, "mode = \"host-step\""))});
@@ -121,7 +121,7 @@ TEST(DaemonService, AWatchdogOfAnotherProcessIsNotFed) {
 }
 
 TEST(DaemonService, RealtimeThatIsRefusedIsToldOrEndsTheStart) {
-  // Core 1023 is there nowhere that this test runs.
+  // This test runs on no machine that has core 1023.
   const std::string realtime = "[realtime]\ncpus = \"sender=1023\"\n";
   {
     ScratchFolder folder;

@@ -82,7 +82,7 @@ TEST(DaemonShaped, ATcpClientBehindASlowLinkSkipsFramesAndTheNewestComes) {
       EXPECT_GT((*frame)->header.frame_number, newest);
       newest = (*frame)->header.frame_number;
     }
-    // However busy the machine is, the link lets no more through.
+    // The link lets no more through, however busy the machine is.
     const double seconds = 1e-9 * static_cast<double>(client::monotonic_now_ns() - start_ns);
     EXPECT_GE(seconds, 8.0 * static_cast<double>(frames * kFrameBytes - (64u << 10)) / 40e6);
     const client::ReceiveCounters& counters = rig.client().counters();

@@ -104,7 +104,7 @@ TEST(DaemonShm, EveryTransportCarriesTheSameFramesWhileReadersStopAndCrash) {
   auto host = client::HostClient::connect("udp://" + daemon.host_udp());
   ASSERT_TRUE(host.has_value());
 
-  // Every frame is taken before the next is asked for: what is missing was lost by emitd.
+  // Every frame is taken before the next is requested, so missing frames were lost by emitd.
   constexpr std::uint64_t kFrames = 120;
   for (std::uint64_t k = 1; k <= kFrames; ++k) {
     protocol::HostFrameData pose;

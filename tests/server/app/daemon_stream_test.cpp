@@ -22,8 +22,8 @@ constexpr std::uint64_t kFrames = 1000;
 #endif
 constexpr std::int64_t kLongNs = 30'000'000'000;
 
-/// A client and the checks that hold for every stream: what is missing is flagged, what is complete
-/// is intact.
+/// A client and the checks that hold for every stream: missing frames are flagged, complete frames
+/// are intact.
 struct Watcher {
   std::unique_ptr<client::FrameClient> client;
   std::uint64_t newest = 0;
@@ -40,7 +40,7 @@ struct Watcher {
     }
     return out;
   }
-  /// False: nothing within the timeout.
+  /// Waits for a frame. It returns false when none came within the timeout.
   bool take(std::int64_t timeout_ns) {
     const auto frame = client->receive(timeout_ns);
     EXPECT_TRUE(frame.has_value()) << frame.error().text;
@@ -74,8 +74,8 @@ TEST(DaemonStream, AStoppedClientCostsTheOthersNothingOverTcpAndUdp) {
   auto host = client::HostClient::connect("udp://" + daemon.host_udp());
   ASSERT_TRUE(host.has_value());
 
-  // The test is the slowest link of the chain: every frame is taken before the next is asked for,
-  // so whatever is missing was lost by emitd and not by a busy machine.
+  // The test is the slowest link of the chain: every frame is taken before the next is requested.
+  // So missing frames were lost by emitd and not by a busy machine.
   for (std::uint64_t k = 1; k <= kFrames; ++k) {
     protocol::HostFrameData frame;
     frame.frame_number = k;
@@ -103,7 +103,8 @@ TEST(DaemonStream, AStoppedClientCostsTheOthersNothingOverTcpAndUdp) {
     EXPECT_EQ(udp.client->counters().crc_errors, 0U);
     EXPECT_EQ(udp.client->counters().os_drops, 0U);
   }
-  // The stopped ones: newest frames arrive again, and every gap of the source's own is announced.
+  // The clients that stood still get the newest frames again, and every gap of the source's own is
+  // announced.
   while (tcp_stopped.newest < kFrames && tcp_stopped.take(kLongNs)) {
   }
   EXPECT_EQ(tcp_stopped.newest, kFrames);
@@ -154,7 +155,7 @@ TEST(DaemonStream, AClientLearnsTheSpectralResponseOfItsBand) {
 }
 
 TEST(DaemonStream, AUdpClientThatWasBusyTakesAllTheFramesInItsSocket) {
-  // A fifth of a second: forty small frames, which wait there whole.
+  // The pause is a fifth of a second: forty small frames, which wait there whole.
   ScratchFolder folder;
   const std::string config =
       folder.write("emitd.toml", canned_config(64, 48, "mode = \"ig-clock\"\nrate_hz = 200.0"));
@@ -162,7 +163,7 @@ TEST(DaemonStream, AUdpClientThatWasBusyTakesAllTheFramesInItsSocket) {
   ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
   Watcher watcher = Watcher::open("udp://" + daemon.control());
   ASSERT_NE(watcher.client, nullptr);
-  // Before its first look, when it does not know yet how datagrams come.
+  // The receiver does not know before its first look how datagrams come.
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   ASSERT_TRUE(watcher.take(kLongNs));
   const std::uint64_t first = watcher.newest;

@@ -76,7 +76,7 @@ class DaemonTls : public ::testing::Test {
     for (int i = 0; i < 500 && metric(name) < at_least; ++i) ::usleep(10'000);
     return metric(name) >= at_least;
   }
-  /// Poses and their frames, one after the other.
+  /// Sends poses and receives their frames, one after the other.
   void expect_frames(client::FrameClient& client, client::HostClient& host, std::uint64_t first,
                      std::uint64_t count) {
     for (std::uint64_t k = first; k < first + count; ++k) {
@@ -96,7 +96,7 @@ class DaemonTls : public ::testing::Test {
 };
 
 TEST_F(DaemonTls, ClientHostAndRecorderWorkThroughIt) {
-  // Wide enough that a frame takes many TLS records and does not fit into the socket.
+  // The image is wide enough that a frame takes many TLS records and does not fit into the socket.
   start({}, {}, 16384);
   auto client = client::FrameClient::connect(url(), kLongNs, this->client());
   ASSERT_TRUE(client.has_value()) << client.error().text;
@@ -175,7 +175,7 @@ class ForeignTls {
   ForeignTls(const ForeignTls&) = delete;
   ForeignTls& operator=(const ForeignTls&) = delete;
 
-  /// Bytes that the daemon answers to a hello; none unless it took this client.
+  /// Returns the bytes that the daemon answers to a hello; none unless it accepted this client.
   int answer_to_hello(const std::string& where) {
     const auto address = resolve(*parse_host_port(where), Transport::tcp, false);
     fd_ = ::socket(address->storage.ss_family, SOCK_STREAM, 0);

@@ -48,7 +48,8 @@ struct Memory {
     at_s.push_back(now_s);
     mib.push_back(resident_mib(pid));
   }
-  /// Least squares over the second half: what is taken once, on the way, is no leak.
+  /// Returns the slope by least squares over the second half: memory that is taken once, on the
+  /// way, is no leak.
   [[nodiscard]] double slope_mib_per_h() const {
     const std::size_t from = at_s.size() / 2;
     const auto count = static_cast<double>(at_s.size() - from);
@@ -104,7 +105,7 @@ TEST(Soak, MemoryStaysFlatAndEveryGapIsFlagged) {
     ASSERT_TRUE(receiver.process->says("channel 0")) << receiver.process->err();
     memories.push_back({receiver.label, receiver.process->pid(), {}, {}});
   }
-  // One client after the other comes, takes a few frames and goes without a word.
+  // One client after the other connects, takes a few frames and leaves without a message.
   const auto start = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   const double run_s = std::min(300.0, length_s / 8.0);  // the host restarts after each
@@ -149,7 +150,7 @@ TEST(Soak, MemoryStaysFlatAndEveryGapIsFlagged) {
                 test::json_value(json, "unflagged_gaps").c_str(),
                 test::json_value(json, "os_drops").c_str());
   }
-  // 2 MiB within the test, whatever its length: heaps settle.
+  // The limit is 2 MiB within the test, whatever its length, because heaps settle.
   const double limit_mib_per_h = 2.0 * 3600.0 / std::min(length_s, 3600.0);
   for (const Memory& memory : memories) {
     ASSERT_GE(memory.mib.size(), 4U);

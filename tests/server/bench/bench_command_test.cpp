@@ -48,7 +48,7 @@ TEST(CliBench, ScalingComparesEachCaseWithTheOneBefore) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("s.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"scaling\"");
-  // Two cases of each axis, both methods but for the samples.
+  // There are two cases of each axis, with both methods except for the samples.
   const std::vector<double> values = numbers_of(json, "value");
   ASSERT_EQ(values.size(), 18U) << run.out;
   const std::vector<double> known(values.begin(), values.end() - 2);
@@ -130,7 +130,8 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
     EXPECT_NE(json.find("\"transport\": \"" + std::string(transport) + "\""), std::string::npos)
         << transport;
   }
-  // Five at a fixed rate, then each alone; what is not installed has null and a reason.
+  // There are five contenders at a fixed rate, then each alone. A contender that is not installed
+  // has null and a reason.
   EXPECT_EQ(numbers_of(json, "clients"),
             (std::vector<double>{4, 4, 4, 4, 4, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1}));
   EXPECT_EQ(numbers_of(json, "rate_hz"), std::vector<double>(5, 50));
@@ -143,7 +144,7 @@ TEST(CliBench, StreamMeasuresEveryTransportBesideBareSockets) {
   EXPECT_EQ(numbers_of(json, "bare-tcp-crc").size(), 1U) << "TCP beside a loop that sums too";
   EXPECT_NE(run.out.find(" of bare-tcp-crc"), std::string::npos);
   EXPECT_GE(numbers_of(json, "gbit_s").size(), 11U);
-  // Where iceoryx is there, it is measured.
+  // The suite measures iceoryx when it is installed.
   EXPECT_EQ(json.find("iox-roudi does not start"), std::string::npos);
   EXPECT_EQ(json.find("iox-roudi has no chunks"), std::string::npos);
 }
@@ -199,7 +200,7 @@ TEST(CliBench, TurnFlagsJumpsToPlacesNobodyAnnounced) {
   EXPECT_EQ(json_value(json, "suite"), "\"turn\"");
   EXPECT_EQ(numbers_of(json, "frames"), (std::vector<double>{16, 16, 16, 16}));
   EXPECT_EQ(numbers_of(json, "coarse_frames"), (std::vector<double>{0, 16, 0, 16}));
-  // Without a deadline nothing is shed; one that nothing meets is missed every time.
+  // No quality is shed without a deadline. A deadline that no frame meets is missed every time.
   const std::vector<double> shed = numbers_of(json, "shed_frames");
   ASSERT_EQ(shed.size(), 4U);
   EXPECT_EQ(shed[0] + shed[1], 0.0);

@@ -23,7 +23,7 @@ physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
   return {from, physics::world_from_body_look_at(from, at)};
 }
 
-/// A clear summer day, surfaces with one fast and one slow mode.
+/// Scenario of a clear summer day with surfaces of one fast and one slow mode.
 scene::ScenarioDesc published_scenario(const std::filesystem::path& gltf) {
   scene::ScenarioDesc s = instant_scenario(gltf);
   s.weather.clear();
@@ -38,7 +38,7 @@ scene::ScenarioDesc published_scenario(const std::filesystem::path& gltf) {
   return s;
 }
 
-/// Frames at these instants, in one run; the last one's temperatures.
+/// Renders frames at these instants in one run, and returns the last one's temperatures.
 std::vector<float> last_frame_k(const scene::ScenarioDesc& scenario, const physics::Pose& pose,
                                 const std::vector<std::int64_t>& times_ns) {
   renderer::OutputOptions output;
@@ -67,7 +67,7 @@ struct Errors {
   double p90_k = 1e9;
   double p99_k = 1e9;
 };
-/// Against the same model with 360 steps and traced rays, away from outlines.
+/// Compares with the same model with 360 steps and traced rays, away from outlines.
 Errors errors_of(const scene::ScenarioDesc& scenario, const physics::Pose& pose,
                  const std::vector<std::int64_t>& times_ns) {
   const auto shown = last_frame_k(scenario, pose, times_ns);

@@ -29,7 +29,7 @@ scene::Material stone() {
   return out;
 }
 
-/// 21 June at 48.56 N under a clear sky from 07:00 UTC on.
+/// Scenario of 21 June at 48.56 N under a clear sky from 07:00 UTC on.
 scene::ScenarioDesc scenario(scene::ThermalModel model) {
   scene::ScenarioDesc s;
   s.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
@@ -50,7 +50,7 @@ std::vector<std::int64_t> uniform_nodes(std::size_t steps) {
   return nodes;
 }
 
-/// Level ground that a shadow crosses: its edge takes four minutes to pass.
+/// Views of level ground that a shadow crosses: its edge takes four minutes to pass.
 std::vector<PointView> crossed(std::span<const std::int64_t> nodes_ns, double open_frac) {
   std::vector<PointView> out;
   for (const std::int64_t t : nodes_ns) {
@@ -103,7 +103,7 @@ TEST(CliConverged, instant_surfaces_stand_at_their_equilibrium) {
   EXPECT_NEAR(made->temperature_k(0, view), expected.temperature_k, 1e-6);
 }
 
-/// A wall, 3 m high, 2 m wide and 1 m east of the origin, on level ground.
+/// Makes a wall, 3 m high, 2 m wide and 1 m east of the origin, on level ground.
 reference::RayMesh wall_on_ground() {
   reference::RayMesh mesh;
   mesh.positions_m = {{-50.0, -50.0, 0.0}, {50.0, -50.0, 0.0}, {50.0, 50.0, 0.0},
@@ -122,8 +122,8 @@ PixelSurface ground_point(double x_m, double y_m) {
 }
 
 TEST(CliConverged, an_outline_is_found_from_either_side) {
-  // A rim that turns away from an eye above it, and the ground half a metre behind it: the way
-  // there lies next to square to the rim's own normal.
+  // The rim turns away from an eye above it, and the ground is half a metre behind it. The way
+  // there is nearly square to the rim's own normal.
   PixelSurface rim = ground_point(0.0, 0.0);
   rim.position_m = {0.0, 0.0, 0.5};
   rim.normal = rim.shading_normal = {1.0, 0.0, 0.0};

@@ -33,7 +33,8 @@ TEST(CliBenchRules, shares_are_counted_by_height_and_temperature) {
   sensor.width_px = 5;
   sensor.height_px = 2;
   sensor.fov_h_rad = 0.5;
-  // Sky, the figure, warm ground, cool ground, ground within a kelvin of the warmest; twice.
+  // The pixels are sky, the figure, warm ground, cool ground, ground within a kelvin of the
+  // warmest; twice.
   const std::array<float, 10> depth{kSky, 8, 10, 10, 10, kSky, 8, 10, 10, 10};
   const std::array<float, 10> kelvin{kNan, 290, 320, 310, 319.5F, kNan, 290, 320, 310, 319.5F};
   const SceneFill fill = measure_fill(sensor, looking_down(), depth, kelvin);

@@ -35,11 +35,12 @@ void expect_within(const std::string& test, double budget_k) {
   EXPECT_LE(r.max_error_k, budget_k) << test << ": " << r.worst_input;
 }
 
-// Budgets in kelvin: normals of 16 bits turn a face by up to 5e-5 rad, which is worth a millikelvin
-// in full sun; where frames are compared with frames, the rest is shadow edges that move by less
-// than a texel.
+// The budgets are in kelvin. Normals of 16 bits turn a face by up to 5e-5 rad, which changes it by
+// a millikelvin in full sun. Where frames are compared with frames, the rest is shadow edges that
+// move by less than a texel.
 TEST(StabilityFrames, GrazingSunStaysWithTheModel) {
-  // Nearly edge-on a face shades itself in part: slopes are held at 3 degrees above the sun's rays.
+  // A face that is nearly edge-on shades itself in part, so slopes are at least 3 degrees above the
+  // sun's rays.
   expect_within("frame-grazing-sun", 0.3);
 }
 
@@ -66,7 +67,7 @@ TEST(StabilityFrames, CoincidentFacesDoNotShadeEachOther) {
 TEST(StabilityFrames, AFarAndTallWallDoesNotSwallowNearShadows) {
   const auto r = hostile("frame-depth-range-near-part");
   expect_finite(r);
-  // Shaded ground is 40 K colder: the cores must stay, the penumbra may go.
+  // Shaded ground is 40 K colder. The cores must stay, but the penumbra may change.
   EXPECT_LT(r.p99_error_k, 20.0) << r.worst_input;
 }
 

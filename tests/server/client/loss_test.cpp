@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Losses: the fault injector, when a client asks again, what the sender grants.
+// Losses: the fault injector, the instants of resend requests, and the resends that the sender
+// grants.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -212,7 +213,7 @@ class ResendWindowTest : public ::testing::Test {
     for (const auto& range : ranges) request.ranges[request.count++] = range;
     return request;
   }
-  /// Offsets of what goes out.
+  /// Returns the offsets of the fragments that go out.
   std::vector<std::uint32_t> sent(ResendWindow& window) {
     std::vector<std::uint32_t> offsets;
     while (window.pending()) {
@@ -343,7 +344,7 @@ class LossySender : public ::testing::Test {
     std::ranges::copy(ranges, command.request.ranges.begin());
     context_.resends.commit();
   }
-  /// Turns the sender; datagrams whose turn `loses` says go missing.
+  /// Turns the sender. Datagrams whose turn `loses` names are lost.
   template <class Loses>
   void settle(Loses loses) {
     for (int idle = 0; idle < 2;) {
@@ -387,7 +388,7 @@ class LossySender : public ::testing::Test {
 };
 
 TEST_F(LossySender, RepairsAndResendsWithoutAllocating) {
-  // 33 fragments and 10 of parity a frame; three of a group are one too many.
+  // A frame has 33 fragments and 10 of parity. Three losses in a group are one too many.
   const auto loses = [](std::uint64_t index) {
     return index == 5 || index == 10 || index == 15 || index == 16;
   };

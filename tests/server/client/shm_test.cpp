@@ -132,7 +132,7 @@ client::SubscribeOptions in_place() {
   return options;
 }
 
-/// The frame that is there now; null when there is none.
+/// Returns the frame that is there now; null when there is none.
 const client::ReceivedFrame* take(client::FrameClient& reader) {
   const auto frame = reader.receive(0);
   EXPECT_TRUE(frame.has_value()) << frame.error().text;
@@ -293,8 +293,7 @@ TEST(Shm, ASleepingReaderIsWokenByTheFrame) {
   EXPECT_EQ((*frame)->header.frame_number, 1U);
 }
 
-/// Writes next to nothing per frame, so that frames change faster than anybody can sum their
-/// pixels.
+/// Writes very little per frame, so that frames change faster than anybody can sum their pixels.
 class QuickRing {
  public:
   explicit QuickRing(const std::string& name) {
@@ -345,7 +344,7 @@ TEST(Shm, TornFramesNeverGetThroughHoweverFastTheDaemon) {
   ASSERT_NE(reader, nullptr);
   std::atomic<bool> stop{false};
   std::thread publisher([&] {
-    // Bursts that overwrite every slot, at any time of a reader's work.
+    // Bursts overwrite every slot, at any time of a reader's work.
     std::mt19937 random(3);
     while (!stop.load()) {
       for (int i = 0; i < 3; ++i) {
@@ -367,7 +366,7 @@ TEST(Shm, TornFramesNeverGetThroughHoweverFastTheDaemon) {
     }
     EXPECT_GT(header.frame_number, last);
     last = header.frame_number;
-    // Used in place: either it is this frame's, or the reader is told.
+    // Pixels used in place are either those of this frame, or the reader reports that they are not.
     const float pixel = (*frame)->pixels.back();
     EXPECT_TRUE(pixel == static_cast<float>(header.frame_number % 7) || !reader->intact());
   }
@@ -377,7 +376,7 @@ TEST(Shm, TornFramesNeverGetThroughHoweverFastTheDaemon) {
   EXPECT_EQ(reader->counters().lost, 0U);
 }
 
-/// A process that has a ring and ends as a crash does, when told to.
+/// A process that has a ring and, on request, ends as a crash does.
 class RingProcess {
  public:
   explicit RingProcess(const std::string& name) {

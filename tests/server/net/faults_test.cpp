@@ -152,7 +152,7 @@ TEST(Journal, WhatIsNoLogIsKeptAsWell) {
   const auto first = keep_older_journal(file);
   ASSERT_TRUE(first.has_value()) << first.error().text;
   EXPECT_FALSE(std::filesystem::exists(file));
-  // Another one of the same second.
+  // A second journal has a change time in the same second.
   std::filesystem::copy_file(*first, file);
   std::filesystem::last_write_time(file, std::filesystem::last_write_time(*first));
   const auto second = keep_older_journal(file);
@@ -200,7 +200,7 @@ TEST(Listener, OutOfDescriptorsIsToldAndAskedAgainAfterAWhile) {
   stepped.clock.advance(100 * kMs);
   stepped.settle();
   EXPECT_EQ(refused(), 2U);
-  // It is served now: without a hello it has to go.
+  // The connection is served now. It has to end without a hello.
   stepped.clock.advance(5000 * kMs);
   stepped.settle();
   EXPECT_NE(stepped.log.find("no hello within 5 s"), std::string::npos) << stepped.log;
@@ -274,7 +274,7 @@ TEST(Log, ThatNobodyReadsKeepsNobody) {
     log->write(LogLevel::info, std::string(4096, '.'));  // a pipe holds 1 MiB at most
   }
   EXPECT_FALSE(log->finish(10 * kMs));
-  // Its thread, which goes on, is let go: read until it closes the pipe.
+  // The recorder's thread goes on until it closes the pipe, so the test reads until then.
   log.reset();
   std::array<char, 65536> bytes{};
   std::ptrdiff_t lines = 0;

@@ -72,10 +72,10 @@ std::string congestion_control_of(int fd) {
                                                                                   : "?";
 }
 
-/// A network of this thread's own, in which it may set the choice of the system.
+/// A network of this thread's own, in which it may set the system's choice.
 class OwnNetwork {
  public:
-  /// Why there is none; empty: there is one, with a loopback interface.
+  /// Returns the reason why there is none; empty: there is one, with a loopback interface.
   [[nodiscard]] static std::string enter() {
     if (::unshare(CLONE_NEWNET) != 0) {
       return "no right to a network of its own";
@@ -88,7 +88,7 @@ class OwnNetwork {
     ::close(fd);
     return up ? "" : "no loopback interface";
   }
-  /// False: this kernel does not have it, or nobody may choose.
+  /// Sets the choice. It returns false when this kernel does not have it, or nobody may choose.
   [[nodiscard]] static bool choose(const std::string& system) {
     std::ofstream(kFile) << system << std::flush;
     std::string chosen;
@@ -235,7 +235,7 @@ int low_water_of(int fd) {
   return bytes;
 }
 
-/// The client's end, welcomed by what `server` writes.
+/// The client's end, welcomed by the bytes of `server`.
 physics::Result<client::ClientConnection> greeted(TcpSocket& server, TcpSocket client,
                                                   const SocketAddress& peer) {
   std::vector<std::byte> welcome;
@@ -248,7 +248,7 @@ physics::Result<client::ClientConnection> greeted(TcpSocket& server, TcpSocket c
                                          client::monotonic_now_ns() + kLongNs);
 }
 
-/// A frame record with a body of zeros.
+/// Returns a frame record with a body of zeros.
 std::vector<std::byte> frame_record(std::uint32_t body_bytes) {
   std::vector<std::byte> out(protocol::kRecordHeaderBytes + body_bytes);
   protocol::encode_record_header(protocol::RecordKind::frame, body_bytes,
@@ -265,7 +265,7 @@ TEST_F(TcpPair, AClientIsWokenByPiecesOfARecordAndByTheFirstByteOfTheNext) {
   const std::vector<std::byte> stream = frame_record(kBodyBytes);
   protocol::Record record;
   std::size_t given = 0;
-  /// Gives up to `end` of the stream away; until the client waits for `low_water` bytes.
+  /// Sends up to `end` of the stream, until the client waits for `low_water` bytes.
   const auto arrive = [&](std::size_t end, int low_water) {
     const std::int64_t end_ns = client::monotonic_now_ns() + kLongNs;
     do {
@@ -432,7 +432,8 @@ TEST(Resolve, TakesNumbersAndNamesWhatItCannotFind) {
   const auto every = resolve({"", 7000}, Transport::udp, true);
   ASSERT_TRUE(every.has_value());
   EXPECT_EQ(every->port(), 7000);
-  // Reserved: never exists (RFC 6761). Without a name service the reason is another.
+  // This name is reserved and never exists (RFC 6761). Without a name service the reason is
+  // another.
   const auto nowhere = resolve({"host.invalid", 7000}, Transport::tcp, false);
   ASSERT_FALSE(nowhere.has_value());
   EXPECT_EQ(nowhere.error().text.substr(0, 19), "host.invalid:7000: ");

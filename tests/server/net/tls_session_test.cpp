@@ -18,7 +18,7 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
-/// A daemon's and a client's end, joined and through with the handshake.
+/// A daemon's and a client's end, joined, with the handshake done.
 class TlsPair : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -137,7 +137,7 @@ TEST_F(TlsPair, OneThreadReadsWhileTheOtherWrites) {
     }
     if (got != expected) failed = true;
   };
-  // Sender and receiver of the daemon on one session, as much on the client's.
+  // Sender and receiver of the daemon share one session, and so do both threads of the client.
   std::thread sender([&] { send_all(*near_, down); });
   std::thread receiver([&] { read_all(*near_, up); });
   std::thread client_sender([&] { send_all(*far_, up); });
@@ -148,7 +148,7 @@ TEST_F(TlsPair, OneThreadReadsWhileTheOtherWrites) {
   EXPECT_FALSE(failed);
 }
 
-// Plain connections take none; what OpenSSL takes is bounded and documented.
+// Plain connections take no memory. The memory that OpenSSL takes is bounded and documented.
 TEST_F(TlsPair, ReadingAndWritingTakeAtMostTwoBlocksOfMemoryARecord) {
   const Bytes frame = noise(4 * 16'384);
   std::array<std::byte, 65536> space;

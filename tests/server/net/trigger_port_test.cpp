@@ -30,7 +30,7 @@ class Port : public ::testing::Test {
     port_ = std::move(*port);
   }
 
-  /// Returns what the port makes of a datagram once it is there.
+  /// Returns the port's result for a datagram once it has arrived.
   std::optional<ReceivedTrigger> take(std::span<const std::byte> bytes) {
     EXPECT_EQ(source_.send_to(bytes, port_->address()).status, IoStatus::done);
     pollfd wait{port_->fd(), POLLIN, 0};

@@ -44,7 +44,7 @@ TEST(PoseTrack, IsExactAtReceivedPosesAndHoldsTheOldestBeforeThem) {
 }
 
 TEST(PoseTrack, ExtrapolatesConstantAccelerationExactlyFromPositions) {
-  // x = 2 t + 15 t^2; 1 nm covers the rounding of times to nanoseconds.
+  // The motion is x = 2 t + 15 t^2; 1 nm covers the rounding of times to nanoseconds.
   const auto x = [](double t) { return 2.0 * t + 15.0 * t * t; };
   PoseTrack track;
   track.push(at(0, x(0.0)));

@@ -81,7 +81,7 @@ TEST(QualityPolicy, what_disturbs_less_than_one_frame_in_128_costs_no_quality) {
   settle(policy, 10.0, 8.0);
   for (int i = 0; i < 2000; ++i) {
     const bool disturbed = i % 200 == 0;
-    // Not at once after it: the machine's pace is in doubt for some frames.
+    // The change does not come at once, because the machine's pace is in doubt for some frames.
     if (i % 200 > 60) {
       EXPECT_EQ(policy.choose(kRungs, 12 * kMs), 0U) << i;
     }

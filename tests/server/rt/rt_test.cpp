@@ -78,7 +78,7 @@ TEST(Shortage, SeesWhatIsGivenBetweenTheLookAndTheWord) {
   Shortage shortage;
   int looks = 0;
   const auto found = shortage.look([&] {
-    // The giver comes behind the first look and finds that nobody wants.
+    // The giver comes after the first look and finds that nobody wants anything.
     if (looks++ == 0) {
       EXPECT_FALSE(shortage.end());
       return std::optional<int>();
@@ -88,7 +88,7 @@ TEST(Shortage, SeesWhatIsGivenBetweenTheLookAndTheWord) {
   EXPECT_TRUE(found.has_value());
 }
 
-/// Works as often as it is told to and looks at its doorbell when it is about to rest.
+/// Agent that works a set number of times and looks at its doorbell when it is about to rest.
 class RestingAgent final : public Agent {
  public:
   explicit RestingAgent(Doorbell& bell) : Agent(bell) {}
@@ -240,7 +240,7 @@ TEST(Log, KeepsWhatPeersSayOnOneLine) {
   EXPECT_NE(line.text.find("x??level"), std::string::npos);
 }
 
-// FIPS 180-4 examples.
+// The digests are the examples of FIPS 180-4.
 TEST(Sha256, MatchesPublishedDigests) {
   const auto digest = [](const std::string& text, std::size_t times = 1) {
     Sha256 hash;

@@ -26,7 +26,7 @@ Event event(EventKind kind, std::uint64_t a, std::uint64_t b, std::string_view t
   return out;
 }
 
-/// Everything that metrics are made from, without agents.
+/// All objects that metrics are made from, without agents.
 struct Sources {
   test::FakeClock clock;
   Context context{clock, 1u << 16, 4};
@@ -167,7 +167,8 @@ TEST(MetricsText, ShowsClientsFromTheirConnectionToTheirEnd) {
                     {"channel", "1"},
                     {"transport", "udp"}}),
             9.0);
-  // Its place is another's: the row of the old one, whose end was not told, is gone.
+  // Its place belongs to another connection now. The row of the old one, whose end was not
+  // reported, is gone.
   counts.begin(kKey + (1u << kConnectionPlaceBits));
   EXPECT_TRUE(std::isnan(frames({})));
   sources.board.note(event(EventKind::connected, kKey + (1u << kConnectionPlaceBits), 0, "b"));

@@ -17,7 +17,7 @@ namespace {
 
 using test::from_hex;
 
-// Answer of ptp4l (linuxptp 3.1.1) to sequence 7 while it listened alone.
+// This is the answer of ptp4l (linuxptp 3.1.1) to sequence 7 while it listened alone.
 constexpr std::string_view kPortData =
     "0d0200500000000000000000000000000000000042eaa5fffe1c149f00010007047f000000000000"
     "00000000000002000001001c200442eaa5fffe1c149f000104000000000000000000010300010002";
@@ -103,7 +103,7 @@ class FakePtp4l {
     bound_ = ::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0;
   }
   [[nodiscard]] bool bound() const { return bound_; }
-  /// Answers every question that waits; how many there were.
+  /// Answers every question that waits and returns their number.
   int answer(std::uint8_t state) {
     int answered = 0;
     for (;;) {

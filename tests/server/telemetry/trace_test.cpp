@@ -34,7 +34,7 @@ struct Event {
   double dur_us = 0.0;
 };
 
-/// Complete events, one a line; metadata lines give the processes' names.
+/// Returns complete events, one a line. Metadata lines give the processes' names.
 struct Parsed {
   std::vector<Event> events;
   std::map<int, std::string> processes;

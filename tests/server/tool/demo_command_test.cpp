@@ -17,7 +17,7 @@ std::size_t count_files(const std::filesystem::path& folder, const std::string& 
   return count;
 }
 
-/// The demo's work folder below `out`; "" when there is none.
+/// Returns the demo's work folder below `out`; "" when there is none.
 std::string work_folder(const std::filesystem::path& out) {
   for (const auto& entry : std::filesystem::directory_iterator(out)) {
     if (entry.path().filename().string().starts_with("run-")) return entry.path().string();
@@ -25,7 +25,7 @@ std::string work_folder(const std::filesystem::path& out) {
   return "";
 }
 
-/// A small picture keeps llvmpipe quick.
+/// The image is small, which keeps llvmpipe quick.
 const std::vector<std::string> kSmall{
     "--set", "sensor.width_px=320", "--set", "sensor.height_px=256", "--set", "thermal.steps=9"};
 
@@ -88,7 +88,7 @@ TEST(CliView, shows_a_scenario_in_a_window) {
       std::chrono::seconds(120));
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_EQ(result.out, "2 frames shown\n");
-  // Some kilobytes: a window of one colour would compress to less.
+  // The size is some kilobytes: a window of one colour would compress to less.
   EXPECT_GT(std::filesystem::file_size(folder.file("view.png")), 4000U);
 }
 

@@ -16,7 +16,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// Without conduction and convection the equilibrium is Ta itself, whatever the emissivity.
+/// Rows without conduction and convection: the equilibrium is Ta itself, whatever the emissivity.
 constexpr char kRows[] =
     "lambda,d,eps,Ta,Tc,hc,Tair\n0,0.1,0.9,300,280,0,290\n1.5,0.2,0.9,320,290,5,295\n";
 

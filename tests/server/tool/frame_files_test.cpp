@@ -69,7 +69,7 @@ TEST(CliApparentTemperature, inverts_the_band_integral_to_a_millikelvin) {
 TEST(CliApparentTemperature, slope_is_the_inverse_of_the_derivative) {
   const ApparentTemperature table(8.0, 12.0);
   const auto exact = physics::band_radiance({8.0, 12.0, {}}, physics::Kelvin{300.0});
-  // 0.1 %: chord of a 0.05 K table interval against the tangent.
+  // The tolerance of 0.1 % covers the chord of a 0.05 K table interval against the tangent.
   EXPECT_NEAR(table.kelvin_per_radiance(exact.radiance_w_m2_sr) * exact.derivative_w_m2_sr_k, 1.0,
               1e-3);
 }

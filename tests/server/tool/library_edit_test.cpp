@@ -65,7 +65,7 @@ source = "s"
 name = "b"
 base_k = 290
 )");
-  // Doing it again changes nothing.
+  // A second edit changes nothing.
   EXPECT_EQ(*with_fitted_modes(*text, entries), *text);
 }
 

@@ -121,7 +121,8 @@ TEST(CliTrajectory, a_turn_gives_the_body_rate) {
   path[0].pose.world_from_body = physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0);
   path[1].pose.world_from_body = physics::world_from_body_heading_pitch_roll(0.4, 0.0, 0.0);
   const auto sample = sample_trajectory(path, kSecondNs / 2, 0);
-  // Heading grows clockwise seen from above: a positive rotation about the body's z, which is down.
+  // Heading grows clockwise seen from above. This is a positive rotation about the body's z, which
+  // is down.
   EXPECT_NEAR(sample.rates.angular_rate_body_rad_s.z, 0.4, 1e-6);
   EXPECT_NEAR(sample.rates.angular_rate_body_rad_s.x, 0.0, 1e-6);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// emit receive against a daemon with canned frames.
+// Command emit receive against a daemon with canned frames.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -9,7 +9,7 @@
 namespace emit::test {
 namespace {
 
-/// Mid-morning of the scenario; a small picture keeps llvmpipe quick.
+/// Mid-morning of the scenario. The image is small, which keeps llvmpipe quick.
 std::vector<std::string> render(const std::string& out, std::vector<std::string> more = {}) {
   std::vector<std::string> arguments{"render",   "box",
                                      "--time-s", "12600",
@@ -200,7 +200,7 @@ TEST(CliBench, paper_fills_every_key) {
   for (const char* stage : {"geometry", "occlusion", "shadow", "thermal", "radiance", "readback"}) {
     sum += std::stod(json_value(json, stage));
   }
-  EXPECT_EQ(json_value(json, "pixels_compared"), "4000");  // two pictures
+  EXPECT_EQ(json_value(json, "pixels_compared"), "4000");  // two images
   EXPECT_EQ(json_value(json, "not_finite_px"), "0");
   const double rms_k = std::stod(json_value(json, "rms_error_k"));
   EXPECT_GT(rms_k, 0.01);  // five steps are not enough

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// --tls-* and --key-file of emit's commands, against a daemon that asks for them.
+// Options --tls-* and --key-file of emit's commands, against a daemon that asks for them.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

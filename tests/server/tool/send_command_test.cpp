@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// emit send against a daemon with canned frames.
+// Command emit send against a daemon with canned frames.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -77,7 +77,7 @@ TEST_F(CliSend, plays_a_network_capture) {
     const std::string out = le(value, bytes);
     return std::string(out.rbegin(), out.rend());
   };
-  // Raw IPv4 over UDP to port 5555.
+  // The packet is raw IPv4 over UDP to port 5555.
   std::string capture =
       le(0xA1B2C3D4, 4) + le(2, 2) + le(4, 2) + le(0, 8) + le(262144, 4) + le(101, 4);
   auto pose = std::make_unique<protocol::HostFrameData>();

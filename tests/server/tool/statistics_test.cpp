@@ -46,7 +46,7 @@ TEST(CliStatistics, limited_samples_keep_an_even_choice_and_exact_sums) {
   EXPECT_EQ(samples.sum(), all.sum());
   EXPECT_EQ(samples.mean(), all.mean());
   EXPECT_NEAR(samples.median(), all.median(), 2000.0);
-  // Every 256th from the first on: nothing of the end is missing.
+  // Every 256th sample is kept from the first on, so nothing of the end is missing.
   EXPECT_EQ(samples.values().front(), all.values().front());
   EXPECT_EQ(samples.values().back(), all.values()[(10'000 - 1) / 256 * 256]);
 }

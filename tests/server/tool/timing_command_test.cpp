@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// emit latency, trigger and trace against a daemon with canned frames.
+// Commands emit latency, trigger and trace against a daemon with canned frames.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ struct Daemon {
   bool ready = false;
 };
 
-/// emit latency with a JSON file; the file's text.
+/// Runs emit latency with a JSON file and returns the file's text.
 std::string latency(Daemon& daemon, const std::string& url, std::vector<std::string> more) {
   const std::string json = daemon.folder.file("latency.json");
   std::vector<std::string> arguments{"latency", url, "--rate", "500", "--json", json};
@@ -81,8 +81,8 @@ TEST(CliLatency, TellsTheShareOfTheSlotInIgClock) {
   const std::string json = latency(daemon, "tcp://" + daemon.process.control(), {"--frames", "40"});
   EXPECT_EQ(json_value(json, "frames"), "40");
   EXPECT_EQ(json_value(json, "missed"), "0") << "the marker stays until it is changed again";
-  // Nothing about "disagreed": a slot that is drawn late knows of a pose that it lies before in
-  // time, as often as the machine is late. In lock step it is 0.
+  // The row "disagreed" is not tested: a slot that is drawn late knows a pose that lies before it
+  // in time, as often as the machine is late. In lock step it is 0.
   EXPECT_THAT(json, HasSubstr("\"stage\": \"sampling\""));
   EXPECT_THAT(json, HasSubstr("\"pacing\": \"ig-clock\""));
 }
@@ -99,7 +99,7 @@ TEST(CliLatency, SaysWhatCannotBeMeasured) {
   EXPECT_EQ(run_emit({"latency", "tcp://127.0.0.1:1"}).exit_code, 1);
 }
 
-/// What the daemon said when it was ready.
+/// Returns the trigger URL of the daemon's message when it was ready.
 std::string trigger_url(const ScratchFolder& folder) {
   const std::string out = folder.read("stdout");
   const std::size_t at = out.find("trigger=") + 8;
@@ -160,8 +160,8 @@ TEST(CliTrigger, StartsFramesOfADaemonThatWaitsForThem) {
   EXPECT_EQ(sent.exit_code, 0) << sent.err;
   EXPECT_THAT(sent.out, HasSubstr("50 triggers sent"));
   EXPECT_EQ(run_emit({"trigger", "tcp" + url.substr(3)}).exit_code, 2);
-  // The last ones may still be on their way. A machine that stood still sends two at once; every
-  // one is accounted for.
+  // The last triggers may still be on their way. A machine that stood still sends two at once.
+  // Every trigger is counted.
   ProcessResult stat;
   const auto counter = [&](const std::string& name) {
     const std::size_t found = stat.out.find("\"emitd_" + name + "\"");

@@ -148,7 +148,7 @@ TEST(CliBadConfiguration, an_unknown_override_exits_with_78) {
   EXPECT_NE(result.err.find("stepz"), std::string::npos);
 }
 
-/// With a scenario whose glTF is no glTF, and with one that there is not.
+/// Scenarios with a scene file that is no glTF, and with a file that does not exist.
 class CliBadScenario : public testing::TestWithParam<std::vector<std::string>> {};
 
 TEST_P(CliBadScenario, exits_with_78) {

@@ -21,22 +21,22 @@ struct DecodeFault {
   };
   Kind kind = Kind::none;
   Part part = Part::message;
-  std::uint32_t entity_id = 0;  ///< of Part::entity
+  std::uint32_t entity_id = 0;  ///< id of the entity, for Part::entity
   const char* field = "";       ///< name as in host.proto, static storage
   double value = 0.0;
   double lowest = 0.0;
   double highest = 0.0;
 };
 
-/// Enough for every text of the functions below, bytes.
+/// Length that is enough for every text of the functions below, bytes.
 inline constexpr std::size_t kFaultTextBytes = 192;
 
 /// Writes for example "invalid pose: entity 7: position_m.x is nan, must be -1e+08 to 1e+08".
 /// Returns the part of `buffer` that it used; a text that is too long is cut off.
 [[nodiscard]] std::string_view fault_text(DecodeStatus status, const DecodeFault& fault,
                                           std::span<char> buffer) noexcept;
-/// As fault_text(), without the value, so that frames with the same fault have the same text:
-/// "invalid pose: entity 7: position_m.x".
+/// Writes the text of fault_text() without the value, so that frames with the same fault have the
+/// same text, for example "invalid pose: entity 7: position_m.x".
 [[nodiscard]] std::string_view fault_place(DecodeStatus status, const DecodeFault& fault,
                                            std::span<char> buffer) noexcept;
 

@@ -106,8 +106,8 @@ struct FrameStats {
   /// have not taken in a change of the weather or of an entity's shade, and in a frame that
   /// prepared the surface anew (rewarm_s).
   bool coarse = false;
-  /// How long it took to prepare the surface anew inside this frame, because the thermal time had
-  /// jumped, in s of wall time; 0 in frames that did not. The frame is also `coarse`.
+  /// Wall time that this frame spent on preparing the surface anew because the thermal time had
+  /// jumped, s. It is 0 in other frames. Such a frame is also `coarse`.
   double rewarm_s = 0.0;
 };
 
@@ -146,12 +146,12 @@ struct SceneStats {
   bool coarse_meshes = false;
   /// Warnings of the scenario's and the scene's loaders: unmapped materials, gaps of the weather.
   std::vector<std::string> warnings;
-  /// After warm_up(): what the first frame's history and weather lack, one sentence each.
+  /// Gaps of the first frame's history and weather, one sentence each; valid after warm_up().
   std::vector<std::string> first_frame_warnings;
 };
 
-/// Warnings that are known after warm_up(), one sentence each: what the first frame lacks, and what
-/// `thermal.max_samples` is too small for.
+/// Returns warnings that are known after warm_up(), one sentence each: gaps of the first frame's
+/// history and weather, and a `thermal.max_samples` that is too small.
 [[nodiscard]] std::vector<std::string> warm_up_warnings(const SceneStats& stats);
 
 /// Number of a read-back slot.

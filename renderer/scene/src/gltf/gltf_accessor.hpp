@@ -7,7 +7,7 @@
 
 namespace emit::scene {
 
-/// What read_floats() does with a value that is infinite or not a number.
+/// Treatment of a value that is infinite or not a number in read_floats().
 enum class NonFinite { refuse, keep };
 
 /// Values of an accessor, tightly packed, `components` per element. Normalised integers become

@@ -7,9 +7,9 @@
 
 namespace emit::scene {
 
-/// Where a skinned mesh is shown.
+/// Pose in which a skinned mesh is shown.
 struct SkinPose {
-  /// By joint: the joint's transform times its inverse bind matrix.
+  /// Transform of each joint times its inverse bind matrix, by joint.
   std::vector<glm::dmat4> gltf_from_bind;
   /// Transform of the mesh's node. It counts only for primitives without joints.
   glm::dmat4 gltf_from_node{1.0};

@@ -29,7 +29,7 @@ struct JsonMember {
 /// Text of a string with its escapes resolved; nothing when the value is no string.
 [[nodiscard]] std::optional<std::string> json_string(std::string_view value);
 
-/// Nothing when the value is no whole number of 0 to 2^64 - 1.
+/// Returns the value; empty when it is no whole number of 0 to 2^64 - 1.
 [[nodiscard]] std::optional<std::uint64_t> json_unsigned(std::string_view value);
 
 }  // namespace emit::scene

@@ -37,7 +37,7 @@ Built built() {
   return out;
 }
 
-/// Triangles drawn from that distance.
+/// Returns the triangles drawn from that distance.
 std::vector<std::uint32_t> drawn_from(const Built& built, float distance_m, double pixel_rad) {
   glm::dmat4 relworld_from_mesh(1.0);
   relworld_from_mesh[3] = glm::dvec4(0.0, 0.0, distance_m, 1.0);
@@ -54,7 +54,7 @@ std::vector<std::uint32_t> drawn_from(const Built& built, float distance_m, doub
   return indices;
 }
 
-/// Ends of all edges by place; a closed surface has every edge twice.
+/// Counts the ends of all edges by place. A closed surface has every edge twice.
 bool closed(const scene::Mesh& mesh, const std::vector<std::uint32_t>& indices) {
   std::map<std::pair<std::uint64_t, std::uint64_t>, int> edges;
   const auto key = [&](std::uint32_t v) {
@@ -68,7 +68,7 @@ bool closed(const scene::Mesh& mesh, const std::vector<std::uint32_t>& indices) 
     const std::size_t next = i % 3 == 2 ? i - 2 : i + 1;
     ++edges[std::minmax(key(indices[i]), key(indices[next]))];
   }
-  // A pole's triangles have two corners in one place: their edges there count doubly.
+  // The triangles of a pole have two corners in one place, so their edges there count doubly.
   return std::ranges::all_of(edges, [](const auto& edge) {
     return edge.second % 2 == 0 || edge.first.first == edge.first.second;
   });
@@ -123,8 +123,8 @@ TEST(ClusterLevels, errors_only_grow_with_coarseness_and_hold) {
     EXPECT_LE(glm::distance(own.centre_m, coarser.centre_m) + own.radius_m,
               1.0001F * coarser.radius_m);
   }
-  // Every vertex of what is drawn lies on the ball, so the middles of its triangles tell how far
-  // off the surface is: no more than promised.
+  // Every drawn vertex lies on the ball, so the middles of its triangles show how far off the
+  // surface is. It is no more than promised.
   const float distance_m = 100.0F;
   const auto indices = drawn_from(b, distance_m, 1e-3);
   ASSERT_LT(indices.size(), 2U * b.finest_triangles);
@@ -138,7 +138,7 @@ TEST(ClusterLevels, errors_only_grow_with_coarseness_and_hold) {
 }
 
 TEST(ClusterGroups, neighbours_go_together_and_nobody_is_left_out) {
-  // Eight clusters in a row; each shares places with the next.
+  // The eight clusters lie in a row, and each shares places with the next.
   std::vector<GroupMember> members(8);
   for (std::uint32_t m = 0; m < 8; ++m) {
     members[m].places = {10 * m, 10 * m + 1, 10 * m + 10, 10 * m + 11};

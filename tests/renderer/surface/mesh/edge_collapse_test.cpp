@@ -15,7 +15,7 @@
 namespace emit::renderer {
 namespace {
 
-/// A square sheet of cells of 1 m, in the xy plane.
+/// Makes a square sheet of cells of 1 m, in the xy plane.
 struct Sheet {
   std::vector<glm::vec3> positions_m;
   std::vector<std::uint32_t> place;
@@ -56,7 +56,7 @@ float area_z_m2(const Sheet& sheet, const std::uint32_t* corner) {
   return 0.5F * glm::cross(sheet.positions_m[corner[1]] - a, sheet.positions_m[corner[2]] - a).z;
 }
 
-/// Edges by how often triangles have them, in either direction.
+/// Counts edges by how often triangles have them, in either direction.
 std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges(
     const std::vector<std::uint32_t>& indices) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> out;
@@ -89,7 +89,7 @@ TEST(EdgeCollapse, covers_the_same_sheet_once_and_keeps_its_rim) {
 TEST(EdgeCollapse, keeps_triangles_where_values_bend) {
   Sheet sheet(20);
   for (std::size_t v = 0; v < sheet.value_k.size(); ++v) {
-    // A step across x = 10, as a shadow's edge.
+    // The values have a step across x = 10, as a shadow's edge has.
     sheet.value_k[v] = sheet.positions_m[v].x < 9.5F ? 0.0F : 5.0F;
   }
   const std::vector<std::uint32_t> indices = sheet.collapsed(250);
@@ -115,7 +115,7 @@ TEST(EdgeCollapse, keeps_triangles_where_values_bend) {
 }
 
 TEST(EdgeCollapse, a_crease_stays_a_crease) {
-  // Two sheets that share a line of places but not of vertices.
+  // The two sheets share a line of places but not of vertices.
   Sheet sheet(8);
   std::vector<std::uint32_t> copy(sheet.positions_m.size());
   for (std::uint32_t v = 0; v < copy.size(); ++v) copy[v] = v;

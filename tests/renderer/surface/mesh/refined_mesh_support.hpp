@@ -102,7 +102,7 @@ inline double smallest_angle_rad(const RefinedMesh& mesh) {
   return smallest;
 }
 
-/// Some leaves are split over and over, near one corner more often than elsewhere.
+/// Splits some leaves over and over, near one corner more often than elsewhere.
 inline void split_at_random(RefinedMesh& mesh, std::uint32_t seed, int rounds) {
   std::mt19937 random(seed);
   for (int round = 0; round < rounds; ++round) {
@@ -132,7 +132,7 @@ inline void expect_watertight(const RefinedMesh& mesh) {
   }
 }
 
-/// Edges are only ever halved: a vertex inside an edge shows at its middle.
+/// Expects that edges are only ever halved: a vertex inside an edge shows at its middle.
 inline void expect_no_vertex_inside_an_edge(const RefinedMesh& mesh) {
   std::set<Place3> places;
   for (const auto& vertex : mesh.vertices()) places.insert(key(vertex.position_m));

@@ -242,7 +242,7 @@ TEST(RefinedMesh, branching_surfaces_and_plates_without_thickness_stay_conformin
   scene::Mesh source;
   source.positions_m = {{0, 0, 0}, {4, 0, 0}, {1, 2, 0}, {1, -1, 1}, {1, 0, 3}};
   source.normals.assign(5, {0, 0, 1});
-  // Three wings along one edge, the first with a back side.
+  // The mesh has three wings along one edge, the first with a back side.
   source.indices = {0, 1, 2, 1, 0, 2, 0, 1, 3, 0, 1, 4};
   source.submeshes = {{0, 12, 0, true}};
   RefinedMesh mesh(source, kNoLimit);
@@ -288,7 +288,7 @@ TEST(RefinedMesh, leaves_alone_triangles_with_two_corners_at_one_position) {
   EXPECT_EQ(mesh.leaf(0), (std::array<std::uint32_t, 3>{0, 1, 2}));
 }
 
-/// Level fan around the origin with neighbours at these angles.
+/// Makes a level fan around the origin with neighbours at these angles.
 scene::Mesh fan(std::initializer_list<double> angles_deg, bool closed) {
   scene::Mesh mesh;
   mesh.positions_m.emplace_back(0.0F);
@@ -308,7 +308,7 @@ scene::Mesh fan(std::initializer_list<double> angles_deg, bool closed) {
 
 TEST(FindInward, of_a_vertex_inside_is_nothing_however_uneven_its_leaves_are) {
   std::vector<glm::vec3> inward;
-  // Four slim leaves to the east, two wide ones for the rest.
+  // The fan has four slim leaves to the east and two wide ones for the rest.
   find_inward(RefinedMesh(fan({-20, -10, 0, 10, 20, 180}, true), kNoLimit), 0, inward);
   ASSERT_EQ(inward.size(), 7U);
   EXPECT_EQ(inward[0], glm::vec3(0.0F));
@@ -318,10 +318,10 @@ TEST(FindInward, of_a_vertex_inside_is_nothing_however_uneven_its_leaves_are) {
 
 TEST(FindInward, of_a_vertex_on_the_rim_points_into_the_leaves_however_far_they_reach) {
   std::vector<glm::vec3> inward;
-  // All but a gap of 20 degrees towards the west: directions nearly cancel.
+  // The fan covers all but a gap of 20 degrees towards the west: directions nearly cancel.
   find_inward(RefinedMesh(fan({-170, -90, 0, 90, 170}, false), kNoLimit), 0, inward);
   EXPECT_GT(inward[0].x, 0.99F);
-  // Where rims of two materials meet, both are on them.
+  // Vertices at which rims of two materials meet lie on both rims.
   find_inward(RefinedMesh(octahedron(), kNoLimit), 0, inward);
   EXPECT_EQ(inward[4], glm::vec3(0.0F));
   for (std::size_t v = 6; v < 10; ++v) EXPECT_GT(glm::length(inward[v]), 0.99F);

@@ -13,7 +13,7 @@ namespace {
 
 using test::SurfaceScene;
 
-/// A street of boxes on ground.
+/// Makes a street of boxes on ground.
 SurfaceScene street() {
   SurfaceScene scene;
   scene.add_static(test::level_mesh(glm::vec3(-60.0F), glm::vec3(60.0F), 0.0F));
@@ -24,7 +24,7 @@ SurfaceScene street() {
   return scene;
 }
 
-/// A triangle of one metre.
+/// Makes a triangle of one metre.
 scene::Mesh small_triangle() {
   scene::Mesh mesh;
   mesh.positions_m = {{0.0F, 0.0F, 0.0F}, {1.0F, 0.0F, 0.0F}, {0.0F, 1.0F, 0.0F}};
@@ -39,7 +39,7 @@ TEST(BulkBounds, are_the_box_of_all_of_an_ordinary_scene) {
   const scene::Aabb box = bulk_bounds(street().geometry);
   EXPECT_EQ(box.min_m, glm::dvec3(-60.0, -60.0, 0.0));
   EXPECT_EQ(box.max_m, glm::dvec3(60.0, 60.0, 4.0));
-  // A wide scene is wide.
+  // The bounds of a wide scene are wide.
   SurfaceScene wide;
   for (int i = 0; i < 50; ++i) {
     wide.add_static(test::box_mesh(glm::vec3(-2.0F), glm::vec3(2.0F)), glm::dvec3(200.0 * i));

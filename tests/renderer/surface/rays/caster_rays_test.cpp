@@ -101,7 +101,8 @@ TEST(CasterRays, a_packet_that_passes_a_mover_by_meets_what_single_rays_meet) {
     for (MoverPlacement& mover : movers) {
       mover.position_m = {place(random), place(random), place(random)};
     }
-    // From one point towards all sides, or side by side, as different queries send them.
+    // The rays go from one point towards all sides, or side by side, as different queries send
+    // them.
     std::array<CasterRay, CasterRays::kMaxRays> rays;
     const glm::vec3 along = random_direction(random);
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -201,7 +202,7 @@ TEST(CasterRays, no_ray_leaves_a_closed_body) {
 TEST(CasterRays, a_mover_blocks_where_it_stands) {
   SurfaceScene scene;
   scene.add_static(test::level_mesh(glm::vec3(-9.0F), glm::vec3(9.0F), 0.0F));
-  // 4 m long in body x; the set's centre is off the body's origin.
+  // The box is 4 m long in body x; the set's centre is off the body's origin.
   scene.add_mover(test::box_mesh(glm::vec3(0.0F, -0.5F, -0.5F), glm::vec3(4.0F, 0.5F, 0.5F)));
   const CasterRays casters = rays_of(scene);
   ASSERT_EQ(casters.movers(), 1U);
@@ -217,7 +218,7 @@ TEST(CasterRays, a_mover_blocks_where_it_stands) {
   EXPECT_EQ(casters.blocked_mover(0, east, rays), 0U);
   EXPECT_EQ(casters.blocked_static(rays), 0U);
 
-  // The nearer of ground and mover; the normal comes back in rel axes.
+  // The ray meets the nearer of ground and entity. The normal comes back in rel axes.
   const CasterRay from_above{{1.0F, 3.0F, 8.0F}, kDown};
   auto hit = casters.first_hit(from_above, {&north, 1});
   ASSERT_TRUE(hit.has_value());
@@ -243,7 +244,7 @@ TEST(CasterRays, nothing_is_lost_by_skipping_far_movers) {
   std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
   int blocked = 0;
   for (int i = 0; i < 4000; ++i) {
-    // Far off, where rounding is at its worst; the ray aims into the box's inner half.
+    // The ray starts far off, where rounding is at its worst, and aims into the box's inner half.
     const glm::vec3 direction = random_direction(random);
     const MoverPlacement placement{glm::mat3(1.0F), 1e5F * random_direction(random), true};
     const glm::vec3 inside(4.0F + unit(random), 0.25F * unit(random), 0.25F * unit(random));
@@ -270,7 +271,7 @@ TEST(CasterRays, movers_come_in_the_order_of_their_objects) {
   EXPECT_EQ(casters.object_of_mover(1), 7U);
 }
 
-/// Listed one by one, and as instances of one mesh.
+/// The instances are listed one by one, and as instances of one mesh.
 TEST(CasterRays, ten_thousand_instances_of_a_mesh) {
   SurfaceScene scene;
   const std::uint32_t ground =
@@ -287,7 +288,7 @@ TEST(CasterRays, ten_thousand_instances_of_a_mesh) {
     const glm::vec3 tilted(std::sin(0.5F), 0.0F, std::cos(0.5F));
     for (const int i : {0, 99, 4711, 9999}) {
       const scene::Instance& instance = scene.geometry.instances[static_cast<std::size_t>(i) + 1];
-      // The middle of the first triangle of cell (5, 3).
+      // The ray aims at the middle of the first triangle of cell (5, 3).
       const glm::dvec4 place_mesh((5.0 + 2.0 / 3.0) / 16.0, (3.0 + 1.0 / 3.0) / 16.0, 0.0, 1.0);
       const glm::vec3 place(glm::dvec3(instance.world_from_mesh * place_mesh) -
                             casters.origin_world_m());

@@ -11,7 +11,7 @@
 namespace emit::renderer {
 namespace {
 
-/// Ten spheres that share their mesh, seen from so far that a pixel is 3 cm wide.
+/// Makes ten spheres that share their mesh, seen from so far that a pixel is 3 cm wide.
 scene::SceneGeometry many_spheres(scene::Mesh mesh) {
   scene::SceneGeometry geometry;
   for (int i = 0; i < 10; ++i) {
@@ -53,7 +53,7 @@ TEST(CoarseGeometry, more_goes_until_vertices_leave_half_of_the_samples) {
   const scene::SceneGeometry full = many_spheres(scene::sphere(60, false));
   const CoarseGeometry with_kept = coarse(full, 100'000'000);
   EXPECT_FALSE(coarse(full, 2 * vertices(with_kept)).visibly);
-  // Facets that are kept only to spare cuts go first, and nobody sees it.
+  // Facets that are kept only to spare cuts go first, which does not show.
   const CoarseGeometry without = coarse(full, 2 * vertices(with_kept) - 1);
   EXPECT_FALSE(without.visibly);
   const std::size_t unseen = vertices(without);
@@ -62,7 +62,8 @@ TEST(CoarseGeometry, more_goes_until_vertices_leave_half_of_the_samples) {
   const CoarseGeometry made = coarse(full, 2 * unseen - 1);
   EXPECT_TRUE(made.visibly);
   EXPECT_LT(vertices(made), unseen);
-  // No farther than to eight times the error: a sphere of a metre keeps its shape.
+  // The surface moves no farther than eight times the error, so a sphere of a metre keeps its
+  // shape.
   const CoarseGeometry least = coarse(full, 100);
   EXPECT_TRUE(least.visibly);
   EXPECT_LT(vertices(least), vertices(made));
@@ -70,7 +71,7 @@ TEST(CoarseGeometry, more_goes_until_vertices_leave_half_of_the_samples) {
 }
 
 TEST(CoarseGeometry, outlines_of_small_bodies_stay_as_long_as_samples_are_left) {
-  // Three pixels wide.
+  // The spheres are three pixels wide.
   const scene::SceneGeometry full = many_spheres(scene::sphere(60, false));
   const CoarseGeometry made = coarse(full, 100'000'000, 667.0);
   EXPECT_FALSE(made.visibly);
@@ -101,7 +102,7 @@ TEST(CoarseGeometry, meshes_that_nothing_can_change_cost_the_others_nothing) {
 }
 
 TEST(CoarseGeometry, what_would_hardly_spare_a_vertex_is_not_worth_being_seen) {
-  // Every triangle has vertices of its own, as bodies have them along hard edges.
+  // Every triangle has vertices of its own, as along hard edges.
   scene::Mesh mesh = scene::sphere(60, false);
   scene::Mesh hard = mesh;
   hard.positions_m.clear();

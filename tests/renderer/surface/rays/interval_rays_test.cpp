@@ -48,7 +48,7 @@ class IntervalRaysTest : public ::testing::Test {
   void update(std::int64_t begin_ns, std::int64_t end_ns) {
     interval_.update(begin_ns, end_ns, 3, environment_, EntityPoses({}), rays_->origin_world_m());
   }
-  /// Visible share of a uniform disc behind the edge.
+  /// Returns the visible share of a uniform disc behind the edge.
   [[nodiscard]] double expected_frac(double x_m, std::int64_t now_ns) const {
     const glm::dvec3 sun = environment_.sun_at(now_ns).direction_enu;
     const glm::dvec3 to_edge = glm::normalize(glm::dvec3(-x_m, 0.0, kPlateM));
@@ -57,7 +57,7 @@ class IntervalRaysTest : public ::testing::Test {
         std::clamp(-std::asin(glm::dot(plane, sun)) / physics::kSunSemiAngleRad, -1.0, 1.0);
     return 0.5 + (std::asin(v) + v * std::sqrt(1.0 - v * v)) / physics::kPi;
   }
-  /// Where the middle of the shadow's edge lies.
+  /// Returns the place of the middle of the shadow's edge.
   [[nodiscard]] double edge_m(std::int64_t now_ns) const {
     const glm::dvec3 sun = environment_.sun_at(now_ns).direction_enu;
     return -kPlateM * sun.x / sun.z;
@@ -82,7 +82,7 @@ TEST_F(IntervalRaysTest, PenumbraIsThatOfTheSunsDisc) {
 }
 
 TEST_F(IntervalRaysTest, AShadowIsNoShorterThanItsCaster) {
-  // 3 cm above the ground, where starting half a millimetre above it would show.
+  // The point lies 3 cm above the ground, where a start half a millimetre above it would show.
   constexpr float kLowM = 0.03F;
   test::SurfaceScene scene;
   scene.add_static(scene.add_mesh(test::level_mesh(glm::vec3(0.0F, -20.0F, 0.0F),
@@ -160,7 +160,8 @@ TEST_F(IntervalRaysTest, ABodyThatPassesHidesTheSunForTheTimeItTakes) {
   const auto end_ns = kNoonNs + std::llround(kIntervalS * 1e9);
   const glm::dvec3 sun = environment_.sun_at((kNoonNs + end_ns) / 2).direction_enu;
   IntervalRays interval(std::vector<float>{4.0F});
-  // In the interval's middle it stands between the sun and the place, 5 m above the ground.
+  // The entity stands between the sun and the place in the middle of the interval, 5 m above the
+  // ground.
   const glm::dvec3 between_m = 5.0 / sun.z * sun + glm::dvec3(0.0, 0.0, -1.0);
   for (const double speed_m_s : {0.8, 1.0, 2.0, 4.0, 16.0}) {
     std::vector<PoseHistory> entities;
@@ -171,7 +172,7 @@ TEST_F(IntervalRaysTest, ABodyThatPassesHidesTheSunForTheTimeItTakes) {
       ASSERT_TRUE(entities[0].append(side < 0.0 ? kNoonNs : end_ns, pose, true, false));
     }
     const double shaded_frac = 2.0 * kHalfLengthM / speed_m_s / kIntervalS;
-    // Wherever its way lies in the interval, as long as it passes wholly.
+    // The entity hides the sun wherever its way lies in the interval, as long as it passes wholly.
     const double aside_m = 0.5 * (kIntervalS * speed_m_s - 2.0 * kHalfLengthM) - 0.2;
     for (std::uint32_t turn = 0; turn < 4; ++turn) {
       interval.update(kNoonNs, end_ns, turn, environment_, EntityPoses(entities),
@@ -189,8 +190,8 @@ TEST_F(IntervalRaysTest, ABodyThatPassesHidesTheSunForTheTimeItTakes) {
   }
 }
 
-/// Entities that no ray of a packet can meet are passed over; an exaggerated radius lets every ray
-/// be asked.
+/// Entities that no ray of a packet can meet are ignored. An exaggerated radius makes every ray
+/// test them.
 TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
   test::SurfaceScene scene;
   scene.add_static(scene.add_mesh(test::level_mesh(glm::vec3(-900.0F, -900.0F, 0.0F),
@@ -231,7 +232,7 @@ TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
     }
   }
   EXPECT_GT(partly, 100);
-  // Sky, too: it is looked for wherever the entity passes, here within five metres of it.
+  // The sky is tested wherever the entity passes, here within five metres of it.
   IntervalRays near(std::vector<float>{0.5F, 0.5F});
   near.update(kNoonNs, end_ns, 3, environment_, EntityPoses(entities), rays->origin_world_m());
   std::array<float, 3> hidden_on_third{};

@@ -15,7 +15,7 @@ namespace emit::renderer {
 namespace {
 
 const std::array<glm::dvec3, 2> kEyes{glm::dvec3(0.0, 0.0, 5.0), glm::dvec3(0.0, 0.5, 5.0)};
-/// Triangles of the sphere look some two pixels wide.
+/// The sphere's triangles look about two pixels wide.
 constexpr double kPixelRad = 3e-3;
 
 scene::SceneGeometry scene_of(scene::Mesh mesh) {
@@ -45,7 +45,8 @@ Count count_kept(const scene::SceneGeometry& geometry, double pixel_rad,
   EXPECT_EQ(kept.size(), geometry.meshes.size());
   const scene::Mesh& mesh = geometry.meshes[0];
   Count count;
-  // Not a list of nothing: simplification would hold the mesh's borders for it.
+  // A mesh without kept facets has an empty list. Simplification would keep the mesh's borders for
+  // a list of false.
   if (kept[0].empty()) return count;
   EXPECT_EQ(kept[0].size(), mesh.indices.size() / 3);
   EXPECT_NE(std::ranges::count(kept[0], true), 0);
@@ -61,7 +62,8 @@ Count count_kept(const scene::SceneGeometry& geometry, double pixel_rad,
 TEST(KeptFacets, are_what_the_eyes_see_of_a_surface_that_bends) {
   const scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
   const Count kept = count_kept(geometry, kPixelRad);
-  // What shows of it is a cap of 40 % of its surface, where not too slim towards the pole.
+  // The visible cap is 40 % of the sphere's surface. Facets near its rim that look too slim are not
+  // kept.
   const std::size_t all = geometry.meshes[0].indices.size() / 3;
   EXPECT_GT(kept.towards_eye, all / 5);
   EXPECT_LT(kept.towards_eye, all / 2);
@@ -79,7 +81,7 @@ TEST(KeptFacets, none_lies_where_the_sun_never_comes) {
 
 TEST(KeptFacets, none_hides_behind_something_else) {
   scene::SceneGeometry geometry = scene_of(scene::sphere(100, false));
-  // Hangs over its eastern half, which the sun reaches below it.
+  // A plate hangs over the eastern half. The sun reaches that half below it.
   geometry.meshes.push_back(test::level_mesh({0.0F, -3.0F, 0.0F}, {3.0F, 3.0F, 0.0F}, 1.5F));
   scene::Instance plate;
   plate.mesh = 1;

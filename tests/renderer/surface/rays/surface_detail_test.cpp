@@ -30,8 +30,8 @@ glm::vec3 wave_normal(float x, float y) {
                                   1.0F));
 }
 
-/// Gentle waves over [-1, 1]^2, in cells of a centimetre, 5 m up and turned. `unit`: length of the
-/// mesh's own unit, m.
+/// Makes gentle waves over [-1, 1]^2, in cells of a centimetre, 5 m up and turned. `unit` is the
+/// length of the mesh's own unit, m.
 scene::SceneGeometry waves(float unit_m = 1.0F) {
   constexpr std::uint32_t kCells = 200;
   scene::Mesh mesh;
@@ -98,14 +98,14 @@ TEST(SurfaceDetail, GivesPlacesAndNormalsOfTheFullSurface) {
     EXPECT_LT(glm::distance(place->normal, wave_normal(near_m.x, near_m.y)), 2e-3F);
     const float height_m = kHeightM * std::sin(kPerM * near_m.x) * std::cos(kPerM * near_m.y);
     EXPECT_LT(glm::distance(place->position_m, glm::vec3(near_m.x, near_m.y, height_m)), 3e-4F);
-    // Too far away, and facing the other way.
+    // One place is too far away, and one faces the other way.
     EXPECT_FALSE(detail.place(0, near_m + glm::vec3(0.0F, 0.0F, 0.1F), {0.0F, 0.0F, 1.0F}, 0.03F));
     EXPECT_FALSE(detail.place(0, near_m, {0.0F, 0.0F, -1.0F}, 0.03F));
   }
 }
 
-/// Greatest difference between the interpolated normals of the drawn surface, in the middle of its
-/// triangles, and the waves' own, but for the worst `left_out` of them.
+/// Returns the greatest difference between the interpolated normals of the drawn surface, in the
+/// middle of its triangles, and the waves' own. The worst `left_out` of them do not count.
 float normals_error(bool with_detail, double left_out, float unit_m = 1.0F) {
   scene::ScenarioDesc scenario;
   scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 380.0};
@@ -159,7 +159,7 @@ TEST(SurfaceDetail, SamplesOfASimplifiedSurfaceFaceAsItDid) {
   EXPECT_GT(with_rad, 0.0F);
   EXPECT_LT(with_rad, 0.02F);
   EXPECT_GT(normals_error(false, 0.02), 2.0F * with_rad);
-  // Whatever the unit of the mesh.
+  // The result does not depend on the unit of the mesh.
   EXPECT_NEAR(normals_error(true, 0.02, 0.01F), with_rad, 0.004F);
 }
 

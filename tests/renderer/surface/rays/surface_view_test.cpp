@@ -55,7 +55,7 @@ double instance_frac(const SurfaceView& view, std::uint32_t instance) {
   return total;
 }
 
-/// `point.position_m` in world coordinates.
+/// Returns `point.position_m` in world coordinates.
 SurfaceView view_of(const CasterRays& casters, ViewPoint point, std::uint32_t rays = 256) {
   point.position_m -= glm::vec3(casters.origin_world_m());
   return ViewSampler(rays).view(casters, point, {});
@@ -132,7 +132,8 @@ TEST(SurfaceView, the_foot_of_a_wall_sees_half_of_the_sky) {
       EXPECT_LT(view.seen[i].normal.x, -0.999F);
     }
   }
-  // The wall sees sky and ground by halves; without ground the lower half shows what is far off.
+  // The wall sees sky and ground by halves. Without ground the lower half shows the far
+  // surroundings.
   const ViewPoint middle{.position_m = {0.0F, 0.0F, 2.0F}, .normal = {-1.0F, 0.0F, 0.0F}};
   const SurfaceView view = view_of(casters, middle);
   EXPECT_NEAR(view.sky_frac, 0.5F, 0.01F);
@@ -185,7 +186,7 @@ TEST(SurfaceView, ground_beside_a_cube_sees_its_near_face) {
                 polygon_frac(glm::dvec3(point.position_m), glm::dvec3(0.0, 0.0, 1.0), face), 0.02)
         << distance_m;
   }
-  // And the top of the cube sees none of it.
+  // The top of the cube sees none of it.
   EXPECT_EQ(view_of(casters, {.position_m = {1.0F, 0.0F, 2.0F}}).sky_frac, 1.0F);
 }
 
@@ -203,7 +204,7 @@ TEST(SurfaceView, inside_a_body_all_rays_end_on_its_back_faces) {
 TEST(SurfaceView, joined_hits_keep_objects_sides_and_places) {
   SurfaceScene scene;
   scene.add_static(ground());
-  // Two rows of boxes left and right of the point, seen from 1 m above the ground.
+  // Two rows of boxes stand left and right of the point, seen from 1 m above the ground.
   for (int i = 0; i < 8; ++i) {
     const auto y = static_cast<float>(i - 4);
     scene.add_static(test::box_mesh(glm::vec3(1.0F, y, 0.0F), glm::vec3(2.0F, y + 1.0F, 4.0F)));
@@ -259,7 +260,7 @@ TEST(AdjacentFaces, of_a_cube_are_those_within_reach) {
   scene.add_static(ground());
   scene.add_static(test::box_mesh(glm::vec3(0.0F, 0.0F, 1.0F), glm::vec3(2.0F, 2.0F, 3.0F)));
   const CasterRays casters = rays_of(scene);
-  // 0.2 m from the edge with -x, 0.3 m from that with +y.
+  // The point is 0.2 m from the edge with -x and 0.3 m from that with +y.
   const ViewPoint point{.position_m = {0.2F, 1.7F, 3.0F}};
   AdjacentFaces faces = adjacent_of(casters, point, 0.25F);
   ASSERT_EQ(faces.count, 1U);
@@ -297,7 +298,7 @@ TEST(AdjacentFaces, of_a_rod_are_both_sides_but_not_the_back) {
 }
 
 TEST(AdjacentFaces, gentle_creases_have_none_and_a_round_side_is_one) {
-  // A prism of 32 sides, 1 m in radius and height: its top is one face, its mantle round.
+  // The prism has 32 sides and 1 m in radius and height: its top is one face, its mantle round.
   SurfaceScene scene;
   scene::Mesh prism;
   constexpr int kSides = 32;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Once warmed up, the thermal samples of the method "cached" are carried on without the heap, on
-// whatever thread: what a frame does besides its GL calls.
+// The method "cached" advances its thermal samples without the heap after the warm-up, on any
+// thread. This is the work of a frame besides its GL calls.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -143,7 +143,7 @@ TEST_P(SteadyState, NeitherDoesWhatTheHostTells) {
   EXPECT_TRUE(environment_->append(dull));
   run(100);
   EXPECT_EQ(emit::test::heap_request_count() - before, 0U);
-  // It stands where it was told to: all follow the intervals again.
+  // The entity stands where the host put it, so all blocks follow the intervals again.
   EXPECT_EQ(surface_->local_blocks(), 0U);
   for (std::size_t node = 0; node < 2; ++node) {
     for (const SampleVertex& vertex : surface_->vertices(node)) {
@@ -184,7 +184,7 @@ TEST(WorkerPool, EveryPartIsDoneOnceWhateverTheNumberOfThreads) {
 
 TEST(WorkerPool, ThreadsShareTheWork) {
   threads::WorkerPool pool(2);
-  // Two parts that wait for each other.
+  // The two parts wait for each other.
   std::atomic<int> arrived{0};
   pool.run(2, 1, [&](std::size_t, std::size_t) {
     ++arrived;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shade of entities: silhouettes, the response of materials, and pages of what was shaded.
+// Shade of entities: entity shadow depth maps, the response of materials, and exposure tiles.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -75,7 +75,7 @@ class ShadeTest : public ::testing::Test {
   [[nodiscard]] ShadePages::Inputs inputs() {
     return {environment_, entities_, *rays_, workers_, silhouettes_};
   }
-  /// As frames do it, ten a second.
+  /// Runs the tiles as frames do, ten a second.
   void run_to(ShadePages& shade, std::int64_t from_ns, std::int64_t until_ns,
               const SurfaceSamples& all, const ShadePages::Inputs& inputs) {
     for (std::int64_t t = from_ns; t < until_ns;) {
@@ -84,7 +84,7 @@ class ShadeTest : public ::testing::Test {
       shade.run(t, all, inputs);
     }
   }
-  /// Samples of the ground, a metre apart.
+  /// Returns samples of the ground, a metre apart.
   [[nodiscard]] static SurfaceSamples ground() {
     SurfaceSamples all;
     for (int y = -20; y <= 20; ++y) {
@@ -104,7 +104,8 @@ class ShadeTest : public ::testing::Test {
             0,
             tolerance_k};
   }
-  /// How far within the plate's shade a point of the ground lies.
+  /// Returns the distance of a point of the ground from the edge of the plate's shadow, positive
+  /// inside.
   [[nodiscard]] double inside_m(const glm::vec3& point_m, double east_m,
                                 std::int64_t now_ns) const {
     const glm::dvec3 sun = to_sun(now_ns);
@@ -142,12 +143,12 @@ TEST_F(ShadeTest, ASilhouetteIsDarkBehindItsBodyOnly) {
       if (std::abs(inside) < 0.12) continue;
       EXPECT_EQ(shaded_frac(point_m), inside > 0.0 ? 1.0F : 0.0F) << x << ' ' << y;
       dark += inside > 0.0 ? 1 : 0;
-      // The same line on the sun's side of the plate.
+      // The mirrored point lies on the same line on the sun's side of the plate.
       EXPECT_EQ(shaded_frac(point_m + (kHeightM / sun.z + 1.0F) * sun), 0.0F);
     }
   }
   EXPECT_GT(dark, 300);
-  // On the edge half of the disc, however many looks are taken at a time.
+  // A point on the edge sees half of the disc, however many looks are taken at a time.
   const glm::vec3 edge_m = glm::vec3(kHalfM, 0.0F, kHeightM) - kHeightM / sun.z * sun;
   EXPECT_NEAR(shaded_frac(edge_m), 0.5F, 0.35F);
   const glm::vec4 p(edge_m, 1.0F);
@@ -171,7 +172,7 @@ TEST_F(ShadeTest, ASilhouetteIsMadeAnewWhereTheBodyHasTurnedToTheSun) {
   EXPECT_EQ(silhouettes_.revision(0), 1U);
   EXPECT_TRUE(silhouettes_.look(0, turned(1.5e-2F), Silhouettes::kSharpRad, *rays_, workers_));
   EXPECT_EQ(silhouettes_.revision(0), 2U);
-  // So often per frame and no more; then what is nearly right will do.
+  // So many updates are allowed per frame. After that a map that is nearly right is used.
   for (int i = 2; i < Silhouettes::kLooksPerFrame; ++i) {
     const float rad = 0.02F * static_cast<float>(i);
     EXPECT_TRUE(silhouettes_.look(0, turned(rad), Silhouettes::kSharpRad, *rays_, workers_));
@@ -187,7 +188,7 @@ TEST_F(ShadeTest, ASilhouetteIsMadeAnewWhereTheBodyHasTurnedToTheSun) {
 }
 
 TEST_F(ShadeTest, AShadowLiesInTheSunsDirectionWhateverTheOutlineIsOf) {
-  // From 300 m a turn of 15 mrad would put it 4 m aside.
+  // A turn of 15 mrad would shift the shadow by 4 m at 300 m.
   constexpr float kFarM = 300.0F;
   const glm::vec3 sun(to_sun(kNoonNs));
   const glm::vec3 before = glm::normalize(sun + glm::vec3(1e-2F, 1e-2F, 0.0F));
@@ -234,7 +235,7 @@ TEST_F(ShadeTest, FourExponentialsFollowTheModel) {
 }
 
 TEST_F(ShadeTest, TheStepResponseIsThatOfTheModelsOwnSteps) {
-  // A face in balance with its surroundings, and the same with some sun.
+  // The face is in balance with its surroundings, first without and then with some sun.
   HeatInterval interval = heat_->sized_interval();
   SurfaceForcing forcing;
   constexpr double kAroundK = 300.0;
@@ -292,7 +293,7 @@ TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
           const glm::vec4 found = page.left_frac * page.shade[y * ShadePages::kSide + x];
           for (glm::length_t k = 0; k < 4; ++k) {
             const double tau_s = ShadeResponse::kTauS[static_cast<std::size_t>(k)];
-            // Pages take turns within a step.
+            // Tiles take turns within a step.
             const double early = -std::expm1(-30.2 / tau_s) * std::exp(-age_s / tau_s);
             EXPECT_NEAR(found[k], inside_m > 0.0 ? flux_frac * early : 0.0, 0.012)
                 << at_m.x << ' ' << at_m.y << ", mode " << k;
@@ -306,7 +307,7 @@ TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
   const auto [inside, used] = check(0.0);
   EXPECT_GT(inside, 100);
   EXPECT_GE(used, 2);
-  // Vertices have the same.
+  // Vertices have the same values.
   int vertices = 0;
   for (std::size_t i = 0; i < all.samples.size(); ++i) {
     const double inside_m = this->inside_m(
@@ -321,7 +322,7 @@ TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
     vertices += inside_m > 0.0 ? 1 : 0;
   }
   EXPECT_GE(vertices, 9);
-  // It goes far away: what is left decays, and pages with nothing left are given back.
+  // The plate goes far away. The rest decays, and tiles with nothing left are released.
   ASSERT_TRUE(entities_[0].append(kNoonNs + kStaysNs, pose_at(500.0, kHeightM), true, true));
   shade.run(kNoonNs + kStaysNs + 20 * kSecondNs, all, inputs());
   (void)check(20.0);
@@ -332,7 +333,7 @@ TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
 }
 
 TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
-  // 4 m at 8 m/s: half a second.
+  // The plate is 4 m long and moves at 8 m/s, so it passes in half a second.
   const SurfaceSamples all = ground();
   ShadePages shade = pages(all);
   shade.restart(kNoonNs, entities_);
@@ -352,14 +353,14 @@ TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
       for (std::uint32_t x = 3; x < ShadePages::kSide; x += 7) {
         const glm::vec3 at_m(page.first_m + page.texel_m * glm::vec2(x, y), page.plane_m);
         const glm::vec3 world_m = at_m + glm::vec3(rays_->origin_world_m());
-        // Its middle passed at that place.
+        // The middle of the plate passed at that place.
         const glm::dvec3 sun = to_sun(kNoonNs + 2 * kSecondNs);
         const double east_m = world_m.x + kHeightM / sun.z * sun.x;
         const double north_m = world_m.y + kHeightM / sun.z * sun.y;
         if (std::abs(north_m) > kHalfM - 0.15 || std::abs(east_m) > 11.0) continue;
-        // There it stood before it came from elsewhere.
+        // The plate stood there before the motion began.
         if (std::abs(east_m) < kHalfM + 0.15) continue;
-        // Of the slowest mode hardly anything has been forgotten.
+        // The slowest mode has decayed by hardly anything.
         EXPECT_NEAR(page.left_frac.w * page.shade[y * ShadePages::kSide + x].w,
                     flux_frac * 0.5 / ShadeResponse::kTauS[3], 0.1 * flux_frac * 0.5 / 1000.0)
             << east_m << ' ' << north_m;
@@ -371,7 +372,7 @@ TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
 }
 
 TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
-  // Here and there, too fast for anything to be forgotten.
+  // The plate jumps from place to place, too fast for anything to decay.
   const SurfaceSamples all = ground();
   ShadePages shade = pages(all, 0.01F);
   shade.restart(kNoonNs, entities_);
@@ -385,7 +386,7 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
     ASSERT_TRUE(entities_[0].append(now_ns, pose, true, true));
     shade.run(now_ns, all, inputs());
     was_short = was_short || shade.short_of_pages();
-    // What is in the shade now has pages all the same.
+    // Places that are in the shade now have tiles all the same.
     float most_k = 0.0F;
     for (const float vertex_k : shade.vertices_k()) most_k = std::max(most_k, vertex_k);
     if (std::abs(east_m) < 15.0 && std::abs(pose.position_world_m.y) < 15.0) {
@@ -399,7 +400,7 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
 }
 
 TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
-  // More parked vehicles than pages, and one that comes.
+  // There are more parked vehicles than tiles, and one that arrives.
   const SurfaceSamples all = ground();
   constexpr int kParked = 40;
   test::SurfaceScene scene;
@@ -455,7 +456,7 @@ TEST_F(ShadeTest, AfterAJumpTheLastMinuteIsMadeUpForAndTheRestIsOlder) {
 }
 
 TEST_F(ShadeTest, FasterSimTimeMakesNearlyTheSame) {
-  // It comes by at 2 m/s, stops for a while and goes on.
+  // The plate comes by at 2 m/s, stops for a while and goes on.
   const SurfaceSamples all = ground();
   const auto east_m = [](double s) {
     return s < 8.0 ? -16.0 + 2.0 * s : s < 18.0 ? 0.0 : 2.0 * (s - 18.0);
@@ -525,7 +526,7 @@ TEST_F(ShadeTest, BackInTimePagesAreForgottenAndFramesSaySo) {
   shade.run(kNoonNs + 5 * kSecondNs, all, inputs());
   for (const float vertex_k : shade.vertices_k()) EXPECT_NEAR(vertex_k, 0.0F, 1e-4F);
   EXPECT_TRUE(shade.short_of_pages());
-  // The same instant again is not back in time.
+  // A second run of the same instant is not a step back in time.
   shade.run(kNoonNs + 8 * kSecondNs, all, inputs());
   const float most_k = *std::ranges::max_element(shade.vertices_k());
   EXPECT_GT(most_k, 0.3F);
@@ -534,7 +535,7 @@ TEST_F(ShadeTest, BackInTimePagesAreForgottenAndFramesSaySo) {
 }
 
 TEST_F(ShadeTest, LongShadowsHavePagesToo) {
-  // In the evening the sun stands 8 degrees high.
+  // The sun stands 8 degrees high in the evening.
   const SurfaceSamples all = ground();
   std::int64_t low_ns = kNoonNs;
   while (to_sun(low_ns).z > 0.15) low_ns += 60 * kSecondNs;
@@ -581,7 +582,7 @@ TEST_F(ShadeTest, RaysBelongToOnePageEachOnSlopingGround) {
   }
   ASSERT_GE(planes_m.size(), 6U);
   std::ranges::sort(planes_m);
-  // They would be 0.16 m apart, each with its own.
+  // The planes would be 0.16 m apart if each tile had its own.
   EXPECT_EQ(std::ranges::unique(planes_m).begin() - planes_m.begin(), 1);
 }
 
@@ -590,7 +591,7 @@ TEST_F(ShadeTest, WhatStandsBetweenTheSunAndTheEntityIsNotInItsShade) {
   const glm::vec3 sun(to_sun(kNoonNs));
   const glm::vec3 plate_m(1.0F, 0.0F, kHeightM);
   const glm::vec3 origin_m(rays_->origin_world_m());
-  // Along the ray through the plate's middle: below it, and above.
+  // The samples lie along the ray through the plate's middle: below it, and above.
   const std::size_t first = all.samples.size();
   for (const float way_m : {-1.0F, -0.3F, 0.3F}) {
     SurfaceSample& sample = all.samples.emplace_back();

@@ -16,7 +16,7 @@ namespace emit::renderer {
 namespace {
 
 constexpr std::size_t kMovers = 2;
-/// Magic, version, number of parts, hashes, instant, size of the body.
+/// The header holds magic, version, number of parts, hashes, instant and size of the body.
 constexpr std::size_t kBodyAt = 8 + 4 + 4 + 8 * kStateParts + 8 + 8;
 constexpr std::int64_t kAtNs = 7'200'000'000'000;
 
@@ -100,7 +100,7 @@ class StateFile : public testing::Test {
   void put(const std::string& bytes) const {
     std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes;
   }
-  /// With the checksum that belongs to them.
+  /// Writes the bytes with a checksum that fits them.
   void put_signed(std::string bytes) const {
     Fnv64 hash;
     hash.put(bytes.data(), bytes.size() - 8);
@@ -111,7 +111,7 @@ class StateFile : public testing::Test {
   [[nodiscard]] physics::Result<SurfaceModel> read(const StateKey& key = some_key()) const {
     return read_state(file_, wanted(key), world_.geometry, kMovers, world_.options);
   }
-  /// Text of the refusal; empty when the file was taken.
+  /// Returns the text of the refusal; empty when the file was accepted.
   [[nodiscard]] std::string refusal(const StateKey& key = some_key()) const {
     const auto got = read(key);
     if (got) return "";
@@ -275,8 +275,8 @@ TEST_F(StateFile, of_another_kind_or_version_it_says_so) {
 TEST_F(StateFile, huge_counts_and_indices_out_of_range_are_refused_though_the_checksum_holds) {
   write();
   const std::string whole = bytes();
-  // Any eight bytes of the body as a count or as indices of 2^60 and more. What is taken all the
-  // same must be free of indices that lead anywhere else: reading them all shows it.
+  // The test reads any eight bytes of the body as a count or as indices of 2^60 and more. A file
+  // that is accepted must have no index that leads anywhere else. Reading all of them shows it.
   std::size_t refused = 0;
   for (std::size_t at = kBodyAt; at + 16 <= whole.size(); at += 4) {
     std::string changed = whole;

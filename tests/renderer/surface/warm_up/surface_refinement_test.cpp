@@ -24,7 +24,7 @@ using physics::kReferenceK;
 constexpr double kPixelRad = 8e-3;
 
 TEST(SurfaceRefinement, StopsAtHalfAPixelWhereTheCameraComesClosest) {
-  // A body's shadow on the ground, more closely looked at than any picture could show.
+  // A box's shadow on the ground is seen more closely than any image could show.
   test::SurfaceScene scene;
   scene.add_static(test::level_mesh(glm::vec3(-12.0F), glm::vec3(12.0F), 0.0F));
   scene.add_static(test::box_mesh(glm::vec3(-1.0F, -1.0F, 1e-3F), glm::vec3(1.0F, 1.0F, 2.0F)));
@@ -60,7 +60,7 @@ TEST(SurfaceRefinement, StopsAtHalfAPixelWhereTheCameraComesClosest) {
   StepPlan plan(scenario.thermal);
   RefineView view;
   view.pixel_rad = kPixelRad;
-  // It comes nearer and passes.
+  // The camera comes nearer and passes.
   view.eyes = {{{-30.0, -4.0, 12.0}, {}}, {{-8.0, -4.0, 6.0}, {}}, {{-20.0, 20.0, 9.0}, {}}};
   ASSERT_TRUE((*surface)->prepare(7200 * kSecondNs, view, {environment, {}}, plan, history,
                                   std::nullopt, {}));

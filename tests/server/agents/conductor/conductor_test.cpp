@@ -148,7 +148,7 @@ TEST(RenderAgent, CountsForgottenPosesAndTheirFramesAreDegraded) {
   events.pop();
   EXPECT_EQ(events.front(), nullptr) << "once per run";
 
-  // After a reset of the source it counts from nothing.
+  // The source counts from nothing after it was reset.
   rig.script.dropped_poses = 0;
   rig.command(CommandKind::reset);
   rig.send(1, 1);
@@ -251,7 +251,7 @@ TEST(Conductor, OfMoreEntitiesThanAFrameTakesThoseThatStandAreToldNowAndThen) {
     }
     EXPECT_LE(rig.script.entities.back().first - times.back(), longest_ns) << id;
   }
-  // Each of those takes the place of one that moved, which is behind for a frame.
+  // Each of those takes the place of an entity that moved, which is then behind for a frame.
   EXPECT_GE(rig.count(Counter::frames_entities_behind), 3U);
   EXPECT_LE(rig.count(Counter::frames_entities_behind), 10U);
 }

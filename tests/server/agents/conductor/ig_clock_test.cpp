@@ -101,7 +101,7 @@ TEST(IgClockPacing, RepeatsThePreviousFrameThenShowsTheLateOne) {
   EXPECT_EQ(rig.frames[5].header.flags & (protocol::kFlagLate | protocol::kFlagRepeated), 0U);
 }
 
-/// Frames of the next `slots` slots: one each, none twice, none more.
+/// Checks the frames of the next `slots` slots: there is one each, none twice, none more.
 void expect_a_frame_per_slot(Rig& rig, int slots) {
   for (int slot = 0; slot < slots; ++slot) {
     const std::size_t before = rig.frames.size();
@@ -166,7 +166,7 @@ TEST(IgClockPacing, FlagsATeleportWithTheFirstPoseBehindIt) {
   rig.settle();
   const auto entity_at = [](double x_m, bool teleport, std::int64_t early_ns) {
     return [=](protocol::HostFrameData& frame) {
-      // A stamp ahead of the slot: its display time lies before this frame's simulation time.
+      // The stamp is ahead of the slot: its display time lies before this frame's simulation time.
       frame.received_ns += early_ns;
       frame.entity_count = 1;
       frame.entities[0].entity_id = 3;

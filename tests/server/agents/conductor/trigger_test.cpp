@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pacing mode trigger: what begins a frame, and what is told of the triggers that do not.
+// Pacing mode trigger: the triggers that begin a frame, and the reports of those that do not.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ using test::kMs;
 using Rig = test::ConductorRig;
 using Verdict = TriggerGate::Verdict;
 
-/// Triggers at 100 Hz.
+/// The sync source sends triggers at 100 Hz.
 config::PacingConfig triggered() {
   config::PacingConfig pacing;
   pacing.mode = config::PacingMode::trigger;
@@ -251,7 +251,8 @@ TEST(PredictionError, IsMeasuredWhenTheTruthComes) {
   ASSERT_EQ(rig.frames.size(), 1U);
   EXPECT_EQ(rig.frames[0].header.predictions, 0U);
   EXPECT_EQ(rig.context().prediction.position.count(0), 0U);
-  // Predicted: 1 m on at 10 ms. Truth at 20 ms: 3 m and 0.2 rad, so half of that at 10 ms.
+  // The prediction is 1 m on at 10 ms. The truth at 20 ms is 3 m and 0.2 rad, so half of that at 10
+  // ms.
   rig.clock.set(rig.clock.tai_ns() + 10 * kMs);
   rig.with(moving(0.2)).send(2, 20 * kMs, 3.0);
   rig.trigger(2);

@@ -23,7 +23,7 @@ protocol::SessionKey key_of(unsigned char seed) {
   return key;
 }
 
-/// A host that knows a key and what the daemon challenged it with.
+/// A host that knows a key and the daemon's challenge.
 class Peer {
  public:
   Peer(const protocol::SessionKey& key, std::uint64_t session_id)

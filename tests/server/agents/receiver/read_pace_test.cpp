@@ -18,7 +18,7 @@ namespace emit::server {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
-/// Refused messages that may come at once.
+/// Number of refused messages that may come at once.
 constexpr std::uint64_t kBurst = ReadPace::kBurstNs / ReadPace::kRefusalNs;
 
 TEST(ReadPace, LetsTheRateThroughForEver) {
@@ -78,7 +78,8 @@ class FloodTest : public ::testing::Test {
     say(bytes);
     settle();
   }
-  /// The receiver hears of it at its next write, or when it has read what was said before.
+  /// Closes the peer's end. The receiver notices it at its next write, or after it has read earlier
+  /// bytes.
   void reset_peer() {
     const linger abrupt{1, 0};
     ::setsockopt(peer_.get(), SOL_SOCKET, SO_LINGER, &abrupt, sizeof abrupt);
@@ -88,7 +89,7 @@ class FloodTest : public ::testing::Test {
     ASSERT_EQ(::send(peer_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL),
               static_cast<ssize_t>(bytes.size()));
   }
-  /// Records that only the daemon may send: each is refused.
+  /// Sends records that only the daemon may send: each is refused.
   void say_refused(std::uint32_t count) {
     std::vector<std::byte> bytes(count * protocol::kRecordHeaderBytes);
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -187,8 +188,8 @@ TEST_F(FloodTest, EndsWithItsPeerThoughItIsNotRead) {
 }
 
 TEST_F(FloodTest, IsNotAnsweredOnceItsPeerIsGone) {
-  // Each is refused and ends its connection, here while the refusal itself cannot be written any
-  // more: read, refused and ended in one turn.
+  // Each record is refused and ends its connection, here while the refusal itself cannot be written
+  // any more. The record is read, refused and the connection ended in one turn.
   v1::ControlRecord wrong_version;
   wrong_version.mutable_hello()->set_protocol_version(77);
   std::vector<std::byte> unknown_hello;

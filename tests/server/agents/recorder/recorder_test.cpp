@@ -23,7 +23,7 @@ namespace {
 
 using test::ScratchFolder;
 
-/// No file of this process gets longer, as on a full disk, while this object lives.
+/// Guard while which no file of this process gets longer, as on a full disk.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) {
@@ -57,7 +57,7 @@ class RecorderRig {
     ASSERT_TRUE(writer_.write(line));
     turn();
   }
-  /// Entries of some 10 kB.
+  /// Writes entries of some 10 kB.
   void write(int count) {
     std::vector<protocol::EntityStateData> entities(protocol::kMaxEntitiesPerFrame);
     for (protocol::EntityStateData& entity : entities) {
@@ -236,7 +236,7 @@ TEST(Recorder, MemoryIsBoundedAndALateRecorderIsSentWhatItLacks) {
   EXPECT_EQ(records[1].journal().sequence(), forgotten + 1);
   EXPECT_EQ(records.back().journal().sequence(), rig.lines());
 
-  // A new run begins without a gap, and what is left of the old one goes.
+  // A new run begins without a gap, and the rest of the old one is dropped.
   rig.start_run();
   EXPECT_LT(rig.context.journal_memory_bytes.load(), 4096U);
   Peer second;

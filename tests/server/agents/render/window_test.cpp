@@ -82,7 +82,7 @@ TEST(Channels, OnlyWhatAChannelIsDueForIsAskedOfTheRenderer) {
     EXPECT_EQ(rig.frames[i].image.pictures[1].size(), 6U);
     EXPECT_EQ(rig.frames[i].image.pictures[2].size(), lines ? 16U : 0U);
   }
-  // The source counts its pixels up: the window holds those of its place.
+  // The source counts its pixels up, so the window holds those of its place.
   const auto& last = rig.frames[8].image;
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(last.pictures[1][i], last.pictures[0][(1 + i / 3) * kWidthPx + 2 + i % 3]) << i;
@@ -145,7 +145,8 @@ TEST(Channels, AFrameThatWasNotReadyForItsChannelLeavesAGap) {
   const auto& half_field = rig.connect(0, 2);
   const auto& gate = rig.connect(1);
   for (int i = 0; i < 4; ++i) rig.publish_due();
-  // Frame 5 repeats frame 4, which has no pixels of the field; what was made for it comes as 6.
+  // Frame 5 repeats frame 4, which has no pixels of the field. The image made for frame 5 comes as
+  // 6.
   rig.publish(7, true);
   rig.settle();
   rig.publish(7);

@@ -21,7 +21,7 @@ class Client final : public SenderClient {
   void spill() noexcept override {}
   [[nodiscard]] std::uint32_t connection() const noexcept override { return 1; }
 
-  /// A frame of a pose received at `received_ns`, whose last byte goes `delay_ns` later.
+  /// Sends a frame of a pose received at `received_ns`, whose last byte goes `delay_ns` later.
   const protocol::FrameHeader& frame(std::int64_t received_ns, std::int64_t delay_ns) {
     protocol::FrameHeader header;
     header.frame_number = ++number_;
@@ -49,7 +49,7 @@ TEST(ClientDelay, EachHeaderTellsOfTheFrameBefore) {
   const protocol::FrameHeader third = client.frame(3000 * kUs, 148 * kUs);
   EXPECT_EQ(third.previous_delay_ns, 180 * kUs);
   EXPECT_EQ(third.previous_jitter_ns, 5 * kUs) << "80 / 16";
-  // 5 + (32 - 5) / 16
+  // The jitter is 5 + (32 - 5) / 16.
   EXPECT_EQ(client.jitter_ns(), 6687);
   EXPECT_EQ(client.frame(4000 * kUs, 148 * kUs).previous_jitter_ns, 6687);
 }

@@ -113,7 +113,7 @@ TEST(Compression, APictureThatLeavesTheWindowBeforeItsTurnGoesOutAsItIs) {
   ChannelClients rig;
   rig.sender().allow_compression();
   const auto& peer = rig.connect(kAll, 1, true);
-  // More than the window holds, before anybody has time to encode.
+  // The frames are more than the window holds, before anybody has time to encode.
   for (int i = 0; i < 8; ++i) rig.publish(1);
   rig.settle();
   EXPECT_EQ(peer.numbers.front(), 1U);

@@ -51,7 +51,7 @@ class Rig {
     std::uint64_t bad_crc = 0;
     std::uint64_t bytes = 0;
 
-    /// Takes what has arrived.
+    /// Takes the frames that have arrived.
     void read() {
       for (;;) {
         const auto space = parser.writable();
@@ -82,7 +82,8 @@ class Rig {
     auto near = TcpSocket::adopt(sockets_, pair[0]);
     EXPECT_TRUE(near.has_value());
     peer->near = std::move(*near);
-    // Less than a frame, so that a client that does not read stops in the middle of one.
+    // The buffer is smaller than a frame, so that a client that does not read stops in the middle
+    // of one.
     const int send_bytes = 32 << 10;
     EXPECT_EQ(::setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &send_bytes, sizeof(send_bytes)), 0);
     SocketClient::Params params;
@@ -98,7 +99,7 @@ class Rig {
     return peer;
   }
 
-  /// False: every slot is held.
+  /// Publishes a frame. It returns false when every slot is in use.
   bool publish(ChannelSet channels = kAllChannels) {
     renderer::FrameRequest request;
     request.frame_number = ++number_;
@@ -189,7 +190,7 @@ TEST(Sender, AStoppedClientDelaysNobodyAndItsGapIsFlagged) {
 
 using Turns = std::vector<std::pair<std::uint32_t, SenderClient::Turn>>;
 
-/// Needs two turns for a frame and says which it was given.
+/// Client that needs two turns for a frame and notes which kind each was.
 class TwoTurnClient final : public SenderClient {
  public:
   TwoTurnClient(std::uint32_t connection, Turns& turns) : connection_(connection), turns_(turns) {}
@@ -324,7 +325,7 @@ TEST(Sender, AGapIsToldByTheFrameBehindItHoweverFarBehindTheClientIs) {
     Rig rig;
     Rig::Peer* peer = rig.connect();
     for (int i = 1; i <= 4; ++i) {
-      // The third has nothing to show for this channel, which would have wanted it.
+      // The third frame shows nothing for this channel, which would have wanted it.
       ASSERT_TRUE(rig.publish(i == 3 ? ChannelSet{0} : kAllChannels));
       rig.settle(stopped ? std::vector<Rig::Peer*>{} : std::vector{peer});
     }
@@ -448,8 +449,8 @@ TEST(UdpBatch, DeliversEveryFragmentWithAndWithoutSegmentation) {
   }
 }
 
-/// Datagrams of a frame through a real socket into a receiver that has the kernel write payloads to
-/// their place, in the order that `order` gives.
+/// Sends the datagrams of a frame through a real socket into a receiver that has the kernel write
+/// payloads to their place. `order` gives their order.
 class UdpInPlace : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -464,7 +465,7 @@ class UdpInPlace : public ::testing::Test {
     sender_ = std::move(*sender);
     ASSERT_TRUE(sender_.connect(numeric_address("127.0.0.1", receiver_->port())).has_value());
   }
-  /// Datagrams of frame `id`, whose pixels are all different.
+  /// Returns the datagrams of frame `id`, whose pixels are all different.
   static std::vector<std::vector<std::byte>> datagrams(std::uint32_t id,
                                                        std::uint32_t payload_bytes,
                                                        std::uint16_t stream_id = 1,
@@ -561,7 +562,7 @@ TEST_F(UdpInPlace, OfJoinedDatagramsNothingButAFramesBeginningIsMisplaced) {
     }
     expect_frame(id);
   }
-  // Before the first message nobody knows that datagrams come joined.
+  // The receiver does not know before the first message that datagrams come joined.
   EXPECT_LE(receiver_->misplaced(), 16U + kFrames - 1);
 }
 
@@ -570,7 +571,7 @@ TEST_F(UdpInPlace, WhatWasNotExpectedComesOutRightAllTheSame) {
   for (std::uint32_t id = 1; id <= 30; ++id) {
     auto order = datagrams(id, id % 2 == 0 ? 1440 : 8900);
     const std::size_t count = order.size();
-    // Neighbours change places, some come twice, strangers come between.
+    // Neighbours change places, some datagrams come twice, and other senders' come between.
     for (int swap = 0; swap < 6; ++swap) {
       std::swap(order[random() % count], order[random() % count]);
     }
@@ -611,7 +612,8 @@ TEST_F(UdpInPlace, OtherStreamsAndOtherMachinesTakeNobodysPlace) {
     take();
   }
   for (std::uint32_t id = 1; id <= 4; ++id) {
-    // Before and between: the same stream and frame from another machine, and other pixels.
+    // Datagrams before and between carry the same stream and frame from another machine, and other
+    // pixels.
     const auto wanted = datagrams(id, 1440);
     const auto forged = datagrams(id, 1440, 1, 1000);
     for (std::size_t i = 0; i < wanted.size(); ++i) {

@@ -36,7 +36,7 @@ class CsvReader {
  public:
   /// Reads the header row. Errors: not_found; io; parse as above. Errors name the file.
   [[nodiscard]] static Result<CsvReader> open(const std::filesystem::path& file);
-  /// The same for text in memory; `name` stands for the file in messages.
+  /// Reads the header row of text in memory; `name` stands for the file in messages.
   [[nodiscard]] static Result<CsvReader> from_text(std::string text, std::string name);
   CsvReader(CsvReader&&) noexcept;
   CsvReader& operator=(CsvReader&&) noexcept;
@@ -68,18 +68,21 @@ class CsvTable {
  public:
   /// Errors: those of CsvReader.
   [[nodiscard]] static Result<CsvTable> read(const std::filesystem::path& file);
-  /// The same from text; `name` stands for the file in messages.
+  /// Reads a table from text in memory; `name` stands for the file in messages.
   [[nodiscard]] static Result<CsvTable> parse(std::string text, std::string name);
 
   [[nodiscard]] std::size_t rows() const noexcept { return lines_.size(); }
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  /// Line of a row in the file, from 1, for messages. @pre row < rows()
+  /// Line of a row in the file, from 1, for messages.
+  /// @pre row < rows()
   [[nodiscard]] std::size_t line_of(std::size_t row) const;
 
-  /// Errors: invalid_argument, when the column is missing; parse, when it is there twice, or naming
-  /// file, line and column of a cell that is not a number (`nan` and `inf` are numbers here).
+  /// Reads a column of numbers. Errors: invalid_argument, when the column is missing; parse, when
+  /// it exists twice, or when a cell is not a number (`nan` and `inf` are numbers here). The second
+  /// kind names file, line and column.
   [[nodiscard]] Result<std::vector<double>> numbers(std::string_view column) const;
-  /// The views live as long as the table. Errors: those of a column, as above.
+  /// Reads a column of texts. The views live as long as the table. Errors: those of a column, as
+  /// above.
   [[nodiscard]] Result<std::vector<std::string_view>> texts(std::string_view column) const;
 
  private:
@@ -99,14 +102,14 @@ class CsvTable {
   std::vector<std::size_t> lines_;
 };
 
-/// The number that a cell holds: a decimal number with '.', a leading '+' allowed, `nan` or `inf`.
-/// Empty when it is something else. Thread: any.
+/// Returns the number that a cell holds: a decimal number with '.', a leading '+' allowed, `nan` or
+/// `inf`. The result is empty when the cell holds something else. Thread: any.
 [[nodiscard]] std::optional<double> csv_number(std::string_view text) noexcept;
-/// Why `text` is not a number, for messages: "which is not a number", with a hint for decimal
-/// commas and for dates.
+/// Returns the reason why `text` is not a number, for messages: "which is not a number", with a
+/// hint for decimal commas and for dates.
 [[nodiscard]] std::string not_a_number_text(std::string_view text);
-/// What a time in seconds beyond the range of simulation times looks like: "; this looks like UNIX
-/// time ..." or an empty text.
+/// Returns a hint for a time in seconds beyond the range of simulation times: "; this looks like
+/// UNIX time ...", or an empty text.
 [[nodiscard]] std::string unix_time_hint(double seconds);
 
 }  // namespace emit::physics

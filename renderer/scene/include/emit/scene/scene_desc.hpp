@@ -223,7 +223,7 @@ struct DisplayOptions {
   double max_k = 330.0;
 };
 
-/// All that a scenario file says.
+/// Content of a scenario file.
 struct ScenarioDesc {
   std::string name;
   std::filesystem::path file;  ///< the file itself, for messages
@@ -240,7 +240,8 @@ struct ScenarioDesc {
   std::vector<ChannelDesc> channels;
   ThermalOptions thermal;
   DisplayOptions display;
-  /// What the loader found doubtful, one sentence each, beginning with the file's name.
+  /// Doubtful points that the loader found, one sentence each. A sentence begins with the file's
+  /// name.
   std::vector<std::string> warnings;
 };
 
