@@ -109,10 +109,10 @@ Result<LadderSurvey> survey_ladder(const LadderSubject& subject, const FrameRequ
     // Render every level twice and keep the shorter time, because the first round also fills
     // caches.
     for (int round = 0; round < 2; ++round) {
-      request.rung = 0;
+      request.quality_level = 0;
       const Taken full(subject.renderer, request);
       for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
-        request.rung = static_cast<std::uint8_t>(r);
+        request.quality_level = static_cast<std::uint8_t>(r);
         const Taken shed(subject.renderer, request);
         if (!full.good() || !shed.good()) {
           return make_error(ErrorCode::gpu, "the device failed in its first frames");

@@ -30,13 +30,13 @@ void LadderMap::add(const physics::Pose& camera, const PerLevel& levels) {
   places_.push_back({camera, levels});
   // Compute the medians over all positions anew.
   std::vector<double> values(places_.size());
-  const auto median = [&](std::size_t level, double RungStats::*member) {
+  const auto median = [&](std::size_t level, double QualityLevelStats::*member) {
     for (std::size_t p = 0; p < places_.size(); ++p) values[p] = places_[p].levels[level].*member;
     std::ranges::sort(values);
     return values[values.size() / 2];
   };
   for (std::size_t r = 0; r < medians_.size(); ++r) {
-    medians_[r] = {median(r, &RungStats::frame_ms), median(r, &RungStats::error_k)};
+    medians_[r] = {median(r, &QualityLevelStats::frame_ms), median(r, &QualityLevelStats::error_k)};
   }
 }
 

@@ -24,7 +24,7 @@ struct QualityLevel {
 /// outlines alone keep them small.
 inline constexpr double kAnyPx = 1e6;
 
-/// Quality levels from full quality, number 0, to the coarsest. The numbers (`rung` in the
+/// Quality levels from full quality, number 0, to the coarsest. The numbers (`quality_level` in the
 /// interface) are part of recordings, because a replay renders the level that was recorded.
 inline constexpr std::array<QualityLevel, 12> kQualityLadder = {{
     {1.0, {0.0, 0.25, 4.0, 0.5, 0}},
@@ -60,7 +60,7 @@ using TrianglesPerLevel = std::array<std::uint32_t, kQualityLadder.size()>;
 /// Times and errors of every quality level, measured where the camera is going to be.
 class LadderMap {
  public:
-  using PerLevel = std::array<RungStats, kQualityLadder.size()>;
+  using PerLevel = std::array<QualityLevelStats, kQualityLadder.size()>;
 
   /// Adds a measured position of the camera, in the order of its trajectory. Setup only.
   void add(const physics::Pose& camera, const PerLevel& levels);

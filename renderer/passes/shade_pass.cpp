@@ -18,7 +18,7 @@ namespace emit::renderer {
 namespace {
 
 constexpr auto kPageSide = static_cast<GLsizei>(ShadePages::kSide);
-constexpr auto kSilhouetteSide = static_cast<GLsizei>(Silhouettes::kSide);
+constexpr auto kEntityShadowSide = static_cast<GLsizei>(EntityShadowMaps::kSide);
 
 /// Smallest part of the frame's window that holds the convex hull of points in relworld axes: first
 /// column, first row, end column, end row. It is empty when the hull lies outside.
@@ -68,13 +68,13 @@ bool is_empty(const glm::uvec4& px) noexcept {
 ShadePass::ShadePass(std::size_t entities)
     : pages_(GL_RGBA32F, kPageSide, kPageSide, ShadePages::kPages),
       tops_(GL_R32F, kPageSide, kPageSide, ShadePages::kPages),
-      silhouettes_(GL_R32F, kSilhouetteSide, kSilhouetteSide, static_cast<GLsizei>(entities)),
+      shadow_maps_(GL_R32F, kEntityShadowSide, kEntityShadowSide, static_cast<GLsizei>(entities)),
       tiles_(ShadePages::kPages + entities),
       params_buffer_(gl::Buffer::dynamic(sizeof(gpu::ShadeParams))),
       page_buffer_(gl::Buffer::dynamic(ShadePages::kPages * sizeof(gpu::PageParams))),
       page_table_(GL_RGBA32F, page_buffer_),
-      silhouette_buffer_(gl::Buffer::dynamic(entities * sizeof(gpu::SilhouetteParams))),
-      silhouette_table_(GL_RGBA32F, silhouette_buffer_),
+      entity_shadow_buffer_(gl::Buffer::dynamic(entities * sizeof(gpu::EntityShadowParams))),
+      entity_shadow_table_(GL_RGBA32F, entity_shadow_buffer_),
       tile_buffer_(gl::Buffer::dynamic(ShadeTiles::kMaxTiles * sizeof(gpu::ShadeTile))),
       tile_table_(GL_RGBA32UI, tile_buffer_),
       list_buffer_(gl::Buffer::dynamic(ShadeTiles::max_entries(ShadePages::kPages + entities) * 2)),
@@ -83,7 +83,7 @@ ShadePass::ShadePass(std::size_t entities)
   pages_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   pages_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   page_params_.reserve(ShadePages::kPages);
-  silhouette_params_.reserve(entities);
+  entity_shadow_params_.reserve(entities);
   // Pack two positions of taps into each entry.
   for (std::uint32_t tap = 0; tap < EMIT_SHADE_TAPS; tap += 2) {
     const auto [x, y] = shade_tap(tap);
@@ -111,12 +111,12 @@ void ShadePass::begin(const ShadePages& pages) {
 void ShadePass::prepare(CachedSurface& surface, const glm::dvec3& camera_world_m,
                         const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
   page_params_.clear();
-  silhouette_params_.clear();
+  entity_shadow_params_.clear();
   params_.slope = surface.shade().slope();
   tiles_.begin(frame.rendered_window_px);
   const glm::dvec3 relworld_from_rel_m = surface.origin_world_m() - camera_world_m;
   prepare_pages(surface.shade(), relworld_from_rel_m, camera, frame);
-  prepare_silhouettes(surface, relworld_from_rel_m, camera, frame);
+  prepare_entity_shadows(surface, relworld_from_rel_m, camera, frame);
   tiles_.sort();
 }
 
@@ -153,9 +153,10 @@ void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworl
   }
 }
 
-void ShadePass::prepare_silhouettes(CachedSurface& surface, const glm::dvec3& relworld_from_rel_m,
-                                    const CameraSetup& camera,
-                                    const gpu::FrameParams& frame) noexcept {
+void ShadePass::prepare_entity_shadows(CachedSurface& surface,
+                                       const glm::dvec3& relworld_from_rel_m,
+                                       const CameraSetup& camera,
+                                       const gpu::FrameParams& frame) noexcept {
   const std::span<const CachedSurface::Shadow> shadows = surface.shadows();
   for (std::size_t m = 0; m < shadows.size(); ++m) {
     const CachedSurface::Shadow& shadow = shadows[m];
@@ -168,9 +169,9 @@ void ShadePass::prepare_silhouettes(CachedSurface& surface, const glm::dvec3& re
     const glm::uvec4 px = part_of_window(corners_m, camera, frame);
     if (is_empty(px)) continue;
     // Place the depth map at the pose of the frame and append its parameters.
-    const PlacedSilhouette placed = surface.cast_shadow(m);
-    tiles_.add_silhouette(px);
-    gpu::SilhouetteParams& params = silhouette_params_.emplace_back();
+    const PlacedShadowMap placed = surface.cast_shadow(m);
+    tiles_.add_entity_shadow(px);
+    gpu::EntityShadowParams& params = entity_shadow_params_.emplace_back();
     const auto from_relworld = [&](const glm::vec4& line) {
       const double shift = glm::dot(glm::dvec3(line), relworld_from_rel_m);
       return glm::vec4(glm::vec3(line), static_cast<float>(static_cast<double>(line.w) - shift));
@@ -200,17 +201,17 @@ void ShadePass::upload(const CachedSurface& surface) noexcept {
                         GL_RGBA, GL_FLOAT, pages[p].shade.data());
   }
   // Send the shadow depth maps that changed.
-  const Silhouettes& silhouettes = surface.silhouettes();
-  for (std::size_t m = 0; m < silhouettes.size(); ++m) {
-    if (sent_[m] == silhouettes.revision(m)) continue;
-    sent_[m] = silhouettes.revision(m);
-    glTextureSubImage3D(silhouettes_.id(), 0, 0, 0, static_cast<GLint>(m), kSilhouetteSide,
-                        kSilhouetteSide, 1, GL_RED, GL_FLOAT, silhouettes.depths_m(m).data());
+  const EntityShadowMaps& shadow_maps = surface.shadow_maps();
+  for (std::size_t m = 0; m < shadow_maps.size(); ++m) {
+    if (sent_[m] == shadow_maps.revision(m)) continue;
+    sent_[m] = shadow_maps.revision(m);
+    glTextureSubImage3D(shadow_maps_.id(), 0, 0, 0, static_cast<GLint>(m), kEntityShadowSide,
+                        kEntityShadowSide, 1, GL_RED, GL_FLOAT, shadow_maps.depths_m(m).data());
   }
   // Send the parameters of the frame.
   params_buffer_.upload(std::span<const gpu::ShadeParams>(&params_, 1));
   page_buffer_.upload(std::span<const gpu::PageParams>(page_params_));
-  silhouette_buffer_.upload(std::span<const gpu::SilhouetteParams>(silhouette_params_));
+  entity_shadow_buffer_.upload(std::span<const gpu::EntityShadowParams>(entity_shadow_params_));
   tile_buffer_.upload(tiles_.tiles());
   list_buffer_.upload(tiles_.entries());
 }
@@ -221,10 +222,10 @@ void ShadePass::dispatch() const noexcept {
   params_buffer_.bind_uniform(EMIT_BIND_SHADE);
   pages_.bind(EMIT_TEX_SHADE);
   tops_.bind(EMIT_TEX_SHADE_TOP);
-  silhouettes_.bind(EMIT_TEX_SILHOUETTES);
+  shadow_maps_.bind(EMIT_TEX_ENTITY_SHADOWS);
   response_table_.bind(EMIT_TEX_RESPONSE);
   page_table_.bind(EMIT_TEX_PAGE_PARAMS);
-  silhouette_table_.bind(EMIT_TEX_SILHOUETTE_PARAMS);
+  entity_shadow_table_.bind(EMIT_TEX_ENTITY_SHADOW_PARAMS);
   tile_table_.bind(EMIT_TEX_SHADE_TILES);
   list_table_.bind(EMIT_TEX_SHADE_LIST);
   glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);

@@ -17,7 +17,7 @@
 namespace emit::renderer {
 
 /// Shade of entities per pixel, between the geometry pass and the radiance pass. It works only in
-/// the part of the image that exposure tiles ("pages") and entity shadow depth maps ("silhouettes")
+/// the part of the image that exposure tiles ("pages") and entity shadow depth maps ("shadow_maps")
 /// reach. See passes/shade.comp. Owner: CachedStage. Thread: the one that owns the GL context. Real
 /// time: create() and begin() are setup only, the rest is RT-safe.
 class ShadePass {
@@ -43,25 +43,25 @@ class ShadePass {
   explicit ShadePass(std::size_t entities);
   void prepare_pages(const ShadePages& shade, const glm::dvec3& relworld_from_rel_m,
                      const CameraSetup& camera, const gpu::FrameParams& frame) noexcept;
-  void prepare_silhouettes(CachedSurface& surface, const glm::dvec3& relworld_from_rel_m,
-                           const CameraSetup& camera, const gpu::FrameParams& frame) noexcept;
+  void prepare_entity_shadows(CachedSurface& surface, const glm::dvec3& relworld_from_rel_m,
+                              const CameraSetup& camera, const gpu::FrameParams& frame) noexcept;
 
   gl::Program program_;
   std::uint32_t rows_ = 1;  ///< blocks of 8 x 8 pixels per work group
   gl::Texture pages_;       ///< RGBA32F, one layer per exposure tile: shade by mode
   gl::Texture tops_;  ///< R32F, one layer per exposure tile: height at which the shade began, m
-  gl::Texture silhouettes_;  ///< R32F, one layer per entity: depth, m
+  gl::Texture shadow_maps_;  ///< R32F, one layer per entity: depth, m
   gl::Buffer response_;      ///< weights of the four modes of each material, K
   gl::BufferTexture response_table_;
   gpu::ShadeParams params_{};
   std::vector<gpu::PageParams> page_params_;
-  std::vector<gpu::SilhouetteParams> silhouette_params_;
+  std::vector<gpu::EntityShadowParams> entity_shadow_params_;
   ShadeTiles tiles_;
   gl::Buffer params_buffer_;
   gl::Buffer page_buffer_;
   gl::BufferTexture page_table_;
-  gl::Buffer silhouette_buffer_;
-  gl::BufferTexture silhouette_table_;
+  gl::Buffer entity_shadow_buffer_;
+  gl::BufferTexture entity_shadow_table_;
   gl::Buffer tile_buffer_;
   gl::BufferTexture tile_table_;
   gl::Buffer list_buffer_;

@@ -17,14 +17,14 @@ void ShadeTiles::begin(const glm::uvec4& window_px) noexcept {
   EMIT_CHECK_OP(window_px.w, <=, 65536U);
   window_px_ = window_px;
   pages_ = 0;
-  silhouettes_ = 0;
+  shadow_maps_ = 0;
   rectangles_.clear();
   tiles_.clear();
   used_entries_ = 0;
 }
 
 void ShadeTiles::add_page(const glm::uvec4& px) noexcept {
-  EMIT_CHECK_OP(silhouettes_, ==, 0U);
+  EMIT_CHECK_OP(shadow_maps_, ==, 0U);
   add(px, pages_++);
 }
 
@@ -73,13 +73,13 @@ void ShadeTiles::sort() noexcept {
   };
   // Count the rectangles of each screen tile.
   for_each([](gpu::ShadeTile& tile, bool page, std::uint32_t) {
-    ++(page ? tile.pages : tile.silhouettes);
+    ++(page ? tile.pages : tile.shadow_maps);
   });
   // Give each screen tile its part of the list.
   std::uint32_t first = 0;
   for (gpu::ShadeTile& tile : all_) {
     tile.first = first;
-    first += tile.pages + tile.silhouettes;
+    first += tile.pages + tile.shadow_maps;
   }
   used_entries_ = first;
   // Fill in the numbers. Rectangles come in the order of their entries, and `first` is the next
@@ -90,7 +90,7 @@ void ShadeTiles::sort() noexcept {
   // Keep the screen tiles that something reaches, with `first` set back to the first entry.
   for (std::size_t i = 0; i < all_.size(); ++i) {
     gpu::ShadeTile& tile = all_[i];
-    const std::uint32_t count = tile.pages + tile.silhouettes;
+    const std::uint32_t count = tile.pages + tile.shadow_maps;
     if (count == 0) continue;
     tile.first -= count;
     const glm::uvec2 place_px =

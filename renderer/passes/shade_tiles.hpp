@@ -14,7 +14,7 @@ namespace emit::renderer {
 
 /// Sorts rectangles of an image into its screen tiles. The rectangles are the bounds of exposure
 /// tiles
-/// ("pages") and of entity shadow depth maps ("silhouettes"). A pixel then reads only the
+/// ("pages") and of entity shadow depth maps ("shadow_maps"). A pixel then reads only the
 /// rectangles that may reach its screen tile, and screen tiles that nothing reaches are left out.
 /// Real time: the constructor is setup only; all other functions are RT-safe.
 class ShadeTiles {
@@ -42,7 +42,7 @@ class ShadeTiles {
   void add_page(const glm::uvec4& px) noexcept;
   /// Adds the rectangle of an entity shadow depth map. They have numbers of their own, from 0.
   /// @pre The rectangle is not empty and lies within the window; there is memory for it.
-  void add_silhouette(const glm::uvec4& px) noexcept { add(px, silhouettes_++); }
+  void add_entity_shadow(const glm::uvec4& px) noexcept { add(px, shadow_maps_++); }
   /// Sorts the rectangles. tiles(), entries() and tile_px() are valid from then on.
   void sort() noexcept;
 
@@ -75,7 +75,7 @@ class ShadeTiles {
   std::uint32_t tile_px_ = kMinPx;
   std::uint32_t columns_ = 0;
   std::uint32_t pages_ = 0;
-  std::uint32_t silhouettes_ = 0;
+  std::uint32_t shadow_maps_ = 0;
   std::vector<Rectangle> rectangles_;
   std::vector<gpu::ShadeTile> all_;  ///< screen tiles, with those that nothing reaches
   std::vector<gpu::ShadeTile> tiles_;

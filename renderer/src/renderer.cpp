@@ -115,7 +115,7 @@ class GlRenderer final : public Renderer {
   bool poll(SlotIndex slot) noexcept override { return readback_.ready(slot); }
   const FrameView& collect(SlotIndex slot) noexcept override;
   void release(SlotIndex slot) noexcept override { readback_.release(slot); }
-  std::span<const RungStats> expected_rungs(const FrameRequest& request) noexcept override;
+  std::span<const QualityLevelStats> expected_levels(const FrameRequest& request) noexcept override;
   physics::Pose scenario_sensor_pose_at(std::int64_t sim_time_ns) const noexcept override;
   const SceneStats& scene_stats() const noexcept override { return scene_stats_; }
   const std::string& device_name() const noexcept override { return context_.device_name(); }
@@ -179,7 +179,7 @@ class GlRenderer final : public Renderer {
   StageClock clock_;
   LadderMap ladder_;
   FrameCost frame_cost_;
-  LadderMap::PerLevel expected_rungs_{};  ///< result of the last call of expected_rungs()
+  LadderMap::PerLevel expected_levels_{};  ///< result of the last call of expected_levels()
 };
 
 /// Content that the radiance pass is compiled for.
@@ -402,21 +402,22 @@ void GlRenderer::read_back(std::uint32_t slot) noexcept {
   readback_.copy_from(output_buffer_, slot, std::span(parts).first(planes_ + 1));
 }
 
-std::span<const RungStats> GlRenderer::expected_rungs(const FrameRequest& request) noexcept {
-  static constexpr std::array<RungStats, 1> kFullOnly{};
+std::span<const QualityLevelStats> GlRenderer::expected_levels(
+    const FrameRequest& request) noexcept {
+  static constexpr std::array<QualityLevelStats, 1> kFullOnly{};
   if (ladder_.empty()) return kFullOnly;
-  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
+  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_levels_);
   // Estimate the times from triangles and pixels where nothing was measured. The measured frames
   // are whole images.
   const glm::uvec2 window_px = window_size_px(window_of(request.window_px, output_px()));
   if (!known || window_px != output_px()) {
     const TrianglesPerLevel triangles = count_triangles(request);
     for (std::size_t r = 0; r < kQualityLadder.size(); ++r) {
-      expected_rungs_[r].frame_ms =
+      expected_levels_[r].frame_ms =
           frame_cost_.frame_ms(triangles[r], rendered_pixels(kQualityLadder[r], window_px));
     }
   }
-  return expected_rungs_;
+  return expected_levels_;
 }
 
 TrianglesPerLevel GlRenderer::count_triangles(const FrameRequest& request) noexcept {
@@ -446,7 +447,7 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
     view.stats.dropped_poses += history.dropped();
   }
   view.stages_ms = {};
-  view.rung = 0;
+  view.quality_level = 0;
   view.estimated_error_k = 0.0F;
   StageTimes& stages = view.stages_ms;
   // Prepare the surface where the thermal time has jumped, and measure how long that takes.
@@ -468,12 +469,15 @@ int GlRenderer::submit(const FrameRequest& request) noexcept {
   clock_.start();
 
   // Choose the quality level and state its expected error.
-  view.rung = passes_.enlarge ? std::min<std::uint8_t>(request.rung, kQualityLadder.size() - 1) : 0;
-  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_rungs_);
-  view.estimated_error_k = view.rung == 0 ? 0.0F
-                           : known        ? static_cast<float>(expected_rungs_[view.rung].error_k)
-                                          : std::numeric_limits<float>::quiet_NaN();
-  const QualityLevel& level = kQualityLadder[view.rung];
+  view.quality_level =
+      passes_.enlarge ? std::min<std::uint8_t>(request.quality_level, kQualityLadder.size() - 1)
+                      : 0;
+  const bool known = ladder_.at(request.sensor_pose, scenario_.sensor.fov_h_rad, expected_levels_);
+  view.estimated_error_k = view.quality_level == 0 ? 0.0F
+                           : known
+                               ? static_cast<float>(expected_levels_[view.quality_level].error_k)
+                               : std::numeric_limits<float>::quiet_NaN();
+  const QualityLevel& level = kQualityLadder[view.quality_level];
   // Do the work of the CPU and bind everything.
   prepare(request, level);
   view.stats.coarse = stage_->coarse_from(request.sensor_pose) || view.stats.rewarm_s > 0.0;

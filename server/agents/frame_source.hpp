@@ -54,10 +54,10 @@ class FrameSource {
   [[nodiscard]] virtual const renderer::FrameView& collect(renderer::SlotIndex slot) noexcept = 0;
   virtual void release(renderer::SlotIndex slot) noexcept = 0;
 
-  /// Returns Renderer::expected_rungs(). Sources without a ladder have one quality level.
-  [[nodiscard]] virtual std::span<const renderer::RungStats> expected_rungs(
+  /// Returns Renderer::expected_levels(). Sources without a ladder have one quality level.
+  [[nodiscard]] virtual std::span<const renderer::QualityLevelStats> expected_levels(
       const renderer::FrameRequest& /*request*/) noexcept {
-    static constexpr std::array<renderer::RungStats, 1> kFullOnly{};
+    static constexpr std::array<renderer::QualityLevelStats, 1> kFullOnly{};
     return kFullOnly;
   }
 

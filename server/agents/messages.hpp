@@ -89,7 +89,7 @@ struct RenderDone {
   std::uint64_t dropped_poses = 0;  ///< of the histories, in this run
   bool coarse = false;              ///< the surface was not prepared for this camera
   bool warmed_up = false;           ///< the surface warmed up again within this frame
-  std::uint8_t rung = 0;            ///< quality level, an index into the quality ladder
+  std::uint8_t quality_level = 0;   ///< quality level, an index into the quality ladder
   float estimated_error_k = 0.0F;   ///< error of that level; NaN: not known
   bool device_failed = false;  ///< the driver reported an error: the pixels are not to be trusted
   std::int64_t render_start_ns = 0;

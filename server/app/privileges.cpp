@@ -51,8 +51,8 @@ std::string limit_text(__rlimit_resource_t which) {
 
 physics::Result<std::string> drop_privileges() {
   const std::uint64_t before = capabilities();
-  constexpr rlim_t kMostPriority = 99;
-  raise_limit(RLIMIT_RTPRIO, kMostPriority);
+  constexpr rlim_t kMaxPriority = 99;
+  raise_limit(RLIMIT_RTPRIO, kMaxPriority);
   raise_limit(RLIMIT_MEMLOCK, RLIM_INFINITY);
 
   for (int capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0; ++capability) {

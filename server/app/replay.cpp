@@ -139,7 +139,7 @@ physics::Result<std::optional<ReplayedFrame>> JournalPlayer::play(const v1::Fram
     if (!physics::is_valid(request.sensor_pose)) {
       return fail(ErrorCode::protocol, "bad sensor pose");
     }
-    request.rung = static_cast<std::uint8_t>(
+    request.quality_level = static_cast<std::uint8_t>(
         std::min<std::uint32_t>(decision.quality_rung(), std::numeric_limits<std::uint8_t>::max()));
     const int slot = source_.submit(request);
     if (slot < 0) {

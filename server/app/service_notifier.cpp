@@ -43,9 +43,9 @@ std::string one_line(std::string_view text) {
 ServiceNotifier ServiceNotifier::from_environment() {
   const std::string_view pid = variable("WATCHDOG_PID");
   const bool ours = pid.empty() || number(pid) == ::getpid();
-  constexpr std::int64_t kMostUs = 1'000'000'000'000;
+  constexpr std::int64_t kMaxUs = 1'000'000'000'000;
   const std::int64_t watchdog_us =
-      ours ? std::clamp<std::int64_t>(number(variable("WATCHDOG_USEC")), 0, kMostUs) : 0;
+      ours ? std::clamp<std::int64_t>(number(variable("WATCHDOG_USEC")), 0, kMaxUs) : 0;
   return {variable("NOTIFY_SOCKET"), watchdog_us * 1000};
 }
 

@@ -296,8 +296,8 @@ physics::Result<bool> ClientConnection::receive(protocol::Record& record, std::i
       case server::IoStatus::would_block:
         // A record's rest wakes this thread in pieces, not with every segment: waking costs as much
         // as copying tens of kilobytes. Larger pieces would stop a sender with a small buffer.
-        constexpr std::size_t kMostWaiting = 128u << 10;
-        wake_at(std::clamp<std::size_t>(parser_.missing_bytes(), 1, kMostWaiting));
+        constexpr std::size_t kMaxWaiting = 128u << 10;
+        wake_at(std::clamp<std::size_t>(parser_.missing_bytes(), 1, kMaxWaiting));
         if (!wait_for(socket_.fd(), POLLIN, end_ns)) {
           return false;
         }

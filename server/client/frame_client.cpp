@@ -26,12 +26,12 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-constexpr std::uint64_t kMostFrameBytes = 1u << 30;
+constexpr std::uint64_t kMaxFrameBytes = 1u << 30;
 
-/// Bytes of a channel's frames; more than kMostFrameBytes where the daemon claims what no frame is.
+/// Bytes of a channel's frames; more than kMaxFrameBytes where the daemon claims what no frame is.
 std::uint64_t frame_bytes_of(const ChannelDescription& channel) {
   const std::uint64_t pixels = std::uint64_t{channel.width_px} * channel.height_px;
-  return std::min(pixels, kMostFrameBytes) * sizeof(float);
+  return std::min(pixels, kMaxFrameBytes) * sizeof(float);
 }
 
 class FrameClientImpl final : public FrameClient {
@@ -98,9 +98,9 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
   for (const auto& channel : connection_.server().channels) {
     largest = std::max(largest, frame_bytes_of(channel));
   }
-  if (largest > kMostFrameBytes) {
+  if (largest > kMaxFrameBytes) {
     return make_error(ErrorCode::protocol,
-                      fmt::format("frames of more than {} bytes are refused", kMostFrameBytes));
+                      fmt::format("frames of more than {} bytes are refused", kMaxFrameBytes));
   }
   v1::ControlRecord request;
   v1::Subscribe& subscribe = *request.mutable_subscribe();
@@ -206,10 +206,9 @@ void FrameClientImpl::make_reassembler(std::uint64_t frame_bytes) {
     params.buffers = 6;
   }
   // A client that was busy elsewhere finds whole frames in the socket, and takes them at once.
-  constexpr std::uint64_t kMostFrames = 256;
-  params.buffers += static_cast<std::uint32_t>(
-      std::min(kMostFrames,
-               UdpFrameReceiver::kMostTakenBytes / std::max<std::uint64_t>(frame_bytes, 1) + 1));
+  constexpr std::uint64_t kMaxFrames = 256;
+  params.buffers += static_cast<std::uint32_t>(std::min(
+      kMaxFrames, UdpFrameReceiver::kMaxTakenBytes / std::max<std::uint64_t>(frame_bytes, 1) + 1));
   reassembler_.emplace(params);
 }
 

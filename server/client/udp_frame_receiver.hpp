@@ -40,7 +40,7 @@ class UdpFrameReceiver {
   static constexpr unsigned kBatch = 16;  ///< messages
   static constexpr std::size_t kDatagramBytes = 65536;
   /// Largest number of bytes that one take() receives.
-  static constexpr std::uint64_t kMostTakenBytes = kBatch * kDatagramBytes;
+  static constexpr std::uint64_t kMaxTakenBytes = kBatch * kDatagramBytes;
 
   /// Takes what lies in the socket, at most one batch. Returns the datagrams taken.
   int take(protocol::Reassembler& reassembler, ReceiveCounters& counters);

@@ -57,7 +57,7 @@ physics::Result<void> check_secret_file(const std::filesystem::path& file) {
 physics::Result<std::string> read_secret_file(const std::filesystem::path& file) {
   auto fd = open_secret(file);
   if (!fd) return tl::unexpected(std::move(fd.error()));
-  constexpr std::size_t kMostBytes = 64u << 10;
+  constexpr std::size_t kMaxBytes = 64u << 10;
   std::string text;
   std::array<char, 4096> piece;
   for (;;) {
@@ -66,7 +66,7 @@ physics::Result<std::string> read_secret_file(const std::filesystem::path& file)
     if (got < 0) return failure(file, error_text(errno));
     if (got == 0) return text;
     text.append(piece.data(), static_cast<std::size_t>(got));
-    if (text.size() > kMostBytes) return failure(file, "longer than 64 KiB");
+    if (text.size() > kMaxBytes) return failure(file, "longer than 64 KiB");
   }
 }
 

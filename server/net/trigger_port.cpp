@@ -94,7 +94,7 @@ bool TriggerPort::accept(std::span<const std::byte> datagram, const protocol::Ip
   }
   // Numbers protect within a run of this daemon; what was recorded in another one is too old.
   const std::int64_t edge_ns = out.trigger.edge_ns;
-  if (seal_ && (edge_ns < out.received_ns - kMostAgeNs || edge_ns > out.received_ns + kMostAgeNs)) {
+  if (seal_ && (edge_ns < out.received_ns - kMaxAgeNs || edge_ns > out.received_ns + kMaxAgeNs)) {
     counters_.add(Counter::triggers_stale);
     return false;
   }

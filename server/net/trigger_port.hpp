@@ -43,12 +43,12 @@ class TriggerInput {
 
 /// The UDP port of trigger datagrams. What is no trigger, or not from the one sender that is
 /// allowed, is counted (triggers_refused) and dropped unanswered. With keys, so is what none of
-/// them sealed (triggers_unauthenticated) or was sealed more than kMostAgeNs ago (triggers_stale).
+/// them sealed (triggers_unauthenticated) or was sealed more than kMaxAgeNs ago (triggers_stale).
 /// Thread: the conductor's after open().
 class TriggerPort final : public TriggerInput {
  public:
   /// Between a sealed trigger's own instant and its arrival, either way.
-  static constexpr std::int64_t kMostAgeNs = 1'000'000'000;
+  static constexpr std::int64_t kMaxAgeNs = 1'000'000'000;
 
   /// `udp` is address:port; `peer` the only address datagrams are taken from, empty: any. A port
   /// beyond loopback needs a peer. `keys`: one of them has sealed every trigger; empty: none is

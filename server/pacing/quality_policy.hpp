@@ -11,36 +11,39 @@
 
 namespace emit::server {
 
-/// Which rung of the quality ladder a frame is rendered with, so that it is ready in time: the one
-/// with the least error among those whose expected time fits, else the fastest. A frame is expected
-/// to take what the ladder measured for its rung and camera, at the machine's present pace, plus
-/// what every frame takes beside it (both fitted to the latest frames), plus what so few of the
-/// latest frames took longer than expected that it need not be kept free: about one frame in 128
-/// is late, one in 64 at most, if the next ones are like the latest. Pure. RT-safe.
+/// Which quality_level of the quality ladder a frame is rendered with, so that it is ready in time:
+/// the one with the least error among those whose expected time fits, else the fastest. A frame is
+/// expected to take what the ladder measured for its quality_level and camera, at the machine's
+/// present pace, plus what every frame takes beside it (both fitted to the latest frames), plus
+/// what so few of the latest frames took longer than expected that it need not be kept free: about
+/// one frame in 128 is late, one in 64 at most, if the next ones are like the latest. Pure.
+/// RT-safe.
 class QualityPolicy {
  public:
-  /// `rungs`: what each costs and gets wrong in the frame that is next; not empty, [0] is full
-  /// quality. `available_ns`: from now until the frame is due; <= 0: too late for any.
-  [[nodiscard]] std::size_t choose(std::span<const renderer::RungStats> rungs,
+  /// `quality_levels`: what each costs and gets wrong in the frame that is next; not empty, [0] is
+  /// full quality. `available_ns`: from now until the frame is due; <= 0: too late for any.
+  [[nodiscard]] std::size_t choose(std::span<const renderer::QualityLevelStats> quality_levels,
                                    std::int64_t available_ns) const noexcept {
     const double spare_ms = kUsedFrac * 1e-6 * static_cast<double>(available_ns) - excess_ms();
-    std::size_t best = rungs.size();
+    std::size_t best = quality_levels.size();
     std::size_t fastest = 0;
-    for (std::size_t i = 0; i < rungs.size(); ++i) {
-      if (rungs[i].frame_ms < rungs[fastest].frame_ms) fastest = i;
-      if (expected_ms(rungs[i].frame_ms) > spare_ms) continue;
-      if (best == rungs.size() || rungs[i].error_k < rungs[best].error_k) best = i;
+    for (std::size_t i = 0; i < quality_levels.size(); ++i) {
+      if (quality_levels[i].frame_ms < quality_levels[fastest].frame_ms) fastest = i;
+      if (expected_ms(quality_levels[i].frame_ms) > spare_ms) continue;
+      if (best == quality_levels.size() || quality_levels[i].error_k < quality_levels[best].error_k)
+        best = i;
     }
-    return best < rungs.size() ? best : fastest;
+    return best < quality_levels.size() ? best : fastest;
   }
 
-  /// A frame was ready `work_ns` after its begin, with a rung of that RungStats::frame_ms.
-  void finished(std::int64_t work_ns, double rung_ms) noexcept {
+  /// A frame was ready `work_ns` after its begin, with a quality_level of that
+  /// QualityLevelStats::frame_ms.
+  void finished(std::int64_t work_ns, double level_ms) noexcept {
     const double work_ms = 1e-6 * static_cast<double>(work_ns);
-    excess_ms_[next_] = static_cast<float>(work_ms - expected_ms(rung_ms));
+    excess_ms_[next_] = static_cast<float>(work_ms - expected_ms(level_ms));
     next_ = (next_ + 1) % excess_ms_.size();
     count_ = std::min(count_ + 1, excess_ms_.size());
-    fit(work_ms, rung_ms);
+    fit(work_ms, level_ms);
   }
 
  private:
@@ -55,12 +58,12 @@ class QualityPolicy {
   static constexpr double kKept = 0.95;
   /// The ladder's own word (pace 1, nothing beside) counts as this many frames.
   static constexpr double kPrior = 0.5;
-  /// Beyond, the work does not follow the rungs' times: then it all counts as beside.
-  static constexpr double kLeastPace = 0.25;
-  static constexpr double kMostPace = 4.0;
+  /// Beyond, the work does not follow the quality_levels' times: then it all counts as beside.
+  static constexpr double kMinPace = 0.25;
+  static constexpr double kMaxPace = 4.0;
 
-  [[nodiscard]] double expected_ms(double rung_ms) const noexcept {
-    return pace_ * rung_ms + beside_ms_;
+  [[nodiscard]] double expected_ms(double level_ms) const noexcept {
+    return pace_ * level_ms + beside_ms_;
   }
 
   /// Returns the excess, ms, that one remembered frame in kFramesPerLate exceeds. It is not more
@@ -80,20 +83,21 @@ class QualityPolicy {
     return std::min(latest_ms, largest_ms[sought - 1]);
   }
 
-  /// Least squares of work = pace * rung + beside, older frames fading, drawn towards pace 1.
-  void fit(double work_ms, double rung_ms) noexcept {
+  /// Least squares of work = pace * quality_level + beside, older frames fading, drawn towards
+  /// pace 1.
+  void fit(double work_ms, double level_ms) noexcept {
     for (double* sum : {&n_, &r_, &rr_, &w_, &rw_}) *sum *= kKept;
     n_ += 1.0;
-    r_ += rung_ms;
-    rr_ += rung_ms * rung_ms;
+    r_ += level_ms;
+    rr_ += level_ms * level_ms;
     w_ += work_ms;
-    rw_ += rung_ms * work_ms;
+    rw_ += level_ms * work_ms;
     const double prior_rr = kPrior * rr_ / n_;
     const double a = rr_ + prior_rr;
     const double d = n_ + kPrior;
     const double determinant = a * d - r_ * r_;
-    if (determinant <= 0.0) return;  // rungs without a time: nothing was measured
-    pace_ = std::clamp(((rw_ + prior_rr) * d - w_ * r_) / determinant, kLeastPace, kMostPace);
+    if (determinant <= 0.0) return;  // quality_levels without a time: nothing was measured
+    pace_ = std::clamp(((rw_ + prior_rr) * d - w_ * r_) / determinant, kMinPace, kMaxPace);
     beside_ms_ = (w_ - pace_ * r_) / d;
   }
 
@@ -102,7 +106,8 @@ class QualityPolicy {
   std::size_t count_ = 0;
   double pace_ = 1.0;
   double beside_ms_ = 0.0;
-  // Fading sums over frames: weight, rung, rung squared, work, rung times work.
+  // Fading sums over frames: weight, quality_level, quality_level squared, work, quality_level
+  // times work.
   double n_ = 0.0;
   double r_ = 0.0;
   double rr_ = 0.0;

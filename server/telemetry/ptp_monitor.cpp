@@ -57,9 +57,9 @@ void PtpMonitor::ask() {
 }
 
 void PtpMonitor::take_answers(std::int64_t monotonic_ns) {
-  constexpr int kMostPerTurn = 64;
+  constexpr int kMaxPerTurn = 64;
   std::array<std::byte, 1500> bytes;
-  for (int i = 0; i < kMostPerTurn; ++i) {
+  for (int i = 0; i < kMaxPerTurn; ++i) {
     const ssize_t size = ::recv(socket_.get(), bytes.data(), bytes.size(), 0);
     if (size < 0) return;
     const std::span<const std::byte> message(bytes.data(), static_cast<std::size_t>(size));

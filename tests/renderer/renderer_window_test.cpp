@@ -63,12 +63,12 @@ class Camera {
     std::vector<float> radiance;
     std::vector<float> temperature;
   };
-  [[nodiscard]] Planes render(const physics::Pose& pose, std::uint8_t rung = 0,
+  [[nodiscard]] Planes render(const physics::Pose& pose, std::uint8_t quality_level = 0,
                               const scene::PixelRect& window_px = {}) {
     renderer::FrameRequest request;
     request.sim_time_ns = request.thermal_time_ns = kNowNs;
     request.sensor_pose = pose;
-    request.rung = rung;
+    request.quality_level = quality_level;
     request.window_px = window_px;
     const auto slot = static_cast<renderer::SlotIndex>(renderer_->submit(request));
     const auto& view = renderer_->collect(slot);
@@ -99,23 +99,25 @@ std::size_t differing(const std::vector<float>& a, const std::vector<float>& b,
 
 /// Expects the bits of the whole image in every window, at the given quality levels.
 void expect_windows_of(const scene::ScenarioDesc& scenario, renderer::Ladder ladder,
-                       const std::vector<std::uint8_t>& rungs) {
+                       const std::vector<std::uint8_t>& quality_levels) {
   Camera camera(scenario, ladder);
-  for (const std::uint8_t rung : rungs) {
-    const auto whole = camera.render(kHere, rung);
+  for (const std::uint8_t quality_level : quality_levels) {
+    const auto whole = camera.render(kHere, quality_level);
     for (const scene::PixelRect& window : windows()) {
       // Fill the memory with another frame, which must not show through.
-      const auto before = camera.render(kElsewhere, rung);
+      const auto before = camera.render(kElsewhere, quality_level);
       ASSERT_GT(differing(whole.radiance, before.radiance, {0, 0, kWidthPx, kHeightPx}), 3000U);
-      const auto part = camera.render(kHere, rung, window);
+      const auto part = camera.render(kHere, quality_level, window);
       EXPECT_EQ(differing(whole.radiance, part.radiance, window), 0U)
-          << "rung " << int{rung} << ", window at " << window.x_px << ", " << window.y_px;
+          << "quality_level " << int{quality_level} << ", window at " << window.x_px << ", "
+          << window.y_px;
       EXPECT_EQ(differing(whole.temperature, part.temperature, window), 0U)
-          << "rung " << int{rung} << ", window at " << window.x_px << ", " << window.y_px;
+          << "quality_level " << int{quality_level} << ", window at " << window.x_px << ", "
+          << window.y_px;
     }
-    EXPECT_EQ(
-        differing(whole.radiance, camera.render(kHere, rung).radiance, {0, 0, kWidthPx, kHeightPx}),
-        0U)
+    EXPECT_EQ(differing(whole.radiance, camera.render(kHere, quality_level).radiance,
+                        {0, 0, kWidthPx, kHeightPx}),
+              0U)
         << "a window leaves no trace";
   }
 }
@@ -131,7 +133,7 @@ TEST(RendererWindow, HoldsTheBitsOfTheWholePictureWithFoster) {
   expect_windows_of(scenario, renderer::Ladder::none, {0});
 }
 
-TEST(RendererWindow, HoldsTheBitsOfTheWholePictureOnEveryRungOfCachedFrames) {
+TEST(RendererWindow, HoldsTheBitsOfTheWholePictureOnEveryQualityLevelOfCachedFrames) {
   auto scenario = box_on_ground();
   scenario.weather.clear();
   scenario.thermal.method = scene::ThermalMethod::cached;

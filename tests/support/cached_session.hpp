@@ -70,9 +70,9 @@ class Session {
   }
   /// Renders a frame at a quality level and returns its temperatures by pixel, K; NaN for sky.
   [[nodiscard]] std::vector<float> frame_k(std::int64_t sim_time_ns, const physics::Pose& pose,
-                                           std::uint8_t rung = 0) {
+                                           std::uint8_t quality_level = 0) {
     renderer::FrameRequest request;
-    request.rung = rung;
+    request.quality_level = quality_level;
     request.sim_time_ns = request.thermal_time_ns = sim_time_ns;
     request.sensor_pose = pose;
     const int slot = renderer_->submit(request);

@@ -21,7 +21,8 @@ struct SourceScript {
   bool coarse = false;                     ///< likewise
   std::atomic<bool> device_failed{false};  ///< of every frame collected
   std::atomic<bool> device_lost{false};    ///< likewise
-  std::vector<renderer::RungStats> rungs{renderer::RungStats{}};  ///< quality ladder
+  std::vector<renderer::QualityLevelStats> quality_levels{
+      renderer::QualityLevelStats{}};  ///< quality ladder
   std::vector<renderer::FrameRequest> submitted;
   std::vector<std::pair<std::int64_t, std::vector<renderer::EntityUpdate>>> entities;
   std::vector<scene::WeatherSample> weather;
@@ -96,7 +97,7 @@ class ScriptedSource final : public server::FrameSource {
       mix(static_cast<double>(request.sim_time_ns));
       mix(static_cast<double>(request.thermal_time_ns));
       mix(request.sensor_pose.position_world_m.x);
-      mix(static_cast<double>(request.rung));
+      mix(static_cast<double>(request.quality_level));
       auto& pixels = pixels_[slot];
       for (std::size_t i = 0; i < pixels.size(); ++i) {
         pixels[i] = static_cast<float>(state_ + static_cast<double>(i));
@@ -107,10 +108,11 @@ class ScriptedSource final : public server::FrameSource {
       view.sensor_pose = request.sensor_pose;
       view.stats.dropped_poses = script_.dropped_poses;
       view.stats.coarse = script_.coarse;
-      view.rung = request.rung;
-      view.estimated_error_k = request.rung < script_.rungs.size()
-                                   ? static_cast<float>(script_.rungs[request.rung].error_k)
-                                   : 0.0F;
+      view.quality_level = request.quality_level;
+      view.estimated_error_k =
+          request.quality_level < script_.quality_levels.size()
+              ? static_cast<float>(script_.quality_levels[request.quality_level].error_k)
+              : 0.0F;
       view.width_px = info_.width_px;
       view.height_px = info_.height_px;
       view.radiance_w_m2_sr = {std::span<const float>(pixels)};
@@ -128,9 +130,9 @@ class ScriptedSource final : public server::FrameSource {
     used_[slot].store(false);
     script_.held.fetch_sub(1);
   }
-  std::span<const renderer::RungStats> expected_rungs(
+  std::span<const renderer::QualityLevelStats> expected_levels(
       const renderer::FrameRequest& /*request*/) noexcept override {
-    return script_.rungs;
+    return script_.quality_levels;
   }
   const server::SourceInfo& info() const noexcept override { return info_; }
 

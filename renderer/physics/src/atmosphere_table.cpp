@@ -108,7 +108,7 @@ Result<AtmosphereTable> AtmosphereTable::build(const AtmosphereGrid& grid) {
     if (starts_beyond_zero) table.nodes_.push_back({});
     for (std::size_t i = e * ranges; i < (e + 1) * ranges; ++i) {
       table.nodes_.push_back(
-          {std::max(0.0, -std::log(std::max(grid.transmittance_frac[i], kLeastTransmittance))),
+          {std::max(0.0, -std::log(std::max(grid.transmittance_frac[i], kMinTransmittance))),
            grid.path_radiance_w_m2_sr[i]});
     }
   }

@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kFrequencies = 40;
 constexpr double kTausPerDecade = 8.0;
 // Modes with a smaller share of the resistance are left out: 6 mK in a sheet under full sun.
-constexpr double kLeastShare = 1e-4;
+constexpr double kMinShare = 1e-4;
 
 /// Impedance that the modes must meet: its samples, the weights that turn an error of the impedance
 /// into one of the temperature, and the resistance that the modes must add up to.
@@ -226,7 +226,7 @@ Result<FosterNetwork> network_of_stack(std::span<const StackLayer> layers,
   }
   std::vector<double> resistances;
   solve_resistances(target, taus, resistances);
-  const double least = kLeastShare * target.resistance_m2k_w;
+  const double least = kMinShare * target.resistance_m2k_w;
   std::vector<NetworkMode> modes = modes_of(taus, resistances, least);
   merge(modes, options.modes, 0.0);
 

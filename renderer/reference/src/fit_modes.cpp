@@ -19,7 +19,7 @@ using physics::Result;
 
 constexpr double kFastestTauS = 1.0;
 constexpr double kSlowestTauS = 1e8;
-constexpr double kLeastShare = 1e-6;
+constexpr double kMinShare = 1e-6;
 
 /// Time constant of a mode and its share of the whole response.
 struct Mode {
@@ -50,9 +50,9 @@ std::vector<double> parameters_of(const std::vector<Mode>& modes) {
   for (std::size_t i = 1; i < count; ++i) {
     p[i] = std::log(std::max(modes[i].tau_s / modes[i - 1].tau_s - 1.0, 1e-3));
   }
-  const double last = std::max(modes.back().share, kLeastShare);
+  const double last = std::max(modes.back().share, kMinShare);
   for (std::size_t i = 0; i + 1 < count; ++i) {
-    p[count + i] = std::log(std::max(modes[i].share, kLeastShare) / last);
+    p[count + i] = std::log(std::max(modes[i].share, kMinShare) / last);
   }
   return p;
 }

@@ -22,13 +22,13 @@ namespace {
 /// Distance that a surface may move, in pixels.
 constexpr double kErrorPx = 0.25;
 /// Meshes whose triangles are wider than this on average are left alone: there is little to gain.
-constexpr double kLeastEdgePx = 6.0;
+constexpr double kMinEdgePx = 6.0;
 /// Instances that look wider than this have their own mesh, as long as the copies have no more than
-/// kMostCopied vertices. The meshes that classes share may have as many again.
+/// kMaxCopied vertices. The meshes that classes share may have as many again.
 constexpr double kOwnMeshPx = 16.0;
-constexpr std::size_t kMostCopied = 2'000'000;
+constexpr std::size_t kMaxCopied = 2'000'000;
 /// Errors below this are smaller than the rounding of the collapse itself.
-constexpr double kLeastErrorM = 1e-6;
+constexpr double kMinErrorM = 1e-6;
 
 double greatest_scale(const glm::dmat4& m) {
   return std::max({glm::length(glm::dvec3(m[0])), glm::length(glm::dvec3(m[1])),
@@ -160,7 +160,7 @@ SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
     const double px_per_m = pixels_per_m(instance.world_bounds, view);
     const double width_m = glm::length(instance.world_bounds.max_m - instance.world_bounds.min_m);
     const std::size_t vertices = geometry.meshes[mesh].positions_m.size();
-    if (width_m * px_per_m > kOwnMeshPx && copied + vertices <= kMostCopied) {
+    if (width_m * px_per_m > kOwnMeshPx && copied + vertices <= kMaxCopied) {
       copied += vertices;
       --uses[mesh];
       instance.mesh = copy_of(mesh);
@@ -170,7 +170,7 @@ SceneGeometry separated(SceneGeometry geometry, const DetailView& view) {
     const int octave = std::ilogb(std::clamp(scale * px_per_m, 1e-9, 1e9));
     const auto [own, is_new] = classes.try_emplace({mesh, octave}, mesh);
     // Beyond the limit classes share: the mesh stays as fine as the nearest of them needs.
-    if (is_new && taken[mesh] && shared + vertices <= kMostCopied) {
+    if (is_new && taken[mesh] && shared + vertices <= kMaxCopied) {
       shared += vertices;
       own->second = copy_of(mesh);
     }
@@ -188,8 +188,8 @@ std::vector<double> simplify_errors(const SceneGeometry& geometry, const DetailV
     const Mesh& mesh = geometry.meshes[m];
     const double error =
         std::min(kErrorPx * widths[m], most_body_frac * 0.5 * middle_extent(mesh.bounds));
-    if (!(error > kLeastErrorM) || !std::isfinite(error) || mesh.indices.empty()) continue;
-    if (mean_edge(mesh) <= kLeastEdgePx * widths[m]) errors[m] = error;
+    if (!(error > kMinErrorM) || !std::isfinite(error) || mesh.indices.empty()) continue;
+    if (mean_edge(mesh) <= kMinEdgePx * widths[m]) errors[m] = error;
   }
   return errors;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts the shade of entities on static surfaces, where triangles are too large to show it. It changes the geometry
 // buffer of the samples. Exposure tiles ("pages") lower the temperature where entities have cast shade lately. Entity
-// shadow depth maps ("silhouettes") reduce the sunlight where entities stand now. Work is done only in the screen tiles
+// shadow depth maps ("shadow_maps") reduce the sunlight where entities stand now. Work is done only in the screen tiles
 // that some of them may reach, and each screen tile lists those that may reach it.
 //   EMIT_ROWS  number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "shared/shade_params.glsl.h"
@@ -13,10 +13,10 @@ layout(rg32ui, binding = EMIT_IMG_SURFACE) uniform uimage2D surface_image;
 layout(std140, binding = EMIT_BIND_SHADE) uniform Shade { ShadeParams shade; };
 layout(binding = EMIT_TEX_SHADE) uniform sampler2DArray pages_texture;
 layout(binding = EMIT_TEX_SHADE_TOP) uniform sampler2DArray tops_texture;
-layout(binding = EMIT_TEX_SILHOUETTES) uniform sampler2DArray silhouettes_texture;
+layout(binding = EMIT_TEX_ENTITY_SHADOWS) uniform sampler2DArray entity_shadows_texture;
 layout(binding = EMIT_TEX_RESPONSE) uniform samplerBuffer response_table;
 layout(binding = EMIT_TEX_PAGE_PARAMS) uniform samplerBuffer page_params;
-layout(binding = EMIT_TEX_SILHOUETTE_PARAMS) uniform samplerBuffer silhouette_params;
+layout(binding = EMIT_TEX_ENTITY_SHADOW_PARAMS) uniform samplerBuffer entity_shadow_params;
 layout(binding = EMIT_TEX_SHADE_TILES) uniform usamplerBuffer shade_tiles;
 layout(binding = EMIT_TEX_SHADE_LIST) uniform usamplerBuffer shade_list;
 
@@ -47,18 +47,18 @@ float cooler_k(vec3 p, uint material, int page) {
   return sum_k;
 }
 
-// Share of the sun's disc that entity shadow depth map `silhouette` leaves at the point `p` (relworld), 0..1.
-float lit_frac(vec3 p, int silhouette) {
+// Share of the sun's disc that entity shadow depth map `shadow_map` leaves at the point `p` (relworld), 0..1.
+float lit_frac(vec3 p, int shadow_map) {
   // Find the point on the map.
-  int texel = silhouette * EMIT_SILHOUETTE_TEXELS;
+  int texel = shadow_map * EMIT_ENTITY_SHADOW_TEXELS;
   vec4 point = vec4(p, 1.0);
-  vec2 at = vec2(dot(texelFetch(silhouette_params, texel), point),
-                 dot(texelFetch(silhouette_params, texel + 1), point));
-  float depth_m = dot(texelFetch(silhouette_params, texel + 2), point);
+  vec2 at = vec2(dot(texelFetch(entity_shadow_params, texel), point),
+                 dot(texelFetch(entity_shadow_params, texel + 1), point));
+  float depth_m = dot(texelFetch(entity_shadow_params, texel + 2), point);
   // Compute the radius of the sun's disc on the map.
-  vec4 penumbra = texelFetch(silhouette_params, texel + 3);  // mean_depth_m, penumbra_texels_per_m, layer
+  vec4 penumbra = texelFetch(entity_shadow_params, texel + 3);  // mean_depth_m, penumbra_texels_per_m, layer
   float radius = max(0.5, (depth_m - penumbra.x) * penumbra.y);
-  float side = float(textureSize(silhouettes_texture, 0).x);
+  float side = float(textureSize(entity_shadows_texture, 0).x);
   bool within = all(greaterThan(at, vec2(-radius))) && all(lessThan(at, vec2(side + radius)));
   // Count the taps whose texel lies in front of the point.
   int taps = within ? EMIT_SHADE_TAPS : 0;
@@ -67,7 +67,7 @@ float lit_frac(vec3 p, int silhouette) {
     vec4 both = shade.taps[i >> 1];
     vec2 place = floor(at + radius * ((i & 1) == 0 ? both.xy : both.zw));
     bool inside = all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, vec2(side)));
-    float caster_m = texelFetch(silhouettes_texture, ivec3(clamp(place, vec2(0.0), vec2(side - 1.0)), penumbra.z), 0).r;
+    float caster_m = texelFetch(entity_shadows_texture, ivec3(clamp(place, vec2(0.0), vec2(side - 1.0)), penumbra.z), 0).r;
     if (inside && depth_m > caster_m + EMIT_SHADE_LIFT_M) shaded += 1.0;
   }
   return 1.0 - shaded / float(EMIT_SHADE_TAPS);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Structs and constants of the shade of entities per pixel, for C++ and GLSL.
 // A "page" is an exposure tile: a level square of ground whose texels remember how long entities have shaded them.
-// A "silhouette" is an entity shadow depth map: depths of one entity along the direction of the sun.
+// A "shadow_map" is an entity shadow depth map: depths of one entity along the direction of the sun.
 #pragma once
 #include "shared/bindings.glsl.h"
 #include "shared/cpp_glsl.glsl.h"
@@ -13,7 +13,7 @@
 // Texels along a side of an exposure tile. The outermost texels repeat those of the neighbouring tiles.
 #define EMIT_PAGE_SIDE 128
 #define EMIT_PAGE_TEXELS 3
-#define EMIT_SILHOUETTE_TEXELS 4
+#define EMIT_ENTITY_SHADOW_TEXELS 4
 
 EMIT_SHARED_BEGIN
 
@@ -37,9 +37,9 @@ struct PageParams {
   vec4 left_frac;      // by mode: share of the stored value that is left at the time of the frame
 };
 
-// One entity shadow depth map at the pose of the frame, in relworld axes. Shaders read it as EMIT_SILHOUETTE_TEXELS
+// One entity shadow depth map at the pose of the frame, in relworld axes. Shaders read it as EMIT_ENTITY_SHADOW_TEXELS
 // texels. The dot product of a line with vec4(p, 1) gives the coordinate of the point p.
-struct SilhouetteParams {
+struct EntityShadowParams {
   vec4 column;                   // texels from the first column
   vec4 row;                      // texels from the first row
   vec4 depth_m;
@@ -54,7 +54,7 @@ struct ShadeTile {
   uint place_px;      // first column + 65536 * first row
   uint first;         // index of its first entry in the list; exposure tiles come before shadow depth maps
   uint pages;         // number of exposure tiles
-  uint silhouettes;   // number of shadow depth maps
+  uint shadow_maps;   // number of shadow depth maps
 };
 
 #ifdef __cplusplus
@@ -63,8 +63,8 @@ EMIT_SHARED_OFFSET(ShadeParams, taps, 16);
 static_assert(sizeof(PageParams) == 16 * EMIT_PAGE_TEXELS);
 EMIT_SHARED_OFFSET(PageParams, reach_m, 16);
 EMIT_SHARED_OFFSET(PageParams, left_frac, 32);
-static_assert(sizeof(SilhouetteParams) == 16 * EMIT_SILHOUETTE_TEXELS);
-EMIT_SHARED_OFFSET(SilhouetteParams, mean_depth_m, 48);
+static_assert(sizeof(EntityShadowParams) == 16 * EMIT_ENTITY_SHADOW_TEXELS);
+EMIT_SHARED_OFFSET(EntityShadowParams, mean_depth_m, 48);
 static_assert(sizeof(ShadeTile) == 16);
 #endif
 

@@ -19,7 +19,7 @@ namespace {
 /// Largest number of clusters that are simplified together.
 constexpr std::size_t kGroupClusters = 8;
 /// Largest share of its triangles that a group may keep to get a coarser level.
-constexpr double kWorthFrac = 0.75;
+constexpr double kSensitivityFrac = 0.75;
 /// Largest share of all triangles that a new level may have; the build ends with a larger one.
 constexpr double kLevelFrac = 0.95;
 /// Share of the surface of a group that may have larger errors than stated.
@@ -200,7 +200,7 @@ Builder::Merged Builder::merge(std::span<const Node> nodes,
   const Local local = localised(mesh_, fine);
   Indices coarse = collapse(local);
   if (coarse.empty() ||
-      static_cast<double>(coarse.size()) > kWorthFrac * static_cast<double>(fine.size())) {
+      static_cast<double>(coarse.size()) > kSensitivityFrac * static_cast<double>(fine.size())) {
     return {};
   }
   Merged merged;

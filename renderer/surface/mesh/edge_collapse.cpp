@@ -22,7 +22,7 @@ constexpr float kEdgePx = 0.5F;
 /// Width in pixels that the longest edge of any new triangle must reach to be visible.
 constexpr float kSizePx = 4.0F;
 /// Smallest cosine of the angle by which a triangle may turn in a collapse.
-constexpr float kLeastTurnCosine = 0.25F;
+constexpr float kMinTurnCosine = 0.25F;
 
 /// Number of neighbours, the nearest ones, that a place may be collapsed into.
 constexpr std::size_t kTried = 4;
@@ -220,7 +220,7 @@ float Collapse::cost_m(std::uint32_t from, std::uint32_t to) {
     const glm::vec3 old_normal = normal(before_m);
     const glm::vec3 new_normal = normal(turned.at_m);
     if (!(glm::dot(old_normal, new_normal) >
-          kLeastTurnCosine * glm::length(old_normal) * glm::length(new_normal))) {
+          kMinTurnCosine * glm::length(old_normal) * glm::length(new_normal))) {
       return kNever;
     }
     turned_.push_back(turned);

@@ -11,7 +11,7 @@ namespace {
 
 /// Smallest cosine between a face and an axis with which the face counts. A flatter one is hardly
 /// seen from there.
-constexpr float kLeastCos = 0.3F;
+constexpr float kMinCos = 0.3F;
 
 /// Index into MoverFaces of a direction along an axis.
 std::size_t face_of(glm::length_t axis, bool positive) noexcept {
@@ -57,7 +57,7 @@ void MoverGlow::add(const glm::vec3& normal, float area_m2, float sent_w_m2,
                     MoverFaces& faces) noexcept {
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     const float cosine = std::abs(normal[axis]);
-    if (cosine < kLeastCos) continue;
+    if (cosine < kMinCos) continue;
     const std::size_t face = face_of(axis, normal[axis] > 0.0F);
     faces.area_m2[face] += cosine * area_m2;
     faces.sent_w[face] += cosine * area_m2 * sent_w_m2;

@@ -16,9 +16,9 @@ namespace emit::renderer {
 namespace {
 
 /// Largest number of times that the errors double: from a quarter of a pixel to two.
-constexpr std::uint32_t kMostDoublings = 3;
+constexpr std::uint32_t kMaxDoublings = 3;
 /// Smallest share of its vertices that a scene must lose to make visible errors acceptable.
-constexpr double kLeastGainFrac = 0.1;
+constexpr double kMinGainFrac = 0.1;
 
 /// Returns the number of samples that all instances of meshes that may change take, with one at
 /// every vertex.
@@ -37,14 +37,13 @@ std::optional<scene::SceneGeometry> visibly_simplified(const scene::SceneGeometr
                                                        std::size_t unseen, std::size_t most) {
   std::optional<scene::SceneGeometry> out;
   std::size_t left = unseen;
-  for (std::uint32_t i = 0; i < kMostDoublings && left > most; ++i) {
+  for (std::uint32_t i = 0; i < kMaxDoublings && left > most; ++i) {
     for (double& error : errors) error *= 2.0;
     out = scene::simplified(full, errors);
     left = sampled_vertices(*out, errors);
   }
-  const bool worth =
-      static_cast<double>(left) <= (1.0 - kLeastGainFrac) * static_cast<double>(unseen);
-  return worth ? std::move(out) : std::nullopt;
+  const bool pays = static_cast<double>(left) <= (1.0 - kMinGainFrac) * static_cast<double>(unseen);
+  return pays ? std::move(out) : std::nullopt;
 }
 
 }  // namespace

@@ -21,13 +21,13 @@ constexpr double kGolden = 0.6180339887498949;
 /// Distance, in radii of an entity, from which on it hides too little sky to matter (1/400).
 constexpr float kNearRadii = 10.0F;
 /// Largest share of the sky that an entity may hide without touching a place (touches()).
-constexpr float kMostHiddenFrac = 1.0F / 16.0F;
+constexpr float kMaxHiddenFrac = 1.0F / 16.0F;
 constexpr std::size_t kSkyRays = 16;
 static_assert(kSkyRays == kPacketRays);
 /// Room for the rounding of float32, as a share of the distance.
 constexpr float kRoundingFrac = 1e-5F;
 /// Largest distance of the start of a ray from its place, in standard deviations of the blur.
-constexpr float kMostDeviates = 3.5F;
+constexpr float kMaxDeviates = 3.5F;
 
 double fraction_of(double x) noexcept {
   return x - std::floor(x);
@@ -266,7 +266,7 @@ bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float a
     const float away_m = std::max(glm::length(aside_m) - ball.way_m - apart_m, 0.0F);
     const float radius_m = mover_radius_m_[mover];
     const float height_m = std::abs(aside_m.z) + ball.way_m + apart_m + 0.5F * radius_m;
-    if (kMostHiddenFrac * away_m * away_m * away_m <= radius_m * radius_m * height_m) return true;
+    if (kMaxHiddenFrac * away_m * away_m * away_m <= radius_m * radius_m * height_m) return true;
   }
   return false;
 }
@@ -284,7 +284,7 @@ SunShare IntervalRays::sun_share(const CasterRays& rays, const SurfaceSample& sa
   for (std::size_t first = 0; first < kSunRays; first += kPacketRays) {
     // Stop after the first packet if its rays agree and no entity can pass.
     if (first == kPacketRays && (lit == 0 || lit == faced) &&
-        !may_pass(sample, start_m, kMostDeviates * blur_m)) {
+        !may_pass(sample, start_m, kMaxDeviates * blur_m)) {
       break;
     }
     // Spread the starts along the surface: lateral conduction has blurred old shadows.

@@ -15,7 +15,7 @@ namespace {
 
 /// Smallest size of a triangle, as the side of an equilateral one of the same area. Finer ones
 /// cannot be told apart in the image.
-constexpr float kLeastEdgePx = 1.2F;
+constexpr float kMinEdgePx = 1.2F;
 /// Cosine between the normals of two corners below which the surface counts as bent. One degree
 /// changes the temperature in the sun by some tenths of a kelvin.
 constexpr float kEvenCos = 0.99985F;
@@ -54,8 +54,7 @@ bool seen_wide(const std::array<glm::vec3, 3>& corners_m, std::span<const glm::v
   return std::ranges::any_of(eyes_m, [&](const glm::vec3& eye_m) {
     const glm::vec3 to_eye_m = eye_m - centre_m;
     const float distance_m = glm::length(to_eye_m);
-    if (edge_m <= kLeastEdgePx * pixel_rad * distance_m ||
-        !(glm::dot(across_m2, to_eye_m) > 0.0F)) {
+    if (edge_m <= kMinEdgePx * pixel_rad * distance_m || !(glm::dot(across_m2, to_eye_m) > 0.0F)) {
       return false;
     }
     const CasterRay ray{eye_m, -to_eye_m / distance_m};
@@ -111,9 +110,9 @@ std::vector<std::vector<bool>> kept_facets(const scene::SceneGeometry& geometry,
           corners_m[k] = glm::vec3(to_rel * glm::vec4(mesh.positions_m[corner[k]], 1.0F));
         }
         if (mirrored) std::swap(corners_m[1], corners_m[2]);
-        const bool worth =
+        const bool pays =
             seen_wide(corners_m, eyes_m, pixel_rad, rays) && lit(corners_m, to_suns, offsets, rays);
-        if (worth) keep[t] = 1;
+        if (pays) keep[t] = 1;
       }
     });
     // Mark the corners of the triangles to keep.

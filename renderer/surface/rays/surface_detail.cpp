@@ -10,7 +10,7 @@ namespace emit::renderer {
 namespace {
 
 /// Smallest cosine between the normals of the full and the coarse surface (60 degrees).
-constexpr float kLeastCos = 0.5F;
+constexpr float kMinCos = 0.5F;
 
 }  // namespace
 
@@ -60,7 +60,7 @@ std::optional<SurfaceDetail::Place> SurfaceDetail::place(std::uint32_t mesh,
   const glm::vec2 b = hit[0].barycentric;
   const glm::vec3 sum = (1.0F - b.x - b.y) * corner(0) + b.x * corner(1) + b.y * corner(2);
   const float length = glm::length(sum);
-  if (!(length > 0.0F) || glm::dot(sum, normal) < kLeastCos * length) return std::nullopt;
+  if (!(length > 0.0F) || glm::dot(sum, normal) < kMinCos * length) return std::nullopt;
   // Move the point along the normal by the distance to the hit, in lengths of the mesh.
   const auto to_full = static_cast<float>((reach_rel_m - hit[0].distance_m) / scale);
   return Place{position_m + to_full * normal, sum / length};

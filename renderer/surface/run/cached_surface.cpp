@@ -26,7 +26,7 @@ constexpr std::size_t kGrain = 32;
 /// and 5 um, on a surface of 300 K.
 constexpr float kSunK = 5.0F;
 /// Largest number of intervals that are made up for one by one after a jump of sim time.
-constexpr std::int64_t kMostIntervals = 16;
+constexpr std::int64_t kMaxIntervals = 16;
 /// Events closer than this after a node belong to the node. The second limit is a fraction of an
 /// interval and holds for events that are known in advance, so that many events do not make many
 /// intervals.
@@ -39,7 +39,7 @@ constexpr std::int64_t kRenewalFraction = 8;
 constexpr std::int64_t kAnswerFraction = 4;
 /// Flux in W m-2 per kelvin of tolerance below which a change does not matter: however thin a
 /// surface is, its own radiation balances as much.
-constexpr double kLeastNewsWM2K = 5.0;
+constexpr double kMinNewsWM2K = 5.0;
 /// Typical difference in K between sunlit surfaces and the air. It turns a change of the film
 /// coefficient into a flux.
 constexpr double kFilmK = 20.0;
@@ -105,7 +105,7 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
   const auto movers = static_cast<std::size_t>(
       std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
   interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
-  silhouettes_ = Silhouettes(mover_boxes_m(geometry_, movers, mover_of_object_));
+  shadow_maps_ = EntityShadowMaps(mover_boxes_m(geometry_, movers, mover_of_object_));
 }
 
 physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
@@ -161,7 +161,7 @@ bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
   // Let the first interval stand for all time before the history, because nothing changes there.
   const std::int64_t begin_ns = nodes_[storage(0)].at_ns;
   return (now_ns < begin_ns && begin_ns > options_.history_start_ns) ||
-         now_ns > nodes_[storage(1)].at_ns + kMostIntervals * interval_ns_;
+         now_ns > nodes_[storage(1)].at_ns + kMaxIntervals * interval_ns_;
 }
 
 std::int64_t CachedSurface::take_news(const Environment& environment) noexcept {
@@ -482,7 +482,7 @@ bool CachedSurface::matters(std::int64_t now_ns, const Environment& environment)
     change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
                             between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
   }
-  return change_w_m2 > kLeastNewsWM2K * options_.tolerance_k;
+  return change_w_m2 > kMinNewsWM2K * options_.tolerance_k;
 }
 
 void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
@@ -555,7 +555,7 @@ std::uint32_t CachedSurface::share_at(std::int64_t now_ns) const noexcept {
 void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
                             SurfaceHistory& history) noexcept {
   EMIT_CHECK(!stale(now_ns));
-  silhouettes_.begin_frame();
+  shadow_maps_.begin_frame();
   const auto count = static_cast<std::uint32_t>(model_->samples.samples.size());
   const SurfaceStep step = this->step();
   const LocalSteps::Inputs local = local_inputs(inputs, history, step);
@@ -581,7 +581,7 @@ void CachedSurface::advance(std::int64_t now_ns, const Inputs& inputs,
   // Advance blocks on their own and exposure tiles to now.
   local_->run(now_ns, window(), local);
   shade_->run(now_ns, model_->samples,
-              {inputs.environment, inputs.entities, rays(), workers_, silhouettes_});
+              {inputs.environment, inputs.entities, rays(), workers_, shadow_maps_});
   const double fraction = static_cast<double>(now_ns - node(0).at_ns) /
                           static_cast<double>(node(1).at_ns - node(0).at_ns);
   fraction_ = static_cast<float>(std::clamp(fraction, 0.0, 1.0));

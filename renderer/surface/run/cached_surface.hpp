@@ -21,8 +21,8 @@
 #include "surface/rays/ray_offsets.hpp"
 #include "surface/run/local_steps.hpp"
 #include "surface/run/surface_step.hpp"
+#include "surface/shade/entity_shadow_maps.hpp"
 #include "surface/shade/shade_pages.hpp"
-#include "surface/shade/silhouettes.hpp"
 #include "surface/state/state_file.hpp"
 #include "threads/worker_pool.hpp"
 
@@ -120,7 +120,7 @@ class CachedSurface {
   /// Exposure tiles: recent shade of entities, finer than samples lie.
   [[nodiscard]] const ShadePages& shade() const noexcept { return *shade_; }
   /// Entity shadow depth maps.
-  [[nodiscard]] const Silhouettes& silhouettes() const noexcept { return silhouettes_; }
+  [[nodiscard]] const EntityShadowMaps& shadow_maps() const noexcept { return shadow_maps_; }
   /// Space that an entity may shade, down to static surfaces.
   struct Shadow {
     bool on = false;  ///< the entity is there and the sun is up
@@ -133,7 +133,7 @@ class CachedSurface {
   /// Brings the shadow depth map of an entity up to date, and places it. Call it for shadows that
   /// show in the frame.
   /// @pre place_shadows(); shadows()[mover].on
-  [[nodiscard]] PlacedSilhouette cast_shadow(std::size_t mover) noexcept;
+  [[nodiscard]] PlacedShadowMap cast_shadow(std::size_t mover) noexcept;
   /// Returns true if, since place_shadows(), more entities had turned than one frame can make maps
   /// for. Then some shadow has an outline of a while ago.
   [[nodiscard]] bool stale_shadow() const noexcept { return stale_shadow_; }
@@ -254,7 +254,7 @@ class CachedSurface {
   std::vector<MoverFaces> faces_;  ///< by entity, at the node with which the interval begins
 
   std::optional<LocalSteps> local_;
-  Silhouettes silhouettes_;
+  EntityShadowMaps shadow_maps_;
   std::vector<Shadow> shadows_;
   glm::vec3 to_sun_{0.0F, 0.0F, 1.0F};  ///< unit vector to the sun of shadows()
   bool stale_shadow_ = false;

@@ -27,8 +27,8 @@ void CachedSurface::begin_shade(std::int64_t now_ns, const Inputs& inputs) {
   place_movers(now_ns, inputs.entities);
   const glm::vec3 to_sun(inputs.environment.sun_at(now_ns).direction_enu);
   for (std::size_t m = 0; m < movers_now_.size(); ++m) {
-    silhouettes_.begin_frame();
-    (void)silhouettes_.look(m, to_sun * movers_now_[m].rel_from_body, Silhouettes::kSharpRad,
+    shadow_maps_.begin_frame();
+    (void)shadow_maps_.look(m, to_sun * movers_now_[m].rel_from_body, EntityShadowMaps::kSharpRad,
                             rays(), workers_);
   }
 }
@@ -42,7 +42,7 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
   stale_shadow_ = false;
   for (std::size_t m = 0; m < movers_now_.size(); ++m) {
     const MoverPlacement& mover = movers_now_[m];
-    const float diagonal_m = silhouettes_.diagonal_m(m);
+    const float diagonal_m = shadow_maps_.diagonal_m(m);
     Shadow& shadow = shadows_[m];
     shadow.on = up && mover.on && diagonal_m > 0.0F;
     if (!shadow.on) continue;
@@ -51,9 +51,9 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
     constexpr float kFarDiagonals = 20.0F;
     constexpr float kLowerDiagonals = 0.25F;
     std::array<CasterRay, 9> behind;
-    std::ranges::copy(silhouettes_.corners_m(m, mover), shadow.hull_m.begin());
+    std::ranges::copy(shadow_maps_.corners_m(m, mover), shadow.hull_m.begin());
     for (std::size_t i = 0; i < 8; ++i) behind[i] = {shadow.hull_m[i], -to_sun_};
-    behind[8] = {silhouettes_.middle_m(m, mover), -to_sun_};
+    behind[8] = {shadow_maps_.middle_m(m, mover), -to_sun_};
     std::array<CasterHit, behind.size()> hits;
     const std::uint32_t met = rays().first_hits(behind, {true, {}}, hits);
     float end_m = behind[8].origin_m.z - kFarDiagonals * diagonal_m * to_sun_.z;
@@ -76,7 +76,7 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
       high_m = glm::max(high_m, at_m);
       farthest_m = std::max(farthest_m, way_m);
     }
-    const float rim_m = silhouettes_.rim_m(m, farthest_m) / to_sun_.z;
+    const float rim_m = shadow_maps_.rim_m(m, farthest_m) / to_sun_.z;
     low_m -= rim_m;
     high_m += rim_m;
     // Add the corners of that rectangle to those of the box.
@@ -87,14 +87,14 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
   }
 }
 
-PlacedSilhouette CachedSurface::cast_shadow(std::size_t mover) noexcept {
+PlacedShadowMap CachedSurface::cast_shadow(std::size_t mover) noexcept {
   EMIT_CHECK(mover < shadows_.size() && shadows_[mover].on);
   const MoverPlacement& now = movers_now_[mover];
-  if (!silhouettes_.look(mover, to_sun_ * now.rel_from_body, Silhouettes::kSharpRad, rays(),
+  if (!shadow_maps_.look(mover, to_sun_ * now.rel_from_body, EntityShadowMaps::kSharpRad, rays(),
                          workers_)) {
     stale_shadow_ = true;
   }
-  return silhouettes_.place(mover, now, to_sun_);
+  return shadow_maps_.place(mover, now, to_sun_);
 }
 
 }  // namespace emit::renderer

@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t kGrain = 32;
 /// Number of steps in an interval, and limits of the length of a step.
 constexpr std::int64_t kStepsPerInterval = 16;
-constexpr std::int64_t kLeastStepNs = 250'000'000;
-constexpr std::int64_t kMostStepNs = 1'250'000'000;
+constexpr std::int64_t kMinStepNs = 250'000'000;
+constexpr std::int64_t kMaxStepNs = 1'250'000'000;
 /// Distance and turn from the foreseen pose within which an entity's shade counts as foreseen.
 constexpr double kForeseenM = 0.05;
 constexpr double kForeseenRad = 5e-3;
@@ -51,7 +51,7 @@ LocalSteps::LocalSteps(const SurfaceSamples& all, const Setup& setup, const Inte
                        HeatInterval interval)
     : blocks_(all),
       start_ns_(setup.start_ns),
-      step_ns_(std::clamp(setup.interval_ns / kStepsPerInterval, kLeastStepNs, kMostStepNs)),
+      step_ns_(std::clamp(setup.interval_ns / kStepsPerInterval, kMinStepNs, kMaxStepNs)),
       turn_ns_(step_ns_ / static_cast<std::int64_t>(kTurns)),
       rays_(rays),
       known_rays_(rays),

@@ -18,21 +18,21 @@ constexpr double kStayedM = 0.05;
 constexpr double kStayedRad = 5e-3;
 /// Sine of the lowest sun that tiles are made for. A lower sun draws shadows too long for them and
 /// hardly warms level ground.
-constexpr double kLeastSunSine = 0.05;
+constexpr double kMinSunSine = 0.05;
 /// Least number of texels along the diagonal of an entity's box. The level of the tiles follows
 /// from it.
 constexpr float kTexelsPerDiagonal = 64.0F;
 constexpr int kFinestLevel = -8;
 constexpr int kCoarsestLevel = 10;
 /// Number of levels by which tiles of a long shadow may be coarser than the entity's diagonal asks.
-constexpr int kMostCoarser = 4;
+constexpr int kMaxCoarser = 4;
 /// Places of an entity that are farther apart than this share of its diagonal would leave gaps in
 /// the shade.
-constexpr float kMostGapFrac = 0.5F;
+constexpr float kMaxGapFrac = 0.5F;
 /// Smallest rise of a shaded height that is recorded, in m.
 constexpr float kTopStepM = 0.02F;
 /// Smallest change of a vertex that is sent to the device, in K.
-constexpr float kLeastChangeK = 5e-5F;
+constexpr float kMinChangeK = 5e-5F;
 /// Longest way of an entity between two places of a step, in texels. A longer way takes more
 /// places.
 constexpr float kPlaceTexels = 4.0F;
@@ -46,10 +46,10 @@ constexpr float kReachMarginM = 0.5F;
 /// ground belongs to another surface.
 constexpr float kLowestFrac = 0.25F;
 /// Limits of the squares by which vertices are found: smallest side, largest number along an axis.
-constexpr float kLeastSquareM = 4.0F;
-constexpr int kMostSquares = 1024;
+constexpr float kMinSquareM = 4.0F;
+constexpr int kMaxSquares = 1024;
 /// A tile that holds less than this, in tolerances, is given back.
-constexpr float kLeastWorthFrac = 0.5F;
+constexpr float kMinEffectFrac = 0.5F;
 
 /// Share of older shade that is left after `turns` turns, by mode.
 glm::vec4 left_after(std::int64_t turns) noexcept {
@@ -80,11 +80,11 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
       tolerance_k_(tolerance_k),
       start_ns_(start_ns),
       pages_(entities > 0 ? kPages : 0),
-      places_(entities * kMostPlaces),
+      places_(entities * kMaxPlaces),
       place_count_(entities, 0),
       at_start_(entities) {
   if (entities == 0) return;
-  // Find the largest weight of each mode: with it worth_k() bounds all materials.
+  // Find the largest weight of each mode: with it effect_k() bounds all materials.
   for (const glm::vec4& weights : response_.weights_k()) {
     most_weight_k_ = glm::max(most_weight_k_, weights);
   }
@@ -93,9 +93,9 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
     page.shade.assign(std::size_t{kSide} * kSide, glm::vec4(0.0F));
     page.target.assign(std::size_t{kSide} * kSide, 0.0F);
     page.top_m.assign(std::size_t{kSide} * kSide, 0.0F);
-    page.members.reserve(kMostMembers);
+    page.members.reserve(kMaxMembers);
   }
-  casts_.reserve(entities * kMostCasts);
+  casts_.reserve(entities * kMaxCasts);
   vertices_k_.assign(drawn, 0.0F);
   changes_.add(0, drawn);
 
@@ -113,7 +113,7 @@ ShadePages::ShadePages(const SurfaceSamples& all, std::uint32_t drawn, ShadeResp
   highest_m_ = high_m.z;
   squares_m_ = glm::vec2(low_m);
   square_m_ = std::max(
-      {kLeastSquareM, (high_m.x - low_m.x) / kMostSquares, (high_m.y - low_m.y) / kMostSquares});
+      {kMinSquareM, (high_m.x - low_m.x) / kMaxSquares, (high_m.y - low_m.y) / kMaxSquares});
   squares_ = floor_of(glm::vec2(high_m - low_m) / square_m_) + 1;
   const auto square_of = [&](std::uint32_t i) {
     const glm::ivec2 at = floor_of((glm::vec2(all.samples[i].position_m) - squares_m_) / square_m_);
@@ -170,8 +170,8 @@ void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
     return;
   }
   // After a long jump, let what the tiles hold fade over the part that is left out.
-  if (end - next_turn_ > kMostWindows * kMostWindowTurns) {
-    next_turn_ = end - kMostWindows * kMostWindowTurns;
+  if (end - next_turn_ > kMaxWindows * kMaxWindowTurns) {
+    next_turn_ = end - kMaxWindows * kMaxWindowTurns;
     for (Page& page : pages_) {
       page.left_frac *= left_after(next_turn_ - 1 - page.at_turn);
       page.at_turn = next_turn_ - 1;
@@ -179,7 +179,7 @@ void ShadePages::run(std::int64_t until_ns, const SurfaceSamples& all,
   }
   // Step all tiles over the rest, in a few windows of about equal length.
   const std::int64_t due = end - next_turn_;
-  const std::int64_t windows = std::min(kMostWindows, due / kTurns);
+  const std::int64_t windows = std::min(kMaxWindows, due / kTurns);
   for (std::int64_t w = windows; w > 0; --w) {
     const std::int64_t turns = (end - next_turn_) / w;
     next_turn_ += turns;
@@ -194,7 +194,7 @@ ShadePages::Page* ShadePages::page_at(int level, const glm::ivec2& cell) noexcep
   return nullptr;
 }
 
-float ShadePages::worth_k(const Page& page) const noexcept {
+float ShadePages::effect_k(const Page& page) const noexcept {
   return glm::dot(most_weight_k_, page.left_frac * page.most);
 }
 
@@ -227,11 +227,11 @@ ShadePages::Page* ShadePages::take_page(std::int64_t turn, bool come) noexcept {
   // Find the tile that holds least, among those on which no moved entity casts now.
   for (Page& page : pages_) {
     if (!come || page.come_turn > turn - kTurns) continue;
-    if (least == nullptr || worth_k(page) < worth_k(*least)) least = &page;
+    if (least == nullptr || effect_k(page) < effect_k(*least)) least = &page;
   }
   if (!come) return nullptr;
   // Report a loss if there is no such tile, or if it holds shade that matters.
-  if (least == nullptr || (least->come_turn > kNever && worth_k(*least) > tolerance_k_)) {
+  if (least == nullptr || (least->come_turn > kNever && effect_k(*least) > tolerance_k_)) {
     short_turn_ = turn;
   }
   if (least != nullptr) give_back(*least);
@@ -310,26 +310,27 @@ void ShadePages::cast(std::size_t mover, std::int64_t turn, std::int64_t turns, 
   // Leave out an entity that is away or has no surface.
   place_count_[mover] = 0;
   const MoverPlacement middle = placement_at(begin_ns + (end_ns - begin_ns) / 2);
-  const float diagonal_m = inputs.silhouettes.diagonal_m(mover);
+  const float diagonal_m = inputs.shadow_maps.diagonal_m(mover);
   if (!middle.on || !(diagonal_m > 0.0F)) return;
   // Leave out an entity that is so fast that its places would leave gaps. Report a loss if its
   // shade would have changed the temperature by more than the tolerance.
   const float way_m =
       glm::distance(placement_at(begin_ns).position_m, placement_at(end_ns).position_m);
-  if (way_m > kMostGapFrac * diagonal_m * kMostPlaces) {
+  if (way_m > kMaxGapFrac * diagonal_m * kMaxPlaces) {
     const auto window_s = static_cast<float>(1e-9 * static_cast<double>(end_ns - begin_ns));
     if (come && passing_k(window_s * diagonal_m / way_m) > tolerance_k_) short_turn_ = turn;
     return;
   }
   // Bring its shadow depth map up to date for the middle of the step.
   const glm::vec3 sun(to_sun);
-  const bool sharp = inputs.silhouettes.look(mover, sun * middle.rel_from_body,
-                                             Silhouettes::kSmearedRad, inputs.rays, inputs.workers);
+  const bool sharp =
+      inputs.shadow_maps.look(mover, sun * middle.rel_from_body, EntityShadowMaps::kSmearedRad,
+                              inputs.rays, inputs.workers);
   if (!sharp && come) short_turn_ = turn;
   // Choose the number of places, a power of two, so that they are a few texels apart.
   const float texel_m = std::ldexp(1.0F, level_of(diagonal_m));
   std::uint32_t places = 1;
-  while (places < kMostPlaces && way_m > kPlaceTexels * texel_m * static_cast<float>(places)) {
+  while (places < kMaxPlaces && way_m > kPlaceTexels * texel_m * static_cast<float>(places)) {
     places *= 2;
   }
   cast_on_.reset();
@@ -337,23 +338,23 @@ void ShadePages::cast(std::size_t mover, std::int64_t turn, std::int64_t turns, 
     const MoverPlacement placement =
         placement_at(begin_ns + (end_ns - begin_ns) * (2 * i + 1) / (2 * places));
     if (!placement.on) continue;
-    const PlacedSilhouette placed = inputs.silhouettes.place(mover, placement, sun);
-    places_[mover * kMostPlaces + place_count_[mover]++] = {placed, i, places};
+    const PlacedShadowMap placed = inputs.shadow_maps.place(mover, placement, sun);
+    places_[mover * kMaxPlaces + place_count_[mover]++] = {placed, i, places};
     // Find the ground behind it, along the sun's rays.
-    const CasterRay behind{inputs.silhouettes.middle_m(mover, placement), -sun};
+    const CasterRay behind{inputs.shadow_maps.middle_m(mover, placement), -sun};
     std::array<CasterHit, 1> hit;
     if (inputs.rays.first_hits({&behind, 1}, {true, {}}, hit) == 0) continue;
     const float ground_m = behind.origin_m.z - hit[0].distance_m * sun.z;
-    const float top_m = placement.position_m.z + inputs.silhouettes.top_m(mover, placement);
+    const float top_m = placement.position_m.z + inputs.shadow_maps.top_m(mover, placement);
     find_pages(mover, turn, turns, come, placed, ground_m, top_m, inputs);
   }
 }
 
 void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t turns, bool come,
-                            const PlacedSilhouette& placed, float ground_m, float top_m,
+                            const PlacedShadowMap& placed, float ground_m, float top_m,
                             const Inputs& inputs) noexcept {
   const ShadedBox box = shaded_box(placed, ground_m);
-  int level = level_of(inputs.silhouettes.diagonal_m(mover));
+  int level = level_of(inputs.shadow_maps.diagonal_m(mover));
   float texel_m = std::ldexp(1.0F, level);
   glm::ivec2 first(0);
   glm::ivec2 last(-1);
@@ -361,13 +362,13 @@ void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t t
   for (int coarser = 0;; ++coarser) {
     const float own_m = texel_m * kOwnSide;
     const glm::vec2 size = (box.high_m - box.low_m) / own_m;
-    if (std::max(size.x, size.y) < static_cast<float>(kMostCells)) {
+    if (std::max(size.x, size.y) < static_cast<float>(kMaxCells)) {
       first = floor_of((box.low_m - texel_m) / own_m);
       last = floor_of((box.high_m + texel_m) / own_m);
       const glm::ivec2 count = last - first + 1;
-      if (count.x * count.y <= static_cast<int>(kMostCells)) break;
+      if (count.x * count.y <= static_cast<int>(kMaxCells)) break;
     }
-    if (coarser == kMostCoarser) {
+    if (coarser == kMaxCoarser) {
       if (come) short_turn_ = turn;
       return;
     }
@@ -405,7 +406,7 @@ void ShadePages::find_pages(std::size_t mover, std::int64_t turn, std::int64_t t
   }
 }
 
-bool ShadePages::meets(const PlacedSilhouette& placed, float texel_m, const glm::ivec2& cell,
+bool ShadePages::meets(const PlacedShadowMap& placed, float texel_m, const glm::ivec2& cell,
                        float plane_m) noexcept {
   const float own_m = texel_m * kOwnSide;
   glm::vec2 low(std::numeric_limits<float>::infinity());
@@ -422,14 +423,14 @@ bool ShadePages::meets(const PlacedSilhouette& placed, float texel_m, const glm:
     depth_m = std::max(depth_m, glm::dot(placed.depth_m, p));
   }
   // Compare with the box of the map's filled texels, widened by the penumbra.
-  constexpr float kMiddle = 0.5F * Silhouettes::kSide;
+  constexpr float kMiddle = 0.5F * EntityShadowMaps::kSide;
   const glm::vec2 half = placed.half + penumbra_texels(placed, depth_m);
   return glm::all(glm::lessThanEqual(low, kMiddle + half)) &&
          glm::all(glm::greaterThanEqual(high, kMiddle - half));
 }
 
 void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const glm::vec4& gain,
-                       const Silhouettes& silhouettes) noexcept {
+                       const EntityShadowMaps& shadow_maps) noexcept {
   // Add up the shaded share of each texel, over all entities that cast on the tile and all of their
   // places.
   constexpr auto kLast = static_cast<int>(kSide) - 1;
@@ -437,7 +438,7 @@ void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const g
     if (cast.page != index) continue;
     const std::uint32_t places = place_count_[cast.mover];
     for (std::uint32_t p = 0; p < places; ++p) {
-      const auto& [placed, number, of] = places_[cast.mover * kMostPlaces + p];
+      const auto& [placed, number, of] = places_[cast.mover * kMaxPlaces + p];
       const ShadedBox box = shaded_box(placed, page.plane_m);
       constexpr auto kEnd = static_cast<float>(kSide);
       const auto texel_of = [&](const glm::vec2& at_m, float aside) {
@@ -461,14 +462,14 @@ void ShadePages::shade(Page& page, std::uint32_t index, float flux_frac, const g
         float found = 0.0F;
         for (int x = first.x; x <= last.x; ++x) {
           const glm::vec3 at = origin + static_cast<float>(x) * right + static_cast<float>(y) * up;
-          const float frac = silhouettes.shaded_frac(cast.mover, at.x, at.y, at.z,
+          const float frac = shadow_maps.shaded_frac(cast.mover, at.x, at.y, at.z,
                                                      penumbra_texels(placed, at.z), number, of);
           if (frac == 0.0F) continue;
           row[x] += frac;
           found += frac;
           // Record how high the shade begins: everything deeper along this ray is shaded.
           const float top_m =
-              (silhouettes.caster_m(cast.mover, at.x, at.y) - at.z) * placed.depth_m.z;
+              (shadow_maps.caster_m(cast.mover, at.x, at.y) - at.z) * placed.depth_m.z;
           if (top_m > tops_m[x] + kTopStepM) raise(page, x, y, top_m);
         }
         if (found > 0.0F) page.marked[static_cast<std::size_t>(y)] = 1;
@@ -515,7 +516,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, Pace pace,
   casts_.clear();
   float flux_frac = 0.0F;
   // List who casts on which tile. Entities that have moved come first, so that they get tiles.
-  if (sun.direction_enu.z > kLeastSunSine) {
+  if (sun.direction_enu.z > kMinSunSine) {
     const physics::Forcing forcing = inputs.environment.forcing_at(middle_ns, sun);
     flux_frac = static_cast<float>(forcing.direct_normal_w_m2 * (1.0 - forcing.cloud_frac) /
                                    ShadeResponse::kFullSunWM2);
@@ -539,7 +540,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, Pace pace,
       const glm::vec4 left = left_after(turn - page.at_turn);
       page.at_turn = turn;
       if (page.cast_turn > turn - turns) {
-        shade(page, static_cast<std::uint32_t>(p), flux_frac, 1.0F - left, inputs.silhouettes);
+        shade(page, static_cast<std::uint32_t>(p), flux_frac, 1.0F - left, inputs.shadow_maps);
       } else {
         page.left_frac *= left;
       }
@@ -549,7 +550,7 @@ void ShadePages::take_turn(std::int64_t turn, std::int64_t turns, Pace pace,
   for (std::size_t p = first; p < pages_.size(); p += stride) {
     Page& page = pages_[p];
     if (!page.used) continue;
-    if (page.cast_turn <= turn - turns && worth_k(page) < kLeastWorthFrac * tolerance_k_) {
+    if (page.cast_turn <= turn - turns && effect_k(page) < kMinEffectFrac * tolerance_k_) {
       give_back(page);
     } else {
       show_vertices(page, all, end_ns);
@@ -601,7 +602,7 @@ void ShadePages::gather(Page& page, const SurfaceSamples& all, std::int64_t at_n
         if (glm::any(glm::lessThan(at_m, low_m)) || glm::any(glm::greaterThanEqual(at_m, high_m))) {
           continue;
         }
-        if (page.members.size() == kMostMembers) {
+        if (page.members.size() == kMaxMembers) {
           page.members.clear();
           page.fine = true;
           return;
@@ -635,7 +636,7 @@ void ShadePages::show_vertices(Page& page, const SurfaceSamples& all,
     if (page.changed) member.shade = at(page, sample.position_m);
     const float shown_k =
         glm::dot(response_.weights_k()[sample.material], page.left_frac * member.shade);
-    if (std::abs(shown_k - member.shown_k) < kLeastChangeK) continue;
+    if (std::abs(shown_k - member.shown_k) < kMinChangeK) continue;
     vertices_k_[member.sample] += shown_k - member.shown_k;
     member.shown_k = shown_k;
     changes_.add(member.sample, 1);

@@ -18,8 +18,8 @@
 #include "shared/shade_params.glsl.h"
 #include "surface/heat/surface_node.hpp"
 #include "surface/heat/surface_samples.hpp"
+#include "surface/shade/entity_shadow_maps.hpp"
 #include "surface/shade/shade_response.hpp"
-#include "surface/shade/silhouettes.hpp"
 
 namespace emit::renderer {
 
@@ -51,14 +51,14 @@ class ShadePages {
   static constexpr std::int64_t kTurnNs = kStepNs / kTurns;
   static constexpr std::int64_t kShortTurns = 10'000'000'000 / kTurnNs;
   /// Longest time, in turns, that run() covers in steps of normal length. For a longer time it
-  /// steps all tiles at once, in at most kMostWindows windows of at most kMostWindowTurns. After a
+  /// steps all tiles at once, in at most kMaxWindows windows of at most kMaxWindowTurns. After a
   /// jump of sim time only the latest part, of that length in all, is made up for.
   static constexpr std::int64_t kTurnsPerFrame = 3 * kTurns;
-  static constexpr std::int64_t kMostWindowTurns = 15'000'000'000 / kTurnNs;
-  static constexpr std::int64_t kMostWindows = 4;
+  static constexpr std::int64_t kMaxWindowTurns = 15'000'000'000 / kTurnNs;
+  static constexpr std::int64_t kMaxWindows = 4;
   /// Largest number of vertices of a tile. Triangles of a tile with more vertices are fine enough
   /// without it.
-  static constexpr std::size_t kMostMembers = 4096;
+  static constexpr std::size_t kMaxMembers = 4096;
 
   /// A static vertex whose shade a tile holds.
   struct Member {
@@ -71,7 +71,7 @@ class ShadePages {
     bool used = false;
     bool changed = false;      ///< texels have changed since forget_changes()
     bool top_changed = false;  ///< top_m has changed since forget_changes()
-    bool fine = false;         ///< it has more vertices than kMostMembers and is not shown
+    bool fine = false;         ///< it has more vertices than kMaxMembers and is not shown
     int level = 0;             ///< texels are 2^level m wide
     glm::ivec2 cell{0};  ///< place in the grid of own squares of that level, from the origin of rel
     float texel_m = 1.0F;
@@ -99,7 +99,7 @@ class ShadePages {
     std::span<const PoseHistory> entities;
     const CasterRays& rays;
     threads::WorkerPool& workers;
-    Silhouettes& silhouettes;
+    EntityShadowMaps& shadow_maps;
   };
 
   /// Takes memory for all tiles where there are entities. `drawn` is the number of samples that are
@@ -143,15 +143,15 @@ class ShadePages {
   /// Shadow depth map of an entity at one of its places within a step. The places share the taps:
   /// place `number` of `of` takes every `of`th tap.
   struct Place {
-    PlacedSilhouette silhouette;
+    PlacedShadowMap shadow_map;
     std::uint32_t number = 0;
     std::uint32_t of = 1;
   };
   /// Largest number of places of an entity within a step. It divides EMIT_SHADE_TAPS, so that
   /// places get equal shares of the taps.
-  static constexpr std::size_t kMostPlaces = 8;
-  static constexpr std::size_t kMostCells = 24;  ///< tiles that an entity may shade from one place
-  static constexpr std::size_t kMostCasts = 96;  ///< tiles per entity in a step, on average
+  static constexpr std::size_t kMaxPlaces = 8;
+  static constexpr std::size_t kMaxCells = 24;  ///< tiles that an entity may shade from one place
+  static constexpr std::size_t kMaxCasts = 96;  ///< tiles per entity in a step, on average
 
   /// Which tiles a call of take_turn() steps.
   enum class Pace : std::uint8_t {
@@ -169,10 +169,10 @@ class ShadePages {
   /// Lists the tiles on which an entity casts from one place, and takes new ones. `ground_m` is the
   /// height of the ground behind the entity, and `top_m` is the height of its top, both rel.
   void find_pages(std::size_t mover, std::int64_t turn, std::int64_t turns, bool come,
-                  const PlacedSilhouette& placed, float ground_m, float top_m,
+                  const PlacedShadowMap& placed, float ground_m, float top_m,
                   const Inputs& inputs) noexcept;
   /// Returns true if the shadow of an entity, penumbra included, may touch the cell of a tile.
-  [[nodiscard]] static bool meets(const PlacedSilhouette& placed, float texel_m,
+  [[nodiscard]] static bool meets(const PlacedShadowMap& placed, float texel_m,
                                   const glm::ivec2& cell, float plane_m) noexcept;
   [[nodiscard]] Page* page_at(int level, const glm::ivec2& cell) noexcept;
   /// Height of the plane of a new tile, from five rays down. It is that of a neighbour if the two
@@ -193,7 +193,7 @@ class ShadePages {
   /// Advances the texels of a tile by one step: `flux_frac` is the direct sun as a share of
   /// ShadeResponse::kFullSunWM2, and `gain` is 1 - exp(-dt / tau_k).
   void shade(Page& page, std::uint32_t index, float flux_frac, const glm::vec4& gain,
-             const Silhouettes& silhouettes) noexcept;
+             const EntityShadowMaps& shadow_maps) noexcept;
   /// Records that points at a texel and at its neighbours are shaded up to a height above the
   /// plane.
   static void raise(Page& page, int x, int y, float top_m) noexcept;
@@ -206,7 +206,7 @@ class ShadePages {
   /// Greatest change of temperature, in K, that full shade of this duration causes.
   [[nodiscard]] float passing_k(float seconds) const noexcept;
   /// Upper bound, in K, of the change of temperature that a tile holds.
-  [[nodiscard]] float worth_k(const Page& page) const noexcept;
+  [[nodiscard]] float effect_k(const Page& page) const noexcept;
 
   ShadeResponse response_;
   glm::vec4 most_weight_k_{0.0F};

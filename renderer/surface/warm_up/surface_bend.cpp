@@ -44,7 +44,7 @@ float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined
   const glm::vec3 facing = glm::normalize(patch.normal_from_mesh * full->normal);
   // Add up the differences that the other normal makes: of the sky, then of the sun in each
   // interval.
-  float cost_k = worth_.sky_k(material) * glm::dot(to_sky, facing - drawn_facing);
+  float cost_k = sensitivity_.sky_k(material) * glm::dot(to_sky, facing - drawn_facing);
   for (std::size_t i = 0; i < count; ++i) {
     const glm::vec3& to_sun = in_.record.rays[i].to_sun();
     float sun_frac = 0.0F;
@@ -55,7 +55,7 @@ float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined
       sun_frac += share;
       drawn_frac += share * std::max(0.0F, glm::dot(patch.samples[corner].normal, to_sun));
     }
-    cost_k += worth_.sun_k(material, i) *
+    cost_k += sensitivity_.sun_k(material, i) *
               (sun_frac * std::max(0.0F, glm::dot(facing, to_sun)) - drawn_frac);
   }
   return std::abs(cost_k);

@@ -2,7 +2,7 @@
 #pragma once
 #include <cstdint>
 
-#include "surface/model/drive_worth.hpp"
+#include "surface/model/drive_sensitivity.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -13,7 +13,8 @@ namespace emit::renderer {
 class SurfaceBend {
  public:
   /// Keeps references: both must outlive the object.
-  SurfaceBend(const SurfaceInputs& inputs, const DriveWorth& worth) : in_(inputs), worth_(worth) {}
+  SurfaceBend(const SurfaceInputs& inputs, const DriveSensitivity& sensitivity)
+      : in_(inputs), sensitivity_(sensitivity) {}
 
   /// Greatest difference in temperature at four places of a triangle, its centre and near the
   /// middles of its edges, in K. It is 0 if the mesh has lost no triangle. It is computed to first
@@ -27,7 +28,7 @@ class SurfaceBend {
                                 std::uint32_t slot, const SurfacePatch& patch) const;
 
   const SurfaceInputs& in_;
-  const DriveWorth& worth_;
+  const DriveSensitivity& sensitivity_;
 };
 
 }  // namespace emit::renderer

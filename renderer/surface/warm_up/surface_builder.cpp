@@ -25,11 +25,11 @@ namespace {
 constexpr std::uint32_t kMaxRounds = 400;
 /// Limits of a round. It halves the leaves that need more than the greatest need divided by
 /// kNeedStep. If these are fewer than one in kRoundShare of all leaves in need, or than
-/// kLeastPerRound, it takes that many: otherwise a few needy triangles, one per round, would use up
+/// kMinPerRound, it takes that many: otherwise a few needy triangles, one per round, would use up
 /// the rounds.
 constexpr float kNeedStep = 4.0F;
 constexpr std::size_t kRoundShare = 8;
-constexpr std::size_t kLeastPerRound = 256;
+constexpr std::size_t kMinPerRound = 256;
 /// A round for which samples do not suffice is the last one if it adds no more than max_samples /
 /// kLastFraction samples.
 constexpr std::size_t kLastFraction = 256;
@@ -55,10 +55,10 @@ class Builder {
       : in_(inputs),
         options_(options),
         progress_(progress),
-        worth_(inputs),
-        sampler_(inputs, worth_, options),
+        sensitivity_(inputs),
+        sampler_(inputs, sensitivity_, options),
         partners_(inputs, sampler_),
-        refinement_(inputs, worth_, view, options) {}
+        refinement_(inputs, sensitivity_, view, options) {}
 
   physics::Result<SurfaceModel> run();
 
@@ -88,7 +88,7 @@ class Builder {
   const SurfaceInputs& in_;
   SurfaceModelOptions options_;
   const SurfaceProgress& progress_;
-  DriveWorth worth_;
+  DriveSensitivity sensitivity_;
   PatchSampler sampler_;
   PartnerFinder partners_;  ///< used only where heat moves across edges
   SurfaceRefinement refinement_;
@@ -330,7 +330,7 @@ float Builder::need_of_neediest() {
     refinement_.list(mesh, 0.0F, needs_);
     for (const SurfaceRefinement::Need& need : needs_) ranked_.push_back(need.need);
   }
-  const std::size_t taken = std::max(kLeastPerRound, ranked_.size() / kRoundShare);
+  const std::size_t taken = std::max(kMinPerRound, ranked_.size() / kRoundShare);
   if (ranked_.size() <= taken) return 0.0F;
   const auto last = ranked_.begin() + static_cast<std::ptrdiff_t>(taken);
   std::ranges::nth_element(ranked_, last, std::greater{});

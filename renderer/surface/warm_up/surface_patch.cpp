@@ -38,7 +38,7 @@ constexpr float kFreeLengths = 2.0F;
 
 }  // namespace
 
-PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
+PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveSensitivity& sensitivity,
                            const SurfaceModelOptions& options)
     : in_(inputs),
       options_(options),
@@ -54,7 +54,7 @@ PatchSampler::PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
   for (std::uint32_t m = 0; m < inputs.materials.size(); ++m) {
     const auto alike_k = kAlikeFrac * static_cast<float>(options.tolerance_k);
     sky_limit_frac_.push_back(
-        std::max(kSkyNoiseFrac, alike_k / std::max(std::abs(worth.sky_k(m)), 1e-3F)));
+        std::max(kSkyNoiseFrac, alike_k / std::max(std::abs(sensitivity.sky_k(m)), 1e-3F)));
   }
 }
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "surface/model/drive_worth.hpp"
+#include "surface/model/drive_sensitivity.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/sphere_view.hpp"
 #include "surface/warm_up/sent_history.hpp"
@@ -78,7 +78,7 @@ struct SampleStand {
 class PatchSampler {
  public:
   /// Keeps a reference to `inputs`, which must outlive it.
-  PatchSampler(const SurfaceInputs& inputs, const DriveWorth& worth,
+  PatchSampler(const SurfaceInputs& inputs, const DriveSensitivity& sensitivity,
                const SurfaceModelOptions& options);
 
   [[nodiscard]] const SunTracer& tracer() const noexcept { return tracer_; }

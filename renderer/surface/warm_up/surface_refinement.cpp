@@ -19,7 +19,7 @@ constexpr float kBaseAsidePx = 128.0F;
 constexpr float kBaseNeed = 1e6F;  ///< need of triangles wider than that
 /// Need below which a triangle is left as it is: an error of one tolerance in a triangle of that
 /// many pixels.
-constexpr float kLeastNeed = 3.0F;
+constexpr float kMinNeed = 3.0F;
 /// Share of its need that counts if a triangle is out of view.
 constexpr float kAsideFrac = 1.0F / 64.0F;
 /// Allowed error from shade that points between the corners meet, in tolerances.
@@ -56,12 +56,12 @@ constexpr float kSharpBendFrac = 4.0F;
 /// Shortest edges that are halved, in pixels: where the temperature is smooth, and where the edge
 /// of a shadow runs. Finer ones change no pixel by more than a tenth of a kelvin (emit bench
 /// error-vs-time).
-constexpr float kLeastEdgePx = 2.5F;
-constexpr float kLeastShadowEdgePx = 0.9F;
+constexpr float kMinEdgePx = 2.5F;
+constexpr float kMinShadowEdgePx = 0.9F;
 /// Width in pixels that narrower bodies are taken for, because their pixels show a mean over all
 /// their faces; and the greatest factor, because a body far below a pixel hardly counts.
-constexpr float kLeastBodyPx = 16.0F;
-constexpr float kMostFiner = 12.0F;
+constexpr float kMinBodyPx = 16.0F;
+constexpr float kMaxFiner = 12.0F;
 
 /// Width of a body: the middle one of its three extents, in m. This is the thickness of a pole, but
 /// not that of a sheet.
@@ -100,11 +100,12 @@ glm::vec3 when_in_view(const glm::vec3& eye_m, const glm::vec3& boresight,
 
 }  // namespace
 
-SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWorth& worth,
-                                     const RefineView& view, const SurfaceModelOptions& options)
+SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
+                                     const DriveSensitivity& sensitivity, const RefineView& view,
+                                     const SurfaceModelOptions& options)
     : in_(inputs),
-      worth_(worth),
-      bend_(inputs, worth_),
+      sensitivity_(sensitivity),
+      bend_(inputs, sensitivity_),
       pixel_rad_(static_cast<float>(view.pixel_rad)),
       field_rad_(static_cast<float>(view.field_rad)),
       tolerance_k_(static_cast<float>(options.tolerance_k)),
@@ -138,7 +139,7 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs, const DriveWor
 SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>& corners_m,
                                                   float longest_m, float body_m,
                                                   std::span<const Eye> eyes) const noexcept {
-  constexpr float kLeastM = 1e-6F;
+  constexpr float kMinM = 1e-6F;
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
   const glm::vec3 twice_area_m2 =
       glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
@@ -146,8 +147,8 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
   float least_px_m = std::numeric_limits<float>::infinity();
   for (const Eye& eye : eyes) {
     const glm::vec3 way_m = centre_m - eye.rel_m;
-    const float distance_m = std::max(glm::length(way_m), kLeastM);
-    const float px_m = std::max(pixel_rad_ * distance_m, kLeastM);
+    const float distance_m = std::max(glm::length(way_m), kMinM);
+    const float px_m = std::max(pixel_rad_ * distance_m, kMinM);
     least_px_m = std::min(least_px_m, px_m);
     // Measure the square that is as large as the triangle looks, up to the longest edge.
     const glm::vec3 ahead = way_m / distance_m;
@@ -162,7 +163,7 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
                          std::acos(cosine) < field_rad_ + longest_m / distance_m;
     if (in_view) width.in_view_px = looks_px;
   }
-  width.finer = std::clamp(kLeastBodyPx * least_px_m / std::max(body_m, kLeastM), 1.0F, kMostFiner);
+  width.finer = std::clamp(kMinBodyPx * least_px_m / std::max(body_m, kMinM), 1.0F, kMaxFiner);
   return width;
 }
 
@@ -261,12 +262,12 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
     const bool lit = low > 1.0F - kAgreeFrac;
     if (!lit && high > kAgreeFrac) continue;
     // Add the sensitivity to this interval at each point that finds the opposite.
-    const float worth_k =
-        worth_.sun_k(face.material, i) * std::max(0.0F, glm::dot(rays.normal(face), rays.to_sun()));
+    const float effect_k = sensitivity_.sun_k(face.material, i) *
+                           std::max(0.0F, glm::dot(rays.normal(face), rays.to_sun()));
     const IntervalRays::Spots spots = rays.spots(in_.rays, face, points_m, sun_offset_m);
     const std::uint32_t odd = spots.faced & (lit ? ~spots.lit : spots.lit);
     for (std::size_t k = 0; k < points_m.size(); ++k) {
-      if (((odd >> k) & 1U) != 0U) missed_k[k] += lit ? -worth_k : worth_k;
+      if (((odd >> k) & 1U) != 0U) missed_k[k] += lit ? -effect_k : effect_k;
     }
   }
   float most_k = 0.0F;
@@ -297,7 +298,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   const float edge_px = width.finer * width.edge_px;
   Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
   // Leave alone what is narrow enough, and what has a prescribed temperature.
-  if (edge_px <= kLeastShadowEdgePx) return judged;
+  if (edge_px <= kMinShadowEdgePx) return judged;
   if (in_.materials[vertices[leaf[0]].material].prescribed_k) return judged;
   // Halve a triangle that is too wide, whatever lies in it.
   const float over_base = std::max(width.in_view_px / kBasePx, width.anywhere_px / kBaseAsidePx);
@@ -309,7 +310,7 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   if (!seen(corners_m, refined, slot, patch)) return judged;
 
   // Take the greatest of the errors that exceed their limits.
-  const bool smooth = edge_px > kLeastEdgePx;
+  const bool smooth = edge_px > kMinEdgePx;
   float error_k = 0.0F;
   const auto count_in = [&](float found_k, float limit_frac) {
     if (found_k > limit_frac * tolerance_k_) error_k = std::max(error_k, found_k);
@@ -368,7 +369,7 @@ SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const Refin
       }
       // Take the root mean square over the instances: a new vertex costs a sample on each of them.
       const auto mean = [uses](float sum) { return std::sqrt(sum / std::max(uses, 1.0F)); };
-      if (mean(finer_squares) > kLeastNeed) judged[i].need = mean(squares);
+      if (mean(finer_squares) > kMinNeed) judged[i].need = mean(squares);
     }
   });
   Most most;

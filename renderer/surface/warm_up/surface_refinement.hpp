@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "surface/model/drive_worth.hpp"
+#include "surface/model/drive_sensitivity.hpp"
 #include "surface/warm_up/surface_bend.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 
@@ -29,9 +29,9 @@ namespace emit::renderer {
 /// change the whole body; that comes last.
 class SurfaceRefinement {
  public:
-  /// Keeps references: `inputs` and `worth` must outlive it.
-  SurfaceRefinement(const SurfaceInputs& inputs, const DriveWorth& worth, const RefineView& view,
-                    const SurfaceModelOptions& options);
+  /// Keeps references: `inputs` and `sensitivity` must outlive it.
+  SurfaceRefinement(const SurfaceInputs& inputs, const DriveSensitivity& sensitivity,
+                    const RefineView& view, const SurfaceModelOptions& options);
 
   /// Greatest need of a mesh's leaves, and of those in the field of view. It is 0 if none is too
   /// coarse.
@@ -91,7 +91,7 @@ class SurfaceRefinement {
                                      const SurfacePatch& patch) const;
 
   const SurfaceInputs& in_;
-  const DriveWorth& worth_;
+  const DriveSensitivity& sensitivity_;
   SurfaceBend bend_;
   std::vector<Eye> eyes_;
   /// Places of the camera relative to each entity where its script brings it closest to the

@@ -80,9 +80,9 @@ void FrameLedger::fill_image(PublishFrame& out, const RenderDone& done, bool lat
 
 void FrameLedger::note_quality(FrameHeader& header, const Issued& issued,
                                const RenderDone& done) noexcept {
-  if (done.rung > 0) {
+  if (done.quality_level > 0) {
     header.flags |= protocol::kFlagDegraded;
-    header.quality_rung = done.rung;
+    header.quality_rung = done.quality_level;
     header.estimated_error_k = done.estimated_error_k;
     context_.counters.add(Counter::frames_shed);
   }

@@ -26,8 +26,8 @@ namespace {
 /// Returns false only when the file was read to its end without a run. A file that cannot be read
 /// may be somebody's.
 bool holds_a_run(const std::filesystem::path& file, std::uint64_t bytes) {
-  constexpr std::uint64_t kMostOfNone = 256u << 10;
-  if (bytes > kMostOfNone) {
+  constexpr std::uint64_t kMaxOfNone = 256u << 10;
+  if (bytes > kMaxOfNone) {
     return true;
   }
   auto log = protocol::LogReader::open(file);
@@ -111,8 +111,8 @@ physics::Result<std::filesystem::path> keep_older_journal(const std::filesystem:
     return failure("cannot be kept: " + unresolved.message());
   }
   const std::string stem = real.stem().string();
-  constexpr int kMostOfASecond = 1000;
-  for (int i = 1; i <= kMostOfASecond; ++i) {
+  constexpr int kMaxOfASecond = 1000;
+  for (int i = 1; i <= kMaxOfASecond; ++i) {
     const std::filesystem::path kept =
         real.parent_path() / fmt::format("{}.{:%Y%m%dT%H%M%S}Z{}{}", stem, changed,
                                          i == 1 ? std::string() : fmt::format("-{}", i),

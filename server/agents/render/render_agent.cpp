@@ -77,7 +77,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
                                 std::span(job->entities.data(), job->entity_count));
         job_prepared_ = true;
       }
-      const double expected_ms = choose_rung(*job, now_ns);
+      const double expected_ms = choose_quality_level(*job, now_ns);
       bool warmed_up = false;
       const auto slot = context_.of_slots.look([&] { return submit(job->request, warmed_up); });
       if (!slot) {
@@ -130,15 +130,15 @@ std::optional<renderer::SlotIndex> RenderAgent::submit(const renderer::FrameRequ
   return static_cast<renderer::SlotIndex>(slot);
 }
 
-double RenderAgent::choose_rung(RenderJob& job, std::int64_t now_ns) noexcept {
-  job.request.rung = 0;
+double RenderAgent::choose_quality_level(RenderJob& job, std::int64_t now_ns) noexcept {
+  job.request.quality_level = 0;
   if (job.deadline_ns == 0) {
     return 0.0;
   }
-  const auto rungs = source_->expected_rungs(job.request);
-  const std::size_t rung = quality_.choose(rungs, job.deadline_ns - now_ns);
-  job.request.rung = static_cast<std::uint8_t>(rung);
-  return rungs[rung].frame_ms;
+  const auto quality_levels = source_->expected_levels(job.request);
+  const std::size_t quality_level = quality_.choose(quality_levels, job.deadline_ns - now_ns);
+  job.request.quality_level = static_cast<std::uint8_t>(quality_level);
+  return quality_levels[quality_level].frame_ms;
 }
 
 void RenderAgent::apply_weather(const RenderJob& job) noexcept {
@@ -176,7 +176,7 @@ void RenderAgent::note_device(const renderer::FrameView& view) noexcept {
   context_.render_events.push(EventKind::source_failed, 0, 0, "the device reported an error");
   if (view.device_lost) {
     lose_device("the driver reset the context");
-  } else if (++failures_ >= kMostFailures) {
+  } else if (++failures_ >= kMaxFailures) {
     lose_device("the device reported errors for 30 frames in a row");
   }
 }
@@ -211,7 +211,7 @@ bool RenderAgent::finish_oldest() noexcept {
   if (view.stats.coarse) {
     context_.counters.add(Counter::frames_coarse);
   }
-  done->rung = view.rung;
+  done->quality_level = view.quality_level;
   done->estimated_error_k = view.estimated_error_k;
   done->warmed_up = oldest.warmed_up;
   // Neither a wall clock that is set nor a warm-up must be taken for a slow device.

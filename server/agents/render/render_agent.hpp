@@ -52,7 +52,7 @@ class RenderAgent final : public Agent {
   static constexpr std::size_t kDepth = 2;
   /// Frames in a row with an error of the driver, and how long one may be in work, before the
   /// device counts as lost. A software renderer may take seconds for a frame.
-  static constexpr std::uint32_t kMostFailures = 30;
+  static constexpr std::uint32_t kMaxFailures = 30;
   static constexpr std::int64_t kLongestFrameNs = 60'000'000'000;
 
   bool take_job(std::int64_t now_ns) noexcept;
@@ -63,8 +63,8 @@ class RenderAgent final : public Agent {
   bool finish_oldest() noexcept;
   /// Takes the images of image.channels, and their checksums.
   void take_pictures(const renderer::FrameView& view, Image& image) noexcept;
-  /// Chooses the quality level of the job. Returns its RungStats::frame_ms.
-  double choose_rung(RenderJob& job, std::int64_t now_ns) noexcept;
+  /// Chooses the quality level of the job. Returns its QualityLevelStats::frame_ms.
+  double choose_quality_level(RenderJob& job, std::int64_t now_ns) noexcept;
   void apply_weather(const RenderJob& job) noexcept;
   void note_dropped_poses(std::uint64_t in_run) noexcept;
   void note_device(const renderer::FrameView& view) noexcept;

@@ -25,9 +25,9 @@ class RendererSource final : public FrameSource {
     return renderer_->collect(slot);
   }
   void release(renderer::SlotIndex slot) noexcept override { renderer_->release(slot); }
-  std::span<const renderer::RungStats> expected_rungs(
+  std::span<const renderer::QualityLevelStats> expected_levels(
       const renderer::FrameRequest& request) noexcept override {
-    return renderer_->expected_rungs(request);
+    return renderer_->expected_levels(request);
   }
   const SourceInfo& info() const noexcept override { return info_; }
 

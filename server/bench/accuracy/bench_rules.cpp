@@ -77,22 +77,22 @@ std::vector<std::string> broken_rules(const SceneFill& fill, bool statue) {
                                    100.0 * share, 100.0 * least));
     }
   };
-  check("surfaces fill", fill.surface_frac, kLeastSurfaceFrac);
-  if (statue) check("the statue fills", fill.figure_frac, kLeastFigureFrac);
-  check("ground swept by the shadow fills", fill.swept_ground_frac, kLeastSweptFrac);
+  check("surfaces fill", fill.surface_frac, kMinSurfaceFrac);
+  if (statue) check("the statue fills", fill.figure_frac, kMinFigureFrac);
+  check("ground swept by the shadow fills", fill.swept_ground_frac, kMinSweptFrac);
   return broken;
 }
 
 std::vector<std::string> broken_rules(std::uint32_t width_px, std::uint32_t height_px,
                                       std::optional<std::uint32_t> error_pixels) {
   std::vector<std::string> broken;
-  if (width_px < kLeastWidthPx || height_px < kLeastHeightPx) {
+  if (width_px < kMinWidthPx || height_px < kMinHeightPx) {
     broken.push_back(fmt::format("pictures of {}x{}, the rule is {}x{} at least", width_px,
-                                 height_px, kLeastWidthPx, kLeastHeightPx));
+                                 height_px, kMinWidthPx, kMinHeightPx));
   }
-  if (error_pixels.value_or(kLeastErrorPixels) < kLeastErrorPixels) {
+  if (error_pixels.value_or(kMinErrorPixels) < kMinErrorPixels) {
     broken.push_back(fmt::format("errors of {} pixels, the rule is {} at least", *error_pixels,
-                                 kLeastErrorPixels));
+                                 kMinErrorPixels));
   }
   return broken;
 }

@@ -22,16 +22,16 @@ struct SceneFill {
 
 /// Smallest shares that the published tables require of an image. The figure counts for the statue
 /// alone.
-inline constexpr double kLeastSurfaceFrac = 0.80;
-inline constexpr double kLeastFigureFrac = 0.25;
-inline constexpr double kLeastSweptFrac = 0.15;
+inline constexpr double kMinSurfaceFrac = 0.80;
+inline constexpr double kMinFigureFrac = 0.25;
+inline constexpr double kMinSweptFrac = 0.15;
 /// Smallest size of every image, and the smallest number of pixels whose error is computed.
-inline constexpr std::uint32_t kLeastWidthPx = 1024;
-inline constexpr std::uint32_t kLeastHeightPx = 768;
-inline constexpr std::uint32_t kLeastErrorPixels = 20'000;
+inline constexpr std::uint32_t kMinWidthPx = 1024;
+inline constexpr std::uint32_t kMinHeightPx = 768;
+inline constexpr std::uint32_t kMinErrorPixels = 20'000;
 /// Largest ratio of the time of a per-frame image to the time in which Embree traces the steps of
 /// its history.
-inline constexpr double kMostEmbreeRatio = 6.0;
+inline constexpr double kMaxEmbreeRatio = 6.0;
 
 /// Measures the shares in one image. `depth_m` is the distance along the boresight, +Inf in the
 /// sky; `temperature_k` is as rendered.

@@ -51,7 +51,7 @@ struct Row {
   std::size_t factor_2 = 0;  ///< frames whose estimate is within that of the difference
   std::size_t judged = 0;    ///< frames that shed work
   std::size_t unknown = 0;   ///< of these, without estimate
-  std::vector<std::size_t> of_rung;
+  std::vector<std::size_t> of_quality_level;
 };
 
 /// The scenario's own flight, which repeats. The thermal clock runs on.
@@ -118,19 +118,19 @@ class Flight {
     for (std::uint32_t i = 0; i < frames_; ++i) {
       renderer::FrameRequest wanted = request(i);
       const auto start = Clock::now();
-      const auto rungs = renderer_->expected_rungs(wanted);
-      const std::size_t rung = policy.choose(rungs, budget_ns);
-      const double expected_ms = rungs[rung].frame_ms;
-      wanted.rung = static_cast<std::uint8_t>(rung);
+      const auto quality_levels = renderer_->expected_levels(wanted);
+      const std::size_t quality_level = policy.choose(quality_levels, budget_ns);
+      const double expected_ms = quality_levels[quality_level].frame_ms;
+      wanted.quality_level = static_cast<std::uint8_t>(quality_level);
       auto shed = render(wanted);
       if (!shed) return tl::unexpected(std::move(shed.error()));
       const double frame_ms = ms_since(start);
       policy.finished(static_cast<std::int64_t>(1e6 * frame_ms), expected_ms);
       row.frame_ms.add(frame_ms);
       if (frame_ms <= row.budget_ms) ++row.within;
-      row.of_rung.resize(std::max(row.of_rung.size(), rungs.size()));
-      ++row.of_rung[(*shed)->rung];
-      if ((*shed)->rung > 0) {
+      row.of_quality_level.resize(std::max(row.of_quality_level.size(), quality_levels.size()));
+      ++row.of_quality_level[(*shed)->quality_level];
+      if ((*shed)->quality_level > 0) {
         if (auto judged = judge(wanted, **shed, row); !judged) return judged;
       }
       release(*shed);
@@ -174,7 +174,7 @@ class Flight {
   }
 
   Result<void> judge(renderer::FrameRequest wanted, const renderer::FrameView& shed, Row& row) {
-    wanted.rung = 0;
+    wanted.quality_level = 0;
     auto full = render(wanted);
     if (!full) return tl::unexpected(std::move(full.error()));
     double actual_k = 0.0;
@@ -207,8 +207,8 @@ class Flight {
 };
 
 Json row_json(const Row& row, const BudgetOptions& command, const Flight& flight, double free_ms) {
-  Json rungs = Json::array();
-  for (const std::size_t count : row.of_rung) rungs.push(Json(count));
+  Json quality_levels = Json::array();
+  for (const std::size_t count : row.of_quality_level) quality_levels.push(Json(count));
   Json json = Json::object();
   json.set("scene", command.scene).set("width", command.width_px).set("height", command.height_px);
   json.set("frames", row.frame_ms.count()).set("free_running_ms_median", free_ms);
@@ -221,7 +221,7 @@ Json row_json(const Row& row, const BudgetOptions& command, const Flight& flight
   json.set("error_k_median", row.actual_k.median()).set("error_k_max", row.actual_k.max());
   json.set("estimate_within_factor_2_frac",
            static_cast<double>(row.factor_2) / static_cast<double>(row.judged));
-  json.set("frames_of_rung", std::move(rungs)).set("warm_up_s", flight.warm_up_s());
+  json.set("frames_of_rung", std::move(quality_levels)).set("warm_up_s", flight.warm_up_s());
   json.set("samples", flight.stats().samples);
   return json;
 }

@@ -102,7 +102,7 @@ class Turntable {
       const auto frame = row.budget_ms ? renderer_->render_within(request(eye_m, i), *row.budget_ms)
                                        : renderer_->render(request(eye_m, i));
       if (!frame) return tl::unexpected(frame.error());
-      if (frame->rung > 0) ++row.shed_frames;
+      if (frame->quality_level > 0) ++row.shed_frames;
       if (row.budget_ms && frame->frame_ms > *row.budget_ms) ++row.late_frames;
       frame_ms.add(frame->frame_ms);
       row.frame_ms.add(frame->frame_ms);

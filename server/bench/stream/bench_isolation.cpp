@@ -133,12 +133,12 @@ class IsolationBench {
   }
   /// Returns an empty result where there are too few pairs to know the spread.
   [[nodiscard]] std::optional<bool> met() const {
-    if (command_.pairs < kLeastPairs) return std::nullopt;
+    if (command_.pairs < kMinPairs) return std::nullopt;
     return std::abs(ratio_.median() - 1.0) <= std::max(kLimit, spread(self_ratio_));
   }
 
   static constexpr double kLimit = 0.05;
-  static constexpr std::uint32_t kLeastPairs = 15;
+  static constexpr std::uint32_t kMinPairs = 15;
   const IsolationOptions& command_;
   std::string shm_;
   std::string control_;
@@ -266,8 +266,7 @@ Json IsolationBench::json() const {
 }
 
 void IsolationBench::print(std::FILE* out) const {
-  const std::string judged = !met()
-                                 ? fmt::format("not judged with fewer than {} pairs", kLeastPairs)
+  const std::string judged = !met() ? fmt::format("not judged with fewer than {} pairs", kMinPairs)
                              : *met() ? "met"
                                       : "not met";
   fmt::print(out,

@@ -469,11 +469,11 @@ Row throughput_row(const Contender& contender, const Series& own) {
 Result<void> StreamBench::throughput() {
   // The run is long enough to hide the time of starting up.
   constexpr double kBytes = 2e9;
-  constexpr std::uint64_t kLeastFrames = 200;
-  constexpr std::uint64_t kMostFrames = 4000;
+  constexpr std::uint64_t kMinFrames = 200;
+  constexpr std::uint64_t kMaxFrames = 4000;
   yardstick_.frames =
       std::clamp(static_cast<std::uint64_t>(kBytes / static_cast<double>(yardstick_.frame_bytes)),
-                 kLeastFrames, kMostFrames);
+                 kMinFrames, kMaxFrames);
   auto daemons = start_daemons();
   if (!daemons) return tl::unexpected(daemons.error());
   const std::vector<Contender> contenders = contenders_of(command_);

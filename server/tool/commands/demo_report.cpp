@@ -93,11 +93,11 @@ std::vector<std::string> demo_losses(const std::vector<DemoClientView>& clients,
 
 std::vector<std::string> demo_shortfalls(const DemoResults& results,
                                          const std::vector<Departure>& departures) {
-  constexpr std::uint64_t kLeastFrames = 3;
+  constexpr std::uint64_t kMinFrames = 3;
   std::vector<std::string> failures;
-  if (results.frames_written < kLeastFrames) {
+  if (results.frames_written < kMinFrames) {
     failures.push_back(fmt::format("{} frames were written, the demo shows at least {}",
-                                   results.frames_written, kLeastFrames));
+                                   results.frames_written, kMinFrames));
   }
   if (!departures.empty() && results.frames_after_departure == 0) {
     failures.push_back(fmt::format(

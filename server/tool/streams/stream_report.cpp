@@ -33,7 +33,7 @@ constexpr std::array<FlagName, 15> kFlagNames{{{protocol::kFlagLate, "late"},
 }  // namespace
 
 StreamReport::StreamReport(std::uint32_t every_nth) : every_nth_(every_nth) {
-  for (Samples& stage : stages_) stage = Samples(kMostSamples);  // copies would lose their memory
+  for (Samples& stage : stages_) stage = Samples(kMaxSamples);  // copies would lose their memory
 }
 
 void StreamReport::add(const client::ReceivedFrame& frame) {

@@ -66,11 +66,11 @@ class StreamReport {
       "queue_ms", "render_ms", "readback_ms", "hand_over_ms", "transport_ms", "total_ms"};
 
   /// The number of samples is limited because a client may run for weeks.
-  static constexpr std::size_t kMostSamples = 1u << 18;
+  static constexpr std::size_t kMaxSamples = 1u << 18;
 
   std::array<Samples, kStages> stages_;
-  Samples ready_ms_{kMostSamples};
-  Samples interval_ms_{kMostSamples};
+  Samples ready_ms_{kMaxSamples};
+  Samples interval_ms_{kMaxSamples};
   std::int64_t last_byte_ns_ = 0;  // of the frame before, on this connection
   std::array<std::uint64_t, 32> flag_counts_{};
   std::uint64_t frames_ = 0;

@@ -93,7 +93,7 @@ Result<TimedFrame> RendererThread::timed(const std::function<int(Clock::time_poi
     const renderer::FrameView& view = renderer_->collect(index);
     out.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     out.coarse = view.stats.coarse;
-    out.rung = view.rung;
+    out.quality_level = view.quality_level;
     failed = view.device_failed;
     if (temperature_k != nullptr) {
       temperature_k->assign(view.temperature_k.begin(), view.temperature_k.end());
@@ -120,16 +120,17 @@ void RendererThread::apply_weather(const scene::WeatherSample& sample) {
 }
 
 Result<TimedFrame> RendererThread::render_within(renderer::FrameRequest request, double budget_ms) {
-  double rung_ms = 0.0;
+  double level_ms = 0.0;
   const auto frame = timed([&](Clock::time_point start) {
-    const auto rungs = renderer_->expected_rungs(request);
+    const auto quality_levels = renderer_->expected_levels(request);
     const std::chrono::duration<double, std::milli> spent = Clock::now() - start;
-    const std::size_t rung = policy_.choose(rungs, std::llround(1e6 * (budget_ms - spent.count())));
-    rung_ms = rungs[rung].frame_ms;
-    request.rung = static_cast<std::uint8_t>(rung);
+    const std::size_t quality_level =
+        policy_.choose(quality_levels, std::llround(1e6 * (budget_ms - spent.count())));
+    level_ms = quality_levels[quality_level].frame_ms;
+    request.quality_level = static_cast<std::uint8_t>(quality_level);
     return renderer_->submit(request);
   });
-  if (frame) policy_.finished(std::llround(1e6 * frame->frame_ms), rung_ms);
+  if (frame) policy_.finished(std::llround(1e6 * frame->frame_ms), level_ms);
   return frame;
 }
 

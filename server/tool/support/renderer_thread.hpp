@@ -21,7 +21,7 @@ namespace emit::tool {
 struct TimedFrame {
   double frame_ms = 0.0;
   bool coarse = false;  ///< renderer::FrameStats::coarse
-  std::uint8_t rung = 0;
+  std::uint8_t quality_level = 0;
 };
 
 /// A renderer on a thread of its own, so that several renderers, each with its own GL context,

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kStartNs = 3600 * kSecondNs;
-constexpr std::uint8_t kRungs = 12;
+constexpr std::uint8_t kQualityLevels = 12;
 constexpr std::size_t kMovedPx = 4;
 
 physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {
@@ -42,7 +42,7 @@ scene::ScenarioDesc approach() {
 struct Frame {
   std::vector<float> radiance_w_m2_sr;
   std::vector<float> temperature_k;
-  std::uint8_t rung = 0;
+  std::uint8_t quality_level = 0;
   float estimated_error_k = 0.0F;
 };
 
@@ -62,12 +62,12 @@ class Flight {
     const auto ready = renderer_->warm_up(request(0.0, 0));
     EXPECT_TRUE(ready.has_value());
   }
-  [[nodiscard]] renderer::FrameRequest request(double seconds, std::uint8_t rung) const {
+  [[nodiscard]] renderer::FrameRequest request(double seconds, std::uint8_t quality_level) const {
     renderer::FrameRequest request;
     request.sim_time_ns = kStartNs + std::llround(seconds * 1e9);
     request.thermal_time_ns = kStartNs;
     request.sensor_pose = renderer_->scenario_sensor_pose_at(request.sim_time_ns);
-    request.rung = rung;
+    request.quality_level = quality_level;
     return request;
   }
   [[nodiscard]] Frame frame(const renderer::FrameRequest& request) {
@@ -78,7 +78,7 @@ class Flight {
     const auto plane = view.radiance_w_m2_sr[0];
     Frame out{{plane.begin(), plane.end()},
               {view.temperature_k.begin(), view.temperature_k.end()},
-              view.rung,
+              view.quality_level,
               view.estimated_error_k};
     renderer_->release(static_cast<renderer::SlotIndex>(slot));
     return out;
@@ -95,16 +95,16 @@ double rms_k(const scene::ScenarioDesc& scenario, const Frame& a, const Frame& b
   return apparent.rms_difference_k(a.radiance_w_m2_sr, b.radiance_w_m2_sr);
 }
 
-TEST(RendererLadder, RungsAreWholePicturesAndAsFarOffAsTheySay) {
+TEST(RendererLadder, QualityLevelsAreWholePicturesAndAsFarOffAsTheySay) {
   const auto scenario = approach();
   Flight run(scenario, renderer::Ladder::live);
   for (const double seconds : {0.0, 2.3, 7.9}) {
     const Frame full = run.frame(run.request(seconds, 0));
     EXPECT_EQ(full.estimated_error_k, 0.0F);
     double scaled_k = 0.0;
-    for (std::uint8_t rung = 1; rung < kRungs; ++rung) {
-      const Frame shed = run.frame(run.request(seconds, rung));
-      EXPECT_EQ(shed.rung, rung);
+    for (std::uint8_t quality_level = 1; quality_level < kQualityLevels; ++quality_level) {
+      const Frame shed = run.frame(run.request(seconds, quality_level));
+      EXPECT_EQ(shed.quality_level, quality_level);
       const double difference_k = rms_k(scenario, full, shed);
       // Expect errors along edges only: the image shifted by a pixel of the coarsest level is
       // worse.
@@ -113,10 +113,12 @@ TEST(RendererLadder, RungsAreWholePicturesAndAsFarOffAsTheySay) {
         moved.radiance_w_m2_sr[i] = shed.radiance_w_m2_sr[i + kMovedPx];
       }
       EXPECT_LT(difference_k, 0.9 * rms_k(scenario, full, moved))
-          << seconds << " s, rung " << int{rung};
+          << seconds << " s, quality_level " << int{quality_level};
       const auto estimate_k = static_cast<double>(shed.estimated_error_k);
-      EXPECT_LE(estimate_k, 2.0 * difference_k + 0.03) << seconds << " s, rung " << int{rung};
-      EXPECT_GE(estimate_k, 0.5 * difference_k - 0.03) << seconds << " s, rung " << int{rung};
+      EXPECT_LE(estimate_k, 2.0 * difference_k + 0.03)
+          << seconds << " s, quality_level " << int{quality_level};
+      EXPECT_GE(estimate_k, 0.5 * difference_k - 0.03)
+          << seconds << " s, quality_level " << int{quality_level};
       scaled_k = difference_k;
     }
     EXPECT_GT(scaled_k, 0.1);  // the last level renders a sixteenth of the pixels
@@ -127,13 +129,14 @@ TEST(RendererLadder, ShedFramesLeaveNoTrace) {
   const auto scenario = approach();
   Flight run(scenario, renderer::Ladder::live);
   const Frame before = run.frame(run.request(4.0, 0));
-  const Frame shed = run.frame(run.request(4.0, kRungs - 1));
+  const Frame shed = run.frame(run.request(4.0, kQualityLevels - 1));
   EXPECT_NE(before.radiance_w_m2_sr, shed.radiance_w_m2_sr);
   const Frame after = run.frame(run.request(4.0, 0));
   EXPECT_EQ(before.radiance_w_m2_sr, after.radiance_w_m2_sr);
   // Expect the same images from a renderer that has measured nothing, as in a replay.
   Flight replay(scenario, renderer::Ladder::replayed);
-  EXPECT_EQ(replay.frame(replay.request(4.0, kRungs - 1)).radiance_w_m2_sr, shed.radiance_w_m2_sr);
+  EXPECT_EQ(replay.frame(replay.request(4.0, kQualityLevels - 1)).radiance_w_m2_sr,
+            shed.radiance_w_m2_sr);
   EXPECT_EQ(replay.frame(replay.request(4.0, 0)).radiance_w_m2_sr, before.radiance_w_m2_sr);
 }
 
@@ -141,7 +144,7 @@ TEST(RendererLadder, TemperatureIsNeverBetweenTwoObjects) {
   const auto scenario = approach();
   Flight run(scenario, renderer::Ladder::live);
   const Frame full = run.frame(run.request(4.0, 0));
-  const Frame shed = run.frame(run.request(4.0, kRungs - 1));
+  const Frame shed = run.frame(run.request(4.0, kQualityLevels - 1));
   const auto [low, high] = std::ranges::minmax(full.temperature_k);
   for (const float t : shed.temperature_k) {
     if (std::isnan(t)) continue;
@@ -159,10 +162,11 @@ TEST(RendererLadder, WhatIsNotMeasuredIsNotClaimed) {
   request = run.request(4.0, 3);
   request.sensor_pose = looking(request.sensor_pose.position_world_m, {30.0, 0.0, 0.5});
   EXPECT_TRUE(std::isnan(run.frame(request).estimated_error_k));
-  const auto rungs = run.renderer().expected_rungs(request);
-  ASSERT_EQ(rungs.size(), std::size_t{kRungs});
-  EXPECT_EQ(rungs[0].error_k, 0.0);
-  for (const renderer::RungStats& rung : rungs) EXPECT_GT(rung.frame_ms, 0.0);
+  const auto quality_levels = run.renderer().expected_levels(request);
+  ASSERT_EQ(quality_levels.size(), std::size_t{kQualityLevels});
+  EXPECT_EQ(quality_levels[0].error_k, 0.0);
+  for (const renderer::QualityLevelStats& quality_level : quality_levels)
+    EXPECT_GT(quality_level.frame_ms, 0.0);
 }
 
 TEST(RendererLadder, WithoutLadderThereIsFullQualityOnly) {
@@ -171,9 +175,9 @@ TEST(RendererLadder, WithoutLadderThereIsFullQualityOnly) {
     scenario.thermal.method = method;
     const bool none = method == scene::ThermalMethod::cached;
     Flight run(scenario, none ? renderer::Ladder::none : renderer::Ladder::live);
-    EXPECT_EQ(run.renderer().expected_rungs({}).size(), 1U);
+    EXPECT_EQ(run.renderer().expected_levels({}).size(), 1U);
     const Frame asked = run.frame(run.request(1.0, 9));
-    EXPECT_EQ(asked.rung, 0);
+    EXPECT_EQ(asked.quality_level, 0);
     EXPECT_EQ(asked.estimated_error_k, 0.0F);
     EXPECT_EQ(asked.radiance_w_m2_sr, run.frame(run.request(1.0, 0)).radiance_w_m2_sr);
   }

@@ -86,7 +86,7 @@ TEST(Simplify, a_sphere_of_few_pixels_keeps_its_outline) {
   for (const double away_m : {667.0, 2000.0, 10'000.0}) {
     const std::array<glm::dvec3, 1> eyes{glm::dvec3(0.0, 0.0, 1.0 + away_m)};
     const SceneGeometry coarse = simplified_for(scene_of(sphere(60, false)), {eyes, kPixelRad});
-    EXPECT_LT(sag_m(coarse.meshes[0]), 2.0 * kMostBodyFrac);
+    EXPECT_LT(sag_m(coarse.meshes[0]), 2.0 * kMaxBodyFrac);
     triangles.push_back(coarse.triangles);
   }
   EXPECT_LT(triangles[0], 60U * 60U * 4U / 10U);
@@ -105,8 +105,8 @@ TEST(Simplify, the_thickness_of_a_pole_bounds_what_it_loses_but_not_that_of_a_sh
     }
     return simplify_errors(scene_of(std::move(mesh)), {eyes, kPixelRad})[0];
   };
-  EXPECT_NEAR(error({0.5F, 20.0F, 0.5F}), 0.5 * kMostBodyFrac, 1e-6);
-  EXPECT_NEAR(error({20.0F, 0.01F, 20.0F}), 20.0 * kMostBodyFrac, 1e-5);
+  EXPECT_NEAR(error({0.5F, 20.0F, 0.5F}), 0.5 * kMaxBodyFrac, 1e-6);
+  EXPECT_NEAR(error({20.0F, 0.01F, 20.0F}), 20.0 * kMaxBodyFrac, 1e-5);
 }
 
 TEST(Simplify, nothing_changes_where_pixels_are_finer_or_the_distance_is_unknown) {

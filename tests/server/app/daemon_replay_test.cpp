@@ -194,7 +194,7 @@ TEST_P(DaemonReplay, TheJournalAloneGivesTheSamePixels) {
   std::uint64_t published = 0;
   {
     // Frames lose quality, in lock step always; the journal tells which.
-    live_script.rungs = {{1.0, 0.0}, {0.5, 0.1}};
+    live_script.quality_levels = {{1.0, 0.0}, {0.5, 0.1}};
     auto config = configuration(GetParam(), folder.file("run.mcap"));
     if (lock_step) config.pacing.budget_ns = 1;
     LiveDaemon live(config, live_script);

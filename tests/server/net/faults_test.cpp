@@ -294,7 +294,7 @@ TEST(ClockSteps, CostNoQuality) {
     pacing.budget_ns = 12 * kMs;
     return pacing;
   }());
-  rig.script.rungs = {{8.0, 0.0}, {3.0, 0.2}};
+  rig.script.quality_levels = {{8.0, 0.0}, {3.0, 0.2}};
   for (std::uint64_t n = 1; n <= 60; ++n) {
     rig.script.ready = false;
     rig.send(n, static_cast<std::int64_t>(n) * kMs);

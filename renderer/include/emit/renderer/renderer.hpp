@@ -36,9 +36,9 @@ struct DeviceOptions {
   bool debug_context = false;  ///< turns the debug output of GL on, which is slow
 };
 
-/// Use of the quality levels of FrameRequest::rung. With `replayed` and `live` the renderer takes
-/// memory for a second image. Where the thermal method has nothing to shed there is one level,
-/// whatever is chosen.
+/// Use of the quality levels of FrameRequest::quality_level. With `replayed` and `live` the
+/// renderer takes memory for a second image. Where the thermal method has nothing to shed there is
+/// one level, whatever is chosen.
 enum class Ladder : std::uint8_t {
   none,      ///< frames have full quality
   replayed,  ///< frames have the levels of a recording
@@ -69,7 +69,8 @@ struct FrameRequest {
   std::int64_t sim_time_ns = 0;      ///< instant that the image shows: entities at this time
   std::int64_t thermal_time_ns = 0;  ///< instant of the temperatures; in a hold before sim_time_ns
   physics::Pose sensor_pose;         ///< body frame of the seeker head, x along the boresight
-  std::uint8_t rung = 0;  ///< quality level; 0 is full quality, a number too high is the last one
+  std::uint8_t quality_level =
+      0;  ///< quality level; 0 is full quality, a number too high is the last one
   /// Part of the image that is requested. Its pixels have the bits of the whole image. The other
   /// pixels are not drawn and have no meaning. An empty rectangle, or one that does not fit,
   /// requests all.
@@ -87,7 +88,7 @@ struct StageTimes {
 };
 
 /// Time and error of a quality level.
-struct RungStats {
+struct QualityLevelStats {
   /// Time from submit() to the end of collect() without other load; 0: not measured.
   double frame_ms = 0.0;
   double error_k = 0.0;  ///< error as FrameView::estimated_error_k defines it
@@ -123,7 +124,7 @@ struct FrameView {
   std::span<const float> depth_m;                        ///< empty unless asked for
   std::span<const float> object_id;                      ///< empty unless asked for
   FrameStats stats;
-  std::uint8_t rung = 0;  ///< quality level that was rendered
+  std::uint8_t quality_level = 0;  ///< quality level that was rendered
   /// Expected difference from full quality: RMS of the apparent temperature over the image, K, in
   /// the band where it is largest. NaN: nothing was measured near this camera.
   float estimated_error_k = 0.0F;
@@ -207,7 +208,7 @@ class Renderer {
   /// near the camera. Where nothing was measured near, times come from what is in view, and errors
   /// are the medians of the trajectory. Entry 0 is full quality; without a ladder it is the only
   /// one. The result is valid until the next call. RT-safe.
-  [[nodiscard]] virtual std::span<const RungStats> expected_rungs(
+  [[nodiscard]] virtual std::span<const QualityLevelStats> expected_levels(
       const FrameRequest& request) noexcept = 0;
   /// Makes a slot free again. Thread: any. RT-safe.
   /// @pre submit() returned the slot, and it was not released.

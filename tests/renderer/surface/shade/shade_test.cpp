@@ -56,7 +56,7 @@ class ShadeTest : public ::testing::Test {
     EXPECT_TRUE(rays.has_value());
     rays_.emplace(std::move(*rays));
     const scene::Aabb box = scene_.geometry.meshes.back().bounds;
-    silhouettes_ = Silhouettes({&box, 1});
+    shadow_maps_ = EntityShadowMaps({&box, 1});
     auto networks = build_foster_materials(scenario_, scenario_.materials);
     EXPECT_TRUE(networks.has_value());
     heat_.emplace(FosterHeat(std::span(*networks).first(3), kReferenceK, 0.02));
@@ -73,14 +73,14 @@ class ShadeTest : public ::testing::Test {
     return environment_.sun_at(now_ns).direction_enu;
   }
   [[nodiscard]] ShadePages::Inputs inputs() {
-    return {environment_, entities_, *rays_, workers_, silhouettes_};
+    return {environment_, entities_, *rays_, workers_, shadow_maps_};
   }
   /// Runs the tiles as frames do, ten a second.
   void run_to(ShadePages& shade, std::int64_t from_ns, std::int64_t until_ns,
               const SurfaceSamples& all, const ShadePages::Inputs& inputs) {
     for (std::int64_t t = from_ns; t < until_ns;) {
       t = std::min(t + kSecondNs / 10, until_ns);
-      inputs.silhouettes.begin_frame();
+      inputs.shadow_maps.begin_frame();
       shade.run(t, all, inputs);
     }
   }
@@ -120,19 +120,19 @@ class ShadeTest : public ::testing::Test {
   std::optional<CasterRays> rays_;
   std::optional<SampleHeat> heat_;
   threads::WorkerPool workers_{2};
-  Silhouettes silhouettes_;
+  EntityShadowMaps shadow_maps_;
   std::vector<PoseHistory> entities_;
 };
 
-TEST_F(ShadeTest, ASilhouetteIsDarkBehindItsBodyOnly) {
+TEST_F(ShadeTest, AnEntityShadowMapIsDarkBehindItsBodyOnly) {
   const glm::vec3 sun(to_sun(kNoonNs));
-  (void)silhouettes_.look(0, sun, Silhouettes::kSharpRad, *rays_, workers_);
+  (void)shadow_maps_.look(0, sun, EntityShadowMaps::kSharpRad, *rays_, workers_);
   const MoverPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kHeightM}, true};
-  const PlacedSilhouette placed = silhouettes_.place(0, high, sun);
+  const PlacedShadowMap placed = shadow_maps_.place(0, high, sun);
   const auto shaded_frac = [&](const glm::vec3& point_m) {
     const glm::vec4 p(point_m, 1.0F);
     const float depth_m = glm::dot(placed.depth_m, p);
-    return silhouettes_.shaded_frac(0, glm::dot(placed.column, p), glm::dot(placed.row, p), depth_m,
+    return shadow_maps_.shaded_frac(0, glm::dot(placed.column, p), glm::dot(placed.row, p), depth_m,
                                     penumbra_texels(placed, depth_m));
   };
   int dark = 0;
@@ -154,37 +154,38 @@ TEST_F(ShadeTest, ASilhouetteIsDarkBehindItsBodyOnly) {
   const glm::vec4 p(edge_m, 1.0F);
   float sum = 0.0F;
   for (std::uint32_t first = 0; first < 5; ++first) {
-    sum += silhouettes_.shaded_frac(0, glm::dot(placed.column, p), glm::dot(placed.row, p),
+    sum += shadow_maps_.shaded_frac(0, glm::dot(placed.column, p), glm::dot(placed.row, p),
                                     glm::dot(placed.depth_m, p),
                                     penumbra_texels(placed, glm::dot(placed.depth_m, p)), first, 5);
   }
   EXPECT_FLOAT_EQ(sum, shaded_frac(edge_m));
 }
 
-TEST_F(ShadeTest, ASilhouetteIsMadeAnewWhereTheBodyHasTurnedToTheSun) {
+TEST_F(ShadeTest, AnEntityShadowMapIsMadeAnewWhereTheBodyHasTurnedToTheSun) {
   const glm::vec3 sun(to_sun(kNoonNs));
-  (void)silhouettes_.look(0, sun, Silhouettes::kSharpRad, *rays_, workers_);
-  EXPECT_EQ(silhouettes_.revision(0), 1U);
+  (void)shadow_maps_.look(0, sun, EntityShadowMaps::kSharpRad, *rays_, workers_);
+  EXPECT_EQ(shadow_maps_.revision(0), 1U);
   const auto turned = [&](float rad) { return glm::normalize(sun + glm::vec3(rad, 0.0F, 0.0F)); };
-  EXPECT_TRUE(silhouettes_.look(0, turned(3e-3F), Silhouettes::kSharpRad, *rays_, workers_));
-  EXPECT_EQ(silhouettes_.revision(0), 1U);
-  EXPECT_TRUE(silhouettes_.look(0, turned(1.5e-2F), Silhouettes::kSmearedRad, *rays_, workers_));
-  EXPECT_EQ(silhouettes_.revision(0), 1U);
-  EXPECT_TRUE(silhouettes_.look(0, turned(1.5e-2F), Silhouettes::kSharpRad, *rays_, workers_));
-  EXPECT_EQ(silhouettes_.revision(0), 2U);
+  EXPECT_TRUE(shadow_maps_.look(0, turned(3e-3F), EntityShadowMaps::kSharpRad, *rays_, workers_));
+  EXPECT_EQ(shadow_maps_.revision(0), 1U);
+  EXPECT_TRUE(
+      shadow_maps_.look(0, turned(1.5e-2F), EntityShadowMaps::kSmearedRad, *rays_, workers_));
+  EXPECT_EQ(shadow_maps_.revision(0), 1U);
+  EXPECT_TRUE(shadow_maps_.look(0, turned(1.5e-2F), EntityShadowMaps::kSharpRad, *rays_, workers_));
+  EXPECT_EQ(shadow_maps_.revision(0), 2U);
   // So many updates are allowed per frame. After that a map that is nearly right is used.
-  for (int i = 2; i < Silhouettes::kLooksPerFrame; ++i) {
+  for (int i = 2; i < EntityShadowMaps::kLooksPerFrame; ++i) {
     const float rad = 0.02F * static_cast<float>(i);
-    EXPECT_TRUE(silhouettes_.look(0, turned(rad), Silhouettes::kSharpRad, *rays_, workers_));
+    EXPECT_TRUE(shadow_maps_.look(0, turned(rad), EntityShadowMaps::kSharpRad, *rays_, workers_));
   }
-  const auto looks = static_cast<std::uint32_t>(Silhouettes::kLooksPerFrame);
-  EXPECT_EQ(silhouettes_.revision(0), looks);
-  EXPECT_TRUE(silhouettes_.look(0, turned(0.15F), Silhouettes::kSharpRad, *rays_, workers_));
-  EXPECT_FALSE(silhouettes_.look(0, turned(0.5F), Silhouettes::kSharpRad, *rays_, workers_));
-  EXPECT_EQ(silhouettes_.revision(0), looks);
-  silhouettes_.begin_frame();
-  EXPECT_TRUE(silhouettes_.look(0, turned(0.5F), Silhouettes::kSharpRad, *rays_, workers_));
-  EXPECT_EQ(silhouettes_.revision(0), looks + 1);
+  const auto looks = static_cast<std::uint32_t>(EntityShadowMaps::kLooksPerFrame);
+  EXPECT_EQ(shadow_maps_.revision(0), looks);
+  EXPECT_TRUE(shadow_maps_.look(0, turned(0.15F), EntityShadowMaps::kSharpRad, *rays_, workers_));
+  EXPECT_FALSE(shadow_maps_.look(0, turned(0.5F), EntityShadowMaps::kSharpRad, *rays_, workers_));
+  EXPECT_EQ(shadow_maps_.revision(0), looks);
+  shadow_maps_.begin_frame();
+  EXPECT_TRUE(shadow_maps_.look(0, turned(0.5F), EntityShadowMaps::kSharpRad, *rays_, workers_));
+  EXPECT_EQ(shadow_maps_.revision(0), looks + 1);
 }
 
 TEST_F(ShadeTest, AShadowLiesInTheSunsDirectionWhateverTheOutlineIsOf) {
@@ -192,14 +193,14 @@ TEST_F(ShadeTest, AShadowLiesInTheSunsDirectionWhateverTheOutlineIsOf) {
   constexpr float kFarM = 300.0F;
   const glm::vec3 sun(to_sun(kNoonNs));
   const glm::vec3 before = glm::normalize(sun + glm::vec3(1e-2F, 1e-2F, 0.0F));
-  (void)silhouettes_.look(0, before, Silhouettes::kSharpRad, *rays_, workers_);
+  (void)shadow_maps_.look(0, before, EntityShadowMaps::kSharpRad, *rays_, workers_);
   const MoverPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kFarM}, true};
-  const PlacedSilhouette placed = silhouettes_.place(0, high, sun);
+  const PlacedShadowMap placed = shadow_maps_.place(0, high, sun);
   for (const float up_m : {kFarM - 1.0F, 0.5F * kFarM, 0.0F}) {
     const glm::vec3 behind_m = high.position_m - (kFarM - up_m) / sun.z * sun;
     for (const float aside : {-0.95F, 0.0F, 0.95F}) {
       const glm::vec4 p(behind_m + aside * glm::vec3(kHalfM, 0.0F, 0.0F), 1.0F);
-      constexpr float kMiddle = 0.5F * Silhouettes::kSide;
+      constexpr float kMiddle = 0.5F * EntityShadowMaps::kSide;
       const float at = glm::length(glm::vec2(glm::dot(placed.column, p) - kMiddle,
                                              glm::dot(placed.row, p) - kMiddle)) *
                        placed.texel_m;
@@ -418,12 +419,12 @@ TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
   }
   const auto rays = CasterRays::create(scene.geometry);
   ASSERT_TRUE(rays.has_value());
-  Silhouettes silhouettes(boxes);
+  EntityShadowMaps shadow_maps(boxes);
   ShadePages shade(all, static_cast<std::uint32_t>(all.samples.size()),
                    ShadeResponse(*heat_, scenario_.materials.size(), {12.0, 305.0}),
                    entities.size(), 0, 0.1F);
   shade.restart(kNoonNs, entities);
-  const ShadePages::Inputs inputs{environment_, entities, *rays, workers_, silhouettes};
+  const ShadePages::Inputs inputs{environment_, entities, *rays, workers_, shadow_maps};
   run_to(shade, kNoonNs, kNoonNs + 2 * kSecondNs, all, inputs);
   EXPECT_FALSE(shade.short_of_pages());
   ASSERT_TRUE(entities.back().append(kNoonNs + 2 * kSecondNs, pose_at(0.0, kHeightM), true, true));
@@ -436,10 +437,10 @@ TEST_F(ShadeTest, AfterAJumpTheLastMinuteIsMadeUpForAndTheRestIsOlder) {
   const SurfaceSamples all = ground();
   const auto vertices_after = [&](std::int64_t seconds_at_a_time) {
     std::vector<PoseHistory> entities{PoseHistory({}, pose_at(0.0, kHeightM))};
-    Silhouettes silhouettes = silhouettes_;
+    EntityShadowMaps shadow_maps = shadow_maps_;
     ShadePages shade = pages(all);
     shade.restart(kNoonNs, entities);
-    const ShadePages::Inputs inputs{environment_, entities, *rays_, workers_, silhouettes};
+    const ShadePages::Inputs inputs{environment_, entities, *rays_, workers_, shadow_maps};
     shade.run(kNoonNs + 30 * kSecondNs, all, inputs);
     EXPECT_TRUE(entities[0].append(kNoonNs + 30 * kSecondNs, pose_at(500.0, kHeightM), true, true));
     for (std::int64_t s = 30; s < 330; s += seconds_at_a_time) {
@@ -467,14 +468,14 @@ TEST_F(ShadeTest, FasterSimTimeMakesNearlyTheSame) {
       EXPECT_TRUE(entities[0].append(kNoonNs + i * (kSecondNs / 10),
                                      pose_at(east_m(0.1 * i), kHeightM), true, false));
     }
-    Silhouettes silhouettes = silhouettes_;
+    EntityShadowMaps shadow_maps = shadow_maps_;
     ShadePages shade = pages(all);
     shade.restart(kNoonNs, entities);
     constexpr std::int64_t kEndNs = 26 * kSecondNs;
     for (std::int64_t t = 0; t < kEndNs;) {
       t = std::min(t + step_ns, kEndNs);
-      silhouettes.begin_frame();
-      shade.run(kNoonNs + t, all, {environment_, entities, *rays_, workers_, silhouettes});
+      shadow_maps.begin_frame();
+      shade.run(kNoonNs + t, all, {environment_, entities, *rays_, workers_, shadow_maps});
     }
     EXPECT_FALSE(shade.short_of_pages());
     return std::vector<float>(shade.vertices_k().begin(), shade.vertices_k().end());
@@ -503,11 +504,11 @@ TEST_F(ShadeTest, WhatIsTooFastForItsPlacesIsLeftOutAndSaidWhereItMatters) {
       EXPECT_TRUE(entities[0].append(kNoonNs + i * (kSecondNs / 10),
                                      pose_at(-100.0 + 0.1 * i * speed_m_s, kHeightM), true, false));
     }
-    Silhouettes silhouettes = silhouettes_;
+    EntityShadowMaps shadow_maps = shadow_maps_;
     ShadePages shade = pages(all, 0.01F);
     shade.restart(kNoonNs, entities);
     shade.run(kNoonNs + kSecondNs / 5, all,
-              {environment_, entities, *rays_, workers_, silhouettes});
+              {environment_, entities, *rays_, workers_, shadow_maps});
     for (const ShadePages::Page& page : shade.pages()) EXPECT_FALSE(page.used);
     return shade.short_of_pages();
   };
@@ -575,7 +576,7 @@ TEST_F(ShadeTest, RaysBelongToOnePageEachOnSlopingGround) {
                                     pose_at(-10.0 + 0.2 * i, kHeightM), true, false));
   }
   shade.run(kNoonNs + 10 * kSecondNs, all,
-            {environment_, entities_, *rays, workers_, silhouettes_});
+            {environment_, entities_, *rays, workers_, shadow_maps_});
   std::vector<float> planes_m;
   for (const ShadePages::Page& page : shade.pages()) {
     if (page.used) planes_m.push_back(page.plane_m);
@@ -612,11 +613,11 @@ TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {
   std::vector<float> first;
   for (const unsigned int threads : {1U, 3U}) {
     threads::WorkerPool workers(threads);
-    Silhouettes silhouettes = silhouettes_;
+    EntityShadowMaps shadow_maps = shadow_maps_;
     ShadePages shade = pages(all);
     shade.restart(kNoonNs, entities_);
     shade.run(kNoonNs + 5 * kSecondNs, all,
-              {environment_, entities_, *rays_, workers, silhouettes});
+              {environment_, entities_, *rays_, workers, shadow_maps});
     const std::vector<float> found(shade.vertices_k().begin(), shade.vertices_k().end());
     if (first.empty()) first = found;
     EXPECT_EQ(found, first);

@@ -76,7 +76,7 @@ TEST(HostStep, ShedsWorkToBeInTimeSaysSoAndStopsSheddingAfterwards) {
   config::PacingConfig pacing;
   pacing.budget_ns = 3 * kMs;
   Rig rig(pacing);
-  rig.script.rungs = {{2.5, 0.0}, {1.2, 0.25}, {0.5, 2.0}};
+  rig.script.quality_levels = {{2.5, 0.0}, {1.2, 0.25}, {0.5, 2.0}};
   const auto frame = [&](std::uint64_t number, std::int64_t work_ns) {
     rig.script.ready = false;
     rig.send(number, static_cast<std::int64_t>(number) * kMs);
@@ -132,7 +132,7 @@ TEST(HostStep, SaysThatItWaitsForASlotOrForRoom) {
 
 TEST(HostStep, WithoutBudgetNothingIsShed) {
   Rig rig;
-  rig.script.rungs = {{2.5, 0.0}, {1.2, 0.25}};
+  rig.script.quality_levels = {{2.5, 0.0}, {1.2, 0.25}};
   for (std::uint64_t k = 1; k < 5; ++k) {
     rig.script.ready = false;
     rig.send(k, static_cast<std::int64_t>(k) * kMs);

@@ -45,7 +45,7 @@ class AtmosphereTable {
   };
 
   /// Smallest transmittance, used in place of smaller ones: the logarithm must stay finite.
-  static constexpr double kLeastTransmittance = 1e-30;
+  static constexpr double kMinTransmittance = 1e-30;
 
   /// Errors: those of validate().
   [[nodiscard]] static Result<AtmosphereTable> build(const AtmosphereGrid& grid);

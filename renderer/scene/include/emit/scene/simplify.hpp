@@ -26,7 +26,7 @@ struct DetailView {
 
 /// Largest share of half a body's width by which its surface may move. Its outline then keeps its
 /// area to some percent, however few pixels it covers.
-inline constexpr double kMostBodyFrac = 0.02;
+inline constexpr double kMaxBodyFrac = 0.02;
 
 /// Distance, by mesh, that the surface may move when it is simplified, in the mesh's own lengths: a
 /// quarter of a pixel seen from the nearest eye, and at most `most_body_frac` of half its own
@@ -34,7 +34,7 @@ inline constexpr double kMostBodyFrac = 0.02;
 /// an entity has it, or the eyes are unknown.
 [[nodiscard]] std::vector<double> simplify_errors(const SceneGeometry& geometry,
                                                   const DetailView& view,
-                                                  double most_body_frac = kMostBodyFrac);
+                                                  double most_body_frac = kMaxBodyFrac);
 
 /// Removes triangles from meshes that have more than their pixels can show, by edge collapses with
 /// a quadric error (Garland and Heckbert 1997, SIGGRAPH). That error is a mean over the faces

@@ -11,9 +11,9 @@ namespace emit::renderer {
 /// material. It is a finite difference around half of the sun in every interval and half of the
 /// sky. It is computed once at the warm-up: the time grows with the number of materials and with
 /// the square of the number of intervals. Immutable; any thread.
-class DriveWorth {
+class DriveSensitivity {
  public:
-  explicit DriveWorth(const SurfaceInputs& inputs);
+  explicit DriveSensitivity(const SurfaceInputs& inputs);
 
   /// Returns the kelvins that the whole sun of interval `interval` of the record, at normal
   /// incidence, adds to the temperature at the end of the record. For another face multiply by the

@@ -17,7 +17,7 @@ namespace emit::renderer {
 
 /// An entity shadow depth map at one pose of its entity. It gives the place on the map of a point p
 /// (rel axes, m) along the sun's rays.
-struct PlacedSilhouette {
+struct PlacedShadowMap {
   glm::vec4 column;      ///< dot with (p, 1) gives texels from the first column
   glm::vec4 row;         ///< dot with (p, 1) gives texels from the first row
   glm::vec4 depth_m;     ///< dot with (p, 1) gives m away from the sun, from the body's origin
@@ -33,17 +33,17 @@ struct PlacedSilhouette {
 /// Owner: CachedSurface. Thread: the renderer's; computes on all cores. Real time: everything but
 /// the constructor is RT-safe. look() sends 16,384 rays to make a map anew, for at most
 /// kLooksPerFrame maps per frame.
-class Silhouettes {
+class EntityShadowMaps {
  public:
   /// Texels along a side of a map.
   static constexpr std::uint32_t kSide = 128;
   /// Depth of open texels, where nothing shades.
   static constexpr float kOpenM = 1e30F;
 
-  Silhouettes() = default;
+  EntityShadowMaps() = default;
   /// Takes memory for one map per entity. `bounds_m` holds the box of each entity in the axes of
   /// its body.
-  explicit Silhouettes(std::span<const scene::Aabb> bounds_m);
+  explicit EntityShadowMaps(std::span<const scene::Aabb> bounds_m);
 
   /// Largest radius, in texels, around a place in a texel for which the texel and its eight
   /// neighbours answer alone.
@@ -66,8 +66,8 @@ class Silhouettes {
             const CasterRays& rays, threads::WorkerPool& workers) noexcept;
   /// Places the map of an entity at a pose. `to_sun` is the unit vector to the sun, rel axes.
   /// @pre look() for about this direction
-  [[nodiscard]] PlacedSilhouette place(std::size_t mover, const MoverPlacement& placement,
-                                       const glm::vec3& to_sun) const noexcept;
+  [[nodiscard]] PlacedShadowMap place(std::size_t mover, const MoverPlacement& placement,
+                                      const glm::vec3& to_sun) const noexcept;
   /// Shaded share of a disc of `radius_texels` around a place on the map, at a depth in m. Only
   /// every `stride`th of the EMIT_SHADE_TAPS taps from `first` on is read. The sum over all first <
   /// stride is the share of all taps.
@@ -130,10 +130,10 @@ struct ShadedBox {
   glm::vec2 low_m;
   glm::vec2 high_m;
 };
-[[nodiscard]] ShadedBox shaded_box(const PlacedSilhouette& silhouette, float plane_m) noexcept;
+[[nodiscard]] ShadedBox shaded_box(const PlacedShadowMap& shadow_map, float plane_m) noexcept;
 
 /// Radius in texels of the penumbra's disc at a depth in m. It is at least as large as needed to
 /// smooth the edges of the texels.
-[[nodiscard]] float penumbra_texels(const PlacedSilhouette& silhouette, float depth_m) noexcept;
+[[nodiscard]] float penumbra_texels(const PlacedShadowMap& shadow_map, float depth_m) noexcept;
 
 }  // namespace emit::renderer

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface/shade/silhouettes.hpp"
+#include "surface/shade/entity_shadow_maps.hpp"
 
 #include <algorithm>
 #include <array>
@@ -47,10 +47,10 @@ const std::array<glm::vec2, EMIT_SHADE_TAPS>& taps() noexcept {
 
 /// Point of the level plane on the sun's ray through a place on the map. Solves column(p) = column
 /// and row(p) = row for x and y by Cramer's rule.
-glm::vec2 on_plane(const PlacedSilhouette& silhouette, float column, float row,
+glm::vec2 on_plane(const PlacedShadowMap& shadow_map, float column, float row,
                    float plane_m) noexcept {
-  const glm::vec4& c = silhouette.column;
-  const glm::vec4& r = silhouette.row;
+  const glm::vec4& c = shadow_map.column;
+  const glm::vec4& r = shadow_map.row;
   const float right_c = column - c.z * plane_m - c.w;
   const float right_r = row - r.z * plane_m - r.w;
   const float determinant = c.x * r.y - c.y * r.x;
@@ -60,7 +60,8 @@ glm::vec2 on_plane(const PlacedSilhouette& silhouette, float column, float row,
 
 }  // namespace
 
-Silhouettes::Silhouettes(std::span<const scene::Aabb> bounds_m) : alone_(bounds_m.size()) {
+EntityShadowMaps::EntityShadowMaps(std::span<const scene::Aabb> bounds_m)
+    : alone_(bounds_m.size()) {
   for (MoverPlacement& placement : alone_) placement.on = false;
   for (const scene::Aabb& box : bounds_m) {
     Tile& tile = tiles_.emplace_back();
@@ -72,8 +73,8 @@ Silhouettes::Silhouettes(std::span<const scene::Aabb> bounds_m) : alone_(bounds_
   (void)taps();
 }
 
-bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
-                       const CasterRays& rays, threads::WorkerPool& workers) noexcept {
+bool EntityShadowMaps::look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
+                            const CasterRays& rays, threads::WorkerPool& workers) noexcept {
   // Keep the map if it still fits, or if the frame may make no more of them.
   Tile& tile = tiles_[mover];
   const float turned_rad = glm::distance(tile.to_sun, to_sun_body);
@@ -140,7 +141,7 @@ bool Silhouettes::look(std::size_t mover, const glm::vec3& to_sun_body, float mo
   return true;
 }
 
-void Silhouettes::look_around(Tile& tile) noexcept {
+void EntityShadowMaps::look_around(Tile& tile) noexcept {
   constexpr auto kEnd = static_cast<int>(kSide);
   for (int y = 0; y < kEnd; ++y) {
     for (int x = 0; x < kEnd; ++x) {
@@ -167,8 +168,8 @@ void Silhouettes::look_around(Tile& tile) noexcept {
   }
 }
 
-PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& placement,
-                                    const glm::vec3& to_sun) const noexcept {
+PlacedShadowMap EntityShadowMaps::place(std::size_t mover, const MoverPlacement& placement,
+                                        const glm::vec3& to_sun) const noexcept {
   const Tile& tile = tiles_[mover];
   EMIT_DCHECK(tile.box_m.empty() || tile.revision > 0);
   const auto line = [&](const glm::vec3& axis_body, float scale, float origin) {
@@ -177,12 +178,12 @@ PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& pla
   };
   // Turn the map's axes into rel axes and scale them to texels.
   const float per_m = 1.0F / tile.texel_m;
-  PlacedSilhouette placed{line(tile.across, per_m, -tile.corner_m.x * per_m),
-                          line(tile.along, per_m, -tile.corner_m.y * per_m),
-                          line(-tile.to_sun, 1.0F, 0.0F),
-                          tile.mean_m,
-                          tile.texel_m,
-                          tile.half};
+  PlacedShadowMap placed{line(tile.across, per_m, -tile.corner_m.x * per_m),
+                         line(tile.along, per_m, -tile.corner_m.y * per_m),
+                         line(-tile.to_sun, 1.0F, 0.0F),
+                         tile.mean_m,
+                         tile.texel_m,
+                         tile.half};
   // Shear the map if the entity has turned a little since: rays must go to the sun of now, through
   // the places that they have at the entity's mean depth.
   const glm::vec4 aside = (placed.depth_m - glm::vec4(0.0F, 0.0F, 0.0F, tile.mean_m)) /
@@ -192,9 +193,9 @@ PlacedSilhouette Silhouettes::place(std::size_t mover, const MoverPlacement& pla
   return placed;
 }
 
-float Silhouettes::shaded_frac(std::size_t mover, float column, float row, float depth_m,
-                               float radius_texels, std::uint32_t first,
-                               std::uint32_t stride) const noexcept {
+float EntityShadowMaps::shaded_frac(std::size_t mover, float column, float row, float depth_m,
+                                    float radius_texels, std::uint32_t first,
+                                    std::uint32_t stride) const noexcept {
   const std::vector<float>& depths_m = tiles_[mover].depth_m;
   constexpr auto kWidth = static_cast<float>(kSide);
   // Return early if the whole disc lies outside the map.
@@ -226,7 +227,7 @@ float Silhouettes::shaded_frac(std::size_t mover, float column, float row, float
   return static_cast<float>(shaded) / EMIT_SHADE_TAPS;
 }
 
-float Silhouettes::caster_m(std::size_t mover, float column, float row) const noexcept {
+float EntityShadowMaps::caster_m(std::size_t mover, float column, float row) const noexcept {
   const Tile& tile = tiles_[mover];
   constexpr float kLast = static_cast<float>(kSide) - 1.0F;
   const float depth_m =
@@ -235,25 +236,26 @@ float Silhouettes::caster_m(std::size_t mover, float column, float row) const no
   return depth_m < kOpenM ? depth_m : tile.mean_m;
 }
 
-float Silhouettes::diagonal_m(std::size_t mover) const noexcept {
+float EntityShadowMaps::diagonal_m(std::size_t mover) const noexcept {
   const scene::Aabb& box_m = tiles_[mover].box_m;
   return box_m.empty() ? 0.0F : static_cast<float>(glm::distance(box_m.min_m, box_m.max_m));
 }
 
-float Silhouettes::rim_m(std::size_t mover, float way_m) const noexcept {
+float EntityShadowMaps::rim_m(std::size_t mover, float way_m) const noexcept {
   static const auto kTangent = static_cast<float>(std::tan(physics::kSunSemiAngleRad));
   // Use the diagonal, because no turn of the box makes texels wider.
   return way_m * kTangent + diagonal_m(mover) * (kRim + 1.0F) / kSide;
 }
 
-glm::vec3 Silhouettes::middle_m(std::size_t mover, const MoverPlacement& placement) const noexcept {
+glm::vec3 EntityShadowMaps::middle_m(std::size_t mover,
+                                     const MoverPlacement& placement) const noexcept {
   const scene::Aabb& box_m = tiles_[mover].box_m;
   return placement.rel_from_body * glm::vec3(0.5 * (box_m.min_m + box_m.max_m)) +
          placement.position_m;
 }
 
-std::array<glm::vec3, 8> Silhouettes::corners_m(std::size_t mover,
-                                                const MoverPlacement& placement) const noexcept {
+std::array<glm::vec3, 8> EntityShadowMaps::corners_m(
+    std::size_t mover, const MoverPlacement& placement) const noexcept {
   std::array<glm::vec3, 8> out = corners(tiles_[mover].box_m);
   for (glm::vec3& corner_m : out) {
     corner_m = placement.rel_from_body * corner_m + placement.position_m;
@@ -261,7 +263,7 @@ std::array<glm::vec3, 8> Silhouettes::corners_m(std::size_t mover,
   return out;
 }
 
-float Silhouettes::top_m(std::size_t mover, const MoverPlacement& placement) const noexcept {
+float EntityShadowMaps::top_m(std::size_t mover, const MoverPlacement& placement) const noexcept {
   float top_m = -std::numeric_limits<float>::infinity();
   for (const glm::vec3& corner_m : corners(tiles_[mover].box_m)) {
     top_m = std::max(top_m, (placement.rel_from_body * corner_m).z);
@@ -269,24 +271,24 @@ float Silhouettes::top_m(std::size_t mover, const MoverPlacement& placement) con
   return top_m;
 }
 
-float penumbra_texels(const PlacedSilhouette& silhouette, float depth_m) noexcept {
+float penumbra_texels(const PlacedShadowMap& shadow_map, float depth_m) noexcept {
   static const auto kTangent = static_cast<float>(std::tan(physics::kSunSemiAngleRad));
   constexpr float kLeast = 0.5F;
-  return std::max(kLeast, (depth_m - silhouette.mean_m) * kTangent / silhouette.texel_m);
+  return std::max(kLeast, (depth_m - shadow_map.mean_m) * kTangent / shadow_map.texel_m);
 }
 
-ShadedBox shaded_box(const PlacedSilhouette& silhouette, float plane_m) noexcept {
-  constexpr auto kEnd = static_cast<float>(Silhouettes::kSide);
+ShadedBox shaded_box(const PlacedShadowMap& shadow_map, float plane_m) noexcept {
+  constexpr auto kEnd = static_cast<float>(EntityShadowMaps::kSide);
   // Find the depth of the shadow's middle on the plane, which gives the width of the penumbra.
-  const glm::vec2 middle_m = on_plane(silhouette, 0.5F * kEnd, 0.5F * kEnd, plane_m);
-  const float depth_m = glm::dot(silhouette.depth_m, glm::vec4(middle_m, plane_m, 1.0F));
-  const float rim = penumbra_texels(silhouette, depth_m);
+  const glm::vec2 middle_m = on_plane(shadow_map, 0.5F * kEnd, 0.5F * kEnd, plane_m);
+  const float depth_m = glm::dot(shadow_map.depth_m, glm::vec4(middle_m, plane_m, 1.0F));
+  const float rim = penumbra_texels(shadow_map, depth_m);
   // Bound the corners of the filled part of the map, widened by the penumbra.
   ShadedBox box{middle_m, middle_m};
-  const glm::vec2 half = silhouette.half + rim;
+  const glm::vec2 half = shadow_map.half + rim;
   for (const float column : {0.5F * kEnd - half.x, 0.5F * kEnd + half.x}) {
     for (const float row : {0.5F * kEnd - half.y, 0.5F * kEnd + half.y}) {
-      const glm::vec2 at_m = on_plane(silhouette, column, row, plane_m);
+      const glm::vec2 at_m = on_plane(shadow_map, column, row, plane_m);
       box.low_m = glm::min(box.low_m, at_m);
       box.high_m = glm::max(box.high_m, at_m);
     }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface/model/drive_worth.hpp"
+#include "surface/model/drive_sensitivity.hpp"
 
 namespace emit::renderer {
 
-DriveWorth::DriveWorth(const SurfaceInputs& inputs) : intervals_(inputs.record.size()) {
+DriveSensitivity::DriveSensitivity(const SurfaceInputs& inputs) : intervals_(inputs.record.size()) {
   constexpr float kHalf = 0.5F;   ///< share of sun and sky around which the difference is taken
   constexpr float kMore = 0.25F;  ///< step of the difference
   const HistoryRecord& record = inputs.record;
