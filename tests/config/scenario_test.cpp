@@ -367,7 +367,7 @@ TEST_F(ConfigTest, a_model_has_a_rotation_and_an_offset_in_its_body) {
   EXPECT_EQ(again->objects[0].model_rotation_rad, object.model_rotation_rad);
   EXPECT_EQ(again->objects[0].model_offset_m, object.model_offset_m);
   EXPECT_EQ(scenario_error("[[object]]\ngltf = \"a.glb\"\nmodel_rotation_deg = [400, 0, 0]\n"),
-            "s.toml:4:22: 'model_rotation_deg' holds 400, must be -360 .. 360");
+            "s.toml:4:22: 'model_rotation_deg' holds 400.0, must be -360 .. 360");
   EXPECT_THAT(scenario_error("[[object]]\ngltf = \"a.glb\"\nmodel_offset_m = [1, 2]\n"),
               ::testing::HasSubstr("'model_offset_m' must be an array of 3 numbers"));
 }

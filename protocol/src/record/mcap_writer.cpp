@@ -53,8 +53,7 @@ struct McapWriter::Impl {
 
   Output chunk;  // records of the chunk in work
   std::map<std::uint16_t, std::vector<IndexEntry>> chunk_index;
-  std::vector<std::uint64_t> chunk_ends;  // where each message of the chunk ends in its records
-  std::uint64_t chunk_first_ns = 0;       // log time of the chunk's first message
+  std::uint64_t chunk_first_ns = 0;  // log time of the chunk's first message
   std::uint64_t chunk_start_ns = 0;
   std::uint64_t chunk_end_ns = 0;
   std::uint32_t chunk_count = 0;
@@ -138,7 +137,6 @@ struct McapWriter::Impl {
     scratch.number(crc32(chunk.bytes()));
     scratch.string("");  // not compressed
     scratch.number(std::uint64_t{chunk.size()});
-    const std::uint64_t messages_at = scratch.size();
     scratch.raw(chunk.bytes());
     scratch.end_record(record);
     const std::uint64_t record_bytes = scratch.size();
@@ -174,13 +172,9 @@ struct McapWriter::Impl {
     chunk.clear();
     chunk_index.clear();
     const auto written = put(scratch.bytes());
-    // A disk that fills up takes a part of the chunk. A reader gets the whole messages of that
-    // part.
-    const std::uint64_t taken_bytes = file_bytes - chunk_at;
-    for (const std::uint64_t end : chunk_ends) {
-      if (messages_at + end <= taken_bytes) ++messages_in_file;
-    }
-    chunk_ends.clear();
+    // A disk that fills up may take the chunk and not all of its index. A reader then has the
+    // messages.
+    if (file_bytes - chunk_at >= record_bytes) messages_in_file = message_count;
     if (!written) return written;
     ++chunk_count;
     auto kept = chunk_indexes.append(index_record.bytes());
@@ -406,7 +400,6 @@ Result<void> McapWriter::write(std::uint16_t channel_id, std::uint32_t sequence,
   }
   self.chunk_index[channel_id].push_back({log_ns, self.chunk.size()});
   Impl::append_message(self.chunk, channel_id, sequence, log_ns, publish_ns, data);
-  self.chunk_ends.push_back(self.chunk.size());
   self.chunk_start_ns = std::min(self.chunk_start_ns, log_ns);
   self.chunk_end_ns = std::max(self.chunk_end_ns, log_ns);
   const bool full = self.chunk.size() >= self.options.chunk_bytes;

@@ -286,10 +286,15 @@ class CoplanarCutter {
     }
     std::ranges::sort(boxes, {}, [](const Box& box) { return box.min.x; });
     std::vector<Box> active;
+    std::set<std::uint32_t> hidden;  // facets that lie wholly under one other
     for (const Box& box : boxes) {
-      std::erase_if(active, [&](const Box& other) { return other.max.x <= box.min.x; });
+      std::erase_if(active, [&](const Box& other) {
+        return other.max.x <= box.min.x || hidden.contains(other.facet);
+      });
       for (const Box& other : active) {
-        if (other.max.y <= box.min.y || other.min.y >= box.max.y) continue;
+        if (hidden.contains(box.facet)) break;
+        if (hidden.contains(other.facet) || other.max.y <= box.min.y || other.min.y >= box.max.y)
+          continue;
         const Facet& a = facets_[box.facet];
         const Facet& b = facets_[other.facet];
         if (a.material == b.material || is_known_group(a, b) || !one_plane(a, b)) continue;
@@ -301,9 +306,13 @@ class CoplanarCutter {
             equal ? std::tie(a.part, a.submesh) > std::tie(b.part, b.submesh) : area_a < area_b;
         const std::uint32_t top = a_covers ? box.facet : other.facet;
         const std::uint32_t bottom = a_covers ? other.facet : box.facet;
-        if (overlap(facets_[bottom], facets_[top])) covers_[bottom].insert(top);
+        if (!overlap(facets_[bottom], facets_[top])) continue;
+        covers_[bottom].insert(top);
+        // What a hidden facet covers, its own cover covers too. Without it a stack of equal facets
+        // costs time in proportion to its height.
+        if (hides(facets_[bottom], facets_[top])) hidden.insert(bottom);
       }
-      active.push_back(box);
+      if (!hidden.contains(box.facet)) active.push_back(box);
     }
   }
 
@@ -362,6 +371,16 @@ class CoplanarCutter {
     const double around = perimeter(inside);
     return around > 0.0 &&
            2.0 * std::abs(area2(inside)) > kMinWidthFrac * std::sqrt(top.area_m2) * around;
+  }
+
+  /// Returns true if no part of `bottom` reaches out from under `top`.
+  static bool hides(const Facet& bottom, const Facet& top) {
+    const Projection flat(bottom.normal);
+    return std::ranges::all_of(sides(top, flat, {0.0, 0.0, 0.0}), [&](const Line& line) {
+      return std::ranges::all_of(bottom.corner_m, [&](const glm::dvec3& corner) {
+        return line.side(flat(corner)) >= -tolerance_of(top);
+      });
+    });
   }
 
   /// Edges that two covering facets share; a cut goes on below them.

@@ -44,15 +44,4 @@ HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& hi
   return record;
 }
 
-HistoryRecord extend_history_record(const StepPlan& plan, SurfaceHistory& history,
-                                    const RecordInputs& inputs) {
-  HistoryRecord record;
-  for (const HistoryInterval& interval : plan.intervals()) {
-    const IntervalForcing forcing =
-        history.extend(interval.begin_ns, interval.end_ns, inputs.environment);
-    append(record, interval, forcing, plan.intervals().back().end_ns, inputs);
-  }
-  return record;
-}
-
 }  // namespace emit::renderer

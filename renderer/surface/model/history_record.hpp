@@ -21,7 +21,7 @@ struct HistoryRecord {
   [[nodiscard]] std::size_t size() const noexcept { return intervals.size(); }
 };
 
-/// Inputs of make_history_record() and extend_history_record(). All of them must outlive the call.
+/// Inputs of make_history_record(). All of them must outlive the call.
 struct RecordInputs {
   const SampleHeat& heat;                 ///< thermal model, which sizes and fills the gains
   const Environment& environment;         ///< sun and weather
@@ -35,11 +35,5 @@ struct RecordInputs {
 /// @pre history.update() has been called with this plan
 [[nodiscard]] HistoryRecord make_history_record(const StepPlan& plan, const SurfaceHistory& history,
                                                 const RecordInputs& inputs);
-
-/// Makes the record of the plan's intervals and extends `history` to their end. The first interval
-/// begins at the instant that `history` has reached, so the record has no tail. Setup only: it
-/// allocates.
-[[nodiscard]] HistoryRecord extend_history_record(const StepPlan& plan, SurfaceHistory& history,
-                                                  const RecordInputs& inputs);
 
 }  // namespace emit::renderer

@@ -14,7 +14,6 @@
 #include "emit/physics/surface_balance.hpp"
 #include "history/foster_history.hpp"
 #include "surface/mesh/sheet_sides.hpp"
-#include "surface/warm_up/carry_on.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -219,8 +218,7 @@ physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const Mod
     if (!saved.start) return std::nullopt;
     return tl::unexpected(std::move(read.error()));
   }
-  // Refuse a state of another instant, or for another camera.
-  if (!saved.start && read->at_ns != work.start_ns) return std::nullopt;
+  // Refuse a state for another camera.
   if (saved.fits_camera && !saved.fits_camera(read->eyes)) {
     if (!saved.start) return std::nullopt;
     return physics::make_error(
@@ -233,24 +231,6 @@ physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const Mod
   // Bring plan and history to the instant of the state.
   work.plan.update(read->at_ns, work.inputs.environment, work.inputs.entities);
   work.history.update(work.plan, work.inputs.environment);
-  if (read->at_ns == work.start_ns) return std::move(*read);
-
-  // Advance the state from there, in steps that are short near the end.
-  scene::ThermalOptions ahead = options_;
-  ahead.history_start_ns = read->at_ns;
-  const std::int64_t way_ns = work.start_ns - read->at_ns;
-  ahead.steps = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
-      (way_ns + interval_ns_ - 1) / interval_ns_, 1, std::max<std::int64_t>(1, options_.steps)));
-  StepPlan plan(ahead);
-  plan.update(work.start_ns, work.inputs.environment, work.inputs.entities);
-  const HistoryRecord record =
-      extend_history_record(plan, work.history, record_inputs(work.inputs));
-  if (auto carried =
-          carry_on(surface_inputs(record, work.history, {}), work.options, *read, work.progress);
-      !carried) {
-    return tl::unexpected(std::move(carried.error()));
-  }
-  read->at_ns = work.start_ns;
   return std::move(*read);
 }
 

@@ -79,7 +79,7 @@ class CachedSurface {
 
   /// Samples the surface for `now_ns`, or takes it from `saved` and advances it to there. It also
   /// computes the interval that holds `now_ns`, and brings `plan` and `history` there. Setup:
-  /// seconds. Errors: those of build_surface_model(), read_state(), carry_on() and write_state();
+  /// seconds. Errors: those of build_surface_model(), read_state() and write_state();
   /// config (the saved surface was refined for another camera).
   [[nodiscard]] physics::Result<void> prepare(std::int64_t now_ns, const RefineView& view,
                                               const Inputs& inputs, StepPlan& plan,

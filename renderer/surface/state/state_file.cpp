@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <fstream>
 #include <limits>
 #include <string>
 #include <system_error>
@@ -273,10 +274,10 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   key[static_cast<std::size_t>(StatePart::live)] = wanted.live_hash(header.at_ns);
   const std::string parts = different_parts(header.key, key);
   if (!parts.empty()) return "made for another scenario, different in: " + parts;
-  if (header.at_ns > wanted.start_ns) {
-    return fmt::format(
-        "holds the surface at {:.3f} s, and this run starts at {:.3f} s, before that",
-        1e-9 * static_cast<double>(header.at_ns), 1e-9 * static_cast<double>(wanted.start_ns));
+  if (header.at_ns != wanted.start_ns) {
+    return fmt::format("holds the surface at {:.3f} s, and this run starts at {:.3f} s",
+                       1e-9 * static_cast<double>(header.at_ns),
+                       1e-9 * static_cast<double>(wanted.start_ns));
   }
   return "";
 }

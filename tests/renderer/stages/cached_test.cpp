@@ -201,7 +201,7 @@ TEST(RendererCached, TheLimitOfSamplesHoldsWithThoseAcrossEdges) {
     for (const Quad& quad : box({x_m, 1.0, 0.0}, {x_m + 0.4, 1.4, 0.5})) quads.push_back(quad);
   }
   quads.push_back(ground(12.0, 12.0));
-  for (const std::uint32_t max_samples : {1000U, 2000U, 4000U}) {
+  for (const std::uint32_t max_samples : {1000U, 2000U, 3000U}) {
     auto scenario = cached_scenario(write_quads("blocks", quads));
     scenario.thermal.model = scene::ThermalModel::foster;
     scenario.thermal.tolerance_k = 0.05;
