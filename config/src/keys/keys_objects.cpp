@@ -95,7 +95,7 @@ Key<ObjectDraft> model_rotation() {
   return custom<ObjectDraft>(
       {"model_rotation_deg", "array of 3 floats", "deg", "-360 .. 360",
        "Rotation of the model in its body: heading (nose to the right), pitch (nose up), roll "
-       "(right side down). A model whose nose lies along glTF +x needs [90, 0, 0].",
+       "(right side down). [90, 0, 0] turns +x forward.",
        false},
       [](ObjectDraft& out, const Node& node, Diagnostics& diagnostics) {
         double values_deg[3] = {0.0, 0.0, 0.0};

@@ -308,8 +308,8 @@ class CoplanarCutter {
         const std::uint32_t bottom = a_covers ? other.facet : box.facet;
         if (!overlap(facets_[bottom], facets_[top])) continue;
         covers_[bottom].insert(top);
-        // What a hidden facet covers, its own cover covers too. Without it a stack of equal facets
-        // costs time in proportion to its height.
+        // The cover of a hidden facet covers what that facet covers, too. So a stack of equal
+        // facets costs time in proportion to its height.
         if (hides(facets_[bottom], facets_[top])) hidden.insert(bottom);
       }
       if (!hidden.contains(box.facet)) active.push_back(box);
