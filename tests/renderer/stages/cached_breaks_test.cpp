@@ -377,22 +377,29 @@ TEST(RendererCachedBreaks, MoreMaterialsThanAPixelCanNameAreRefused) {
   auto scenario = instant_scenario(file);
   const scene::Material material = scenario.materials.front();
   std::string materials = R"({"name":"surface"})";
-  std::string primitives = R"({"attributes":{"POSITION":0},"material":0})";
+  const std::string mesh = R"({"primitives":[{"attributes":{"POSITION":0},"material":0}]})";
   const auto replace = [&text](const std::string& from, const std::string& to) {
     ASSERT_NE(text.find(from), std::string::npos);
     text.replace(text.find(from), from.size(), to);
   };
   std::string more_materials = materials;
-  std::string more_primitives = primitives;
+  // Every material has a floor of its own: surfaces that cover each other are cut.
+  std::string more_meshes = mesh;
+  std::string more_nodes = R"({"mesh":0})";
+  std::string more_roots = "0";
   for (std::size_t i = 1; i < kMaterials; ++i) {
     const std::string number = std::to_string(i);
     more_materials += R"(,{"name":"m)" + number + R"("})";
-    more_primitives += R"(,{"attributes":{"POSITION":0},"material":)" + number + "}";
+    more_meshes += R"(,{"primitives":[{"attributes":{"POSITION":0},"material":)" + number + "}]}";
+    more_nodes += R"(,{"translation":[0,)" + number + R"(,0],"mesh":)" + number + "}";
+    more_roots += "," + number;
     scenario.materials.push_back(material);
     scenario.materials.back().name = "m" + number;
   }
   replace(materials, more_materials);
-  replace(primitives, more_primitives);
+  replace(mesh, more_meshes);
+  replace(R"("nodes":[{"mesh":0}])", R"("nodes":[)" + more_nodes + "]");
+  replace(R"("nodes":[0])", R"("nodes":[)" + more_roots + "]");
   std::ofstream(file) << text;
   const auto made = renderer::Renderer::create(scenario, {}, {});
   ASSERT_FALSE(made.has_value());
