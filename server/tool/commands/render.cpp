@@ -39,14 +39,14 @@ struct RenderOptions {
 
 /// Settings of --quality preview. They cost a few seconds for a scene of 50'000 triangles.
 std::vector<std::string> preview_set() {
-  return {"thermal.method=\"cached\"", "thermal.max_samples=120000", "thermal.tolerance_k=2",
+  return {"thermal.method=\"cached\"", "thermal.max_samples=320000", "thermal.tolerance_k=2",
           "thermal.first_step_s=120",  "thermal.lateral=false",      "thermal.exchange=false",
           "thermal.shadow_map_px=512", "thermal.max_cascades=1"};
 }
 
 constexpr const char* kPreviewText =
     "preview: leaves out conduction along the surface and exchange of radiation between faces; "
-    "shadows in the temperatures are coarse, and steps of the history are long\n";
+    "temperatures aim at 2 K instead of thermal.tolerance_k, and shadows are coarse\n";
 
 /// What one run renders: an image at every instant, which all bands take their radiance from.
 struct Plan {
@@ -421,7 +421,8 @@ void add_options(CommandLine& line, RenderOptions& options) {
   line.option(
           "--time-s", options.times_s,
           "Simulated time since the scenario's epoch, s; repeatable: all are rendered after one "
-          "warm-up, in ascending order")
+          "warm-up, in ascending order. As in the daemon, edges of shadows that moved since the "
+          "first time may be coarser than in a run of their own")
       .repeatable()
       .type_name("S")
       .required();

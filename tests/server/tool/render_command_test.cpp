@@ -74,12 +74,14 @@ TEST(CliRender, the_cached_method_says_how_many_samples_it_has) {
   EXPECT_EQ(json_value(json, "nonfinite_px"), "0");
 }
 
-/// Largest difference in kelvin that `emit compare` finds; NaN when it fails.
-double difference_k(const TemporaryFolder& folder, const std::string& a, const std::string& b) {
+/// Figure of the difference of temperatures that `emit compare` finds, K: "max" or "rms".
+double difference_k(const TemporaryFolder& folder, const std::string& a, const std::string& b,
+                    const std::string& figure) {
   const ProcessResult diff =
       run_emit({"compare", folder.file(a), folder.file(b), "--json", folder.file("diff.json")});
   EXPECT_EQ(diff.exit_code, 0) << diff.err;
-  return std::stod("0" + json_value(read_text(folder.file("diff.json")), "max_error_k"));
+  const std::string json = read_text(folder.file("diff.json"));
+  return std::stod(json_value(json.substr(json.find("\"temperature\"")), figure));
 }
 
 /// Several times after one warm-up are the images of as many runs.
@@ -87,33 +89,38 @@ class CliRenderSeveral : public testing::TestWithParam<const char*> {};
 
 TEST_P(CliRenderSeveral, times_and_bands_give_the_images_of_single_runs) {
   const TemporaryFolder folder;
-  const std::vector<std::string> method{"--set", std::string("thermal.method=") + GetParam()};
+  const std::vector<std::string> method{"--set", std::string("thermal.method=") + GetParam(),
+                                        "--set", "thermal.steps=27"};
   auto all = render(folder.file("all.exr"), method);
   // The later time comes first: the order on the command line does not matter.
-  all[3] = "13500";
+  all[3] = "16200";
   for (const char* word : {"--time-s", "12600", "--band", "3-5", "--band", "8-12"}) {
     all.emplace_back(word);
   }
   all.insert(all.end(), {"--png", folder.file("{band}.png"), "--json", folder.file("all.json")});
   const ProcessResult result = run_emit(all);
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_LT(result.out.find("all_t12600_3-5.exr"), result.out.find("all_t13500_3-5.exr"));
+  EXPECT_LT(result.out.find("all_t12600_3-5.exr"), result.out.find("all_t16200_3-5.exr"));
   for (const char* png :
-       {"3-5_t12600.png", "3-5_t13500.png", "8-12_t12600.png", "8-12_t13500.png"}) {
+       {"3-5_t12600.png", "3-5_t16200.png", "8-12_t12600.png", "8-12_t16200.png"}) {
     EXPECT_TRUE(std::filesystem::exists(folder.file(png))) << png;
   }
-  for (const char* time : {"12600", "13500"}) {
+  for (const char* time : {"12600", "16200"}) {
     for (const char* band : {"3-5", "8-12"}) {
       auto one = render(folder.file("one.exr"), method);
       one[3] = time;
       one.insert(one.end(), {"--band", band});
       ASSERT_EQ(run_emit(one).exit_code, 0);
       const std::string name = std::string("all_t") + time + "_" + band + ".exr";
-      const double limit_k = std::string(GetParam()) == "per-frame" ? 0.0 : 0.2;
-      EXPECT_LE(difference_k(folder, name, "one.exr"), limit_k) << name;
+      if (std::string(GetParam()) == "per-frame") {
+        EXPECT_EQ(difference_k(folder, name, "one.exr", "max"), 0.0) << name;
+      } else {
+        // Only edges of shadows that moved since the warm-up are coarser than in a run of its own.
+        EXPECT_LT(difference_k(folder, name, "one.exr", "rms"), 0.4) << name;
+      }
     }
   }
-  EXPECT_GT(difference_k(folder, "all_t12600_8-12.exr", "all_t13500_8-12.exr"), 0.5);
+  EXPECT_GT(difference_k(folder, "all_t12600_8-12.exr", "all_t16200_8-12.exr", "rms"), 1.0);
   const std::string json = read_text(folder.file("all.json"));
   std::size_t frames = 0;
   for (std::size_t at = json.find("\"sim_time_s\""); at != std::string::npos;
@@ -151,7 +158,7 @@ TEST(CliRender, png_of_chooses_what_the_colours_stand_for) {
   EXPECT_NE(without, png("t.png", {"--png-of", "temperature"}));
   EXPECT_NE(without, png("r.png", {"--png-of", "radiance"}));
   // The picture does not change what the frame holds.
-  EXPECT_EQ(difference_k(folder, "d.png.exr", "t.png.exr"), 0.0);
+  EXPECT_EQ(difference_k(folder, "d.png.exr", "t.png.exr", "max"), 0.0);
 }
 
 TEST(CliRender, preview_says_what_it_leaves_out_and_set_counts_more) {
