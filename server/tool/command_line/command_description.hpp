@@ -5,7 +5,7 @@
 
 namespace emit::tool {
 
-/// What a value names, for completion in a shell.
+/// Kind of things that a value names, for completion in a shell.
 enum class ValueKind : unsigned char { text, file, folder };
 
 /// One option, flag or positional argument of a command, as --help shows it.

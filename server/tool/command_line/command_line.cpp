@@ -17,7 +17,7 @@ namespace emit::tool {
 
 namespace detail {
 
-/// What is known of a program's commands beside what CLI11 keeps.
+/// Facts about a program's commands that CLI11 does not keep.
 struct Registry {
   struct Leaf {
     CLI::App* app = nullptr;

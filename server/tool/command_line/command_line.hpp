@@ -30,7 +30,7 @@ struct Registry;
 class Option {
  public:
   Option& required();
-  /// What --help calls the value, e.g. "FILE".
+  /// Sets what --help calls the value, e.g. "FILE".
   Option& type_name(const std::string& name);
   /// Other values end the program with exit code 2. Both ends belong to the range.
   Option& in_range(int low, int high);

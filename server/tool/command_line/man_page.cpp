@@ -57,7 +57,7 @@ std::string value_of(const OptionDescription& option) {
                               : option.value;
 }
 
-/// How an option or argument is written on a command line.
+/// Form of an option or argument on a command line.
 std::string usage(const OptionDescription& option) {
   std::string text;
   if (option.positional) {

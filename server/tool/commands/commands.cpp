@@ -8,7 +8,7 @@
 namespace emit::tool {
 namespace {
 
-/// In the order of `emit --help`.
+/// The order is that of `emit --help`.
 constexpr void (*kCommands[])(CommandLine&) = {
     add_render,  add_solve, add_inspect,    add_compare, add_generate, add_view,
     add_demo,    add_serve, add_receive,    add_stat,    add_send,     add_latency,

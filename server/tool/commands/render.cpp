@@ -48,7 +48,7 @@ constexpr const char* kPreviewText =
     "preview: leaves out conduction along the surface and exchange of radiation between faces; "
     "temperatures aim at 2 K instead of thermal.tolerance_k, and shadows are coarse\n";
 
-/// What one run renders: an image at every instant, which all bands take their radiance from.
+/// Frames of one run: an image at every instant, which all bands take their radiance from.
 struct Plan {
   std::vector<double> times_s;     ///< ascending
   std::vector<std::size_t> bands;  ///< indices into the scenario's bands
@@ -401,7 +401,7 @@ physics::Result<void> Rendering::run() {
 int run(const RenderOptions& command) {
   ScenarioChoice input = command.input;
   if (command.quality == "preview") {
-    // What the user sets comes later, and counts.
+    // The keys that the user sets come later, so that they count.
     const std::vector<std::string> preview = preview_set();
     input.set.insert(input.set.begin(), preview.begin(), preview.end());
   }

@@ -9,7 +9,7 @@
 
 #include "emit/physics/error.hpp"
 
-/// What every subcommand shares towards the terminal. Single thread, setup only.
+/// Output of every subcommand to the terminal. Single thread, setup only.
 namespace emit::tool {
 
 enum ExitCode : int {
@@ -25,7 +25,7 @@ int fail(int code, std::string_view text);
 int fail(const physics::Error& error);
 /// The same of something that judges what the command was called with: invalid_argument is 2.
 int fail_call(const physics::Error& error);
-/// For errors met while reading a scenario or daemon configuration: always 78.
+/// Reports errors met while reading a scenario or daemon configuration: always 78.
 int fail_config(const physics::Error& error);
 void warn(std::string_view text);
 /// Where a command's text for people goes: standard output, or standard error when `--json -` takes

@@ -30,7 +30,7 @@ std::string value_of(const std::string& line, const std::string& key) {
   return line.substr(from, line.find_first_of(" \t\r\n\"", from) - from);
 }
 
-/// What the log of a daemon says about its start.
+/// State of a daemon's start as its log says it.
 struct StartState {
   std::optional<std::string> ready_line;
   std::uint64_t warm_up_percent = 0;

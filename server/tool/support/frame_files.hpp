@@ -21,9 +21,9 @@ namespace emit::tool {
 /// over 150..1500 K; outside it the end of the table. Setup only to build; lookup any thread.
 class ApparentTemperature {
  public:
-  /// Of a band with its response. Precondition: physics::validate().
+  /// Makes the table of a band with its response. Precondition: physics::validate().
   explicit ApparentTemperature(const physics::Band& band);
-  /// Of a rectangular band. Precondition: 0 < lo_um < hi_um.
+  /// Makes the table of a rectangular band. Precondition: 0 < lo_um < hi_um.
   ApparentTemperature(double lo_um, double hi_um);
   [[nodiscard]] double kelvin(double radiance_w_m2_sr) const noexcept;
   /// dT/dL there, K per W m-2 sr-1.
@@ -43,7 +43,7 @@ class ApparentTemperature {
 [[nodiscard]] std::optional<physics::Band> spectral_band(const image::FrameMetadata& metadata);
 /// The response for a frame's attributes.
 [[nodiscard]] std::vector<physics::ResponsePoint> response_of(const scene::SpectralBand& band);
-/// How radiances become kelvins, for the user: "band 3-5 um by its response of 12 points".
+/// Text that says how radiances become kelvins: "band 3-5 um by its response of 12 points".
 [[nodiscard]] std::string conversion_text(const physics::Band& band, bool response_known);
 
 /// Planes of one frame on their way to disk; empty planes are left out.
@@ -66,7 +66,7 @@ struct FramePlanes {
   std::uint32_t sensor_height_px = 0;
 };
 
-/// What the colours of a picture stand for.
+/// Quantity that the colours of a picture stand for.
 enum class PngQuantity : unsigned char {
   apparent,  ///< temperature of a blackbody of the pixel's radiance in the band, as a sensor sees
   temperature,  ///< temperature of the surface itself, without sky
@@ -76,7 +76,7 @@ enum class PngQuantity : unsigned char {
 /// "apparent", "temperature" or "radiance". @pre `text` is one of them.
 [[nodiscard]] PngQuantity png_quantity(std::string_view text) noexcept;
 
-/// What a PNG shows, and in which colours. The limits are those of temperatures; radiance is shown
+/// Content and colours of a PNG. The limits are those of temperatures; radiance is shown
 /// between its 1st and 99th percentile. A colour bar lies beside the picture.
 struct PngStyle {
   double min_k = 280.0;

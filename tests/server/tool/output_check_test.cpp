@@ -73,14 +73,19 @@ TEST_F(OutputCheck, what_cannot_be_written_is_named_with_the_reason) {
 }
 
 TEST_F(OutputCheck, permissions_count) {
-  if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
-  ASSERT_EQ(::mkdir((folder_ / "closed").c_str(), 0500), 0);
-  ASSERT_EQ(::chmod((folder_ / "old").c_str(), 0400), 0);
+  ASSERT_EQ(::mkdir((folder_ / "closed").c_str(), 0555), 0);
+  ASSERT_EQ(::chmod((folder_ / "old").c_str(), 0444), 0);
+  ASSERT_EQ(::chmod(folder_.c_str(), 0755), 0);
+  // Root may write everywhere, and other users may not.
+  const bool root = ::geteuid() == 0;
+  constexpr uid_t kNobody = 65534;
+  if (root) ASSERT_EQ(::seteuid(kNobody), 0);
   expect_error(check_output_file(folder_ / "closed" / "x"), folder_ / "closed" / "x",
                "Permission denied");
   expect_error(check_output_folder(folder_ / "closed" / "x"), folder_ / "closed" / "x",
                "Permission denied");
   expect_error(check_output_file(folder_ / "old"), folder_ / "old", "Permission denied");
+  if (root) ASSERT_EQ(::seteuid(0), 0);
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ class BashCompletion : public testing::Test {
     write_text(folder_.file("here.toml"), "");
     std::filesystem::create_directory(folder_.file("sub"));
   }
-  /// What bash offers behind `words`; the last of them is being typed.
+  /// Candidates that bash offers behind `words`; the last of them is being typed.
   [[nodiscard]] std::set<std::string> candidates(const Words& words) const {
     std::string line;
     for (const std::string& word : words) line += " '" + word + "'";
