@@ -63,8 +63,8 @@ server/agents/conductor: server/agents server/net server/pacing server/rt config
 server/agents/recorder: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/render: server/agents server/pacing renderer/image renderer/physics
 server/app: server/host server/agents server/agents/conductor server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
-server/tool/support: server/app server/pacing config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
-server/tool/command_line: server/tool/support renderer/physics
+server/tool/support: server/app server/pacing server/telemetry config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
+server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene
 server/tool/view: server/tool/support server/tool/streams server/client renderer/image renderer/include renderer/physics
 server/bench/stability: server/tool/command_line server/tool/support renderer/image renderer/include renderer/physics renderer/scene renderer/verify

@@ -83,8 +83,19 @@ FrameSourceFactory DaemonImpl::source_factory() {
         config_.pacing.mode != config::PacingMode::host_step || config_.pacing.budget_ns > 0;
     output.ladder = deadlines ? renderer::Ladder::live : renderer::Ladder::none;
     return make_renderer_source(*scenario_, device, output,
-                                [this](double done_frac) { return health_.warming_up(done_frac); });
+                                [this](double done_frac) { return warming_up(done_frac); });
   };
+}
+
+bool DaemonImpl::warming_up(double done_frac) {
+  if (!warm_up_meter_) warm_up_meter_.emplace(clock_);
+  if (const auto report = warm_up_meter_->due(done_frac)) {
+    log_->write(LogLevel::info,
+                fmt::format("event=warm_up done_percent={}{} text=\"{}\"", report->done_percent,
+                            report->left_s ? fmt::format(" left_s={:.0f}", *report->left_s) : "",
+                            progress_text("warm-up", *report)));
+  }
+  return health_.warming_up(done_frac);
 }
 
 physics::Result<void> DaemonImpl::setup() {

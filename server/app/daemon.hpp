@@ -4,7 +4,9 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "agents/frame_source.hpp"
 #include "emit/config/daemon_config.hpp"
@@ -77,9 +79,20 @@ class Daemon {
   [[nodiscard]] virtual std::string ready_line() const = 0;
 };
 
-/// The function main() of emitd and of `emit serve`. Exit codes: 0 after SIGTERM or SIGINT, 2
-/// usage, 75 the device was lost, 78 bad configuration (file:line:column on standard error), 1
-/// otherwise.
+/// One option of emitd, as its --help shows it.
+struct DaemonOption {
+  std::string_view name;   ///< with dashes
+  std::string_view value;  ///< what the value is called; empty: a flag
+  std::string_view text;
+  bool required = false;
+  bool repeatable = false;
+};
+[[nodiscard]] std::span<const DaemonOption> daemon_options() noexcept;
+/// Exit codes of emitd, as its --help shows them.
+[[nodiscard]] std::string_view daemon_exit_codes() noexcept;
+
+/// Runs emitd; main() of emitd and `emit serve` call it. Exit codes: 0 after SIGTERM or SIGINT, 2 usage, 75
+/// the device was lost, 78 bad configuration (file:line:column on standard error), 1 otherwise.
 /// @param program  name shown in messages, "emitd" or "emit serve"; argv[0] is skipped.
 [[nodiscard]] int emitd_main(int argc, char** argv, const char* program = "emitd");
 

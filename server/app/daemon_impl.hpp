@@ -24,6 +24,7 @@
 #include "telemetry/log.hpp"
 #include "telemetry/metrics_server.hpp"
 #include "telemetry/metrics_text.hpp"
+#include "telemetry/progress.hpp"
 #include "telemetry/ptp_monitor.hpp"
 #include "telemetry/status_board.hpp"
 
@@ -116,6 +117,9 @@ class DaemonImpl final : public Daemon {
   void warn(const std::string& text);
   void log_congestion_control(const CongestionControl& tcp);
   void log_scene(const renderer::SceneStats& scene);
+  /// Progress of the warm-up to the service manager and, every few seconds, to the log. Always goes
+  /// on. Thread: the render agent's, before it serves.
+  bool warming_up(double done_frac);
   void plan_realtime(AgentRunner& runner) const {
     runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
   }
@@ -141,6 +145,7 @@ class DaemonImpl final : public Daemon {
   ClockWatch clock_watch_{clock_};
 
   ServiceNotifier nobody_;
+  std::optional<ProgressMeter> warm_up_meter_;  ///< from the first report on
   ServiceHealth health_{options_.notifier != nullptr ? *options_.notifier : nobody_};
   RealtimeReport realtime_;
   std::unique_ptr<PtpMonitor> ptp_;

@@ -58,20 +58,40 @@ struct Arguments {
   bool check = false;
 };
 
+constexpr DaemonOption kOptions[] = {
+    {.name = "--config",
+     .value = "FILE",
+     .text = "daemon configuration (TOML); config/README.md lists the keys",
+     .required = true},
+    {.name = "--set",
+     .value = "key=value",
+     .text = "overrides a key of the configuration or of the scenario",
+     .repeatable = true},
+    {.name = "--check",
+     .text = "load configuration, scenario, certificates and keys, say what is wrong,\n"
+             "and exit; ports, folders and the device are not tried"}};
+
+/// Text of several lines with `indent` before each but the first.
+std::string indented(std::string_view text, std::string_view indent) {
+  std::string out;
+  for (const char c : text) {
+    out += c;
+    if (c == '\n') out += indent;
+  }
+  return out;
+}
+
 void print_usage(std::FILE* out, const char* program) {
-  fmt::print(
-      out,
-      "usage: {} --config FILE [--set key=value]... [--check]\n"
-      "       {} --version | --help\n"
-      "\n"
-      "  --config FILE    daemon configuration (TOML); config/README.md lists the keys\n"
-      "  --set key=value  overrides a key of the configuration or of the scenario\n"
-      "  --check          load configuration, scenario, certificates and keys, say what is wrong,\n"
-      "                   and exit; ports, folders and the device are not tried\n"
-      "\n"
-      "exit: 0 after SIGTERM or SIGINT, 2 usage, 75 the device was lost (start it again),\n"
-      "      78 bad configuration, 1 otherwise\n",
-      program, program);
+  fmt::print(out,
+             "usage: {} --config FILE [--set key=value]... [--check]\n"
+             "       {} --version | --help\n"
+             "\n",
+             program, program);
+  for (const DaemonOption& option : kOptions) {
+    fmt::print(out, "  {:<15}  {}\n", fmt::format("{} {}", option.name, option.value),
+               indented(option.text, std::string(19, ' ')));
+  }
+  fmt::print(out, "\nexit: {}\n", indented(daemon_exit_codes(), std::string(6, ' ')));
 }
 
 /// Returns an exit code, or -1 to go on.
@@ -214,6 +234,15 @@ int serve(const Arguments& arguments, const char* program) {
 }
 
 }  // namespace
+
+std::span<const DaemonOption> daemon_options() noexcept {
+  return kOptions;
+}
+
+std::string_view daemon_exit_codes() noexcept {
+  return "0 after SIGTERM or SIGINT, 2 usage, 75 the device was lost (start it again),\n"
+         "78 bad configuration, 1 otherwise";
+}
 
 int emitd_main(int argc, char** argv, const char* program) {
   Arguments arguments;

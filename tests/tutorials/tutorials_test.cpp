@@ -60,6 +60,28 @@ TEST(Tutorials, Rig) {
   run_shell_snippets("rig.md");
 }
 
+/// Manual pages and completion scripts lie where man(1) and the shells look for them.
+TEST(Installation, HasManualPagesAndCompletion) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run(folder, std::string(EMIT_TEST_CMAKE) + " --install '" EMIT_TEST_BINARY_DIR
+                                                       "' --component help --prefix prefix"),
+            0)
+      << folder.read("log");
+  for (const char* file :
+       {"share/man/man1/emit.1", "share/man/man1/emit-render.1",
+        "share/man/man1/emit-bench-paper.1", "share/man/man8/emitd.8",
+        "share/bash-completion/completions/emit", "share/fish/vendor_completions.d/emit.fish",
+        "share/zsh/site-functions/_emit"}) {
+    EXPECT_FALSE(folder.read(std::string("prefix/") + file).empty()) << file;
+  }
+  EXPECT_EQ(run(folder, "bash -n prefix/share/bash-completion/completions/emit"), 0)
+      << folder.read("log");
+  if (run(folder, "command -v man") == 0) {
+    EXPECT_EQ(run(folder, "MANPATH=\"$PWD/prefix/share/man\" man -w emit-render emitd"), 0)
+        << folder.read("log");
+  }
+}
+
 /// Fixture with the client library as an integrator has it: installed, without the source tree.
 class ClientTutorial : public ::testing::Test {
  protected:

@@ -18,6 +18,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/svg_plot.hpp"
 
 namespace emit::tool {
@@ -161,7 +162,7 @@ struct Row {
   double order = 0.0;  ///< against the previous row; NaN in the first
 };
 
-Result<std::vector<Row>> converge(const Study& study, ProgressBar& progress, std::uint64_t& done) {
+Result<std::vector<Row>> converge(const Study& study, Progress& progress, std::uint64_t& done) {
   const auto truth = study.run(study.finest);
   if (!truth) return tl::unexpected(truth.error());
   progress.advance_to(++done);
@@ -248,7 +249,7 @@ int run(const ConvergenceOptions& command) {
   std::uint64_t work = 0;
   for (const Study& study : studies) work += 1 + study.refinements.size();
   const InterruptGuard interrupt;
-  ProgressBar progress("bench convergence", work);
+  Progress progress("bench convergence", work);
   std::uint64_t done = 0;
   TextTable table({"solver", "axis", "refinement", "step or cell", "max error K", "order"});
   Json results = Json::array();
@@ -286,7 +287,7 @@ int run(const ConvergenceOptions& command) {
 }
 
 void add_options(CommandLine& line, ConvergenceOptions& options) {
-  line.path("--plot", options.plot, "Write the diagrams as SVG");
+  line.output_file("--plot", options.plot, "Write the diagrams as SVG");
   add_json(line, options.json);
 }
 

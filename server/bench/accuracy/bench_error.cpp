@@ -28,6 +28,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 #include "tool/support/svg_plot.hpp"
@@ -255,7 +256,7 @@ Result<Truth> solve_truth(const scene::ScenarioDesc& scenario, const reference::
   if (!geometry) return tl::unexpected(geometry.error());
   scene::adopt_sheets(*geometry);
   Truth truth;
-  ProgressBar progress("reference of " + label, 1000);
+  Progress progress("reference of " + label, 1000);
   reference::SolveOptions options;
   options.rays = command.rays;
   options.refine = command.refine;
@@ -494,7 +495,7 @@ Result<void> run_scene(const std::string& name, const std::vector<Setting>& sett
                            fmt::format("{:.1f}", truth->solve_s),
                            fmt::format("{:.3f}", truth->edge_m)});
 
-  ProgressBar progress("settings of " + name, settings.size());
+  Progress progress("settings of " + name, settings.size());
   std::uint64_t done = 0;
   ErrorFigures figures(name, view, truth->image);
   for (const Setting& setting : settings) {
@@ -581,11 +582,11 @@ void add_options(CommandLine& line, ErrorOptions& options) {
               "Scenario; repeatable; default block-on-road, ribbed, statue, airfield")
       .repeatable();
   line.flag("--quick", options.quick, "Models, spacings and two step counts only");
-  line.path("--csv", options.csv, "Write the results as CSV");
-  line.path("--plot", options.plot, "Write the diagrams as SVG");
-  line.path("--figures", options.figures,
-            "Folder for pictures and profiles of reference and models")
-      .type_name("DIR");
+  line.output_file("--csv", options.csv, "Write the results as CSV");
+  line.output_file("--plot", options.plot, "Write the diagrams as SVG");
+  line.output_folder("--figures", options.figures,
+                     "Existing folder for pictures and profiles of reference and models",
+                     CommandLine::OutputFolder::exists);
   line.option("--frames", options.frames, "Frames timed per setting").positive().show_default();
   add_image_size(line, options.width_px, options.height_px);
   line.option("--rays", options.rays, "Rays per face or pixel of the reference")

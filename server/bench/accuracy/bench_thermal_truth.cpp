@@ -18,6 +18,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
@@ -111,7 +112,7 @@ class ThermalTruth {
 
   const ThermalTruthOptions& command_;
   InterruptGuard interrupt_;
-  ProgressBar progress_;
+  Progress progress_;
   TemporaryFolder folder_;
   std::uint64_t done_ = 0;
   std::string device_;
@@ -517,8 +518,8 @@ void add_options(CommandLine& line, ThermalTruthOptions& options) {
       .show_default();
   line.option("--steps", options.steps, "History steps").in_range(1U, 4096U).show_default();
   add_image_size(line, options.width_px, options.height_px);
-  line.path("--pictures", options.pictures, "Existing folder for the judged frames as PNG")
-      .type_name("DIR");
+  line.output_folder("--pictures", options.pictures, "Existing folder for the judged frames as PNG",
+                     CommandLine::OutputFolder::exists);
   add_gpu(line, options.gpu_index);
   add_json(line, options.json);
 }

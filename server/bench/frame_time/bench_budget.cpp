@@ -18,6 +18,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 
@@ -86,7 +87,7 @@ class Flight {
   }
 
   Result<void> warm_up() {
-    ProgressBar bar("warm-up", 1000);
+    Progress bar("warm-up", 1000);
     const auto start = Clock::now();
     auto ready = renderer_->warm_up(request(0), [&](double done_frac) {
       bar.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
@@ -236,7 +237,7 @@ int run(const BudgetOptions& command) {
   TextTable text({"budget", "ms", "within", "median ms", "worst ms", "shed", "estimate K",
                   "difference K", "within factor 2"});
   Json results = Json::array();
-  ProgressBar progress("bench budget", command.budgets.size());
+  Progress progress("bench budget", command.budgets.size());
   std::uint64_t done = 0;
   for (const double budget_frac : command.budgets) {
     Row row;

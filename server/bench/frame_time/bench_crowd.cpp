@@ -19,6 +19,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 
@@ -105,7 +106,7 @@ Result<std::vector<Row>> run(const CrowdOptions& command, std::string& device) {
   if (!object) return tl::unexpected(std::move(object.error()));
   crowded.objects.push_back(std::move(*object));
 
-  ProgressBar progress("bench crowd", 4);
+  Progress progress("bench crowd", 4);
   std::vector<SceneRunner> runners;
   for (const scene::ScenarioDesc* scenario : {&*alone, &*alone, &crowded}) {
     auto runner = SceneRunner::start(*scenario, SceneRunner::kSettleFrames, command.gpu_index);

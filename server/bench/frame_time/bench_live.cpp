@@ -18,6 +18,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/renderer_thread.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
@@ -199,7 +200,7 @@ class LiveBench {
         static_cast<std::uint64_t>(std::llround(command_.seconds * command_.rate_hz));
     const auto every =
         static_cast<std::uint64_t>(std::max(1.0, std::round(command_.every_s * command_.rate_hz)));
-    ProgressBar progress("bench live", frames);
+    Progress progress("bench live", frames);
     for (std::uint64_t i = 0; i <= frames; ++i) {
       const bool compared = i % every == 0;
       tell(i);

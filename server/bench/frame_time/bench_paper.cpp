@@ -14,6 +14,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -226,7 +227,7 @@ int run(const PaperOptions& command) {
     if (!wanted(method, command)) continue;
     frames += 2 * (std::uint64_t{std::max(command.frames.frames, method.least_frames)} + 1);
   }
-  ProgressBar progress("bench paper", scenes.size() * steps.size() * frames);
+  Progress progress("bench paper", scenes.size() * steps.size() * frames);
   std::uint64_t done = 0;
   std::vector<Row> rows;
   for (const std::string& scene : scenes) {

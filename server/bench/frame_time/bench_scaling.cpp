@@ -19,6 +19,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
 
@@ -71,8 +72,8 @@ Row row_of(const ScalingAxis& axis, const ScalingCase& made, const char* method,
 
 /// Compares each case with the case before, which runs twice: its twin shows the noise of the
 /// machine.
-Result<void> run_cached(const ScalingAxis& axis, const ScalingOptions& command,
-                        ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
+Result<void> run_cached(const ScalingAxis& axis, const ScalingOptions& command, Progress& progress,
+                        std::uint64_t& done, std::vector<Row>& rows) {
   std::optional<SceneRunner> before;
   for (const ScalingCase& made : axis.cases) {
     auto runner = SceneRunner::start(made.scenario, SceneRunner::kSettleFrames, command.gpu_index);
@@ -100,7 +101,7 @@ Result<void> run_cached(const ScalingAxis& axis, const ScalingOptions& command,
 
 /// Adds a few frames of the published method.
 Result<void> run_per_frame(const ScalingAxis& axis, const ScalingOptions& command,
-                           ProgressBar& progress, std::uint64_t& done, std::vector<Row>& rows) {
+                           Progress& progress, std::uint64_t& done, std::vector<Row>& rows) {
   std::optional<double> before_ms;
   for (const ScalingCase& made : axis.cases) {
     scene::ScenarioDesc scenario = made.scenario;
@@ -182,7 +183,7 @@ Result<void> run_axes(const ScalingOptions& command, std::vector<Row>& rows) {
     cases += axis->cases.size() * (name == "samples" ? 1 : 2);
     axes.push_back(std::move(*axis));
   }
-  ProgressBar progress("bench scaling", cases);
+  Progress progress("bench scaling", cases);
   std::uint64_t done = 0;
   for (const ScalingAxis& axis : axes) {
     if (wanted(command.methods, "cached")) {

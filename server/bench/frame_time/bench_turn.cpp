@@ -17,6 +17,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/renderer_thread.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/support/statistics.hpp"
@@ -153,7 +154,7 @@ class Turntable {
 
 Result<void> run_method(Turntable& table, const TurnOptions& command, const std::string& method,
                         std::vector<Row>& rows) {
-  ProgressBar progress("bench turn", 4 * std::uint64_t{command.runs});
+  Progress progress("bench turn", 4 * std::uint64_t{command.runs});
   std::uint64_t done = 0;
   const auto fly = [&](const char* name, bool jump,
                        std::optional<double> budget_ms) -> Result<Row> {

@@ -6,6 +6,7 @@
 #include "emit/physics/check.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -37,7 +38,7 @@ Result<std::size_t> PaperReference::picture_of(const reference::SolveView& view)
   for (std::size_t i = 0; i < pictures_.size(); ++i) {
     if (same_view(pictures_[i].view, view)) return i;
   }
-  ProgressBar progress("reference of " + label_, 1000);
+  Progress progress("reference of " + label_, 1000);
   ConvergedOptions options = options_;
   options.progress = [&progress](double done_frac) {
     progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));

@@ -13,6 +13,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -174,7 +175,7 @@ class StabilityBench {
 
   const StabilityOptions& command_;
   InterruptGuard interrupt_;
-  ProgressBar progress_;
+  Progress progress_;
   std::string device_;
   Json results_ = Json::array();
   TextTable table_{
@@ -202,8 +203,9 @@ void add_options(CommandLine& line, StabilityOptions& options) {
       .one_of(stability_parts());
   line.option("--frame", options.frames, "Test of part frames, e.g. frame-zero-area; repeatable")
       .repeatable();
-  line.path("--pictures", options.pictures, "Existing folder for the hostile frames as PNG")
-      .type_name("DIR");
+  line.output_folder("--pictures", options.pictures,
+                     "Existing folder for the hostile frames as PNG",
+                     CommandLine::OutputFolder::exists);
   add_gpu(line, options.gpu_index);
   add_json(line, options.json);
 }

@@ -22,6 +22,7 @@
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
@@ -159,7 +160,7 @@ Result<void> IsolationBench::run(const std::filesystem::path& work) {
   control_ = "tcp://" + daemon->control_address();
   // The first run is not counted, because it pays for work that is done once.
   if (auto first = measure(true); !first) return tl::unexpected(first.error());
-  ProgressBar progress("pairs", command_.pairs);
+  Progress progress("pairs", command_.pairs);
   for (std::uint32_t pair = 0; pair < command_.pairs; ++pair) {
     // The order changes, so that a drift of the machine favours neither.
     std::array<double, 3> p99_ms{};

@@ -28,6 +28,7 @@
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/statistics.hpp"
 
 namespace emit::tool {
@@ -478,7 +479,7 @@ Result<void> StreamBench::throughput() {
   if (!daemons) return tl::unexpected(daemons.error());
   const std::vector<Contender> contenders = contenders_of(command_);
   std::map<std::string, Series> series;
-  ProgressBar progress("throughput", command_.repeats * contenders.size());
+  Progress progress("throughput", command_.repeats * contenders.size());
   for (std::uint32_t round = 0; round < command_.repeats; ++round) {
     const auto measured = measure_round(contenders, *daemons, series, [&](std::size_t i) {
       progress.advance_to(round * contenders.size() + i);

@@ -20,6 +20,7 @@
 #include "tool/streams/stream_report.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/daemon_process.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -151,7 +152,7 @@ physics::Result<LossyStream::Result> LossyStream::measure(const Options& options
   constexpr auto kPatience = std::chrono::seconds(2);
   const double cpu_before_s = daemon->cpu_seconds();
   const auto start = Clock::now();
-  ProgressBar progress("lossy frames", options.frames);
+  Progress progress("lossy frames", options.frames);
   for (std::uint64_t number = 1; number <= options.frames; ++number) {
     if (number > kWindow) static_cast<void>(receiver.wait_for(number - kWindow, kPatience));
     protocol::HostFrameData frame;

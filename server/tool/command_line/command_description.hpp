@@ -5,6 +5,9 @@
 
 namespace emit::tool {
 
+/// Kind of things that a value names, for completion in a shell.
+enum class ValueKind : unsigned char { text, file, folder };
+
 /// One option, flag or positional argument of a command, as --help shows it.
 struct OptionDescription {
   std::vector<std::string>
@@ -16,6 +19,9 @@ struct OptionDescription {
   std::string value;                 ///< what the value is called, e.g. "FILE"
   std::string default_text;          ///< empty: none is shown
   std::vector<std::string> choices;  ///< the only values that are taken; empty: any
+  /// Values that the machine has now, e.g. shipped scenarios; others are taken too.
+  std::vector<std::string> suggestions;
+  ValueKind kind = ValueKind::text;
   std::string text;
 };
 

@@ -11,12 +11,13 @@
 
 #include "tool/command_line/nearest_name.hpp"
 #include "tool/support/console.hpp"
+#include "tool/support/output_check.hpp"
 
 namespace emit::tool {
 
 namespace detail {
 
-/// What is known of a program's commands beside what CLI11 keeps.
+/// Facts about a program's commands that CLI11 does not keep.
 struct Registry {
   struct Leaf {
     CLI::App* app = nullptr;
@@ -24,7 +25,20 @@ struct Registry {
   };
   struct Raw {
     CLI::App* app = nullptr;
+    CommandDescription description;
     int (*run)(int argc, char** argv) = nullptr;
+  };
+  /// CLI11 keeps the choices of an option only as text, and knows nothing of the others.
+  struct Value {
+    std::vector<std::string> choices;
+    std::function<std::vector<std::string>()> suggestions;
+    ValueKind kind = ValueKind::text;
+  };
+
+  struct Output {
+    const CLI::App* app = nullptr;
+    std::string option;
+    std::function<physics::Result<void>()> check;
   };
 
   Registry(const std::string& name, const std::string& text) : root(text, name) {}
@@ -32,8 +46,8 @@ struct Registry {
   CLI::App root;
   std::vector<Leaf> leaves;
   std::vector<Raw> raw;
-  /// CLI11 keeps the choices of an option only as text.
-  std::map<const CLI::Option*, std::vector<std::string>> choices;
+  std::vector<Output> outputs;
+  std::map<const CLI::Option*, Value> values;
 };
 
 }  // namespace detail
@@ -73,6 +87,60 @@ std::optional<UnknownCommand> find_unknown_command(const CLI::App& root, int arg
   return std::nullopt;
 }
 
+struct UnknownOption {
+  std::string command;     ///< with the program's name
+  std::string name;        ///< with dashes
+  std::string suggestion;  ///< with dashes; empty: none is near
+};
+
+const CLI::Option* find_option(const CLI::App& app, const std::string& name) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->check_lname(name)) return option;
+  }
+  return nullptr;
+}
+
+/// The first long option that its command does not have. Empty: something else is wrong with the
+/// arguments.
+std::optional<UnknownOption> find_unknown_option(const CLI::App& root, int argc, char** argv) {
+  const CLI::App* app = &root;
+  std::string path = root.get_name();
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--") return std::nullopt;
+    if (!word.starts_with("--")) {
+      for (const CLI::App* below : app->get_subcommands([](const CLI::App*) { return true; })) {
+        if (!below->check_name(word)) continue;
+        app = below;
+        path += " " + word;
+        break;
+      }
+      continue;
+    }
+    const std::size_t equals = word.find('=');
+    const std::string name = word.substr(2, equals == std::string::npos ? equals : equals - 2);
+    if (const CLI::Option* option = find_option(*app, name)) {
+      // The next word is the value, whatever it looks like.
+      if (equals == std::string::npos && option->get_items_expected_max() > 0) ++i;
+      continue;
+    }
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app->get_options()) {
+      for (const std::string& known : option->get_lnames()) names.push_back(known);
+    }
+    const std::string near = nearest_name(name, names);
+    return UnknownOption{path, "--" + name, near.empty() ? "" : "--" + near};
+  }
+  return std::nullopt;
+}
+
+std::string text_of(const UnknownOption& unknown) {
+  return fmt::format(
+      "{} has no option '{}'{}; `{} --help` lists them", unknown.command, unknown.name,
+      unknown.suggestion.empty() ? "" : fmt::format(", did you mean '{}'?", unknown.suggestion),
+      unknown.command);
+}
+
 std::string text_of(const UnknownCommand& unknown) {
   return fmt::format(
       "there is no command '{}'{}; `{} --help` lists them", unknown.command,
@@ -98,14 +166,20 @@ OptionDescription description_of(const CLI::Option& option, const detail::Regist
     out.value = type.substr(0, type.find(':'));
     out.default_text = option.get_default_str();
   }
-  if (const auto found = registry.choices.find(&option); found != registry.choices.end()) {
-    out.choices = found->second;
+  if (const auto found = registry.values.find(&option); found != registry.values.end()) {
+    const detail::Registry::Value& value = found->second;
+    out.choices = value.choices;
+    if (value.suggestions) out.suggestions = value.suggestions();
+    out.kind = value.kind == ValueKind::file && out.value == "DIR" ? ValueKind::folder : value.kind;
   }
   out.text = option.get_description();
   return out;
 }
 
 CommandDescription description_of(const CLI::App& app, const detail::Registry& registry) {
+  for (const detail::Registry::Raw& raw : registry.raw) {
+    if (raw.app == &app) return raw.description;
+  }
   CommandDescription out;
   out.name = app.get_name();
   out.text = app.get_description();
@@ -163,13 +237,24 @@ Option& Option::positive() {
 
 Option& Option::one_of(const std::vector<std::string>& values) {
   option_->check(CLI::IsMember(values));
-  registry_->choices[option_] = values;
+  registry_->values[option_].choices = values;
   return *this;
 }
 
 Option& Option::one_of_numbers(const std::vector<int>& values) {
   option_->check(CLI::IsMember(values));
-  for (const int value : values) registry_->choices[option_].push_back(fmt::format("{}", value));
+  auto& choices = registry_->values[option_].choices;
+  for (const int value : values) choices.push_back(fmt::format("{}", value));
+  return *this;
+}
+
+Option& Option::suggest(std::function<std::vector<std::string>()> values) {
+  registry_->values[option_].suggestions = std::move(values);
+  return *this;
+}
+
+Option& Option::may_be_file() {
+  registry_->values[option_].kind = ValueKind::file;
   return *this;
 }
 
@@ -273,19 +358,85 @@ Option CommandLine::flag(const std::string& name, bool& target, const std::strin
 
 Option CommandLine::path(const std::string& name, std::filesystem::path& target,
                          const std::string& text) {
-  return {*registry_, *app_->add_option_function<std::string>(
-                               name, [&target](const std::string& value) { target = value; }, text)
-                           ->type_name("FILE")};
+  Option option{*registry_,
+                *app_->add_option_function<std::string>(
+                    name, [&target](const std::string& value) { target = value; }, text)};
+  return option.type_name("FILE").may_be_file();
 }
 
 Option CommandLine::path(const std::string& name, std::optional<std::filesystem::path>& target,
                          const std::string& text) {
-  return {
+  Option option{
       *registry_,
       *app_->add_option_function<std::string>(
-               name, [&target](const std::string& value) { target = std::filesystem::path(value); },
-               text)
-           ->type_name("FILE")};
+          name, [&target](const std::string& value) { target = std::filesystem::path(value); },
+          text)};
+  return option.type_name("FILE").may_be_file();
+}
+
+namespace {
+
+/// The path that an option was given or has by default; none: nothing is written.
+std::optional<std::filesystem::path> given(const std::filesystem::path& target) {
+  return target.empty() ? std::nullopt : std::optional(target);
+}
+
+std::optional<std::filesystem::path> given(const std::optional<std::filesystem::path>& target) {
+  return target;
+}
+
+template <class Target>
+std::function<physics::Result<void>()> file_check(const Target& target) {
+  return [&target]() -> physics::Result<void> {
+    const auto file = given(target);
+    if (!file || *file == "-") return {};
+    return check_output_file(*file);
+  };
+}
+
+template <class Target>
+std::function<physics::Result<void>()> folder_check(const Target& target,
+                                                    CommandLine::OutputFolder folder) {
+  return [&target, folder]() -> physics::Result<void> {
+    const auto path = given(target);
+    if (!path) return {};
+    // A file of any name stands for those that the command writes into an existing folder.
+    return folder == CommandLine::OutputFolder::exists ? check_output_file(*path / "file")
+                                                       : check_output_folder(*path);
+  };
+}
+
+}  // namespace
+
+void CommandLine::check_output(const std::string& option,
+                               std::function<physics::Result<void>()> check) const {
+  registry_->outputs.push_back({app_, option, std::move(check)});
+}
+
+Option CommandLine::output_file(const std::string& name, std::filesystem::path& target,
+                                const std::string& text) {
+  check_output(name, file_check(target));
+  return path(name, target, text);
+}
+
+Option CommandLine::output_file(const std::string& name,
+                                std::optional<std::filesystem::path>& target,
+                                const std::string& text) {
+  check_output(name, file_check(target));
+  return path(name, target, text);
+}
+
+Option CommandLine::output_folder(const std::string& name, std::filesystem::path& target,
+                                  const std::string& text, OutputFolder folder) {
+  check_output(name, folder_check(target, folder));
+  return path(name, target, text).type_name("DIR");
+}
+
+Option CommandLine::output_folder(const std::string& name,
+                                  std::optional<std::filesystem::path>& target,
+                                  const std::string& text, OutputFolder folder) {
+  check_output(name, folder_check(target, folder));
+  return path(name, target, text).type_name("DIR");
 }
 
 Option CommandLine::count(const std::string& name, std::uint64_t& target, const std::string& text) {
@@ -314,13 +465,22 @@ CommandLine CommandLine::group(const CommandText& text) {
   return {*registry_, *app};
 }
 
-void CommandLine::raw_command(const std::string& name, const std::string& text,
+void CommandLine::raw_command(const CommandDescription& description,
                               int (*run)(int argc, char** argv)) {
-  registry_->raw.push_back({app_->add_subcommand(name, text), run});
+  CLI::App* app = app_->add_subcommand(description.name, description.text);
+  registry_->raw.push_back({app, description, run});
 }
 
 CommandDescription CommandLine::describe() const {
   return description_of(*app_, *registry_);
+}
+
+std::vector<std::string> CommandLine::command_names() const {
+  std::vector<std::string> names;
+  for (const CLI::App* below : app_->get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(below->get_name());
+  }
+  return names;
 }
 
 Program::Program(const std::string& name, const std::string& text, const std::string& version,
@@ -339,16 +499,28 @@ CommandLine Program::root() noexcept {
 
 int Program::run(int argc, char** argv) {
   // A raw command reads its own arguments: CLI11 does not see them.
-  for (const auto& [app, run] : registry_->raw) {
+  for (const auto& [app, description, run] : registry_->raw) {
     if (argc >= 2 && app->check_name(argv[1])) return run(argc - 1, argv + 1);
   }
   CLI::App& root = registry_->root;
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (const auto unknown = find_unknown_command(root, argc, argv))
-      return fail(kExitUsage, text_of(*unknown));
+    if (error.get_exit_code() != 0) {
+      if (const auto unknown = find_unknown_command(root, argc, argv)) {
+        return fail(kExitUsage, text_of(*unknown));
+      }
+      if (const auto unknown = find_unknown_option(root, argc, argv)) {
+        return fail(kExitUsage, text_of(*unknown));
+      }
+    }
     return root.exit(error) == 0 ? kExitOk : kExitUsage;
+  }
+  for (const auto& [app, option, check] : registry_->outputs) {
+    if (!app->parsed()) continue;
+    if (const auto writable = check(); !writable) {
+      return fail(physics::Error(writable.error()).with_context(option));
+    }
   }
   for (const auto& [app, run] : registry_->leaves) {
     if (app->parsed()) return run();

@@ -30,7 +30,7 @@ struct Registry;
 class Option {
  public:
   Option& required();
-  /// What --help calls the value, e.g. "FILE".
+  /// Sets what --help calls the value, e.g. "FILE".
   Option& type_name(const std::string& name);
   /// Other values end the program with exit code 2. Both ends belong to the range.
   Option& in_range(int low, int high);
@@ -41,6 +41,10 @@ class Option {
   Option& positive();
   Option& one_of(const std::vector<std::string>& values);
   Option& one_of_numbers(const std::vector<int>& values);
+  /// Values that shells offer; others are taken too. `values` runs when the command is described.
+  Option& suggest(std::function<std::vector<std::string>()> values);
+  /// The value may be a file too, so that shells offer files.
+  Option& may_be_file();
   /// --help shows the target's value as the default.
   Option& show_default();
   Option& default_text(const std::string& text);
@@ -95,6 +99,19 @@ class CommandLine {
   Option path(const std::string& name, std::filesystem::path& target, const std::string& text);
   Option path(const std::string& name, std::optional<std::filesystem::path>& target,
               const std::string& text);
+  /// A file that the command writes. Program::run() checks before the command runs that it can be
+  /// written; "-" stands for standard output and is not checked.
+  Option output_file(const std::string& name, std::filesystem::path& target,
+                     const std::string& text);
+  Option output_file(const std::string& name, std::optional<std::filesystem::path>& target,
+                     const std::string& text);
+  /// A folder that the command writes files into. It is checked as an output_file() is. With
+  /// `OutputFolder::exists` the command does not create it.
+  enum class OutputFolder : std::uint8_t { created, exists };
+  Option output_folder(const std::string& name, std::filesystem::path& target,
+                       const std::string& text, OutputFolder folder = OutputFolder::created);
+  Option output_folder(const std::string& name, std::optional<std::filesystem::path>& target,
+                       const std::string& text, OutputFolder folder = OutputFolder::created);
   /// A number that counts something.
   Option count(const std::string& name, std::uint64_t& target, const std::string& text);
   Option seconds(const std::string& name, double& target, const std::string& text);
@@ -105,30 +122,37 @@ class CommandLine {
   /// Adds a command with options of its own. `run` returns the exit code of the process.
   template <class Options>
   void command(const CommandText& text, void (*add_options)(CommandLine&, Options&),
+               int (*run)(const Options&)) {
+    command<Options>(text, std::function<void(CommandLine&, Options&)>(add_options),
+                     std::function<int(const Options&)>(run));
+  }
+  /// The same for functions that hold more than the options, e.g. the tool itself.
+  template <class Options>
+  void command(const CommandText& text,
+               const std::function<void(CommandLine&, Options&)>& add_options,
                std::function<int(const Options&)> run) {
     // Options must outlive parsing: they live in the closure that runs the command.
     auto options = std::make_shared<Options>();
     CommandLine line = leaf(text, [options, run = std::move(run)] { return run(*options); });
     add_options(line, *options);
   }
-  template <class Options>
-  void command(const CommandText& text, void (*add_options)(CommandLine&, Options&),
-               int (*run)(const Options&)) {
-    command<Options>(text, add_options, std::function<int(const Options&)>(run));
-  }
   /// Adds a command that only holds others.
   CommandLine group(const CommandText& text);
   /// Adds a command that parses its own arguments, as a main() does; argv[0] is its name.
-  void raw_command(const std::string& name, const std::string& text,
-                   int (*run)(int argc, char** argv));
+  /// `description` has the name and what --help of the command says.
+  void raw_command(const CommandDescription& description, int (*run)(int argc, char** argv));
 
   /// The command with all that was added to it so far.
   [[nodiscard]] CommandDescription describe() const;
+  /// Names of the commands that were added to it so far.
+  [[nodiscard]] std::vector<std::string> command_names() const;
 
  private:
   friend class Program;
   CommandLine(detail::Registry& registry, CLI::App& app) : registry_(&registry), app_(&app) {}
   CommandLine leaf(const CommandText& text, std::function<int()> run);
+  /// Adds a check that Program::run() makes before it runs the command.
+  void check_output(const std::string& option, std::function<physics::Result<void>()> check) const;
 
   detail::Registry* registry_;
   CLI::App* app_;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tool/command_line/common_options.hpp"
 
+#include "emit/config/load.hpp"
+
 namespace emit::tool {
 
 void add_json(CommandLine& line, std::optional<std::filesystem::path>& target) {
-  line.path("--json", target, "Write the results as JSON (- for standard output)");
+  line.output_file("--json", target, "Write the results as JSON (- for standard output)");
 }
 
 void add_set(CommandLine& line, std::vector<std::string>& target) {
@@ -16,13 +18,28 @@ void add_set(CommandLine& line, std::vector<std::string>& target) {
 void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& name) {
   line.option(name, target.scenario, "Shipped scenario (airfield, box, ...) or a .toml file")
       .required()
-      .type_name("SCENARIO");
+      .type_name("SCENARIO")
+      .suggest(config::shipped_scenarios)
+      .may_be_file();
   add_set(line, target.set);
 }
 
 void add_gpu(CommandLine& line, int& target) {
   line.option("--gpu", target, "EGL device index; default: first hardware device, else Mesa")
       .type_name("N");
+}
+
+void add_png_of(CommandLine& line, std::string& target, bool surface) {
+  std::vector<std::string> names{"apparent", "radiance"};
+  std::string text =
+      "What the colours of the PNG stand for. apparent: temperature of a blackbody with the "
+      "pixel's "
+      "radiance in the band, as the sensor sees it; radiance: radiance in the band";
+  if (surface) {
+    names.emplace_back("temperature");
+    text += "; temperature: temperature of the surface itself, without sky";
+  }
+  line.option("--png-of", target, text).one_of(names).type_name("QUANTITY").show_default();
 }
 
 void add_image_size(CommandLine& line, std::uint32_t& width_px, std::uint32_t& height_px) {

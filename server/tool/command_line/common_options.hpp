@@ -20,6 +20,9 @@ void add_set(CommandLine& line, std::vector<std::string>& target);
 void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& name);
 /// --gpu N.
 void add_gpu(CommandLine& line, int& target);
+/// --png-of QUANTITY: what the colours of a PNG stand for. `surface`: the frames carry temperatures
+/// of surfaces, so that these can be shown.
+void add_png_of(CommandLine& line, std::string& target, bool surface);
 /// --width and --height of the image, px.
 void add_image_size(CommandLine& line, std::uint32_t& width_px, std::uint32_t& height_px);
 

@@ -8,11 +8,12 @@
 namespace emit::tool {
 namespace {
 
-/// In the order of `emit --help`.
+/// The order is that of `emit --help`.
 constexpr void (*kCommands[])(CommandLine&) = {
-    add_render, add_solve,   add_inspect,  add_compare,  add_generate, add_view,    add_demo,
-    add_serve,  add_receive, add_stat,     add_send,     add_latency,  add_trigger, add_trace,
-    add_record, add_replay,  add_make_log, add_evaluate, add_fit,      add_bench};
+    add_render,  add_solve, add_inspect,    add_compare, add_generate, add_view,
+    add_demo,    add_serve, add_receive,    add_stat,    add_send,     add_latency,
+    add_trigger, add_trace, add_record,     add_replay,  add_make_log, add_evaluate,
+    add_fit,     add_bench, add_completion, add_man};
 
 }  // namespace
 

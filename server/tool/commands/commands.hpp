@@ -9,6 +9,7 @@ namespace emit::tool {
 
 void add_bench(CommandLine& tool);
 void add_compare(CommandLine& tool);
+void add_completion(CommandLine& tool);
 void add_demo(CommandLine& tool);
 void add_evaluate(CommandLine& tool);
 void add_fit(CommandLine& tool);
@@ -16,6 +17,7 @@ void add_generate(CommandLine& tool);
 void add_inspect(CommandLine& tool);
 void add_latency(CommandLine& tool);
 void add_make_log(CommandLine& tool);
+void add_man(CommandLine& tool);
 void add_receive(CommandLine& tool);
 void add_record(CommandLine& tool);
 void add_render(CommandLine& tool);

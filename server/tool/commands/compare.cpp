@@ -51,10 +51,27 @@ Json names_json(const std::vector<std::string>& names) {
   return json;
 }
 
+/// Errors: those of read_exr(); invalid_argument where the image has no radiance, as every frame of
+/// emit has.
+physics::Result<image::ExrImage> read_frame(const std::filesystem::path& file) {
+  auto exr = image::read_exr(file);
+  if (!exr) return exr;
+  std::vector<std::string> names;
+  for (const image::ExrChannel& channel : exr->channels) {
+    if (channel.name.starts_with(image::kRadianceChannel)) return exr;
+    names.push_back(channel.name);
+  }
+  return physics::make_error(
+      physics::ErrorCode::invalid_argument,
+      fmt::format("{}: there is no channel '{}', so that it is no frame of emit; the file has {}",
+                  file.string(), image::kRadianceChannel,
+                  names.empty() ? "no channel" : list(names)));
+}
+
 int run(const CompareOptions& command) {
-  const auto a = image::read_exr(command.a);
+  const auto a = read_frame(command.a);
   if (!a) return fail(a.error());
-  const auto b = image::read_exr(command.b);
+  const auto b = read_frame(command.b);
   if (!b) return fail(b.error());
 
   // Radiance in kelvin needs the band, which the reference names in its attributes.

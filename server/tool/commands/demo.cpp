@@ -21,6 +21,7 @@
 #include "tool/support/daemon_process.hpp"
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -346,7 +347,7 @@ Result<void> Demo::play() {
   constexpr std::size_t kTrialFrames = 8;
   std::uint64_t next_save = 0;
   const auto begin = Clock::now();
-  ProgressBar progress("poses", plan.left());
+  Progress progress("poses", plan.left());
   Samples step_s;
   while (const auto index = plan.next()) {
     if (InterruptGuard::interrupted()) return make_error(ErrorCode::io, "interrupted");
@@ -490,8 +491,7 @@ int run(const DemoOptions& command) {
 }
 
 void add_options(CommandLine& line, DemoOptions& options) {
-  line.path("--out", options.out, "Folder for the frames")
-      .type_name("DIR")
+  line.output_folder("--out", options.out, "Folder for the frames")
       .default_text(options.out.string());
   line.option("--scenario", options.input.scenario, "Shipped scenario or .toml file")
       .show_default();

@@ -15,6 +15,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/library_edit.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -172,7 +173,7 @@ int run(const FitOptions& command) {
   TextTable table({"material", "rms K", "max K", "derived rms K", "max K", "modes"});
   Json results = Json::array();
   std::vector<LibraryEntry> entries;
-  ProgressBar bar("fitting", materials.size());
+  Progress bar("fitting", materials.size());
   for (std::size_t i = 0; i < materials.size(); ++i) {
     const scene::Material& material = *materials[i];
     const auto fit = curve_input ? reference::fit_curve(material, curve, options)
@@ -236,7 +237,7 @@ void add_options(CommandLine& line, FitOptions& options) {
       .in_range(600.0, 864'000.0)
       .show_default();
   line.path("--library", options.library, "Library to start from; default: the shipped one");
-  line.path("--out", options.out, "Library to write: the same with the fitted modes");
+  line.output_file("--out", options.out, "Library to write: the same with the fitted modes");
   add_json(line, options.json);
 }
 

@@ -20,7 +20,7 @@ int run(const GenerateOptions& command) {
 
 void add_options(CommandLine& line, GenerateOptions& options) {
   line.option("scene", options.scene, "Scene name, or all").required().type_name("SCENE");
-  line.path("--out", options.out, "Folder to write into").required().type_name("DIR");
+  line.output_folder("--out", options.out, "Folder to write into").required();
   add_set(line, options.set);
 }
 

@@ -22,6 +22,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -63,7 +64,7 @@ class LatencyProbe {
   /// The pose that is held: of the log, else as the daemon shows it now, else 10 m above the origin
   /// with a view to the north.
   Result<void> choose_pose();
-  Result<void> run(ProgressBar& progress);
+  Result<void> run(Progress& progress);
 
   [[nodiscard]] const LatencyReport& report() const noexcept { return report_; }
   [[nodiscard]] bool by_picture() const noexcept { return entity_.has_value(); }
@@ -200,7 +201,7 @@ Result<void> LatencyProbe::sample(bool counts) {
   return {};
 }
 
-Result<void> LatencyProbe::run(ProgressBar& progress) {
+Result<void> LatencyProbe::run(Progress& progress) {
   started_ns_ = client::monotonic_now_ns();
   entity_ = command_.entity;
   if (!entity_ && client_.server().device == "canned: test pattern") {
@@ -260,7 +261,7 @@ int run(const LatencyOptions& command) {
   const InterruptGuard interrupt;
   LatencyProbe probe(command, client, **host);
   if (auto done = probe.choose_pose(); !done) return fail(done.error());
-  ProgressBar progress("toggles", command.frames);
+  Progress progress("toggles", command.frames);
   const auto done = probe.run(progress);
   progress.finish();
   if (!done) return fail(done.error());

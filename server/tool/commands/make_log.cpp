@@ -9,6 +9,7 @@
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -40,7 +41,7 @@ int run(const MakeLogOptions& command) {
   if (!writer) return fail(writer.error());
   const auto count =
       static_cast<std::uint64_t>(std::floor(command.duration_s * command.rate_hz + 1e-9)) + 1;
-  ProgressBar progress("poses", count);
+  Progress progress("poses", count);
   const auto frame = std::make_unique<protocol::HostFrameData>();
   for (std::uint64_t i = 0; i < count; ++i) {
     make_host_frame(*scenario, start_ns, command.rate_hz, i, *frame);
@@ -62,7 +63,7 @@ void add_options(CommandLine& line, MakeLogOptions& options) {
   line.option("--start-s", options.start_s,
               "Simulated time of the first pose; default: the sensor trajectory's first node");
   line.seconds("--duration-s", options.duration_s, "Length").positive().show_default();
-  line.path("--out", options.out, "MCAP log to write").required();
+  line.output_file("--out", options.out, "MCAP log to write").required();
 }
 
 }  // namespace

@@ -19,6 +19,7 @@
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -42,6 +43,7 @@ struct ReceiveOptions {
   bool reconnect = false;
   double min_k = 280.0;
   double max_k = 330.0;
+  std::string png_of = "apparent";
   client::Security security;
 };
 
@@ -49,7 +51,7 @@ using Clock = std::chrono::steady_clock;
 
 physics::Result<void> save(const std::filesystem::path& directory,
                            const client::ReceivedFrame& frame,
-                           const client::ChannelDescription& channel, const ColorLimits& limits,
+                           const client::ChannelDescription& channel, const PngStyle& style,
                            std::optional<ApparentTemperature>& apparent) {
   FramePlanes planes;
   planes.width_px = frame.header.width_px;
@@ -81,7 +83,7 @@ physics::Result<void> save(const std::filesystem::path& directory,
                      channel.band_hi_um,
                      temperature ? "K" : "W m-2 sr-1",
                      channel.response};
-  return write_frame_files(directory, planes, limits);
+  return write_frame_files(directory, planes, style);
 }
 
 void print_losses(std::FILE* out, const client::ReceiveCounters& c, const StreamReport& report) {
@@ -250,8 +252,9 @@ physics::Result<bool> Reception::receive_next() {
   last_frame_ = Clock::now();
   report_.add(**received);
   if (command_.out) {
-    const auto saved = save(*command_.out, **received, stream_.channel(),
-                            {command_.min_k, command_.max_k}, apparent_);
+    const auto saved =
+        save(*command_.out, **received, stream_.channel(),
+             {command_.min_k, command_.max_k, png_quantity(command_.png_of)}, apparent_);
     if (!saved) return tl::unexpected(saved.error());
   }
   return true;
@@ -259,7 +262,7 @@ physics::Result<bool> Reception::receive_next() {
 
 physics::Result<void> Reception::receive() {
   const InterruptGuard interrupt;
-  ProgressBar progress("frames", command_.frames == 0 ? 1 : command_.frames);
+  Progress progress("frames", command_.frames == 0 ? 1 : command_.frames);
   start_ = last_frame_ = Clock::now();
   while (!InterruptGuard::interrupted() &&
          (command_.frames == 0 || report_.frames() < command_.frames)) {
@@ -359,11 +362,10 @@ void add_options(CommandLine& line, ReceiveOptions& options) {
       .required()
       .type_name("URL");
   line.count("--frames", options.frames, "Stop after this many; 0: until interrupted");
-  line.path("--out", options.out,
-            "Folder for frame_NNNNNN.exr and .png (apparent temperature, by the band's response "
-            "where "
-            "the daemon tells it, else as of a rectangular band)")
-      .type_name("DIR");
+  line.output_folder("--out", options.out,
+                     "Folder for frame_NNNNNN.exr and .png (apparent temperatures by the band's "
+                     "response where the "
+                     "daemon tells it, else as of a rectangular band)");
   line.option("--name", options.channel_name, "Channel; default: the first that fits")
       .type_name("NAME");
   line.option("--channel", options.channel_kind, "Channel kind; default: any")
@@ -389,6 +391,7 @@ void add_options(CommandLine& line, ReceiveOptions& options) {
   line.flag("--reconnect", options.reconnect,
             "When the stream ends, connect again and go on, until no frame came for --timeout-s");
   add_security(line, options.security);
+  add_png_of(line, options.png_of, false);
   line.option("--min-k", options.min_k, "Lower limit of the PNG's colours").show_default();
   line.option("--max-k", options.max_k, "Upper limit of the PNG's colours").show_default();
   add_json(line, options.json);

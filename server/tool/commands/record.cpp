@@ -13,6 +13,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -45,7 +46,7 @@ int run(const RecordOptions& command) {
                        ? start + std::chrono::duration_cast<Clock::duration>(
                                      std::chrono::duration<double>(command.duration_s))
                        : Clock::time_point::max();
-  ProgressBar progress("frames", command.frames);
+  Progress progress("frames", command.frames);
   v1::JournalEntry entry;
   std::uint64_t entries = 0;
   std::uint64_t frames = 0;
@@ -128,7 +129,7 @@ void add_options(CommandLine& line, RecordOptions& options) {
   line.option("--from", options.from, "Control address of the daemon, tcp://host:port")
       .required()
       .type_name("URL");
-  line.path("--out", options.out, "MCAP log to write").required();
+  line.output_file("--out", options.out, "MCAP log to write").required();
   add_security(line, options.security);
   line.count("--frames", options.frames, "Stop after this many frames; 0: no limit");
   line.seconds("--duration-s", options.duration_s, "Stop after this long; 0: until interrupted");

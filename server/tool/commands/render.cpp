@@ -4,6 +4,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "emit/renderer/renderer.hpp"
 #include "emit/scene/trajectory.hpp"
@@ -13,6 +17,8 @@
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/output_check.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -20,13 +26,34 @@ namespace {
 
 struct RenderOptions {
   ScenarioChoice input;
-  double time_s = 0.0;
+  std::vector<double> times_s;
   std::filesystem::path out;
   std::optional<std::filesystem::path> png;
+  std::string png_of = "apparent";
   std::optional<std::filesystem::path> json;
   std::vector<std::string> channels;  ///< empty: all of temperature, depth, object
-  std::string band;                   ///< empty: the scenario's first
+  std::vector<std::string> bands;     ///< empty: the scenario's first
+  std::string quality = "full";
   int gpu_index = -1;
+};
+
+/// Settings of --quality preview. They cost a few seconds for a scene of 50'000 triangles.
+std::vector<std::string> preview_set() {
+  return {"thermal.method=\"cached\"", "thermal.max_samples=320000", "thermal.tolerance_k=2",
+          "thermal.first_step_s=120",  "thermal.lateral=false",      "thermal.exchange=false",
+          "thermal.shadow_map_px=512", "thermal.max_cascades=1"};
+}
+
+constexpr const char* kPreviewText =
+    "preview: leaves out conduction along the surface and exchange of radiation between faces; "
+    "temperatures aim at 2 K instead of thermal.tolerance_k, and shadows are coarse\n";
+
+/// Frames of one run: an image at every instant, which all bands take their radiance from.
+struct Plan {
+  std::vector<double> times_s;     ///< ascending
+  std::vector<std::size_t> bands;  ///< indices into the scenario's bands
+  FrameFileNames exr_names;
+  std::optional<FrameFileNames> png_names;
 };
 
 double ms_since(std::chrono::steady_clock::time_point start) {
@@ -65,17 +92,73 @@ struct Times {
   double frame_ms = 0.0;
 };
 
-/// Surfaces need only be fine enough for this frame, unless their state is shared with others.
-void keep_only_view_at(std::int64_t sim_time_ns, scene::ScenarioDesc& scenario) {
-  scene::Trajectory& way = scenario.sensor.trajectory;
-  if (way.size() > 1 && scenario.thermal.state_file.empty()) {
-    way = {{sim_time_ns, scene::trajectory_at(way, sim_time_ns).pose}};
+std::int64_t time_ns(double time_s) {
+  return std::llround(time_s * 1e9);
+}
+
+template <class Value>
+void sort_unique(std::vector<Value>& values) {
+  std::ranges::sort(values);
+  values.erase(std::ranges::unique(values).begin(), values.end());
+}
+
+/// Errors: invalid_argument (a time that is none, a band that the scenario does not have).
+physics::Result<Plan> make_plan(const RenderOptions& command, const scene::ScenarioDesc& scenario) {
+  std::vector<double> times_s = command.times_s;
+  for (const double time_s : times_s) {
+    if (!std::isfinite(time_s) || std::abs(time_s) > 9e9) {
+      return physics::make_error(physics::ErrorCode::invalid_argument, "--time-s: not a time");
+    }
+  }
+  sort_unique(times_s);
+  std::vector<std::size_t> bands;
+  const std::vector<std::string> first{""};
+  for (const std::string& name : command.bands.empty() ? first : command.bands) {
+    const auto band = find_band(scenario, name);
+    if (!band) return tl::unexpected(band.error());
+    if (std::ranges::find(bands, *band) == bands.end()) bands.push_back(*band);
+  }
+  const auto names = [&](const std::filesystem::path& pattern) {
+    return FrameFileNames(pattern, times_s.size() > 1, bands.size() > 1);
+  };
+  Plan plan{times_s, bands, names(command.out), std::nullopt};
+  if (command.png) plan.png_names = names(*command.png);
+  return plan;
+}
+
+/// Errors: io, naming the option and the file that cannot be written.
+physics::Result<void> check_outputs(const Plan& plan, const scene::ScenarioDesc& scenario) {
+  for (const double time_s : plan.times_s) {
+    for (const std::size_t band : plan.bands) {
+      const std::string& name = scenario.bands[band].name;
+      if (auto exr = check_output_file(plan.exr_names.file(time_s, name)); !exr) {
+        return tl::unexpected(std::move(exr.error()).with_context("--out"));
+      }
+      if (!plan.png_names) continue;
+      if (auto png = check_output_file(plan.png_names->file(time_s, name)); !png) {
+        return tl::unexpected(std::move(png.error()).with_context("--png"));
+      }
+    }
+  }
+  return {};
+}
+
+/// Surfaces need only be fine enough for these frames, unless their state is shared with others.
+void keep_only_views_at(const std::vector<double>& times_s, scene::ScenarioDesc& scenario) {
+  const scene::Trajectory way = scenario.sensor.trajectory;
+  if (way.size() <= 1 || !scenario.thermal.state_file.empty()) return;
+  scenario.sensor.trajectory.clear();
+  for (const double time_s : times_s) {
+    const std::int64_t sim_time_ns = time_ns(time_s);
+    scenario.sensor.trajectory.push_back(
+        {sim_time_ns, scene::trajectory_at(way, sim_time_ns).pose});
   }
 }
 
 renderer::OutputOptions output_options(const RenderOptions& command) {
   renderer::OutputOptions output;
-  output.temperature = wants(command, "temperature") || command.png.has_value();
+  output.temperature = wants(command, "temperature") ||
+                       (command.png && png_quantity(command.png_of) == PngQuantity::temperature);
   output.depth = wants(command, "depth");
   output.object = wants(command, "object");
   output.slots = 2;
@@ -84,17 +167,100 @@ renderer::OutputOptions output_options(const RenderOptions& command) {
 
 /// Errors: those of Renderer::warm_up().
 physics::Result<void> warm_up(renderer::Renderer& renderer, const renderer::FrameRequest& first) {
-  ProgressBar progress("warm-up", 1000);
-  const InterruptGuard interrupt;
+  Progress progress("warm-up", 1000);
   return renderer.warm_up(first, [&progress](double done_frac) {
     progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
     return !InterruptGuard::interrupted();
   });
 }
 
-physics::Result<void> write_files(const RenderOptions& command, const scene::ScenarioDesc& scenario,
-                                  std::size_t band, const renderer::FrameView& view) {
-  const scene::SpectralBand& shown = scenario.bands[band];
+/// Brings the surface from one instant to a later one in steps that it takes as they come: behind a
+/// longer jump the renderer would sample it anew. Errors: internal (no slot, interrupted), gpu.
+physics::Result<void> carry_on(renderer::Renderer& renderer, const scene::ScenarioDesc& scenario,
+                               std::int64_t from_ns, std::int64_t to_ns) {
+  if (scenario.thermal.method != scene::ThermalMethod::cached) return {};
+  // The surface makes up for 16 intervals at once.
+  constexpr double kIntervalsPerStep = 12.0;
+  const auto step_ns =
+      std::max<std::int64_t>(1, time_ns(kIntervalsPerStep * scenario.thermal.first_step_s));
+  Progress progress(fmt::format("surface at {:g} s", 1e-9 * static_cast<double>(to_ns)),
+                    static_cast<std::uint64_t>((to_ns - from_ns) / step_ns));
+  for (std::int64_t at_ns = from_ns + step_ns; at_ns < to_ns; at_ns += step_ns) {
+    if (InterruptGuard::interrupted()) {
+      return physics::make_error(physics::ErrorCode::internal, "interrupted");
+    }
+    renderer::FrameRequest request;
+    request.sim_time_ns = request.thermal_time_ns = at_ns;
+    request.sensor_pose = renderer.scenario_sensor_pose_at(at_ns);
+    request.window_px = {0, 0, 1, 1};
+    const int slot = renderer.submit(request);
+    if (slot < 0) {
+      return physics::make_error(physics::ErrorCode::internal, "the renderer has no free slot");
+    }
+    const bool failed = renderer.collect(static_cast<renderer::SlotIndex>(slot)).device_failed;
+    renderer.release(static_cast<renderer::SlotIndex>(slot));
+    if (failed) return physics::make_error(physics::ErrorCode::gpu, "the device reported an error");
+    progress.advance_to(static_cast<std::uint64_t>((at_ns - from_ns) / step_ns));
+  }
+  return {};
+}
+
+/// One run: it renders the plan and writes files, lines and JSON.
+class Rendering {
+ public:
+  Rendering(const RenderOptions& command, const scene::ScenarioDesc& scenario, const Plan& plan)
+      : command_(command), scenario_(scenario), plan_(plan), apparent_(scenario.bands.size()) {}
+  /// Errors: those of the renderer; io.
+  [[nodiscard]] physics::Result<void> run();
+
+ private:
+  [[nodiscard]] physics::Result<void> create();
+  [[nodiscard]] physics::Result<void> render(std::size_t index);
+  [[nodiscard]] physics::Result<void> write_files(double time_s, std::size_t band,
+                                                  const renderer::FrameView& view);
+  void print_frame(double time_s, std::size_t band, const renderer::FrameView& view) const;
+  void print_warnings(const renderer::FrameView& view) const;
+  [[nodiscard]] Json run_json() const;
+  [[nodiscard]] Json frame_json(double time_s, std::size_t band,
+                                const renderer::FrameView& view) const;
+  [[nodiscard]] physics::Result<void> write_json_file() const;
+  [[nodiscard]] renderer::FrameRequest request(std::size_t index) const;
+
+  const RenderOptions& command_;
+  const scene::ScenarioDesc& scenario_;
+  const Plan& plan_;
+  std::vector<std::optional<ApparentTemperature>> apparent_;  ///< of the bands that were shown
+  std::unique_ptr<renderer::Renderer> renderer_;
+  Times times_;
+  std::vector<Json> frames_;
+};
+
+renderer::FrameRequest Rendering::request(std::size_t index) const {
+  renderer::FrameRequest out;
+  out.frame_number = index + 1;
+  out.sim_time_ns = out.thermal_time_ns = time_ns(plan_.times_s[index]);
+  out.sensor_pose = renderer_->scenario_sensor_pose_at(out.sim_time_ns);
+  return out;
+}
+
+physics::Result<void> Rendering::create() {
+  auto start = std::chrono::steady_clock::now();
+  auto created =
+      renderer::Renderer::create(scenario_, {command_.gpu_index, false}, output_options(command_));
+  if (!created) return tl::unexpected(std::move(created.error()));
+  renderer_ = std::move(*created);
+  times_.setup_ms = ms_since(start);
+  for (const std::string& text : renderer_->scene_stats().warnings) warn(text);
+  start = std::chrono::steady_clock::now();
+  if (auto warm = warm_up(*renderer_, request(0)); !warm) return warm;
+  times_.warm_up_ms = ms_since(start);
+  for (const std::string& text : renderer::warm_up_warnings(renderer_->scene_stats())) warn(text);
+  return {};
+}
+
+physics::Result<void> Rendering::write_files(double time_s, std::size_t band,
+                                             const renderer::FrameView& view) {
+  const scene::SpectralBand& shown = scenario_.bands[band];
   FramePlanes planes;
   planes.width_px = view.width_px;
   planes.height_px = view.height_px;
@@ -104,49 +270,66 @@ physics::Result<void> write_files(const RenderOptions& command, const scene::Sce
   planes.object_id = view.object_id;
   planes.metadata = {view.sim_time_ns, view.frame_number, view.sensor_pose, shown.name,
                      shown.lo_um,      shown.hi_um,       "W m-2 sr-1",     response_of(shown)};
-  if (command.png) {
-    const ColorLimits limits{scenario.display.min_k, scenario.display.max_k};
-    if (auto done = write_frame_png(*command.png, planes, limits); !done) return done;
+  if (plan_.png_names) {
+    const PngStyle style{scenario_.display.min_k, scenario_.display.max_k,
+                         png_quantity(command_.png_of)};
+    if (style.quantity == PngQuantity::apparent && !apparent_[band]) {
+      apparent_[band].emplace(spectral_band(shown));
+    }
+    planes.apparent = apparent_[band] ? &*apparent_[band] : nullptr;
+    const auto file = plan_.png_names->file(time_s, shown.name);
+    if (auto done = write_frame_png(file, planes, style); !done) return done;
   }
-  if (!wants(command, "temperature")) planes.temperature_k = {};
-  return write_frame_exr(command.out, planes);
+  if (!wants(command_, "temperature")) planes.temperature_k = {};
+  return write_frame_exr(plan_.exr_names.file(time_s, shown.name), planes);
 }
 
-void print_frame(const RenderOptions& command, const std::string& band,
-                 const renderer::Renderer& renderer, const renderer::FrameView& view,
-                 const Times& times) {
-  const renderer::SceneStats& scene = renderer.scene_stats();
+void Rendering::print_frame(double time_s, std::size_t band,
+                            const renderer::FrameView& view) const {
+  const renderer::SceneStats& scene = renderer_->scene_stats();
+  const std::string& name = scenario_.bands[band].name;
   fmt::print(
-      text_stream(command.json),
+      text_stream(command_.json),
       "{}: {}x{}, sim time {:.3f} s, band {}, {} triangles, setup {:.0f} ms, warm-up {:.0f} ms{}, "
       "frame {:.1f} ms, {}\n",
-      command.out.string(), view.width_px, view.height_px, command.time_s, band, scene.triangles,
-      times.setup_ms, times.warm_up_ms,
+      plan_.exr_names.file(time_s, name).string(), view.width_px, view.height_px, time_s, name,
+      scene.triangles, times_.setup_ms, times_.warm_up_ms,
       scene.samples > 0 ? fmt::format(" ({} thermal samples, {:.0f} MiB)", scene.samples,
                                       static_cast<double>(scene.sample_bytes) / (1 << 20))
                         : std::string(),
-      times.frame_ms, renderer.device_name());
-  for (const std::string& text : renderer::warm_up_warnings(scene)) warn(text);
+      times_.frame_ms, renderer_->device_name());
+}
+
+void Rendering::print_warnings(const renderer::FrameView& view) const {
+  const std::string frame =
+      plan_.times_s.size() > 1
+          ? fmt::format("sim time {:.3f} s: ", 1e-9 * static_cast<double>(view.sim_time_ns))
+          : std::string();
   if (view.stats.nonfinite_px > 0) {
-    warn(fmt::format("{} pixels were not finite and are written as 0", view.stats.nonfinite_px));
+    warn(fmt::format("{}{} pixels were not finite and are written as 0", frame,
+                     view.stats.nonfinite_px));
   }
   if (view.stats.clamped_px > 0) {
-    warn(fmt::format("{} pixels lie outside a model's range", view.stats.clamped_px));
+    warn(fmt::format("{}{} pixels lie outside a model's range", frame, view.stats.clamped_px));
   }
 }
 
-Json frame_json(const RenderOptions& command, const scene::ScenarioDesc& scenario, std::size_t band,
-                const renderer::Renderer& renderer, const renderer::FrameView& view,
-                const Times& times) {
+Json Rendering::run_json() const {
+  const renderer::SceneStats& scene = renderer_->scene_stats();
   Json json = Json::object();
-  json.set("device", renderer.device_name()).set("scenario", scenario.name);
-  json.set("sim_time_s", command.time_s).set("band", scenario.bands[band].name);
+  json.set("device", renderer_->device_name()).set("scenario", scenario_.name);
+  json.set("quality", command_.quality);
+  json.set("triangles", scene.triangles);
+  json.set("setup_ms", times_.setup_ms).set("warm_up_ms", times_.warm_up_ms);
+  json.set("samples", scene.samples).set("sample_bytes", scene.sample_bytes);
+  return json;
+}
+
+Json Rendering::frame_json(double time_s, std::size_t band, const renderer::FrameView& view) const {
+  Json json = Json::object();
+  json.set("sim_time_s", time_s).set("band", scenario_.bands[band].name);
   json.set("width", view.width_px).set("height", view.height_px);
-  json.set("triangles", renderer.scene_stats().triangles);
-  json.set("setup_ms", times.setup_ms).set("warm_up_ms", times.warm_up_ms);
-  json.set("frame_ms", times.frame_ms);
-  json.set("samples", renderer.scene_stats().samples);
-  json.set("sample_bytes", renderer.scene_stats().sample_bytes);
+  json.set("frame_ms", times_.frame_ms);
   json.set("nonfinite_px", view.stats.nonfinite_px);
   json.set("clamped_px", view.stats.clamped_px);
   json.set("radiance", plane_json(view.radiance_w_m2_sr[band]));
@@ -159,64 +342,110 @@ Json frame_json(const RenderOptions& command, const scene::ScenarioDesc& scenari
   return json;
 }
 
-int run(const RenderOptions& command) {
-  auto scenario = load_scenario_choice(command.input);
-  if (!scenario) return fail_config(scenario.error());
-  const auto band = find_band(*scenario, command.band);
-  if (!band) return fail(kExitUsage, band.error().text);
-  if (!std::isfinite(command.time_s) || std::abs(command.time_s) > 9e9) {
-    return fail(kExitUsage, "--time-s: not a time");
+/// One frame has its keys beside those of the run. `frames` has those of every frame.
+physics::Result<void> Rendering::write_json_file() const {
+  if (!command_.json) return {};
+  Json json = run_json();
+  if (frames_.size() == 1) json.merge(frames_.front());
+  Json frames = Json::array();
+  for (const Json& frame : frames_) frames.push(frame);
+  json.set("frames", std::move(frames));
+  return write_json(*command_.json, json);
+}
+
+physics::Result<void> Rendering::render(std::size_t index) {
+  const double time_s = plan_.times_s[index];
+  const renderer::FrameRequest wanted = request(index);
+  if (index > 0) {
+    const std::int64_t from_ns = time_ns(plan_.times_s[index - 1]);
+    if (auto there = carry_on(*renderer_, scenario_, from_ns, wanted.sim_time_ns); !there) {
+      return there;
+    }
   }
-  renderer::FrameRequest request;
-  request.frame_number = 1;
-  request.sim_time_ns = std::llround(command.time_s * 1e9);
-  request.thermal_time_ns = request.sim_time_ns;
-  keep_only_view_at(request.sim_time_ns, *scenario);
-
-  Times times;
-  auto start = std::chrono::steady_clock::now();
-  const auto created =
-      renderer::Renderer::create(*scenario, {command.gpu_index, false}, output_options(command));
-  if (!created) return fail(created.error());
-  renderer::Renderer& renderer = **created;
-  times.setup_ms = ms_since(start);
-  for (const std::string& text : renderer.scene_stats().warnings) warn(text);
-
-  start = std::chrono::steady_clock::now();
-  request.sensor_pose = renderer.scenario_sensor_pose_at(request.sim_time_ns);
-  if (auto warm = warm_up(renderer, request); !warm) return fail(warm.error());
-  times.warm_up_ms = ms_since(start);
-  start = std::chrono::steady_clock::now();
-  const int slot = renderer.submit(request);
-  if (slot < 0) return fail(kExitFailure, "the renderer has no free slot");
-  const renderer::FrameView& view = renderer.collect(static_cast<renderer::SlotIndex>(slot));
-  times.frame_ms = ms_since(start);
+  const auto start = std::chrono::steady_clock::now();
+  const int slot = renderer_->submit(wanted);
+  if (slot < 0) {
+    return physics::make_error(physics::ErrorCode::internal, "the renderer has no free slot");
+  }
+  const renderer::FrameView& view = renderer_->collect(static_cast<renderer::SlotIndex>(slot));
+  times_.frame_ms = ms_since(start);
   if (view.device_failed) {
-    return fail(kExitFailure, "the device reported an error: the frame is not written");
+    return physics::make_error(physics::ErrorCode::gpu,
+                               "the device reported an error: the frame is not written");
   }
+  for (const std::size_t band : plan_.bands) {
+    if (auto done = write_files(time_s, band, view); !done) return done;
+    print_frame(time_s, band, view);
+    Json json = frame_json(time_s, band, view);
+    const std::string& name = scenario_.bands[band].name;
+    json.set("file", plan_.exr_names.file(time_s, name).string());
+    frames_.push_back(std::move(json));
+  }
+  print_warnings(view);
+  renderer_->release(static_cast<renderer::SlotIndex>(slot));
+  return {};
+}
 
-  if (auto done = write_files(command, *scenario, *band, view); !done) return fail(done.error());
-  print_frame(command, scenario->bands[*band].name, renderer, view, times);
-  if (command.json) {
-    const Json json = frame_json(command, *scenario, *band, renderer, view, times);
-    if (auto done = write_json(*command.json, json); !done) return fail(done.error());
+physics::Result<void> Rendering::run() {
+  const InterruptGuard interrupt;
+  if (auto created = create(); !created) return created;
+  for (std::size_t i = 0; i < plan_.times_s.size(); ++i) {
+    if (InterruptGuard::interrupted()) {
+      return physics::make_error(physics::ErrorCode::internal, "interrupted");
+    }
+    if (auto rendered = render(i); !rendered) return rendered;
   }
-  renderer.release(static_cast<renderer::SlotIndex>(slot));
+  return write_json_file();
+}
+
+int run(const RenderOptions& command) {
+  ScenarioChoice input = command.input;
+  if (command.quality == "preview") {
+    // The keys that the user sets come later, so that they count.
+    const std::vector<std::string> preview = preview_set();
+    input.set.insert(input.set.begin(), preview.begin(), preview.end());
+  }
+  auto scenario = load_scenario_choice(input);
+  if (!scenario) return fail_config(scenario.error());
+  const auto plan = make_plan(command, *scenario);
+  if (!plan) return fail(kExitUsage, plan.error().text);
+  if (auto writable = check_outputs(*plan, *scenario); !writable) return fail(writable.error());
+  if (command.quality == "preview") fmt::print(text_stream(command.json), kPreviewText);
+  keep_only_views_at(plan->times_s, *scenario);
+  if (auto done = Rendering(command, *scenario, *plan).run(); !done) return fail(done.error());
   return kExitOk;
 }
 
 void add_options(CommandLine& line, RenderOptions& options) {
   add_scenario(line, options.input, "scenario");
-  line.seconds("--time-s", options.time_s, "Simulated time since the scenario's epoch, s")
+  line.option(
+          "--time-s", options.times_s,
+          "Simulated time since the scenario's epoch, s; repeatable: all are rendered after one "
+          "warm-up, in ascending order. As in the daemon, edges of shadows that moved since the "
+          "first time may be coarser than in a run of their own")
+      .repeatable()
+      .type_name("S")
       .required();
-  line.path("--out", options.out, "OpenEXR file to write").required();
-  line.path("--png", options.png, "False-colour temperature as PNG");
+  line.path("--out", options.out,
+            "OpenEXR file to write. {time} and {band} in the name stand for time and band of the "
+            "frame; without them several times add _t<time>, and several bands add _<band>, before "
+            "the extension")
+      .required();
+  line.path("--png", options.png, "False-colour image as PNG; the name is made as that of --out");
+  add_png_of(line, options.png_of, true);
   line.option("--channel", options.channels,
               "Channel beside radiance: temperature, depth, object; repeatable; default all")
       .repeatable()
       .one_of({"temperature", "depth", "object"});
-  line.option("--band", options.band, "Band of the radiance channel; default: the first")
+  line.option("--band", options.bands,
+              "Band of the radiance channel; repeatable: a file for each; default: the first")
+      .repeatable()
       .type_name("NAME");
+  line.option("--quality", options.quality,
+              "preview renders an own scene in seconds. It sets keys of [thermal] to low cost and "
+              "says what it leaves out; keys of --set count more")
+      .one_of({"full", "preview"})
+      .show_default();
   add_gpu(line, options.gpu_index);
   add_json(line, options.json);
 }
@@ -226,7 +455,7 @@ void add_options(CommandLine& line, RenderOptions& options) {
 void add_render(CommandLine& tool) {
   tool.command<RenderOptions>(
       {.name = "render",
-       .text = "Render one frame of a scenario offline",
+       .text = "Render frames of a scenario offline",
        .example = "emit render block-on-road --time-s 41400 --out road.exr --png road.png"},
       add_options, run);
 }

@@ -21,6 +21,7 @@ struct ReplayOptions {
   std::filesystem::path log;
   ScenarioChoice input;
   std::optional<std::filesystem::path> out;
+  std::string png_of = "apparent";
   std::string speed = "max";
   int gpu_index = -1;
   std::optional<std::filesystem::path> json;
@@ -48,12 +49,15 @@ int run(const ReplayOptions& command) {
   constexpr std::size_t plane = 0;  // bands are in the order of the channels
   const scene::SpectralBand band =
       plane < scenario->bands.size() ? scenario->bands[plane] : scene::SpectralBand{};
-  const ColorLimits limits{scenario->display.min_k, scenario->display.max_k};
+  const PngStyle style{scenario->display.min_k, scenario->display.max_k,
+                       png_quantity(command.png_of)};
   JournalReplayOptions options;
   options.log = command.log;
   options.speed = *speed;
   options.gpu_index = command.gpu_index;
   options.temperature = command.out.has_value();
+  std::optional<ApparentTemperature> apparent;
+  if (command.out && physics::validate(spectral_band(band))) apparent.emplace(spectral_band(band));
   const InterruptGuard interrupt;
   const auto summary = replay_journal(
       *scenario, options, [&](const server::ReplayedFrame& frame) -> physics::Result<void> {
@@ -69,10 +73,11 @@ int run(const ReplayOptions& command) {
         planes.temperature_k = frame.view->temperature_k;
         planes.depth_m = frame.view->depth_m;
         planes.object_id = frame.view->object_id;
+        planes.apparent = apparent ? &*apparent : nullptr;
         planes.metadata = {frame.sim_time_ns, frame.frame_number, frame.view->sensor_pose,
                            band.name,         band.lo_um,         band.hi_um,
                            "W m-2 sr-1",      response_of(band)};
-        return write_frame_files(*command.out, planes, limits);
+        return write_frame_files(*command.out, planes, style);
       });
   if (!summary) return fail(summary.error());
 
@@ -99,7 +104,8 @@ int run(const ReplayOptions& command) {
 void add_options(CommandLine& line, ReplayOptions& options) {
   line.path("log", options.log, "MCAP log of emit record, or of the daemon's journal").required();
   add_scenario(line, options.input, "--scenario");
-  line.path("--out", options.out, "Folder for frame_NNNNNN.exr and .png").type_name("DIR");
+  line.output_folder("--out", options.out, "Folder for frame_NNNNNN.exr and .png");
+  add_png_of(line, options.png_of, true);
   line.option("--speed", options.speed, "Multiple of the recorded pace, or max")
       .type_name("X")
       .show_default();

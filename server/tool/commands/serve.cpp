@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include "app/daemon.hpp"
 #include "tool/commands/commands.hpp"
 
@@ -13,7 +15,22 @@ int run(int argc, char** argv) {
 }  // namespace
 
 void add_serve(CommandLine& tool) {
-  tool.raw_command("serve", "Run the daemon (same as emitd)", run);
+  CommandDescription serve;
+  serve.name = "serve";
+  serve.text = "Run the daemon (same as emitd)";
+  serve.footer = fmt::format("Exit codes: {}", server::daemon_exit_codes());
+  for (const server::DaemonOption& option : server::daemon_options()) {
+    OptionDescription out;
+    out.names.emplace_back(option.name);
+    out.value = option.value;
+    out.takes_value = !option.value.empty();
+    out.required = option.required;
+    out.repeatable = option.repeatable;
+    out.text = option.text;
+    if (out.value == "FILE") out.kind = ValueKind::file;
+    serve.options.push_back(std::move(out));
+  }
+  tool.raw_command(serve, run);
 }
 
 }  // namespace emit::tool

@@ -17,6 +17,7 @@
 #include "tool/support/frame_files.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
@@ -27,6 +28,7 @@ struct SolveOptions {
   double time_s = 0.0;
   std::filesystem::path out;
   std::optional<std::filesystem::path> png;
+  std::string png_of = "apparent";
   std::optional<std::filesystem::path> json;
   std::optional<std::filesystem::path> checkpoint;
   std::string dimension = "auto";  ///< "auto", "1" or "3"
@@ -64,7 +66,7 @@ struct Solution {
   Times times;
 };
 
-reference::SolveOptions solver_options(const SolveOptions& command, ProgressBar& bar) {
+reference::SolveOptions solver_options(const SolveOptions& command, Progress& bar) {
   reference::SolveOptions options;
   options.dimension = command.dimension == "1"   ? reference::SolveDimension::one
                       : command.dimension == "3" ? reference::SolveDimension::three
@@ -102,7 +104,7 @@ physics::Result<Solution> solve(const SolveOptions& command, const scene::Scenar
                                 const scene::SceneGeometry& geometry,
                                 const reference::SolveView& view) {
   const InterruptGuard interrupts;
-  ProgressBar bar("solve", 1000);
+  Progress bar("solve", 1000);
   const auto interrupted = [](const char* advice) {
     return physics::make_error(physics::ErrorCode::internal, fmt::format("interrupted{}", advice));
   };
@@ -145,7 +147,9 @@ physics::Result<void> write_files(const SolveOptions& command, const scene::Scen
                      shown.lo_um,      shown.hi_um, "W m-2 sr-1",     response_of(shown)};
   if (auto done = write_frame_exr(command.out, planes); !done) return done;
   if (!command.png) return {};
-  return write_frame_png(*command.png, planes, {scenario.display.min_k, scenario.display.max_k});
+  return write_frame_png(
+      *command.png, planes,
+      {scenario.display.min_k, scenario.display.max_k, png_quantity(command.png_of)});
 }
 
 void print_solution(const SolveOptions& command, const Solution& solution) {
@@ -221,8 +225,9 @@ void add_options(CommandLine& line, SolveOptions& options) {
   add_scenario(line, options.input, "scenario");
   line.seconds("--time-s", options.time_s, "Simulated time since the scenario's epoch, s")
       .required();
-  line.path("--out", options.out, "OpenEXR file to write").required();
-  line.path("--png", options.png, "False-colour temperature as PNG");
+  line.output_file("--out", options.out, "OpenEXR file to write").required();
+  line.output_file("--png", options.png, "False-colour image as PNG");
+  add_png_of(line, options.png_of, true);
   line.option("--dimension", options.dimension,
               "Conduction: 3 (solids of axis-aligned faces, nothing moving), 1 (behind every "
               "pixel), auto (3 where it fits)")
@@ -240,9 +245,8 @@ void add_options(CommandLine& line, SolveOptions& options) {
       .show_default();
   line.count("--pixels", options.pixels,
              "Only so many surface pixels, always the same ones, the rest NaN; 0: all");
-  line.path("--checkpoint", options.checkpoint,
-            "Folder to save the three-dimensional history in, and to go on from")
-      .type_name("DIR");
+  line.output_folder("--checkpoint", options.checkpoint,
+                     "Folder to save the three-dimensional history in, and to go on from");
   line.option("--threads", options.threads, "Threads; 0: one per core").show_default();
   line.option("--band", options.band, "Band of the radiance channel; default: the first")
       .type_name("NAME");

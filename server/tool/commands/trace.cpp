@@ -36,7 +36,7 @@ int run(const TraceOptions& command) {
 
 void add_options(CommandLine& line, TraceOptions& options) {
   line.option("url", options.url, "http://host:port of metrics.listen").required().type_name("URL");
-  line.path("--out", options.out, "JSON file to write").required();
+  line.output_file("--out", options.out, "JSON file to write").required();
 }
 
 }  // namespace

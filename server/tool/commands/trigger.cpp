@@ -17,6 +17,7 @@
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
 #include "tool/support/json.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -54,7 +55,7 @@ int run(const TriggerOptions& command) {
   const server::SystemClock clock;
   protocol::Trigger trigger;
   trigger.run_id = static_cast<std::uint64_t>(clock.tai_ns());
-  ProgressBar progress("triggers", command.frames == 0 ? 1 : command.frames);
+  Progress progress("triggers", command.frames == 0 ? 1 : command.frames);
   const std::int64_t start_ns = clock.tai_ns();
   std::uint64_t failed = 0;
   while (!InterruptGuard::interrupted() &&

@@ -11,6 +11,7 @@
 #include "emit/v1/control.pb.h"
 #include "tool/support/console.hpp"
 #include "tool/support/interrupt.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -30,6 +31,18 @@ void warn_of_differences(const server::JournalPlayer& player, const std::string&
     warn(fmt::format("the journal was recorded on '{}', this is '{}': frames may differ",
                      player.device(), device));
   }
+}
+
+/// Frames of a journal, up to what does not read. The replay itself reports errors of the log.
+std::uint64_t count_frames(const std::filesystem::path& file) {
+  std::uint64_t frames = 0;
+  auto log = protocol::LogReader::open(file);
+  while (log && !InterruptGuard::interrupted()) {
+    const auto more = log->next();
+    if (!more || !*more) break;
+    if (log->topic() == protocol::LogTopic::journal && log->journal().has_frame()) ++frames;
+  }
+  return frames;
 }
 
 }  // namespace
@@ -57,7 +70,7 @@ physics::Result<JournalReplaySummary> replay_journal(
   output.slots = 3;
   output.ladder = renderer::Ladder::replayed;
   auto source = [&] {
-    ProgressBar warm_up("warm-up", 1000);
+    Progress warm_up("warm-up", 1000);
     return server::make_renderer_source(
         scenario, renderer::DeviceOptions{options.gpu_index, false}, output, [&](double done_frac) {
           warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
@@ -74,7 +87,8 @@ physics::Result<JournalReplaySummary> replay_journal(
   auto channels = server::make_channels(scenario, (*source)->info());
   if (!channels) return tl::unexpected(channels.error());
   server::JournalPlayer player(**source, std::move(*channels));
-  ProgressBar progress("replay", options.expected_frames);
+  Progress progress(
+      "replay", options.expected_frames > 0 ? options.expected_frames : count_frames(options.log));
   start = Clock::now();
   std::int64_t first_wall_ns = 0;
   bool compared_run = false;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <chrono>
-#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -34,26 +32,6 @@ void warn(std::string_view text);
 /// Returns the stream for a command's text for people: standard output, or standard error when
 /// `--json -` takes standard output.
 [[nodiscard]] std::FILE* text_stream(const std::optional<std::filesystem::path>& json);
-
-/// Progress bar on standard error. It is silent unless that is a terminal.
-class ProgressBar {
- public:
-  ProgressBar(std::string label, std::uint64_t total);
-  ~ProgressBar();
-  ProgressBar(const ProgressBar&) = delete;
-  ProgressBar& operator=(const ProgressBar&) = delete;
-
-  void advance_to(std::uint64_t done);
-  /// Clears the line. The destructor calls it too.
-  void finish();
-
- private:
-  std::string label_;
-  std::uint64_t total_;
-  bool shown_;
-  std::chrono::steady_clock::time_point start_;
-  std::chrono::steady_clock::time_point last_draw_;
-};
 
 /// Plain text table with right-aligned columns; the first column is left-aligned.
 class TextTable {

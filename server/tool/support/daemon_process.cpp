@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <deque>
 #include <fstream>
 #include <optional>
@@ -13,6 +14,7 @@
 
 #include "emit/config/load.hpp"
 #include "tool/support/console.hpp"
+#include "tool/support/progress.hpp"
 
 namespace emit::tool {
 namespace {
@@ -28,14 +30,29 @@ std::string value_of(const std::string& line, const std::string& key) {
   return line.substr(from, line.find_first_of(" \t\r\n\"", from) - from);
 }
 
-std::optional<std::string> ready_line(const std::filesystem::path& log) {
+/// State of a daemon's start as its log says it.
+struct StartState {
+  std::optional<std::string> ready_line;
+  std::uint64_t warm_up_percent = 0;
+};
+
+StartState start_state(const std::filesystem::path& log) {
   std::ifstream file(log);
   std::string line;
+  StartState out;
   while (std::getline(file, line)) {
     // The last line may still be incomplete: without its newline getline() hits the end of file.
-    if (line.find("ready control=") != std::string::npos && !file.eof()) return line;
+    if (file.eof()) break;
+    if (line.find("ready control=") != std::string::npos) {
+      out.ready_line = line;
+      break;
+    }
+    if (const std::string percent = value_of(line, "event=warm_up done_percent=");
+        !percent.empty()) {
+      out.warm_up_percent = std::strtoull(percent.c_str(), nullptr, 10);
+    }
   }
-  return std::nullopt;
+  return out;
 }
 
 }  // namespace
@@ -64,12 +81,15 @@ physics::Result<DaemonProcess> DaemonProcess::start(const config::DaemonConfig& 
 
   DaemonProcess daemon(std::move(*process), log);
   const auto end = std::chrono::steady_clock::now() + timeout;
+  Progress progress("warm-up of emitd", 100);
   while (true) {
-    if (const auto line = ready_line(log)) {
-      daemon.control_ = value_of(*line, "control=");
-      daemon.host_udp_ = value_of(*line, "host_udp=");
+    const StartState state = start_state(log);
+    if (state.ready_line) {
+      daemon.control_ = value_of(*state.ready_line, "control=");
+      daemon.host_udp_ = value_of(*state.ready_line, "host_udp=");
       return daemon;
     }
+    if (state.warm_up_percent > 0) progress.advance_to(state.warm_up_percent);
     if (const auto status = daemon.process_.poll()) {
       return make_error(
           *status == kExitConfig ? ErrorCode::config : ErrorCode::io,

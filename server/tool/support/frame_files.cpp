@@ -129,42 +129,111 @@ physics::Result<void> write_frame_exr(const std::filesystem::path& file, const F
   return image::write_exr(file, exr);
 }
 
-physics::Result<void> write_frame_png(const std::filesystem::path& file, const FramePlanes& frame,
-                                      const ColorLimits& limits) {
-  image::FalseColorOptions options;
-  options.min_value = limits.min_k;
-  options.max_value = limits.max_k;
-  options.color_bar = true;
-  options.unit = "K";
-  std::vector<float> apparent;
-  std::span<const float> values = frame.temperature_k;
-  if (values.empty()) {
-    if (frame.apparent != nullptr) {
-      apparent = frame.apparent->kelvin(frame.radiance_w_m2_sr);
-      values = apparent;
-    } else if (const auto band = spectral_band(frame.metadata)) {
-      apparent = ApparentTemperature(*band).kelvin(frame.radiance_w_m2_sr);
-      values = apparent;
-    } else {
-      // A canned image of no band is scaled by its own range of radiance.
-      values = frame.radiance_w_m2_sr;
-      options.unit.assign(1, 'W');
-      const auto range = image::percentile_range(values, 1.0, 99.0);
-      options.min_value = range ? range->min_value : 0.0;
-      options.max_value =
-          range && range->max_value > range->min_value ? range->max_value : options.min_value + 1.0;
+PngQuantity png_quantity(std::string_view text) noexcept {
+  if (text == "temperature") return PngQuantity::temperature;
+  if (text == "radiance") return PngQuantity::radiance;
+  return PngQuantity::apparent;
+}
+
+namespace {
+
+/// Values of a picture with what the colour bar says.
+struct PngValues {
+  std::vector<float> made;  ///< holds what `values` shows where the frame does not have it
+  std::span<const float> values;
+  std::string unit;
+  double min_value = 0.0;
+  double max_value = 1.0;
+};
+
+PngValues radiance_values(const FramePlanes& frame) {
+  PngValues out;
+  out.values = frame.radiance_w_m2_sr;
+  out.unit = "W";
+  const auto range = image::percentile_range(out.values, 1.0, 99.0);
+  out.min_value = range ? range->min_value : 0.0;
+  out.max_value =
+      range && range->max_value > range->min_value ? range->max_value : out.min_value + 1.0;
+  return out;
+}
+
+physics::Result<PngValues> png_values(const FramePlanes& frame, const PngStyle& style) {
+  PngValues out;
+  out.unit = "K";
+  out.min_value = style.min_k;
+  out.max_value = style.max_k;
+  if (style.quantity == PngQuantity::temperature || frame.radiance_w_m2_sr.empty()) {
+    if (frame.temperature_k.empty() || style.quantity == PngQuantity::radiance) {
+      return make_error(
+          ErrorCode::invalid_argument,
+          fmt::format(
+              "the frame carries no {}, so that no picture shows it",
+              style.quantity == PngQuantity::radiance ? "radiance" : "temperature of surfaces"));
     }
+    out.values = frame.temperature_k;
+    return out;
   }
-  const auto picture = image::false_color(values, frame.width_px, frame.height_px, options);
+  if (style.quantity == PngQuantity::radiance) return radiance_values(frame);
+  if (frame.apparent != nullptr) {
+    out.made = frame.apparent->kelvin(frame.radiance_w_m2_sr);
+  } else if (const auto band = spectral_band(frame.metadata)) {
+    out.made = ApparentTemperature(*band).kelvin(frame.radiance_w_m2_sr);
+  } else {
+    return radiance_values(frame);  // a canned frame of no band
+  }
+  out.values = out.made;
+  return out;
+}
+
+std::string with_placeholder(std::string text, std::string_view place, const std::string& value) {
+  for (std::size_t at = text.find(place); at != std::string::npos;
+       at = text.find(place, at + value.size())) {
+    text.replace(at, place.size(), value);
+  }
+  return text;
+}
+
+}  // namespace
+
+physics::Result<void> write_frame_png(const std::filesystem::path& file, const FramePlanes& frame,
+                                      const PngStyle& style) {
+  const auto shown = png_values(frame, style);
+  if (!shown) {
+    return make_error(shown.error().code, fmt::format("{}: {}", file.string(), shown.error().text));
+  }
+  image::FalseColorOptions options;
+  options.min_value = shown->min_value;
+  options.max_value = shown->max_value;
+  options.color_bar = true;
+  options.unit = shown->unit;
+  const auto picture = image::false_color(shown->values, frame.width_px, frame.height_px, options);
   if (!picture) return tl::unexpected(picture.error());
   return image::write_png(file, *picture);
 }
 
 physics::Result<void> write_frame_files(const std::filesystem::path& directory,
-                                        const FramePlanes& frame, const ColorLimits& limits) {
+                                        const FramePlanes& frame, const PngStyle& style) {
   const auto stem = directory / fmt::format("frame_{:06}", frame.metadata.frame_number);
   if (auto written = write_frame_exr(stem.string() + ".exr", frame); !written) return written;
-  return write_frame_png(stem.string() + ".png", frame, limits);
+  return write_frame_png(stem.string() + ".png", frame, style);
+}
+
+std::filesystem::path FrameFileNames::file(double time_s, std::string_view band) const {
+  constexpr std::string_view kTime = "{time}";
+  constexpr std::string_view kBand = "{band}";
+  // A slash in the name of a band makes no folder.
+  std::string band_name(band);
+  std::ranges::replace(band_name, '/', '_');
+  const std::string time = fmt::format("{}", time_s);
+  const std::string pattern = pattern_.string();
+  std::string added;
+  if (several_times_ && pattern.find(kTime) == std::string::npos) added += "_t" + time;
+  if (several_bands_ && pattern.find(kBand) == std::string::npos) added += "_" + band_name;
+  std::filesystem::path named = pattern_;
+  if (!added.empty()) {
+    named.replace_filename(pattern_.stem().string() + added + pattern_.extension().string());
+  }
+  return with_placeholder(with_placeholder(named.string(), kTime, time), kBand, band_name);
 }
 
 physics::Result<void> make_directory(const std::filesystem::path& directory) {

@@ -5,6 +5,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "emit/image/exr_image.hpp"
@@ -69,24 +71,55 @@ struct FramePlanes {
   std::uint32_t sensor_height_px = 0;
 };
 
-/// Limits of the false colours, with a colour bar beside the image.
-struct ColorLimits {
+/// Quantity that the colours of a picture stand for.
+enum class PngQuantity : unsigned char {
+  apparent,  ///< temperature of a blackbody of the pixel's radiance in the band, as a sensor sees
+  temperature,  ///< temperature of the surface itself, without sky
+  radiance,     ///< radiance in the band
+};
+
+/// Returns the quantity named "apparent", "temperature" or "radiance". Any other text gives
+/// apparent.
+[[nodiscard]] PngQuantity png_quantity(std::string_view text) noexcept;
+
+/// Content and colours of a PNG. The limits are those of temperatures; radiance is shown
+/// between its 1st and 99th percentile. A colour bar lies beside the picture.
+struct PngStyle {
   double min_k = 280.0;
   double max_k = 330.0;
+  PngQuantity quantity = PngQuantity::apparent;
 };
 
 [[nodiscard]] physics::Result<void> write_frame_exr(const std::filesystem::path& file,
                                                     const FramePlanes& frame);
-/// Writes a false-colour PNG: the surface temperature where the frame has it, else the apparent
-/// temperature of the radiance. For a frame without a band it shows radiance between its 1st and
-/// 99th percentile.
+/// Writes a false-colour PNG. Apparent temperature falls back to radiance for a frame of no band, and to the frame's
+/// temperature where it has no radiance. Errors: invalid_argument (the frame lacks the quantity),
+/// io.
 [[nodiscard]] physics::Result<void> write_frame_png(const std::filesystem::path& file,
                                                     const FramePlanes& frame,
-                                                    const ColorLimits& limits);
+                                                    const PngStyle& style);
 /// Writes frame_NNNNNN.exr and .png into `directory`, numbered by the metadata's frame number.
 [[nodiscard]] physics::Result<void> write_frame_files(const std::filesystem::path& directory,
                                                       const FramePlanes& frame,
-                                                      const ColorLimits& limits);
+                                                      const PngStyle& style);
+
+/// Names of the files of several frames that one option names. `{time}` and `{band}` in the name
+/// are replaced by the simulated time in s and by the name of the band. Where a run has several
+/// times or bands and the name has no such place, "_t<time>" or "_<band>" is added before the
+/// extension.
+class FrameFileNames {
+ public:
+  FrameFileNames(std::filesystem::path pattern, bool several_times, bool several_bands)
+      : pattern_(std::move(pattern)),
+        several_times_(several_times),
+        several_bands_(several_bands) {}
+  [[nodiscard]] std::filesystem::path file(double time_s, std::string_view band) const;
+
+ private:
+  std::filesystem::path pattern_;
+  bool several_times_;
+  bool several_bands_;
+};
 
 /// Creates a folder and its parents. Errors: io.
 [[nodiscard]] physics::Result<void> make_directory(const std::filesystem::path& directory);

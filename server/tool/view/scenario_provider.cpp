@@ -11,6 +11,7 @@
 
 #include "emit/renderer/renderer.hpp"
 #include "tool/support/console.hpp"
+#include "tool/support/progress.hpp"
 #include "tool/support/scenario_input.hpp"
 #include "tool/view/frame_provider.hpp"
 #include "tool/view/view_control.hpp"
@@ -83,7 +84,7 @@ class ScenarioProvider final : public FrameProvider {
     renderer::FrameRequest first;
     first.sim_time_ns = first.thermal_time_ns = std::llround(sim_time_s_ * 1e9);
     first.sensor_pose = renderer.scenario_sensor_pose_at(first.sim_time_ns);
-    ProgressBar bar("warm-up", 1000);
+    Progress bar("warm-up", 1000);
     auto ready = renderer.warm_up(first, [&](double done_frac) {
       bar.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
       return !stop_.load();

@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <vector>
@@ -114,6 +116,103 @@ TEST(CliFrameFiles, a_frame_comes_back_from_disk_bit_for_bit) {
   EXPECT_EQ(metadata->sim_time_ns, planes.metadata.sim_time_ns);
   EXPECT_EQ(metadata->frame_number, 42U);
   EXPECT_TRUE(std::filesystem::exists(folder.path() / "frame_000042.png"));
+}
+
+/// Frame of blackbodies at these temperatures; `emissivity` scales what they radiate.
+struct BlackbodyFrame {
+  explicit BlackbodyFrame(double emissivity) {
+    const physics::Band band{8.0, 12.0, {}};
+    for (const float t_k : temperature_k) {
+      radiance.push_back(static_cast<float>(
+          emissivity * physics::band_radiance(band, physics::Kelvin{static_cast<double>(t_k)})
+                           .radiance_w_m2_sr));
+    }
+    planes.width_px = 4;
+    planes.height_px = 1;
+    planes.radiance_w_m2_sr = radiance;
+    planes.temperature_k = temperature_k;
+    planes.metadata.band_name = "8-12";
+    planes.metadata.band_lo_um = 8.0;
+    planes.metadata.band_hi_um = 12.0;
+  }
+  std::vector<float> temperature_k{285.02F, 297.52F, 312.51F, 325.03F};
+  std::vector<float> radiance;
+  FramePlanes planes;
+};
+
+std::string png_of(const FramePlanes& planes, PngQuantity quantity) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "x.png";
+  EXPECT_TRUE(write_frame_png(file, planes, {280.0, 330.0, quantity}).has_value());
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(CliPng, of_blackbodies_shows_one_temperature_as_apparent_and_of_the_surface) {
+  const BlackbodyFrame frame(1.0);
+  EXPECT_EQ(png_of(frame.planes, PngQuantity::apparent),
+            png_of(frame.planes, PngQuantity::temperature));
+}
+
+TEST(CliPng, of_grey_surfaces_shows_what_the_sensor_sees_unless_asked_otherwise) {
+  const BlackbodyFrame black(1.0);
+  const BlackbodyFrame grey(0.8);
+  EXPECT_EQ(png_of(grey.planes, PngQuantity::temperature),
+            png_of(black.planes, PngQuantity::temperature));
+  EXPECT_NE(png_of(grey.planes, PngQuantity::apparent),
+            png_of(black.planes, PngQuantity::apparent));
+  FramePlanes shown = grey.planes;
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_frame_files(folder.path(), shown, {280.0, 330.0}).has_value());
+  std::ifstream stream(folder.path() / "frame_000000.png", std::ios::binary);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(stream), {}),
+            png_of(grey.planes, PngQuantity::apparent));
+}
+
+TEST(CliPng, of_radiance_does_not_depend_on_the_limits_in_kelvin) {
+  const BlackbodyFrame frame(1.0);
+  const TemporaryFolder folder;
+  const auto other = folder.path() / "other.png";
+  ASSERT_TRUE(write_frame_png(other, frame.planes, {1.0, 2.0, PngQuantity::radiance}).has_value());
+  std::ifstream stream(other, std::ios::binary);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(stream), {}),
+            png_of(frame.planes, PngQuantity::radiance));
+}
+
+TEST(CliPng, of_what_the_frame_lacks_is_an_error_that_names_it) {
+  BlackbodyFrame frame(1.0);
+  frame.planes.temperature_k = {};
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "x.png";
+  const auto written =
+      write_frame_png(file, frame.planes, {280.0, 330.0, PngQuantity::temperature});
+  ASSERT_FALSE(written.has_value());
+  EXPECT_NE(written.error().text.find("temperature"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(file));
+}
+
+TEST(CliPng, of_a_frame_of_temperatures_shows_them) {
+  BlackbodyFrame frame(1.0);
+  const std::string surface = png_of(frame.planes, PngQuantity::temperature);
+  frame.planes.radiance_w_m2_sr = {};
+  EXPECT_EQ(png_of(frame.planes, PngQuantity::apparent), surface);
+}
+
+TEST(CliFrameFileNames, one_frame_has_the_name_that_was_given) {
+  EXPECT_EQ(FrameFileNames("a/road.exr", false, false).file(41400.0, "8-12"), "a/road.exr");
+}
+
+TEST(CliFrameFileNames, several_frames_differ_by_what_varies) {
+  EXPECT_EQ(FrameFileNames("a/road.exr", true, false).file(41400.0, "8-12"), "a/road_t41400.exr");
+  EXPECT_EQ(FrameFileNames("a/road.exr", false, true).file(41400.0, "8-12"), "a/road_8-12.exr");
+  EXPECT_EQ(FrameFileNames("a/road.exr", true, true).file(12.5, "8-12"), "a/road_t12.5_8-12.exr");
+  EXPECT_EQ(FrameFileNames("road", true, true).file(-3.0, "a/b"), "road_t-3_a_b");
+}
+
+TEST(CliFrameFileNames, places_in_the_name_are_filled) {
+  EXPECT_EQ(FrameFileNames("{band}/f{time}.exr", true, true).file(12.5, "8-12"), "8-12/f12.5.exr");
+  EXPECT_EQ(FrameFileNames("{band}_f.exr", true, true).file(12.5, "8-12"), "8-12_f_t12.5.exr");
+  EXPECT_EQ(FrameFileNames("f{time}.exr", false, false).file(12.5, "8-12"), "f12.5.exr");
 }
 
 TEST(CliSceneOptions, block_size_sets_all_three_edges_and_single_ones_override_it) {

@@ -116,6 +116,50 @@ TEST(CliUsage, what_is_wrong_is_named) {
   }
 }
 
+/// A mistyped word and what the tool takes it for.
+struct Mistake {
+  std::vector<std::string> arguments;
+  std::string suggestion;
+};
+
+class CliMistyped : public testing::TestWithParam<Mistake> {};
+
+TEST_P(CliMistyped, gets_a_suggestion_in_one_line) {
+  const ProcessResult result = run_emit(GetParam().arguments);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("did you mean '" + GetParam().suggestion + "'?"), std::string::npos)
+      << result.err;
+  EXPECT_EQ(result.err.find('\n'), result.err.size() - 1) << result.err;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Words, CliMistyped,
+    testing::Values(Mistake{{"rendr"}, "render"},
+                    Mistake{{"recieve", "tcp://localhost:1"}, "receive"},
+                    Mistake{{"bench", "papre", "--json", "x"}, "bench paper"},
+                    Mistake{{"bench", "thermal-trut"}, "bench thermal-truth"},
+                    Mistake{{"render", "box", "--tim-s", "1", "--out", "x"}, "--time-s"},
+                    Mistake{{"render", "box", "--time-s", "1", "--uot=x"}, "--out"},
+                    Mistake{{"bench", "paper", "--sceen", "box"}, "--scene"},
+                    Mistake{{"man", "bnech"}, "emit-bench"}, Mistake{{"--vesion"}, "--version"}));
+
+TEST(CliUsage, a_word_that_nothing_is_like_gets_no_suggestion) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"xylophone"},
+        std::vector<std::string>{"render", "box", "--xylophone"}}) {
+    const ProcessResult result = run_emit(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_NE(result.err.find("xylophone"), std::string::npos);
+    EXPECT_EQ(result.err.find("did you mean"), std::string::npos) << result.err;
+  }
+}
+
+TEST(CliUsage, the_value_of_an_option_is_no_option) {
+  const ProcessResult result =
+      run_emit({"render", "box", "--out", "--tim-s", "--time-s", "1", "--bnad", "x"});
+  EXPECT_NE(result.err.find("no option '--bnad', did you mean '--band'?"), std::string::npos)
+      << result.err;
+}
+
 TEST(CliBadConfiguration, an_unknown_scenario_exits_with_78) {
   const ProcessResult result =
       run_emit({"render", "no-such-scenario", "--time-s", "0", "--out", "x.exr"});
