@@ -91,8 +91,9 @@ struct DaemonOption {
 /// Exit codes of emitd, as its --help shows them.
 [[nodiscard]] std::string_view daemon_exit_codes() noexcept;
 
-/// Runs emitd; main() of emitd and `emit serve` call it. Exit codes: 0 after SIGTERM or SIGINT, 2 usage, 75
-/// the device was lost, 78 bad configuration (file:line:column on standard error), 1 otherwise.
+/// Runs emitd; main() of emitd and `emit serve` call it. Exit codes: 0 after SIGTERM or SIGINT, 2
+/// usage, 75 the device was lost, 78 bad configuration (file:line:column on standard error), 1
+/// otherwise.
 /// @param program  name shown in messages, "emitd" or "emit serve"; argv[0] is skipped.
 [[nodiscard]] int emitd_main(int argc, char** argv, const char* program = "emitd");
 

@@ -11,7 +11,6 @@
 #include <glm/ext/vector_double2.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <limits>
 #include <map>
 #include <set>
 #include <tuple>
@@ -19,6 +18,7 @@
 #include <utility>
 
 #include "emit/physics/check.hpp"
+#include "plane_pieces.hpp"
 
 namespace emit::scene {
 namespace {
@@ -40,8 +40,6 @@ constexpr std::size_t kMaxMatchedPieces = 3000;
 constexpr std::size_t kMaxCopiedVertices = 2'000'000;
 constexpr std::size_t kMaxMessages = 8;
 
-using Point2 = glm::dvec2;
-
 /// A triangle of one part, in the common axes.
 struct Facet {
   std::uint32_t part = 0;
@@ -58,84 +56,6 @@ struct PlaneEntry {
   std::uint64_t key = 0;
   std::uint32_t facet = 0;
   auto operator<=>(const PlaneEntry&) const = default;
-};
-
-/// Corner of a piece: weights of the cut triangle's corners.
-struct PieceCorner {
-  glm::dvec3 weight{0.0};
-  Point2 at{0.0};
-};
-using Piece = std::vector<PieceCorner>;
-
-double cross2(const Point2& a, const Point2& b) {
-  return a.x * b.y - a.y * b.x;
-}
-
-double area2(const Piece& piece) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < piece.size(); ++i) {
-    sum += cross2(piece[i].at, piece[(i + 1) % piece.size()].at);
-  }
-  return 0.5 * sum;
-}
-
-double perimeter(const Piece& piece) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < piece.size(); ++i) {
-    sum += glm::distance(piece[i].at, piece[(i + 1) % piece.size()].at);
-  }
-  return sum;
-}
-
-/// A line; the inside is on its left.
-struct Line {
-  Point2 from{0.0};
-  Point2 direction{1.0, 0.0};
-  [[nodiscard]] double side(const Point2& p) const { return cross2(direction, p - from); }
-};
-
-/// Two pieces may reach the same corner over different edges. Rounding gives it the same weights,
-/// and so the same position to the last bit.
-glm::dvec3 rounded(const glm::dvec3& weight) {
-  constexpr double kSteps = 68719476736.0;  // 2^36: far finer than float32
-  return glm::round(weight * kSteps) / kSteps;
-}
-
-/// Splits a convex piece. Corners on the line belong to both halves.
-std::pair<Piece, Piece> split(const Piece& piece, const Line& line, double tolerance) {
-  Piece left;
-  Piece right;
-  for (std::size_t i = 0; i < piece.size(); ++i) {
-    const PieceCorner& a = piece[i];
-    const PieceCorner& b = piece[(i + 1) % piece.size()];
-    const double side_a = line.side(a.at);
-    const double side_b = line.side(b.at);
-    if (side_a >= -tolerance) left.push_back(a);
-    if (side_a <= tolerance) right.push_back(a);
-    if ((side_a > tolerance && side_b < -tolerance) ||
-        (side_a < -tolerance && side_b > tolerance)) {
-      const double t = side_a / (side_a - side_b);
-      const PieceCorner cut{rounded(glm::mix(a.weight, b.weight, t)), glm::mix(a.at, b.at, t)};
-      left.push_back(cut);
-      right.push_back(cut);
-    }
-  }
-  return {std::move(left), std::move(right)};
-}
-
-/// Coordinates of a plane: the two axes along which its normal is smallest. Parallel projection
-/// keeps lines, and what lies inside what.
-struct Projection {
-  int u = 0;
-  int v = 1;
-  explicit Projection(const glm::dvec3& normal) {
-    const glm::dvec3 n = glm::abs(normal);
-    const int dropped = n.x >= n.y && n.x >= n.z ? 0 : n.y >= n.z ? 1 : 2;
-    u = (dropped + 1) % 3;
-    v = (dropped + 2) % 3;
-    if (normal[dropped] < 0.0) std::swap(u, v);
-  }
-  [[nodiscard]] Point2 operator()(const glm::dvec3& p) const { return {p[u], p[v]}; }
 };
 
 struct EdgeKey {
@@ -164,41 +84,20 @@ std::uint64_t plane_key(const glm::dvec3& normal, double offset_m, double shift)
   return hash;
 }
 
-/// Cuts a convex polygon into triangles. Some of its corners may lie on straight edges. The
-/// smallest corner triangle is cut off first, so that no corner on an edge is left without a
-/// triangle.
-std::vector<std::array<std::size_t, 3>> triangulate(const Piece& piece) {
-  std::vector<std::size_t> left(piece.size());
-  for (std::size_t i = 0; i < left.size(); ++i) left[i] = i;
-  std::vector<std::array<std::size_t, 3>> out;
-  const double least = 1e-12 * std::abs(area2(piece));
-  while (left.size() >= 3) {
-    double best = std::numeric_limits<double>::infinity();
-    std::size_t best_at = left.size();
-    for (std::size_t i = 0; i < left.size(); ++i) {
-      const Point2& a = piece[left[i]].at;
-      const Point2& b = piece[left[(i + 1) % left.size()]].at;
-      const Point2& c = piece[left[(i + 2) % left.size()]].at;
-      const double area = 0.5 * cross2(b - a, c - a);
-      if (area > least && area < best) {
-        best = area;
-        best_at = i;
-      }
-    }
-    if (best_at == left.size()) break;
-    const std::size_t middle = (best_at + 1) % left.size();
-    out.push_back({left[best_at], left[middle], left[(best_at + 2) % left.size()]});
-    left.erase(left.begin() + static_cast<std::ptrdiff_t>(middle));
-  }
-  return out;
-}
-
 class CoplanarCutter {
  public:
   CoplanarCutter(std::vector<Mesh>& meshes, std::vector<CoplanarPart>& parts)
       : meshes_(meshes), parts_(parts) {}
 
   std::vector<std::string> run() {
+    const std::size_t triangles = count_triangles();
+    if (triangles > kMaxComparedTriangles) {
+      return {
+          fmt::format("{} triangles are more than {}: surfaces that lie in one plane are not "
+                      "looked for, and may "
+                      "show through each other",
+                      triangles, kMaxComparedTriangles)};
+    }
     collect();
     if (several_materials_) find_overlaps();
     if (!covers_.empty()) rebuild();
@@ -206,10 +105,15 @@ class CoplanarCutter {
   }
 
  private:
+  [[nodiscard]] std::size_t count_triangles() const {
+    std::size_t count = 0;
+    for (const CoplanarPart& part : parts_) count += meshes_[part.mesh].indices.size() / 3;
+    return count;
+  }
+
   void collect() {
     std::set<std::uint32_t> materials;
     for (std::uint32_t p = 0; p < parts_.size(); ++p) {
-      EMIT_CHECK_OP(parts_[p].mesh, <, meshes_.size());
       const Mesh& mesh = meshes_[parts_[p].mesh];
       for (std::uint32_t s = 0; s < mesh.submeshes.size(); ++s) {
         materials.insert(mesh.submeshes[s].material);
@@ -423,63 +327,12 @@ class CoplanarCutter {
     return pieces;
   }
 
-  /// Splits a piece along `lines` and keeps what lies outside of them, unless it does not reach out
-  /// from under the covering triangle with these `edges`.
-  static void subtract(Piece piece, const std::array<Line, 3>& lines,
-                       const std::array<Line, 3>& edges, double tolerance,
-                       std::vector<Piece>& out) {
-    Piece inside = piece;
-    for (const Line& line : lines) {
-      inside = split(inside, line, tolerance).first;
-      if (inside.size() < 3) break;
-    }
-    if (inside.size() < 3 || !(std::abs(area2(inside)) > 0.0)) {
-      out.push_back(std::move(piece));
-      return;
-    }
-    for (const Line& line : lines) {
-      auto [left, right] = split(piece, line, tolerance);
-      const bool hidden = std::ranges::all_of(right, [&](const PieceCorner& corner) {
-        return std::ranges::all_of(
-            edges, [&](const Line& edge) { return edge.side(corner.at) >= -10.0 * tolerance; });
-      });
-      if (right.size() >= 3 && !hidden) out.push_back(std::move(right));
-      piece = std::move(left);
-    }
-  }
-
   /// Sets the corners of all pieces into the edges of the others on which they lie.
   static void match_corners(std::vector<Piece>& pieces, double size_m) {
     if (pieces.size() > kMaxMatchedPieces) return;
     std::vector<PieceCorner> corners;
     for (const Piece& piece : pieces) corners.insert(corners.end(), piece.begin(), piece.end());
     for (Piece& piece : pieces) piece = with_corners_on_edges(piece, corners, 1e-8 * size_m);
-  }
-
-  static Piece with_corners_on_edges(const Piece& piece, const std::vector<PieceCorner>& corners,
-                                     double tolerance) {
-    Piece out;
-    for (std::size_t i = 0; i < piece.size(); ++i) {
-      const PieceCorner& a = piece[i];
-      const PieceCorner& b = piece[(i + 1) % piece.size()];
-      out.push_back(a);
-      const Point2 along = b.at - a.at;
-      const double length = glm::length(along);
-      std::vector<std::pair<double, const PieceCorner*>> on_edge;
-      for (const PieceCorner& corner : corners) {
-        const Point2 to = corner.at - a.at;
-        if (std::abs(cross2(along, to)) > tolerance * length) continue;
-        const double t = glm::dot(along, to) / length;
-        if (t > tolerance && t < length - tolerance) on_edge.emplace_back(t, &corner);
-      }
-      std::ranges::sort(on_edge, {}, [](const auto& entry) { return entry.first; });
-      double last = 0.0;
-      for (const auto& [t, corner] : on_edge) {
-        if (t - last > tolerance) out.push_back(*corner);
-        last = t;
-      }
-    }
-    return out;
   }
 
   /// New vertices of one part by the edge of its mesh on which they lie.

@@ -13,7 +13,7 @@ namespace emit::scene {
 /// A mesh that is placed more often than this need only be handed over at its first places: plants
 /// and posts that stand in thousands would cost minutes.
 inline constexpr std::size_t kMaxComparedPlacements = 8;
-/// Scenes with more triangles are not searched for surfaces in one plane.
+/// cut_coplanar() leaves scenes with more triangles as they are and says so.
 inline constexpr std::size_t kMaxComparedTriangles = 4'000'000;
 
 /// One placed mesh among those that may cover each other.

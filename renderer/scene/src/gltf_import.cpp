@@ -294,17 +294,14 @@ void separate_coplanar(const GltfFile& file, GltfModel& model) {
   std::vector<CoplanarPart> parts;
   std::vector<std::size_t> placement_of;
   std::vector<std::size_t> count(model.meshes.size(), 0);
-  std::size_t triangles = 0;
   for (std::size_t i = 0; i < model.placements.size(); ++i) {
     const GltfPlacement& placement = model.placements[i];
     if (++count[placement.mesh] > kMaxComparedPlacements) continue;
-    triangles += model.meshes[placement.mesh].indices.size() / 3;
     parts.push_back(
         {placement.mesh, placement.gltf_from_mesh,
          fmt::format("node '{}' mesh '{}'", placement.node, model.meshes[placement.mesh].name)});
     placement_of.push_back(i);
   }
-  if (triangles > kMaxComparedTriangles) return;
   for (CoplanarPart& part : parts) part.shared = count[part.mesh] > kMaxComparedPlacements;
   const std::vector<std::string> messages = cut_coplanar(model.meshes, parts);
   if (messages.empty()) return;

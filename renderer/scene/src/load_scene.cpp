@@ -183,17 +183,14 @@ class SceneLoader {
     }
     if (groups.size() < 2) return;
     std::vector<CoplanarPart> parts;
-    std::size_t triangles = 0;
     for (const std::size_t i : candidates) {
       const Instance& instance = geometry_.instances[i];
       const Mesh& mesh = geometry_.meshes[instance.mesh];
-      triangles += mesh.indices.size() / 3;
       parts.push_back(
           {instance.mesh, instance.world_from_mesh,
            fmt::format("object '{}' mesh '{}'", scenario_.objects[instance.object].name, mesh.name),
            groups.at({instance.object, instance.placement})});
     }
-    if (triangles > kMaxComparedTriangles) return;
     for (CoplanarPart& part : parts) part.shared = is_shared(part.mesh, uses[part.mesh]);
     const std::vector<std::string> messages = cut_coplanar(geometry_.meshes, parts);
     if (messages.empty()) return;

@@ -29,8 +29,8 @@ namespace emit::renderer {
 /// ahead counts and is not done again. A block returns to the interval, over the rest of it, when
 /// no such entity is near any more. Blocks take turns, so that no frame advances all of them.
 ///
-/// While a block is on its own, node `before` holds its states at the end of its latest step, and
-/// `after` holds the states foreseen at the end of the next step. The vertices of both nodes lie on
+/// Node `before` holds the states of a block on its own at the end of its latest step, and `after`
+/// holds the states foreseen at the end of the next step. The vertices of both nodes lie on
 /// the line through these two.
 ///
 /// Owner: CachedSurface. Thread: the renderer's; computes on all cores. Real time: everything but

@@ -92,9 +92,9 @@ struct PngStyle {
 
 [[nodiscard]] physics::Result<void> write_frame_exr(const std::filesystem::path& file,
                                                     const FramePlanes& frame);
-/// Writes a false-colour PNG. Apparent temperature falls back to radiance for a frame of no band, and to the frame's
-/// temperature where it has no radiance. Errors: invalid_argument (the frame lacks the quantity),
-/// io.
+/// Writes a false-colour PNG. Apparent temperature falls back to radiance for a frame of no band,
+/// and to the frame's temperature where it has no radiance. Errors: invalid_argument (the frame
+/// lacks the quantity), io.
 [[nodiscard]] physics::Result<void> write_frame_png(const std::filesystem::path& file,
                                                     const FramePlanes& frame,
                                                     const PngStyle& style);

@@ -152,6 +152,18 @@ TEST(Coplanar, twins_and_layers_leave_one_material_at_each_place) {
   EXPECT_THAT(materials_at(layers, 1.3, 12.2), testing::ElementsAre(0U));
 }
 
+TEST(Coplanar, of_a_high_stack_of_equal_surfaces_the_last_one_stays) {
+  // A comparison of all pairs would take minutes.
+  constexpr std::uint32_t kLayers = 6000;
+  std::vector<std::pair<std::string, Shape>> shapes;
+  for (std::uint32_t i = 0; i < kLayers; ++i) {
+    shapes.emplace_back(std::to_string(i), Shape::ground(0, 0, 4, 4));
+  }
+  const GltfModel model = load(test::text_of(shapes));
+  EXPECT_THAT(materials_at(model, 1.3, 2.2), testing::ElementsAre(kLayers - 1));
+  EXPECT_EQ(model.placements.size(), 1U);
+}
+
 TEST(Coplanar, surfaces_apart_turned_away_or_of_one_edge_stay_whole) {
   const Shape road = Shape::ground(-12, -12, 12, 12);
   const auto untouched = [](const GltfModel& model) {

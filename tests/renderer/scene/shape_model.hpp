@@ -56,7 +56,7 @@ struct Shape {
 };
 
 /// One node, mesh and material per shape.
-inline GltfText text_of(std::initializer_list<std::pair<std::string, Shape>> shapes) {
+inline GltfText text_of(const std::vector<std::pair<std::string, Shape>>& shapes) {
   GltfText text;
   text.buffer.clear();
   text.views.clear();
