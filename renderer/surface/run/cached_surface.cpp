@@ -208,12 +208,17 @@ physics::Result<SurfaceModel> CachedSurface::warm_up(const ModelWork& work) cons
   return model;
 }
 
+StateKey CachedSurface::key_of(const ModelWork& work, const Saved& saved) {
+  StateKey key = saved.key;
+  key[static_cast<std::size_t>(StatePart::live)] =
+      live_hash(work.start_ns, work.inputs.environment, work.inputs.entities);
+  return key;
+}
+
 physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const ModelWork& work,
                                                                        const Saved& saved) const {
-  const StateWanted wanted{saved.key, work.start_ns, [&work](std::int64_t at_ns) {
-                             return live_hash(at_ns, work.inputs.environment, work.inputs.entities);
-                           }};
-  auto read = read_state(saved.file, wanted, geometry_, movers_now_.size(), work.options);
+  auto read = read_state(saved.file, {key_of(work, saved), work.start_ns}, geometry_,
+                         movers_now_.size(), work.options);
   if (!read) {
     if (!saved.start) return std::nullopt;
     return tl::unexpected(std::move(read.error()));
@@ -252,10 +257,7 @@ physics::Result<SurfaceModel> CachedSurface::make_model(const ModelWork& work,
   }
   auto model = warm_up(work);
   if (!model || !writes) return model;
-  StateKey key = saved->key;
-  key[static_cast<std::size_t>(StatePart::live)] =
-      live_hash(work.start_ns, work.inputs.environment, work.inputs.entities);
-  if (auto written = write_state(saved->file, key, *model); !written) {
+  if (auto written = write_state(saved->file, key_of(work, *saved), *model); !written) {
     return tl::unexpected(std::move(written.error()));
   }
   return model;

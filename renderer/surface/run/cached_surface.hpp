@@ -169,7 +169,9 @@ class CachedSurface {
                                                          const std::optional<Saved>& saved) const;
   /// Samples the surface and integrates its history.
   [[nodiscard]] physics::Result<SurfaceModel> warm_up(const ModelWork& work) const;
-  /// The saved model, advanced to the start. It is empty if it does not fit and this is no error.
+  /// Returns the key of the state at the start of `work`: the scenario's and the host's input.
+  [[nodiscard]] static StateKey key_of(const ModelWork& work, const Saved& saved);
+  /// Returns the saved model. It is empty if it does not fit and this is no error.
   [[nodiscard]] physics::Result<std::optional<SurfaceModel>> take_saved(const ModelWork& work,
                                                                         const Saved& saved) const;
   [[nodiscard]] SurfaceInputs surface_inputs(const HistoryRecord& record,

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <span>
 #include <string_view>
 
@@ -16,8 +15,8 @@
 #include "surface/model/surface_model.hpp"
 
 /// State file of a surface (thermal.state_file): the surface at one instant after its history, so
-/// that a later run need not repeat the warm-up. A run that starts at a later time than the state
-/// continues from it. A state does not depend on bands. Setup only.
+/// that a later run that starts there need not repeat the warm-up. A state does not depend on
+/// bands. Setup only.
 ///
 /// Layout, little endian: 8 bytes "EMITSTAT", version u32, number of parts u32, the parts' hashes
 /// u64 each, the instant i64 in ns of sim time, size of the body u64, body (SurfaceModel member by
@@ -56,10 +55,8 @@ using StateKey = std::array<std::uint64_t, kStateParts>;
 
 /// Requirements of a run on a state.
 struct StateWanted {
-  StateKey key{};             ///< wanted hashes; StatePart::live is not used
-  std::int64_t start_ns = 0;  ///< latest allowed instant of the state
-  /// Function that returns the hash of StatePart::live for the instant of a state.
-  std::function<std::uint64_t(std::int64_t at_ns)> live_hash;
+  StateKey key{};             ///< wanted hashes
+  std::int64_t start_ns = 0;  ///< wanted instant of the state
 };
 
 /// Writes a state. It writes a temporary file in the same folder and renames it. Errors: io, with
@@ -71,8 +68,8 @@ struct StateWanted {
 [[nodiscard]] physics::Result<void> check_state_writable(const std::filesystem::path& file);
 
 /// Reads a state for a scene that has `geometry` and `movers` entities. Errors: io (the file cannot
-/// be read), config (the file is truncated, damaged, of another version, later than the start of
-/// the run, or made for something else). The message names the file and the reason.
+/// be read), config (the file is truncated, damaged, of another version, of another instant, or
+/// made for something else). The message names the file and the reason.
 [[nodiscard]] physics::Result<SurfaceModel> read_state(const std::filesystem::path& file,
                                                        const StateWanted& wanted,
                                                        const scene::SceneGeometry& geometry,

@@ -78,8 +78,7 @@ struct World {
 
 /// A run that starts at `start_ns` and asks for that key.
 StateWanted wanted(const StateKey& key, std::int64_t start_ns = kAtNs) {
-  return {key, start_ns,
-          [live = key[static_cast<std::size_t>(StatePart::live)]](std::int64_t) { return live; }};
+  return {key, start_ns};
 }
 
 class StateFile : public testing::Test {
