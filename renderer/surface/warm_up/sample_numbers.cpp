@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
@@ -12,8 +13,8 @@
 namespace emit::renderer {
 namespace {
 
-/// Views in one task of a parallel loop.
-constexpr std::size_t kGrain = 16;
+/// Views in one part of the lists.
+constexpr std::size_t kPartViews = 256;
 
 /// Largest number of samples in the list of a view: three corners for each seen face.
 constexpr std::size_t kMaxListed = 3 * SurfaceView::kMaxSeen;
@@ -64,6 +65,8 @@ class Numbers {
   /// Index of the sample of a vertex of an instance, on the side that is seen.
   [[nodiscard]] std::uint32_t sample_of(std::uint32_t instance, std::uint32_t vertex,
                                         bool behind) const;
+  /// Fills `list` with the samples around the places of one view. Returns the sum of the weights.
+  float spread(std::span<const SeenPlace> places, SeenList& list) const;
   /// Turns the views of one side of a patch into lists of samples, and frees them.
   void list_views(SurfacePatch& side);
   /// Appends the sample of a vertex on one side of a patch.
@@ -93,6 +96,23 @@ std::uint32_t Numbers::sample_of(std::uint32_t instance, std::uint32_t vertex, b
          static_cast<std::uint32_t>(back - backs_[mesh].begin());
 }
 
+float Numbers::spread(std::span<const SeenPlace> places, SeenList& list) const {
+  list.clear();
+  float sum_frac = 0.0F;
+  for (const SeenPlace& place : places) {
+    sum_frac += place.weight_frac;
+    const RefinedMesh& mesh = model_.meshes[in_.geometry.instances[place.instance].mesh];
+    const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
+    for (glm::length_t k = 0; k < 3; ++k) {
+      const float weight_frac = place.weight_frac * at.weight[k];
+      if (!(weight_frac > 0.0F)) continue;
+      const std::uint32_t corner = at.vertex[static_cast<std::size_t>(k)];
+      list.add(sample_of(place.instance, corner, place.behind), weight_frac);
+    }
+  }
+  return sum_frac;
+}
+
 void Numbers::list_views(SurfacePatch& side) {
   listed_.assign(side.samples.size(), {});
   if (options_.exchange) {
@@ -100,35 +120,41 @@ void Numbers::list_views(SurfacePatch& side) {
     for (std::uint32_t v = 0; v < side.seen.size(); ++v) {
       if (!side.seen[v].empty()) views.push_back(v);
     }
-    // Spread the weight of every seen place over the corners of the triangle there.
-    std::vector<std::vector<SeenSample>> lists(views.size());
-    threads::parallel_parts(views.size(), kGrain, [&](std::size_t from, std::size_t to) {
+    // Spread the weight of every seen place over the corners of the triangle there. Parts of the
+    // views make their lists on all cores, and free the views.
+    std::vector<std::vector<SeenSample>> parts((views.size() + kPartViews - 1) / kPartViews);
+    threads::parallel_parts(parts.size(), 1, [&](std::size_t from, std::size_t to) {
       SeenList list;
-      for (std::size_t i = from; i < to; ++i) {
-        list.clear();
-        float sum_frac = 0.0F;
-        for (const SeenPlace& place : side.seen[views[i]]) {
-          sum_frac += place.weight_frac;
-          const RefinedMesh& mesh = model_.meshes[in_.geometry.instances[place.instance].mesh];
-          const RefinedMesh::Place at = mesh.locate(place.triangle, place.barycentric);
-          for (glm::length_t k = 0; k < 3; ++k) {
-            const float weight_frac = place.weight_frac * at.weight[k];
-            if (!(weight_frac > 0.0F)) continue;
-            const std::uint32_t corner = at.vertex[static_cast<std::size_t>(k)];
-            list.add(sample_of(place.instance, corner, place.behind), weight_frac);
-          }
+      for (std::size_t part = from; part < to; ++part) {
+        const std::size_t end = std::min(views.size(), (part + 1) * kPartViews);
+        for (std::size_t i = part * kPartViews; i < end; ++i) {
+          const float sum_frac = spread(side.seen[views[i]], list);
+          listed_[views[i]] = {static_cast<std::uint32_t>(parts[part].size()),
+                               static_cast<std::uint32_t>(list.list().size()), sum_frac};
+          parts[part].insert(parts[part].end(), list.list().begin(), list.list().end());
+          side.seen[views[i]] = {};
         }
-        lists[i].assign(list.list().begin(), list.list().end());
-        listed_[views[i]].weight_frac = sum_frac;
       }
     });
-    // Append the lists one after the other, so that their order does not depend on the threads.
+    // Append the parts one after the other, so that their order does not depend on the threads.
     std::vector<SeenSample>& seen = model_.samples.seen;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      listed_[views[i]].first = static_cast<std::uint32_t>(seen.size());
-      listed_[views[i]].count = static_cast<std::uint32_t>(lists[i].size());
-      seen.insert(seen.end(), lists[i].begin(), lists[i].end());
+    std::vector<std::size_t> first(parts.size());
+    std::size_t total = seen.size();
+    for (std::size_t part = 0; part < parts.size(); ++part) {
+      first[part] = total;
+      total += parts[part].size();
     }
+    EMIT_CHECK_OP(total, <=, std::numeric_limits<std::uint32_t>::max());
+    seen.resize(total);
+    threads::parallel_parts(parts.size(), 1, [&](std::size_t from, std::size_t to) {
+      for (std::size_t part = from; part < to; ++part) {
+        std::ranges::copy(parts[part], seen.begin() + static_cast<std::ptrdiff_t>(first[part]));
+        const std::size_t end = std::min(views.size(), (part + 1) * kPartViews);
+        for (std::size_t i = part * kPartViews; i < end; ++i) {
+          listed_[views[i]].first += static_cast<std::uint32_t>(first[part]);
+        }
+      }
+    });
   }
   side.seen = {};
 }

@@ -2,73 +2,61 @@
 #pragma once
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "emit/physics/check.hpp"
 #include "surface/heat/surface_samples.hpp"
+#include "surface/warm_up/row_store.hpp"
 
 namespace emit::renderer {
 
-/// Radiation and heat that samples send out over the whole history, one row of float32 numbers per
-/// sample. A row holds the long-wave exitance at every node, the reflected sunlight of every
+/// Radiation and heat that one sample sends out over the whole history: a view of a row of float32
+/// numbers. The row holds the long-wave exitance at every node, the reflected sunlight of every
 /// interval and the net flux into the solid at every node, all in W/m2. An interval lies between
-/// two nodes.
-/// Threads may write different rows at the same time.
-class SentHistory {
+/// two nodes. A view of an empty row keeps nothing.
+template <class Value>
+class SentRow {
  public:
-  SentHistory() = default;
-  /// Begins with no samples. `intervals` may be 0: then rows are empty and nothing is stored.
-  explicit SentHistory(std::size_t intervals)
-      : intervals_(intervals), row_(intervals == 0 ? 0 : 3 * intervals + 2) {}
+  SentRow() = default;
+  explicit SentRow(std::span<Value> values) noexcept
+      : values_(values.data()), intervals_(values.empty() ? 0 : (values.size() - 2) / 3) {}
 
-  void resize(std::size_t samples) { values_.resize(samples * row_); }
-  [[nodiscard]] bool keeps() const noexcept { return row_ != 0; }
-  [[nodiscard]] std::size_t intervals() const noexcept { return intervals_; }
-
-  /// Stores the output of a sample at the first node. @pre keeps()
-  void keep_begin(std::size_t sample, const SampleOutput& output) noexcept {
-    keep_node(sample, 0, output);
-  }
-  /// Stores the output of a sample over `interval` and at the node where it ends. @pre keeps()
-  void keep_end(std::size_t sample, std::size_t interval, const SampleOutput& output) noexcept {
-    keep_node(sample, interval + 1, output);
-    at(sample, intervals_ + 1 + interval) = output.shortwave_out_w_m2;
+  /// Returns the number of values in the row of a history of `intervals` intervals.
+  [[nodiscard]] static constexpr std::size_t length(std::size_t intervals) noexcept {
+    return 3 * intervals + 2;
   }
 
-  /// Part of a row that other samples receive: the long wave at all nodes, then the sunlight of all
-  /// intervals.
-  [[nodiscard]] std::span<const float> radiation_w_m2(std::size_t sample) const noexcept {
-    return std::span(values_).subspan(sample * row_, radiation_size());
+  /// Stores the output at the first node. @pre the row is not empty
+  void keep_begin(const SampleOutput& output) const noexcept { keep_node(0, output); }
+  /// Stores the output over `interval` and at the node where it ends. @pre the row is not empty
+  void keep_end(std::size_t interval, const SampleOutput& output) const noexcept {
+    EMIT_DCHECK_OP(interval, <, intervals_);
+    keep_node(interval + 1, output);
+    values_[intervals_ + 1 + interval] = output.shortwave_out_w_m2;
   }
-  [[nodiscard]] std::size_t radiation_size() const noexcept { return 2 * intervals_ + 1; }
-  [[nodiscard]] float longwave_w_m2(std::size_t sample, std::size_t node) const noexcept {
-    return values_[sample * row_ + node];
+
+  /// Part of the row that other samples receive: the long wave at all nodes, then the sunlight of
+  /// all intervals.
+  [[nodiscard]] std::span<Value> radiation_w_m2() const noexcept {
+    return {values_, 2 * intervals_ + 1};
   }
-  [[nodiscard]] float flux_w_m2(std::size_t sample, std::size_t node) const noexcept {
-    return values_[sample * row_ + 2 * intervals_ + 1 + node];
+  [[nodiscard]] float longwave_w_m2(std::size_t node) const noexcept { return values_[node]; }
+  [[nodiscard]] float flux_w_m2(std::size_t node) const noexcept {
+    return values_[2 * intervals_ + 1 + node];
   }
-  [[nodiscard]] std::span<const float> row(std::size_t sample) const noexcept {
-    return std::span(values_).subspan(sample * row_, row_);
-  }
-  [[nodiscard]] std::span<float> row(std::size_t sample) noexcept {
-    return std::span(values_).subspan(sample * row_, row_);
-  }
-  /// Frees the memory.
-  void clear() noexcept { values_ = {}; }
 
  private:
-  [[nodiscard]] float& at(std::size_t sample, std::size_t place) noexcept {
-    EMIT_DCHECK_OP(place, <, row_);
-    return values_[sample * row_ + place];
-  }
-  void keep_node(std::size_t sample, std::size_t node, const SampleOutput& output) noexcept {
-    at(sample, node) = output.longwave_out_w_m2;
-    at(sample, 2 * intervals_ + 1 + node) = output.flux_w_m2;
+  void keep_node(std::size_t node, const SampleOutput& output) const noexcept {
+    EMIT_DCHECK(values_ != nullptr);
+    EMIT_DCHECK_OP(node, <=, intervals_);
+    values_[node] = output.longwave_out_w_m2;
+    values_[2 * intervals_ + 1 + node] = output.flux_w_m2;
   }
 
+  Value* values_ = nullptr;
   std::size_t intervals_ = 0;
-  std::size_t row_ = 0;
-  std::vector<float> values_;
 };
+
+/// Rows of the samples of a patch.
+using SentHistory = RowStore<float>;
 
 }  // namespace emit::renderer

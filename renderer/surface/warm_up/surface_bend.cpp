@@ -51,7 +51,7 @@ float SurfaceBend::cost_at_k(const glm::vec3& weight, const RefinedMesh& refined
     float drawn_frac = 0.0F;
     for (glm::length_t k = 0; k < 3; ++k) {
       const std::uint32_t corner = leaf[static_cast<std::size_t>(k)];
-      const float share = weight[k] * patch.sun_frac[corner * count + i];
+      const float share = weight[k] * patch.sun_frac.row(corner)[i];
       sun_frac += share;
       drawn_frac += share * std::max(0.0F, glm::dot(patch.samples[corner].normal, to_sun));
     }

@@ -392,9 +392,8 @@ physics::Result<SurfaceModel> Builder::run() {
   // Lay all samples out in one array, and integrate their history again with exchange.
   number_samples(in_, options_, patches_, model_);
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
-  SampleHistories histories = take_histories(in_, patches_, model_);
+  SampleHistories histories = take_histories(in_, std::move(patches_), model_);
   const ExchangeOptions exchange_options{.sweeps = sampler_.keeps_sent() ? kExchangeSweeps : 0,
-                                         .evaluated = true,
                                          .glow = options_.exchange};
   if (!exchange(in_, exchange_options, std::move(histories), model_, exchanged)) return stopped();
   replace_covered();

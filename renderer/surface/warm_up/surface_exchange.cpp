@@ -32,8 +32,8 @@ class SeenRadiation {
     sums_w_m2_.resize(lists_.size() * row_size_);
   }
 
-  /// Adds up the radiation of `sent`, list by list. Uses all cores.
-  void gather(const SentHistory& sent) {
+  /// Adds up the radiation in the rows `sent`, by sample, list by list. Uses all cores.
+  void gather(std::span<const SentRow<float>> sent) {
     constexpr std::size_t kListGrain = 16;
     threads::parallel_parts(lists_.size(), kListGrain, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) {
@@ -42,14 +42,14 @@ class SeenRadiation {
         for (std::uint32_t k = 0; k < lists_[i].count; ++k) {
           const SeenSample& seen = all_.seen[lists_[i].first + k];
           const double weight = seen.weight_frac;
-          const std::span<const float> row_w_m2 = sent.radiation_w_m2(seen.sample);
+          const std::span<const float> row_w_m2 = sent[seen.sample].radiation_w_m2();
           for (std::size_t j = 0; j < row_size_; ++j) sum_w_m2[j] += weight * row_w_m2[j];
         }
       }
     });
   }
 
-  /// Row of the list that a sample sees. It is empty if the sample sees nothing.
+  /// Returns the row of the list that a sample sees. It is empty if the sample sees nothing.
   [[nodiscard]] std::span<const double> of(const SurfaceSample& sample) const noexcept {
     if (sample.seen_count == 0) return {};
     return std::span(sums_w_m2_).subspan(list_of_entry_[sample.first_seen] * row_size_, row_size_);
@@ -65,7 +65,7 @@ class SeenRadiation {
   std::size_t row_size_;
   std::vector<std::uint32_t> list_of_entry_;  ///< list that begins with an entry of `seen`
   std::vector<List> lists_;
-  std::vector<double> sums_w_m2_;  ///< by list: rows like SentHistory::radiation_w_m2()
+  std::vector<double> sums_w_m2_;  ///< by list: rows like SentRow::radiation_w_m2()
 };
 
 /// Integrates samples over the whole history, with what the others sent in the sweep before.
@@ -74,8 +74,8 @@ class Sweeper {
   Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options, SampleHistories histories,
           SurfaceModel& model);
 
-  /// Does one sweep. With `all` it includes samples that no sweep changes.
-  void sweep(bool all);
+  /// Does one sweep over the samples that sweeps change.
+  void sweep();
 
  private:
   /// Measures the radiation of the faces of entities at every node, from the latest sweep.
@@ -94,13 +94,13 @@ class Sweeper {
 
   const SurfaceInputs& in_;
   SurfaceModel& model_;
+  SampleHistories histories_;
   std::size_t intervals_;
   std::size_t nodes_;
-  std::vector<SampleState> start_;
-  std::vector<float> sun_frac_;
-  std::vector<HiddenSky> hidden_sky_;
-  SentHistory before_;
-  SentHistory after_;
+  std::vector<std::uint32_t> swept_;  ///< samples that sweeps change; one for both faces of a sheet
+  SentHistory second_;                ///< second rows of the samples that sweeps change
+  std::vector<SentRow<float>> before_;  ///< by sample: what it sent in the latest sweep
+  std::vector<SentRow<float>> after_;   ///< by sample: what it sends in this sweep
   SeenRadiation seen_;
   MoverGlow glow_;
   std::vector<MoverFaces> faces_;  ///< by node, then entity; empty without exchange or entities
@@ -110,18 +110,31 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
                  SampleHistories histories, SurfaceModel& model)
     : in_(inputs),
       model_(model),
+      histories_(std::move(histories)),
       intervals_(inputs.record.size()),
       nodes_(intervals_ + 1),
-      start_(std::move(histories.start)),
-      sun_frac_(std::move(histories.sun_frac)),
-      hidden_sky_(std::move(histories.hidden_sky)),
-      before_(std::move(histories.sent)),
-      after_(before_),
-      seen_(model.samples, before_.radiation_size()) {
-  if (options.glow && before_.keeps() && !inputs.movers_now.empty()) {
+      second_(SentRow<float>::length(intervals_)),
+      seen_(model.samples, 2 * intervals_ + 1) {
+  for (const SampleHistories::Rows& rows : histories_.rows) before_.emplace_back(rows.sent_w_m2);
+  if (options.glow && !inputs.movers_now.empty()) {
     glow_ = MoverGlow(model, inputs.geometry, inputs.mover_of_object);
     faces_.resize(inputs.movers_now.size() * nodes_);
     measure_faces();
+  }
+  // Find the samples that sweeps change. They need a second row; the others keep theirs.
+  after_ = before_;
+  const auto give_row = [&](std::uint32_t s) {
+    const std::size_t row = second_.rows();
+    second_.grow(row + 1);
+    after_[s] = SentRow(second_.row(row));
+  };
+  for (std::uint32_t s = 0; s < before_.size(); ++s) {
+    if (!steps_itself(model_.samples, s)) continue;
+    const std::uint32_t other = model_.samples.samples[s].other_side;
+    if (alone(s) && (other == kNoSample || alone(other))) continue;
+    swept_.push_back(s);
+    give_row(s);
+    if (other != kNoSample) give_row(other);
   }
 }
 
@@ -131,21 +144,17 @@ void Sweeper::measure_faces() {
     for (std::size_t j = from; j < to; ++j) {
       glow_.measure(
           model_.samples, in_.record.rays[std::min(j, intervals_ - 1)],
-          [&](std::size_t s) { return before_.longwave_w_m2(s, j); },
+          [&](std::size_t s) { return before_[s].longwave_w_m2(j); },
           std::span(faces_).subspan(j * movers, movers));
     }
   });
 }
 
-void Sweeper::sweep(bool all) {
+void Sweeper::sweep() {
   // Gather the radiation of the sweep before, then integrate every sample that it can change.
   seen_.gather(before_);
-  threads::parallel_parts(start_.size(), kGrain, [&](std::size_t from, std::size_t to) {
-    for (auto s = static_cast<std::uint32_t>(from); s < to; ++s) {
-      if (!steps_itself(model_.samples, s)) continue;
-      const std::uint32_t other = model_.samples.samples[s].other_side;
-      if (all || !alone(s) || (other != kNoSample && !alone(other))) carry(s);
-    }
+  threads::parallel_parts(swept_.size(), kGrain, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) carry(swept_[i]);
   });
   // Make the result of this sweep the input of the next one.
   std::swap(before_, after_);
@@ -159,15 +168,16 @@ bool Sweeper::alone(std::size_t s) const noexcept {
     if (partner.sample != kNoSample) return false;
   }
   if (faces_.empty()) return true;
-  const auto hidden = std::span(hidden_sky_).subspan(s * intervals_, intervals_);
-  return std::ranges::all_of(hidden, [](const HiddenSky& sky) { return sky.frac == 0.0F; });
+  return std::ranges::all_of(histories_.rows[s].hidden_sky,
+                             [](const HiddenSky& sky) { return sky.frac == 0.0F; });
 }
 
 SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j) const noexcept {
   const SurfaceSample& sample = model_.samples.samples[s];
   SampleDrive drive;
-  drive.sun_frac = sun_frac_[s * intervals_ + j];
-  if (!hidden_sky_.empty()) drive.hidden_sky_frac = hidden_sky_[s * intervals_ + j].frac;
+  const SampleHistories::Rows& rows = histories_.rows[s];
+  drive.sun_frac = rows.sun_frac[j];
+  if (!rows.hidden_sky.empty()) drive.hidden_sky_frac = rows.hidden_sky[j].frac;
   // Add what the seen samples send, scaled to the share of the hemisphere that they fill.
   if (const std::span<const double> received_w_m2 = seen_.of(sample); !received_w_m2.empty()) {
     const double scale = sample.seen_scale;
@@ -182,7 +192,7 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j
 void Sweeper::add_glow(std::size_t s, const glm::vec3& normal, std::size_t j,
                        SampleDrive& drive) const noexcept {
   if (faces_.empty() || drive.hidden_sky_frac == 0.0F) return;
-  const std::size_t mover = hidden_sky_[s * intervals_ + j].mover;
+  const std::size_t mover = histories_.rows[s].hidden_sky[j].mover;
   const std::size_t movers = faces_.size() / nodes_;
   // Leave the surroundings in place if no face of the entity looks towards the surface.
   const float begin_w_m2 = faces_[j * movers + mover].towards_w_m2(normal);
@@ -198,8 +208,7 @@ void Sweeper::carry(std::uint32_t s) {
   const SurfaceSample& sample = model_.samples.samples[s];
   const std::uint32_t other = sample.other_side;
   const bool sheet = other != kNoSample;
-  const bool keeps = after_.keeps();
-  SampleState state = start_[s];
+  SampleState state = histories_.start[s];
   SampleOutput output;
   SampleOutput back_output;
   for (std::size_t j = 0; j < intervals_; ++j) {
@@ -210,13 +219,11 @@ void Sweeper::carry(std::uint32_t s) {
     SampleDrive drive = this->drive(s, normal, j);
     for (std::size_t p = 0; p < kMaxPartners; ++p) {
       const std::uint32_t partner = sample.partners[p].sample;
-      if (partner == kNoSample || !keeps) continue;
-      drive.partner_begin_w_m2[p] = before_.flux_w_m2(partner, j);
-      drive.partner_end_w_m2[p] = before_.flux_w_m2(partner, j + 1);
+      if (partner == kNoSample) continue;
+      drive.partner_begin_w_m2[p] = before_[partner].flux_w_m2(j);
+      drive.partner_end_w_m2[p] = before_[partner].flux_w_m2(j + 1);
     }
-    if (keeps && j == 0) {
-      after_.keep_begin(s, in_.heat.output(sample, normal, begin, drive, state));
-    }
+    if (j == 0) after_[s].keep_begin(in_.heat.output(sample, normal, begin, drive, state));
     // Advance it, together with its other face if it is a sheet.
     if (!sheet) {
       output = in_.heat.advance(sample, normal, interval, drive, state);
@@ -224,15 +231,15 @@ void Sweeper::carry(std::uint32_t s) {
       const SurfaceSample& behind = model_.samples.samples[other];
       SampleDrive back_drive = this->drive(other, -normal, j);
       const SheetBack face{behind, back_drive};
-      if (keeps && j == 0) {
-        after_.keep_begin(other, in_.heat.output(behind, -normal, begin, back_drive, state));
+      if (j == 0) {
+        after_[other].keep_begin(in_.heat.output(behind, -normal, begin, back_drive, state));
       }
       output = in_.heat.advance(sample, normal, interval, drive, state, &face);
       back_drive.longwave_begin_w_m2 = back_drive.longwave_end_w_m2;
       back_output = in_.heat.output(behind, -normal, interval.forcing.end, back_drive, state);
-      if (keeps) after_.keep_end(other, j, back_output);
+      after_[other].keep_end(j, back_output);
     }
-    if (keeps) after_.keep_end(s, j, output);
+    after_[s].keep_end(j, output);
   }
   // Store the end of the record; both faces of a sheet have one state.
   model_.states[s] = state;
@@ -245,47 +252,38 @@ void Sweeper::carry(std::uint32_t s) {
 
 }  // namespace
 
-SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfacePatch>& patches,
+SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfacePatch> patches,
                                SurfaceModel& model) {
   EMIT_CHECK_OP(model.first_sample.size(), ==, inputs.geometry.instances.size());
   const std::size_t count = model.samples.samples.size();
-  const std::size_t intervals = inputs.record.size();
-  const bool movers = !inputs.movers_now.empty();
-  const bool keeps = !patches.empty() && patches.front().sent.keeps();
   SampleHistories out;
+  out.patches = std::move(patches);
+  out.rows.resize(count);
   out.start.resize(count);
-  out.sun_frac.resize(count * intervals);
-  if (movers) out.hidden_sky.resize(count * intervals);
-  out.sent = SentHistory(keeps ? intervals : 0);
-  out.sent.resize(count);
   model.states.resize(count);
   model.outputs.resize(count);
-  // Copy the histories of one side of a vertex to its sample.
-  const auto take = [&](const SurfacePatch& side, std::size_t vertex, std::size_t s) {
-    const auto at = [&](std::size_t row) { return static_cast<std::ptrdiff_t>(row * intervals); };
-    std::copy_n(side.sun_frac.begin() + at(vertex), intervals, out.sun_frac.begin() + at(s));
-    if (movers) {
-      std::copy_n(side.hidden_sky.begin() + at(vertex), intervals, out.hidden_sky.begin() + at(s));
-    }
-    if (keeps) std::ranges::copy(side.sent.row(vertex), out.sent.row(s).begin());
-  };
-  // Copy patch by patch. The partners' patch follows the drawn samples.
-  for (std::size_t p = 0; p < patches.size(); ++p) {
-    SurfacePatch& patch = patches[p];
+  // Go through the patches. The partners' patch follows the drawn samples.
+  for (std::size_t p = 0; p < out.patches.size(); ++p) {
+    SurfacePatch& patch = out.patches[p];
     const std::size_t first =
         p < model.first_sample.size() ? model.first_sample[p] : model.drawn_samples;
-    for (std::size_t i = 0; i < patch.samples.size(); ++i) {
-      take(patch, i, first + i);
+    const bool keeps = patch.sent.length() != 0;
+    const auto rows_of = [](SurfacePatch& side, std::size_t vertex) {
+      return SampleHistories::Rows{side.sun_frac.row(vertex), side.hidden_sky.row(vertex),
+                                   side.sent.row(vertex)};
+    };
+    for (std::size_t i = 0; i < patch.states.size(); ++i) {
+      out.rows[first + i] = rows_of(patch, i);
       if (keeps) out.start[first + i].modes_k = patch.start_k[i];
       model.states[first + i] = patch.states[i];
       model.outputs[first + i] = patch.outputs[i];
       const std::uint32_t other = model.samples.samples[first + i].other_side;
       if (other == kNoSample) continue;
-      take(*patch.back, i, other);
+      out.rows[other] = rows_of(*patch.back, i);
       model.states[other] = patch.states[i];
       model.outputs[other] = patch.back->outputs[i];
     }
-    patch = {};
+    patch.free_all_but_rows();
   }
   // Start the modes that a partner drives like that partner's own modes, with the weight of its
   // flux (physics.md eq. 22).
@@ -305,12 +303,12 @@ SampleHistories take_histories(const SurfaceInputs& inputs, std::vector<SurfaceP
 bool exchange(const SurfaceInputs& inputs, const ExchangeOptions& options,
               SampleHistories histories, SurfaceModel& model, const SurfaceProgress& report) {
   EMIT_CHECK_OP(histories.start.size(), ==, model.samples.samples.size());
-  EMIT_CHECK_OP(histories.sun_frac.size(), ==, model.samples.samples.size() * inputs.record.size());
-  // Sweep. The first sweep includes all samples unless the model holds their own histories already.
+  EMIT_CHECK_OP(histories.rows.size(), ==, model.samples.samples.size());
+  if (options.sweeps == 0) return !report || report(1.0);
   Sweeper sweeper(inputs, options, std::move(histories), model);
   for (std::uint32_t i = 0; i < options.sweeps; ++i) {
     if (report && !report((i + 1.0) / (options.sweeps + 1.0))) return false;
-    sweeper.sweep(!options.evaluated && i == 0);
+    sweeper.sweep();
   }
   return !report || report(1.0);
 }

@@ -268,17 +268,17 @@ void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo
   };
   const auto drive_of = [&](const SurfacePatch& side, std::size_t i) {
     SampleDrive drive;
-    drive.sun_frac = side.sun_frac[index * count + i];
-    if (!side.hidden_sky.empty()) {
-      drive.hidden_sky_frac = side.hidden_sky[index * count + i].frac;
-    }
+    drive.sun_frac = side.sun_frac.row(index)[i];
+    if (side.hidden_sky.length() != 0) drive.hidden_sky_frac = side.hidden_sky.row(index)[i].frac;
     return drive;
   };
   const SurfaceSample front = alone(patch);
   const bool sheet = patch.back && in_.materials[front.material].sheet;
   const SurfaceSample back = sheet ? alone(*patch.back) : SurfaceSample{};
   SampleState state = start_state(front, memo);
-  const bool keeps = patch.sent.keeps();
+  const bool keeps = patch.sent.length() != 0;
+  const SentRow sent(patch.sent.row(index));
+  const SentRow back_sent(sheet ? patch.back->sent.row(index) : std::span<float>());
   if (keeps) patch.start_k[index] = state.modes_k;
   SampleOutput output;
   SampleOutput back_output;
@@ -289,24 +289,23 @@ void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo
     const SampleDrive drive = drive_of(patch, i);
     const glm::vec3 normal = record.rays[i].normal(front);
     if (keeps && i == 0) {
-      patch.sent.keep_begin(index, in_.heat.output(front, normal, begin, drive, state));
+      sent.keep_begin(in_.heat.output(front, normal, begin, drive, state));
     }
     if (sheet) {
       const SampleDrive back_drive = drive_of(*patch.back, i);
       const SheetBack other{back, back_drive};
       if (keeps && i == 0) {
-        patch.back->sent.keep_begin(index,
-                                    in_.heat.output(back, -normal, begin, back_drive, state));
+        back_sent.keep_begin(in_.heat.output(back, -normal, begin, back_drive, state));
       }
       output = in_.heat.advance(front, normal, interval, drive, state, &other);
       if (keeps || i + 1 == count) {
         back_output = in_.heat.output(back, -normal, interval.forcing.end, back_drive, state);
       }
-      if (keeps) patch.back->sent.keep_end(index, i, back_output);
+      if (keeps) back_sent.keep_end(i, back_output);
     } else {
       output = in_.heat.advance(front, normal, interval, drive, state);
     }
-    if (keeps) patch.sent.keep_end(index, i, output);
+    if (keeps) sent.keep_end(i, output);
   }
   patch.states[index] = state;
   patch.outputs[index] = output;
@@ -318,11 +317,7 @@ void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const Samp
   // Find the view and the shade of each face, then the history of both.
   const auto look = [&](SurfacePatch& side) {
     if (!inherit_view(side, index, stand)) look_around(side, index, stand);
-    const std::size_t count = in_.record.size();
-    const std::size_t first = index * count;
-    tracer_.trace(side.samples[index], std::span(side.sun_frac).subspan(first, count),
-                  side.hidden_sky.empty() ? std::span<HiddenSky>()
-                                          : std::span(side.hidden_sky).subspan(first, count));
+    tracer_.trace(side.samples[index], side.sun_frac.row(index), side.hidden_sky.row(index));
   };
   look(patch);
   if (patch.back && in_.materials[patch.samples[index].material].sheet) look(*patch.back);
@@ -331,9 +326,9 @@ void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const Samp
 
 void SurfacePatch::begin(std::size_t intervals, bool movers, bool keeps_sent) {
   EMIT_CHECK(samples.empty());
-  intervals_ = intervals;
-  movers_ = movers;
-  sent = SentHistory(keeps_sent ? intervals : 0);
+  sun_frac = RowStore<float>(intervals);
+  hidden_sky = RowStore<HiddenSky>(movers ? intervals : 0);
+  sent = SentHistory(keeps_sent ? SentRow<float>::length(intervals) : 0);
   if (back) back->begin(intervals, movers, keeps_sent);
 }
 
@@ -345,16 +340,29 @@ void SurfacePatch::grow(std::size_t vertices) {
   view_of.resize(vertices);
   std::iota(view_of.begin() + static_cast<std::ptrdiff_t>(before), view_of.end(),
             static_cast<std::uint32_t>(before));
-  sent.resize(vertices);
-  if (sent.keeps()) start_k.resize(vertices);
+  sent.grow(vertices);
+  if (sent.length() != 0) start_k.resize(vertices);
   states.resize(vertices);
   outputs.resize(vertices);
   surplus_k.resize(vertices, -1.0F);
   to_sky.resize(vertices);
   sky_surplus_frac.resize(vertices, kUnknown);
-  sun_frac.resize(vertices * intervals_);
-  if (movers_) hidden_sky.resize(vertices * intervals_);
+  sun_frac.grow(vertices);
+  hidden_sky.grow(vertices);
   if (back) back->grow(vertices);
+}
+
+void SurfacePatch::free_all_but_rows() {
+  samples = {};
+  seen = {};
+  view_of = {};
+  start_k = {};
+  states = {};
+  outputs = {};
+  surplus_k = {};
+  to_sky = {};
+  sky_surplus_frac = {};
+  if (back) back->free_all_but_rows();
 }
 
 }  // namespace emit::renderer

@@ -40,7 +40,7 @@ struct SurfacePatch {
   std::vector<std::vector<SeenPlace>> seen;
   std::vector<std::uint32_t> view_of;                 ///< vertex whose view counts for this one
   std::vector<physics::FosterState<double>> start_k;  ///< modes at the start of the history
-  SentHistory sent;  ///< radiation and heat sent out over the history
+  SentHistory sent;  ///< rows of SentRow by vertex; they are empty if nothing is exchanged
   std::vector<SampleState> states;
   std::vector<SampleOutput> outputs;
   /// Difference of the temperature from the mean of the vertex's parents, K; negative if it has
@@ -50,20 +50,18 @@ struct SurfacePatch {
   /// Greatest difference of the shares of sky and surroundings from the mean of the vertex's
   /// parents. It is infinite if the vertex has no parents, and until the difference is known.
   std::vector<float> sky_surplus_frac;
-  std::vector<float> sun_frac;        ///< by vertex, then interval
-  std::vector<HiddenSky> hidden_sky;  ///< by vertex, then interval; empty without entities
+  RowStore<float> sun_frac;        ///< rows by vertex: visible share of the sun in each interval
+  RowStore<HiddenSky> hidden_sky;  ///< rows by vertex; the rows are empty without entities
   /// Patch of the other faces of sheets, with the same vertices; null if the mesh has no sheets.
   std::unique_ptr<SurfacePatch> back;
 
-  /// Sets the number of intervals that arrays hold, whether there are entities, and whether `sent`
+  /// Sets the number of intervals that rows hold, whether there are entities, and whether `sent`
   /// is stored. @pre the patch has no vertices
   void begin(std::size_t intervals, bool movers, bool keeps_sent);
   /// Makes room for the samples of `vertices` vertices in all. @pre begin()
   void grow(std::size_t vertices);
-
- private:
-  std::size_t intervals_ = 0;
-  bool movers_ = false;
+  /// Frees everything but sun_frac, hidden_sky and sent, on both sides of sheets.
+  void free_all_but_rows();
 };
 
 /// Facts about the place of a sample that the sample itself does not hold.

@@ -210,7 +210,7 @@ float SurfaceRefinement::shadow_edge_k(const RefinedMesh& refined, std::uint32_t
   for (std::size_t i = recent_; i < count; ++i) {
     const auto sun = [&](std::size_t corner) {
       const glm::vec3 normal = in_.record.rays[i].normal(patch.samples[leaf[corner]]);
-      return patch.sun_frac[leaf[corner] * count + i] *
+      return patch.sun_frac.row(leaf[corner])[i] *
              std::max(0.0F, glm::dot(normal, in_.record.rays[i].to_sun()));
     };
     const float high = std::max({sun(0), sun(1), sun(2)});
@@ -255,7 +255,7 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
   for (std::size_t i = 0; i < count; ++i) {
     const IntervalRays& rays = in_.record.rays[i];
     if (!rays.sun_up()) continue;
-    const auto frac = [&](std::size_t corner) { return patch.sun_frac[leaf[corner] * count + i]; };
+    const auto frac = [&](std::size_t corner) { return patch.sun_frac.row(leaf[corner])[i]; };
     const float low = std::min({frac(0), frac(1), frac(2)});
     const float high = std::max({frac(0), frac(1), frac(2)});
     // Skip the interval if the corners disagree: they know of the edge already.
