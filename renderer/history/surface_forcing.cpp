@@ -10,7 +10,6 @@
 #include "history/surface_history.hpp"
 
 namespace emit::renderer {
-namespace {}  // namespace
 
 physics::Result<std::vector<IntervalForcing>> surface_forcing(
     const scene::ScenarioDesc& scenario, std::span<const std::int64_t> nodes_ns) {

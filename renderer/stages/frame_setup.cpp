@@ -45,7 +45,8 @@ struct Fluxes {
   float environment = 0.0F;
 };
 
-/// Indirect fluxes of the published model (S_i, R_LW and R_e / emissivity of eq. 1).
+/// Indirect fluxes of the published model (S_i, R_LW and R_e / emissivity of
+/// physics.md eq. 1).
 Fluxes fluxes(const physics::Forcing& forcing) noexcept {
   return {
       .diffuse = static_cast<float>(physics::diffuse_input_w_m2(forcing.diffuse_horizontal_w_m2)),
@@ -56,7 +57,7 @@ Fluxes fluxes(const physics::Forcing& forcing) noexcept {
           static_cast<float>(physics::environment_input_w_m2(1.0, forcing.environment_k))};
 }
 
-/// Indirect fluxes of the extended model (eq. 16).
+/// Indirect fluxes of the extended model (physics.md eq. 16).
 Fluxes fluxes(const SurfaceForcing& forcing) noexcept {
   return {.diffuse = static_cast<float>(forcing.diffuse_w_m2),
           .longwave = static_cast<float>(forcing.longwave_w_m2),

@@ -56,8 +56,7 @@ struct RecorderReleased {
   std::uint32_t connection = 0;
 };
 
-/// Doorbells of the agents. Each is quality_level after something was put on one of the agent's
-/// rings.
+/// Doorbells of the agents. Each is rung after something was put on one of the agent's rings.
 struct Doorbells {
   Doorbell conductor;
   Doorbell receiver;

@@ -11,13 +11,12 @@
 
 namespace emit::server {
 
-/// Which quality_level of the quality ladder a frame is rendered with, so that it is ready in time:
-/// the one with the least error among those whose expected time fits, else the fastest. A frame is
-/// expected to take what the ladder measured for its quality_level and camera, at the machine's
-/// present pace, plus what every frame takes beside it (both fitted to the latest frames), plus
-/// what so few of the latest frames took longer than expected that it need not be kept free: about
-/// one frame in 128 is late, one in 64 at most, if the next ones are like the latest. Pure.
-/// RT-safe.
+/// Choice of the quality level with which a frame is ready in time: the one with the least error
+/// among those whose expected time fits, else the fastest. A frame is expected to take what the
+/// ladder measured for its level and camera, at the machine's present pace, plus what every frame
+/// takes beside it (both fitted to the latest frames), plus an excess that about one frame in 128
+/// goes beyond. So about one frame in 128 is late, one in 64 at most, if the next ones are like the
+/// latest. Pure. RT-safe.
 class QualityPolicy {
  public:
   /// `quality_levels`: what each costs and gets wrong in the frame that is next; not empty, [0] is
@@ -36,8 +35,8 @@ class QualityPolicy {
     return best < quality_levels.size() ? best : fastest;
   }
 
-  /// A frame was ready `work_ns` after its begin, with a quality_level of that
-  /// QualityLevelStats::frame_ms.
+  /// Takes note of a frame that was ready `work_ns` after its begin. `level_ms` is
+  /// QualityLevelStats::frame_ms of its quality level.
   void finished(std::int64_t work_ns, double level_ms) noexcept {
     const double work_ms = 1e-6 * static_cast<double>(work_ns);
     excess_ms_[next_] = static_cast<float>(work_ms - expected_ms(level_ms));
@@ -58,7 +57,8 @@ class QualityPolicy {
   static constexpr double kKept = 0.95;
   /// The ladder's own word (pace 1, nothing beside) counts as this many frames.
   static constexpr double kPrior = 0.5;
-  /// Beyond, the work does not follow the quality_levels' times: then it all counts as beside.
+  /// Limits of the pace. Beyond them the work does not follow the times of the levels, and all of
+  /// it counts as beside.
   static constexpr double kMinPace = 0.25;
   static constexpr double kMaxPace = 4.0;
 
@@ -83,8 +83,7 @@ class QualityPolicy {
     return std::min(latest_ms, largest_ms[sought - 1]);
   }
 
-  /// Least squares of work = pace * quality_level + beside, older frames fading, drawn towards
-  /// pace 1.
+  /// Least squares of work = pace * level_ms + beside, older frames fading, drawn towards pace 1.
   void fit(double work_ms, double level_ms) noexcept {
     for (double* sum : {&n_, &r_, &rr_, &w_, &rw_}) *sum *= kKept;
     n_ += 1.0;
@@ -96,7 +95,7 @@ class QualityPolicy {
     const double a = rr_ + prior_rr;
     const double d = n_ + kPrior;
     const double determinant = a * d - r_ * r_;
-    if (determinant <= 0.0) return;  // quality_levels without a time: nothing was measured
+    if (determinant <= 0.0) return;  // levels without a time: nothing was measured
     pace_ = std::clamp(((rw_ + prior_rr) * d - w_ * r_) / determinant, kMinPace, kMaxPace);
     beside_ms_ = (w_ - pace_ * r_) / d;
   }
@@ -106,8 +105,7 @@ class QualityPolicy {
   std::size_t count_ = 0;
   double pace_ = 1.0;
   double beside_ms_ = 0.0;
-  // Fading sums over frames: weight, quality_level, quality_level squared, work, quality_level
-  // times work.
+  // Fading sums over frames: weight, level_ms, level_ms squared, work, level_ms times work.
   double n_ = 0.0;
   double r_ = 0.0;
   double rr_ = 0.0;

@@ -12,7 +12,7 @@ namespace emit::server {
 struct alignas(kCacheLineBytes) ClientCounts {
   std::atomic<std::uint32_t> connection{0};  ///< key of the connection that has the place; 0: none
   std::atomic<std::uint64_t> frames{0};      ///< sent completely
-  std::atomic<std::uint64_t> skipped{0};     ///< not sent because the client was slow
+  std::atomic<std::uint64_t> skipped{0};     ///< it was slow, or an image missed its number
   std::atomic<std::int64_t> delay_ns{0};     ///< of the last frame: pose received to last byte sent
   std::atomic<std::int64_t> jitter_ns{0};    ///< of delay_ns, smoothed (FrameHeader)
 

@@ -82,7 +82,7 @@ namespace emit::server {
   X(frames_sent, "frames sent completely, all clients")                                   \
   X(frames_shared, "frames put into shared memory, counted as sent too")                  \
   X(frames_unread, "frames not put into shared memory because nobody reads it")           \
-  X(frames_skipped, "frames skipped for slow clients, flagged gap-before")                \
+  X(frames_skipped, "frames skipped: the client was slow, or an image missed its number") \
   X(frames_left_out, "frames not sent by the clients' own wish (every_nth)")              \
   X(frames_spilled, "partly sent frames moved to a client's own buffer")                  \
   X(bytes_sent, "bytes handed to the kernel, all clients")                                \

@@ -5,30 +5,31 @@
 
 namespace emit::server {
 
+/// Each member has the name that the log prints (`event=NAME`).
 enum class EventKind : std::uint8_t {
-  run_started,      ///< a = run id
-  host_epoch,       ///< a = host's run id
-  command,          ///< a = CommandKind
-  refused,          ///< a = StatusCode, b = count
-  connected,        ///< a = connection, text = peer
-  disconnected,     ///< a = connection, text = why
-  hello,            ///< a = connection, b = role, text = software
-  subscribed,       ///< a = connection, b = channel, text = transport
-  client_failed,    ///< a = connection, text = why
-  client_slow,      ///< a = connection
-  no_gso,           ///< a = connection, text = why
-  source_failed,    ///< text = why
-  device_lost,      ///< text = why; the daemon ends
-  journal_failed,   ///< text = why
-  journal_overrun,  ///< a = first sequence lost
-  slots_missed,     ///< a = how many
-  weather_lost,     ///< a = sim time of the sample, ns
-  poses_dropped,    ///< a = how many
-  warmed_up,        ///< a = time it took, ns, b = jump of simulation time, ns
-  trigger_silent,   ///< a = number of the last one
-  peer_refused,     ///< text = address, a = PeerRefusal
-  secured,          ///< a = connection, text = names in the peer's certificate
-  host_session,     ///< text = address
+  run_started,              ///< a = run id
+  host_restarted,           ///< a = host's run id
+  command,                  ///< a = CommandKind
+  refused,                  ///< a = StatusCode, b = count
+  connected,                ///< a = connection, text = peer
+  disconnected,             ///< a = connection, text = why
+  hello,                    ///< a = connection, b = role, text = software
+  subscribed,               ///< a = connection, b = channel, text = transport
+  client_failed,            ///< a = connection, b = errno
+  disconnected_slow,        ///< a = connection
+  no_segmentation_offload,  ///< a = connection, b = errno
+  source_failed,            ///< text = why
+  device_lost,              ///< text = why; the daemon ends
+  journal_failed,           ///< text = why
+  journal_overrun,          ///< a = first sequence lost
+  slots_missed,             ///< a = how many
+  weather_lost,             ///< a = sim time of the sample, ns
+  poses_dropped,            ///< a = how many
+  warmed_up_again,          ///< a = time it took, ns, b = jump of simulation time, ns
+  trigger_silent,           ///< a = number of the last one
+  peer_refused,             ///< text = address, a = PeerRefusal
+  secured,                  ///< a = connection, text = names in the peer's certificate
+  host_session,             ///< text = address
 };
 
 /// Why a peer is turned away before anything it says is looked at.

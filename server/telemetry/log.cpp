@@ -141,7 +141,7 @@ EventText describe(const Event& event) {
   switch (event.kind) {
     case EventKind::run_started:
       return {LogLevel::info, fmt::format("event=run_started run_id={}", event.a), false};
-    case EventKind::host_epoch:
+    case EventKind::host_restarted:
       return {LogLevel::info, fmt::format("event=host_restarted host_run_id={}", event.a), false};
     case EventKind::command: {
       static constexpr std::array kNames{"unspecified", "start", "stop", "hold", "step", "reset"};
@@ -178,12 +178,12 @@ EventText describe(const Event& event) {
               fmt::format("event=client_failed connection={} why=\"{}\"", connection(),
                           error_text(static_cast<int>(event.b))),
               false};
-    case EventKind::client_slow:
+    case EventKind::disconnected_slow:
       return {
           LogLevel::warn,
           fmt::format("event=disconnected_slow connection={} why=\"fell behind\"", connection()),
           false};
-    case EventKind::no_gso:
+    case EventKind::no_segmentation_offload:
       return {LogLevel::warn,
               fmt::format("event=no_segmentation_offload connection={} why=\"{}\"", connection(),
                           error_text(static_cast<int>(event.b))),
@@ -225,7 +225,7 @@ EventText describe(const Event& event) {
                           "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
                           event.a),
               false};
-    case EventKind::warmed_up:
+    case EventKind::warmed_up_again:
       return {LogLevel::warn,
               fmt::format("event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
                           "meanwhile, this frame is flagged degraded\" remedy=\"move simulation "

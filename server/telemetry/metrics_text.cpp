@@ -161,7 +161,8 @@ void add_clients(MetricsText& out, const MetricsSources& sources) {
   };
   each("client_frames_total", "counter", "Frames sent completely to a connection",
        [](const ClientCounts& c) { return c.frames.load(std::memory_order_relaxed); });
-  each("client_skipped_total", "counter", "Frames skipped because a connection was slow",
+  each("client_skipped_total", "counter",
+       "Frames skipped for a connection: it was slow, or an image missed its number",
        [](const ClientCounts& c) { return c.skipped.load(std::memory_order_relaxed); });
   each("client_delay_seconds", "gauge",
        "Delay of a connection's last frame, from the pose's arrival to the last byte",

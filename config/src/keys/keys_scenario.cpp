@@ -103,8 +103,8 @@ const KeyTable<WeatherSample>& weather_sample_keys() {
                                      EMIT_FIELD(wind_m_s), "Wind speed.")),
       required(number<WeatherSample>("cloud_frac", "", between(limits::kCloudFrac),
                                      EMIT_FIELD(cloud_frac),
-                                     "Share of the direct sun that clouds take (beta of Eq. 1). It "
-                                     "is 0 where `dni_w_m2` is measured.")),
+                                     "Share of the direct sun that clouds take (beta of "
+                                     "physics.md eq. 1). It is 0 where `dni_w_m2` is measured.")),
       number<WeatherSample>("environment_k", "K", between(limits::kEnvironmentK),
                             EMIT_FIELD(environment_k),
                             "Temperature of the surroundings. Without it emit2014 takes the air's, "

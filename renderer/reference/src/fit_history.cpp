@@ -365,7 +365,7 @@ void emit2014_residuals(const FitProblem& problem, std::span<const scene::Relaxa
                 drive.absorbed_w_m2 + g * problem.base_k})
         .temperature_k;
   };
-  // Start every history at the true temperature and relax by eq. 6.
+  // Start every history at the true temperature and relax by physics.md eq. 6.
   for (const FitHistory& history : problem.histories) {
     std::vector<double> x(modes.size(), problem.truth_at_start_k);
     for (const FitStep& step : history.steps) {

@@ -36,7 +36,7 @@ vec4 foster_step(vec4 x, vec3 begin, vec3 end, vec4 start_frac, vec4 end_frac, F
   vec4 gain = s.resistance_m2k_w * end_frac;
   float r_m2k_w = (gain.x + gain.y) + (gain.z + gain.w);
   if (!(r_m2k_w > 0.0)) return x;  // no time passed
-  // Solve for the temperature at the end (eq. 18).
+  // Solve for the temperature at the end (physics.md eq. 18).
   float conductance = 1.0 / r_m2k_w;
   bool guarded = false;
   float t = equilibrium_k(s.emission_w_m2_k4, end.y + conductance,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shader of `emit bench stability`: equilibrium temperatures of random surfaces. A case draws its surface from its
 // number in the domain EMIT_DOMAIN. Output row: temperature in K, 1 if clamped. With EMIT_CLOSED_FORMS the row also
-// holds the published Eq. 6 as typeset, Eq. 6 with its outer root closed where the derivation closes it, and an
-// equivalent form that does not cancel.
+// holds EMIT Eq. 6 as typeset, EMIT Eq. 6 with its outer root closed where the derivation closes it, and an equivalent
+// form that does not cancel.
 #include "lib/balance.glsl"
 #include "lib/equilibrium.glsl"
 #include "shared/stability_inputs.glsl.h"

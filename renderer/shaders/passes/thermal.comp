@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Advances every visible surface point over one interval of the thermal history: soft shadow, Eq. 1, the stable root of
-// Eq. 5, and the exact relaxation of two modes (physics.md eq. 1 to 6). Inside an interval the shade is constant, at
-// its mean, and the drive is linear between the equilibria at the two ends. With EMIT_SUN_ONLY the pass stores the
-// shade of the last step and changes no temperature.
+// Advances every visible surface point over one interval of the thermal history: soft shadow, absorbed flux
+// (physics.md eq. 1), equilibrium temperature (eq. 4), and the exact relaxation of two modes (eq. 5 and 6). Inside an
+// interval the shade is constant, at its mean, and the drive is linear between the equilibria at the two ends. With
+// EMIT_SUN_ONLY the pass stores the shade of the last step and changes no temperature.
 #include "passes/gbuffer.glsl"
 #include "passes/pcss.glsl"
 #include "passes/tables.glsl"
@@ -27,8 +27,8 @@ struct IntervalEnd {
   float environment_w_m2;
 };
 
-// Equilibrium temperature (Eq. 1 and 5) minus the reference temperature, in K. `surface` is the first texel of the
-// material. Sets `clamped` where an input lies outside its range.
+// Equilibrium temperature (physics.md eq. 1 and 4) minus the reference temperature, in K. `surface` is the first texel
+// of the material. Sets `clamped` where an input lies outside its range.
 float equilibrium_offset_k(vec4 surface, vec3 n, IntervalEnd end, float sun_frac, float sky_frac, inout bool clamped) {
   float direct_w_m2 = end.sun_w_m2 * max(dot(n, end.to_sun), 0.0);
   float absorbed_w_m2 = absorbed_flux_w_m2(direct_w_m2, end.diffuse_w_m2, surface.y * end.environment_w_m2,

@@ -49,7 +49,7 @@ struct DrawParams {
 struct MaterialParams {
   float solar_absorptance_frac;
   float emissivity_frac;
-  float conductance_w_m2_k;   // lambda / d of Eq. 5
+  float conductance_w_m2_k;   // lambda / d of physics.md eq. 4
   float base_k;
   float initial_offset_k;     // surface temperature at the start of the history minus the reference temperature
   float prescribed_offset_k;  // prescribed temperature minus the reference temperature
@@ -83,8 +83,8 @@ struct StepParams {
   float sun_start_w_m2;           // direct normal flux below the clouds
   vec3 to_sun_end;
   float sun_end_w_m2;
-  float diffuse_start_w_m2;       // emit2014: S_i of Eq. 1; foster: diffuse flux on a level surface
-  float longwave_start_w_m2;      // emit2014: R_LW of Eq. 1; foster: long-wave flux of the sky on a level surface
+  float diffuse_start_w_m2;       // emit2014: S_i of physics.md eq. 1; foster: diffuse flux on a level surface
+  float longwave_start_w_m2;      // emit2014: R_LW of physics.md eq. 1; foster: long-wave sky flux on a level surface
   float reflected_start_w_m2;     // foster: sunlight that the surroundings reflect
   float environment_start_w_m2;   // long-wave exitance of the surroundings; emit2014: R_e / emissivity
   float diffuse_end_w_m2;

@@ -64,7 +64,7 @@ double Emit2014Heat::absorbed_w_m2(const SurfaceSample& sample, const glm::vec3&
   physics::SurfaceFluxes<double> in;
   in.direct_w_m2 = std::max(0.0, glm::dot(glm::dvec3(normal), forcing.sun_w_m2));
   in.sun_frac = drive.sun_frac;
-  // Convert the flux on a level surface to the inputs of eq. 1 (physics.md eq. 3): open level
+  // Convert the flux on a level surface to the inputs of physics.md eq. 1 by its eq. 3: open level
   // ground then absorbs exactly what the sky sends.
   in.diffuse_w_m2 = physics::diffuse_input_w_m2(forcing.diffuse_w_m2);
   in.environment_w_m2 = material.exchange.emissivity_frac * forcing.environment_w_m2;
@@ -92,7 +92,7 @@ SampleOutput Emit2014Heat::output(const SurfaceSample& sample, const SampleDrive
                                   const SampleState& state) const noexcept {
   const Material& material = materials_[sample.material];
   double offset_k = 0.0;
-  // Sum the modes with their weights (eq. 5), unless the temperature is prescribed.
+  // Sum the modes with their weights (physics.md eq. 5), unless the temperature is prescribed.
   if (material.prescribed_k) {
     offset_k = *material.prescribed_k - reference_k_;
   } else {
@@ -117,7 +117,7 @@ SampleOutput Emit2014Heat::advance(const SurfaceSample& sample, const glm::vec3&
         equilibrium_k(sample, normal, interval.forcing.begin, drive, back) - reference_k_;
     const double end_k =
         equilibrium_k(sample, normal, interval.forcing.end, drive, back) - reference_k_;
-    // Relax every mode towards the line between them: exact for any length (eq. 6).
+    // Relax every mode towards the line between them: exact for any length (physics.md eq. 6).
     for (std::size_t i = 0; i < material.mode_count; ++i) {
       state.modes_k[i] = physics::relax_linear(state.modes_k[i], begin_k, end_k,
                                                interval.relaxation[sample.material][i]);

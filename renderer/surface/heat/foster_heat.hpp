@@ -12,8 +12,8 @@
 
 namespace emit::renderer {
 
-/// Extended thermal model on samples: surface balance and flux-driven states (physics.md eq. 16-18,
-/// with the radiation of other samples of eq. 20 and the conduction across edges of eq. 22).
+/// Extended thermal model on samples: surface balance, flux-driven states, radiation of other
+/// samples and conduction across edges (physics.md eq. 16-18, 20, 22).
 /// Immutable after construction; any thread; RT-safe except for the constructor and size().
 class FosterHeat {
  public:

@@ -69,8 +69,8 @@ enum class SkyMeasure : std::uint8_t {
 };
 
 /// Heat of a sample at the end of an interval, as values of the modes of its thermal model. With
-/// foster they are kelvins above the base (eq. 17), with emit2014 offsets from the reference
-/// temperature.
+/// foster they are kelvins above the base (physics.md eq. 17), with emit2014 offsets from the
+/// reference temperature.
 struct SampleState {
   /// Modes of the sample itself. With foster its own flux drives them, with emit2014 its
   /// equilibrium temperature.

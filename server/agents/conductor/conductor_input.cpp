@@ -64,7 +64,7 @@ bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
       return false;
     }
     context_.counters.add(Counter::host_epochs);
-    context_.conductor_events.push(EventKind::host_epoch, frame.run_id);
+    context_.conductor_events.push(EventKind::host_restarted, frame.run_id);
   }
   gate_.accept(frame);
   drop_unknown_entities(input);

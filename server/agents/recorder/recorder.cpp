@@ -262,7 +262,7 @@ void Recorder::discard_old() {
     for (std::size_t i = peers_.size(); i-- > 0;) {
       if (peers_[i].next < kept_first_) {
         context_.counters.add(Counter::recorders_disconnected_slow);
-        context_.recorder_events.push(EventKind::client_slow, peers_[i].connection);
+        context_.recorder_events.push(EventKind::disconnected_slow, peers_[i].connection);
         remove(i);
       }
     }

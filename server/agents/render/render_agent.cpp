@@ -124,7 +124,7 @@ std::optional<renderer::SlotIndex> RenderAgent::submit(const renderer::FrameRequ
   if (jumped && warms_up_again(took_ns)) {
     warmed_up = true;
     context_.counters.add(Counter::frames_warmed_up);
-    context_.render_events.push(EventKind::warmed_up, static_cast<std::uint64_t>(took_ns),
+    context_.render_events.push(EventKind::warmed_up_again, static_cast<std::uint64_t>(took_ns),
                                 static_cast<std::uint64_t>(moved_ns));
   }
   return static_cast<renderer::SlotIndex>(slot);

@@ -162,7 +162,7 @@ void Sender::evict_oldest() noexcept {
     if (client.next == first_) {
       if (client.every_frame()) {
         context_.counters.add(Counter::clients_disconnected_slow);
-        context_.sender_events.push(EventKind::client_slow, client.connection());
+        context_.sender_events.push(EventKind::disconnected_slow, client.connection());
         remove(i, true);
         continue;
       }

@@ -180,7 +180,7 @@ SocketClient::Progress SocketClient::send_udp(UdpBatch& batch, Context& context,
         return Progress::retry_soon;
       case UdpBatch::Status::no_segmentation:
         segmentation_ = false;
-        context.sender_events.push(EventKind::no_gso, params_.connection,
+        context.sender_events.push(EventKind::no_segmentation_offload, params_.connection,
                                    static_cast<std::uint64_t>(result.error));
         break;
       case UdpBatch::Status::failed:

@@ -43,7 +43,7 @@ class SocketClient final : public SenderClient {
   void begin(const protocol::FrameHeader& header, const Image& image,
              std::int64_t now_ns) noexcept override;
   [[nodiscard]] Progress send(UdpBatch& batch, Context& context, Turn turn) noexcept override;
-  /// Moves the rest of the frame into this client's own memory.
+  /// Copies the image of the frame into this client's own memory.
   void spill() noexcept override;
   [[nodiscard]] bool may_ask_again() const noexcept override { return params_.resend_frames > 0; }
   [[nodiscard]] bool ask_again(const protocol::ResendRequest& request) noexcept override;

@@ -27,7 +27,7 @@ double direct_on_face_w_m2(const SurfaceForcing& f, const PointView& view) noexc
   return view.sun_frac * std::max(0.0, glm::dot(view.normal, f.sun_w_m2));
 }
 
-/// Computes eq. 1 and 4 of physics.md.
+/// Computes physics.md eq. 1 and 4.
 double equilibrium_k(const SurfaceForcing& f, const PointView& view,
                      const scene::Material& material) noexcept {
   physics::SurfaceFluxes<double> in;
@@ -52,7 +52,7 @@ double equilibrium_k(const SurfaceForcing& f, const PointView& view,
       .temperature_k;
 }
 
-/// Computes eq. 16 of physics.md.
+/// Computes physics.md eq. 16.
 physics::FosterDrive<double> drive(const SurfaceForcing& f, const PointView& view,
                                    const renderer::FosterMaterial& material) noexcept {
   const double around_frac = 1.0 - view.sky_frac;

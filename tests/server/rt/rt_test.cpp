@@ -106,18 +106,18 @@ class RestingAgent final : public Agent {
     ++rests_;
     doorbell().ring();
     pollfd bell{doorbell().fd(), POLLIN, 0};
-    quality_level_ = quality_level_ || ::poll(&bell, 1, 0) != 0;
+    rung_ = rung_ || ::poll(&bell, 1, 0) != 0;
     return 1;
   }
   void wait() { done_.wait(false); }
   [[nodiscard]] int rests() const { return rests_; }
-  [[nodiscard]] bool quality_level() const { return quality_level_; }
+  [[nodiscard]] bool rung() const { return rung_; }
 
  private:
   int work_ = 3;
   std::atomic<bool> done_{false};
   mutable int rests_ = 0;
-  mutable bool quality_level_ = false;
+  mutable bool rung_ = false;
 };
 
 TEST(AgentRunner, LetsAnAgentRestOnceBehindItsWorkWhileRingsWakeNobody) {
@@ -129,7 +129,7 @@ TEST(AgentRunner, LetsAnAgentRestOnceBehindItsWorkWhileRingsWakeNobody) {
   agent.wait();
   runner.stop();
   EXPECT_EQ(agent.rests(), 1);
-  EXPECT_FALSE(agent.quality_level()) << "it is awake: no write to its descriptor";
+  EXPECT_FALSE(agent.rung()) << "it is awake: no write to its descriptor";
 }
 
 TEST(ByteRing, CarriesRecordsOfAnyLengthBetweenTwoThreads) {

@@ -19,7 +19,8 @@ TEST_P(CliHelp, every_command_explains_itself_with_an_example) {
 INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
                          testing::Values("render", "receive", "send", "stat", "record", "replay",
                                          "demo", "view", "compare", "inspect", "evaluate",
-                                         "generate", "make-log", "bench"));
+                                         "generate", "make-log", "bench", "latency", "trigger",
+                                         "trace", "solve", "fit", "man"));
 
 TEST(CliUsage, version_names_tool_and_number) {
   const ProcessResult result = run_emit({"--version"});

@@ -138,9 +138,9 @@ Result<Temperatures> by_reference(const History& history, std::uint32_t refine) 
   return out;
 }
 
-/// Computes the temperatures by the published model: Eq. 1-6 on the first layer over its core,
-/// without convection, relaxed by the material's modes, with an equilibrium that is linear between
-/// rows.
+/// Computes the temperatures by the published model: physics.md eq. 4 on the first layer over its
+/// core, without convection, relaxed by the material's modes (eq. 5 and 6), with an equilibrium
+/// that is linear between rows.
 Result<Temperatures> by_emit2014(const History& history, const std::vector<HistoryMode>& modes) {
   double weights = 0.0;
   for (const HistoryMode& mode : modes) {

@@ -272,7 +272,7 @@ TEST(Sender, WakesConductorAndRenderOnlyWhereTheyWaitForIt) {
   Rig rig;
   Rig::Peer* peer = rig.connect();
   Doorbells& bells = rig.context().bells;
-  const auto quality_level = [&](Doorbell& bell) {
+  const auto rung = [&](Doorbell& bell) {
     pollfd wait{bell.fd(), POLLIN, 0};
     const bool out = ::poll(&wait, 1, 0) != 0;
     bell.disarm();
@@ -289,8 +289,8 @@ TEST(Sender, WakesConductorAndRenderOnlyWhereTheyWaitForIt) {
     ASSERT_TRUE(rig.publish());
     rig.settle({peer});
     EXPECT_EQ(rig.script().held.load(), 0);
-    EXPECT_EQ(quality_level(bells.conductor), waited_for);
-    EXPECT_EQ(quality_level(bells.render), waited_for);
+    EXPECT_EQ(rung(bells.conductor), waited_for);
+    EXPECT_EQ(rung(bells.render), waited_for);
   }
 }
 

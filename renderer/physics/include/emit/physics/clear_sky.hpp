@@ -6,7 +6,7 @@
 #include "emit/physics/units.hpp"
 
 /// Models of sun, sky and air for a place without weather data (physics.md section 8). They give
-/// the inputs of eq. 1 as raw SI numbers. Any thread. RT-safe.
+/// the inputs of physics.md eq. 1 as raw SI numbers. Any thread. RT-safe.
 namespace emit::physics {
 
 /// Returns the relative optical air mass at sea level after Kasten and Young (1989), physics.md eq.

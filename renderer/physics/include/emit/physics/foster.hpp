@@ -18,9 +18,9 @@
 ///
 /// x_i are kelvins above the base, q is the net flux into the solid and A is the absorbed flux. A
 /// step is implicit in the surface balance and exact for q linear over the step. The new
-/// temperature is the root of the quartic of eq. 4, with P in place of the core temperature and 1/R
-/// in place of its conductance. A steady state is that of eq. 4. shaders/lib/foster.glsl is the
-/// float32 twin of foster_step().
+/// temperature is the root of the quartic of physics.md eq. 4, with P in place of the core
+/// temperature and 1/R in place of its conductance. A steady state is that of the same equation.
+/// shaders/lib/foster.glsl is the float32 twin of foster_step().
 namespace emit::physics {
 
 /// Largest number of modes of a network.
@@ -143,8 +143,8 @@ template <class Real>
 template <class Real>
 bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const FosterDrive<Real>& end,
                  const FosterGains<Real>& g, const FosterSurface<Real>& s) noexcept {
-  // Advance the states with the flux at the start alone. P of eq. 18 is the temperature that this
-  // gives, R is what each W/m2 of the flux at the end adds to it.
+  // Advance the states with the flux at the start alone. P of physics.md eq. 18 is the temperature
+  // that this gives, R is what each W/m2 of the flux at the end adds to it.
   const Real q_begin = foster_flux_w_m2(foster_offset_k(x, s), begin, s);
   FosterState<Real> partial;  // new states before the flux at the end is added
   Real p_k = s.base_offset_k;
@@ -157,7 +157,7 @@ bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const Fos
   }
   if (!(r_m2k_w > Real(0))) return false;  // the step has no length
   const Real conductance = Real(1) / r_m2k_w;
-  // Solve eq. 18 for the temperature at the end of the step.
+  // Solve physics.md eq. 18 for the temperature at the end of the step.
   const SurfaceBalance<Real> balance{s.emission_w_m2_k4, end.film_w_m2_k + conductance,
                                      end.absorbed_w_m2 +
                                          end.film_w_m2_k * (s.reference_k + end.air_offset_k) +

@@ -8,10 +8,10 @@
 ///
 ///   T(t) = sum w_i x_i(t),   tau_i x_i' = u(t) - x_i,   sum w_i = 1        (physics.md eq. 5)
 ///
-/// One step of length dt (eq. 6) is exact for a drive u that is constant or linear over it,
-/// whatever dt is. The gains are computed here in double, once per mode and step. The state itself
-/// may be float32 if it is stored as an offset from a reference temperature; a state in kelvin
-/// stalls in float32. shaders/lib/relaxation.glsl is the float32 twin. Any thread. RT-safe.
+/// One step of length dt (physics.md eq. 6) is exact for a drive u that is constant or linear over
+/// it, whatever dt is. The gains are computed here in double, once per mode and step. The state
+/// itself may be float32 if it is stored as an offset from a reference temperature; a state in
+/// kelvin stalls in float32. shaders/lib/relaxation.glsl is the float32 twin. Any thread. RT-safe.
 namespace emit::physics {
 
 /// Gains of one step of one mode, physics.md eq. 6: x_new = x + (u0 - x) start + (u1 - x) end. With

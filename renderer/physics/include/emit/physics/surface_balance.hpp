@@ -22,9 +22,9 @@ struct SurfaceFluxes {
   Real sky_frac = 0;       ///< f_i: full-sphere factor, 0.5 on open flat ground, up to 1
 };
 
-/// Returns the absorbed flux of eq. 1, W/m2: E_abs = a_s [S_d f_d (1-beta) + S_i f_i] + (1-f_i) R_e
-/// + eps f_i R_LW. `solar_absorptance_frac` is a_s = 1 - albedo. The result may be negative for f_i
-/// > 0.5 and a hot environment.
+/// Returns the absorbed flux of physics.md eq. 1, W/m2: E_abs = a_s [S_d f_d (1-beta) + S_i f_i] +
+/// (1-f_i) R_e + eps f_i R_LW. `solar_absorptance_frac` is a_s = 1 - albedo. The result may be
+/// negative for f_i > 0.5 and a hot environment.
 template <class Real>
 [[nodiscard]] constexpr Real absorbed_flux_w_m2(const SurfaceFluxes<Real>& in,
                                                 Real solar_absorptance_frac,
@@ -43,14 +43,14 @@ template <class Real>
   return direct_normal_w_m2 * std::max(Real(0), cos_incidence);
 }
 
-/// Returns S_i of eq. 3 from the diffuse horizontal irradiance, W/m2. Flat ground (f_i = 0.5) then
-/// absorbs exactly that irradiance.
+/// Returns S_i of physics.md eq. 3 from the diffuse horizontal irradiance, W/m2. Flat ground (f_i =
+/// 0.5) then absorbs exactly that irradiance.
 template <class Real>
 [[nodiscard]] constexpr Real diffuse_input_w_m2(Real diffuse_horizontal_w_m2) noexcept {
   return Real(2) * diffuse_horizontal_w_m2;
 }
 
-/// Returns R_e = eps sigma T_env^4 of eq. 3, W/m2.
+/// Returns R_e = eps sigma T_env^4 of physics.md eq. 3, W/m2.
 template <class Real>
 [[nodiscard]] constexpr Real environment_input_w_m2(Real emissivity_frac,
                                                     Real environment_k) noexcept {
@@ -58,9 +58,9 @@ template <class Real>
   return emissivity_frac * Real(kStefanBoltzmannWPerM2K4) * t2 * t2;
 }
 
-/// Returns R_LW = 2 L_down - sigma T_env^4 of eq. 3, that is 2 L_down - R_e / eps, W/m2. With it
-/// eq. 1 gives T_a = T_0 in an isothermal enclosure for every f_i, and flat ground absorbs eps
-/// L_down.
+/// Returns R_LW = 2 L_down - sigma T_env^4 of physics.md eq. 3, that is 2 L_down - R_e / eps, W/m2.
+/// With it absorbed_flux_w_m2() gives T_a = T_0 in an isothermal enclosure for every f_i, and flat
+/// ground absorbs eps L_down.
 template <class Real>
 [[nodiscard]] constexpr Real longwave_input_w_m2(Real longwave_down_w_m2,
                                                  Real environment_k) noexcept {
@@ -77,7 +77,7 @@ struct SurfaceExchange {
   Real air_k = 0;
 };
 
-/// Returns the coefficients of eq. 4, the quartic whose positive root is the equilibrium
+/// Returns the coefficients of physics.md eq. 4, the quartic whose positive root is the equilibrium
 /// temperature.
 template <class Real>
 [[nodiscard]] constexpr SurfaceBalance<Real> surface_balance(
@@ -87,8 +87,9 @@ template <class Real>
           absorbed_w_m2 + x.core_conductance_w_m2_k * x.core_k + x.film_w_m2_k * x.air_k};
 }
 
-/// Returns T_a of eq. 2, the temperature in K at which emission alone balances `absorbed_w_m2`. The
-/// result is NaN if `absorbed_w_m2` is negative, and not finite if `emissivity_frac` is 0.
+/// Returns T_a of physics.md eq. 2, the temperature in K at which emission alone balances
+/// `absorbed_w_m2`. The result is NaN if `absorbed_w_m2` is negative, and not finite if
+/// `emissivity_frac` is 0.
 template <class Real>
 [[nodiscard]] Real radiative_temperature_k(Real absorbed_w_m2, Real emissivity_frac) noexcept {
   return std::sqrt(std::sqrt(absorbed_w_m2 / (emissivity_frac * Real(kStefanBoltzmannWPerM2K4))));

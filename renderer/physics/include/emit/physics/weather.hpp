@@ -19,7 +19,7 @@ struct WeatherSample {
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;
   double wind_m_s = 0.0;
-  double cloud_frac = 0.0;              ///< beta of eq. 1, 0..1; 0 for measured sun
+  double cloud_frac = 0.0;              ///< beta of physics.md eq. 1, 0..1; 0 for measured sun
   std::optional<double> environment_k;  ///< surroundings; if absent, the air temperature
   std::optional<double> film_w_m2_k;    ///< if absent, from the wind; not used by emit2014
 };
@@ -34,9 +34,9 @@ struct ClearSky {
   double cloud_frac = 0.0;
 };
 
-/// Inputs of eq. 1 that do not depend on the surface.
+/// Inputs of physics.md eq. 1 that do not depend on the surface.
 struct Forcing {
-  double direct_normal_w_m2 = 0.0;  ///< before clouds: eq. 1 applies cloud_frac
+  double direct_normal_w_m2 = 0.0;  ///< before clouds, which absorbed_flux_w_m2() applies
   double diffuse_horizontal_w_m2 = 0.0;
   double longwave_down_w_m2 = 0.0;
   double air_k = 0.0;

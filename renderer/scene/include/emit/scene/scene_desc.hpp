@@ -183,7 +183,7 @@ enum class StepSpacing : std::uint8_t { uniform, geometric };
 /// Choice and parameters of the thermal simulation.
 struct ThermalOptions {
   ThermalMethod method = ThermalMethod::cached;
-  ThermalModel model = ThermalModel::emit2014;
+  ThermalModel model = ThermalModel::emit2014;  ///< scenario files default to foster
   double tolerance_k = 0.1;
   double initial_k = 290.0;           ///< surface temperature at history start
   std::int64_t history_start_ns = 0;  ///< sim time at which the thermal simulation starts

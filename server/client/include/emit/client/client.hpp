@@ -89,7 +89,9 @@ struct SubscribeOptions {
   std::string channel_kind;
   std::string sensor;
   std::string band;
-  bool every_frame = false;  ///< the daemon disconnects this client rather than skip a frame
+  /// No frame is skipped because this client is slow: where it falls behind, the daemon disconnects
+  /// it (tcp, udp), or receive() fails (shm).
+  bool every_frame = false;
   /// 1..kMaxEveryNth: frames 1, 1 + n, 1 + 2 n, ... of every run; what is left out is no gap. Of a
   /// channel that shows every m-th frame, n times m.
   std::uint32_t every_nth = 1;
