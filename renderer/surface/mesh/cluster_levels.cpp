@@ -295,18 +295,28 @@ ClusterLevels build_cluster_levels(scene::Mesh& mesh, const VertexValues& values
     out.of_submesh.resize(mesh.submeshes.size());
     return out;
   }
+  // Build the levels of all submeshes on all cores.
   const Builder builder(mesh, values);
+  std::vector<std::vector<Node>> built(mesh.submeshes.size());
+  threads::parallel_parts(built.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) {
+      const scene::Submesh& submesh = mesh.submeshes[k];
+      if (submesh.index_count == 0) continue;
+      built[k] =
+          builder.build(std::span(mesh.indices).subspan(submesh.first_index, submesh.index_count));
+    }
+  });
+  // Lay the clusters out submesh by submesh.
   Indices finest(mesh.indices.size());
   Indices coarser;
-  for (const scene::Submesh& submesh : mesh.submeshes) {
+  for (std::size_t k = 0; k < built.size(); ++k) {
+    const scene::Submesh& submesh = mesh.submeshes[k];
     const ClusterLevels::Range range{static_cast<std::uint32_t>(out.clusters.size()), 0};
     out.of_submesh.push_back(range);
     if (submesh.index_count == 0) continue;
-    // Build the levels of the submesh and put the finest clusters first: they keep its range of
-    // indices.
+    // Put the finest clusters first: they keep the submesh's range of indices.
     std::uint32_t place = submesh.first_index;
-    std::vector<Node> nodes =
-        builder.build(std::span(mesh.indices).subspan(submesh.first_index, submesh.index_count));
+    std::vector<Node>& nodes = built[k];
     std::ranges::stable_partition(nodes, &Node::finest);
     for (Node& node : nodes) {
       const auto count = static_cast<std::uint32_t>(node.indices.size());

@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -65,19 +66,27 @@ struct Group {
   std::uint32_t count = 0;
   std::uint32_t instance = 0;
   bool front = true;
-  glm::vec3 direction{0.0F};     ///< sum over the group
-  glm::vec3 normal{0.0F};        ///< sum over the group
+  glm::vec3 direction{0.0F};  ///< sum over the group
+  glm::vec3 normal{0.0F};     ///< sum over the group
+  glm::vec3 mean_direction{0.0F};
+  glm::vec3 mean_normal{0.0F};
   std::uint32_t before = kNone;  ///< neighbours in the list
   std::uint32_t after = kNone;
+
+  /// Computes the unit means from the sums.
+  void take_means() noexcept {
+    const auto mean = [](const glm::vec3& sum) { return sum / std::max(glm::length(sum), 1e-6F); };
+    mean_direction = mean(direction);
+    mean_normal = mean(normal);
+  }
 };
 
 /// Returns the growth of the spread by joining two groups (Ward's criterion), on the unit spheres
 /// of directions and of normals. Other instances and the other side of faces cost more, so that
 /// they are joined last.
 float join_cost(const Group& a, const Group& b) noexcept {
-  const auto mean = [](const glm::vec3& sum) { return sum / std::max(glm::length(sum), 1e-6F); };
-  const glm::vec3 aside = mean(a.direction) - mean(b.direction);
-  float spread = glm::dot(aside, aside) + 1.0F - glm::dot(mean(a.normal), mean(b.normal));
+  const glm::vec3 aside = a.mean_direction - b.mean_direction;
+  float spread = glm::dot(aside, aside) + 1.0F - glm::dot(a.mean_normal, b.mean_normal);
   if (a.instance != b.instance) spread += 8.0F;
   if (a.front != b.front) spread += 4.0F;
   const auto na = static_cast<float>(a.count);
@@ -85,38 +94,37 @@ float join_cost(const Group& a, const Group& b) noexcept {
   return spread * na * nb / (na + nb);
 }
 
-/// Costs of joining group i with the one after it. Minima of blocks make it fast to find the
-/// smallest cost, and the first of equal ones.
+/// Costs of joining group i with the one after it. A tree of minima tells the smallest cost, and
+/// the first of equal ones.
 class JoinCosts {
  public:
-  /// Starts with `count` infinite costs.
-  explicit JoinCosts(std::size_t count) noexcept : blocks_((count + kBlock - 1) / kBlock) {
-    std::fill_n(costs_.begin(), blocks_ * kBlock, kNever);
-    std::fill_n(least_.begin(), blocks_, kNever);
+  /// Starts with infinite costs.
+  JoinCosts() noexcept {
+    costs_.fill(kNever);
+    for (std::uint32_t i = 0; i < kLeaves; ++i) first_[kLeaves + i] = i;
+    for (std::uint32_t node = kLeaves - 1; node > 0; --node) first_[node] = first_[2 * node];
   }
-  /// Sets a cost and updates the minimum of its block.
-  void set(std::size_t i, float cost) noexcept {
+  /// Sets a cost and updates the minima above it.
+  void set(std::uint32_t i, float cost) noexcept {
     costs_[i] = cost;
-    const auto begin = costs_.begin() + static_cast<std::ptrdiff_t>(i / kBlock * kBlock);
-    least_[i / kBlock] = *std::min_element(begin, begin + kBlock);
+    for (std::uint32_t node = (kLeaves + i) / 2; node > 0; node /= 2) {
+      const std::uint32_t left = first_[2 * node];
+      const std::uint32_t right = first_[2 * node + 1];
+      first_[node] = costs_[right] < costs_[left] ? right : left;
+    }
   }
-  void remove(std::size_t i) noexcept { set(i, kNever); }
+  void remove(std::uint32_t i) noexcept { set(i, kNever); }
   /// Returns the index of the smallest cost.
-  [[nodiscard]] std::size_t least() const noexcept {
-    const auto block = static_cast<std::size_t>(
-        std::min_element(least_.data(), least_.data() + blocks_) - least_.data());
-    const float* begin = costs_.data() + block * kBlock;
-    return block * kBlock +
-           static_cast<std::size_t>(std::min_element(begin, begin + kBlock) - begin);
-  }
+  [[nodiscard]] std::uint32_t least() const noexcept { return first_[1]; }
 
  private:
-  static constexpr std::size_t kBlock = 16;
+  static constexpr std::uint32_t kLeaves = ViewSampler::kMaxRays;
   static constexpr float kNever = std::numeric_limits<float>::infinity();
-  static_assert(ViewSampler::kMaxRays % kBlock == 0);
-  std::array<float, ViewSampler::kMaxRays> costs_;
-  std::array<float, ViewSampler::kMaxRays / kBlock> least_;
-  std::size_t blocks_;
+  static_assert(std::has_single_bit(kLeaves));
+  std::array<float, kLeaves> costs_;
+  /// Index of the smallest cost below each node. Node 1 is the root; nodes 2i and 2i + 1 lie below
+  /// node i.
+  std::array<std::uint32_t, 2 * kLeaves> first_;
 };
 
 /// Sorted hits of one point and their groups.
@@ -144,11 +152,16 @@ void join_neighbours(Hits& hits) noexcept {
   for (std::size_t i = 0; i < hits.count; ++i) sorted[i] = hits.faces[order[i].second];
   hits.faces = sorted;
 
-  // Start with one group per hit.
-  JoinCosts costs(hits.count);
+  // Start with one group per hit. A view of few hits needs no joining.
   for (std::uint32_t i = 0; i < hits.count; ++i) {
     const SeenFace& face = hits.faces[i];
     hits.groups[i] = {i, 1, face.instance, face.front, face.direction, face.normal};
+  }
+  if (hits.count <= SurfaceView::kMaxSeen) return;
+  // Link them in the order of the list, and enter the costs of joining neighbours.
+  JoinCosts costs;
+  for (std::uint32_t i = 0; i < hits.count; ++i) {
+    hits.groups[i].take_means();
     if (i == 0) continue;
     hits.groups[i].before = i - 1;
     hits.groups[i - 1].after = i;
@@ -157,7 +170,7 @@ void join_neighbours(Hits& hits) noexcept {
   std::size_t left = hits.count;
   for (; left > SurfaceView::kMaxSeen; --left) {
     // Join the two neighbours that cost least. The larger one decides the instance and the side.
-    const auto best = static_cast<std::uint32_t>(costs.least());
+    const std::uint32_t best = costs.least();
     Group& group = hits.groups[best];
     const Group& other = hits.groups[group.after];
     if (other.count > group.count) {
@@ -167,6 +180,7 @@ void join_neighbours(Hits& hits) noexcept {
     group.count += other.count;
     group.direction += other.direction;
     group.normal += other.normal;
+    group.take_means();
     // Take the second group out of the list and update the costs on both sides of the new one.
     costs.remove(group.after);
     group.after = other.after;
@@ -178,7 +192,6 @@ void join_neighbours(Hits& hits) noexcept {
     hits.groups[group.after].before = best;
     costs.set(best, join_cost(group, hits.groups[group.after]));
   }
-  if (left == hits.count || hits.count == 0) return;
   // Move the groups that are left to the front. The first of the list is never joined to another.
   std::size_t to = 0;
   for (std::uint32_t from = 0; from != kNone; from = hits.groups[from].after) {
