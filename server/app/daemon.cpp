@@ -99,8 +99,7 @@ bool DaemonImpl::warming_up(double done_frac) {
 }
 
 physics::Result<void> DaemonImpl::setup() {
-  started_ns_ = clock_.monotonic_ns();
-  housekept_ns_.store(started_ns_, std::memory_order_release);
+  liveness_.start(clock_.monotonic_ns());
   if (!scenario_ && !options_.source_factory &&
       config_.source.kind == config::SourceKind::renderer) {
     return physics::make_error(ErrorCode::config,
@@ -398,7 +397,7 @@ int DaemonImpl::run() {
       return 1;
     }
   }
-  serving_.store(true, std::memory_order_release);
+  liveness_.serving.store(true, std::memory_order_release);
   health_.ready(ready_line());
   log_->write(LogLevel::info, ready_line());
   while (!stop_.load(std::memory_order_acquire)) {
@@ -427,7 +426,7 @@ void DaemonImpl::watch_once() {
 
 /// Finishes the frames in work, lets clients read and closes the journal, each within its limit.
 int DaemonImpl::end_in_order() {
-  serving_.store(false, std::memory_order_release);
+  liveness_.serving.store(false, std::memory_order_release);
   health_.stopping();
   log_->write(LogLevel::info, "event=stopping");
   receiver_->drain();
@@ -455,7 +454,7 @@ int DaemonImpl::end_in_order() {
 
 /// Sends and records what was rendered. The render thread is left alone: it may hang in the driver.
 int DaemonImpl::end_without_device() {
-  serving_.store(false, std::memory_order_release);
+  liveness_.serving.store(false, std::memory_order_release);
   housekeep();
   log_->write(LogLevel::error,
               fmt::format("event=stopping reason=device_lost exit={}", kExitDeviceLost));

@@ -19,6 +19,7 @@
 #include "agents/sender/shm_client.hpp"
 #include "app/clock_watch.hpp"
 #include "app/daemon.hpp"
+#include "app/liveness.hpp"
 #include "app/service_health.hpp"
 #include "net/trigger_port.hpp"
 #include "telemetry/log.hpp"
@@ -107,9 +108,6 @@ class DaemonImpl final : public Daemon {
   void stop_agents();
   [[nodiscard]] int end_without_device();
   [[nodiscard]] MetricsMoment moment() const;
-  /// Returns true while host frames are taken and frames come: false while stopping, and while the
-  /// surface warms up again behind a jump of simulation time. Any thread.
-  [[nodiscard]] bool is_ready() const noexcept;
   void housekeep();
   void watch_ptp();
   void log_summary();
@@ -139,9 +137,7 @@ class DaemonImpl final : public Daemon {
   StatusBoard board_;
   Fd stop_event_;
   std::atomic<bool> stop_{false};
-  std::atomic<bool> serving_{false};
-  std::int64_t started_ns_ = 0;
-  std::atomic<std::int64_t> housekept_ns_{0};  ///< monotonic
+  Liveness liveness_;
   ClockWatch clock_watch_{clock_};
 
   ServiceNotifier nobody_;

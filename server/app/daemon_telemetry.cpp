@@ -57,7 +57,7 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   MetricsServer::Answers answers;
   answers.metrics = [this] { return metrics_text(sources_, moment()); };
   answers.trace = [this] { return chrome_trace(context_.trace.entries()); };
-  answers.ready = [this] { return is_ready(); };
+  answers.ready = [this] { return liveness_.is_ready(context_); };
   answers.admits = [this](const SocketAddress& peer) {
     const protocol::IpAddress ip = ip_of(peer);
     if (receiver_->may_connect(ip)) {
@@ -70,9 +70,8 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
     return false;
   };
   answers.healthy = [this] {
-    constexpr std::int64_t kStuckNs = 5'000'000'000;
     const std::int64_t now_ns = clock_.monotonic_ns();
-    return now_ns - housekept_ns_.load(std::memory_order_acquire) < kStuckNs &&
+    return liveness_.is_main_alive(now_ns) &&
            ServiceHealth::stuck_agent(sources_.agents, now_ns, ServiceHealth::kStuckNs).empty();
   };
   auto opened = MetricsServer::start(*address, std::move(answers));
@@ -83,17 +82,11 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   return {};
 }
 
-bool DaemonImpl::is_ready() const noexcept {
-  const std::int64_t since_ns = context_.jump_since_ns.load(std::memory_order_relaxed);
-  return serving_.load(std::memory_order_acquire) &&
-         !(since_ns != 0 && warms_up_again(clock_.monotonic_ns() - since_ns));
-}
-
 MetricsMoment DaemonImpl::moment() const {
   const std::int64_t now_ns = clock_.monotonic_ns();
   return {context_.run_id.load(std::memory_order_relaxed),
-          is_ready(),
-          now_ns - started_ns_,
+          liveness_.is_ready(context_),
+          now_ns - liveness_.started_ns,
           now_ns,
           context_.journal_memory_bytes.load(std::memory_order_relaxed),
           ptp_ ? std::optional(ptp_->status()) : std::nullopt};
@@ -148,7 +141,7 @@ void DaemonImpl::housekeep() {
     board_.set_warnings(LogLevel::warn, distinct_);
     board_.set_warnings(LogLevel::error, errors_);
   }
-  housekept_ns_.store(clock_.monotonic_ns(), std::memory_order_release);
+  liveness_.housekept_ns.store(clock_.monotonic_ns(), std::memory_order_release);
 }
 
 void DaemonImpl::log_summary() {
