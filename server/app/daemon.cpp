@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <filesystem>
 
 #include "app/daemon_impl.hpp"
 #include "app/privileges.hpp"
@@ -62,6 +63,7 @@ DaemonImpl::DaemonImpl(const config::DaemonConfig& config,
       tracks_(scenario_),
       context_(clock_, journal_bytes(config_.journal),
                std::max<std::size_t>(config_.control.max_clients, 1)),
+      log_(context_),
       stop_event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
 
 FrameSourceFactory DaemonImpl::source_factory() {
@@ -88,13 +90,7 @@ FrameSourceFactory DaemonImpl::source_factory() {
 }
 
 bool DaemonImpl::warming_up(double done_frac) {
-  if (!warm_up_meter_) warm_up_meter_.emplace(clock_);
-  if (const auto report = warm_up_meter_->due(done_frac)) {
-    log_->write(LogLevel::info,
-                fmt::format("event=warm_up done_percent={}{} text=\"{}\"", report->done_percent,
-                            report->left_s ? fmt::format(" left_s={:.0f}", *report->left_s) : "",
-                            progress_text("warm-up", *report)));
-  }
+  log_.warming_up(done_frac);
   return health_.warming_up(done_frac);
 }
 
@@ -113,7 +109,7 @@ physics::Result<void> DaemonImpl::setup() {
   if (auto opened = open_ports(); !opened) {
     return opened;
   }
-  if (auto opened = open_log(); !opened) {
+  if (auto opened = log_.open(config_.log, options_.on_log); !opened) {
     return opened;
   }
   if (!options_.stepped) {
@@ -151,19 +147,6 @@ physics::Result<void> DaemonImpl::open_ports() {
   return {};
 }
 
-physics::Result<void> DaemonImpl::open_log() {
-  if (options_.on_log) {
-    log_ = make_log(options_.on_log);
-    return {};
-  }
-  auto log = make_log(config_.log);
-  if (!log) {
-    return tl::unexpected<Error>(std::move(log.error()));
-  }
-  log_ = std::move(*log);
-  return {};
-}
-
 physics::Result<void> DaemonImpl::start_render() {
   render_ = std::make_unique<RenderAgent>(context_, source_factory());
   render_runner_ = std::make_unique<AgentRunner>(*render_, clock_);
@@ -185,9 +168,9 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
   }
   context_.channels = std::move(channels->channels);
   context_.pictures = std::move(channels->pictures);
-  const Names names{fmt::format("emitd {} ({})", kVersion, kCommit),
-                    scenario_ ? scenario_->name : std::string(),
-                    std::string(pacing_name(config_.pacing.mode)), source.device};
+  const ProcessNames names{fmt::format("emitd {} ({})", kVersion, kCommit),
+                           scenario_ ? scenario_->name : std::string(),
+                           std::string(pacing_name(config_.pacing.mode)), source.device};
   receiver_->set_identity({names.software, names.scenario, names.pacing, names.device});
   if (auto made = make_recorder(names); !made) {
     return made;
@@ -210,7 +193,7 @@ physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
                        {"pacing", names.pacing}});
 }
 
-physics::Result<void> DaemonImpl::make_recorder(const Names& names) {
+physics::Result<void> DaemonImpl::make_recorder(const ProcessNames& names) {
   Recorder::Identity identity;
   identity.scenario_name = names.scenario;
   identity.software = names.software;
@@ -229,16 +212,7 @@ physics::Result<void> DaemonImpl::make_recorder(const Names& names) {
   if (!journal) {
     return tl::unexpected<Error>(Error(journal.error()).with_context("journal.file"));
   }
-  if (!journal->older.empty()) {
-    log_->write(LogLevel::info, fmt::format("event=journal_kept file={}", journal->older.string()));
-  }
-  if (!journal->off.empty()) {
-    warn(
-        fmt::format("event=journal_off why=\"{}\" effect=\"no journal is written, every entry "
-                    "counts as dropped\" remedy=\"make room and start again, or set "
-                    "journal.required to have the start refused\"",
-                    journal->off));
-  }
+  log_.journal(*journal);
   return {};
 }
 
@@ -263,28 +237,17 @@ physics::Result<void> DaemonImpl::make_sender(const SourceInfo& source) {
   return {};
 }
 
-void DaemonImpl::log_start(const Names& names, const SourceInfo& source) {
-  log_->write(
-      LogLevel::info,
-      fmt::format("software=\"{}\" commit={} device=\"{}\" scenario=\"{}\" pacing={} "
-                  "channels={} width_px={} height_px={}",
-                  names.software, kCommit, names.device, scenario_ ? scenario_->file.string() : "",
-                  names.pacing, context_.channels.size(), source.width_px, source.height_px));
-  log_scene(source.scene);
+void DaemonImpl::log_start(const ProcessNames& names, const SourceInfo& source) {
+  log_.software(names, scenario_ ? scenario_->file : std::filesystem::path(), source);
+  log_.scene(source.scene);
   if (!privileges_.empty()) {
-    log_->write(LogLevel::info, privileges_);
+    log_.write(LogLevel::info, privileges_);
   }
   if (shm_) {
-    log_->write(LogLevel::info,
-                fmt::format("event=shm url=shm://{} slots={} mode={:04o}", config_.stream.shm,
-                            config_.stream.shm_slots, config_.stream.shm_mode));
+    log_.shared_memory(config_.stream);
   }
-  log_congestion_control(receiver_->congestion_control());
-  if (clock_.tai_offset_unset()) {
-    warn(
-        "event=tai_offset_unset effect=\"wall instants are UTC\" "
-        "remedy=\"let ntpd, chronyd or phc2sys set the kernel's TAI offset\"");
-  }
+  log_.congestion_control(receiver_->congestion_control());
+  log_.tai_offset();
 }
 
 physics::Result<void> DaemonImpl::make_runners() {
@@ -344,62 +307,26 @@ physics::Result<void> DaemonImpl::check_realtime() {
                                fmt::format("{}: [realtime] is required, but the host refuses: {}",
                                            config_.file.string(), refused));
   }
-  warn(
+  log_.warn(
       fmt::format("event=realtime_refused what=\"{}\" effect=\"timing is as the host "
                   "schedules other programs\"",
                   refused));
   return {};
 }
 
-void DaemonImpl::warn(const std::string& text) {
-  if (const std::string line = distinct_.note(text, clock_.tai_ns()); !line.empty()) {
-    log_->write(LogLevel::warn, line);
-  }
-  board_.set_warnings(LogLevel::warn, distinct_);
-}
-
-void DaemonImpl::log_congestion_control(const CongestionControl& tcp) {
-  if (tcp.chosen.starts_with("bbr")) {
-    warn(
-        fmt::format("event=bbr_kept congestion_control={} effect=\"frames over TCP are spread out "
-                    "and may come late\" remedy=\"allow reno: "
-                    "net.ipv4.tcp_allowed_congestion_control\"",
-                    tcp.chosen));
-    return;
-  }
-  log_->write(LogLevel::info,
-              fmt::format("event=tcp congestion_control={}{}", tcp.chosen,
-                          tcp.chosen == tcp.system ? "" : " instead_of=" + tcp.system));
-}
-
-void DaemonImpl::log_scene(const renderer::SceneStats& scene) {
-  if (scene.instances > 0) {
-    log_->write(LogLevel::info,
-                fmt::format("event=scene triangles={} instances={} samples={} sample_bytes={}",
-                            scene.triangles, scene.instances, scene.samples, scene.sample_bytes));
-  }
-  for (std::string text : scene.warnings) {
-    std::ranges::replace(text, '"', '\'');
-    warn(fmt::format("event=scene_warning text=\"{}\"", text));
-  }
-  for (const std::string& text : renderer::warm_up_warnings(scene)) {
-    warn(fmt::format("event=scene_warning text=\"{}\"", text));
-  }
-}
-
 int DaemonImpl::run() {
   for (AgentRunner* runner : serving_runners()) {
     if (!runner->start_thread()) {
-      log_->write(LogLevel::error,
-                  fmt::format("event=agent_failed agent={}", runner->agent().name()));
+      log_.write(LogLevel::error,
+                 fmt::format("event=agent_failed agent={}", runner->agent().name()));
       stop_agents();
-      log_taken_ = log_->finish(kLogEndNs);
+      log_.finish(kLogEndNs);
       return 1;
     }
   }
   liveness_.serving.store(true, std::memory_order_release);
   health_.ready(ready_line());
-  log_->write(LogLevel::info, ready_line());
+  log_.write(LogLevel::info, ready_line());
   while (!stop_.load(std::memory_order_acquire)) {
     if (context_.device_lost.load(std::memory_order_acquire)) {
       return end_without_device();
@@ -415,12 +342,12 @@ void DaemonImpl::watch_once() {
   ::poll(&wait, 1, kHousekeepingMs);
   housekeep();
   if (const auto stuck = health_.turn(sources_.agents, clock_.monotonic_ns()); !stuck.empty()) {
-    log_->write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
-                                             "watchdog, where there is one, ends the daemon\"",
-                                             stuck));
+    log_.write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
+                                            "watchdog, where there is one, ends the daemon\"",
+                                            stuck));
   }
   if (ptp_) {
-    watch_ptp();
+    log_.ptp(ptp_->turn(clock_.monotonic_ns()), *ptp_);
   }
 }
 
@@ -428,7 +355,7 @@ void DaemonImpl::watch_once() {
 int DaemonImpl::end_in_order() {
   liveness_.serving.store(false, std::memory_order_release);
   health_.stopping();
-  log_->write(LogLevel::info, "event=stopping");
+  log_.write(LogLevel::info, "event=stopping");
   receiver_->drain();
   context_.bells.receiver.ring();
   conductor_->drain();
@@ -443,12 +370,12 @@ int DaemonImpl::end_in_order() {
   const bool journal = wait_until([this] { return recorder_->idle(); }, kJournalDrainNs);
   stop_agents();
   housekeep();
-  log_summary();
-  log_->write(
+  log_.summary(sources_.agents);
+  log_.write(
       LogLevel::info,
       fmt::format("event=stopped frames={} clients={} journal={}", frames ? "drained" : "given_up",
                   clients ? "drained" : "given_up", journal ? "drained" : "given_up"));
-  log_taken_ = log_->finish(kLogEndNs);
+  log_.finish(kLogEndNs);
   return 0;
 }
 
@@ -456,8 +383,8 @@ int DaemonImpl::end_in_order() {
 int DaemonImpl::end_without_device() {
   liveness_.serving.store(false, std::memory_order_release);
   housekeep();
-  log_->write(LogLevel::error,
-              fmt::format("event=stopping reason=device_lost exit={}", kExitDeviceLost));
+  log_.write(LogLevel::error,
+             fmt::format("event=stopping reason=device_lost exit={}", kExitDeviceLost));
   receiver_->drain();
   context_.bells.receiver.ring();
   static_cast<void>(wait_until([this] { return sender_->idle(); }, kLostDrainNs));
@@ -467,8 +394,8 @@ int DaemonImpl::end_without_device() {
     runner->stop();
   }
   housekeep();
-  log_summary();
-  log_taken_ = log_->finish(kLostDrainNs);
+  log_.summary(sources_.agents);
+  log_.finish(kLostDrainNs);
   return kExitDeviceLost;
 }
 
@@ -484,6 +411,11 @@ bool DaemonImpl::wait_until(Predicate done, std::int64_t limit_ns) {
     housekeep();
   }
   return true;
+}
+
+void DaemonImpl::housekeep() {
+  log_.housekeep();
+  liveness_.housekept_ns.store(clock_.monotonic_ns(), std::memory_order_release);
 }
 
 int DaemonImpl::step() {

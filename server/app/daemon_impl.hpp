@@ -17,17 +17,15 @@
 #include "agents/runner.hpp"
 #include "agents/sender/sender.hpp"
 #include "agents/sender/shm_client.hpp"
-#include "app/clock_watch.hpp"
 #include "app/daemon.hpp"
+#include "app/daemon_log.hpp"
 #include "app/liveness.hpp"
+#include "app/process_names.hpp"
 #include "app/service_health.hpp"
 #include "net/trigger_port.hpp"
-#include "telemetry/log.hpp"
 #include "telemetry/metrics_server.hpp"
 #include "telemetry/metrics_text.hpp"
-#include "telemetry/progress.hpp"
 #include "telemetry/ptp_monitor.hpp"
-#include "telemetry/status_board.hpp"
 
 namespace emit::server {
 
@@ -49,7 +47,7 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] physics::Result<void> setup();
 
   int run() override;
-  bool log_taken() const noexcept override { return log_taken_; }
+  bool log_taken() const noexcept override { return log_.taken(); }
   void request_stop() noexcept override {
     stop_.store(true, std::memory_order_release);
     const std::uint64_t one = 1;
@@ -75,23 +73,15 @@ class DaemonImpl final : public Daemon {
 
  private:
   [[nodiscard]] FrameSourceFactory source_factory();
-  /// Names of this process that several parts state.
-  struct Names {
-    std::string software;
-    std::string scenario;
-    std::string pacing;
-    std::string device;
-  };
   // The functions below are the steps of setup(), in their order.
   [[nodiscard]] physics::Result<void> open_clocks();
   [[nodiscard]] physics::Result<void> open_ports();
-  [[nodiscard]] physics::Result<void> open_log();
   [[nodiscard]] physics::Result<void> check_realtime();
   [[nodiscard]] physics::Result<void> start_render();
   [[nodiscard]] physics::Result<void> make_agents(const SourceInfo& source);
-  [[nodiscard]] physics::Result<void> make_recorder(const Names& names);
+  [[nodiscard]] physics::Result<void> make_recorder(const ProcessNames& names);
   [[nodiscard]] physics::Result<void> make_sender(const SourceInfo& source);
-  void log_start(const Names& names, const SourceInfo& source);
+  void log_start(const ProcessNames& names, const SourceInfo& source);
   [[nodiscard]] physics::Result<void> make_runners();
   [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
   /// Returns the runners that start after the render agent's, in the order of their start.
@@ -109,14 +99,8 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] int end_without_device();
   [[nodiscard]] MetricsMoment moment() const;
   void housekeep();
-  void watch_ptp();
-  void log_summary();
-  /// Writes a warning to the log and keeps it among those that /metrics shows. Setup only.
-  void warn(const std::string& text);
-  void log_congestion_control(const CongestionControl& tcp);
-  void log_scene(const renderer::SceneStats& scene);
-  /// Progress of the warm-up to the service manager and, every few seconds, to the log. Always goes
-  /// on. Thread: the render agent's, before it serves.
+  /// Sends the progress of the warm-up to the service manager and, every few seconds, to the log.
+  /// Returns true: the warm-up goes on. Thread: the render agent's, before it serves.
   bool warming_up(double done_frac);
   void plan_realtime(AgentRunner& runner) const {
     runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
@@ -129,19 +113,13 @@ class DaemonImpl final : public Daemon {
   const Clock& clock_;
   ScenarioTracks tracks_;
   Context context_;
-  std::unique_ptr<Log> log_;
-  bool log_taken_ = true;
+  DaemonLog log_;
   std::string privileges_;  ///< what was given up, for the log
-  DistinctTable distinct_;
-  DistinctTable errors_;
-  StatusBoard board_;
   Fd stop_event_;
   std::atomic<bool> stop_{false};
   Liveness liveness_;
-  ClockWatch clock_watch_{clock_};
 
   ServiceNotifier nobody_;
-  std::optional<ProgressMeter> warm_up_meter_;  ///< from the first report on
   ServiceHealth health_{options_.notifier != nullptr ? *options_.notifier : nobody_};
   RealtimeReport realtime_;
   std::unique_ptr<PtpMonitor> ptp_;

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 
 #include "app/daemon_impl.hpp"
 #include "emit/version.hpp"
 #include "net/ip_address.hpp"
 
-/// Reports of the daemon about itself: metrics over HTTP, the log, the state of the clocks.
+/// Reports of the daemon about itself: metrics over HTTP.
 namespace emit::server {
 
 using physics::Error;
@@ -52,7 +51,7 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   sources_.prediction = &context_.prediction;
   sources_.realtime = &realtime_;
   sources_.clients = context_.clients();
-  sources_.board = &board_;
+  sources_.board = &log_.board();
   sources_.build = std::move(build);
   MetricsServer::Answers answers;
   answers.metrics = [this] { return metrics_text(sources_, moment()); };
@@ -90,79 +89,6 @@ MetricsMoment DaemonImpl::moment() const {
           now_ns,
           context_.journal_memory_bytes.load(std::memory_order_relaxed),
           ptp_ ? std::optional(ptp_->status()) : std::nullopt};
-}
-
-void DaemonImpl::watch_ptp() {
-  switch (ptp_->turn(clock_.monotonic_ns())) {
-    case PtpMonitor::Change::none:
-      return;
-    case PtpMonitor::Change::went_down:
-      log_->write(LogLevel::warn,
-                  "event=ptp_silent effect=\"nobody says whether the clock follows its master\" "
-                  "remedy=\"ptp4l, clock.ptp_socket and who may write to it\"");
-      return;
-    case PtpMonitor::Change::went_up:
-    case PtpMonitor::Change::state:
-      break;
-  }
-  const PtpStatus status = ptp_->status();
-  log_->write(LogLevel::info,
-              fmt::format("event=ptp state={} grandmaster={} offset_ns={}", to_string(status.state),
-                          status.grandmaster, status.offset_ns));
-}
-
-void DaemonImpl::housekeep() {
-  if (const std::int64_t step_ns = clock_watch_.look(); step_ns != 0 && log_) {
-    context_.counters.add(Counter::clock_steps);
-    log_->write(LogLevel::warn,
-                fmt::format("event=clock_step by_ms={:.3f}", static_cast<double>(step_ns) * 1e-6));
-  }
-  bool warned = false;
-  for (EventLog* events :
-       {&context_.conductor_events, &context_.receiver_events, &context_.render_events,
-        &context_.sender_events, &context_.recorder_events, &context_.metrics_events}) {
-    while (const Event* event = events->ring().front()) {
-      const EventText line = describe(*event);
-      board_.note(*event);
-      events->ring().pop();
-      warned = warned || line.distinct;
-      if (!log_) {
-        continue;
-      }
-      // Errors have a table of their own, which peers cannot fill.
-      DistinctTable& table = line.level == LogLevel::error ? errors_ : distinct_;
-      const std::string text = line.distinct ? table.note(line.text, clock_.tai_ns()) : line.text;
-      if (!text.empty()) {
-        log_->write(line.level, text);
-      }
-    }
-  }
-  if (warned) {
-    board_.set_warnings(LogLevel::warn, distinct_);
-    board_.set_warnings(LogLevel::error, errors_);
-  }
-  liveness_.housekept_ns.store(clock_.monotonic_ns(), std::memory_order_release);
-}
-
-void DaemonImpl::log_summary() {
-  std::string counters = "event=counters";
-  for (std::size_t i = 0; i < kCounterCount; ++i) {
-    const std::uint64_t value = context_.counters.get(static_cast<Counter>(i));
-    if (value != 0) {
-      counters += fmt::format(" {}={}", kCounterLabels[i].name, value);
-    }
-  }
-  log_->write(LogLevel::info, counters);
-  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
-                              sender_runner_.get(), recorder_runner_.get()}) {
-    const DutyCycle& duty = runner->duty_cycle();
-    log_->write(LogLevel::info,
-                fmt::format("event=duty_cycle agent={} turns={} busy_ms={:.1f} max_turn_us={} "
-                            "turns_over_1ms={}",
-                            runner->agent().name(), duty.cycles(),
-                            static_cast<double>(duty.busy_ns()) * 1e-6, duty.max_ns() / 1000,
-                            duty.over_threshold()));
-  }
 }
 
 }  // namespace emit::server
