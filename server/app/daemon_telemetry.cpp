@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <array>
-
 #include "app/daemon_impl.hpp"
 #include "emit/version.hpp"
 #include "net/ip_address.hpp"
@@ -14,18 +12,15 @@ using physics::Error;
 using physics::ErrorCode;
 
 std::string DaemonImpl::ready_line() const {
-  const SocketAddress host = receiver_->host_address();
-  return fmt::format("ready control={} host_udp={}{}{}", to_string(receiver_->control_address()),
+  const SocketAddress host = agents_.receiver().host_address();
+  return fmt::format("ready control={} host_udp={}{}{}",
+                     to_string(agents_.receiver().control_address()),
                      host.length != 0 ? to_string(host) : std::string("off"),
                      triggers_ ? " trigger=" + to_string(triggers_->address()) : std::string(),
                      metrics_ ? " metrics=" + to_string(metrics_->address()) : std::string());
 }
 
 physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
-  for (AgentRunner* runner : {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
-                              sender_runner_.get(), recorder_runner_.get()}) {
-    sources_.agents.emplace_back(runner->agent().name(), &runner->duty_cycle());
-  }
   if (config_.metrics.listen.empty()) {
     return {};
   }
@@ -51,6 +46,7 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   sources_.prediction = &context_.prediction;
   sources_.realtime = &realtime_;
   sources_.clients = context_.clients();
+  sources_.agents = agents_.duty_cycles();
   sources_.board = &log_.board();
   sources_.build = std::move(build);
   MetricsServer::Answers answers;
@@ -59,7 +55,7 @@ physics::Result<void> DaemonImpl::open_metrics(MetricsText::Labels build) {
   answers.ready = [this] { return liveness_.is_ready(context_); };
   answers.admits = [this](const SocketAddress& peer) {
     const protocol::IpAddress ip = ip_of(peer);
-    if (receiver_->may_connect(ip)) {
+    if (agents_.receiver().may_connect(ip)) {
       return true;
     }
     context_.counters.add(Counter::peers_refused);
