@@ -152,11 +152,24 @@ physics::Result<void> DaemonImpl::make_agents() {
   if (auto made = agents_.make_runners(); !made) {
     return made;
   }
-  return open_metrics({{"version", kVersion},
-                       {"commit", kCommit},
-                       {"device", names.device},
-                       {"scenario", names.scenario},
-                       {"pacing", names.pacing}});
+  return open_endpoint(names);
+}
+
+physics::Result<void> DaemonImpl::open_endpoint(const ProcessNames& names) {
+  const MetricsEndpoint::Parts parts{context_,  liveness_,          log_.board(),
+                                     realtime_, agents_.receiver(), agents_.duty_cycles(),
+                                     ptp_.get()};
+  auto opened = MetricsEndpoint::open(config_, parts,
+                                      {{"version", kVersion},
+                                       {"commit", kCommit},
+                                       {"device", names.device},
+                                       {"scenario", names.scenario},
+                                       {"pacing", names.pacing}});
+  if (!opened) {
+    return tl::unexpected<Error>(std::move(opened.error()));
+  }
+  endpoint_ = std::move(*opened);
+  return {};
 }
 
 void DaemonImpl::log_start(const ProcessNames& names) {
@@ -220,6 +233,15 @@ physics::Result<void> DaemonImpl::check_realtime() {
                   "schedules other programs\"",
                   refused));
   return {};
+}
+
+std::string DaemonImpl::ready_line() const {
+  const SocketAddress host = agents_.receiver().host_address();
+  return fmt::format("ready control={} host_udp={}{}{}",
+                     to_string(agents_.receiver().control_address()),
+                     host.length != 0 ? to_string(host) : std::string("off"),
+                     triggers_ ? " trigger=" + to_string(triggers_->address()) : std::string(),
+                     endpoint_ ? " metrics=" + to_string(endpoint_->address()) : std::string());
 }
 
 int DaemonImpl::run() {

@@ -13,23 +13,23 @@
 #include "app/daemon.hpp"
 #include "app/daemon_log.hpp"
 #include "app/liveness.hpp"
+#include "app/metrics_endpoint.hpp"
 #include "app/process_names.hpp"
 #include "app/service_health.hpp"
 #include "net/trigger_port.hpp"
-#include "telemetry/metrics_server.hpp"
-#include "telemetry/metrics_text.hpp"
 #include "telemetry/ptp_monitor.hpp"
 
 namespace emit::server {
 
-/// The daemon: makes the agents, turns or watches them, and leads the shutdown (daemon.cpp). It
-/// reports about itself in daemon_telemetry.cpp. Thread: main, unless a function says otherwise.
+/// The daemon: opens ports and clocks, has the agents made, turns or watches them, and leads the
+/// shutdown. Agents, log and metrics are classes of their own. Thread: main, unless a function says
+/// otherwise.
 class DaemonImpl final : public Daemon {
  public:
   DaemonImpl(const config::DaemonConfig& config, std::optional<scene::ScenarioDesc> scenario,
              DaemonOptions options);
   ~DaemonImpl() override {
-    metrics_.reset();
+    endpoint_.reset();
     if (options_.stepped && agents_.is_made()) {
       agents_.drain_stepped([this] { return step(); });
     }
@@ -58,7 +58,7 @@ class DaemonImpl final : public Daemon {
   std::uint64_t counter(Counter id) const noexcept override { return context_.counters.get(id); }
   std::string ready_line() const override;
   std::uint16_t metrics_port() const noexcept override {
-    return metrics_ ? metrics_->address().port() : std::uint16_t{0};
+    return endpoint_ ? endpoint_->address().port() : std::uint16_t{0};
   }
   std::uint16_t trigger_port() const noexcept override {
     return triggers_ ? triggers_->address().port() : std::uint16_t{0};
@@ -72,14 +72,13 @@ class DaemonImpl final : public Daemon {
   [[nodiscard]] physics::Result<void> check_realtime();
   [[nodiscard]] physics::Result<void> make_agents();
   void log_start(const ProcessNames& names);
-  [[nodiscard]] physics::Result<void> open_metrics(MetricsText::Labels build);
+  [[nodiscard]] physics::Result<void> open_endpoint(const ProcessNames& names);
   /// Runs one turn of the main thread while serving: waits up to 100 ms, then checks the agents.
   void watch_once();
   [[nodiscard]] int end_in_order();
   template <class Predicate>
   bool wait_until(Predicate done, std::int64_t limit_ns);
   [[nodiscard]] int end_without_device();
-  [[nodiscard]] MetricsMoment moment() const;
   void housekeep();
   /// Sends the progress of the warm-up to the service manager and, every few seconds, to the log.
   /// Returns true: the warm-up goes on. Thread: the render agent's, before it serves.
@@ -104,8 +103,7 @@ class DaemonImpl final : public Daemon {
   std::unique_ptr<PtpMonitor> ptp_;
   std::unique_ptr<TriggerPort> triggers_;
   AgentSet agents_;
-  MetricsSources sources_;
-  std::unique_ptr<MetricsServer> metrics_;  ///< reads all of the above
+  std::unique_ptr<MetricsEndpoint> endpoint_;  ///< its thread reads all of the above
 };
 
 }  // namespace emit::server
