@@ -47,8 +47,8 @@ class AgentSet {
   /// Makes the render agent and waits until its source is made and warmed up.
   /// Errors: those of the factory, internal (no thread).
   [[nodiscard]] physics::Result<void> start_render(FrameSourceFactory factory);
-  /// Makes the recorder and opens the journal. Errors: config, io (the journal), io, parse (a file
-  /// of the scenario).
+  /// Makes the recorder and opens the journal. Errors: config (the disk leaves no room), io (the
+  /// journal or a file of the scenario), parse (a glTF file).
   [[nodiscard]] physics::Result<Recorder::Opened> make_recorder(const ProcessNames& names);
   /// Makes the sender, and the shared memory where stream.shm asks for it. Errors: io.
   /// @pre start_render() succeeded

@@ -11,7 +11,6 @@
 
 #include "app/daemon_impl.hpp"
 #include "app/privileges.hpp"
-#include "app/replay.hpp"
 #include "emit/version.hpp"
 #include "net/key_file.hpp"
 
