@@ -7,10 +7,10 @@
 
 #include <algorithm>
 #include <ctime>
+#include <filesystem>
 
 #include "app/daemon_impl.hpp"
 #include "app/privileges.hpp"
-#include "app/replay.hpp"
 #include "emit/version.hpp"
 #include "net/key_file.hpp"
 
@@ -28,10 +28,6 @@ constexpr std::int64_t kJournalDrainNs = 5'000'000'000;
 /// Limit of each step after the device was lost: a new process is wanted soon.
 constexpr std::int64_t kLostDrainNs = 300'000'000;
 constexpr std::int64_t kLogEndNs = 2'000'000'000;
-
-std::uint32_t slot_count(const config::DaemonConfig& config) {
-  return std::clamp<std::uint32_t>(config.stream.queue_frames + 3, 4, kMaxSlots);
-}
 
 std::size_t journal_bytes(const config::JournalConfig& config) {
   // A line is some hundred bytes; one with every entity of a frame about 20 KiB.
@@ -62,45 +58,24 @@ DaemonImpl::DaemonImpl(const config::DaemonConfig& config,
       tracks_(scenario_),
       context_(clock_, journal_bytes(config_.journal),
                std::max<std::size_t>(config_.control.max_clients, 1)),
-      stop_event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+      log_(context_),
+      stop_event_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
+      agents_(context_, config_, scenario_, tracks_, options_.stepped) {}
 
 FrameSourceFactory DaemonImpl::source_factory() {
   if (options_.source_factory) {
     return options_.source_factory;
   }
-  if (config_.source.kind == config::SourceKind::canned) {
-    return [this] {
-      return make_canned_source(config_.source, slot_count(config_),
-                                scenario_ ? scenario_->bands.size() : 1);
-    };
-  }
-  return [this] {
-    renderer::DeviceOptions device;
-    device.gpu_index = config_.device.gpu_index;
-    renderer::OutputOptions output;
-    output.slots = slot_count(config_);
-    const bool deadlines =
-        config_.pacing.mode != config::PacingMode::host_step || config_.pacing.budget_ns > 0;
-    output.ladder = deadlines ? renderer::Ladder::live : renderer::Ladder::none;
-    return make_renderer_source(*scenario_, device, output,
-                                [this](double done_frac) { return warming_up(done_frac); });
-  };
+  return agents_.configured_source([this](double done_frac) { return warming_up(done_frac); });
 }
 
 bool DaemonImpl::warming_up(double done_frac) {
-  if (!warm_up_meter_) warm_up_meter_.emplace(clock_);
-  if (const auto report = warm_up_meter_->due(done_frac)) {
-    log_->write(LogLevel::info,
-                fmt::format("event=warm_up done_percent={}{} text=\"{}\"", report->done_percent,
-                            report->left_s ? fmt::format(" left_s={:.0f}", *report->left_s) : "",
-                            progress_text("warm-up", *report)));
-  }
+  log_.warming_up(done_frac);
   return health_.warming_up(done_frac);
 }
 
 physics::Result<void> DaemonImpl::setup() {
-  started_ns_ = clock_.monotonic_ns();
-  housekept_ns_.store(started_ns_, std::memory_order_release);
+  liveness_.start(clock_.monotonic_ns());
   if (!scenario_ && !options_.source_factory &&
       config_.source.kind == config::SourceKind::renderer) {
     return physics::make_error(ErrorCode::config,
@@ -114,7 +89,7 @@ physics::Result<void> DaemonImpl::setup() {
   if (auto opened = open_ports(); !opened) {
     return opened;
   }
-  if (auto opened = open_log(); !opened) {
+  if (auto opened = log_.open(config_.log, options_.on_log); !opened) {
     return opened;
   }
   if (!options_.stepped) {
@@ -130,16 +105,15 @@ physics::Result<void> DaemonImpl::setup() {
       return tl::unexpected<Error>(std::move(free.error()).with_context("stream.shm"));
     }
   }
-  if (auto started = start_render(); !started) {
+  if (auto started = agents_.start_render(source_factory()); !started) {
     return started;
   }
-  return make_agents(*render_->source_info());
+  return make_agents();
 }
 
 physics::Result<void> DaemonImpl::open_ports() {
-  receiver_ = std::make_unique<Receiver>(context_, config_);
-  if (auto opened = receiver_->open(); !opened) {
-    return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
+  if (auto opened = agents_.open_receiver(); !opened) {
+    return opened;
   }
   if (options_.drop_privileges) {
     // Privileges are dropped while this thread is the only one, because each thread has its own.
@@ -152,155 +126,63 @@ physics::Result<void> DaemonImpl::open_ports() {
   return {};
 }
 
-physics::Result<void> DaemonImpl::open_log() {
-  if (options_.on_log) {
-    log_ = make_log(options_.on_log);
-    return {};
-  }
-  auto log = make_log(config_.log);
-  if (!log) {
-    return tl::unexpected<Error>(std::move(log.error()));
-  }
-  log_ = std::move(*log);
-  return {};
-}
-
-physics::Result<void> DaemonImpl::start_render() {
-  render_ = std::make_unique<RenderAgent>(context_, source_factory());
-  render_runner_ = std::make_unique<AgentRunner>(*render_, clock_);
-  plan_realtime(*render_runner_);
-  const bool started =
-      options_.stepped ? render_runner_->start_stepped() : render_runner_->start_thread();
-  if (started) {
-    return {};
-  }
-  return render_->source_info()
-             ? physics::make_error(ErrorCode::internal, "the render thread did not start")
-             : tl::unexpected<Error>(Error(render_->source_info().error()));
-}
-
-physics::Result<void> DaemonImpl::make_agents(const SourceInfo& source) {
+physics::Result<void> DaemonImpl::make_agents() {
+  const SourceInfo& source = agents_.source();
   auto channels = make_channels(scenario_, source);
   if (!channels) {
     return tl::unexpected<Error>(std::move(channels.error()));
   }
   context_.channels = std::move(channels->channels);
   context_.pictures = std::move(channels->pictures);
-  const Names names{fmt::format("emitd {} ({})", kVersion, kCommit),
-                    scenario_ ? scenario_->name : std::string(),
-                    std::string(pacing_name(config_.pacing.mode)), source.device};
-  receiver_->set_identity({names.software, names.scenario, names.pacing, names.device});
-  if (auto made = make_recorder(names); !made) {
-    return made;
-  }
-  if (auto made = make_sender(source); !made) {
-    return made;
-  }
-  Conductor::Options options;
-  options.pacing = config_.pacing;
-  options.canned = source.canned;
-  conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers_.get());
-  log_start(names, source);
-  if (auto made = make_runners(); !made) {
-    return made;
-  }
-  return open_metrics({{"version", kVersion},
-                       {"commit", kCommit},
-                       {"device", names.device},
-                       {"scenario", names.scenario},
-                       {"pacing", names.pacing}});
-}
-
-physics::Result<void> DaemonImpl::make_recorder(const Names& names) {
-  Recorder::Identity identity;
-  identity.scenario_name = names.scenario;
-  identity.software = names.software;
-  identity.device = names.device;
-  identity.pacing = names.pacing;
-  if (scenario_) {
-    auto hash = scenario_sha256(*scenario_);
-    if (!hash) {
-      return tl::unexpected<Error>(std::move(hash.error()));
-    }
-    identity.scenario_sha256 = std::move(*hash);
-  }
-  recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
-  recorder_->set_identity(std::move(identity));
-  const auto journal = recorder_->open();
+  const ProcessNames names{fmt::format("emitd {} ({})", kVersion, kCommit),
+                           scenario_ ? scenario_->name : std::string(),
+                           std::string(pacing_name(config_.pacing.mode)), source.device};
+  agents_.receiver().set_identity({names.software, names.scenario, names.pacing, names.device});
+  auto journal = agents_.make_recorder(names);
   if (!journal) {
-    return tl::unexpected<Error>(Error(journal.error()).with_context("journal.file"));
+    return tl::unexpected<Error>(std::move(journal.error()));
   }
-  if (!journal->older.empty()) {
-    log_->write(LogLevel::info, fmt::format("event=journal_kept file={}", journal->older.string()));
+  log_.journal(*journal);
+  if (auto made = agents_.make_sender(); !made) {
+    return made;
   }
-  if (!journal->off.empty()) {
-    warn(
-        fmt::format("event=journal_off why=\"{}\" effect=\"no journal is written, every entry "
-                    "counts as dropped\" remedy=\"make room and start again, or set "
-                    "journal.required to have the start refused\"",
-                    journal->off));
+  agents_.make_conductor(triggers_.get());
+  log_start(names);
+  if (auto made = agents_.make_runners(); !made) {
+    return made;
   }
+  return open_endpoint(names);
+}
+
+physics::Result<void> DaemonImpl::open_endpoint(const ProcessNames& names) {
+  const MetricsEndpoint::Parts parts{context_,  liveness_,          log_.board(),
+                                     realtime_, agents_.receiver(), agents_.duty_cycles(),
+                                     ptp_.get()};
+  auto opened = MetricsEndpoint::open(config_, parts,
+                                      {{"version", kVersion},
+                                       {"commit", kCommit},
+                                       {"device", names.device},
+                                       {"scenario", names.scenario},
+                                       {"pacing", names.pacing}});
+  if (!opened) {
+    return tl::unexpected<Error>(std::move(opened.error()));
+  }
+  endpoint_ = std::move(*opened);
   return {};
 }
 
-physics::Result<void> DaemonImpl::make_sender(const SourceInfo& source) {
-  // Three slots beside the window: one is being rendered, one is on its way here, one is free.
-  const std::uint32_t window =
-      std::min(std::max(config_.stream.queue_frames, 1U), std::max(source.slots, 4U) - 3);
-  if (!config_.stream.shm.empty()) {
-    auto shm =
-        ShmClient::create(config_.stream, context_.channels, receiver_->welcome(), clock_.tai_ns());
-    if (!shm) {
-      return tl::unexpected<Error>(std::move(shm.error()).with_context("stream.shm"));
-    }
-    shm_ = std::move(*shm);
-  }
-  const bool slotted = config_.pacing.mode != config::PacingMode::host_step;
-  sender_ =
-      std::make_unique<Sender>(context_, window, config_.control.max_clients, slotted, shm_.get());
-  if (config_.stream.compression) {
-    sender_->allow_compression();
-  }
-  return {};
-}
-
-void DaemonImpl::log_start(const Names& names, const SourceInfo& source) {
-  log_->write(
-      LogLevel::info,
-      fmt::format("software=\"{}\" commit={} device=\"{}\" scenario=\"{}\" pacing={} "
-                  "channels={} width_px={} height_px={}",
-                  names.software, kCommit, names.device, scenario_ ? scenario_->file.string() : "",
-                  names.pacing, context_.channels.size(), source.width_px, source.height_px));
-  log_scene(source.scene);
+void DaemonImpl::log_start(const ProcessNames& names) {
+  const SourceInfo& source = agents_.source();
+  log_.software(names, scenario_ ? scenario_->file : std::filesystem::path(), source);
+  log_.scene(source.scene);
   if (!privileges_.empty()) {
-    log_->write(LogLevel::info, privileges_);
+    log_.write(LogLevel::info, privileges_);
   }
-  if (shm_) {
-    log_->write(LogLevel::info,
-                fmt::format("event=shm url=shm://{} slots={} mode={:04o}", config_.stream.shm,
-                            config_.stream.shm_slots, config_.stream.shm_mode));
+  if (!config_.stream.shm.empty()) {
+    log_.shared_memory(config_.stream);
   }
-  log_congestion_control(receiver_->congestion_control());
-  if (clock_.tai_offset_unset()) {
-    warn(
-        "event=tai_offset_unset effect=\"wall instants are UTC\" "
-        "remedy=\"let ntpd, chronyd or phc2sys set the kernel's TAI offset\"");
-  }
-}
-
-physics::Result<void> DaemonImpl::make_runners() {
-  recorder_runner_ = std::make_unique<AgentRunner>(*recorder_, clock_);
-  sender_runner_ = std::make_unique<AgentRunner>(*sender_, clock_);
-  conductor_runner_ = std::make_unique<AgentRunner>(*conductor_, clock_);
-  receiver_runner_ = std::make_unique<AgentRunner>(*receiver_, clock_);
-  for (AgentRunner* runner : serving_runners()) {
-    plan_realtime(*runner);
-    if (options_.stepped && !runner->start_stepped()) {
-      return physics::make_error(ErrorCode::io,
-                                 fmt::format("the {} did not start", runner->agent().name()));
-    }
-  }
-  return {};
+  log_.congestion_control(agents_.receiver().congestion_control());
+  log_.tai_offset();
 }
 
 physics::Result<void> DaemonImpl::open_clocks() {
@@ -345,62 +227,32 @@ physics::Result<void> DaemonImpl::check_realtime() {
                                fmt::format("{}: [realtime] is required, but the host refuses: {}",
                                            config_.file.string(), refused));
   }
-  warn(
+  log_.warn(
       fmt::format("event=realtime_refused what=\"{}\" effect=\"timing is as the host "
                   "schedules other programs\"",
                   refused));
   return {};
 }
 
-void DaemonImpl::warn(const std::string& text) {
-  if (const std::string line = distinct_.note(text, clock_.tai_ns()); !line.empty()) {
-    log_->write(LogLevel::warn, line);
-  }
-  board_.set_warnings(LogLevel::warn, distinct_);
-}
-
-void DaemonImpl::log_congestion_control(const CongestionControl& tcp) {
-  if (tcp.chosen.starts_with("bbr")) {
-    warn(
-        fmt::format("event=bbr_kept congestion_control={} effect=\"frames over TCP are spread out "
-                    "and may come late\" remedy=\"allow reno: "
-                    "net.ipv4.tcp_allowed_congestion_control\"",
-                    tcp.chosen));
-    return;
-  }
-  log_->write(LogLevel::info,
-              fmt::format("event=tcp congestion_control={}{}", tcp.chosen,
-                          tcp.chosen == tcp.system ? "" : " instead_of=" + tcp.system));
-}
-
-void DaemonImpl::log_scene(const renderer::SceneStats& scene) {
-  if (scene.instances > 0) {
-    log_->write(LogLevel::info,
-                fmt::format("event=scene triangles={} instances={} samples={} sample_bytes={}",
-                            scene.triangles, scene.instances, scene.samples, scene.sample_bytes));
-  }
-  for (std::string text : scene.warnings) {
-    std::ranges::replace(text, '"', '\'');
-    warn(fmt::format("event=scene_warning text=\"{}\"", text));
-  }
-  for (const std::string& text : renderer::warm_up_warnings(scene)) {
-    warn(fmt::format("event=scene_warning text=\"{}\"", text));
-  }
+std::string DaemonImpl::ready_line() const {
+  const SocketAddress host = agents_.receiver().host_address();
+  return fmt::format("ready control={} host_udp={}{}{}",
+                     to_string(agents_.receiver().control_address()),
+                     host.length != 0 ? to_string(host) : std::string("off"),
+                     triggers_ ? " trigger=" + to_string(triggers_->address()) : std::string(),
+                     endpoint_ ? " metrics=" + to_string(endpoint_->address()) : std::string());
 }
 
 int DaemonImpl::run() {
-  for (AgentRunner* runner : serving_runners()) {
-    if (!runner->start_thread()) {
-      log_->write(LogLevel::error,
-                  fmt::format("event=agent_failed agent={}", runner->agent().name()));
-      stop_agents();
-      log_taken_ = log_->finish(kLogEndNs);
-      return 1;
-    }
+  if (const std::string_view failed = agents_.start_serving(); !failed.empty()) {
+    log_.write(LogLevel::error, fmt::format("event=agent_failed agent={}", failed));
+    agents_.stop();
+    log_.finish(kLogEndNs);
+    return 1;
   }
-  serving_.store(true, std::memory_order_release);
+  liveness_.serving.store(true, std::memory_order_release);
   health_.ready(ready_line());
-  log_->write(LogLevel::info, ready_line());
+  log_.write(LogLevel::info, ready_line());
   while (!stop_.load(std::memory_order_acquire)) {
     if (context_.device_lost.load(std::memory_order_acquire)) {
       return end_without_device();
@@ -415,61 +267,60 @@ void DaemonImpl::watch_once() {
   constexpr int kHousekeepingMs = 100;
   ::poll(&wait, 1, kHousekeepingMs);
   housekeep();
-  if (const auto stuck = health_.turn(sources_.agents, clock_.monotonic_ns()); !stuck.empty()) {
-    log_->write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
-                                             "watchdog, where there is one, ends the daemon\"",
-                                             stuck));
+  if (const auto stuck = health_.turn(agents_.duty_cycles(), clock_.monotonic_ns());
+      !stuck.empty()) {
+    log_.write(LogLevel::error, fmt::format("event=agent_stuck agent={} effect=\"frames stop; a "
+                                            "watchdog, where there is one, ends the daemon\"",
+                                            stuck));
   }
   if (ptp_) {
-    watch_ptp();
+    log_.ptp(ptp_->turn(clock_.monotonic_ns()), *ptp_);
   }
 }
 
 /// Finishes the frames in work, lets clients read and closes the journal, each within its limit.
 int DaemonImpl::end_in_order() {
-  serving_.store(false, std::memory_order_release);
+  liveness_.serving.store(false, std::memory_order_release);
   health_.stopping();
-  log_->write(LogLevel::info, "event=stopping");
-  receiver_->drain();
+  log_.write(LogLevel::info, "event=stopping");
+  agents_.receiver().drain();
   context_.bells.receiver.ring();
-  conductor_->drain();
+  agents_.conductor().drain();
   context_.bells.conductor.ring();
   const auto lost = [this] { return context_.device_lost.load(std::memory_order_acquire); };
   const bool frames =
-      wait_until([&] { return conductor_->drained() || lost(); }, kFramesDrainNs) && !lost();
+      wait_until([&] { return agents_.conductor().drained() || lost(); }, kFramesDrainNs) &&
+      !lost();
   if (lost()) {
     return end_without_device();
   }
-  const bool clients = wait_until([this] { return sender_->idle(); }, kClientsDrainNs);
-  const bool journal = wait_until([this] { return recorder_->idle(); }, kJournalDrainNs);
-  stop_agents();
+  const bool clients = wait_until([this] { return agents_.sender().idle(); }, kClientsDrainNs);
+  const bool journal = wait_until([this] { return agents_.recorder().idle(); }, kJournalDrainNs);
+  agents_.stop();
   housekeep();
-  log_summary();
-  log_->write(
+  log_.summary(agents_.duty_cycles());
+  log_.write(
       LogLevel::info,
       fmt::format("event=stopped frames={} clients={} journal={}", frames ? "drained" : "given_up",
                   clients ? "drained" : "given_up", journal ? "drained" : "given_up"));
-  log_taken_ = log_->finish(kLogEndNs);
+  log_.finish(kLogEndNs);
   return 0;
 }
 
 /// Sends and records what was rendered. The render thread is left alone: it may hang in the driver.
 int DaemonImpl::end_without_device() {
-  serving_.store(false, std::memory_order_release);
+  liveness_.serving.store(false, std::memory_order_release);
   housekeep();
-  log_->write(LogLevel::error,
-              fmt::format("event=stopping reason=device_lost exit={}", kExitDeviceLost));
-  receiver_->drain();
+  log_.write(LogLevel::error,
+             fmt::format("event=stopping reason=device_lost exit={}", kExitDeviceLost));
+  agents_.receiver().drain();
   context_.bells.receiver.ring();
-  static_cast<void>(wait_until([this] { return sender_->idle(); }, kLostDrainNs));
-  static_cast<void>(wait_until([this] { return recorder_->idle(); }, kLostDrainNs));
-  for (AgentRunner* runner : {conductor_runner_.get(), sender_runner_.get(), recorder_runner_.get(),
-                              receiver_runner_.get()}) {
-    runner->stop();
-  }
+  static_cast<void>(wait_until([this] { return agents_.sender().idle(); }, kLostDrainNs));
+  static_cast<void>(wait_until([this] { return agents_.recorder().idle(); }, kLostDrainNs));
+  agents_.stop_without_render();
   housekeep();
-  log_summary();
-  log_taken_ = log_->finish(kLostDrainNs);
+  log_.summary(agents_.duty_cycles());
+  log_.finish(kLostDrainNs);
   return kExitDeviceLost;
 }
 
@@ -487,34 +338,15 @@ bool DaemonImpl::wait_until(Predicate done, std::int64_t limit_ns) {
   return true;
 }
 
+void DaemonImpl::housekeep() {
+  log_.housekeep();
+  liveness_.housekept_ns.store(clock_.monotonic_ns(), std::memory_order_release);
+}
+
 int DaemonImpl::step() {
-  int work = 0;
-  for (AgentRunner* runner :
-       {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
-        conductor_runner_.get(), sender_runner_.get(), recorder_runner_.get()}) {
-    work += runner->step();
-  }
+  const int work = agents_.step();
   housekeep();
   return work;
-}
-
-void DaemonImpl::drain_stepped() {
-  receiver_->drain();
-  conductor_->drain();
-  constexpr int kMaxSteps = 10'000;
-  for (int i = 0; i < kMaxSteps && (step() > 0 || !conductor_->drained()); ++i) {
-  }
-}
-
-void DaemonImpl::stop_agents() {
-  // The order is against the flow of what is lent: slots go back to the source before it ends, and
-  // descriptors to the receiver before it closes them.
-  for (AgentRunner* runner : {conductor_runner_.get(), sender_runner_.get(), recorder_runner_.get(),
-                              receiver_runner_.get(), render_runner_.get()}) {
-    if (runner != nullptr) {
-      runner->stop();
-    }
-  }
 }
 
 physics::Result<std::unique_ptr<Daemon>> Daemon::create(const config::DaemonConfig& config,

@@ -4,7 +4,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "app/service_notifier.hpp"
 #include "telemetry/duty_cycle.hpp"
@@ -21,9 +20,9 @@ class ServiceHealth {
 
   explicit ServiceHealth(const ServiceNotifier& notifier) : notifier_(notifier) {}
 
-  using Agents = std::vector<std::pair<std::string, const DutyCycle*>>;
   /// Returns the first agent silent for longer than that; empty: none.
-  [[nodiscard]] static std::string_view stuck_agent(const Agents& agents, std::int64_t now_ns,
+  [[nodiscard]] static std::string_view stuck_agent(const NamedDutyCycles& agents,
+                                                    std::int64_t now_ns,
                                                     std::int64_t limit_ns) noexcept {
     for (const auto& [name, duty] : agents) {
       if (duty->silent_ns(now_ns) > limit_ns) return name;
@@ -47,7 +46,7 @@ class ServiceHealth {
   /// Runs once per turn of main while serving. It reports to the manager that the daemon is alive,
   /// twice within the time the manager waits, unless an agent is stuck.
   /// @return the agent that is stuck, once for each time it gets stuck; else empty.
-  [[nodiscard]] std::string_view turn(const Agents& agents, std::int64_t now_ns) {
+  [[nodiscard]] std::string_view turn(const NamedDutyCycles& agents, std::int64_t now_ns) {
     const std::int64_t watchdog_ns = notifier_.watchdog_ns();
     const std::int64_t limit_ns = watchdog_ns > 0 ? watchdog_ns : kStuckNs;
     const std::string_view stuck = stuck_agent(agents, now_ns, limit_ns);

@@ -34,6 +34,32 @@ std::uint64_t frame_bytes_of(const ChannelDescription& channel) {
   return std::min(pixels, kMaxFrameBytes) * sizeof(float);
 }
 
+/// Returns the bytes of the largest channel's frames. Errors: protocol.
+physics::Result<std::uint64_t> largest_frame_bytes(const ServerInfo& server) {
+  std::uint64_t largest = 0;
+  for (const auto& channel : server.channels) {
+    largest = std::max(largest, frame_bytes_of(channel));
+  }
+  if (largest > kMaxFrameBytes) {
+    return make_error(ErrorCode::protocol,
+                      fmt::format("frames of more than {} bytes are refused", kMaxFrameBytes));
+  }
+  return largest;
+}
+
+/// Returns the request with what does not depend on the transport.
+v1::ControlRecord subscribe_request(const SubscribeOptions& options) {
+  v1::ControlRecord request;
+  v1::Subscribe& subscribe = *request.mutable_subscribe();
+  subscribe.set_channel_name(options.channel_name);
+  subscribe.set_channel_kind(options.channel_kind);
+  subscribe.set_sensor(options.sensor);
+  subscribe.set_band(options.band);
+  subscribe.set_every_frame(options.every_frame);
+  subscribe.set_every_nth(options.every_nth);
+  return request;
+}
+
 class FrameClientImpl final : public FrameClient {
  public:
   FrameClientImpl(ClientConnection connection, bool udp)
@@ -55,6 +81,21 @@ class FrameClientImpl final : public FrameClient {
   std::string receive_buffer_advice() const override;
 
  private:
+  // Steps of subscribe().
+  /// Opens the receiver of datagrams and adds its terms to the request. Errors: io.
+  physics::Result<void> ask_for_datagrams(const SubscribeOptions& options, std::uint64_t largest,
+                                          v1::Subscribe& subscribe);
+  /// Takes memory for records of frames and adds their terms to the request.
+  void ask_for_records(const SubscribeOptions& options, std::uint64_t largest,
+                       v1::Subscribe& subscribe);
+  /// Returns the daemon's answer. Errors: io (no answer by `end_ns`), protocol (refused).
+  physics::Result<v1::Subscribed> wait_for_answer(std::int64_t end_ns);
+  /// Takes over what the daemon grants. Errors: protocol, it grants what was not asked for.
+  physics::Result<void> take_terms(const SubscribeOptions& options,
+                                   const v1::Subscribed& subscribed);
+  physics::Result<void> take_error_correction(const SubscribeOptions& options,
+                                              const v1::Subscribed& subscribed);
+
   physics::Result<const ReceivedFrame*> receive_tcp(std::int64_t end_ns);
   physics::Result<const ReceivedFrame*> receive_udp(std::int64_t end_ns);
   const ReceivedFrame* pop_udp();
@@ -94,50 +135,67 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
     return make_error(ErrorCode::invalid_argument, every_nth_error(options.every_nth));
   }
   // Frames may follow the answer at once: the parser must take the largest channel's.
-  std::uint64_t largest = 0;
-  for (const auto& channel : connection_.server().channels) {
-    largest = std::max(largest, frame_bytes_of(channel));
+  const auto largest = largest_frame_bytes(connection_.server());
+  if (!largest) {
+    return tl::unexpected<physics::Error>(largest.error());
   }
-  if (largest > kMaxFrameBytes) {
-    return make_error(ErrorCode::protocol,
-                      fmt::format("frames of more than {} bytes are refused", kMaxFrameBytes));
-  }
-  v1::ControlRecord request;
-  v1::Subscribe& subscribe = *request.mutable_subscribe();
-  subscribe.set_channel_name(options.channel_name);
-  subscribe.set_channel_kind(options.channel_kind);
-  subscribe.set_sensor(options.sensor);
-  subscribe.set_band(options.band);
-  subscribe.set_every_frame(options.every_frame);
-  subscribe.set_every_nth(options.every_nth);
-  if (udp_) {
-    auto receiver = UdpFrameReceiver::open(connection_.context(), connection_.peer(),
-                                           connection_.local_address(), options);
-    if (!receiver) {
-      return tl::unexpected<physics::Error>(std::move(receiver.error()));
-    }
-    receiver_ = std::move(*receiver);
-    receiver_->size_buffer(largest);
-    subscribe.set_udp_port(options.announced_udp_port != 0 ? options.announced_udp_port
-                                                           : receiver_->port());
-    subscribe.set_fragment_payload_bytes(options.fragment_payload_bytes);
-    subscribe.set_multicast_group(options.multicast_group);
-    terms_.udp_port = receiver_->port();
-    subscribe.set_resend(options.resend);
-    if (options.fec) {
-      v1::ErrorCorrection& wish = *subscribe.mutable_error_correction();
-      wish.set_data_fragments(options.fec->data_fragments);
-      wish.set_parity_fragments(options.fec->parity_fragments);
-    }
-  } else {
-    subscribe.set_compression(options.compression ? v1::COMPRESSION_SHUFFLED_LZ4
-                                                  : v1::COMPRESSION_NONE);
-    connection_.allow_frames(static_cast<std::uint32_t>(largest + protocol::kFrameHeaderBytes));
-    pixels_.resize(static_cast<std::size_t>(largest / sizeof(float)));
+  v1::ControlRecord request = subscribe_request(options);
+  if (!udp_) {
+    ask_for_records(options, *largest, *request.mutable_subscribe());
+  } else if (auto asked = ask_for_datagrams(options, *largest, *request.mutable_subscribe());
+             !asked) {
+    return tl::unexpected<physics::Error>(std::move(asked.error()));
   }
   if (auto sent = connection_.send(request, end_ns); !sent) {
     return tl::unexpected<physics::Error>(std::move(sent.error()));
   }
+  auto subscribed = wait_for_answer(end_ns);
+  if (!subscribed) {
+    return tl::unexpected<physics::Error>(std::move(subscribed.error()));
+  }
+  if (auto taken = take_terms(options, *subscribed); !taken) {
+    return tl::unexpected<physics::Error>(std::move(taken.error()));
+  }
+  if (udp_) {
+    make_reassembler(*largest);
+  }
+  subscribed_ = true;
+  return channel_;
+}
+
+physics::Result<void> FrameClientImpl::ask_for_datagrams(const SubscribeOptions& options,
+                                                         std::uint64_t largest,
+                                                         v1::Subscribe& subscribe) {
+  auto receiver = UdpFrameReceiver::open(connection_.context(), connection_.peer(),
+                                         connection_.local_address(), options);
+  if (!receiver) {
+    return tl::unexpected<physics::Error>(std::move(receiver.error()));
+  }
+  receiver_ = std::move(*receiver);
+  receiver_->size_buffer(largest);
+  subscribe.set_udp_port(options.announced_udp_port != 0 ? options.announced_udp_port
+                                                         : receiver_->port());
+  subscribe.set_fragment_payload_bytes(options.fragment_payload_bytes);
+  subscribe.set_multicast_group(options.multicast_group);
+  terms_.udp_port = receiver_->port();
+  subscribe.set_resend(options.resend);
+  if (options.fec) {
+    v1::ErrorCorrection& wish = *subscribe.mutable_error_correction();
+    wish.set_data_fragments(options.fec->data_fragments);
+    wish.set_parity_fragments(options.fec->parity_fragments);
+  }
+  return {};
+}
+
+void FrameClientImpl::ask_for_records(const SubscribeOptions& options, std::uint64_t largest,
+                                      v1::Subscribe& subscribe) {
+  subscribe.set_compression(options.compression ? v1::COMPRESSION_SHUFFLED_LZ4
+                                                : v1::COMPRESSION_NONE);
+  connection_.allow_frames(static_cast<std::uint32_t>(largest + protocol::kFrameHeaderBytes));
+  pixels_.resize(static_cast<std::size_t>(largest / sizeof(float)));
+}
+
+physics::Result<v1::Subscribed> FrameClientImpl::wait_for_answer(std::int64_t end_ns) {
   protocol::Record record;
   for (;;) {
     auto received = connection_.receive(record, end_ns);
@@ -156,41 +214,46 @@ physics::Result<ChannelDescription> FrameClientImpl::subscribe(const SubscribeOp
       return make_error(ErrorCode::protocol, "subscription refused: " + answer.status().text());
     }
     if (answer.has_subscribed()) {
-      channel_ = describe_channel(answer.subscribed().channel());
-      stream_id_ = static_cast<std::uint16_t>(answer.subscribed().stream_id());
-      terms_.every_nth = std::max(answer.subscribed().every_nth(), 1U);
-      if (terms_.every_nth != std::uint64_t{options.every_nth} * channel_.every_nth) {
-        return make_error(ErrorCode::protocol, "this daemon cannot leave frames out (every_nth)");
-      }
-      if (!options.channel_name.empty() && channel_.name != options.channel_name) {
-        return make_error(ErrorCode::protocol,
-                          fmt::format("this daemon knows no channels by name: it offers '{}' for "
-                                      "'{}'",
-                                      channel_.name, options.channel_name));
-      }
-      account_.set_every_nth(terms_.every_nth);
-      terms_.fec = {answer.subscribed().error_correction().data_fragments(),
-                    answer.subscribed().error_correction().parity_fragments()};
-      terms_.compression = !udp_ && answer.subscribed().compression() != v1::COMPRESSION_NONE;
-      terms_.resend = udp_ && answer.subscribed().resend();
-      terms_.fragment_payload_bytes = udp_ ? answer.subscribed().fragment_payload_bytes() : 0;
-      if (!udp_ || !terms_.fec.on()) {
-        terms_.fec = {};
-      } else if (!terms_.fec.valid() ||
-                 (options.fec ? terms_.fec != *options.fec
-                              : terms_.fec.parity_fragments > terms_.fec.data_fragments)) {
-        // It decides how much memory is taken here.
-        return make_error(ErrorCode::protocol,
-                          fmt::format("error correction of {}+{} was not asked for",
-                                      terms_.fec.data_fragments, terms_.fec.parity_fragments));
-      }
-      if (udp_) {
-        make_reassembler(largest);
-      }
-      subscribed_ = true;
-      return channel_;
+      return std::move(*answer.mutable_subscribed());
     }
   }
+}
+
+physics::Result<void> FrameClientImpl::take_terms(const SubscribeOptions& options,
+                                                  const v1::Subscribed& subscribed) {
+  channel_ = describe_channel(subscribed.channel());
+  stream_id_ = static_cast<std::uint16_t>(subscribed.stream_id());
+  terms_.every_nth = std::max(subscribed.every_nth(), 1U);
+  if (terms_.every_nth != std::uint64_t{options.every_nth} * channel_.every_nth) {
+    return make_error(ErrorCode::protocol, "this daemon cannot leave frames out (every_nth)");
+  }
+  if (!options.channel_name.empty() && channel_.name != options.channel_name) {
+    return make_error(ErrorCode::protocol,
+                      fmt::format("this daemon knows no channels by name: it offers '{}' for '{}'",
+                                  channel_.name, options.channel_name));
+  }
+  account_.set_every_nth(terms_.every_nth);
+  terms_.compression = !udp_ && subscribed.compression() != v1::COMPRESSION_NONE;
+  terms_.resend = udp_ && subscribed.resend();
+  terms_.fragment_payload_bytes = udp_ ? subscribed.fragment_payload_bytes() : 0;
+  return take_error_correction(options, subscribed);
+}
+
+physics::Result<void> FrameClientImpl::take_error_correction(const SubscribeOptions& options,
+                                                             const v1::Subscribed& subscribed) {
+  terms_.fec = {subscribed.error_correction().data_fragments(),
+                subscribed.error_correction().parity_fragments()};
+  if (!udp_ || !terms_.fec.on()) {
+    terms_.fec = {};
+  } else if (!terms_.fec.valid() ||
+             (options.fec ? terms_.fec != *options.fec
+                          : terms_.fec.parity_fragments > terms_.fec.data_fragments)) {
+    // It decides how much memory is taken here.
+    return make_error(ErrorCode::protocol,
+                      fmt::format("error correction of {}+{} was not asked for",
+                                  terms_.fec.data_fragments, terms_.fec.parity_fragments));
+  }
+  return {};
 }
 
 void FrameClientImpl::make_reassembler(std::uint64_t frame_bytes) {

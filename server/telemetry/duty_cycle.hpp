@@ -2,6 +2,9 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "rt/spsc_ring.hpp"
 
@@ -55,5 +58,8 @@ class alignas(kCacheLineBytes) DutyCycle {
   std::atomic<std::uint64_t> cycles_{0};
   std::atomic<std::int64_t> beat_ns_{0};
 };
+
+/// Duty cycles of several agents, each with the agent's name.
+using NamedDutyCycles = std::vector<std::pair<std::string, const DutyCycle*>>;
 
 }  // namespace emit::server

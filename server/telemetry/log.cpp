@@ -135,120 +135,157 @@ std::string_view role_name(std::uint64_t role) noexcept {
   return role < kRoles.size() ? kRoles[role] : "?";
 }
 
+namespace {
+
+EventText info(std::string text) {
+  return {LogLevel::info, std::move(text), false};
+}
+EventText warn(std::string text) {
+  return {LogLevel::warn, std::move(text), false};
+}
+EventText distinct_warn(std::string text) {
+  return {LogLevel::warn, std::move(text), true};
+}
+EventText error(std::string text) {
+  return {LogLevel::error, std::move(text), false};
+}
+EventText distinct_error(std::string text) {
+  return {LogLevel::error, std::move(text), true};
+}
+EventText unknown() {
+  return distinct_error("event=unknown");
+}
+
+EventText describe_command(const Event& event) {
+  static constexpr std::array kNames{"unspecified", "start", "stop", "hold", "step", "reset"};
+  return info(
+      fmt::format("event=command kind={}", event.a < kNames.size() ? kNames[event.a] : "?"));
+}
+
+/// Returns the text of an event about one connection.
+EventText describe_connection(const Event& event, const std::string& text) {
+  const std::string connection = connection_name(event.a);
+  switch (event.kind) {
+    case EventKind::connected:
+      return info(fmt::format("event=connected connection={} peer={}", connection, text));
+    case EventKind::disconnected:
+      return info(fmt::format("event=disconnected connection={} why=\"{}\"", connection, text));
+    case EventKind::hello:
+      return info(fmt::format("event=hello connection={} role={} software=\"{}\"", connection,
+                              role_name(event.b), text));
+    case EventKind::subscribed:
+      return info(fmt::format("event=subscribed connection={} channel={} transport={}", connection,
+                              event.b, text));
+    case EventKind::client_failed:
+      return warn(fmt::format("event=client_failed connection={} why=\"{}\"", connection,
+                              error_text(static_cast<int>(event.b))));
+    case EventKind::disconnected_slow:
+      return warn(
+          fmt::format("event=disconnected_slow connection={} why=\"fell behind\"", connection));
+    case EventKind::no_segmentation_offload:
+      return warn(fmt::format("event=no_segmentation_offload connection={} why=\"{}\"", connection,
+                              error_text(static_cast<int>(event.b))));
+    case EventKind::secured:
+      return info(fmt::format("event=secured connection={} names=\"{}\"", connection, text));
+    default:
+      return unknown();
+  }
+}
+
+/// Returns the text of an event about a request or a peer that was refused.
+EventText describe_refusal(const Event& event, const std::string& text) {
+  if (event.kind == EventKind::refused) {
+    return distinct_warn(fmt::format(
+        "event=refused status={} text=\"{}\"", event.a,
+        text.empty() ? protocol::status_text(static_cast<protocol::StatusCode>(event.a), 0)
+                     : text));
+  }
+  static constexpr std::array kWhy{"not in access.allow", "TLS handshake failed",
+                                   "host datagram without a valid MAC",
+                                   "trigger without a valid MAC"};
+  return distinct_warn(fmt::format("event=peer_refused why=\"{}\" peer=\"{}\"",
+                                   event.a < kWhy.size() ? kWhy[event.a] : "?", text));
+}
+
+/// Returns the text of an event after which frames, journal or weather lack something.
+EventText describe_loss(const Event& event, const std::string& text) {
+  switch (event.kind) {
+    case EventKind::source_failed:
+      return distinct_error(fmt::format("event=source_failed why=\"{}\"", text));
+    case EventKind::device_lost:
+      return error(
+          fmt::format("event=device_lost why=\"{}\" effect=\"no more frames: emitd ends\"", text));
+    case EventKind::journal_failed:
+      return distinct_error(
+          fmt::format("event=journal_failed why=\"{}\" effect=\"journal file ends here\"", text));
+    case EventKind::journal_overrun:
+      return error(fmt::format(
+          "event=journal_overrun sequence={} effect=\"journal cannot be replayed\"", event.a));
+    case EventKind::weather_lost:
+      return error(
+          fmt::format("event=weather_lost sim_time_ns={} effect=\"the host's weather no longer "
+                      "changes in this run\" remedy=\"reset the run, or send weather less "
+                      "often\"",
+                      static_cast<std::int64_t>(event.a)));
+    case EventKind::poses_dropped:
+      return warn(
+          fmt::format("event=poses_dropped count={} effect=\"oldest motion of this run is kept "
+                      "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
+                      event.a));
+    case EventKind::warmed_up_again:
+      return warn(
+          fmt::format("event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
+                      "meanwhile, this frame is flagged degraded\" remedy=\"move simulation "
+                      "time on in steps, or start at that time\"",
+                      static_cast<double>(event.a) * 1e-9,
+                      static_cast<double>(static_cast<std::int64_t>(event.b)) * 1e-9));
+    default:
+      return unknown();
+  }
+}
+
+}  // namespace
+
 EventText describe(const Event& event) {
   const std::string text = printable_text(event);
-  const auto connection = [&] { return connection_name(event.a); };
+  // The switch has no default, so that the compiler reports a kind without a text.
   switch (event.kind) {
     case EventKind::run_started:
-      return {LogLevel::info, fmt::format("event=run_started run_id={}", event.a), false};
+      return info(fmt::format("event=run_started run_id={}", event.a));
     case EventKind::host_restarted:
-      return {LogLevel::info, fmt::format("event=host_restarted host_run_id={}", event.a), false};
-    case EventKind::command: {
-      static constexpr std::array kNames{"unspecified", "start", "stop", "hold", "step", "reset"};
-      return {LogLevel::info,
-              fmt::format("event=command kind={}", event.a < kNames.size() ? kNames[event.a] : "?"),
-              false};
-    }
+      return info(fmt::format("event=host_restarted host_run_id={}", event.a));
+    case EventKind::command:
+      return describe_command(event);
     case EventKind::refused:
-      return {LogLevel::warn,
-              fmt::format("event=refused status={} text=\"{}\"", event.a,
-                          text.empty()
-                              ? protocol::status_text(static_cast<protocol::StatusCode>(event.a), 0)
-                              : text),
-              true};
+    case EventKind::peer_refused:
+      return describe_refusal(event, text);
     case EventKind::connected:
-      return {LogLevel::info,
-              fmt::format("event=connected connection={} peer={}", connection(), text), false};
     case EventKind::disconnected:
-      return {LogLevel::info,
-              fmt::format("event=disconnected connection={} why=\"{}\"", connection(), text),
-              false};
     case EventKind::hello:
-      return {LogLevel::info,
-              fmt::format("event=hello connection={} role={} software=\"{}\"", connection(),
-                          role_name(event.b), text),
-              false};
     case EventKind::subscribed:
-      return {LogLevel::info,
-              fmt::format("event=subscribed connection={} channel={} transport={}", connection(),
-                          event.b, text),
-              false};
     case EventKind::client_failed:
-      return {LogLevel::warn,
-              fmt::format("event=client_failed connection={} why=\"{}\"", connection(),
-                          error_text(static_cast<int>(event.b))),
-              false};
     case EventKind::disconnected_slow:
-      return {
-          LogLevel::warn,
-          fmt::format("event=disconnected_slow connection={} why=\"fell behind\"", connection()),
-          false};
     case EventKind::no_segmentation_offload:
-      return {LogLevel::warn,
-              fmt::format("event=no_segmentation_offload connection={} why=\"{}\"", connection(),
-                          error_text(static_cast<int>(event.b))),
-              false};
-    case EventKind::source_failed:
-      return {LogLevel::error, fmt::format("event=source_failed why=\"{}\"", text), true};
-    case EventKind::device_lost:
-      return {
-          LogLevel::error,
-          fmt::format("event=device_lost why=\"{}\" effect=\"no more frames: emitd ends\"", text),
-          false};
-    case EventKind::journal_failed:
-      return {
-          LogLevel::error,
-          fmt::format("event=journal_failed why=\"{}\" effect=\"journal file ends here\"", text),
-          true};
-    case EventKind::journal_overrun:
-      return {LogLevel::error,
-              fmt::format("event=journal_overrun sequence={} effect=\"journal cannot be replayed\"",
-                          event.a),
-              false};
-    case EventKind::slots_missed:
-      return {LogLevel::warn, fmt::format("event=slots_missed count={}", event.a), true};
-    case EventKind::trigger_silent:
-      return {LogLevel::warn,
-              "event=trigger_silent effect=\"no frames until the next trigger\" remedy=\"the sync "
-              "source, its link, trigger.peer\"",
-              true};
-    case EventKind::weather_lost:
-      return {LogLevel::error,
-              fmt::format("event=weather_lost sim_time_ns={} effect=\"the host's weather no longer "
-                          "changes in this run\" remedy=\"reset the run, or send weather less "
-                          "often\"",
-                          static_cast<std::int64_t>(event.a)),
-              false};
-    case EventKind::poses_dropped:
-      return {LogLevel::warn,
-              fmt::format("event=poses_dropped count={} effect=\"oldest motion of this run is kept "
-                          "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
-                          event.a),
-              false};
-    case EventKind::warmed_up_again:
-      return {LogLevel::warn,
-              fmt::format("event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
-                          "meanwhile, this frame is flagged degraded\" remedy=\"move simulation "
-                          "time on in steps, or start at that time\"",
-                          static_cast<double>(event.a) * 1e-9,
-                          static_cast<double>(static_cast<std::int64_t>(event.b)) * 1e-9),
-              false};
-    case EventKind::peer_refused: {
-      static constexpr std::array kWhy{"not in access.allow", "TLS handshake failed",
-                                       "host datagram without a valid MAC",
-                                       "trigger without a valid MAC"};
-      return {LogLevel::warn,
-              fmt::format("event=peer_refused why=\"{}\" peer=\"{}\"",
-                          event.a < kWhy.size() ? kWhy[event.a] : "?", text),
-              true};
-    }
     case EventKind::secured:
-      return {LogLevel::info,
-              fmt::format("event=secured connection={} names=\"{}\"", connection(), text), false};
+      return describe_connection(event, text);
+    case EventKind::source_failed:
+    case EventKind::device_lost:
+    case EventKind::journal_failed:
+    case EventKind::journal_overrun:
+    case EventKind::weather_lost:
+    case EventKind::poses_dropped:
+    case EventKind::warmed_up_again:
+      return describe_loss(event, text);
+    case EventKind::slots_missed:
+      return distinct_warn(fmt::format("event=slots_missed count={}", event.a));
+    case EventKind::trigger_silent:
+      return distinct_warn(
+          "event=trigger_silent effect=\"no frames until the next trigger\" remedy=\"the sync "
+          "source, its link, trigger.peer\"");
     case EventKind::host_session:
-      return {LogLevel::info, fmt::format("event=host_session peer={}", text), false};
+      return info(fmt::format("event=host_session peer={}", text));
   }
-  return {LogLevel::error, "event=unknown", true};
+  return unknown();
 }
 
 }  // namespace emit::server

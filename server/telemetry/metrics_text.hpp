@@ -48,8 +48,8 @@ struct MetricsSources {
   const RealtimeReport* realtime = nullptr;      ///< likewise
   std::span<const ClientCounts> clients;
   const StatusBoard* board = nullptr;
-  std::vector<std::pair<std::string, const DutyCycle*>> agents;  ///< by name
-  MetricsText::Labels build;                                     ///< labels of emitd_build_info
+  NamedDutyCycles agents;
+  MetricsText::Labels build;  ///< labels of emitd_build_info
 };
 /// Values that change with the moment of the scrape.
 struct MetricsMoment {

@@ -58,6 +58,135 @@ const KeyTable<FosterFit>& foster_fit_keys() {
   return keys;
 }
 
+namespace {
+
+// The keys of a material that hold tables, each with what is checked across its entries.
+
+Key<Material> band_emissivity_key() {
+  return custom<Material>(
+      {"band_emissivity_frac", "table", "", "0 .. 1",
+       "Emissivities by name of the band. Other bands use `emissivity_frac`.", false},
+      [](Material& out, const Node& node, Diagnostics& diagnostics) {
+        if (!expect_table(node, "band_emissivity_frac", diagnostics)) {
+          return;
+        }
+        for (const Member& member : node.members) {
+          double value = 0.0;
+          read_number(member.value, member.key, between(0, 1), value, diagnostics);
+          out.band_emissivity.push_back({member.key, value});
+        }
+      },
+      [](const Material& in) -> std::optional<std::string> {
+        if (in.band_emissivity.empty()) {
+          return std::nullopt;
+        }
+        std::string out = "{";
+        for (const scene::BandEmissivity& entry : in.band_emissivity) {
+          out += (out.size() > 1 ? ", " : " ") + toml_string(entry.band) + " = " +
+                 toml_number(entry.emissivity_frac);
+        }
+        return out + " }";
+      });
+}
+
+Key<Material> layers_key() {
+  return custom<Material>(
+      {"layers", "array of tables", "", "1 .. 16",
+       "Layers from the outside down to where the temperature is `base_k`. emit2014 uses the "
+       "first. Required without `prescribed_k`. See `layers` below.",
+       false},
+      [](Material& out, const Node& node, Diagnostics& diagnostics) {
+        read_array(node, "layers", layer_keys(), Layer{}, out.layers, diagnostics);
+        if (out.layers.size() > 16) {
+          diagnostics.add(node.at, "'layers' has " + std::to_string(out.layers.size()) +
+                                       " entries, at most 16 are taken");
+        }
+      },
+      [](const Material& in) { return write_array(in.layers, layer_keys()); });
+}
+
+Key<Material> relaxation_modes_key() {
+  return custom<Material>(
+      {"modes", "array of tables", "", "1 .. 2, weights add up to 1",
+       "emit2014: relaxation modes. Without them the slab formula (slab_modes.hpp) derives "
+       "them from the first layer. See `modes` below.",
+       false},
+      [](Material& out, const Node& node, Diagnostics& diagnostics) {
+        const std::size_t faults = diagnostics.size();
+        read_array(node, "modes", mode_keys(), RelaxationMode{}, out.modes, diagnostics);
+        if (diagnostics.size() != faults) {
+          return;
+        }
+        if (out.modes.empty() || out.modes.size() > limits::kMaxRelaxationModes) {
+          diagnostics.add(node.at, "'modes' has " + std::to_string(out.modes.size()) +
+                                       " entries, must have 1 or 2");
+          return;
+        }
+        double sum = 0.0;
+        for (const RelaxationMode& mode : out.modes) {
+          sum += mode.weight_frac;
+        }
+        if (std::abs(sum - 1.0) > 1e-6) {
+          diagnostics.add(node.at,
+                          "the weights of 'modes' add up to " + toml_number(sum) + ", must be 1");
+        }
+      },
+      [](const Material& in) { return write_array(in.modes, mode_keys()); });
+}
+
+Key<Material> foster_modes_key() {
+  return custom<Material>(
+      {"foster_modes", "array of tables", "", "1 .. 4, resistances add up to that of the layers",
+       "foster: modes, fastest first, as `emit fit` writes them. Without them they are derived "
+       "from the layers. See `foster_modes` below.",
+       false},
+      [](Material& out, const Node& node, Diagnostics& diagnostics) {
+        const std::size_t faults = diagnostics.size();
+        read_array(node, "foster_modes", foster_mode_keys(), FosterMode{}, out.foster_modes,
+                   diagnostics);
+        if (diagnostics.size() != faults) {
+          return;
+        }
+        if (out.foster_modes.empty() || out.foster_modes.size() > physics::kMaxFosterModes) {
+          diagnostics.add(node.at, "'foster_modes' has " + std::to_string(out.foster_modes.size()) +
+                                       " entries, must have 1 to 4");
+          return;
+        }
+        for (std::size_t i = 1; i < out.foster_modes.size(); ++i) {
+          if (out.foster_modes[i].tau_s <= out.foster_modes[i - 1].tau_s) {
+            diagnostics.add(node.items[i].at, "time constants of 'foster_modes' must increase");
+          }
+        }
+      },
+      [](const Material& in) -> std::optional<std::string> {
+        if (in.foster_modes.empty()) {
+          return std::nullopt;
+        }
+        return write_array(in.foster_modes, foster_mode_keys());
+      });
+}
+
+Key<Material> foster_fit_key() {
+  return custom<Material>(
+      {"foster_fit", "table", "", "",
+       "Error of `foster_modes` against the reference solver as `emit fit` found it: "
+       "`horizon_s`, `rms_k`, `max_k`.",
+       false},
+      [](Material& out, const Node& node, Diagnostics& diagnostics) {
+        if (expect_table(node, "foster_fit", diagnostics)) {
+          read_table(node, foster_fit_keys(), out.foster_fit.emplace(), diagnostics);
+        }
+      },
+      [](const Material& in) -> std::optional<std::string> {
+        if (!in.foster_fit) {
+          return std::nullopt;
+        }
+        return inline_table(*in.foster_fit, foster_fit_keys());
+      });
+}
+
+}  // namespace
+
 const KeyTable<Material>& material_keys() {
   static const KeyTable<Material> keys = {
       required(text<Material>("name", EMIT_FIELD(name), "Unique name of the material.")),
@@ -67,43 +196,8 @@ const KeyTable<Material>& material_keys() {
       required(number<Material>("emissivity_frac", "", between(0.01, 1),
                                 EMIT_FIELD(emissivity_frac),
                                 "Total hemispherical emissivity in the long-wave infrared.")),
-      custom<Material>(
-          {"band_emissivity_frac", "table", "", "0 .. 1",
-           "Emissivities by name of the band. Other bands use `emissivity_frac`.", false},
-          [](Material& out, const Node& node, Diagnostics& diagnostics) {
-            if (!expect_table(node, "band_emissivity_frac", diagnostics)) {
-              return;
-            }
-            for (const Member& member : node.members) {
-              double value = 0.0;
-              read_number(member.value, member.key, between(0, 1), value, diagnostics);
-              out.band_emissivity.push_back({member.key, value});
-            }
-          },
-          [](const Material& in) -> std::optional<std::string> {
-            if (in.band_emissivity.empty()) {
-              return std::nullopt;
-            }
-            std::string out = "{";
-            for (const scene::BandEmissivity& entry : in.band_emissivity) {
-              out += (out.size() > 1 ? ", " : " ") + toml_string(entry.band) + " = " +
-                     toml_number(entry.emissivity_frac);
-            }
-            return out + " }";
-          }),
-      custom<Material>(
-          {"layers", "array of tables", "", "1 .. 16",
-           "Layers from the outside down to where the temperature is `base_k`. emit2014 uses the "
-           "first. Required without `prescribed_k`. See `layers` below.",
-           false},
-          [](Material& out, const Node& node, Diagnostics& diagnostics) {
-            read_array(node, "layers", layer_keys(), Layer{}, out.layers, diagnostics);
-            if (out.layers.size() > 16) {
-              diagnostics.add(node.at, "'layers' has " + std::to_string(out.layers.size()) +
-                                           " entries, at most 16 are taken");
-            }
-          },
-          [](const Material& in) { return write_array(in.layers, layer_keys()); }),
+      band_emissivity_key(),
+      layers_key(),
       written_if([](const Material& in) { return in.base_k > 0.0; },
                  number<Material>(
                      "base_k", "K", between(150, 2000), EMIT_FIELD(base_k),
@@ -114,79 +208,9 @@ const KeyTable<Material>& material_keys() {
                        "that of the first layer counts. It goes with `modes`."),
       number<Material>("initial_k", "K", between(150, 2000), EMIT_FIELD(initial_k),
                        "Surface temperature at the start. Without it `thermal.initial_k` counts."),
-      custom<Material>(
-          {"modes", "array of tables", "", "1 .. 2, weights add up to 1",
-           "emit2014: relaxation modes. Without them the slab formula (slab_modes.hpp) derives "
-           "them from the first layer. See `modes` below.",
-           false},
-          [](Material& out, const Node& node, Diagnostics& diagnostics) {
-            const std::size_t faults = diagnostics.size();
-            read_array(node, "modes", mode_keys(), RelaxationMode{}, out.modes, diagnostics);
-            if (diagnostics.size() != faults) {
-              return;
-            }
-            if (out.modes.empty() || out.modes.size() > limits::kMaxRelaxationModes) {
-              diagnostics.add(node.at, "'modes' has " + std::to_string(out.modes.size()) +
-                                           " entries, must have 1 or 2");
-              return;
-            }
-            double sum = 0.0;
-            for (const RelaxationMode& mode : out.modes) {
-              sum += mode.weight_frac;
-            }
-            if (std::abs(sum - 1.0) > 1e-6) {
-              diagnostics.add(
-                  node.at, "the weights of 'modes' add up to " + toml_number(sum) + ", must be 1");
-            }
-          },
-          [](const Material& in) { return write_array(in.modes, mode_keys()); }),
-      custom<Material>(
-          {"foster_modes", "array of tables", "",
-           "1 .. 4, resistances add up to that of the layers",
-           "foster: modes, fastest first, as `emit fit` writes them. Without them they are derived "
-           "from the layers. See `foster_modes` below.",
-           false},
-          [](Material& out, const Node& node, Diagnostics& diagnostics) {
-            const std::size_t faults = diagnostics.size();
-            read_array(node, "foster_modes", foster_mode_keys(), FosterMode{}, out.foster_modes,
-                       diagnostics);
-            if (diagnostics.size() != faults) {
-              return;
-            }
-            if (out.foster_modes.empty() || out.foster_modes.size() > physics::kMaxFosterModes) {
-              diagnostics.add(node.at, "'foster_modes' has " +
-                                           std::to_string(out.foster_modes.size()) +
-                                           " entries, must have 1 to 4");
-              return;
-            }
-            for (std::size_t i = 1; i < out.foster_modes.size(); ++i) {
-              if (out.foster_modes[i].tau_s <= out.foster_modes[i - 1].tau_s) {
-                diagnostics.add(node.items[i].at, "time constants of 'foster_modes' must increase");
-              }
-            }
-          },
-          [](const Material& in) -> std::optional<std::string> {
-            if (in.foster_modes.empty()) {
-              return std::nullopt;
-            }
-            return write_array(in.foster_modes, foster_mode_keys());
-          }),
-      custom<Material>(
-          {"foster_fit", "table", "", "",
-           "Error of `foster_modes` against the reference solver as `emit fit` found it: "
-           "`horizon_s`, `rms_k`, `max_k`.",
-           false},
-          [](Material& out, const Node& node, Diagnostics& diagnostics) {
-            if (expect_table(node, "foster_fit", diagnostics)) {
-              read_table(node, foster_fit_keys(), out.foster_fit.emplace(), diagnostics);
-            }
-          },
-          [](const Material& in) -> std::optional<std::string> {
-            if (!in.foster_fit) {
-              return std::nullopt;
-            }
-            return inline_table(*in.foster_fit, foster_fit_keys());
-          }),
+      relaxation_modes_key(),
+      foster_modes_key(),
+      foster_fit_key(),
       boolean<Material>("dry_layers_valid", EMIT_FIELD(dry_layers_valid),
                         "`false` says that heat also moves by evaporation, melting or stirring. "
                         "Temperatures are then a guide only, and a warning says so."),

@@ -11,6 +11,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <map>
+#include <utility>
 
 namespace emit::reference {
 namespace {
@@ -27,6 +28,135 @@ constexpr std::int64_t kShortestMovingNs = kSecondNs / 2;
 constexpr double kEvenFrac = 0.02;
 /// Distance beyond which an entity does not change a point's view of the sky.
 constexpr double kMoverReachM = 25.0;
+
+/// The views of one point over its history: at the nodes, and between them where the sun's share
+/// changes. The share of the sky is remembered from one look to the next, so that the order of the
+/// looks is part of the result. Thread: one owner.
+class PointViews {
+ public:
+  /// The arguments outlive the object. `sim_time_ns`: instant at which the point is where it says.
+  PointViews(const RayScene& scene, const SurfaceClimate& climate, const SolvePoint& point,
+             std::uint32_t rays, std::int64_t sim_time_ns)
+      : scene_(scene),
+        climate_(climate),
+        point_(point),
+        rays_(rays),
+        last_poses_(scene.desc().movers.size()),
+        last_on_(last_poses_.size(), 0) {
+    carry_back(sim_time_ns);
+  }
+
+  /// Samples at all nodes and refines between them. `instants`: the scene at the nodes.
+  std::vector<ViewSample> run(std::span<const std::int64_t> nodes_ns,
+                              std::span<const SceneInstant> instants) {
+    double last_sun = 0.0;
+    for (std::size_t i = 0; i < nodes_ns.size(); ++i) {
+      const auto [sample, sun] = look(nodes_ns[i], instants[i]);
+      if (i > 0) {
+        const bool moving = nodes_ns[i] - nodes_ns[i - 1] < kStaticStepNs;
+        refine(nodes_ns[i - 1], last_sun, nodes_ns[i], sun,
+               moving ? kShortestMovingNs : kShortestStaticNs);
+      }
+      out_.push_back(sample);
+      last_sun = sun;
+    }
+    return std::move(out_);
+  }
+
+ private:
+  /// Finds the point in the frame of its entity, so that it can be carried back in time with it.
+  void carry_back(std::int64_t sim_time_ns) {
+    if (point_.mover == kNoMover) return;
+    const SceneInstant now = scene_.at(sim_time_ns);
+    const physics::Pose& pose = now.mover_pose(point_.mover);
+    const glm::dquat back = glm::conjugate(pose.world_from_body);
+    body_m_ = back * (point_.position_world_m - pose.position_world_m);
+    body_normal_ = back * point_.normal;
+  }
+
+  SurfacePoint place_at(const SceneInstant& instant) const {
+    SurfacePoint p{point_.position_world_m, point_.normal, 0.0};
+    if (point_.mover != kNoMover) {
+      const physics::Pose& pose = instant.mover_pose(point_.mover);
+      p.position_world_m = pose.position_world_m + pose.world_from_body * body_m_;
+      p.normal = pose.world_from_body * body_normal_;
+      p.tolerance_m = 1e-9;
+    }
+    return p;
+  }
+
+  /// Returns the share of the sky. It is traced again only if an entity near the point has moved.
+  double sky_frac(const SceneInstant& instant, const SurfacePoint& p) {
+    bool same = last_sky_ >= 0.0;
+    for (std::uint32_t m = 0; m < last_poses_.size(); ++m) {
+      const physics::Pose& pose = instant.mover_pose(m);
+      const bool near =
+          m == point_.mover || std::min(glm::distance(pose.position_world_m, p.position_world_m),
+                                        glm::distance(last_poses_[m].position_world_m,
+                                                      p.position_world_m)) < kMoverReachM;
+      if (!near) continue;
+      same = same && last_on_[m] == (instant.mover_on(m) ? 1 : 0) &&
+             glm::distance(pose.position_world_m, last_poses_[m].position_world_m) < 0.5 &&
+             std::abs(glm::dot(pose.world_from_body, last_poses_[m].world_from_body)) > 0.9998;
+    }
+    if (!same) {
+      last_sky_ = instant.sky_view(p, rays_).sky_cosine.value_frac;
+      for (std::uint32_t m = 0; m < last_poses_.size(); ++m) {
+        last_poses_[m] = instant.mover_pose(m);
+        last_on_[m] = instant.mover_on(m) ? 1 : 0;
+      }
+    }
+    return last_sky_;
+  }
+
+  /// Samples the view at one instant. The second value is the visible share of the sun.
+  std::pair<ViewSample, double> look(std::int64_t t, const SceneInstant& instant) {
+    ViewSample sample;
+    sample.time_ns = t;
+    const ClimateNode now = climate_.at(t);
+    const glm::dvec3 to_sun = glm::normalize(now.to_sun);
+    const SurfacePoint p = place_at(instant);
+    // An entity that is switched off stands in the open.
+    const bool absent = point_.mover != kNoMover && !instant.mover_on(point_.mover);
+    const double cosine = glm::dot(p.normal, to_sun);
+    double sun = 0.0;
+    if (cosine > 0.0 && now.direct_normal_w_m2 > 0.0) {
+      sun = absent ? 1.0 : instant.sun_visible_frac_clipped(p, to_sun).value_frac;
+    }
+    sample.sky_frac = absent ? 0.5 * (1.0 + p.normal.z) : sky_frac(instant, p);
+    if (point_.mover == kNoMover) {
+      sample.sun_frac = sun;
+    } else {
+      // Pass the sunlight on an entity as a flux: the solver knows only one direction of the face,
+      // but the entity turns.
+      sample.sun_frac = 0.0;
+      sample.scene_shortwave_w_m2 = now.direct_normal_w_m2 * sun * std::max(0.0, cosine);
+    }
+    return {sample, sun};
+  }
+
+  /// Halves an interval until the sun's share is even over it, and adds the samples inside it.
+  void refine(std::int64_t from, double sun_from, std::int64_t to, double sun_to,
+              std::int64_t shortest) {
+    if (to - from <= shortest || std::abs(sun_to - sun_from) <= kEvenFrac) return;
+    const std::int64_t middle = from + (to - from) / 2;
+    const auto [sample, sun] = look(middle, scene_.at(middle));
+    refine(from, sun_from, middle, sun, shortest);
+    out_.push_back(sample);
+    refine(middle, sun, to, sun_to, shortest);
+  }
+
+  const RayScene& scene_;
+  const SurfaceClimate& climate_;
+  const SolvePoint& point_;
+  std::uint32_t rays_;
+  glm::dvec3 body_m_{0.0};                 ///< in the frame of the point's entity
+  glm::dvec3 body_normal_{0.0};            ///< likewise
+  double last_sky_ = -1.0;                 ///< -1: not traced yet
+  std::vector<physics::Pose> last_poses_;  ///< of the entities, when the sky was traced
+  std::vector<char> last_on_;              ///< likewise, 1: on
+  std::vector<ViewSample> out_;
+};
 
 }  // namespace
 
@@ -73,103 +203,7 @@ std::vector<ViewSample> PointHistories::views(const SolvePoint& point,
                                               std::span<const std::int64_t> nodes_ns,
                                               std::span<const SceneInstant> instants,
                                               std::int64_t sim_time_ns) const {
-  // Find the point in the frame of its entity, so that it can be carried back in time with it.
-  glm::dvec3 body_m(0.0);
-  glm::dvec3 body_normal(0.0);
-  if (point.mover != kNoMover) {
-    const SceneInstant now = scene_.at(sim_time_ns);
-    const physics::Pose& pose = now.mover_pose(point.mover);
-    const glm::dquat back = glm::conjugate(pose.world_from_body);
-    body_m = back * (point.position_world_m - pose.position_world_m);
-    body_normal = back * point.normal;
-  }
-  const auto place = [&](const SceneInstant& instant) {
-    SurfacePoint p{point.position_world_m, point.normal, 0.0};
-    if (point.mover != kNoMover) {
-      const physics::Pose& pose = instant.mover_pose(point.mover);
-      p.position_world_m = pose.position_world_m + pose.world_from_body * body_m;
-      p.normal = pose.world_from_body * body_normal;
-      p.tolerance_m = 1e-9;
-    }
-    return p;
-  };
-  // Trace the sky again only if an entity near the point has moved.
-  double last_sky = -1.0;
-  std::vector<physics::Pose> last_poses(scene_.desc().movers.size());
-  std::vector<char> last_on(last_poses.size(), 0);
-  const auto sky_of = [&](const SceneInstant& instant, const SurfacePoint& p) {
-    bool same = last_sky >= 0.0;
-    for (std::uint32_t m = 0; m < last_poses.size(); ++m) {
-      const physics::Pose& pose = instant.mover_pose(m);
-      const bool near =
-          m == point.mover || std::min(glm::distance(pose.position_world_m, p.position_world_m),
-                                       glm::distance(last_poses[m].position_world_m,
-                                                     p.position_world_m)) < kMoverReachM;
-      if (!near) continue;
-      same = same && last_on[m] == (instant.mover_on(m) ? 1 : 0) &&
-             glm::distance(pose.position_world_m, last_poses[m].position_world_m) < 0.5 &&
-             std::abs(glm::dot(pose.world_from_body, last_poses[m].world_from_body)) > 0.9998;
-    }
-    if (!same) {
-      last_sky = instant.sky_view(p, rays_).sky_cosine.value_frac;
-      for (std::uint32_t m = 0; m < last_poses.size(); ++m) {
-        last_poses[m] = instant.mover_pose(m);
-        last_on[m] = instant.mover_on(m) ? 1 : 0;
-      }
-    }
-    return last_sky;
-  };
-
-  std::vector<ViewSample> out;
-  // Sample the view at one instant.
-  const auto look = [&](std::int64_t t, const SceneInstant& instant) {
-    ViewSample sample;
-    sample.time_ns = t;
-    const ClimateNode now = climate_.at(t);
-    const glm::dvec3 to_sun = glm::normalize(now.to_sun);
-    const SurfacePoint p = place(instant);
-    // An entity that is switched off stands in the open.
-    const bool absent = point.mover != kNoMover && !instant.mover_on(point.mover);
-    const double cosine = glm::dot(p.normal, to_sun);
-    double sun = 0.0;
-    if (cosine > 0.0 && now.direct_normal_w_m2 > 0.0) {
-      sun = absent ? 1.0 : instant.sun_visible_frac_clipped(p, to_sun).value_frac;
-    }
-    sample.sky_frac = absent ? 0.5 * (1.0 + p.normal.z) : sky_of(instant, p);
-    if (point.mover == kNoMover) {
-      sample.sun_frac = sun;
-    } else {
-      // Pass the sunlight on an entity as a flux: the solver knows only one direction of the face,
-      // but the entity turns.
-      sample.sun_frac = 0.0;
-      sample.scene_shortwave_w_m2 = now.direct_normal_w_m2 * sun * std::max(0.0, cosine);
-    }
-    return std::pair(sample, sun);
-  };
-  double last_sun = 0.0;
-  // Halve an interval until the sun's share is even over it.
-  std::function<void(std::int64_t, double, std::int64_t, double, std::int64_t)> between =
-      [&](std::int64_t from, double sun_from, std::int64_t to, double sun_to,
-          std::int64_t shortest) {
-        if (to - from <= shortest || std::abs(sun_to - sun_from) <= kEvenFrac) return;
-        const std::int64_t middle = from + (to - from) / 2;
-        const auto [sample, sun] = look(middle, scene_.at(middle));
-        between(from, sun_from, middle, sun, shortest);
-        out.push_back(sample);
-        between(middle, sun, to, sun_to, shortest);
-      };
-  // Sample at all nodes and refine between them.
-  for (std::size_t i = 0; i < nodes_ns.size(); ++i) {
-    const auto [sample, sun] = look(nodes_ns[i], instants[i]);
-    if (i > 0) {
-      const bool moving = nodes_ns[i] - nodes_ns[i - 1] < kStaticStepNs;
-      between(nodes_ns[i - 1], last_sun, nodes_ns[i], sun,
-              moving ? kShortestMovingNs : kShortestStaticNs);
-    }
-    out.push_back(sample);
-    last_sun = sun;
-  }
-  return out;
+  return PointViews(scene_, climate_, point, rays_, sim_time_ns).run(nodes_ns, instants);
 }
 
 Result<std::vector<double>> PointHistories::temperatures(

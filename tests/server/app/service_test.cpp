@@ -54,7 +54,7 @@ TEST(ServiceHealth, TellsThatItLivesWhileEveryAgentTurns) {
   ServiceHealth health(notifier);
   DutyCycle sender;
   DutyCycle render;
-  const ServiceHealth::Agents agents{{"sender", &sender}, {"render", &render}};
+  const NamedDutyCycles agents{{"sender", &sender}, {"render", &render}};
   std::int64_t now_ns = 100 * kSecondNs;
   const auto turn = [&](std::int64_t after_ns) {
     now_ns += after_ns;

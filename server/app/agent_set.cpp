@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/agent_set.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "app/replay.hpp"
+#include "emit/physics/check.hpp"
+
+namespace emit::server {
+namespace {
+
+using physics::Error;
+using physics::ErrorCode;
+
+std::uint32_t slot_count(const config::DaemonConfig& config) {
+  return std::clamp<std::uint32_t>(config.stream.queue_frames + 3, 4, kMaxSlots);
+}
+
+}  // namespace
+
+physics::Result<void> AgentSet::open_receiver() {
+  receiver_ = std::make_unique<Receiver>(context_, config_);
+  if (auto opened = receiver_->open(); !opened) {
+    return tl::unexpected<Error>(std::move(opened.error()).with_context(config_.file.string()));
+  }
+  return {};
+}
+
+FrameSourceFactory AgentSet::configured_source(renderer::WarmUpProgress progress) const {
+  if (config_.source.kind == config::SourceKind::canned) {
+    return [this] {
+      return make_canned_source(config_.source, slot_count(config_),
+                                scenario_ ? scenario_->bands.size() : 1);
+    };
+  }
+  return [this, progress = std::move(progress)] {
+    renderer::DeviceOptions device;
+    device.gpu_index = config_.device.gpu_index;
+    renderer::OutputOptions output;
+    output.slots = slot_count(config_);
+    const bool deadlines =
+        config_.pacing.mode != config::PacingMode::host_step || config_.pacing.budget_ns > 0;
+    output.ladder = deadlines ? renderer::Ladder::live : renderer::Ladder::none;
+    return make_renderer_source(*scenario_, device, output, progress);
+  };
+}
+
+physics::Result<void> AgentSet::start_render(FrameSourceFactory factory) {
+  render_ = std::make_unique<RenderAgent>(context_, std::move(factory));
+  render_runner_ = std::make_unique<AgentRunner>(*render_, context_.clock);
+  plan_realtime(*render_runner_);
+  const bool started = stepped_ ? render_runner_->start_stepped() : render_runner_->start_thread();
+  if (started) {
+    return {};
+  }
+  return render_->source_info()
+             ? physics::make_error(ErrorCode::internal, "the render thread did not start")
+             : tl::unexpected<Error>(Error(render_->source_info().error()));
+}
+
+physics::Result<Recorder::Opened> AgentSet::make_recorder(const ProcessNames& names) {
+  Recorder::Identity identity;
+  identity.scenario_name = names.scenario;
+  identity.software = names.software;
+  identity.device = names.device;
+  identity.pacing = names.pacing;
+  if (scenario_) {
+    auto hash = scenario_sha256(*scenario_);
+    if (!hash) {
+      return tl::unexpected<Error>(std::move(hash.error()));
+    }
+    identity.scenario_sha256 = std::move(*hash);
+  }
+  recorder_ = std::make_unique<Recorder>(context_, config_.journal, config_.control.max_clients);
+  recorder_->set_identity(std::move(identity));
+  auto opened = recorder_->open();
+  if (!opened) {
+    return tl::unexpected<Error>(std::move(opened.error()).with_context("journal.file"));
+  }
+  return opened;
+}
+
+physics::Result<void> AgentSet::make_sender() {
+  // Three slots beside the window: one is being rendered, one is on its way here, one is free.
+  const std::uint32_t window =
+      std::min(std::max(config_.stream.queue_frames, 1U), std::max(source().slots, 4U) - 3);
+  if (!config_.stream.shm.empty()) {
+    auto shm = ShmClient::create(config_.stream, context_.channels, receiver().welcome(),
+                                 context_.clock.tai_ns());
+    if (!shm) {
+      return tl::unexpected<Error>(std::move(shm.error()).with_context("stream.shm"));
+    }
+    shm_ = std::move(*shm);
+  }
+  const bool slotted = config_.pacing.mode != config::PacingMode::host_step;
+  sender_ =
+      std::make_unique<Sender>(context_, window, config_.control.max_clients, slotted, shm_.get());
+  if (config_.stream.compression) {
+    sender_->allow_compression();
+  }
+  return {};
+}
+
+void AgentSet::make_conductor(TriggerInput* triggers) {
+  Conductor::Options options;
+  options.pacing = config_.pacing;
+  options.canned = source().canned;
+  conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers);
+}
+
+physics::Result<void> AgentSet::make_runners() {
+  EMIT_CHECK(render_runner_ != nullptr);
+  recorder_runner_ = std::make_unique<AgentRunner>(recorder(), context_.clock);
+  sender_runner_ = std::make_unique<AgentRunner>(sender(), context_.clock);
+  conductor_runner_ = std::make_unique<AgentRunner>(conductor(), context_.clock);
+  receiver_runner_ = std::make_unique<AgentRunner>(receiver(), context_.clock);
+  for (AgentRunner* runner : serving_order()) {
+    plan_realtime(*runner);
+    if (stepped_ && !runner->start_stepped()) {
+      return physics::make_error(ErrorCode::io,
+                                 fmt::format("the {} did not start", runner->agent().name()));
+    }
+  }
+  for (AgentRunner* runner : label_order()) {
+    duty_cycles_.emplace_back(runner->agent().name(), &runner->duty_cycle());
+  }
+  return {};
+}
+
+std::string_view AgentSet::start_serving() {
+  EMIT_CHECK(is_made());
+  for (AgentRunner* runner : serving_order()) {
+    if (!runner->start_thread()) {
+      return runner->agent().name();
+    }
+  }
+  return {};
+}
+
+int AgentSet::step() {
+  EMIT_CHECK(is_made());
+  int work = 0;
+  for (AgentRunner* runner : step_order()) {
+    work += runner->step();
+  }
+  return work;
+}
+
+void AgentSet::drain_stepped(const std::function<int()>& step) {
+  EMIT_CHECK(is_made());
+  receiver_->drain();
+  conductor_->drain();
+  constexpr int kMaxSteps = 10'000;
+  for (int i = 0; i < kMaxSteps && (step() > 0 || !conductor_->drained()); ++i) {
+  }
+}
+
+void AgentSet::stop() {
+  stop_without_render();
+  if (render_runner_ != nullptr) {
+    render_runner_->stop();
+  }
+}
+
+void AgentSet::stop_without_render() {
+  for (AgentRunner* runner : stop_order()) {
+    if (runner != nullptr) {
+      runner->stop();
+    }
+  }
+}
+
+const SourceInfo& AgentSet::source() const {
+  EMIT_CHECK(render_ != nullptr && render_->source_info().has_value());
+  return *render_->source_info();
+}
+
+Receiver& AgentSet::receiver() const {
+  EMIT_CHECK(receiver_ != nullptr);
+  return *receiver_;
+}
+
+Recorder& AgentSet::recorder() const {
+  EMIT_CHECK(recorder_ != nullptr);
+  return *recorder_;
+}
+
+Sender& AgentSet::sender() const {
+  EMIT_CHECK(sender_ != nullptr);
+  return *sender_;
+}
+
+Conductor& AgentSet::conductor() const {
+  EMIT_CHECK(conductor_ != nullptr);
+  return *conductor_;
+}
+
+void AgentSet::plan_realtime(AgentRunner& runner) const {
+  runner.set_realtime(thread_realtime(config_.realtime, runner.agent().name()));
+}
+
+}  // namespace emit::server
