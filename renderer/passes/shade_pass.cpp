@@ -17,7 +17,7 @@
 namespace emit::renderer {
 namespace {
 
-constexpr auto kPageSide = static_cast<GLsizei>(ShadePages::kSide);
+constexpr auto kExposureTileSide = static_cast<GLsizei>(ExposureTiles::kSide);
 constexpr auto kEntityShadowSide = static_cast<GLsizei>(EntityShadowMaps::kSide);
 
 /// Smallest part of the frame's window that holds the convex hull of points in relworld axes: first
@@ -66,23 +66,25 @@ bool is_empty(const glm::uvec4& px) noexcept {
 }  // namespace
 
 ShadePass::ShadePass(std::size_t entities)
-    : pages_(GL_RGBA32F, kPageSide, kPageSide, ShadePages::kPages),
-      tops_(GL_R32F, kPageSide, kPageSide, ShadePages::kPages),
+    : exposure_tiles_(GL_RGBA32F, kExposureTileSide, kExposureTileSide, ExposureTiles::kTiles),
+      tops_(GL_R32F, kExposureTileSide, kExposureTileSide, ExposureTiles::kTiles),
       shadow_maps_(GL_R32F, kEntityShadowSide, kEntityShadowSide, static_cast<GLsizei>(entities)),
-      tiles_(ShadePages::kPages + entities),
+      tiles_(ExposureTiles::kTiles + entities),
       params_buffer_(gl::Buffer::dynamic(sizeof(gpu::ShadeParams))),
-      page_buffer_(gl::Buffer::dynamic(ShadePages::kPages * sizeof(gpu::PageParams))),
-      page_table_(GL_RGBA32F, page_buffer_),
+      exposure_tile_buffer_(
+          gl::Buffer::dynamic(ExposureTiles::kTiles * sizeof(gpu::ExposureTileParams))),
+      exposure_tile_table_(GL_RGBA32F, exposure_tile_buffer_),
       entity_shadow_buffer_(gl::Buffer::dynamic(entities * sizeof(gpu::EntityShadowParams))),
       entity_shadow_table_(GL_RGBA32F, entity_shadow_buffer_),
       tile_buffer_(gl::Buffer::dynamic(ShadeTiles::kMaxTiles * sizeof(gpu::ShadeTile))),
       tile_table_(GL_RGBA32UI, tile_buffer_),
-      list_buffer_(gl::Buffer::dynamic(ShadeTiles::max_entries(ShadePages::kPages + entities) * 2)),
+      list_buffer_(
+          gl::Buffer::dynamic(ShadeTiles::max_entries(ExposureTiles::kTiles + entities) * 2)),
       list_table_(GL_R16UI, list_buffer_),
       sent_(entities, 0) {
-  pages_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  pages_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  page_params_.reserve(ShadePages::kPages);
+  exposure_tiles_.parameter(GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  exposure_tiles_.parameter(GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  exposure_tile_params_.reserve(ExposureTiles::kTiles);
   entity_shadow_params_.reserve(entities);
   // Pack two positions of taps into each entry.
   for (std::uint32_t tap = 0; tap < EMIT_SHADE_TAPS; tap += 2) {
@@ -103,36 +105,38 @@ physics::Result<ShadePass> ShadePass::create(std::size_t entities, bool software
   return pass;
 }
 
-void ShadePass::begin(const ShadePages& pages) {
-  response_ = gl::Buffer::from(pages.response().weights_k());
+void ShadePass::begin(const ExposureTiles& tiles) {
+  response_ = gl::Buffer::from(tiles.response().weights_k());
   response_table_ = gl::BufferTexture(GL_RGBA32F, response_);
 }
 
 void ShadePass::prepare(CachedSurface& surface, const glm::dvec3& camera_world_m,
                         const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
-  page_params_.clear();
+  exposure_tile_params_.clear();
   entity_shadow_params_.clear();
   params_.slope = surface.shade().slope();
   tiles_.begin(frame.rendered_window_px);
   const glm::dvec3 relworld_from_rel_m = surface.origin_world_m() - camera_world_m;
-  prepare_pages(surface.shade(), relworld_from_rel_m, camera, frame);
+  prepare_exposure_tiles(surface.shade(), relworld_from_rel_m, camera, frame);
   prepare_entity_shadows(surface, relworld_from_rel_m, camera, frame);
   tiles_.sort();
 }
 
-void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworld_from_rel_m,
-                              const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
-  const std::span<const ShadePages::Page> pages = shade.pages();
-  for (std::size_t p = 0; p < pages.size(); ++p) {
-    const ShadePages::Page& page = pages[p];
-    if (!page.used || page.fine) continue;
+void ShadePass::prepare_exposure_tiles(const ExposureTiles& shade,
+                                       const glm::dvec3& relworld_from_rel_m,
+                                       const CameraSetup& camera,
+                                       const gpu::FrameParams& frame) noexcept {
+  const std::span<const ExposureTiles::ExposureTile> tiles = shade.tiles();
+  for (std::size_t p = 0; p < tiles.size(); ++p) {
+    const ExposureTiles::ExposureTile& tile = tiles[p];
+    if (!tile.used || tile.fine) continue;
     // Find the part of the window that the tile may shade: from its lowest to its highest receiver,
     // along the rays of the sun.
-    const glm::dvec3 first_m = glm::dvec3(page.first_m, page.plane_m) + relworld_from_rel_m;
-    const double side_m = page.texel_m * (ShadePages::kSide - 1);
+    const glm::dvec3 first_m = glm::dvec3(tile.first_m, tile.plane_m) + relworld_from_rel_m;
+    const double side_m = tile.texel_m * (ExposureTiles::kSide - 1);
     std::array<glm::dvec3, 8> corners_m;
     for (std::size_t i = 0; i < corners_m.size(); ++i) {
-      const double height_m = (i & 4U) != 0U ? page.reach_m : page.lowest_m;
+      const double height_m = (i & 4U) != 0U ? tile.reach_m : tile.lowest_m;
       corners_m[i] = first_m + glm::dvec3((i & 1U) != 0U ? side_m : 0.0,
                                           (i & 2U) != 0U ? side_m : 0.0, height_m);
       corners_m[i] += glm::dvec3(height_m * glm::dvec2(shade.slope()), 0.0);
@@ -140,16 +144,16 @@ void ShadePass::prepare_pages(const ShadePages& shade, const glm::dvec3& relworl
     const glm::uvec4 px = part_of_window(corners_m, camera, frame);
     if (is_empty(px)) continue;
     // Append its parameters.
-    tiles_.add_page(px);
-    gpu::PageParams& params = page_params_.emplace_back();
+    tiles_.add_exposure_tile(px);
+    gpu::ExposureTileParams& params = exposure_tile_params_.emplace_back();
     params.first_x_m = static_cast<float>(first_m.x);
     params.first_y_m = static_cast<float>(first_m.y);
     params.plane_m = static_cast<float>(first_m.z);
-    params.texels_per_m = 1.0F / page.texel_m;
-    params.reach_m = page.reach_m;
-    params.lowest_m = page.lowest_m;
+    params.texels_per_m = 1.0F / tile.texel_m;
+    params.reach_m = tile.reach_m;
+    params.lowest_m = tile.lowest_m;
     params.layer = static_cast<float>(p);
-    params.left_frac = page.left_frac;
+    params.left_frac = tile.left_frac;
   }
 }
 
@@ -189,16 +193,16 @@ void ShadePass::prepare_entity_shadows(CachedSurface& surface,
 void ShadePass::upload(const CachedSurface& surface) noexcept {
   // Send the exposure tiles that changed.
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  const std::span<const ShadePages::Page> pages = surface.shade().pages();
-  for (std::size_t p = 0; p < pages.size(); ++p) {
-    if (!pages[p].used) continue;
-    if (pages[p].top_changed) {
-      glTextureSubImage3D(tops_.id(), 0, 0, 0, static_cast<GLint>(p), kPageSide, kPageSide, 1,
-                          GL_RED, GL_FLOAT, pages[p].top_m.data());
+  const std::span<const ExposureTiles::ExposureTile> tiles = surface.shade().tiles();
+  for (std::size_t p = 0; p < tiles.size(); ++p) {
+    if (!tiles[p].used) continue;
+    if (tiles[p].top_changed) {
+      glTextureSubImage3D(tops_.id(), 0, 0, 0, static_cast<GLint>(p), kExposureTileSide,
+                          kExposureTileSide, 1, GL_RED, GL_FLOAT, tiles[p].top_m.data());
     }
-    if (!pages[p].changed) continue;
-    glTextureSubImage3D(pages_.id(), 0, 0, 0, static_cast<GLint>(p), kPageSide, kPageSide, 1,
-                        GL_RGBA, GL_FLOAT, pages[p].shade.data());
+    if (!tiles[p].changed) continue;
+    glTextureSubImage3D(exposure_tiles_.id(), 0, 0, 0, static_cast<GLint>(p), kExposureTileSide,
+                        kExposureTileSide, 1, GL_RGBA, GL_FLOAT, tiles[p].shade.data());
   }
   // Send the shadow depth maps that changed.
   const EntityShadowMaps& shadow_maps = surface.shadow_maps();
@@ -210,7 +214,7 @@ void ShadePass::upload(const CachedSurface& surface) noexcept {
   }
   // Send the parameters of the frame.
   params_buffer_.upload(std::span<const gpu::ShadeParams>(&params_, 1));
-  page_buffer_.upload(std::span<const gpu::PageParams>(page_params_));
+  exposure_tile_buffer_.upload(std::span<const gpu::ExposureTileParams>(exposure_tile_params_));
   entity_shadow_buffer_.upload(std::span<const gpu::EntityShadowParams>(entity_shadow_params_));
   tile_buffer_.upload(tiles_.tiles());
   list_buffer_.upload(tiles_.entries());
@@ -220,11 +224,11 @@ void ShadePass::dispatch() const noexcept {
   if (tiles_.tiles().empty()) return;
   program_.use();
   params_buffer_.bind_uniform(EMIT_BIND_SHADE);
-  pages_.bind(EMIT_TEX_SHADE);
+  exposure_tiles_.bind(EMIT_TEX_SHADE);
   tops_.bind(EMIT_TEX_SHADE_TOP);
   shadow_maps_.bind(EMIT_TEX_ENTITY_SHADOWS);
   response_table_.bind(EMIT_TEX_RESPONSE);
-  page_table_.bind(EMIT_TEX_PAGE_PARAMS);
+  exposure_tile_table_.bind(EMIT_TEX_EXPOSURE_TILE_PARAMS);
   entity_shadow_table_.bind(EMIT_TEX_ENTITY_SHADOW_PARAMS);
   tile_table_.bind(EMIT_TEX_SHADE_TILES);
   list_table_.bind(EMIT_TEX_SHADE_LIST);

@@ -16,16 +16,16 @@ void ShadeTiles::begin(const glm::uvec4& window_px) noexcept {
   EMIT_CHECK_OP(window_px.z, <=, 65536U);
   EMIT_CHECK_OP(window_px.w, <=, 65536U);
   window_px_ = window_px;
-  pages_ = 0;
+  exposure_tiles_ = 0;
   shadow_maps_ = 0;
   rectangles_.clear();
   tiles_.clear();
   used_entries_ = 0;
 }
 
-void ShadeTiles::add_page(const glm::uvec4& px) noexcept {
+void ShadeTiles::add_exposure_tile(const glm::uvec4& px) noexcept {
   EMIT_CHECK_OP(shadow_maps_, ==, 0U);
-  add(px, pages_++);
+  add(px, exposure_tiles_++);
 }
 
 void ShadeTiles::add(const glm::uvec4& px, std::uint32_t number) noexcept {
@@ -66,20 +66,20 @@ void ShadeTiles::sort() noexcept {
       const glm::uvec4 tiles = tiles_of(rectangles_[i].px);
       for (std::uint32_t y = tiles.y; y <= tiles.w; ++y) {
         for (std::uint32_t x = tiles.x; x <= tiles.z; ++x) {
-          visit(all_[std::size_t{y} * columns_ + x], i < pages_, rectangles_[i].number);
+          visit(all_[std::size_t{y} * columns_ + x], i < exposure_tiles_, rectangles_[i].number);
         }
       }
     }
   };
   // Count the rectangles of each screen tile.
-  for_each([](gpu::ShadeTile& tile, bool page, std::uint32_t) {
-    ++(page ? tile.pages : tile.shadow_maps);
+  for_each([](gpu::ShadeTile& tile, bool exposure_tile, std::uint32_t) {
+    ++(exposure_tile ? tile.exposure_tiles : tile.shadow_maps);
   });
   // Give each screen tile its part of the list.
   std::uint32_t first = 0;
   for (gpu::ShadeTile& tile : all_) {
     tile.first = first;
-    first += tile.pages + tile.shadow_maps;
+    first += tile.exposure_tiles + tile.shadow_maps;
   }
   used_entries_ = first;
   // Fill in the numbers. Rectangles come in the order of their entries, and `first` is the next
@@ -90,7 +90,7 @@ void ShadeTiles::sort() noexcept {
   // Keep the screen tiles that something reaches, with `first` set back to the first entry.
   for (std::size_t i = 0; i < all_.size(); ++i) {
     gpu::ShadeTile& tile = all_[i];
-    const std::uint32_t count = tile.pages + tile.shadow_maps;
+    const std::uint32_t count = tile.exposure_tiles + tile.shadow_maps;
     if (count == 0) continue;
     tile.first -= count;
     const glm::uvec2 place_px =

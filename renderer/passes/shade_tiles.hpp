@@ -13,8 +13,7 @@
 namespace emit::renderer {
 
 /// Sorts rectangles of an image into its screen tiles. The rectangles are the bounds of exposure
-/// tiles
-/// ("pages") and of entity shadow depth maps ("shadow_maps"). A pixel then reads only the
+/// tiles and of entity shadow depth maps. A pixel then reads only the
 /// rectangles that may reach its screen tile, and screen tiles that nothing reaches are left out.
 /// Real time: the constructor is setup only; all other functions are RT-safe.
 class ShadeTiles {
@@ -39,7 +38,7 @@ class ShadeTiles {
   /// the order of the calls, from 0.
   /// @pre The rectangle is not empty and lies within the window; no shadow depth map was added yet;
   /// there is memory for it.
-  void add_page(const glm::uvec4& px) noexcept;
+  void add_exposure_tile(const glm::uvec4& px) noexcept;
   /// Adds the rectangle of an entity shadow depth map. They have numbers of their own, from 0.
   /// @pre The rectangle is not empty and lies within the window; there is memory for it.
   void add_entity_shadow(const glm::uvec4& px) noexcept { add(px, shadow_maps_++); }
@@ -74,7 +73,7 @@ class ShadeTiles {
   glm::uvec4 window_px_{0U};
   std::uint32_t tile_px_ = kMinPx;
   std::uint32_t columns_ = 0;
-  std::uint32_t pages_ = 0;
+  std::uint32_t exposure_tiles_ = 0;
   std::uint32_t shadow_maps_ = 0;
   std::vector<Rectangle> rectangles_;
   std::vector<gpu::ShadeTile> all_;  ///< screen tiles, with those that nothing reaches

@@ -227,7 +227,7 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   // Check the flags of the surface, then the positions it was prepared for. Meshes were simplified
   // only if the scenario has positions of the camera.
   return visibly_simplified_ || surface_->model().full_in_view ||
-         surface_->shade().short_of_pages() || surface_->stale_shadow() || surface_->lags() ||
+         surface_->shade().short_of_tiles() || surface_->stale_shadow() || surface_->lags() ||
          !stands_near(refined_eyes_, here, least_cos) ||
          (!detail_eyes_.empty() && !stands_near(detail_eyes_, here, kAnyCosine));
 }

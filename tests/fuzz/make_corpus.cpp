@@ -490,7 +490,7 @@ void make_state_seeds() {
   for (std::uint32_t i = 0; i < model.drawn_samples; ++i) {
     renderer::SurfaceSample sample;
     sample.material = i % 3;
-    sample.mover = -1;
+    sample.entity = -1;
     sample.first_seen = i;
     sample.seen_count = 1;
     sample.seen_scale = 1.0F;

@@ -5,7 +5,7 @@
 /// Scene of the state files in the corpus.
 namespace emit::fuzz {
 
-inline constexpr std::size_t kMovers = 2;
+inline constexpr std::size_t kEntities = 2;
 
 [[nodiscard]] inline renderer::StateKey state_key() {
   renderer::StateKey key{};

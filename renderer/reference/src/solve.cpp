@@ -243,7 +243,7 @@ Result<std::vector<PixelHit>> SceneSolver::Data::see(const SolveView& view, Solv
       // Take the face's own normal if the interpolated one turns away from the side that is seen.
       if (glm::dot(normal, hit->geometric_normal) <= 0.0) normal = hit->geometric_normal;
       if (!hit->front) normal = -normal;
-      p.point = {hit->position_world_m, normal, hit->material, hit->mover};
+      p.point = {hit->position_world_m, normal, hit->material, hit->entity};
       found[pixel] = p;
       image.depth_m[pixel] = static_cast<float>(hit->distance_m / glm::length(sensor_ray));
       image.object_id[pixel] = static_cast<float>(hit->object + 1);

@@ -27,7 +27,7 @@ constexpr std::int64_t kShortestStaticNs = 4 * kSecondNs;
 constexpr std::int64_t kShortestMovingNs = kSecondNs / 2;
 constexpr double kEvenFrac = 0.02;
 /// Distance beyond which an entity does not change a point's view of the sky.
-constexpr double kMoverReachM = 25.0;
+constexpr double kEntityReachM = 25.0;
 
 /// The views of one point over its history: at the nodes, and between them where the sun's share
 /// changes. The share of the sky is remembered from one look to the next, so that the order of the
@@ -41,7 +41,7 @@ class PointViews {
         climate_(climate),
         point_(point),
         rays_(rays),
-        last_poses_(scene.desc().movers.size()),
+        last_poses_(scene.desc().entities.size()),
         last_on_(last_poses_.size(), 0) {
     carry_back(sim_time_ns);
   }
@@ -66,9 +66,9 @@ class PointViews {
  private:
   /// Finds the point in the frame of its entity, so that it can be carried back in time with it.
   void carry_back(std::int64_t sim_time_ns) {
-    if (point_.mover == kNoMover) return;
+    if (point_.entity == kNoEntity) return;
     const SceneInstant now = scene_.at(sim_time_ns);
-    const physics::Pose& pose = now.mover_pose(point_.mover);
+    const physics::Pose& pose = now.entity_pose(point_.entity);
     const glm::dquat back = glm::conjugate(pose.world_from_body);
     body_m_ = back * (point_.position_world_m - pose.position_world_m);
     body_normal_ = back * point_.normal;
@@ -76,8 +76,8 @@ class PointViews {
 
   SurfacePoint place_at(const SceneInstant& instant) const {
     SurfacePoint p{point_.position_world_m, point_.normal, 0.0};
-    if (point_.mover != kNoMover) {
-      const physics::Pose& pose = instant.mover_pose(point_.mover);
+    if (point_.entity != kNoEntity) {
+      const physics::Pose& pose = instant.entity_pose(point_.entity);
       p.position_world_m = pose.position_world_m + pose.world_from_body * body_m_;
       p.normal = pose.world_from_body * body_normal_;
       p.tolerance_m = 1e-9;
@@ -89,21 +89,21 @@ class PointViews {
   double sky_frac(const SceneInstant& instant, const SurfacePoint& p) {
     bool same = last_sky_ >= 0.0;
     for (std::uint32_t m = 0; m < last_poses_.size(); ++m) {
-      const physics::Pose& pose = instant.mover_pose(m);
+      const physics::Pose& pose = instant.entity_pose(m);
       const bool near =
-          m == point_.mover || std::min(glm::distance(pose.position_world_m, p.position_world_m),
-                                        glm::distance(last_poses_[m].position_world_m,
-                                                      p.position_world_m)) < kMoverReachM;
+          m == point_.entity || std::min(glm::distance(pose.position_world_m, p.position_world_m),
+                                         glm::distance(last_poses_[m].position_world_m,
+                                                       p.position_world_m)) < kEntityReachM;
       if (!near) continue;
-      same = same && last_on_[m] == (instant.mover_on(m) ? 1 : 0) &&
+      same = same && last_on_[m] == (instant.entity_on(m) ? 1 : 0) &&
              glm::distance(pose.position_world_m, last_poses_[m].position_world_m) < 0.5 &&
              std::abs(glm::dot(pose.world_from_body, last_poses_[m].world_from_body)) > 0.9998;
     }
     if (!same) {
       last_sky_ = instant.sky_view(p, rays_).sky_cosine.value_frac;
       for (std::uint32_t m = 0; m < last_poses_.size(); ++m) {
-        last_poses_[m] = instant.mover_pose(m);
-        last_on_[m] = instant.mover_on(m) ? 1 : 0;
+        last_poses_[m] = instant.entity_pose(m);
+        last_on_[m] = instant.entity_on(m) ? 1 : 0;
       }
     }
     return last_sky_;
@@ -117,14 +117,14 @@ class PointViews {
     const glm::dvec3 to_sun = glm::normalize(now.to_sun);
     const SurfacePoint p = place_at(instant);
     // An entity that is switched off stands in the open.
-    const bool absent = point_.mover != kNoMover && !instant.mover_on(point_.mover);
+    const bool absent = point_.entity != kNoEntity && !instant.entity_on(point_.entity);
     const double cosine = glm::dot(p.normal, to_sun);
     double sun = 0.0;
     if (cosine > 0.0 && now.direct_normal_w_m2 > 0.0) {
       sun = absent ? 1.0 : instant.sun_visible_frac_clipped(p, to_sun).value_frac;
     }
     sample.sky_frac = absent ? 0.5 * (1.0 + p.normal.z) : sky_frac(instant, p);
-    if (point_.mover == kNoMover) {
+    if (point_.entity == kNoEntity) {
       sample.sun_frac = sun;
     } else {
       // Pass the sunlight on an entity as a flux: the solver knows only one direction of the face,
@@ -167,10 +167,10 @@ PointHistories::PointHistories(const scene::ScenarioDesc& scenario,
 
 /// Returns true if an entity moves or switches between two instants.
 bool PointHistories::moves(const SceneInstant& a, const SceneInstant& b) const {
-  for (std::uint32_t m = 0; m < scene_.desc().movers.size(); ++m) {
-    if (a.mover_on(m) != b.mover_on(m)) return true;
-    const physics::Pose& pa = a.mover_pose(m);
-    const physics::Pose& pb = b.mover_pose(m);
+  for (std::uint32_t m = 0; m < scene_.desc().entities.size(); ++m) {
+    if (a.entity_on(m) != b.entity_on(m)) return true;
+    const physics::Pose& pa = a.entity_pose(m);
+    const physics::Pose& pb = b.entity_pose(m);
     if (glm::distance(pa.position_world_m, pb.position_world_m) > 1e-3 ||
         std::abs(glm::dot(pa.world_from_body, pb.world_from_body)) < 1.0 - 1e-9) {
       return true;

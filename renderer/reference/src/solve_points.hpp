@@ -17,7 +17,7 @@ struct SolvePoint {
   glm::dvec3 position_world_m{0.0};
   glm::dvec3 normal{0.0};  ///< unit normal towards the visible side
   std::uint32_t material = 0;
-  std::uint32_t mover = kNoMover;
+  std::uint32_t entity = kNoEntity;
 };
 
 /// One-dimensional histories of points, with the visibility of sun and sky at the places where the

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts the shade of entities on static surfaces, where triangles are too large to show it. It changes the geometry
-// buffer of the samples. Exposure tiles ("pages") lower the temperature where entities have cast shade lately. Entity
-// shadow depth maps ("shadow_maps") reduce the sunlight where entities stand now. Work is done only in the screen tiles
+// buffer of the samples. Exposure tiles lower the temperature where entities have cast shade lately. Entity
+// shadow depth maps reduce the sunlight where entities stand now. Work is done only in the screen tiles
 // that some of them may reach, and each screen tile lists those that may reach it.
 //   EMIT_ROWS  number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "shared/shade_params.glsl.h"
@@ -11,11 +11,11 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(rg32ui, binding = EMIT_IMG_SURFACE) uniform uimage2D surface_image;
 layout(std140, binding = EMIT_BIND_SHADE) uniform Shade { ShadeParams shade; };
-layout(binding = EMIT_TEX_SHADE) uniform sampler2DArray pages_texture;
+layout(binding = EMIT_TEX_SHADE) uniform sampler2DArray exposure_texture;
 layout(binding = EMIT_TEX_SHADE_TOP) uniform sampler2DArray tops_texture;
 layout(binding = EMIT_TEX_ENTITY_SHADOWS) uniform sampler2DArray entity_shadows_texture;
 layout(binding = EMIT_TEX_RESPONSE) uniform samplerBuffer response_table;
-layout(binding = EMIT_TEX_PAGE_PARAMS) uniform samplerBuffer page_params;
+layout(binding = EMIT_TEX_EXPOSURE_TILE_PARAMS) uniform samplerBuffer exposure_tile_params;
 layout(binding = EMIT_TEX_ENTITY_SHADOW_PARAMS) uniform samplerBuffer entity_shadow_params;
 layout(binding = EMIT_TEX_SHADE_TILES) uniform usamplerBuffer shade_tiles;
 layout(binding = EMIT_TEX_SHADE_LIST) uniform usamplerBuffer shade_list;
@@ -23,23 +23,25 @@ layout(binding = EMIT_TEX_SHADE_LIST) uniform usamplerBuffer shade_list;
 // Loops with at most one turn stand for branches here: software rasterisers run both sides of a branch, but leave a
 // loop that no lane is in.
 
-// Temperature in K that recent shade has taken off a surface that faces the sun, by exposure tile `page` (physics.md
+// Temperature in K that recent shade has taken off a surface that faces the sun, by exposure tile `tile` (physics.md
 // eq. 25). `p` is the point in relworld axes.
-float cooler_k(vec3 p, uint material, int page) {
+float cooler_k(vec3 p, uint material, int tile) {
   // Follow the sun's ray from the point to the plane of the tile.
-  vec4 place = texelFetch(page_params, page * EMIT_PAGE_TEXELS);  // first_x_m, first_y_m, plane_m, texels_per_m
+  // `place` is first_x_m, first_y_m, plane_m, texels_per_m.
+  vec4 place = texelFetch(exposure_tile_params, tile * EMIT_EXPOSURE_TILE_TEXELS);
   float height_m = p.z - place.z;
   vec2 at = (p.xy - height_m * shade.slope - place.xy) * place.w;
   // Leave points outside the tile. Its own texels end half way to the texels of its rim.
-  bool inside = all(greaterThanEqual(at, vec2(0.5))) && all(lessThan(at, vec2(float(EMIT_PAGE_SIDE) - 1.5)));
+  bool inside = all(greaterThanEqual(at, vec2(0.5))) && all(lessThan(at, vec2(float(EMIT_EXPOSURE_TILE_SIDE) - 1.5)));
   float sum_k = 0.0;
   for (int looks = inside ? 1 : 0; looks > 0; --looks) {
-    vec4 range = texelFetch(page_params, page * EMIT_PAGE_TEXELS + 1);  // reach_m, lowest_m, layer
+    // `range` is reach_m, lowest_m, layer.
+    vec4 range = texelFetch(exposure_tile_params, tile * EMIT_EXPOSURE_TILE_TEXELS + 1);
     // Leave points above the height at which the shade began: they lie between the sun and the entity.
     float top_m = texelFetch(tops_texture, ivec3(ivec2(at + 0.5), int(range.z)), 0).r;
     // Weigh the modes of the response of the material.
-    vec4 shaded = textureLod(pages_texture, vec3((at + 0.5) / float(EMIT_PAGE_SIDE), range.z), 0.0);
-    vec4 left_frac = texelFetch(page_params, page * EMIT_PAGE_TEXELS + 2);
+    vec4 shaded = textureLod(exposure_texture, vec3((at + 0.5) / float(EMIT_EXPOSURE_TILE_SIDE), range.z), 0.0);
+    vec4 left_frac = texelFetch(exposure_tile_params, tile * EMIT_EXPOSURE_TILE_TEXELS + 2);
     vec4 weight_k = texelFetch(response_table, int(material));
     bool reached = height_m <= min(range.x, top_m) && height_m >= range.y;
     sum_k = reached ? dot(weight_k, left_frac * shaded) : 0.0;
@@ -84,16 +86,16 @@ void shade_pixel(ivec2 px, uvec4 tile) {
   bool lit = depth > 0.0 && !texel_moves(texel) && sun_cosine > 0.0;
   // Add up how much colder the exposure tiles make the surface.
   int first = int(tile.y);
-  int behind_pages = lit ? first + int(tile.z) : first;
-  int last = lit ? behind_pages + int(tile.w) : behind_pages;
+  int behind_exposure_tiles = lit ? first + int(tile.z) : first;
+  int last = lit ? behind_exposure_tiles + int(tile.w) : behind_exposure_tiles;
   float colder_k = 0.0;
-  for (int i = first; i < behind_pages; ++i) {
+  for (int i = first; i < behind_exposure_tiles; ++i) {
     colder_k += cooler_k(p, texel_material(texel), int(texelFetch(shade_list, i).r));
   }
   // Multiply the shares of the sun that the shadow depth maps leave. The texel holds the share that static surfaces
   // leave.
   float left_frac = 1.0;
-  for (int i = behind_pages; i < last; ++i) left_frac *= lit_frac(p, int(texelFetch(shade_list, i).r));
+  for (int i = behind_exposure_tiles; i < last; ++i) left_frac *= lit_frac(p, int(texelFetch(shade_list, i).r));
   // Write the pixel if it changed.
   if (colder_k == 0.0 && left_frac == 1.0) return;
   texel = packed_surface_texel(texel_temperature_k(texel) - sun_cosine * colder_k, left_frac * sun_cosine,

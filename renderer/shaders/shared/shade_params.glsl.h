@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Structs and constants of the shade of entities per pixel, for C++ and GLSL.
-// A "page" is an exposure tile: a level square of ground whose texels remember how long entities have shaded them.
-// A "shadow_map" is an entity shadow depth map: depths of one entity along the direction of the sun.
+// An exposure tile is a level square of ground whose texels remember how long entities have shaded them.
+// An entity shadow depth map holds the depths of one entity along the direction of the sun.
 #pragma once
 #include "shared/bindings.glsl.h"
 #include "shared/cpp_glsl.glsl.h"
@@ -11,8 +11,8 @@
 // A receiver counts as shaded where it lies this much deeper than the caster.
 #define EMIT_SHADE_LIFT_M 0.01f
 // Texels along a side of an exposure tile. The outermost texels repeat those of the neighbouring tiles.
-#define EMIT_PAGE_SIDE 128
-#define EMIT_PAGE_TEXELS 3
+#define EMIT_EXPOSURE_TILE_SIDE 128
+#define EMIT_EXPOSURE_TILE_TEXELS 3
 #define EMIT_ENTITY_SHADOW_TEXELS 4
 
 EMIT_SHARED_BEGIN
@@ -24,8 +24,8 @@ struct ShadeParams {
   vec4 taps[EMIT_SHADE_TAPS / 2];  // positions in the unit disc, two in each entry
 };
 
-// One exposure tile in relworld axes. Shaders read it as EMIT_PAGE_TEXELS texels.
-struct PageParams {
+// One exposure tile in relworld axes. Shaders read it as EMIT_EXPOSURE_TILE_TEXELS texels.
+struct ExposureTileParams {
   float first_x_m;     // centre of the first texel
   float first_y_m;
   float plane_m;       // height of the tile's plane
@@ -51,18 +51,18 @@ struct EntityShadowParams {
 
 // Square part of the rendered image, with the exposure tiles and shadow depth maps that may shade its pixels.
 struct ShadeTile {
-  uint place_px;      // first column + 65536 * first row
-  uint first;         // index of its first entry in the list; exposure tiles come before shadow depth maps
-  uint pages;         // number of exposure tiles
-  uint shadow_maps;   // number of shadow depth maps
+  uint place_px;        // first column + 65536 * first row
+  uint first;           // index of its first entry in the list; exposure tiles come before shadow depth maps
+  uint exposure_tiles;  // number of exposure tiles
+  uint shadow_maps;     // number of shadow depth maps
 };
 
 #ifdef __cplusplus
 static_assert(sizeof(ShadeParams) == 16 + 8 * EMIT_SHADE_TAPS);
 EMIT_SHARED_OFFSET(ShadeParams, taps, 16);
-static_assert(sizeof(PageParams) == 16 * EMIT_PAGE_TEXELS);
-EMIT_SHARED_OFFSET(PageParams, reach_m, 16);
-EMIT_SHARED_OFFSET(PageParams, left_frac, 32);
+static_assert(sizeof(ExposureTileParams) == 16 * EMIT_EXPOSURE_TILE_TEXELS);
+EMIT_SHARED_OFFSET(ExposureTileParams, reach_m, 16);
+EMIT_SHARED_OFFSET(ExposureTileParams, left_frac, 32);
 static_assert(sizeof(EntityShadowParams) == 16 * EMIT_ENTITY_SHADOW_TEXELS);
 EMIT_SHARED_OFFSET(EntityShadowParams, mean_depth_m, 48);
 static_assert(sizeof(ShadeTile) == 16);

@@ -52,14 +52,15 @@ SampleBlocks::SampleBlocks(const SurfaceSamples& all) {
   std::vector<Key> keys;
   for (std::uint32_t i = 0; i < samples.size(); ++i) {
     if (!steps_itself(all, i)) continue;
-    keys.emplace_back(samples[i].mover, place_on_curve(samples[i].position_m, low_m, width_m), i);
+    keys.emplace_back(samples[i].entity, place_on_curve(samples[i].position_m, low_m, width_m), i);
   }
   std::ranges::sort(keys);
   // Cut the sorted list into groups: a new one begins with another entity or when the last one is
   // full.
-  for (const auto& [mover, place, index] : keys) {
-    if (blocks_.empty() || blocks_.back().mover != mover || blocks_.back().count == kBlockSamples) {
-      blocks_.push_back({.mover = mover, .first = static_cast<std::uint32_t>(order_.size())});
+  for (const auto& [entity, place, index] : keys) {
+    if (blocks_.empty() || blocks_.back().entity != entity ||
+        blocks_.back().count == kBlockSamples) {
+      blocks_.push_back({.entity = entity, .first = static_cast<std::uint32_t>(order_.size())});
     }
     ++blocks_.back().count;
     order_.push_back(index);

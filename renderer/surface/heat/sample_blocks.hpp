@@ -19,8 +19,8 @@ class SampleBlocks {
   struct Block {
     glm::vec3 centre_m{0.0F};  ///< same frame as the positions of its samples
     float radius_m = 0.0F;
-    std::int32_t mover = -1;  ///< entity of all its samples, or -1: static
-    std::uint32_t first = 0;  ///< index of its first sample in the common order
+    std::int32_t entity = -1;  ///< entity of all its samples, or -1: static
+    std::uint32_t first = 0;   ///< index of its first sample in the common order
     std::uint32_t count = 0;
   };
 

@@ -35,8 +35,8 @@ struct Partner {
 /// same. Coordinates are in rel for static surfaces and in the body frame for those of entities.
 struct SurfaceSample {
   glm::vec3 position_m{0.0F};
-  glm::vec3 normal{0.0F};   ///< outward, unit length
-  std::int32_t mover = -1;  ///< entity, or -1: static
+  glm::vec3 normal{0.0F};    ///< outward, unit length
+  std::int32_t entity = -1;  ///< entity, or -1: static
   std::uint32_t material = 0;
   float sky_frac = 1.0F;  ///< cosine-weighted share of the hemisphere that shows sky
   float far_frac = 0.0F;  ///< share of the hemisphere whose rays leave the scene below the horizon
@@ -84,7 +84,7 @@ struct SampleOutput {
   float offset_k = 0.0F;  ///< temperature from the reference temperature
   /// Visible share of the sun's disc, mean over the interval before. In the output of a step of a
   /// static sample it counts the shade of static geometry alone, because frames add the shade of
-  /// entities themselves (ShadePages).
+  /// entities themselves (ExposureTiles).
   float sun_frac = 0.0F;
   float longwave_out_w_m2 = 0.0F;   ///< emitted and reflected
   float shortwave_out_w_m2 = 0.0F;  ///< reflected sunlight, mean of the interval before

@@ -63,14 +63,14 @@ using SurfaceProgress = std::function<bool(double done_frac)>;
 struct SurfaceInputs {
   const scene::SceneGeometry& geometry;
   std::span<const scene::Material> materials;
-  std::span<const std::int32_t> mover_of_object;  ///< entity of each object; -1: static
-  const CasterRays& rays;                         ///< geometry that casts shade, as loaded
+  std::span<const std::int32_t> entity_of_object;  ///< entity of each object; -1: static
+  const CasterRays& rays;                          ///< geometry that casts shade, as loaded
   const CasterRays& places;  ///< `geometry` with the same origin: finds the place that a ray hits
   const SampleHeat& heat;
   const SurfaceHistory& history;
   const HistoryRecord& record;
   /// Placements of the entities at the end of the record.
-  std::span<const MoverPlacement> movers_now;
+  std::span<const EntityPlacement> entities_now;
   const SurfaceDetail* detail = nullptr;  ///< null: no mesh has lost triangles
   /// Places in rel where each entity stands now and where its script takes it. An empty span:
   /// entities stay where they are.

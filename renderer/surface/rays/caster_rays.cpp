@@ -75,7 +75,7 @@ struct PacketCone {
 
 struct CasterRays::Impl {
   /// Geometry of one entity, in its body axes.
-  struct Mover {
+  struct Entity {
     std::uint32_t object = 0;
     glm::dvec3 centre_body_m{0.0};  ///< origin of the set
     CasterSet set;
@@ -84,37 +84,38 @@ struct CasterRays::Impl {
   EmbreeDevice device;
   glm::dvec3 origin_world_m{0.0};
   CasterSet fixed;
-  std::vector<Mover> movers;
+  std::vector<Entity> entities;
 
   /// Transforms a ray to the axes and the origin of the set of an entity. Returns false and writes
   /// nothing if the ray passes the ball around the entity.
-  [[nodiscard]] static bool enter(const Mover& mover, const MoverPlacement& placement,
+  [[nodiscard]] static bool enter(const Entity& entity, const EntityPlacement& placement,
                                   const CasterRay& ray, CasterRay& inside) noexcept;
   /// Returns false if no ray of the packet comes near the entity.
-  [[nodiscard]] static bool comes_near(const Mover& mover, const MoverPlacement& placement,
+  [[nodiscard]] static bool comes_near(const Entity& entity, const EntityPlacement& placement,
                                        const PacketCone& cone) noexcept {
-    return placement.on && cone.may_meet(placement.rel_from_body * glm::vec3(mover.centre_body_m) +
+    return placement.on && cone.may_meet(placement.rel_from_body * glm::vec3(entity.centre_body_m) +
                                              placement.position_m,
-                                         mover.set.radius_m());
+                                         entity.set.radius_m());
   }
   /// Transforms all rays to the axes of an entity that stands at one place for all of them. Returns
   /// the bits of those that come near it.
-  [[nodiscard]] static std::uint32_t enter_all(const Mover& mover, const MoverPlacement& placement,
+  [[nodiscard]] static std::uint32_t enter_all(const Entity& entity,
+                                               const EntityPlacement& placement,
                                                std::span<const CasterRay> rays,
                                                Packet& inside) noexcept;
 };
 
-bool CasterRays::Impl::enter(const Mover& mover, const MoverPlacement& placement,
+bool CasterRays::Impl::enter(const Entity& entity, const EntityPlacement& placement,
                              const CasterRay& ray, CasterRay& inside) noexcept {
   if (!placement.on) return false;
-  const glm::vec3 centre_m(mover.centre_body_m);
+  const glm::vec3 centre_m(entity.centre_body_m);
   const glm::vec3 centre_rel_m = placement.rel_from_body * centre_m + placement.position_m;
   const glm::vec3 to_centre = centre_rel_m - ray.origin_m;
   // Find the point of the ray that is nearest to the centre of the ball.
   const float along_m = std::max(glm::dot(to_centre, ray.direction), 0.0F);
   const glm::vec3 aside = to_centre - along_m * ray.direction;
   // Leave room for the rounding of far-off origins.
-  const float reach_m = mover.set.radius_m() + 1e-6F * (along_m + glm::length(to_centre));
+  const float reach_m = entity.set.radius_m() + 1e-6F * (along_m + glm::length(to_centre));
   if (glm::dot(aside, aside) > reach_m * reach_m) return false;
   // Apply the inverse rotation: vector * matrix multiplies by the transpose.
   inside = {(ray.origin_m - placement.position_m) * placement.rel_from_body - centre_m,
@@ -122,12 +123,12 @@ bool CasterRays::Impl::enter(const Mover& mover, const MoverPlacement& placement
   return true;
 }
 
-std::uint32_t CasterRays::Impl::enter_all(const Mover& mover, const MoverPlacement& placement,
+std::uint32_t CasterRays::Impl::enter_all(const Entity& entity, const EntityPlacement& placement,
                                           std::span<const CasterRay> rays,
                                           Packet& inside) noexcept {
   std::uint32_t near = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    if (enter(mover, placement, rays[i], inside[i])) near |= 1U << i;
+    if (enter(entity, placement, rays[i], inside[i])) near |= 1U << i;
   }
   return near;
 }
@@ -177,13 +178,13 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
   if (!set) return tl::unexpected(std::move(set.error()).with_context("static geometry"));
   impl->fixed = std::move(*set);
   for (const auto& [object, parts] : moving) {
-    Impl::Mover mover{object, centre(bounds_of(parts)), {}};
-    auto body = CasterSet::create(impl->device.get(), parts, mover.centre_body_m, flat_triangles);
+    Impl::Entity entity{object, centre(bounds_of(parts)), {}};
+    auto body = CasterSet::create(impl->device.get(), parts, entity.centre_body_m, flat_triangles);
     if (!body) {
       return tl::unexpected(std::move(body.error()).with_context(fmt::format("object {}", object)));
     }
-    mover.set = std::move(*body);
-    impl->movers.push_back(std::move(mover));
+    entity.set = std::move(*body);
+    impl->entities.push_back(std::move(entity));
   }
   return CasterRays(std::move(impl));
 }
@@ -191,11 +192,11 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
 const glm::dvec3& CasterRays::origin_world_m() const noexcept {
   return impl_->origin_world_m;
 }
-std::size_t CasterRays::movers() const noexcept {
-  return impl_->movers.size();
+std::size_t CasterRays::entities() const noexcept {
+  return impl_->entities.size();
 }
-std::uint32_t CasterRays::object_of_mover(std::size_t mover) const noexcept {
-  return impl_->movers[mover].object;
+std::uint32_t CasterRays::object_of_entity(std::size_t entity) const noexcept {
+  return impl_->entities[entity].object;
 }
 
 std::uint32_t CasterRays::blocked_static(std::span<const CasterRay> rays,
@@ -204,17 +205,17 @@ std::uint32_t CasterRays::blocked_static(std::span<const CasterRay> rays,
   return impl_->fixed.occluded(rays, all_of(rays) & wanted);
 }
 
-std::uint32_t CasterRays::blocked_mover(std::size_t mover, const MoverPlacement& placement,
-                                        std::span<const CasterRay> rays) const noexcept {
+std::uint32_t CasterRays::blocked_entity(std::size_t entity, const EntityPlacement& placement,
+                                         std::span<const CasterRay> rays) const noexcept {
   EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
   Packet inside;
-  const Impl::Mover& body = impl_->movers[mover];
+  const Impl::Entity& body = impl_->entities[entity];
   const std::uint32_t near = Impl::enter_all(body, placement, rays, inside);
   return near == 0 ? 0 : body.set.occluded({inside.data(), rays.size()}, near);
 }
 
-std::uint32_t CasterRays::blocked_moving(std::size_t mover,
-                                         std::span<const MoverPlacement> placements,
+std::uint32_t CasterRays::blocked_moving(std::size_t entity,
+                                         std::span<const EntityPlacement> placements,
                                          std::span<const CasterRay> rays,
                                          std::uint32_t wanted) const noexcept {
   EMIT_DCHECK_OP(rays.size(), <=, kMaxRays);
@@ -223,7 +224,7 @@ std::uint32_t CasterRays::blocked_moving(std::size_t mover,
   // entity stands.
   Packet inside;
   std::uint32_t near = 0;
-  const Impl::Mover& body = impl_->movers[mover];
+  const Impl::Entity& body = impl_->entities[entity];
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (((wanted >> i) & 1U) != 0U && Impl::enter(body, placements[i], rays[i], inside[i])) {
       near |= 1U << i;
@@ -232,29 +233,29 @@ std::uint32_t CasterRays::blocked_moving(std::size_t mover,
   return near == 0 ? 0 : body.set.occluded({inside.data(), rays.size()}, near);
 }
 
-std::uint32_t CasterRays::blocked_in_body(std::size_t mover,
+std::uint32_t CasterRays::blocked_in_body(std::size_t entity,
                                           std::span<const CasterRay> rays) const noexcept {
-  return blocked_mover(mover, MoverPlacement{}, rays);
+  return blocked_entity(entity, EntityPlacement{}, rays);
 }
 
 std::uint32_t CasterRays::blocked(std::span<const CasterRay> rays,
                                   const CasterSelection& selection) const noexcept {
   // Try static geometry first, then the entities until every ray is blocked.
   std::uint32_t blocked = selection.fixed ? blocked_static(rays) : 0;
-  const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
+  const std::size_t count = std::min(selection.entities.size(), impl_->entities.size());
   if (count == 0 || rays.empty()) return blocked;
   const PacketCone cone(rays);
   for (std::size_t m = 0; m < count && blocked != all_of(rays); ++m) {
-    if (!Impl::comes_near(impl_->movers[m], selection.movers[m], cone)) continue;
-    blocked |= blocked_mover(m, selection.movers[m], rays);
+    if (!Impl::comes_near(impl_->entities[m], selection.entities[m], cone)) continue;
+    blocked |= blocked_entity(m, selection.entities[m], rays);
   }
   return blocked;
 }
 
 std::optional<CasterHit> CasterRays::first_hit(
-    const CasterRay& ray, std::span<const MoverPlacement> movers) const noexcept {
+    const CasterRay& ray, std::span<const EntityPlacement> entities) const noexcept {
   CasterHit hit;
-  if (first_hits({&ray, 1}, {true, movers}, {&hit, 1}) == 0) return std::nullopt;
+  if (first_hits({&ray, 1}, {true, entities}, {&hit, 1}) == 0) return std::nullopt;
   return hit;
 }
 
@@ -274,18 +275,18 @@ std::uint32_t CasterRays::first_hits(std::span<const CasterRay> rays,
     }
   };
   if (selection.fixed) shorten(impl_->fixed.nearest(rays, all_of(rays), limits_m, hits));
-  const std::size_t count = std::min(selection.movers.size(), impl_->movers.size());
+  const std::size_t count = std::min(selection.entities.size(), impl_->entities.size());
   if (count == 0 || rays.empty()) return found;
   const PacketCone cone(rays);
   for (std::size_t m = 0; m < count; ++m) {
     Packet inside;
-    const MoverPlacement& placement = selection.movers[m];
-    if (!Impl::comes_near(impl_->movers[m], placement, cone)) continue;
-    const std::uint32_t near = Impl::enter_all(impl_->movers[m], placement, rays, inside);
+    const EntityPlacement& placement = selection.entities[m];
+    if (!Impl::comes_near(impl_->entities[m], placement, cone)) continue;
+    const std::uint32_t near = Impl::enter_all(impl_->entities[m], placement, rays, inside);
     if (near == 0) continue;
     // Trace in the axes of the body, then turn the normals back to rel.
     const std::uint32_t nearer =
-        impl_->movers[m].set.nearest({inside.data(), rays.size()}, near, limits_m, hits);
+        impl_->entities[m].set.nearest({inside.data(), rays.size()}, near, limits_m, hits);
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (((nearer >> i) & 1U) != 0U) hits[i].normal = placement.rel_from_body * hits[i].normal;
     }

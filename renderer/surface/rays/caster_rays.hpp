@@ -26,7 +26,7 @@ struct CasterRay {
 };
 
 /// Placement of an entity: rel = rel_from_body * body + position_m.
-struct MoverPlacement {
+struct EntityPlacement {
   glm::mat3 rel_from_body{1.0F};
   glm::vec3 position_m{0.0F};
   bool on = true;  ///< false: the entity is not in the scene
@@ -43,11 +43,11 @@ struct CasterHit {
   glm::vec3 normal{0.0F};
 };
 
-/// Selection of the geometry that a query looks at. Entry m of `movers` places entity m; entities
+/// Selection of the geometry that a query looks at. Entry m of `entities` places entity m; entities
 /// without an entry are not in the scene.
 struct CasterSelection {
   bool fixed = true;  ///< static geometry is included
-  std::span<const MoverPlacement> movers;
+  std::span<const EntityPlacement> entities;
 };
 
 /// Ray queries against the scene: one Embree hierarchy for static geometry and one per entity in
@@ -85,37 +85,37 @@ class CasterRays {
   [[nodiscard]] const glm::dvec3& origin_world_m() const noexcept;
   /// Returns the number of entities that have an instance. They are numbered in the order of
   /// Instance::object.
-  [[nodiscard]] std::size_t movers() const noexcept;
-  /// Returns the object of an entity. `mover` must be below movers().
-  [[nodiscard]] std::uint32_t object_of_mover(std::size_t mover) const noexcept;
+  [[nodiscard]] std::size_t entities() const noexcept;
+  /// Returns the object of an entity. `entity` must be below entities().
+  [[nodiscard]] std::uint32_t object_of_entity(std::size_t entity) const noexcept;
 
   /// Returns bits: bit i is set if ray i hits static geometry. Rays of one call should be alike in
   /// origin or direction. Only rays whose bit in `wanted` is set are traced.
   /// @pre rays.size() <= kMaxRays
   [[nodiscard]] std::uint32_t blocked_static(std::span<const CasterRay> rays,
                                              std::uint32_t wanted = kAllRays) const noexcept;
-  /// Returns the same bits for the entity `mover` at `placement`.
-  [[nodiscard]] std::uint32_t blocked_mover(std::size_t mover, const MoverPlacement& placement,
-                                            std::span<const CasterRay> rays) const noexcept;
+  /// Returns the same bits for the entity `entity` at `placement`.
+  [[nodiscard]] std::uint32_t blocked_entity(std::size_t entity, const EntityPlacement& placement,
+                                             std::span<const CasterRay> rays) const noexcept;
   /// Returns the same bits for an entity that stands elsewhere for every ray: ray i meets it at
   /// placements[i].
   /// @pre placements.size() >= rays.size()
-  [[nodiscard]] std::uint32_t blocked_moving(std::size_t mover,
-                                             std::span<const MoverPlacement> placements,
+  [[nodiscard]] std::uint32_t blocked_moving(std::size_t entity,
+                                             std::span<const EntityPlacement> placements,
                                              std::span<const CasterRay> rays,
                                              std::uint32_t wanted = kAllRays) const noexcept;
   /// Returns the same bits for rays in the axes of the body of an entity, relative to the origin of
   /// the body. This tells how an entity shades itself, without the rounding of a far-off placement.
-  [[nodiscard]] std::uint32_t blocked_in_body(std::size_t mover,
+  [[nodiscard]] std::uint32_t blocked_in_body(std::size_t entity,
                                               std::span<const CasterRay> rays) const noexcept;
 
   /// Returns the same bits for everything that is selected.
   [[nodiscard]] std::uint32_t blocked(std::span<const CasterRay> rays,
                                       const CasterSelection& selection) const noexcept;
 
-  /// Returns the nearest face of static geometry and of the entities at the placements `movers`.
+  /// Returns the nearest face of static geometry and of the entities at the placements `entities`.
   [[nodiscard]] std::optional<CasterHit> first_hit(
-      const CasterRay& ray, std::span<const MoverPlacement> movers) const noexcept;
+      const CasterRay& ray, std::span<const EntityPlacement> entities) const noexcept;
   /// Finds the nearest faces of up to kMaxRays rays. Bit i of the result is set if hits[i] was
   /// written; `hits` must have an entry per ray. To trace in the axes of a body, select that entity
   /// alone with the default placement and no static geometry. Faces at `within_m` and farther are

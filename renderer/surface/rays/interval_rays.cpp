@@ -104,8 +104,8 @@ void IntervalRays::aim(std::size_t ray, std::uint32_t turn, const glm::dvec3& to
 void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint32_t turn,
                           const Environment& environment, const EntityPoses& poses,
                           const glm::dvec3& origin_world_m) noexcept {
-  const std::size_t movers = mover_radius_m_.size();
-  any_mover_on_ = false;
+  const std::size_t entities = entity_radius_m_.size();
+  any_entity_on_ = false;
   sun_up_ = false;
   for (std::size_t i = 0; i < kSunRays; ++i) {
     // Permute the strata of time by an odd multiplier.
@@ -117,20 +117,20 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
     sun_up_ = sun_up_ || sun.elevation.value() > StepPlan::kMinSunElevationRad;
     aim(i, turn, sun.direction_enu);
     // Place every entity at the instant of the ray.
-    for (std::size_t m = 0; m < movers; ++m) {
+    for (std::size_t m = 0; m < entities; ++m) {
       const TrajectoryState state = poses.at(m, at_ns);
-      MoverPlacement& place = placements_[m * kSunRays + i];
+      EntityPlacement& place = placements_[m * kSunRays + i];
       place.rel_from_body = glm::mat3(glm::mat3_cast(state.pose.world_from_body));
       place.position_m = glm::vec3(state.pose.position_world_m - origin_world_m);
       place.on = state.on;
-      any_mover_on_ = any_mover_on_ || state.on;
+      any_entity_on_ = any_entity_on_ || state.on;
     }
   }
   bound_packets();
 }
 
 void IntervalRays::bound_packets() noexcept {
-  const std::size_t movers = mover_radius_m_.size();
+  const std::size_t entities = entity_radius_m_.size();
   for (std::size_t packet = 0; packet < spread_sine_.size(); ++packet) {
     const std::size_t first = packet * kPacketRays;
     spread_sine_[packet] = 0.0F;
@@ -138,15 +138,15 @@ void IntervalRays::bound_packets() noexcept {
       spread_sine_[packet] =
           std::max(spread_sine_[packet], glm::distance(direction_[i], direction_[first]));
     }
-    for (std::size_t m = 0; m < movers; ++m) {
-      Reach& ball = reaches_[packet * movers + m];
+    for (std::size_t m = 0; m < entities; ++m) {
+      Reach& ball = reaches_[packet * entities + m];
       ball = {};
       // Enclose the origins of the body in a box, its corners in a sphere, and add the radius of
       // the geometry.
       glm::vec3 low(std::numeric_limits<float>::infinity());
       glm::vec3 high = -low;
       for (std::size_t i = first; i < first + kPacketRays; ++i) {
-        const MoverPlacement& place = placed(m, i);
+        const EntityPlacement& place = placed(m, i);
         ball.changes = ball.changes || place.on != placed(m, 0).on ||
                        place.position_m != placed(m, 0).position_m ||
                        place.rel_from_body != placed(m, 0).rel_from_body;
@@ -157,27 +157,27 @@ void IntervalRays::bound_packets() noexcept {
       if (!(low.x <= high.x)) continue;
       ball.centre_m = 0.5F * (low + high);
       ball.way_m = 0.5F * glm::distance(low, high);
-      ball.radius_m = ball.way_m + mover_radius_m_[m];
+      ball.radius_m = ball.way_m + entity_radius_m_[m];
     }
   }
 }
 
 void IntervalRays::hold(const glm::dvec3& to_sun) noexcept {
-  for (MoverPlacement& place : placements_) place.on = false;
-  any_mover_on_ = false;
+  for (EntityPlacement& place : placements_) place.on = false;
+  any_entity_on_ = false;
   sun_up_ = to_sun.z > std::sin(StepPlan::kMinSunElevationRad);
   for (std::size_t i = 0; i < kSunRays; ++i) aim(i, 0, to_sun);
   bound_packets();
 }
 
 glm::vec3 IntervalRays::normal(const SurfaceSample& sample) const noexcept {
-  if (sample.mover < 0) return sample.normal;
-  return placed(static_cast<std::size_t>(sample.mover), middle_ray_).rel_from_body * sample.normal;
+  if (sample.entity < 0) return sample.normal;
+  return placed(static_cast<std::size_t>(sample.entity), middle_ray_).rel_from_body * sample.normal;
 }
 
-bool IntervalRays::comes_near(const glm::vec3& start_m, float apart_m, std::size_t mover,
+bool IntervalRays::comes_near(const glm::vec3& start_m, float apart_m, std::size_t entity,
                               std::size_t packet) const noexcept {
-  const Reach& ball = reach(mover, packet);
+  const Reach& ball = reach(entity, packet);
   if (ball.radius_m < 0.0F) return false;
   const glm::vec3& direction = direction_[packet * kPacketRays];
   const glm::vec3 to_centre_m = ball.centre_m - start_m;
@@ -202,8 +202,8 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
     const std::size_t ray = first + k;
     glm::vec3 n = face.normal;
     glm::vec3 start_m = starts_m[k];
-    if (face.mover >= 0) {
-      const MoverPlacement& place = placed(static_cast<std::size_t>(face.mover), ray);
+    if (face.entity >= 0) {
+      const EntityPlacement& place = placed(static_cast<std::size_t>(face.entity), ray);
       n = place.rel_from_body * n;
       start_m = place.rel_from_body * start_m + place.position_m;
     }
@@ -216,7 +216,7 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
   const std::span<const CasterRay> packet(sent.data(), starts_m.size());
   spots.open = spots.faced & ~rays.blocked_static(packet, spots.faced);
   spots.lit = spots.open;
-  if (!any_mover_on_) return spots;
+  if (!any_entity_on_) return spots;
   // Trace those that are left against the entities whose ball they may hit.
   const glm::vec3& from_m = sent[static_cast<std::size_t>(std::countr_zero(spots.faced))].origin_m;
   float apart_m = 0.0F;
@@ -224,47 +224,47 @@ IntervalRays::Spots IntervalRays::send(const CasterRays& rays, const SurfaceSamp
     if (((spots.faced >> k) & 1U) == 0U) continue;
     apart_m = std::max(apart_m, glm::distance(packet[k].origin_m, from_m));
   }
-  for (std::size_t m = 0; m < mover_radius_m_.size() && spots.lit != 0; ++m) {
+  for (std::size_t m = 0; m < entity_radius_m_.size() && spots.lit != 0; ++m) {
     if (!comes_near(from_m, apart_m, m, first / kPacketRays)) continue;
     spots.lit &= ~rays.blocked_moving(m, placed_in_packet(m, first), packet, spots.lit);
   }
   return spots;
 }
 
-IntervalRays::Carried IntervalRays::carried(const glm::vec3& at_body_m, std::int32_t mover,
+IntervalRays::Carried IntervalRays::carried(const glm::vec3& at_body_m, std::int32_t entity,
                                             std::size_t packet) const noexcept {
-  if (mover < 0) return {at_body_m, 0.0F};
-  const auto own = static_cast<std::size_t>(mover);
-  const MoverPlacement& place = placed(own, packet * kPacketRays);
+  if (entity < 0) return {at_body_m, 0.0F};
+  const auto own = static_cast<std::size_t>(entity);
+  const EntityPlacement& place = placed(own, packet * kPacketRays);
   return {place.rel_from_body * at_body_m + place.position_m, 2.0F * reach(own, packet).way_m};
 }
 
 bool IntervalRays::may_pass(const SurfaceSample& sample, const glm::vec3& start_m,
                             float apart_m) const noexcept {
-  if (short_ || !any_mover_on_) return false;
+  if (short_ || !any_entity_on_) return false;
   for (std::size_t packet = 1; packet < kSunRays / kPacketRays; ++packet) {
-    const Carried from = carried(start_m, sample.mover, packet);
-    for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
-      if (static_cast<std::int64_t>(m) == sample.mover || !reach(m, packet).changes) continue;
+    const Carried from = carried(start_m, sample.entity, packet);
+    for (std::size_t m = 0; m < entity_radius_m_.size(); ++m) {
+      if (static_cast<std::int64_t>(m) == sample.entity || !reach(m, packet).changes) continue;
       if (comes_near(from.at_m, apart_m + from.way_m, m, packet)) return true;
     }
   }
   return false;
 }
 
-bool IntervalRays::touches(std::size_t mover, const glm::vec3& centre_m, float around_m,
+bool IntervalRays::touches(std::size_t entity, const glm::vec3& centre_m, float around_m,
                            std::int32_t own) const noexcept {
   for (std::size_t packet = 0; packet < kSunRays / kPacketRays; ++packet) {
-    const Reach& ball = reach(mover, packet);
+    const Reach& ball = reach(entity, packet);
     if (ball.radius_m < 0.0F) continue;
     const Carried from = carried(centre_m, own, packet);
     const float apart_m = around_m + from.way_m;
-    if (sun_up_ && comes_near(from.at_m, apart_m, mover, packet)) return true;
+    if (sun_up_ && comes_near(from.at_m, apart_m, entity, packet)) return true;
     // Compare the hidden share of the sky with its limit. A ball hides (radius / distance)^2 *
     // height / distance of the sky of level ground.
     const glm::vec3 aside_m = ball.centre_m - from.at_m;
     const float away_m = std::max(glm::length(aside_m) - ball.way_m - apart_m, 0.0F);
-    const float radius_m = mover_radius_m_[mover];
+    const float radius_m = entity_radius_m_[entity];
     const float height_m = std::abs(aside_m.z) + ball.way_m + apart_m + 0.5F * radius_m;
     if (kMaxHiddenFrac * away_m * away_m * away_m <= radius_m * radius_m * height_m) return true;
   }
@@ -295,7 +295,7 @@ SunShare IntervalRays::sun_share(const CasterRays& rays, const SurfaceSample& sa
     const Spots spots = send(rays, sample, starts_m, first);
     faced += std::popcount(spots.faced);
     lit += std::popcount(spots.lit);
-    open += std::popcount(sample.mover < 0 ? spots.open : spots.lit);
+    open += std::popcount(sample.entity < 0 ? spots.open : spots.lit);
     if (faced == 0) return {};
   }
   // Take the mean over the rays whose instant had the sun before the face.
@@ -319,7 +319,7 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
                                    float start_offset_m) const noexcept {
   // Leave out surfaces of entities: their sky_frac already lacks what their own body hides, seen
   // from where it stood at the warm-up.
-  if (!any_mover_on_ || sample.mover >= 0) return {};
+  if (!any_entity_on_ || sample.entity >= 0) return {};
   const Tangents tangents = tangents_of(sample.normal);
   const glm::vec3 start_m = sample.position_m + start_offset_m * sample.normal;
   const SkyDirections& local = sky_directions(sky_);
@@ -328,9 +328,9 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
   std::uint32_t hidden = 0;
   HiddenSky most;
   int by_most = 0;
-  for (std::size_t m = 0; m < mover_radius_m_.size(); ++m) {
+  for (std::size_t m = 0; m < entity_radius_m_.size(); ++m) {
     // Skip entities that are too far away to hide much sky.
-    const float reach_m = kNearRadii * mover_radius_m_[m];
+    const float reach_m = kNearRadii * entity_radius_m_[m];
     const Reach& ball = reach(m, 0);
     const float away_m = glm::distance(ball.centre_m, start_m) * (1.0F - kRoundingFrac);
     if (ball.radius_m < 0.0F || away_m > reach_m + ball.way_m) continue;
@@ -353,7 +353,7 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
     hidden |= rays.blocked_moving(m, placed_in_packet(m, 0), sent, wanted & above & ~hidden);
     if (const int by_this = std::popcount(hidden) - by_others; by_this > by_most) {
       by_most = by_this;
-      most.mover = static_cast<std::uint32_t>(m);
+      most.entity = static_cast<std::uint32_t>(m);
     }
   }
   most.frac = static_cast<float>(std::popcount(hidden)) / kSkyRays;

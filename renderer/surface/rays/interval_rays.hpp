@@ -25,7 +25,7 @@ inline constexpr std::size_t kSunRays = 4 * kPacketRays;
 struct HiddenSky {
   /// Share of the sky rays of hidden_sky() that an entity blocks, 0 to 1.
   float frac = 0.0F;
-  std::uint32_t mover = 0;
+  std::uint32_t entity = 0;
 };
 
 /// Visible share of the sun's disc, mean over the part of an interval in which the sun stands
@@ -42,14 +42,14 @@ struct SunShare {
 /// One thread may update it; const functions may then run on any thread.
 class IntervalRays {
  public:
-  /// Makes room for the entities. `mover_radius_m` has the radius of the geometry of each entity
+  /// Makes room for the entities. `entity_radius_m` has the radius of the geometry of each entity
   /// around the origin of its body. `sky` is the measure of the directions of hidden_sky(). It
   /// allocates.
-  explicit IntervalRays(std::vector<float> mover_radius_m, SkyMeasure sky = SkyMeasure::cosine)
-      : mover_radius_m_(std::move(mover_radius_m)),
+  explicit IntervalRays(std::vector<float> entity_radius_m, SkyMeasure sky = SkyMeasure::cosine)
+      : entity_radius_m_(std::move(entity_radius_m)),
         sky_(sky),
-        placements_(mover_radius_m_.size() * kSunRays),
-        reaches_(mover_radius_m_.size() * kSunRays / kPacketRays) {}
+        placements_(entity_radius_m_.size() * kSunRays),
+        reaches_(entity_radius_m_.size() * kSunRays / kPacketRays) {}
 
   /// Computes directions and placements for the interval [begin_ns, end_ns]. `turn` varies the
   /// pattern between intervals. `poses` are in the order of the radii. RT-safe.
@@ -96,7 +96,7 @@ class IntervalRays {
 
   /// Returns true if an entity may shade a sample within `around_m` of `centre_m`, or hide more
   /// than 1/16 of its sky. `own` is the entity in whose frame that place is, or -1. RT-safe.
-  [[nodiscard]] bool touches(std::size_t mover, const glm::vec3& centre_m, float around_m,
+  [[nodiscard]] bool touches(std::size_t entity, const glm::vec3& centre_m, float around_m,
                              std::int32_t own) const noexcept;
 
   /// Returns whether the sun is high enough to count (StepPlan::kMinSunElevationRad) at the instant
@@ -105,20 +105,20 @@ class IntervalRays {
   /// Returns the unit vector of the first ray, which points to the disc of the sun.
   [[nodiscard]] const glm::vec3& to_sun() const noexcept { return direction_[0]; }
   /// Returns the placement of an entity in the middle of the interval.
-  [[nodiscard]] const MoverPlacement& placement(std::size_t mover) const noexcept {
-    return placed(mover, middle_ray_);
+  [[nodiscard]] const EntityPlacement& placement(std::size_t entity) const noexcept {
+    return placed(entity, middle_ray_);
   }
   /// Returns the outward normal of a sample in the middle of the interval, in world axes.
   [[nodiscard]] glm::vec3 normal(const SurfaceSample& sample) const noexcept;
 
  private:
-  [[nodiscard]] const MoverPlacement& placed(std::size_t mover, std::size_t ray) const noexcept {
-    return placements_[mover * kSunRays + ray];
+  [[nodiscard]] const EntityPlacement& placed(std::size_t entity, std::size_t ray) const noexcept {
+    return placements_[entity * kSunRays + ray];
   }
   /// Returns the placements of an entity for the packet that begins with ray `first`.
-  [[nodiscard]] std::span<const MoverPlacement> placed_in_packet(std::size_t mover,
-                                                                 std::size_t first) const noexcept {
-    return std::span(placements_).subspan(mover * kSunRays + first, kPacketRays);
+  [[nodiscard]] std::span<const EntityPlacement> placed_in_packet(
+      std::size_t entity, std::size_t first) const noexcept {
+    return std::span(placements_).subspan(entity * kSunRays + first, kPacketRays);
   }
 
   /// Points a ray at its place in the disc around `to_sun` and sets its lateral shift.
@@ -126,7 +126,7 @@ class IntervalRays {
 
   /// Returns false if no ray of a packet that starts within `apart_m` of `start_m` can hit the
   /// entity.
-  [[nodiscard]] bool comes_near(const glm::vec3& start_m, float apart_m, std::size_t mover,
+  [[nodiscard]] bool comes_near(const glm::vec3& start_m, float apart_m, std::size_t entity,
                                 std::size_t packet) const noexcept;
 
   /// Returns true if an entity that moves, or is not always in the scene, can block a ray that is
@@ -141,7 +141,7 @@ class IntervalRays {
     float way_m = 0.0F;
   };
   /// Returns the path of a place; a static place does not move.
-  [[nodiscard]] Carried carried(const glm::vec3& at_body_m, std::int32_t mover,
+  [[nodiscard]] Carried carried(const glm::vec3& at_body_m, std::int32_t entity,
                                 std::size_t packet) const noexcept;
 
   /// Sends ray `first` + k from start k, against static geometry and entities. `first` begins a
@@ -156,23 +156,23 @@ class IntervalRays {
     float radius_m = -1.0F;  ///< negative: the entity is not in the scene
     bool changes = false;    ///< it moves, turns, or is away for a part of the interval
   };
-  [[nodiscard]] const Reach& reach(std::size_t mover, std::size_t packet) const noexcept {
-    return reaches_[packet * mover_radius_m_.size() + mover];
+  [[nodiscard]] const Reach& reach(std::size_t entity, std::size_t packet) const noexcept {
+    return reaches_[packet * entity_radius_m_.size() + entity];
   }
   /// Computes the balls, and how far the directions of each packet spread.
   void bound_packets() noexcept;
 
-  std::vector<float> mover_radius_m_;
+  std::vector<float> entity_radius_m_;
   SkyMeasure sky_ = SkyMeasure::cosine;
-  std::vector<MoverPlacement> placements_;  ///< by entity, then ray
-  std::vector<Reach> reaches_;              ///< by packet, then entity
+  std::vector<EntityPlacement> placements_;  ///< by entity, then ray
+  std::vector<Reach> reaches_;               ///< by packet, then entity
   std::array<glm::vec3, kSunRays> direction_{};
   /// Largest distance of a direction from the first one of its packet.
   std::array<float, kSunRays / kPacketRays> spread_sine_{};
   std::array<glm::vec2, kSunRays> spread_{};  ///< lateral shifts: unit normal deviates
   std::size_t middle_ray_ = 0;
   bool short_ = false;
-  bool any_mover_on_ = false;
+  bool any_entity_on_ = false;
   bool sun_up_ = false;
 };
 

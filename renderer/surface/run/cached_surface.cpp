@@ -38,7 +38,7 @@ constexpr std::int64_t kRenewalFraction = 8;
 constexpr std::int64_t kAnswerFraction = 4;
 /// Flux in W m-2 per kelvin of tolerance below which a change does not matter: however thin a
 /// surface is, its own radiation balances as much.
-constexpr double kMinNewsWM2K = 5.0;
+constexpr double kMinChangeWM2K = 5.0;
 /// Typical difference in K between sunlit surfaces and the air. It turns a change of the film
 /// coefficient into a flux.
 constexpr double kFilmK = 20.0;
@@ -46,30 +46,30 @@ constexpr double kFilmK = 20.0;
 constexpr std::int64_t kHeldFrames = 64;
 
 /// Box of each entity's geometry in the axes of its body.
-std::vector<scene::Aabb> mover_boxes_m(const scene::SceneGeometry& geometry, std::size_t movers,
-                                       std::span<const std::int32_t> mover_of_object) {
-  std::vector<scene::Aabb> boxes(movers);
+std::vector<scene::Aabb> entity_boxes_m(const scene::SceneGeometry& geometry, std::size_t entities,
+                                        std::span<const std::int32_t> entity_of_object) {
+  std::vector<scene::Aabb> boxes(entities);
   for (const scene::Instance& instance : geometry.instances) {
-    const std::int32_t mover = mover_of_object[instance.object];
-    if (mover < 0) continue;
-    boxes[static_cast<std::size_t>(mover)].add(
+    const std::int32_t entity = entity_of_object[instance.object];
+    if (entity < 0) continue;
+    boxes[static_cast<std::size_t>(entity)].add(
         scene::transformed(geometry.meshes[instance.mesh].bounds, instance.body_from_mesh));
   }
   return boxes;
 }
 
 /// Radius of each entity's geometry around the origin of its body, in m.
-std::vector<float> mover_radii_m(const scene::SceneGeometry& geometry, std::size_t movers,
-                                 std::span<const std::int32_t> mover_of_object) {
-  std::vector<float> radius_m(movers, 0.0F);
+std::vector<float> entity_radii_m(const scene::SceneGeometry& geometry, std::size_t entities,
+                                  std::span<const std::int32_t> entity_of_object) {
+  std::vector<float> radius_m(entities, 0.0F);
   for (const scene::Instance& instance : geometry.instances) {
-    const std::int32_t mover = mover_of_object[instance.object];
-    if (mover < 0) continue;
+    const std::int32_t entity = entity_of_object[instance.object];
+    if (entity < 0) continue;
     const scene::Aabb box =
         scene::transformed(geometry.meshes[instance.mesh].bounds, instance.body_from_mesh);
     if (box.empty()) continue;
     const glm::dvec3 farthest = glm::max(glm::abs(box.min_m), glm::abs(box.max_m));
-    float& radius = radius_m[static_cast<std::size_t>(mover)];
+    float& radius = radius_m[static_cast<std::size_t>(entity)];
     radius = std::max(radius, static_cast<float>(glm::length(farthest)));
   }
   return radius_m;
@@ -87,13 +87,13 @@ SampleHeat heat_of(const scene::ThermalOptions& options, std::span<const scene::
 }  // namespace
 
 CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-                             std::vector<std::int32_t> mover_of_object,
+                             std::vector<std::int32_t> entity_of_object,
                              std::span<const FosterMaterial> networks, CasterRays places,
                              std::optional<SurfaceDetail> detail, double reference_k)
     : geometry_(std::move(geometry)),
       materials_(geometry_.materials),
       options_(scenario.thermal),
-      mover_of_object_(std::move(mover_of_object)),
+      entity_of_object_(std::move(entity_of_object)),
       places_(std::move(places)),
       detail_(std::move(detail)),
       extended_(scenario.thermal.model == scene::ThermalModel::foster),
@@ -101,41 +101,42 @@ CachedSurface::CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGe
       interval_(heat_.sized_interval()),
       workers_(threads::WorkerPool::all_cores()),
       interval_ns_(std::max<std::int64_t>(1, std::llround(scenario.thermal.first_step_s * 1e9))) {
-  const auto movers = static_cast<std::size_t>(
-      std::ranges::count_if(mover_of_object_, [](std::int32_t m) { return m >= 0; }));
-  interval_rays_.emplace(mover_radii_m(geometry_, movers, mover_of_object_), heat_.sky_measure());
-  shadow_maps_ = EntityShadowMaps(mover_boxes_m(geometry_, movers, mover_of_object_));
+  const auto entities = static_cast<std::size_t>(
+      std::ranges::count_if(entity_of_object_, [](std::int32_t m) { return m >= 0; }));
+  interval_rays_.emplace(entity_radii_m(geometry_, entities, entity_of_object_),
+                         heat_.sky_measure());
+  shadow_maps_ = EntityShadowMaps(entity_boxes_m(geometry_, entities, entity_of_object_));
 }
 
 physics::Result<std::unique_ptr<CachedSurface>> CachedSurface::create(
     const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-    std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
+    std::vector<std::int32_t> entity_of_object, std::span<const FosterMaterial> networks,
     double reference_k, std::optional<SurfaceDetail> detail) {
   auto rays = CasterRays::create(
       geometry, detail ? std::optional(detail->rays().origin_world_m()) : std::nullopt);
   if (!rays) return tl::unexpected(std::move(rays.error()));
   // Check that the rays number the entities like the scenario does.
-  std::size_t mover = 0;
+  std::size_t entity = 0;
   for (std::size_t object = 0; object < scenario.objects.size(); ++object) {
     if (scenario.objects[object].entity_id == 0) continue;
-    if (mover >= rays->movers() || rays->object_of_mover(mover) != object) {
+    if (entity >= rays->entities() || rays->object_of_entity(entity) != object) {
       return physics::make_error(
           physics::ErrorCode::config,
           fmt::format("entity object '{}' has no triangles", scenario.objects[object].name));
     }
-    ++mover;
+    ++entity;
   }
   return std::unique_ptr<CachedSurface>(
-      new CachedSurface(scenario, std::move(geometry), std::move(mover_of_object), networks,
+      new CachedSurface(scenario, std::move(geometry), std::move(entity_of_object), networks,
                         std::move(*rays), std::move(detail), reference_k));
 }
 
-void CachedSurface::place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities) {
-  movers_now_.resize(entities.size());
+void CachedSurface::place_entities(std::int64_t now_ns, std::span<const PoseHistory> entities) {
+  entities_now_.resize(entities.size());
   for (std::size_t m = 0; m < entities.size(); ++m) {
     const TrajectoryState state = entities[m].at(now_ns);
-    movers_now_[m] = {glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
-                      glm::vec3(state.pose.position_world_m - rays().origin_world_m()), state.on};
+    entities_now_[m] = {glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
+                        glm::vec3(state.pose.position_world_m - rays().origin_world_m()), state.on};
   }
 }
 
@@ -163,7 +164,7 @@ bool CachedSurface::stale(std::int64_t now_ns) const noexcept {
          now_ns > nodes_[storage(1)].at_ns + kMaxIntervals * interval_ns_;
 }
 
-std::int64_t CachedSurface::take_news(const Environment& environment) noexcept {
+std::int64_t CachedSurface::take_weather_change(const Environment& environment) noexcept {
   return environment.changed_since_ns(std::exchange(revision_, environment.revision()));
 }
 
@@ -188,8 +189,16 @@ std::int64_t CachedSurface::next_node_ns(std::int64_t from_ns, std::int64_t now_
 SurfaceInputs CachedSurface::surface_inputs(const HistoryRecord& record,
                                             const SurfaceHistory& history,
                                             std::span<const std::vector<glm::vec3>> ways_m) const {
-  return {geometry_, materials_, mover_of_object_, rays(),      places_,
-          heat_,     history,    record,           movers_now_, detail_ ? &*detail_ : nullptr,
+  return {geometry_,
+          materials_,
+          entity_of_object_,
+          rays(),
+          places_,
+          heat_,
+          history,
+          record,
+          entities_now_,
+          detail_ ? &*detail_ : nullptr,
           ways_m};
 }
 
@@ -218,7 +227,7 @@ StateKey CachedSurface::key_of(const ModelWork& work, const Saved& saved) {
 physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const ModelWork& work,
                                                                        const Saved& saved) const {
   auto read = read_state(saved.file, {key_of(work, saved), work.start_ns}, geometry_,
-                         movers_now_.size(), work.options);
+                         entities_now_.size(), work.options);
   if (!read) {
     if (!saved.start) return std::nullopt;
     return tl::unexpected(std::move(read.error()));
@@ -272,7 +281,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   const std::int64_t start_ns =
       options_.history_start_ns +
       std::max<std::int64_t>(0, now_ns - options_.history_start_ns) / interval_ns_ * interval_ns_;
-  place_movers(start_ns, inputs.entities);
+  place_entities(start_ns, inputs.entities);
   SurfaceModelOptions options;
   options.tolerance_k = options_.tolerance_k;
   options.max_samples = options_.max_samples;
@@ -285,8 +294,8 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   offsets_ = ray_offsets(geometry_);
   model_ = std::move(*model);
   if (options.exchange) {
-    glow_ = MoverGlow(*model_, geometry_, mover_of_object_);
-    faces_.assign(movers_now_.size(), {});
+    exitance_ = EntityExitance(*model_, geometry_, entity_of_object_);
+    faces_.assign(entities_now_.size(), {});
   }
 
   // Take the memory of the nodes.
@@ -307,8 +316,8 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
   }
-  (void)take_news(inputs.environment);
-  news_ns_ = kNoNews;
+  (void)take_weather_change(inputs.environment);
+  weather_change_ns_ = kNoChange;
   renewing_ = false;
   lags_ = false;
   last_now_ns_ = now_ns;
@@ -323,7 +332,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   // Replace the model's shares of the sun, which include the shade of entities, by those of the
   // first interval, which do not.
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
-    if (inputs.entities.empty() || model_->samples.samples[i].mover >= 0) continue;
+    if (inputs.entities.empty() || model_->samples.samples[i].entity >= 0) continue;
     first.outputs[i].sun_frac = node(1).outputs[i].sun_frac;
     first.vertices[i].sun_frac = node(1).vertices[i].sun_frac;
   }
@@ -363,7 +372,7 @@ void CachedSurface::begin_interval(std::size_t index, const Inputs& inputs,
   interval_rays_->update(from.at_ns, to.at_ns, turn_++, inputs.environment,
                          EntityPoses(inputs.entities), rays().origin_world_m());
   local_->send_rays(index, inputs.entities);
-  glow_.measure(
+  exitance_.measure(
       model_->samples, *interval_rays_,
       [&from](std::size_t sample) { return from.outputs[sample].longwave_out_w_m2; }, faces_);
   done_ = 0;
@@ -464,7 +473,7 @@ bool CachedSurface::matters(std::int64_t now_ns, const Environment& environment)
     change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
                             between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
   }
-  return change_w_m2 > kMinNewsWM2K * options_.tolerance_k;
+  return change_w_m2 > kMinChangeWM2K * options_.tolerance_k;
 }
 
 void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
@@ -475,7 +484,7 @@ void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, co
   // Shorten the interval after a change that matters: surfaces answer like the root of time at
   // first, which a line over a whole interval does not follow.
   if (lags_) end_ns = std::min(end_ns, std::max(event_ns, now_ns) + interval_ns_ / kAnswerFraction);
-  local_->take_news(event_ns, window(), model_->samples);
+  local_->take_weather_change(event_ns, window(), model_->samples);
   cut_at(event_ns, end_ns);
   begin_interval(0, inputs, history);
   renewing_ = true;
@@ -490,7 +499,7 @@ void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
   // Compute the rest of node 1, then begin node 2 anew from there.
   compute(0, static_cast<std::uint32_t>(model_->samples.samples.size()));
   renewing_ = false;
-  lags_ = news_ns_ <= now_ns && matters(now_ns, inputs.environment);
+  lags_ = weather_change_ns_ <= now_ns && matters(now_ns, inputs.environment);
   node(2).changes.clear();
   begin_anew(1, inputs, history);
   share_begin_ns_ = now_ns;
@@ -500,29 +509,29 @@ void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
 void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
                                  SurfaceHistory& history) noexcept {
   // Merge the newest change with what waits already.
-  const std::int64_t newest_ns = take_news(inputs.environment);
-  if (newest_ns != kNoNews) local_->doubt(newest_ns);
-  news_ns_ = std::min(news_ns_, newest_ns);
-  if (news_ns_ == kNoNews) return;
+  const std::int64_t newest_ns = take_weather_change(inputs.environment);
+  if (newest_ns != kNoChange) local_->discard_foreseen(newest_ns);
+  weather_change_ns_ = std::min(weather_change_ns_, newest_ns);
+  if (weather_change_ns_ == kNoChange) return;
   // Let a change wait while another one is being taken in.
   if (renewing_) {
-    lags_ = lags_ || (news_ns_ <= now_ns && matters(now_ns, inputs.environment));
+    lags_ = lags_ || (weather_change_ns_ <= now_ns && matters(now_ns, inputs.environment));
     return;
   }
-  if (news_ns_ >= node(2).at_ns) {
-    news_ns_ = kNoNews;
-  } else if (news_ns_ >= node(1).at_ns) {
+  if (weather_change_ns_ >= node(2).at_ns) {
+    weather_change_ns_ = kNoChange;
+  } else if (weather_change_ns_ >= node(1).at_ns) {
     // Begin the next interval anew, unless the current one is about to end: then the change waits
     // for the next one.
     if (node(1).at_ns - now_ns < interval_ns_ / kRenewalFraction) return;
     begin_anew(1, inputs, history);
     share_begin_ns_ = now_ns;
     share_end_ns_ = node(1).at_ns;
-    news_ns_ = kNoNews;
-  } else if (news_ns_ <= now_ns) {  // later weather waits for its instant
+    weather_change_ns_ = kNoChange;
+  } else if (weather_change_ns_ <= now_ns) {  // later weather waits for its instant
     const SurfaceStep step = this->step();
     local_->run(std::min(now_ns, node(1).at_ns), window(), local_inputs(inputs, history, step));
-    begin_renewal(std::exchange(news_ns_, kNoNews), now_ns, inputs, history);
+    begin_renewal(std::exchange(weather_change_ns_, kNoChange), now_ns, inputs, history);
   }
 }
 

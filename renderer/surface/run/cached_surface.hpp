@@ -16,13 +16,13 @@
 #include "history/step_plan.hpp"
 #include "history/surface_history.hpp"
 #include "surface/heat/surface_node.hpp"
-#include "surface/model/mover_glow.hpp"
+#include "surface/model/entity_exitance.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/ray_offsets.hpp"
 #include "surface/run/local_steps.hpp"
 #include "surface/run/surface_step.hpp"
 #include "surface/shade/entity_shadow_maps.hpp"
-#include "surface/shade/shade_pages.hpp"
+#include "surface/shade/exposure_tiles.hpp"
 #include "surface/state/state_file.hpp"
 #include "threads/worker_pool.hpp"
 
@@ -56,13 +56,13 @@ class CachedSurface {
     std::span<const PoseHistory> entities;
   };
 
-  /// Makes the surface without samples. `mover_of_object` holds the index of each object's
+  /// Makes the surface without samples. `entity_of_object` holds the index of each object's
   /// PoseHistory, or -1 for static objects. `networks` are by material, and empty for emit2014.
   /// `detail` is given if meshes were simplified. Errors: config (an entity without triangles),
   /// those of CasterRays.
   [[nodiscard]] static physics::Result<std::unique_ptr<CachedSurface>> create(
       const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-      std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
+      std::vector<std::int32_t> entity_of_object, std::span<const FosterMaterial> networks,
       double reference_k, std::optional<SurfaceDetail> detail = std::nullopt);
 
   /// The state file (thermal.state_file), and the requirements on the state in it.
@@ -118,7 +118,7 @@ class CachedSurface {
   [[nodiscard]] std::size_t local_blocks() const noexcept { return local_->active(); }
 
   /// Exposure tiles: recent shade of entities, finer than samples lie.
-  [[nodiscard]] const ShadePages& shade() const noexcept { return *shade_; }
+  [[nodiscard]] const ExposureTiles& shade() const noexcept { return *shade_; }
   /// Entity shadow depth maps.
   [[nodiscard]] const EntityShadowMaps& shadow_maps() const noexcept { return shadow_maps_; }
   /// Space that an entity may shade, down to static surfaces.
@@ -132,8 +132,8 @@ class CachedSurface {
   void place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns, const Inputs& inputs) noexcept;
   /// Brings the shadow depth map of an entity up to date, and places it. Call it for shadows that
   /// show in the frame.
-  /// @pre place_shadows(); shadows()[mover].on
-  [[nodiscard]] PlacedShadowMap cast_shadow(std::size_t mover) noexcept;
+  /// @pre place_shadows(); shadows()[entity].on
+  [[nodiscard]] PlacedShadowMap cast_shadow(std::size_t entity) noexcept;
   /// Returns true if, since place_shadows(), more entities had turned than one frame can make maps
   /// for. Then some shadow has an outline of a while ago.
   [[nodiscard]] bool stale_shadow() const noexcept { return stale_shadow_; }
@@ -151,8 +151,9 @@ class CachedSurface {
 
  private:
   CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
-                std::vector<std::int32_t> mover_of_object, std::span<const FosterMaterial> networks,
-                CasterRays places, std::optional<SurfaceDetail> detail, double reference_k);
+                std::vector<std::int32_t> entity_of_object,
+                std::span<const FosterMaterial> networks, CasterRays places,
+                std::optional<SurfaceDetail> detail, double reference_k);
 
   /// Input of making a model, for the start of the first interval shown.
   struct ModelWork {
@@ -180,8 +181,8 @@ class CachedSurface {
   [[nodiscard]] RecordInputs record_inputs(const Inputs& inputs) const {
     return {heat_, inputs.environment, inputs.entities, *interval_rays_, rays().origin_world_m()};
   }
-  /// Fills movers_now_ with the poses of the entities.
-  void place_movers(std::int64_t now_ns, std::span<const PoseHistory> entities);
+  /// Fills entities_now_ with the poses of the entities.
+  void place_entities(std::int64_t now_ns, std::span<const PoseHistory> entities);
   /// Places of each entity from `from_ns` on, by its script, rel.
   [[nodiscard]] std::vector<std::vector<glm::vec3>> ways_m(
       std::int64_t from_ns, std::span<const PoseHistory> entities) const;
@@ -214,10 +215,10 @@ class CachedSurface {
   [[nodiscard]] bool matters(std::int64_t now_ns, const Environment& environment) const noexcept;
   /// Number of samples that are to be computed by `now_ns`.
   [[nodiscard]] std::uint32_t share_at(std::int64_t now_ns) const noexcept;
-  /// Earliest time whose weather the host has changed since the last call; kNoNews if there is
+  /// Earliest time whose weather the host has changed since the last call; kNoChange if there is
   /// none.
-  [[nodiscard]] std::int64_t take_news(const Environment& environment) noexcept;
-  static constexpr std::int64_t kNoNews = std::numeric_limits<std::int64_t>::max();
+  [[nodiscard]] std::int64_t take_weather_change(const Environment& environment) noexcept;
+  static constexpr std::int64_t kNoChange = std::numeric_limits<std::int64_t>::max();
   /// Rays against everything that shades, as loaded.
   [[nodiscard]] const CasterRays& rays() const noexcept {
     return detail_ ? detail_->rays() : places_;
@@ -241,7 +242,7 @@ class CachedSurface {
   scene::SceneGeometry geometry_;
   std::vector<scene::Material> materials_;
   scene::ThermalOptions options_;
-  std::vector<std::int32_t> mover_of_object_;
+  std::vector<std::int32_t> entity_of_object_;
   CasterRays places_;
   std::optional<SurfaceDetail> detail_;
   bool extended_ = false;  ///< thermal.model foster
@@ -250,17 +251,17 @@ class CachedSurface {
   HeatInterval interval_;
   threads::WorkerPool workers_;
   RayOffsets offsets_;
-  std::vector<MoverPlacement> movers_now_;
+  std::vector<EntityPlacement> entities_now_;
   std::optional<SurfaceModel> model_;
-  MoverGlow glow_;
-  std::vector<MoverFaces> faces_;  ///< by entity, at the node with which the interval begins
+  EntityExitance exitance_;
+  std::vector<EntityFaces> faces_;  ///< by entity, at the node with which the interval begins
 
   std::optional<LocalSteps> local_;
   EntityShadowMaps shadow_maps_;
   std::vector<Shadow> shadows_;
   glm::vec3 to_sun_{0.0F, 0.0F, 1.0F};  ///< unit vector to the sun of shadows()
   bool stale_shadow_ = false;
-  std::optional<ShadePages> shade_;
+  std::optional<ExposureTiles> shade_;
 
   std::array<SurfaceNode, 3> nodes_;
   std::size_t ring_ = 0;
@@ -268,9 +269,10 @@ class CachedSurface {
   std::int64_t share_begin_ns_ = 0;  ///< begin of the time in which the samples are computed
   std::int64_t share_end_ns_ = 0;    ///< end of that time
   std::int64_t last_now_ns_ = 0;
-  bool renewing_ = false;           ///< node 1 is being computed, because the weather has changed
-  bool lags_ = false;               ///< a change that matters is not known to all samples
-  std::int64_t news_ns_ = kNoNews;  ///< earliest change of the weather that is not taken in
+  bool renewing_ = false;  ///< node 1 is being computed, because the weather has changed
+  bool lags_ = false;      ///< a change that matters is not known to all samples
+  std::int64_t weather_change_ns_ =
+      kNoChange;  ///< earliest change of the weather that is not taken in
   std::uint32_t turn_ = 0;
   std::int64_t interval_ns_ = 0;
   std::uint64_t revision_ = 0;  ///< revision of the weather that is taken in

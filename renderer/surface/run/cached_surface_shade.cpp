@@ -24,36 +24,36 @@ void CachedSurface::begin_shade(std::int64_t now_ns, const Inputs& inputs) {
   shade_->restart(now_ns, inputs.entities);
   shadows_.assign(inputs.entities.size(), {});
   // Make all shadow depth maps now. Frames make those anew whose entity has turned.
-  place_movers(now_ns, inputs.entities);
+  place_entities(now_ns, inputs.entities);
   const glm::vec3 to_sun(inputs.environment.sun_at(now_ns).direction_enu);
-  for (std::size_t m = 0; m < movers_now_.size(); ++m) {
+  for (std::size_t m = 0; m < entities_now_.size(); ++m) {
     shadow_maps_.begin_frame();
-    (void)shadow_maps_.look(m, to_sun * movers_now_[m].rel_from_body, EntityShadowMaps::kSharpRad,
+    (void)shadow_maps_.look(m, to_sun * entities_now_[m].rel_from_body, EntityShadowMaps::kSharpRad,
                             rays(), workers_);
   }
 }
 
 void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
                                   const Inputs& inputs) noexcept {
-  place_movers(drawn_ns, inputs.entities);
+  place_entities(drawn_ns, inputs.entities);
   const physics::SunPosition sun = inputs.environment.sun_at(sun_ns);
   to_sun_ = glm::vec3(sun.direction_enu);
   const bool up = sun.elevation.value() > StepPlan::kMinSunElevationRad;
   stale_shadow_ = false;
-  for (std::size_t m = 0; m < movers_now_.size(); ++m) {
-    const MoverPlacement& mover = movers_now_[m];
+  for (std::size_t m = 0; m < entities_now_.size(); ++m) {
+    const EntityPlacement& entity = entities_now_[m];
     const float diagonal_m = shadow_maps_.diagonal_m(m);
     Shadow& shadow = shadows_[m];
-    shadow.on = up && mover.on && diagonal_m > 0.0F;
+    shadow.on = up && entity.on && diagonal_m > 0.0F;
     if (!shadow.on) continue;
     // Find the end of the shadow: the lowest surface behind the entity, and a little lower. Without
     // any surface the shadow ends after some diagonals.
     constexpr float kFarDiagonals = 20.0F;
     constexpr float kLowerDiagonals = 0.25F;
     std::array<CasterRay, 9> behind;
-    std::ranges::copy(shadow_maps_.corners_m(m, mover), shadow.hull_m.begin());
+    std::ranges::copy(shadow_maps_.corners_m(m, entity), shadow.hull_m.begin());
     for (std::size_t i = 0; i < 8; ++i) behind[i] = {shadow.hull_m[i], -to_sun_};
-    behind[8] = {shadow_maps_.middle_m(m, mover), -to_sun_};
+    behind[8] = {shadow_maps_.middle_m(m, entity), -to_sun_};
     std::array<CasterHit, behind.size()> hits;
     const std::uint32_t met = rays().first_hits(behind, {true, {}}, hits);
     float end_m = behind[8].origin_m.z - kFarDiagonals * diagonal_m * to_sun_.z;
@@ -87,14 +87,14 @@ void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
   }
 }
 
-PlacedShadowMap CachedSurface::cast_shadow(std::size_t mover) noexcept {
-  EMIT_CHECK(mover < shadows_.size() && shadows_[mover].on);
-  const MoverPlacement& now = movers_now_[mover];
-  if (!shadow_maps_.look(mover, to_sun_ * now.rel_from_body, EntityShadowMaps::kSharpRad, rays(),
+PlacedShadowMap CachedSurface::cast_shadow(std::size_t entity) noexcept {
+  EMIT_CHECK(entity < shadows_.size() && shadows_[entity].on);
+  const EntityPlacement& now = entities_now_[entity];
+  if (!shadow_maps_.look(entity, to_sun_ * now.rel_from_body, EntityShadowMaps::kSharpRad, rays(),
                          workers_)) {
     stale_shadow_ = true;
   }
-  return shadow_maps_.place(mover, now, to_sun_);
+  return shadow_maps_.place(entity, now, to_sun_);
 }
 
 }  // namespace emit::renderer

@@ -133,8 +133,8 @@ void LocalSteps::look_around(std::int64_t at_ns, const Window& window,
 void LocalSteps::want(std::size_t entity, const IntervalRays& rays, std::int64_t at_ns) noexcept {
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
     const SampleBlocks::Block& block = blocks_.blocks()[b];
-    if (block.mover != static_cast<std::int32_t>(entity) &&
-        !rays.touches(entity, block.centre_m, block.radius_m, block.mover)) {
+    if (block.entity != static_cast<std::int32_t>(entity) &&
+        !rays.touches(entity, block.centre_m, block.radius_m, block.entity)) {
       continue;
     }
     // Mark the block as touched, and put it in its group unless it is there already.
@@ -163,8 +163,8 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
   inputs.history.restore_surroundings(window.next.surroundings);
 }
 
-void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
-                           const SurfaceSamples& all) noexcept {
+void LocalSteps::take_weather_change(std::int64_t event_ns, const Window& window,
+                                     const SurfaceSamples& all) noexcept {
   EMIT_CHECK_OP(event_ns, >=, window.before.at_ns);
   EMIT_CHECK_OP(event_ns, <=, window.after.at_ns);
   for (std::uint32_t b = 0; b < state_.size(); ++b) {
@@ -176,7 +176,7 @@ void LocalSteps::take_news(std::int64_t event_ns, const Window& window,
   }
 }
 
-void LocalSteps::doubt(std::int64_t event_ns) noexcept {
+void LocalSteps::discard_foreseen(std::int64_t event_ns) noexcept {
   for (std::int64_t& foreseen_ns : foreseen_ns_) {
     if (foreseen_ns > event_ns) foreseen_ns = kNever;
   }

@@ -79,10 +79,11 @@ class LocalSteps {
   /// Does the steps that are due up to `until_ns`, which must lie in the current interval.
   void run(std::int64_t until_ns, const Window& window, const Inputs& inputs) noexcept;
   /// Discards steps ahead that end after `event_ns`, because the weather changes at that time.
-  void doubt(std::int64_t event_ns) noexcept;
+  void discard_foreseen(std::int64_t event_ns) noexcept;
   /// Prepares for moving node `before` to `event_ns`: blocks that were on their own in this
   /// interval are on their own from then on. @pre run(); event_ns lies in the current interval
-  void take_news(std::int64_t event_ns, const Window& window, const SurfaceSamples& all) noexcept;
+  void take_weather_change(std::int64_t event_ns, const Window& window,
+                           const SurfaceSamples& all) noexcept;
   /// Prepares for the end of the current interval. @pre run() to its end
   void rotate(const Window& window, const SurfaceSamples& all) noexcept;
   /// Follows the end of the interval: the node that was `next` is `after` now, and the one that was

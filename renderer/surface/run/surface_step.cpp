@@ -16,7 +16,7 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
   const HiddenSky hidden = interval_rays.hidden_sky(step.rays, sample, offsets.around_m);
   drive.hidden_sky_frac = hidden.frac;
   if (hidden.frac > 0.0F && !step.faces.empty()) {
-    const float sent_w_m2 = step.faces[hidden.mover].towards_w_m2(sample.normal);
+    const float sent_w_m2 = step.faces[hidden.entity].towards_w_m2(sample.normal);
     drive.hidden_is_seen = sent_w_m2 >= 0.0F;
     if (drive.hidden_is_seen) {
       drive.longwave_begin_w_m2 += sample.sky_frac * hidden.frac * sent_w_m2;
@@ -52,10 +52,10 @@ void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
   const SurfaceSample& sample = step.all.samples[index];
   // Take ray offsets for the place of the sample, of an entity for where it stands now.
   RayOffsets offsets = step.offsets;
-  if (sample.mover < 0) {
+  if (sample.entity < 0) {
     offsets = offsets.at(sample.position_m);
-  } else if (const MoverPlacement& place =
-                 interval_rays.placement(static_cast<std::size_t>(sample.mover));
+  } else if (const EntityPlacement& place =
+                 interval_rays.placement(static_cast<std::size_t>(sample.entity));
              place.on) {
     offsets = offsets.at(place.rel_from_body * sample.position_m + place.position_m);
   }

@@ -6,7 +6,7 @@
 #include "surface/heat/heat_interval.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_samples.hpp"
-#include "surface/model/mover_glow.hpp"
+#include "surface/model/entity_exitance.hpp"
 #include "surface/rays/caster_rays.hpp"
 #include "surface/rays/interval_rays.hpp"
 #include "surface/rays/ray_offsets.hpp"
@@ -19,7 +19,7 @@ struct SurfaceStep {
   const SampleHeat& heat;
   const CasterRays& rays;
   RayOffsets offsets;
-  std::span<const MoverFaces> faces;  ///< by entity; if empty, entities send what surroundings do
+  std::span<const EntityFaces> faces;  ///< by entity; if empty, entities send what surroundings do
 };
 
 /// Result of a step of a sample. `behind` is the output of a sheet's other face, which has the same

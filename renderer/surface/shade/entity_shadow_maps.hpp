@@ -56,52 +56,52 @@ class EntityShadowMaps {
   static constexpr float kSharpRad = 4e-3F;
   static constexpr float kSmearedRad = 2e-2F;
 
-  [[nodiscard]] std::size_t size() const noexcept { return tiles_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return maps_.size(); }
   /// Allows kLooksPerFrame new maps again.
   void begin_frame() noexcept { looks_left_ = kLooksPerFrame; }
   /// Makes the map anew if the unit vector to the sun in body axes has turned by `most_turn_rad` or
   /// more since the map was made. Returns false if the frame may make no more maps and the turn is
   /// ten times that or more.
-  bool look(std::size_t mover, const glm::vec3& to_sun_body, float most_turn_rad,
+  bool look(std::size_t entity, const glm::vec3& to_sun_body, float most_turn_rad,
             const CasterRays& rays, threads::WorkerPool& workers) noexcept;
   /// Places the map of an entity at a pose. `to_sun` is the unit vector to the sun, rel axes.
   /// @pre look() for about this direction
-  [[nodiscard]] PlacedShadowMap place(std::size_t mover, const MoverPlacement& placement,
+  [[nodiscard]] PlacedShadowMap place(std::size_t entity, const EntityPlacement& placement,
                                       const glm::vec3& to_sun) const noexcept;
   /// Shaded share of a disc of `radius_texels` around a place on the map, at a depth in m. Only
   /// every `stride`th of the EMIT_SHADE_TAPS taps from `first` on is read. The sum over all first <
   /// stride is the share of all taps.
-  [[nodiscard]] float shaded_frac(std::size_t mover, float column, float row, float depth_m,
+  [[nodiscard]] float shaded_frac(std::size_t entity, float column, float row, float depth_m,
                                   float radius_texels, std::uint32_t first = 0,
                                   std::uint32_t stride = 1) const noexcept;
   /// Depth in m of the entity's surface at a place on the map. It is the mean depth if the texel is
   /// open.
-  [[nodiscard]] float caster_m(std::size_t mover, float column, float row) const noexcept;
+  [[nodiscard]] float caster_m(std::size_t entity, float column, float row) const noexcept;
   /// Depths of a map, kSide rows of kSide texels, in m.
-  [[nodiscard]] std::span<const float> depths_m(std::size_t mover) const noexcept {
-    return tiles_[mover].depth_m;
+  [[nodiscard]] std::span<const float> depths_m(std::size_t entity) const noexcept {
+    return maps_[entity].depth_m;
   }
   /// Number of times that the map was made anew.
-  [[nodiscard]] std::uint32_t revision(std::size_t mover) const noexcept {
-    return tiles_[mover].revision;
+  [[nodiscard]] std::uint32_t revision(std::size_t entity) const noexcept {
+    return maps_[entity].revision;
   }
   /// Diagonal of the entity's box in m; 0 if the entity has no surface.
-  [[nodiscard]] float diagonal_m(std::size_t mover) const noexcept;
+  [[nodiscard]] float diagonal_m(std::size_t entity) const noexcept;
   /// Width in m of the rim that penumbra and texels add to a shadow `way_m` behind the entity.
-  [[nodiscard]] float rim_m(std::size_t mover, float way_m) const noexcept;
+  [[nodiscard]] float rim_m(std::size_t entity, float way_m) const noexcept;
   /// Centre of the entity's box, rel.
-  [[nodiscard]] glm::vec3 middle_m(std::size_t mover,
-                                   const MoverPlacement& placement) const noexcept;
+  [[nodiscard]] glm::vec3 middle_m(std::size_t entity,
+                                   const EntityPlacement& placement) const noexcept;
   /// Corners of the entity's box, rel.
-  [[nodiscard]] std::array<glm::vec3, 8> corners_m(std::size_t mover,
-                                                   const MoverPlacement& placement) const noexcept;
+  [[nodiscard]] std::array<glm::vec3, 8> corners_m(std::size_t entity,
+                                                   const EntityPlacement& placement) const noexcept;
   /// Height in m of the highest corner of the entity's box above its origin, in the axes of
   /// `placement`.
-  [[nodiscard]] float top_m(std::size_t mover, const MoverPlacement& placement) const noexcept;
+  [[nodiscard]] float top_m(std::size_t entity, const EntityPlacement& placement) const noexcept;
 
  private:
   /// The map of one entity.
-  struct Tile {
+  struct Map {
     scene::Aabb box_m;
     glm::vec3 to_sun{0.0F};  ///< body axes, like the next two vectors
     glm::vec3 across{1.0F, 0.0F, 0.0F};
@@ -118,10 +118,10 @@ class EntityShadowMaps {
     std::vector<float> around_m;
   };
   /// Fills around_m.
-  static void look_around(Tile& tile) noexcept;
+  static void look_around(Map& map) noexcept;
 
-  std::vector<Tile> tiles_;
-  std::vector<MoverPlacement> alone_;  ///< scratch: placements with at most one entity present
+  std::vector<Map> maps_;
+  std::vector<EntityPlacement> alone_;  ///< scratch: placements with at most one entity present
   int looks_left_ = kLooksPerFrame;
 };
 

@@ -48,7 +48,7 @@ void visit_members(T& s, const Visit& visit) {
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, SurfaceSample>
 void visit_members(T& s, const Visit& visit) {
-  visit(s.position_m), visit(s.normal), visit(s.mover), visit(s.material), visit(s.sky_frac),
+  visit(s.position_m), visit(s.normal), visit(s.entity), visit(s.material), visit(s.sky_frac),
       visit(s.sphere_sky_frac);
   visit(s.far_frac), visit(s.first_seen), visit(s.seen_count), visit(s.seen_scale);
   visit(s.covered);
@@ -115,7 +115,7 @@ bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::
 
 /// Returns true if the arrays of a model fit each other and no index leads out of its array.
 bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
-                std::size_t movers) {
+                std::size_t entities) {
   const std::size_t count = model.samples.samples.size();
   const std::size_t seen = model.samples.seen.size();
   if (model.states.size() != count || model.outputs.size() != count ||
@@ -147,7 +147,7 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
     if (first + samples > model.drawn_samples) return false;
     for (std::size_t k = first; k < first + samples; ++k) {
       const std::uint32_t other = all[k].other_side;
-      if ((all[k].mover >= 0) != (instance.entity_id != 0) || all[k].mover != all[first].mover ||
+      if ((all[k].entity >= 0) != (instance.entity_id != 0) || all[k].entity != all[first].entity ||
           (other != kNoSample && (other < first || other >= first + samples))) {
         return false;
       }
@@ -161,8 +161,8 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
             all[s.other_side].other_side < count && &all[all[s.other_side].other_side] == &s);
   };
   const auto sample_fits = [&](const SurfaceSample& s) {
-    return sides_fit(s) && s.material < geometry.materials.size() && s.mover >= -1 &&
-           s.mover < static_cast<std::int64_t>(movers) && s.first_seen <= seen &&
+    return sides_fit(s) && s.material < geometry.materials.size() && s.entity >= -1 &&
+           s.entity < static_cast<std::int64_t>(entities) && s.first_seen <= seen &&
            s.seen_count <= seen - s.first_seen &&
            std::ranges::all_of(s.partners, [&](const Partner& partner) {
              return partner.sample == kNoSample || partner.sample < count;
@@ -320,7 +320,7 @@ Result<void> check_state_writable(const std::filesystem::path& file) {
 }
 
 Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWanted& wanted,
-                                const scene::SceneGeometry& geometry, std::size_t movers,
+                                const scene::SceneGeometry& geometry, std::size_t entities,
                                 const SurfaceModelOptions& options) {
   const auto refuse = [&file](const std::string& why) {
     return make_error(ErrorCode::config,
@@ -357,7 +357,7 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   take_value(source, model.full);
   take_value(source, model.full_in_view);
   // Check all indices: a file with a matching checksum may still be made by a faulty program.
-  if (!source.ok() || !source.at_end() || !consistent(model, geometry, movers)) {
+  if (!source.ok() || !source.at_end() || !consistent(model, geometry, entities)) {
     return refuse("damaged: its contents contradict each other");
   }
   return model;

@@ -67,13 +67,13 @@ struct StateWanted {
 /// Tests whether write_state() could write: the folder exists and permits it. Errors: io.
 [[nodiscard]] physics::Result<void> check_state_writable(const std::filesystem::path& file);
 
-/// Reads a state for a scene that has `geometry` and `movers` entities. Errors: io (the file cannot
-/// be read), config (the file is truncated, damaged, of another version, of another instant, or
-/// made for something else). The message names the file and the reason.
+/// Reads a state for a scene that has `geometry` and `entities` entities. Errors: io (the file
+/// cannot be read), config (the file is truncated, damaged, of another version, of another instant,
+/// or made for something else). The message names the file and the reason.
 [[nodiscard]] physics::Result<SurfaceModel> read_state(const std::filesystem::path& file,
                                                        const StateWanted& wanted,
                                                        const scene::SceneGeometry& geometry,
-                                                       std::size_t movers,
+                                                       std::size_t entities,
                                                        const SurfaceModelOptions& options);
 
 }  // namespace emit::renderer

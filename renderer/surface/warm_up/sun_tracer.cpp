@@ -18,9 +18,9 @@ SunTracer::SunTracer(const SurfaceInputs& inputs, const SurfaceModelOptions& opt
   }
 }
 
-RayOffsets SunTracer::offsets(const glm::vec3& place_m, std::int32_t mover) const noexcept {
-  if (mover < 0) return offsets_.at(place_m);
-  const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(mover)];
+RayOffsets SunTracer::offsets(const glm::vec3& place_m, std::int32_t entity) const noexcept {
+  if (entity < 0) return offsets_.at(place_m);
+  const EntityPlacement& place = in_.entities_now[static_cast<std::size_t>(entity)];
   return place.on ? offsets_.at(place.rel_from_body * place_m + place.position_m) : offsets_;
 }
 
@@ -29,7 +29,7 @@ void SunTracer::trace(const SurfaceSample& sample, std::span<float> sun_frac,
   const HistoryRecord& record = in_.record;
   EMIT_DCHECK_OP(sun_frac.size(), ==, record.size());
   EMIT_DCHECK(hidden_sky.empty() || hidden_sky.size() == record.size());
-  const RayOffsets offsets = this->offsets(sample.position_m, sample.mover);
+  const RayOffsets offsets = this->offsets(sample.position_m, sample.entity);
   // Limit the blur to half of the way over which the surface is a plane: rays must not start beyond
   // an edge.
   const float max_blur_m = lateral_ ? std::min(max_blur_m_, 0.5F * sample.flat_m) : 0.0F;

@@ -21,9 +21,9 @@ class SunTracer {
   void trace(const SurfaceSample& sample, std::span<float> sun_frac,
              std::span<HiddenSky> hidden_sky) const;
 
-  /// Distances of the starts of rays from the surface at a place. If `mover` is not negative, the
+  /// Distances of the starts of rays from the surface at a place. If `entity` is not negative, the
   /// place is in the body frame of that entity.
-  [[nodiscard]] RayOffsets offsets(const glm::vec3& place_m, std::int32_t mover) const noexcept;
+  [[nodiscard]] RayOffsets offsets(const glm::vec3& place_m, std::int32_t entity) const noexcept;
   /// Distances that hold for the bulk of the scene.
   [[nodiscard]] const RayOffsets& bulk_offsets() const noexcept { return offsets_; }
 

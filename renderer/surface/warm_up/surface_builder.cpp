@@ -115,10 +115,10 @@ void Builder::make_patches() {
     SurfacePatch patch;
     patch.mesh = instance.mesh;
     patch.object = instance.object;
-    patch.mover = in_.mover_of_object[instance.object];
+    patch.entity = in_.entity_of_object[instance.object];
     // Static patches lie in rel axes, and those of entities lie in the axes of their body.
     glm::dmat4 rel_from_mesh = instance.body_from_mesh;
-    if (patch.mover < 0) {
+    if (patch.entity < 0) {
       rel_from_mesh = instance.world_from_mesh;
       rel_from_mesh[3] -= glm::dvec4(in_.rays.origin_world_m(), 0.0);
     }
@@ -129,9 +129,9 @@ void Builder::make_patches() {
       patch.back = std::make_unique<SurfacePatch>();
       patch.back->mesh = patch.mesh;
       patch.back->object = patch.object;
-      patch.back->mover = patch.mover;
+      patch.back->entity = patch.entity;
     }
-    patch.begin(in_.record.size(), !in_.movers_now.empty(), sampler_.keeps_sent());
+    patch.begin(in_.record.size(), !in_.entities_now.empty(), sampler_.keeps_sent());
     patches_of_mesh_[patch.mesh].push_back(static_cast<std::uint32_t>(patches_.size()));
     sample_count_ += samples_of(patch.mesh);
     patches_.push_back(std::move(patch));
@@ -188,13 +188,13 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         const glm::vec3 unit_inward = length > 0.0F ? inward / length : glm::vec3(0.0F);
         const glm::vec3 drawn_m(patch.rel_from_mesh * glm::vec4(vertices[v].position_m, 1.0F));
         const glm::vec3 off_edge_m =
-            sampler_.tracer().offsets(drawn_m, patch.mover).around_m * unit_inward;
+            sampler_.tracer().offsets(drawn_m, patch.entity).around_m * unit_inward;
         const auto to_rel = [&](const glm::vec3& at_m) {
           return glm::vec3(patch.rel_from_mesh * glm::vec4(at_m, 1.0F)) + off_edge_m;
         };
         sample.position_m = to_rel(place_m_[v]);
         sample.normal = glm::normalize(patch.normal_from_mesh * vertices[v].normal);
-        sample.mover = patch.mover;
+        sample.entity = patch.entity;
         sample.material = vertices[v].material;
         // Let the sample of a sheet's other face stand at the same place.
         if (in_.materials[sample.material].sheet) {
@@ -394,7 +394,7 @@ physics::Result<SurfaceModel> Builder::run() {
   const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
   SampleHistories histories = take_histories(in_, std::move(patches_), model_);
   const ExchangeOptions exchange_options{.sweeps = sampler_.keeps_sent() ? kExchangeSweeps : 0,
-                                         .glow = options_.exchange};
+                                         .exitance = options_.exchange};
   if (!exchange(in_, exchange_options, std::move(histories), model_, exchanged)) return stopped();
   replace_covered();
   return std::move(model_);

@@ -8,7 +8,7 @@
 #include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/sheet_sides.hpp"
-#include "surface/model/mover_glow.hpp"
+#include "surface/model/entity_exitance.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -87,8 +87,8 @@ class Sweeper {
   [[nodiscard]] SampleDrive drive(std::size_t s, const glm::vec3& normal,
                                   std::size_t j) const noexcept;
   /// Adds the radiation of the entity that hides most of the sample's sky in interval j.
-  void add_glow(std::size_t s, const glm::vec3& normal, std::size_t j,
-                SampleDrive& drive) const noexcept;
+  void add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j,
+                    SampleDrive& drive) const noexcept;
   /// Integrates sample `s`, and the other face of a sheet with it, over the record.
   void carry(std::uint32_t s);
 
@@ -102,8 +102,8 @@ class Sweeper {
   std::vector<SentRow<float>> before_;  ///< by sample: what it sent in the latest sweep
   std::vector<SentRow<float>> after_;   ///< by sample: what it sends in this sweep
   SeenRadiation seen_;
-  MoverGlow glow_;
-  std::vector<MoverFaces> faces_;  ///< by node, then entity; empty without exchange or entities
+  EntityExitance exitance_;
+  std::vector<EntityFaces> faces_;  ///< by node, then entity; empty without exchange or entities
 };
 
 Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
@@ -116,9 +116,9 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
       second_(SentRow<float>::length(intervals_)),
       seen_(model.samples, 2 * intervals_ + 1) {
   for (const SampleHistories::Rows& rows : histories_.rows) before_.emplace_back(rows.sent_w_m2);
-  if (options.glow && !inputs.movers_now.empty()) {
-    glow_ = MoverGlow(model, inputs.geometry, inputs.mover_of_object);
-    faces_.resize(inputs.movers_now.size() * nodes_);
+  if (options.exitance && !inputs.entities_now.empty()) {
+    exitance_ = EntityExitance(model, inputs.geometry, inputs.entity_of_object);
+    faces_.resize(inputs.entities_now.size() * nodes_);
     measure_faces();
   }
   // Find the samples that sweeps change. They need a second row; the others keep theirs.
@@ -139,13 +139,13 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
 }
 
 void Sweeper::measure_faces() {
-  const std::size_t movers = faces_.size() / nodes_;
+  const std::size_t entities = faces_.size() / nodes_;
   threads::parallel_parts(faces_.empty() ? 0 : nodes_, 1, [&](std::size_t from, std::size_t to) {
     for (std::size_t j = from; j < to; ++j) {
-      glow_.measure(
+      exitance_.measure(
           model_.samples, in_.record.rays[std::min(j, intervals_ - 1)],
           [&](std::size_t s) { return before_[s].longwave_w_m2(j); },
-          std::span(faces_).subspan(j * movers, movers));
+          std::span(faces_).subspan(j * entities, entities));
     }
   });
 }
@@ -185,18 +185,18 @@ SampleDrive Sweeper::drive(std::size_t s, const glm::vec3& normal, std::size_t j
     drive.longwave_end_w_m2 = scale * received_w_m2[j + 1];
     drive.shortwave_w_m2 = scale * received_w_m2[nodes_ + j];
   }
-  add_glow(s, normal, j, drive);
+  add_exitance(s, normal, j, drive);
   return drive;
 }
 
-void Sweeper::add_glow(std::size_t s, const glm::vec3& normal, std::size_t j,
-                       SampleDrive& drive) const noexcept {
+void Sweeper::add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j,
+                           SampleDrive& drive) const noexcept {
   if (faces_.empty() || drive.hidden_sky_frac == 0.0F) return;
-  const std::size_t mover = histories_.rows[s].hidden_sky[j].mover;
-  const std::size_t movers = faces_.size() / nodes_;
+  const std::size_t entity = histories_.rows[s].hidden_sky[j].entity;
+  const std::size_t entities = faces_.size() / nodes_;
   // Leave the surroundings in place if no face of the entity looks towards the surface.
-  const float begin_w_m2 = faces_[j * movers + mover].towards_w_m2(normal);
-  const float end_w_m2 = faces_[(j + 1) * movers + mover].towards_w_m2(normal);
+  const float begin_w_m2 = faces_[j * entities + entity].towards_w_m2(normal);
+  const float end_w_m2 = faces_[(j + 1) * entities + entity].towards_w_m2(normal);
   if (begin_w_m2 < 0.0F || end_w_m2 < 0.0F) return;
   const double hidden_frac = model_.samples.samples[s].sky_frac * drive.hidden_sky_frac;
   drive.longwave_begin_w_m2 += hidden_frac * begin_w_m2;

@@ -39,7 +39,7 @@ inline constexpr std::uint32_t kExchangeSweeps = 3;
 /// Options of exchange().
 struct ExchangeOptions {
   std::uint32_t sweeps = kExchangeSweeps;
-  bool glow = true;  ///< entities send long-wave radiation to the surfaces whose sky they hide
+  bool exitance = true;  ///< entities send long-wave radiation to the surfaces whose sky they hide
 };
 
 /// Integrates all samples over the record several times, each time with the radiation and the heat

@@ -67,12 +67,12 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
   // Leave out a sample around which the surface is a plane as far as the rays below would look.
   if (own.flat_m > kFlatReaches * reach_m) return;
   // Look at the sample's own body alone, in the axes of the body.
-  std::vector<MoverPlacement> alone(in_.movers_now.size());
-  for (MoverPlacement& place : alone) place.on = false;
-  CasterSelection selection{own.mover < 0, {}};
-  if (own.mover >= 0) {
-    alone[static_cast<std::size_t>(own.mover)] = {};
-    selection.movers = alone;
+  std::vector<EntityPlacement> alone(in_.entities_now.size());
+  for (EntityPlacement& place : alone) place.on = false;
+  CasterSelection selection{own.entity < 0, {}};
+  if (own.entity >= 0) {
+    alone[static_cast<std::size_t>(own.entity)] = {};
+    selection.entities = alone;
   }
   // Take the offset of the place in the body's axes: float32 resolves more there than where the
   // body stands.
@@ -100,7 +100,7 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
     Found found;
     found.sample.position_m = at_m;
     found.sample.normal = m;
-    found.sample.mover = own.mover;
+    found.sample.entity = own.entity;
     found.sample.material = own.material;
     for (const scene::Submesh& submesh : mesh.submeshes) {
       if (3 * hit[0].triangle >= submesh.first_index &&
@@ -171,7 +171,7 @@ void PartnerFinder::append(std::vector<SurfacePatch>& patches) const {
   const std::size_t count = partners.samples.size();
   std::vector<SurfaceSample> samples = std::move(partners.samples);
   partners.samples = {};
-  partners.begin(in_.record.size(), !in_.movers_now.empty(), sampler_.keeps_sent());
+  partners.begin(in_.record.size(), !in_.entities_now.empty(), sampler_.keeps_sent());
   partners.grow(count);
   partners.samples = std::move(samples);
   threads::parallel_parts(count, kGrain, [&](std::size_t from, std::size_t to) {

@@ -120,20 +120,21 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
   // Let an entity see the world from where it stands now, and its own hull always. If it is far off
   // it sees its hull alone, because float32 would not resolve the hull there.
   const bool far_off =
-      sample.mover >= 0 &&
-      glm::length(in_.movers_now[static_cast<std::size_t>(sample.mover)].position_m) > kMaxWorldM;
+      sample.entity >= 0 &&
+      glm::length(in_.entities_now[static_cast<std::size_t>(sample.entity)].position_m) >
+          kMaxWorldM;
   const float offset_m = far_off ? tracer_.bulk_offsets().around_m
-                                 : tracer_.offsets(sample.position_m, sample.mover).around_m;
+                                 : tracer_.offsets(sample.position_m, sample.entity).around_m;
   ViewPoint point{sample.position_m, sample.normal, stand.inward, offset_m};
   ViewPoint drawn{stand.drawn_m, sample.normal, stand.inward, offset_m};
-  std::array<MoverPlacement, 1> self;
+  std::array<EntityPlacement, 1> self;
   CasterSelection selection{true, {}};
-  std::vector<MoverPlacement> placed;
-  if (sample.mover >= 0) {
-    placed.assign(in_.movers_now.begin(), in_.movers_now.end());
-    MoverPlacement& own = placed[static_cast<std::size_t>(sample.mover)];
+  std::vector<EntityPlacement> placed;
+  if (sample.entity >= 0) {
+    placed.assign(in_.entities_now.begin(), in_.entities_now.end());
+    EntityPlacement& own = placed[static_cast<std::size_t>(sample.entity)];
     if (far_off) {
-      for (MoverPlacement& place : placed) place.on = false;
+      for (EntityPlacement& place : placed) place.on = false;
       own.position_m = glm::vec3(0.0F);
       selection.fixed = false;
     }
@@ -143,7 +144,7 @@ void PatchSampler::look_around(SurfacePatch& patch, std::uint32_t index,
       each->normal = own.rel_from_body * each->normal;
       each->inward = own.rel_from_body * each->inward;
     }
-    selection.movers = placed;
+    selection.entities = placed;
   }
   // Find the open shares.
   const ViewShares open = sky_.shares(in_.rays, point, selection);
@@ -324,12 +325,12 @@ void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const Samp
   integrate(patch, index, memo);
 }
 
-void SurfacePatch::begin(std::size_t intervals, bool movers, bool keeps_sent) {
+void SurfacePatch::begin(std::size_t intervals, bool entities, bool keeps_sent) {
   EMIT_CHECK(samples.empty());
   sun_frac = RowStore<float>(intervals);
-  hidden_sky = RowStore<HiddenSky>(movers ? intervals : 0);
+  hidden_sky = RowStore<HiddenSky>(entities ? intervals : 0);
   sent = SentHistory(keeps_sent ? SentRow<float>::length(intervals) : 0);
-  if (back) back->begin(intervals, movers, keeps_sent);
+  if (back) back->begin(intervals, entities, keeps_sent);
 }
 
 void SurfacePatch::grow(std::size_t vertices) {

@@ -29,7 +29,7 @@ struct SeenPlace {
 struct SurfacePatch {
   std::uint32_t mesh = 0;
   std::uint32_t object = 0;
-  std::int32_t mover = -1;
+  std::int32_t entity = -1;
   glm::mat4 rel_from_mesh{1.0F};  ///< body_from_mesh for entities
   glm::mat3 normal_from_mesh{1.0F};
 
@@ -57,7 +57,7 @@ struct SurfacePatch {
 
   /// Sets the number of intervals that rows hold, whether there are entities, and whether `sent`
   /// is stored. @pre the patch has no vertices
-  void begin(std::size_t intervals, bool movers, bool keeps_sent);
+  void begin(std::size_t intervals, bool entities, bool keeps_sent);
   /// Makes room for the samples of `vertices` vertices in all. @pre begin()
   void grow(std::size_t vertices);
   /// Frees everything but sun_frac, hidden_sky and sent, on both sides of sheets.
@@ -92,7 +92,7 @@ class PatchSampler {
     SampleState state;
   };
 
-  /// Evaluates sample `index` and its other face. Position, normal, material and mover must stand
+  /// Evaluates sample `index` and its other face. Position, normal, material and entity must stand
   /// in patch.samples already. Everything that the sample sees counts as surroundings here.
   void evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand,
                 StartMemo& memo) const;

@@ -121,7 +121,7 @@ SurfaceRefinement::SurfaceRefinement(const SurfaceInputs& inputs,
         {glm::vec3(eye.world_m - inputs.rays.origin_world_m()), glm::vec3(eye.boresight)});
   }
   for (const std::vector<glm::vec3>& way_m : inputs.ways_m) {
-    std::vector<Eye>& eyes = eyes_of_mover_.emplace_back();
+    std::vector<Eye>& eyes = eyes_of_entity_.emplace_back();
     for (const Eye& eye : eyes_) {
       eyes.push_back({when_in_view(eye.rel_m, eye.boresight, way_m), eye.boresight});
     }
@@ -169,7 +169,7 @@ SurfaceRefinement::Width SurfaceRefinement::width(const std::array<glm::vec3, 3>
 
 bool SurfaceRefinement::seen(const std::array<glm::vec3, 3>& corners_m, const RefinedMesh& refined,
                              std::uint32_t slot, const SurfacePatch& patch) const {
-  if (patch.mover >= 0) return true;
+  if (patch.entity >= 0) return true;
   const glm::vec3 centre_m = (corners_m[0] + corners_m[1] + corners_m[2]) / 3.0F;
   const glm::vec3 across = glm::cross(corners_m[1] - corners_m[0], corners_m[2] - corners_m[0]);
   const float area = glm::length(across);
@@ -232,7 +232,7 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
   const float length = glm::length(normal);
   if (!(length > 0.0F)) return 0.0F;
   face.normal = normal / length;
-  face.mover = patch.mover;
+  face.entity = patch.entity;
   face.material = a.material;
   // Spread points evenly (R2 sequence, Roberts 2018), at other places in every leaf.
   constexpr float kStepU = 0.7548776662F;
@@ -250,7 +250,7 @@ float SurfaceRefinement::missed_shade_k(const RefinedMesh& refined, std::uint32_
     points_m[k] = (1.0F - u - v) * a.position_m + u * b.position_m + v * c.position_m;
   }
   float sun_offset_m = offsets_.sun_m;
-  if (patch.mover < 0) sun_offset_m = offsets_.at(a.position_m).sun_m;
+  if (patch.entity < 0) sun_offset_m = offsets_.at(a.position_m).sun_m;
   std::array<float, kPacketRays> missed_k{};
   for (std::size_t i = 0; i < count; ++i) {
     const IntervalRays& rays = in_.record.rays[i];
@@ -283,18 +283,18 @@ SurfaceRefinement::Judged SurfaceRefinement::need(const RefinedMesh& refined, st
   for (std::size_t i = 0; i < 3; ++i) {
     // Take the vertices, because the samples' own places are moved off edges.
     corners_m[i] = glm::vec3(patch.rel_from_mesh * glm::vec4(vertices[leaf[i]].position_m, 1.0F));
-    if (patch.mover >= 0) {
-      const MoverPlacement& place = in_.movers_now[static_cast<std::size_t>(patch.mover)];
+    if (patch.entity >= 0) {
+      const EntityPlacement& place = in_.entities_now[static_cast<std::size_t>(patch.entity)];
       corners_m[i] = place.rel_from_body * corners_m[i] + place.position_m;
     }
   }
   const float longest_m = std::max({glm::distance(corners_m[0], corners_m[1]),
                                     glm::distance(corners_m[1], corners_m[2]),
                                     glm::distance(corners_m[2], corners_m[0])});
-  const auto mover = static_cast<std::size_t>(patch.mover);
-  const bool goes = patch.mover >= 0 && mover < eyes_of_mover_.size();
+  const auto entity = static_cast<std::size_t>(patch.entity);
+  const bool goes = patch.entity >= 0 && entity < eyes_of_entity_.size();
   const Width width =
-      this->width(corners_m, longest_m, body_m, goes ? eyes_of_mover_[mover] : eyes_);
+      this->width(corners_m, longest_m, body_m, goes ? eyes_of_entity_[entity] : eyes_);
   const float edge_px = width.finer * width.edge_px;
   Judged judged{refined.node(slot), 0.0F, width.in_view_px > 0.0F};
   // Leave alone what is narrow enough, and what has a prescribed temperature.

@@ -96,7 +96,7 @@ class SurfaceRefinement {
   std::vector<Eye> eyes_;
   /// Places of the camera relative to each entity where its script brings it closest to the
   /// middle of the image, moved so that the entity may stay where it is.
-  std::vector<std::vector<Eye>> eyes_of_mover_;
+  std::vector<std::vector<Eye>> eyes_of_entity_;
   std::vector<float> body_m_;  ///< by instance: width of its body
   float pixel_rad_ = 1e-3F;
   float field_rad_ = 0.0F;

@@ -20,9 +20,9 @@ constexpr std::int64_t kMovingStepNs = 500'000'000;
 constexpr std::uint32_t kFirstRays = 16;
 /// Distance beyond which a moving entity leaves a point's view of the sky unchanged. A nearer one
 /// may move and turn by the two values below.
-constexpr double kMoverReachM = 25.0;
-constexpr double kMoverShiftM = 0.25;
-constexpr double kMoverTurnCos = 0.9998;  // of half the angle
+constexpr double kEntityReachM = 25.0;
+constexpr double kEntityShiftM = 0.25;
+constexpr double kEntityTurnCos = 0.9998;  // of half the angle
 
 bool same_place(const physics::Pose& a, const physics::Pose& b, double shift_m, double turn_cos) {
   return glm::distance(a.position_world_m, b.position_world_m) <= shift_m &&
@@ -52,14 +52,14 @@ ConvergedViews::ConvergedViews(const reference::RayScene& scene, std::int64_t st
 }
 
 bool ConvergedViews::moves(std::int64_t from_ns, std::int64_t to_ns) const {
-  const auto movers = static_cast<std::uint32_t>(scene_.desc().movers.size());
-  if (movers == 0) return false;
+  const auto entities = static_cast<std::uint32_t>(scene_.desc().entities.size());
+  if (entities == 0) return false;
   const reference::SceneInstant here = scene_.at(from_ns);
   for (int part = 1; part <= 4; ++part) {
     const reference::SceneInstant there = scene_.at(from_ns + (to_ns - from_ns) * part / 4);
-    for (std::uint32_t m = 0; m < movers; ++m) {
-      if (here.mover_on(m) != there.mover_on(m) ||
-          !same_place(here.mover_pose(m), there.mover_pose(m), 1e-3, 1.0 - 1e-9)) {
+    for (std::uint32_t m = 0; m < entities; ++m) {
+      if (here.entity_on(m) != there.entity_on(m) ||
+          !same_place(here.entity_pose(m), there.entity_pose(m), 1e-3, 1.0 - 1e-9)) {
         return true;
       }
     }
@@ -95,14 +95,14 @@ ConvergedViews::Placed ConvergedViews::placed(const PixelSurface& point, std::si
   out.point.position_world_m = point.position_m;
   out.point.normal = point.shading_normal;
   out.point.tolerance_m = 1e-9 * (1.0 + glm::length(point.position_m));
-  if (point.mover == reference::kNoMover) return out;
-  const physics::Pose& now = instants_.back().mover_pose(point.mover);
-  const physics::Pose& then = instants_[node].mover_pose(point.mover);
+  if (point.entity == reference::kNoEntity) return out;
+  const physics::Pose& now = instants_.back().entity_pose(point.entity);
+  const physics::Pose& then = instants_[node].entity_pose(point.entity);
   const glm::dquat then_from_now = then.world_from_body * glm::conjugate(now.world_from_body);
   out.point.position_world_m =
       then.position_world_m + then_from_now * (point.position_m - now.position_world_m);
   out.point.normal = then_from_now * point.shading_normal;
-  out.absent = !instants_[node].mover_on(point.mover);
+  out.absent = !instants_[node].entity_on(point.entity);
   return out;
 }
 
@@ -141,15 +141,15 @@ void ConvergedViews::fill_sun(const PixelSurface& point, const ConvergedModel& m
 
 bool ConvergedViews::same_surroundings(const PixelSurface& point, const glm::dvec3& position_m,
                                        std::size_t a, std::size_t b) const {
-  for (std::uint32_t m = 0; m < scene_.desc().movers.size(); ++m) {
-    const physics::Pose& before = instants_[a].mover_pose(m);
-    const physics::Pose& after = instants_[b].mover_pose(m);
-    const bool near = m == point.mover ||
+  for (std::uint32_t m = 0; m < scene_.desc().entities.size(); ++m) {
+    const physics::Pose& before = instants_[a].entity_pose(m);
+    const physics::Pose& after = instants_[b].entity_pose(m);
+    const bool near = m == point.entity ||
                       std::min(glm::distance(before.position_world_m, position_m),
-                               glm::distance(after.position_world_m, position_m)) < kMoverReachM;
+                               glm::distance(after.position_world_m, position_m)) < kEntityReachM;
     if (!near) continue;
-    if (instants_[a].mover_on(m) != instants_[b].mover_on(m) ||
-        !same_place(before, after, kMoverShiftM, kMoverTurnCos)) {
+    if (instants_[a].entity_on(m) != instants_[b].entity_on(m) ||
+        !same_place(before, after, kEntityShiftM, kEntityTurnCos)) {
       return false;
     }
   }

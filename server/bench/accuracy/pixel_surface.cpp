@@ -31,7 +31,7 @@ PixelSurface trace_pixel(const reference::SceneInstant& scene, const reference::
   pixel.surface = true;
   pixel.object = hit->object;
   pixel.material = hit->material;
-  pixel.mover = hit->mover;
+  pixel.entity = hit->entity;
   pixel.distance_m = hit->distance_m;
   pixel.position_m = hit->position_world_m;
   pixel.normal = hit->front ? hit->geometric_normal : -hit->geometric_normal;

@@ -13,7 +13,7 @@ struct PixelSurface {
   bool surface = false;  ///< false: sky
   std::uint32_t object = 0;
   std::uint32_t material = 0;
-  std::uint32_t mover = reference::kNoMover;
+  std::uint32_t entity = reference::kNoEntity;
   double distance_m = 0.0;  ///< along the ray
   glm::dvec3 position_m{0.0};
   glm::dvec3 normal{0.0};          ///< of the face, towards the camera

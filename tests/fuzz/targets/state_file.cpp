@@ -49,7 +49,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     std::memcpy(&wanted.start_ns, file.data() + kInstantAt, sizeof wanted.start_ns);
   }
   const auto model =
-      renderer::read_state(fuzz::file_of(file), wanted, geometry, fuzz::kMovers, options);
+      renderer::read_state(fuzz::file_of(file), wanted, geometry, fuzz::kEntities, options);
   if (!model) return 0;
   fuzz::require(model->meshes.size() == geometry.meshes.size(), "a mesh for every mesh");
   for (const renderer::RefinedMesh& mesh : model->meshes) {

@@ -15,12 +15,12 @@ using renderer::ShadeTiles;
 
 /// Rectangles of both kinds.
 struct Rectangles {
-  std::vector<glm::uvec4> pages;
+  std::vector<glm::uvec4> exposure_tiles;
   std::vector<glm::uvec4> shadow_maps;
 };
 
 /// Random rectangles within a window.
-Rectangles random_rectangles(const glm::uvec4& window_px, std::size_t pages,
+Rectangles random_rectangles(const glm::uvec4& window_px, std::size_t exposure_tiles,
                              std::size_t shadow_maps, std::uint32_t seed) {
   std::mt19937 random(seed);
   const auto within = [&](std::uint32_t first, std::uint32_t behind) {
@@ -35,7 +35,7 @@ Rectangles random_rectangles(const glm::uvec4& window_px, std::size_t pages,
     return glm::uvec4(left, low, right, high);
   };
   Rectangles out;
-  for (std::size_t i = 0; i < pages; ++i) out.pages.push_back(rectangle());
+  for (std::size_t i = 0; i < exposure_tiles; ++i) out.exposure_tiles.push_back(rectangle());
   for (std::size_t i = 0; i < shadow_maps; ++i) out.shadow_maps.push_back(rectangle());
   return out;
 }
@@ -43,7 +43,7 @@ Rectangles random_rectangles(const glm::uvec4& window_px, std::size_t pages,
 /// Sorts rectangles into screen tiles.
 void sort(ShadeTiles& tiles, const glm::uvec4& window_px, const Rectangles& rectangles) {
   tiles.begin(window_px);
-  for (const glm::uvec4& px : rectangles.pages) tiles.add_page(px);
+  for (const glm::uvec4& px : rectangles.exposure_tiles) tiles.add_exposure_tile(px);
   for (const glm::uvec4& px : rectangles.shadow_maps) tiles.add_entity_shadow(px);
   tiles.sort();
 }
@@ -76,15 +76,16 @@ void expect_every_pixel_finds_its_own(const ShadeTiles& tiles, const glm::uvec4&
         const glm::uvec2 place(tile.place_px & 0xffffU, tile.place_px >> 16U);
         if (!lies_in(px, glm::uvec4(place, place + tile_px))) continue;
         ++found;
-        const auto entries = tiles.entries().subspan(tile.first, tile.pages + tile.shadow_maps);
-        expect_named(entries.first(tile.pages), px, rectangles.pages);
-        expect_named(entries.subspan(tile.pages), px, rectangles.shadow_maps);
+        const auto entries =
+            tiles.entries().subspan(tile.first, tile.exposure_tiles + tile.shadow_maps);
+        expect_named(entries.first(tile.exposure_tiles), px, rectangles.exposure_tiles);
+        expect_named(entries.subspan(tile.exposure_tiles), px, rectangles.shadow_maps);
       }
       const auto in_any = [&](const std::vector<glm::uvec4>& all) {
         return std::ranges::any_of(all, [&](const glm::uvec4& each) { return lies_in(px, each); });
       };
       EXPECT_LE(found, 1U);
-      const bool reached = in_any(rectangles.pages) || in_any(rectangles.shadow_maps);
+      const bool reached = in_any(rectangles.exposure_tiles) || in_any(rectangles.shadow_maps);
       EXPECT_GE(found, reached ? 1U : 0U);
     }
   }
@@ -108,7 +109,7 @@ TEST(ShadeTiles, SquaresThatNothingReachesAreLeftOut) {
        {{{kPx, kPx, 3 * kPx, 2 * kPx}}, {{2 * kPx, kPx, 2 * kPx + 1, kPx + 1}}});
   ASSERT_EQ(tiles.tiles().size(), 2U);
   EXPECT_EQ(tiles.tiles()[0].place_px, kPx | kPx << 16U);
-  EXPECT_EQ(tiles.tiles()[0].pages, 1U);
+  EXPECT_EQ(tiles.tiles()[0].exposure_tiles, 1U);
   EXPECT_EQ(tiles.tiles()[0].shadow_maps, 0U);
   EXPECT_EQ(tiles.tiles()[1].place_px, 2 * kPx | kPx << 16U);
   EXPECT_EQ(tiles.tiles()[1].shadow_maps, 1U);
@@ -130,17 +131,17 @@ TEST(ShadeTiles, LargePicturesHaveLargerSquares) {
 TEST(ShadeTiles, WhereEntriesRunOutSquaresAreLargerAndNothingIsLost) {
   const glm::uvec4 window_px(0, 0, 640, 512);
   Rectangles rectangles;
-  rectangles.pages.assign(128, window_px);
+  rectangles.exposure_tiles.assign(128, window_px);
   rectangles.shadow_maps.assign(60'000, window_px);
-  const std::size_t records = rectangles.pages.size() + rectangles.shadow_maps.size();
+  const std::size_t records = rectangles.exposure_tiles.size() + rectangles.shadow_maps.size();
   ShadeTiles tiles(records);
   sort(tiles, window_px, rectangles);
   std::size_t entries = 0;
-  for (const auto& tile : tiles.tiles()) entries += tile.pages + tile.shadow_maps;
+  for (const auto& tile : tiles.tiles()) entries += tile.exposure_tiles + tile.shadow_maps;
   EXPECT_LE(tiles.entries().size(), ShadeTiles::max_entries(records));
   EXPECT_EQ(entries, tiles.entries().size());
   ASSERT_EQ(tiles.tiles().size(), 1U);
-  EXPECT_EQ(tiles.tiles()[0].pages, 128U);
+  EXPECT_EQ(tiles.tiles()[0].exposure_tiles, 128U);
   EXPECT_EQ(tiles.tiles()[0].shadow_maps, 60'000U);
 }
 

@@ -10,8 +10,8 @@
 namespace emit {
 namespace {
 
+using reference::RayEntity;
 using reference::RayMesh;
-using reference::RayMover;
 using reference::SurfacePoint;
 using test::box_mesh;
 using test::ground_mesh;
@@ -22,27 +22,27 @@ constexpr std::int64_t kSecondNs = 1'000'000'000;
 
 /// Returns a level box that drives east at 1 m/s from `start`. The box is in body axes (x forward,
 /// z down).
-RayMover driving_east(const glm::dvec3& start) {
+RayEntity driving_east(const glm::dvec3& start) {
   const glm::dquat east = physics::world_from_body_heading_pitch_roll(0.5 * physics::kPi, 0.0, 0.0);
-  RayMover mover{.entity_id = 5};
-  mover.poses.push_back({.sim_time_ns = 0, .pose = {start, east}});
-  mover.poses.push_back(
+  RayEntity entity{.entity_id = 5};
+  entity.poses.push_back({.sim_time_ns = 0, .pose = {start, east}});
+  entity.poses.push_back(
       {.sim_time_ns = 10 * kSecondNs, .pose = {start + glm::dvec3(10.0, 0.0, 0.0), east}});
-  mover.poses.push_back({.sim_time_ns = 20 * kSecondNs,
-                         .pose = {start + glm::dvec3(10.0, 0.0, 0.0), east},
-                         .on = false});
-  return mover;
+  entity.poses.push_back({.sim_time_ns = 20 * kSecondNs,
+                          .pose = {start + glm::dvec3(10.0, 0.0, 0.0), east},
+                          .on = false});
+  return entity;
 }
 
-class Movers : public testing::TestWithParam<glm::dvec3> {};
-INSTANTIATE_TEST_SUITE_P(Places, Movers,
+class Entities : public testing::TestWithParam<glm::dvec3> {};
+INSTANTIATE_TEST_SUITE_P(Places, Entities,
                          testing::Values(glm::dvec3(0.0), glm::dvec3(1e5, -1e5, 512.0)));
 
-TEST_P(Movers, ShadeWhereTheyStoodAtTheInstant) {
+TEST_P(Entities, ShadeWhereTheyStoodAtTheInstant) {
   RayMesh ground = ground_mesh(50.0);
   test::move(ground, GetParam());
   RayMesh body = box_mesh({-2.0, -1.0, -1.5}, {2.0, 1.0, -0.5});
-  body.mover = 0;
+  body.entity = 0;
   body.object = 1;
   const auto scene = make_scene({ground, body}, {driving_east(GetParam())});
   const auto up = [&](double east_m, std::int64_t time_ns) {
@@ -60,25 +60,25 @@ TEST_P(Movers, ShadeWhereTheyStoodAtTheInstant) {
   EXPECT_NEAR(up(5.0, 3 * kSecondNs), 0.5, 5e-3);  // the front edge is right overhead
   EXPECT_EQ(up(10.0, 15 * kSecondNs), 0.0);        // the box is parked
   EXPECT_EQ(up(10.0, 20 * kSecondNs), 1.0);        // the box is switched off
-  EXPECT_FALSE(scene.at(20 * kSecondNs).mover_on(0));
+  EXPECT_FALSE(scene.at(20 * kSecondNs).entity_on(0));
 
   const auto hit =
       scene.at(4 * kSecondNs).first_hit({GetParam() + glm::dvec3(4.5, 0.25, 0.0), {0.0, 0.0, 1.0}});
   ASSERT_TRUE(hit.has_value());
-  EXPECT_EQ(hit->mover, 0U);
+  EXPECT_EQ(hit->entity, 0U);
   EXPECT_EQ(hit->object, 1U);
   EXPECT_NEAR(hit->distance_m, 0.5, 1e-9);
   EXPECT_NEAR(hit->geometric_normal.z, -1.0, 1e-12);  // the underside was hit
 }
 
-TEST_P(Movers, DoNotShadeTheirOwnOutside) {
+TEST_P(Entities, DoNotShadeTheirOwnOutside) {
   RayMesh body = box_mesh({-2.0, -1.0, -1.5}, {2.0, 1.0, -0.5});
-  body.mover = 0;
+  body.entity = 0;
   const auto scene = make_scene({body}, {driving_east(GetParam())});
   for (int second = 0; second < 10; ++second) {
     const auto now = scene.at(second * kSecondNs + 123'456'789);
     const glm::dvec3 roof_body{0.7 - 0.1 * second, 0.3, -1.5};
-    const auto& pose = now.mover_pose(0);
+    const auto& pose = now.entity_pose(0);
     const SurfacePoint roof{.position_world_m = pose.position_world_m +
                                                 glm::mat3_cast(pose.world_from_body) * roof_body,
                             .normal = {0.0, 0.0, 1.0}};
@@ -99,7 +99,7 @@ std::vector<SurfacePoint> ground_points() {
 
 TEST(ReferenceVisibilityThreads, AnswersDoNotDependOnTheirNumber) {
   RayMesh body = test::sphere_mesh(1.2, 12, 20, 0.2);
-  body.mover = 0;
+  body.entity = 0;
   const auto scene =
       make_scene({ground_mesh(20.0), box_mesh({-1.0, -1.0, 0.0}, {1.0, 1.0, 2.0})}, {});
   const auto moving =

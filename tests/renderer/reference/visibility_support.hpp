@@ -18,9 +18,9 @@
 namespace emit::test {
 
 inline reference::RayScene make_scene(
-    std::vector<reference::RayMesh> meshes, std::vector<reference::RayMover> movers = {},
+    std::vector<reference::RayMesh> meshes, std::vector<reference::RayEntity> entities = {},
     reference::RayArithmetic arithmetic = reference::RayArithmetic::exact) {
-  auto scene = reference::RayScene::create({std::move(meshes), std::move(movers)}, arithmetic);
+  auto scene = reference::RayScene::create({std::move(meshes), std::move(entities)}, arithmetic);
   if (!scene) throw std::runtime_error(scene.error().text);
   return std::move(*scene);
 }

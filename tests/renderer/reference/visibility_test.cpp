@@ -303,9 +303,9 @@ TEST(ReferenceVisibility, RefusesMeshesThatMakeNoSense) {
   ASSERT_FALSE(wrong.has_value());
   EXPECT_NE(wrong.error().text.find("mesh 0: index 9"), std::string::npos) << wrong.error().text;
   mesh = ground_mesh(1.0);
-  mesh.mover = 0;
+  mesh.entity = 0;
   EXPECT_FALSE(reference::RayScene::create({{mesh}, {}}).has_value());
-  EXPECT_FALSE(reference::RayScene::create({{}, {reference::RayMover{}}}).has_value());
+  EXPECT_FALSE(reference::RayScene::create({{}, {reference::RayEntity{}}}).has_value());
   // A scene without geometry is valid: everything is open.
   const auto empty = make_scene({});
   EXPECT_EQ(empty.at(0).sky_view({.normal = {0.0, 0.0, 1.0}}, 64).sky_cosine.value_frac, 1.0);
@@ -365,7 +365,7 @@ TEST(Visibility, QueriesAgainstTheContractStopTheProgram) {
               now.sun_visible_frac(points, {0.0, 0.0, 1.0}, {}, false, seen);
             }).find("(3 == 4)"),
             std::string::npos);
-  EXPECT_NE(message_of([&] { (void)now.mover_pose(0); }).find("(0 < 0)"), std::string::npos);
+  EXPECT_NE(message_of([&] { (void)now.entity_pose(0); }).find("(0 < 0)"), std::string::npos);
   EXPECT_NE(message_of([&] { (void)now.triangle(0, 2); }).find("(2 < 2)"), std::string::npos);
   EXPECT_NE(message_of([&] { (void)now.triangle(1, 0); }).find("(1 < 1)"), std::string::npos);
 }

@@ -85,7 +85,7 @@ struct SurfaceScene {
   std::uint32_t add_static(scene::Mesh mesh, const glm::dvec3& position_m = glm::dvec3(0.0)) {
     return add_static(add_mesh(std::move(mesh)), glm::translate(glm::dmat4(1.0), position_m));
   }
-  std::uint32_t add_mover(scene::Mesh mesh, const glm::dmat4& body_from_mesh = glm::dmat4(1.0)) {
+  std::uint32_t add_entity(scene::Mesh mesh, const glm::dmat4& body_from_mesh = glm::dmat4(1.0)) {
     scene::Instance instance;
     instance.mesh = add_mesh(std::move(mesh));
     instance.entity_id = 100 + objects;

@@ -169,13 +169,13 @@ TEST(CliConverged, looking_coarse_to_fine_misses_no_shadow) {
 TEST(CliConverged, steps_are_cut_finer_while_a_caster_moves) {
   reference::RayMesh body = wall_on_ground();
   body.indices.erase(body.indices.begin(), body.indices.begin() + 6);
-  body.mover = 0;
-  reference::RayMover mover;
-  mover.poses.resize(2);
-  mover.poses[0].sim_time_ns = 3600 * kSecondNs;
-  mover.poses[1].sim_time_ns = 3610 * kSecondNs;
-  mover.poses[1].pose.position_world_m = {0.0, 40.0, 0.0};
-  const auto scene = reference::RayScene::create({{body}, {mover}});
+  body.entity = 0;
+  reference::RayEntity entity;
+  entity.poses.resize(2);
+  entity.poses[0].sim_time_ns = 3600 * kSecondNs;
+  entity.poses[1].sim_time_ns = 3610 * kSecondNs;
+  entity.poses[1].pose.position_world_m = {0.0, 40.0, 0.0};
+  const auto scene = reference::RayScene::create({{body}, {entity}});
   ASSERT_TRUE(scene.has_value());
   const ConvergedViews views(*scene, 0, kEndNs, {}, {});
   const auto nodes = views.nodes_ns();

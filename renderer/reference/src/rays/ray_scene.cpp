@@ -32,8 +32,8 @@ Result<void> check(const RaySceneDesc& desc) {
   const auto fail = [](std::string text) {
     return make_error(ErrorCode::invalid_argument, std::move(text));
   };
-  for (std::size_t i = 0; i < desc.movers.size(); ++i) {
-    if (desc.movers[i].poses.empty()) return fail(fmt::format("mover {} has no pose", i));
+  for (std::size_t i = 0; i < desc.entities.size(); ++i) {
+    if (desc.entities[i].poses.empty()) return fail(fmt::format("entity {} has no pose", i));
   }
   for (std::size_t i = 0; i < desc.meshes.size(); ++i) {
     const RayMesh& mesh = desc.meshes[i];
@@ -55,8 +55,8 @@ Result<void> check(const RaySceneDesc& desc) {
       return fail(fmt::format("mesh {}: {} materials for {} triangles", i, mesh.materials.size(),
                               triangles));
     }
-    if (mesh.mover != kNoMover && mesh.mover >= desc.movers.size()) {
-      return fail(fmt::format("mesh {}: mover {} of {}", i, mesh.mover, desc.movers.size()));
+    if (mesh.entity != kNoEntity && mesh.entity >= desc.entities.size()) {
+      return fail(fmt::format("mesh {}: entity {} of {}", i, mesh.entity, desc.entities.size()));
     }
   }
   return {};
@@ -67,26 +67,26 @@ Result<void> check(const RaySceneDesc& desc) {
 RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
                             const scene::SceneGeometry& geometry) {
   RaySceneDesc desc;
-  std::map<std::uint32_t, std::uint32_t> mover_of_object;
+  std::map<std::uint32_t, std::uint32_t> entity_of_object;
   for (std::size_t i = 0; i < geometry.instances.size(); ++i) {
     const scene::Instance& instance = geometry.instances[i];
     const scene::Mesh& mesh = geometry.meshes[instance.mesh];
     RayMesh out;
     out.object = instance.object;
     out.instance = static_cast<std::uint32_t>(i);
-    // Give every entity one mover, shared by its instances.
+    // Give every entity one entity, shared by its instances.
     if (instance.entity_id != 0) {
-      const auto [entry, added] = mover_of_object.try_emplace(
-          instance.object, static_cast<std::uint32_t>(desc.movers.size()));
+      const auto [entry, added] = entity_of_object.try_emplace(
+          instance.object, static_cast<std::uint32_t>(desc.entities.size()));
       if (added) {
         const scene::ObjectDesc& object = scenario.objects[instance.object];
-        RayMover mover{.entity_id = instance.entity_id, .poses = object.trajectory};
-        if (mover.poses.empty()) {
-          mover.poses.push_back({.pose = object.instances[instance.placement], .on = object.on});
+        RayEntity entity{.entity_id = instance.entity_id, .poses = object.trajectory};
+        if (entity.poses.empty()) {
+          entity.poses.push_back({.pose = object.instances[instance.placement], .on = object.on});
         }
-        desc.movers.push_back(std::move(mover));
+        desc.entities.push_back(std::move(entity));
       }
-      out.mover = entry->second;
+      out.entity = entry->second;
     }
     // Transform to the frame of the mesh: the body frame of an entity, else the world frame.
     const glm::dmat4& target_from_mesh =
@@ -129,10 +129,10 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
   impl->arithmetic = arithmetic;
 
   // Sort the triangles into sets: one for everything static, one per entity.
-  std::vector<RaySet::Builder> builders(1 + impl->desc.movers.size());
+  std::vector<RaySet::Builder> builders(1 + impl->desc.entities.size());
   for (std::size_t m = 0; m < impl->desc.meshes.size(); ++m) {
     const RayMesh& mesh = impl->desc.meshes[m];
-    RaySet::Builder& builder = builders[mesh.mover == kNoMover ? 0 : 1 + mesh.mover];
+    RaySet::Builder& builder = builders[mesh.entity == kNoEntity ? 0 : 1 + mesh.entity];
     for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i) {
       const std::array<glm::dvec3, 3> corners = {mesh.positions_m[mesh.indices[3 * i]],
                                                  mesh.positions_m[mesh.indices[3 * i + 1]],
@@ -153,7 +153,7 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
     if (i == 0) {
       impl->fixed = std::move(*set);
     } else {
-      impl->movers.push_back(std::move(*set));
+      impl->entities.push_back(std::move(*set));
     }
   }
   return RayScene(std::move(impl));
@@ -163,14 +163,14 @@ SceneInstant RayScene::at(std::int64_t sim_time_ns) const {
   auto instant = std::make_shared<SceneInstant::Impl>();
   instant->scene = impl_.get();
   // Place every entity at its pose and find the centre of its set.
-  for (std::size_t i = 0; i < impl_->movers.size(); ++i) {
+  for (std::size_t i = 0; i < impl_->entities.size(); ++i) {
     const scene::TrajectoryState state =
-        scene::trajectory_at(impl_->desc.movers[i].poses, sim_time_ns);
-    PlacedMover placed{.set = impl_->movers[i].get(), .pose = state.pose, .on = state.on};
+        scene::trajectory_at(impl_->desc.entities[i].poses, sim_time_ns);
+    PlacedEntity placed{.set = impl_->entities[i].get(), .pose = state.pose, .on = state.on};
     placed.world_from_body = glm::mat3_cast(glm::normalize(state.pose.world_from_body));
     placed.centre_world_m =
         state.pose.position_world_m + placed.world_from_body * placed.set->origin_m();
-    instant->movers.push_back(placed);
+    instant->entities.push_back(placed);
   }
   return SceneInstant(std::move(instant));
 }
@@ -187,13 +187,13 @@ std::size_t RayScene::dropped_triangles() const noexcept {
 
 // --- queries at one instant ----------------------------------------------------------------------
 
-const physics::Pose& SceneInstant::mover_pose(std::uint32_t mover) const {
-  EMIT_CHECK_OP(mover, <, impl_->movers.size());
-  return impl_->movers[mover].pose;
+const physics::Pose& SceneInstant::entity_pose(std::uint32_t entity) const {
+  EMIT_CHECK_OP(entity, <, impl_->entities.size());
+  return impl_->entities[entity].pose;
 }
-bool SceneInstant::mover_on(std::uint32_t mover) const {
-  EMIT_CHECK_OP(mover, <, impl_->movers.size());
-  return impl_->movers[mover].on;
+bool SceneInstant::entity_on(std::uint32_t entity) const {
+  EMIT_CHECK_OP(entity, <, impl_->entities.size());
+  return impl_->entities[entity].on;
 }
 
 SceneInstant::Corners SceneInstant::triangle(std::uint32_t mesh, std::uint32_t primitive) const {
@@ -203,9 +203,9 @@ SceneInstant::Corners SceneInstant::triangle(std::uint32_t mesh, std::uint32_t p
   std::array<glm::dvec3, 3> corners;
   for (std::size_t i = 0; i < 3; ++i) {
     corners[i] = source.positions_m[source.indices[3 * std::size_t{primitive} + i]];
-    if (source.mover != kNoMover) {
-      const PlacedMover& mover = impl_->movers[source.mover];
-      corners[i] = mover.pose.position_world_m + mover.world_from_body * corners[i];
+    if (source.entity != kNoEntity) {
+      const PlacedEntity& entity = impl_->entities[source.entity];
+      corners[i] = entity.pose.position_world_m + entity.world_from_body * corners[i];
     }
   }
   return {corners[0], corners[1], corners[2]};
@@ -231,19 +231,20 @@ PreparedRay SceneInstant::Impl::in_fixed(const Ray& ray) const noexcept {
           plane_m(ray.origin_world_m, ray.tolerance_m)};
 }
 
-PreparedRay SceneInstant::Impl::in_mover(const PlacedMover& mover, const Ray& ray) const noexcept {
+PreparedRay SceneInstant::Impl::in_entity(const PlacedEntity& entity,
+                                          const Ray& ray) const noexcept {
   // A product vector * matrix applies the transposed matrix, which is the inverse rotation.
-  return {(ray.origin_world_m - mover.pose.position_world_m) * mover.world_from_body -
-              mover.set->origin_m(),
-          ray.direction * mover.world_from_body, plane_m(ray.origin_world_m, ray.tolerance_m)};
+  return {(ray.origin_world_m - entity.pose.position_world_m) * entity.world_from_body -
+              entity.set->origin_m(),
+          ray.direction * entity.world_from_body, plane_m(ray.origin_world_m, ray.tolerance_m)};
 }
 
-bool SceneInstant::Impl::near(const PlacedMover& mover, const Ray& ray) const noexcept {
-  if (!mover.on || mover.set->empty()) return false;
+bool SceneInstant::Impl::near(const PlacedEntity& entity, const Ray& ray) const noexcept {
+  if (!entity.on || entity.set->empty()) return false;
   // Test the ray against the ball around the entity.
-  const glm::dvec3 to_centre = mover.centre_world_m - ray.origin_world_m;
+  const glm::dvec3 to_centre = entity.centre_world_m - ray.origin_world_m;
   const double distance2 = glm::dot(to_centre, to_centre);
-  const double radius_m = mover.set->radius_m() * 1.000001;
+  const double radius_m = entity.set->radius_m() * 1.000001;
   if (distance2 <= radius_m * radius_m) return true;
   const double along_m = glm::dot(to_centre, ray.direction);
   return along_m > 0.0 && distance2 - along_m * along_m <= radius_m * radius_m + 1e-9 * distance2;
@@ -258,18 +259,18 @@ std::uint32_t SceneInstant::Impl::blocked_16(std::span<const Ray> rays) const {
   for (std::size_t i = 0; i < rays.size(); ++i) prepared[i] = in_fixed(rays[i]);
   scene->fixed->occluded_16({prepared.data(), rays.size()}, blocked);
   // Test the remaining rays against the entities near them.
-  for (const PlacedMover& mover : movers) {
+  for (const PlacedEntity& entity : entities) {
     if (blocked == all) break;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      if (((blocked >> i) & 1U) != 0U || !near(mover, rays[i])) continue;
-      if (mover.set->occluded(in_mover(mover, rays[i]))) blocked |= 1U << i;
+      if (((blocked >> i) & 1U) != 0U || !near(entity, rays[i])) continue;
+      if (entity.set->occluded(in_entity(entity, rays[i]))) blocked |= 1U << i;
     }
   }
   return blocked;
 }
 
 RayHit SceneInstant::Impl::complete(const Ray& ray, const RaySet& set, const SetHit& hit,
-                                    const PlacedMover* mover) const {
+                                    const PlacedEntity* entity) const {
   // Find the triangle in the description.
   const TriangleSource source = set.source(hit.index);
   const RayMesh& mesh = scene->desc.meshes[source.mesh];
@@ -278,7 +279,7 @@ RayHit SceneInstant::Impl::complete(const Ray& ray, const RaySet& set, const Set
   const double wc = hit.triangle.v;
   const double wa = 1.0 - wb - wc;
   const auto to_world = [&](const glm::dvec3& v) {
-    return mover != nullptr ? mover->world_from_body * v : v;
+    return entity != nullptr ? entity->world_from_body * v : v;
   };
   RayHit out;
   out.distance_m = hit.triangle.distance_m;
@@ -287,14 +288,14 @@ RayHit SceneInstant::Impl::complete(const Ray& ray, const RaySet& set, const Set
   out.primitive = source.primitive;
   out.object = mesh.object;
   out.instance = mesh.instance;
-  out.mover = mesh.mover;
+  out.entity = mesh.entity;
   out.material = mesh.materials.empty()       ? 0
                  : mesh.materials.size() == 1 ? mesh.materials.front()
                                               : mesh.materials[source.primitive];
   // Interpolate the position and move it to the world frame.
   const glm::dvec3 local_m = wa * a + wb * b + wc * c + set.origin_m();
   out.position_world_m = to_world(local_m);
-  if (mover != nullptr) out.position_world_m += mover->pose.position_world_m;
+  if (entity != nullptr) out.position_world_m += entity->pose.position_world_m;
   out.geometric_normal = to_world(glm::normalize(glm::cross(b - a, c - a)));
   out.front = glm::dot(out.geometric_normal, ray.direction) < 0.0;
   out.shading_normal = out.geometric_normal;
@@ -312,7 +313,7 @@ RayHit SceneInstant::Impl::complete(const Ray& ray, const RaySet& set, const Set
 std::optional<RayHit> SceneInstant::first_hit(const Ray& ray) const {
   SetHit hit;
   const RaySet* set = nullptr;
-  const PlacedMover* from = nullptr;
+  const PlacedEntity* from = nullptr;
   double limit_m = std::numeric_limits<double>::infinity();
   // Take the hit on static geometry as the limit.
   if (impl_->scene->fixed->first_hit(impl_->in_fixed(ray), limit_m, hit)) {
@@ -320,13 +321,13 @@ std::optional<RayHit> SceneInstant::first_hit(const Ray& ray) const {
     limit_m = hit.triangle.distance_m;
   }
   // Look for nearer hits on the entities.
-  for (const PlacedMover& mover : impl_->movers) {
+  for (const PlacedEntity& entity : impl_->entities) {
     SetHit nearer;
-    if (!impl_->near(mover, ray)) continue;
-    if (!mover.set->first_hit(impl_->in_mover(mover, ray), limit_m, nearer)) continue;
+    if (!impl_->near(entity, ray)) continue;
+    if (!entity.set->first_hit(impl_->in_entity(entity, ray), limit_m, nearer)) continue;
     hit = nearer;
-    set = mover.set;
-    from = &mover;
+    set = entity.set;
+    from = &entity;
     limit_m = hit.triangle.distance_m;
   }
   if (set == nullptr) return std::nullopt;
@@ -335,8 +336,9 @@ std::optional<RayHit> SceneInstant::first_hit(const Ray& ray) const {
 
 bool SceneInstant::occluded(const Ray& ray) const {
   if (impl_->scene->fixed->occluded(impl_->in_fixed(ray))) return true;
-  for (const PlacedMover& mover : impl_->movers) {
-    if (impl_->near(mover, ray) && mover.set->occluded(impl_->in_mover(mover, ray))) return true;
+  for (const PlacedEntity& entity : impl_->entities) {
+    if (impl_->near(entity, ray) && entity.set->occluded(impl_->in_entity(entity, ray)))
+      return true;
   }
   return false;
 }
@@ -365,12 +367,12 @@ void SceneInstant::Impl::gather(const SurfacePoint& point, const glm::dvec3& axi
   };
   // Search the static set, then every entity in its own frame.
   add(*scene->fixed, point.position_world_m - scene->fixed->origin_m(), axis, nullptr);
-  for (const PlacedMover& mover : movers) {
-    if (!mover.on || mover.set->empty()) continue;
+  for (const PlacedEntity& entity : entities) {
+    if (!entity.on || entity.set->empty()) continue;
     const glm::dvec3 apex_m =
-        (point.position_world_m - mover.pose.position_world_m) * mover.world_from_body -
-        mover.set->origin_m();
-    add(*mover.set, apex_m, axis * mover.world_from_body, &mover.world_from_body);
+        (point.position_world_m - entity.pose.position_world_m) * entity.world_from_body -
+        entity.set->origin_m();
+    add(*entity.set, apex_m, axis * entity.world_from_body, &entity.world_from_body);
   }
 }
 

@@ -18,13 +18,13 @@ struct RayScene::Impl {
   RaySceneDesc desc;
   RayArithmetic arithmetic = RayArithmetic::exact;
   std::unique_ptr<RaySet> fixed;
-  std::vector<std::unique_ptr<RaySet>> movers;
+  std::vector<std::unique_ptr<RaySet>> entities;
   std::size_t triangles = 0;
   std::size_t dropped = 0;
 };
 
 /// Set of an entity at its pose of an instant.
-struct PlacedMover {
+struct PlacedEntity {
   const RaySet* set = nullptr;
   physics::Pose pose;
   bool on = true;
@@ -35,7 +35,7 @@ struct PlacedMover {
 /// Entities of a scene at an instant.
 struct SceneInstant::Impl {
   const RayScene::Impl* scene = nullptr;
-  std::vector<PlacedMover> movers;
+  std::vector<PlacedEntity> entities;
 
   /// Returns the distance to a plane that rounding alone may cause, for a point with these world
   /// coordinates.
@@ -43,9 +43,9 @@ struct SceneInstant::Impl {
   /// Returns the ray relative to the static set.
   [[nodiscard]] PreparedRay in_fixed(const Ray& ray) const noexcept;
   /// Returns the ray in the frame of an entity's set.
-  [[nodiscard]] PreparedRay in_mover(const PlacedMover& mover, const Ray& ray) const noexcept;
+  [[nodiscard]] PreparedRay in_entity(const PlacedEntity& entity, const Ray& ray) const noexcept;
   /// Returns true if the ray may hit the entity.
-  [[nodiscard]] bool near(const PlacedMover& mover, const Ray& ray) const noexcept;
+  [[nodiscard]] bool near(const PlacedEntity& entity, const Ray& ray) const noexcept;
 
   /// Returns a mask whose bit i is set if rays[i] is blocked.
   /// @pre at most 16 rays.
@@ -58,7 +58,7 @@ struct SceneInstant::Impl {
 
   /// Completes a hit of a set to a hit in the world frame.
   [[nodiscard]] RayHit complete(const Ray& ray, const RaySet& set, const SetHit& hit,
-                                const PlacedMover* mover) const;
+                                const PlacedEntity* entity) const;
 
   /// Returns the start of rays from a point. Fast arithmetic moves it off the surface by the
   /// float32 error.

@@ -78,7 +78,7 @@ TEST(BulkBounds, know_a_stray_inside_a_mesh) {
 
 TEST(BulkBounds, of_a_scene_with_entities_are_those_of_what_stands_still) {
   SurfaceScene scene = street();
-  scene.add_mover(small_triangle(), glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -6e6)));
+  scene.add_entity(small_triangle(), glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -6e6)));
   EXPECT_EQ(bulk_bounds(scene.geometry).max_m, glm::dvec3(60.0, 60.0, 4.0));
 }
 

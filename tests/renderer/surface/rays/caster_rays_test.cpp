@@ -60,17 +60,17 @@ TEST(CasterRays, one_bit_per_ray_of_any_packet_size) {
   EXPECT_EQ(casters.blocked_static({}), 0U);
 }
 
-TEST(CasterRays, one_packet_meets_a_mover_that_stands_elsewhere_for_every_ray) {
+TEST(CasterRays, one_packet_meets_an_entity_that_stands_elsewhere_for_every_ray) {
   SurfaceScene scene;
   scene.add_static(unit_plate(), glm::dvec3(0.0, 0.0, -50.0));
-  scene.add_mover(test::box_mesh(glm::vec3(-0.6F, -0.4F, 0.0F), glm::vec3(0.6F, 0.4F, 0.9F)));
+  scene.add_entity(test::box_mesh(glm::vec3(-0.6F, -0.4F, 0.0F), glm::vec3(0.6F, 0.4F, 0.9F)));
   const CasterRays casters = rays_of(scene);
   std::mt19937 random(5);
   std::uniform_real_distribution<float> place(-1.5F, 1.5F);
   std::size_t met = 0;
   for (int turn = 0; turn < 300; ++turn) {
     std::array<CasterRay, CasterRays::kMaxRays> rays;
-    std::array<MoverPlacement, CasterRays::kMaxRays> placements;
+    std::array<EntityPlacement, CasterRays::kMaxRays> placements;
     std::uint32_t expected = 0;
     const auto wanted = static_cast<std::uint32_t>(random()) & CasterRays::kAllRays;
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -80,7 +80,7 @@ TEST(CasterRays, one_packet_meets_a_mover_that_stands_elsewhere_for_every_ray) {
           glm::rotate(glm::mat4(1.0F), 3.0F * place(random), glm::vec3(0.0F, 0.0F, 1.0F)));
       placements[i].on = i % 5 != 2;
       if (((wanted >> i) & 1U) == 0U) continue;
-      expected |= casters.blocked_mover(0, placements[i], {&rays[i], 1}) << i;
+      expected |= casters.blocked_entity(0, placements[i], {&rays[i], 1}) << i;
     }
     EXPECT_EQ(casters.blocked_moving(0, placements, rays, wanted), expected);
     met += expected != 0 ? 1U : 0U;
@@ -88,18 +88,18 @@ TEST(CasterRays, one_packet_meets_a_mover_that_stands_elsewhere_for_every_ray) {
   EXPECT_GT(met, 50U);
 }
 
-TEST(CasterRays, a_packet_that_passes_a_mover_by_meets_what_single_rays_meet) {
+TEST(CasterRays, a_packet_that_passes_an_entity_by_meets_what_single_rays_meet) {
   SurfaceScene scene;
   scene.add_static(unit_plate(), glm::dvec3(0.0, 0.0, -50.0));
-  scene.add_mover(test::box_mesh(glm::vec3(-0.6F, -0.4F, 0.0F), glm::vec3(0.6F, 0.4F, 0.9F)));
-  scene.add_mover(test::box_mesh(glm::vec3(-9.0F, -0.4F, 0.0F), glm::vec3(9.0F, 0.4F, 0.9F)));
+  scene.add_entity(test::box_mesh(glm::vec3(-0.6F, -0.4F, 0.0F), glm::vec3(0.6F, 0.4F, 0.9F)));
+  scene.add_entity(test::box_mesh(glm::vec3(-9.0F, -0.4F, 0.0F), glm::vec3(9.0F, 0.4F, 0.9F)));
   const CasterRays casters = rays_of(scene);
   std::mt19937 random(6);
   std::uniform_real_distribution<float> place(-30.0F, 30.0F);
   for (int turn = 0; turn < 500; ++turn) {
-    std::array<MoverPlacement, 2> movers;
-    for (MoverPlacement& mover : movers) {
-      mover.position_m = {place(random), place(random), place(random)};
+    std::array<EntityPlacement, 2> entities;
+    for (EntityPlacement& entity : entities) {
+      entity.position_m = {place(random), place(random), place(random)};
     }
     // The rays go from one point towards all sides, or side by side, as different queries send
     // them.
@@ -111,7 +111,7 @@ TEST(CasterRays, a_packet_that_passes_a_mover_by_meets_what_single_rays_meet) {
       rays[i].origin_m = turn % 2 == 0 ? glm::vec3(0.0F) : 2.0F * random_direction(random);
     }
     std::array<CasterHit, CasterRays::kMaxRays> hits;
-    const CasterSelection selection{true, movers};
+    const CasterSelection selection{true, entities};
     const std::uint32_t blocked = casters.blocked(rays, selection);
     const std::uint32_t hit = casters.first_hits(rays, selection, hits);
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -199,23 +199,23 @@ TEST(CasterRays, no_ray_leaves_a_closed_body) {
   EXPECT_NEAR(hit->distance_m, 0.7F, 1e-6F);
 }
 
-TEST(CasterRays, a_mover_blocks_where_it_stands) {
+TEST(CasterRays, an_entity_blocks_where_it_stands) {
   SurfaceScene scene;
   scene.add_static(test::level_mesh(glm::vec3(-9.0F), glm::vec3(9.0F), 0.0F));
   // The box is 4 m long in body x; the set's centre is off the body's origin.
-  scene.add_mover(test::box_mesh(glm::vec3(0.0F, -0.5F, -0.5F), glm::vec3(4.0F, 0.5F, 0.5F)));
+  scene.add_entity(test::box_mesh(glm::vec3(0.0F, -0.5F, -0.5F), glm::vec3(4.0F, 0.5F, 0.5F)));
   const CasterRays casters = rays_of(scene);
-  ASSERT_EQ(casters.movers(), 1U);
-  MoverPlacement east{glm::mat3(1.0F), {1.0F, 0.0F, 3.0F}, true};
-  MoverPlacement north = east;
+  ASSERT_EQ(casters.entities(), 1U);
+  EntityPlacement east{glm::mat3(1.0F), {1.0F, 0.0F, 3.0F}, true};
+  EntityPlacement north = east;
   north.rel_from_body = glm::mat3(glm::vec3(0.0F, 1.0F, 0.0F), glm::vec3(-1.0F, 0.0F, 0.0F), kUp);
   const std::array<CasterRay, 3> rays = {CasterRay{{4.0F, 0.0F, 0.1F}, kUp},
                                          CasterRay{{1.0F, 3.0F, 0.1F}, kUp},
                                          CasterRay{{-1.0F, 0.0F, 0.1F}, kUp}};
-  EXPECT_EQ(casters.blocked_mover(0, east, rays), 1U);
-  EXPECT_EQ(casters.blocked_mover(0, north, rays), 2U);
+  EXPECT_EQ(casters.blocked_entity(0, east, rays), 1U);
+  EXPECT_EQ(casters.blocked_entity(0, north, rays), 2U);
   east.on = false;
-  EXPECT_EQ(casters.blocked_mover(0, east, rays), 0U);
+  EXPECT_EQ(casters.blocked_entity(0, east, rays), 0U);
   EXPECT_EQ(casters.blocked_static(rays), 0U);
 
   // The ray meets the nearer of ground and entity. The normal comes back in rel axes.
@@ -236,9 +236,9 @@ TEST(CasterRays, a_mover_blocks_where_it_stands) {
   EXPECT_EQ(casters.first_hits({&from_above, 1}, {false, {&east, 1}}, {&only, 1}), 0U);
 }
 
-TEST(CasterRays, nothing_is_lost_by_skipping_far_movers) {
+TEST(CasterRays, nothing_is_lost_by_skipping_far_entities) {
   SurfaceScene scene;
-  scene.add_mover(test::box_mesh(glm::vec3(2.0F, -0.5F, -0.5F), glm::vec3(6.0F, 0.5F, 0.5F)));
+  scene.add_entity(test::box_mesh(glm::vec3(2.0F, -0.5F, -0.5F), glm::vec3(6.0F, 0.5F, 0.5F)));
   const CasterRays casters = rays_of(scene);
   std::mt19937 random(8);
   std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
@@ -246,10 +246,10 @@ TEST(CasterRays, nothing_is_lost_by_skipping_far_movers) {
   for (int i = 0; i < 4000; ++i) {
     // The ray starts far off, where rounding is at its worst, and aims into the box's inner half.
     const glm::vec3 direction = random_direction(random);
-    const MoverPlacement placement{glm::mat3(1.0F), 1e5F * random_direction(random), true};
+    const EntityPlacement placement{glm::mat3(1.0F), 1e5F * random_direction(random), true};
     const glm::vec3 inside(4.0F + unit(random), 0.25F * unit(random), 0.25F * unit(random));
     const CasterRay ray{placement.position_m + inside - 1e4F * direction, direction};
-    blocked += casters.blocked_mover(0, placement, {&ray, 1}) != 0U ? 1 : 0;
+    blocked += casters.blocked_entity(0, placement, {&ray, 1}) != 0U ? 1 : 0;
   }
   EXPECT_EQ(blocked, 4000);
 
@@ -258,17 +258,17 @@ TEST(CasterRays, nothing_is_lost_by_skipping_far_movers) {
   EXPECT_EQ(casters.blocked_in_body(0, body), 1U);
 }
 
-TEST(CasterRays, movers_come_in_the_order_of_their_objects) {
+TEST(CasterRays, entities_come_in_the_order_of_their_objects) {
   SurfaceScene scene;
-  scene.add_mover(unit_plate());
+  scene.add_entity(unit_plate());
   scene.add_static(unit_plate());
-  scene.add_mover(unit_plate());
+  scene.add_entity(unit_plate());
   scene.geometry.instances[0].object = 7;
   scene.geometry.instances[2].object = 4;
   const CasterRays casters = rays_of(scene);
-  ASSERT_EQ(casters.movers(), 2U);
-  EXPECT_EQ(casters.object_of_mover(0), 4U);
-  EXPECT_EQ(casters.object_of_mover(1), 7U);
+  ASSERT_EQ(casters.entities(), 2U);
+  EXPECT_EQ(casters.object_of_entity(0), 4U);
+  EXPECT_EQ(casters.object_of_entity(1), 7U);
 }
 
 /// The instances are listed one by one, and as instances of one mesh.

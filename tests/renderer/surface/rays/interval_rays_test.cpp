@@ -152,8 +152,8 @@ TEST_F(IntervalRaysTest, ABodyThatPassesHidesTheSunForTheTimeItTakes) {
                                                    glm::vec3(90.0F, 90.0F, 0.0F), -1.0F)),
                    glm::dmat4(1.0));
   constexpr double kHalfLengthM = 3.0;
-  scene.add_mover(test::box_mesh(glm::vec3(-kHalfLengthM, -2.0F, -0.01F),
-                                 glm::vec3(kHalfLengthM, 2.0F, 0.01F)));
+  scene.add_entity(test::box_mesh(glm::vec3(-kHalfLengthM, -2.0F, -0.01F),
+                                  glm::vec3(kHalfLengthM, 2.0F, 0.01F)));
   const auto rays = CasterRays::create(scene.geometry);
   ASSERT_TRUE(rays.has_value());
   constexpr double kIntervalS = 20.0;
@@ -198,7 +198,7 @@ TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
                                                    glm::vec3(900.0F, 900.0F, 0.0F), -1.0F)),
                    glm::dmat4(1.0));
   for (int i = 0; i < 2; ++i) {
-    scene.add_mover(test::box_mesh(glm::vec3(-2.0F, -1.0F, -1.5F), glm::vec3(2.0F, 1.0F, 1.5F)));
+    scene.add_entity(test::box_mesh(glm::vec3(-2.0F, -1.0F, -1.5F), glm::vec3(2.0F, 1.0F, 1.5F)));
   }
   const auto rays = CasterRays::create(scene.geometry);
   ASSERT_TRUE(rays.has_value());

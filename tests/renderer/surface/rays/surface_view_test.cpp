@@ -237,15 +237,15 @@ TEST(SurfaceView, joined_hits_keep_objects_sides_and_places) {
   }
 }
 
-TEST(SurfaceView, a_mover_is_seen_where_it_stands) {
+TEST(SurfaceView, an_entity_is_seen_where_it_stands) {
   SurfaceScene scene;
   scene.add_static(ground());
-  const std::uint32_t mover =
-      scene.add_mover(test::level_mesh(glm::vec3(-1e3F), glm::vec3(1e3F), 0.0F));
+  const std::uint32_t entity =
+      scene.add_entity(test::level_mesh(glm::vec3(-1e3F), glm::vec3(1e3F), 0.0F));
   const CasterRays casters = rays_of(scene);
-  MoverPlacement placement{glm::mat3(1.0F), {0.0F, 0.0F, 1.0F}, true};
+  EntityPlacement placement{glm::mat3(1.0F), {0.0F, 0.0F, 1.0F}, true};
   const ViewSampler sampler(64);
-  EXPECT_NEAR(instance_frac(sampler.view(casters, {}, {true, {&placement, 1}}), mover), 1.0, 1e-5);
+  EXPECT_NEAR(instance_frac(sampler.view(casters, {}, {true, {&placement, 1}}), entity), 1.0, 1e-5);
   placement.on = false;
   EXPECT_EQ(sampler.view(casters, {}, {true, {&placement, 1}}).sky_frac, 1.0F);
 }
@@ -285,9 +285,9 @@ TEST(AdjacentFaces, of_a_cube_are_those_within_reach) {
 
 TEST(AdjacentFaces, of_a_rod_are_both_sides_but_not_the_back) {
   SurfaceScene scene;
-  scene.add_mover(test::box_mesh(glm::vec3(-0.05F, -1.0F, -0.05F), glm::vec3(0.05F, 1.0F, 0.05F)));
+  scene.add_entity(test::box_mesh(glm::vec3(-0.05F, -1.0F, -0.05F), glm::vec3(0.05F, 1.0F, 0.05F)));
   const CasterRays casters = rays_of(scene);
-  const MoverPlacement in_body;
+  const EntityPlacement in_body;
   const ViewPoint point{.position_m = {0.01F, 0.0F, 0.05F}};
   const AdjacentFaces faces = adjacent_faces(casters, point, 0.1F, {false, {&in_body, 1}});
   ASSERT_EQ(faces.count, 2U);

@@ -47,7 +47,7 @@ class SteadyState : public ::testing::TestWithParam<scene::ThermalModel> {
     scene_.add_static(
         test::level_mesh(glm::vec3(-20.0F, -20.0F, 0.0F), glm::vec3(20.0F, 20.0F, 0.0F), 0.0F));
     scene_.add_static(test::box_mesh(glm::vec3(-1.0F, -1.0F, 0.0F), glm::vec3(1.0F, 1.0F, 2.0F)));
-    scene_.add_mover(test::box_mesh(glm::vec3(-2.0F, -1.0F, -1.0F), glm::vec3(2.0F, 1.0F, 1.0F)));
+    scene_.add_entity(test::box_mesh(glm::vec3(-2.0F, -1.0F, -1.0F), glm::vec3(2.0F, 1.0F, 1.0F)));
     scene_.geometry.materials = {stone};
     for (scene::Instance& instance : scene_.geometry.instances) {
       instance.world_bounds = scene_.geometry.meshes[instance.mesh].bounds;

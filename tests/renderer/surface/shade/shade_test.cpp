@@ -12,7 +12,7 @@
 #include "emit/physics/constants.hpp"
 #include "history/foster_setup.hpp"
 #include "renderer/surface/surface_scene.hpp"
-#include "surface/shade/shade_pages.hpp"
+#include "surface/shade/exposure_tiles.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -51,7 +51,7 @@ class ShadeTest : public ::testing::Test {
  protected:
   ShadeTest() : scenario_(place()), environment_(scenario_) {
     scene_.add_static(test::level_mesh(glm::vec3(-50.0F), glm::vec3(50.0F), 0.0F));
-    scene_.add_mover(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
+    scene_.add_entity(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
     auto rays = CasterRays::create(scene_.geometry);
     EXPECT_TRUE(rays.has_value());
     rays_.emplace(std::move(*rays));
@@ -72,12 +72,12 @@ class ShadeTest : public ::testing::Test {
   [[nodiscard]] glm::dvec3 to_sun(std::int64_t now_ns) const {
     return environment_.sun_at(now_ns).direction_enu;
   }
-  [[nodiscard]] ShadePages::Inputs inputs() {
+  [[nodiscard]] ExposureTiles::Inputs inputs() {
     return {environment_, entities_, *rays_, workers_, shadow_maps_};
   }
   /// Runs the tiles as frames do, ten a second.
-  void run_to(ShadePages& shade, std::int64_t from_ns, std::int64_t until_ns,
-              const SurfaceSamples& all, const ShadePages::Inputs& inputs) {
+  void run_to(ExposureTiles& shade, std::int64_t from_ns, std::int64_t until_ns,
+              const SurfaceSamples& all, const ExposureTiles::Inputs& inputs) {
     for (std::int64_t t = from_ns; t < until_ns;) {
       t = std::min(t + kSecondNs / 10, until_ns);
       inputs.shadow_maps.begin_frame();
@@ -96,7 +96,7 @@ class ShadeTest : public ::testing::Test {
     }
     return all;
   }
-  [[nodiscard]] ShadePages pages(const SurfaceSamples& all, float tolerance_k = 0.1F) {
+  [[nodiscard]] ExposureTiles tiles(const SurfaceSamples& all, float tolerance_k = 0.1F) {
     return {all,
             static_cast<std::uint32_t>(all.samples.size()),
             ShadeResponse(*heat_, scenario_.materials.size(), {12.0, 305.0}),
@@ -127,7 +127,7 @@ class ShadeTest : public ::testing::Test {
 TEST_F(ShadeTest, AnEntityShadowMapIsDarkBehindItsBodyOnly) {
   const glm::vec3 sun(to_sun(kNoonNs));
   (void)shadow_maps_.look(0, sun, EntityShadowMaps::kSharpRad, *rays_, workers_);
-  const MoverPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kHeightM}, true};
+  const EntityPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kHeightM}, true};
   const PlacedShadowMap placed = shadow_maps_.place(0, high, sun);
   const auto shaded_frac = [&](const glm::vec3& point_m) {
     const glm::vec4 p(point_m, 1.0F);
@@ -194,7 +194,7 @@ TEST_F(ShadeTest, AShadowLiesInTheSunsDirectionWhateverTheOutlineIsOf) {
   const glm::vec3 sun(to_sun(kNoonNs));
   const glm::vec3 before = glm::normalize(sun + glm::vec3(1e-2F, 1e-2F, 0.0F));
   (void)shadow_maps_.look(0, before, EntityShadowMaps::kSharpRad, *rays_, workers_);
-  const MoverPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kFarM}, true};
+  const EntityPlacement high{glm::mat3(1.0F), {0.0F, 0.0F, kFarM}, true};
   const PlacedShadowMap placed = shadow_maps_.place(0, high, sun);
   for (const float up_m : {kFarM - 1.0F, 0.5F * kFarM, 0.0F}) {
     const glm::vec3 behind_m = high.position_m - (kFarM - up_m) / sun.z * sun;
@@ -267,9 +267,9 @@ TEST_F(ShadeTest, TheStepResponseIsThatOfTheModelsOwnSteps) {
   }
 }
 
-TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
+TEST_F(ShadeTest, TilesHoldWhatWasShadedByItsAge) {
   const SurfaceSamples all = ground();
-  ShadePages shade = pages(all);
+  ExposureTiles shade = tiles(all);
   shade.restart(kNoonNs, entities_);
   constexpr std::int64_t kStaysNs = 30 * kSecondNs;
   shade.run(kNoonNs + kStaysNs, all, inputs());
@@ -281,17 +281,17 @@ TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
   const auto check = [&](double age_s) {
     int inside = 0;
     int used = 0;
-    for (const ShadePages::Page& page : shade.pages()) {
-      if (!page.used) continue;
+    for (const ExposureTiles::ExposureTile& tile : shade.tiles()) {
+      if (!tile.used) continue;
       ++used;
-      EXPECT_NEAR(page.plane_m, -rays_->origin_world_m().z, 1e-3);
-      for (std::uint32_t y = 0; y < ShadePages::kSide; y += 5) {
-        for (std::uint32_t x = 0; x < ShadePages::kSide; x += 5) {
-          const glm::vec3 at_m(page.first_m + page.texel_m * glm::vec2(x, y), page.plane_m);
+      EXPECT_NEAR(tile.plane_m, -rays_->origin_world_m().z, 1e-3);
+      for (std::uint32_t y = 0; y < ExposureTiles::kSide; y += 5) {
+        for (std::uint32_t x = 0; x < ExposureTiles::kSide; x += 5) {
+          const glm::vec3 at_m(tile.first_m + tile.texel_m * glm::vec2(x, y), tile.plane_m);
           const double inside_m =
               this->inside_m(at_m + glm::vec3(rays_->origin_world_m()), 0.0, kNoonNs);
           if (std::abs(inside_m) < 0.15) continue;
-          const glm::vec4 found = page.left_frac * page.shade[y * ShadePages::kSide + x];
+          const glm::vec4 found = tile.left_frac * tile.shade[y * ExposureTiles::kSide + x];
           for (glm::length_t k = 0; k < 4; ++k) {
             const double tau_s = ShadeResponse::kTauS[static_cast<std::size_t>(k)];
             // Tiles take turns within a step.
@@ -328,15 +328,15 @@ TEST_F(ShadeTest, PagesHoldWhatWasShadedByItsAge) {
   shade.run(kNoonNs + kStaysNs + 20 * kSecondNs, all, inputs());
   (void)check(20.0);
   shade.run(kNoonNs + kStaysNs + 7200 * kSecondNs, all, inputs());
-  for (const ShadePages::Page& page : shade.pages()) EXPECT_FALSE(page.used);
+  for (const ExposureTiles::ExposureTile& tile : shade.tiles()) EXPECT_FALSE(tile.used);
   for (const float vertex_k : shade.vertices_k()) EXPECT_NEAR(vertex_k, 0.0F, 1e-4F);
-  EXPECT_FALSE(shade.short_of_pages());
+  EXPECT_FALSE(shade.short_of_tiles());
 }
 
 TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
   // The plate is 4 m long and moves at 8 m/s, so it passes in half a second.
   const SurfaceSamples all = ground();
-  ShadePages shade = pages(all);
+  ExposureTiles shade = tiles(all);
   shade.restart(kNoonNs, entities_);
   for (int i = 0; i <= 40; ++i) {
     ASSERT_TRUE(entities_[0].append(kNoonNs + i * (kSecondNs / 10),
@@ -348,11 +348,11 @@ TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
       environment_.forcing_at(end_ns, environment_.sun_at(end_ns)).direct_normal_w_m2 /
       ShadeResponse::kFullSunWM2;
   int met = 0;
-  for (const ShadePages::Page& page : shade.pages()) {
-    if (!page.used) continue;
-    for (std::uint32_t y = 3; y < ShadePages::kSide; y += 7) {
-      for (std::uint32_t x = 3; x < ShadePages::kSide; x += 7) {
-        const glm::vec3 at_m(page.first_m + page.texel_m * glm::vec2(x, y), page.plane_m);
+  for (const ExposureTiles::ExposureTile& tile : shade.tiles()) {
+    if (!tile.used) continue;
+    for (std::uint32_t y = 3; y < ExposureTiles::kSide; y += 7) {
+      for (std::uint32_t x = 3; x < ExposureTiles::kSide; x += 7) {
+        const glm::vec3 at_m(tile.first_m + tile.texel_m * glm::vec2(x, y), tile.plane_m);
         const glm::vec3 world_m = at_m + glm::vec3(rays_->origin_world_m());
         // The middle of the plate passed at that place.
         const glm::dvec3 sun = to_sun(kNoonNs + 2 * kSecondNs);
@@ -362,7 +362,7 @@ TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
         // The plate stood there before the motion began.
         if (std::abs(east_m) < kHalfM + 0.15) continue;
         // The slowest mode has decayed by hardly anything.
-        EXPECT_NEAR(page.left_frac.w * page.shade[y * ShadePages::kSide + x].w,
+        EXPECT_NEAR(tile.left_frac.w * tile.shade[y * ExposureTiles::kSide + x].w,
                     flux_frac * 0.5 / ShadeResponse::kTauS[3], 0.1 * flux_frac * 0.5 / 1000.0)
             << east_m << ' ' << north_m;
         ++met;
@@ -372,10 +372,10 @@ TEST_F(ShadeTest, WhatPassesShadesForAsLongAsItTakes) {
   EXPECT_GT(met, 100);
 }
 
-TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
+TEST_F(ShadeTest, WhereThereAreTooFewTilesItSays) {
   // The plate jumps from place to place, too fast for anything to decay.
   const SurfaceSamples all = ground();
-  ShadePages shade = pages(all, 0.01F);
+  ExposureTiles shade = tiles(all, 0.01F);
   shade.restart(kNoonNs, entities_);
   bool was_short = false;
   constexpr int kAcross = 12;
@@ -386,7 +386,7 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
     pose.position_world_m.y = -44.0 + 8.0 * (i / kAcross);
     ASSERT_TRUE(entities_[0].append(now_ns, pose, true, true));
     shade.run(now_ns, all, inputs());
-    was_short = was_short || shade.short_of_pages();
+    was_short = was_short || shade.short_of_tiles();
     // Places that are in the shade now have tiles all the same.
     float most_k = 0.0F;
     for (const float vertex_k : shade.vertices_k()) most_k = std::max(most_k, vertex_k);
@@ -397,10 +397,10 @@ TEST_F(ShadeTest, WhereThereAreTooFewPagesItSays) {
   EXPECT_TRUE(was_short);
   shade.run(kNoonNs + (kAcross * kAcross + 15) * kSecondNs, all, inputs());
   shade.run(kNoonNs + (kAcross * kAcross + 16) * kSecondNs, all, inputs());
-  EXPECT_FALSE(shade.short_of_pages());
+  EXPECT_FALSE(shade.short_of_tiles());
 }
 
-TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
+TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoTilesFromOthers) {
   // There are more parked vehicles than tiles, and one that arrives.
   const SurfaceSamples all = ground();
   constexpr int kParked = 40;
@@ -409,7 +409,7 @@ TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
   std::vector<scene::Aabb> boxes;
   std::vector<PoseHistory> entities;
   for (int i = 0; i <= kParked; ++i) {
-    scene.add_mover(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
+    scene.add_entity(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
     boxes.push_back(scene.geometry.meshes.back().bounds);
     scene::ObjectDesc plate;
     plate.entity_id = static_cast<std::uint32_t>(7 + i);
@@ -420,13 +420,13 @@ TEST_F(ShadeTest, WhatStandsWhereItStoodTakesNoPagesFromOthers) {
   const auto rays = CasterRays::create(scene.geometry);
   ASSERT_TRUE(rays.has_value());
   EntityShadowMaps shadow_maps(boxes);
-  ShadePages shade(all, static_cast<std::uint32_t>(all.samples.size()),
-                   ShadeResponse(*heat_, scenario_.materials.size(), {12.0, 305.0}),
-                   entities.size(), 0, 0.1F);
+  ExposureTiles shade(all, static_cast<std::uint32_t>(all.samples.size()),
+                      ShadeResponse(*heat_, scenario_.materials.size(), {12.0, 305.0}),
+                      entities.size(), 0, 0.1F);
   shade.restart(kNoonNs, entities);
-  const ShadePages::Inputs inputs{environment_, entities, *rays, workers_, shadow_maps};
+  const ExposureTiles::Inputs inputs{environment_, entities, *rays, workers_, shadow_maps};
   run_to(shade, kNoonNs, kNoonNs + 2 * kSecondNs, all, inputs);
-  EXPECT_FALSE(shade.short_of_pages());
+  EXPECT_FALSE(shade.short_of_tiles());
   ASSERT_TRUE(entities.back().append(kNoonNs + 2 * kSecondNs, pose_at(0.0, kHeightM), true, true));
   run_to(shade, kNoonNs + 2 * kSecondNs, kNoonNs + 12 * kSecondNs, all, inputs);
   const float most_k = *std::ranges::max_element(shade.vertices_k());
@@ -438,9 +438,9 @@ TEST_F(ShadeTest, AfterAJumpTheLastMinuteIsMadeUpForAndTheRestIsOlder) {
   const auto vertices_after = [&](std::int64_t seconds_at_a_time) {
     std::vector<PoseHistory> entities{PoseHistory({}, pose_at(0.0, kHeightM))};
     EntityShadowMaps shadow_maps = shadow_maps_;
-    ShadePages shade = pages(all);
+    ExposureTiles shade = tiles(all);
     shade.restart(kNoonNs, entities);
-    const ShadePages::Inputs inputs{environment_, entities, *rays_, workers_, shadow_maps};
+    const ExposureTiles::Inputs inputs{environment_, entities, *rays_, workers_, shadow_maps};
     shade.run(kNoonNs + 30 * kSecondNs, all, inputs);
     EXPECT_TRUE(entities[0].append(kNoonNs + 30 * kSecondNs, pose_at(500.0, kHeightM), true, true));
     for (std::int64_t s = 30; s < 330; s += seconds_at_a_time) {
@@ -469,7 +469,7 @@ TEST_F(ShadeTest, FasterSimTimeMakesNearlyTheSame) {
                                      pose_at(east_m(0.1 * i), kHeightM), true, false));
     }
     EntityShadowMaps shadow_maps = shadow_maps_;
-    ShadePages shade = pages(all);
+    ExposureTiles shade = tiles(all);
     shade.restart(kNoonNs, entities);
     constexpr std::int64_t kEndNs = 26 * kSecondNs;
     for (std::int64_t t = 0; t < kEndNs;) {
@@ -477,15 +477,15 @@ TEST_F(ShadeTest, FasterSimTimeMakesNearlyTheSame) {
       shadow_maps.begin_frame();
       shade.run(kNoonNs + t, all, {environment_, entities, *rays_, workers_, shadow_maps});
     }
-    EXPECT_FALSE(shade.short_of_pages());
+    EXPECT_FALSE(shade.short_of_tiles());
     return std::vector<float>(shade.vertices_k().begin(), shade.vertices_k().end());
   };
   const auto real_time = vertices_after(kSecondNs / 50);
   const float most_k = *std::ranges::max_element(real_time);
   EXPECT_GT(most_k, 1.0F);
   // Some of these steps are made up for in windows that are as long as a normal step of a tile.
-  for (const std::int64_t step_ns : {26 * ShadePages::kTurnNs, 4 * ShadePages::kStepNs,
-                                     39 * ShadePages::kTurnNs, kSecondNs, 2 * kSecondNs}) {
+  for (const std::int64_t step_ns : {26 * ExposureTiles::kTurnNs, 4 * ExposureTiles::kStepNs,
+                                     39 * ExposureTiles::kTurnNs, kSecondNs, 2 * kSecondNs}) {
     const auto faster = vertices_after(step_ns);
     double squares = 0.0;
     for (std::size_t i = 0; i < faster.size(); ++i) {
@@ -505,28 +505,28 @@ TEST_F(ShadeTest, WhatIsTooFastForItsPlacesIsLeftOutAndSaidWhereItMatters) {
                                      pose_at(-100.0 + 0.1 * i * speed_m_s, kHeightM), true, false));
     }
     EntityShadowMaps shadow_maps = shadow_maps_;
-    ShadePages shade = pages(all, 0.01F);
+    ExposureTiles shade = tiles(all, 0.01F);
     shade.restart(kNoonNs, entities);
     shade.run(kNoonNs + kSecondNs / 5, all,
               {environment_, entities, *rays_, workers_, shadow_maps});
-    for (const ShadePages::Page& page : shade.pages()) EXPECT_FALSE(page.used);
-    return shade.short_of_pages();
+    for (const ExposureTiles::ExposureTile& tile : shade.tiles()) EXPECT_FALSE(tile.used);
+    return shade.short_of_tiles();
   };
   EXPECT_TRUE(vertices_at(150.0));
   EXPECT_FALSE(vertices_at(3e4));
 }
 
-TEST_F(ShadeTest, BackInTimePagesAreForgottenAndFramesSaySo) {
+TEST_F(ShadeTest, BackInTimeTilesAreForgottenAndFramesSaySo) {
   const SurfaceSamples all = ground();
-  ShadePages shade = pages(all);
+  ExposureTiles shade = tiles(all);
   shade.restart(kNoonNs, entities_);
   ASSERT_TRUE(entities_[0].append(kNoonNs, pose_at(1.0, kHeightM), true, true));
   shade.run(kNoonNs + 10 * kSecondNs, all, inputs());
   EXPECT_GT(*std::ranges::max_element(shade.vertices_k()), 1.0F);
-  EXPECT_FALSE(shade.short_of_pages());
+  EXPECT_FALSE(shade.short_of_tiles());
   shade.run(kNoonNs + 5 * kSecondNs, all, inputs());
   for (const float vertex_k : shade.vertices_k()) EXPECT_NEAR(vertex_k, 0.0F, 1e-4F);
-  EXPECT_TRUE(shade.short_of_pages());
+  EXPECT_TRUE(shade.short_of_tiles());
   // A second run of the same instant is not a step back in time.
   shade.run(kNoonNs + 8 * kSecondNs, all, inputs());
   const float most_k = *std::ranges::max_element(shade.vertices_k());
@@ -535,19 +535,19 @@ TEST_F(ShadeTest, BackInTimePagesAreForgottenAndFramesSaySo) {
   EXPECT_EQ(*std::ranges::max_element(shade.vertices_k()), most_k);
 }
 
-TEST_F(ShadeTest, LongShadowsHavePagesToo) {
+TEST_F(ShadeTest, LongShadowsHaveTilesToo) {
   // The sun stands 8 degrees high in the evening.
   const SurfaceSamples all = ground();
   std::int64_t low_ns = kNoonNs;
   while (to_sun(low_ns).z > 0.15) low_ns += 60 * kSecondNs;
   ASSERT_GT(to_sun(low_ns).z, 0.1);
-  ShadePages shade = pages(all);
+  ExposureTiles shade = tiles(all);
   shade.restart(low_ns, entities_);
   physics::Pose pose;
   pose.position_world_m = kHeightM / to_sun(low_ns).z * to_sun(low_ns);
   ASSERT_TRUE(entities_[0].append(low_ns, pose, true, true));
   shade.run(low_ns + 10 * kSecondNs, all, inputs());
-  EXPECT_FALSE(shade.short_of_pages());
+  EXPECT_FALSE(shade.short_of_tiles());
   float found_k = 0.0F;
   for (std::size_t i = 0; i < all.samples.size(); ++i) {
     const glm::dvec2 at_m(all.samples[i].position_m + glm::vec3(rays_->origin_world_m()));
@@ -558,18 +558,18 @@ TEST_F(ShadeTest, LongShadowsHavePagesToo) {
   EXPECT_GT(found_k, 0.05F);
 }
 
-TEST_F(ShadeTest, RaysBelongToOnePageEachOnSlopingGround) {
+TEST_F(ShadeTest, RaysBelongToOneTileEachOnSlopingGround) {
   test::SurfaceScene scene;
   scene::Mesh slope = test::level_mesh(glm::vec3(-50.0F), glm::vec3(50.0F), 0.0F);
   for (glm::vec3& p : slope.positions_m) p.z = 0.02F * p.x;
   slope.bounds = {};
   for (const glm::vec3& p : slope.positions_m) slope.bounds.add(glm::dvec3(p));
   scene.add_static(slope);
-  scene.add_mover(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
+  scene.add_entity(test::level_mesh(glm::vec3(-kHalfM), glm::vec3(kHalfM), 0.0F));
   const auto rays = CasterRays::create(scene.geometry);
   ASSERT_TRUE(rays.has_value());
   const SurfaceSamples all = ground();
-  ShadePages shade = pages(all);
+  ExposureTiles shade = tiles(all);
   shade.restart(kNoonNs, entities_);
   for (int i = 0; i <= 100; ++i) {
     ASSERT_TRUE(entities_[0].append(kNoonNs + i * (kSecondNs / 10),
@@ -578,8 +578,8 @@ TEST_F(ShadeTest, RaysBelongToOnePageEachOnSlopingGround) {
   shade.run(kNoonNs + 10 * kSecondNs, all,
             {environment_, entities_, *rays, workers_, shadow_maps_});
   std::vector<float> planes_m;
-  for (const ShadePages::Page& page : shade.pages()) {
-    if (page.used) planes_m.push_back(page.plane_m);
+  for (const ExposureTiles::ExposureTile& tile : shade.tiles()) {
+    if (tile.used) planes_m.push_back(tile.plane_m);
   }
   ASSERT_GE(planes_m.size(), 6U);
   std::ranges::sort(planes_m);
@@ -599,7 +599,7 @@ TEST_F(ShadeTest, WhatStandsBetweenTheSunAndTheEntityIsNotInItsShade) {
     sample.position_m = plate_m + way_m * sun - origin_m;
     sample.normal = sun;
   }
-  ShadePages shade = pages(all);
+  ExposureTiles shade = tiles(all);
   shade.restart(kNoonNs, entities_);
   ASSERT_TRUE(entities_[0].append(kNoonNs, pose_at(1.0, kHeightM), true, true));
   shade.run(kNoonNs + 10 * kSecondNs, all, inputs());
@@ -614,7 +614,7 @@ TEST_F(ShadeTest, OneThreadMakesWhatManyMake) {
   for (const unsigned int threads : {1U, 3U}) {
     threads::WorkerPool workers(threads);
     EntityShadowMaps shadow_maps = shadow_maps_;
-    ShadePages shade = pages(all);
+    ExposureTiles shade = tiles(all);
     shade.restart(kNoonNs, entities_);
     shade.run(kNoonNs + 5 * kSecondNs, all,
               {environment_, entities_, *rays_, workers, shadow_maps});

@@ -15,7 +15,7 @@
 namespace emit::renderer {
 namespace {
 
-constexpr std::size_t kMovers = 2;
+constexpr std::size_t kEntities = 2;
 /// The header holds magic, version, number of parts, hashes, instant and size of the body.
 constexpr std::size_t kBodyAt = 8 + 4 + 4 + 8 * kStateParts + 8 + 8;
 constexpr std::int64_t kAtNs = 7'200'000'000'000;
@@ -48,7 +48,7 @@ struct World {
       SurfaceSample sample;
       sample.position_m = {number(), number(), number()};
       sample.normal = {number(), number(), number()};
-      sample.mover = i < model.drawn_samples ? 1 : static_cast<std::int32_t>(i % 3) - 1;
+      sample.entity = i < model.drawn_samples ? 1 : static_cast<std::int32_t>(i % 3) - 1;
       sample.material = i % 3;
       sample.sky_frac = number();
       sample.sphere_sky_frac = number();
@@ -108,7 +108,7 @@ class StateFile : public testing::Test {
     put(bytes);
   }
   [[nodiscard]] physics::Result<SurfaceModel> read(const StateKey& key = some_key()) const {
-    return read_state(file_, wanted(key), world_.geometry, kMovers, world_.options);
+    return read_state(file_, wanted(key), world_.geometry, kEntities, world_.options);
   }
   /// Returns the text of the refusal; empty when the file was accepted.
   [[nodiscard]] std::string refusal(const StateKey& key = some_key()) const {
@@ -149,7 +149,7 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     const SurfaceSample& b = model.samples.samples[i];
     EXPECT_EQ(a.position_m, b.position_m);
     EXPECT_EQ(a.normal, b.normal);
-    EXPECT_EQ(a.mover, b.mover);
+    EXPECT_EQ(a.entity, b.entity);
     EXPECT_EQ(a.covered, b.covered);
     EXPECT_EQ(a.open_frac, b.open_frac);
     EXPECT_EQ(a.open_before_frac, b.open_before_frac);
@@ -232,7 +232,7 @@ TEST_F(StateFile, made_for_something_else_it_says_what_differs) {
 TEST_F(StateFile, of_another_instant_it_says_so) {
   write();
   const auto read_at = [this](std::int64_t start_ns) {
-    return read_state(file_, wanted(some_key(), start_ns), world_.geometry, kMovers,
+    return read_state(file_, wanted(some_key(), start_ns), world_.geometry, kEntities,
                       world_.options);
   };
   EXPECT_TRUE(read_at(kAtNs));
@@ -273,7 +273,7 @@ TEST_F(StateFile, huge_counts_and_indices_out_of_range_are_refused_though_the_ch
     const std::size_t count = got->samples.samples.size();
     for (const SurfaceSample& sample : got->samples.samples) {
       ASSERT_LE(sample.first_seen + sample.seen_count, got->samples.seen.size());
-      ASSERT_LT(sample.mover, static_cast<std::int32_t>(kMovers));
+      ASSERT_LT(sample.entity, static_cast<std::int32_t>(kEntities));
       for (const Partner& partner : sample.partners) {
         ASSERT_TRUE(partner.sample == kNoSample || partner.sample < count);
       }
@@ -289,9 +289,9 @@ TEST_F(StateFile, samples_that_belong_to_something_else_are_refused) {
     write();
     return !read();
   };
-  samples[0].mover = -1;  // of an entity's instance
+  samples[0].entity = -1;  // of an entity's instance
   EXPECT_TRUE(refused());
-  samples[0].mover = samples[1].mover;
+  samples[0].entity = samples[1].entity;
   EXPECT_FALSE(refused());
   samples[0].other_side = 3;  // which knows nothing of it
   EXPECT_TRUE(refused());

@@ -31,8 +31,8 @@
 /// number of threads at once. Results do not depend on the number of threads.
 namespace emit::reference {
 
-/// Value of the mover index for geometry that does not move.
-inline constexpr std::uint32_t kNoMover = 0xffffffffU;
+/// Value of the entity index for geometry that does not move.
+inline constexpr std::uint32_t kNoEntity = 0xffffffffU;
 
 /// Triangles of one frame: the world frame for static geometry, the body frame for an entity.
 struct RayMesh {
@@ -43,12 +43,12 @@ struct RayMesh {
   std::vector<std::uint32_t> indices{};
   std::vector<std::uint32_t> materials{};  ///< per triangle, or one for all; if empty, material 0
   std::uint32_t object = 0;
-  std::uint32_t instance = 0;      ///< index into SceneGeometry::instances
-  std::uint32_t mover = kNoMover;  ///< index into RaySceneDesc::movers
+  std::uint32_t instance = 0;        ///< index into SceneGeometry::instances
+  std::uint32_t entity = kNoEntity;  ///< index into RaySceneDesc::entities
 };
 
 /// Entity that moves as one rigid body. `poses` is not empty and ascends in time.
-struct RayMover {
+struct RayEntity {
   std::uint32_t entity_id = 0;
   scene::Trajectory poses{};
 };
@@ -56,11 +56,11 @@ struct RayMover {
 /// Description of a scene for rays.
 struct RaySceneDesc {
   std::vector<RayMesh> meshes{};
-  std::vector<RayMover> movers{};
+  std::vector<RayEntity> entities{};
 };
 
-/// Converts a loaded scene to double. Every entity becomes a mover along its trajectory, or at its
-/// placement if it has none. Replace `movers[i].poses` to use another history of poses.
+/// Converts a loaded scene to double. Every entity becomes an entity along its trajectory, or at
+/// its placement if it has none. Replace `entities[i].poses` to use another history of poses.
 [[nodiscard]] RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
                                           const scene::SceneGeometry& geometry);
 
@@ -93,7 +93,7 @@ struct RayHit {
   std::uint32_t object = 0;
   std::uint32_t instance = 0;
   std::uint32_t material = 0;
-  std::uint32_t mover = kNoMover;
+  std::uint32_t entity = kNoEntity;
 };
 
 /// Point whose view is asked for. `normal` is the outward normal of its own surface, which hides
@@ -189,11 +189,11 @@ class SceneInstant {
                   std::uint32_t seed = 0) const;
 
   /// Returns the pose of an entity at this instant.
-  /// @pre mover is less than the number of movers.
-  [[nodiscard]] const physics::Pose& mover_pose(std::uint32_t mover) const;
+  /// @pre entity is less than the number of entities.
+  [[nodiscard]] const physics::Pose& entity_pose(std::uint32_t entity) const;
   /// Returns true if the entity is switched on at this instant.
-  /// @pre mover is less than the number of movers.
-  [[nodiscard]] bool mover_on(std::uint32_t mover) const;
+  /// @pre entity is less than the number of entities.
+  [[nodiscard]] bool entity_on(std::uint32_t entity) const;
 
   /// Corners of a triangle in world axes.
   struct Corners {
@@ -217,8 +217,8 @@ class RayScene {
  public:
   /// Builds the hierarchies. Triangles with a coordinate that is not finite are dropped (see
   /// dropped_triangles()). Triangles without area stay and are never hit.
-  /// Errors: invalid_argument, naming the mesh (index out of range, array sizes, unknown mover, a
-  /// mover without poses), internal (Embree).
+  /// Errors: invalid_argument, naming the mesh (index out of range, array sizes, unknown entity, a
+  /// entity without poses), internal (Embree).
   [[nodiscard]] static physics::Result<RayScene> create(
       RaySceneDesc desc, RayArithmetic arithmetic = RayArithmetic::exact);
   RayScene(RayScene&&) noexcept;

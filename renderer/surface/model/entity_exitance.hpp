@@ -14,7 +14,7 @@ namespace emit::renderer {
 
 /// Long-wave radiation that leaves an entity, summed over its faces for each of the six directions
 /// of the world's axes. Faces count with the cosine to the axis.
-struct MoverFaces {
+struct EntityFaces {
   /// Sums for each axis: first faces that look in its positive direction, then those that look in
   /// its negative one.
   std::array<float, 6> area_m2{};  ///< projected area
@@ -29,25 +29,25 @@ struct MoverFaces {
 /// Long-wave radiation that entities send towards the surfaces near them (physics.md, section 10).
 /// The ground under a vehicle sees its underside, for example. Immutable after construction; any
 /// thread.
-class MoverGlow {
+class EntityExitance {
  public:
-  MoverGlow() = default;
+  EntityExitance() = default;
   /// Lists the samples of entities with the area that each stands for. Setup only: it allocates.
-  /// `mover_of_object` has the entity of every object, or -1 for a static one.
-  MoverGlow(const SurfaceModel& model, const scene::SceneGeometry& geometry,
-            std::span<const std::int32_t> mover_of_object);
+  /// `entity_of_object` has the entity of every object, or -1 for a static one.
+  EntityExitance(const SurfaceModel& model, const scene::SceneGeometry& geometry,
+                 std::span<const std::int32_t> entity_of_object);
 
   /// Sums over all faces of each entity as it stands in the middle of the interval.
   /// `longwave_out_w_m2(i)` returns the exitance of sample i. Entry m of `out` receives entity m.
   /// `out` must have an entry for every entity. RT-safe.
   template <class LongwaveOut>
   void measure(const SurfaceSamples& all, const IntervalRays& interval,
-               const LongwaveOut& longwave_out_w_m2, std::span<MoverFaces> out) const noexcept {
-    for (MoverFaces& faces : out) faces = {};
+               const LongwaveOut& longwave_out_w_m2, std::span<EntityFaces> out) const noexcept {
+    for (EntityFaces& faces : out) faces = {};
     for (const Part& part : parts_) {
       const SurfaceSample& sample = all.samples[part.sample];
       add(interval.normal(sample), part.area_m2, longwave_out_w_m2(part.sample),
-          out[static_cast<std::size_t>(sample.mover)]);
+          out[static_cast<std::size_t>(sample.entity)]);
     }
   }
 
@@ -59,7 +59,7 @@ class MoverGlow {
   };
   /// Adds the radiation of one sample to the axes that its face looks along.
   static void add(const glm::vec3& normal, float area_m2, float sent_w_m2,
-                  MoverFaces& faces) noexcept;
+                  EntityFaces& faces) noexcept;
 
   std::vector<Part> parts_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface/model/mover_glow.hpp"
+#include "surface/model/entity_exitance.hpp"
 
 #include <algorithm>
 #include <glm/geometric.hpp>
@@ -13,18 +13,18 @@ namespace {
 /// seen from there.
 constexpr float kMinCos = 0.3F;
 
-/// Index into MoverFaces of a direction along an axis.
+/// Index into EntityFaces of a direction along an axis.
 std::size_t face_of(glm::length_t axis, bool positive) noexcept {
   return 2 * static_cast<std::size_t>(axis) + (positive ? 0U : 1U);
 }
 
 }  // namespace
 
-MoverGlow::MoverGlow(const SurfaceModel& model, const scene::SceneGeometry& geometry,
-                     std::span<const std::int32_t> mover_of_object) {
+EntityExitance::EntityExitance(const SurfaceModel& model, const scene::SceneGeometry& geometry,
+                               std::span<const std::int32_t> entity_of_object) {
   for (std::size_t p = 0; p < geometry.instances.size(); ++p) {
     const scene::Instance& instance = geometry.instances[p];
-    if (mover_of_object[instance.object] < 0) continue;
+    if (entity_of_object[instance.object] < 0) continue;
     const RefinedMesh& mesh = model.meshes[instance.mesh];
     // Give each vertex a third of the area of its triangles, measured in the body frame, where the
     // instance has its true size.
@@ -53,8 +53,8 @@ MoverGlow::MoverGlow(const SurfaceModel& model, const scene::SceneGeometry& geom
   }
 }
 
-void MoverGlow::add(const glm::vec3& normal, float area_m2, float sent_w_m2,
-                    MoverFaces& faces) noexcept {
+void EntityExitance::add(const glm::vec3& normal, float area_m2, float sent_w_m2,
+                         EntityFaces& faces) noexcept {
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     const float cosine = std::abs(normal[axis]);
     if (cosine < kMinCos) continue;
@@ -64,7 +64,7 @@ void MoverGlow::add(const glm::vec3& normal, float area_m2, float sent_w_m2,
   }
 }
 
-float MoverFaces::towards_w_m2(const glm::vec3& normal) const noexcept {
+float EntityFaces::towards_w_m2(const glm::vec3& normal) const noexcept {
   float weight = 0.0F;
   float sum_w_m2 = 0.0F;
   for (glm::length_t axis = 0; axis < 3; ++axis) {
