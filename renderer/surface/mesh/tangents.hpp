@@ -3,6 +3,8 @@
 #include <cmath>
 #include <glm/ext/vector_float3.hpp>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 
 /// Two unit vectors that form a right-handed frame (u, v, n) with a normal n.
@@ -15,6 +17,7 @@ struct Tangents {
 /// revisited".
 /// @pre n has unit length
 [[nodiscard]] inline Tangents tangents_of(const glm::vec3& n) noexcept {
+  EMIT_DCHECK(std::abs(n.x * n.x + n.y * n.y + n.z * n.z - 1.0F) < 1e-3F);
   const float sign = std::copysign(1.0F, n.z);
   const float a = -1.0F / (sign + n.z);
   const float b = n.x * n.y * a;

@@ -356,7 +356,11 @@ HiddenSky IntervalRays::hidden_sky(const CasterRays& rays, const SurfaceSample& 
       most.entity = static_cast<std::uint32_t>(m);
     }
   }
-  most.frac = static_cast<float>(std::popcount(hidden)) / kSkyRays;
+  // Take the share of the rays that look to the sky: on a wall these are half of them.
+  if (above != 0) {
+    most.frac =
+        static_cast<float>(std::popcount(hidden)) / static_cast<float>(std::popcount(above));
+  }
   return most;
 }
 

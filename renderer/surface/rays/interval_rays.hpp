@@ -23,7 +23,7 @@ inline constexpr std::size_t kSunRays = 4 * kPacketRays;
 /// Sky that entities hide from a sample, mean over an interval, and the entity that hides most of
 /// it.
 struct HiddenSky {
-  /// Share of the sky rays of hidden_sky() that an entity blocks, 0 to 1.
+  /// Share of the rays of hidden_sky() above the horizon that entities block, 0 to 1.
   float frac = 0.0F;
   std::uint32_t entity = 0;
 };

@@ -601,6 +601,7 @@ void CachedSurface::forget_changes() noexcept {
 }
 
 SampledScene CachedSurface::drawn_scene() const {
+  EMIT_CHECK(model_.has_value());
   SampledScene scene{geometry_, {}, {}, {}};
   scene::SceneGeometry& out = scene.geometry;
   // Group the instances by mesh.

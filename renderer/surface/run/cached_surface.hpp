@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/scene/scene_desc.hpp"
 #include "history/environment.hpp"
 #include "history/pose_history.hpp"
@@ -114,11 +115,17 @@ class CachedSurface {
   /// Returns true while some samples lack a change of the weather by the host that matters.
   [[nodiscard]] bool lags() const noexcept { return lags_; }
   /// Number of blocks of samples that do not follow the intervals, because the host moves an
-  /// entity.
-  [[nodiscard]] std::size_t local_blocks() const noexcept { return local_->active(); }
+  /// entity. @pre prepare()
+  [[nodiscard]] std::size_t local_blocks() const noexcept {
+    EMIT_CHECK(local_.has_value());
+    return local_->active();
+  }
 
-  /// Exposure tiles: recent shade of entities, finer than samples lie.
-  [[nodiscard]] const ExposureTiles& shade() const noexcept { return *shade_; }
+  /// Exposure tiles: recent shade of entities, finer than samples lie. @pre prepare()
+  [[nodiscard]] const ExposureTiles& shade() const noexcept {
+    EMIT_CHECK(shade_.has_value());
+    return *shade_;
+  }
   /// Entity shadow depth maps.
   [[nodiscard]] const EntityShadowMaps& shadow_maps() const noexcept { return shadow_maps_; }
   /// Space that an entity may shade, down to static surfaces.
@@ -143,7 +150,10 @@ class CachedSurface {
   }
 
   /// The samples. Their states have moved into the nodes. @pre prepare()
-  [[nodiscard]] const SurfaceModel& model() const noexcept { return *model_; }
+  [[nodiscard]] const SurfaceModel& model() const noexcept {
+    EMIT_CHECK(model_.has_value());
+    return *model_;
+  }
   /// Main memory of the samples in bytes, without the meshes between them.
   [[nodiscard]] std::uint64_t sample_bytes() const noexcept;
   /// The refined meshes as a scene whose instances are grouped by mesh. @pre prepare()

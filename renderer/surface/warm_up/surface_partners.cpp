@@ -49,7 +49,9 @@ float PartnerFinder::greatest_weight(std::uint32_t material, float distance_m) c
 }
 
 void PartnerFinder::grow(std::size_t patch, std::size_t vertices) {
+  EMIT_CHECK_OP(patch, <, in_.geometry.instances.size());
   if (found_.size() <= patch) found_.resize(patch + 1);
+  EMIT_CHECK_OP(vertices, >=, found_[patch].size());
   found_[patch].resize(vertices);
 }
 

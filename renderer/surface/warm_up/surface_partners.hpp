@@ -17,7 +17,8 @@ class PartnerFinder {
   PartnerFinder(const SurfaceInputs& inputs, const PatchSampler& sampler)
       : in_(inputs), sampler_(sampler) {}
 
-  /// Makes room for `vertices` vertices of a patch. @pre patches are numbered from 0
+  /// Makes room for `vertices` vertices of a patch.
+  /// @pre `patch` is the index of an instance; vertices never become fewer
   void grow(std::size_t patch, std::size_t vertices);
   /// Finds the partners of an evaluated sample. @pre grow() has made room for it
   void find(std::size_t patch, std::uint32_t vertex, const SurfaceSample& own);

@@ -327,6 +327,7 @@ void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const Samp
 
 void SurfacePatch::begin(std::size_t intervals, bool entities, bool keeps_sent) {
   EMIT_CHECK(samples.empty());
+  begun_ = true;
   sun_frac = RowStore<float>(intervals);
   hidden_sky = RowStore<HiddenSky>(entities ? intervals : 0);
   sent = SentHistory(keeps_sent ? SentRow<float>::length(intervals) : 0);
@@ -336,6 +337,8 @@ void SurfacePatch::begin(std::size_t intervals, bool entities, bool keeps_sent) 
 void SurfacePatch::grow(std::size_t vertices) {
   constexpr float kUnknown = std::numeric_limits<float>::infinity();
   const std::size_t before = samples.size();
+  EMIT_CHECK(begun_);
+  EMIT_CHECK_OP(vertices, >=, before);
   samples.resize(vertices);
   seen.resize(vertices);
   view_of.resize(vertices);

@@ -58,10 +58,14 @@ struct SurfacePatch {
   /// Sets the number of intervals that rows hold, whether there are entities, and whether `sent`
   /// is stored. @pre the patch has no vertices
   void begin(std::size_t intervals, bool entities, bool keeps_sent);
-  /// Makes room for the samples of `vertices` vertices in all. @pre begin()
+  /// Makes room for the samples of `vertices` vertices in all.
+  /// @pre begin(); vertices never become fewer
   void grow(std::size_t vertices);
   /// Frees everything but sun_frac, hidden_sky and sent, on both sides of sheets.
   void free_all_but_rows();
+
+ private:
+  bool begun_ = false;
 };
 
 /// Facts about the place of a sample that the sample itself does not hold.

@@ -249,5 +249,29 @@ TEST_F(IntervalRaysTest, WhatIsPassedOverWouldNotHaveHiddenTheSun) {
   for (const float hidden : hidden_on_third) EXPECT_GT(hidden, 0.2F);
 }
 
+/// A wide plate over a face hides all of its sky, however the face is tilted.
+TEST_F(IntervalRaysTest, ARoofHidesTheWholeSkyOfTiltedFaces) {
+  constexpr float kHalfM = 100.0F;
+  test::SurfaceScene scene;
+  scene.add_entity(
+      test::level_mesh(glm::vec3(-kHalfM, -kHalfM, 0.0F), glm::vec3(kHalfM, kHalfM, 0.0F), 0.0F));
+  auto rays = CasterRays::create(scene.geometry, rays_->origin_world_m());
+  ASSERT_TRUE(rays.has_value());
+  std::vector<PoseHistory> entities;
+  entities.emplace_back(scene::ObjectDesc{}, physics::Pose{});
+  ASSERT_TRUE(entities[0].append(kNoonNs, physics::Pose{}, true, false));
+  for (const SkyMeasure measure : {SkyMeasure::cosine, SkyMeasure::sphere}) {
+    IntervalRays under(std::vector<float>{1.5F * kHalfM}, measure);
+    under.update(kNoonNs, kNoonNs, 3, environment_, EntityPoses(entities), rays->origin_world_m());
+    for (const double tilt_deg : {0.0, 30.0, 60.0, 90.0, 120.0}) {
+      const auto tilt_rad = static_cast<float>(tilt_deg * physics::kDegree);
+      SurfaceSample sample;
+      sample.position_m = glm::vec3(glm::dvec3(0.0, 0.0, -0.5) - rays->origin_world_m());
+      sample.normal = glm::vec3(std::sin(tilt_rad), 0.0F, std::cos(tilt_rad));
+      EXPECT_EQ(under.hidden_sky(*rays, sample, kOffsetM).frac, 1.0F) << tilt_deg;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace emit::renderer
