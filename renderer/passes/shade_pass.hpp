@@ -17,9 +17,9 @@
 namespace emit::renderer {
 
 /// Shade of entities per pixel, between the geometry pass and the radiance pass. It works only in
-/// the part of the image that exposure tiles and entity shadow depth maps
-/// reach. See passes/shade.comp. Owner: CachedStage. Thread: the one that owns the GL context. Real
-/// time: create() and begin() are setup only, the rest is RT-safe.
+/// the part of the image that exposure tiles and entity shadow depth maps reach. See
+/// passes/shade.comp. Owner: CachedStage. Thread: the one that owns the GL context. Real time:
+/// create() and begin() are setup only, the rest is RT-safe.
 class ShadePass {
  public:
   /// Compiles the pass and allocates the textures for `entities` entities. `software` says that the

@@ -13,8 +13,8 @@
 namespace emit::renderer {
 
 /// Sorts rectangles of an image into its screen tiles. The rectangles are the bounds of exposure
-/// tiles and of entity shadow depth maps. A pixel then reads only the
-/// rectangles that may reach its screen tile, and screen tiles that nothing reaches are left out.
+/// tiles and of entity shadow depth maps. A pixel then reads only the rectangles that may reach its
+/// screen tile, and screen tiles that nothing reaches are left out.
 /// Real time: the constructor is setup only; all other functions are RT-safe.
 class ShadeTiles {
  public:
@@ -27,7 +27,6 @@ class ShadeTiles {
   static constexpr std::size_t kMaxEntries = 1U << 16U;
 
   /// Reserves memory for `records` rectangles in all.
-  /// @pre There are at most 65536 rectangles of each kind, because entries have 16 bits.
   explicit ShadeTiles(std::size_t records);
 
   /// Starts an image without rectangles. `window_px` is the drawn part: first column, first row,
@@ -37,10 +36,11 @@ class ShadeTiles {
   /// Adds the rectangle of an exposure tile, given like the window. Exposure tiles are numbered in
   /// the order of the calls, from 0.
   /// @pre The rectangle is not empty and lies within the window; no shadow depth map was added yet;
-  /// there is memory for it.
+  /// there is memory for it; fewer than 65536 were added, because entries have 16 bits.
   void add_exposure_tile(const glm::uvec4& px) noexcept;
   /// Adds the rectangle of an entity shadow depth map. They have numbers of their own, from 0.
-  /// @pre The rectangle is not empty and lies within the window; there is memory for it.
+  /// @pre The rectangle is not empty and lies within the window; there is memory for it; fewer than
+  /// 65536 were added.
   void add_entity_shadow(const glm::uvec4& px) noexcept { add(px, shadow_maps_++); }
   /// Sorts the rectangles. tiles(), entries() and tile_px() are valid from then on.
   void sort() noexcept;

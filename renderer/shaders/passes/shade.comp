@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts the shade of entities on static surfaces, where triangles are too large to show it. It changes the geometry
-// buffer of the samples. Exposure tiles lower the temperature where entities have cast shade lately. Entity
-// shadow depth maps reduce the sunlight where entities stand now. Work is done only in the screen tiles
-// that some of them may reach, and each screen tile lists those that may reach it.
+// buffer of the samples. Exposure tiles lower the temperature where entities have cast shade lately. Entity shadow depth
+// maps reduce the sunlight where entities stand now. Work is done only in the screen tiles that some of them may reach,
+// and each screen tile lists those that may reach it.
 //   EMIT_ROWS  number of blocks of 8 x 8 pixels, one below the other, that a work group computes
 #include "shared/shade_params.glsl.h"
 #include "passes/gbuffer.glsl"

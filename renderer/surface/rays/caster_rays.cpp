@@ -196,6 +196,7 @@ std::size_t CasterRays::entities() const noexcept {
   return impl_->entities.size();
 }
 std::uint32_t CasterRays::object_of_entity(std::size_t entity) const noexcept {
+  EMIT_CHECK_OP(entity, <, impl_->entities.size());
   return impl_->entities[entity].object;
 }
 

@@ -86,7 +86,7 @@ class CasterRays {
   /// Returns the number of entities that have an instance. They are numbered in the order of
   /// Instance::object.
   [[nodiscard]] std::size_t entities() const noexcept;
-  /// Returns the object of an entity. `entity` must be below entities().
+  /// Returns the object of an entity. @pre entity < entities()
   [[nodiscard]] std::uint32_t object_of_entity(std::size_t entity) const noexcept;
 
   /// Returns bits: bit i is set if ray i hits static geometry. Rays of one call should be alike in
@@ -94,7 +94,7 @@ class CasterRays {
   /// @pre rays.size() <= kMaxRays
   [[nodiscard]] std::uint32_t blocked_static(std::span<const CasterRay> rays,
                                              std::uint32_t wanted = kAllRays) const noexcept;
-  /// Returns the same bits for the entity `entity` at `placement`.
+  /// Returns the same bits for one entity at `placement`.
   [[nodiscard]] std::uint32_t blocked_entity(std::size_t entity, const EntityPlacement& placement,
                                              std::span<const CasterRay> rays) const noexcept;
   /// Returns the same bits for an entity that stands elsewhere for every ray: ray i meets it at

@@ -136,6 +136,7 @@ class CachedSurface {
   };
   [[nodiscard]] std::span<const Shadow> shadows() const noexcept { return shadows_; }
   /// Finds shadows() for the poses of the entities at `drawn_ns` and the sun of `sun_ns`.
+  /// @pre prepare()
   void place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns, const Inputs& inputs) noexcept;
   /// Brings the shadow depth map of an entity up to date, and places it. Call it for shadows that
   /// show in the frame.

@@ -35,6 +35,7 @@ void CachedSurface::begin_shade(std::int64_t now_ns, const Inputs& inputs) {
 
 void CachedSurface::place_shadows(std::int64_t drawn_ns, std::int64_t sun_ns,
                                   const Inputs& inputs) noexcept {
+  EMIT_CHECK(shade_.has_value());
   place_entities(drawn_ns, inputs.entities);
   const physics::SunPosition sun = inputs.environment.sun_at(sun_ns);
   to_sun_ = glm::vec3(sun.direction_enu);

@@ -67,7 +67,7 @@ struct StateWanted {
 /// Tests whether write_state() could write: the folder exists and permits it. Errors: io.
 [[nodiscard]] physics::Result<void> check_state_writable(const std::filesystem::path& file);
 
-/// Reads a state for a scene that has `geometry` and `entities` entities. Errors: io (the file
+/// Reads a state for a scene with `geometry` and that number of entities. Errors: io (the file
 /// cannot be read), config (the file is truncated, damaged, of another version, of another instant,
 /// or made for something else). The message names the file and the reason.
 [[nodiscard]] physics::Result<SurfaceModel> read_state(const std::filesystem::path& file,

@@ -74,7 +74,7 @@ RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
     RayMesh out;
     out.object = instance.object;
     out.instance = static_cast<std::uint32_t>(i);
-    // Give every entity one entity, shared by its instances.
+    // Make one RayEntity per entity, shared by its instances.
     if (instance.entity_id != 0) {
       const auto [entry, added] = entity_of_object.try_emplace(
           instance.object, static_cast<std::uint32_t>(desc.entities.size()));

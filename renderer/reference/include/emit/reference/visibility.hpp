@@ -59,8 +59,8 @@ struct RaySceneDesc {
   std::vector<RayEntity> entities{};
 };
 
-/// Converts a loaded scene to double. Every entity becomes an entity along its trajectory, or at
-/// its placement if it has none. Replace `entities[i].poses` to use another history of poses.
+/// Converts a loaded scene to double. An entity moves along its trajectory, or stands at its
+/// placement if it has none. Replace `entities[i].poses` to use another history of poses.
 [[nodiscard]] RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
                                           const scene::SceneGeometry& geometry);
 
@@ -217,7 +217,7 @@ class RayScene {
  public:
   /// Builds the hierarchies. Triangles with a coordinate that is not finite are dropped (see
   /// dropped_triangles()). Triangles without area stay and are never hit.
-  /// Errors: invalid_argument, naming the mesh (index out of range, array sizes, unknown entity, a
+  /// Errors: invalid_argument, naming the mesh (index out of range, array sizes, unknown entity, an
   /// entity without poses), internal (Embree).
   [[nodiscard]] static physics::Result<RayScene> create(
       RaySceneDesc desc, RayArithmetic arithmetic = RayArithmetic::exact);
