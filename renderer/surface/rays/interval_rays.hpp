@@ -89,8 +89,8 @@ class IntervalRays {
                             float start_offset_m) const noexcept;
 
   /// Returns the sky that entities hide from a sample. It sends a fixed set of rays, spread by the
-  /// measure of the sky. The result is zero if no entity is near, and on the surfaces of entities.
-  /// Any thread; RT-safe.
+  /// measure of the sky. Static geometry in front of an entity is not looked at. The result is zero
+  /// if no entity is near, and on the surfaces of entities. Any thread; RT-safe.
   [[nodiscard]] HiddenSky hidden_sky(const CasterRays& rays, const SurfaceSample& sample,
                                      float start_offset_m) const noexcept;
 

@@ -282,8 +282,8 @@ class CachedSurface {
   std::int64_t last_now_ns_ = 0;
   bool renewing_ = false;  ///< node 1 is being computed, because the weather has changed
   bool lags_ = false;      ///< a change that matters is not known to all samples
-  std::int64_t weather_change_ns_ =
-      kNoChange;  ///< earliest change of the weather that is not taken in
+  /// Earliest change of the weather that is not taken in.
+  std::int64_t weather_change_ns_ = kNoChange;
   std::uint32_t turn_ = 0;
   std::int64_t interval_ns_ = 0;
   std::uint64_t revision_ = 0;  ///< revision of the weather that is taken in

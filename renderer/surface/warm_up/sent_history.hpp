@@ -13,11 +13,10 @@ namespace emit::renderer {
 /// numbers. The row holds the long-wave exitance at every node, the reflected sunlight of every
 /// interval and the net flux into the solid at every node, all in W/m2. An interval lies between
 /// two nodes. A view of an empty row keeps nothing.
-template <class Value>
 class SentRow {
  public:
   SentRow() = default;
-  explicit SentRow(std::span<Value> values) noexcept
+  explicit SentRow(std::span<float> values) noexcept
       : values_(values.data()), intervals_(values.empty() ? 0 : (values.size() - 2) / 3) {}
 
   /// Returns the number of values in the row of a history of `intervals` intervals.
@@ -36,7 +35,7 @@ class SentRow {
 
   /// Part of the row that other samples receive: the long wave at all nodes, then the sunlight of
   /// all intervals.
-  [[nodiscard]] std::span<Value> radiation_w_m2() const noexcept {
+  [[nodiscard]] std::span<const float> radiation_w_m2() const noexcept {
     return {values_, 2 * intervals_ + 1};
   }
   [[nodiscard]] float longwave_w_m2(std::size_t node) const noexcept { return values_[node]; }
@@ -52,7 +51,7 @@ class SentRow {
     values_[2 * intervals_ + 1 + node] = output.flux_w_m2;
   }
 
-  Value* values_ = nullptr;
+  float* values_ = nullptr;
   std::size_t intervals_ = 0;
 };
 

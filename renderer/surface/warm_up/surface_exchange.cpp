@@ -33,7 +33,7 @@ class SeenRadiation {
   }
 
   /// Adds up the radiation in the rows `sent`, by sample, list by list. Uses all cores.
-  void gather(std::span<const SentRow<float>> sent) {
+  void gather(std::span<const SentRow> sent) {
     constexpr std::size_t kListGrain = 16;
     threads::parallel_parts(lists_.size(), kListGrain, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) {
@@ -99,8 +99,8 @@ class Sweeper {
   std::size_t nodes_;
   std::vector<std::uint32_t> swept_;  ///< samples that sweeps change; one for both faces of a sheet
   SentHistory second_;                ///< second rows of the samples that sweeps change
-  std::vector<SentRow<float>> before_;  ///< by sample: what it sent in the latest sweep
-  std::vector<SentRow<float>> after_;   ///< by sample: what it sends in this sweep
+  std::vector<SentRow> before_;       ///< by sample: what it sent in the latest sweep
+  std::vector<SentRow> after_;        ///< by sample: what it sends in this sweep
   SeenRadiation seen_;
   EntityExitance exitance_;
   std::vector<EntityFaces> faces_;  ///< by node, then entity; empty without exchange or entities
@@ -113,7 +113,7 @@ Sweeper::Sweeper(const SurfaceInputs& inputs, const ExchangeOptions& options,
       histories_(std::move(histories)),
       intervals_(inputs.record.size()),
       nodes_(intervals_ + 1),
-      second_(SentRow<float>::length(intervals_)),
+      second_(SentRow::length(intervals_)),
       seen_(model.samples, 2 * intervals_ + 1) {
   for (const SampleHistories::Rows& rows : histories_.rows) before_.emplace_back(rows.sent_w_m2);
   if (options.exitance && !inputs.entities_now.empty()) {

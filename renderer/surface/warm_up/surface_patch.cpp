@@ -330,7 +330,7 @@ void SurfacePatch::begin(std::size_t intervals, bool entities, bool keeps_sent) 
   begun_ = true;
   sun_frac = RowStore<float>(intervals);
   hidden_sky = RowStore<HiddenSky>(entities ? intervals : 0);
-  sent = SentHistory(keeps_sent ? SentRow<float>::length(intervals) : 0);
+  sent = SentHistory(keeps_sent ? SentRow::length(intervals) : 0);
   if (back) back->begin(intervals, entities, keeps_sent);
 }
 
