@@ -15,10 +15,6 @@ using physics::Result;
 
 namespace {
 
-bool is_ascii_alnum(char c) {
-  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
-
 void check_endpoint(const Node& table, std::string_view key, const std::string& value,
                     bool may_be_empty, Diagnostics& diagnostics) {
   if ((may_be_empty && value.empty()) || is_endpoint(value)) {

@@ -4,7 +4,6 @@
 # and fuzz targets link what they exercise. A folder of headers alone becomes an interface library.
 # With EMIT_UNITY_BUILD a few sources of a library at a time are compiled as one, which halves the time of a first build.
 # SEPARATE names those of SOURCES that define the same private names as others, so they are compiled alone.
-option(EMIT_UNITY_BUILD "Compile several sources of a library at a time: faster from clean, slower after a change" OFF)
 function(emit_library)
   cmake_parse_arguments(arg "" "NAME" "INCLUDE;SOURCES;SEPARATE;PUBLIC;PRIVATE" ${ARGN})
   set(target emit_${arg_NAME})

@@ -23,7 +23,7 @@ class ServiceNotifier;
 struct DaemonOptions {
   Clock* clock = nullptr;             ///< null: SystemClock; must outlive the daemon
   FrameSourceFactory source_factory;  ///< empty: the source that the configuration names
-  bool stepped = false;               ///< no threads: the caller turns the crank with step()
+  bool stepped = false;               ///< no threads: the caller runs the agents with step()
   const ServiceNotifier* notifier = nullptr;  ///< null: nobody; must outlive the daemon
   /// Drops the privileges of the process beyond its user once the ports are open. It is for
   /// programs that are the daemon, because it cannot be undone.
@@ -81,8 +81,8 @@ class Daemon {
 
 /// One option of emitd, as its --help shows it.
 struct DaemonOption {
-  std::string_view name;   ///< with dashes
-  std::string_view value;  ///< what the value is called; empty: a flag
+  std::string_view name;        ///< with dashes
+  std::string_view value = {};  ///< what the value is called; empty: a flag
   std::string_view text;
   bool required = false;
   bool repeatable = false;

@@ -10,11 +10,13 @@
 
 #include "emit/protocol/reassembler.hpp"
 #include "protocol/frames.hpp"
+#include "protocol/received_frames.hpp"
 
 namespace emit::protocol {
 namespace {
 
 using test::Datagram;
+using test::expect_true_to;
 using test::Frame;
 
 Fragmenter cut(const Frame& frame, std::uint32_t payload, std::uint32_t id) {
@@ -46,15 +48,6 @@ Reassembler::Params params(const Frame& frame, const FecParams& fec) {
   out.max_payload_bytes = static_cast<std::uint32_t>(frame.pixels.size());
   out.fec = fec;
   return out;
-}
-
-void expect_true_to(const ReceivedFrame& received, const Frame& sent) {
-  ASSERT_EQ(received.pixels.size() * 4, sent.pixels.size());
-  for (std::size_t i = 0; i < received.pixels.size(); ++i) {
-    float expected = 0.0F;
-    if (received.validity.pixel(i)) std::memcpy(&expected, &sent.pixels[i * 4], sizeof expected);
-    ASSERT_EQ(received.pixels[i], expected) << i;
-  }
 }
 
 struct GeometryCase {

@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "protocol/frames.hpp"
+#include "protocol/received_frames.hpp"
 
 namespace emit::protocol {
 namespace {
 
 using test::Datagram;
+using test::expect_true_to;
 using test::Frame;
 
 constexpr std::uint32_t kWidthPx = 48;
@@ -26,24 +28,6 @@ Reassembler::Params params() {
 
 std::uint64_t count(const Reassembler& reassembler, FragmentStatus status) {
   return reassembler.counters().fragments[static_cast<std::size_t>(status)];
-}
-
-/// Expects that every valid pixel is the sent one, every other pixel is 0, and the counters agree.
-void expect_true_to(const ReceivedFrame& received, const Frame& sent) {
-  ASSERT_EQ(received.pixels.size() * 4, sent.pixels.size());
-  std::uint64_t missing = 0;
-  for (std::size_t i = 0; i < received.pixels.size(); ++i) {
-    float expected = 0.0F;
-    if (received.validity.pixel(i)) {
-      std::memcpy(&expected, &sent.pixels[i * 4], sizeof expected);
-    } else {
-      ++missing;
-    }
-    ASSERT_EQ(received.pixels[i], expected) << i;
-  }
-  EXPECT_EQ(received.missing_px, missing);
-  EXPECT_EQ(received.complete, missing == 0);
-  EXPECT_EQ((received.header.flags & kFlagPartial) != 0, missing != 0);
 }
 
 TEST(Reassembler, GivesACompleteFrameFromFragmentsInAnyOrder) {

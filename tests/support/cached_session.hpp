@@ -18,12 +18,12 @@
 #include "emit/renderer/renderer.hpp"
 #include "history/foster_history.hpp"
 #include "support/renderer_scene.hpp"
+#include "support/times.hpp"
 
 /// Scenarios of the thermal method "cached" with the extended model, and a renderer that shows
 /// them.
 namespace emit::test {
 
-inline constexpr std::int64_t kSecondNs = 1'000'000'000;
 inline constexpr std::int64_t kHourNs = 3600 * kSecondNs;
 using physics::kReferenceK;
 inline constexpr std::uint32_t kWidth = 96;

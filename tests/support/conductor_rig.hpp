@@ -11,10 +11,9 @@
 #include "agents/render/render_agent.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"
+#include "support/times.hpp"
 
 namespace emit::test {
-
-inline constexpr std::int64_t kMs = 1'000'000;
 
 /// Source of the triggers that the test hands out.
 class FakeTriggers final : public server::TriggerInput {

@@ -67,7 +67,7 @@ class ChildProcess {
   ChildProcess(const ScratchFolder& folder, std::string program, std::string out_name,
                std::string err_name, std::vector<std::string> arguments, rlim_t file_limit_bytes)
       : folder_(folder), out_name_(std::move(out_name)), err_name_(std::move(err_name)) {
-    program.insert(0, std::string(EMIT_TEST_BIN_DIR) + "/");
+    program.insert(0, EMIT_TEST_BIN_DIR "/");
     std::vector<char*> argv{program.data()};
     for (auto& argument : arguments) {
       argv.push_back(argument.data());

@@ -75,7 +75,7 @@ class CachedSurface {
     /// is used only if it holds the very instant, and is left as it is.
     bool start = true;
     /// Returns true if a surface that was refined for `eyes` will do for the first frame.
-    std::function<bool(std::span<const RefineView::Eye> eyes)> fits_camera;
+    std::function<bool(std::span<const RefineView::Eye> eyes)> fits_camera = {};
   };
 
   /// Samples the surface for `now_ns`, or takes it from `saved` and advances it to there. It also

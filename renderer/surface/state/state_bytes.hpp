@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <concepts>
@@ -38,15 +39,19 @@ class Fnv64 {
 /// Sink of put_value() that stores the bytes. It takes memory for the expected size at once.
 class ByteStore {
  public:
-  explicit ByteStore(std::size_t expected_bytes) { bytes_.reserve(expected_bytes); }
+  explicit ByteStore(std::size_t expected_bytes) : bytes_(expected_bytes) {}
   void put(const void* data, std::size_t bytes) {
-    const auto* at = static_cast<const std::byte*>(data);
-    bytes_.insert(bytes_.end(), at, at + bytes);
+    if (bytes > bytes_.size() - used_) bytes_.resize(std::max(2 * bytes_.size(), used_ + bytes));
+    if (bytes != 0) std::memcpy(bytes_.data() + used_, data, bytes);
+    used_ += bytes;
   }
-  [[nodiscard]] std::span<const std::byte> bytes() const noexcept { return bytes_; }
+  [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
+    return std::span(bytes_).first(used_);
+  }
 
  private:
   std::vector<std::byte> bytes_;
+  std::size_t used_ = 0;
 };
 
 /// Sink of put_value() that counts the bytes only.
@@ -61,6 +66,9 @@ class ByteCount {
 
 template <class T>
 concept Number = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+/// A number whose bytes in memory are its bytes in a file, so that rows of them are copied whole.
+template <class T>
+concept PlainNumber = Number<T> && !std::same_as<T, bool>;
 
 /// Passes the bytes of a value to a sink with put(data, bytes). Strings and vectors are preceded by
 /// their size as u64; a bool takes one byte.
@@ -94,6 +102,15 @@ template <class Sink, class T, std::size_t N>
 void put_value(Sink& sink, const std::array<T, N>& value);
 template <class Sink, class T>
 void put_value(Sink& sink, const std::vector<T>& value);
+/// Passes the bytes of items to a sink without their number.
+template <class Sink, class T>
+void put_items(Sink& sink, std::span<const T> items) {
+  if constexpr (PlainNumber<T>) {
+    sink.put(items.data(), items.size_bytes());
+  } else {
+    for (const T& item : items) put_value(sink, item);
+  }
+}
 template <class Sink, class T>
 requires requires(const T& value) {
   visit_members(value, [](const auto&) {});
@@ -103,12 +120,12 @@ void put_value(Sink& sink, const T& value) {
 }
 template <class Sink, class T, std::size_t N>
 void put_value(Sink& sink, const std::array<T, N>& value) {
-  for (const T& item : value) put_value(sink, item);
+  put_items(sink, std::span<const T>(value));
 }
 template <class Sink, class T>
 void put_value(Sink& sink, const std::vector<T>& value) {
   put_value(sink, static_cast<std::uint64_t>(value.size()));
-  for (const T& item : value) put_value(sink, item);
+  put_items(sink, std::span<const T>(value));
 }
 
 /// Reader of what put_value() has written. Once a value is missing, ok() is false and nothing more
@@ -125,6 +142,7 @@ class ByteSource {
       ok_ = false;
       return;
     }
+    if (bytes == 0) return;
     std::memcpy(data, left_.data(), bytes);
     left_ = left_.subspan(bytes);
   }
@@ -162,9 +180,18 @@ requires requires(T& value) {
 void take_value(ByteSource& source, T& value) {
   visit_members(value, [&source](auto& member) { take_value(source, member); });
 }
+/// Reads what put_items() has written.
+template <class T>
+void take_items(ByteSource& source, std::span<T> items) {
+  if constexpr (PlainNumber<T>) {
+    source.take(items.data(), items.size_bytes());
+  } else {
+    for (T& item : items) take_value(source, item);
+  }
+}
 template <class T, std::size_t N>
 void take_value(ByteSource& source, std::array<T, N>& value) {
-  for (T& item : value) take_value(source, item);
+  take_items(source, std::span<T>(value));
 }
 template <class T>
 void take_value(ByteSource& source, std::vector<T>& value) {
@@ -178,7 +205,7 @@ void take_value(ByteSource& source, std::vector<T>& value) {
     return;
   }
   value.resize(count);
-  for (T& item : value) take_value(source, item);
+  take_items(source, std::span<T>(value));
 }
 
 }  // namespace emit::renderer

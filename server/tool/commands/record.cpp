@@ -18,6 +18,8 @@
 namespace emit::tool {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 struct RecordOptions {
   std::string from;
   std::filesystem::path out;
@@ -40,7 +42,6 @@ int run(const RecordOptions& command) {
   if (!writer) return fail(writer.error());
 
   const InterruptGuard interrupt;
-  using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   const auto end = command.duration_s > 0.0
                        ? start + std::chrono::duration_cast<Clock::duration>(

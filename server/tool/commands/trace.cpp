@@ -17,11 +17,11 @@ struct TraceOptions {
 };
 
 int run(const TraceOptions& command) {
-  constexpr std::int64_t kTimeoutNs = 10'000'000'000;
+  constexpr std::int64_t kTraceTimeoutNs = 10'000'000'000;
   std::string url = command.url;
   while (url.ends_with('/')) url.pop_back();
   if (!url.ends_with("/trace")) url += "/trace";
-  const auto answer = client::http_get(url, kTimeoutNs);
+  const auto answer = client::http_get(url, kTraceTimeoutNs);
   if (!answer) return fail_call(answer.error());
   if (answer->status != 200) {
     return fail(kExitFailure, fmt::format("{}: answer {}", url, answer->status));

@@ -10,11 +10,12 @@
 
 #include "emit/physics/apparent_temperature.hpp"
 #include "support/renderer_scene.hpp"
+#include "support/times.hpp"
 
 namespace emit::test {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 constexpr std::int64_t kStartNs = 3600 * kSecondNs;
 constexpr std::uint8_t kQualityLevels = 12;
 constexpr std::size_t kMovedPx = 4;

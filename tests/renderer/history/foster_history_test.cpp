@@ -9,11 +9,12 @@
 #include <random>
 
 #include "emit/physics/constants.hpp"
+#include "support/times.hpp"
 
 namespace emit::renderer {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 using physics::kReferenceK;
 
 scene::Material material(const std::string& name, std::vector<scene::Layer> layers) {

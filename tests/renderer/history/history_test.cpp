@@ -8,11 +8,12 @@
 #include "emit/physics/constants.hpp"
 #include "history/pose_history.hpp"
 #include "history/step_plan.hpp"
+#include "support/times.hpp"
 
 namespace emit::renderer {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 
 physics::Pose at_east(double east_m) {
   return {{east_m, 0.0, 0.0}, physics::world_from_body_heading_pitch_roll(0.0, 0.0, 0.0)};

@@ -8,12 +8,13 @@
 #include "emit/physics/clear_sky.hpp"
 #include "emit/physics/sun.hpp"
 #include "emit/physics/weather.hpp"
+#include "support/times.hpp"
 
 namespace emit::physics {
 namespace {
 
-constexpr std::int64_t kSecond = 1000000000LL;
-constexpr std::int64_t kDay = 86400 * kSecond;
+using emit::test::kSecondNs;
+constexpr std::int64_t kDay = 86400 * kSecondNs;
 
 SunPosition sun_at_zenith_angle(double zenith_deg) {
   SunPosition sun;
@@ -34,7 +35,7 @@ TEST(Sun, PosixTimeAgreesWithTheJulianDate) {
   const GeoPlace place{48.56_deg, 11.26_deg, 400_m};
   // The instants are 2003-10-17 19:30:30 UTC and 1955-06-05 12:00 UTC, which is before the POSIX
   // epoch.
-  const SunPosition a = sun_position(1066419030 * kSecond, place);
+  const SunPosition a = sun_position(1066419030 * kSecondNs, place);
   const SunPosition b = sun_position_ut1(julian_day_0h(2003, 10, 17), (19.5 * 3600 + 30) / 86400,
                                          delta_t_s(2003.8), place);
   EXPECT_LT(glm::distance(a.direction_enu, b.direction_enu), 1e-8);
@@ -47,7 +48,7 @@ TEST(Sun, PosixTimeAgreesWithTheJulianDate) {
 TEST(Sun, DirectionIsAUnitVectorOfAzimuthAndElevation) {
   const GeoPlace place{Radians(-0.6), Radians(2.4), 30_m};
   for (int hour = 0; hour < 24; ++hour) {
-    const SunPosition sun = sun_position(1750000000 * kSecond + hour * 3600 * kSecond, place);
+    const SunPosition sun = sun_position(1750000000 * kSecondNs + hour * 3600 * kSecondNs, place);
     EXPECT_NEAR(glm::length(sun.direction_enu), 1.0, 1e-14);
     const double ce = std::cos(sun.elevation.value());
     EXPECT_NEAR(sun.direction_enu.x, ce * std::sin(sun.azimuth.value()), 1e-12);
@@ -64,7 +65,7 @@ TEST(Sun, CulminatesInTheSouthOfTheNorthernTemperateZone) {
   double azimuth_deg = 0.0;
   // The sun of the solstice 2026-06-21 stands at 90 - 48.56 + 23.44 deg.
   for (std::int64_t minute = 0; minute < 1440; ++minute) {
-    const SunPosition sun = sun_position(1781999999LL * kSecond + minute * 60 * kSecond, place);
+    const SunPosition sun = sun_position(1781999999LL * kSecondNs + minute * 60 * kSecondNs, place);
     if (sun.elevation.value() > highest) {
       highest = sun.elevation.value();
       azimuth_deg = to_degrees(sun.azimuth);
@@ -85,9 +86,9 @@ TEST(Sun, DeltaTIsContinuousAndNearTheObservedValues) {
 
 TEST(Sun, MeanSolarTimeFollowsTheLongitude) {
   EXPECT_NEAR(mean_solar_hours(0, Radians(0.0)), 0.0, 1e-12);
-  EXPECT_NEAR(mean_solar_hours(6 * 3600 * kSecond, 90_deg), 12.0, 1e-9);
-  EXPECT_NEAR(mean_solar_hours(6 * 3600 * kSecond, degrees(-120.0)), 22.0, 1e-9);
-  EXPECT_NEAR(mean_solar_hours(-6 * 3600 * kSecond, Radians(0.0)), 18.0, 1e-9);
+  EXPECT_NEAR(mean_solar_hours(6 * 3600 * kSecondNs, 90_deg), 12.0, 1e-9);
+  EXPECT_NEAR(mean_solar_hours(6 * 3600 * kSecondNs, degrees(-120.0)), 22.0, 1e-9);
+  EXPECT_NEAR(mean_solar_hours(-6 * 3600 * kSecondNs, Radians(0.0)), 18.0, 1e-9);
 }
 
 TEST(ClearSky, IrradianceMatchesPublishedValuesAtThreeZenithAngles) {
@@ -178,7 +179,7 @@ TEST(Weather, TwoRowsAtOneInstantAreAJump) {
 
 TEST(Weather, ClearSkyJoinsTheModels) {
   const GeoPlace place{48.56_deg, 11.26_deg, 400_m};
-  const std::int64_t noon = 1782040440LL * kSecond;  // 2026-06-21 11:14 UTC
+  const std::int64_t noon = 1782040440LL * kSecondNs;  // 2026-06-21 11:14 UTC
   const SunPosition sun = sun_position(noon, place);
   ClearSky model;
   model.cloud_frac = 0.3;

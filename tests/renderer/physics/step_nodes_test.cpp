@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/physics/step_nodes.hpp"
+#include "support/times.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +11,8 @@
 namespace emit::physics {
 namespace {
 
-constexpr std::int64_t kSecond = 1000000000LL;
-constexpr std::int64_t kWindow = 12600 * kSecond;  // 3.5 h
+using emit::test::kSecondNs;
+constexpr std::int64_t kWindow = 12600 * kSecondNs;  // 3.5 h
 
 TEST(StepNodes, RatiosOfTheThreeAndAHalfHourWindow) {
   EXPECT_NEAR(geometric_step_ratio(12600.0, 20.0, 27), 1.196, 5e-4);
@@ -39,8 +40,8 @@ TEST(StepNodes, GeometricIntervalsGrowByOneRatioIntoThePast) {
 TEST(StepNodes, AWindowShorterThanItsFirstStepsIsDividedEvenly) {
   std::vector<std::int64_t> geometric(28);
   std::vector<std::int64_t> uniform(28);
-  geometric_step_nodes(0, 500 * kSecond, 20.0, geometric);
-  uniform_step_nodes(0, 500 * kSecond, uniform);
+  geometric_step_nodes(0, 500 * kSecondNs, 20.0, geometric);
+  uniform_step_nodes(0, 500 * kSecondNs, uniform);
   EXPECT_EQ(geometric, uniform);
 }
 
@@ -55,10 +56,10 @@ TEST(StepNodes, UniformIntervalsDifferByOneNanosecondAtMost) {
 }
 
 TEST(StepNodes, NoHistoryYetPutsEveryNodeAtNow) {
-  for (const std::int64_t start : {5 * kSecond, 9 * kSecond}) {
+  for (const std::int64_t start : {5 * kSecondNs, 9 * kSecondNs}) {
     std::vector<std::int64_t> nodes(14, -1);
-    geometric_step_nodes(start, 5 * kSecond, 20.0, nodes);
-    EXPECT_EQ(std::count(nodes.begin(), nodes.end(), 5 * kSecond), 14);
+    geometric_step_nodes(start, 5 * kSecondNs, 20.0, nodes);
+    EXPECT_EQ(std::count(nodes.begin(), nodes.end(), 5 * kSecondNs), 14);
   }
 }
 

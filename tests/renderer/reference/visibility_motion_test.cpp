@@ -6,6 +6,7 @@
 
 #include "emit/physics/frames.hpp"
 #include "renderer/reference/visibility_support.hpp"
+#include "support/times.hpp"
 
 namespace emit {
 namespace {
@@ -18,7 +19,7 @@ using test::ground_mesh;
 using test::make_scene;
 using test::sun_at;
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 
 /// Returns a level box that drives east at 1 m/s from `start`. The box is in body axes (x forward,
 /// z down).

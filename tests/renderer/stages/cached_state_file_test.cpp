@@ -13,11 +13,12 @@
 #include <vector>
 
 #include "support/renderer_scene.hpp"
+#include "support/times.hpp"
 
 namespace emit::test {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 constexpr std::int64_t kHourNs = 3600 * kSecondNs;
 
 physics::Pose looking(const glm::dvec3& from, const glm::dvec3& at) {

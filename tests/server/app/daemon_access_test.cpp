@@ -25,6 +25,7 @@
 #include "support/certificates.hpp"
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
+#include "support/times.hpp"
 #include "support/two_networks.hpp"
 
 namespace emit::server {
@@ -36,7 +37,7 @@ using test::ScratchFolder;
 using test::TwoNetworks;
 using Bytes = std::vector<std::byte>;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 protocol::HostFrameData host_frame(std::uint64_t number, std::uint64_t run_id = 1) {
   protocol::HostFrameData frame;

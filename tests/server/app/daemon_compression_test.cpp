@@ -5,6 +5,7 @@
 
 #include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -13,7 +14,7 @@ using test::canned_config;
 using test::DaemonProcess;
 using test::ScratchFolder;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 std::unique_ptr<client::FrameClient> open(const std::string& url, bool compression) {
   auto client = client::FrameClient::connect(url);

@@ -22,6 +22,7 @@
 #include "support/daemon_process.hpp"
 #include "support/emit_process.hpp"
 #include "support/scripted_source.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -32,7 +33,7 @@ using test::ScratchFolder;
 using test::ToolProcess;
 using namespace std::chrono_literals;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 constexpr std::int64_t kMayBeLostNs = 100'000'000;
 constexpr int kKills = 20;
 

@@ -18,6 +18,7 @@
 #include "rt/fd.hpp"
 #include "support/daemon_process.hpp"
 #include "support/emit_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -27,7 +28,7 @@ using test::DaemonProcess;
 using test::ScratchFolder;
 using test::ToolProcess;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 class DaemonFaults : public ::testing::Test {
  protected:

@@ -17,6 +17,7 @@
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
 #include "support/scripted_source.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -27,7 +28,7 @@ using test::Exposition;
 using test::ScratchFolder;
 using test::ToolProcess;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 TEST(Journal, AStartOnAFullDiskServesWithoutAJournalUnlessItIsRequired) {
   constexpr rlim_t kDiskBytes = 4000;  // the log of the daemon has room, the schemas have not

@@ -15,6 +15,7 @@
 #include "net/socket.hpp"
 #include "rt/fd.hpp"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -23,7 +24,7 @@ using test::canned_config;
 using test::DaemonProcess;
 using test::ScratchFolder;
 
-constexpr std::int64_t kLongNs = 20'000'000'000;
+using emit::test::kLongNs;
 
 class MalformedTraffic : public ::testing::Test {
  protected:

@@ -11,6 +11,7 @@
 #include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -20,7 +21,7 @@ using test::DaemonProcess;
 using test::Exposition;
 using test::ScratchFolder;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 class DaemonMetrics : public testing::Test {
  protected:

@@ -16,6 +16,7 @@
 #include "net/socket.hpp"
 #include "rt/error_text.hpp"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -24,7 +25,7 @@ using test::canned_config;
 using test::DaemonProcess;
 using test::ScratchFolder;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 constexpr std::uint64_t kFrames = 40;
 
 std::string config_at(const std::string& host, const std::string& pacing) {

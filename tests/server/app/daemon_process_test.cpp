@@ -7,6 +7,7 @@
 #include "emit/protocol/record/log.hpp"
 #include "emit/v1/control.pb.h"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -15,7 +16,7 @@ using test::canned_config;
 using test::DaemonProcess;
 using test::ScratchFolder;
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 
 protocol::HostFrameData host_frame(std::uint64_t number) {
   protocol::HostFrameData frame;

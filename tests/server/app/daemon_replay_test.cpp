@@ -17,6 +17,7 @@
 #include "net/socket.hpp"
 #include "support/daemon_process.hpp"
 #include "support/scripted_source.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -25,7 +26,7 @@ using test::ScratchFolder;
 using test::ScriptedSource;
 using test::SourceScript;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 FrameSourceFactory scripted(SourceScript& script) {
   return [&script] {

@@ -9,6 +9,7 @@
 #include "support/daemon_process.hpp"
 #include "support/emit_process.hpp"
 #include "support/scripted_source.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 using test::ScratchFolder;
 using test::ToolProcess;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 /// A daemon in this process, its host and a client that sets the pace.
 class OneRun {

@@ -15,6 +15,7 @@
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
 #include "support/notify_socket.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -26,7 +27,7 @@ using test::NotifySocket;
 using test::ScratchFolder;
 
 constexpr int kLongMs = 30'000;
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 const std::string kMetrics = "[metrics]\nlisten = \"127.0.0.1:0\"\n";
 
 /// Environment for the processes that are started while it exists.

@@ -7,6 +7,7 @@
 
 #include "client/client_connection.hpp"
 #include "emit/client/client.hpp"
+#include "support/times.hpp"
 #include "support/two_networks.hpp"
 
 namespace emit::server {
@@ -17,7 +18,7 @@ using test::ScratchFolder;
 using test::TwoNetworks;
 
 constexpr std::uint64_t kFrames = 60;
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 constexpr std::uint64_t kFrameBytes = 320 * 256 * sizeof(float);
 
 std::string config() {

@@ -12,6 +12,7 @@
 
 #include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -20,7 +21,7 @@ using test::canned_config;
 using test::DaemonProcess;
 using test::ScratchFolder;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 std::string own_name(const char* what) {
   return std::string("system-") + what + "-" + std::to_string(::getpid());

@@ -7,6 +7,7 @@
 
 #include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -20,7 +21,7 @@ constexpr std::uint64_t kFrames = 200;
 #else
 constexpr std::uint64_t kFrames = 1000;
 #endif
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 
 /// A client and the checks that hold for every stream: missing frames are flagged, complete frames
 /// are intact.

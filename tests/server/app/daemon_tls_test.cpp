@@ -20,6 +20,7 @@
 #include "support/certificates.hpp"
 #include "support/daemon_process.hpp"
 #include "support/exposition.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -27,8 +28,8 @@ namespace {
 using test::canned_config;
 using test::DaemonProcess;
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
-constexpr std::int64_t kLongNs = 30 * kSecondNs;
+using emit::test::kLongNs;
+using emit::test::kSecondNs;
 
 protocol::HostFrameData host_frame(std::uint64_t number) {
   protocol::HostFrameData frame;

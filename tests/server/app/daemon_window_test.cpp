@@ -8,6 +8,7 @@
 
 #include "emit/client/client.hpp"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
@@ -16,7 +17,7 @@ using test::canned_config;
 using test::DaemonProcess;
 using test::ScratchFolder;
 
-constexpr std::int64_t kLongNs = 30'000'000'000;
+using emit::test::kLongNs;
 constexpr std::uint64_t kFrames = 24;
 
 const char* const kWorld =

@@ -11,12 +11,13 @@
 #include "host/realtime.hpp"
 #include "support/daemon_process.hpp"
 #include "support/notify_socket.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
 
+using emit::test::kSecondNs;
 using test::NotifySocket;
-constexpr std::int64_t kSecondNs = 1'000'000'000;
 
 TEST(ServiceNotifier, TellsByPathAndByAbstractName) {
   test::ScratchFolder folder;

@@ -10,11 +10,12 @@
 
 #include "bench/accuracy/converged_history.hpp"
 #include "support/renderer_scene.hpp"
+#include "support/times.hpp"
 
 namespace emit::test {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 constexpr std::int64_t kHourNs = 3600 * kSecondNs;
 constexpr std::uint32_t kWidth = 72;
 constexpr std::uint32_t kHeight = 60;

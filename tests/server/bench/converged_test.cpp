@@ -11,11 +11,12 @@
 #include "emit/physics/constants.hpp"
 #include "emit/physics/equilibrium.hpp"
 #include "emit/physics/surface_balance.hpp"
+#include "support/times.hpp"
 
 namespace emit::tool {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 constexpr std::int64_t kEndNs = 7200 * kSecondNs;
 
 scene::Material stone() {

@@ -26,13 +26,14 @@
 #include "rt/futex.hpp"
 #include "support/fake_clock.hpp"
 #include "support/scripted_source.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
 
 constexpr std::uint32_t kWidthPx = 64;
 constexpr std::uint32_t kHeightPx = 48;
-constexpr std::int64_t kLongNs = 20'000'000'000;
+using emit::test::kLongNs;
 
 std::string own_name() {
   static int count = 0;

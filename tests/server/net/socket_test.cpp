@@ -27,11 +27,12 @@
 #include "emit/protocol/framing.hpp"
 #include "emit/protocol/version.hpp"
 #include "emit/v1/control.pb.h"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
 
-constexpr std::int64_t kLongNs = 20'000'000'000;
+using emit::test::kLongNs;
 
 bool readable(int fd) {
   pollfd wait{fd, POLLIN, 0};

@@ -9,11 +9,12 @@
 #include "emit/protocol/trigger_seal.hpp"
 #include "net/trigger_port.hpp"
 #include "support/fake_clock.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 
 protocol::SessionKey key_of(unsigned char seed) {
   protocol::SessionKey key;

@@ -9,11 +9,12 @@
 #include "pacing/pose_track.hpp"
 #include "pacing/run_control.hpp"
 #include "pacing/scenario_track.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using emit::test::kMs;
 
 TimedPose at(std::int64_t time_ns, double x_m, double heading_rad = 0.0) {
   TimedPose out;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pacing/quality_policy.hpp"
+#include "support/times.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,7 @@ namespace {
 
 constexpr std::array<renderer::QualityLevelStats, 4> kQualityLevels{
     {{10.0, 0.0}, {7.0, 0.2}, {7.5, 0.3}, {4.0, 2.0}}};
-constexpr std::int64_t kMs = 1'000'000;
+using emit::test::kMs;
 
 /// Runs frames until the policy has no doubt: wrong costs from the start are forgotten.
 void settle(QualityPolicy& policy, double level_ms, double work_ms) {

@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "support/fake_clock.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 
 /// Progress whose clock and output are the test's.
 struct Rig {

@@ -10,6 +10,7 @@
 
 #include "protocol/hex.hpp"
 #include "support/daemon_process.hpp"
+#include "support/times.hpp"
 #include "telemetry/ptp_monitor.hpp"
 
 namespace emit::server {
@@ -130,7 +131,7 @@ class FakePtp4l {
 };
 
 TEST(PtpMonitor, FollowsWhoAnswersAndNoticesWhenNobodyDoes) {
-  constexpr std::int64_t kSecondNs = 1'000'000'000;
+  using emit::test::kSecondNs;
   test::ScratchFolder folder;
   auto monitor = PtpMonitor::open(folder.file("ptp"), 0);
   ASSERT_TRUE(monitor.has_value()) << monitor.error().text;

@@ -79,13 +79,17 @@ TEST_F(OutputCheck, permissions_count) {
   // Root may write everywhere, and other users may not.
   const bool root = ::geteuid() == 0;
   constexpr uid_t kNobody = 65534;
-  if (root) ASSERT_EQ(::seteuid(kNobody), 0);
+  if (root) {
+    ASSERT_EQ(::seteuid(kNobody), 0);
+  }
   expect_error(check_output_file(folder_ / "closed" / "x"), folder_ / "closed" / "x",
                "Permission denied");
   expect_error(check_output_folder(folder_ / "closed" / "x"), folder_ / "closed" / "x",
                "Permission denied");
   expect_error(check_output_file(folder_ / "old"), folder_ / "old", "Permission denied");
-  if (root) ASSERT_EQ(::seteuid(0), 0);
+  if (root) {
+    ASSERT_EQ(::seteuid(0), 0);
+  }
 }
 
 }  // namespace

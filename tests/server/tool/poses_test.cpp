@@ -6,13 +6,14 @@
 #include <memory>
 #include <vector>
 
+#include "support/times.hpp"
 #include "tool/streams/pose_plan.hpp"
 #include "tool/support/scenario_input.hpp"
 
 namespace emit::tool {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 
 std::vector<std::uint64_t> all_of(PosePlan& plan) {
   std::vector<std::uint64_t> indices;

@@ -148,7 +148,7 @@ struct SceneStats {
   /// Warnings of the scenario's and the scene's loaders: unmapped materials, gaps of the weather.
   std::vector<std::string> warnings;
   /// Gaps of the first frame's history and weather, one sentence each; valid after warm_up().
-  std::vector<std::string> first_frame_warnings;
+  std::vector<std::string> first_frame_warnings = {};
 };
 
 /// Returns warnings that are known after warm_up(), one sentence each: gaps of the first frame's

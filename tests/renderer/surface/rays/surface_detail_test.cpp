@@ -14,12 +14,13 @@
 #include "emit/physics/constants.hpp"
 #include "emit/scene/simplify.hpp"
 #include "history/foster_setup.hpp"
+#include "support/times.hpp"
 #include "surface/run/cached_surface.hpp"
 
 namespace emit::renderer {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 using physics::kReferenceK;
 constexpr float kHeightM = 0.01F;
 constexpr float kPerM = 12.0F;  // of both waves

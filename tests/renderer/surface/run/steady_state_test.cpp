@@ -15,13 +15,14 @@
 #include "history/foster_setup.hpp"
 #include "renderer/surface/surface_scene.hpp"
 #include "support/heap_counter.hpp"
+#include "support/times.hpp"
 #include "surface/run/cached_surface.hpp"
 #include "threads/worker_pool.hpp"
 
 namespace emit::renderer {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 constexpr std::int64_t kStartNs = 7200 * kSecondNs;
 using physics::kReferenceK;
 

@@ -12,12 +12,13 @@
 #include "emit/physics/constants.hpp"
 #include "history/foster_setup.hpp"
 #include "renderer/surface/surface_scene.hpp"
+#include "support/times.hpp"
 #include "surface/shade/exposure_tiles.hpp"
 
 namespace emit::renderer {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 constexpr std::int64_t kNoonNs = 4 * 3600 * kSecondNs;
 using physics::kReferenceK;
 constexpr float kHalfM = 2.0F;

@@ -14,12 +14,13 @@
 #include "emit/physics/constants.hpp"
 #include "history/foster_setup.hpp"
 #include "renderer/surface/surface_scene.hpp"
+#include "support/times.hpp"
 #include "surface/run/cached_surface.hpp"
 
 namespace emit::renderer {
 namespace {
 
-constexpr std::int64_t kSecondNs = 1'000'000'000;
+using emit::test::kSecondNs;
 using physics::kReferenceK;
 constexpr double kPixelRad = 8e-3;
 

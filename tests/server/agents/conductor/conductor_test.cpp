@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "support/conductor_rig.hpp"
+#include "support/times.hpp"
 #include "telemetry/log.hpp"
 
 namespace emit::server {
@@ -79,7 +80,7 @@ TEST(RenderAgent, FramesOfASurfaceThatIsTooCoarseAreDegradedAndCounted) {
 }
 
 TEST(RenderAgent, AFrameInWhichTheSurfaceWarmsUpAgainIsDegradedCountedAndLogged) {
-  constexpr std::int64_t kSecondNs = 1'000'000'000;
+  using emit::test::kSecondNs;
   struct Case {
     std::int64_t to_ns;    // simulation time of the second frame
     std::int64_t took_ns;  // of its submit()

@@ -13,11 +13,12 @@
 #include "emit/v1/control.pb.h"
 #include "rt/fd.hpp"
 #include "support/fake_clock.hpp"
+#include "support/times.hpp"
 
 namespace emit::server {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
+using emit::test::kMs;
 /// Number of refused messages that may come at once.
 constexpr std::uint64_t kBurst = ReadPace::kBurstNs / ReadPace::kRefusalNs;
 
