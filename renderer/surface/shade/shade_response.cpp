@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <utility>
 
@@ -100,6 +102,34 @@ ShadeResponse::ShadeResponse(const SampleHeat& heat, std::size_t materials,
       out[static_cast<glm::length_t>(k)] = static_cast<float>(kFullSunWM2 * weights[k]);
     }
   }
+}
+
+glm::vec4 ShadeResponse::left_frac(double seconds) noexcept {
+  glm::vec4 left;
+  for (std::size_t k = 0; k < kModes; ++k) {
+    left[static_cast<glm::length_t>(k)] = static_cast<float>(std::exp(-seconds / kTauS[k]));
+  }
+  return left;
+}
+
+ShadeEffect::ShadeEffect(const ShadeResponse& response, float tolerance_k)
+    : tolerance_k_(tolerance_k) {
+  for (const glm::vec4& weights : response.weights_k()) {
+    most_weight_k_ = glm::max(most_weight_k_, weights);
+  }
+}
+
+float ShadeEffect::of_shade_k(const glm::vec4& shade) const noexcept {
+  return glm::dot(most_weight_k_, shade);
+}
+
+float ShadeEffect::passing_k(float seconds) const noexcept {
+  float sum_k = 0.0F;
+  for (std::size_t k = 0; k < ShadeResponse::kModes; ++k) {
+    sum_k -= most_weight_k_[static_cast<glm::length_t>(k)] *
+             std::expm1(-seconds / static_cast<float>(ShadeResponse::kTauS[k]));
+  }
+  return sum_k;
 }
 
 }  // namespace emit::renderer
