@@ -6,8 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "emit/threads/parallel.hpp"
-
 namespace emit::renderer {
 namespace {
 
@@ -93,19 +91,7 @@ SceneBuffers::SceneBuffers(scene::SceneGeometry geometry)
 SceneBuffers::SceneBuffers(SampledScene scene, TriangleCull* cull)
     : instances_(std::move(scene.geometry.instances)) {
   std::vector<scene::Mesh>& meshes = scene.geometry.meshes;
-  // Build the levels of detail of each mesh from the temperatures of all instances that share it.
-  std::vector<VertexValues> values(meshes.size());
-  for (std::size_t i = 0; i < instances_.size(); ++i) {
-    const std::uint32_t m = instances_[i].mesh;
-    values[m].push_back(
-        std::span(scene.value_k).subspan(scene.first_sample[i], meshes[m].positions_m.size()));
-  }
-  std::vector<ClusterLevels> levels(meshes.size());
-  threads::parallel_parts(meshes.size(), 1, [&](std::size_t first, std::size_t last) {
-    for (std::size_t m = first; m < last; ++m) {
-      levels[m] = build_cluster_levels(meshes[m], values[m]);
-    }
-  });
+  std::vector<ClusterLevels>& levels = scene.levels;
   add_meshes(meshes, cull != nullptr ? TriangleCull::kMaxIndices : 0);
   // Append the clusters and let submeshes refer to them.
   for (std::size_t m = 0; m < meshes.size(); ++m) {

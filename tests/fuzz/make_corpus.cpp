@@ -499,6 +499,10 @@ void make_state_seeds() {
     model.states.emplace_back();
     model.outputs.emplace_back();
   }
+  const std::vector<float> value_k(model.drawn_samples, 1.0F);
+  model.drawn = renderer::drawn_meshes(
+      {renderer::refined_copy(geometry.meshes[0], model.meshes[0], geometry.materials)},
+      std::vector<renderer::VertexValues>{{value_k}});
   model.eyes = {{{1.0, -2.0, 3.0}, {0.0, 1.0, 0.0}}};
   if (!renderer::write_state(seed("state_file", "split.emitstate"), fuzz::state_key(), model)) {
     std::abort();

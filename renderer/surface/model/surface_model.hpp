@@ -9,6 +9,7 @@
 #include "emit/scene/mesh.hpp"
 #include "surface/heat/sample_heat.hpp"
 #include "surface/heat/surface_samples.hpp"
+#include "surface/mesh/drawn_mesh.hpp"
 #include "surface/mesh/refined_mesh.hpp"
 #include "surface/model/history_record.hpp"
 #include "surface/rays/caster_rays.hpp"
@@ -40,11 +41,12 @@ struct SurfaceModelOptions {
 };
 
 /// Result of the warm-up: refined meshes, their samples, and the state of every sample at the end
-/// of the record.
+/// of the record. build_surface_model() leaves `drawn` empty.
 struct SurfaceModel {
   std::int64_t at_ns = 0;             ///< end of the record
   std::vector<RefineView::Eye> eyes;  ///< places of the camera that the surface was refined for
   std::vector<RefinedMesh> meshes;    ///< same order as SceneGeometry::meshes
+  std::vector<DrawnMesh> drawn;       ///< levels of detail of `meshes`, same order
   /// Index of the first sample of each instance. One sample per vertex of its mesh comes first,
   /// then one for the back of each vertex on a sheet.
   std::vector<std::uint32_t> first_sample;

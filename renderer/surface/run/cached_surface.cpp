@@ -13,7 +13,7 @@
 #include "emit/physics/check.hpp"
 #include "emit/physics/surface_balance.hpp"
 #include "history/foster_history.hpp"
-#include "surface/mesh/sheet_sides.hpp"
+#include "surface/mesh/drawn_mesh.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -248,14 +248,14 @@ physics::Result<std::optional<SurfaceModel>> CachedSurface::take_saved(const Mod
   return std::move(*read);
 }
 
-physics::Result<SurfaceModel> CachedSurface::make_model(const ModelWork& work,
-                                                        const std::optional<Saved>& saved) const {
+physics::Result<CachedSurface::MadeModel> CachedSurface::make_model(
+    const ModelWork& work, const std::optional<Saved>& saved) const {
   // Read the file if it exists. An error of the look-up is left to read_state(), which reports it.
   std::error_code error;
   if (saved && (std::filesystem::exists(saved->file, error) || error)) {
     auto taken = take_saved(work, *saved);
     if (!taken) return tl::unexpected(std::move(taken.error()));
-    if (*taken) return std::move(**taken);
+    if (*taken) return MadeModel{std::move(**taken), false};
   }
   const bool writes = saved && saved->start;
   // Test the file before the long work, not after it.
@@ -265,11 +265,42 @@ physics::Result<SurfaceModel> CachedSurface::make_model(const ModelWork& work,
     }
   }
   auto model = warm_up(work);
-  if (!model || !writes) return model;
-  if (auto written = write_state(saved->file, key_of(work, *saved), *model); !written) {
-    return tl::unexpected(std::move(written.error()));
+  if (!model) return tl::unexpected(std::move(model.error()));
+  return MadeModel{std::move(*model), writes};
+}
+
+float CachedSurface::first_sun_frac(std::uint32_t sample) const {
+  const bool moves = !entities_now_.empty() && model_->samples.samples[sample].entity < 0;
+  return node(moves ? 1 : 0).outputs[sample].sun_frac;
+}
+
+std::vector<DrawnMesh> CachedSurface::make_drawn_meshes() const {
+  std::vector<scene::Mesh> meshes;
+  for (std::size_t m = 0; m < geometry_.meshes.size(); ++m) {
+    meshes.push_back(refined_copy(geometry_.meshes[m], model_->meshes[m], materials_));
   }
-  return model;
+  // Judge levels by the shown temperature, with reflected sunlight counted in.
+  const SurfaceNode& first = node(0);
+  std::vector<float> value_k(model_->drawn_samples);
+  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
+    value_k[i] = first.outputs[i].offset_k + kSunK * first_sun_frac(i);
+  }
+  std::vector<VertexValues> values(meshes.size());
+  for (std::size_t i = 0; i < geometry_.instances.size(); ++i) {
+    const std::uint32_t m = geometry_.instances[i].mesh;
+    values[m].push_back(
+        std::span(value_k).subspan(model_->first_sample[i], meshes[m].positions_m.size()));
+  }
+  return drawn_meshes(std::move(meshes), values);
+}
+
+physics::Result<void> CachedSurface::save(const ModelWork& work, const Saved& saved) {
+  std::swap(model_->states, node(0).states);
+  std::swap(model_->outputs, node(0).outputs);
+  auto written = write_state(saved.file, key_of(work, saved), *model_);
+  std::swap(model_->states, node(0).states);
+  std::swap(model_->outputs, node(0).outputs);
+  return written;
 }
 
 physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineView& view,
@@ -289,10 +320,11 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   // knows no other surface.
   options.lateral = extended_ && options_.lateral;
   options.exchange = extended_ && options_.exchange;
-  auto model = make_model({start_ns, view, inputs, plan, history, options, progress}, saved);
-  if (!model) return tl::unexpected(std::move(model.error()));
+  const ModelWork work{start_ns, view, inputs, plan, history, options, progress};
+  auto made = make_model(work, saved);
+  if (!made) return tl::unexpected(std::move(made.error()));
   offsets_ = ray_offsets(geometry_);
-  model_ = std::move(*model);
+  model_ = std::move(made->model);
   if (options.exchange) {
     exitance_ = EntityExitance(*model_, geometry_, entity_of_object_);
     faces_.assign(entities_now_.size(), {});
@@ -313,9 +345,6 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   first.at_ns = start_ns;
   first.surroundings = history.surroundings();
   first.surroundings_k = history.surroundings_now_k();
-  for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
-    first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
-  }
   (void)take_weather_change(inputs.environment);
   weather_change_ns_ = kNoChange;
   renewing_ = false;
@@ -329,12 +358,16 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   turn_ = static_cast<std::uint32_t>(plan.intervals().size());
   begin_anew(0, inputs, history);
   compute(0, static_cast<std::uint32_t>(count));
+  // Save the surface before the outputs of node 0 change.
+  if (model_->drawn.empty()) model_->drawn = make_drawn_meshes();
+  if (made->to_save) {
+    if (auto written = save(work, *saved); !written) return written;
+  }
   // Replace the model's shares of the sun, which include the shade of entities, by those of the
   // first interval, which do not.
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
-    if (inputs.entities.empty() || model_->samples.samples[i].entity >= 0) continue;
-    first.outputs[i].sun_frac = node(1).outputs[i].sun_frac;
-    first.vertices[i].sun_frac = node(1).vertices[i].sun_frac;
+    first.outputs[i].sun_frac = first_sun_frac(i);
+    first.vertices[i] = {first.outputs[i].offset_k, first.outputs[i].sun_frac};
   }
   begin_anew(1, inputs, history);
   share_begin_ns_ = node(0).at_ns;
@@ -600,8 +633,9 @@ void CachedSurface::forget_changes() noexcept {
   for (SurfaceNode& node : nodes_) node.changes.clear();
 }
 
-SampledScene CachedSurface::drawn_scene() const {
+SampledScene CachedSurface::take_drawn_scene() {
   EMIT_CHECK(model_.has_value());
+  EMIT_CHECK_OP(model_->drawn.size(), ==, geometry_.meshes.size());
   SampledScene scene{geometry_, {}, {}, {}};
   scene::SceneGeometry& out = scene.geometry;
   // Group the instances by mesh.
@@ -612,29 +646,15 @@ SampledScene CachedSurface::drawn_scene() const {
     out.instances[i] = geometry_.instances[order[i]];
     scene.first_sample.push_back(model_->first_sample[order[i]]);
   }
-  // Replace the triangles and vertices of each mesh by the refined ones.
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges;
+  // Replace the triangles and vertices of each mesh by the refined ones, in the order of clusters.
   for (std::size_t m = 0; m < out.meshes.size(); ++m) {
-    scene::Mesh& mesh = out.meshes[m];
-    const RefinedMesh& refined = model_->meshes[m];
-    refined.write_indices(mesh.indices, ranges);
-    for (std::size_t k = 0; k < mesh.submeshes.size(); ++k) {
-      mesh.submeshes[k].first_index = ranges[k].first;
-      mesh.submeshes[k].index_count = ranges[k].second;
-    }
-    mesh.positions_m.clear();
-    mesh.normals.clear();
-    for (const RefinedMesh::Vertex& vertex : refined.vertices()) {
-      mesh.positions_m.push_back(vertex.position_m);
-      mesh.normals.push_back(vertex.normal);
-    }
-    add_backs(refined, materials_, mesh);
+    out.meshes[m] = refined_copy(geometry_.meshes[m], model_->meshes[m], materials_);
+    out.meshes[m].indices = std::move(model_->drawn[m].indices);
+    scene.levels.push_back(std::move(model_->drawn[m].levels));
   }
-  // Add the values of the samples at node 0.
+  model_->drawn.clear();
   for (std::uint32_t i = 0; i < model_->drawn_samples; ++i) {
     scene.sky_frac.push_back(model_->samples.samples[i].sky_frac);
-    const SampleVertex& vertex = nodes_[storage(0)].vertices[i];
-    scene.value_k.push_back(vertex.offset_k + kSunK * vertex.sun_frac);
   }
   return scene;
 }

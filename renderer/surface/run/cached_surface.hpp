@@ -31,12 +31,12 @@ namespace emit::renderer {
 
 /// Scene whose vertices are samples; every instance has its own samples.
 struct SampledScene {
-  scene::SceneGeometry geometry;            ///< instances grouped by mesh
+  /// Instances grouped by mesh. The indices of a mesh hold its submeshes, then the triangles of
+  /// coarser levels of detail.
+  scene::SceneGeometry geometry;
+  std::vector<ClusterLevels> levels;        ///< levels of detail by mesh
   std::vector<std::uint32_t> first_sample;  ///< by instance: sample of its mesh's first vertex
   std::vector<float> sky_frac;              ///< by sample: share of the hemisphere that shows sky
-  /// Shown temperature by sample, K, with reflected sunlight counted in. It decides which
-  /// differences a coarser surface may leave out.
-  std::vector<float> value_k;
 };
 
 /// The thermal method `cached`: temperatures live on samples of the surface. Time advances in
@@ -157,8 +157,9 @@ class CachedSurface {
   }
   /// Main memory of the samples in bytes, without the meshes between them.
   [[nodiscard]] std::uint64_t sample_bytes() const noexcept;
-  /// The refined meshes as a scene whose instances are grouped by mesh. @pre prepare()
-  [[nodiscard]] SampledScene drawn_scene() const;
+  /// Takes the refined meshes as a scene whose instances are grouped by mesh. Their levels of
+  /// detail leave the model. @pre prepare(), and no call since.
+  [[nodiscard]] SampledScene take_drawn_scene();
 
  private:
   CachedSurface(const scene::ScenarioDesc& scenario, scene::SceneGeometry geometry,
@@ -176,9 +177,22 @@ class CachedSurface {
     SurfaceModelOptions options;
     const SurfaceProgress& progress;
   };
-  /// Takes a model from the state file, or makes it and writes the file.
-  [[nodiscard]] physics::Result<SurfaceModel> make_model(const ModelWork& work,
-                                                         const std::optional<Saved>& saved) const;
+  /// A model, and whether the state file is to be written from it.
+  struct MadeModel {
+    SurfaceModel model;
+    bool to_save = false;
+  };
+  /// Takes a model from the state file, or makes it without levels of detail.
+  [[nodiscard]] physics::Result<MadeModel> make_model(const ModelWork& work,
+                                                      const std::optional<Saved>& saved) const;
+  /// Makes the levels of detail for the temperatures of the first frame.
+  /// @pre Nodes 0 and 1 are complete, and node 0 holds the outputs of the model.
+  [[nodiscard]] std::vector<DrawnMesh> make_drawn_meshes() const;
+  /// Writes the model with the states and outputs of node 0, which it lends to the model.
+  [[nodiscard]] physics::Result<void> save(const ModelWork& work, const Saved& saved);
+  /// Returns the share of the sun at a drawn sample in the first frame, without the shade of
+  /// entities on static surfaces, which exposure tiles and shadow maps add.
+  [[nodiscard]] float first_sun_frac(std::uint32_t sample) const;
   /// Samples the surface and integrates its history.
   [[nodiscard]] physics::Result<SurfaceModel> warm_up(const ModelWork& work) const;
   /// Returns the key of the state at the start of `work`: the scenario's and the host's input.

@@ -23,7 +23,7 @@ namespace emit::renderer {
 
 static_assert(std::endian::native == std::endian::little, "files are little endian");
 
-/// FNV-1a hash of 64 bits. It detects accidental changes, not forgery.
+/// FNV-1a hash of 64 bits over the inputs of a run. It detects accidental changes, not forgery.
 class Fnv64 {
  public:
   void put(const void* data, std::size_t bytes) noexcept {

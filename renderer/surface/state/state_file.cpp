@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <isa-l/crc64.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,6 +30,33 @@ template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, RefinedMesh::Parts>
 void visit_members(T& p, const Visit& visit) {
   visit(p.vertices), visit(p.leaves), visit(p.leaf_submesh), visit(p.leaf_node), visit(p.nodes);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, scene::Cluster>
+void visit_members(T& c, const Visit& visit) {
+  visit(c.first_index), visit(c.index_count), visit(c.centre_m), visit(c.radius_m);
+  visit(c.box_centre_m), visit(c.box_half_m);
+  visit(c.cone_apex_m), visit(c.cone_axis), visit(c.cone_cutoff);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, LevelError>
+void visit_members(T& e, const Visit& visit) {
+  visit(e.deviation_m), visit(e.size_m), visit(e.edge_m), visit(e.centre_m), visit(e.radius_m);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, ClusterLevel>
+void visit_members(T& l, const Visit& visit) {
+  visit(l.own), visit(l.coarser), visit(l.has_coarser);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, ClusterLevels::Range>
+void visit_members(T& r, const Visit& visit) {
+  visit(r.first), visit(r.count);
+}
+template <class T, class Visit>
+requires std::same_as<std::remove_const_t<T>, DrawnMesh>
+void visit_members(T& m, const Visit& visit) {
+  visit(m.indices), visit(m.levels.clusters), visit(m.levels.levels), visit(m.levels.of_submesh);
 }
 template <class T, class Visit>
 requires std::same_as<std::remove_const_t<T>, RefineView::Eye>
@@ -77,7 +105,7 @@ using physics::Result;
 constexpr std::array<char, 8> kMagic{'E', 'M', 'I', 'T', 'S', 'T', 'A', 'T'};
 constexpr std::size_t kHeaderBytes = kMagic.size() + 2 * sizeof(std::uint32_t) + sizeof(StateKey) +
                                      sizeof(std::int64_t) + sizeof(std::uint64_t);
-constexpr std::size_t kHashBytes = sizeof(std::uint64_t);
+constexpr std::size_t kChecksumBytes = sizeof(std::uint64_t);
 
 /// Passes the body of a file to a sink. read_state() reads in the same order.
 template <class Sink>
@@ -85,6 +113,7 @@ void put_model(Sink& sink, const SurfaceModel& model) {
   put_value(sink, model.eyes);
   put_value(sink, static_cast<std::uint64_t>(model.meshes.size()));
   for (const RefinedMesh& mesh : model.meshes) put_value(sink, mesh.parts());
+  put_value(sink, model.drawn);
   put_value(sink, model.first_sample);
   put_value(sink, model.samples.samples);
   put_value(sink, model.samples.seen);
@@ -113,13 +142,35 @@ bool take_meshes(ByteSource& source, const scene::SceneGeometry& geometry, std::
   return true;
 }
 
+/// Returns true if all triangles and clusters of a drawn mesh exist. `whole` is the mesh that it
+/// was cut from.
+bool fits(const DrawnMesh& drawn, const scene::Mesh& whole) {
+  const ClusterLevels& levels = drawn.levels;
+  const std::size_t indices = drawn.indices.size();
+  const std::size_t clusters = levels.clusters.size();
+  return indices >= whole.indices.size() && indices % 3 == 0 && levels.levels.size() == clusters &&
+         levels.of_submesh.size() == whole.submeshes.size() &&
+         std::ranges::all_of(drawn.indices,
+                             [&](std::uint32_t v) { return v < whole.positions_m.size(); }) &&
+         std::ranges::all_of(levels.clusters,
+                             [&](const scene::Cluster& cluster) {
+                               return cluster.first_index <= indices &&
+                                      cluster.index_count <= indices - cluster.first_index &&
+                                      cluster.index_count % 3 == 0;
+                             }) &&
+         std::ranges::all_of(levels.of_submesh, [&](const ClusterLevels::Range& range) {
+           return range.first <= clusters && range.count <= clusters - range.first;
+         });
+}
+
 /// Returns true if the arrays of a model fit each other and no index leads out of its array.
 bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                 std::size_t entities) {
   const std::size_t count = model.samples.samples.size();
   const std::size_t seen = model.samples.seen.size();
   if (model.states.size() != count || model.outputs.size() != count ||
-      model.drawn_samples > count || model.first_sample.size() != geometry.instances.size()) {
+      model.drawn_samples > count || model.first_sample.size() != geometry.instances.size() ||
+      model.drawn.size() != model.meshes.size()) {
     return false;
   }
   // Check that vertices have materials of the scene, and that each triangle has one material.
@@ -133,6 +184,9 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
       for (const std::uint32_t v : mesh.leaf(slot)) {
         if (mesh.vertices()[v].material != material) return false;
       }
+    }
+    if (!fits(model.drawn[m], refined_copy(geometry.meshes[m], mesh, geometry.materials))) {
+      return false;
     }
   }
   // Check that the samples of each instance belong to one body and that both sides of a sheet
@@ -258,17 +312,16 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   take_value(source, header.key);
   take_value(source, header.at_ns);
   take_value(source, header.body_bytes);
-  if (!source.ok() || header.parts != kStateParts || file_bytes < kHeaderBytes + kHashBytes ||
-      header.body_bytes != file_bytes - kHeaderBytes - kHashBytes) {
+  if (!source.ok() || header.parts != kStateParts || file_bytes < kHeaderBytes + kChecksumBytes ||
+      header.body_bytes != file_bytes - kHeaderBytes - kChecksumBytes) {
     return "truncated or damaged";
   }
   if (bytes.size() < file_bytes) return {};
-  Fnv64 hash;
-  hash.put(bytes.data(), bytes.size() - kHashBytes);
   std::uint64_t stored = 0;
-  ByteSource tail(bytes.last(kHashBytes));
+  ByteSource tail(bytes.last(kChecksumBytes));
   take_value(tail, stored);
-  if (stored != hash.value()) return "damaged: the checksum is wrong";
+  if (stored != state_checksum(bytes.first(bytes.size() - kChecksumBytes)))
+    return "damaged: the checksum is wrong";
   // Compare the instants first: the hash of the host's input counts up to there.
   if (header.at_ns != wanted.start_ns) {
     return fmt::format("holds the surface at {:.3f} s, and this run starts at {:.3f} s",
@@ -282,12 +335,16 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
 
 }  // namespace
 
+std::uint64_t state_checksum(std::span<const std::byte> bytes) noexcept {
+  return ::crc64_ecma_refl(0, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+}
+
 Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
                          const SurfaceModel& model) {
   // Count the body first, because its size stands before it.
   ByteCount body;
   put_model(body, model);
-  ByteStore store(kHeaderBytes + body.count() + kHashBytes);
+  ByteStore store(kHeaderBytes + body.count() + kChecksumBytes);
   put_value(store, kMagic);
   put_value(store, kStateVersion);
   put_value(store, static_cast<std::uint32_t>(kStateParts));
@@ -296,9 +353,7 @@ Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
   put_value(store, static_cast<std::uint64_t>(body.count()));
   put_model(store, model);
   // Append the checksum of everything before it.
-  Fnv64 hash;
-  hash.put(store.bytes().data(), store.bytes().size());
-  put_value(store, hash.value());
+  put_value(store, state_checksum(store.bytes()));
 
   // Write beside the file and rename, so that no reader sees half a state.
   const std::filesystem::path temporary = temporary_beside(file);
@@ -341,13 +396,14 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   if (!why.empty()) return refuse(why);
   // Take the body apart, in the order of put_model().
   const std::span<const std::byte> all(*bytes);
-  ByteSource source(all.subspan(kHeaderBytes, all.size() - kHeaderBytes - kHashBytes));
+  ByteSource source(all.subspan(kHeaderBytes, all.size() - kHeaderBytes - kChecksumBytes));
   SurfaceModel model;
   model.at_ns = header.at_ns;
   take_value(source, model.eyes);
   if (!take_meshes(source, geometry, options.max_samples, model)) {
     return refuse("damaged: its meshes are not those of the scene");
   }
+  take_value(source, model.drawn);
   take_value(source, model.first_sample);
   take_value(source, model.samples.samples);
   take_value(source, model.samples.seen);

@@ -20,12 +20,12 @@
 ///
 /// Layout, little endian: 8 bytes "EMITSTAT", version u32, number of parts u32, the parts' hashes
 /// u64 each, the instant i64 in ns of sim time, size of the body u64, body (SurfaceModel member by
-/// member, state_bytes.hpp), FNV-1a of everything before as u64.
+/// member, state_bytes.hpp), CRC-64/XZ of everything before as u64.
 namespace emit::renderer {
 
 /// Version of the format. It rises with every change of the layout, and with every change of the
 /// program that gives another state for the same inputs.
-inline constexpr std::uint32_t kStateVersion = 10;
+inline constexpr std::uint32_t kStateVersion = 11;
 
 /// Parts of the input on which a state depends. The error about a file that does not fit names the
 /// parts that differ.
@@ -58,6 +58,10 @@ struct StateWanted {
   StateKey key{};             ///< wanted hashes
   std::int64_t start_ns = 0;  ///< wanted instant of the state
 };
+
+/// Checksum at the end of a file: CRC-64/XZ (ECMA-182, reflected). It detects accidental changes,
+/// not forgery.
+[[nodiscard]] std::uint64_t state_checksum(std::span<const std::byte> bytes) noexcept;
 
 /// Writes a state. It writes a temporary file in the same folder and renames it. Errors: io, with
 /// the name of the file.

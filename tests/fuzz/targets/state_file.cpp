@@ -24,9 +24,8 @@ void seal(std::vector<std::byte>& file) {
   if (file.size() < kBodyAt + 8) return;
   const std::uint64_t body_bytes = file.size() - kBodyAt - 8;
   std::memcpy(file.data() + kBodySizeAt, &body_bytes, sizeof body_bytes);
-  renderer::Fnv64 hash;
-  hash.put(file.data(), file.size() - 8);
-  const std::uint64_t value = hash.value();
+  const std::uint64_t value =
+      renderer::state_checksum(std::span<const std::byte>(file).first(file.size() - 8));
   std::memcpy(file.data() + file.size() - 8, &value, sizeof value);
 }
 

@@ -137,10 +137,11 @@ float normals_error(bool with_detail, double left_out, float unit_m = 1.0F) {
                            {})) {
     return -1.0F;
   }
-  const SampledScene drawn = (*surface)->drawn_scene();
+  const SampledScene drawn = (*surface)->take_drawn_scene();
   const scene::Mesh& mesh = drawn.geometry.meshes[0];
   std::vector<float> errors;
-  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+  // Coarser levels of detail follow behind the only submesh.
+  for (std::size_t i = 0; i < mesh.submeshes[0].index_count; i += 3) {
     glm::vec3 middle_m(0.0F);
     glm::vec3 normal(0.0F);
     for (std::size_t k = 0; k < 3; ++k) {

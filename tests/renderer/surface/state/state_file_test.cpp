@@ -69,6 +69,11 @@ struct World {
       model.states.push_back(state);
       model.outputs.push_back({number(), number(), number(), number(), number()});
     }
+    std::vector<float> value_k(model.drawn_samples);
+    for (float& value : value_k) value = number();
+    model.drawn =
+        drawn_meshes({refined_copy(geometry.meshes[0], model.meshes[0], geometry.materials)},
+                     std::vector<VertexValues>{{value_k}});
     model.full = true;
     model.at_ns = kAtNs;
     model.eyes = {{{number(), number(), number()}, {number(), number(), number()}},
@@ -101,9 +106,8 @@ class StateFile : public testing::Test {
   }
   /// Writes the bytes with a checksum that fits them.
   void put_signed(std::string bytes) const {
-    Fnv64 hash;
-    hash.put(bytes.data(), bytes.size() - 8);
-    const std::uint64_t value = hash.value();
+    const std::uint64_t value =
+        state_checksum(std::as_bytes(std::span(bytes)).first(bytes.size() - 8));
     std::memcpy(bytes.data() + bytes.size() - 8, &value, 8);
     put(bytes);
   }
@@ -175,6 +179,10 @@ TEST_F(StateFile, gives_back_what_was_written_and_leaves_nothing_beside_it) {
     EXPECT_EQ(got->samples.seen[i].sample, model.samples.seen[i].sample);
     EXPECT_EQ(got->samples.seen[i].weight_frac, model.samples.seen[i].weight_frac);
   }
+  ASSERT_EQ(got->drawn.size(), 1U);
+  EXPECT_EQ(got->drawn[0].indices, model.drawn[0].indices);
+  EXPECT_EQ(got->drawn[0].levels.clusters.size(), model.drawn[0].levels.clusters.size());
+  EXPECT_EQ(got->drawn[0].levels.of_submesh.size(), model.drawn[0].levels.of_submesh.size());
   std::vector<std::uint32_t> indices[2];
   std::vector<std::pair<std::uint32_t, std::uint32_t>> ranges[2];
   got->meshes[0].write_indices(indices[0], ranges[0]);
@@ -279,8 +287,43 @@ TEST_F(StateFile, huge_counts_and_indices_out_of_range_are_refused_though_the_ch
       }
     }
     for (const SeenSample& seen : got->samples.seen) ASSERT_LT(seen.sample, count);
+    for (const std::uint32_t v : got->drawn[0].indices) ASSERT_LT(v, got->drawn_samples);
+    for (const scene::Cluster& cluster : got->drawn[0].levels.clusters) {
+      ASSERT_LE(std::size_t{cluster.first_index} + cluster.index_count,
+                got->drawn[0].indices.size());
+    }
   }
   EXPECT_GT(refused, 200U);
+}
+
+TEST_F(StateFile, drawn_meshes_that_do_not_fit_their_meshes_are_refused) {
+  const auto refused = [this](auto&& change) {
+    const std::vector<DrawnMesh> whole = world_.model.drawn;
+    change(world_.model.drawn);
+    write();
+    world_.model.drawn = whole;
+    return !read();
+  };
+  using Drawn = std::vector<DrawnMesh>;
+  EXPECT_FALSE(refused([](Drawn&) {}));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn.clear(); }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn.push_back(drawn[0]); }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].indices.resize(3); }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].indices.push_back(0); }));
+  EXPECT_TRUE(refused([this](Drawn& drawn) {
+    drawn[0].indices[0] = static_cast<std::uint32_t>(world_.model.meshes[0].vertices().size());
+  }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.levels.pop_back(); }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.of_submesh.pop_back(); }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.of_submesh[0].count += 99; }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.clusters[0].index_count += 999; }));
+  EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.clusters[0].first_index = ~0U; }));
+}
+
+TEST(StateChecksum, IsTheCatalogued) {
+  // The check value of CRC-64/XZ: its sum over the digits 1 to 9.
+  constexpr std::string_view kDigits = "123456789";
+  EXPECT_EQ(state_checksum(std::as_bytes(std::span(kDigits))), 0x995dc9bbdf1939faULL);
 }
 
 TEST_F(StateFile, samples_that_belong_to_something_else_are_refused) {
