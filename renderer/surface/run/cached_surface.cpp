@@ -11,9 +11,8 @@
 #include <utility>
 
 #include "emit/physics/check.hpp"
-#include "emit/physics/surface_balance.hpp"
-#include "history/foster_history.hpp"
 #include "surface/mesh/drawn_mesh.hpp"
+#include "surface/run/weather_change.hpp"
 #include "surface/warm_up/surface_patch.hpp"
 
 namespace emit::renderer {
@@ -36,12 +35,6 @@ constexpr std::int64_t kSameFraction = 16;
 constexpr std::int64_t kRenewalFraction = 8;
 /// Fraction of an interval that is the length of the interval after such a change, if it matters.
 constexpr std::int64_t kAnswerFraction = 4;
-/// Flux in W m-2 per kelvin of tolerance below which a change does not matter: however thin a
-/// surface is, its own radiation balances as much.
-constexpr double kMinChangeWM2K = 5.0;
-/// Typical difference in K between sunlit surfaces and the air. It turns a change of the film
-/// coefficient into a flux.
-constexpr double kFilmK = 20.0;
 /// Number of frames over which node 1 is computed anew while sim time stands still.
 constexpr std::int64_t kHeldFrames = 64;
 
@@ -486,33 +479,10 @@ void CachedSurface::begin_anew(std::size_t index, const Inputs& inputs,
   begin_interval(index, inputs, history);
 }
 
-bool CachedSurface::matters(std::int64_t now_ns, const Environment& environment) const noexcept {
-  const physics::SunPosition sun = environment.sun_at(now_ns);
-  const physics::Forcing weather = environment.forcing_at(now_ns, sun);
-  const SurfaceForcing is = open_forcing(sun, weather);
-  const IntervalForcing& taken = node(1).forcing;
-  const double way = std::clamp(
-      1.0 - 1e-9 * static_cast<double>(node(1).at_ns - now_ns) / std::max(taken.dt_s, 1e-9), 0.0,
-      1.0);
-  const auto off = [&](double SurfaceForcing::*value) {
-    return std::abs(is.*value - between(taken.begin.*value, taken.end.*value, way));
-  };
-  // Bound the change of the flux into a surface by the sum of the changes of all its parts.
-  double change_w_m2 =
-      glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
-      off(&SurfaceForcing::diffuse_w_m2) + off(&SurfaceForcing::longwave_w_m2) +
-      is.film_w_m2_k * off(&SurfaceForcing::air_k) + kFilmK * off(&SurfaceForcing::film_w_m2_k);
-  if (weather.environment_stated) {
-    change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
-                            between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
-  }
-  return change_w_m2 > kMinChangeWM2K * options_.tolerance_k;
-}
-
 void CachedSurface::begin_renewal(std::int64_t event_ns, std::int64_t now_ns, const Inputs& inputs,
                                   SurfaceHistory& history) noexcept {
   if (event_ns < node(0).at_ns + kSameNs) event_ns = node(0).at_ns;
-  lags_ = matters(now_ns, inputs.environment);
+  lags_ = weather_matters(node(1), now_ns, inputs.environment, options_.tolerance_k);
   std::int64_t end_ns = next_node_ns(event_ns, now_ns, inputs);
   // Shorten the interval after a change that matters: surfaces answer like the root of time at
   // first, which a line over a whole interval does not follow.
@@ -532,7 +502,8 @@ void CachedSurface::end_renewal(std::int64_t now_ns, const Inputs& inputs,
   // Compute the rest of node 1, then begin node 2 anew from there.
   compute(0, static_cast<std::uint32_t>(model_->samples.samples.size()));
   renewing_ = false;
-  lags_ = weather_change_ns_ <= now_ns && matters(now_ns, inputs.environment);
+  lags_ = weather_change_ns_ <= now_ns &&
+          weather_matters(node(1), now_ns, inputs.environment, options_.tolerance_k);
   node(2).changes.clear();
   begin_anew(1, inputs, history);
   share_begin_ns_ = now_ns;
@@ -548,7 +519,8 @@ void CachedSurface::take_weather(std::int64_t now_ns, const Inputs& inputs,
   if (weather_change_ns_ == kNoChange) return;
   // Let a change wait while another one is being taken in.
   if (renewing_) {
-    lags_ = lags_ || (weather_change_ns_ <= now_ns && matters(now_ns, inputs.environment));
+    lags_ = lags_ || (weather_change_ns_ <= now_ns &&
+                      weather_matters(node(1), now_ns, inputs.environment, options_.tolerance_k));
     return;
   }
   if (weather_change_ns_ >= node(2).at_ns) {

@@ -235,9 +235,6 @@ class CachedSurface {
                      SurfaceHistory& history) noexcept;
   /// Finishes node 1 and begins the next interval.
   void end_renewal(std::int64_t now_ns, const Inputs& inputs, SurfaceHistory& history) noexcept;
-  /// Returns true if the weather of `now_ns` differs from what node 1 was computed with by more
-  /// than the tolerance allows.
-  [[nodiscard]] bool matters(std::int64_t now_ns, const Environment& environment) const noexcept;
   /// Number of samples that are to be computed by `now_ns`.
   [[nodiscard]] std::uint32_t share_at(std::int64_t now_ns) const noexcept;
   /// Earliest time whose weather the host has changed since the last call; kNoChange if there is

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/run/weather_change.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "emit/physics/surface_balance.hpp"
+#include "history/foster_history.hpp"
+
+namespace emit::renderer {
+namespace {
+
+/// Flux in W m-2 per kelvin of tolerance below which a change does not matter: however thin a
+/// surface is, its own radiation balances as much.
+constexpr double kMinChangeWM2K = 5.0;
+/// Typical difference in K between sunlit surfaces and the air. It turns a change of the film
+/// coefficient into a flux.
+constexpr double kFilmK = 20.0;
+
+}  // namespace
+
+bool weather_matters(const SurfaceNode& node, std::int64_t now_ns, const Environment& environment,
+                     double tolerance_k) noexcept {
+  const physics::SunPosition sun = environment.sun_at(now_ns);
+  const physics::Forcing weather = environment.forcing_at(now_ns, sun);
+  const SurfaceForcing is = open_forcing(sun, weather);
+  const IntervalForcing& taken = node.forcing;
+  const double way = std::clamp(
+      1.0 - 1e-9 * static_cast<double>(node.at_ns - now_ns) / std::max(taken.dt_s, 1e-9), 0.0, 1.0);
+  const auto off = [&](double SurfaceForcing::*value) {
+    return std::abs(is.*value - between(taken.begin.*value, taken.end.*value, way));
+  };
+  // Bound the change of the flux into a surface by the sum of the changes of all its parts.
+  double change_w_m2 =
+      glm::distance(is.sun_w_m2, glm::mix(taken.begin.sun_w_m2, taken.end.sun_w_m2, way)) +
+      off(&SurfaceForcing::diffuse_w_m2) + off(&SurfaceForcing::longwave_w_m2) +
+      is.film_w_m2_k * off(&SurfaceForcing::air_k) + kFilmK * off(&SurfaceForcing::film_w_m2_k);
+  if (weather.environment_stated) {
+    change_w_m2 += std::abs(physics::environment_input_w_m2(1.0, weather.environment_k) -
+                            between(taken.begin.environment_w_m2, taken.end.environment_w_m2, way));
+  }
+  return change_w_m2 > kMinChangeWM2K * tolerance_k;
+}
+
+}  // namespace emit::renderer
