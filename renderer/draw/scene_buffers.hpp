@@ -12,7 +12,7 @@
 #include "gl/objects.hpp"
 #include "shared/frame_params.glsl.h"
 #include "surface/mesh/cluster_levels.hpp"
-#include "surface/run/cached_surface.hpp"
+#include "surface/run/sampled_scene.hpp"
 
 namespace emit::renderer {
 

@@ -114,10 +114,10 @@ void ShadePass::prepare(CachedSurface& surface, const glm::dvec3& camera_world_m
                         const CameraSetup& camera, const gpu::FrameParams& frame) noexcept {
   exposure_tile_params_.clear();
   entity_shadow_params_.clear();
-  params_.slope = surface.shade().slope();
+  params_.slope = surface.exposure_tiles().slope();
   tiles_.begin(frame.rendered_window_px);
   const glm::dvec3 relworld_from_rel_m = surface.origin_world_m() - camera_world_m;
-  prepare_exposure_tiles(surface.shade(), relworld_from_rel_m, camera, frame);
+  prepare_exposure_tiles(surface.exposure_tiles(), relworld_from_rel_m, camera, frame);
   prepare_entity_shadows(surface, relworld_from_rel_m, camera, frame);
   tiles_.sort();
 }
@@ -161,9 +161,9 @@ void ShadePass::prepare_entity_shadows(CachedSurface& surface,
                                        const glm::dvec3& relworld_from_rel_m,
                                        const CameraSetup& camera,
                                        const gpu::FrameParams& frame) noexcept {
-  const std::span<const CachedSurface::Shadow> shadows = surface.shadows();
+  const std::span<const EntityShadows::Shadow> shadows = surface.entity_shadows().shadows();
   for (std::size_t m = 0; m < shadows.size(); ++m) {
-    const CachedSurface::Shadow& shadow = shadows[m];
+    const EntityShadows::Shadow& shadow = shadows[m];
     if (!shadow.on) continue;
     // Find the part of the window that the shadow may reach.
     std::array<glm::dvec3, std::tuple_size_v<decltype(shadow.hull_m)>> corners_m;
@@ -193,7 +193,7 @@ void ShadePass::prepare_entity_shadows(CachedSurface& surface,
 void ShadePass::upload(const CachedSurface& surface) noexcept {
   // Send the exposure tiles that changed.
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  const std::span<const ExposureTiles::ExposureTile> tiles = surface.shade().tiles();
+  const std::span<const ExposureTiles::ExposureTile> tiles = surface.exposure_tiles().tiles();
   for (std::size_t p = 0; p < tiles.size(); ++p) {
     if (!tiles[p].used) continue;
     if (tiles[p].top_changed) {
@@ -205,7 +205,7 @@ void ShadePass::upload(const CachedSurface& surface) noexcept {
                         kExposureTileSide, 1, GL_RGBA, GL_FLOAT, tiles[p].shade.data());
   }
   // Send the shadow depth maps that changed.
-  const EntityShadowMaps& shadow_maps = surface.shadow_maps();
+  const EntityShadowMaps& shadow_maps = surface.entity_shadows().maps();
   for (std::size_t m = 0; m < shadow_maps.size(); ++m) {
     if (sent_[m] == shadow_maps.revision(m)) continue;
     sent_[m] = shadow_maps.revision(m);

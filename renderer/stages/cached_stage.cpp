@@ -119,7 +119,7 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
   for (const RefineView::Eye& eye : eyes) eyes_world_m.push_back(eye.world_m);
   const scene::Aabb bounds = geometry.static_bounds;
   // Describe the state file. Its key is made before the meshes are simplified.
-  std::optional<CachedSurface::Saved> saved;
+  std::optional<SavedSurface> saved;
   if (!scenario.thermal.state_file.empty()) {
     saved = {scenario.thermal.state_file, scenario_key(scenario, geometry), true};
   }
@@ -151,7 +151,7 @@ physics::Result<std::unique_ptr<ThermalStage>> CachedStage::create(
 CachedStage::CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
                          std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
                          std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-                         std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
+                         std::optional<SavedSurface> saved, bool visibly_simplified,
                          std::optional<ShadePass> shade_pass, bool software)
     : sensor_(scenario.sensor),
       max_samples_(scenario.thermal.max_samples),
@@ -195,8 +195,8 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
     node = gl::Buffer::dynamic(surface_->model().drawn_samples * sizeof(SampleVertex));
   }
   if (shade_pass_) {
-    shade_pass_->begin(surface_->shade());
-    shade_buffer_ = gl::Buffer::dynamic(surface_->shade().vertices_k().size_bytes());
+    shade_pass_->begin(surface_->exposure_tiles());
+    shade_buffer_ = gl::Buffer::dynamic(surface_->exposure_tiles().vertices_k().size_bytes());
   }
   // Report a device that ran out of memory.
   if (glGetError() != GL_NO_ERROR) {
@@ -228,8 +228,8 @@ bool CachedStage::coarse_from(const physics::Pose& camera) const noexcept {
   // Check the flags of the surface, then the positions it was prepared for. Meshes were simplified
   // only if the scenario has positions of the camera.
   return visibly_simplified_ || surface_->model().full_in_view ||
-         surface_->shade().short_of_tiles() || surface_->stale_shadow() || surface_->lags() ||
-         !stands_near(refined_eyes_, here, least_cos) ||
+         surface_->exposure_tiles().short_of_tiles() || surface_->entity_shadows().stale() ||
+         surface_->lags() || !stands_near(refined_eyes_, here, least_cos) ||
          (!detail_eyes_.empty() && !stands_near(detail_eyes_, here, kAnyCosine));
 }
 
@@ -270,9 +270,9 @@ void CachedStage::upload() noexcept {
   }
   // Send the shade of entities that changed.
   if (shade_pass_) {
-    for (const ChangedRanges::Range& range : surface_->shade().changes()) {
-      shade_buffer_.upload(surface_->shade().vertices_k().subspan(range.first, range.count),
-                           range.first);
+    for (const ChangedRanges::Range& range : surface_->exposure_tiles().changes()) {
+      shade_buffer_.upload(
+          surface_->exposure_tiles().vertices_k().subspan(range.first, range.count), range.first);
     }
     shade_pass_->upload(*surface_);
   }

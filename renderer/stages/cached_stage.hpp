@@ -56,7 +56,7 @@ class CachedStage final : public ThermalStage {
   CachedStage(const scene::ScenarioDesc& scenario, const scene::Aabb& static_bounds,
               std::vector<Eye> detail_eyes, std::unique_ptr<CachedSurface> surface,
               std::vector<FosterMaterial> foster_materials, const SceneHistory& history,
-              std::optional<CachedSurface::Saved> saved, bool visibly_simplified,
+              std::optional<SavedSurface> saved, bool visibly_simplified,
               std::optional<ShadePass> shade_pass, bool software);
 
   scene::SensorDesc sensor_;
@@ -71,7 +71,7 @@ class CachedStage final : public ThermalStage {
   StepPlan plan_;
   SurfaceHistory surface_history_;
   std::unique_ptr<CachedSurface> surface_;
-  std::optional<CachedSurface::Saved> saved_;
+  std::optional<SavedSurface> saved_;
   std::unique_ptr<DrawnScene> drawn_;  ///< null before the first warm_up()
   physics::SunPosition sun_now_;
   physics::Forcing forcing_now_;

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "emit/physics/check.hpp"
-#include "surface/mesh/sheet_sides.hpp"
 #include "emit/threads/parallel.hpp"
+#include "surface/mesh/sheet_sides.hpp"
 
 namespace emit::renderer {
 

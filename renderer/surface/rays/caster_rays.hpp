@@ -11,9 +11,11 @@
 #include <glm/ext/vector_double3.hpp>
 #include <glm/ext/vector_float2.hpp>
 #include <glm/ext/vector_float3.hpp>
+#include <glm/gtc/quaternion.hpp>
 
 #include "emit/physics/error.hpp"
 #include "emit/scene/mesh.hpp"
+#include "emit/scene/trajectory.hpp"
 
 namespace emit::renderer {
 
@@ -31,6 +33,13 @@ struct EntityPlacement {
   glm::vec3 position_m{0.0F};
   bool on = true;  ///< false: the entity is not in the scene
 };
+/// Returns the placement of an entity in a state of its trajectory. `origin_world_m` is the origin
+/// of rel in the world. RT-safe.
+[[nodiscard]] inline EntityPlacement placement_of(const scene::TrajectoryState& state,
+                                                  const glm::dvec3& origin_world_m) noexcept {
+  return {glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
+          glm::vec3(state.pose.position_world_m - origin_world_m), state.on};
+}
 
 /// Nearest face along a ray.
 struct CasterHit {

@@ -2,7 +2,6 @@
 #include "surface/rays/interval_rays.hpp"
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -118,12 +117,9 @@ void IntervalRays::update(std::int64_t begin_ns, std::int64_t end_ns, std::uint3
     aim(i, turn, sun.direction_enu);
     // Place every entity at the instant of the ray.
     for (std::size_t m = 0; m < entities; ++m) {
-      const TrajectoryState state = poses.at(m, at_ns);
       EntityPlacement& place = placements_[m * kSunRays + i];
-      place.rel_from_body = glm::mat3(glm::mat3_cast(state.pose.world_from_body));
-      place.position_m = glm::vec3(state.pose.position_world_m - origin_world_m);
-      place.on = state.on;
-      any_entity_on_ = any_entity_on_ || state.on;
+      place = placement_of(poses.at(m, at_ns), origin_world_m);
+      any_entity_on_ = any_entity_on_ || place.on;
     }
   }
   bound_packets();

@@ -7,7 +7,6 @@
 #include <glm/common.hpp>
 #include <glm/ext/vector_int2.hpp>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/vector_relational.hpp>
 #include <limits>
 
@@ -121,9 +120,7 @@ bool EntityCasts::cast(std::size_t entity, bool moved, const ExposureStep& step,
   const PoseHistory& poses = inputs.entities[entity];
   const glm::dvec3& origin_m = inputs.rays.origin_world_m();
   const auto placement_at = [&](std::int64_t at_ns) {
-    const TrajectoryState state = poses.at(at_ns);
-    return EntityPlacement{glm::mat3(glm::mat3_cast(state.pose.world_from_body)),
-                           glm::vec3(state.pose.position_world_m - origin_m), state.on};
+    return placement_of(poses.at(at_ns), origin_m);
   };
   // Leave out an entity that is away or has no surface.
   place_count_[entity] = 0;

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/run/surface_interval.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "emit/physics/check.hpp"
+
+namespace emit::renderer {
+
+std::uint32_t FrameShares::samples_at(std::int64_t now_ns, std::size_t count) const noexcept {
+  const auto length_ns = static_cast<double>(std::max<std::int64_t>(1, end_ns - begin_ns));
+  const double gone_frac = static_cast<double>(now_ns - begin_ns) / length_ns;
+  return static_cast<std::uint32_t>(
+      std::ceil(std::clamp(gone_frac, 0.0, 1.0) * static_cast<double>(count)));
+}
+
+void FrameShares::move_back(std::int64_t frames) noexcept {
+  const std::int64_t step_ns = (end_ns - begin_ns) / frames;
+  begin_ns -= step_ns;
+  end_ns -= step_ns;
+}
+
+SurfaceInterval::SurfaceInterval(const SurfaceGeometry& geometry, const SampleHeat& heat)
+    : geometry_(geometry),
+      heat_(heat),
+      rays_(geometry.entity_radii_m(), heat.sky_measure()),
+      interval_(heat.sized_interval()) {}
+
+void SurfaceInterval::reset(const SurfaceModel& model, bool exchange, std::uint32_t turn) {
+  turn_ = turn;
+  done_ = 0;
+  exitance_ = {};
+  faces_.clear();
+  if (!exchange) return;
+  exitance_ = EntityExitance(model, geometry_.geometry(), geometry_.entity_of_object());
+  faces_.assign(geometry_.entities(), {});
+}
+
+void SurfaceInterval::begin(const SurfaceNode& from, SurfaceNode& to, const SurfaceSamples& all,
+                            const WorldInputs& inputs, SurfaceHistory& history) noexcept {
+  // Fill the forcing, which also advances the surroundings to the end of the interval.
+  history.restore_surroundings(from.surroundings);
+  interval_.forcing = history.extend(from.at_ns, to.at_ns, inputs.environment);
+  to.forcing = interval_.forcing;
+  to.surroundings = history.surroundings();
+  to.surroundings_k = history.surroundings_now_k();
+  heat_.prepare(interval_);
+  // Send the rays with the poses that are known now.
+  rays_.update(from.at_ns, to.at_ns, turn_++, inputs.environment, EntityPoses(inputs.entities),
+               geometry_.origin_world_m());
+  // Sum the radiation of the entities at the begin.
+  exitance_.measure(
+      all, rays_, [&from](std::size_t sample) { return from.outputs[sample].longwave_out_w_m2; },
+      faces_);
+  done_ = 0;
+}
+
+void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
+                              const SurfaceSamples& all, const LocalSteps* skipped,
+                              threads::WorkerPool& workers) noexcept {
+  EMIT_CHECK_OP(end, <=, to.states.size());
+  constexpr std::size_t kSamplesPerTask = 32;
+  const std::uint32_t first = done_;
+  if (end <= first) return;
+  const SurfaceStep step = this->step(all);
+  const auto keep = [&to](std::size_t i, const SampleState& state, const SampleOutput& output) {
+    to.states[i] = state;
+    to.outputs[i] = output;
+    if (i < to.vertices.size()) to.vertices[i] = {output.offset_k, output.sun_frac};
+  };
+  // Step the samples on all cores.
+  workers.run(end - first, kSamplesPerTask, [&](std::size_t task_begin, std::size_t task_end) {
+    SteppedSample stepped;
+    for (auto i = static_cast<std::uint32_t>(first + task_begin); i < first + task_end; ++i) {
+      if (!steps_itself(all, i) || (skipped != nullptr && skipped->has_own_clock(i))) continue;
+      stepped.state = from.states[i];
+      step_sample(step, rays_, interval_, from.outputs, i, stepped);
+      keep(i, stepped.state, stepped.output);
+      const std::uint32_t behind = all.samples[i].other_side;
+      if (behind != kNoSample) keep(behind, stepped.state, stepped.behind);
+    }
+  });
+  done_ = end;
+  const auto drawn = static_cast<std::uint32_t>(to.vertices.size());
+  to.changes.add(std::min(first, drawn), std::min(end, drawn) - std::min(first, drawn));
+}
+
+}  // namespace emit::renderer

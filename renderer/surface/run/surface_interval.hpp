@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "history/surface_history.hpp"
+#include "surface/heat/heat_interval.hpp"
+#include "surface/heat/sample_heat.hpp"
+#include "surface/heat/surface_node.hpp"
+#include "surface/model/entity_exitance.hpp"
+#include "surface/model/surface_model.hpp"
+#include "surface/rays/interval_rays.hpp"
+#include "surface/run/local_steps.hpp"
+#include "surface/run/surface_geometry.hpp"
+#include "surface/run/surface_step.hpp"
+#include "surface/run/world_inputs.hpp"
+#include "threads/worker_pool.hpp"
+
+namespace emit::renderer {
+
+/// Time in which the samples of an interval are computed, a share of them in each frame.
+struct FrameShares {
+  std::int64_t begin_ns = 0;
+  std::int64_t end_ns = 0;
+
+  /// Returns how many of `count` samples are to be computed by `now_ns`. RT-safe.
+  [[nodiscard]] std::uint32_t samples_at(std::int64_t now_ns, std::size_t count) const noexcept;
+  /// Moves the time back by 1/`frames` of its length. The work then goes on while sim time stands
+  /// still. RT-safe.
+  void move_back(std::int64_t frames) noexcept;
+};
+
+/// The interval that is being computed: its forcing, gains, rays and the radiation of entities, and
+/// how many of the samples are at its end.
+///
+/// Owner: CachedSurface. Thread: the renderer's; compute() uses all cores. Real time: everything
+/// but the constructor and reset() is RT-safe.
+class SurfaceInterval {
+ public:
+  /// Keeps references to both, which must outlive it.
+  SurfaceInterval(const SurfaceGeometry& geometry, const SampleHeat& heat);
+
+  /// Starts with a new model. `exchange` says that faces exchange radiation. `turn` is the number
+  /// of intervals before: each has another pattern of sun rays. It allocates.
+  void reset(const SurfaceModel& model, bool exchange, std::uint32_t turn);
+
+  /// Fills forcing, gains and rays for the interval between two nodes, with the poses and the
+  /// weather that are known now. Nothing of `to` is computed yet. It advances the surroundings in
+  /// `history` to the end of the interval.
+  void begin(const SurfaceNode& from, SurfaceNode& to, const SurfaceSamples& all,
+             const WorldInputs& inputs, SurfaceHistory& history) noexcept;
+  /// Computes the samples up to `end` that are not computed yet, from `from` to `to`. Samples that
+  /// have a clock of their own in `skipped` are left out; null: none are.
+  /// @pre begin() with these nodes; end <= number of samples
+  void compute(const SurfaceNode& from, SurfaceNode& to, std::uint32_t end,
+               const SurfaceSamples& all, const LocalSteps* skipped,
+               threads::WorkerPool& workers) noexcept;
+  /// Number of samples that are computed.
+  [[nodiscard]] std::uint32_t done() const noexcept { return done_; }
+
+  [[nodiscard]] const IntervalRays& rays() const noexcept { return rays_; }
+  [[nodiscard]] const HeatInterval& heat_interval() const noexcept { return interval_; }
+  /// Input that all steps share in this interval.
+  [[nodiscard]] SurfaceStep step(const SurfaceSamples& all) const noexcept {
+    return {all, heat_, geometry_.rays(), geometry_.offsets(), faces_};
+  }
+
+ private:
+  const SurfaceGeometry& geometry_;
+  const SampleHeat& heat_;
+  IntervalRays rays_;
+  HeatInterval interval_;
+  EntityExitance exitance_;
+  std::vector<EntityFaces> faces_;  ///< by entity, at the node with which the interval begins
+  std::uint32_t turn_ = 0;
+  std::uint32_t done_ = 0;
+};
+
+}  // namespace emit::renderer

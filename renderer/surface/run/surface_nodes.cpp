@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "surface/run/surface_nodes.hpp"
+
+#include <algorithm>
+
+#include "emit/physics/check.hpp"
+
+namespace emit::renderer {
+
+void SurfaceNodes::allocate(std::size_t samples, std::size_t drawn) {
+  ring_ = 0;
+  for (SurfaceNode& node : nodes_) {
+    node.states.assign(samples, {});
+    node.outputs.assign(samples, {});
+    node.vertices.assign(drawn, {});
+  }
+}
+
+std::size_t SurfaceNodes::storage(std::size_t index) const noexcept {
+  EMIT_DCHECK_OP(index, <, nodes_.size());
+  return (ring_ + index) % nodes_.size();
+}
+
+const SurfaceNode& SurfaceNodes::stored(std::size_t storage) const noexcept {
+  EMIT_DCHECK_OP(storage, <, nodes_.size());
+  return nodes_[storage];
+}
+
+void SurfaceNodes::rotate() noexcept {
+  ring_ = (ring_ + 1) % nodes_.size();
+}
+
+void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSteps& local,
+                       threads::WorkerPool& workers) noexcept {
+  constexpr std::size_t kSamplesPerTask = 32;
+  SurfaceNode& first = (*this)[0];
+  SurfaceNode& second = (*this)[1];
+  const auto fraction_at = [&](std::int64_t at_ns) {
+    return static_cast<double>(at_ns - first.at_ns) /
+           static_cast<double>(second.at_ns - first.at_ns);
+  };
+  // Move states, outputs and vertices of each sample along the line between the nodes.
+  const double frac = fraction_at(event_ns);
+  const double end_frac = fraction_at(end_ns);
+  workers.run(first.states.size(), kSamplesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
+      if (frac > 0.0 && !local.has_own_clock(i)) {
+        first.states[i] = between(first.states[i], second.states[i], frac);
+        first.outputs[i] = between(first.outputs[i], second.outputs[i], frac);
+      }
+      if (i >= first.vertices.size()) continue;
+      const SampleVertex from = first.vertices[i];
+      SampleVertex& to = second.vertices[i];
+      first.vertices[i] = {between(from.offset_k, to.offset_k, frac),
+                           between(from.sun_frac, to.sun_frac, frac)};
+      to.offset_k = between(from.offset_k, to.offset_k, end_frac);
+    }
+  });
+  first.surroundings = between(first.surroundings, second.surroundings, frac);
+  if (first.surroundings_k && second.surroundings_k) {
+    first.surroundings_k = between(*first.surroundings_k, *second.surroundings_k, frac);
+  }
+  first.at_ns = event_ns;
+  second.at_ns = end_ns;
+  for (SurfaceNode* node : {&first, &second}) {
+    node->changes.add(0, static_cast<std::uint32_t>(node->vertices.size()));
+  }
+}
+
+void SurfaceNodes::mark_all_changed() noexcept {
+  for (SurfaceNode& node : nodes_) {
+    node.changes.clear();
+    node.changes.add(0, static_cast<std::uint32_t>(node.vertices.size()));
+  }
+}
+
+void SurfaceNodes::forget_changes() noexcept {
+  for (SurfaceNode& node : nodes_) node.changes.clear();
+}
+
+float SurfaceNodes::fraction(std::int64_t now_ns) const noexcept {
+  const std::int64_t begin_ns = (*this)[0].at_ns;
+  const double fraction =
+      static_cast<double>(now_ns - begin_ns) / static_cast<double>((*this)[1].at_ns - begin_ns);
+  return static_cast<float>(std::clamp(fraction, 0.0, 1.0));
+}
+
+std::optional<double> SurfaceNodes::surroundings_k(float fraction) const noexcept {
+  const SurfaceNode& before = (*this)[0];
+  const SurfaceNode& after = (*this)[1];
+  if (!before.surroundings_k || !after.surroundings_k) return std::nullopt;
+  return between(*before.surroundings_k, *after.surroundings_k, static_cast<double>(fraction));
+}
+
+std::uint64_t SurfaceNodes::bytes() const noexcept {
+  const auto bytes_of = [](const auto& values) { return values.capacity() * sizeof(values[0]); };
+  std::uint64_t sum = 0;
+  for (const SurfaceNode& node : nodes_) {
+    sum += bytes_of(node.states) + bytes_of(node.outputs) + bytes_of(node.vertices);
+  }
+  return sum;
+}
+
+}  // namespace emit::renderer
