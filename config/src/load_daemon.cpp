@@ -15,6 +15,15 @@ using physics::Result;
 
 namespace {
 
+/// Message to who gives a scenario where a configuration of the daemon is due.
+std::string text_of_scenario(const std::filesystem::path& file) {
+  const Result<std::filesystem::path> profile = find_data_file("profiles/default.toml");
+  return fmt::format(
+      "{0}: this is a scenario, not a configuration of the daemon; `emitd --config {1} --set "
+      "scenario={0}` serves it, and so does the key 'scenario' of a configuration",
+      file.string(), profile ? profile->string() : "PROFILE");
+}
+
 void check_endpoint(const Node& table, std::string_view key, const std::string& value,
                     bool may_be_empty, Diagnostics& diagnostics) {
   if ((may_be_empty && value.empty()) || is_endpoint(value)) {
@@ -112,6 +121,15 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
     return tl::unexpected<physics::Error>(parsed.error());
   }
   Node& root = *parsed;
+  if (const FileKind kind = kind_of(root); kind == FileKind::scenario) {
+    return physics::make_error(physics::ErrorCode::config, text_of_scenario(file));
+  } else if (kind == FileKind::materials) {
+    return physics::make_error(
+        physics::ErrorCode::config,
+        fmt::format("{}: this is a library of materials, not a configuration of the daemon; a "
+                    "scenario names it in the key 'materials'",
+                    file.string()));
+  }
   Diagnostics diagnostics;
   apply_environment(root, daemon_sections(), options, diagnostics);
   for (const std::string& text : overrides) {

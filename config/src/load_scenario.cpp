@@ -156,31 +156,42 @@ void resolve_head(const Node& root, ScenarioDesc& scenario, ScenarioHead& head,
 void check_surroundings(const Node& thermal, const ScenarioDesc& scenario,
                         Diagnostics& diagnostics) {
   const std::string& name = scenario.thermal.surroundings_material;
-  if (!name.empty() &&
-      std::none_of(scenario.materials.begin(), scenario.materials.end(),
-                   [&name](const scene::Material& material) { return material.name == name; })) {
-    diagnostics.add(key_location(thermal, "surroundings_material"),
-                    fmt::format("there is no material '{}'", name));
+  if (!name.empty()) {
+    check_material_name(name, scenario.materials, key_location(thermal, "surroundings_material"),
+                        diagnostics);
   }
 }
 
 void resolve_default_material(const Node& root, const ScenarioHead& head, ScenarioDesc& scenario,
                               Diagnostics& diagnostics) {
-  const auto exists = [&scenario](const std::string& name) {
-    return std::any_of(scenario.materials.begin(), scenario.materials.end(),
-                       [&name](const scene::Material& material) { return material.name == name; });
-  };
-  scenario.default_material = root.has("default_material")
-                                  ? head.default_material
-                                  : default_scenario_head().default_material;
-  if (exists(scenario.default_material)) {
-    return;
+  const bool given = root.has("default_material");
+  scenario.default_material =
+      given ? head.default_material : default_scenario_head().default_material;
+  if (given) {
+    check_material_name(scenario.default_material, scenario.materials,
+                        key_location(root, "default_material"), diagnostics);
+  } else if (std::ranges::find(scenario.materials, scenario.default_material,
+                               &scene::Material::name) == scenario.materials.end()) {
+    diagnostics.add(root.at, fmt::format("there is no material '{}': set default_material",
+                                         scenario.default_material));
   }
-  diagnostics.add(key_location(root, "default_material"),
-                  root.has("default_material")
-                      ? fmt::format("there is no material '{}'", scenario.default_material)
-                      : fmt::format("there is no material '{}': set default_material",
-                                    scenario.default_material));
+}
+
+/// Place and time decide where the sun stands. A scenario that does not give them runs with those
+/// of the shipped scenarios, which is worth a warning.
+void warn_of_default_place_and_time(const Node& root, const Node& place, ScenarioDesc& scenario) {
+  const auto warn = [&scenario](std::string_view key, const std::string& value) {
+    scenario.warnings.push_back(
+        fmt::format("{}: '{}' is not given: {} is taken, which sets where the sun stands",
+                    scenario.file.string(), key, value));
+  };
+  if (!root.has("epoch_utc")) warn("epoch_utc", toml_instant(scenario.epoch_utc_ns));
+  if (!place.has("lat_deg")) {
+    warn("place.lat_deg", unscaled_number(scenario.place.lat_rad, physics::kDegree));
+  }
+  if (!place.has("lon_deg")) {
+    warn("place.lon_deg", unscaled_number(scenario.place.lon_rad, physics::kDegree));
+  }
 }
 
 }  // namespace
@@ -193,6 +204,18 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
     return tl::unexpected<physics::Error>(parsed.error());
   }
   Node& root = *parsed;
+  if (kind_of(root) == FileKind::daemon) {
+    const Node* named = root.find("scenario");
+    return physics::make_error(
+        physics::ErrorCode::config,
+        fmt::format(
+            "{0}: this is a configuration of the daemon, not a scenario; `emitd --config {0}` runs "
+            "it{1}",
+            file.string(),
+            named != nullptr && named->kind == Node::Kind::text
+                ? fmt::format(", and its key 'scenario' names the scenario '{}'", named->text)
+                : std::string()));
+  }
   Diagnostics diagnostics;
   apply_environment(root, scenario_sections(), options, diagnostics);
   for (const std::string& text : overrides) {
@@ -219,7 +242,9 @@ Result<ScenarioDesc> load_scenario(const std::filesystem::path& file,
   }
 
   scenario.place = {48.56 * physics::kDegree, 11.26 * physics::kDegree, 0.0};
-  read_table(section(root, "place", diagnostics), place_keys(), scenario.place, diagnostics);
+  const Node& place = section(root, "place", diagnostics);
+  read_table(place, place_keys(), scenario.place, diagnostics);
+  warn_of_default_place_and_time(root, place, scenario);
   const Node& thermal = section(root, "thermal", diagnostics);
   scenario.thermal = default_thermal();
   read_table(thermal, thermal_keys(), scenario.thermal, diagnostics);

@@ -50,6 +50,18 @@ bool parse_path(std::string_view text, std::vector<Segment>& out) {
   return !out.empty();
 }
 
+/// Names that select() takes.
+std::vector<std::string> names_in(const Node& array) {
+  std::vector<std::string> names;
+  for (const Node& item : array.items) {
+    for (const std::string_view name_key : {"name", "band"}) {
+      const Node* name = item.find(name_key);
+      if (name != nullptr && name->kind == Node::Kind::text) names.push_back(name->text);
+    }
+  }
+  return names;
+}
+
 Node* select(Node& array, const std::string& selector) {
   std::size_t index = 0;
   const char* end = selector.data() + selector.size();
@@ -84,7 +96,10 @@ void put(Node& root, const std::vector<Segment>& path, Node value, Diagnostics& 
                           ? select(*child, path[i].selector)
                           : nullptr;
       if (element == nullptr) {
-        diagnostics.add(at, fmt::format("there is no {}[{}]", path[i].key, path[i].selector));
+        diagnostics.add(
+            at,
+            fmt::format("there is no {}[{}]{}", path[i].key, path[i].selector,
+                        child != nullptr ? did_you_mean(path[i].selector, names_in(*child)) : ""));
         return;
       }
       if (last) {
@@ -160,7 +175,7 @@ void report_unknown_names(const std::vector<std::string>& entries, Diagnostics& 
   for (const std::string& entry : entries) {
     const std::string_view name = std::string_view(entry).substr(0, entry.find('='));
     if (!name.starts_with("EMIT_") || std::ranges::find(known, name) != known.end()) continue;
-    const std::string_view near = nearest_word(name, known);
+    const std::string_view near = physics::nearest_name(name, known);
     diagnostics.add({working_directory_source(std::string(name)), 0, 0},
                     near.empty()
                         ? std::string("unknown environment variable: no key has this name")

@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -16,6 +17,7 @@
 #include "app/daemon.hpp"
 #include "app/service_notifier.hpp"
 #include "emit/config/load.hpp"
+#include "emit/physics/nearest_name.hpp"
 #include "emit/version.hpp"
 
 namespace emit::server {
@@ -91,14 +93,35 @@ void print_usage(std::FILE* out, const char* program) {
     fmt::print(out, "  {:<15}  {}\n", fmt::format("{} {}", option.name, option.value),
                indented(option.text, std::string(19, ' ')));
   }
+  const auto profile = config::find_data_file("profiles/default.toml");
+  fmt::print(out,
+             "\nExample: {} --config {} --set pacing.rate_hz=100\n"
+             "Profiles to begin with: {}\n",
+             program, profile ? profile->string() : "default.toml",
+             profile ? profile->parent_path().string() : "share/emit/profiles of the installation");
   fmt::print(out, "\nexit: {}\n", indented(daemon_exit_codes(), std::string(6, ' ')));
+}
+
+/// Says what is wrong with an argument that parse_arguments() cannot take.
+std::string fault_of(const std::string& argument, const char* program) {
+  if (!argument.starts_with('-')) {
+    return fmt::format("'{0}' is no option; --config {0} names the configuration", argument);
+  }
+  const std::string name = argument.substr(0, argument.find('='));
+  std::vector<std::string_view> names{"--help", "--version"};
+  for (const DaemonOption& option : kOptions) {
+    names.push_back(option.name);
+    if (option.name != name) continue;
+    return option.value.empty() ? fmt::format("{} takes no value", name)
+                                : fmt::format("{0} needs a value: {0} {1}", name, option.value);
+  }
+  return fmt::format("{} has no option '{}'{}", program, name, physics::did_you_mean(name, names));
 }
 
 /// Returns an exit code, or -1 to go on.
 int parse_arguments(int argc, char** argv, const char* program, Arguments& out) {
   const auto usage = [&](const std::string& why) {
-    fmt::print(stderr, "{}: {}\n", program, why);
-    print_usage(stderr, program);
+    fmt::print(stderr, "{0}: error: {1}; `{0} --help` lists the options\n", program, why);
     return kExitUsage;
   };
   for (int i = 1; i < argc; ++i) {
@@ -130,15 +153,16 @@ int parse_arguments(int argc, char** argv, const char* program, Arguments& out) 
       out.config_file = value;
     } else if (value_of("--set", value)) {
       if (value.find('=') == std::string::npos) {
-        return usage(fmt::format("--set {}: not key=value", value));
+        return usage(
+            fmt::format("--set {0}: not key=value; the value is missing: --set {0}=VALUE", value));
       }
       out.overrides.push_back(value);
     } else {
-      return usage(fmt::format("unknown or incomplete argument '{}'", argument));
+      return usage(fault_of(std::string(argument), program));
     }
   }
   if (out.config_file.empty()) {
-    return usage("--config FILE is missing");
+    return usage("--config FILE is required");
   }
   return -1;
 }
@@ -156,8 +180,13 @@ int exit_code_of(const physics::Error& error) {
 }
 
 int fail(const char* program, const physics::Error& error) {
-  // Positions come first on the line, so that editors can jump to them.
-  fmt::print(stderr, "{}\n{}: {}\n", error.text, program, physics::to_string(error.code));
+  // An error of a configuration has a line for each fault.
+  for (std::size_t at = 0; at <= error.text.size();) {
+    const std::size_t end = std::min(error.text.find('\n', at), error.text.size());
+    fmt::print(stderr, "{}: error: {}\n", program,
+               std::string_view(error.text).substr(at, end - at));
+    at = end + 1;
+  }
   return exit_code_of(error);
 }
 
@@ -180,7 +209,7 @@ int serve(const Arguments& arguments, const char* program) {
     }
     scenario = std::move(*loaded);
   } else if (!overrides.scenario.empty()) {
-    fmt::print(stderr, "{}: --set {}: there is no scenario to override\n", program,
+    fmt::print(stderr, "{}: error: --set {}: there is no scenario to override\n", program,
                overrides.scenario.front());
     return kExitConfig;
   }
@@ -253,7 +282,7 @@ int emitd_main(int argc, char** argv, const char* program) {
   try {
     return serve(arguments, program);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "{}: {}\n", program, error.what());
+    fmt::print(stderr, "{}: error: {}\n", program, error.what());
     return kExitFailure;
   }
 }

@@ -379,7 +379,7 @@ physics::Result<TcpListener> TcpListener::open(const SocketContext& context,
       impl->acceptor.listen(kBacklog, error);
     }
     if (error) {
-      return failure("tcp ", address, error_text(error.value()));
+      return failure("tcp ", address, bind_error_text(error.value()));
     }
     return TcpListener(std::move(impl));
   });
@@ -463,7 +463,7 @@ physics::Result<void> UdpSocket::bind(const SocketAddress& address) {
   error_code error;
   impl_->socket.bind(to_endpoint<udp::endpoint>(address), error);
   if (error) {
-    return failure("udp ", address, error_text(error.value()));
+    return failure("udp ", address, bind_error_text(error.value()));
   }
   return {};
 }

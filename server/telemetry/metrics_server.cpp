@@ -185,7 +185,7 @@ physics::Result<std::unique_ptr<MetricsServer>> MetricsServer::start(const Socke
     impl->open(address, error);
     if (error) {
       return physics::make_error(physics::ErrorCode::io,
-                                 to_string(address) + ": " + error_text(error.value()));
+                                 to_string(address) + ": " + bind_error_text(error.value()));
     }
     const tcp::endpoint bound = impl->acceptor.local_endpoint();
     std::memcpy(impl->bound.get(), bound.data(), bound.size());

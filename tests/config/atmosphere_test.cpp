@@ -78,7 +78,8 @@ const std::vector<TableCase>& table_cases() {
        "a.csv:4: band '8-12': elevation 0 deg has no row of range 300 m, which elevation 5 deg has "
        "here; all elevations of a band need the same ranges"},
       {"unknown_band", "8-12,100,0,0.9,1\n8-14,100,0,0.9,1\n",
-       "a.csv:3: there is no band '8-14' (known: 3-5, 3.4-4.1, 8-12, 7.7-9.3)"},
+       "a.csv:3: there is no band '8-14', did you mean '8-12'? (known: 3-5, 3.4-4.1, 8-12, "
+       "7.7-9.3)"},
       {"elevation_out_of_range", "8-12,100,95,0.9,1\n",
        "a.csv:2:10: 'elevation_deg' is 95, must be -90 .. 90"},
       {"transmittance_out_of_range", "8-12,100,0,1.2,1\n",

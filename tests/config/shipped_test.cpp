@@ -94,6 +94,7 @@ TEST_P(ShippedScenario, loads_prints_and_loads_again) {
   const std::string file = std::string(GetParam()) + ".toml";
   const auto first = load_scenario(kConfig / "scenarios" / file, {}, options_);
   ASSERT_TRUE(first.has_value()) << first.error().text;
+  EXPECT_EQ(kind_of_file(kConfig / "scenarios" / file), FileKind::scenario);
   EXPECT_FALSE(first->objects.empty());
   EXPECT_FALSE(first->sensor.trajectory.empty());
   EXPECT_THAT(first->warnings, ::testing::IsEmpty());
@@ -152,6 +153,34 @@ TEST_P(ShippedProfile, loads) {
       load_daemon(kConfig / "profiles" / (std::string(GetParam()) + ".toml"), {}, options_);
   unsetenv("EMIT_DATA_DIR");
   ASSERT_TRUE(loaded.has_value()) << loaded.error().text;
+  EXPECT_EQ(kind_of_file(kConfig / "profiles" / (std::string(GetParam()) + ".toml")),
+            FileKind::daemon);
+}
+
+TEST_F(ConfigTest, the_kind_of_a_file_is_that_of_all_its_keys) {
+  EXPECT_EQ(kind_of_file(kConfig / "materials/library.toml"), FileKind::materials);
+  EXPECT_EQ(kind_of_file(kConfig / "weather/warm_overcast.csv"), FileKind::unknown);
+  EXPECT_EQ(kind_of_file(kConfig / "no_such_file.toml"), FileKind::unknown);
+  EXPECT_EQ(kind_of_file(write("both.toml", "epoch_utc = 2014-06-21T06:00:00Z\n[pacing]\n")),
+            FileKind::unknown);
+  EXPECT_EQ(kind_of_file(write("none.toml", "")), FileKind::unknown);
+}
+
+TEST_F(ConfigTest, a_scenario_without_place_or_time_warns_of_the_defaults_it_takes) {
+  const auto none = scenario("");
+  ASSERT_TRUE(none.has_value()) << none.error().text;
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
+  EXPECT_THAT(none->warnings,
+              ::testing::ElementsAre(
+                  AllOf(HasSubstr("s.toml: 'epoch_utc' is not given"), HasSubstr("2014-06-21T10")),
+                  AllOf(HasSubstr("'place.lat_deg' is not given"), HasSubstr("48.56 is taken")),
+                  AllOf(HasSubstr("'place.lon_deg' is not given"), HasSubstr("11.26 is taken"))));
+  // Values from the command line count as given.
+  const auto given =
+      scenario("epoch_utc = 2014-06-21T06:00:00Z\n[place]\nlat_deg = 10\n", {{"place.lon_deg=20"}});
+  ASSERT_TRUE(given.has_value()) << given.error().text;
+  EXPECT_THAT(given->warnings, ::testing::IsEmpty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, ShippedProfile,

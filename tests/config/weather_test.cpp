@@ -19,7 +19,8 @@ using ::testing::IsEmpty;
 constexpr std::int64_t kHourNs = 3'600'000'000'000;
 constexpr const char* kHeader =
     "time_s,dni_w_m2,dhi_w_m2,longwave_down_w_m2,air_k,wind_m_s,cloud_frac\n";
-constexpr const char* kFile = "[weather]\nfile = \"w.csv\"\n";
+constexpr const char* kFile =
+    "[place]\nlat_deg = 48.56\nlon_deg = 11.26\n[weather]\nfile = \"w.csv\"\n";
 constexpr const char* kMidnight = "epoch_utc = 2014-06-21T00:00:00Z\n";
 
 /// Weather of a clear day by the models themselves, hourly, at the default place.

@@ -5,7 +5,10 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <regex>
 #include <string>
+#include <vector>
 
 #include "support/daemon_process.hpp"
 #include "tutorials/tutorial_page.hpp"
@@ -80,6 +83,40 @@ TEST(Installation, HasManualPagesAndCompletion) {
     EXPECT_EQ(run(folder, "MANPATH=\"$PWD/prefix/share/man\" man -w emit-render emitd"), 0)
         << folder.read("log");
   }
+}
+
+/// Returns the targets of the relative links and images of a Markdown text, without `#section`.
+std::vector<std::string> relative_links(const std::string& text) {
+  static const std::regex link(R"(\]\(([^)\s#]+)(#[^)]*)?\)|\n\[[^\]]+\]: ([^\s#]+))");
+  std::vector<std::string> links;
+  for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it) {
+    const std::string target = (*it)[1].matched ? (*it)[1].str() : (*it)[3].str();
+    if (target.find("://") == std::string::npos) links.push_back(target);
+  }
+  return links;
+}
+
+/// Who reads an installed page follows its links, so that none may lead nowhere.
+TEST(Installation, RelativeLinksOfEveryPageResolve) {
+  namespace fs = std::filesystem;
+  const ScratchFolder folder;
+  ASSERT_EQ(run(folder, std::string(EMIT_TEST_CMAKE) + " --install '" EMIT_TEST_BINARY_DIR
+                                                       "' --component doc --prefix prefix"),
+            0)
+      << folder.read("log");
+  std::size_t pages = 0;
+  std::size_t links = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path() / "prefix")) {
+    if (entry.path().extension() != ".md") continue;
+    ++pages;
+    const std::string page = fs::relative(entry.path(), folder.path()).string();
+    for (const std::string& link : relative_links(folder.read(page))) {
+      ++links;
+      EXPECT_TRUE(fs::exists(entry.path().parent_path() / link)) << page << ": " << link;
+    }
+  }
+  EXPECT_GT(pages, 15U);
+  EXPECT_GT(links, 60U);
 }
 
 /// Fixture with the client library as an integrator has it: installed, without the source tree.

@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "emit/config/load.hpp"
+#include "emit/physics/nearest_name.hpp"
 
 namespace emit::config {
 
@@ -92,9 +93,11 @@ Result<fs::path> resolve_scenario(std::string_view name_or_path) {
       return found;
     }
   }
-  std::string text = fmt::format("scenario '{}' is neither a file nor shipped", name_or_path);
+  const std::vector<std::string> shipped = shipped_scenarios();
+  std::string text = fmt::format("scenario '{}' is neither a file nor shipped{}", name_or_path,
+                                 physics::did_you_mean(name_or_path, shipped));
   std::string listed;
-  for (const std::string& name : shipped_scenarios()) {
+  for (const std::string& name : shipped) {
     listed += (listed.empty() ? "" : ", ") + name;
   }
   if (listed.empty()) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "emit/physics/error.hpp"
-#include "emit/scene/nearest_word.hpp"
+#include "emit/physics/nearest_name.hpp"
 
 /// A parsed file as plain values that know their place in the file. Only toml_adapter.cpp includes
 /// the TOML library.
@@ -97,6 +97,6 @@ class Diagnostics {
 [[nodiscard]] std::string toml_string(std::string_view text);
 [[nodiscard]] std::string toml_instant(std::int64_t posix_ns);
 
-using scene::nearest_word;
+using physics::did_you_mean;
 
 }  // namespace emit::config

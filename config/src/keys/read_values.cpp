@@ -173,11 +173,7 @@ bool expect_table_array(const Node& node, const std::string& name, Diagnostics& 
 }
 
 std::string unknown_key_text(std::string_view key, const std::vector<std::string_view>& known) {
-  const std::string_view near = nearest_word(key, known);
-  if (near.empty()) {
-    return fmt::format("unknown key '{}'", key);
-  }
-  return fmt::format("unknown key '{}', did you mean '{}'?", key, near);
+  return fmt::format("unknown key '{}'{}", key, did_you_mean(key, known));
 }
 
 std::string unscaled_number(double value, double scale) {

@@ -41,10 +41,16 @@ void check_channel_windows(const Node& root, const scene::ScenarioDesc& scenario
 [[nodiscard]] std::optional<scene::BandAtmosphere> model_atmosphere(const std::string& model,
                                                                     const std::string& band);
 
+/// Reports a name that no material has, with the nearest one.
+void check_material_name(const std::string& name, const std::vector<scene::Material>& materials,
+                         const Location& at, Diagnostics& diagnostics);
 [[nodiscard]] std::vector<scene::ObjectDesc> resolve_objects(
     const Node& root, const std::vector<scene::Material>& materials, bool require_files,
     Diagnostics& diagnostics);
 [[nodiscard]] scene::SensorDesc resolve_sensor(const Node& root, Diagnostics& diagnostics);
+
+/// Kind of a file by the keys of its first level, see kind_of_file().
+[[nodiscard]] FileKind kind_of(const Node& root);
 
 /// True for host:port with a port of 0..65535. IPv6 addresses stand in brackets.
 [[nodiscard]] bool is_endpoint(std::string_view text);

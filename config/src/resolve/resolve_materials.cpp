@@ -76,7 +76,8 @@ void check_material(const Material& material, const Node& node,
       bands != nullptr && bands->kind == Node::Kind::table) {
     for (const Member& member : bands->members) {
       if (std::find(known_bands.begin(), known_bands.end(), member.key) == known_bands.end()) {
-        diagnostics.add(member.key_at, fmt::format("there is no band '{}'", member.key));
+        diagnostics.add(member.key_at, fmt::format("there is no band '{}'{}", member.key,
+                                                   did_you_mean(member.key, known_bands)));
       }
     }
   }

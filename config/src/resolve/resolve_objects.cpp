@@ -98,21 +98,6 @@ Trajectory resolve_trajectory(const std::vector<KeyframeDraft>& drafts,
   return out;
 }
 
-void check_material_name(const std::string& name, const std::vector<Material>& materials,
-                         const Location& at, Diagnostics& diagnostics) {
-  std::vector<std::string_view> names;
-  for (const Material& material : materials) {
-    if (material.name == name) {
-      return;
-    }
-    names.push_back(material.name);
-  }
-  const std::string_view near = nearest_word(name, names);
-  diagnostics.add(
-      at, near.empty() ? fmt::format("there is no material '{}'", name)
-                       : fmt::format("there is no material '{}', did you mean '{}'?", name, near));
-}
-
 void resolve_placement(const ObjectDraft& draft, const Node& node, ObjectDesc& desc,
                        Diagnostics& diagnostics) {
   const Member* pose_key = first_pose_key(node);
@@ -214,6 +199,18 @@ ObjectDesc resolve_object(const Node& node, const std::vector<ObjectDesc>& befor
 }
 
 }  // namespace
+
+void check_material_name(const std::string& name, const std::vector<Material>& materials,
+                         const Location& at, Diagnostics& diagnostics) {
+  std::vector<std::string_view> names;
+  for (const Material& material : materials) {
+    if (material.name == name) {
+      return;
+    }
+    names.push_back(material.name);
+  }
+  diagnostics.add(at, fmt::format("there is no material '{}'{}", name, did_you_mean(name, names)));
+}
 
 std::vector<ObjectDesc> resolve_objects(const Node& root, const std::vector<Material>& materials,
                                         bool require_files, Diagnostics& diagnostics) {

@@ -168,8 +168,9 @@ std::vector<ChannelDesc> resolve_channels(const Node& root,
       diagnostics.add(key_location(node, "name"), "'name' is empty");
     }
     if (node.has("band") && !contains(known_bands, channel.band)) {
-      diagnostics.add(key_location(node, "band"), fmt::format("there is no band '{}' (known: {})",
-                                                              channel.band, listed(known_bands)));
+      diagnostics.add(key_location(node, "band"),
+                      fmt::format("there is no band '{}'{} (known: {})", channel.band,
+                                  did_you_mean(channel.band, known_bands), listed(known_bands)));
     }
     for (const ChannelDesc& other : channels) {
       if (!channel.name.empty() && other.name == channel.name) {
@@ -318,8 +319,11 @@ scene::AtmosphereDesc resolve_atmosphere(const Node& root, const std::vector<Spe
     const Node& node = inline_bands->items[i];
     const std::string& name = draft.bands[i].band;
     check_inline_atmosphere(node, draft.bands[i], diagnostics);
-    if (!contains(speakable_band_names(root, bands), name)) {
-      diagnostics.add(key_location(node, "band"), fmt::format("there is no band '{}'", name));
+    const std::vector<std::string> known = speakable_band_names(root, bands);
+    if (!contains(known, name)) {
+      diagnostics.add(key_location(node, "band"),
+                      fmt::format("there is no band '{}'{} (known: {})", name,
+                                  did_you_mean(name, known), listed(known)));
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (draft.bands[j].band == name) {

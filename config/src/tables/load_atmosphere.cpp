@@ -6,6 +6,7 @@
 
 #include "emit/physics/constants.hpp"
 #include "emit/physics/csv.hpp"
+#include "emit/physics/nearest_name.hpp"
 #include "tables.hpp"
 #include "typed_table.hpp"
 
@@ -36,7 +37,8 @@ Result<void> check_band(const fs::path& file, const TableRow& row,
     listed += (listed.empty() ? "" : ", ") + name;
   }
   return fault(file, row.line,
-               fmt::format("there is no band '{}' (known: {})", row.texts[0], listed));
+               fmt::format("there is no band '{}'{} (known: {})", row.texts[0],
+                           physics::did_you_mean(row.texts[0], known_bands), listed));
 }
 
 Result<std::vector<BandAtmosphere>> load_terms(const fs::path& file,

@@ -79,11 +79,10 @@ std::vector<std::size_t> match_header(const CsvReader& reader,
     place = i;
   }
   if (unknown.size() == 1) {
-    const std::string_view near = nearest_word(unknown[0], known);
+    const std::string hint = did_you_mean(unknown[0], known);
     faults.add(reader.place_of(*first_unknown),
-               near.empty()
-                   ? fmt::format("unknown column '{}' (known: {})", unknown[0], quoted_list(known))
-                   : fmt::format("unknown column '{}', did you mean '{}'?", unknown[0], near));
+               fmt::format("unknown column '{}'{}", unknown[0],
+                           hint.empty() ? fmt::format(" (known: {})", quoted_list(known)) : hint));
   } else if (!unknown.empty()) {
     faults.add(
         reader.place_of(*first_unknown),

@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
+#include <utility>
 
 #include "emit/physics/check.hpp"
 
@@ -33,10 +36,40 @@ double percentile(std::vector<double>& values, double percent) {
   return values[static_cast<std::size_t>(index)];
 }
 
-/// Computes the statistics of (a - b) * scale(a, b). A pixel whose scale is not finite is left out.
+/// Pixels of a comparison: a mask, and which of its values are meant. An empty mask means all.
+struct Selection {
+  std::span<const char> mask;
+  bool value = false;
+  [[nodiscard]] bool holds(std::size_t pixel) const {
+    return mask.empty() || (mask[pixel] != 0) == value;
+  }
+};
+
+/// Returns 1 for each pixel that shows no surface in both images, else 0; empty if no channel
+/// tells.
+std::vector<char> no_surface_mask(const ExrImage& a, const ExrImage& b) {
+  for (const char* name : {kObjectChannel, kDepthChannel, kTemperatureChannel}) {
+    const ExrChannel* in_a = a.find(name);
+    const ExrChannel* in_b = b.find(name);
+    if (in_a == nullptr || in_b == nullptr || in_a->pixels.size() != in_b->pixels.size()) continue;
+    const bool by_id = std::string_view(name) == kObjectChannel;
+    const auto empty = [by_id](float value) {
+      return by_id ? value == 0.0F : !std::isfinite(value);
+    };
+    std::vector<char> mask(in_a->pixels.size());
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      mask[i] = empty(in_a->pixels[i]) && empty(in_b->pixels[i]) ? 1 : 0;
+    }
+    return mask;
+  }
+  return {};
+}
+
+/// Computes the statistics of (a - b) * scale(a, b) over the selected pixels. A pixel whose scale
+/// is not finite is left out.
 template <class Scale>
 DiffStats scaled_diff(std::span<const float> a, std::span<const float> b, std::uint32_t width_px,
-                      Scale scale) {
+                      const Selection& selection, Scale scale) {
   DiffStats stats;
   std::vector<double> magnitudes;
   magnitudes.reserve(a.size());
@@ -44,6 +77,9 @@ DiffStats scaled_diff(std::span<const float> a, std::span<const float> b, std::u
   double sum_squares = 0.0;
   double sum_abs = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!selection.holds(i)) {
+      continue;
+    }
     if (!std::isfinite(a[i]) || !std::isfinite(b[i])) {
       stats.one_sided_nan += differs_in_kind(a[i], b[i]) ? 1U : 0U;
       continue;
@@ -85,13 +121,15 @@ DiffStats diff_values(std::span<const float> a, std::span<const float> b, std::u
   EMIT_CHECK_OP(a.size(), ==, b.size());
   EMIT_CHECK_OP(width_px, >, 0U);
   EMIT_CHECK_OP(a.size() % width_px, ==, 0U);
-  return scaled_diff(a, b, width_px, [](double, double) { return 1.0; });
+  return scaled_diff(a, b, width_px, {}, [](double, double) { return 1.0; });
 }
 
 bool ImageDiff::identical() const noexcept {
   return only_in_a.empty() && only_in_b.empty() &&
          std::all_of(channels.begin(), channels.end(), [](const ChannelDiff& channel) {
-           return channel.absolute.max_abs == 0.0 && channel.absolute.one_sided_nan == 0;
+           return std::ranges::all_of(
+               std::array{&channel.absolute, &channel.no_surface_absolute},
+               [](const DiffStats* all) { return all->max_abs == 0.0 && all->one_sided_nan == 0; });
          });
 }
 
@@ -103,6 +141,7 @@ physics::Result<ImageDiff> compare_images(const ExrImage& a, const ExrImage& b,
                                            b.width_px, b.height_px));
   }
   ImageDiff result;
+  const std::vector<char> no_surface = no_surface_mask(a, b);
   for (const ExrChannel& channel : a.channels) {
     const ExrChannel* reference = b.find(channel.name);
     if (reference == nullptr) {
@@ -118,15 +157,27 @@ physics::Result<ImageDiff> compare_images(const ExrImage& a, const ExrImage& b,
     if (channel.name == kTemperatureChannel) {
       diff.unit.assign(1, 'K');
     }
-    diff.absolute = diff_values(channel.pixels, reference->pixels, a.width_px);
-    if (is_radiance(channel.name)) {
-      diff.percent = scaled_diff(channel.pixels, reference->pixels, a.width_px,
-                                 [](double, double value) { return 100.0 / std::abs(value); });
+    if (!is_radiance(channel.name)) {
+      diff.absolute = diff_values(channel.pixels, reference->pixels, a.width_px);
+      result.channels.push_back(std::move(diff));
+      continue;
+    }
+    const auto fill = [&](const Selection& selection, DiffStats& absolute, DiffStats& percent,
+                          DiffStats& kelvin) {
+      const auto stats = [&](const auto& scale) {
+        return scaled_diff(channel.pixels, reference->pixels, a.width_px, selection, scale);
+      };
+      absolute = stats([](double, double) { return 1.0; });
+      percent = stats([](double, double value) { return 100.0 / std::abs(value); });
       if (conversion) {
-        diff.kelvin_equivalent =
-            scaled_diff(channel.pixels, reference->pixels, a.width_px,
-                        [&](double, double value) { return conversion(value); });
+        kelvin = stats([&](double, double value) { return conversion(value); });
       }
+    };
+    const bool masked = no_surface.size() == channel.pixels.size();
+    const std::span<const char> mask = masked ? std::span(no_surface) : std::span<const char>();
+    fill({mask, false}, diff.absolute, diff.percent, diff.kelvin_equivalent);
+    if (masked) {
+      fill({mask, true}, diff.no_surface_absolute, diff.no_surface_percent, diff.no_surface_kelvin);
     }
     result.channels.push_back(std::move(diff));
   }

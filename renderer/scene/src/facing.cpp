@@ -350,13 +350,24 @@ class Facing {
     return surface.contradiction_m2 > kMinContradictionFrac * surface.area_m2;
   }
 
+  /// True for a surface with an outside that its fronts look to: a body, or one without a floor, as
+  /// of a house that stands on the ground.
+  static bool looks_outwards(const Surface& surface) {
+    const double least = surface.closed ? kMinClosedVolume : kMinOpenVolume;
+    return surface.volume_by_winding_m3 > least * surface.area_m2 * std::sqrt(surface.area_m2);
+  }
+
   /// The inner skin of a hollow body looks inwards by right; a body on its own does not.
   void report_inward_bodies() {
     std::vector<const Surface*> outer;
     std::vector<const Surface*> inward;
     for (const Surface& surface : surfaces_) {
-      if (!is_body(surface) || surface.double_sided || was_mended(surface)) continue;
-      (surface.volume_by_winding_m3 > 0.0 ? outer : inward).push_back(&surface);
+      if (surface.double_sided || was_mended(surface)) continue;
+      if (looks_outwards(surface)) {
+        outer.push_back(&surface);
+      } else if (is_body(surface)) {
+        inward.push_back(&surface);
+      }
     }
     std::vector<std::uint32_t> count(model_.meshes.size(), 0);
     constexpr std::size_t kMaxCompared = 1000;
@@ -370,8 +381,7 @@ class Facing {
       if (count[m] == 0) continue;
       model_.warnings.push_back(
           fmt::format("{}: {} triangles bound a body whose fronts and normals all look inwards: it "
-                      "is seen from "
-                      "inside only; turn its faces if it is not a room",
+                      "is seen from inside only; turn its faces if it is not a room",
                       name_of(m), count[m]));
     }
   }

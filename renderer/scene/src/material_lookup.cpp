@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "emit/physics/check.hpp"
-#include "emit/scene/nearest_word.hpp"
+#include "emit/physics/nearest_name.hpp"
 
 namespace emit::scene {
 
@@ -35,6 +35,12 @@ bool MaterialLookup::find(std::string_view name, std::size_t& position) const no
   return found != library_.end();
 }
 
+std::string MaterialLookup::hint_at_material(std::string_view name) const {
+  std::vector<std::string_view> names;
+  for (const Material& material : library_) names.push_back(material.name);
+  return physics::did_you_mean(name, names);
+}
+
 Result<MaterialLookup> MaterialLookup::create(const ScenarioDesc& scenario) {
   MaterialLookup lookup;
   lookup.scenario_ = &scenario;
@@ -44,9 +50,9 @@ Result<MaterialLookup> MaterialLookup::create(const ScenarioDesc& scenario) {
     lookup.library_.push_back(builtin_default_material());
   } else if (!lookup.find(scenario.default_material, lookup.default_position_)) {
     return make_error(ErrorCode::config,
-                      fmt::format("{}: default_material '{}' is not in the "
-                                  "material library",
-                                  scenario.file.string(), scenario.default_material));
+                      fmt::format("{}: default_material '{}' is not in the material library{}",
+                                  scenario.file.string(), scenario.default_material,
+                                  lookup.hint_at_material(scenario.default_material)));
   }
   lookup.used_.assign(lookup.library_.size(), false);
   return lookup;
@@ -58,13 +64,10 @@ void MaterialLookup::warn_of_unknown_keys(const ObjectDesc& object, const GltfMo
   for (const auto& [key, material] : object.material_map) {
     // The empty key stands for primitives without material.
     if (key.empty() || std::ranges::count(names, key) > 0) continue;
-    const std::string_view near = nearest_word(key, names);
-    std::string hint;
-    if (!near.empty()) {
-      hint = fmt::format(", did you mean '{}'?", near);
-    } else if (names.empty()) {
+    std::string hint = physics::did_you_mean(key, names);
+    if (hint.empty() && names.empty()) {
       hint = ": the file has no materials";
-    } else {
+    } else if (hint.empty()) {
       constexpr std::size_t kMaxNames = 8;
       names.resize(std::min(names.size(), kMaxNames));
       hint = fmt::format(": it has '{}'{}", fmt::join(names, "', '"),
@@ -103,9 +106,11 @@ Result<std::vector<std::size_t>> MaterialLookup::resolve(std::uint32_t object_in
       wanted = name;
     }
     if (by != MappedBy::fallback && !find(wanted, positions[i])) {
-      return make_error(ErrorCode::config,
-                        fmt::format("{}: object '{}': material '{}' is not in the material library",
-                                    scenario_->file.string(), object.name, wanted));
+      return make_error(
+          ErrorCode::config,
+          fmt::format("{}: object '{}': material '{}' is not in the material "
+                      "library{}",
+                      scenario_->file.string(), object.name, wanted, hint_at_material(wanted)));
     }
     if (!in_use[i]) {
       continue;

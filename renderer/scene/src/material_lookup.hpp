@@ -37,6 +37,9 @@ class MaterialLookup {
   void warn_of_unknown_keys(const ObjectDesc& object, const GltfModel& model);
   [[nodiscard]] bool find(std::string_view name, std::size_t& position) const noexcept;
 
+  /// Returns ", did you mean 'NAME'?" with the nearest name of the library, else an empty text.
+  [[nodiscard]] std::string hint_at_material(std::string_view name) const;
+
   const ScenarioDesc* scenario_ = nullptr;
   std::vector<Material> library_;
   std::size_t default_position_ = 0;

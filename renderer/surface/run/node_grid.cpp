@@ -6,8 +6,7 @@
 namespace emit::renderer {
 
 std::int64_t NodeGrid::at_or_before_ns(std::int64_t now_ns) const noexcept {
-  return start_ns_ +
-         std::max<std::int64_t>(0, now_ns - start_ns_) / interval_ns_ * interval_ns_;
+  return start_ns_ + std::max<std::int64_t>(0, now_ns - start_ns_) / interval_ns_ * interval_ns_;
 }
 
 std::int64_t NodeGrid::next_ns(std::int64_t from_ns, std::int64_t now_ns,

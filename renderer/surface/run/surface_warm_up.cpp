@@ -36,10 +36,9 @@ physics::Result<SurfaceModel> SurfaceWarmUp::build() const {
   // Make the record of the past.
   in_.plan.update(in_.start_ns, in_.world.environment, in_.world.entities);
   in_.history.update(in_.plan, in_.world.environment);
-  const HistoryRecord record =
-      make_history_record(in_.plan, in_.history,
-                          {in_.heat, in_.world.environment, in_.world.entities, in_.rays,
-                           geometry.origin_world_m()});
+  const HistoryRecord record = make_history_record(
+      in_.plan, in_.history,
+      {in_.heat, in_.world.environment, in_.world.entities, in_.rays, geometry.origin_world_m()});
   // Place samples and integrate their past.
   const std::vector<std::vector<glm::vec3>> ways_m = this->ways_m();
   const SurfaceInputs inputs{geometry.geometry(),

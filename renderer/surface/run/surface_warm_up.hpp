@@ -40,7 +40,7 @@ class SurfaceWarmUp {
   struct Inputs {
     const SurfaceGeometry& geometry;
     const SampleHeat& heat;
-    const IntervalRays& rays;  ///< prototype for the rays of each interval
+    const IntervalRays& rays;   ///< prototype for the rays of each interval
     std::int64_t start_ns = 0;  ///< instant of the model
     const RefineView& view;
     WorldInputs world;

@@ -9,7 +9,7 @@
 #include <map>
 #include <string_view>
 
-#include "tool/command_line/nearest_name.hpp"
+#include "emit/physics/nearest_name.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/output_check.hpp"
 
@@ -55,10 +55,19 @@ struct Registry {
 namespace {
 
 struct UnknownCommand {
-  std::string parent;      ///< with the program's name
-  std::string command;     ///< all words of it, without the program's name
-  std::string suggestion;  ///< the nearest command, all words of it; empty: none is near
+  std::string parent;   ///< with the program's name
+  std::string command;  ///< all words of it, without the program's name
+  std::string hint;     ///< ", did you mean 'COMMAND'?" with all words of it; empty: none is near
 };
+
+/// Returns ", did you mean 'COMMAND'?" for a mistyped last word of a command, else an empty text.
+/// `before` holds the words before it, with a blank at the end.
+std::string hint_at_command(const std::string& before, const std::string& word,
+                            const std::vector<std::string>& names) {
+  const std::vector<std::string_view> known(names.begin(), names.end());
+  const std::string_view near = physics::nearest_name(word, known);
+  return near.empty() ? "" : fmt::format(", did you mean '{}{}'?", before, near);
+}
 
 /// The first word that should be a command and is none. Empty: something else is wrong with the
 /// arguments.
@@ -77,8 +86,7 @@ std::optional<UnknownCommand> find_unknown_command(const CLI::App& root, int arg
       if (each->check_name(word)) known = each;
     }
     if (known == nullptr) {
-      const std::string near = nearest_name(word, names);
-      if (!near.empty()) out.suggestion = before + near;
+      out.hint = hint_at_command(before, word, names);
       return out;
     }
     out.parent += " " + word;
@@ -88,9 +96,9 @@ std::optional<UnknownCommand> find_unknown_command(const CLI::App& root, int arg
 }
 
 struct UnknownOption {
-  std::string command;     ///< with the program's name
-  std::string name;        ///< with dashes
-  std::string suggestion;  ///< with dashes; empty: none is near
+  std::string command;  ///< with the program's name
+  std::string name;     ///< with dashes
+  std::string hint;     ///< ", did you mean '--NAME'?"; empty: none is near
 };
 
 const CLI::Option* find_option(const CLI::App& app, const std::string& name) {
@@ -126,26 +134,38 @@ std::optional<UnknownOption> find_unknown_option(const CLI::App& root, int argc,
     }
     std::vector<std::string> names;
     for (const CLI::Option* option : app->get_options()) {
-      for (const std::string& known : option->get_lnames()) names.push_back(known);
+      for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
     }
-    const std::string near = nearest_name(name, names);
-    return UnknownOption{path, "--" + name, near.empty() ? "" : "--" + near};
+    return UnknownOption{path, "--" + name, physics::did_you_mean("--" + name, names)};
   }
   return std::nullopt;
 }
 
 std::string text_of(const UnknownOption& unknown) {
-  return fmt::format(
-      "{} has no option '{}'{}; `{} --help` lists them", unknown.command, unknown.name,
-      unknown.suggestion.empty() ? "" : fmt::format(", did you mean '{}'?", unknown.suggestion),
-      unknown.command);
+  return fmt::format("{} has no option '{}'{}; `{} --help` lists them", unknown.command,
+                     unknown.name, unknown.hint, unknown.command);
 }
 
 std::string text_of(const UnknownCommand& unknown) {
-  return fmt::format(
-      "there is no command '{}'{}; `{} --help` lists them", unknown.command,
-      unknown.suggestion.empty() ? "" : fmt::format(", did you mean '{}'?", unknown.suggestion),
-      unknown.parent);
+  return fmt::format("there is no command '{}'{}; `{} --help` lists them", unknown.command,
+                     unknown.hint, unknown.parent);
+}
+
+/// Text of any other fault in the arguments. It names the command whose --help helps.
+std::string text_of(const CLI::ParseError& error, const CLI::App& root) {
+  const CLI::App* app = &root;
+  std::string command = root.get_name();
+  while (!app->get_subcommands().empty()) {
+    app = app->get_subcommands().front();
+    command += " " + app->get_name();
+  }
+  std::string text = error.what();
+  if (app->get_require_subcommand_min() > 0 && dynamic_cast<const CLI::RequiredError*>(&error)) {
+    text = fmt::format("a command is missing behind '{}'", command);
+  } else if (dynamic_cast<const CLI::ConversionError*>(&error)) {
+    text = "could not convert" + text.substr(std::min(text.size(), text.find(':')));
+  }
+  return fmt::format("{}; see `{} --help`", text, command);
 }
 
 OptionDescription description_of(const CLI::Option& option, const detail::Registry& registry) {
@@ -236,7 +256,12 @@ Option& Option::positive() {
 }
 
 Option& Option::one_of(const std::vector<std::string>& values) {
-  option_->check(CLI::IsMember(values));
+  CLI::IsMember member(values);
+  member.operation([plain = CLI::Validator(CLI::IsMember(values)), values](std::string& text) {
+    const std::string fault = plain(text);
+    return fault.empty() ? fault : fault + physics::did_you_mean(text, values);
+  });
+  option_->check(member);
   registry_->values[option_].choices = values;
   return *this;
 }
@@ -426,6 +451,21 @@ Option CommandLine::output_file(const std::string& name,
   return path(name, target, text);
 }
 
+Option CommandLine::exr_file(const std::string& name, std::filesystem::path& target,
+                             const std::string& text) {
+  check_output(name, [&target] { return check_image_name(target, ImageFormat::exr); });
+  return output_file(name, target, text);
+}
+
+Option CommandLine::png_file(const std::string& name, std::optional<std::filesystem::path>& target,
+                             const std::string& text) {
+  check_output(name, [&target]() -> physics::Result<void> {
+    if (!target) return {};
+    return check_image_name(*target, ImageFormat::png);
+  });
+  return output_file(name, target, text);
+}
+
 Option CommandLine::output_folder(const std::string& name, std::filesystem::path& target,
                                   const std::string& text, OutputFolder folder) {
   check_output(name, folder_check(target, folder));
@@ -506,20 +546,22 @@ int Program::run(int argc, char** argv) {
   try {
     root.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0) {
-      if (const auto unknown = find_unknown_command(root, argc, argv)) {
-        return fail(kExitUsage, text_of(*unknown));
-      }
-      if (const auto unknown = find_unknown_option(root, argc, argv)) {
-        return fail(kExitUsage, text_of(*unknown));
-      }
+    if (error.get_exit_code() == 0) {
+      root.exit(error);  // prints what --help or --version asks for
+      return kExitOk;
     }
-    return root.exit(error) == 0 ? kExitOk : kExitUsage;
+    if (const auto unknown = find_unknown_command(root, argc, argv)) {
+      return fail(kExitUsage, text_of(*unknown));
+    }
+    if (const auto unknown = find_unknown_option(root, argc, argv)) {
+      return fail(kExitUsage, text_of(*unknown));
+    }
+    return fail(kExitUsage, text_of(error, root));
   }
   for (const auto& [app, option, check] : registry_->outputs) {
     if (!app->parsed()) continue;
     if (const auto writable = check(); !writable) {
-      return fail(physics::Error(writable.error()).with_context(option));
+      return fail_call(physics::Error(writable.error()).with_context(option));
     }
   }
   for (const auto& [app, run] : registry_->leaves) {

@@ -105,6 +105,11 @@ class CommandLine {
                      const std::string& text);
   Option output_file(const std::string& name, std::optional<std::filesystem::path>& target,
                      const std::string& text);
+  /// A frame that the command writes as OpenEXR, or a picture of it as PNG. It is checked as an
+  /// output_file() is, and other extensions than .exr or .png are refused.
+  Option exr_file(const std::string& name, std::filesystem::path& target, const std::string& text);
+  Option png_file(const std::string& name, std::optional<std::filesystem::path>& target,
+                  const std::string& text);
   /// A folder that the command writes files into. It is checked as an output_file() is. With
   /// `OutputFolder::exists` the command does not create it.
   enum class OutputFolder : std::uint8_t { created, exists };

@@ -95,6 +95,7 @@ int run(const CompareOptions& command) {
   const auto diff = image::compare_images(*a, *b, conversion);
   if (!diff) return fail(diff.error());
 
+  std::uint64_t no_surface_px = 0;
   TextTable table(
       {"channel", "unit", "max", "rms", "mean", "p50", "p95", "p99", "pixels", "one-sided nan"});
   Json channels = Json::object();
@@ -115,11 +116,36 @@ int run(const CompareOptions& command) {
       row.set("kelvin", stats_json(channel.kelvin_equivalent));
       worst_k = std::max(worst_k, channel.kelvin_equivalent.max_abs);
     }
+    if (const image::DiffStats& bare = channel.no_surface_absolute;
+        bare.pixels_compared + bare.one_sided_nan > 0) {
+      no_surface_px = bare.pixels_compared;
+      one_sided += bare.one_sided_nan;
+      const std::string name = channel.channel + ", no surface";
+      add_row(table, name, channel.unit, bare);
+      Json other = Json::object();
+      other.set("absolute", stats_json(bare));
+      if (channel.no_surface_percent.pixels_compared > 0) {
+        add_row(table, name, "%", channel.no_surface_percent);
+        other.set("percent", stats_json(channel.no_surface_percent));
+      }
+      if (channel.no_surface_kelvin.pixels_compared > 0) {
+        add_row(table, name, "K equivalent", channel.no_surface_kelvin);
+        other.set("kelvin", stats_json(channel.no_surface_kelvin));
+        worst_k = std::max(worst_k, channel.no_surface_kelvin.max_abs);
+      }
+      row.set("no_surface", std::move(other));
+    }
     channels.set(channel.channel, std::move(row));
   }
   const bool quiet = command.json == std::filesystem::path("-");
   if (!quiet) {
     fmt::print("{}", table.to_string());
+    if (no_surface_px > 0) {
+      fmt::print(
+          "no surface: {} pixels show no surface in both frames; the other rows leave them "
+          "out\n",
+          no_surface_px);
+    }
     if (!conversion_note.empty()) fmt::print("K equivalent: {}\n", conversion_note);
     if (!diff->only_in_a.empty()) fmt::print("only in a: {}\n", list(diff->only_in_a));
     if (!diff->only_in_b.empty()) fmt::print("only in b: {}\n", list(diff->only_in_b));

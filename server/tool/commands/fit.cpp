@@ -10,6 +10,7 @@
 
 #include "emit/config/load.hpp"
 #include "emit/physics/csv.hpp"
+#include "emit/physics/nearest_name.hpp"
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
@@ -145,7 +146,10 @@ int run(const FitOptions& command) {
     const auto found = std::find_if(scenario->materials.begin(), scenario->materials.end(),
                                     [&](const scene::Material& m) { return m.name == name; });
     if (found == scenario->materials.end()) {
-      return fail(kExitUsage, fmt::format("there is no material '{}'", name));
+      std::vector<std::string> known;
+      for (const scene::Material& m : scenario->materials) known.push_back(m.name);
+      return fail(kExitUsage, fmt::format("there is no material '{}'{}", name,
+                                          physics::did_you_mean(name, known)));
     }
     materials.push_back(&*found);
   }

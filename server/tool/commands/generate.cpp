@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "tool/command_line/common_options.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
@@ -19,7 +22,10 @@ int run(const GenerateOptions& command) {
 }
 
 void add_options(CommandLine& line, GenerateOptions& options) {
-  line.option("scene", options.scene, "Scene name, or all").required().type_name("SCENE");
+  line.option("scene", options.scene, fmt::format("Scene: {}", fmt::join(scene_names(), ", ")))
+      .required()
+      .type_name("SCENE")
+      .suggest(scene_names);
   line.output_folder("--out", options.out, "Folder to write into").required();
   add_set(line, options.set);
 }

@@ -3,9 +3,9 @@
 
 #include <fstream>
 
+#include "emit/physics/nearest_name.hpp"
 #include "emit/version.hpp"
 #include "tool/command_line/man_page.hpp"
-#include "tool/command_line/nearest_name.hpp"
 #include "tool/commands/commands.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
@@ -63,10 +63,8 @@ int run(const CommandLine& tool, const ManOptions& command) {
     fmt::print("{}", page.text);
     return kExitOk;
   }
-  const std::string near = nearest_name(title, titles);
   return fail(kExitUsage,
-              fmt::format("there is no page '{}'{}", title,
-                          near.empty() ? "" : fmt::format(", did you mean '{}'?", near)));
+              fmt::format("there is no page '{}'{}", title, physics::did_you_mean(title, titles)));
 }
 
 void add_options(const CommandLine& tool, CommandLine& line, ManOptions& options) {

@@ -168,10 +168,16 @@ class Reception {
   /// One turn of receive(); false ends it.
   physics::Result<bool> receive_next();
   bool connect_again();
+  /// Says once why no frame may have come for a while.
+  void hint_at_silence();
   void print_report() const;
   /// Exit code, after a message where something was lost.
   [[nodiscard]] int judge() const;
   [[nodiscard]] Json json() const;
+  [[nodiscard]] Clock::duration timeout() const {
+    return std::chrono::duration_cast<Clock::duration>(
+        std::chrono::duration<double>(command_.timeout_s));
+  }
 
   const ReceiveOptions& command_;
   StreamSubscription& stream_;
@@ -180,7 +186,8 @@ class Reception {
   std::optional<ApparentTemperature> apparent_;  ///< of the channel's band, once it is needed
   Clock::time_point start_;
   Clock::time_point last_frame_;
-  std::string ended_;  ///< why the stream ended; empty: it was not its end that ended receive()
+  bool hinted_ = false;  ///< hint_at_silence() has said its text
+  std::string ended_;    ///< why the stream ended; empty: it was not its end that ended receive()
 };
 
 void Reception::greet() const {
@@ -217,10 +224,8 @@ void Reception::warn_of_terms() const {
 
 bool Reception::connect_again() {
   warn(ended_ + "; connecting again");
-  const auto timeout = std::chrono::duration_cast<Clock::duration>(
-      std::chrono::duration<double>(command_.timeout_s));
   const auto again = stream_.reopen(
-      [&] { return !InterruptGuard::interrupted() && Clock::now() - last_frame_ < timeout; });
+      [&] { return !InterruptGuard::interrupted() && Clock::now() - last_frame_ < timeout(); });
   if (!again) {
     ended_ += fmt::format("; not connected again: {}", again.error().text);
     return false;
@@ -230,6 +235,27 @@ bool Reception::connect_again() {
   apparent_.reset();
   greet();
   return true;
+}
+
+void Reception::hint_at_silence() {
+  constexpr std::chrono::seconds kSilence(2);
+  if (hinted_ || Clock::now() - last_frame_ < std::min<Clock::duration>(kSilence, timeout()))
+    return;
+  hinted_ = true;
+  const std::string_view pacing = stream_.client().server().pacing;
+  const std::string waited = fmt::format("no frame for {:g} s", std::min(2.0, command_.timeout_s));
+  if (pacing == "host-step") {
+    warn(waited +
+         ": the daemon's pacing is host-step, which makes a frame for each host pose; without a "
+         "host, `emit send LOG --to udp://HOST:PORT` sends poses");
+  } else if (pacing == "trigger") {
+    warn(waited +
+         ": the daemon's pacing is trigger, which makes a frame for each trigger; without a "
+         "source, `emit trigger udp://HOST:PORT` sends triggers");
+  } else {
+    warn(waited +
+         ": the daemon may be stopped (STOP), or wait for the first host pose (`emit send`)");
+  }
 }
 
 physics::Result<bool> Reception::receive_next() {
@@ -243,7 +269,8 @@ physics::Result<bool> Reception::receive_next() {
     return command_.reconnect && connect_again();
   }
   if (*received == nullptr) {
-    if (Clock::now() - last_frame_ > std::chrono::duration<double>(command_.timeout_s)) {
+    hint_at_silence();
+    if (Clock::now() - last_frame_ > timeout()) {
       ended_ = fmt::format("no frame for {:g} s", command_.timeout_s);
       return false;
     }

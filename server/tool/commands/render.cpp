@@ -126,6 +126,18 @@ physics::Result<Plan> make_plan(const RenderOptions& command, const scene::Scena
   return plan;
 }
 
+/// Checks the extensions before the scenario is read. Errors: invalid_argument, naming the option.
+physics::Result<void> check_names(const RenderOptions& command) {
+  if (auto exr = check_image_name(command.out, ImageFormat::exr); !exr) {
+    return tl::unexpected(std::move(exr.error()).with_context("--out"));
+  }
+  if (!command.png) return {};
+  if (auto png = check_image_name(*command.png, ImageFormat::png); !png) {
+    return tl::unexpected(std::move(png.error()).with_context("--png"));
+  }
+  return {};
+}
+
 /// Errors: io, naming the option and the file that cannot be written.
 physics::Result<void> check_outputs(const Plan& plan, const scene::ScenarioDesc& scenario) {
   for (const double time_s : plan.times_s) {
@@ -399,6 +411,7 @@ physics::Result<void> Rendering::run() {
 }
 
 int run(const RenderOptions& command) {
+  if (auto named = check_names(command); !named) return fail_call(named.error());
   ScenarioChoice input = command.input;
   if (command.quality == "preview") {
     // The keys that the user sets come later, so that they count.

@@ -225,8 +225,8 @@ void add_options(CommandLine& line, SolveOptions& options) {
   add_scenario(line, options.input, "scenario");
   line.seconds("--time-s", options.time_s, "Simulated time since the scenario's epoch, s")
       .required();
-  line.output_file("--out", options.out, "OpenEXR file to write").required();
-  line.output_file("--png", options.png, "False-colour image as PNG");
+  line.exr_file("--out", options.out, "OpenEXR file to write").required();
+  line.png_file("--png", options.png, "False-colour image as PNG");
   add_png_of(line, options.png_of, true);
   line.option("--dimension", options.dimension,
               "Conduction: 3 (solids of axis-aligned faces, nothing moving), 1 (behind every "

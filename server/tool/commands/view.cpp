@@ -285,7 +285,7 @@ void add_options(CommandLine& line, ViewOptions& options) {
   line.count("--frames", options.frames,
              "Close after this many frames; 0: until the window closes");
   add_security(line, options.source.security);
-  line.output_file("--screenshot", options.screenshot, "Write the window's last picture as PNG");
+  line.png_file("--screenshot", options.screenshot, "Write the window's last picture as PNG");
   add_gpu(line, options.source.gpu_index);
 }
 

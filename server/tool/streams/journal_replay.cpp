@@ -25,7 +25,9 @@ double seconds_since(Clock::time_point start) {
 void warn_of_differences(const server::JournalPlayer& player, const std::string& scenario_hash,
                          const std::string& device) {
   if (player.scenario_sha256() != scenario_hash) {
-    warn("the journal was recorded with another scenario, or its files have changed since");
+    warn(
+        "the journal was recorded with another scenario, or its files have changed since: frames "
+        "may differ; give the --scenario and every --set value that the daemon had");
   }
   if (player.device() != device) {
     warn(fmt::format("the journal was recorded on '{}', this is '{}': frames may differ",

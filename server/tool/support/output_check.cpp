@@ -63,6 +63,21 @@ physics::Result<void> check_output_file(const fs::path& file) {
   return check_takes_files(file, folder_of(file));
 }
 
+physics::Result<void> check_image_name(const fs::path& file, ImageFormat format) {
+  const bool exr = format == ImageFormat::exr;
+  std::string given = file.extension().string();
+  for (char& c : given) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  if (given.empty() || given == (exr ? ".exr" : ".png")) return {};
+  return physics::make_error(
+      physics::ErrorCode::invalid_argument,
+      fmt::format("{}: the name ends with '{}', but {}", file.string(), given,
+                  exr ? "an OpenEXR file (.exr) is written; --png FILE.png writes a picture "
+                        "beside it"
+                      : "a PNG file (.png) is written"));
+}
+
 physics::Result<void> check_output_folder(const fs::path& folder) {
   if (folder.empty()) return cannot_write(folder, "the name is empty");
   // A slash at the end does not make another folder.

@@ -2,6 +2,7 @@
 #include "tool/support/scenario_input.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +11,7 @@
 
 #include "emit/config/load.hpp"
 #include "emit/physics/check.hpp"
+#include "emit/physics/nearest_name.hpp"
 #include "emit/scene/trajectory.hpp"
 
 namespace emit::tool {
@@ -75,13 +77,14 @@ physics::Result<std::size_t> find_band(const scene::ScenarioDesc& scenario, std:
                       fmt::format("{}: the scenario has no band", scenario.file.string()));
   }
   if (name.empty()) return std::size_t{0};
-  std::string known;
+  std::vector<std::string_view> known;
   for (std::size_t i = 0; i < scenario.bands.size(); ++i) {
     if (scenario.bands[i].name == name) return i;
-    known += (known.empty() ? "" : ", ") + scenario.bands[i].name;
+    known.emplace_back(scenario.bands[i].name);
   }
   return make_error(ErrorCode::invalid_argument,
-                    fmt::format("no band '{}'; the scenario has {}", name, known));
+                    fmt::format("no band '{}'{}; the scenario has {}", name,
+                                physics::did_you_mean(name, known), fmt::join(known, ", ")));
 }
 
 std::size_t band_of_channel(const scene::ScenarioDesc& scenario, scene::ChannelKind kind) noexcept {

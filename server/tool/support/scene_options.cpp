@@ -2,10 +2,13 @@
 #include "tool/support/scene_options.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <charconv>
 #include <functional>
 #include <map>
+
+#include "emit/physics/nearest_name.hpp"
 
 namespace emit::tool {
 namespace {
@@ -59,9 +62,9 @@ std::map<std::string, Setter, std::less<>> setters(scenegen::GenerateOptions& op
   return {};
 }
 
-std::string key_list(const std::map<std::string, Setter, std::less<>>& table) {
-  std::string keys;
-  for (const auto& [key, setter] : table) keys += (keys.empty() ? "" : ", ") + key;
+std::vector<std::string> keys_of(const std::map<std::string, Setter, std::less<>>& table) {
+  std::vector<std::string> keys;
+  for (const auto& [key, setter] : table) keys.push_back(key);
   return keys;
 }
 
@@ -72,6 +75,13 @@ std::vector<SceneKind> all_scene_kinds() {
           SceneKind::airfield};
 }
 
+std::vector<std::string> scene_names() {
+  std::vector<std::string> names;
+  for (const SceneKind kind : all_scene_kinds()) names.emplace_back(scenegen::to_string(kind));
+  names.emplace_back("all");
+  return names;
+}
+
 physics::Result<void> apply_scene_options(scenegen::GenerateOptions& options,
                                           std::span<const std::string> set) {
   const auto table = setters(options);
@@ -79,10 +89,18 @@ physics::Result<void> apply_scene_options(scenegen::GenerateOptions& options,
     const std::size_t equals = entry.find('=');
     const std::string key = entry.substr(0, equals);
     const auto found = table.find(key);
-    if (equals == std::string::npos || found == table.end()) {
-      return make_error(ErrorCode::invalid_argument,
-                        fmt::format("--set {}: scene '{}' has the options {}", entry,
-                                    scenegen::to_string(options.kind), key_list(table)));
+    if (equals == std::string::npos) {
+      return make_error(
+          ErrorCode::invalid_argument,
+          fmt::format("--set {}: the value is missing: --set {}=VALUE", entry, entry));
+    }
+    if (found == table.end()) {
+      const std::vector<std::string> known = keys_of(table);
+      return make_error(
+          ErrorCode::invalid_argument,
+          fmt::format("--set {}: unknown option '{}'{}; scene '{}' has the options {}", entry, key,
+                      physics::did_you_mean(key, known), scenegen::to_string(options.kind),
+                      fmt::join(known, ", ")));
     }
     if (!found->second(std::string_view(entry).substr(equals + 1))) {
       return make_error(ErrorCode::invalid_argument,
@@ -104,12 +122,10 @@ physics::Result<void> generate_scenes(const std::string& scene,
   } else if (const auto kind = scenegen::scene_kind_from(scene)) {
     kinds.push_back(*kind);
   } else {
-    std::string names;
-    for (const SceneKind known : all_scene_kinds()) {
-      names += fmt::format("{}, ", scenegen::to_string(known));
-    }
+    const std::vector<std::string> known = scene_names();
     return make_error(ErrorCode::invalid_argument,
-                      fmt::format("unknown scene '{}'; there are {}all", scene, names));
+                      fmt::format("unknown scene '{}'{}; there are {}", scene,
+                                  physics::did_you_mean(scene, known), fmt::join(known, ", ")));
   }
   for (const SceneKind kind : kinds) {
     scenegen::GenerateOptions options;

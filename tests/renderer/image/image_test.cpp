@@ -328,7 +328,7 @@ TEST(ImageDiff, radiance_is_reported_in_per_cent_and_kelvin) {
   ExrImage b = sample_image();
   a.channels[0].pixels.assign(15, 2.0F);
   b.channels[0].pixels.assign(15, 2.0F);
-  a.channels[0].pixels[6] = 2.5F;
+  a.channels[0].pixels[7] = 2.5F;
   a.channels[2].pixels[4] = 303.25F;
   const auto diff = compare_images(a, b, [](double radiance) { return 10.0 * radiance; });
   ASSERT_TRUE(diff);
@@ -338,7 +338,7 @@ TEST(ImageDiff, radiance_is_reported_in_per_cent_and_kelvin) {
       EXPECT_DOUBLE_EQ(channel.absolute.max_abs, 0.5);
       EXPECT_DOUBLE_EQ(channel.percent.max_abs, 25.0);
       EXPECT_DOUBLE_EQ(channel.kelvin_equivalent.max_abs, 10.0);
-      EXPECT_EQ(channel.absolute.max_x_px, 1U);
+      EXPECT_EQ(channel.absolute.max_x_px, 2U);
       EXPECT_EQ(channel.absolute.max_y_px, 1U);
     } else if (channel.channel == "temperature") {
       EXPECT_EQ(channel.unit, "K");
@@ -346,6 +346,38 @@ TEST(ImageDiff, radiance_is_reported_in_per_cent_and_kelvin) {
       EXPECT_EQ(channel.absolute.pixels_compared, 1U);
     }
   }
+}
+
+TEST(ImageDiff, pixels_without_a_surface_are_apart) {
+  ExrImage a = sample_image();
+  ExrImage b = sample_image();
+  a.channels[0].pixels[7] += 0.5F;  // the one pixel with a depth in both
+  const auto diff = compare_images(a, b);
+  ASSERT_TRUE(diff);
+  const ChannelDiff& radiance = diff->channels[0];
+  EXPECT_EQ(radiance.channel, "radiance");
+  EXPECT_EQ(radiance.absolute.pixels_compared, 1U);
+  EXPECT_DOUBLE_EQ(radiance.absolute.rms, radiance.absolute.max_abs);
+  EXPECT_EQ(radiance.no_surface_absolute.pixels_compared, 14U);
+  EXPECT_EQ(radiance.no_surface_absolute.max_abs, 0.0);
+
+  // A surface in one of the images counts, and a difference of the sky is still one.
+  b.channels[1].pixels[3] = 10.0F;
+  a.channels[0].pixels[0] += 0.25F;
+  const auto sky = compare_images(a, b);
+  EXPECT_EQ(sky->channels[0].absolute.pixels_compared, 2U);
+  EXPECT_NEAR(sky->channels[0].no_surface_absolute.max_abs, 0.25, 1e-6);
+  ExrImage only_sky = sample_image();
+  only_sky.channels[0].pixels[0] += 0.25F;
+  EXPECT_FALSE(compare_images(only_sky, sample_image())->identical());
+}
+
+TEST(ImageDiff, without_a_channel_that_tells_every_pixel_counts) {
+  ExrImage image = sample_image();
+  image.channels.resize(1);
+  const auto diff = compare_images(image, image);
+  EXPECT_EQ(diff->channels[0].absolute.pixels_compared, 15U);
+  EXPECT_EQ(diff->channels[0].no_surface_absolute.pixels_compared, 0U);
 }
 
 TEST(ImageDiff, equal_images_are_identical_and_missing_channels_are_listed) {

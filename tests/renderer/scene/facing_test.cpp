@@ -100,6 +100,21 @@ TEST(Facing, a_body_that_looks_inwards_altogether_is_warned_of) {
                                              HasSubstr("inwards"))));
 }
 
+TEST(Facing, the_inner_skin_of_a_hollow_body_is_not_warned_of) {
+  for (const bool with_floor : {true, false}) {
+    Shape skin = Shape::box(true).turn_winding().turn_normals();
+    for (auto& position : skin.positions) {
+      position.x *= 0.5F;
+      position.y = 0.1F + 0.5F * position.y;
+      position.z *= 0.5F;
+    }
+    const GltfModel model = load({{"ground", Shape::ground(-9, -9, 9, 9)},
+                                  {"house", Shape::box(with_floor)},
+                                  {"skin", skin}});
+    EXPECT_THAT(model.warnings, IsEmpty()) << with_floor;
+  }
+}
+
 TEST(Facing, single_walls_keep_their_winding) {
   Shape wall;
   wall.add_quad({-1, 0, 0}, {1, 0, 0}, {1, 2, 0}, {-1, 2, 0});

@@ -141,7 +141,152 @@ INSTANTIATE_TEST_SUITE_P(
                     Mistake{{"render", "box", "--tim-s", "1", "--out", "x"}, "--time-s"},
                     Mistake{{"render", "box", "--time-s", "1", "--uot=x"}, "--out"},
                     Mistake{{"bench", "paper", "--sceen", "box"}, "--scene"},
-                    Mistake{{"man", "bnech"}, "emit-bench"}, Mistake{{"--vesion"}, "--version"}));
+                    Mistake{{"man", "bnech"}, "emit-bench"}, Mistake{{"--vesion"}, "--version"},
+                    Mistake{{"serve", "--confg", "x.toml"}, "--config"},
+                    Mistake{{"serve", "--st=pacing.rate_hz=3"}, "--set"},
+                    Mistake{{"serve", "--chekc"}, "--check"},
+                    Mistake{{"evaluate", "equilibrium", "x.csv", "--device", "gup"}, "gpu"},
+                    Mistake{{"generate", "statu", "--out", "."}, "statue"},
+                    Mistake{{"generate", "box", "--out", ".", "--set", "size=1"}, "size_m"}));
+
+/// A mistyped name in a scenario's place or in its keys, which is bad configuration.
+class CliMistypedName : public testing::TestWithParam<Mistake> {};
+
+TEST_P(CliMistypedName, gets_a_suggestion) {
+  const ProcessResult result = run_emit(GetParam().arguments);
+  EXPECT_NE(result.exit_code, 0);
+  EXPECT_NE(result.err.find("did you mean '" + GetParam().suggestion + "'?"), std::string::npos)
+      << result.err;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Names, CliMistypedName,
+    testing::Values(Mistake{{"render", "airfeild", "--time-s", "0", "--out", "x.exr"}, "airfield"},
+                    Mistake{{"render", "box", "--time-s", "0", "--out", "x.exr", "--set",
+                             "default_material=asphlt"},
+                            "asphalt"},
+                    Mistake{{"render", "box", "--time-s", "0", "--out", "x.exr", "--set",
+                             "thermal.surroundings_material=gras"},
+                            "grass"},
+                    Mistake{{"render", "box", "--time-s", "0", "--out", "x.exr", "--set",
+                             "object[bxo].scale=2"},
+                            "box"},
+                    Mistake{{"render", "box", "--time-s", "0", "--out", "x.exr", "--band", "8-21"},
+                            "8-12"},
+                    Mistake{{"fit", "box", "--material", "asphlt"}, "asphalt"}));
+
+class CliBadArgument
+    : public testing::TestWithParam<std::pair<std::vector<std::string>, std::string>> {};
+
+TEST_P(CliBadArgument, is_one_line_of_the_common_form_that_names_the_help) {
+  const auto& [arguments, help] = GetParam();
+  const ProcessResult result = run_emit(arguments);
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  const std::string prefix = help == "emit serve" ? "emit serve: error: " : "emit: error: ";
+  EXPECT_EQ(result.err.rfind(prefix, 0), 0U) << result.err;
+  EXPECT_NE(result.err.find("`" + help + " --help`"), std::string::npos) << result.err;
+  EXPECT_EQ(result.err.find('\n'), result.err.size() - 1) << result.err;
+}
+using Arguments = std::vector<std::string>;
+INSTANTIATE_TEST_SUITE_P(
+    Cases, CliBadArgument,
+    testing::Values(
+        std::pair{Arguments{}, "emit"}, std::pair{Arguments{"bench"}, "emit bench"},
+        std::pair{Arguments{"render"}, "emit render"},
+        std::pair{Arguments{"render", "box", "--out", "x.exr"}, "emit render"},
+        std::pair{Arguments{"render", "box", "--time-s", "noon", "--out", "x.exr"}, "emit render"},
+        std::pair{Arguments{"render", "box", "--out"}, "emit render"},
+        std::pair{Arguments{"render", "box", "more", "--time-s", "1", "--out", "x.exr"},
+                  "emit render"},
+        std::pair{Arguments{"render", "box", "-x"}, "emit render"},
+        std::pair{Arguments{"receive", "tcp://localhost:1", "--every", "0"}, "emit receive"},
+        std::pair{Arguments{"bench", "paper", "--frames", "1"}, "emit bench paper"},
+        std::pair{Arguments{"serve"}, "emit serve"},
+        std::pair{Arguments{"serve", "emitd.toml"}, "emit serve"},
+        std::pair{Arguments{"serve", "--config"}, "emit serve"},
+        std::pair{Arguments{"serve", "--config", "x.toml", "--set"}, "emit serve"},
+        std::pair{Arguments{"serve", "--check=1"}, "emit serve"}));
+
+TEST(CliUsage, generate_lists_the_scenes_that_it_knows) {
+  const std::string help = run_emit({"generate", "--help"}).out;
+  for (const char* scene : {"box", "statue", "block-on-road", "ribbed", "airfield", "all"}) {
+    EXPECT_NE(help.find(scene), std::string::npos) << help;
+  }
+}
+
+TEST(CliUsage, the_daemons_help_has_an_example_and_names_the_profiles) {
+  const std::string help = run_emit({"serve", "--help"}).out;
+  EXPECT_NE(help.find("Example: emit serve --config "), std::string::npos) << help;
+  EXPECT_NE(help.find("share/emit/profiles"), std::string::npos) << help;
+}
+
+/// Files of one format under a name that promises another.
+class CliWrongExtension : public testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(CliWrongExtension, is_refused_before_any_work) {
+  const ProcessResult result = run_emit(GetParam());
+  EXPECT_EQ(result.exit_code, 2) << result.err;
+  EXPECT_NE(result.err.find("the name ends with '"), std::string::npos) << result.err;
+}
+INSTANTIATE_TEST_SUITE_P(
+    Commands, CliWrongExtension,
+    testing::Values(std::vector<std::string>{"render", "box", "--time-s", "1", "--out", "x.png"},
+                    std::vector<std::string>{"render", "box", "--time-s", "1", "--out",
+                                             "{time}.tif"},
+                    std::vector<std::string>{"render", "box", "--time-s", "1", "--out", "x.exr",
+                                             "--png", "x.jpg"},
+                    std::vector<std::string>{"solve", "box", "--time-s", "1", "--out", "x.png"},
+                    std::vector<std::string>{"solve", "box", "--time-s", "1", "--out", "x.exr",
+                                             "--png", "x.exr"},
+                    std::vector<std::string>{"view", "box", "--screenshot", "x.exr"}));
+
+/// A file of another kind than the command reads.
+class CliWrongKind : public testing::Test {
+ protected:
+  CliWrongKind() {
+    write_text(folder_.file("scene.toml"),
+               "epoch_utc = 2014-06-21T06:00:00Z\n[[object]]\ngltf = \"share:scenes/box.glb\"\n");
+    write_text(folder_.file("daemon.toml"),
+               "scenario = \"airfield\"\n[pacing]\nmode = \"host-step\"\n");
+  }
+  void expect(const std::vector<std::string>& arguments, int exit_code,
+              const std::vector<std::string>& texts) {
+    const ProcessResult result = run_emit(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    for (const std::string& text : texts) {
+      EXPECT_NE(result.err.find(text), std::string::npos) << text << "\n" << result.err;
+    }
+    EXPECT_EQ(result.err.find("json.exception"), std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find('\n'), result.err.size() - 1) << result.err;
+  }
+  const TemporaryFolder folder_;
+};
+
+TEST_F(CliWrongKind, a_scenario_as_configuration_is_told_how_it_is_served) {
+  const std::string file = folder_.file("scene.toml");
+  expect({"serve", "--config", file, "--check"}, 78,
+         {"this is a scenario", "--set scenario=" + file, "key 'scenario'"});
+}
+
+TEST_F(CliWrongKind, a_configuration_as_scenario_is_told_how_it_is_run) {
+  const std::string file = folder_.file("daemon.toml");
+  expect({"render", file, "--time-s", "1", "--out", folder_.file("x.exr")}, 78,
+         {"configuration of the daemon", "emitd --config " + file, "'airfield'"});
+  expect({"serve", "--config", file, "--set", "scenario=" + file, "--check"}, 78,
+         {"configuration of the daemon"});
+}
+
+TEST_F(CliWrongKind, inspect_says_what_a_file_is_and_which_command_reads_it) {
+  expect({"inspect", folder_.file("scene.toml")}, 1, {"it is a scenario", "emit render"});
+  expect({"inspect", folder_.file("daemon.toml")}, 1, {"configuration of the daemon", "emitd"});
+  write_text(folder_.file("x.exr"), "v/1");
+  expect({"inspect", folder_.file("x.exr")}, 1, {"emit compare"});
+  write_text(folder_.file("x.mcap"), "MCAP");
+  expect({"inspect", folder_.file("x.mcap")}, 1, {"emit send"});
+  write_text(folder_.file("x.gltf"), "# a text");
+  expect({"inspect", folder_.file("x.gltf")}, 1, {"not a glTF file"});
+  write_text(folder_.file("y.gltf"), "{\"asset\": [1,}");
+  expect({"inspect", folder_.file("y.gltf")}, 1, {"not valid JSON", "line 1"});
+}
 
 TEST(CliUsage, a_word_that_nothing_is_like_gets_no_suggestion) {
   for (const std::vector<std::string>& arguments :

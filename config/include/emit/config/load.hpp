@@ -62,6 +62,15 @@ struct LoadOptions {
 /// Names of the shipped scenarios, sorted.
 [[nodiscard]] std::vector<std::string> shipped_scenarios();
 
+/// Kind of a TOML file by the keys of its first level: all of them are keys of that kind.
+enum class FileKind : std::uint8_t {
+  unknown,    ///< no TOML file, or its keys are of no kind or of several
+  scenario,   ///< what load_scenario() reads
+  daemon,     ///< what load_daemon() reads
+  materials,  ///< a library of materials, which a scenario names in `materials`
+};
+[[nodiscard]] FileKind kind_of_file(const std::filesystem::path& file);
+
 /// Sorts overrides by the file whose keys they name. Unknown keys go to `daemon`, whose loader
 /// reports them.
 struct SplitOverrides {

@@ -185,6 +185,14 @@ std::string without_sources(std::string_view json, const std::vector<JsonMember>
   return out.append(json, copied);
 }
 
+/// Text of an error of the JSON parser, without the name of its exception.
+std::string json_fault(const std::string& text) {
+  constexpr std::string_view kException = "[json.exception.";
+  const std::size_t end = text.starts_with(kException) ? text.find("] ") : std::string::npos;
+  return end == std::string::npos ? printable(text)
+                                  : "not valid JSON: " + printable(text.substr(end + 2));
+}
+
 Result<void> parse_json(const std::string& json, tinygltf::Model& model) {
   tinygltf::TinyGLTF parser;
   std::string error;
@@ -194,10 +202,10 @@ Result<void> parse_json(const std::string& json, tinygltf::Model& model) {
     parsed = parser.LoadASCIIFromString(&model, &error, &warning, json.data(),
                                         static_cast<unsigned int>(json.size()), "");
   } catch (const std::exception& thrown) {
-    return make_error(ErrorCode::parse, printable(error + thrown.what()));
+    return make_error(ErrorCode::parse, json_fault(error + thrown.what()));
   }
   if (!parsed) {
-    return make_error(ErrorCode::parse, error.empty() ? "not a glTF file" : printable(error));
+    return make_error(ErrorCode::parse, error.empty() ? "not a glTF file" : json_fault(error));
   }
   return {};
 }
@@ -214,6 +222,12 @@ Result<void> parse_bytes(std::span<const unsigned char> bytes, GltfFile& file) {
   if (json.starts_with("\xef\xbb\xbf")) json.remove_prefix(3);
   const auto root = json_members(json);
   if (!root) {
+    if (json.find_first_not_of(" \t\r\n") == std::string_view::npos ||
+        json[json.find_first_not_of(" \t\r\n")] != '{') {
+      return make_error(
+          ErrorCode::parse,
+          "not a glTF file: it begins neither with 'glTF' (.glb) nor with '{' (.gltf)");
+    }
     // The parser knows best what is the matter with the text.
     auto parsed = parse_json(std::string(json), file.model);
     if (!parsed) return parsed;

@@ -43,6 +43,12 @@ struct ChannelDiff {
   DiffStats percent;
   /// Difference of a radiance channel in kelvin. It is filled if a conversion was given.
   DiffStats kelvin_equivalent;
+  /// The same of a radiance channel over the pixels that show no surface in both images, such as
+  /// sky. The figures above leave these pixels out, because many equal pixels of the sky would make
+  /// an error on the surfaces look small. It is empty if no channel says which pixels these are.
+  DiffStats no_surface_absolute;
+  DiffStats no_surface_percent;
+  DiffStats no_surface_kelvin;
 };
 /// Difference of two images.
 struct ImageDiff {
@@ -58,7 +64,8 @@ struct ImageDiff {
 using KelvinPerRadiance = std::function<double(double radiance_w_m2_sr)>;
 
 /// Compares each channel that both images have; `b` is the reference. The channel "radiance" and
-/// names that begin with "radiance." count as radiance.
+/// names that begin with "radiance." count as radiance. The channel `object`, else `depth`, else
+/// `temperature` of both images says which pixels show no surface.
 /// Errors: invalid_argument (sizes differ, no common channel).
 [[nodiscard]] physics::Result<ImageDiff> compare_images(const ExrImage& a, const ExrImage& b,
                                                         const KelvinPerRadiance& conversion = {});

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "emit/scene/nearest_word.hpp"
+#include "emit/physics/nearest_name.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstddef>
 #include <utility>
 
-namespace emit::scene {
+namespace emit::physics {
 namespace {
 
 /// Optimal string alignment distance: edits and swaps of neighbours.
@@ -32,12 +34,12 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string_view nearest_word(std::string_view word,
+std::string_view nearest_name(std::string_view name,
                               const std::vector<std::string_view>& candidates) {
   std::string_view best;
-  std::size_t best_distance = std::max<std::size_t>(1, word.size() / 3) + 1;
+  std::size_t best_distance = std::max<std::size_t>(1, name.size() / 3) + 1;
   for (const std::string_view candidate : candidates) {
-    const std::size_t distance = edit_distance(word, candidate);
+    const std::size_t distance = edit_distance(name, candidate);
     if (distance < best_distance) {
       best_distance = distance;
       best = candidate;
@@ -48,13 +50,22 @@ std::string_view nearest_word(std::string_view word,
   }
   // A forgotten or foreign unit suffix: `height` for `height_px`, `near_mm` for `near_m`.
   for (const std::string_view candidate : candidates) {
-    if (word.size() >= 4 &&
-        (candidate.substr(0, word.size()) == word ||
-         (candidate.size() >= 4 && word.substr(0, candidate.size()) == candidate))) {
+    if (name.size() >= 4 &&
+        (candidate.substr(0, name.size()) == name ||
+         (candidate.size() >= 4 && name.substr(0, candidate.size()) == candidate))) {
       return candidate;
     }
   }
   return {};
 }
 
-}  // namespace emit::scene
+std::string did_you_mean(std::string_view name, const std::vector<std::string_view>& candidates) {
+  const std::string_view near = nearest_name(name, candidates);
+  return near.empty() ? std::string() : fmt::format(", did you mean '{}'?", near);
+}
+
+std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates) {
+  return did_you_mean(name, std::vector<std::string_view>(candidates.begin(), candidates.end()));
+}
+
+}  // namespace emit::physics
