@@ -77,9 +77,9 @@ std::string status_text(StatusCode code, std::uint64_t detail) {
       return "unknown channel";
     case StatusCode::not_allowed:
       if (detail == kDetailOldRun) {
-        return "this host's run id belongs to a run that another host has replaced: a new run "
-               "needs a run id that no run had before, such as a larger one; or RESET on the "
-               "control port";
+        return "this host's run id belongs to a run that another host has replaced: send under a "
+               "new run id that no run had before, such as a larger one, or RESET on the control "
+               "port";
       }
       return detail == static_cast<std::uint64_t>(CommandKind::step)
                  ? "step needs a pose, and hold or stop before it"

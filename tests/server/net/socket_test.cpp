@@ -347,7 +347,8 @@ TEST(TcpSocket, NamesAddressAndReasonWhenNobodyListens) {
     address = listener->local_address();
     const auto taken = TcpListener::open(context, address);
     ASSERT_FALSE(taken.has_value());
-    EXPECT_EQ(taken.error().text, "tcp " + to_string(address) + ": Address already in use");
+    EXPECT_EQ(taken.error().text.find("tcp " + to_string(address) + ": Address already in use"), 0U)
+        << taken.error().text;
   }
   const auto refused = TcpSocket::connect(context, address, kLongNs);
   ASSERT_FALSE(refused.has_value());

@@ -63,7 +63,7 @@ TEST_F(CliSend, a_run_id_that_was_replaced_is_refused_with_the_way_out) {
   const ProcessResult old = send(log, {"--run-id", "7"});
   EXPECT_EQ(old.exit_code, 1);
   EXPECT_THAT(old.out, HasSubstr("3 refused"));
-  EXPECT_THAT(old.err, HasSubstr("send under a new run id, or RESET"));
+  EXPECT_THAT(old.err, HasSubstr("send under a new run id"));
   EXPECT_EQ(send(log, {"--run-id", "0"}).exit_code, 2) << "0 stands for none";
 }
 
