@@ -24,7 +24,7 @@ renderer/reference/src: renderer/reference renderer/reference/src/rays renderer/
 renderer/shaders/shared: renderer/physics
 renderer/gl: renderer/physics renderer/threads
 renderer/include: renderer/physics renderer/scene
-renderer/history: renderer/include renderer/physics renderer/scene
+renderer/history: renderer/include renderer/physics renderer/scene renderer/threads
 renderer/surface/heat: renderer/history renderer/include renderer/physics renderer/scene
 renderer/surface/mesh: renderer/physics renderer/scene renderer/threads
 renderer/surface/rays: renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh
@@ -179,7 +179,7 @@ only tinygltf 'tiny_gltf'         'renderer/scene/'
 only meshoptimizer 'meshoptimizer' 'renderer/scene/'
 only toml++   'toml\+\+|toml\.hpp' 'config/'
 only Boost    'boost/'            'server/'
-only ISA-L    'isa-l'             'protocol/src/erasure_code|renderer/surface/state/state_file'
+only ISA-L    'isa-l'             'protocol/src/erasure_code|renderer/surface/state/file_sink'
 only Protobuf 'google/protobuf/'  'protocol/|server/'
 only spdlog   'spdlog/'           'server/'
 only Embree   'embree3/'          'renderer/reference/|renderer/surface/rays/caster_'

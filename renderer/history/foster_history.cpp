@@ -13,6 +13,7 @@
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/step_nodes.hpp"
+#include "emit/threads/parallel.hpp"
 
 namespace emit::renderer {
 namespace {
@@ -221,7 +222,11 @@ FosterHistory::FosterHistory(const scene::ScenarioDesc& scenario,
   nodes_ns_.resize(kSpinUpSteps + 1);
   table_.resize(materials_.size() * grid_nodes_ * grid_nodes_);
   spin_up_gains_.resize(materials_.size());
-  spin_up(environment);
+  spin_up(environment, [](std::size_t rows, const auto& fill) {
+    threads::parallel_parts(rows, 1, [&fill](std::size_t begin, std::size_t end) {
+      for (std::size_t row = begin; row < end; ++row) fill(row);
+    });
+  });
 }
 
 SurfaceForcing FosterHistory::forcing(const physics::SunPosition& sun,
@@ -342,7 +347,8 @@ FosterState<double> FosterHistory::spun_up(std::size_t index,
   return x;
 }
 
-void FosterHistory::spin_up(const Environment& environment) noexcept {
+template <class Loop>
+void FosterHistory::spin_up(const Environment& environment, const Loop& each) {
   spin_up_surroundings(environment);
   for (std::size_t m = 0; m < materials_.size(); ++m) {
     const FosterMaterial& material = materials_[m];
@@ -352,17 +358,20 @@ void FosterHistory::spin_up(const Environment& environment) noexcept {
     for (std::size_t i = 0; i < spin_up_.size(); ++i) {
       gains[i] = physics::foster_gains(spin_up_[i].dt_s, material.network);
     }
-    for (std::uint32_t j = 0; j < grid_nodes_; ++j) {
-      for (std::uint32_t i = 0; i < grid_nodes_; ++i) {
-        const double scale = 2.0 / (grid_nodes_ - 1);
-        const FosterState<double> x =
-            spun_up(m, unit_from_octahedral(scale * i - 1.0, scale * j - 1.0));
-        table_[(m * grid_nodes_ + j) * grid_nodes_ + i] =
-            glm::vec4(static_cast<float>(x[0]), static_cast<float>(x[1]), static_cast<float>(x[2]),
-                      static_cast<float>(x[3]));
-      }
-    }
   }
+  // Fill the table row by row.
+  each(materials_.size() * grid_nodes_, [this](std::size_t row) {
+    const std::size_t m = row / grid_nodes_;
+    const std::size_t j = row % grid_nodes_;
+    if (materials_[m].prescribed()) return;
+    const double scale = 2.0 / (grid_nodes_ - 1);
+    for (std::uint32_t i = 0; i < grid_nodes_; ++i) {
+      const FosterState<double> x =
+          spun_up(m, unit_from_octahedral(scale * i - 1.0, scale * static_cast<double>(j) - 1.0));
+      table_[row * grid_nodes_ + i] = glm::vec4(static_cast<float>(x[0]), static_cast<float>(x[1]),
+                                                static_cast<float>(x[2]), static_cast<float>(x[3]));
+    }
+  });
   revision_ = environment.revision();
   const auto changes_ns = environment.changes_ns();
   weather_before_start_ = !changes_ns.empty() && changes_ns.front() < history_start_ns_;
@@ -376,7 +385,10 @@ bool FosterHistory::update(const StepPlan& plan, const Environment& environment)
     const bool before_start = !changes_ns.empty() && changes_ns.front() < history_start_ns_;
     if (before_start != weather_before_start_ ||
         (before_start && changes_ns.back() < history_start_ns_)) {
-      spin_up(environment);
+      // Fill the rows one by one: frames may ask for this, and threads would take memory.
+      spin_up(environment, [](std::size_t rows, const auto& fill) {
+        for (std::size_t row = 0; row < rows; ++row) fill(row);
+      });
       changed = true;
     }
   }

@@ -102,7 +102,10 @@ class FosterHistory {
                                                      const glm::dvec3& normal) const noexcept;
 
  private:
-  void spin_up(const Environment& environment) noexcept;
+  /// Fills the table of spun-up states. `each(rows, fill)` calls fill(row) for every row, in any
+  /// order.
+  template <class Loop>
+  void spin_up(const Environment& environment, const Loop& each);
   void spin_up_surroundings(const Environment& environment) noexcept;
   /// Advances the surroundings over one interval and writes its forcing.
   void carry(const HistoryInterval& interval, double tolerance_k, IntervalForcing& out) noexcept;

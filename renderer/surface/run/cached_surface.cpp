@@ -104,11 +104,9 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
 void CachedSurface::begin_first_interval(std::int64_t start_ns, const Inputs& inputs,
                                          const StepPlan& plan, SurfaceHistory& history) {
   const std::size_t count = model_->samples.samples.size();
-  // Take the memory of the nodes, and the states of the model.
-  nodes_.allocate(count, model_->drawn_samples);
+  // Move the states of the model into node 0.
+  nodes_.begin(std::move(model_->states), std::move(model_->outputs), model_->drawn_samples);
   SurfaceNode& first = nodes_[0];
-  first.states = std::move(model_->states);
-  first.outputs = std::move(model_->outputs);
   first.at_ns = start_ns;
   first.surroundings = history.surroundings();
   first.surroundings_k = history.surroundings_now_k();

@@ -2,18 +2,23 @@
 #include "surface/run/surface_nodes.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "emit/physics/check.hpp"
 
 namespace emit::renderer {
 
-void SurfaceNodes::allocate(std::size_t samples, std::size_t drawn) {
+void SurfaceNodes::begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs,
+                         std::size_t drawn) {
+  EMIT_CHECK_OP(states.size(), ==, outputs.size());
   ring_ = 0;
-  for (SurfaceNode& node : nodes_) {
-    node.states.assign(samples, {});
-    node.outputs.assign(samples, {});
-    node.vertices.assign(drawn, {});
+  for (SurfaceNode& node : nodes_) node.vertices.assign(drawn, {});
+  for (std::size_t index : {1U, 2U}) {
+    (*this)[index].states.assign(states.size(), {});
+    (*this)[index].outputs.assign(outputs.size(), {});
   }
+  (*this)[0].states = std::move(states);
+  (*this)[0].outputs = std::move(outputs);
 }
 
 std::size_t SurfaceNodes::storage(std::size_t index) const noexcept {

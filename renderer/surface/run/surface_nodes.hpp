@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "surface/heat/surface_node.hpp"
 #include "surface/run/local_steps.hpp"
@@ -15,12 +16,12 @@ namespace emit::renderer {
 /// being computed (2). Their storage rotates when an interval ends.
 ///
 /// Owner: CachedSurface. Thread: the renderer's; cut() computes on all cores. Real time: everything
-/// but allocate() is RT-safe.
+/// but begin() is RT-safe.
 class SurfaceNodes {
  public:
-  /// Takes memory for `samples` samples, the first `drawn` of which are vertices. Storage 0 becomes
-  /// node 0.
-  void allocate(std::size_t samples, std::size_t drawn);
+  /// Makes node 0 of these states and outputs, and takes memory for the others. The first `drawn`
+  /// samples are vertices. @pre states and outputs have equal sizes
+  void begin(std::vector<SampleState> states, std::vector<SampleOutput> outputs, std::size_t drawn);
 
   /// A node. @pre index < 3
   [[nodiscard]] SurfaceNode& operator[](std::size_t index) noexcept {

@@ -36,24 +36,6 @@ class Fnv64 {
   std::uint64_t value_ = 0xcbf29ce484222325ULL;
 };
 
-/// Sink of put_value() that stores the bytes. It takes memory for the expected size at once.
-class ByteStore {
- public:
-  explicit ByteStore(std::size_t expected_bytes) : bytes_(expected_bytes) {}
-  void put(const void* data, std::size_t bytes) {
-    if (bytes > bytes_.size() - used_) bytes_.resize(std::max(2 * bytes_.size(), used_ + bytes));
-    if (bytes != 0) std::memcpy(bytes_.data() + used_, data, bytes);
-    used_ += bytes;
-  }
-  [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
-    return std::span(bytes_).first(used_);
-  }
-
- private:
-  std::vector<std::byte> bytes_;
-  std::size_t used_ = 0;
-};
-
 /// Sink of put_value() that counts the bytes only.
 class ByteCount {
  public:

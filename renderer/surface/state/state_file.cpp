@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "surface/state/state_file.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <isa-l/crc64.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <fstream>
 #include <limits>
+#include <memory>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "surface/mesh/sheet_sides.hpp"
+#include "surface/state/file_sink.hpp"
 #include "surface/state/state_bytes.hpp"
 
 namespace emit::renderer {
@@ -227,8 +226,16 @@ bool consistent(const SurfaceModel& model, const scene::SceneGeometry& geometry,
                              [&](const SeenSample& s) { return s.sample < count; });
 }
 
+/// Contents of a file. They are not initialised before they are read: that would touch all of the
+/// memory twice.
+struct FileBytes {
+  std::unique_ptr<std::byte[]> data;
+  std::size_t size = 0;
+  [[nodiscard]] std::span<const std::byte> all() const { return {data.get(), size}; }
+};
+
 /// Reads the first `most` bytes of a file, or all of them if it has fewer. Errors: io.
-Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file, std::uintmax_t most) {
+Result<FileBytes> read_bytes(const std::filesystem::path& file, std::uintmax_t most) {
   const auto unreadable = [&file] {
     return make_error(ErrorCode::io,
                       fmt::format("thermal.state_file {}: cannot be read", file.string()));
@@ -237,8 +244,8 @@ Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file, std
   const std::uintmax_t size = std::min(std::filesystem::file_size(file, error), most);
   std::ifstream in(file, std::ios::binary);
   if (error || !in) return unreadable();
-  std::vector<std::byte> bytes(size);
-  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  FileBytes bytes{std::make_unique_for_overwrite<std::byte[]>(size), size};
+  in.read(reinterpret_cast<char*>(bytes.data.get()), static_cast<std::streamsize>(size));
   if (in.gcount() != static_cast<std::streamsize>(size)) return unreadable();
   return bytes;
 }
@@ -248,25 +255,6 @@ std::filesystem::path temporary_beside(const std::filesystem::path& file) {
   std::filesystem::path temporary = file;
   temporary += fmt::format(".{}.tmp", ::getpid());
   return temporary;
-}
-
-/// Writes a file anew. The error code is empty on success.
-std::error_code write_bytes(const std::filesystem::path& file, std::span<const std::byte> bytes) {
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) return {errno, std::generic_category()};
-  int error = 0;
-  while (!bytes.empty() && error == 0) {
-    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
-    if (written > 0) {
-      bytes = bytes.subspan(static_cast<std::size_t>(written));
-    } else if (written == 0 || errno != EINTR) {
-      error = written == 0 ? EIO : errno;
-    }
-  }
-  // The file must be on the disk before its name is: a loss of power would leave half a state.
-  if (error == 0 && ::fsync(fd) != 0 && errno != EINVAL) error = errno;
-  if (::close(fd) != 0 && error == 0) error = errno;
-  return {error, std::generic_category()};
 }
 
 tl::unexpected<physics::Error> cannot_write(const std::filesystem::path& file,
@@ -320,7 +308,7 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   std::uint64_t stored = 0;
   ByteSource tail(bytes.last(kChecksumBytes));
   take_value(tail, stored);
-  if (stored != state_checksum(bytes.first(bytes.size() - kChecksumBytes)))
+  if (stored != crc64_xz(bytes.first(bytes.size() - kChecksumBytes)))
     return "damaged: the checksum is wrong";
   // Compare the instants first: the hash of the host's input counts up to there.
   if (header.at_ns != wanted.start_ns) {
@@ -335,29 +323,23 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
 
 }  // namespace
 
-std::uint64_t state_checksum(std::span<const std::byte> bytes) noexcept {
-  return ::crc64_ecma_refl(0, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
-}
-
 Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
                          const SurfaceModel& model) {
+  // Write beside the file and rename, so that no reader sees half a state.
+  const std::filesystem::path temporary = temporary_beside(file);
+  FileSink sink(temporary);
   // Count the body first, because its size stands before it.
   ByteCount body;
   put_model(body, model);
-  ByteStore store(kHeaderBytes + body.count() + kChecksumBytes);
-  put_value(store, kMagic);
-  put_value(store, kStateVersion);
-  put_value(store, static_cast<std::uint32_t>(kStateParts));
-  put_value(store, key);
-  put_value(store, model.at_ns);
-  put_value(store, static_cast<std::uint64_t>(body.count()));
-  put_model(store, model);
-  // Append the checksum of everything before it.
-  put_value(store, state_checksum(store.bytes()));
-
-  // Write beside the file and rename, so that no reader sees half a state.
-  const std::filesystem::path temporary = temporary_beside(file);
-  std::error_code error = write_bytes(temporary, store.bytes());
+  put_value(sink, kMagic);
+  put_value(sink, kStateVersion);
+  put_value(sink, static_cast<std::uint32_t>(kStateParts));
+  put_value(sink, key);
+  put_value(sink, model.at_ns);
+  put_value(sink, static_cast<std::uint64_t>(body.count()));
+  put_model(sink, model);
+  put_value(sink, sink.checksum());
+  std::error_code error = sink.finish();
   if (!error) std::filesystem::rename(temporary, file, error);
   if (!error) return {};
   std::error_code ignored;
@@ -367,7 +349,7 @@ Result<void> write_state(const std::filesystem::path& file, const StateKey& key,
 
 Result<void> check_state_writable(const std::filesystem::path& file) {
   const std::filesystem::path temporary = temporary_beside(file);
-  const std::error_code error = write_bytes(temporary, {});
+  const std::error_code error = FileSink(temporary).finish();
   std::error_code ignored;
   std::filesystem::remove(temporary, ignored);
   if (error) return cannot_write(file, error);
@@ -387,15 +369,15 @@ Result<SurfaceModel> read_state(const std::filesystem::path& file, const StateWa
   if (!head) return tl::unexpected(head.error());
   std::error_code error;
   Header header;
-  std::string why = objection(*head, std::filesystem::file_size(file, error), wanted, header);
+  std::string why = objection(head->all(), std::filesystem::file_size(file, error), wanted, header);
   if (!why.empty()) return refuse(why);
   // Read the whole file and check again, now with the checksum.
   const auto bytes = read_bytes(file, std::numeric_limits<std::uintmax_t>::max());
   if (!bytes) return tl::unexpected(bytes.error());
-  why = objection(*bytes, bytes->size(), wanted, header);
+  why = objection(bytes->all(), bytes->size, wanted, header);
   if (!why.empty()) return refuse(why);
   // Take the body apart, in the order of put_model().
-  const std::span<const std::byte> all(*bytes);
+  const std::span<const std::byte> all = bytes->all();
   ByteSource source(all.subspan(kHeaderBytes, all.size() - kHeaderBytes - kChecksumBytes));
   SurfaceModel model;
   model.at_ns = header.at_ns;

@@ -59,10 +59,6 @@ struct StateWanted {
   std::int64_t start_ns = 0;  ///< wanted instant of the state
 };
 
-/// Checksum at the end of a file: CRC-64/XZ (ECMA-182, reflected). It detects accidental changes,
-/// not forgery.
-[[nodiscard]] std::uint64_t state_checksum(std::span<const std::byte> bytes) noexcept;
-
 /// Writes a state. It writes a temporary file in the same folder and renames it. Errors: io, with
 /// the name of the file.
 [[nodiscard]] physics::Result<void> write_state(const std::filesystem::path& file,

@@ -3,6 +3,7 @@
 // the end are corrected, so that inputs pass their checks. When the first byte is not 'E', it is
 // dropped and the rest is taken unchanged.
 #include "surface/state/state_file.hpp"
+#include "surface/state/file_sink.hpp"
 
 #include <cstring>
 #include <vector>
@@ -25,7 +26,7 @@ void seal(std::vector<std::byte>& file) {
   const std::uint64_t body_bytes = file.size() - kBodyAt - 8;
   std::memcpy(file.data() + kBodySizeAt, &body_bytes, sizeof body_bytes);
   const std::uint64_t value =
-      renderer::state_checksum(std::span<const std::byte>(file).first(file.size() - 8));
+      renderer::crc64_xz(std::span<const std::byte>(file).first(file.size() - 8));
   std::memcpy(file.data() + file.size() - 8, &value, sizeof value);
 }
 
