@@ -13,6 +13,22 @@
 namespace emit::test {
 namespace {
 
+TEST(CliReceive, silence_is_explained_once_by_the_daemons_pacing) {
+  const ScratchFolder folder;
+  DaemonProcess daemon(
+      folder,
+      {"--config", folder.write("emitd.toml", canned_config(64, 48, "mode = \"host-step\""))});
+  ASSERT_TRUE(daemon.wait_ready()) << folder.read("stderr");
+  const ProcessResult silent =
+      run_emit({"receive", "tcp://" + daemon.control(), "--frames", "1", "--timeout-s", "0.5"});
+  EXPECT_EQ(silent.exit_code, 1) << silent.err;
+  const std::size_t hint =
+      silent.err.find("emit: warning: no frame for 0.5 s: the daemon's pacing");
+  ASSERT_NE(hint, std::string::npos) << silent.err;
+  EXPECT_NE(silent.err.find("emit send", hint), std::string::npos) << silent.err;
+  EXPECT_EQ(silent.err.find("emit: warning: no frame", hint + 1), std::string::npos) << silent.err;
+}
+
 TEST(CliReceive, shared_memory_works_like_every_other_transport) {
   const ScratchFolder folder;
   const std::string name = "cli-" + std::to_string(::getpid());
