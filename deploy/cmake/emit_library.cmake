@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 # emit_library(NAME name INCLUDE dirs... [SOURCES files...] [SEPARATE files...] [PUBLIC libs...] [PRIVATE libs...]
-#   [SETUP_ONLY])
+#   [COLD])
 # Adds the static library emit_<name> with the alias emit::<name>. Every folder of sources is one library, so that tests
 # and fuzz targets link what they exercise. A folder of headers alone becomes an interface library.
 # With EMIT_UNITY_BUILD a few sources of a library at a time are compiled as one, which halves the time of a first build.
 # SEPARATE names those of SOURCES that define the same private names as others, so they are compiled alone.
-# SETUP_ONLY marks code that runs once at the start. It is compiled with -O1, which takes half the time of -O3.
+# COLD marks libraries without numerical work and without part in a frame, such as command lines and readers of
+# configurations. They are compiled with -O1, which takes about half the time of -O3.
 function(emit_library)
-  cmake_parse_arguments(arg "SETUP_ONLY" "NAME" "INCLUDE;SOURCES;SEPARATE;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(arg "COLD" "NAME" "INCLUDE;SOURCES;SEPARATE;PUBLIC;PRIVATE" ${ARGN})
   set(target emit_${arg_NAME})
   list(TRANSFORM arg_INCLUDE REPLACE "(.+)" "$<BUILD_INTERFACE:\\1>")
   if(arg_SOURCES)
@@ -17,7 +18,7 @@ function(emit_library)
     set_source_files_properties(${arg_SEPARATE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     target_include_directories(${target} PUBLIC ${arg_INCLUDE})
     target_link_libraries(${target} PUBLIC ${arg_PUBLIC} PRIVATE $<BUILD_INTERFACE:emit_options> ${arg_PRIVATE})
-    if(arg_SETUP_ONLY)
+    if(arg_COLD)
       target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
     endif()
   else()

@@ -10,8 +10,6 @@
 namespace emit::renderer {
 namespace {
 
-/// Samples in one task of a parallel loop.
-constexpr std::size_t kGrain = 32;
 /// Number of steps in an interval, and limits of the length of a step.
 constexpr std::int64_t kStepsPerInterval = 16;
 constexpr std::int64_t kMinStepNs = 250'000'000;
@@ -226,7 +224,7 @@ void LocalSteps::step(std::span<const std::uint32_t> blocks, std::uint32_t end,
   // Step a batch on all cores before anything is written, because samples read each other's
   // outputs.
   const auto flush = [&] {
-    inputs.workers.run(batch_.size(), kGrain, [&](std::size_t begin, std::size_t stop) {
+    inputs.workers.run(batch_.size(), kSamplesPerTask, [&](std::size_t begin, std::size_t stop) {
       for (std::size_t k = begin; k < stop; ++k) {
         stepped_[k].state = from.states[batch_[k]];
         step_sample(inputs.step, rays, interval, from.outputs, batch_[k], stepped_[k]);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 
+#include "emit/physics/check.hpp"
 #include "history/environment.hpp"
 #include "history/pose_history.hpp"
 
@@ -15,9 +16,11 @@ class NodeGrid {
   /// Events closer than this after a node belong to the node, ns.
   static constexpr std::int64_t kSameNs = 1'000'000;
 
-  /// The grid begins at `start_ns`. Its instants are `interval_ns` (at least 1) apart.
+  /// The grid begins at `start_ns`. Its instants are `interval_ns` apart. @pre interval_ns > 0
   NodeGrid(std::int64_t start_ns, std::int64_t interval_ns)
-      : start_ns_(start_ns), interval_ns_(interval_ns) {}
+      : start_ns_(start_ns), interval_ns_(interval_ns) {
+    EMIT_CHECK_OP(interval_ns, >, 0);
+  }
 
   [[nodiscard]] std::int64_t start_ns() const noexcept { return start_ns_; }
   [[nodiscard]] std::int64_t interval_ns() const noexcept { return interval_ns_; }

@@ -60,7 +60,6 @@ void SurfaceInterval::compute(const SurfaceNode& from, SurfaceNode& to, std::uin
                               const SurfaceSamples& all, const LocalSteps* skipped,
                               threads::WorkerPool& workers) noexcept {
   EMIT_CHECK_OP(end, <=, to.states.size());
-  constexpr std::size_t kSamplesPerTask = 32;
   const std::uint32_t first = done_;
   if (end <= first) return;
   const SurfaceStep step = this->step(all);

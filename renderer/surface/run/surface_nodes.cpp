@@ -37,7 +37,6 @@ void SurfaceNodes::rotate() noexcept {
 
 void SurfaceNodes::cut(std::int64_t event_ns, std::int64_t end_ns, const LocalSteps& local,
                        threads::WorkerPool& workers) noexcept {
-  constexpr std::size_t kSamplesPerTask = 32;
   SurfaceNode& first = (*this)[0];
   SurfaceNode& second = (*this)[1];
   const auto fraction_at = [&](std::int64_t at_ns) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -12,6 +13,9 @@
 #include "surface/rays/ray_offsets.hpp"
 
 namespace emit::renderer {
+
+/// Number of samples in one task of a parallel loop over samples.
+inline constexpr std::size_t kSamplesPerTask = 32;
 
 /// Input that all steps of a surface share. Everything it refers to must outlive it.
 struct SurfaceStep {

@@ -234,7 +234,7 @@ TEST(GenerateRibbed, has_ribs_of_the_asked_number_and_height) {
   EXPECT_NEAR(enclosed_volume_m3(mesh), 4.0 * (2.5 * 0.25 + 5 * 0.25 * 0.25), 1e-4);
 }
 
-TEST(GenerateAll, shipped_scenes_load_without_complaint) {
+TEST(GenerateAll, small_scenes_load_without_complaint) {
   for (const SceneKind kind : {SceneKind::box, SceneKind::block_on_road, SceneKind::ribbed}) {
     const GeneratedFiles files = run(of(kind), test::test_folder());
     for (const GeneratedFile& file : files.files) {

@@ -4,10 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "renderer/surface/mesh/refined_mesh_support.hpp"
@@ -318,6 +321,33 @@ TEST_F(StateFile, drawn_meshes_that_do_not_fit_their_meshes_are_refused) {
   EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.of_submesh[0].count += 99; }));
   EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.clusters[0].index_count += 999; }));
   EXPECT_TRUE(refused([](Drawn& drawn) { drawn[0].levels.clusters[0].first_index = ~0U; }));
+}
+
+TEST(FileSink, WritesBlocksAsOneFileWithOneChecksum) {
+  // Three blocks and a part of one, in pieces that do not fit a block.
+  std::vector<std::byte> bytes(3'300'007);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    bytes[i] = static_cast<std::byte>((i * 2'654'435'761U) >> 13U);
+  }
+  const auto file = std::filesystem::path(::testing::TempDir()) / "file_sink.bin";
+  FileSink sink(file);
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::size_t piece = std::min<std::size_t>(bytes.size() - at, at == 0 ? 2'500'001 : 4'099);
+    sink.put(bytes.data() + at, piece);
+    at += piece;
+  }
+  EXPECT_EQ(sink.checksum(), crc64_xz(bytes));
+  EXPECT_FALSE(sink.finish());
+  std::ifstream in(file, std::ios::binary);
+  const std::string read((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  EXPECT_TRUE(std::ranges::equal(std::as_bytes(std::span(read)), bytes));
+  std::filesystem::remove(file);
+}
+
+TEST(FileSink, SaysThatADiskIsFull) {
+  FileSink sink("/dev/full");
+  sink.put("12345", 5);
+  EXPECT_EQ(sink.finish(), std::errc::no_space_on_device);
 }
 
 TEST(StateChecksum, IsTheCatalogued) {
