@@ -17,7 +17,6 @@ target_compile_definitions(emit_test_paths INTERFACE
   EMIT_TEST_SHARE_DIR="${EMIT_SHARE_DIR}")
 
 # Every test includes GoogleTest and the same parts of the standard library. They are compiled once.
-option(EMIT_PRECOMPILED_HEADERS "Compile the headers that all tests include once" ON)
 if(EMIT_PRECOMPILED_HEADERS)
   set(emit_precompiled_source "${PROJECT_BINARY_DIR}/generated/test_headers.cpp")
   file(CONFIGURE OUTPUT "${emit_precompiled_source}" CONTENT "// Holds the precompiled headers of the tests.\n")

@@ -111,6 +111,10 @@ class GlRenderer final : public Renderer {
   }
   void reset() noexcept override;
   Result<void> warm_up(const FrameRequest& first, const WarmUpProgress& progress) override;
+  Result<void> carry_on(const FrameRequest& to, const WarmUpProgress& progress) override {
+    EMIT_CHECK(warm_);
+    return stage_->carry_on(to, progress);
+  }
   int submit(const FrameRequest& request) noexcept override;
   bool poll(SlotIndex slot) noexcept override { return readback_.ready(slot); }
   const FrameView& collect(SlotIndex slot) noexcept override;

@@ -206,6 +206,12 @@ physics::Result<void> CachedStage::warm_up(const FrameRequest& request,
   return {};
 }
 
+physics::Result<void> CachedStage::carry_on(const FrameRequest& to,
+                                            const WarmUpProgress& progress) {
+  return surface_->carry_on(to.thermal_time_ns, {history_.environment, history_.entities},
+                            surface_history_, progress);
+}
+
 DrawnScene& CachedStage::drawn() noexcept {
   EMIT_CHECK(drawn_ != nullptr);
   return *drawn_;

@@ -25,6 +25,7 @@ class CachedStage final : public ThermalStage {
 
   physics::Result<void> warm_up(const FrameRequest& request,
                                 const WarmUpProgress& progress) override;
+  physics::Result<void> carry_on(const FrameRequest& to, const WarmUpProgress& progress) override;
   bool cold(const FrameRequest& request) const noexcept override {
     return surface_->stale(request.thermal_time_ns);
   }

@@ -26,6 +26,7 @@ class PerFrameStage final : public ThermalStage {
       std::vector<FosterMaterial> foster_materials, const SceneHistory& history);
 
   physics::Result<void> warm_up(const FrameRequest&, const WarmUpProgress&) override { return {}; }
+  physics::Result<void> carry_on(const FrameRequest&, const WarmUpProgress&) override { return {}; }
   bool cold(const FrameRequest&) const noexcept override { return false; }
   DrawnScene& drawn() noexcept override { return drawn_; }
   void prepare(const FrameRequest& request, CameraSetup& camera,

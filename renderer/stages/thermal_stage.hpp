@@ -42,8 +42,8 @@ struct SceneHistory {
 /// Method that computes surface temperatures (thermal.method). It owns the geometry that is drawn,
 /// because the method decides how fine the meshes are.
 /// Call order of a frame: prepare(), upload(), bind(), draw().
-/// Owner: Renderer. Thread: the one that owns the GL context. Real time: warm_up() is setup only,
-/// all other functions are RT-safe.
+/// Owner: Renderer. Thread: the one that owns the GL context. Real time: warm_up() and
+/// carry_on() are setup only, all other functions are RT-safe.
 class ThermalStage {
  public:
   ThermalStage() = default;
@@ -54,6 +54,11 @@ class ThermalStage {
   /// Does the work that frames from `request` on need once. Errors: those of Renderer::warm_up().
   virtual physics::Result<void> warm_up(const FrameRequest& request,
                                         const WarmUpProgress& progress) = 0;
+  /// Brings the temperatures to the instant of `to`, however far ahead it is. Errors: those of
+  /// Renderer::carry_on().
+  /// @pre warm_up() has succeeded
+  virtual physics::Result<void> carry_on(const FrameRequest& to,
+                                         const WarmUpProgress& progress) = 0;
   /// True when a frame of that request would have to wait for warm_up().
   [[nodiscard]] virtual bool cold(const FrameRequest& request) const noexcept = 0;
 

@@ -412,10 +412,9 @@ const KeyTable<ThermalOptions>& thermal_keys() {
           "exchange", EMIT_FIELD(exchange),
           "cached with foster: faces exchange radiation with each other. With `false` they see the "
           "temperature of the surroundings where others hide the sky."),
-      path<ThermalOptions>(
-          "state_file", EMIT_FIELD(state_file),
-          "cached: file of the warmed-up surface. The first run writes it, later runs read it. A "
-          "file of another scenario or first frame is refused."),
+      path<ThermalOptions>("state_file", EMIT_FIELD(state_file),
+                           "cached: file of the warmed-up surface. The first run writes it, runs "
+                           "that start up to 15 minutes later read it. Others are refused."),
   };
   return keys;
 }

@@ -28,6 +28,7 @@ float radiance_at(std::size_t index) noexcept {
 }  // namespace
 
 ApparentTemperature::ApparentTemperature(const Band& band) {
+  EMIT_CHECK(validate(band).has_value());
   const auto radiance = [&](double at_k) {
     return band_radiance(band, Kelvin(at_k)).radiance_w_m2_sr;
   };

@@ -2,6 +2,8 @@
 #include "emit/physics/foster.hpp"
 
 #include <algorithm>
+#include <experimental/simd>
+#include <type_traits>
 
 namespace emit::physics {
 
@@ -81,36 +83,119 @@ FosterLadder foster_ladder(double dt_s, const FosterNetwork& network) noexcept {
   return ladder;
 }
 
-FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& begin,
-                             const FosterDrive<double>& end, const FosterLadder& ladder,
-                             const FosterSurface<double>& surface, double tolerance_k) noexcept {
+namespace {
+
+/// Advances as foster_advance() does. `gains_at(level)` returns the gains of a level. Lanes that
+/// have converged keep their result while others go on.
+template <class Real, class GainsAt>
+FosterAdvance advance_controlled(FosterState<Real>& x, const FosterDrive<Real>& begin,
+                                 const FosterDrive<Real>& end, const GainsAt& gains_at,
+                                 const FosterSurface<Real>& surface, double tolerance_k) noexcept {
+  using std::abs;
   FosterAdvance result;
   // Start with one step, then halve the steps until the result stops moving.
-  const FosterState<double> start = x;
-  result.clamped = foster_step(x, begin, end, ladder.level[0], surface);
+  const FosterState<Real> start = x;
+  Mask<Real> clamped = foster_step(x, begin, end, gains_at(0), surface);
+  Mask<Real> moves = Mask<Real>(true);
   for (int level = 1; level <= kMaxFosterLevel; ++level) {
-    const FosterState<double> coarse = x;
-    const FosterGains<double>& gains = ladder.level[static_cast<std::size_t>(level)];
+    const FosterGains<Real> gains = gains_at(static_cast<std::size_t>(level));
     const int steps = 1 << level;
-    x = start;
-    FosterDrive<double> from = begin;
+    FosterState<Real> fine = start;
+    FosterDrive<Real> from = begin;
     for (int i = 1; i <= steps; ++i) {
-      const FosterDrive<double> to =
-          i == steps ? end : lerp(begin, end, static_cast<double>(i) / steps);
-      result.clamped = foster_step(x, from, to, gains, surface) || result.clamped;
+      const FosterDrive<Real> to =
+          i == steps ? end : lerp(begin, end, Real(static_cast<double>(i) / steps));
+      clamped = either(foster_step(fine, from, to, gains, surface), clamped);
       from = to;
     }
     // Compare with the coarser result. Step doubling of a second-order scheme leaves a third of the
     // change as error.
-    double change_k = std::abs(foster_offset_k(x, surface) - foster_offset_k(coarse, surface));
+    Real change_k = abs(foster_offset_k(fine, surface) - foster_offset_k(x, surface));
     for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
-      change_k = std::max(change_k, std::abs(x[i] - coarse[i]));
+      const Real mode_k = abs(fine[i] - x[i]);
+      change_k = choose(Mask<Real>(change_k < mode_k), mode_k, change_k);
+      x[i] = choose(moves, fine[i], x[i]);
     }
-    result.level = level;
-    result.error_k = change_k / 3.0;
-    if (!(change_k > tolerance_k)) break;
+    moves = both(moves, Mask<Real>(change_k > Real(tolerance_k)));
+    if constexpr (std::is_same_v<Real, double>) {
+      result.level = level;
+      result.error_k = change_k / 3.0;
+      result.clamped = clamped;
+    }
+    if (none(moves)) break;
   }
   return result;
+}
+
+/// Surfaces side by side.
+using Lanes = std::experimental::fixed_size_simd<double, kFosterLanes>;
+
+/// Returns one value of every lane; `value` takes the number of the lane.
+template <class Value>
+Lanes gathered(const Value& value) noexcept {
+  return Lanes([&](auto lane) { return value(static_cast<std::size_t>(lane)); });
+}
+
+/// Advances as many surfaces as there are lanes.
+void advance_lanes(const std::array<const FosterLane*, kFosterLanes>& lanes,
+                   double tolerance_k) noexcept {
+  const auto drive = [&](FosterDrive<double> FosterLane::*which) {
+    return FosterDrive<Lanes>{
+        gathered([&](std::size_t l) { return (lanes[l]->*which).absorbed_w_m2; }),
+        gathered([&](std::size_t l) { return (lanes[l]->*which).film_w_m2_k; }),
+        gathered([&](std::size_t l) { return (lanes[l]->*which).air_offset_k; })};
+  };
+  FosterSurface<Lanes> surface;
+  surface.emission_w_m2_k4 =
+      gathered([&](std::size_t l) { return lanes[l]->surface.emission_w_m2_k4; });
+  surface.base_offset_k = gathered([&](std::size_t l) { return lanes[l]->surface.base_offset_k; });
+  surface.reference_k = gathered([&](std::size_t l) { return lanes[l]->surface.reference_k; });
+  FosterState<Lanes> x;
+  for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+    surface.resistance_m2k_w[i] =
+        gathered([&](std::size_t l) { return lanes[l]->surface.resistance_m2k_w[i]; });
+    x[i] = gathered([&](std::size_t l) { return (*lanes[l]->x)[i]; });
+  }
+  const auto gains_at = [&](std::size_t level) {
+    FosterGains<Lanes> gains;
+    for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
+      gains.start_frac[i] =
+          gathered([&](std::size_t l) { return lanes[l]->ladder->level[level].start_frac[i]; });
+      gains.end_frac[i] =
+          gathered([&](std::size_t l) { return lanes[l]->ladder->level[level].end_frac[i]; });
+    }
+    return gains;
+  };
+  advance_controlled(x, drive(&FosterLane::begin), drive(&FosterLane::end), gains_at, surface,
+                     tolerance_k);
+  for (std::size_t l = 0; l < kFosterLanes; ++l) {
+    for (std::size_t i = 0; i < kMaxFosterModes; ++i) (*lanes[l]->x)[i] = x[i][l];
+  }
+}
+
+}  // namespace
+
+FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& begin,
+                             const FosterDrive<double>& end, const FosterLadder& ladder,
+                             const FosterSurface<double>& surface, double tolerance_k) noexcept {
+  return advance_controlled(
+      x, begin, end, [&](std::size_t level) -> const auto& { return ladder.level[level]; }, surface,
+      tolerance_k);
+}
+
+void foster_advance_all(std::span<const FosterLane> lanes, double tolerance_k) noexcept {
+  while (lanes.size() > 1) {
+    // Fill lanes without a surface with the first one, whose result is stored again.
+    std::array<const FosterLane*, kFosterLanes> group;
+    group.fill(&lanes.front());
+    const std::size_t count = std::min(lanes.size(), kFosterLanes);
+    for (std::size_t l = 0; l < count; ++l) group[l] = &lanes[l];
+    advance_lanes(group, tolerance_k);
+    lanes = lanes.subspan(count);
+  }
+  for (const FosterLane& lane : lanes) {
+    foster_advance(*lane.x, lane.begin, lane.end, *lane.ladder, lane.surface, tolerance_k);
+  }
 }
 
 }  // namespace emit::physics

@@ -106,24 +106,28 @@ SampleOutput Emit2014Heat::output(const SurfaceSample& sample, const SampleDrive
   return out;
 }
 
-SampleOutput Emit2014Heat::advance(const SurfaceSample& sample, const glm::vec3& normal,
-                                   const HeatInterval& interval, const SampleDrive& drive,
-                                   SampleState& state, const SheetBack* back) const noexcept {
-  const Material& material = materials_[sample.material];
-  if (!material.prescribed_k) {
-    // Find the equilibrium temperature at both ends of the interval, with the mean shade of the
-    // interval.
-    const double begin_k =
-        equilibrium_k(sample, normal, interval.forcing.begin, drive, back) - reference_k_;
-    const double end_k =
-        equilibrium_k(sample, normal, interval.forcing.end, drive, back) - reference_k_;
-    // Relax every mode towards the line between them: exact for any length (physics.md eq. 6).
-    for (std::size_t i = 0; i < material.mode_count; ++i) {
-      state.modes_k[i] = physics::relax_linear(state.modes_k[i], begin_k, end_k,
-                                               interval.relaxation[sample.material][i]);
+void Emit2014Heat::advance(std::span<SampleAdvance> samples,
+                           const HeatInterval& interval) const noexcept {
+  for (SampleAdvance& each : samples) {
+    const SurfaceSample& sample = *each.sample;
+    const Material& material = materials_[sample.material];
+    if (!material.prescribed_k) {
+      // Find the equilibrium temperature at both ends of the interval, with the mean shade of the
+      // interval.
+      const auto target_k = [&](const SurfaceForcing& forcing) {
+        return equilibrium_k(sample, each.normal, forcing, each.drive, each.back) - reference_k_;
+      };
+      const double begin_k = target_k(interval.forcing.begin);
+      const double end_k = target_k(interval.forcing.end);
+      // Relax every mode towards the line between them: exact for any length (physics.md eq. 6).
+      for (std::size_t i = 0; i < material.mode_count; ++i) {
+        double& mode_k = each.state->modes_k[i];
+        mode_k =
+            physics::relax_linear(mode_k, begin_k, end_k, interval.relaxation[sample.material][i]);
+      }
     }
+    each.output = output(sample, each.drive, *each.state);
   }
-  return output(sample, drive, state);
 }
 
 void Emit2014Heat::step_response(std::uint32_t material, const ResponseConditions& around,

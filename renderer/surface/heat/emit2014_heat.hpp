@@ -31,10 +31,8 @@ class Emit2014Heat {
 
   /// Returns the state at the start of the history: all modes at the initial temperature.
   [[nodiscard]] SampleState start_state(const SurfaceSample& sample) const noexcept;
-  /// Advances a sample over an interval; see SampleHeat::advance().
-  SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
-                       const HeatInterval& interval, const SampleDrive& drive, SampleState& state,
-                       const SheetBack* back) const noexcept;
+  /// Advances samples over an interval; see SampleHeat::advance_all().
+  void advance(std::span<SampleAdvance> samples, const HeatInterval& interval) const noexcept;
   /// Returns the output of a sample in this state; see SampleHeat::output().
   [[nodiscard]] SampleOutput output(const SurfaceSample& sample, const SampleDrive& drive,
                                     const SampleState& state) const noexcept;

@@ -2,6 +2,7 @@
 #include "surface/heat/foster_heat.hpp"
 
 #include <algorithm>
+#include <array>
 #include <glm/geometric.hpp>
 
 #include "emit/physics/constants.hpp"
@@ -145,45 +146,78 @@ SampleOutput FosterHeat::output(const SurfaceSample& sample, const glm::vec3& no
   return output_of(sample, forcing, in, drive, offset_k(sample.material, state));
 }
 
-SampleOutput FosterHeat::advance(const SurfaceSample& sample, const glm::vec3& normal,
-                                 const HeatInterval& interval, const SampleDrive& drive,
-                                 SampleState& state, const SheetBack* back) const noexcept {
+bool FosterHeat::begin_advance(const SampleAdvance& each, const HeatInterval& interval,
+                               const Incoming& end, physics::FosterLane& lane) const noexcept {
+  const SurfaceSample& sample = *each.sample;
+  const SampleDrive& drive = each.drive;
   const IntervalForcing& forcing = interval.forcing;
-  const Incoming end = incoming(sample, normal, forcing.end, drive, drive.longwave_end_w_m2);
-  if (!materials_[sample.material].prescribed()) {
-    // Gather what drives the body at both ends of the interval.
-    const Incoming begin =
-        incoming(sample, normal, forcing.begin, drive, drive.longwave_begin_w_m2);
-    const Incoming body_begin = into_body(begin, sample.covered, normal, forcing.begin, back,
-                                          &SampleDrive::longwave_begin_w_m2);
-    const Incoming body_end =
-        into_body(end, sample.covered, normal, forcing.end, back, &SampleDrive::longwave_end_w_m2);
-    const physics::FosterLadder& ladder = interval.ladders[sample.material];
-    // Reduce the resistances at the foot of a solid (physics.md eq. 23).
-    FosterSurface<double> surface = surfaces_[sample.material];
-    for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
-      surface.resistance_m2k_w[i] *= sample.open_frac[i];
-    }
-    // Advance the modes that the partners drive. They shift the temperature above which the own
-    // flux acts, so their mean over the interval is added to the base.
-    for (std::size_t p = 0; p < kMaxPartners; ++p) {
-      if (sample.partners[p].sample == kNoSample) continue;
-      const double before_k = sum(state.partner_k[p]);
-      relax(state.partner_k[p], surface, sample.partners[p].weight_frac,
-            drive.partner_begin_w_m2[p], drive.partner_end_w_m2[p], ladder.level[0]);
-      surface.base_offset_k += 0.5 * (before_k + sum(state.partner_k[p]));
-    }
-    // Advance the own modes: without any flux if all faces are covered, else by the surface
-    // balance.
-    if (sample.covered && (back == nullptr || back->sample.covered)) {
-      relax(state.modes_k, surface, kWhole, 0.0, 0.0, ladder.level[0]);
-    } else {
-      physics::foster_advance(state.modes_k, absorbed(sample.material, forcing.begin, body_begin),
-                              absorbed(sample.material, forcing.end, body_end), ladder, surface,
-                              tolerance_k_);
-    }
+  // Gather what drives the body at both ends of the interval.
+  const Incoming begin =
+      incoming(sample, each.normal, forcing.begin, drive, drive.longwave_begin_w_m2);
+  const Incoming body_begin = into_body(begin, sample.covered, each.normal, forcing.begin,
+                                        each.back, &SampleDrive::longwave_begin_w_m2);
+  const Incoming body_end = into_body(end, sample.covered, each.normal, forcing.end, each.back,
+                                      &SampleDrive::longwave_end_w_m2);
+  lane.ladder = &interval.ladders[sample.material];
+  const physics::FosterGains<double>& gains = lane.ladder->level[0];
+  // Reduce the resistances at the foot of a solid (physics.md eq. 23).
+  FosterSurface<double>& surface = lane.surface;
+  surface = surfaces_[sample.material];
+  for (std::size_t i = 0; i < physics::kMaxFosterModes; ++i) {
+    surface.resistance_m2k_w[i] *= sample.open_frac[i];
   }
-  return output_of(sample, forcing.end, end, drive, offset_k(sample.material, state));
+  // Advance the modes that the partners drive. They shift the temperature above which the own flux
+  // acts, so their mean over the interval is added to the base.
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    if (sample.partners[p].sample == kNoSample) continue;
+    FosterState<double>& partner_k = each.state->partner_k[p];
+    const double before_k = sum(partner_k);
+    relax(partner_k, surface, sample.partners[p].weight_frac, drive.partner_begin_w_m2[p],
+          drive.partner_end_w_m2[p], gains);
+    surface.base_offset_k += 0.5 * (before_k + sum(partner_k));
+  }
+  // Let the own modes decay without any flux if all faces are covered.
+  if (sample.covered && (each.back == nullptr || each.back->sample.covered)) {
+    relax(each.state->modes_k, surface, kWhole, 0.0, 0.0, gains);
+    return false;
+  }
+  lane.x = &each.state->modes_k;
+  lane.begin = absorbed(sample.material, forcing.begin, body_begin);
+  lane.end = absorbed(sample.material, forcing.end, body_end);
+  return true;
+}
+
+template <std::size_t most>
+void FosterHeat::advance_group(std::span<SampleAdvance> group,
+                               const HeatInterval& interval) const noexcept {
+  const SurfaceForcing& at_end = interval.forcing.end;
+  // Collect the samples whose own modes the surface balance drives.
+  std::array<Incoming, most> ends;
+  std::array<physics::FosterLane, most> lanes;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    const SampleAdvance& each = group[i];
+    ends[i] = incoming(*each.sample, each.normal, at_end, each.drive, each.drive.longwave_end_w_m2);
+    if (materials_[each.sample->material].prescribed()) continue;
+    if (begin_advance(each, interval, ends[i], lanes[count])) ++count;
+  }
+  physics::foster_advance_all(std::span(lanes).first(count), tolerance_k_);
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    SampleAdvance& each = group[i];
+    each.output = output_of(*each.sample, at_end, ends[i], each.drive,
+                            offset_k(each.sample->material, *each.state));
+  }
+}
+
+void FosterHeat::advance(std::span<SampleAdvance> samples,
+                         const HeatInterval& interval) const noexcept {
+  while (samples.size() > 1) {
+    const std::size_t count = std::min(samples.size(), kAdvanceTogether);
+    advance_group<kAdvanceTogether>(samples.first(count), interval);
+    samples = samples.subspan(count);
+  }
+  // Spare a single sample the room for others.
+  if (!samples.empty()) advance_group<1>(samples, interval);
 }
 
 void FosterHeat::advance_unshadowed(std::uint32_t material, const glm::vec3& normal,

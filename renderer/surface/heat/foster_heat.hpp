@@ -33,10 +33,8 @@ class FosterHeat {
                                         const physics::FosterState<double>& before_k,
                                         std::span<const HeatInterval> tail) const noexcept;
 
-  /// Advances a sample over an interval; see SampleHeat::advance().
-  SampleOutput advance(const SurfaceSample& sample, const glm::vec3& normal,
-                       const HeatInterval& interval, const SampleDrive& drive, SampleState& state,
-                       const SheetBack* back) const noexcept;
+  /// Advances samples over an interval; see SampleHeat::advance_all().
+  void advance(std::span<SampleAdvance> samples, const HeatInterval& interval) const noexcept;
 
   /// Returns whether a material is a sheet.
   [[nodiscard]] bool is_sheet(std::uint32_t material) const noexcept {
@@ -75,6 +73,14 @@ class FosterHeat {
   [[nodiscard]] Incoming into_body(const Incoming& own, bool own_covered, const glm::vec3& normal,
                                    const SurfaceForcing& forcing, const SheetBack* back,
                                    double SampleDrive::*longwave_w_m2) const noexcept;
+  /// Advances what a sample does not share with others: modes that its partners drive, and the own
+  /// modes of a covered one. If the surface balance drives its own modes, it returns true and fills
+  /// `lane`. `end` is what arrives at the face at the end of the interval.
+  [[nodiscard]] bool begin_advance(const SampleAdvance& each, const HeatInterval& interval,
+                                   const Incoming& end, physics::FosterLane& lane) const noexcept;
+  /// Advances up to `most` samples.
+  template <std::size_t most>
+  void advance_group(std::span<SampleAdvance> group, const HeatInterval& interval) const noexcept;
   /// Returns the input of the surface balance: absorbed flux A, film and air.
   [[nodiscard]] physics::FosterDrive<double> absorbed(std::uint32_t material,
                                                       const SurfaceForcing& forcing,

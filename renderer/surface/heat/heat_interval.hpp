@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <glm/ext/vector_float3.hpp>
 #include <vector>
 
 #include "emit/physics/foster.hpp"
@@ -45,6 +46,19 @@ struct SheetBack {
   const SurfaceSample& sample;
   const SampleDrive& drive;
 };
+
+/// One sample on its way over an interval: what goes into SampleHeat::advance_all(), and what comes
+/// out of it.
+struct SampleAdvance {
+  const SurfaceSample* sample = nullptr;
+  glm::vec3 normal{0.0F};  ///< world axes, in the middle of the interval
+  SampleDrive drive;
+  SampleState* state = nullptr;     ///< at the begin of the interval, then at its end
+  const SheetBack* back = nullptr;  ///< other face of a sheet; null for all other samples
+  SampleOutput output;              ///< at the end of the interval
+};
+/// Number of samples that are best advanced together.
+inline constexpr std::size_t kAdvanceTogether = physics::kFosterLanes;
 
 /// Forcing of an interval and the gains of the thermal model over it, one entry per material. The
 /// vector of the model that is not in use stays empty.

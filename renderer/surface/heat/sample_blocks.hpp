@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <glm/ext/vector_float3.hpp>
 #include <span>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "surface/heat/surface_samples.hpp"
 
 namespace emit::renderer {
@@ -30,8 +32,10 @@ class SampleBlocks {
 
   [[nodiscard]] std::span<const Block> blocks() const noexcept { return blocks_; }
   /// Returns the samples of a group, ascending. A sheet appears with the side that is advanced
-  /// (steps_itself()); its other side follows from it. `block` must be below blocks().size().
+  /// (steps_itself()); its other side follows from it.
+  /// @pre block < blocks().size()
   [[nodiscard]] std::span<const std::uint32_t> samples(std::size_t block) const noexcept {
+    EMIT_DCHECK_OP(block, <, blocks_.size());
     return std::span(order_).subspan(blocks_[block].first, blocks_[block].count);
   }
 

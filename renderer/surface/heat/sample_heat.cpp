@@ -39,11 +39,14 @@ SampleState SampleHeat::start_state(const SurfaceSample& sample, const glm::vec3
 SampleOutput SampleHeat::advance(const SurfaceSample& sample, const glm::vec3& normal,
                                  const HeatInterval& interval, const SampleDrive& drive,
                                  SampleState& state, const SheetBack* back) const noexcept {
-  return std::visit(
-      [&](const auto& model) {
-        return model.advance(sample, normal, interval, drive, state, back);
-      },
-      model_);
+  SampleAdvance one{&sample, normal, drive, &state, back, {}};
+  advance_all({&one, 1}, interval);
+  return one.output;
+}
+
+void SampleHeat::advance_all(std::span<SampleAdvance> samples,
+                             const HeatInterval& interval) const noexcept {
+  std::visit([&](const auto& model) { model.advance(samples, interval); }, model_);
 }
 
 void SampleHeat::step_response(std::uint32_t material, const ResponseConditions& around,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -10,7 +11,9 @@
 
 #include <glm/ext/vector_float2.hpp>
 #include <glm/ext/vector_float3.hpp>
+#include <glm/geometric.hpp>
 
+#include "emit/physics/check.hpp"
 #include "emit/scene/mesh.hpp"
 
 namespace emit::renderer {
@@ -67,14 +70,18 @@ class RefinedMesh {
   [[nodiscard]] std::uint32_t leaf_count() const noexcept {
     return static_cast<std::uint32_t>(leaves_.size());
   }
-  /// Returns the vertices of a leaf, counter-clockwise seen from outside. `slot` must be below
-  /// leaf_count().
+  /// Returns the vertices of a leaf, counter-clockwise seen from outside.
+  /// @pre slot < leaf_count()
   [[nodiscard]] const std::array<std::uint32_t, 3>& leaf(std::uint32_t slot) const noexcept {
+    EMIT_DCHECK_OP(slot, <, leaf_count());
     return leaves_[slot];
   }
   /// Returns the node of the triangle in this slot. The number changes when the triangle is halved.
-  /// `slot` must be below leaf_count().
-  [[nodiscard]] std::uint32_t node(std::uint32_t slot) const noexcept { return leaf_node_[slot]; }
+  /// @pre slot < leaf_count()
+  [[nodiscard]] std::uint32_t node(std::uint32_t slot) const noexcept {
+    EMIT_DCHECK_OP(slot, <, leaf_count());
+    return leaf_node_[slot];
+  }
   /// Returns a copy of the complete state.
   [[nodiscard]] Parts parts() const {
     return {vertices_, leaves_, leaf_submesh_, leaf_node_, nodes_};
@@ -85,7 +92,9 @@ class RefinedMesh {
                                                        std::size_t max_vertices, Parts parts);
 
   /// Returns the submesh of a leaf, an index into scene::Mesh::submeshes.
+  /// @pre slot < leaf_count()
   [[nodiscard]] std::uint32_t submesh(std::uint32_t slot) const noexcept {
+    EMIT_DCHECK_OP(slot, <, leaf_count());
     return leaf_submesh_[slot];
   }
 
@@ -102,8 +111,11 @@ class RefinedMesh {
   bool split(std::span<const std::uint32_t> slots);
 
   /// Sets the normal of a vertex that split() has made, to the direction in which the surface
-  /// really faces. It must have unit length.
+  /// really faces.
+  /// @pre `vertex` exists; `normal` has unit length
   void set_normal(std::uint32_t vertex, const glm::vec3& normal) noexcept {
+    EMIT_DCHECK_OP(vertex, <, vertices_.size());
+    EMIT_DCHECK(std::abs(glm::dot(normal, normal) - 1.0F) < 1e-3F);
     vertices_[vertex].normal = normal;
   }
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/ext/vector_float3.hpp>
 #include <span>
 #include <vector>
 
+#include "emit/physics/check.hpp"
 #include "emit/scene/mesh.hpp"
 #include "surface/model/surface_model.hpp"
 #include "surface/rays/interval_rays.hpp"
@@ -39,13 +41,15 @@ class EntityExitance {
 
   /// Sums over all faces of each entity as it stands in the middle of the interval.
   /// `longwave_out_w_m2(i)` returns the exitance of sample i. Entry m of `out` receives entity m.
-  /// `out` must have an entry for every entity. RT-safe.
+  /// RT-safe.
+  /// @pre `out` has an entry for every entity with samples
   template <class LongwaveOut>
   void measure(const SurfaceSamples& all, const IntervalRays& interval,
                const LongwaveOut& longwave_out_w_m2, std::span<EntityFaces> out) const noexcept {
     for (EntityFaces& faces : out) faces = {};
     for (const Part& part : parts_) {
       const SurfaceSample& sample = all.samples[part.sample];
+      EMIT_DCHECK_OP(static_cast<std::size_t>(sample.entity), <, out.size());
       add(interval.normal(sample), part.area_m2, longwave_out_w_m2(part.sample),
           out[static_cast<std::size_t>(sample.entity)]);
     }

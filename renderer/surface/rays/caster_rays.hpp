@@ -126,9 +126,9 @@ class CasterRays {
   [[nodiscard]] std::optional<CasterHit> first_hit(
       const CasterRay& ray, std::span<const EntityPlacement> entities) const noexcept;
   /// Finds the nearest faces of up to kMaxRays rays. Bit i of the result is set if hits[i] was
-  /// written; `hits` must have an entry per ray. To trace in the axes of a body, select that entity
-  /// alone with the default placement and no static geometry. Faces at `within_m` and farther are
-  /// ignored.
+  /// written. To trace in the axes of a body, select that entity alone with the default placement
+  /// and no static geometry. Faces at `within_m` and farther are ignored.
+  /// @pre `hits` has an entry per ray
   std::uint32_t first_hits(std::span<const CasterRay> rays, const CasterSelection& selection,
                            std::span<CasterHit> hits,
                            float within_m = std::numeric_limits<float>::infinity()) const noexcept;

@@ -19,6 +19,8 @@ SurfaceDetail::SurfaceDetail(scene::SceneGeometry full, CasterRays rays,
     : full_(std::move(full)),
       rays_(std::move(rays)),
       instance_of_mesh_(coarse.meshes.size(), kNone) {
+  EMIT_CHECK_OP(full_.meshes.size(), ==, coarse.meshes.size());
+  EMIT_CHECK_OP(full_.instances.size(), ==, coarse.instances.size());
   // Choose one static instance of every mesh that has lost triangles: rays find the surface of the
   // mesh there.
   for (std::size_t i = 0; i < full_.instances.size(); ++i) {

@@ -23,8 +23,9 @@ class SurfaceDetail {
     glm::vec3 normal{0.0F};  ///< unit length
   };
 
-  /// Takes the full scene and the rays against it. `full` and `coarse` must have the same
-  /// instances, and the meshes of entities must not differ.
+  /// Takes the full scene and the rays against it.
+  /// @pre `full` and `coarse` have as many instances and meshes; the meshes of entities are the
+  /// same
   SurfaceDetail(scene::SceneGeometry full, CasterRays rays, const scene::SceneGeometry& coarse);
 
   /// Returns true if the coarse mesh has lost triangles and a static instance has it.

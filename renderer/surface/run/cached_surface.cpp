@@ -13,6 +13,15 @@ namespace {
 
 /// Largest number of intervals that are made up for one by one after a jump of sim time.
 constexpr std::int64_t kMaxIntervals = 16;
+/// A saved surface serves runs that start up to this much later. Shadows that have moved for longer
+/// meet triangles that were not refined for them.
+constexpr std::int64_t kServedNs = 900'000'000'000;
+/// A saved surface serves runs that start up to this many intervals later. To sample it anew takes
+/// less time than more of them.
+constexpr std::int64_t kServedIntervals = 90;
+/// Longest step of carry_on(). Exposure tiles take their normal steps over it, as they do between
+/// frames.
+constexpr std::int64_t kCarryNs = ExposureTiles::kTurnsPerFrame * ExposureTiles::kTurnNs;
 /// Number of frames over which node 1 is computed anew while sim time stands still.
 constexpr std::int64_t kHeldFrames = 64;
 
@@ -66,19 +75,25 @@ SurfaceModelOptions CachedSurface::model_options() const noexcept {
   return options;
 }
 
+std::int64_t CachedSurface::earliest_ns(std::int64_t start_ns) const noexcept {
+  return start_ns - std::min(kServedNs, kServedIntervals * grid_.interval_ns());
+}
+
 physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineView& view,
                                              const Inputs& inputs, StepPlan& plan,
                                              SurfaceHistory& history,
                                              const std::optional<SavedSurface>& saved,
                                              const SurfaceProgress& progress) {
   EMIT_CHECK_OP(inputs.entities.size(), ==, geometry_.entities());
-  // Make the model for the node of the grid at or before now.
-  const std::int64_t start_ns = grid_.at_or_before_ns(now_ns);
-  const SurfaceWarmUp warm_up({geometry_, heat_, interval_.rays(), start_ns, view, inputs,
-                               model_options(), progress, plan, history});
+  // Make the model for the node of the grid at or before now, or take an earlier one.
+  const std::int64_t latest_ns = grid_.at_or_before_ns(now_ns);
+  const SurfaceWarmUp warm_up({geometry_, heat_, interval_.rays(), latest_ns,
+                               earliest_ns(latest_ns), view, inputs, model_options(), progress,
+                               plan, history});
   auto made = warm_up.make(saved);
   if (!made) return tl::unexpected(std::move(made.error()));
   model_ = std::move(made->model);
+  const std::int64_t start_ns = model_->at_ns;
   // Complete the first interval.
   begin_first_interval(start_ns, inputs, plan, history);
   fill_first_vertices();
@@ -97,7 +112,29 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   begin_next(start_ns, inputs, history);
   nodes_.mark_all_changed();
   begin_shade(start_ns, inputs);
+  if (start_ns < latest_ns) {
+    last_now_ns_ = start_ns;
+    return carry_on(now_ns, inputs, history, progress);
+  }
   last_now_ns_ = now_ns;
+  return {};
+}
+
+physics::Result<void> CachedSurface::carry_on(std::int64_t now_ns, const Inputs& inputs,
+                                              SurfaceHistory& history,
+                                              const SurfaceProgress& progress) {
+  EMIT_CHECK(model_.has_value());
+  const std::int64_t from_ns = last_now_ns_;
+  while (last_now_ns_ < now_ns) {
+    const double done_frac =
+        static_cast<double>(last_now_ns_ - from_ns) / static_cast<double>(now_ns - from_ns);
+    if (progress && !progress(done_frac)) {
+      return physics::make_error(physics::ErrorCode::internal,
+                                 "stopped while carrying the surface on");
+    }
+    // Pass at most the end of one interval at a time.
+    advance(std::min({now_ns, nodes_[2].at_ns, last_now_ns_ + kCarryNs}), inputs, history);
+  }
   return {};
 }
 

@@ -55,15 +55,24 @@ class CachedSurface {
       std::vector<std::int32_t> entity_of_object, std::span<const FosterMaterial> networks,
       double reference_k, std::optional<SurfaceDetail> detail = std::nullopt);
 
-  /// Samples the surface for `now_ns`, or takes it from `saved`. It also computes the interval that
-  /// holds `now_ns`, and brings `plan` and `history` there. Setup: seconds. Errors: those of
-  /// SurfaceWarmUp.
+  /// Samples the surface for `now_ns`, or takes it from `saved` and carries it on to `now_ns`. It
+  /// also computes the interval that holds `now_ns`, and brings `plan` and `history` to the instant
+  /// of the model. Setup: seconds. Errors: those of SurfaceWarmUp and of carry_on().
   /// @pre `inputs` has the entities of the geometry
   [[nodiscard]] physics::Result<void> prepare(std::int64_t now_ns, const RefineView& view,
                                               const Inputs& inputs, StepPlan& plan,
                                               SurfaceHistory& history,
                                               const std::optional<SavedSurface>& saved,
                                               const SurfaceProgress& progress);
+
+  /// Brings the samples to `now_ns`, however far ahead it is, interval by interval. It does nothing
+  /// for an instant before the latest one. Places of samples and meshes stay as they are. Setup:
+  /// every interval takes as long as all its frames together. Errors: `internal` if `progress`
+  /// stopped it.
+  /// @pre prepare()
+  [[nodiscard]] physics::Result<void> carry_on(std::int64_t now_ns, const Inputs& inputs,
+                                               SurfaceHistory& history,
+                                               const SurfaceProgress& progress);
 
   /// Returns true if frames at `now_ns` need prepare() first: sim time went back behind the current
   /// interval, or it jumped far ahead of it.
@@ -139,6 +148,8 @@ class CachedSurface {
                 std::span<const FosterMaterial> networks, double reference_k);
 
   [[nodiscard]] SurfaceModelOptions model_options() const noexcept;
+  /// Earliest instant of a saved surface that serves a run from `start_ns` on.
+  [[nodiscard]] std::int64_t earliest_ns(std::int64_t start_ns) const noexcept;
   /// Takes the states of a model at `start_ns` as node 0, and computes node 1.
   void begin_first_interval(std::int64_t start_ns, const Inputs& inputs, const StepPlan& plan,
                             SurfaceHistory& history);

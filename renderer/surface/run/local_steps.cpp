@@ -91,6 +91,7 @@ std::size_t LocalSteps::active() const noexcept {
 }
 
 void LocalSteps::run(std::int64_t until_ns, const Window& window, const Inputs& inputs) noexcept {
+  EMIT_CHECK_OP(until_ns, <=, window.after.at_ns);
   for (;; ++next_turn_) {
     const std::int64_t at_ns = start_ns_ + next_turn_ * turn_ns_;
     if (at_ns > until_ns) return;

@@ -66,7 +66,7 @@ class LocalSteps {
     const HeatInterval& next_interval;
   };
 
-  /// Copies `rays` and `interval`, which must have room for the scene's entities and materials.
+  /// Copies `rays` and `interval`, which have room for the scene's entities and materials.
   LocalSteps(const SurfaceSamples& all, const Setup& setup, const IntervalRays& rays,
              HeatInterval interval);
 
@@ -76,7 +76,8 @@ class LocalSteps {
   /// Returns all blocks to the interval without a step; steps begin after `now_ns`.
   void restart(std::int64_t now_ns) noexcept;
 
-  /// Does the steps that are due up to `until_ns`, which must lie in the current interval.
+  /// Does the steps that are due up to `until_ns`.
+  /// @pre until_ns <= window.after.at_ns
   void run(std::int64_t until_ns, const Window& window, const Inputs& inputs) noexcept;
   /// Discards steps ahead that end after `event_ns`, because the weather changes at that time.
   void discard_foreseen(std::int64_t event_ns) noexcept;

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 
+#include "emit/physics/check.hpp"
+
 namespace emit::renderer {
 namespace {
 
@@ -49,6 +51,7 @@ SampleDrive drive_of(const SurfaceStep& step, const IntervalRays& interval_rays,
 void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
                  const HeatInterval& interval, std::span<const SampleOutput> begin,
                  std::uint32_t index, SteppedSample& stepped) noexcept {
+  EMIT_DCHECK(steps_itself(step.all, index));
   const SurfaceSample& sample = step.all.samples[index];
   // Take ray offsets for the place of the sample, of an entity for where it stands now.
   RayOffsets offsets = step.offsets;

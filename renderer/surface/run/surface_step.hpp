@@ -34,9 +34,9 @@ struct SteppedSample {
   SampleOutput behind;
 };
 
-/// Advances sample `index` over an interval, from the state in `sample`. Of a sheet, `index` must
-/// be the face with the lower index. `begin` holds the outputs of all samples at the begin of the
-/// interval. Any thread; RT-safe.
+/// Advances sample `index` over an interval, from the state in `sample`. `begin` holds the outputs
+/// of all samples at the begin of the interval. Any thread; RT-safe.
+/// @pre steps_itself(step.all, index): of a sheet it is the face with the lower index
 void step_sample(const SurfaceStep& step, const IntervalRays& interval_rays,
                  const HeatInterval& interval, std::span<const SampleOutput> begin,
                  std::uint32_t index, SteppedSample& sample) noexcept;

@@ -59,16 +59,18 @@ physics::Result<SurfaceModel> SurfaceWarmUp::build() const {
   return model;
 }
 
-StateKey SurfaceWarmUp::key_of(const SavedSurface& saved) const {
+StateKey SurfaceWarmUp::key_of(const SavedSurface& saved, std::int64_t at_ns) const {
   StateKey key = saved.key;
   key[static_cast<std::size_t>(StatePart::live)] =
-      live_hash(in_.start_ns, in_.world.environment, in_.world.entities);
+      live_hash(at_ns, in_.world.environment, in_.world.entities);
   return key;
 }
 
 physics::Result<std::optional<SurfaceModel>> SurfaceWarmUp::take(const SavedSurface& saved) const {
-  auto read = read_state(saved.file, {key_of(saved), in_.start_ns}, in_.geometry.geometry(),
-                         placements_.size(), in_.options);
+  const StateWanted wanted{[&](std::int64_t at_ns) { return key_of(saved, at_ns); },
+                           saved.start ? in_.earliest_ns : in_.start_ns, in_.start_ns};
+  auto read =
+      read_state(saved.file, wanted, in_.geometry.geometry(), placements_.size(), in_.options);
   if (!read) {
     if (!saved.start) return std::nullopt;
     return tl::unexpected(std::move(read.error()));
@@ -111,7 +113,7 @@ physics::Result<SurfaceWarmUp::Made> SurfaceWarmUp::make(
 
 physics::Result<void> SurfaceWarmUp::save(const SavedSurface& saved,
                                           const SurfaceModel& model) const {
-  return write_state(saved.file, key_of(saved), model);
+  return write_state(saved.file, key_of(saved, model.at_ns), model);
 }
 
 }  // namespace emit::renderer

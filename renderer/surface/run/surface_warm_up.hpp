@@ -42,12 +42,14 @@ class SurfaceWarmUp {
     const SampleHeat& heat;
     const IntervalRays& rays;   ///< prototype for the rays of each interval
     std::int64_t start_ns = 0;  ///< instant of the model
+    /// Earliest instant of a saved model that will do in place of `start_ns`.
+    std::int64_t earliest_ns = 0;
     const RefineView& view;
     WorldInputs world;
     SurfaceModelOptions options;
     const SurfaceProgress& progress;
-    StepPlan& plan;           ///< is brought to the instant
-    SurfaceHistory& history;  ///< is brought to the instant
+    StepPlan& plan;           ///< is brought to the instant of the model
+    SurfaceHistory& history;  ///< is brought to the instant of the model
   };
   /// A model, and whether the state file is to be written from it.
   struct Made {
@@ -68,8 +70,8 @@ class SurfaceWarmUp {
  private:
   /// Samples the surface and integrates its history.
   [[nodiscard]] physics::Result<SurfaceModel> build() const;
-  /// Returns the key of the state: the scenario's hashes and that of the host's input.
-  [[nodiscard]] StateKey key_of(const SavedSurface& saved) const;
+  /// Returns the key of a state at an instant: the scenario's hashes and that of the host's input.
+  [[nodiscard]] StateKey key_of(const SavedSurface& saved, std::int64_t at_ns) const;
   /// Returns the saved model. It is empty if it does not fit and this is no error.
   [[nodiscard]] physics::Result<std::optional<SurfaceModel>> take(const SavedSurface& saved) const;
   /// Places of each entity from the start on, by its script, rel.

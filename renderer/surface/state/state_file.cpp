@@ -311,12 +311,15 @@ std::string objection(std::span<const std::byte> bytes, std::uintmax_t file_byte
   if (stored != crc64_xz(bytes.first(bytes.size() - kChecksumBytes)))
     return "damaged: the checksum is wrong";
   // Compare the instants first: the hash of the host's input counts up to there.
-  if (header.at_ns != wanted.start_ns) {
-    return fmt::format("holds the surface at {:.3f} s, and this run starts at {:.3f} s",
-                       1e-9 * static_cast<double>(header.at_ns),
-                       1e-9 * static_cast<double>(wanted.start_ns));
+  if (header.at_ns < wanted.earliest_ns || header.at_ns > wanted.start_ns) {
+    const auto seconds = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns); };
+    return fmt::format(
+        "holds the surface at {:.3f} s and serves runs that start up to {:.0f} s later; this run "
+        "starts at {:.3f} s",
+        seconds(header.at_ns), seconds(wanted.start_ns - wanted.earliest_ns),
+        seconds(wanted.start_ns));
   }
-  const std::string parts = different_parts(header.key, wanted.key);
+  const std::string parts = different_parts(header.key, wanted.key_at(header.at_ns));
   if (!parts.empty()) return "made for another scenario, different in: " + parts;
   return "";
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string_view>
 
@@ -17,6 +18,9 @@
 /// State file of a surface (thermal.state_file): the surface at one instant after its history, so
 /// that a later run that starts there need not repeat the warm-up. A state does not depend on
 /// bands. Setup only.
+///
+/// A state serves runs that start at its instant, and runs that start a little later and carry the
+/// surface on to there.
 ///
 /// Layout, little endian: 8 bytes "EMITSTAT", version u32, number of parts u32, the parts' hashes
 /// u64 each, the instant i64 in ns of sim time, size of the body u64, body (SurfaceModel member by
@@ -55,8 +59,10 @@ using StateKey = std::array<std::uint64_t, kStateParts>;
 
 /// Requirements of a run on a state.
 struct StateWanted {
-  StateKey key{};             ///< wanted hashes
-  std::int64_t start_ns = 0;  ///< wanted instant of the state
+  /// Returns the wanted hashes of a state at an instant.
+  std::function<StateKey(std::int64_t at_ns)> key_at;
+  std::int64_t earliest_ns = 0;  ///< earliest instant of a state that will do; start_ns or before
+  std::int64_t start_ns = 0;     ///< latest one: the instant at which the run starts
 };
 
 /// Writes a state. It writes a temporary file in the same folder and renames it. Errors: io, with
@@ -68,8 +74,8 @@ struct StateWanted {
 [[nodiscard]] physics::Result<void> check_state_writable(const std::filesystem::path& file);
 
 /// Reads a state for a scene with `geometry` and that number of entities. Errors: io (the file
-/// cannot be read), config (the file is truncated, damaged, of another version, of another instant,
-/// or made for something else). The message names the file and the reason.
+/// cannot be read), config (the file is truncated, damaged, of another version, of an instant that
+/// will not do, or made for something else). The message names the file and the reason.
 [[nodiscard]] physics::Result<SurfaceModel> read_state(const std::filesystem::path& file,
                                                        const StateWanted& wanted,
                                                        const scene::SceneGeometry& geometry,

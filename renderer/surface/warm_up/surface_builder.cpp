@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -7,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 #include <memory>
+#include <span>
 
 #include "emit/threads/parallel.hpp"
 #include "surface/mesh/refined_mesh_edges.hpp"
@@ -215,11 +217,19 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
     const std::size_t end = std::min(jobs_.size(), begin + kSlice);
     threads::parallel_parts(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
       PatchSampler::StartMemo memo;
-      for (std::size_t j = begin + from; j < begin + to; ++j) {
-        const Job& job = jobs_[j];
-        SurfacePatch& patch = patches_[job.patch];
-        sampler_.evaluate(patch, job.index, job_stand_[j], memo);
-        if (options_.lateral) partners_.find(job.patch, job.index, patch.samples[job.index]);
+      std::array<NewSample, kAdvanceTogether> group;
+      for (std::size_t j = begin + from; j < begin + to; j += kAdvanceTogether) {
+        const std::size_t count = std::min(begin + to - j, kAdvanceTogether);
+        for (std::size_t k = 0; k < count; ++k) {
+          const Job& job = jobs_[j + k];
+          group[k] = {&patches_[job.patch], job.index, job_stand_[j + k]};
+        }
+        sampler_.evaluate(std::span(group).first(count), memo);
+        if (!options_.lateral) continue;
+        for (std::size_t k = j; k < j + count; ++k) {
+          const Job& job = jobs_[k];
+          partners_.find(job.patch, job.index, patches_[job.patch].samples[job.index]);
+        }
       }
     });
     const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());

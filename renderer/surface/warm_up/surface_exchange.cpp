@@ -2,8 +2,11 @@
 #include "surface/warm_up/surface_exchange.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <optional>
+#include <span>
 
 #include "emit/physics/check.hpp"
 #include "emit/threads/parallel.hpp"
@@ -89,8 +92,12 @@ class Sweeper {
   /// Adds the radiation of the entity that hides most of the sample's sky in interval j.
   void add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j,
                     SampleDrive& drive) const noexcept;
-  /// Integrates sample `s`, and the other face of a sheet with it, over the record.
-  void carry(std::uint32_t s);
+  /// Integrates samples, and the other faces of sheets with them, over the record.
+  /// @pre there are at most kAdvanceTogether
+  void carry(std::span<const std::uint32_t> samples);
+  /// Input of sample `s` in interval j, with the fluxes of its partners.
+  [[nodiscard]] SampleDrive whole_drive(std::size_t s, const glm::vec3& normal,
+                                        std::size_t j) const noexcept;
 
   const SurfaceInputs& in_;
   SurfaceModel& model_;
@@ -154,7 +161,9 @@ void Sweeper::sweep() {
   // Gather the radiation of the sweep before, then integrate every sample that it can change.
   seen_.gather(before_);
   threads::parallel_parts(swept_.size(), kGrain, [&](std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) carry(swept_[i]);
+    for (std::size_t i = from; i < to; i += kAdvanceTogether) {
+      carry(std::span(swept_).subspan(i, std::min(to - i, kAdvanceTogether)));
+    }
   });
   // Make the result of this sweep the input of the next one.
   std::swap(before_, after_);
@@ -204,49 +213,81 @@ void Sweeper::add_exitance(std::size_t s, const glm::vec3& normal, std::size_t j
   drive.hidden_is_seen = true;
 }
 
-void Sweeper::carry(std::uint32_t s) {
+SampleDrive Sweeper::whole_drive(std::size_t s, const glm::vec3& normal,
+                                 std::size_t j) const noexcept {
+  SampleDrive drive = this->drive(s, normal, j);
   const SurfaceSample& sample = model_.samples.samples[s];
-  const std::uint32_t other = sample.other_side;
-  const bool sheet = other != kNoSample;
-  SampleState state = histories_.start[s];
-  SampleOutput output;
-  SampleOutput back_output;
+  for (std::size_t p = 0; p < kMaxPartners; ++p) {
+    const std::uint32_t partner = sample.partners[p].sample;
+    if (partner == kNoSample) continue;
+    drive.partner_begin_w_m2[p] = before_[partner].flux_w_m2(j);
+    drive.partner_end_w_m2[p] = before_[partner].flux_w_m2(j + 1);
+  }
+  return drive;
+}
+
+void Sweeper::carry(std::span<const std::uint32_t> samples) {
+  EMIT_DCHECK_OP(samples.size(), <=, kAdvanceTogether);
+  const std::vector<SurfaceSample>& all = model_.samples.samples;
+  std::array<SampleAdvance, kAdvanceTogether> fronts;
+  std::array<SampleState, kAdvanceTogether> states;
+  // Inputs and outputs of the other faces of sheets.
+  std::array<SampleDrive, kAdvanceTogether> back_drives;
+  std::array<std::optional<SheetBack>, kAdvanceTogether> backs;
+  std::array<SampleOutput, kAdvanceTogether> back_outputs;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const SurfaceSample& sample = all[samples[i]];
+    states[i] = histories_.start[samples[i]];
+    fronts[i].sample = &sample;
+    fronts[i].state = &states[i];
+    if (sample.other_side == kNoSample) continue;
+    backs[i].emplace(SheetBack{all[sample.other_side], back_drives[i]});
+    fronts[i].back = &*backs[i];
+  }
   for (std::size_t j = 0; j < intervals_; ++j) {
-    // Collect the input of the sample over the interval.
     const HeatInterval& interval = in_.record.intervals[j];
     const SurfaceForcing& begin = interval.forcing.begin;
-    const glm::vec3 normal = in_.record.rays[j].normal(sample);
-    SampleDrive drive = this->drive(s, normal, j);
-    for (std::size_t p = 0; p < kMaxPartners; ++p) {
-      const std::uint32_t partner = sample.partners[p].sample;
-      if (partner == kNoSample) continue;
-      drive.partner_begin_w_m2[p] = before_[partner].flux_w_m2(j);
-      drive.partner_end_w_m2[p] = before_[partner].flux_w_m2(j + 1);
-    }
-    if (j == 0) after_[s].keep_begin(in_.heat.output(sample, normal, begin, drive, state));
-    // Advance it, together with its other face if it is a sheet.
-    if (!sheet) {
-      output = in_.heat.advance(sample, normal, interval, drive, state);
-    } else {
-      const SurfaceSample& behind = model_.samples.samples[other];
-      SampleDrive back_drive = this->drive(other, -normal, j);
-      const SheetBack face{behind, back_drive};
-      if (j == 0) {
-        after_[other].keep_begin(in_.heat.output(behind, -normal, begin, back_drive, state));
+    // Collect the input of the samples over the interval.
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const std::uint32_t s = samples[i];
+      SampleAdvance& front = fronts[i];
+      front.normal = in_.record.rays[j].normal(*front.sample);
+      front.drive = whole_drive(s, front.normal, j);
+      const bool first = j == 0;
+      if (first) {
+        after_[s].keep_begin(
+            in_.heat.output(*front.sample, front.normal, begin, front.drive, states[i]));
       }
-      output = in_.heat.advance(sample, normal, interval, drive, state, &face);
-      back_drive.longwave_begin_w_m2 = back_drive.longwave_end_w_m2;
-      back_output = in_.heat.output(behind, -normal, interval.forcing.end, back_drive, state);
-      after_[other].keep_end(j, back_output);
+      if (front.back == nullptr) continue;
+      const std::uint32_t other = front.sample->other_side;
+      back_drives[i] = drive(other, -front.normal, j);
+      if (first) {
+        after_[other].keep_begin(
+            in_.heat.output(all[other], -front.normal, begin, back_drives[i], states[i]));
+      }
     }
-    after_[s].keep_end(j, output);
+    // Advance them, sheets together with their other faces.
+    in_.heat.advance_all(std::span(fronts).first(samples.size()), interval);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const SampleAdvance& front = fronts[i];
+      after_[samples[i]].keep_end(j, front.output);
+      if (front.back == nullptr) continue;
+      const std::uint32_t other = front.sample->other_side;
+      back_drives[i].longwave_begin_w_m2 = back_drives[i].longwave_end_w_m2;
+      back_outputs[i] = in_.heat.output(all[other], -front.normal, interval.forcing.end,
+                                        back_drives[i], states[i]);
+      after_[other].keep_end(j, back_outputs[i]);
+    }
   }
   // Store the end of the record; both faces of a sheet have one state.
-  model_.states[s] = state;
-  model_.outputs[s] = output;
-  if (sheet) {
-    model_.states[other] = state;
-    model_.outputs[other] = back_output;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const std::uint32_t s = samples[i];
+    model_.states[s] = states[i];
+    model_.outputs[s] = fronts[i].output;
+    const std::uint32_t other = all[s].other_side;
+    if (other == kNoSample) continue;
+    model_.states[other] = states[i];
+    model_.outputs[other] = back_outputs[i];
   }
 }
 

@@ -2,8 +2,10 @@
 #include "surface/warm_up/surface_partners.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -178,9 +180,15 @@ void PartnerFinder::append(std::vector<SurfacePatch>& patches) const {
   partners.samples = std::move(samples);
   threads::parallel_parts(count, kGrain, [&](std::size_t from, std::size_t to) {
     PatchSampler::StartMemo memo;
-    for (std::size_t i = from; i < to; ++i) {
-      sampler_.evaluate(partners, static_cast<std::uint32_t>(i),
-                        {partners.samples[i].position_m, glm::vec3(0.0F)}, memo);
+    std::array<NewSample, kAdvanceTogether> group;
+    for (std::size_t i = from; i < to; i += kAdvanceTogether) {
+      const std::size_t in_group = std::min(to - i, kAdvanceTogether);
+      for (std::size_t k = 0; k < in_group; ++k) {
+        group[k] = {&partners,
+                    static_cast<std::uint32_t>(i + k),
+                    {partners.samples[i + k].position_m, glm::vec3(0.0F)}};
+      }
+      sampler_.evaluate(std::span(group).first(in_group), memo);
     }
   });
   patches.push_back(std::move(partners));

@@ -2,10 +2,14 @@
 #include "surface/warm_up/surface_patch.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <span>
+#include <utility>
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/constants.hpp"
@@ -258,71 +262,102 @@ bool PatchSampler::of_a_sheet(const SeenFace& face) const noexcept {
   });
 }
 
-void PatchSampler::integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const {
+void PatchSampler::integrate(std::span<const NewSample> samples, StartMemo& memo) const {
   const HistoryRecord& record = in_.record;
   const std::size_t count = record.size();
+  const bool keeps = keeps_sent();
   // Count everything seen as surroundings, because samples are not numbered yet.
-  const auto alone = [index](const SurfacePatch& side) {
+  const auto alone = [](const SurfacePatch& side, std::uint32_t index) {
     SurfaceSample sample = side.samples[index];
     sample.far_frac = 1.0F - sample.sky_frac;
     return sample;
   };
-  const auto drive_of = [&](const SurfacePatch& side, std::size_t i) {
+  const auto drive_of = [](const SurfacePatch& side, std::uint32_t index, std::size_t i) {
     SampleDrive drive;
     drive.sun_frac = side.sun_frac.row(index)[i];
     if (side.hidden_sky.length() != 0) drive.hidden_sky_frac = side.hidden_sky.row(index)[i].frac;
     return drive;
   };
-  const SurfaceSample front = alone(patch);
-  const bool sheet = patch.back && in_.materials[front.material].sheet;
-  const SurfaceSample back = sheet ? alone(*patch.back) : SurfaceSample{};
-  SampleState state = start_state(front, memo);
-  const bool keeps = patch.sent.length() != 0;
-  const SentRow sent(patch.sent.row(index));
-  const SentRow back_sent(sheet ? patch.back->sent.row(index) : std::span<float>());
-  if (keeps) patch.start_k[index] = state.modes_k;
-  SampleOutput output;
-  SampleOutput back_output;
+  const auto place_of = [](const NewSample& each) { return std::pair(each.patch, each.index); };
+  /// One face of a sample, and what it sends out.
+  struct Face {
+    SurfaceSample sample;
+    SentRow sent;
+  };
+  std::array<Face, kAdvanceTogether> faces;
+  std::array<Face, kAdvanceTogether> other_faces;
+  std::array<SampleState, kAdvanceTogether> states;
+  std::array<SampleAdvance, kAdvanceTogether> fronts;
+  // Inputs and outputs of the other faces of sheets.
+  std::array<SampleDrive, kAdvanceTogether> back_drives;
+  std::array<std::optional<SheetBack>, kAdvanceTogether> backs;
+  std::array<SampleOutput, kAdvanceTogether> back_outputs;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const auto [patch, index] = place_of(samples[k]);
+    faces[k] = {alone(*patch, index), SentRow(patch->sent.row(index))};
+    const SurfaceSample& front = faces[k].sample;
+    states[k] = start_state(front, memo);
+    if (keeps) patch->start_k[index] = states[k].modes_k;
+    fronts[k].sample = &front;
+    fronts[k].state = &states[k];
+    if (patch->back == nullptr || !in_.materials[front.material].sheet) continue;
+    other_faces[k] = {alone(*patch->back, index), SentRow(patch->back->sent.row(index))};
+    backs[k].emplace(SheetBack{other_faces[k].sample, back_drives[k]});
+    fronts[k].back = &*backs[k];
+  }
   // Advance over the intervals, and store what others will receive.
   for (std::size_t i = 0; i < count; ++i) {
     const HeatInterval& interval = record.intervals[i];
     const SurfaceForcing& begin = interval.forcing.begin;
-    const SampleDrive drive = drive_of(patch, i);
-    const glm::vec3 normal = record.rays[i].normal(front);
-    if (keeps && i == 0) {
-      sent.keep_begin(in_.heat.output(front, normal, begin, drive, state));
-    }
-    if (sheet) {
-      const SampleDrive back_drive = drive_of(*patch.back, i);
-      const SheetBack other{back, back_drive};
-      if (keeps && i == 0) {
-        back_sent.keep_begin(in_.heat.output(back, -normal, begin, back_drive, state));
+    const bool first = keeps && i == 0;
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      const auto [patch, index] = place_of(samples[k]);
+      SampleAdvance& front = fronts[k];
+      front.normal = record.rays[i].normal(*front.sample);
+      front.drive = drive_of(*patch, index, i);
+      if (first) {
+        faces[k].sent.keep_begin(
+            in_.heat.output(*front.sample, front.normal, begin, front.drive, states[k]));
       }
-      output = in_.heat.advance(front, normal, interval, drive, state, &other);
-      if (keeps || i + 1 == count) {
-        back_output = in_.heat.output(back, -normal, interval.forcing.end, back_drive, state);
+      if (front.back == nullptr) continue;
+      back_drives[k] = drive_of(*patch->back, index, i);
+      if (first) {
+        other_faces[k].sent.keep_begin(in_.heat.output(other_faces[k].sample, -front.normal, begin,
+                                                       back_drives[k], states[k]));
       }
-      if (keeps) back_sent.keep_end(i, back_output);
-    } else {
-      output = in_.heat.advance(front, normal, interval, drive, state);
     }
-    if (keeps) sent.keep_end(i, output);
+    in_.heat.advance_all(std::span(fronts).first(samples.size()), interval);
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      const SampleAdvance& front = fronts[k];
+      if (keeps) faces[k].sent.keep_end(i, front.output);
+      if (front.back == nullptr || (!keeps && i + 1 < count)) continue;
+      back_outputs[k] = in_.heat.output(other_faces[k].sample, -front.normal, interval.forcing.end,
+                                        back_drives[k], states[k]);
+      if (keeps) other_faces[k].sent.keep_end(i, back_outputs[k]);
+    }
   }
-  patch.states[index] = state;
-  patch.outputs[index] = output;
-  if (sheet) patch.back->outputs[index] = back_output;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const auto [patch, index] = place_of(samples[k]);
+    patch->states[index] = states[k];
+    patch->outputs[index] = fronts[k].output;
+    if (fronts[k].back != nullptr) patch->back->outputs[index] = back_outputs[k];
+  }
 }
 
-void PatchSampler::evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand,
-                            StartMemo& memo) const {
-  // Find the view and the shade of each face, then the history of both.
-  const auto look = [&](SurfacePatch& side) {
-    if (!inherit_view(side, index, stand)) look_around(side, index, stand);
-    tracer_.trace(side.samples[index], side.sun_frac.row(index), side.hidden_sky.row(index));
-  };
-  look(patch);
-  if (patch.back && in_.materials[patch.samples[index].material].sheet) look(*patch.back);
-  integrate(patch, index, memo);
+void PatchSampler::evaluate(std::span<const NewSample> samples, StartMemo& memo) const {
+  EMIT_CHECK_OP(samples.size(), <=, kAdvanceTogether);
+  for (const NewSample& each : samples) {
+    // Find the view and the shade of each face.
+    const std::uint32_t index = each.index;
+    const auto look = [&](SurfacePatch& side) {
+      if (!inherit_view(side, index, each.stand)) look_around(side, index, each.stand);
+      tracer_.trace(side.samples[index], side.sun_frac.row(index), side.hidden_sky.row(index));
+    };
+    SurfacePatch& patch = *each.patch;
+    look(patch);
+    if (patch.back && in_.materials[patch.samples[index].material].sheet) look(*patch.back);
+  }
+  integrate(samples, memo);
 }
 
 void SurfacePatch::begin(std::size_t intervals, bool entities, bool keeps_sent) {

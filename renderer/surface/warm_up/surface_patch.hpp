@@ -6,6 +6,7 @@
 #include <glm/ext/matrix_float4x4.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "surface/model/drive_sensitivity.hpp"
@@ -76,7 +77,14 @@ struct SampleStand {
   std::optional<std::array<std::uint32_t, 2>> parents = std::nullopt;
 };
 
-/// Evaluator of single samples of patches: view, shade and history. Owner: the builder. Any thread.
+/// Sample to be evaluated: vertex `index` of a patch.
+struct NewSample {
+  SurfacePatch* patch = nullptr;
+  std::uint32_t index = 0;
+  SampleStand stand;
+};
+
+/// Evaluator of samples of patches: view, shade and history. Owner: the builder. Any thread.
 class PatchSampler {
  public:
   /// Keeps a reference to `inputs`, which must outlive it.
@@ -96,10 +104,11 @@ class PatchSampler {
     SampleState state;
   };
 
-  /// Evaluates sample `index` and its other face. Position, normal, material and entity must stand
-  /// in patch.samples already. Everything that the sample sees counts as surroundings here.
-  void evaluate(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand,
-                StartMemo& memo) const;
+  /// Evaluates samples and their other faces. Everything that a sample sees counts as surroundings
+  /// here.
+  /// @pre there are at most kAdvanceTogether; position, normal, material and entity stand in
+  /// patch->samples; none is the parent of another
+  void evaluate(std::span<const NewSample> samples, StartMemo& memo) const;
 
  private:
   /// State at the start of the record, by the thermal model.
@@ -110,8 +119,8 @@ class PatchSampler {
   /// Returns false, and changes nothing, if rays are needed.
   bool inherit_view(SurfacePatch& patch, std::uint32_t index, const SampleStand& stand) const;
 
-  /// Integrates the temperature over the history, and stores what the sample sends out.
-  void integrate(SurfacePatch& patch, std::uint32_t index, StartMemo& memo) const;
+  /// Integrates the temperatures over the history, and stores what the samples send out.
+  void integrate(std::span<const NewSample> samples, StartMemo& memo) const;
 
   /// Returns true if a face of the scene as loaded belongs to a sheet. A sample that sees its back
   /// is not inside a body.

@@ -186,35 +186,14 @@ physics::Result<void> warm_up(renderer::Renderer& renderer, const renderer::Fram
   });
 }
 
-/// Brings the surface from one instant to a later one in steps that it takes as they come: behind a
-/// longer jump the renderer would sample it anew. Errors: internal (no slot, interrupted), gpu.
-physics::Result<void> carry_on(renderer::Renderer& renderer, const scene::ScenarioDesc& scenario,
-                               std::int64_t from_ns, std::int64_t to_ns) {
-  if (scenario.thermal.method != scene::ThermalMethod::cached) return {};
-  // The surface makes up for 16 intervals at once.
-  constexpr double kIntervalsPerStep = 12.0;
-  const auto step_ns =
-      std::max<std::int64_t>(1, time_ns(kIntervalsPerStep * scenario.thermal.first_step_s));
-  Progress progress(fmt::format("surface at {:g} s", 1e-9 * static_cast<double>(to_ns)),
-                    static_cast<std::uint64_t>((to_ns - from_ns) / step_ns));
-  for (std::int64_t at_ns = from_ns + step_ns; at_ns < to_ns; at_ns += step_ns) {
-    if (InterruptGuard::interrupted()) {
-      return physics::make_error(physics::ErrorCode::internal, "interrupted");
-    }
-    renderer::FrameRequest request;
-    request.sim_time_ns = request.thermal_time_ns = at_ns;
-    request.sensor_pose = renderer.scenario_sensor_pose_at(at_ns);
-    request.window_px = {0, 0, 1, 1};
-    const int slot = renderer.submit(request);
-    if (slot < 0) {
-      return physics::make_error(physics::ErrorCode::internal, "the renderer has no free slot");
-    }
-    const bool failed = renderer.collect(static_cast<renderer::SlotIndex>(slot)).device_failed;
-    renderer.release(static_cast<renderer::SlotIndex>(slot));
-    if (failed) return physics::make_error(physics::ErrorCode::gpu, "the device reported an error");
-    progress.advance_to(static_cast<std::uint64_t>((at_ns - from_ns) / step_ns));
-  }
-  return {};
+/// Brings the surface to the instant of a frame. Errors: those of Renderer::carry_on().
+physics::Result<void> carry_on(renderer::Renderer& renderer, const renderer::FrameRequest& to) {
+  Progress progress(
+      fmt::format("surface at {:g} s", 1e-9 * static_cast<double>(to.thermal_time_ns)), 1000);
+  return renderer.carry_on(to, [&progress](double done_frac) {
+    progress.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
+    return !InterruptGuard::interrupted();
+  });
 }
 
 /// One run: it renders the plan and writes files, lines and JSON.
@@ -369,10 +348,7 @@ physics::Result<void> Rendering::render(std::size_t index) {
   const double time_s = plan_.times_s[index];
   const renderer::FrameRequest wanted = request(index);
   if (index > 0) {
-    const std::int64_t from_ns = time_ns(plan_.times_s[index - 1]);
-    if (auto there = carry_on(*renderer_, scenario_, from_ns, wanted.sim_time_ns); !there) {
-      return there;
-    }
+    if (auto there = carry_on(*renderer_, wanted); !there) return there;
   }
   const auto start = std::chrono::steady_clock::now();
   const int slot = renderer_->submit(wanted);

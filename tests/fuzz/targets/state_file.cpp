@@ -44,9 +44,10 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   renderer::SurfaceModelOptions options;
   options.max_samples = 1000;
   // Ask for the instant in the header, whatever it is, so that the body is read.
-  renderer::StateWanted wanted{fuzz::state_key(), 0};
+  renderer::StateWanted wanted{[](std::int64_t) { return fuzz::state_key(); }, 0, 0};
   if (file.size() >= kBodySizeAt) {
     std::memcpy(&wanted.start_ns, file.data() + kInstantAt, sizeof wanted.start_ns);
+    wanted.earliest_ns = wanted.start_ns;
   }
   const auto model =
       renderer::read_state(fuzz::file_of(file), wanted, geometry, fuzz::kEntities, options);

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <vector>
 
@@ -311,6 +313,53 @@ TEST(Relaxation, SplittingALinearStepAThousandTimesMovesNothing) {
           x = relax_linear(x, at(i), at(i + 1), part_f);
         }
         EXPECT_NEAR(x, expected, 1e-3) << tau_s << " " << dt_s << " " << splits;
+      }
+    }
+  }
+}
+
+/// Surfaces that differ in everything, so that they need different splits of the interval.
+TEST(FosterLanes, have_the_bits_of_single_surfaces) {
+  std::mt19937_64 random(11);
+  const auto number = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  FosterNetwork networks[2];
+  networks[0] = {{{{60.0, 0.01}, {1800.0, 0.05}, {2e4, 0.2}, {2e5, 0.6}}}, 4};
+  networks[1] = {{{{20.0, 0.002}, {900.0, 0.4}}}, 2};
+  for (const double dt_s : {0.0, 5.0, 600.0, 7200.0}) {
+    const FosterLadder ladders[] = {foster_ladder(dt_s, networks[0]),
+                                    foster_ladder(dt_s, networks[1])};
+    // Numbers of surfaces around the number of lanes: none, one, some lanes free, several groups.
+    for (const std::size_t count : {0U, 1U, 2U, 7U, 8U, 9U, 17U}) {
+      std::vector<FosterState<double>> single(count);
+      std::vector<FosterState<double>> together;
+      std::vector<FosterLane> lanes(count);
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t kind = i % 2;
+        for (double& mode_k : single[i]) mode_k = number(-20.0, 30.0);
+        FosterLane& lane = lanes[i];
+        lane.begin = {number(0.0, 1200.0), number(0.0, 40.0), number(-40.0, 20.0)};
+        // Some balances have no positive root, so that they are clamped.
+        lane.end = {i % 5 == 3 ? -1e6 : number(0.0, 1200.0), number(0.0, 40.0),
+                    number(-40.0, 20.0)};
+        lane.ladder = &ladders[kind];
+        lane.surface = foster_surface(networks[kind], i % 7 == 6 ? 0.0 : number(0.02, 1.0),
+                                      number(270.0, 300.0), 288.15);
+      }
+      together = single;
+      for (std::size_t i = 0; i < count; ++i) {
+        lanes[i].x = &together[i];
+        foster_advance(single[i], lanes[i].begin, lanes[i].end, *lanes[i].ladder, lanes[i].surface,
+                       0.02);
+      }
+      foster_advance_all(lanes, 0.02);
+      for (std::size_t i = 0; i < count; ++i) {
+        for (std::size_t m = 0; m < kMaxFosterModes; ++m) {
+          EXPECT_EQ(std::bit_cast<std::uint64_t>(together[i][m]),
+                    std::bit_cast<std::uint64_t>(single[i][m]))
+              << dt_s << " s, " << count << " surfaces, surface " << i << ", mode " << m;
+        }
       }
     }
   }

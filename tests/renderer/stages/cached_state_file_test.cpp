@@ -213,9 +213,10 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
   refused("this run starts at", [](Session&, renderer::FrameRequest& first) {
     first.sim_time_ns = first.thermal_time_ns -= 60 * kSecondNs;
   });
-  refused("this run starts at", [](Session&, renderer::FrameRequest& first) {
-    first.sim_time_ns = first.thermal_time_ns += 240 * kSecondNs;
-  });
+  refused("serves runs that start up to 900 s later; this run starts at",
+          [](Session&, renderer::FrameRequest& first) {
+            first.sim_time_ns = first.thermal_time_ns += 940 * kSecondNs;
+          });
   refused("refined for other places of the camera", [](Session&, renderer::FrameRequest& first) {
     first.sensor_pose.position_world_m.x += 3.0;
   });
@@ -225,6 +226,73 @@ TEST(RendererStateFile, OneThatDoesNotFitIsRefusedWithTheReasonAndKept) {
   });
   EXPECT_EQ(std::filesystem::last_write_time(file), written);
   EXPECT_TRUE(Session(scenario).warm_up().result);  // the file is still valid
+  std::filesystem::remove(file);
+}
+
+TEST(RendererStateFile, ARunThatStartsLaterShowsWhatOneShowsThatWentOnToThere) {
+  const auto file = fresh_file();
+  const auto scenario = saved_scenario(file);
+  const std::vector<double> later_s{7.0, 65.0, 240.0, 905.0};
+  std::vector<std::vector<float>> went_on;
+  {
+    Session run(scenario);
+    ASSERT_TRUE(run.warm_up().result);
+    for (const double seconds : later_s) {
+      // Go there in small steps, as a daemon does.
+      for (double at_s = seconds - 6.9; at_s < seconds; at_s += 0.7) {
+        ASSERT_TRUE(run.renderer().carry_on(run.request(at_s)));
+        (void)run.frame(run.request(at_s));
+      }
+      went_on.push_back(run.frame(run.request(seconds)));
+    }
+  }
+  for (std::size_t i = 0; i < later_s.size(); ++i) {
+    Session run(scenario);
+    const WarmUp warm = run.warm_up(run.request(later_s[i]));
+    ASSERT_TRUE(warm.result) << warm.result.error().text;
+    const auto shown = run.frame(run.request(later_s[i]));
+    // Frames update the shadow maps of entities, which shows for seconds after one has left.
+    if (later_s[i] > 60.0) {
+      EXPECT_TRUE(same_bits(shown, went_on[i])) << later_s[i];
+      continue;
+    }
+    for (std::size_t p = 0; p < shown.size(); ++p) {
+      if (std::isnan(shown[p])) continue;
+      ASSERT_NEAR(shown[p], went_on[i][p], 0.05F) << later_s[i] << " s, value " << p;
+    }
+  }
+  EXPECT_FALSE(same_bits(went_on[1], went_on[3]));
+  std::filesystem::remove(file);
+}
+
+TEST(RendererStateFile, PosesOfTheHostAfterItsInstantDoNotMatterToIt) {
+  const auto file = fresh_file();
+  const auto scenario = saved_scenario(file);
+  ASSERT_TRUE(Session(scenario).warm_up().result);
+  Session run(scenario);
+  const renderer::EntityUpdate update{7, scenario.objects[1].instances[0], true, false};
+  EXPECT_EQ(run.renderer().apply_entities(2 * kHourNs + 3 * kSecondNs, {&update, 1}), 1U);
+  const WarmUp warm = run.warm_up(run.request(65.0));
+  EXPECT_TRUE(warm.result) << warm.result.error().text;
+  EXPECT_EQ(run.frame(run.request(65.0)).empty(), false);
+  std::filesystem::remove(file);
+}
+
+TEST(RendererStateFile, CarryingOnReportsAndStops) {
+  const auto file = fresh_file();
+  const auto scenario = saved_scenario(file);
+  Session run(scenario);
+  ASSERT_TRUE(run.warm_up().result);
+  std::vector<double> done;
+  ASSERT_TRUE(run.renderer().carry_on(run.request(600.0), [&done](double frac) {
+    done.push_back(frac);
+    return true;
+  }));
+  EXPECT_GT(done.size(), 10U);
+  EXPECT_TRUE(std::ranges::is_sorted(done));
+  const auto stopped = run.renderer().carry_on(run.request(900.0), [](double) { return false; });
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, physics::ErrorCode::internal);
   std::filesystem::remove(file);
 }
 

@@ -190,10 +190,18 @@ class Renderer {
   /// Does the work that frames from `first` on need once. With thermal.method = "cached" it samples
   /// the surface and integrates its history, which takes seconds to minutes on all cores. Call it
   /// before the first frame; otherwise submit() does it, and does it again where sim time goes back
-  /// behind the samples. Setup only. Errors: internal (`progress` asked to stop), gpu (no memory
-  /// for the samples).
+  /// behind the samples. With thermal.state_file it takes a saved surface of that instant, or of a
+  /// little earlier and carries it on. Setup only. Errors: internal (`progress` asked to stop), gpu
+  /// (no memory for the samples), config (the state file does not fit), io.
   [[nodiscard]] virtual physics::Result<void> warm_up(const FrameRequest& first,
                                                       const WarmUpProgress& progress = {}) = 0;
+
+  /// Brings the surface to the thermal instant of `to`, however far ahead it is: submit() would
+  /// sample it anew behind a long jump. It does nothing for an instant before the latest one.
+  /// Setup only. Errors: internal (`progress` asked to stop).
+  /// @pre warm_up() has succeeded.
+  [[nodiscard]] virtual physics::Result<void> carry_on(const FrameRequest& to,
+                                                       const WarmUpProgress& progress = {}) = 0;
 
   /// Issues a frame and returns its slot; -1 when every slot is in use. It does not wait for the
   /// device. RT-safe after warm_up().

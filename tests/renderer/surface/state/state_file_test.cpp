@@ -85,9 +85,12 @@ struct World {
   }
 };
 
+/// States up to this much older than the start of a run serve it.
+constexpr std::int64_t kServedNs = 1'000'000'000;
+
 /// A run that starts at `start_ns` and asks for that key.
 StateWanted wanted(const StateKey& key, std::int64_t start_ns = kAtNs) {
-  return {key, start_ns};
+  return {[key](std::int64_t) { return key; }, start_ns - kServedNs, start_ns};
 }
 
 class StateFile : public testing::Test {
@@ -240,18 +243,38 @@ TEST_F(StateFile, made_for_something_else_it_says_what_differs) {
   }
 }
 
-TEST_F(StateFile, of_another_instant_it_says_so) {
+TEST_F(StateFile, serves_a_run_that_starts_a_little_later) {
+  write();
+  std::vector<std::int64_t> asked_ns;
+  for (const std::int64_t later_ns : {std::int64_t{0}, std::int64_t{1}, kServedNs}) {
+    StateWanted want = wanted(some_key(), kAtNs + later_ns);
+    want.key_at = [&asked_ns](std::int64_t at_ns) {
+      asked_ns.push_back(at_ns);
+      return some_key();
+    };
+    const auto got = read_state(file_, want, world_.geometry, kEntities, world_.options);
+    ASSERT_TRUE(got) << got.error().text;
+    EXPECT_EQ(got->at_ns, kAtNs);
+  }
+  // The host's input counts up to the instant of the state, not to the start of the run.
+  ASSERT_FALSE(asked_ns.empty());
+  for (const std::int64_t at_ns : asked_ns) EXPECT_EQ(at_ns, kAtNs);
+}
+
+TEST_F(StateFile, of_an_instant_that_will_not_do_it_says_so) {
   write();
   const auto read_at = [this](std::int64_t start_ns) {
     return read_state(file_, wanted(some_key(), start_ns), world_.geometry, kEntities,
                       world_.options);
   };
   EXPECT_TRUE(read_at(kAtNs));
-  for (const std::int64_t apart_ns : {-1'500'000'000LL, 1'500'000'000LL}) {
+  for (const std::int64_t apart_ns : {std::int64_t{-1}, kServedNs + 1}) {
     const auto refused = read_at(kAtNs + apart_ns);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, physics::ErrorCode::config);
-    EXPECT_NE(refused.error().text.find("surface at 7200.000 s"), std::string::npos)
+    EXPECT_NE(
+        refused.error().text.find("surface at 7200.000 s and serves runs that start up to 1 s"),
+        std::string::npos)
         << refused.error().text;
   }
 }

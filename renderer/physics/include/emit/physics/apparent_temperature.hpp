@@ -13,8 +13,9 @@ namespace emit::physics {
 /// end. Any thread after construction. Real time: RT-safe, except the constructor.
 class ApparentTemperature {
  public:
-  /// Builds the table of `band`, which must pass validate(). Setup only: it allocates and
-  /// integrates Planck's law (physics.md eq. 7) some ten thousand times.
+  /// Builds the table of `band`. Setup only: it allocates and integrates Planck's law (physics.md
+  /// eq. 7) some ten thousand times.
+  /// @pre validate(band)
   explicit ApparentTemperature(const Band& band);
 
   /// Returns the temperature in K. A radiance that is NaN or not positive gives the lowest entry.

@@ -9,6 +9,7 @@
 #include "emit/physics/constants.hpp"
 #include "emit/physics/equilibrium.hpp"
 #include "emit/physics/error.hpp"
+#include "emit/physics/lanes.hpp"
 #include "emit/physics/relaxation.hpp"
 
 /// Heat conduction into a stack of layers, modelled by a few flux-driven states (a Foster network):
@@ -141,8 +142,9 @@ template <class Real>
 /// Returns true if the surface balance had to be clamped (see solve_equilibrium). The step is
 /// unconditionally stable and second order in its length. Any thread. RT-safe.
 template <class Real>
-bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const FosterDrive<Real>& end,
-                 const FosterGains<Real>& g, const FosterSurface<Real>& s) noexcept {
+Mask<Real> foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin,
+                       const FosterDrive<Real>& end, const FosterGains<Real>& g,
+                       const FosterSurface<Real>& s) noexcept {
   // Advance the states with the flux at the start alone. P of physics.md eq. 18 is the temperature
   // that this gives, R is what each W/m2 of the flux at the end adds to it.
   const Real q_begin = foster_flux_w_m2(foster_offset_k(x, s), begin, s);
@@ -155,7 +157,8 @@ bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const Fos
     p_k += partial[i];
     r_m2k_w += s.resistance_m2k_w[i] * g.end_frac[i];
   }
-  if (!(r_m2k_w > Real(0))) return false;  // the step has no length
+  const Mask<Real> lasts = r_m2k_w > Real(0);
+  if (none(lasts)) return Mask<Real>(false);  // the step has no length
   const Real conductance = Real(1) / r_m2k_w;
   // Solve physics.md eq. 18 for the temperature at the end of the step.
   const SurfaceBalance<Real> balance{s.emission_w_m2_k4, end.film_w_m2_k + conductance,
@@ -168,17 +171,18 @@ bool foster_step(FosterState<Real>& x, const FosterDrive<Real>& begin, const Fos
   Real offset_k = root.temperature_k - s.reference_k;
   const Real t3 = root.temperature_k * root.temperature_k * root.temperature_k;
   const Real slope = Real(4) * s.emission_w_m2_k4 * t3 + end.film_w_m2_k;
-  if (!root.clamped) {
-    offset_k += (foster_flux_w_m2(offset_k, end, s) - (offset_k - p_k) * conductance) /
-                (slope + conductance);
-  }
+  const Real polished_k =
+      offset_k +
+      (foster_flux_w_m2(offset_k, end, s) - (offset_k - p_k) * conductance) / (slope + conductance);
+  offset_k = choose(root.clamped, offset_k, polished_k);
   // Take the flux from the side of the balance that loses less to rounding.
-  const Real q_end = slope * r_m2k_w > Real(1) ? (offset_k - p_k) * conductance
-                                               : foster_flux_w_m2(offset_k, end, s);
+  const Mask<Real> steep = slope * r_m2k_w > Real(1);
+  const Real q_end =
+      choose(steep, (offset_k - p_k) * conductance, foster_flux_w_m2(offset_k, end, s));
   for (std::size_t i = 0; i < kMaxFosterModes; ++i) {
-    x[i] = partial[i] + s.resistance_m2k_w[i] * q_end * g.end_frac[i];
+    x[i] = choose(lasts, partial[i] + s.resistance_m2k_w[i] * q_end * g.end_frac[i], x[i]);
   }
-  return root.clamped;
+  return both(root.clamped, lasts);
 }
 
 /// Returns the steady states under a flux, x_i = r_i q. With q = (T - T_base) / sum r_i they are
@@ -233,5 +237,22 @@ struct FosterAdvance {
 FosterAdvance foster_advance(FosterState<double>& x, const FosterDrive<double>& begin,
                              const FosterDrive<double>& end, const FosterLadder& ladder,
                              const FosterSurface<double>& surface, double tolerance_k) noexcept;
+
+/// Number of surfaces that foster_advance_all() computes side by side.
+inline constexpr std::size_t kFosterLanes = 8;
+
+/// One surface of foster_advance_all(): the parameters of foster_advance().
+struct FosterLane {
+  FosterState<double>* x = nullptr;
+  FosterDrive<double> begin;
+  FosterDrive<double> end;
+  const FosterLadder* ladder = nullptr;
+  FosterSurface<double> surface;
+};
+
+/// Advances each surface as foster_advance() does, bit for bit, in less time: a step waits for
+/// divisions and roots, which several surfaces share. Any thread. RT-safe.
+/// @pre no pointer is null, and no two surfaces share `x`
+void foster_advance_all(std::span<const FosterLane> lanes, double tolerance_k) noexcept;
 
 }  // namespace emit::physics
