@@ -34,7 +34,7 @@ struct DemoOptions {
   std::uint64_t frames = 0;  ///< 0: as many as fit the budget
   bool all = false;
   bool keep = false;
-  double budget_s = 15.0;
+  double budget_s = 10.0;
   std::optional<std::filesystem::path> json;
 };
 
