@@ -17,8 +17,9 @@ renderer/scene/src/gltf: renderer/scene renderer/physics
 renderer/scene/src: renderer/scene renderer/scene/src/gltf renderer/physics
 renderer/scene/generate: renderer/physics
 renderer/threads: renderer/physics
+renderer/embree: renderer/physics
 renderer/reference: renderer/physics renderer/scene
-renderer/reference/src/rays: renderer/reference renderer/physics renderer/scene renderer/threads
+renderer/reference/src/rays: renderer/embree renderer/reference renderer/physics renderer/scene renderer/threads
 renderer/reference/src/conduction: renderer/reference renderer/reference/src/rays renderer/physics renderer/scene renderer/threads
 renderer/reference/src: renderer/reference renderer/reference/src/rays renderer/reference/src/conduction renderer/physics renderer/scene renderer/threads
 renderer/shaders/shared: renderer/physics
@@ -27,7 +28,7 @@ renderer/include: renderer/physics renderer/scene
 renderer/history: renderer/include renderer/physics renderer/scene renderer/threads
 renderer/surface/heat: renderer/history renderer/include renderer/physics renderer/scene
 renderer/surface/mesh: renderer/physics renderer/scene renderer/threads
-renderer/surface/rays: renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh
+renderer/surface/rays: renderer/embree renderer/history renderer/physics renderer/scene renderer/threads renderer/surface/heat renderer/surface/mesh
 renderer/surface/model: renderer/history renderer/physics renderer/scene renderer/surface/heat renderer/surface/mesh renderer/surface/rays
 renderer/surface/shade: renderer/history renderer/physics renderer/scene renderer/threads renderer/shaders/shared renderer/surface/heat renderer/surface/mesh renderer/surface/rays
 renderer/surface/state: renderer/history renderer/physics renderer/scene renderer/surface/mesh renderer/surface/model
@@ -127,7 +128,7 @@ arrows=$(includes | awk -F: -v layers="$layers" '
       to = from
     } else if (from ~ /^(config|renderer\/reference|renderer\/scene|renderer\/verify)\/src/) {
       root = from; sub(/\/src.*/, "/src", root); to = header ~ /^shared\// ? "renderer/shaders/shared" : \
-          header ~ /^(gl|threads)\// ? "renderer/" folder(header) : root "/" folder(header)
+          header ~ /^(embree|gl|threads)\// ? "renderer/" folder(header) : root "/" folder(header)
     } else if (from ~ /^protocol/) {
       to = "protocol"
     } else if (from ~ /^config\/tools/) {
@@ -182,7 +183,7 @@ only Boost    'boost/'            'server/'
 only ISA-L    'isa-l'             'protocol/src/erasure_code|renderer/surface/state/file_sink'
 only Protobuf 'google/protobuf/'  'protocol/|server/'
 only spdlog   'spdlog/'           'server/'
-only Embree   'embree3/'          'renderer/reference/|renderer/surface/rays/caster_'
+only Embree   'embree3/'          'renderer/embree/|renderer/reference/|renderer/surface/rays/caster_'
 only Eigen    'Eigen/'            'renderer/reference/'
 only Ceres    'ceres/'            'renderer/reference/'
 only OpenSSL  'openssl/'          'protocol/src/|server/net/tls_|server/app/sha256'

@@ -26,7 +26,8 @@ struct SourceInfo {
   /// Step of the thermal clock from frame to frame beyond which the source may warm up again inside
   /// submit(), ns: the newest interval of the surface's history.
   std::int64_t surface_step_ns = 20'000'000'000;
-  renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
+  std::int64_t first_time_ns = 0;  ///< simulation time that the surface is warmed up for
+  renderer::SceneStats scene;      ///< warmed up; empty for pre-rendered pixels
 };
 
 /// Source of frames. The same calls, in the same order, give the same pixels: the journal and its
@@ -67,11 +68,13 @@ class FrameSource {
 /// Called once, on the thread that will own the source (a GL context is bound to its thread).
 using FrameSourceFactory = std::function<physics::Result<std::unique_ptr<FrameSource>>()>;
 
-/// Makes a source of frames of emit::renderer. `progress` is called with the part of the warm-up
-/// that is done.
+/// Makes a source of frames of emit::renderer whose surface is warmed up for a frame at
+/// `first_time_ns` of simulation time. `progress` is called with the part of the warm-up that is
+/// done.
 [[nodiscard]] physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
-    const renderer::OutputOptions& output, const renderer::WarmUpProgress& progress = {});
+    const renderer::OutputOptions& output, std::int64_t first_time_ns,
+    const renderer::WarmUpProgress& progress = {});
 
 /// The images of make_canned_source() where `canned_dir` is empty: frame k shows the one at
 /// (k - 1) modulo their number.

@@ -44,7 +44,7 @@ FrameSourceFactory AgentSet::configured_source(renderer::WarmUpProgress progress
     const bool deadlines =
         config_.pacing.mode != config::PacingMode::host_step || config_.pacing.budget_ns > 0;
     output.ladder = deadlines ? renderer::Ladder::live : renderer::Ladder::none;
-    return make_renderer_source(*scenario_, device, output, progress);
+    return make_renderer_source(*scenario_, device, output, config_.source.first_time_ns, progress);
   };
 }
 
@@ -67,6 +67,7 @@ physics::Result<Recorder::Opened> AgentSet::make_recorder(const ProcessNames& na
   identity.software = names.software;
   identity.device = names.device;
   identity.pacing = names.pacing;
+  identity.first_time_ns = config_.source.first_time_ns;
   if (scenario_) {
     auto hash = scenario_sha256(*scenario_);
     if (!hash) {

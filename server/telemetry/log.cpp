@@ -233,12 +233,12 @@ EventText describe_loss(const Event& event, const std::string& text) {
                       "coarser, frames are flagged degraded\" remedy=\"reset the run\"",
                       event.a));
     case EventKind::warmed_up_again:
-      return warn(
-          fmt::format("event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
-                      "meanwhile, this frame is flagged degraded\" remedy=\"move simulation "
-                      "time on in steps, or start at that time\"",
-                      static_cast<double>(event.a) * 1e-9,
-                      static_cast<double>(static_cast<std::int64_t>(event.b)) * 1e-9));
+      return warn(fmt::format(
+          "event=warmed_up_again took_s={:.3f} jump_s={:.3f} effect=\"no frame "
+          "meanwhile, this frame is flagged degraded\" remedy=\"move simulation "
+          "time on in steps, or set source.first_time_s to the time of the first pose\"",
+          static_cast<double>(event.a) * 1e-9,
+          static_cast<double>(static_cast<std::int64_t>(event.b)) * 1e-9));
     default:
       return unknown();
   }

@@ -22,7 +22,8 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
   std::filesystem::create_directories(folder_ / "frames");
   const std::string text =
       "scenario = \"s.toml\"\n"
-      "[source]\nkind = \"canned\"\ncanned_dir = \"frames\"\ncanned_width_px = 320\n"
+      "[source]\nkind = \"canned\"\nfirst_time_s = -7.5\ncanned_dir = \"frames\"\ncanned_width_px "
+      "= 320\n"
       "canned_height_px = 240\ncanned_frames = 3\n"
       "[pacing]\nmode = \"ig-clock\"\nrate_hz = 59.94\nbudget_ms = 4.5\nhorizon_ms = 20\n"
       "display_delay_ms = 7.25\n"
@@ -43,6 +44,7 @@ TEST_F(ConfigTest, every_daemon_key_is_read_and_survives_printing) {
   ASSERT_TRUE(first.has_value()) << first.error().text;
   EXPECT_EQ(first->scenario, folder_ / "s.toml");
   EXPECT_EQ(first->source.kind, SourceKind::canned);
+  EXPECT_EQ(first->source.first_time_ns, -7'500'000'000);
   EXPECT_EQ(first->source.canned_dir, folder_ / "frames");
   EXPECT_EQ(first->source.canned_width_px, 320U);
   EXPECT_EQ(first->source.canned_height_px, 240U);

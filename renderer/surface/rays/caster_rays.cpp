@@ -81,7 +81,7 @@ struct CasterRays::Impl {
     CasterSet set;
   };
 
-  EmbreeDevice device;
+  embree::Device device;
   glm::dvec3 origin_world_m{0.0};
   CasterSet fixed;
   std::vector<Entity> entities;
@@ -142,12 +142,9 @@ Result<CasterRays> CasterRays::create(const scene::SceneGeometry& geometry,
                                       const std::optional<glm::dvec3>& origin_world_m,
                                       std::uint64_t flat_triangles) {
   auto impl = std::make_unique<Impl>();
-  impl->device.reset(rtcNewDevice(nullptr));
-  if (!impl->device) {
-    return make_error(ErrorCode::internal,
-                      fmt::format("Embree gave no device, error {}",
-                                  static_cast<int>(rtcGetDeviceError(nullptr))));
-  }
+  auto device = embree::make_device();
+  if (!device) return tl::unexpected(std::move(device.error()));
+  impl->device = std::move(*device);
   // Sort the instances: static ones, and those of each entity.
   std::vector<CasterPart> fixed;
   std::vector<CasterPart> everything;  // parts at the placements of the scenario

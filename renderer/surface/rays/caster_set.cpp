@@ -26,11 +26,6 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 /// Number of triangles that take about as much memory as one instance in the hierarchy.
 constexpr std::uint64_t kTrianglesOfInstance = 8;
 
-struct GeometryRelease {
-  void operator()(RTCGeometryTy* geometry) const noexcept { rtcReleaseGeometry(geometry); }
-};
-using EmbreeGeometry = std::unique_ptr<RTCGeometryTy, GeometryRelease>;
-
 /// Returns whether all coordinates are finite. Others are left out of the bounds.
 bool finite(const glm::vec3& p) noexcept {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
@@ -76,7 +71,7 @@ Result<void> check(std::span<const CasterPart> parts) {
 /// Buffers of a triangle geometry, which the caller fills. Embree allocates them with the padding
 /// that it needs.
 struct TriangleBuffers {
-  EmbreeGeometry geometry;
+  embree::Geometry geometry;
   glm::vec3* positions_m = nullptr;
   std::uint32_t* indices = nullptr;
 };
@@ -98,8 +93,8 @@ Result<TriangleBuffers> new_triangles(RTCDeviceTy* device, std::size_t vertices,
 }
 
 /// Returns an empty scene.
-EmbreeScene new_scene(RTCDeviceTy* device) {
-  EmbreeScene scene(rtcNewScene(device));
+embree::Scene new_scene(RTCDeviceTy* device) {
+  embree::Scene scene(rtcNewScene(device));
   // Ask for robust traversal: no ray then slips through the edge between two faces.
   rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
@@ -142,13 +137,6 @@ RTCIntersectContext coherent_context() noexcept {
 }
 
 }  // namespace
-
-void EmbreeRelease::operator()(RTCDeviceTy* device) const noexcept {
-  rtcReleaseDevice(device);
-}
-void EmbreeRelease::operator()(RTCSceneTy* scene) const noexcept {
-  rtcReleaseScene(scene);
-}
 
 scene::Aabb bounds_of(std::span<const CasterPart> parts) {
   std::map<const scene::Mesh*, scene::Aabb> boxes;
@@ -201,7 +189,7 @@ Result<void> CasterSet::add_shared(RTCDeviceTy* device, std::span<const CasterPa
                                    const glm::dvec3& origin_m) {
   /// Mesh that is stored once.
   struct Stored {
-    EmbreeScene scene;
+    embree::Scene scene;
     glm::dvec3 centre_m{0.0};  ///< centre of the mesh; vertices are stored relative to it
   };
   std::map<const scene::Mesh*, Stored> stored;
@@ -237,7 +225,7 @@ Result<void> CasterSet::add_shared(RTCDeviceTy* device, std::span<const CasterPa
             static_cast<float>(column < 3 ? linear[column][row] : position_m[row]);
       }
     }
-    const EmbreeGeometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
+    const embree::Geometry geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
     rtcSetGeometryInstancedScene(geometry.get(), mesh.scene.get());
     rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
     rtcCommitGeometry(geometry.get());

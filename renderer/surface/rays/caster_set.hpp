@@ -9,22 +9,12 @@
 #include <glm/ext/matrix_float3x3.hpp>
 #include <glm/ext/vector_double3.hpp>
 
+#include "embree/embree_device.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/scene/mesh.hpp"
 #include "surface/rays/caster_rays.hpp"
 
-struct RTCDeviceTy;
-struct RTCSceneTy;
-
 namespace emit::renderer {
-
-/// Releases objects of Embree.
-struct EmbreeRelease {
-  void operator()(RTCDeviceTy* device) const noexcept;
-  void operator()(RTCSceneTy* scene) const noexcept;
-};
-using EmbreeDevice = std::unique_ptr<RTCDeviceTy, EmbreeRelease>;
-using EmbreeScene = std::unique_ptr<RTCSceneTy, EmbreeRelease>;
 
 /// Mesh of a set and its placement.
 struct CasterPart {
@@ -84,7 +74,7 @@ class CasterSet {
                                                  std::span<const CasterPart> parts,
                                                  const glm::dvec3& origin_m);
 
-  EmbreeScene scene_;            ///< null: the set is empty
+  embree::Scene scene_;          ///< null: the set is empty
   std::vector<FlatRange> flat_;  ///< ranges of geometry 0 of the scene, ascending by `first`
   std::vector<Shared> shared_;   ///< entry i is geometry 1 + i
   float radius_m_ = 0.0F;

@@ -110,6 +110,7 @@ bool to_journal_entry(std::span<const std::byte> line, const Recorder::Identity&
       message.set_software(identity.software);
       message.set_device(identity.device);
       message.set_pacing(identity.pacing);
+      message.set_first_time_ns(identity.first_time_ns);
       return true;
     }
     case JournalKind::host_frame:

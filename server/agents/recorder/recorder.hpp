@@ -31,6 +31,7 @@ class Recorder final : public Agent {
     std::string software;
     std::string device;
     std::string pacing;
+    std::int64_t first_time_ns = 0;
   };
   Recorder(Context& context, config::JournalConfig config, std::size_t max_peers);
 

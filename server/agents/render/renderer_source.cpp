@@ -40,14 +40,17 @@ class RendererSource final : public FrameSource {
 
 physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
     const scene::ScenarioDesc& scenario, const renderer::DeviceOptions& device,
-    const renderer::OutputOptions& output, const renderer::WarmUpProgress& progress) {
+    const renderer::OutputOptions& output, std::int64_t first_time_ns,
+    const renderer::WarmUpProgress& progress) {
   auto renderer = renderer::Renderer::create(scenario, device, output);
   if (!renderer) {
     return tl::unexpected<physics::Error>(std::move(renderer.error()));
   }
   // The warm-up makes the first frame as fast as the thousandth.
   renderer::FrameRequest first;
-  first.sensor_pose = (*renderer)->scenario_sensor_pose_at(0);
+  first.sim_time_ns = first_time_ns;
+  first.thermal_time_ns = first_time_ns;
+  first.sensor_pose = (*renderer)->scenario_sensor_pose_at(first_time_ns);
   if (auto warm = (*renderer)->warm_up(first, progress); !warm) {
     return tl::unexpected<physics::Error>(std::move(warm.error()));
   }
@@ -58,6 +61,7 @@ physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
   info.slots = output.slots;
   info.planes = scenario.bands.size();
   info.surface_step_ns = static_cast<std::int64_t>(scenario.thermal.first_step_s * 1e9);
+  info.first_time_ns = first_time_ns;
   info.scene = (*renderer)->scene_stats();
   return std::make_unique<RendererSource>(std::move(*renderer), std::move(info));
 }

@@ -35,16 +35,29 @@ void warn_of_differences(const server::JournalPlayer& player, const std::string&
   }
 }
 
-/// Frames of a journal, up to what does not read. The replay itself reports errors of the log.
-std::uint64_t count_frames(const std::filesystem::path& file) {
+/// Facts about a journal that a replay needs before it plays it.
+struct JournalOutline {
   std::uint64_t frames = 0;
+  std::int64_t first_time_ns = 0;  ///< simulation time that the daemon was warmed up for
+};
+/// Returns the outline of a journal, up to what does not read. The replay itself reports errors of
+/// the log.
+JournalOutline outline_of(const std::filesystem::path& file) {
+  JournalOutline outline;
+  bool started = false;
   auto log = protocol::LogReader::open(file);
   while (log && !InterruptGuard::interrupted()) {
     const auto more = log->next();
     if (!more || !*more) break;
-    if (log->topic() == protocol::LogTopic::journal && log->journal().has_frame()) ++frames;
+    if (log->topic() != protocol::LogTopic::journal) continue;
+    const v1::JournalEntry& entry = log->journal();
+    if (entry.has_frame()) ++outline.frames;
+    if (entry.has_run_start() && !started) {
+      started = true;
+      outline.first_time_ns = entry.run_start().first_time_ns();
+    }
   }
-  return frames;
+  return outline;
 }
 
 }  // namespace
@@ -65,6 +78,7 @@ physics::Result<JournalReplaySummary> replay_journal(
   const auto scenario_hash = server::scenario_sha256(scenario);
   if (!scenario_hash) return tl::unexpected(scenario_hash.error());
 
+  const JournalOutline outline = outline_of(options.log);
   JournalReplaySummary summary;
   auto start = Clock::now();
   renderer::OutputOptions output;
@@ -74,7 +88,8 @@ physics::Result<JournalReplaySummary> replay_journal(
   auto source = [&] {
     Progress warm_up("warm-up", 1000);
     return server::make_renderer_source(
-        scenario, renderer::DeviceOptions{options.gpu_index, false}, output, [&](double done_frac) {
+        scenario, renderer::DeviceOptions{options.gpu_index, false}, output, outline.first_time_ns,
+        [&](double done_frac) {
           warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
           return !InterruptGuard::interrupted();
         });
@@ -89,8 +104,7 @@ physics::Result<JournalReplaySummary> replay_journal(
   auto channels = server::make_channels(scenario, (*source)->info());
   if (!channels) return tl::unexpected(channels.error());
   server::JournalPlayer player(**source, std::move(*channels));
-  Progress progress(
-      "replay", options.expected_frames > 0 ? options.expected_frames : count_frames(options.log));
+  Progress progress("replay", outline.frames);
   start = Clock::now();
   std::int64_t first_wall_ns = 0;
   bool compared_run = false;

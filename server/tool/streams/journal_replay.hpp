@@ -15,8 +15,7 @@ struct JournalReplayOptions {
   std::filesystem::path log;
   double speed = 0.0;  ///< multiple of the recorded pace; 0: as fast as it goes
   int gpu_index = -1;
-  bool temperature = false;           ///< the views carry temperature, depth and object too
-  std::uint64_t expected_frames = 0;  ///< for the progress only; 0: they are counted
+  bool temperature = false;  ///< the views carry temperature, depth and object too
 };
 
 struct JournalReplaySummary {

@@ -19,6 +19,7 @@ enum class SchedulerKind : std::uint8_t { other, fifo };
 
 struct SourceConfig {
   SourceKind kind = SourceKind::renderer;
+  std::int64_t first_time_ns = 0;  ///< renderer: simulation time that the surface is warmed up for
   /// canned: folder of frame_*.exr with a `radiance` channel. They are shown in the order of names,
   /// again and again. When it is empty, a test pattern moves.
   std::filesystem::path canned_dir;

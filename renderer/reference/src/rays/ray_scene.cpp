@@ -122,7 +122,7 @@ RayScene::~RayScene() = default;
 Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
   if (auto checked = check(desc); !checked) return tl::unexpected(std::move(checked.error()));
   auto impl = std::make_unique<Impl>();
-  auto device = make_embree_device();
+  auto device = embree::make_device();
   if (!device) return tl::unexpected(std::move(device.error()));
   impl->device = std::move(*device);
   impl->desc = std::move(desc);

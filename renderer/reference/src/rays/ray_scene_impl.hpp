@@ -14,7 +14,7 @@ namespace emit::reference {
 
 /// Hierarchies of a scene.
 struct RayScene::Impl {
-  EmbreeDevice device;  // declared before the sets, so that it is released after them
+  embree::Device device;  // declared before the sets, so that it is released after them
   RaySceneDesc desc;
   RayArithmetic arithmetic = RayArithmetic::exact;
   std::unique_ptr<RaySet> fixed;

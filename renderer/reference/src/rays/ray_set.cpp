@@ -49,23 +49,6 @@ Query make_query(const PreparedRay* rays, bool coherent) noexcept {
 
 }  // namespace
 
-void EmbreeRelease::operator()(RTCDeviceTy* device) const noexcept {
-  rtcReleaseDevice(device);
-}
-void EmbreeRelease::operator()(RTCSceneTy* scene) const noexcept {
-  rtcReleaseScene(scene);
-}
-
-Result<EmbreeDevice> make_embree_device() {
-  EmbreeDevice device(rtcNewDevice(nullptr));
-  if (!device) {
-    return make_error(ErrorCode::internal,
-                      fmt::format("Embree gave no device, error {}",
-                                  static_cast<int>(rtcGetDeviceError(nullptr))));
-  }
-  return device;
-}
-
 /// Functions through which Embree reads a set. They decide every candidate in double.
 struct SetCallbacks {
   static void bounds(const RTCBoundsFunctionArguments* args) {

@@ -6,26 +6,13 @@
 #include <span>
 #include <vector>
 
+#include "embree/embree_device.hpp"
 #include "emit/physics/error.hpp"
 #include "emit/reference/visibility.hpp"
 #include "ray_cone_tree.hpp"
 #include "ray_triangle.hpp"
 
-struct RTCDeviceTy;
-struct RTCSceneTy;
-
 namespace emit::reference {
-
-/// Deleter of Embree's objects.
-struct EmbreeRelease {
-  void operator()(RTCDeviceTy* device) const noexcept;
-  void operator()(RTCSceneTy* scene) const noexcept;
-};
-using EmbreeDevice = std::unique_ptr<RTCDeviceTy, EmbreeRelease>;
-using EmbreeScene = std::unique_ptr<RTCSceneTy, EmbreeRelease>;
-
-/// Creates an Embree device. Errors: internal.
-[[nodiscard]] physics::Result<EmbreeDevice> make_embree_device();
 
 /// Mesh and triangle of a scene that a triangle of a set comes from.
 struct TriangleSource {
@@ -87,7 +74,7 @@ class RaySet {
   double radius_m_ = 0.0;
   double pad_m_ = 0.0;
   RayArithmetic arithmetic_ = RayArithmetic::exact;
-  EmbreeScene scene_;
+  embree::Scene scene_;
   ConeTree cone_tree_;
 };
 

@@ -124,6 +124,17 @@ TEST(RenderAgent, AFrameInWhichTheSurfaceWarmsUpAgainIsDegradedCountedAndLogged)
   }
 }
 
+TEST(RenderAgent, AFirstPoseFarFromTheWarmUpIsAWarmUpToo) {
+  using emit::test::kSecondNs;
+  Rig rig;
+  rig.script.on_submit = [&](const renderer::FrameRequest&) { rig.clock.advance(kSecondNs); };
+  rig.send(1, 3600 * kSecondNs);
+  rig.settle();
+  ASSERT_EQ(rig.frames.size(), 1U);
+  EXPECT_NE(rig.frames[0].header.flags & protocol::kFlagDegraded, 0U);
+  EXPECT_EQ(rig.count(Counter::frames_warmed_up), 1U);
+}
+
 TEST(RenderAgent, CountsForgottenPosesAndTheirFramesAreDegraded) {
   Rig rig;
   rig.send(1, 1);
