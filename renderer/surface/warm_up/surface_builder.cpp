@@ -43,6 +43,43 @@ constexpr float kDetailReachFrac = 0.5F;
 /// edge.
 constexpr float kOffCreaseFrac = 0.02F;
 
+/// Share of the progress that ends when every sample is evaluated. The rest is the exchange.
+constexpr double kEvaluatedFrac = 0.8;
+
+/// Estimates how much of the evaluation of samples is done. Nobody knows how many samples the
+/// refinement will take: at least half as many as before it, and some for each leaf that is too
+/// coarse.
+class EvaluationProgress {
+ public:
+  /// Sets the number of samples before the refinement.
+  void begin(std::size_t samples) noexcept {
+    least_ = refined_ = 1.5 * static_cast<double>(samples);
+  }
+  /// Takes what a round of the refinement found: the leaves that are too coarse, and the partners
+  /// of all samples so far. The refinement is over when no leaf is too coarse.
+  void expect(std::size_t coarse_leaves, std::size_t partners) noexcept {
+    // A leaf that is halved often has halves that are too coarse as well.
+    constexpr double kSamplesOfLeaf = 2.5;
+    const double left = kSamplesOfLeaf * static_cast<double>(coarse_leaves);
+    refined_ = coarse_leaves == 0 ? done_ : std::max(least_, done_ + left);
+    partners_ = static_cast<double>(partners);
+  }
+  /// Takes the number of samples that were evaluated since the last call. Returns the part that is
+  /// done, 0 to 1; it never falls.
+  double advance(std::size_t samples) noexcept {
+    done_ += static_cast<double>(samples);
+    frac_ = std::max(frac_, done_ / std::max({refined_ + partners_, done_, 1.0}));
+    return frac_;
+  }
+
+ private:
+  double least_ = 0.0;     ///< least number of samples after the refinement
+  double refined_ = 0.0;   ///< expected number of samples after the refinement
+  double partners_ = 0.0;  ///< expected number of partners
+  double done_ = 0.0;
+  double frac_ = 0.0;
+};
+
 /// Sample to be evaluated: vertex `index` of a patch.
 struct Job {
   std::uint32_t patch = 0;
@@ -73,7 +110,7 @@ class Builder {
   /// Need above which lie about as many leaves as a round takes at least; 0 if there are fewer.
   [[nodiscard]] float need_of_neediest();
   /// Evaluates a sample for every vertex that has none yet. Returns false when stopped.
-  bool sample_new_vertices(double begin_frac, double end_frac);
+  bool sample_new_vertices();
   /// Gives the vertices from `first` on the normals of the surface as loaded, and moves their
   /// samples onto it.
   void adopt_detail(std::uint32_t mesh, std::uint32_t first);
@@ -86,10 +123,15 @@ class Builder {
     return refined.vertices().size() + back_vertices(refined, in_.materials).size();
   }
   bool report(double frac) const { return !progress_ || progress_(frac); }
+  /// Reports that `samples` more were evaluated. Returns false when stopped.
+  bool report_evaluated(std::size_t samples) {
+    return report(kEvaluatedFrac * evaluation_.advance(samples));
+  }
 
   const SurfaceInputs& in_;
   SurfaceModelOptions options_;
   const SurfaceProgress& progress_;
+  EvaluationProgress evaluation_;
   DriveSensitivity sensitivity_;
   PatchSampler sampler_;
   PartnerFinder partners_;  ///< used only where heat moves across edges
@@ -163,7 +205,7 @@ void Builder::adopt_detail(std::uint32_t mesh, std::uint32_t first) {
   });
 }
 
-bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
+bool Builder::sample_new_vertices() {
   // Place a sample at each new vertex of each instance.
   jobs_.clear();
   job_stand_.clear();
@@ -232,8 +274,7 @@ bool Builder::sample_new_vertices(double begin_frac, double end_frac) {
         }
       }
     });
-    const double done = static_cast<double>(end) / static_cast<double>(jobs_.size());
-    if (!report(begin_frac + (end_frac - begin_frac) * done)) return false;
+    if (!report_evaluated(end - begin)) return false;
   }
   // Count the partners found, and compare each sample with the mean of its parents.
   for (const Job& job : jobs_) {
@@ -356,13 +397,9 @@ physics::Result<SurfaceModel> Builder::run() {
     model_.meshes.emplace_back(mesh, options_.max_samples);
   }
   make_patches();
-  // Let each round take a quarter of the progress that is left: nobody knows how many rounds
-  // follow.
-  double done_frac = 0.0;
+  evaluation_.begin(sample_count_);
   std::size_t count_before = 0;  // samples before the latest round
-  const auto next_frac = [&done_frac] { return done_frac + 0.25 * (0.8 - done_frac); };
-  double to_frac = next_frac();
-  if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+  if (!sample_new_vertices()) return stopped();
   least_count_ = sample_count_;
   // Refine in rounds, the greatest need first: if samples run out, what is left matters least.
   for (std::uint32_t round = 0;; ++round) {
@@ -372,7 +409,9 @@ physics::Result<SurfaceModel> Builder::run() {
           refinement_.judge(mesh, model_.meshes[mesh], patches_, patches_of_mesh_[mesh]);
       most.need = std::max(most.need, here.need);
       most.in_view = std::max(most.in_view, here.in_view);
+      most.coarse_leaves += here.coarse_leaves;
     }
+    evaluation_.expect(most.coarse_leaves, partner_count_);
     // Stop when samples have run out. The next round takes the room that this one leaves, until a
     // round adds next to nothing.
     const bool none_left =
@@ -388,20 +427,22 @@ physics::Result<SurfaceModel> Builder::run() {
     // Halve the neediest leaves of all meshes, and evaluate the new samples.
     const float above = std::min(most.need / kNeedStep, need_of_neediest());
     for (std::uint32_t mesh = 0; mesh < model_.meshes.size(); ++mesh) split(mesh, above);
-    done_frac = to_frac;
-    to_frac = next_frac();
-    if (!sample_new_vertices(done_frac, to_frac)) return stopped();
+    if (!sample_new_vertices()) return stopped();
   }
   if (options_.lateral) {
     // Drop the weakest partners if those of the last samples are more than room was left for.
     if (sample_count_ > options_.max_samples && sample_count_ > least_count_) {
       partners_.drop(sample_count_ - std::max(options_.max_samples, least_count_));
     }
-    partners_.append(patches_);
+    evaluation_.expect(0, partners_.count());
+    const auto evaluated = [this](std::size_t samples) { return report_evaluated(samples); };
+    if (!partners_.append(patches_, evaluated)) return stopped();
   }
   // Lay all samples out in one array, and integrate their history again with exchange.
   number_samples(in_, options_, patches_, model_);
-  const auto exchanged = [this](double frac) { return report(0.8 + 0.2 * frac); };
+  const auto exchanged = [this](double frac) {
+    return report(kEvaluatedFrac + (1.0 - kEvaluatedFrac) * frac);
+  };
   SampleHistories histories = take_histories(in_, std::move(patches_), model_);
   const ExchangeOptions exchange_options{.sweeps = sampler_.keeps_sent() ? kExchangeSweeps : 0,
                                          .exitance = options_.exchange};

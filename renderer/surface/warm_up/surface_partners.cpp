@@ -17,6 +17,9 @@ namespace {
 
 /// Partners in one task of a parallel loop.
 constexpr std::size_t kGrain = 64;
+/// Partners between two reports of progress. It is a multiple of kGrain, so that the tasks hold the
+/// same partners with and without slices.
+constexpr std::size_t kSlice = 16384;
 /// A partner that drives no mode by more than this share is left out.
 constexpr double kMinWeightFrac = 0.03;
 /// Greatest distance of a partner's face from its sample, in m.
@@ -124,6 +127,14 @@ void PartnerFinder::find(std::size_t patch, std::uint32_t vertex, const SurfaceS
   }
 }
 
+std::size_t PartnerFinder::count() const noexcept {
+  std::size_t out = 0;
+  for (const auto& vertices : found_) {
+    for (const std::vector<Found>& partners : vertices) out += partners.size();
+  }
+  return out;
+}
+
 void PartnerFinder::drop(std::size_t count) {
   // List all partners by their greatest weight, equal ones by the sample they belong to.
   struct Place {
@@ -150,7 +161,8 @@ void PartnerFinder::drop(std::size_t count) {
   }
 }
 
-void PartnerFinder::append(std::vector<SurfacePatch>& patches) const {
+bool PartnerFinder::append(std::vector<SurfacePatch>& patches,
+                           const std::function<bool(std::size_t count)>& evaluated) const {
   EMIT_CHECK_OP(found_.size(), ==, patches.size());
   SurfacePatch partners;
   for (std::size_t p = 0; p < patches.size(); ++p) {
@@ -171,27 +183,32 @@ void PartnerFinder::append(std::vector<SurfacePatch>& patches) const {
       }
     }
   }
-  // Evaluate the partners like other samples.
+  // Evaluate the partners like other samples, in slices.
   const std::size_t count = partners.samples.size();
   std::vector<SurfaceSample> samples = std::move(partners.samples);
   partners.samples = {};
   partners.begin(in_.record.size(), !in_.entities_now.empty(), sampler_.keeps_sent());
   partners.grow(count);
   partners.samples = std::move(samples);
-  threads::parallel_parts(count, kGrain, [&](std::size_t from, std::size_t to) {
-    PatchSampler::StartMemo memo;
-    std::array<NewSample, kAdvanceTogether> group;
-    for (std::size_t i = from; i < to; i += kAdvanceTogether) {
-      const std::size_t in_group = std::min(to - i, kAdvanceTogether);
-      for (std::size_t k = 0; k < in_group; ++k) {
-        group[k] = {&partners,
-                    static_cast<std::uint32_t>(i + k),
-                    {partners.samples[i + k].position_m, glm::vec3(0.0F)}};
+  for (std::size_t begin = 0; begin < count; begin += kSlice) {
+    const std::size_t end = std::min(count, begin + kSlice);
+    threads::parallel_parts(end - begin, kGrain, [&](std::size_t from, std::size_t to) {
+      PatchSampler::StartMemo memo;
+      std::array<NewSample, kAdvanceTogether> group;
+      for (std::size_t i = begin + from; i < begin + to; i += kAdvanceTogether) {
+        const std::size_t in_group = std::min(begin + to - i, kAdvanceTogether);
+        for (std::size_t k = 0; k < in_group; ++k) {
+          group[k] = {&partners,
+                      static_cast<std::uint32_t>(i + k),
+                      {partners.samples[i + k].position_m, glm::vec3(0.0F)}};
+        }
+        sampler_.evaluate(std::span(group).first(in_group), memo);
       }
-      sampler_.evaluate(std::span(group).first(in_group), memo);
-    }
-  });
+    });
+    if (!evaluated(end - begin)) return false;
+  }
   patches.push_back(std::move(partners));
+  return true;
 }
 
 }  // namespace emit::renderer

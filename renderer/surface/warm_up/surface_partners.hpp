@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "surface/warm_up/surface_patch.hpp"
@@ -26,13 +27,17 @@ class PartnerFinder {
   [[nodiscard]] std::size_t count(std::size_t patch, std::uint32_t vertex) const noexcept {
     return found_[patch][vertex].size();
   }
+  /// Number of all partners.
+  [[nodiscard]] std::size_t count() const noexcept;
   /// Removes the `count` partners that drive their samples least.
   void drop(std::size_t count);
 
   /// Evaluates all partners and appends one patch that holds them. Until samples are numbered,
   /// Partner::sample is an index into that patch, and a partner's own first_seen and
-  /// partners[0].sample are the patch and the vertex it belongs to.
-  void append(std::vector<SurfacePatch>& patches) const;
+  /// partners[0].sample are the patch and the vertex it belongs to. `evaluated` is called with the
+  /// number of partners that were evaluated since its last call. Returns false if it did.
+  bool append(std::vector<SurfacePatch>& patches,
+              const std::function<bool(std::size_t count)>& evaluated) const;
 
  private:
   /// A partner that was found, and its distance from the edge.

@@ -374,6 +374,7 @@ SurfaceRefinement::Most SurfaceRefinement::judge(std::uint32_t mesh, const Refin
   });
   Most most;
   for (const Judged& leaf : judged) {
+    if (leaf.need > 0.0F) most.coarse_leaves += of_mesh.size();
     most.need = std::max(most.need, leaf.need);
     if (leaf.in_view) most.in_view = std::max(most.in_view, leaf.need);
   }

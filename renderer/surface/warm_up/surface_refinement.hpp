@@ -34,10 +34,11 @@ class SurfaceRefinement {
                     const RefineView& view, const SurfaceModelOptions& options);
 
   /// Greatest need of a mesh's leaves, and of those in the field of view. It is 0 if none is too
-  /// coarse.
+  /// coarse. The leaves that are too coarse are counted in every instance.
   struct Most {
     float need = 0.0F;
     float in_view = 0.0F;
+    std::size_t coarse_leaves = 0;
   };
   /// Judges the leaves of `mesh` that are new since the last call. `of_mesh` are the patches of its
   /// instances. Call it for each mesh in turn, after its vertices were sampled.

@@ -158,21 +158,33 @@ TEST(RendererCached, GoingBackStartsAfresh) {
 
 TEST(RendererCached, WarmUpReportsAndStops) {
   const auto scenario = cached_scenario(box_on_ground());
-  Session run(scenario);
   renderer::FrameRequest request;
   request.sim_time_ns = request.thermal_time_ns = kHourNs;
   request.sensor_pose = looking({3.0, -9.0, 6.0}, {0.0, 0.0, 0.0});
-  EXPECT_FALSE(run.renderer().warm_up(request, [](double) { return false; }));
-  double last_frac = 0.0;
-  ASSERT_TRUE(run.renderer().warm_up(request, [&](double frac) {
-    EXPECT_GE(frac, last_frac);
-    last_frac = frac;
-    return true;
-  }));
-  EXPECT_EQ(last_frac, 1.0);
-  EXPECT_GT(run.renderer().scene_stats().samples, 100U);
-  EXPECT_FALSE(run.renderer().scene_stats().samples_full);
-  EXPECT_TRUE(warm_up_warnings(run.renderer().scene_stats()).empty());
+  int reports = 0;
+  {
+    Session run(scenario);
+    EXPECT_FALSE(run.renderer().warm_up(request, [](double) { return false; }));
+    double last_frac = 0.0;
+    ASSERT_TRUE(run.renderer().warm_up(request, [&](double frac) {
+      EXPECT_GE(frac, last_frac);
+      last_frac = frac;
+      ++reports;
+      return true;
+    }));
+    EXPECT_EQ(last_frac, 1.0);
+    EXPECT_GT(run.renderer().scene_stats().samples, 100U);
+    EXPECT_FALSE(run.renderer().scene_stats().samples_full);
+    EXPECT_TRUE(warm_up_warnings(run.renderer().scene_stats()).empty());
+  }
+  EXPECT_GT(reports, 4);
+  // Every report can stop it: those of samples, of their partners and of the exchange.
+  for (int stop = 1; stop <= reports; ++stop) {
+    Session run(scenario);
+    int seen = 0;
+    EXPECT_FALSE(run.renderer().warm_up(request, [&](double) { return ++seen < stop; })) << stop;
+    EXPECT_EQ(seen, stop);
+  }
 }
 
 TEST(RendererCached, TheLimitOfSamplesIsKeptAndSaid) {
