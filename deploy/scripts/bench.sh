@@ -64,7 +64,7 @@ arguments() { # of a suite, when quick
 
 if $install; then deploy/scripts/install_deps.sh --with-yardsticks; fi
 cmake --preset release
-cmake --build --preset release --target emit emitd config_data emit_scenes emit_logs
+cmake --build --preset release --target emit emit_lab emitd config_data emit_scenes emit_logs
 mkdir -p "$out"
 rm -f "$out"/bench.{json,md} # of an earlier run: this one may be interrupted
 # Without it a suite that ends in good order on Ctrl-C is followed by the next.

@@ -3,21 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <csignal>
+
 #include "emit/version.hpp"
 
 namespace emit::tool {
-namespace {
-
-/// The order is that of `emit --help`.
-constexpr void (*kCommands[])(CommandLine&) = {
-    add_render,  add_solve, add_inspect,    add_compare, add_generate, add_view,
-    add_demo,    add_serve, add_receive,    add_stat,    add_send,     add_latency,
-    add_trigger, add_trace, add_record,     add_replay,  add_make_log, add_evaluate,
-    add_fit,     add_bench, add_completion, add_man};
-
-}  // namespace
-
-int run_tool(int argc, char** argv) {
+int run_tool(int argc, char** argv, const LabCommands& lab) {
+  // A limit on the size of files then is a write error with a message, as a full disk is.
+  std::signal(SIGXFSZ, SIG_IGN);
   Program program("emit",
                   "emit: command-line tool of emitd, the real-time infrared image generator.",
                   fmt::format("emit {} ({})", kVersion, kCommit),
@@ -26,7 +19,14 @@ int run_tool(int argc, char** argv) {
                   "(serve), 1 any other failure.\n"
                   "Example: emit demo --out frames");
   CommandLine tool = program.root();
-  for (const auto add : kCommands) add(tool);
+  // The order is that of `emit --help`.
+  for (const auto add :
+       {add_render,  add_solve, add_inspect,    add_compare, add_generate, add_view,
+        add_demo,    add_serve, add_receive,    add_stat,    add_send,     add_latency,
+        add_trigger, add_trace, add_record,     add_replay,  add_make_log, lab.evaluate,
+        lab.fit,     lab.bench, lab.completion, lab.man}) {
+    add(tool);
+  }
   return program.run(argc, argv);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <string>
 #include <utility>
 
 #include "support/emit_process.hpp"
@@ -21,6 +23,29 @@ INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
                                          "demo", "view", "compare", "inspect", "evaluate",
                                          "generate", "make-log", "bench", "latency", "trigger",
                                          "trace", "solve", "fit", "man"));
+
+TEST(CliUsage, commands_of_emit_lab_are_those_of_emit) {
+  const std::string folder = EMIT_TEST_BIN_DIR;
+  const std::string help = run_emit({"--help"}).out;
+  EXPECT_EQ(run_process({folder + "/emit-lab", "--help"}).out, help);
+  for (const char* command : {"bench", "evaluate", "fit", "man", "completion"}) {
+    EXPECT_NE(help.find(std::string("\n  ") + command + " "), std::string::npos) << command;
+    EXPECT_EQ(run_emit({command, "--help"}).out,
+              run_process({folder + "/emit-lab", command, "--help"}).out);
+  }
+}
+
+TEST(CliUsage, without_emit_lab_its_commands_say_what_to_build) {
+  const TemporaryFolder folder;
+  std::filesystem::copy_file(std::string(EMIT_TEST_BIN_DIR) + "/emit", folder.file("emit"));
+  const ProcessResult result = run_process({folder.file("emit"), "bench", "paper"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(
+      result.err.find("emit-lab: No such file or directory; `emit bench` is a command of that "
+                      "program, which is built by"),
+      std::string::npos)
+      << result.err;
+}
 
 TEST(CliUsage, version_names_tool_and_number) {
   const ProcessResult result = run_emit({"--version"});

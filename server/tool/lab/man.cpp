@@ -6,7 +6,7 @@
 #include "emit/physics/nearest_name.hpp"
 #include "emit/version.hpp"
 #include "tool/command_line/man_page.hpp"
-#include "tool/commands/commands.hpp"
+#include "tool/lab/lab.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/frame_files.hpp"
 
@@ -85,9 +85,7 @@ void add_options(const CommandLine& tool, CommandLine& line, ManOptions& options
 
 void add_man(CommandLine& tool) {
   tool.command<ManOptions>(
-      {.name = "man",
-       .text = "Print the manual page of a command, for man -l; or write all pages",
-       .example = "emit man render | man -l -"},
+      kManText,
       std::function<void(CommandLine&, ManOptions&)>(
           [tool](CommandLine& line, ManOptions& options) { add_options(tool, line, options); }),
       std::function<int(const ManOptions&)>(

@@ -12,7 +12,7 @@
 #include "emit/physics/csv.hpp"
 #include "emit/physics/nearest_name.hpp"
 #include "tool/command_line/common_options.hpp"
-#include "tool/commands/commands.hpp"
+#include "tool/lab/lab.hpp"
 #include "tool/support/console.hpp"
 #include "tool/support/json.hpp"
 #include "tool/support/library_edit.hpp"
@@ -248,11 +248,7 @@ void add_options(CommandLine& line, FitOptions& options) {
 }  // namespace
 
 void add_fit(CommandLine& tool) {
-  tool.command<FitOptions>({.name = "fit",
-                            .text = "Fit a material's modes to the reference solver, or to a curve",
-                            .example = "emit fit block-on-road --material asphalt --modes 4 --json "
-                                       "fit.json --out library.toml"},
-                           add_options, run);
+  tool.command<FitOptions>(kFitText, add_options, run);
 }
 
 }  // namespace emit::tool

@@ -11,7 +11,7 @@
 
 #include "emit/config/slab_modes.hpp"
 #include "tool/command_line/common_options.hpp"
-#include "tool/commands/commands.hpp"
+#include "tool/lab/lab.hpp"
 #include "tool/support/console.hpp"
 
 namespace emit::tool {
@@ -180,11 +180,7 @@ void add_options(CommandLine& line, EvaluateOptions& options) {
 }  // namespace
 
 void add_evaluate(CommandLine& tool) {
-  tool.command<EvaluateOptions>(
-      {.name = "evaluate",
-       .text = "Run one model on a table; CSV to standard output",
-       .example = "emit evaluate equilibrium quartic_roots.csv --precision float32 --device gpu"},
-      add_options, run);
+  tool.command<EvaluateOptions>(kEvaluateText, add_options, run);
 }
 
 }  // namespace emit::tool

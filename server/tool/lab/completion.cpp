@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "tool/commands/commands.hpp"
+#include "tool/lab/lab.hpp"
 #include "tool/support/console.hpp"
 
 namespace emit::tool {
@@ -43,9 +43,7 @@ void add_options(CommandLine& line, CompletionOptions& options) {
 
 void add_completion(CommandLine& tool) {
   tool.command<CompletionOptions>(
-      {.name = "completion",
-       .text = "Print the completion script of a shell, to be sourced",
-       .example = "source <(emit completion bash)"},
+      kCompletionText,
       std::function<void(CommandLine&, CompletionOptions&)>(
           [](CommandLine& line, CompletionOptions& options) { add_options(line, options); }),
       std::function<int(const CompletionOptions&)>(

@@ -3,7 +3,7 @@
 #include "bench/frame_time/frame_time_benches.hpp"
 #include "bench/stability/stability_benches.hpp"
 #include "bench/stream/stream_benches.hpp"
-#include "tool/commands/commands.hpp"
+#include "tool/lab/lab.hpp"
 
 namespace emit::tool {
 namespace {
@@ -17,9 +17,7 @@ constexpr void (*kSuites[])(CommandLine&) = {
 }  // namespace
 
 void add_bench(CommandLine& tool) {
-  CommandLine bench = tool.group({.name = "bench",
-                                  .text = "Benchmarks; results as JSON",
-                                  .example = "emit bench paper --json paper.json"});
+  CommandLine bench = tool.group(kBenchText);
   for (const auto add : kSuites) add(bench);
 }
 
