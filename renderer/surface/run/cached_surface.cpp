@@ -25,6 +25,11 @@ constexpr std::int64_t kCarryNs = ExposureTiles::kTurnsPerFrame * ExposureTiles:
 /// Number of frames over which node 1 is computed anew while sim time stands still.
 constexpr std::int64_t kHeldFrames = 64;
 
+/// Progress of the warm-up when all samples are made, and when the levels of detail are made too.
+/// The rest is the state file.
+constexpr double kSampledFrac = 0.85;
+constexpr double kLevelsFrac = 0.97;
+
 /// The thermal model that the scenario names.
 SampleHeat heat_of(const scene::ThermalOptions& options, std::span<const scene::Material> materials,
                    std::span<const FosterMaterial> networks, double reference_k) {
@@ -87,8 +92,15 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   EMIT_CHECK_OP(inputs.entities.size(), ==, geometry_.entities());
   // Make the model for the node of the grid at or before now, or take an earlier one.
   const std::int64_t latest_ns = grid_.at_or_before_ns(now_ns);
+  const auto report = [&progress](double done_frac) -> physics::Result<void> {
+    if (!progress || progress(done_frac)) return {};
+    return physics::make_error(physics::ErrorCode::internal, "stopped while preparing the surface");
+  };
+  const SurfaceProgress sampling = [&progress](double done_frac) {
+    return !progress || progress(kSampledFrac * done_frac);
+  };
   const SurfaceWarmUp warm_up({geometry_, heat_, interval_.rays(), latest_ns,
-                               earliest_ns(latest_ns), view, inputs, model_options(), progress,
+                               earliest_ns(latest_ns), view, inputs, model_options(), sampling,
                                plan, history});
   auto made = warm_up.make(saved);
   if (!made) return tl::unexpected(std::move(made.error()));
@@ -100,6 +112,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   // Save the surface before the outputs of node 0 change.
   if (model_->drawn.empty()) {
     model_->drawn = make_drawn_meshes(geometry_.geometry(), *model_, nodes_[0].vertices);
+    if (auto go_on = report(kLevelsFrac); !go_on) return go_on;
   }
   if (made->to_save) {
     if (auto written = save(warm_up, *saved); !written) return written;
@@ -117,7 +130,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
     return carry_on(now_ns, inputs, history, progress);
   }
   last_now_ns_ = now_ns;
-  return {};
+  return report(1.0);
 }
 
 physics::Result<void> CachedSurface::carry_on(std::int64_t now_ns, const Inputs& inputs,

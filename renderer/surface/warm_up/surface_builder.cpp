@@ -47,13 +47,13 @@ constexpr float kOffCreaseFrac = 0.02F;
 constexpr double kEvaluatedFrac = 0.8;
 
 /// Estimates how much of the evaluation of samples is done. Nobody knows how many samples the
-/// refinement will take: at least half as many as before it, and some for each leaf that is too
-/// coarse.
+/// refinement will take: at least one and a half as many as before it, and some for each leaf that
+/// is too coarse.
 class EvaluationProgress {
  public:
   /// Sets the number of samples before the refinement.
   void begin(std::size_t samples) noexcept {
-    least_ = refined_ = 1.5 * static_cast<double>(samples);
+    least_ = refined_ = 2.5 * static_cast<double>(samples);
   }
   /// Takes what a round of the refinement found: the leaves that are too coarse, and the partners
   /// of all samples so far. The refinement is over when no leaf is too coarse.

@@ -22,8 +22,9 @@ inline const CommandText kEvaluateText{
 inline const CommandText kFitText{
     .name = "fit",
     .text = "Fit a material's modes to the reference solver, or to a curve",
-    .example = "emit fit block-on-road --material asphalt --modes 4 --json fit.json --out "
-               "library.toml"};
+    .example =
+        "emit fit block-on-road --material asphalt --modes 4 --json fit.json --out "
+        "library.toml"};
 inline const CommandText kManText{
     .name = "man",
     .text = "Print the manual page of a command, for man -l; or write all pages",

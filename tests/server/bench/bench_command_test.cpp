@@ -67,10 +67,16 @@ TEST(CliBench, ScalingComparesEachCaseWithTheOneBefore) {
 
 TEST(CliBench, ACrowdIsMeasuredBesideTheSceneWithoutIt) {
   const TemporaryFolder folder;
-  const ProcessResult run =
-      run_emit({"bench", "crowd", "--instances", "20", "--pairs", "15", "--set",
-                "thermal.tolerance_k=50", "--set", "thermal.steps=3", "--set", "sensor.width_px=64",
-                "--set", "sensor.height_px=48", "--json", folder.file("c.json")});
+  const ProcessResult run = run_emit({"bench",       "crowd",
+                                      "--instances", "20",
+                                      "--pairs",     "15",
+                                      "--set",       "thermal.tolerance_k=50",
+                                      "--set",       "thermal.steps=3",
+                                      "--set",       "thermal.spin_up_s=600",
+                                      "--set",       "thermal.history_start_s=-600",
+                                      "--set",       "sensor.width_px=64",
+                                      "--set",       "sensor.height_px=48",
+                                      "--json",      folder.file("c.json")});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string json = read_text(folder.file("c.json"));
   EXPECT_EQ(json_value(json, "suite"), "\"crowd\"");
