@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,8 +27,9 @@ struct SourceInfo {
   /// Step of the thermal clock from frame to frame beyond which the source may warm up again inside
   /// submit(), ns: the newest interval of the surface's history.
   std::int64_t surface_step_ns = 20'000'000'000;
-  std::int64_t first_time_ns = 0;  ///< simulation time that the surface is warmed up for
-  renderer::SceneStats scene;      ///< warmed up; empty for pre-rendered pixels
+  /// Simulation time that the surface is warmed up for; none: the source has no such surface.
+  std::optional<std::int64_t> first_time_ns;
+  renderer::SceneStats scene;  ///< warmed up; empty for pre-rendered pixels
 };
 
 /// Source of frames. The same calls, in the same order, give the same pixels: the journal and its

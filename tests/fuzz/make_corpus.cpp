@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "emit/image/exr_image.hpp"
+#include "emit/protocol/axes.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/host_session.hpp"
 #include "emit/protocol/pixel_codec.hpp"
@@ -509,6 +510,34 @@ void make_state_seeds() {
   }
 }
 
+void make_axes_seeds() {
+  protocol::AxesCodec codec;
+  protocol::AxesCommand command;
+  command.counter = 1000;
+  command.time_ns = 1'800'000'000'000'000'005;
+  command.sim_time_ns = 12'500'000'000;
+  command.period_us = 1000;
+  command.mode = protocol::AxesMode::follow;
+  command.count = protocol::kMaxAxes;
+  for (protocol::AxisValues& axis : command.axes) axis = {0.25, -1.5, 20.0};
+  const auto keep = [](const char* name, std::span<const std::byte> bytes) {
+    write("axes", name, Bytes(bytes.begin(), bytes.end()));
+  };
+  keep("follow", codec.encode(command));
+  command.mode = protocol::AxesMode::park;
+  command.count = 0;
+  keep("park", codec.encode(command));
+  protocol::AxesMonitor monitor;
+  monitor.counter = 3;
+  monitor.command_counter = 1000;
+  monitor.state = protocol::AxesState::following;
+  monitor.limited_axes = 5;
+  monitor.count = 3;
+  monitor.measured.fill({0.25, -1.5, 20.0});
+  monitor.demanded.fill({0.26, -1.5, 20.0});
+  keep("monitor", codec.encode(monitor));
+}
+
 void make_trigger_seeds() {
   for (const auto& [name, trigger] :
        {std::pair("stamped",
@@ -539,6 +568,7 @@ int main(int argc, char** argv) {
   make_network_seeds();
   make_loss_seeds();
   make_trigger_seeds();
+  make_axes_seeds();
   make_session_seeds();
   make_fragment_seeds();
   make_log_seeds();

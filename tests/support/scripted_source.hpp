@@ -45,6 +45,7 @@ class ScriptedSource final : public server::FrameSource {
     info_.height_px = height_px;
     info_.slots = slots;
     info_.planes = 1;
+    info_.first_time_ns = 0;
     for (auto& pixels : pixels_) {
       pixels.resize(std::size_t{width_px} * height_px);
     }

@@ -26,7 +26,7 @@ const KeyTable<SourceConfig>& source_keys() {
                                 EMIT_FIELD(first_time_ns),
                                 "renderer: simulation time of the first pose, for which the "
                                 "surface is warmed up at start. "
-                                "Another first time may warm it up again."),
+                                "At other times the first frame waits."),
       path<SourceConfig>(
           "canned_dir", EMIT_FIELD(canned_dir),
           "canned: folder of `frame_*.exr` with a `radiance` channel. They are shown in the order "

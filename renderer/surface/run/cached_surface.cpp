@@ -110,7 +110,8 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
   begin_first_interval(start_ns, inputs, plan, history);
   fill_first_vertices();
   // Save the surface before the outputs of node 0 change.
-  if (model_->drawn.empty()) {
+  const bool made_anew = model_->drawn.empty();
+  if (made_anew) {
     model_->drawn = make_drawn_meshes(geometry_.geometry(), *model_, nodes_[0].vertices);
     if (auto go_on = report(kLevelsFrac); !go_on) return go_on;
   }
@@ -130,7 +131,7 @@ physics::Result<void> CachedSurface::prepare(std::int64_t now_ns, const RefineVi
     return carry_on(now_ns, inputs, history, progress);
   }
   last_now_ns_ = now_ns;
-  return report(1.0);
+  return made_anew ? report(1.0) : physics::Result<void>();
 }
 
 physics::Result<void> CachedSurface::carry_on(std::int64_t now_ns, const Inputs& inputs,

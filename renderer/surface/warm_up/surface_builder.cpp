@@ -51,9 +51,10 @@ constexpr double kEvaluatedFrac = 0.8;
 /// is too coarse.
 class EvaluationProgress {
  public:
-  /// Sets the number of samples before the refinement.
-  void begin(std::size_t samples) noexcept {
-    least_ = refined_ = 2.5 * static_cast<double>(samples);
+  /// Sets the number of samples before the refinement, and the greatest one after it.
+  void begin(std::size_t samples, std::size_t most) noexcept {
+    most_ = static_cast<double>(std::max(samples, most));
+    least_ = refined_ = std::min(2.5 * static_cast<double>(samples), most_);
   }
   /// Takes what a round of the refinement found: the leaves that are too coarse, and the partners
   /// of all samples so far. The refinement is over when no leaf is too coarse.
@@ -61,7 +62,8 @@ class EvaluationProgress {
     // A leaf that is halved often has halves that are too coarse as well.
     constexpr double kSamplesOfLeaf = 2.5;
     const double left = kSamplesOfLeaf * static_cast<double>(coarse_leaves);
-    refined_ = coarse_leaves == 0 ? done_ : std::max(least_, done_ + left);
+    const double expected = std::min(std::max(least_, done_ + left), std::max(most_, done_));
+    refined_ = coarse_leaves == 0 ? done_ : expected;
     partners_ = static_cast<double>(partners);
   }
   /// Takes the number of samples that were evaluated since the last call. Returns the part that is
@@ -73,6 +75,7 @@ class EvaluationProgress {
   }
 
  private:
+  double most_ = 0.0;      ///< greatest number of samples after the refinement
   double least_ = 0.0;     ///< least number of samples after the refinement
   double refined_ = 0.0;   ///< expected number of samples after the refinement
   double partners_ = 0.0;  ///< expected number of partners
@@ -397,7 +400,7 @@ physics::Result<SurfaceModel> Builder::run() {
     model_.meshes.emplace_back(mesh, options_.max_samples);
   }
   make_patches();
-  evaluation_.begin(sample_count_);
+  evaluation_.begin(sample_count_, options_.max_samples);
   std::size_t count_before = 0;  // samples before the latest round
   if (!sample_new_vertices()) return stopped();
   least_count_ = sample_count_;

@@ -35,7 +35,8 @@ class PartnerFinder {
   /// Evaluates all partners and appends one patch that holds them. Until samples are numbered,
   /// Partner::sample is an index into that patch, and a partner's own first_seen and
   /// partners[0].sample are the patch and the vertex it belongs to. `evaluated` is called with the
-  /// number of partners that were evaluated since its last call. Returns false if it did.
+  /// number of partners that were evaluated since its last call. Returns false if it returned
+  /// false; nothing is appended then.
   bool append(std::vector<SurfacePatch>& patches,
               const std::function<bool(std::size_t count)>& evaluated) const;
 

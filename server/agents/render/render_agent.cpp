@@ -105,8 +105,9 @@ std::optional<renderer::SlotIndex> RenderAgent::submit(const renderer::FrameRequ
                                                        bool& warmed_up) noexcept {
   // The renderer does not report a warm-up inside submit(). It is recognised by its causes and its
   // effect: the thermal clock jumped further than a step of the surface, and submit() took long.
-  const std::int64_t moved_ns =
-      request.thermal_time_ns - last_thermal_ns_.value_or(info_->first_time_ns);
+  const std::int64_t before_ns =
+      last_thermal_ns_.value_or(info_->first_time_ns.value_or(request.thermal_time_ns));
+  const std::int64_t moved_ns = request.thermal_time_ns - before_ns;
   const bool jumped = std::abs(moved_ns) > info_->surface_step_ns;
   const std::int64_t begun_ns = context_.clock.monotonic_ns();
   if (jumped) {

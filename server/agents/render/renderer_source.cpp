@@ -61,7 +61,7 @@ physics::Result<std::unique_ptr<FrameSource>> make_renderer_source(
   info.slots = output.slots;
   info.planes = scenario.bands.size();
   info.surface_step_ns = static_cast<std::int64_t>(scenario.thermal.first_step_s * 1e9);
-  info.first_time_ns = first_time_ns;
+  if (scenario.thermal.method == scene::ThermalMethod::cached) info.first_time_ns = first_time_ns;
   info.scene = (*renderer)->scene_stats();
   return std::make_unique<RendererSource>(std::move(*renderer), std::move(info));
 }

@@ -56,6 +56,7 @@ const std::vector<OutputCase>& output_cases() {
     add({"make-log", "airfield", "--out", "GOOD"}, {"--out"});
     add({"send", "no.mcap", "--to", "udp://127.0.0.1:9"}, {"--json"});
     add({"latency", "tcp://127.0.0.1:1"}, {"--json"});
+    add({"fms-sim", "--seconds", "0.1"}, {"--json"});
     add({"stat", "http://127.0.0.1:1"}, {"--json"});
     add({"trace", "http://127.0.0.1:1", "--out", "GOOD"}, {"--out"});
     add({"compare", "a.exr", "b.exr"}, {"--json"});

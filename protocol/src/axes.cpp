@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emit/protocol/axes.hpp"
+
+#include <google/protobuf/arena.h>
+
+#include <cmath>
+
+#include "emit/physics/check.hpp"
+#include "emit/v1/axes.pb.h"
+
+namespace emit::protocol {
+namespace {
+
+/// Memory of one message with all axes, bytes.
+constexpr std::size_t kAxesArenaBytes = std::size_t{64} << 10U;
+
+bool within(double value, double limit) noexcept {
+  return std::abs(value) <= limit;  // false for NaN
+}
+
+bool valid(const v1::AxisValues& axis) noexcept {
+  return within(axis.angle_rad(), kMaxAxisRad) && within(axis.rate_rad_s(), kMaxAxisRadS) &&
+         within(axis.acceleration_rad_s2(), kMaxAxisRadS2);
+}
+
+AxisValues values_of(const v1::AxisValues& axis) noexcept {
+  return {axis.angle_rad(), axis.rate_rad_s(), axis.acceleration_rad_s2()};
+}
+
+void set(const AxisValues& values, v1::AxisValues& out) noexcept {
+  out.set_angle_rad(values.angle_rad);
+  out.set_rate_rad_s(values.rate_rad_s);
+  out.set_acceleration_rad_s2(values.acceleration_rad_s2);
+}
+
+}  // namespace
+
+std::string_view to_string(AxesState state) noexcept {
+  switch (state) {
+    case AxesState::motors_off:
+      return "motors off";
+    case AxesState::parking:
+      return "parking";
+    case AxesState::parked:
+      return "parked";
+    case AxesState::capturing:
+      return "capturing";
+    case AxesState::following:
+      return "following";
+    case AxesState::fault:
+      return "fault";
+  }
+  return "unknown state";
+}
+
+std::string_view to_string(AxesFault fault) noexcept {
+  switch (fault) {
+    case AxesFault::none:
+      return "none";
+    case AxesFault::size:
+      return "wrong size";
+    case AxesFault::malformed:
+      return "malformed";
+    case AxesFault::version:
+      return "wrong version";
+    case AxesFault::axes:
+      return "wrong number of axes";
+    case AxesFault::value:
+      return "value out of range";
+  }
+  return "unknown fault";
+}
+
+struct AxesCodec::Impl {
+  std::unique_ptr<char[]> block = std::make_unique<char[]>(kAxesArenaBytes);
+  google::protobuf::Arena arena{[this] {
+    google::protobuf::ArenaOptions options;
+    options.initial_block = block.get();
+    options.initial_block_size = kAxesArenaBytes;
+    return options;
+  }()};
+  std::array<std::byte, kMaxAxesBytes> bytes{};
+
+  template <class Message>
+  Message& fresh() noexcept {
+    arena.Reset();
+    return *google::protobuf::Arena::CreateMessage<Message>(&arena);
+  }
+  template <class Message>
+  std::span<const std::byte> write(const Message& message) noexcept {
+    const std::size_t size = message.ByteSizeLong();
+    EMIT_CHECK_OP(size, <=, bytes.size());
+    message.SerializeWithCachedSizesToArray(
+        reinterpret_cast<google::protobuf::uint8*>(bytes.data()));
+    return std::span(bytes).first(size);
+  }
+  template <class Message>
+  AxesFault read(std::span<const std::byte> from, Message& message) noexcept {
+    if (from.size() > kMaxAxesBytes) return AxesFault::size;
+    if (!message.ParseFromArray(from.data(), static_cast<int>(from.size()))) {
+      return AxesFault::malformed;
+    }
+    return message.protocol_version() == kAxesVersion ? AxesFault::none : AxesFault::version;
+  }
+};
+
+AxesCodec::AxesCodec() : impl_(std::make_unique<Impl>()) {}
+AxesCodec::~AxesCodec() = default;
+AxesCodec::AxesCodec(AxesCodec&&) noexcept = default;
+AxesCodec& AxesCodec::operator=(AxesCodec&&) noexcept = default;
+
+std::span<const std::byte> AxesCodec::encode(const AxesCommand& command) noexcept {
+  EMIT_CHECK_OP(command.count, <=, kMaxAxes);
+  auto& message = impl_->fresh<v1::AxesCommand>();
+  message.set_protocol_version(kAxesVersion);
+  message.set_counter(command.counter);
+  message.set_time_ns(command.time_ns);
+  message.set_sim_time_ns(command.sim_time_ns);
+  message.set_period_us(command.period_us);
+  message.set_timeout_ms(command.timeout_ms);
+  message.set_mode(static_cast<v1::AxesCommand::Mode>(command.mode));
+  for (std::size_t i = 0; i < command.count; ++i) set(command.axes[i], *message.add_axes());
+  return impl_->write(message);
+}
+
+std::span<const std::byte> AxesCodec::encode(const AxesMonitor& monitor) noexcept {
+  EMIT_CHECK_OP(monitor.count, <=, kMaxAxes);
+  auto& message = impl_->fresh<v1::AxesMonitor>();
+  message.set_protocol_version(kAxesVersion);
+  message.set_counter(monitor.counter);
+  message.set_time_ns(monitor.time_ns);
+  message.set_command_counter(monitor.command_counter);
+  message.set_state(static_cast<v1::AxesMonitor::State>(monitor.state));
+  message.set_limited_axes(monitor.limited_axes);
+  message.set_faulty_axes(monitor.faulty_axes);
+  message.set_timed_out(monitor.timed_out);
+  for (std::size_t i = 0; i < monitor.count; ++i) {
+    set(monitor.measured[i], *message.add_measured());
+    set(monitor.demanded[i], *message.add_demanded());
+  }
+  return impl_->write(message);
+}
+
+AxesFault AxesCodec::decode(std::span<const std::byte> bytes, AxesCommand& out) noexcept {
+  auto& message = impl_->fresh<v1::AxesCommand>();
+  if (const AxesFault fault = impl_->read(bytes, message); fault != AxesFault::none) return fault;
+  if (message.mode() == v1::AxesCommand::MODE_UNSPECIFIED ||
+      !v1::AxesCommand::Mode_IsValid(message.mode())) {
+    return AxesFault::malformed;
+  }
+  const auto count = static_cast<std::size_t>(message.axes_size());
+  if (count > kMaxAxes || (count == 0 && message.mode() == v1::AxesCommand::FOLLOW)) {
+    return AxesFault::axes;
+  }
+  bool in_range = message.timeout_ms() >= 1 && message.timeout_ms() <= kMaxAxesTimeoutMs &&
+                  message.time_ns() >= 0 && message.time_ns() <= kMaxAxesTimeNs;
+  for (const v1::AxisValues& axis : message.axes()) in_range = in_range && valid(axis);
+  if (!in_range) return AxesFault::value;
+  out = {message.counter(),
+         message.time_ns(),
+         message.sim_time_ns(),
+         message.period_us(),
+         message.timeout_ms(),
+         static_cast<AxesMode>(message.mode()),
+         count,
+         {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    out.axes[i] = values_of(message.axes(static_cast<int>(i)));
+  }
+  return AxesFault::none;
+}
+
+AxesFault AxesCodec::decode(std::span<const std::byte> bytes, AxesMonitor& out) noexcept {
+  auto& message = impl_->fresh<v1::AxesMonitor>();
+  if (const AxesFault fault = impl_->read(bytes, message); fault != AxesFault::none) return fault;
+  if (message.state() == v1::AxesMonitor::STATE_UNSPECIFIED ||
+      !v1::AxesMonitor::State_IsValid(message.state())) {
+    return AxesFault::malformed;
+  }
+  const auto count = static_cast<std::size_t>(message.measured_size());
+  if (count > kMaxAxes || message.demanded_size() != message.measured_size()) {
+    return AxesFault::axes;
+  }
+  for (const v1::AxisValues& axis : message.measured()) {
+    if (!valid(axis)) return AxesFault::value;
+  }
+  for (const v1::AxisValues& axis : message.demanded()) {
+    if (!valid(axis)) return AxesFault::value;
+  }
+  out = {message.counter(),
+         message.time_ns(),
+         message.command_counter(),
+         static_cast<AxesState>(message.state()),
+         message.limited_axes(),
+         message.faulty_axes(),
+         message.timed_out(),
+         count,
+         {},
+         {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    out.measured[i] = values_of(message.measured(static_cast<int>(i)));
+    out.demanded[i] = values_of(message.demanded(static_cast<int>(i)));
+  }
+  return AxesFault::none;
+}
+
+}  // namespace emit::protocol
