@@ -17,6 +17,16 @@ bool is_root_key(const std::vector<SectionDoc>& sections, std::string_view key) 
 
 }  // namespace
 
+std::string place_of_scenario_key(std::string_view key) {
+  if (!is_root_key(scenario_sections(), key)) return {};
+  return "belongs to the scenario file that 'scenario' names";
+}
+
+std::string place_of_daemon_key(std::string_view key) {
+  if (!is_root_key(daemon_sections(), key)) return {};
+  return "belongs to the configuration of the daemon (emitd --config)";
+}
+
 FileKind kind_of(const Node& root) {
   const auto all = [&root](const auto& is_known) {
     return !root.members.empty() && std::ranges::all_of(root.members, [&](const Member& member) {

@@ -144,7 +144,7 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   DaemonConfig daemon;
   daemon.file = file;
   DaemonHead head;
-  read_table(root, daemon_head_keys(), head, diagnostics, names);
+  read_table(root, daemon_head_keys(), head, diagnostics, names, place_of_scenario_key);
   read_table(section(root, "source", diagnostics), source_keys(), daemon.source, diagnostics);
   read_table(section(root, "pacing", diagnostics), pacing_keys(), daemon.pacing, diagnostics);
   read_table(section(root, "trigger", diagnostics), trigger_keys(), daemon.trigger, diagnostics);

@@ -148,7 +148,7 @@ void resolve_head(const Node& root, ScenarioDesc& scenario, ScenarioHead& head,
       diagnostics.add(root.at, "no materials: " + shipped.error().text);
     }
   }
-  read_table(root, scenario_head_keys(), head, diagnostics, section_names());
+  read_table(root, scenario_head_keys(), head, diagnostics, section_names(), place_of_daemon_key);
   scenario.name = head.name;
   scenario.epoch_utc_ns = head.epoch_utc_ns;
 }

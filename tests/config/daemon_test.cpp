@@ -118,6 +118,9 @@ TEST_F(ConfigTest, daemon_combinations_and_ranges_are_checked) {
             "d.toml:3:14: 'canned_dir': none: no such folder");
   EXPECT_EQ(daemon_error(kCanned + "[stream]\nqueue = 2\n"),
             "d.toml:4:1: unknown key 'queue', did you mean 'queue_frames'?");
+  EXPECT_EQ(daemon_error(kCanned + "[sensor]\nwidth_px = 64\n"),
+            "d.toml:3:2: unknown key 'sensor', which belongs to the scenario file that 'scenario' "
+            "names");
 }
 
 TEST_F(ConfigTest, timing_sections_are_read_printed_and_checked) {

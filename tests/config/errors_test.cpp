@@ -31,6 +31,9 @@ const std::vector<Case>& cases() {
       {"misspelt_section", "[thermall]\nsteps = 3\n",
        "s.toml:2:2: unknown key 'thermall', did you mean 'thermal'?"},
       {"foreign_key", "zzzzzz = 1\n", "s.toml:2:1: unknown key 'zzzzzz'"},
+      {"daemon_key", "[pacing]\nmode = \"host-step\"\n",
+       "s.toml:2:2: unknown key 'pacing', which belongs to the configuration of the daemon "
+       "(emitd --config)"},
       {"text_for_integer", "[thermal]\nsteps = \"many\"\n",
        "s.toml:3:9: 'steps' must be an integer, not a string"},
       {"float_for_integer", "[thermal]\nsteps = 27.0\n",

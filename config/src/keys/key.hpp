@@ -98,10 +98,12 @@ bool expect_table_array(const Node& node, const std::string& name, Diagnostics& 
 [[nodiscard]] std::string unscaled_number(double value, double scale);
 
 /// Reads every member of `table` by `keys`. It reports unknown keys, faulty values and required
-/// keys that are missing. The caller reads the keys `also_known` itself.
+/// keys that are missing. The caller reads the keys `also_known` itself. `elsewhere` says where an
+/// unknown key belongs; an empty text means nowhere.
 template <class T>
 void read_table(const Node& table, const KeyTable<T>& keys, T& out, Diagnostics& diagnostics,
-                const std::vector<std::string_view>& also_known = {}) {
+                const std::vector<std::string_view>& also_known = {},
+                std::string (*elsewhere)(std::string_view key) = nullptr) {
   for (const Member& member : table.members) {
     const Key<T>* found = nullptr;
     for (const Key<T>& key : keys) {
@@ -123,7 +125,10 @@ void read_table(const Node& table, const KeyTable<T>& keys, T& out, Diagnostics&
       for (const Key<T>& key : keys) {
         names.push_back(key.spec.name);
       }
-      diagnostics.add(member.key_at, unknown_key_text(member.key, names));
+      const std::string place = elsewhere != nullptr ? elsewhere(member.key) : std::string();
+      diagnostics.add(member.key_at, place.empty()
+                                         ? unknown_key_text(member.key, names)
+                                         : "unknown key '" + member.key + "', which " + place);
     }
   }
   for (const Key<T>& key : keys) {

@@ -51,6 +51,10 @@ void check_material_name(const std::string& name, const std::vector<scene::Mater
 
 /// Kind of a file by the keys of its first level, see kind_of_file().
 [[nodiscard]] FileKind kind_of(const Node& root);
+/// Returns where a key of the first level belongs that another kind of file has, for the message
+/// about an unknown key; empty if no such file has it.
+[[nodiscard]] std::string place_of_scenario_key(std::string_view key);
+[[nodiscard]] std::string place_of_daemon_key(std::string_view key);
 
 /// True for host:port with a port of 0..65535. IPv6 addresses stand in brackets.
 [[nodiscard]] bool is_endpoint(std::string_view text);
