@@ -23,11 +23,11 @@ bool valid(const v1::AxisValues& axis) noexcept {
          within(axis.acceleration_rad_s2(), kMaxAxisRadS2);
 }
 
-AxisValues values_of(const v1::AxisValues& axis) noexcept {
+AxisMotion values_of(const v1::AxisValues& axis) noexcept {
   return {axis.angle_rad(), axis.rate_rad_s(), axis.acceleration_rad_s2()};
 }
 
-void set(const AxisValues& values, v1::AxisValues& out) noexcept {
+void set(const AxisMotion& values, v1::AxisValues& out) noexcept {
   out.set_angle_rad(values.angle_rad);
   out.set_rate_rad_s(values.rate_rad_s);
   out.set_acceleration_rad_s2(values.acceleration_rad_s2);

@@ -6,6 +6,7 @@
 #include <glm/ext/vector_double3.hpp>
 
 #include "emit/physics/error.hpp"
+#include "emit/protocol/axes.hpp"
 
 /// Kinematics of the gimbals of a flight motion simulator. A gimbal stands in a base frame and
 /// turns a payload. Both frames are x forward, y right, z down, and agree when all angles are zero.
@@ -14,12 +15,7 @@ namespace emit::server {
 /// Axis about which a gimbal ring turns: x, y or z of the frame of the ring.
 enum class GimbalAxis : std::uint8_t { roll, pitch, yaw };
 
-/// Angle of an axis with its first two derivatives.
-struct AxisMotion {
-  double angle_rad = 0.0;
-  double rate_rad_s = 0.0;
-  double acceleration_rad_s2 = 0.0;
-};
+using protocol::AxisMotion;
 
 /// Three rings that turn about three different axes, in any nesting order. They hold the unit under
 /// test. With angles a, b, c of the rings from the outermost to the innermost,
@@ -44,8 +40,8 @@ class ThreeAxisGimbal {
   [[nodiscard]] glm::dmat3 base_from_payload(const glm::dvec3& angles_rad) const noexcept;
 
   /// Returns the angles that give the payload an attitude. Two sets of angles do, and each angle
-  /// counts in full turns: those nearest to `near_rad` are taken. In gimbal lock the outer ring
-  /// stays at `near_rad`.
+  /// counts in full turns: those nearest to `near_rad` are taken, whatever the travel of the rings.
+  /// In gimbal lock the outer ring stays at `near_rad`.
   /// @pre `base_from_payload` is a rotation
   [[nodiscard]] glm::dvec3 angles_rad(const glm::dmat3& base_from_payload,
                                       const glm::dvec3& near_rad) const noexcept;
@@ -95,7 +91,8 @@ class TwoAxisGimbal {
 
   /// Returns the motion of the rings that keeps the payload's x axis on a target. The vector to the
   /// target and its derivatives are in axes of the base, of any length. On the outer axis the outer
-  /// ring stays at its angle in `near`.
+  /// ring stays at its angle in `near`. The inner ring stays within a right angle, so that a target
+  /// which passes the outer axis asks the outer ring for half a turn.
   /// @pre `target_m` is not zero
   [[nodiscard]] Motion motion(const glm::dvec3& target_m, const glm::dvec3& velocity_m_s,
                               const glm::dvec3& acceleration_m_s2,

@@ -58,8 +58,8 @@ class MotionTable {
               const TableAlignment& alignment) noexcept
       : unit_(unit), target_(target), alignment_(alignment) {}
 
-  /// Returns the motion of the axes for a state of the seeker. Of all angles that show it, those
-  /// nearest to `near` are taken.
+  /// Returns the motion of the axes for a state of the seeker. Of the angles that show it, those
+  /// nearest to `near` are taken, as ThreeAxisGimbal and TwoAxisGimbal say.
   /// @pre state.target_m is not zero
   [[nodiscard]] TableMotion command(const SeekerState& state,
                                     const TableMotion& near) const noexcept;
@@ -94,7 +94,7 @@ struct ImageShift {
 
 /// Returns the shift for an image of `size_px` pixels. `focal_px` is the focal length in pixels.
 /// Both attitudes have body axes.
-/// @pre the line of sight turns by less than a right angle
+/// @pre the corners of the rendered image lie before the camera that shows it
 [[nodiscard]] ImageShift image_shift(const glm::dmat3& world_from_rendered,
                                      const glm::dmat3& world_from_shown, const glm::dvec2& size_px,
                                      double focal_px) noexcept;

@@ -21,10 +21,6 @@ constexpr double kCapturedRadS = 1e-2;
 /// Time over which a soft start grows to all that the axes have.
 constexpr double kCaptureS = 3.0;
 
-protocol::AxisValues values_of(const AxisMotion& motion) noexcept {
-  return {motion.angle_rad, motion.rate_rad_s, motion.acceleration_rad_s2};
-}
-
 }  // namespace
 
 physics::Result<TableSimulator> TableSimulator::create(const Options& options) {
@@ -119,7 +115,7 @@ AxisMotion TableSimulator::demand(std::size_t axis, std::int64_t now_ns) const n
     return {options_.axes[axis].park_rad, 0.0, 0.0};
   }
   // Take the demand to the instant of this step, along its own rate and acceleration.
-  const protocol::AxisValues& at = command_.axes[axis];
+  const AxisMotion& at = command_.axes[axis];
   const double ahead_s =
       1e-9 * (static_cast<double>(now_ns) - static_cast<double>(command_.time_ns));
   const double taken_s = std::clamp(ahead_s, -kLongestExtrapolationS, kLongestExtrapolationS);
@@ -155,8 +151,8 @@ const protocol::AxesMonitor& TableSimulator::step(std::int64_t now_ns) noexcept 
         monitor_.faulty_axes |= 1U << i;
       }
     }
-    monitor_.measured[i] = values_of(model.measure());
-    monitor_.demanded[i] = values_of(profiles_[i].motion());
+    monitor_.measured[i] = model.measure();
+    monitor_.demanded[i] = profiles_[i].motion();
   }
   if (powered && monitor_.faulty_axes != 0) {
     state = AxesState::fault;

@@ -519,7 +519,7 @@ void make_axes_seeds() {
   command.period_us = 1000;
   command.mode = protocol::AxesMode::follow;
   command.count = protocol::kMaxAxes;
-  for (protocol::AxisValues& axis : command.axes) axis = {0.25, -1.5, 20.0};
+  for (protocol::AxisMotion& axis : command.axes) axis = {0.25, -1.5, 20.0};
   const auto keep = [](const char* name, std::span<const std::byte> bytes) {
     write("axes", name, Bytes(bytes.begin(), bytes.end()));
   };

@@ -49,7 +49,7 @@ AxesMonitor full_monitor() {
   return out;
 }
 
-void expect_equal(const AxisValues& a, const AxisValues& b) {
+void expect_equal(const AxisMotion& a, const AxisMotion& b) {
   EXPECT_EQ(a.angle_rad, b.angle_rad);
   EXPECT_EQ(a.rate_rad_s, b.rate_rad_s);
   EXPECT_EQ(a.acceleration_rad_s2, b.acceleration_rad_s2);

@@ -21,12 +21,11 @@ const KeyTable<SourceConfig>& source_keys() {
                            EMIT_FIELD(kind),
                            "renderer: frames are rendered. canned: frames are read or made "
                            "beforehand, to test a rig."),
-      nanoseconds<SourceConfig>("first_time_s", "s", 1e9,
-                                between(-limits::kMaxSimTimeS, limits::kMaxSimTimeS),
-                                EMIT_FIELD(first_time_ns),
-                                "renderer: simulation time of the first pose, for which the "
-                                "surface is warmed up at start. "
-                                "At other times the first frame waits."),
+      nanoseconds<SourceConfig>(
+          "first_time_s", "s", 1e9, between(-limits::kMaxSimTimeS, limits::kMaxSimTimeS),
+          EMIT_FIELD(first_time_ns),
+          "renderer: simulation time of the first pose, for which the "
+          "surface is warmed up at start. At other times the first frame waits."),
       path<SourceConfig>(
           "canned_dir", EMIT_FIELD(canned_dir),
           "canned: folder of `frame_*.exr` with a `radiance` channel. They are shown in the order "

@@ -40,7 +40,7 @@ struct PlannedFault {
 };
 
 struct FmsSimOptions {
-  std::string listen = "127.0.0.1:7010";
+  std::string listen = fmt::format("127.0.0.1:{}", protocol::kDefaultAxesPort);
   std::uint32_t axes = 5;
   double rate_hz = 1000.0;
   double seconds = 0.0;  ///< 0: until interrupted

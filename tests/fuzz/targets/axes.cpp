@@ -10,7 +10,7 @@ namespace {
 
 using namespace emit;
 
-bool sound(const protocol::AxisValues& axis) {
+bool sound(const protocol::AxisMotion& axis) {
   return std::abs(axis.angle_rad) <= protocol::kMaxAxisRad &&
          std::abs(axis.rate_rad_s) <= protocol::kMaxAxisRadS &&
          std::abs(axis.acceleration_rad_s2) <= protocol::kMaxAxisRadS2;

@@ -26,7 +26,8 @@ inline constexpr std::int64_t kMaxAxesTimeNs = 4'000'000'000'000'000'000;
 /// Longest timeout of a command, ms. The shortest is 1 ms.
 inline constexpr std::uint32_t kMaxAxesTimeoutMs = 60'000;
 
-struct AxisValues {
+/// Angle of an axis with its first two derivatives (emit.v1.AxisValues).
+struct AxisMotion {
   double angle_rad = 0.0;
   double rate_rad_s = 0.0;
   double acceleration_rad_s2 = 0.0;
@@ -54,7 +55,7 @@ struct AxesCommand {
   std::uint32_t timeout_ms = 100;
   AxesMode mode = AxesMode::off;
   std::size_t count = 0;  ///< axes in use; 0 is allowed for off and park
-  std::array<AxisValues, kMaxAxes> axes{};
+  std::array<AxisMotion, kMaxAxes> axes{};
 };
 
 /// Contents of emit.v1.AxesMonitor; its fields are documented there.
@@ -67,8 +68,8 @@ struct AxesMonitor {
   std::uint32_t faulty_axes = 0;
   bool timed_out = false;
   std::size_t count = 0;
-  std::array<AxisValues, kMaxAxes> measured{};
-  std::array<AxisValues, kMaxAxes> demanded{};
+  std::array<AxisMotion, kMaxAxes> measured{};
+  std::array<AxisMotion, kMaxAxes> demanded{};
 };
 
 /// Reason why bytes are no valid message.
