@@ -2,8 +2,10 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -12,7 +14,9 @@
 namespace emit::server {
 
 /// Choice of the quality level with which a frame is ready in time: the one with the least error
-/// among those whose expected time fits, else the fastest. A frame is expected to take what the
+/// among those whose expected time fits. If none fits, it is the one with the least error among
+/// those that are about as fast as the fastest: a device whose frames take the same time at every
+/// level would give its quality away for nothing. A frame is expected to take what the
 /// ladder measured for its level and camera, at the machine's present pace, plus what every frame
 /// takes beside it (both fitted to the latest frames), plus an excess that about one frame in 128
 /// goes beyond. So about one frame in 128 is late, one in 64 at most, if the next ones are like the
@@ -24,15 +28,14 @@ class QualityPolicy {
   [[nodiscard]] std::size_t choose(std::span<const renderer::QualityLevelStats> quality_levels,
                                    std::int64_t available_ns) const noexcept {
     const double spare_ms = kUsedFrac * 1e-6 * static_cast<double>(available_ns) - excess_ms();
-    std::size_t best = quality_levels.size();
-    std::size_t fastest = 0;
-    for (std::size_t i = 0; i < quality_levels.size(); ++i) {
-      if (quality_levels[i].frame_ms < quality_levels[fastest].frame_ms) fastest = i;
-      if (expected_ms(quality_levels[i].frame_ms) > spare_ms) continue;
-      if (best == quality_levels.size() || quality_levels[i].error_k < quality_levels[best].error_k)
-        best = i;
+    const auto within = best_within(quality_levels, spare_ms);
+    if (within) return *within;
+    double fastest_ms = expected_ms(quality_levels.front().frame_ms);
+    for (const renderer::QualityLevelStats& level : quality_levels) {
+      fastest_ms = std::min(fastest_ms, expected_ms(level.frame_ms));
     }
-    return best < quality_levels.size() ? best : fastest;
+    return best_within(quality_levels, fastest_ms + kWorthlessFrac * std::abs(fastest_ms))
+        .value_or(0);
   }
 
   /// Takes note of a frame that was ready `work_ns` after its begin. `level_ms` is
@@ -53,6 +56,8 @@ class QualityPolicy {
   static constexpr std::size_t kFramesPerLate = 128;
   /// Part of the time left that a frame may use, because costs are measured no better than this.
   static constexpr double kUsedFrac = 0.92;
+  /// A frame that is late in any case is not made faster by less than this part.
+  static constexpr double kWorthlessFrac = 0.1;
   /// Weight of a frame in the fit one frame later, relative to before.
   static constexpr double kKept = 0.95;
   /// The ladder's own word (pace 1, nothing beside) counts as this many frames.
@@ -64,6 +69,18 @@ class QualityPolicy {
 
   [[nodiscard]] double expected_ms(double level_ms) const noexcept {
     return pace_ * level_ms + beside_ms_;
+  }
+
+  /// Returns the level with the least error among those that are expected to take `most_ms` at
+  /// most.
+  [[nodiscard]] std::optional<std::size_t> best_within(
+      std::span<const renderer::QualityLevelStats> quality_levels, double most_ms) const noexcept {
+    std::optional<std::size_t> best;
+    for (std::size_t i = 0; i < quality_levels.size(); ++i) {
+      if (expected_ms(quality_levels[i].frame_ms) > most_ms) continue;
+      if (!best || quality_levels[i].error_k < quality_levels[*best].error_k) best = i;
+    }
+    return best;
   }
 
   /// Returns the excess, ms, that one remembered frame in kFramesPerLate exceeds. It is not more

@@ -61,7 +61,9 @@ TEST(StabilityFrames, ZeroAreaTrianglesChangeNothing) {
 }
 
 TEST(StabilityFrames, CoincidentFacesDoNotShadeEachOther) {
-  expect_within("frame-coincident-faces", 1e-3);
+  // A device may round the depths of coincident triangles differently, which changes the width of
+  // a penumbra. A face in its own shadow would be 40 K colder.
+  expect_within("frame-coincident-faces", 0.02);
 }
 
 TEST(StabilityFrames, AFarAndTallWallDoesNotSwallowNearShadows) {

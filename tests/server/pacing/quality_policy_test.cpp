@@ -29,6 +29,22 @@ TEST(QualityPolicy, the_first_frame_goes_by_what_the_ladder_measured) {
   EXPECT_EQ(policy.choose(kQualityLevels, -1), 3U);
 }
 
+TEST(QualityPolicy, gives_no_quality_away_where_every_level_takes_about_the_same_time) {
+  // The frames of a fast device wait for the processor, whatever the level is.
+  constexpr std::array<renderer::QualityLevelStats, 4> kAlike{
+      {{2.6, 0.0}, {2.55, 0.2}, {2.5, 0.3}, {2.4, 2.0}}};
+  QualityPolicy policy;
+  EXPECT_EQ(policy.choose(kAlike, 1 * kMs), 0U);
+  for (std::size_t i = 0; i < 600; ++i) {
+    policy.finished(std::llround(2.5e6), kAlike[i % 4].frame_ms);
+  }
+  EXPECT_EQ(policy.choose(kAlike, 1 * kMs), 0U);
+  // A level that is faster by more than a tenth is worth its error.
+  constexpr std::array<renderer::QualityLevelStats, 3> kOneFaster{
+      {{2.6, 0.0}, {1.9, 0.2}, {1.8, 2.0}}};
+  EXPECT_EQ(QualityPolicy().choose(kOneFaster, 1 * kMs), 1U);
+}
+
 TEST(QualityPolicy, without_measured_times_there_is_nothing_to_shed) {
   constexpr std::array<renderer::QualityLevelStats, 1> kFullOnly{};
   QualityPolicy policy;

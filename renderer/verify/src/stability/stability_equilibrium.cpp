@@ -35,11 +35,18 @@ float flushed(float value) {
   return std::abs(value) < std::numeric_limits<float>::min() ? 0.0F : value;
 }
 
-/// Returns the surface with numbers below the normal range as zero, as devices may take them.
-SurfaceInput flushed(SurfaceInput s) {
+/// Largest divisor for which GLSL 4.50 section 4.7.1 states a precision: 2^126.
+constexpr float kMaxDivisor = 0x1p126F;
+
+/// Returns the surface as devices may take it: numbers below the normal range are zero, and so is a
+/// quotient by a divisor beyond kMaxDivisor, whose reciprocal is below the normal range.
+SurfaceInput as_devices_may_take(SurfaceInput s) {
   for (float* value : {&s.conductivity_w_m_k, &s.thickness_m, &s.emissivity_frac, &s.radiative_k,
                        &s.core_k, &s.film_w_m2_k, &s.air_k}) {
     *value = flushed(*value);
+  }
+  if (std::isfinite(s.conductivity_w_m_k) && std::abs(s.thickness_m) > kMaxDivisor) {
+    s.conductivity_w_m_k = 0.0F;
   }
   return s;
 }
@@ -232,9 +239,10 @@ class EquilibriumSweep {
     if (domain_.id == EMIT_DOMAIN_HOSTILE || domain_.id == EMIT_DOMAIN_RAW) {
       const bool is_raw = domain_.id == EMIT_DOMAIN_RAW;
       const Quartic b = is_raw ? raw(index) : quartic_of(surface(index));
-      // The case is invalid in either treatment of numbers below the normal range.
+      // The case is invalid in exact arithmetic as well as in that of a device.
       const bool nonsense =
-          clearly_invalid(b) && (is_raw || clearly_invalid(quartic_of(flushed(surface(index)))));
+          clearly_invalid(b) &&
+          (is_raw || clearly_invalid(quartic_of(as_devices_may_take(surface(index)))));
       tallies[0].add_flag(clamped, !nonsense);
       if (is_raw && !clamped) {
         // Only the relative error counts, because such coefficients give temperatures of any size.
