@@ -56,6 +56,34 @@ void resolve_daemon_scenario(const Node& root, const std::string& text, DaemonCo
   daemon.scenario = std::filesystem::absolute(*path, code).lexically_normal();
 }
 
+/// Checks that the axes of the motion simulator fit its rings.
+void check_motion(const Node& table, const MotionConfig& motion, Diagnostics& diagnostics) {
+  check_endpoint(table, "controller", motion.controller, false, diagnostics);
+  const bool has_target = motion.target_rings != TargetRings::none;
+  const std::size_t wanted = has_target ? 5 : 3;
+  if (motion.axes.size() != wanted) {
+    diagnostics.add(key_location(table, "axes"),
+                    fmt::format("'axes' has {} axes, must have {}: three rings of the unit{}",
+                                motion.axes.size(), wanted,
+                                has_target ? ", then azimuth and elevation of the target" : ""));
+  }
+  for (std::size_t i = 0; i < motion.axes.size(); ++i) {
+    const MotionAxisConfig& axis = motion.axes[i];
+    if (!(axis.min_rad < axis.max_rad)) {
+      diagnostics.add(
+          key_location(table, "axes"),
+          fmt::format("'axes': axis {} has no travel: 'min_deg' must be below 'max_deg'", i + 1));
+    } else if (!(axis.park_rad >= axis.min_rad && axis.park_rad <= axis.max_rad)) {
+      diagnostics.add(key_location(table, "axes"),
+                      fmt::format("'axes': 'park_deg' of axis {} is outside of its travel", i + 1));
+    }
+  }
+  if (has_target && motion.target_entity < 0) {
+    diagnostics.add(key_location(table, "target_entity"),
+                    "'target_entity' is missing: the target rings need the entity to point to");
+  }
+}
+
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
   Diagnostics reported_before;  // section() has reported wrong kinds
   const Node& pacing = section(root, "pacing", reported_before);
@@ -84,6 +112,9 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
   }
   check_endpoint(section(root, "metrics", reported_before), "listen", daemon.metrics.listen, true,
                  diagnostics);
+  if (daemon.motion.enabled()) {
+    check_motion(section(root, "motion", reported_before), daemon.motion, diagnostics);
+  }
   check_access(root, daemon, diagnostics);
   if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {
     std::error_code code;
@@ -148,6 +179,7 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   read_table(section(root, "source", diagnostics), source_keys(), daemon.source, diagnostics);
   read_table(section(root, "pacing", diagnostics), pacing_keys(), daemon.pacing, diagnostics);
   read_table(section(root, "trigger", diagnostics), trigger_keys(), daemon.trigger, diagnostics);
+  read_table(section(root, "motion", diagnostics), motion_keys(), daemon.motion, diagnostics);
   read_table(section(root, "clock", diagnostics), clock_keys(), daemon.clock, diagnostics);
   read_table(section(root, "realtime", diagnostics), realtime_keys(), daemon.realtime, diagnostics);
   read_table(section(root, "host", diagnostics), host_keys(), daemon.host, diagnostics);

@@ -15,8 +15,8 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-// Offsets of the fields (docs/wire.md section 3). The bytes kReservedAt..kPreviousJitterAt and
-// kReservedBehindAt..kCrcAt are zero.
+// Offsets of the fields (docs/wire.md section 3). The bytes behind kReservedAt, kReservedMotionAt
+// and kReservedBehindAt are zero.
 enum Offset : std::size_t {
   kMagicAt = 0,
   kVersionAt = 4,
@@ -65,7 +65,14 @@ enum Offset : std::size_t {
   kSensorWidthAt = 276,
   kSensorHeightAt = 280,
   kEncodedBytesAt = 284,
-  kReservedBehindAt = 288,
+  kMotionStateAt = 288,
+  kMotionFaultsAt = 289,
+  kReservedMotionAt = 290,
+  kShiftXAt = 292,
+  kShiftYAt = 296,
+  kPointingErrorAt = 300,
+  kDisplayAt = 304,
+  kReservedBehindAt = 312,
   kCrcAt = 316,
 };
 static_assert(kCrcAt + 4 == kFrameHeaderBytes);
@@ -178,6 +185,13 @@ void encode(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> o
   wire::put(to, kSensorWidthAt, header.sensor_width_px);
   wire::put(to, kSensorHeightAt, header.sensor_height_px);
   wire::put(to, kEncodedBytesAt, header.encoded_bytes);
+  wire::put(to, kMotionStateAt, static_cast<std::uint8_t>(header.motion_state));
+  wire::put(to, kMotionFaultsAt, header.motion_faults);
+  std::ranges::fill(to.subspan(kReservedMotionAt, kShiftXAt - kReservedMotionAt), std::byte{0});
+  wire::put(to, kShiftXAt, header.shift_x_px);
+  wire::put(to, kShiftYAt, header.shift_y_px);
+  wire::put(to, kPointingErrorAt, header.pointing_error_px);
+  wire::put(to, kDisplayAt, header.display_ns);
   std::ranges::fill(to.subspan(kReservedBehindAt, kCrcAt - kReservedBehindAt), std::byte{0});
   wire::put(to, kCrcAt, crc32c(to.first(kCrcAt)));
 }
@@ -253,6 +267,12 @@ HeaderFault parse_frame_header(std::span<const std::byte> bytes, FrameHeader& he
   header.sensor_width_px = wire::get<std::uint32_t>(bytes, kSensorWidthAt);
   header.sensor_height_px = wire::get<std::uint32_t>(bytes, kSensorHeightAt);
   header.encoded_bytes = wire::get<std::uint32_t>(bytes, kEncodedBytesAt);
+  header.motion_state = static_cast<MotionState>(wire::get<std::uint8_t>(bytes, kMotionStateAt));
+  header.motion_faults = wire::get<std::uint8_t>(bytes, kMotionFaultsAt);
+  header.shift_x_px = wire::get<float>(bytes, kShiftXAt);
+  header.shift_y_px = wire::get<float>(bytes, kShiftYAt);
+  header.pointing_error_px = wire::get<float>(bytes, kPointingErrorAt);
+  header.display_ns = wire::get<std::int64_t>(bytes, kDisplayAt);
 
   const std::uint64_t expected = expected_payload_bytes(header.width_px, header.height_px);
   if (expected == 0 || header.payload_bytes != expected) return HeaderFault::payload_size;

@@ -15,6 +15,7 @@
 #include "rt/counters.hpp"
 #include "rt/doorbell.hpp"
 #include "rt/histogram.hpp"
+#include "rt/motion_times.hpp"
 #include "rt/prediction_error.hpp"
 #include "rt/shortage.hpp"
 #include "rt/spsc_ring.hpp"
@@ -63,6 +64,7 @@ struct Doorbells {
   Doorbell render;
   Doorbell sender;
   Doorbell recorder;
+  Doorbell motion;
 };
 
 /// Objects that more than one agent uses: rings, counters and what is fixed after start.
@@ -91,6 +93,7 @@ struct Context {
   Counters counters;
   FrameTimes times;
   PredictionErrors prediction;
+  MotionTimes motion_times;
   FrameTrace trace;
   Doorbells bells;
   std::vector<Channel> channels;  ///< fixed before the agents run
@@ -105,17 +108,19 @@ struct Context {
   /// Memory of the entries that are kept for recorders that connect later.
   std::atomic<std::uint64_t> journal_memory_bytes{0};
 
-  SpscRing<HostInput> host_inputs{32};       // receiver -> conductor
-  SpscRing<StatusReply> replies{256};        // conductor -> receiver
-  SpscRing<RenderJob> jobs{16};              // conductor -> render
-  SpscRing<RenderDone> done{16};             // render -> conductor
-  SpscRing<PublishFrame> published{16};      // conductor -> sender
-  ByteRing journal;                          // conductor -> recorder
-  SpscRing<ClientCommand> to_sender;         // receiver -> sender
-  SpscRing<ClientReleased> from_sender;      // sender -> receiver
-  SpscRing<ResendCommand> resends{64};       // receiver -> sender
-  SpscRing<RecorderCommand> to_recorder;     // receiver -> recorder
-  SpscRing<RecorderReleased> from_recorder;  // recorder -> receiver
+  SpscRing<HostInput> host_inputs{32};         // receiver -> conductor
+  SpscRing<StatusReply> replies{256};          // conductor -> receiver
+  SpscRing<RenderJob> jobs{16};                // conductor -> render
+  SpscRing<RenderDone> done{16};               // render -> conductor
+  SpscRing<PublishFrame> published{16};        // conductor -> sender
+  SpscRing<MotionInput> motion_inputs{64};     // conductor -> motion
+  SpscRing<MotionReport> motion_reports{256};  // motion -> conductor
+  ByteRing journal;                            // conductor -> recorder
+  SpscRing<ClientCommand> to_sender;           // receiver -> sender
+  SpscRing<ClientReleased> from_sender;        // sender -> receiver
+  SpscRing<ResendCommand> resends{64};         // receiver -> sender
+  SpscRing<RecorderCommand> to_recorder;       // receiver -> recorder
+  SpscRing<RecorderReleased> from_recorder;    // recorder -> receiver
 
   Shortage of_room;    ///< on `published`: the conductor waits for the sender
   Shortage of_slots;   ///< of the source: render waits for whoever releases one
@@ -127,6 +132,7 @@ struct Context {
   EventLog sender_events{256, counters};
   EventLog recorder_events{64, counters};
   EventLog metrics_events{64, counters};
+  EventLog motion_events{64, counters};
 
  private:
   std::size_t client_places_;

@@ -9,6 +9,8 @@
 #include "emit/protocol/control.hpp"
 #include "emit/protocol/frame_header.hpp"
 #include "emit/protocol/host_frame.hpp"
+#include "motion/feedback_track.hpp"
+#include "motion/seeker_course.hpp"
 #include "pacing/run_control.hpp"
 #include "rt/connection_key.hpp"
 
@@ -95,6 +97,22 @@ struct RenderDone {
   std::int64_t render_start_ns = 0;
   std::int64_t render_end_ns = 0;
   std::int64_t readback_end_ns = 0;
+};
+
+/// Message of conductor to motion agent.
+struct MotionInput {
+  enum class Kind : std::uint8_t { pose, reset };
+  Kind kind = Kind::pose;
+  SeekerPose pose;
+  std::int64_t received_ns = 0;  ///< arrival of the pose, wall
+};
+
+/// Message of motion agent to conductor: what the axes do, with a measurement or without.
+struct MotionReport {
+  bool has_feedback = false;
+  AxisFeedback feedback;
+  protocol::MotionState state = protocol::MotionState::none;
+  std::uint8_t faults = 0;  ///< protocol::MotionFaults
 };
 
 /// Message of conductor to sender. The header lacks the fields that depend on channel and client.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "agents/motion/motion_setup.hpp"
 #include "app/replay.hpp"
 #include "emit/physics/check.hpp"
 
@@ -105,10 +106,37 @@ physics::Result<void> AgentSet::make_sender() {
   return {};
 }
 
+physics::Result<void> AgentSet::make_motion() {
+  if (!config_.motion.enabled()) {
+    return {};
+  }
+  const auto named = [this](physics::Error& error) {
+    return tl::unexpected<Error>(std::move(error).with_context(config_.file.string()));
+  };
+  auto plan = make_motion_plan(config_, scenario_, context_.channels);
+  if (!plan) {
+    return named(plan.error());
+  }
+  auto follower = TableFollower::create(plan->follower);
+  if (!follower) {
+    return named(follower.error());
+  }
+  auto port = AxesPort::open(config_.motion.controller, context_.counters);
+  if (!port) {
+    return named(port.error());
+  }
+  motion_plan_ = std::move(*plan);
+  motion_ = std::make_unique<MotionAgent>(context_, std::move(*port), std::move(*follower),
+                                          motion_plan_->follower.period_ns);
+  return {};
+}
+
 void AgentSet::make_conductor(TriggerInput* triggers) {
   Conductor::Options options;
   options.pacing = config_.pacing;
   options.canned = source().canned;
+  options.first_time_ns = config_.source.first_time_ns;
+  options.motion = motion_plan_ ? &*motion_plan_ : nullptr;
   conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers);
 }
 
@@ -118,7 +146,13 @@ physics::Result<void> AgentSet::make_runners() {
   sender_runner_ = std::make_unique<AgentRunner>(sender(), context_.clock);
   conductor_runner_ = std::make_unique<AgentRunner>(conductor(), context_.clock);
   receiver_runner_ = std::make_unique<AgentRunner>(receiver(), context_.clock);
+  if (motion_) {
+    motion_runner_ = std::make_unique<AgentRunner>(*motion_, context_.clock);
+  }
   for (AgentRunner* runner : serving_order()) {
+    if (runner == nullptr) {
+      continue;
+    }
     plan_realtime(*runner);
     if (stepped_ && !runner->start_stepped()) {
       return physics::make_error(ErrorCode::io,
@@ -126,6 +160,9 @@ physics::Result<void> AgentSet::make_runners() {
     }
   }
   for (AgentRunner* runner : label_order()) {
+    if (runner == nullptr) {
+      continue;
+    }
     duty_cycles_.emplace_back(runner->agent().name(), &runner->duty_cycle());
   }
   return {};
@@ -134,7 +171,7 @@ physics::Result<void> AgentSet::make_runners() {
 std::string_view AgentSet::start_serving() {
   EMIT_CHECK(is_made());
   for (AgentRunner* runner : serving_order()) {
-    if (!runner->start_thread()) {
+    if (runner != nullptr && !runner->start_thread()) {
       return runner->agent().name();
     }
   }
@@ -145,7 +182,7 @@ int AgentSet::step() {
   EMIT_CHECK(is_made());
   int work = 0;
   for (AgentRunner* runner : step_order()) {
-    work += runner->step();
+    work += runner != nullptr ? runner->step() : 0;
   }
   return work;
 }

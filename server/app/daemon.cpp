@@ -146,6 +146,9 @@ physics::Result<void> DaemonImpl::make_agents() {
   if (auto made = agents_.make_sender(); !made) {
     return made;
   }
+  if (auto made = agents_.make_motion(); !made) {
+    return made;
+  }
   agents_.make_conductor(triggers_.get());
   log_start(names);
   if (auto made = agents_.make_runners(); !made) {
@@ -155,9 +158,10 @@ physics::Result<void> DaemonImpl::make_agents() {
 }
 
 physics::Result<void> DaemonImpl::open_endpoint(const ProcessNames& names) {
-  const MetricsEndpoint::Parts parts{context_,  liveness_,          log_.board(),
-                                     realtime_, agents_.receiver(), agents_.duty_cycles(),
-                                     ptp_.get()};
+  const MetricsEndpoint::Parts parts{context_,           liveness_,
+                                     log_.board(),       realtime_,
+                                     agents_.receiver(), agents_.duty_cycles(),
+                                     ptp_.get(),         config_.motion.enabled()};
   auto opened = MetricsEndpoint::open(config_, parts,
                                       {{"version", kVersion},
                                        {"commit", kCommit},

@@ -164,7 +164,8 @@ void DaemonLog::take_events() {
   bool warned = false;
   for (EventLog* events :
        {&context_.conductor_events, &context_.receiver_events, &context_.render_events,
-        &context_.sender_events, &context_.recorder_events, &context_.metrics_events}) {
+        &context_.sender_events, &context_.recorder_events, &context_.metrics_events,
+        &context_.motion_events}) {
     while (const Event* event = events->ring().front()) {
       const EventText line = describe(*event);
       board_.note(*event);

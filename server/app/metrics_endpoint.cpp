@@ -59,6 +59,7 @@ MetricsEndpoint::MetricsEndpoint(const Parts& parts, MetricsText::Labels build) 
   sources_.counters = &parts_.context.counters;
   sources_.times = &parts_.context.times;
   sources_.prediction = &parts_.context.prediction;
+  sources_.motion = parts_.motion ? &parts_.context.motion_times : nullptr;
   sources_.realtime = &parts_.realtime;
   sources_.clients = parts_.context.clients();
   sources_.board = &parts_.board;

@@ -31,6 +31,7 @@ class MetricsEndpoint {
     const Receiver& receiver;            ///< it decides which peers may ask
     const NamedDutyCycles& duty_cycles;  ///< of all agents; fixed by now
     const PtpMonitor* ptp;               ///< null: nobody asks ptp4l
+    bool motion = false;                 ///< a motion simulator is driven
   };
 
   /// Opens metrics.listen and starts the thread; null when metrics.listen is empty.

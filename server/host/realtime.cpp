@@ -25,8 +25,8 @@ namespace {
 
 /// Difference between the conductor's priority and that of an agent. An agent without an entry is
 /// not real-time.
-constexpr std::array<std::pair<std::string_view, int>, 4> kBelow{
-    {{"conductor", 0}, {"receiver", 1}, {"sender", 2}, {"render", 3}}};
+constexpr std::array<std::pair<std::string_view, int>, 5> kBelow{
+    {{"conductor", 0}, {"motion", 0}, {"receiver", 1}, {"sender", 2}, {"render", 3}}};
 
 constexpr std::size_t kPageBytes = 4096;
 /// Deeper than any agent's loop goes.
@@ -137,7 +137,7 @@ RealtimeReport ask_for_realtime(const config::RealtimeConfig& config) {
     const bool granted = why.empty();
     report.add({"lock_memory", "", granted, std::move(why)});
   }
-  for (const char* agent : {"conductor", "receiver", "sender", "render", "recorder"}) {
+  for (const char* agent : {"conductor", "motion", "receiver", "sender", "render", "recorder"}) {
     const ThreadRealtime wish = thread_realtime(config, agent);
     if (!wish.fifo && wish.cpus.empty()) continue;
     std::optional<int> cpus;

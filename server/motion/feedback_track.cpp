@@ -30,18 +30,30 @@ bool FeedbackTrack::add(const AxisFeedback& feedback) noexcept {
   return true;
 }
 
+FeedbackTrack::State FeedbackTrack::predicted(std::int64_t time_ns) const noexcept {
+  const AxisFeedback& last = sample(count_ - 1);
+  // Find the rates of a little earlier.
+  std::size_t i = count_ - 1;
+  while (i > 0 && last.time_ns - sample(i - 1).time_ns <= kAccelerationNs) --i;
+  const AxisFeedback& earlier = sample(i);
+  const double span_s = seconds(last.time_ns - earlier.time_ns);
+  const double after_s = seconds(time_ns - last.time_ns);
+  // The change of the rates is the acceleration in the middle of the span.
+  const double gain_s = span_s > 0.0 ? 0.5 * after_s * after_s / span_s : 0.0;
+  return {{last.angles.unit_rad + after_s * last.unit_rates_rad_s +
+               gain_s * (last.unit_rates_rad_s - earlier.unit_rates_rad_s),
+           last.angles.target_rad + after_s * last.target_rates_rad_s +
+               gain_s * (last.target_rates_rad_s - earlier.target_rates_rad_s)},
+          time_ns > last.time_ns};
+}
+
 std::optional<FeedbackTrack::State> FeedbackTrack::at(std::int64_t time_ns,
                                                       std::int64_t horizon_ns) const noexcept {
   if (count_ == 0 || time_ns < sample(0).time_ns) return std::nullopt;
   const AxisFeedback& last = sample(count_ - 1);
-  // Go on at the latest rates.
   if (time_ns >= last.time_ns) {
-    const std::int64_t after_ns = time_ns - last.time_ns;
-    if (after_ns > horizon_ns) return std::nullopt;
-    const double after_s = seconds(after_ns);
-    return State{{last.angles.unit_rad + after_s * last.unit_rates_rad_s,
-                  last.angles.target_rad + after_s * last.target_rates_rad_s},
-                 after_ns > 0};
+    if (time_ns - last.time_ns > horizon_ns) return std::nullopt;
+    return predicted(time_ns);
   }
   // Find the two measurements around the instant, from the latest back: that is where it mostly is.
   std::size_t i = count_ - 1;

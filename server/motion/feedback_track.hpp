@@ -23,6 +23,9 @@ struct AxisFeedback {
 class FeedbackTrack {
  public:
   static constexpr std::size_t kSamples = 64;
+  /// Accelerations are the change of the rates over this time, so that noise matters little. A
+  /// controller need not measure them.
+  static constexpr std::int64_t kAccelerationNs = 16'000'000;
 
   /// State of the axes at an instant.
   struct State {
@@ -33,9 +36,10 @@ class FeedbackTrack {
   /// Adds a measurement. Returns false and drops it if it is not later than the latest one.
   bool add(const AxisFeedback& feedback) noexcept;
 
-  /// Returns the angles at an instant: cubic between two measurements, by the latest rates after
-  /// the last one. Returns nothing if there is no measurement, if the instant is before the oldest
-  /// one that is kept, or if it is more than `horizon_ns` after the latest one.
+  /// Returns the angles at an instant: cubic between two measurements; after the last one by its
+  /// rates and the accelerations that the rates of the latest kAccelerationNs show. Returns nothing
+  /// if there is no measurement, if the instant is before the oldest one that is kept, or if it is
+  /// more than `horizon_ns` after the latest one.
   [[nodiscard]] std::optional<State> at(std::int64_t time_ns,
                                         std::int64_t horizon_ns) const noexcept;
 
@@ -46,6 +50,8 @@ class FeedbackTrack {
   void clear() noexcept { count_ = 0; }
 
  private:
+  /// Returns the state after the latest measurement.
+  [[nodiscard]] State predicted(std::int64_t time_ns) const noexcept;
   /// Returns a kept measurement, the oldest first.
   [[nodiscard]] const AxisFeedback& sample(std::size_t i) const noexcept {
     return samples_[(first_ + i) % kSamples];

@@ -81,6 +81,8 @@ PoseTrack::Motion PoseTrack::motion_at_newest() const noexcept {
     motion.angular_rate_body_rad_s = last.rates->angular_rate_body_rad_s;
     if (before != nullptr && before->rates) {
       motion.acceleration_m_s2 = (motion.velocity_m_s - before->rates->velocity_world_m_s) / dt_s;
+      motion.angular_acceleration_body_rad_s2 =
+          (motion.angular_rate_body_rad_s - before->rates->angular_rate_body_rad_s) / dt_s;
     }
     return motion;
   }
@@ -99,6 +101,11 @@ PoseTrack::Motion PoseTrack::motion_at_newest() const noexcept {
         (before->pose.position_world_m - first->pose.position_world_m) / dt_before_s;
     motion.acceleration_m_s2 = (mean_velocity - velocity_before) * (2.0 / (dt_s + dt_before_s));
     motion.velocity_m_s = mean_velocity + motion.acceleration_m_s2 * (0.5 * dt_s);
+    const glm::dvec3 rate_before =
+        angular_rate(first->pose.world_from_body, before->pose.world_from_body, dt_before_s);
+    motion.angular_acceleration_body_rad_s2 =
+        (motion.angular_rate_body_rad_s - rate_before) * (2.0 / (dt_s + dt_before_s));
+    motion.angular_rate_body_rad_s += motion.angular_acceleration_body_rad_s2 * (0.5 * dt_s);
   }
   return motion;
 }
@@ -121,8 +128,10 @@ PoseSample PoseTrack::sample(std::int64_t sim_time_ns, std::int64_t horizon_ns) 
     out.pose.position_world_m =
         last.pose.position_world_m +
         (motion.velocity_m_s + motion.acceleration_m_s2 * (0.5 * dt_s)) * dt_s;
-    out.pose.world_from_body =
-        turned(last.pose.world_from_body, motion.angular_rate_body_rad_s, dt_s);
+    out.pose.world_from_body = turned(
+        last.pose.world_from_body,
+        motion.angular_rate_body_rad_s + motion.angular_acceleration_body_rad_s2 * (0.5 * dt_s),
+        dt_s);
     return out;
   }
   for (std::size_t i = count_ - 1;; --i) {

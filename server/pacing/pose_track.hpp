@@ -32,9 +32,9 @@ struct PoseSample {
 /// Recent poses of one body, and where it is at an instant.
 ///
 /// Between received poses: linear in position, shortest arc in attitude. Beyond the newest:
-/// p + v t + a t^2 / 2 and q exp(omega t / 2), the dead reckoning "RVW" of DIS; v and omega as
-/// given, else differenced, a always differenced. Before the oldest: the oldest. Thread: one owner.
-/// Real time: RT-safe.
+/// p + v t + a t^2 / 2 and a turn by omega t + alpha t^2 / 2. v and omega are as given, else
+/// differenced; a and alpha are always differenced. Before the oldest: the oldest. Thread: one
+/// owner. Real time: RT-safe.
 class PoseTrack {
  public:
   static constexpr std::size_t kHistory = 8;
@@ -58,6 +58,7 @@ class PoseTrack {
     glm::dvec3 velocity_m_s{0.0};
     glm::dvec3 acceleration_m_s2{0.0};
     glm::dvec3 angular_rate_body_rad_s{0.0};
+    glm::dvec3 angular_acceleration_body_rad_s2{0.0};
   };
   /// index 0 = oldest.
   [[nodiscard]] const TimedPose& at(std::size_t index) const noexcept {

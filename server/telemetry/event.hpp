@@ -30,6 +30,7 @@ enum class EventKind : std::uint8_t {
   peer_refused,             ///< text = address, a = PeerRefusal
   secured,                  ///< a = connection, text = names in the peer's certificate
   host_session,             ///< text = address
+  motion_changed,           ///< a = protocol::MotionState, b = protocol::MotionFaults
 };
 
 /// Why a peer is turned away before anything it says is looked at.

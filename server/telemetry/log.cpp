@@ -207,6 +207,23 @@ EventText describe_refusal(const Event& event, const std::string& text) {
                                    event.a < kWhy.size() ? kWhy[event.a] : "?", text));
 }
 
+/// Returns the text of a change of what the motion simulator does.
+EventText describe_motion(const Event& event) {
+  static constexpr std::array kStates{"none",      "waiting",   "parked", "parking",
+                                      "capturing", "following", "fault"};
+  static constexpr std::array kFaults{"no_feedback", "no_host", "interlock",
+                                      "limit",       "lock",    "clock"};
+  std::string faults;
+  for (std::size_t i = 0; i < kFaults.size(); ++i) {
+    if ((event.b >> i & 1U) != 0) faults += (faults.empty() ? "" : ",") + std::string(kFaults[i]);
+  }
+  const std::string text = fmt::format("event=motion state={} faults={}",
+                                       event.a < kStates.size() ? kStates[event.a] : "?",
+                                       faults.empty() ? "none" : faults);
+  // Limits and locks come and go with every manoeuvre.
+  return faults.empty() ? info(text) : distinct_warn(text);
+}
+
 /// Returns the text of an event after which frames, journal or weather lack something.
 EventText describe_loss(const Event& event, const std::string& text) {
   switch (event.kind) {
@@ -282,6 +299,8 @@ EventText describe(const Event& event) {
       return distinct_warn(
           "event=trigger_silent effect=\"no frames until the next trigger\" remedy=\"the sync "
           "source, its link, trigger.peer\"");
+    case EventKind::motion_changed:
+      return describe_motion(event);
     case EventKind::host_session:
       return info(fmt::format("event=host_session peer={}", text));
   }

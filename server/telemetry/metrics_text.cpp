@@ -93,6 +93,26 @@ void add_prediction(MetricsText& out, const PredictionErrors& errors) {
   out.sample({}, errors.max_attitude_rad.load(std::memory_order_relaxed));
 }
 
+void add_motion(MetricsText& out, const MotionTimes& times) {
+  out.family("motion_late_seconds", "histogram",
+             "Time from the instant at which a command of the motion simulator was due to sending");
+  out.histogram({}, times.late);
+  out.family("motion_feedback_age_seconds", "histogram",
+             "Age of measurements of the motion simulator when they arrive");
+  out.histogram({}, times.age);
+  out.family("motion_axis_error_radians", "histogram",
+             "Difference of measured and commanded angle, of the axis with the largest one");
+  out.histogram({}, times.error.histogram);
+  out.family("motion_axis_error_max_radians", "gauge", "Largest motion_axis_error_radians so far");
+  out.sample({}, times.error.max.load(std::memory_order_relaxed));
+  out.family("motion_pointing_error_pixels", "histogram",
+             "Error of direction in the centre of a projected image, after its shift");
+  out.histogram({}, times.pointing.histogram);
+  out.family("motion_pointing_error_max_pixels", "gauge",
+             "Largest motion_pointing_error_pixels so far");
+  out.sample({}, times.pointing.max.load(std::memory_order_relaxed));
+}
+
 void add_realtime(MetricsText& out, const RealtimeReport& report) {
   out.family("realtime_granted", "gauge",
              "1 where the host grants what [realtime] asks for, 0 where it refuses; nothing where "
@@ -232,6 +252,7 @@ std::string metrics_text(const MetricsSources& sources, const MetricsMoment& mom
   add_counters(out, *sources.counters);
   add_times(out, *sources.times);
   if (sources.prediction != nullptr) add_prediction(out, *sources.prediction);
+  if (sources.motion != nullptr) add_motion(out, *sources.motion);
   add_agents(out, sources, moment);
   if (sources.realtime != nullptr) add_realtime(out, *sources.realtime);
   if (moment.ptp) add_ptp(out, *moment.ptp);

@@ -12,6 +12,7 @@
 #include "rt/client_counts.hpp"
 #include "rt/counters.hpp"
 #include "rt/histogram.hpp"
+#include "rt/motion_times.hpp"
 #include "rt/prediction_error.hpp"
 #include "telemetry/duty_cycle.hpp"
 #include "telemetry/ptp_status.hpp"
@@ -45,6 +46,7 @@ struct MetricsSources {
   const Counters* counters = nullptr;
   const FrameTimes* times = nullptr;
   const PredictionErrors* prediction = nullptr;  ///< null: left out
+  const MotionTimes* motion = nullptr;           ///< likewise
   const RealtimeReport* realtime = nullptr;      ///< likewise
   std::span<const ClientCounts> clients;
   const StatusBoard* board = nullptr;

@@ -162,6 +162,53 @@ TEST_F(ConfigTest, timing_sections_are_read_printed_and_checked) {
             "d.toml:4:12: 'priority' is 3, must be 4 .. 99");
 }
 
+const std::string kRing =
+    "{ min_deg = -90, max_deg = 90, rate_deg_s = 180, acceleration_deg_s2 = 1800 }";
+
+/// Section of a motion simulator with so many axes.
+std::string motion_section(int axes, const std::string& more = "") {
+  std::string out = kCanned + "[motion]\ncontroller = \"10.0.0.5:7010\"\n" + more + "axes = [";
+  for (int i = 0; i < axes; ++i) out += kRing + ", ";
+  return out + "]\n";
+}
+
+TEST_F(ConfigTest, a_motion_simulator_is_read_printed_and_checked) {
+  EXPECT_FALSE(daemon(kCanned)->motion.enabled());
+  const auto first = daemon(motion_section(
+      5,
+      "unit_rings = \"pitch-yaw-roll\"\ntarget_rings = \"elevation-azimuth\"\n"
+      "target_entity = 7\nlab_deg = [90, 0, 0]\nrate_hz = 2000\nfeedback_timeout_ms = 5\n"
+      "host_timeout_ms = 50\ncontroller_timeout_ms = 30\nsoft_frac = 0.5\n"));
+  ASSERT_TRUE(first.has_value()) << first.error().text;
+  const MotionConfig& motion = first->motion;
+  EXPECT_TRUE(motion.enabled());
+  EXPECT_EQ(motion.unit_rings, "pitch-yaw-roll");
+  EXPECT_EQ(motion.target_rings, TargetRings::elevation_azimuth);
+  EXPECT_EQ(motion.target_entity, 7);
+  ASSERT_EQ(motion.axes.size(), 5U);
+  EXPECT_NEAR(motion.axes[4].rate_rad_s, 3.14159265, 1e-8);
+  EXPECT_NEAR(motion.lab_rad[0], 1.57079633, 1e-8);
+  EXPECT_EQ(motion.feedback_timeout_ns, 5'000'000);
+  EXPECT_EQ(motion.controller_timeout_ms, 30U);
+  const std::string printed = print_daemon(*first);
+  const auto second = daemon(printed);
+  ASSERT_TRUE(second.has_value()) << second.error().text;
+  EXPECT_EQ(print_daemon(*second), printed);
+
+  EXPECT_THAT(daemon_error(motion_section(5)),
+              ::testing::HasSubstr("'axes' has 5 axes, must have 3: three rings of the unit"));
+  EXPECT_THAT(
+      daemon_error(motion_section(3, "target_rings = \"azimuth-elevation\"\ntarget_entity = 1\n")),
+      ::testing::HasSubstr("'axes' has 3 axes, must have 5"));
+  EXPECT_THAT(daemon_error(motion_section(5, "target_rings = \"azimuth-elevation\"\n")),
+              ::testing::HasSubstr("'target_entity' is missing"));
+  EXPECT_THAT(daemon_error(kCanned + "[motion]\ncontroller = \"table\"\n"),
+              ::testing::HasSubstr("'controller' is 'table', must be address:port"));
+  EXPECT_THAT(daemon_error(kCanned + "[motion]\ncontroller = \"a:1\"\naxes = [ { min_deg = 5, "
+                                     "max_deg = 5, rate_deg_s = 1, acceleration_deg_s2 = 1 } ]\n"),
+              ::testing::HasSubstr("axis 1 has no travel"));
+}
+
 TEST_F(ConfigTest, an_unknown_scenario_is_reported_where_it_is_named) {
   EXPECT_THAT(daemon_error("scenario = \"no_such_scenario\"\n"),
               ::testing::StartsWith(

@@ -32,7 +32,8 @@ class ConductorRig {
  public:
   explicit ConductorRig(config::PacingConfig pacing = {},
                         std::optional<scene::ScenarioDesc> scenario = std::nullopt,
-                        bool canned = false)
+                        bool canned = false, const server::MotionPlan* motion = nullptr,
+                        std::int64_t first_time_ns = 0)
       : scenario_(std::move(scenario)),
         tracks_(scenario_),
         context_(clock, 1u << 20, 4),
@@ -41,7 +42,7 @@ class ConductorRig {
                   return physics::Result<std::unique_ptr<server::FrameSource>>(
                       std::make_unique<ScriptedSource>(script, 8, 4, 7));
                 }),
-        conductor_(context_, tracks_, options(pacing, canned),
+        conductor_(context_, tracks_, options(pacing, canned, motion, first_time_ns),
                    pacing.mode == config::PacingMode::trigger ? &triggers_ : nullptr) {
     EXPECT_TRUE(render_.on_start());
     auto table = *server::make_channels(std::nullopt, *render_.source_info());
@@ -138,8 +139,12 @@ class ConductorRig {
   std::vector<server::StatusReply> replies;
 
  private:
-  static server::Conductor::Options options(config::PacingConfig pacing, bool canned) {
+  static server::Conductor::Options options(config::PacingConfig pacing, bool canned,
+                                            const server::MotionPlan* motion,
+                                            std::int64_t first_time_ns) {
     server::Conductor::Options out;
+    out.first_time_ns = first_time_ns;
+    out.motion = motion;
     out.canned = canned;
     out.pacing = pacing;
     return out;

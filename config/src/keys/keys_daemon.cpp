@@ -62,8 +62,9 @@ const KeyTable<PacingConfig>& pacing_keys() {
           "Poses are extrapolated at most this far. Beyond it the frame is flagged stale."),
       nanoseconds<PacingConfig>("display_delay_ms", "ms", 1e6, between(0, 60000),
                                 EMIT_FIELD(display_delay_ns),
-                                "ig-clock, trigger: poses are predicted to this time after the "
-                                "start of the slot. It is at most `horizon_ms`."),
+                                "Poses (ig-clock, trigger) and axes of `[motion]` are predicted "
+                                "to this time after the slot begins or the pose comes. It is "
+                                "at most `horizon_ms`."),
   };
   return keys;
 }
@@ -97,11 +98,11 @@ const KeyTable<RealtimeConfig>& realtime_keys() {
                              std::vector<std::pair<std::string, SchedulerKind>>{
                                  {"other", SchedulerKind::other}, {"fifo", SchedulerKind::fifo}},
                              EMIT_FIELD(scheduler),
-                             "fifo: conductor, receiver, sender and render run as real-time "
-                             "threads (SCHED_FIFO). It needs LimitRTPRIO."),
-      integer<RealtimeConfig>(
-          "priority", "", 4, 99, EMIT_FIELD(priority),
-          "fifo: priority of the conductor. Receiver, sender and render have 1, 2 and 3 less."),
+                             "fifo: conductor, motion, receiver, sender and render run as "
+                             "real-time threads (SCHED_FIFO). It needs LimitRTPRIO."),
+      integer<RealtimeConfig>("priority", "", 4, 99, EMIT_FIELD(priority),
+                              "fifo: priority of conductor and motion. Receiver, sender and render "
+                              "have 1, 2 and 3 less."),
       text<RealtimeConfig>("cpus", EMIT_FIELD(cpus),
                            "Cores of agents, such as `conductor=2, receiver=2, sender=3, "
                            "render=4-7`. The others run on any core."),

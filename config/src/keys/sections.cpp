@@ -71,6 +71,10 @@ const std::vector<SectionDoc>& daemon_sections() {
       section_doc("pacing", false, "Time at which a frame is due.", pacing_keys(), PacingConfig{}),
       section_doc("trigger", false, "The external sync source of `pacing.mode = \"trigger\"`.",
                   trigger_keys(), TriggerConfig{}),
+      section_doc("motion", false,
+                  "The flight motion simulator that emitd drives "
+                  "([motion.md](../server/docs/motion.md)).",
+                  motion_keys(), MotionConfig{}),
       section_doc("clock", false, "Source of the clock's time.", clock_keys(), ClockConfig{}),
       section_doc("realtime", false,
                   "Real-time settings of the agents. `deploy/scripts/check_host.sh` shows what the "

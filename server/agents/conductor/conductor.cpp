@@ -16,7 +16,11 @@ Conductor::Conductor(Context& context, const ScenarioTracks& scenario, const Opt
       journal_(context),
       ledger_(context),
       entities_(scenario),
-      slots_(make_slot_source(context, options.pacing, triggers)) {}
+      slots_(make_slot_source(context, options.pacing, triggers)) {
+  if (options.motion != nullptr) {
+    motion_.emplace(context, scenario, *options.motion);
+  }
+}
 
 bool Conductor::on_start() noexcept {
   start_run(context_.clock.tai_ns());
@@ -35,6 +39,9 @@ int Conductor::wait_fd() const noexcept {
 int Conductor::do_work(std::int64_t now_ns) noexcept {
   if (slots_ && !draining()) {
     slots_->poll(now_ns);
+  }
+  if (motion_) {
+    motion_->take_reports();
   }
   int work = take_images_and_slots(now_ns);
   if (draining()) {
@@ -63,6 +70,9 @@ void Conductor::start_run(std::int64_t now_ns) noexcept {
   last_sim_time_ns_ = 0;
   issued_any_ = false;
   slot_policy_.reset();
+  if (motion_) {
+    motion_->start_run();
+  }
   context_.run_id.store(run_id, std::memory_order_relaxed);
   journal_.run_start(run_id, now_ns);
   context_.conductor_events.push(EventKind::run_started, run_id);
@@ -123,8 +133,9 @@ void Conductor::issue_slot() noexcept {
 }
 
 void Conductor::show_start(RenderJob& job, FrameLedger::Issued& issued) const noexcept {
-  job.request.sim_time_ns = 0;
-  job.request.sensor_pose = scenario_.sensor_at(0);
+  // The surface is warmed up for this instant.
+  job.request.sim_time_ns = options_.first_time_ns;
+  job.request.sensor_pose = scenario_.sensor_at(options_.first_time_ns);
   // The frame says that no host steers it, unless it is a canned one, which no pose would change.
   issued.header.flags |= options_.canned ? 0U : protocol::kFlagStale;
 }
@@ -154,6 +165,11 @@ void Conductor::issue(RenderJob& job, FrameLedger::Issued& issued, bool is_step)
   job.channels = due_channels(context_.channels, ledger_.next_number());
   job.request.window_px = window_around(context_.channels, job.channels);
   job.request.thermal_time_ns = control_.thermal_time_ns(job.request.sim_time_ns, is_step);
+  if (motion_) {
+    const std::int64_t begin_ns =
+        slots_ ? issued.header.slot_begin_ns : issued.header.host_received_ns;
+    motion_->place(job, issued, begin_ns + options_.pacing.display_delay_ns);
+  }
   last_sim_time_ns_ = job.request.sim_time_ns;
   issued_any_ = true;
 
@@ -238,7 +254,10 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
   }
   const bool late_for_slot = slots_ && slot_policy_.finished();
   const bool has_deadline = !slots_ || slots_->has_deadlines();
-  const FrameLedger::Issued& issued = ledger_.oldest();
+  FrameLedger::Issued& issued = ledger_.oldest();
+  if (motion_) {
+    motion_->finish(issued);
+  }
   ledger_.fill_image(*frame, done,
                      late_for_slot || (has_deadline && is_past_deadline(issued.header.deadline_ns,
                                                                         done.readback_end_ns)));
@@ -259,6 +278,9 @@ bool Conductor::publish_repeat(std::int64_t now_ns) noexcept {
   frame->header.deadline_ns = slot.deadline_ns;
   frame->header.slot_begin_ns = slot.begin_ns;
   frame->header.trigger_number = slot.trigger_number;
+  if (motion_) {
+    motion_->finish_repeat(frame->header, slot.begin_ns + options_.pacing.display_delay_ns);
+  }
   const FrameHeader header = frame->header;  // the ring's element is the sender's after commit()
   hand_over(header);
   journal_.frame(header, ledger_.shown_for_journal(), false, {}, now_ns);
@@ -283,6 +305,7 @@ void Conductor::count_flags(std::uint32_t flags) noexcept {
   count(protocol::kFlagRepeated, Counter::frames_repeated);
   count(protocol::kFlagStale, Counter::frames_stale);
   count(protocol::kFlagExtrapolated, Counter::frames_extrapolated);
+  count(protocol::kFlagMotionFault, Counter::frames_motion_fault);
 }
 
 void Conductor::record_times(const FrameHeader& header) noexcept {

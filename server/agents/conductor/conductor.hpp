@@ -3,11 +3,13 @@
 #include <array>
 #include <atomic>
 #include <memory>
+#include <optional>
 
 #include "agents/agent.hpp"
 #include "agents/conductor/conductor_journal.hpp"
 #include "agents/conductor/entity_book.hpp"
 #include "agents/conductor/frame_ledger.hpp"
+#include "agents/conductor/motion_view.hpp"
 #include "agents/conductor/slot_source.hpp"
 #include "agents/context.hpp"
 #include "emit/config/daemon_config.hpp"
@@ -27,7 +29,9 @@ class Conductor final : public Agent {
  public:
   struct Options {
     config::PacingConfig pacing;
-    bool canned = false;  ///< frames carry kFlagCanned
+    bool canned = false;                 ///< frames carry kFlagCanned
+    const MotionPlan* motion = nullptr;  ///< the motion simulator, where there is one
+    std::int64_t first_time_ns = 0;      ///< simulation time that is shown before the first pose
   };
   /// @param triggers  where pacing mode trigger reads its triggers, on the agent's thread; that
   ///                  mode needs it
@@ -96,6 +100,7 @@ class Conductor final : public Agent {
   ConductorJournal journal_;
   FrameLedger ledger_;
   EntityBook entities_;
+  std::optional<MotionView> motion_;
   std::unique_ptr<SlotSource> slots_;  // null: host-step
   SlotPolicy slot_policy_;
   RunControl control_;

@@ -99,6 +99,9 @@ void Conductor::store(const HostFrameData& frame) noexcept {
   for (const EntityStateData& state : frame.entity_span()) {
     entities_.store(state, frame.sim_time_ns, !slots_);
   }
+  if (motion_) {
+    motion_->take_pose(frame);
+  }
   if (frame.environment) {
     store_weather(*frame.environment, frame.sim_time_ns);
   }

@@ -40,7 +40,7 @@ void FrameLedger::issue(RenderJob& job, Issued& issued) noexcept {
   ++in_work_;
 }
 
-const FrameLedger::Issued& FrameLedger::oldest() const noexcept {
+FrameLedger::Issued& FrameLedger::oldest() noexcept {
   EMIT_DCHECK(!idle());
   return issued_[first_];
 }

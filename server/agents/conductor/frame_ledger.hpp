@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <glm/ext/matrix_double3x3.hpp>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,13 @@ class FrameLedger {
     protocol::FrameHeader header;
     std::int64_t thermal_time_ns = 0;
     bool entities_behind = false;  ///< more entities moved than a frame takes
+    /// Attitudes of a frame with a motion simulator, and what was wrong when it was issued.
+    struct Motion {
+      glm::dmat3 world_from_seeker{1.0};
+      glm::dmat3 world_from_rendered{1.0};
+      std::uint8_t faults = 0;  ///< protocol::MotionFaults
+    };
+    Motion motion;
     std::uint32_t entity_count = 0;
     std::array<renderer::EntityUpdate, protocol::kMaxEntitiesPerFrame> entities;
     [[nodiscard]] std::span<const renderer::EntityUpdate> entity_span() const noexcept {
@@ -46,7 +54,7 @@ class FrameLedger {
   void issue(RenderJob& job, Issued& issued) noexcept;
   /// Returns the frame whose image comes next.
   /// @pre !idle()
-  [[nodiscard]] const Issued& oldest() const noexcept;
+  [[nodiscard]] Issued& oldest() noexcept;
 
   /// Writes the frame of oldest() with its image, and keeps it for repetition.
   /// @pre !idle()

@@ -105,6 +105,7 @@ void print_losses(std::FILE* out, const client::ReceiveCounters& c, const Stream
              report.flagged(protocol::kFlagStale), report.flagged(protocol::kFlagDegraded),
              report.flagged(protocol::kFlagExtrapolated), report.flagged(protocol::kFlagNonFinite),
              report.flagged(protocol::kFlagClamped));
+  fmt::print(out, "{}", report.motion_line());
 }
 
 /// Exit code of arguments that make no sense together, after a message; kExitOk when they do.
@@ -359,6 +360,7 @@ Json Reception::json() const {
   json.set("sent_pixel_bytes", report_.sent_pixel_bytes());
   json.set("error_correction", to_string(terms_.fec)).set("resend", terms_.resend);
   json.set("counters", counters_json(stream_.counters())).set("flags", report_.flags_json());
+  json.set("motion", report_.motion_json());
   json.set("unflagged_gaps", report_.unflagged_gaps());
   json.set("every_nth", terms_.every_nth).set("reconnects", stream_.reconnects());
   json.set("runs", report_.runs());

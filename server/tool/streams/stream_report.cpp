@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <cmath>
 
 #include "tool/support/console.hpp"
 
@@ -14,7 +15,7 @@ struct FlagName {
   protocol::FrameFlags flag;
   const char* name;
 };
-constexpr std::array<FlagName, 15> kFlagNames{{{protocol::kFlagLate, "late"},
+constexpr std::array<FlagName, 16> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagRepeated, "repeated"},
                                                {protocol::kFlagStale, "stale"},
                                                {protocol::kFlagDegraded, "degraded"},
@@ -28,7 +29,8 @@ constexpr std::array<FlagName, 15> kFlagNames{{{protocol::kFlagLate, "late"},
                                                {protocol::kFlagTimeUnset, "time_unset"},
                                                {protocol::kFlagTriggerFault, "trigger_fault"},
                                                {protocol::kFlagCorrupt, "corrupt"},
-                                               {protocol::kFlagLostBefore, "lost_before"}}};
+                                               {protocol::kFlagLostBefore, "lost_before"},
+                                               {protocol::kFlagMotionFault, "motion_fault"}}};
 
 }  // namespace
 
@@ -55,6 +57,14 @@ void StreamReport::add(const client::ReceivedFrame& frame) {
     flag_counts_[bit] += (header.flags >> bit) & 1U;
   }
 
+  motion_frames_ += header.motion_state != protocol::MotionState::none ? 1U : 0U;
+  if (header.motion_state == protocol::MotionState::following && header.motion_faults == 0 &&
+      header.display_ns != 0 && std::isfinite(header.pointing_error_px)) {
+    const double error_px = header.pointing_error_px;
+    pointing_px_.add(error_px);
+    pointing_squares_px2_ += error_px * error_px;
+  }
+
   const auto add_span = [](Samples& samples, std::int64_t from_ns, std::int64_t to_ns) {
     if (from_ns > 0 && to_ns > 0) samples.add(1e-6 * static_cast<double>(to_ns - from_ns));
   };
@@ -75,6 +85,32 @@ void StreamReport::add(const client::ReceivedFrame& frame) {
 
 std::uint64_t StreamReport::flagged(protocol::FrameFlags flag) const {
   return flag_counts_[static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(flag)))];
+}
+
+std::string StreamReport::motion_line() const {
+  if (motion_frames_ == 0) return {};
+  const std::string pointing =
+      pointing_px_.empty()
+          ? std::string("no pointing error is known")
+          : fmt::format(
+                "pointing error RMS {:.4f}  p99 {:.4f}  max {:.4f} px  ({} frames)",
+                std::sqrt(pointing_squares_px2_ / static_cast<double>(pointing_px_.count())),
+                pointing_px_.percentile(0.99), pointing_px_.max(), pointing_px_.count());
+  return fmt::format("motion simulator: {} of {} frames flagged; {}\n",
+                     flagged(protocol::kFlagMotionFault), motion_frames_, pointing);
+}
+
+Json StreamReport::motion_json() const {
+  Json json = Json::object();
+  json.set("frames", motion_frames_).set("flagged", flagged(protocol::kFlagMotionFault));
+  json.set("pointing_frames", pointing_px_.count());
+  if (!pointing_px_.empty()) {
+    json.set("pointing_rms_px",
+             std::sqrt(pointing_squares_px2_ / static_cast<double>(pointing_px_.count())));
+    json.set("pointing_p99_px", pointing_px_.percentile(0.99));
+    json.set("pointing_max_px", pointing_px_.max());
+  }
+  return json;
 }
 
 std::string StreamReport::stage_table() const {

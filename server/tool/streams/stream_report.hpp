@@ -52,10 +52,16 @@ class StreamReport {
   /// Time from the last byte of one frame to the last byte of the next, ms.
   [[nodiscard]] const Samples& interval_ms() const noexcept { return interval_ms_; }
 
+  /// Pointing errors of projected frames that carry no flag motion_fault, px.
+  [[nodiscard]] const Samples& pointing_px() const noexcept { return pointing_px_; }
+  /// Returns one line about the motion simulator; empty where none is driven.
+  [[nodiscard]] std::string motion_line() const;
+
   /// Returns the table of stages: median, p99 and largest, ms.
   [[nodiscard]] std::string stage_table() const;
   [[nodiscard]] Json stages_json() const;
   [[nodiscard]] Json flags_json() const;
+  [[nodiscard]] Json motion_json() const;
 
  private:
   enum Stage : std::size_t { kQueue, kRender, kReadback, kHandOver, kTransport, kTotal, kStages };
@@ -71,7 +77,10 @@ class StreamReport {
   std::array<Samples, kStages> stages_;
   Samples ready_ms_{kMaxSamples};
   Samples interval_ms_{kMaxSamples};
-  std::int64_t last_byte_ns_ = 0;  // of the frame before, on this connection
+  Samples pointing_px_{kMaxSamples};
+  double pointing_squares_px2_ = 0.0;
+  std::uint64_t motion_frames_ = 0;  // with a motion simulator
+  std::int64_t last_byte_ns_ = 0;    // of the frame before, on this connection
   std::array<std::uint64_t, 32> flag_counts_{};
   std::uint64_t frames_ = 0;
   std::uint64_t pixel_bytes_ = 0;

@@ -53,6 +53,26 @@ TEST(FeedbackTrack, goes_on_at_the_latest_rates_as_far_as_the_horizon) {
   EXPECT_FALSE(track.at(5 * kMs - 1, 2 * kMs).has_value());
 }
 
+TEST(FeedbackTrack, predicts_a_constant_acceleration) {
+  const auto feedback = [](std::int64_t time_ns) {
+    const double t = 1e-9 * static_cast<double>(time_ns);
+    AxisFeedback out;
+    out.time_ns = time_ns;
+    out.angles.unit_rad = glm::dvec3(0.3 + 0.5 * t + 0.5 * 4.0 * t * t);
+    out.unit_rates_rad_s = glm::dvec3(0.5 + 4.0 * t);
+    out.angles.target_rad = glm::dvec2(-1.0 * t * t);
+    out.target_rates_rad_s = glm::dvec2(-2.0 * t);
+    return out;
+  };
+  FeedbackTrack track;
+  for (int i = 0; i <= 100; ++i) track.add(feedback(i * kMs));
+  const auto state = track.at(120 * kMs, 20 * kMs);
+  ASSERT_TRUE(state.has_value());
+  const AxisFeedback truth = feedback(120 * kMs);
+  EXPECT_LT(glm::length(state->angles.unit_rad - truth.angles.unit_rad), 1e-12);
+  EXPECT_LT(glm::length(state->angles.target_rad - truth.angles.target_rad), 1e-12);
+}
+
 TEST(FeedbackTrack, drops_what_is_not_later_and_keeps_the_latest) {
   FeedbackTrack track;
   EXPECT_EQ(track.latest(), nullptr);

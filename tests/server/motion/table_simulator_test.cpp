@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "motion/table_simulator.hpp"
+#include "support/times.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,7 @@ using protocol::AxesMode;
 using protocol::AxesMonitor;
 using protocol::AxesState;
 
-constexpr std::int64_t kMs = 1'000'000;
+using test::kMs;
 constexpr double kTurnRadS = 3.0;
 constexpr double kSizeRad = 0.3;
 

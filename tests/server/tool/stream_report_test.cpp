@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace emit::tool {
 namespace {
 
@@ -39,6 +41,29 @@ TEST(StreamReport, OfEveryThirdFrameTheOthersAreNoGap) {
   EXPECT_EQ(unflagged_after(frame(4), 3), 0U);
   EXPECT_EQ(unflagged_after(frame(7), 3), 1U);
   EXPECT_EQ(unflagged_after(frame(7, protocol::kFlagLostBefore, 1), 3), 0U);
+}
+
+TEST(StreamReport, PointingErrorsCountWhereTheAxesFollow) {
+  StreamReport report;
+  report.add(frame(1));
+  EXPECT_EQ(report.motion_line(), "") << "no motion simulator is driven";
+  const auto with_motion = [&](std::uint64_t number, float error_px, std::uint8_t faults) {
+    client::ReceivedFrame out =
+        frame(number, faults != 0 ? std::uint32_t{protocol::kFlagMotionFault} : 0U);
+    out.header.motion_state = protocol::MotionState::following;
+    out.header.motion_faults = faults;
+    out.header.pointing_error_px = error_px;
+    out.header.display_ns = 1;
+    report.add(out);
+  };
+  with_motion(2, std::numeric_limits<float>::quiet_NaN(), 0);
+  with_motion(3, 3.0F, 0);
+  with_motion(4, 4.0F, 0);
+  with_motion(5, 100.0F, protocol::kMotionLimit);
+  EXPECT_EQ(report.pointing_px().count(), 2U);
+  EXPECT_EQ(report.motion_line(),
+            "motion simulator: 1 of 4 frames flagged; pointing error RMS 3.5355  p99 4.0000  "
+            "max 4.0000 px  (2 frames)\n");
 }
 
 }  // namespace

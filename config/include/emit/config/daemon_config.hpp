@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -33,7 +34,8 @@ struct PacingConfig {
   double rate_hz = 200.0;      ///< ig_clock: rate of frames; trigger: rate of the sync source
   std::int64_t budget_ns = 0;  ///< deadline after pose or trigger; 0: none, or one period
   std::int64_t horizon_ns = 50'000'000;  ///< longest extrapolation; later frames are flagged stale
-  /// ig_clock, trigger: poses are predicted to this time after the start of the slot.
+  /// ig_clock, trigger: poses are predicted to this time after the start of the slot. With a motion
+  /// simulator its axes are too; host_step counts from the arrival of the pose.
   std::int64_t display_delay_ns = 0;
 };
 
@@ -41,6 +43,40 @@ struct PacingConfig {
 struct TriggerConfig {
   std::string udp = "127.0.0.1:7003";
   std::string peer;  ///< address of the sync source; empty: any on loopback
+};
+
+/// Rings about the target: none, or two with the one named first outermost.
+enum class TargetRings : std::uint8_t { none, azimuth_elevation, elevation_azimuth };
+
+/// Travel, rate and acceleration of an axis of a motion simulator.
+struct MotionAxisConfig {
+  double min_rad = 0.0;
+  double max_rad = 0.0;
+  double rate_rad_s = 0.0;
+  double acceleration_rad_s2 = 0.0;
+  double park_rad = 0.0;
+};
+
+/// The flight motion simulator.
+struct MotionConfig {
+  std::string controller;  ///< address:port of its controller; empty: there is none
+  double rate_hz = 1000.0;
+  std::string unit_rings = "yaw-pitch-roll";  ///< outermost first
+  TargetRings target_rings = TargetRings::none;
+  std::int64_t target_entity = -1;     ///< that the target rings point to; -1: none
+  std::vector<MotionAxisConfig> axes;  ///< rings of the unit, outermost first; azimuth, elevation
+  // Rotations as yaw, pitch and roll, rad (server/docs/motion.md).
+  std::array<double, 3> lab_rad{};
+  std::array<double, 3> unit_base_rad{};
+  std::array<double, 3> unit_mount_rad{};
+  std::array<double, 3> target_base_rad{};
+  std::array<double, 3> target_mount_rad{};
+  std::int64_t feedback_timeout_ns = 20'000'000;
+  std::int64_t host_timeout_ns = 200'000'000;
+  std::uint32_t controller_timeout_ms = 100;
+  double soft_frac = 0.2;  ///< share of rate and acceleration with which the axes set off
+
+  [[nodiscard]] bool enabled() const noexcept { return !controller.empty(); }
 };
 
 /// Real-time settings of the agents. Everything is off by default.
@@ -59,8 +95,8 @@ struct AgentCpus {
   std::vector<std::uint32_t> cpus;  ///< ascending, not empty
 };
 /// Reads a text such as "conductor=2, receiver=2, render=4-7". Agents are receiver, conductor,
-/// render, sender and recorder, each at most once. Cores are below kMaxCpus. Errors (config) name
-/// the part at fault.
+/// render, sender, recorder and motion, each at most once. Cores are below kMaxCpus. Errors
+/// (config) name the part at fault.
 [[nodiscard]] physics::Result<std::vector<AgentCpus>> parse_agent_cpus(std::string_view text);
 inline constexpr std::uint32_t kMaxCpus = 1024;
 
@@ -147,6 +183,7 @@ struct DaemonConfig {
   SourceConfig source;
   PacingConfig pacing;
   TriggerConfig trigger;
+  MotionConfig motion;
   ClockConfig clock;
   RealtimeConfig realtime;
   HostConfig host;

@@ -50,9 +50,32 @@ enum FrameFlags : std::uint32_t {
   kFlagCorrupt = 1u << 13,  ///< set by a receiver: no pixel is missing, but the checksum is wrong
   /// Set by a receiver: frames before this one were lost on the network.
   kFlagLostBefore = 1u << 14,
+  /// The motion simulator does not show what the frame assumes: motion_state and motion_faults say
+  /// why.
+  kFlagMotionFault = 1u << 15,
 };
 /// Flags that only a receiver may set. A receiver clears them where a sender set them.
 inline constexpr std::uint32_t kReceiverFlags = kFlagPartial | kFlagCorrupt | kFlagLostBefore;
+
+/// State of the flight motion simulator, as emitd drives it.
+enum class MotionState : std::uint8_t {
+  none = 0,     ///< emitd drives no motion simulator
+  waiting = 1,  ///< the controller sends no measurements
+  parked = 2,
+  parking = 3,
+  capturing = 4,  ///< the axes approach the demands softly
+  following = 5,
+  fault = 6,  ///< the interlock of the controller is open
+};
+/// Reasons why the axes do not show what a frame assumes, as bits.
+enum MotionFaults : std::uint8_t {
+  kMotionNoFeedback = 1u << 0,  ///< no measurement for longer than motion.feedback_timeout_ms
+  kMotionNoHost = 1u << 1,      ///< no pose for longer than motion.host_timeout_ms
+  kMotionInterlock = 1u << 2,   ///< the controller has switched the motors off
+  kMotionLimit = 1u << 3,       ///< an axis is at a limit and cannot meet its demand
+  kMotionLock = 1u << 4,        ///< two axes are nearly parallel, and rates are damped
+  kMotionClock = 1u << 5,       ///< simulation time does not pass as fast as time
+};
 
 /// Contents of a frame header. The order and the offsets of the fields on the wire are in
 /// docs/wire.md section 3.
@@ -109,6 +132,17 @@ struct FrameHeader {
   std::uint32_t payload_crc32c = 0;  ///< CRC-32C of the raw pixels, whatever the encoding is
   PixelEncoding encoding = PixelEncoding::raw;
   std::uint32_t encoded_bytes = 0;  ///< length of the encoded pixels behind the header; 0 when raw
+  // The members below are 0 without a motion simulator.
+  MotionState motion_state = MotionState::none;
+  std::uint8_t motion_faults = 0;  ///< MotionFaults
+  /// Projector: shift of the image, right and down, that brings it to where the axes are at
+  /// display_ns, as far as they were known when the frame was published.
+  float shift_x_px = 0.0F;
+  float shift_y_px = 0.0F;
+  /// Projector: error of direction that the shift left in the centre of the newest frame whose
+  /// axes were measured up to its display. NaN: none was.
+  float pointing_error_px = 0.0F;
+  std::int64_t display_ns = 0;  ///< wall instant for which the axes were predicted
 };
 
 /// Largest n that a client may ask for in "every n-th frame".

@@ -33,6 +33,15 @@ TEST(IgClockPacing, SendsOneFramePerSlotFromTheFirstOn) {
   }
 }
 
+TEST(IgClockPacing, ShowsTheFirstTimeUntilAPoseComes) {
+  Rig rig(ig_clock(), std::nullopt, false, nullptr, 12'600'000 * kMs);
+  rig.settle();
+  rig.next_slot();
+  for (const auto& frame : rig.frames) {
+    EXPECT_EQ(frame.header.sim_time_ns, 12'600'000 * kMs) << "the surface is warmed up for it";
+  }
+}
+
 TEST(IgClockPacing, CannedFramesAreNotStaleBeforeTheHostHasSpoken) {
   Rig rig(ig_clock(), std::nullopt, true);
   rig.settle();

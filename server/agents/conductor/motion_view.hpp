@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "agents/conductor/frame_ledger.hpp"
+#include "agents/context.hpp"
+#include "motion/feedback_track.hpp"
+#include "motion/motion_plan.hpp"
+#include "pacing/scenario_track.hpp"
+
+namespace emit::server {
+
+/// The conductor's side of a motion simulator: it tells the motion agent the poses, turns the
+/// camera of projected frames to where the axes will be, and says in every frame what they do.
+///
+/// Thread: the conductor's. Real time: RT-safe.
+class MotionView {
+ public:
+  /// The arguments outlive the view.
+  MotionView(Context& context, const ScenarioTracks& scenario, const MotionPlan& plan)
+      : context_(context), scenario_(scenario), plan_(plan) {}
+
+  /// A run begins.
+  void start_run() noexcept;
+  /// Hands a pose of the host to the motion agent.
+  void take_pose(const protocol::HostFrameData& frame) noexcept;
+  /// Takes the reports of the motion agent.
+  /// @return the number of reports taken
+  int take_reports() noexcept;
+
+  /// Turns the camera of a frame that is shown at `display_ns`, wall.
+  void place(RenderJob& job, FrameLedger::Issued& issued, std::int64_t display_ns) noexcept;
+  /// Writes state and shift into the header of a finished frame.
+  void finish(FrameLedger::Issued& issued) noexcept;
+  /// Writes state and shift into the header of the frame that finish() had last, which is shown
+  /// again at `display_ns`.
+  void finish_repeat(protocol::FrameHeader& header, std::int64_t display_ns) noexcept;
+
+ private:
+  /// A frame whose axes are not measured up to its display yet.
+  struct Shown {
+    std::int64_t display_ns = 0;
+    FrameLedger::Issued::Motion motion;
+    glm::dvec2 shift_px{0.0};
+    bool follows = false;  ///< the axes did what the frame assumes
+  };
+  static constexpr std::size_t kKept = 64;
+
+  /// Returns the angles at an instant. `known` is false where no measurement is near.
+  [[nodiscard]] TableAngles angles_at(std::int64_t time_ns, bool& known) const noexcept;
+  [[nodiscard]] glm::dvec2 shift_px(const FrameLedger::Issued::Motion& motion,
+                                    const TableAngles& angles) const noexcept;
+  void write(protocol::FrameHeader& header, const FrameLedger::Issued::Motion& motion,
+             std::int64_t display_ns) noexcept;
+  void judge_shown() noexcept;
+  void push(const MotionInput& input) noexcept;
+
+  Context& context_;
+  const ScenarioTracks& scenario_;
+  const MotionPlan& plan_;
+  FeedbackTrack track_;
+  protocol::MotionState state_ = protocol::MotionState::waiting;
+  std::uint8_t faults_ = protocol::kMotionNoFeedback;
+  bool target_moved_ = false;  ///< the host has moved the target in this run
+  glm::dvec3 target_m_{0.0};
+  FrameLedger::Issued::Motion finished_;  ///< of the newest finished frame
+  std::array<Shown, kKept> shown_;
+  std::size_t first_shown_ = 0;
+  std::size_t shown_count_ = 0;
+  std::optional<double> pointing_error_px_;
+};
+
+}  // namespace emit::server

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/motion/motion_agent.hpp"
+
+namespace emit::server {
+namespace {
+
+/// Messages taken in a turn, so that a flood does not delay the commands.
+constexpr int kMostPerTurn = 64;
+
+}  // namespace
+
+bool MotionAgent::on_start() noexcept {
+  const std::int64_t now_ns = context_.clock.tai_ns();
+  follower_.reset(now_ns);
+  due_ns_ = now_ns + period_ns_;
+  return true;
+}
+
+int MotionAgent::do_work(std::int64_t now_ns) noexcept {
+  int work = take_poses(now_ns) + take_monitors(now_ns);
+  if (now_ns >= due_ns_) {
+    command(now_ns);
+    ++work;
+  }
+  return work;
+}
+
+int MotionAgent::take_poses(std::int64_t now_ns) noexcept {
+  int work = 0;
+  for (; work < kMostPerTurn; ++work) {
+    const MotionInput* input = context_.motion_inputs.front();
+    if (input == nullptr) break;
+    if (input->kind == MotionInput::Kind::reset) {
+      follower_.reset(now_ns);
+    } else if (!follower_.take(input->pose, input->received_ns)) {
+      context_.counters.add(Counter::axes_clock_jumps);
+    }
+    context_.motion_inputs.pop();
+  }
+  return work;
+}
+
+int MotionAgent::take_monitors(std::int64_t now_ns) noexcept {
+  int work = 0;
+  for (; work < kMostPerTurn; ++work) {
+    const auto monitor = port_.receive();
+    if (!monitor) break;
+    const auto feedback = follower_.take(*monitor, now_ns);
+    if (!feedback) {
+      context_.counters.add(Counter::axes_reports_refused);
+      continue;
+    }
+    context_.counters.add(Counter::axes_reports);
+    context_.motion_times.age.record(now_ns - feedback->time_ns);
+    if (follower_.status().state == protocol::MotionState::following) {
+      context_.motion_times.error.record(follower_.error_rad());
+    }
+    report(&*feedback);
+  }
+  return work;
+}
+
+void MotionAgent::command(std::int64_t now_ns) noexcept {
+  context_.motion_times.late.record(now_ns - due_ns_);
+  port_.send(follower_.step(now_ns));
+  // Commands that are due already are left out: the axes need the newest one alone.
+  const std::int64_t missed = (now_ns - due_ns_) / period_ns_;
+  if (missed > 0) {
+    context_.counters.add(Counter::axes_commands_missed, static_cast<std::uint64_t>(missed));
+  }
+  due_ns_ += (missed + 1) * period_ns_;
+  note_status();
+}
+
+void MotionAgent::note_status() noexcept {
+  const TableFollower::Status& now = follower_.status();
+  const bool changed = now.state != known_.state || now.faults != known_.faults;
+  const auto began = [&](protocol::MotionFaults fault) {
+    return (now.faults & ~known_.faults & fault) != 0;
+  };
+  if (began(protocol::kMotionNoFeedback)) context_.counters.add(Counter::axes_feedback_losses);
+  if (began(protocol::kMotionNoHost)) context_.counters.add(Counter::axes_host_silences);
+  if (began(protocol::kMotionInterlock)) context_.counters.add(Counter::axes_interlocks);
+  if ((now.faults & protocol::kMotionLimit) != 0) {
+    context_.counters.add(Counter::axes_commands_limited);
+  }
+  if (changed) {
+    context_.motion_events.push(EventKind::motion_changed, static_cast<std::uint64_t>(now.state),
+                                now.faults);
+  }
+  known_ = now;
+  // A status without a measurement has to reach the conductor too.
+  if (changed || !reported_) report(nullptr);
+  reported_ = false;
+}
+
+void MotionAgent::report(const AxisFeedback* feedback) noexcept {
+  MotionReport* out = context_.motion_reports.claim();
+  if (out == nullptr) {
+    context_.counters.add(Counter::axes_reports_dropped);
+    return;
+  }
+  out->has_feedback = feedback != nullptr;
+  if (feedback != nullptr) out->feedback = *feedback;
+  out->state = follower_.status().state;
+  out->faults = follower_.status().faults;
+  context_.motion_reports.commit();
+  reported_ = true;
+  // The conductor looks at each frame. It is woken only when it has not looked for long.
+  if (context_.motion_reports.free() < context_.motion_reports.capacity() / 2) {
+    context_.bells.conductor.ring();
+  }
+}
+
+void MotionAgent::on_stop() noexcept {
+  follower_.reset(context_.clock.tai_ns());
+  port_.send(follower_.step(context_.clock.tai_ns()));
+}
+
+}  // namespace emit::server

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion/table_follower.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "emit/physics/check.hpp"
+
+namespace emit::server {
+namespace {
+
+using protocol::AxesMode;
+using protocol::AxesState;
+using protocol::MotionState;
+
+/// Time over which a soft start grows to all that the axes have.
+constexpr double kSoftStartS = 3.0;
+/// Differences from the demand below which an axis has reached it.
+constexpr double kReachedRad = 1e-4;
+constexpr double kReachedRadS = 1e-2;
+/// The axes follow after they have met their demands for so long.
+constexpr std::int64_t kSettleNs = 100'000'000;
+/// A new pose takes over within the time between two poses, but not within more than this.
+constexpr double kLongestBlendS = 0.1;
+/// Longest step of the commands. After a longer gap the axes set off from where they were.
+constexpr double kLongestStepS = 0.1;
+constexpr std::int64_t kMotorsOffNs = 100'000'000;
+/// A jump of simulation time is reported for this long.
+constexpr std::int64_t kClockFaultNs = 1'000'000'000;
+
+double seconds_of(std::int64_t ns) noexcept {
+  return 1e-9 * static_cast<double>(ns);
+}
+
+AxisMotion difference(const AxisMotion& a, const AxisMotion& b) noexcept {
+  return {a.angle_rad - b.angle_rad, a.rate_rad_s - b.rate_rad_s,
+          a.acceleration_rad_s2 - b.acceleration_rad_s2};
+}
+
+AxisMotion sum(const AxisMotion& a, const AxisMotion& b) noexcept {
+  return {a.angle_rad + b.angle_rad, a.rate_rad_s + b.rate_rad_s,
+          a.acceleration_rad_s2 + b.acceleration_rad_s2};
+}
+
+}  // namespace
+
+physics::Result<TableFollower> TableFollower::create(const Options& options) {
+  const auto refuse = [](const char* text) {
+    return physics::make_error(physics::ErrorCode::invalid_argument, text);
+  };
+  if (options.axes.size() != 3 && options.axes.size() != 5) {
+    return refuse("a motion simulator has three axes, or five with those of the target");
+  }
+  if (options.period_ns <= 0) return refuse("the period of the commands must be positive");
+  if (!(options.soft_frac > 0.0 && options.soft_frac <= 1.0)) {
+    return refuse("the share of a soft start must be above 0 and at most 1");
+  }
+  std::vector<AxisProfile> profiles;
+  for (const Axis& axis : options.axes) {
+    auto profile = AxisProfile::create(axis.limits);
+    if (!profile) return tl::unexpected(std::move(profile.error()));
+    if (!(axis.park_rad >= axis.limits.min_rad && axis.park_rad <= axis.limits.max_rad)) {
+      return refuse("the park position of an axis is outside of its travel");
+    }
+    profiles.push_back(*profile);
+  }
+  return TableFollower(options, std::move(profiles));
+}
+
+TableFollower::TableFollower(const Options& options, std::vector<AxisProfile> profiles) noexcept
+    : options_(options), profiles_(std::move(profiles)) {
+  command_.period_us = static_cast<std::uint32_t>(options.period_ns / 1000);
+  command_.timeout_ms = options.controller_timeout_ms;
+}
+
+void TableFollower::reset(std::int64_t now_ns) noexcept {
+  clock_.clear();
+  incoming_.clear();
+  incoming_is_new_ = false;
+  clock_jumped_ = false;
+  driving_ = false;
+  off_until_ns_ = now_ns + kMotorsOffNs;
+}
+
+bool TableFollower::take(const SeekerPose& pose, std::int64_t received_ns) noexcept {
+  received_ns_ = received_ns;
+  const bool jumped = clock_.arrived(pose.sim_time_ns, received_ns);
+  if (jumped) {
+    // Poses before the jump tell nothing about the motion after it.
+    incoming_.clear();
+    clock_fault_ns_ = received_ns;
+    clock_jumped_ = true;
+  }
+  incoming_.push(pose);
+  incoming_is_new_ = true;
+  return !jumped;
+}
+
+std::optional<AxisFeedback> TableFollower::take(const protocol::AxesMonitor& monitor,
+                                                std::int64_t now_ns) noexcept {
+  if (monitor.count != options_.axes.size()) return std::nullopt;
+  const bool silent = now_ns - monitor_ns_ > options_.feedback_timeout_ns;
+  if (has_monitor_ && monitor.time_ns <= monitor_.time_ns && !silent) return std::nullopt;
+  monitor_ = monitor;
+  monitor_ns_ = now_ns;
+  has_monitor_ = true;
+  measure_error(monitor);
+  AxisFeedback out;
+  out.time_ns = monitor.time_ns;
+  for (int i = 0; i < 3; ++i) {
+    const AxisMotion& axis = monitor.measured[static_cast<std::size_t>(i)];
+    out.angles.unit_rad[i] = axis.angle_rad;
+    out.unit_rates_rad_s[i] = axis.rate_rad_s;
+  }
+  for (int i = 0; i < 2 && monitor.count == 5; ++i) {
+    const AxisMotion& axis = monitor.measured[static_cast<std::size_t>(3 + i)];
+    out.angles.target_rad[i] = axis.angle_rad;
+    out.target_rates_rad_s[i] = axis.rate_rad_s;
+  }
+  return out;
+}
+
+void TableFollower::measure_error(const protocol::AxesMonitor& monitor) noexcept {
+  error_rad_ = 0.0;
+  if (status_.state != MotionState::following) return;
+  // The latest command reaches back to the measurement, which is hardly older.
+  const double back_s = seconds_of(monitor.time_ns - command_.time_ns);
+  for (std::size_t i = 0; i < monitor.count; ++i) {
+    const AxisMotion& asked = command_.axes[i];
+    const double asked_rad =
+        asked.angle_rad + back_s * (asked.rate_rad_s + 0.5 * back_s * asked.acceleration_rad_s2);
+    error_rad_ = std::max(error_rad_, std::abs(monitor.measured[i].angle_rad - asked_rad));
+  }
+}
+
+void TableFollower::choose(std::int64_t now_ns) noexcept {
+  using namespace protocol;
+  const bool measured = has_monitor_ && now_ns - monitor_ns_ <= options_.feedback_timeout_ns;
+  const bool host = !incoming_.empty() && now_ns - received_ns_ <= options_.host_timeout_ns;
+  const bool interlock = measured && monitor_.state == AxesState::fault;
+  status_.faults = 0;
+  if (!measured) status_.faults |= kMotionNoFeedback;
+  if (!host) status_.faults |= kMotionNoHost;
+  if (interlock) status_.faults |= kMotionInterlock;
+  if (clock_jumped_ && now_ns - clock_fault_ns_ <= kClockFaultNs) {
+    status_.faults |= kMotionClock;
+  }
+  if (now_ns < off_until_ns_) {
+    command_.mode = AxesMode::off;
+  } else {
+    command_.mode =
+        status_.faults == 0 || status_.faults == kMotionClock ? AxesMode::follow : AxesMode::park;
+  }
+  if (command_.mode == AxesMode::follow) {
+    if (!driving_) start_where_axes_are(now_ns);
+    driving_ = true;
+    return;
+  }
+  driving_ = false;
+  status_.state = !measured                             ? MotionState::waiting
+                  : interlock                           ? MotionState::fault
+                  : monitor_.state == AxesState::parked ? MotionState::parked
+                                                        : MotionState::parking;
+}
+
+void TableFollower::start_where_axes_are(std::int64_t now_ns) noexcept {
+  for (std::size_t i = 0; i < profiles_.size(); ++i) {
+    profiles_[i].start(monitor_.measured[i].angle_rad);
+    blends_[i].clear();
+  }
+  near_ = {};
+  for (std::size_t i = 0; i < 3; ++i) near_.unit.rings[i] = {profiles_[i].motion().angle_rad, 0, 0};
+  if (profiles_.size() == 5) {
+    near_.target.azimuth = profiles_[3].motion();
+    near_.target.elevation = profiles_[4].motion();
+  }
+  course_ = incoming_;
+  incoming_is_new_ = false;
+  blend_ns_ = now_ns;
+  followed_ns_ = now_ns;
+  offset_ns_ = now_ns - clock_.sim_time_ns(now_ns);
+  capture_ns_ = now_ns;
+  unsettled_ns_ = now_ns;
+  captured_ = false;
+}
+
+double TableFollower::share(std::int64_t now_ns) const noexcept {
+  if (captured_) return 1.0;
+  const double grown = std::min(seconds_of(now_ns - capture_ns_) / kSoftStartS, 1.0);
+  return options_.soft_frac + (1.0 - options_.soft_frac) * grown;
+}
+
+TableFollower::Motions TableFollower::motions(const SeekerState& state, bool& near_lock) noexcept {
+  const TableMotion motion = options_.table.command(state, near_);
+  near_lock = motion.unit.near_lock || (profiles_.size() == 5 && motion.target.near_lock);
+  near_ = motion;
+  return {motion.unit.rings[0], motion.unit.rings[1], motion.unit.rings[2], motion.target.azimuth,
+          motion.target.elevation};
+}
+
+void TableFollower::follow(std::int64_t now_ns, std::int64_t time_ns) noexcept {
+  bool near_lock = false;
+  const std::int64_t sim_time_ns = clock_.sim_time_ns(time_ns);
+  const double since_blend_s = seconds_of(time_ns - blend_ns_);
+  // Let a new pose take over from where the old ones had the axes go.
+  if (incoming_is_new_) {
+    const double span_s = std::clamp(seconds_of(incoming_.interval_ns()),
+                                     seconds_of(options_.period_ns), kLongestBlendS);
+    const Motions old = motions(course_.at(time_ns - offset_ns_), near_lock);
+    const Motions now = motions(incoming_.at(sim_time_ns), near_lock);
+    for (std::size_t i = 0; i < profiles_.size(); ++i) {
+      blends_[i].start(difference(sum(old[i], blends_[i].at(since_blend_s)), now[i]), span_s);
+    }
+    blend_ns_ = time_ns;
+    course_ = incoming_;
+    incoming_is_new_ = false;
+  }
+  offset_ns_ = time_ns - sim_time_ns;
+  const Motions course = motions(course_.at(sim_time_ns), near_lock);
+  // A caller that was late has left commands out: the axes have moved on meanwhile.
+  const double step_s = std::min(seconds_of(time_ns - followed_ns_), kLongestStepS);
+  followed_ns_ = time_ns;
+  const double blended_s = seconds_of(time_ns - blend_ns_);
+  bool limited = false;
+  bool reached = true;
+  for (std::size_t i = 0; i < profiles_.size(); ++i) {
+    const AxisMotion demand = sum(course[i], blends_[i].at(blended_s));
+    const AxisProfile::Command command = profiles_[i].step(demand, step_s, share(now_ns));
+    command_.axes[i] = command.motion;
+    limited = limited || command.limited();
+    reached = reached &&
+              std::abs(command.motion.angle_rad - command.wanted.angle_rad) < kReachedRad &&
+              std::abs(command.motion.rate_rad_s - command.wanted.rate_rad_s) < kReachedRadS;
+  }
+  if (!reached || monitor_.state != AxesState::following) unsettled_ns_ = now_ns;
+  captured_ = captured_ || now_ns - unsettled_ns_ >= kSettleNs;
+  const bool following = captured_ && monitor_.state == AxesState::following;
+  status_.state = following ? MotionState::following : MotionState::capturing;
+  // Limits only say that the axes are under way as long as they set off.
+  if (following && (limited || monitor_.limited_axes != 0)) {
+    status_.faults |= protocol::kMotionLimit;
+  }
+  if (near_lock) status_.faults |= protocol::kMotionLock;
+}
+
+const protocol::AxesCommand& TableFollower::step(std::int64_t now_ns) noexcept {
+  const std::int64_t time_ns = now_ns + options_.period_ns;
+  choose(now_ns);
+  ++command_.counter;
+  command_.time_ns = time_ns;
+  command_.sim_time_ns = clock_.empty() ? 0 : clock_.sim_time_ns(time_ns);
+  if (command_.mode == AxesMode::follow) {
+    command_.count = profiles_.size();
+    follow(now_ns, time_ns);
+  } else {
+    command_.count = 0;
+  }
+  return command_;
+}
+
+}  // namespace emit::server

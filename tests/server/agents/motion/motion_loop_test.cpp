@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: Apache-2.0
+// The loop through a motion simulator on a fake clock: host, conductor, motion agent and a
+// simulated table that is reached by UDP.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <optional>
+#include <vector>
+
+#include "agents/motion/motion_agent.hpp"
+#include "agents/motion/motion_setup.hpp"
+#include "emit/physics/constants.hpp"
+#include "motion/table_simulator.hpp"
+#include "support/conductor_rig.hpp"
+
+namespace emit::server {
+namespace {
+
+using protocol::MotionState;
+using test::kMs;
+using test::kSecondNs;
+
+constexpr glm::dvec2 kSizePx{640.0, 512.0};
+const double kFocalPx = 320.0 / std::tan(5.0 * physics::kDegree);
+const glm::dvec3 kTargetM{900.0, 1200.0, 250.0};
+
+struct LoopOptions {
+  std::string rings = "yaw-pitch-roll";
+  double delay_s = 0.001;
+  double noise_arcsec = 0.0;
+  bool projects = true;
+  std::int64_t display_delay_ns = 10 * kMs;
+};
+
+config::DaemonConfig daemon_config(const LoopOptions& options, std::uint16_t port) {
+  config::DaemonConfig config;
+  config.motion.controller = fmt::format("127.0.0.1:{}", port);
+  config.motion.unit_rings = options.rings;
+  config.motion.target_rings = config::TargetRings::azimuth_elevation;
+  config.motion.target_entity = 7;
+  config.motion.axes.assign(5, {-2.0, 2.0, 7.0, 140.0, 0.0});
+  // The parts of a real table never stand exactly as they should.
+  config.motion.lab_rad = {0.6, 0.01, -0.02};
+  config.motion.unit_base_rad = {0.01, 0.02, -0.01};
+  config.motion.unit_mount_rad = {-0.02, 0.01, 0.03};
+  config.motion.target_base_rad = {0.02, -0.01, 0.01};
+  config.motion.target_mount_rad = {0.01, 0.015, -0.02};
+  return config;
+}
+
+scene::ScenarioDesc scenario_with_target() {
+  scene::ScenarioDesc scenario = test::scenario_with_entity(7);
+  scenario.sensor.width_px = 640;
+  scenario.sensor.height_px = 512;
+  scenario.sensor.fov_h_rad = 10.0 * physics::kDegree;
+  return scenario;
+}
+
+std::vector<Channel> channels_of(scene::ChannelKind kind) {
+  Channel channel;
+  channel.kind = kind;
+  return {channel};
+}
+
+/// A UDP port of the table, made before the agent that connects to it.
+class TablePort {
+ public:
+  TablePort() {
+    const auto where = parse_host_port("127.0.0.1:0");
+    auto socket = UdpSocket::open_bound(context_, *resolve(*where, Transport::udp, true));
+    EXPECT_TRUE(socket.has_value());
+    socket_ = std::move(*socket);
+  }
+  [[nodiscard]] std::uint16_t port() const { return socket_.local_address().port(); }
+  /// Calls `use` for every command that has arrived.
+  template <class Use>
+  void receive(const Use& use) {
+    for (;;) {
+      std::array<std::byte, protocol::kMaxAxesBytes> space;
+      SocketAddress from;
+      from.length = sizeof(from.storage);
+      const ssize_t size = ::recvfrom(socket_.fd(), space.data(), space.size(), MSG_DONTWAIT,
+                                      from.get(), &from.length);
+      if (size < 0) return;
+      host_ = from;
+      protocol::AxesCommand command;
+      EXPECT_EQ(codec_.decode(std::span(space).first(static_cast<std::size_t>(size)), command),
+                protocol::AxesFault::none);
+      use(command);
+    }
+  }
+  void send(const protocol::AxesMonitor& monitor) {
+    if (host_.length == 0) return;
+    EXPECT_EQ(socket_.send_to(codec_.encode(monitor), host_).status, IoStatus::done);
+  }
+
+ private:
+  const SocketContext context_;
+  UdpSocket socket_;
+  protocol::AxesCodec codec_;
+  SocketAddress host_;
+};
+
+/// Everything in the loop, with frames at 100 Hz, poses at 100 Hz and axes at 1 kHz.
+class Loop {
+ public:
+  explicit Loop(const LoopOptions& options)
+      : options_(options),
+        plan_(*make_motion_plan(daemon_config(options, port_.port()), scenario_with_target(),
+                                channels_of(options.projects ? scene::ChannelKind::projector
+                                                             : scene::ChannelKind::injection))),
+        rig_(pacing(options), scenario_with_target(), false, &plan_) {
+    auto port = AxesPort::open(daemon_config(options, port_.port()).motion.controller,
+                               rig_.context().counters);
+    EXPECT_TRUE(port.has_value());
+    auto follower = TableFollower::create(plan_.follower);
+    EXPECT_TRUE(follower.has_value());
+    agent_.emplace(rig_.context(), std::move(*port), std::move(*follower), kMs);
+    EXPECT_TRUE(agent_->on_start());
+    TableSimulator::Options simulated;
+    TableSimulator::Axis axis;
+    axis.dynamics.limits = {-2.0, 2.0, 7.0, 140.0};
+    axis.dynamics.natural_rad_s = 2.0 * physics::kPi * 20.0;
+    axis.dynamics.delay_s = options.delay_s;
+    axis.dynamics.noise_rad = options.noise_arcsec * physics::kDegree / 3600.0;
+    simulated.axes.assign(5, axis);
+    auto table = TableSimulator::create(simulated);
+    EXPECT_TRUE(table.has_value());
+    table_.emplace(std::move(*table));
+    rig_.settle();
+  }
+
+  void run(std::int64_t for_ns) {
+    for (std::int64_t end_ns = rig_.clock.tai_ns() + for_ns; rig_.clock.tai_ns() < end_ns;) {
+      rig_.clock.advance(kMs);
+      const std::int64_t now_ns = rig_.clock.tai_ns();
+      if (host_speaks && sim_ns() % (10 * kMs) == 5 * kMs) send_pose();
+      port_.receive([&](const protocol::AxesCommand& command) {
+        EXPECT_TRUE(table_->take(command, now_ns));
+        last_mode = command.mode;
+      });
+      const protocol::AxesMonitor& monitor = table_->step(now_ns);
+      monitors.push_back(monitor);
+      if (controller_answers) port_.send(monitor);
+      agent_->do_work(now_ns);
+      rig_.settle();
+    }
+  }
+
+  /// Returns the distance between where the frame shows a point of the world to the real seeker and
+  /// where the simulated one sees it, px. `from_centre_px` is the place of the point in the image.
+  [[nodiscard]] double pointing_error_px(const protocol::FrameHeader& frame,
+                                         const glm::dvec2& from_centre_px) const {
+    const TableAngles angles = angles_at(frame.display_ns);
+    const glm::dmat3 seeker_from_projector = plan_.follower.table.seeker_from_projector(angles);
+    const glm::dmat3 sensor_from_body = physics::sensor_from_body();
+    // The frame has the point at this place before it is shifted.
+    const glm::dvec3 in_rendered =
+        glm::transpose(sensor_from_body) * glm::dvec3(from_centre_px / kFocalPx, 1.0);
+    const glm::dvec3 in_world = glm::mat3_cast(frame.pose.world_from_body) * in_rendered;
+    const glm::dvec2 shifted_px = from_centre_px + glm::dvec2(frame.shift_x_px, frame.shift_y_px);
+    const glm::dvec3 shown = seeker_from_projector * glm::transpose(sensor_from_body) *
+                             glm::dvec3(shifted_px / kFocalPx, 1.0);
+    const glm::dvec3 wanted =
+        glm::transpose(glm::mat3_cast(seeker_at(frame.sim_time_ns))) * in_world;
+    return kFocalPx * glm::length(glm::cross(glm::normalize(shown), glm::normalize(wanted)));
+  }
+  [[nodiscard]] std::int64_t sim_ns() const { return rig_.clock.tai_ns() - start_ns_; }
+  [[nodiscard]] static glm::dquat seeker_at(std::int64_t sim_ns) {
+    const double t = 1e-9 * static_cast<double>(sim_ns);
+    return physics::world_from_body_heading_pitch_roll(
+        0.6 + 0.3 * std::sin(1.7 * t), 0.15 * std::sin(1.1 * t), 0.4 * std::sin(0.9 * t));
+  }
+  [[nodiscard]] TableAngles angles_at(std::int64_t wall_ns) const {
+    const auto found = std::ranges::find(monitors, wall_ns, &protocol::AxesMonitor::time_ns);
+    if (found == monitors.end()) return {};
+    const auto& m = found->measured;
+    return {{m[0].angle_rad, m[1].angle_rad, m[2].angle_rad}, {m[3].angle_rad, m[4].angle_rad}};
+  }
+
+  test::ConductorRig& rig() { return rig_; }
+  std::vector<protocol::AxesMonitor> monitors;
+  protocol::AxesMode last_mode = protocol::AxesMode::off;
+  bool host_speaks = true;
+  bool controller_answers = true;
+
+ private:
+  static config::PacingConfig pacing(const LoopOptions& options) {
+    config::PacingConfig out;
+    out.mode = config::PacingMode::ig_clock;
+    out.rate_hz = 100.0;
+    out.display_delay_ns = options.display_delay_ns;
+    return out;
+  }
+  void send_pose() {
+    const glm::dquat seeker = seeker_at(sim_ns());
+    rig_.with([&](protocol::HostFrameData& frame) {
+          frame.seeker.world_from_body = seeker;
+          // A host tells the rates of its seeker.
+          const double step_s = 1e-4;
+          const glm::dquat turn = glm::conjugate(seeker) *
+                                  seeker_at(sim_ns() + static_cast<std::int64_t>(step_s * 1e9));
+          frame.seeker_rates =
+              protocol::PoseRates{{}, glm::dvec3(turn.x, turn.y, turn.z) * (2.0 / step_s)};
+          frame.entity_count = 1;
+          frame.entities[0] = {};
+          frame.entities[0].entity_id = 7;
+          frame.entities[0].has_pose = true;
+          frame.entities[0].pose.position_world_m = kTargetM;
+        })
+        .send(++number_, sim_ns());
+  }
+
+  LoopOptions options_;
+  TablePort port_;
+  MotionPlan plan_;
+  test::ConductorRig rig_;
+  const std::int64_t start_ns_ = rig_.clock.tai_ns();
+  std::optional<MotionAgent> agent_;
+  std::optional<TableSimulator> table_;
+  std::uint64_t number_ = 0;
+};
+
+/// Root mean square and greatest pointing error over frames that are shown already.
+struct Pointing {
+  double rms_px = 0.0;
+  double max_px = 0.0;
+  int frames = 0;
+};
+Pointing pointing_of(Loop& loop, std::size_t from, const glm::dvec2& from_centre_px) {
+  Pointing out;
+  double squares = 0.0;
+  for (std::size_t i = from; i < loop.rig().frames.size(); ++i) {
+    const protocol::FrameHeader& header = loop.rig().frames[i].header;
+    if (header.display_ns > loop.rig().clock.tai_ns()) continue;
+    const double error_px = loop.pointing_error_px(header, from_centre_px);
+    squares += error_px * error_px;
+    out.max_px = std::max(out.max_px, error_px);
+    ++out.frames;
+  }
+  out.rms_px = std::sqrt(squares / std::max(out.frames, 1));
+  return out;
+}
+
+TEST(MotionLoop, a_minute_of_projection_points_within_a_tenth_of_a_pixel) {
+  LoopOptions options;
+  options.noise_arcsec = 1.0;
+  Loop loop(options);
+  loop.run(10 * kSecondNs);
+  const std::size_t from = loop.rig().frames.size();
+  loop.monitors.clear();
+  loop.run(60 * kSecondNs);
+  int flagged = 0;
+  for (std::size_t i = from; i < loop.rig().frames.size(); ++i) {
+    const protocol::FrameHeader& header = loop.rig().frames[i].header;
+    flagged += (header.flags & protocol::kFlagMotionFault) != 0 ? 1 : 0;
+    EXPECT_EQ(header.motion_state, MotionState::following);
+  }
+  EXPECT_EQ(flagged, 0);
+  for (const glm::dvec2 place :
+       {glm::dvec2(0.0), glm::dvec2(-320.0, -256.0), glm::dvec2(320.0, 256.0)}) {
+    const Pointing pointing = pointing_of(loop, from, place);
+    EXPECT_GE(pointing.frames, 5990);
+    EXPECT_LT(pointing.rms_px, 0.1);
+    EXPECT_LT(pointing.max_px, 0.4);
+    EXPECT_GT(pointing.rms_px, 1e-4) << "noise and lag cannot leave nothing";
+  }
+  // The header tells the error of earlier frames, and the metrics hold all of them.
+  const double told_px = loop.rig().frames.back().header.pointing_error_px;
+  EXPECT_GT(told_px, 0.0);
+  EXPECT_LT(told_px, 0.4);
+  EXPECT_LT(loop.rig().context().motion_times.pointing.max.load(), 0.4);
+  EXPECT_EQ(loop.rig().count(Counter::axes_reports_refused), 0U);
+  EXPECT_EQ(loop.rig().count(Counter::axes_inputs_dropped), 0U);
+  EXPECT_EQ(loop.rig().count(Counter::axes_reports_dropped), 0U);
+}
+
+/// A frame whose display the axes reach without prediction leaves geometry alone.
+TEST(MotionLoop, geometry_holds_over_the_field_in_every_nesting_order) {
+  for (const char* rings : {"yaw-pitch-roll", "yaw-roll-pitch", "pitch-yaw-roll", "pitch-roll-yaw",
+                            "roll-yaw-pitch", "roll-pitch-yaw"}) {
+    LoopOptions options;
+    options.rings = rings;
+    options.delay_s = 0.0;
+    options.display_delay_ns = 0;
+    Loop loop(options);
+    loop.run(8 * kSecondNs);
+    const std::size_t from = loop.rig().frames.size();
+    loop.monitors.clear();
+    loop.run(1 * kSecondNs);
+    for (double x = -320.0; x <= 320.0; x += 160.0) {
+      for (double y = -256.0; y <= 256.0; y += 128.0) {
+        const Pointing pointing = pointing_of(loop, from + 1, {x, y});
+        EXPECT_GE(pointing.frames, 98);
+        EXPECT_LT(pointing.max_px, 0.05) << rings << " at " << x << ", " << y;
+      }
+    }
+    EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following) << rings;
+  }
+}
+
+TEST(MotionLoop, an_injected_frame_looks_along_the_seeker) {
+  LoopOptions options;
+  options.projects = false;
+  Loop loop(options);
+  loop.run(8 * kSecondNs);
+  const protocol::FrameHeader& header = loop.rig().frames.back().header;
+  const glm::dquat turn =
+      glm::conjugate(Loop::seeker_at(header.sim_time_ns)) * header.pose.world_from_body;
+  EXPECT_LT(2.0 * std::abs(glm::length(glm::dvec3(turn.x, turn.y, turn.z))), 1e-4);
+  EXPECT_EQ(header.shift_x_px, 0.0F);
+  EXPECT_EQ(header.motion_state, MotionState::following);
+  EXPECT_EQ(header.flags & protocol::kFlagMotionFault, 0U);
+}
+
+TEST(MotionLoop, frames_say_why_the_axes_do_not_follow) {
+  Loop loop({});
+  loop.run(20 * kMs);
+  EXPECT_NE(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U)
+      << "the axes have not set off yet";
+  loop.run(8 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
+  // The controller stops to answer.
+  loop.controller_answers = false;
+  loop.run(100 * kMs);
+  protocol::FrameHeader header = loop.rig().frames.back().header;
+  EXPECT_NE(header.flags & protocol::kFlagMotionFault, 0U);
+  EXPECT_EQ(header.motion_faults, protocol::kMotionNoFeedback);
+  EXPECT_EQ(header.motion_state, MotionState::waiting);
+  EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
+  EXPECT_EQ(loop.rig().count(Counter::axes_feedback_losses), 1U);
+  loop.controller_answers = true;
+  loop.run(8 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
+  // The host stops.
+  loop.host_speaks = false;
+  loop.run(500 * kMs);
+  header = loop.rig().frames.back().header;
+  EXPECT_NE(header.flags & protocol::kFlagMotionFault, 0U);
+  EXPECT_NE(header.motion_faults & protocol::kMotionNoHost, 0);
+  EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
+  EXPECT_GT(loop.rig().count(Counter::frames_motion_fault), 0U);
+}
+
+TEST(MotionLoop, an_agent_that_did_not_run_leaves_out_commands_and_counts_them) {
+  Loop loop({});
+  loop.run(100 * kMs);
+  const std::uint64_t sent = loop.rig().count(Counter::axes_commands);
+  loop.rig().clock.advance(50 * kMs);
+  loop.run(kMs);
+  EXPECT_EQ(loop.rig().count(Counter::axes_commands), sent + 1);
+  EXPECT_EQ(loop.rig().count(Counter::axes_commands_missed), 50U);
+}
+
+TEST(MotionLoop, both_kinds_of_channels_in_one_daemon_are_refused) {
+  std::vector<Channel> channels = channels_of(scene::ChannelKind::projector);
+  channels.push_back(channels_of(scene::ChannelKind::injection).front());
+  const auto plan = make_motion_plan(daemon_config({}, 1), scenario_with_target(), channels);
+  ASSERT_FALSE(plan.has_value());
+  EXPECT_THAT(plan.error().text, ::testing::HasSubstr("two daemons"));
+}
+
+}  // namespace
+}  // namespace emit::server
