@@ -3,8 +3,30 @@
 # share/emit/python in the build tree as when installed, so that PYTHONPATH=PREFIX/share/emit/python is right for both.
 set(python_dir ${EMIT_SHARE_DIR}/python)
 set(python_files)
-file(GLOB python_sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR}/python
-  ${CMAKE_CURRENT_SOURCE_DIR}/python/emit_client/*.py ${CMAKE_CURRENT_SOURCE_DIR}/python/examples/*.py)
+set(python_sources
+  emit_client/__init__.py
+  emit_client/control.py
+  emit_client/crc32c.py
+  emit_client/deadline.py
+  emit_client/errors.py
+  emit_client/frame_client.py
+  emit_client/frame_header.py
+  emit_client/frames.py
+  emit_client/host_client.py
+  emit_client/host_frames.py
+  emit_client/messages.py
+  emit_client/reassembler.py
+  emit_client/resend_planner.py
+  emit_client/security.py
+  emit_client/server_info.py
+  emit_client/session_host.py
+  emit_client/shm_frame_client.py
+  emit_client/socket_frame_client.py
+  emit_client/tcp_frame_client.py
+  emit_client/udp_frame_client.py
+  emit_client/url.py
+  examples/receive_frames.py
+  examples/send_poses.py)
 foreach(file IN LISTS python_sources)
   add_custom_command(OUTPUT ${python_dir}/${file}
     COMMAND ${CMAKE_COMMAND} -E copy ${CMAKE_CURRENT_SOURCE_DIR}/python/${file} ${python_dir}/${file}
@@ -28,6 +50,12 @@ add_custom_command(OUTPUT ${message_modules}
 add_custom_target(emit_client_python ALL DEPENDS ${python_files} ${message_modules})
 
 set(python_install_dir ${CMAKE_INSTALL_DATADIR}/emit/python)
-install(DIRECTORY python/emit_client python/examples DESTINATION ${python_install_dir} COMPONENT client
-  USE_SOURCE_PERMISSIONS FILES_MATCHING PATTERN "*.py" PATTERN "__pycache__" EXCLUDE)
+foreach(file IN LISTS python_sources)
+  cmake_path(GET file PARENT_PATH folder)
+  if(folder STREQUAL examples)
+    install(PROGRAMS python/${file} DESTINATION ${python_install_dir}/${folder} COMPONENT client)
+  else()
+    install(FILES python/${file} DESTINATION ${python_install_dir}/${folder} COMPONENT client)
+  endif()
+endforeach()
 install(FILES ${message_modules} DESTINATION ${python_install_dir}/emit/v1 COMPONENT client)

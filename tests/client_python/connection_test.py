@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The client against a daemon of a few lines, which sends what a real one does not."""
 import contextlib
+import random
 import socket
 import threading
 import unittest
 
 import numpy as np
-from emit_client import ClosedError, DeadlineError, FrameClient, ProtocolError, RefusedError, crc32c
+from emit_client import ClosedError, DeadlineError, EmitError, FrameClient, ProtocolError, RefusedError, crc32c
 from emit_client.messages import control_pb2
 from wire import frame_header, record
 
@@ -46,7 +47,8 @@ def fake_daemon(*answers, hold=False):
         done = threading.Event()
 
         def serve():
-            with listener.accept()[0] as stream:
+            # A client that refuses what it gets closes at once, which resets the connection.
+            with contextlib.suppress(ConnectionError), listener.accept()[0] as stream:
                 for answer in answers:
                     stream.recv(65536)
                     stream.sendall(answer)
@@ -80,6 +82,21 @@ class Greeting(unittest.TestCase):
     def test_welcome_in_pieces_that_never_ends(self):
         with fake_daemon(welcome()[:20], hold=True) as url, self.assertRaisesRegex(DeadlineError, "no welcome"):
             FrameClient.connect(url, timeout_s=0.1)
+
+
+class Hostile(unittest.TestCase):
+    def test_changed_bytes_raise_nothing_but_errors_of_the_package(self):
+        chance = random.Random(8)
+        for _ in range(100):
+            answers = [bytearray(welcome()), bytearray(subscribed() + frame(1) + frame(2))]
+            for _ in range(chance.randint(1, 3)):
+                answer = chance.choice(answers)
+                answer[chance.randrange(len(answer))] = chance.randrange(256)
+            with fake_daemon(*answers) as url, contextlib.suppress(EmitError):
+                with FrameClient.connect(url, timeout_s=0.1) as client:
+                    client.subscribe(timeout_s=0.1)
+                    for _ in range(3):
+                        client.receive(0.1)
 
 
 class Subscribing(unittest.TestCase):

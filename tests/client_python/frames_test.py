@@ -114,6 +114,53 @@ class SameFrames(unittest.TestCase):
                     self.assertEqual(client.counters.partial, 0)
 
 
+class Networks(unittest.TestCase):
+    def test_two_clients_of_a_multicast_group(self):
+        with Daemon(pacing=IG_CLOCK) as daemon:
+            with FrameClient.connect(daemon.udp_url) as first, FrameClient.connect(daemon.udp_url) as second:
+                first.subscribe(multicast_group="239.255.77.1")
+                # The port of the group carries the other stream too, which is foreign.
+                second.subscribe(multicast_group="239.255.77.1", udp_port=first.terms.udp_port)
+                for client in (first, second):
+                    self.assertEqual(len(list(client.frames(10))), 10)
+                    self.assertEqual(client.counters.partial, 0)
+                    self.assertGreater(client.counters.foreign_datagrams, 0)
+
+    def test_ipv6(self):
+        try:
+            with socket.socket(socket.AF_INET6) as probe:
+                probe.bind(("::1", 0))
+        except OSError:
+            self.skipTest("this machine has no IPv6")
+        with Daemon(address="[::1]") as daemon:
+            for url, host_url in ((daemon.tcp_url, daemon.tcp_url), (daemon.udp_url, daemon.host_url)):
+                with FrameClient.connect(url) as client, HostClient.connect(host_url) as host:
+                    client.subscribe()
+                    for number in range(1, 4):
+                        host.send_pose(number * STEP_NS, pose(number))
+                        self.assertEqual(client.receive().header.host_frame_number, number)
+                    self.assertEqual(client.counters.foreign_datagrams, 0)
+
+    def test_strangers_and_a_flood_do_not_hold_the_caller(self):
+        with Daemon() as daemon, FrameClient.connect(daemon.udp_url) as client:
+            client.subscribe()
+            where = ("127.0.0.1", client.terms.udp_port)
+            with socket.socket(type=socket.SOCK_DGRAM) as stranger:
+                stranger.bind(("127.0.0.2", 0))
+                for _ in range(10):
+                    stranger.sendto(bytes(40), where)
+            with socket.socket(type=socket.SOCK_DGRAM) as local:
+                for datagram in (b"", b"x", bytes(40)):
+                    local.sendto(datagram, where)
+            self.assertIsNone(client.receive(0.05))
+            self.assertEqual((client.counters.foreign_datagrams, client.counters.bad_datagrams), (10, 3))
+            take, client._take = client._take, lambda: True
+            begin_s = time.monotonic()
+            self.assertIsNone(client.receive(0.05))
+            self.assertLess(time.monotonic() - begin_s, 5)
+            client._take = take
+
+
 class SharedMemory(unittest.TestCase):
     def test_pixels_in_place_say_when_they_are_overwritten(self):
         with Daemon(pacing=IG_CLOCK) as daemon, FrameClient.connect(daemon.shm_url) as client:

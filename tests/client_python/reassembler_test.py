@@ -220,6 +220,26 @@ class Refused(Case):
         self.assertEqual([frame.header.frame_number for frame in self.pop_all()][-1], 4)
 
 
+class Hostile(Case):
+    def test_changed_datagrams_never_raise(self):
+        chance = random.Random(7)
+        good = [datagram for number in range(1, 4) for datagram in self.datagrams(number)]
+        for _ in range(5000):
+            datagram = bytearray(chance.choice(good))
+            for _ in range(chance.randint(0, 3)):
+                datagram[chance.randrange(min(len(datagram), 32 + 320))] = chance.choice((0, 1, 2, 127, 255))
+            if chance.random() < 0.1:
+                del datagram[chance.randrange(len(datagram)):]
+            if chance.random() < 0.5:
+                self.reassembler.push(datagram)
+            else:
+                self.reassembler.push_joined(np.frombuffer(bytes(datagram) * chance.randint(1, 3), np.uint8),
+                                             max(len(datagram), 1))
+            for frame in self.pop_all():
+                self.assertEqual(frame.pixels.shape, (frame.header.height_px, frame.header.width_px))
+        self.reassembler.flush()
+
+
 class Joined(Case):
     """The kernel joins datagrams; the outcome is that of single ones."""
 
