@@ -37,7 +37,11 @@ class Daemon:
         self._log = (self.folder / "stderr").open("wb")
         self.process = subprocess.Popen([BIN_DIR / "emitd", "--config", config], stdout=subprocess.PIPE,
                                         stderr=self._log)
-        ready = self._read_ready_line()
+        try:
+            ready = self._read_ready_line()
+        except BaseException:
+            self.close()
+            raise
         words = dict(word.split("=", 1) for word in ready.split()[1:])
         self.control = words["control"]
         self.host_udp = words["host_udp"]
@@ -60,6 +64,8 @@ class Daemon:
             self.process.wait()
         self.process.stdout.close()
         self._log.close()
+        # A daemon that was killed leaves its shared memory behind.
+        pathlib.Path(f"/dev/shm/emitd-{self.shm}").unlink(missing_ok=True)
         shutil.rmtree(self.folder)
 
     def __enter__(self):
@@ -80,8 +86,6 @@ class Daemon:
                         return line.decode()
                 if not piece:
                     break
-        self.process.kill()
-        self.process.wait()
         raise AssertionError(f"emitd is not ready: {self.log()}")
 
 
