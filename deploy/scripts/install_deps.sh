@@ -11,7 +11,7 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
            libopenexr-dev libboost-dev libprotobuf-dev protobuf-compiler libspdlog-dev libfmt-dev
            libtomlplusplus-dev libcli11-dev libexpected-dev libembree-dev libtbb-dev libeigen3-dev
            libceres-dev libmeshoptimizer-dev libisal-dev liblz4-dev libssl-dev libgtest-dev libgmock-dev
-           python3-protobuf)
+           python3-protobuf python3-numpy)
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
 checkers=(clang-format clang-tidy clang libclang-rt-dev python3)
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)

@@ -155,17 +155,32 @@ TEST_F(ClientTutorial, CppProjectBuildsAgainstTheInstalledPackageAndReceivesFram
   expect_five_frames();
 }
 
-TEST_F(ClientTutorial, PythonProgramReceivesFrames) {
+TEST_F(ClientTutorial, PythonPackageReceivesFrames) {
+  if (run(folder_, "/usr/bin/python3 -c 'import google.protobuf, numpy'") != 0) {
+    GTEST_SKIP() << "python3-protobuf or python3-numpy is not installed";
+  }
+  folder_.write("client.py", page_.snippets("py"));
+  EXPECT_EQ(
+      run(folder_,
+          "PYTHONPATH=\"$PWD/prefix/share/emit/python:$PYTHONPATH\" /usr/bin/python3 client.py "
+          "tcp://" +
+              daemon_.control()),
+      0)
+      << folder_.read("log");
+  expect_five_frames();
+}
+
+TEST_F(ClientTutorial, PythonProgramWithoutThePackageReceivesFrames) {
   if (run(folder_, "/usr/bin/python3 -c 'import google.protobuf'") != 0) {
     GTEST_SKIP() << "python3-protobuf is not installed";
   }
-  folder_.write("client.py", page_.snippets("python"));
+  folder_.write("raw_client.py", page_.snippets("python"));
   ASSERT_EQ(run(folder_,
                 "protoc --proto_path=prefix/share/emit/proto --python_out=. emit/v1/control.proto "
                 "emit/v1/host.proto emit/v1/status.proto"),
             0)
       << folder_.read("log");
-  EXPECT_EQ(run(folder_, "/usr/bin/python3 client.py " + daemon_.control()), 0)
+  EXPECT_EQ(run(folder_, "/usr/bin/python3 raw_client.py " + daemon_.control()), 0)
       << folder_.read("log");
   expect_five_frames();
 }

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The header in front of every frame's pixels (wire format, section 3)."""
+from __future__ import annotations
+
+import dataclasses
+import functools
+import struct
+
+from .crc32c import crc32c
+from .errors import ProtocolError
+
+FRAME_HEADER_BYTES = 320
+_MAGIC = 0x524D4645
+_VERSION = 1
+_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBB6xqqQffIIIIII28xI")
+assert _LAYOUT.size == FRAME_HEADER_BYTES
+
+FLAG_NAMES = (
+    "late", "repeated", "stale", "degraded", "partial", "hold", "non_finite", "clamped", "extrapolated", "gap_before",
+    "canned", "time_unset", "trigger_fault", "corrupt", "lost_before")
+FLAG_BITS = {name: 1 << bit for bit, name in enumerate(FLAG_NAMES)}
+# Only a receiver may set these flags. It clears them where a sender set them.
+RECEIVER_FLAG_BITS = FLAG_BITS["partial"] | FLAG_BITS["corrupt"] | FLAG_BITS["lost_before"]
+
+_QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k"}
+_CHANNEL_KINDS = {0: "injection", 1: "projector"}
+_ENCODINGS = {0: "raw", 1: "shuffled_lz4"}
+
+
+@functools.lru_cache(maxsize=256)
+def _names_of(bits: int) -> frozenset[str]:
+    return frozenset(FLAG_NAMES[bit] if bit < len(FLAG_NAMES) else f"bit_{bit}"
+                     for bit in range(32) if bits >> bit & 1)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class FrameHeader:
+    """All fields of a frame header. Names and units are those of the wire format.
+
+    Wall instants are ns of TAI (UTC with the flag time_unset); 0 means that the event did not happen.
+    """
+
+    quantity: str  # "radiance_w_m2_sr" or "temperature_k"
+    channel_kind: str  # "injection" or "projector"
+    channel_index: int
+    width_px: int
+    height_px: int
+    band_lo_um: float
+    band_hi_um: float
+    flag_bits: int
+    estimated_error_k: float  # NaN: not known; infinite: the image is not to be trusted
+    nonfinite_px: int
+    clamped_px: int
+    payload_crc32c: int
+    payload_bytes: int
+    run_id: int
+    frame_number: int
+    host_frame_number: int  # newest host frame used; 0: none yet
+    sim_time_ns: int
+    pose_sim_time_ns: int
+    host_received_ns: int
+    deadline_ns: int
+    render_start_ns: int
+    render_end_ns: int
+    readback_end_ns: int
+    send_start_ns: int
+    previous_age_ns: int
+    previous_delay_ns: int
+    previous_frame_number: int
+    position_m: tuple[float, float, float]  # of the sensor, east, north and up
+    world_from_body: tuple[float, float, float, float]  # w, x, y, z
+    quality_level: int  # 0: full quality
+    encoding: str  # "raw", or "shuffled_lz4", which this package does not ask for
+    previous_jitter_ns: int
+    slot_begin_ns: int
+    trigger_number: int
+    prediction_error_m: float
+    prediction_error_rad: float
+    predictions: int  # while it is 0, the prediction errors have no meaning
+    window_x_px: int
+    window_y_px: int
+    sensor_width_px: int  # 0: the daemon does not say
+    sensor_height_px: int
+    encoded_bytes: int
+
+    @property
+    def flags(self) -> frozenset[str]:
+        """Names of the flags that are set. A flag that this package does not know is called bit_N."""
+        return _names_of(self.flag_bits)
+
+    def with_flags(self, bits: int) -> FrameHeader:
+        """Returns the header with these flags set too."""
+        return self if bits & ~self.flag_bits == 0 else dataclasses.replace(self, flag_bits=self.flag_bits | bits)
+
+
+def parse_frame_header(raw: bytes) -> FrameHeader:
+    """Decodes and checks the header at the begin of `raw`. Raises ProtocolError, which names what is wrong."""
+    if len(raw) < FRAME_HEADER_BYTES:
+        raise ProtocolError(f"frame header: {len(raw)} bytes, {FRAME_HEADER_BYTES} needed")
+    raw = bytes(raw[:FRAME_HEADER_BYTES])
+    fields = _LAYOUT.unpack(raw)
+    magic, version, pixel_format, quantity, channel_kind, header_bytes = fields[:6]
+    if magic != _MAGIC:
+        raise ProtocolError(f"frame header: magic {magic:#010x}, not {_MAGIC:#010x}")
+    if version != _VERSION:
+        raise ProtocolError(f"frame header: version {version}, this is version {_VERSION}")
+    if header_bytes != FRAME_HEADER_BYTES:
+        raise ProtocolError(f"frame header: size field {header_bytes}, not {FRAME_HEADER_BYTES}")
+    computed = crc32c(raw[:-4])
+    if fields[-1] != computed:
+        raise ProtocolError(f"frame header: CRC {fields[-1]:#010x}, computed {computed:#010x}")
+    if pixel_format != 1:
+        raise ProtocolError(f"frame header: unknown pixel format {pixel_format}")
+    if quantity not in _QUANTITIES:
+        raise ProtocolError(f"frame header: unknown pixel quantity {quantity}")
+    position = fields[31:34]
+    quaternion = fields[34:38]
+    quality_level, encoding = fields[38:40]
+    if encoding not in _ENCODINGS:
+        raise ProtocolError(f"frame header: unknown pixel encoding {encoding}")
+    header = FrameHeader(
+        _QUANTITIES[quantity], _CHANNEL_KINDS.get(channel_kind, f"kind_{channel_kind}"), *fields[6:11],
+        fields[11] & ~RECEIVER_FLAG_BITS, *fields[12:31], position, quaternion, quality_level, _ENCODINGS[encoding],
+        *fields[40:-1])
+    if header.payload_bytes != 4 * header.width_px * header.height_px:
+        raise ProtocolError(f"frame header: {header.payload_bytes} payload bytes for {header.width_px}x"
+                            f"{header.height_px} float32 pixels")
+    if (header.sensor_width_px or header.sensor_height_px) and (
+            header.window_x_px + header.width_px > header.sensor_width_px or
+            header.window_y_px + header.height_px > header.sensor_height_px):
+        raise ProtocolError(
+            f"frame header: {header.width_px}x{header.height_px} pixels at {header.window_x_px}, {header.window_y_px}"
+            f" of a sensor of {header.sensor_width_px}x{header.sensor_height_px}")
+    return header
