@@ -20,15 +20,18 @@ class FrameHeaderBytes(unittest.TestCase):
                      previous_age_ns=-19, previous_delay_ns=20, previous_frame_number=21, quality_level=22,
                      previous_jitter_ns=23, slot_begin_ns=24, trigger_number=25, prediction_error_m=26.5,
                      prediction_error_rad=27.5, predictions=28, window_x_px=29, window_y_px=30, sensor_width_px=131,
-                     sensor_height_px=132)
+                     sensor_height_px=132, motion_fault_bits=0b101001, shift_x_px=33.5, shift_y_px=-34.5,
+                     pointing_error_px=0.25, display_ns=35)
         header = parse_frame_header(frame_header(
-            **given, position_east_m=1.5, position_north_m=2.5, position_up_m=3.5, attitude_w=0.5, attitude_x=-0.5,
-            attitude_y=0.25, attitude_z=0.75))
+            **given, motion_state=5, position_east_m=1.5, position_north_m=2.5, position_up_m=3.5, attitude_w=0.5,
+            attitude_x=-0.5, attitude_y=0.25, attitude_z=0.75))
         given.update(channel_kind="projector")
         for name, value in given.items():
             self.assertEqual(getattr(header, name), value, name)
         self.assertEqual(header.position_m, (1.5, 2.5, 3.5))
         self.assertEqual(header.world_from_body, (0.5, -0.5, 0.25, 0.75))
+        self.assertEqual(header.motion_state, "following")
+        self.assertEqual(header.motion_faults, {"no_feedback", "limit", "clock"})
         self.assertEqual(header.quantity, "radiance_w_m2_sr")
         self.assertEqual(header.payload_bytes, 48)
         self.assertEqual(header.encoding, "raw")
@@ -59,7 +62,8 @@ class FrameHeaderBytes(unittest.TestCase):
     def test_reserved_bytes_are_ignored(self):
         raw = bytearray(frame_header())
         raw[226:232] = b"\xff" * 6
-        raw[288:316] = b"\xff" * 28
+        raw[290:292] = b"\xff" * 2
+        raw[312:316] = b"\xff" * 4
         self.assertEqual(parse_frame_header(with_crc(bytes(raw))).frame_number, 1)
 
     def test_faults_are_named(self):

@@ -12,18 +12,20 @@ from .errors import ProtocolError
 FRAME_HEADER_BYTES = 320
 _MAGIC = 0x524D4645
 _VERSION = 1
-_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBB6xqqQffIIIIII28xI")
+_LAYOUT = struct.Struct("<I4BHHIIffIfIIIQQQQ10qQ3d4dBB6xqqQffIIIIIIBB2xfffq4xI")
 assert _LAYOUT.size == FRAME_HEADER_BYTES
 
 FLAG_NAMES = (
     "late", "repeated", "stale", "degraded", "partial", "hold", "non_finite", "clamped", "extrapolated", "gap_before",
-    "canned", "time_unset", "trigger_fault", "corrupt", "lost_before")
+    "canned", "time_unset", "trigger_fault", "corrupt", "lost_before", "motion_fault")
 FLAG_BITS = {name: 1 << bit for bit, name in enumerate(FLAG_NAMES)}
 # Only a receiver may set these flags. It clears them where a sender set them.
 RECEIVER_FLAG_BITS = FLAG_BITS["partial"] | FLAG_BITS["corrupt"] | FLAG_BITS["lost_before"]
 
 _QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k"}
 _CHANNEL_KINDS = {0: "injection", 1: "projector"}
+_MOTION_STATES = ("none", "waiting", "parked", "parking", "capturing", "following", "fault")
+_MOTION_FAULTS = ("no_feedback", "no_host", "interlock", "limit", "lock", "clock")
 _ENCODINGS = {0: "raw", 1: "shuffled_lz4"}
 
 
@@ -82,6 +84,18 @@ class FrameHeader:
     sensor_width_px: int  # 0: the daemon does not say
     sensor_height_px: int
     encoded_bytes: int
+    motion_state: str  # of the motion simulator; "none": the daemon drives none
+    motion_fault_bits: int
+    shift_x_px: float  # projector: the shift that brings the image to where the axes are
+    shift_y_px: float
+    pointing_error_px: float  # projector: of an earlier frame; NaN: not known
+    display_ns: int
+
+    @property
+    def motion_faults(self) -> frozenset[str]:
+        """Reasons of the flag motion_fault. A reason that this package does not know is called bit_N."""
+        return frozenset(_MOTION_FAULTS[bit] if bit < len(_MOTION_FAULTS) else f"bit_{bit}"
+                         for bit in range(8) if self.motion_fault_bits >> bit & 1)
 
     @property
     def flags(self) -> frozenset[str]:
@@ -91,6 +105,10 @@ class FrameHeader:
     def with_flags(self, bits: int) -> FrameHeader:
         """Returns the header with these flags set too."""
         return self if bits & ~self.flag_bits == 0 else dataclasses.replace(self, flag_bits=self.flag_bits | bits)
+
+
+def _motion_state(value: int) -> str:
+    return _MOTION_STATES[value] if value < len(_MOTION_STATES) else f"state_{value}"
 
 
 def parse_frame_header(raw: bytes) -> FrameHeader:
@@ -121,7 +139,7 @@ def parse_frame_header(raw: bytes) -> FrameHeader:
     header = FrameHeader(
         _QUANTITIES[quantity], _CHANNEL_KINDS.get(channel_kind, f"kind_{channel_kind}"), *fields[6:11],
         fields[11] & ~RECEIVER_FLAG_BITS, *fields[12:31], position, quaternion, quality_level, _ENCODINGS[encoding],
-        *fields[40:-1])
+        *fields[40:-7], _motion_state(fields[-7]), *fields[-6:-1])
     if header.payload_bytes != 4 * header.width_px * header.height_px:
         raise ProtocolError(f"frame header: {header.payload_bytes} payload bytes for {header.width_px}x"
                             f"{header.height_px} float32 pixels")
