@@ -78,7 +78,7 @@ void check_motion(const Node& table, const MotionConfig& motion, Diagnostics& di
                       fmt::format("'axes': 'park_deg' of axis {} is outside of its travel", i + 1));
     }
   }
-  if (has_target && motion.target_entity < 0) {
+  if (has_target && motion.target_entity == 0) {
     diagnostics.add(key_location(table, "target_entity"),
                     "'target_entity' is missing: the target rings need the entity to point to");
   }

@@ -18,6 +18,10 @@ bool within(double value, double limit) noexcept {
   return std::abs(value) <= limit;  // false for NaN
 }
 
+bool valid_instant(std::int64_t time_ns) noexcept {
+  return time_ns >= 0 && time_ns <= kMaxAxesTimeNs;
+}
+
 bool valid(const v1::AxisValues& axis) noexcept {
   return within(axis.angle_rad(), kMaxAxisRad) && within(axis.rate_rad_s(), kMaxAxisRadS) &&
          within(axis.acceleration_rad_s2(), kMaxAxisRadS2);
@@ -153,7 +157,7 @@ AxesFault AxesCodec::decode(std::span<const std::byte> bytes, AxesCommand& out) 
     return AxesFault::axes;
   }
   bool in_range = message.timeout_ms() >= 1 && message.timeout_ms() <= kMaxAxesTimeoutMs &&
-                  message.time_ns() >= 0 && message.time_ns() <= kMaxAxesTimeNs;
+                  valid_instant(message.time_ns());
   for (const v1::AxisValues& axis : message.axes()) in_range = in_range && valid(axis);
   if (!in_range) return AxesFault::value;
   out = {message.counter(),
@@ -187,6 +191,7 @@ AxesFault AxesCodec::decode(std::span<const std::byte> bytes, AxesMonitor& out) 
   for (const v1::AxisValues& axis : message.demanded()) {
     if (!valid(axis)) return AxesFault::value;
   }
+  if (!valid_instant(message.time_ns())) return AxesFault::value;
   out = {message.counter(),
          message.time_ns(),
          message.command_counter(),

@@ -101,14 +101,17 @@ struct RenderDone {
 
 /// Message of conductor to motion agent.
 struct MotionInput {
-  enum class Kind : std::uint8_t { pose, reset };
+  /// forget: a run begins. reset: the host has asked for it, which closes the interlock too.
+  enum class Kind : std::uint8_t { pose, target, forget, reset };
   Kind kind = Kind::pose;
   SeekerPose pose;
+  TimedPoint target;
   std::int64_t received_ns = 0;  ///< arrival of the pose, wall
 };
 
 /// Message of motion agent to conductor: what the axes do, with a measurement or without.
 struct MotionReport {
+  std::int64_t at_ns = 0;  ///< when it was made, wall
   bool has_feedback = false;
   AxisFeedback feedback;
   protocol::MotionState state = protocol::MotionState::none;

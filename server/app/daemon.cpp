@@ -95,7 +95,7 @@ physics::Result<void> DaemonImpl::setup() {
   if (!options_.stepped) {
     // Ask with the privileges that stay, and before anything large is made, so that it comes from
     // memory that is locked.
-    realtime_ = ask_for_realtime(config_.realtime);
+    realtime_ = ask_for_realtime(config_.realtime, config_.motion.enabled());
     if (auto checked = check_realtime(); !checked) {
       return checked;
     }

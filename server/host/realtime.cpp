@@ -130,7 +130,7 @@ std::string RealtimeReport::refusals() const {
   return out;
 }
 
-RealtimeReport ask_for_realtime(const config::RealtimeConfig& config) {
+RealtimeReport ask_for_realtime(const config::RealtimeConfig& config, bool with_motion) {
   RealtimeReport report;
   if (config.lock_memory) {
     std::string why = lock_memory(config.heap_touch_mib);
@@ -138,6 +138,7 @@ RealtimeReport ask_for_realtime(const config::RealtimeConfig& config) {
     report.add({"lock_memory", "", granted, std::move(why)});
   }
   for (const char* agent : {"conductor", "motion", "receiver", "sender", "render", "recorder"}) {
+    if (agent == std::string_view("motion") && !with_motion) continue;
     const ThreadRealtime wish = thread_realtime(config, agent);
     if (!wish.fifo && wish.cpus.empty()) continue;
     std::optional<int> cpus;

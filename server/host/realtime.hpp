@@ -57,6 +57,7 @@ class RealtimeReport {
 
 /// Locks memory where that is asked for, and tries what the agents' threads will ask for on a
 /// thread that ends again, so that a start can be given up before anything serves. Allocates.
-[[nodiscard]] RealtimeReport ask_for_realtime(const config::RealtimeConfig& config);
+[[nodiscard]] RealtimeReport ask_for_realtime(const config::RealtimeConfig& config,
+                                              bool with_motion = false);
 
 }  // namespace emit::server

@@ -55,8 +55,9 @@ physics::Result<AxisProfile> AxisProfile::create(const AxisLimits& limits) {
   return AxisProfile(limits);
 }
 
-void AxisProfile::start(double angle_rad) noexcept {
-  motion_ = {std::clamp(angle_rad, limits_.min_rad, limits_.max_rad), 0.0, 0.0};
+void AxisProfile::start(double angle_rad, double rate_rad_s) noexcept {
+  motion_ = {std::clamp(angle_rad, limits_.min_rad, limits_.max_rad),
+             std::clamp(rate_rad_s, -limits_.rate_rad_s, limits_.rate_rad_s), 0.0};
 }
 
 AxisProfile::Command AxisProfile::step(const AxisMotion& demand, double step_s,

@@ -38,8 +38,8 @@ class AxisProfile {
   /// Errors: invalid_argument (no travel, or a rate or an acceleration that is not positive).
   [[nodiscard]] static physics::Result<AxisProfile> create(const AxisLimits& limits);
 
-  /// Places the axis at rest. Angles outside of the travel count as its ends.
-  void start(double angle_rad) noexcept;
+  /// Places the axis at an angle, with a rate. Values beyond the limits count as the limits.
+  void start(double angle_rad, double rate_rad_s = 0.0) noexcept;
 
   /// Returns the command for `step_s` later, at which `demand` is to be met. `share` is the part of
   /// the greatest rate and acceleration that is used: small ones start and park softly. To stop

@@ -19,8 +19,6 @@ struct MotionPlan {
   bool projects = false;
   double focal_px = 1.0;    ///< focal length of the image
   glm::dvec2 size_px{1.0};  ///< of the whole image
-  /// Longest prediction of the axes beyond their latest measurement.
-  std::int64_t horizon_ns = 50'000'000;
 };
 
 }  // namespace emit::server

@@ -9,28 +9,39 @@
 #include "emit/physics/frames.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "motion/motion_table.hpp"
+#include "motion/point_course.hpp"
 
 namespace emit::server {
 
-/// Pose of the seeker and place of its target at an instant of simulation time.
+/// Pose of the seeker at an instant of simulation time.
 struct SeekerPose {
   std::int64_t sim_time_ns = 0;
   physics::Pose seeker;
-  std::optional<protocol::PoseRates> seeker_rates;
-  glm::dvec3 target_m{0.0};  ///< world
-  std::optional<glm::dvec3> target_velocity_m_s;
+  std::optional<protocol::PoseRates> rates;
 };
 
 /// Motion of the seeker and its target, predicted from the latest poses: with rates as the host
-/// gives them, or differenced, and with constant acceleration.
+/// gives them, or differenced, and with constant acceleration. The target may come more seldom than
+/// the seeker.
 ///
 /// Fixed size. RT-safe.
 class SeekerCourse {
  public:
-  /// Adds a pose. One of the newest instant replaces that one, and one that is older is dropped.
+  /// Adds a pose, by the rules of PointCourse::push().
   void push(const SeekerPose& pose) noexcept;
-  void clear() noexcept { count_ = 0; }
+  /// Adds a place of the target.
+  void push_target(const TimedPoint& target) noexcept { target_.push(target); }
+  /// Forgets the seeker's poses. The target stays.
+  void clear_seeker() noexcept {
+    count_ = 0;
+    position_.clear();
+  }
+  void clear() noexcept {
+    clear_seeker();
+    target_.clear();
+  }
   [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
+  [[nodiscard]] bool has_target() const noexcept { return !target_.empty(); }
   /// @pre !empty()
   [[nodiscard]] std::int64_t newest_ns() const noexcept {
     EMIT_DCHECK(!empty());
@@ -41,23 +52,23 @@ class SeekerCourse {
     return count_ < 2 ? 0 : newest_ns() - poses_[count_ - 2].sim_time_ns;
   }
 
-  /// Returns the state at an instant near the newest pose. A target at the seeker's own place
-  /// counts as one straight ahead.
+  /// Returns the state at an instant near the newest pose. Without a target, or with one at the
+  /// seeker's own place, the target counts as straight ahead.
   /// @pre !empty()
   [[nodiscard]] SeekerState at(std::int64_t sim_time_ns) const noexcept;
 
  private:
-  /// Rates and accelerations at the newest pose.
-  struct Rates {
-    glm::dvec3 turn_rad_s{0.0};
-    glm::dvec3 turn_acceleration_rad_s2{0.0};
-    glm::dvec3 target_velocity_m_s{0.0};
-    glm::dvec3 target_acceleration_m_s2{0.0};
+  /// Angular velocity and acceleration at the newest pose, in axes of the seeker.
+  struct Turn {
+    glm::dvec3 rate_rad_s{0.0};
+    glm::dvec3 acceleration_rad_s2{0.0};
   };
-  [[nodiscard]] Rates rates() const noexcept;
+  [[nodiscard]] Turn turn() const noexcept;
 
   std::array<SeekerPose, 3> poses_;  ///< the oldest first
   std::size_t count_ = 0;
+  PointCourse position_;  ///< of the seeker
+  PointCourse target_;
 };
 
 }  // namespace emit::server

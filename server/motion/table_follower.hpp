@@ -22,7 +22,9 @@ namespace emit::server {
 /// jump of angle, rate or acceleration. Commands stay within the limits of the axes.
 ///
 /// The axes follow while poses and measurements come. Else they park: when the host is silent, when
-/// no measurement comes, and when the interlock of the controller is open. They set off softly.
+/// no measurement comes, when the clocks differ, and when the interlock of the controller is open.
+/// They set off softly from where they are; so they do after a jump of simulation time, and when a
+/// ring has to turn to another angle for the same attitude.
 ///
 /// Pure: the caller gives all instants. Thread: one owner. Real time: RT-safe after create().
 class TableFollower {
@@ -39,6 +41,8 @@ class TableFollower {
     std::int64_t period_ns = 1'000'000;
     std::int64_t feedback_timeout_ns = 20'000'000;
     std::int64_t host_timeout_ns = 200'000'000;
+    /// Longest prediction beyond the newest pose. The axes come to rest there.
+    std::int64_t horizon_ns = 50'000'000;
     std::uint32_t controller_timeout_ms = 100;  ///< after which the controller parks by itself
     double soft_frac = 0.2;  ///< share of rate and acceleration with which the axes set off
   };
@@ -53,12 +57,19 @@ class TableFollower {
   /// AxisProfile refuses, or a park position outside of the travel).
   [[nodiscard]] static physics::Result<TableFollower> create(const Options& options);
 
+  /// Forgets the poses. The axes park until the next one.
+  void forget() noexcept;
   /// Forgets the poses, and switches the motors off for a tenth of a second, which closes an
   /// interlock that nothing holds open.
   void reset(std::int64_t now_ns) noexcept;
   /// Takes a pose that arrived at `received_ns`. Returns false if simulation time has jumped
   /// against time.
   bool take(const SeekerPose& pose, std::int64_t received_ns) noexcept;
+  /// Takes a place of the target.
+  void take(const TimedPoint& target) noexcept {
+    incoming_.push_target(target);
+    incoming_is_new_ = true;
+  }
   /// Takes what the controller reports. Returns the measurement; nothing if it has another number
   /// of axes or is not newer than the latest one.
   std::optional<AxisFeedback> take(const protocol::AxesMonitor& monitor,
@@ -81,10 +92,17 @@ class TableFollower {
   void choose(std::int64_t now_ns) noexcept;
   /// Writes the demands for `time_ns` into the command.
   void follow(std::int64_t now_ns, std::int64_t time_ns) noexcept;
-  /// Returns the motion of all axes that shows a state, near the latest one.
-  [[nodiscard]] Motions motions(const SeekerState& state, bool& near_lock) noexcept;
-  /// Starts the commands where the axes are.
+  /// Returns the motion of all axes that shows a course at an instant, with the angles nearest to
+  /// the commands. Beyond the horizon the axes rest.
+  [[nodiscard]] Motions motions(const SeekerCourse& course, std::int64_t sim_time_ns) noexcept;
+  /// Returns true if an axis is to turn so far that another angle for the same attitude was chosen.
+  [[nodiscard]] bool turns_over(const Motions& a, const Motions& b) const noexcept;
+  /// Starts the commands where the axes are, with their rates.
   void start_where_axes_are(std::int64_t now_ns) noexcept;
+  /// Lets the axes set off softly once more.
+  void capture(std::int64_t now_ns) noexcept;
+  /// Notes instants of the wall clock, and begins anew where it was set.
+  void watch_clock(std::int64_t now_ns) noexcept;
   [[nodiscard]] double share(std::int64_t now_ns) const noexcept;
   void measure_error(const protocol::AxesMonitor& monitor) noexcept;
 
@@ -97,7 +115,8 @@ class TableFollower {
   std::int64_t received_ns_ = 0;     ///< when the latest pose arrived
   std::int64_t clock_fault_ns_ = 0;  ///< when simulation time jumped last
   bool clock_jumped_ = false;
-  TableMotion near_;  ///< latest motion, for the choice of angles
+  Motions wanted_{};  ///< latest demands without blends
+  bool near_lock_ = false;
   std::array<AxisBlend, kMaxAxes> blends_;
   std::int64_t blend_ns_ = 0;     ///< when the blends began, wall
   std::int64_t followed_ns_ = 0;  ///< instant of the latest demands, wall
@@ -105,9 +124,12 @@ class TableFollower {
   protocol::AxesMonitor monitor_;
   std::int64_t monitor_ns_ = 0;  ///< when monitor_ arrived
   bool has_monitor_ = false;
-  std::int64_t off_until_ns_ = 0;  ///< motors are switched off until then
-  std::int64_t capture_ns_ = 0;    ///< when the axes set off
-  std::int64_t unsettled_ns_ = 0;  ///< when an axis did not meet its demand last
+  std::int64_t taken_ns_ = 0;           ///< when the controller took a new command last
+  std::int64_t followed_state_ns_ = 0;  ///< when the controller was following last
+  std::int64_t stepped_ns_ = 0;         ///< instant of the latest step
+  std::int64_t off_until_ns_ = 0;       ///< motors are switched off until then
+  std::int64_t capture_ns_ = 0;         ///< when the axes set off
+  std::int64_t unsettled_ns_ = 0;       ///< when an axis did not meet its demand last
   bool captured_ = false;
   bool driving_ = false;  ///< the latest command was to follow
   protocol::AxesCommand command_;

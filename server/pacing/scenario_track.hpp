@@ -17,6 +17,8 @@ class ScenarioTracks {
   /// Absent scenario: no entity is unknown, everything starts at the origin.
   explicit ScenarioTracks(const std::optional<scene::ScenarioDesc>& scenario);
 
+  /// Returns true if there is a scenario, which says which entities there are.
+  [[nodiscard]] bool has_entities() const noexcept { return !any_entity_; }
   [[nodiscard]] bool knows(std::uint32_t entity_id) const noexcept;
   [[nodiscard]] scene::TrajectoryState entity_at(std::uint32_t entity_id,
                                                  std::int64_t sim_time_ns) const noexcept;

@@ -82,13 +82,14 @@ namespace emit::server {
   X(axes_commands_missed, "commands left out because the motion agent did not run")       \
   X(axes_commands_limited, "commands with an axis at a limit")                            \
   X(axes_send_errors, "commands the kernel refused to send")                              \
-  X(axes_inputs_dropped, "poses the motion agent did not take in time")                   \
+  X(axes_inputs_dropped, "poses and targets the motion agent did not take in time")       \
   X(axes_reports, "measurements of the motion simulator taken")                           \
   X(axes_reports_refused, "its datagrams refused: malformed, old, wrong number of axes")  \
   X(axes_reports_dropped, "measurements the conductor did not take in time")              \
   X(axes_feedback_losses, "times its measurements stopped: motion.feedback_timeout_ms")   \
   X(axes_host_silences, "times its axes parked for want of poses: host_timeout_ms")       \
   X(axes_interlocks, "times its interlock was open")                                      \
+  X(axes_commands_ignored, "times it did not take or follow commands for 0.5 s")          \
   X(axes_clock_jumps, "jumps of simulation time against time, seen by the axes")          \
   X(frames_motion_fault, "frames flagged motion_fault")                                   \
   X(no_free_slot, "attempts to render while every slot was in use")                       \

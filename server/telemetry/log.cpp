@@ -211,8 +211,8 @@ EventText describe_refusal(const Event& event, const std::string& text) {
 EventText describe_motion(const Event& event) {
   static constexpr std::array kStates{"none",      "waiting",   "parked", "parking",
                                       "capturing", "following", "fault"};
-  static constexpr std::array kFaults{"no_feedback", "no_host", "interlock",
-                                      "limit",       "lock",    "clock"};
+  static constexpr std::array kFaults{"no_feedback", "no_host", "interlock",        "limit",
+                                      "lock",        "clock",   "controller_clock", "ignored"};
   std::string faults;
   for (std::size_t i = 0; i < kFaults.size(); ++i) {
     if ((event.b >> i & 1U) != 0) faults += (faults.empty() ? "" : ",") + std::string(kFaults[i]);
@@ -220,7 +220,6 @@ EventText describe_motion(const Event& event) {
   const std::string text = fmt::format("event=motion state={} faults={}",
                                        event.a < kStates.size() ? kStates[event.a] : "?",
                                        faults.empty() ? "none" : faults);
-  // Limits and locks come and go with every manoeuvre.
   return faults.empty() ? info(text) : distinct_warn(text);
 }
 

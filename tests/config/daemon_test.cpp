@@ -184,7 +184,7 @@ TEST_F(ConfigTest, a_motion_simulator_is_read_printed_and_checked) {
   EXPECT_TRUE(motion.enabled());
   EXPECT_EQ(motion.unit_rings, "pitch-yaw-roll");
   EXPECT_EQ(motion.target_rings, TargetRings::elevation_azimuth);
-  EXPECT_EQ(motion.target_entity, 7);
+  EXPECT_EQ(motion.target_entity, 7U);
   ASSERT_EQ(motion.axes.size(), 5U);
   EXPECT_NEAR(motion.axes[4].rate_rad_s, 3.14159265, 1e-8);
   EXPECT_NEAR(motion.lab_rad[0], 1.57079633, 1e-8);

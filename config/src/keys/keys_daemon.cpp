@@ -104,8 +104,8 @@ const KeyTable<RealtimeConfig>& realtime_keys() {
                               "fifo: priority of conductor and motion. Receiver, sender and render "
                               "have 1, 2 and 3 less."),
       text<RealtimeConfig>("cpus", EMIT_FIELD(cpus),
-                           "Cores of agents, such as `conductor=2, receiver=2, sender=3, "
-                           "render=4-7`. The others run on any core."),
+                           "Cores of agents, such as `conductor=2, motion=2, receiver=2, "
+                           "sender=3, render=4-7`. The others run on any core."),
       boolean<RealtimeConfig>(
           "lock_memory", EMIT_FIELD(lock_memory),
           "With `true` all memory is locked, and stacks and heap are touched at start, so that no "

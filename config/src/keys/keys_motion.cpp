@@ -69,8 +69,8 @@ const KeyTable<MotionConfig>& motion_keys() {
                                {"elevation-azimuth", TargetRings::elevation_azimuth}},
                            EMIT_FIELD(target_rings),
                            "Rings of target or projector, the outermost first. none: it is fixed."),
-      integer<MotionConfig>("target_entity", "", -1, 4294967295, EMIT_FIELD(target_entity),
-                            "Entity that the target rings point to. -1 means none."),
+      integer<MotionConfig>("target_entity", "", 0, 4294967295, EMIT_FIELD(target_entity),
+                            "Entity that the target rings point to. 0 means none."),
       custom<MotionConfig>(
           {"axes", "array of tables", "", "3 or 5 axes",
            "Axes of the unit, outermost first, then azimuth and elevation: `min_deg`, `max_deg`, "

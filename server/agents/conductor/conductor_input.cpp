@@ -99,7 +99,8 @@ void Conductor::store(const HostFrameData& frame) noexcept {
   for (const EntityStateData& state : frame.entity_span()) {
     entities_.store(state, frame.sim_time_ns, !slots_);
   }
-  if (motion_) {
+  // The axes of a run that is stopped park when no poses come.
+  if (motion_ && control_.running()) {
     motion_->take_pose(frame);
   }
   if (frame.environment) {
@@ -168,6 +169,9 @@ bool Conductor::take_command(const HostInput& input, std::int64_t now_ns) noexce
       slots_->reset();
     }
     static_cast<void>(reset_run(now_ns));  // room and idleness were checked above
+    if (motion_) {
+      motion_->reset();
+    }
   } else if (immediate_step) {
     // The pose may be old; the frame was asked for now.
     issue_pose(true, now_ns);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "agents/conductor/motion_view.hpp"
 
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
+#include <utility>
 
 namespace emit::server {
 
@@ -22,36 +24,60 @@ void MotionView::start_run() noexcept {
   target_moved_ = false;
   shown_count_ = 0;
   pointing_error_px_.reset();
-  MotionInput input;
-  input.kind = MotionInput::Kind::reset;
-  push(input);
+  if (pending_ != MotionInput::Kind::reset) pending_ = MotionInput::Kind::forget;
+  push_pending();
+}
+
+void MotionView::reset() noexcept {
+  pending_ = MotionInput::Kind::reset;
+  push_pending();
+}
+
+void MotionView::push_pending() noexcept {
+  if (pending_ == MotionInput::Kind::pose) return;
+  MotionInput* out = context_.motion_inputs.claim();
+  if (out == nullptr) return;
+  *out = {};
+  out->kind = std::exchange(pending_, MotionInput::Kind::pose);
+  context_.motion_inputs.commit();
+  context_.bells.motion.ring();
 }
 
 void MotionView::push(const MotionInput& input) noexcept {
-  if (!context_.motion_inputs.push(input)) {
+  push_pending();
+  if (pending_ != MotionInput::Kind::pose || !context_.motion_inputs.push(input)) {
     context_.counters.add(Counter::axes_inputs_dropped);
+    return;
   }
   context_.bells.motion.ring();
 }
 
+void MotionView::take_target(const protocol::HostFrameData& frame) noexcept {
+  MotionInput input;
+  input.kind = MotionInput::Kind::target;
+  input.target.sim_time_ns = frame.sim_time_ns;
+  const scene::TrajectoryState scripted =
+      scenario_.entity_at(*plan_.target_entity, frame.sim_time_ns);
+  bool come = !target_moved_ && scenario_.has_entities();
+  input.target.position_m = scripted.pose.position_world_m;
+  for (const protocol::EntityStateData& entity : frame.entity_span()) {
+    if (entity.entity_id != *plan_.target_entity) continue;
+    // The first state of the host ends the scripted motion.
+    come = !target_moved_ || entity.has_pose;
+    input.target.teleport = entity.teleport || !target_moved_;
+    target_moved_ = true;
+    if (!entity.has_pose) continue;
+    input.target.position_m = entity.pose.position_world_m;
+    if (entity.rates) input.target.velocity_m_s = entity.rates->velocity_world_m_s;
+  }
+  if (come) push(input);
+}
+
 void MotionView::take_pose(const protocol::HostFrameData& frame) noexcept {
+  if (plan_.target_entity) take_target(frame);
   MotionInput input;
   input.received_ns = frame.received_ns;
-  input.pose.sim_time_ns = frame.sim_time_ns;
-  input.pose.seeker = frame.seeker;
-  input.pose.seeker_rates = frame.seeker_rates;
-  if (plan_.target_entity) {
-    for (const protocol::EntityStateData& entity : frame.entity_span()) {
-      if (entity.entity_id != *plan_.target_entity || !entity.has_pose) continue;
-      target_m_ = entity.pose.position_world_m;
-      target_moved_ = true;
-      if (entity.rates) input.pose.target_velocity_m_s = entity.rates->velocity_world_m_s;
-    }
-    input.pose.target_m =
-        target_moved_
-            ? target_m_
-            : scenario_.entity_at(*plan_.target_entity, frame.sim_time_ns).pose.position_world_m;
-  }
+  input.pose = {frame.sim_time_ns, frame.seeker, frame.seeker_rates};
   push(input);
 }
 
@@ -68,14 +94,21 @@ int MotionView::take_reports() noexcept {
     }
     state_ = report->state;
     faults_ = report->faults;
+    reported_ns_ = report->at_ns;
     context_.motion_reports.pop();
   }
   if (taken > 0) judge_shown();
+  push_pending();
+  // An agent that does not come to its turn leaves the axes to the controller.
+  if (context_.clock.tai_ns() - reported_ns_ > plan_.follower.feedback_timeout_ns) {
+    state_ = MotionState::waiting;
+    faults_ |= protocol::kMotionNoFeedback;
+  }
   return taken;
 }
 
 TableAngles MotionView::angles_at(std::int64_t time_ns, bool& known) const noexcept {
-  const auto state = track_.at(time_ns, plan_.horizon_ns);
+  const auto state = track_.at(time_ns, plan_.follower.horizon_ns);
   known = state.has_value();
   if (state) return state->angles;
   const AxisFeedback* latest = track_.latest();
@@ -84,9 +117,15 @@ TableAngles MotionView::angles_at(std::int64_t time_ns, bool& known) const noexc
 
 glm::dvec2 MotionView::shift_px(const FrameLedger::Issued::Motion& motion,
                                 const TableAngles& angles) const noexcept {
-  return image_shift(motion.world_from_rendered,
-                     plan_.follower.table.world_from_projector(motion.world_from_seeker, angles),
-                     plan_.size_px, plan_.focal_px)
+  const glm::dmat3 world_from_shown =
+      plan_.follower.table.world_from_projector(motion.world_from_seeker, angles);
+  // Axes so far from where they were expected are no matter of a shift.
+  constexpr double kLeastCosine = 0.9;
+  if (glm::dot(motion.world_from_rendered[0], world_from_shown[0]) < kLeastCosine ||
+      glm::dot(motion.world_from_rendered[1], world_from_shown[1]) < kLeastCosine) {
+    return glm::dvec2(std::numeric_limits<double>::quiet_NaN());
+  }
+  return image_shift(motion.world_from_rendered, world_from_shown, plan_.size_px, plan_.focal_px)
       .shift_px;
 }
 
@@ -96,8 +135,8 @@ void MotionView::place(RenderJob& job, FrameLedger::Issued& issued,
   bool known = true;
   issued.motion.world_from_seeker = glm::mat3_cast(job.request.sensor_pose.world_from_body);
   issued.motion.world_from_rendered = issued.motion.world_from_seeker;
-  issued.header.display_ns = display_ns;
   if (plan_.projects) {
+    issued.header.display_ns = display_ns;
     issued.motion.world_from_rendered = plan_.follower.table.world_from_projector(
         issued.motion.world_from_seeker, angles_at(display_ns, known));
     job.request.sensor_pose.world_from_body =
@@ -115,8 +154,7 @@ void MotionView::finish(FrameLedger::Issued& issued) noexcept {
 
 void MotionView::finish_repeat(FrameHeader& header, std::int64_t display_ns) noexcept {
   take_reports();
-  header.display_ns = display_ns;
-  finished_.faults = 0;
+  if (plan_.projects) header.display_ns = display_ns;
   write(header, finished_, display_ns);
 }
 
@@ -126,22 +164,33 @@ void MotionView::write(FrameHeader& header, const FrameLedger::Issued::Motion& m
   header.motion_faults = static_cast<std::uint8_t>(motion.faults | faults_);
   header.shift_x_px = 0.0F;
   header.shift_y_px = 0.0F;
+  header.pointing_error_px = std::numeric_limits<float>::quiet_NaN();
   if (plan_.projects) {
     bool known = true;
     const glm::dvec2 shift = shift_px(motion, angles_at(display_ns, known));
-    if (!known) header.motion_faults |= protocol::kMotionNoFeedback;
-    header.shift_x_px = static_cast<float>(shift.x);
-    header.shift_y_px = static_cast<float>(shift.y);
-    header.pointing_error_px =
-        static_cast<float>(pointing_error_px_.value_or(std::numeric_limits<double>::quiet_NaN()));
-    if (shown_count_ == kKept) {
-      first_shown_ = (first_shown_ + 1) % kKept;
-      --shown_count_;
+    if (!known || !std::isfinite(shift.x + shift.y)) {
+      header.motion_faults |= protocol::kMotionNoFeedback;
+    } else {
+      header.shift_x_px = static_cast<float>(shift.x);
+      header.shift_y_px = static_cast<float>(shift.y);
     }
-    shown_[(first_shown_ + shown_count_++) % kKept] = {display_ns, motion, shift, follows(header)};
+    if (pointing_error_px_) header.pointing_error_px = static_cast<float>(*pointing_error_px_);
+    keep(header, motion, shift);
   }
   header.flags &= ~std::uint32_t{protocol::kFlagMotionFault};
   if (!follows(header)) header.flags |= protocol::kFlagMotionFault;
+}
+
+void MotionView::keep(const FrameHeader& header, const FrameLedger::Issued::Motion& motion,
+                      const glm::dvec2& shift) noexcept {
+  // A frame that is shown again, or whose pose is stale, is not where its seeker looks.
+  constexpr std::uint32_t kOld = protocol::kFlagRepeated | protocol::kFlagStale;
+  if (!follows(header) || (header.flags & kOld) != 0) return;
+  if (shown_count_ == kKept) {
+    first_shown_ = (first_shown_ + 1) % kKept;
+    --shown_count_;
+  }
+  shown_[(first_shown_ + shown_count_++) % kKept] = {header.display_ns, motion, shift};
 }
 
 void MotionView::judge_shown() noexcept {
@@ -151,7 +200,7 @@ void MotionView::judge_shown() noexcept {
     if (latest->time_ns < shown.display_ns) break;
     bool known = true;
     const TableAngles angles = angles_at(shown.display_ns, known);
-    if (known && shown.follows) {
+    if (known) {
       pointing_error_px_ = glm::distance(shift_px(shown.motion, angles), shown.shift_px);
       context_.motion_times.pointing.record(*pointing_error_px_);
     }

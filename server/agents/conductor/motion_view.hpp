@@ -25,9 +25,11 @@ class MotionView {
 
   /// A run begins.
   void start_run() noexcept;
-  /// Hands a pose of the host to the motion agent.
+  /// Asks the motion agent to close the interlock, because the host has reset the run.
+  void reset() noexcept;
+  /// Hands a pose of the host, and where its target is, to the motion agent.
   void take_pose(const protocol::HostFrameData& frame) noexcept;
-  /// Takes the reports of the motion agent.
+  /// Takes the reports of the motion agent. One that is silent counts as a lack of measurements.
   /// @return the number of reports taken
   int take_reports() noexcept;
 
@@ -45,7 +47,6 @@ class MotionView {
     std::int64_t display_ns = 0;
     FrameLedger::Issued::Motion motion;
     glm::dvec2 shift_px{0.0};
-    bool follows = false;  ///< the axes did what the frame assumes
   };
   static constexpr std::size_t kKept = 64;
 
@@ -55,8 +56,14 @@ class MotionView {
                                     const TableAngles& angles) const noexcept;
   void write(protocol::FrameHeader& header, const FrameLedger::Issued::Motion& motion,
              std::int64_t display_ns) noexcept;
+  /// Keeps a frame until its axes are measured.
+  void keep(const protocol::FrameHeader& header, const FrameLedger::Issued::Motion& motion,
+            const glm::dvec2& shift) noexcept;
   void judge_shown() noexcept;
+  void take_target(const protocol::HostFrameData& frame) noexcept;
   void push(const MotionInput& input) noexcept;
+  /// Hands over what must not get lost: the begin of a run.
+  void push_pending() noexcept;
 
   Context& context_;
   const ScenarioTracks& scenario_;
@@ -64,8 +71,10 @@ class MotionView {
   FeedbackTrack track_;
   protocol::MotionState state_ = protocol::MotionState::waiting;
   std::uint8_t faults_ = protocol::kMotionNoFeedback;
-  bool target_moved_ = false;  ///< the host has moved the target in this run
-  glm::dvec3 target_m_{0.0};
+  std::int64_t reported_ns_ = 0;  ///< instant of the latest report, wall
+  bool target_moved_ = false;     ///< the host has moved the target in this run
+  /// What the motion agent has no room for yet; pose: nothing.
+  MotionInput::Kind pending_ = MotionInput::Kind::pose;
   FrameLedger::Issued::Motion finished_;  ///< of the newest finished frame
   std::array<Shown, kKept> shown_;
   std::size_t first_shown_ = 0;

@@ -10,14 +10,16 @@ constexpr int kMostPerTurn = 64;
 }  // namespace
 
 bool MotionAgent::on_start() noexcept {
-  const std::int64_t now_ns = context_.clock.tai_ns();
-  follower_.reset(now_ns);
-  due_ns_ = now_ns + period_ns_;
+  due_ns_ = context_.clock.tai_ns() + period_ns_;
   return true;
 }
 
 int MotionAgent::do_work(std::int64_t now_ns) noexcept {
   int work = take_poses(now_ns) + take_monitors(now_ns);
+  // Somebody has set the clock back: the next command is not due in hours.
+  if (due_ns_ - now_ns > 2 * period_ns_) {
+    due_ns_ = now_ns;
+  }
   if (now_ns >= due_ns_) {
     command(now_ns);
     ++work;
@@ -30,10 +32,21 @@ int MotionAgent::take_poses(std::int64_t now_ns) noexcept {
   for (; work < kMostPerTurn; ++work) {
     const MotionInput* input = context_.motion_inputs.front();
     if (input == nullptr) break;
-    if (input->kind == MotionInput::Kind::reset) {
-      follower_.reset(now_ns);
-    } else if (!follower_.take(input->pose, input->received_ns)) {
-      context_.counters.add(Counter::axes_clock_jumps);
+    switch (input->kind) {
+      case MotionInput::Kind::forget:
+        follower_.forget();
+        break;
+      case MotionInput::Kind::reset:
+        follower_.reset(now_ns);
+        break;
+      case MotionInput::Kind::target:
+        follower_.take(input->target);
+        break;
+      case MotionInput::Kind::pose:
+        if (!follower_.take(input->pose, input->received_ns)) {
+          context_.counters.add(Counter::axes_clock_jumps);
+        }
+        break;
     }
     context_.motion_inputs.pop();
   }
@@ -75,16 +88,20 @@ void MotionAgent::command(std::int64_t now_ns) noexcept {
 void MotionAgent::note_status() noexcept {
   const TableFollower::Status& now = follower_.status();
   const bool changed = now.state != known_.state || now.faults != known_.faults;
+  // Limits and locks come and go with every manoeuvre: they are counted, not logged.
+  constexpr unsigned kCounted = protocol::kMotionLimit | protocol::kMotionLock;
+  const bool logged = now.state != known_.state || ((now.faults ^ known_.faults) & ~kCounted) != 0;
   const auto began = [&](protocol::MotionFaults fault) {
     return (now.faults & ~known_.faults & fault) != 0;
   };
   if (began(protocol::kMotionNoFeedback)) context_.counters.add(Counter::axes_feedback_losses);
   if (began(protocol::kMotionNoHost)) context_.counters.add(Counter::axes_host_silences);
+  if (began(protocol::kMotionIgnored)) context_.counters.add(Counter::axes_commands_ignored);
   if (began(protocol::kMotionInterlock)) context_.counters.add(Counter::axes_interlocks);
   if ((now.faults & protocol::kMotionLimit) != 0) {
     context_.counters.add(Counter::axes_commands_limited);
   }
-  if (changed) {
+  if (logged) {
     context_.motion_events.push(EventKind::motion_changed, static_cast<std::uint64_t>(now.state),
                                 now.faults);
   }
@@ -100,6 +117,7 @@ void MotionAgent::report(const AxisFeedback* feedback) noexcept {
     context_.counters.add(Counter::axes_reports_dropped);
     return;
   }
+  out->at_ns = context_.clock.tai_ns();
   out->has_feedback = feedback != nullptr;
   if (feedback != nullptr) out->feedback = *feedback;
   out->state = follower_.status().state;

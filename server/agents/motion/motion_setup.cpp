@@ -87,11 +87,19 @@ physics::Result<MotionPlan> make_motion_plan(const config::DaemonConfig& config,
   plan.follower.host_timeout_ns = motion.host_timeout_ns;
   plan.follower.controller_timeout_ms = motion.controller_timeout_ms;
   plan.follower.soft_frac = motion.soft_frac;
-  if (motion.target_entity >= 0) {
-    plan.target_entity = static_cast<std::uint32_t>(motion.target_entity);
+  if (motion.target_rings != config::TargetRings::none) {
+    plan.target_entity = motion.target_entity;
+    const auto is_target = [&](const scene::ObjectDesc& object) {
+      return object.entity_id == plan.target_entity;
+    };
+    if (scenario && !std::ranges::any_of(scenario->objects, is_target)) {
+      return make_error(
+          ErrorCode::config,
+          fmt::format("motion.target_entity: the scenario has no entity {}", *plan.target_entity));
+    }
   }
   plan.projects = projects;
-  plan.horizon_ns = config.pacing.horizon_ns;
+  plan.follower.horizon_ns = config.pacing.horizon_ns;
   if (scenario) {
     plan.size_px = {scenario->sensor.width_px, scenario->sensor.height_px};
     plan.focal_px = 0.5 * plan.size_px.x / std::tan(0.5 * scenario->sensor.fov_h_rad);

@@ -69,11 +69,40 @@ TEST(HostClock, finds_the_least_delay_at_once_in_the_beginning) {
 }
 
 TEST(HostClock, a_jump_of_simulation_time_is_reported_and_followed) {
+  for (const std::int64_t jump_ns : {1000 * kMs, -1000 * kMs}) {
+    HostClock clock;
+    for (int i = 0; i < 100; ++i) EXPECT_FALSE(clock.arrived(i * kMs, kStartNs + i * kMs));
+    // Time that seems to have stood may be a burst of late poses, for a tenth of a second.
+    int jumps = 0;
+    std::int64_t late_ns = 0;
+    for (int i = 100; i < 300; ++i) {
+      const std::int64_t received_ns = kStartNs + i * kMs;
+      jumps += clock.arrived(i * kMs + jump_ns, received_ns) ? 1 : 0;
+      if (clock.sim_time_ns(received_ns) != i * kMs + jump_ns) late_ns += kMs;
+    }
+    EXPECT_EQ(jumps, 1) << jump_ns;
+    EXPECT_LE(late_ns, jump_ns > 0 ? 0 : 101 * kMs) << jump_ns;
+  }
+}
+
+TEST(HostClock, poses_that_the_network_held_back_are_no_jump) {
   HostClock clock;
-  for (int i = 0; i < 100; ++i) EXPECT_FALSE(clock.arrived(i * kMs, kStartNs + i * kMs));
-  const std::int64_t received_ns = kStartNs + 100 * kMs;
-  EXPECT_TRUE(clock.arrived(100 * kMs + 1000 * kMs, received_ns));
-  EXPECT_EQ(clock.sim_time_ns(received_ns), 1100 * kMs);
+  for (int i = 0; i < 200; ++i) EXPECT_FALSE(clock.arrived(i * kMs, kStartNs + i * kMs));
+  // Nothing comes for 80 ms, then all of it at once.
+  for (int i = 200; i < 280; ++i) EXPECT_FALSE(clock.arrived(i * kMs, kStartNs + 280 * kMs));
+  for (int i = 280; i < 400; ++i) EXPECT_FALSE(clock.arrived(i * kMs, kStartNs + i * kMs));
+  EXPECT_NEAR(static_cast<double>(clock.sim_time_ns(kStartNs + 400 * kMs)), 400e6, 50e3);
+}
+
+TEST(HostClock, a_host_that_paused_is_found_within_a_tenth_of_a_second) {
+  HostClock clock;
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(clock.arrived(10 * i * kMs, kStartNs + 10 * i * kMs));
+  int jumps = 0;
+  for (int i = 100; i < 130; ++i) {
+    jumps += clock.arrived(10 * i * kMs, kStartNs + (10 * i + 150) * kMs) ? 1 : 0;
+  }
+  EXPECT_EQ(jumps, 1);
+  EXPECT_EQ(clock.sim_time_ns(kStartNs + 1450 * kMs), 1300 * kMs);
 }
 
 TEST(HostClock, a_simulation_at_half_speed_is_reported) {

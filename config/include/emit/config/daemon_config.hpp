@@ -63,7 +63,7 @@ struct MotionConfig {
   double rate_hz = 1000.0;
   std::string unit_rings = "yaw-pitch-roll";  ///< outermost first
   TargetRings target_rings = TargetRings::none;
-  std::int64_t target_entity = -1;     ///< that the target rings point to; -1: none
+  std::uint32_t target_entity = 0;     ///< that the target rings point to; 0: none
   std::vector<MotionAxisConfig> axes;  ///< rings of the unit, outermost first; azimuth, elevation
   // Rotations as yaw, pitch and roll, rad (server/docs/motion.md).
   std::array<double, 3> lab_rad{};

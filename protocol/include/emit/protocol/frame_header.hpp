@@ -69,12 +69,14 @@ enum class MotionState : std::uint8_t {
 };
 /// Reasons why the axes do not show what a frame assumes, as bits.
 enum MotionFaults : std::uint8_t {
-  kMotionNoFeedback = 1u << 0,  ///< no measurement for longer than motion.feedback_timeout_ms
-  kMotionNoHost = 1u << 1,      ///< no pose for longer than motion.host_timeout_ms
-  kMotionInterlock = 1u << 2,   ///< the controller has switched the motors off
-  kMotionLimit = 1u << 3,       ///< an axis is at a limit and cannot meet its demand
-  kMotionLock = 1u << 4,        ///< two axes are nearly parallel, and rates are damped
-  kMotionClock = 1u << 5,       ///< simulation time does not pass as fast as time
+  kMotionNoFeedback = 1u << 0,       ///< no measurement for longer than motion.feedback_timeout_ms
+  kMotionNoHost = 1u << 1,           ///< no pose for longer than motion.host_timeout_ms
+  kMotionInterlock = 1u << 2,        ///< the controller has switched the motors off
+  kMotionLimit = 1u << 3,            ///< an axis is at a limit and cannot meet its demand
+  kMotionLock = 1u << 4,             ///< two axes are nearly parallel, and rates are damped
+  kMotionClock = 1u << 5,            ///< simulation time does not pass as fast as time
+  kMotionControllerClock = 1u << 6,  ///< the clocks of controller and emitd differ
+  kMotionIgnored = 1u << 7,          ///< the controller does not take or follow the commands
 };
 
 /// Contents of a frame header. The order and the offsets of the fields on the wire are in

@@ -25,7 +25,7 @@ RECEIVER_FLAG_BITS = FLAG_BITS["partial"] | FLAG_BITS["corrupt"] | FLAG_BITS["lo
 _QUANTITIES = {1: "radiance_w_m2_sr", 2: "temperature_k"}
 _CHANNEL_KINDS = {0: "injection", 1: "projector"}
 _MOTION_STATES = ("none", "waiting", "parked", "parking", "capturing", "following", "fault")
-_MOTION_FAULTS = ("no_feedback", "no_host", "interlock", "limit", "lock", "clock")
+_MOTION_FAULTS = ("no_feedback", "no_host", "interlock", "limit", "lock", "clock", "controller_clock", "ignored")
 _ENCODINGS = {0: "raw", 1: "shuffled_lz4"}
 
 

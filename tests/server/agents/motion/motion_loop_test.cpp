@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "agents/motion/motion_agent.hpp"
@@ -149,7 +150,7 @@ class Loop {
       const protocol::AxesMonitor& monitor = table_->step(now_ns);
       monitors.push_back(monitor);
       if (controller_answers) port_.send(monitor);
-      agent_->do_work(now_ns);
+      if (agent_runs) agent_->do_work(now_ns);
       rig_.settle();
     }
   }
@@ -190,6 +191,12 @@ class Loop {
   protocol::AxesMode last_mode = protocol::AxesMode::off;
   bool host_speaks = true;
   bool controller_answers = true;
+  bool agent_runs = true;
+  std::uint64_t host_run = 1;
+  int target_every = 1;  ///< poses of the seeker for one of the target
+  glm::dvec3 target_m = kTargetM;
+  bool target_teleports = false;
+  TableSimulator& table() { return *table_; }
 
  private:
   static config::PacingConfig pacing(const LoopOptions& options) {
@@ -209,13 +216,15 @@ class Loop {
                                   seeker_at(sim_ns() + static_cast<std::int64_t>(step_s * 1e9));
           frame.seeker_rates =
               protocol::PoseRates{{}, glm::dvec3(turn.x, turn.y, turn.z) * (2.0 / step_s)};
+          if (number_ % static_cast<std::uint64_t>(target_every) != 0) return;
           frame.entity_count = 1;
           frame.entities[0] = {};
           frame.entities[0].entity_id = 7;
           frame.entities[0].has_pose = true;
-          frame.entities[0].pose.position_world_m = kTargetM;
+          frame.entities[0].pose.position_world_m = target_m;
+          frame.entities[0].teleport = std::exchange(target_teleports, false);
         })
-        .send(++number_, sim_ns());
+        .send(++number_, sim_ns(), 0.0, host_run);
   }
 
   LoopOptions options_;
@@ -347,6 +356,93 @@ TEST(MotionLoop, frames_say_why_the_axes_do_not_follow) {
   EXPECT_NE(header.motion_faults & protocol::kMotionNoHost, 0);
   EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
   EXPECT_GT(loop.rig().count(Counter::frames_motion_fault), 0U);
+}
+
+TEST(MotionLoop, an_agent_that_hangs_is_seen_in_the_frames) {
+  for (const bool projects : {true, false}) {
+    LoopOptions options;
+    options.projects = projects;
+    Loop loop(options);
+    loop.run(8 * kSecondNs);
+    ASSERT_EQ(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
+    loop.agent_runs = false;
+    loop.run(100 * kMs);
+    const protocol::FrameHeader& header = loop.rig().frames.back().header;
+    EXPECT_EQ(header.motion_state, MotionState::waiting);
+    EXPECT_NE(header.motion_faults & protocol::kMotionNoFeedback, 0);
+  }
+}
+
+TEST(MotionLoop, a_stopped_run_parks_the_axes_and_a_reset_closes_the_interlock) {
+  Loop loop({});
+  loop.run(8 * kSecondNs);
+  loop.rig().command(CommandKind::stop);
+  loop.run(500 * kMs);
+  EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
+  loop.rig().command(CommandKind::start);
+  loop.run(8 * kSecondNs);
+  EXPECT_EQ(loop.last_mode, protocol::AxesMode::follow);
+  // A host that was started anew does not close an open interlock; the command does.
+  loop.table().set_fault(0, AxisFault::runaway);
+  loop.run(2 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::fault);
+  loop.table().set_fault(0, AxisFault::none);
+  loop.host_run = 2;
+  loop.run(2 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::fault);
+  loop.rig().command(CommandKind::reset);
+  loop.run(20 * kMs);
+  loop.rig().command(CommandKind::start);
+  loop.run(10 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following);
+}
+
+TEST(MotionLoop, a_target_that_comes_seldom_or_teleports_leaves_the_axes_calm) {
+  Loop loop({});
+  loop.target_every = 5;
+  loop.run(8 * kSecondNs);
+  const auto largest_rate = [&] {
+    double out = 0.0;
+    for (const protocol::AxesMonitor& monitor : loop.monitors) {
+      for (const auto axis : {3U, 4U}) {
+        out = std::max(out, std::abs(monitor.demanded[axis].rate_rad_s));
+      }
+    }
+    loop.monitors.clear();
+    return out;
+  };
+  largest_rate();
+  loop.run(2 * kSecondNs);
+  EXPECT_LT(largest_rate(), 1e-3) << "it stands";
+  EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following);
+  loop.target_m = kTargetM + glm::dvec3(0.0, 0.0, 40.0);
+  loop.target_teleports = true;
+  loop.run(1 * kSecondNs);
+  EXPECT_LT(largest_rate(), 4.0) << "a jump of 1.5 degrees within a tenth of a second";
+  loop.run(8 * kSecondNs);
+  EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following);
+}
+
+TEST(MotionLoop, repeated_frames_keep_their_faults_and_are_not_judged) {
+  Loop loop({});
+  loop.run(30 * kMs);
+  EXPECT_NE(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
+  loop.run(8 * kSecondNs);
+  loop.rig().script.ready = false;
+  loop.run(50 * kMs);
+  const protocol::FrameHeader repeated = loop.rig().frames.back().header;
+  ASSERT_NE(repeated.flags & protocol::kFlagRepeated, 0U);
+  EXPECT_EQ(repeated.display_ns, repeated.slot_begin_ns + 10 * kMs);
+  EXPECT_EQ(repeated.motion_state, MotionState::following);
+}
+
+TEST(MotionLoop, a_target_that_the_scenario_lacks_is_refused) {
+  config::DaemonConfig config = daemon_config({}, 1);
+  config.motion.target_entity = 8;
+  const auto plan =
+      make_motion_plan(config, scenario_with_target(), channels_of(scene::ChannelKind::projector));
+  ASSERT_FALSE(plan.has_value());
+  EXPECT_THAT(plan.error().text, ::testing::HasSubstr("the scenario has no entity 8"));
 }
 
 TEST(MotionLoop, an_agent_that_did_not_run_leaves_out_commands_and_counts_them) {
