@@ -210,6 +210,22 @@ TEST_F(CliLog, export_writes_a_folder_or_one_table) {
   EXPECT_EQ(log({"export", "csv", log_, "--table", "frame", "--out", file("t")}).exit_code, 2);
 }
 
+TEST_F(CliLog, a_network_capture_is_described_and_exported) {
+  const std::string capture = EMIT_TEST_SOURCE_DIR "/fuzz/corpus/pose_pcap/raw.pcap";
+  const ProcessResult info = log({"info", capture, "--json", "-"});
+  EXPECT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_EQ(json_value(info.out, "kind"), "\"capture\"");
+  EXPECT_EQ(json_value(info.out, "host_frames"), "1");
+  EXPECT_EQ(json_value(info.out, "first_sim_time_ns"), "-1500000000");
+  EXPECT_THAT(info.err, HasSubstr("stand there twice"));
+  const ProcessResult exported =
+      log({"export", "csv", capture, "--table", "seeker", "--out", file("seeker.csv")});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_THAT(read_text(file("seeker.csv")), HasSubstr("\ncapture,,"));
+  EXPECT_THAT(read_text(file("seeker.csv")), HasSubstr(",42,-1.500000000,"));
+  EXPECT_EQ(log({"cut", capture, "--out", file("out.mcap")}).exit_code, 2);
+}
+
 TEST_F(CliLog, the_help_of_every_command_has_an_example) {
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{}, std::vector<std::string>{"info"},
