@@ -16,9 +16,9 @@ inline constexpr std::int64_t kLeastIntervalNs = 500'000;
 /// Place of a body at an instant of simulation time.
 struct TimedPoint {
   std::int64_t sim_time_ns = 0;
-  glm::dvec3 position_m{0.0};               ///< world
-  std::optional<glm::dvec3> velocity_m_s;   ///< world; absent: it is differenced
-  bool teleport = false;                    ///< no motion led here
+  glm::dvec3 position_m{0.0};              ///< world
+  std::optional<glm::dvec3> velocity_m_s;  ///< world; absent: it is differenced
+  bool teleport = false;                   ///< no motion led here
 };
 
 /// Motion of a point, predicted from its latest places with constant acceleration: from given

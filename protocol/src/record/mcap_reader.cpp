@@ -35,7 +35,7 @@ struct RecordView {
 struct McapReader::Impl {
   std::filesystem::path path;
   std::ifstream file;
-  std::uint64_t file_bytes = 0;
+  McapFacts facts;
   std::uint64_t offset = 0;  // offset of the next record in the file
   bool has_end_magic = false;
   bool ended = false;
@@ -66,12 +66,12 @@ struct McapReader::Impl {
   void end_truncated(std::string_view what) {
     ended = true;
     truncation = fmt::format("{}: offset {}: {} after {} messages; the last {} bytes are not used",
-                             path.string(), offset, what, message_count, file_bytes - offset);
+                             path.string(), offset, what, message_count, facts.file_bytes - offset);
   }
 
   /// Reads the next record of the file. Returns no value at the end.
   Result<std::optional<RecordView>> next_record() {
-    const std::uint64_t left = file_bytes - offset;
+    const std::uint64_t left = facts.file_bytes - offset;
     if (left < mcap::kRecordPrefixBytes) {
       end_truncated(left == 0 ? "the file ends without a footer" : "the file ends within a record");
       return std::nullopt;
@@ -141,7 +141,15 @@ struct McapReader::Impl {
                   fmt::format("chunk CRC {:#010x}, computed {:#010x}", crc, computed));
     }
     chunk_rest = records;
+    ++facts.chunks;
     return {};
+  }
+
+  /// Takes the header. Its strings are for people only, so that a damaged one is no error.
+  void take_header(std::span<const std::byte> content) {
+    Input fields(content);
+    facts.profile = fields.string();
+    facts.library = fields.string();
   }
 
   Result<void> take_schema(std::span<const std::byte> content) {
@@ -204,6 +212,15 @@ struct McapReader::Impl {
       case Opcode::channel:
         taken = take_channel(view.content);
         break;
+      case Opcode::header:
+        take_header(view.content);
+        break;
+      case Opcode::attachment:
+        ++facts.attachments;
+        break;
+      case Opcode::metadata:
+        ++facts.metadata;
+        break;
       case Opcode::chunk:
         if (in_chunk) return fail(ErrorCode::parse, record_offset, "chunk within a chunk");
         taken = open_chunk(view.content);
@@ -213,7 +230,7 @@ struct McapReader::Impl {
         if (in_chunk) return fail(ErrorCode::parse, record_offset, "end of data within a chunk");
         return finish();
       default:
-        break;  // index, attachment, metadata or a future opcode: skipped
+        break;  // index or a future opcode: skipped
     }
     if (!taken) return tl::unexpected(taken.error());
     return false;
@@ -244,18 +261,18 @@ Result<McapReader> McapReader::open(const std::filesystem::path& path) {
     return physics::make_error(ErrorCode::io, path.string() + ": is a directory");
   }
   impl->file.open(path, std::ios::binary);
-  impl->file_bytes = std::filesystem::file_size(path, code);
+  impl->facts.file_bytes = std::filesystem::file_size(path, code);
   if (!impl->file || code) {
     return physics::make_error(ErrorCode::io, path.string() + ": cannot open");
   }
   std::array<std::byte, mcap::kMagic.size()> magic{};
-  if (impl->file_bytes < magic.size() || !impl->read_at(0, magic) || magic != mcap::kMagic) {
+  if (impl->facts.file_bytes < magic.size() || !impl->read_at(0, magic) || magic != mcap::kMagic) {
     return physics::make_error(ErrorCode::parse,
                                path.string() + ": offset 0: not an MCAP file (wrong magic)");
   }
   impl->offset = magic.size();
-  if (impl->file_bytes >= 2 * magic.size() &&
-      impl->read_at(impl->file_bytes - magic.size(), magic)) {
+  if (impl->facts.file_bytes >= 2 * magic.size() &&
+      impl->read_at(impl->facts.file_bytes - magic.size(), magic)) {
     impl->has_end_magic = magic == mcap::kMagic;
   }
   return McapReader(std::move(impl));
@@ -295,6 +312,22 @@ const McapChannel* McapReader::channel(std::uint16_t id) const noexcept {
 const McapSchema* McapReader::schema(std::uint16_t id) const noexcept {
   const auto found = impl_->schemas.find(id);
   return found == impl_->schemas.end() ? nullptr : &found->second;
+}
+
+const std::map<std::uint16_t, McapChannel>& McapReader::channels() const noexcept {
+  return impl_->channels;
+}
+
+const std::map<std::uint16_t, McapSchema>& McapReader::schemas() const noexcept {
+  return impl_->schemas;
+}
+
+const McapFacts& McapReader::facts() const noexcept {
+  return impl_->facts;
+}
+
+const std::filesystem::path& McapReader::path() const noexcept {
+  return impl_->path;
 }
 
 const std::optional<std::string>& McapReader::truncation() const noexcept {

@@ -170,7 +170,7 @@ void Conductor::issue(RenderJob& job, FrameLedger::Issued& issued, bool is_step)
         slots_ ? issued.header.slot_begin_ns : issued.header.host_received_ns;
     motion_->place(job, issued, begin_ns + options_.pacing.display_delay_ns);
   }
-  // What is shown before the first pose holds no later frame back.
+  // A frame before the first pose holds no later frame back.
   if (input_.came) {
     last_sim_time_ns_ = job.request.sim_time_ns;
     issued_any_ = true;

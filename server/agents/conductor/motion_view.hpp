@@ -73,7 +73,7 @@ class MotionView {
   std::uint8_t faults_ = protocol::kMotionNoFeedback;
   std::int64_t reported_ns_ = 0;  ///< instant of the latest report, wall
   bool target_moved_ = false;     ///< the host has moved the target in this run
-  /// What the motion agent has no room for yet; pose: nothing.
+  /// Kind of the message that the motion agent had no room for; pose: there is none.
   MotionInput::Kind pending_ = MotionInput::Kind::pose;
   FrameLedger::Issued::Motion finished_;  ///< of the newest finished frame
   std::array<Shown, kKept> shown_;

@@ -479,6 +479,14 @@ Option CommandLine::output_folder(const std::string& name,
   return path(name, target, text).type_name("DIR");
 }
 
+Option CommandLine::output_file_or_folder(const std::string& name, std::filesystem::path& target,
+                                          std::function<bool()> is_file, const std::string& text) {
+  check_output(name, [&target, is_file = std::move(is_file)] {
+    return is_file() ? check_output_file(target) : check_output_folder(target);
+  });
+  return path(name, target, text).type_name("DIR_OR_FILE");
+}
+
 Option CommandLine::count(const std::string& name, std::uint64_t& target, const std::string& text) {
   return option(name, target, text).type_name("N");
 }

@@ -117,6 +117,10 @@ class CommandLine {
                        const std::string& text, OutputFolder folder = OutputFolder::created);
   Option output_folder(const std::string& name, std::optional<std::filesystem::path>& target,
                        const std::string& text, OutputFolder folder = OutputFolder::created);
+  /// A file or a folder that the command writes, whichever `is_file` says once the line is parsed.
+  /// It is checked as an output_file() or an output_folder() is.
+  Option output_file_or_folder(const std::string& name, std::filesystem::path& target,
+                               std::function<bool()> is_file, const std::string& text);
   /// A number that counts something.
   Option count(const std::string& name, std::uint64_t& target, const std::string& text);
   Option seconds(const std::string& name, double& target, const std::string& text);

@@ -14,6 +14,7 @@ void add_fms_sim(CommandLine& tool);
 void add_generate(CommandLine& tool);
 void add_inspect(CommandLine& tool);
 void add_latency(CommandLine& tool);
+void add_log(CommandLine& tool);
 void add_make_log(CommandLine& tool);
 void add_receive(CommandLine& tool);
 void add_record(CommandLine& tool);

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <memory>
+#include <optional>
 #include <thread>
 
 #include "emit/protocol/record/log.hpp"
@@ -39,6 +41,7 @@ void warn_of_differences(const server::JournalPlayer& player, const std::string&
 struct JournalOutline {
   std::uint64_t frames = 0;
   std::int64_t first_time_ns = 0;  ///< simulation time that the daemon was warmed up for
+  std::uint64_t first_sequence = 0;
 };
 /// Returns the outline of a journal, up to what does not read. The replay itself reports errors of
 /// the log.
@@ -52,6 +55,7 @@ JournalOutline outline_of(const std::filesystem::path& file) {
     if (log->topic() != protocol::LogTopic::journal) continue;
     const v1::JournalEntry& entry = log->journal();
     if (entry.has_frame()) ++outline.frames;
+    if (outline.first_sequence == 0) outline.first_sequence = entry.sequence();
     if (entry.has_run_start() && !started) {
       started = true;
       outline.first_time_ns = entry.run_start().first_time_ns();
@@ -59,6 +63,36 @@ JournalOutline outline_of(const std::filesystem::path& file) {
   }
   return outline;
 }
+
+/// A source in the state in which a daemon starts, and the player that feeds it.
+struct ReplayedDaemon {
+  std::unique_ptr<server::FrameSource> source;
+  std::optional<server::JournalPlayer> player;
+
+  /// Warms a new source up, in place of the former one.
+  physics::Result<void> start(const scene::ScenarioDesc& scenario,
+                              const JournalReplayOptions& options, std::int64_t first_time_ns) {
+    player.reset();
+    source.reset();
+    renderer::OutputOptions output;
+    output.temperature = output.depth = output.object = options.temperature;
+    output.slots = 3;
+    output.ladder = renderer::Ladder::replayed;
+    Progress warm_up("warm-up", 1000);
+    auto made = server::make_renderer_source(
+        scenario, renderer::DeviceOptions{options.gpu_index, false}, output, first_time_ns,
+        [&](double done_frac) {
+          warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
+          return !InterruptGuard::interrupted();
+        });
+    if (!made) return tl::unexpected(made.error());
+    auto channels = server::make_channels(scenario, (*made)->info());
+    if (!channels) return tl::unexpected(channels.error());
+    source = std::move(*made);
+    player.emplace(*source, std::move(*channels));
+    return {};
+  }
+};
 
 }  // namespace
 
@@ -81,33 +115,26 @@ physics::Result<JournalReplaySummary> replay_journal(
   const JournalOutline outline = outline_of(options.log);
   JournalReplaySummary summary;
   auto start = Clock::now();
-  renderer::OutputOptions output;
-  output.temperature = output.depth = output.object = options.temperature;
-  output.slots = 3;
-  output.ladder = renderer::Ladder::replayed;
-  auto source = [&] {
-    Progress warm_up("warm-up", 1000);
-    return server::make_renderer_source(
-        scenario, renderer::DeviceOptions{options.gpu_index, false}, output, outline.first_time_ns,
-        [&](double done_frac) {
-          warm_up.advance_to(static_cast<std::uint64_t>(1000.0 * done_frac));
-          return !InterruptGuard::interrupted();
-        });
-  }();
-  if (!source) return tl::unexpected(source.error());
-  const renderer::SceneStats& scene = (*source)->info().scene;
+  ReplayedDaemon daemon;
+  if (auto started = daemon.start(scenario, options, outline.first_time_ns); !started) {
+    return tl::unexpected(started.error());
+  }
+  const renderer::SceneStats& scene = daemon.source->info().scene;
   for (const std::string& text : scene.warnings) warn(text);
   for (const std::string& text : renderer::warm_up_warnings(scene)) warn(text);
-  summary.device = (*source)->info().device;
+  if (outline.first_sequence > 1 && scenario.thermal.method == scene::ThermalMethod::cached) {
+    warn(
+        "the journal lacks earlier runs of its daemon, and a cached surface remembers them: frames "
+        "may differ");
+  }
+  summary.device = daemon.source->info().device;
   summary.setup_s = seconds_since(start);
 
-  auto channels = server::make_channels(scenario, (*source)->info());
-  if (!channels) return tl::unexpected(channels.error());
-  server::JournalPlayer player(**source, std::move(*channels));
   Progress progress("replay", outline.frames);
   start = Clock::now();
   std::int64_t first_wall_ns = 0;
   bool compared_run = false;
+  std::uint64_t last_sequence = 0;
   while (!InterruptGuard::interrupted()) {
     const auto more = log->next();
     if (!more) return tl::unexpected(more.error());
@@ -121,6 +148,15 @@ physics::Result<JournalReplaySummary> replay_journal(
       std::this_thread::sleep_until(start + std::chrono::duration_cast<Clock::duration>(
                                                 std::chrono::duration<double>(offset_s)));
     }
+    // Another daemon begins where the numbers do, as in a merged log. Its surface was warmed up
+    // anew.
+    if (entry.has_run_start() && entry.sequence() <= last_sequence) {
+      auto restarted = daemon.start(scenario, options, entry.run_start().first_time_ns());
+      if (!restarted) return tl::unexpected(restarted.error());
+      compared_run = false;
+    }
+    last_sequence = entry.sequence();
+    server::JournalPlayer& player = *daemon.player;
     const auto applied = player.apply(entry);
     if (!applied) return tl::unexpected(applied.error());
     if (entry.has_run_start() && !compared_run) {
@@ -135,17 +171,17 @@ physics::Result<JournalReplaySummary> replay_journal(
           physics::ErrorCode::gpu,
           fmt::format("frame {}: the device reported an error", frame.frame_number));
     }
+    ++summary.frames;
+    if (!frame.matches) ++summary.mismatches;
     if (!frame.repeated) ++summary.rendered;
     if (!frame.matches && summary.first_mismatch == 0) summary.first_mismatch = frame.frame_number;
     if (on_frame) {
       if (auto handled = on_frame(frame); !handled) return tl::unexpected(handled.error());
     }
-    progress.advance_to(player.frames());
+    progress.advance_to(summary.frames);
   }
   progress.finish();
   if (log->truncation()) warn(*log->truncation());
-  summary.frames = player.frames();
-  summary.mismatches = player.mismatches();
   summary.play_s = seconds_since(start);
   if (summary.frames == 0) {
     return physics::make_error(

@@ -30,8 +30,10 @@ struct JournalReplaySummary {
 };
 
 /// Re-renders a journal on the calling thread and hands every frame to `on_frame`, which may stop
-/// the replay with an error. Warns on standard error when the journal was made with another
-/// scenario or device. Errors: those of the log reader, the renderer and the player.
+/// the replay with an error. A merged log may hold several daemons, one behind the other: each
+/// begins with a surface that is warmed up anew. Warns on standard error when the journal was made
+/// with another scenario or device, or lacks runs that the surface remembers. Errors: those of the
+/// log reader, the renderer and the player.
 [[nodiscard]] physics::Result<JournalReplaySummary> replay_journal(
     const scene::ScenarioDesc& scenario, const JournalReplayOptions& options,
     const std::function<physics::Result<void>(const server::ReplayedFrame&)>& on_frame);

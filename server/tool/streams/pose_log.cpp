@@ -5,19 +5,15 @@
 #include <cctype>
 
 namespace emit::tool {
-namespace {
-
-bool is_csv(const std::filesystem::path& file) {
+bool is_pose_csv(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension == ".csv";
 }
 
-}  // namespace
-
 physics::Result<PoseLog> PoseLog::open(const std::filesystem::path& file, std::uint16_t host_port) {
-  if (is_csv(file)) {
+  if (is_pose_csv(file)) {
     auto reader = protocol::PoseCsvReader::open(file);
     if (!reader) return tl::unexpected(reader.error());
     return PoseLog(std::move(*reader));

@@ -14,6 +14,9 @@
 
 namespace emit::tool {
 
+/// Returns true where the name says that a file holds poses as CSV.
+[[nodiscard]] bool is_pose_csv(const std::filesystem::path& file);
+
 /// Host frames of a log in file order. The file is CSV where the name ends in .csv, a network
 /// capture where the file starts like one, else MCAP. Thread: one owner.
 class PoseLog {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fuzz target: logs and journals (MCAP), as records and as messages.
 #include "emit/protocol/record/log.hpp"
+#include "emit/protocol/record/log_outline.hpp"
 #include "emit/protocol/record/mcap_reader.hpp"
+#include "emit/protocol/record/mcap_summary.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/fuzz_input.hpp"
 #include "fuzz/memory_file.hpp"
@@ -44,5 +46,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto& file = fuzz::file_of(fuzz::as_bytes(data, size));
   read_records(file);
   read_messages(file);
+  static_cast<void>(protocol::outline_log(file));
+  static_cast<void>(protocol::read_mcap_summary(file));
   return 0;
 }

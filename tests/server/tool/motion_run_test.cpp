@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <fmt/format.h>
 #include <functional>
 #include <string>
 #include <thread>
@@ -69,15 +69,15 @@ TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
     axes += "{ min_deg = -100, max_deg = 100, rate_deg_s = 300, acceleration_deg_s2 = 5000 }, ";
   }
   DaemonProcess daemon(
-      folder, {"--config",
-               folder.write("emitd.toml",
-                            "scenario = \"world.toml\"\n[pacing]\nmode = \"ig-clock\"\n"
-                            "rate_hz = 50\n[motion]\ncontroller = \"" +
-                                controller + "\"\nfeedback_timeout_ms = 1000\naxes = [" + axes +
-                                "]\n[host]\nudp = \"127.0.0.1:0\"\n"
-                                "[control]\ntcp = \"127.0.0.1:0\"\n"
-                                "[journal]\nfile = \"journal.mcap\"\n"
-                                "[metrics]\nlisten = \"127.0.0.1:0\"\n")});
+      folder,
+      {"--config", folder.write("emitd.toml",
+                                "scenario = \"world.toml\"\n[pacing]\nmode = \"ig-clock\"\n"
+                                "rate_hz = 50\n[motion]\ncontroller = \"" +
+                                    controller + "\"\nfeedback_timeout_ms = 1000\naxes = [" + axes +
+                                    "]\n[host]\nudp = \"127.0.0.1:0\"\n"
+                                    "[control]\ntcp = \"127.0.0.1:0\"\n"
+                                    "[journal]\nfile = \"journal.mcap\"\n"
+                                    "[metrics]\nlisten = \"127.0.0.1:0\"\n")});
   ASSERT_TRUE(daemon.wait_ready(kMotionLimit)) << folder.read("stderr");
   const auto metric = [&](const std::string& name) {
     const auto answer = client::http_get("http://" + daemon.metrics() + "/metrics", kLongNs);
@@ -85,9 +85,9 @@ TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
   };
 
   // The axes follow the host, and the error of direction gets known.
-  ToolProcess receiver(folder, "receive",
-                       {"receive", "tcp://" + daemon.control(), "--json",
-                        folder.file("receive.json")});
+  ToolProcess receiver(
+      folder, "receive",
+      {"receive", "tcp://" + daemon.control(), "--json", folder.file("receive.json")});
   ToolProcess host(folder, "send",
                    {"send", folder.write("poses.csv", swinging_poses(100)), "--to",
                     "udp://" + daemon.host_udp()});
@@ -107,14 +107,13 @@ TEST(MotionRun, a_real_loop_follows_is_flagged_when_it_does_not_and_replays) {
   const std::string report = folder.read("receive.json");
   EXPECT_GT(std::stoi("0" + json_value(report, "pointing_frames")), 0) << report;
   // The daemon switches the motors off when it ends.
-  EXPECT_TRUE(wait_until(
-      [&] { return table.err().rfind("motors off") != std::string::npos; }))
+  EXPECT_TRUE(wait_until([&] { return table.err().rfind("motors off") != std::string::npos; }))
       << table.err();
   table.signal(SIGINT);
   EXPECT_EQ(table.wait(), 0);
-  const ProcessResult replayed = run_emit(
-      {"replay", folder.file("journal.mcap"), "--scenario", folder.file("world.toml")},
-      kMotionLimit);
+  const ProcessResult replayed =
+      run_emit({"replay", folder.file("journal.mcap"), "--scenario", folder.file("world.toml")},
+               kMotionLimit);
   EXPECT_EQ(replayed.exit_code, 0) << replayed.out << replayed.err;
   EXPECT_THAT(replayed.out, HasSubstr("0 differ from the recording"));
 }

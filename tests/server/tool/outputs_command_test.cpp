@@ -51,6 +51,12 @@ const std::vector<OutputCase>& output_cases() {
     add({"receive", "tcp://127.0.0.1:1"}, {"--json"}, {"--out"});
     add({"record", "--from", "tcp://127.0.0.1:1", "--out", "GOOD"}, {"--out", "--json"});
     add({"replay", "no.mcap", "--scenario", "box"}, {"--json"}, {"--out"});
+    add({"log", "info", "no.mcap"}, {"--json"});
+    add({"log", "cut", "no.mcap", "--out", "GOOD"}, {"--out", "--json"});
+    add({"log", "merge", "a.mcap", "b.mcap", "--out", "GOOD"}, {"--out", "--json"});
+    add({"log", "export", "csv", "no.mcap", "--table", "frames", "--out", "GOOD"},
+        {"--out", "--json"});
+    add({"log", "export", "csv", "no.mcap"}, {}, {"--out"});
     add({"fit", "block-on-road"}, {"--out", "--json"});
     add({"generate", "box", "--out", "GOOD"}, {}, {"--out"});
     add({"make-log", "airfield", "--out", "GOOD"}, {"--out"});
@@ -130,6 +136,7 @@ TEST(CliOutputs, an_existing_file_survives_a_run_that_fails_later) {
         Arguments{"solve", "no-such-scenario", "--time-s", "0", "--out", kept},
         Arguments{"record", "--from", "tcp://127.0.0.1:1", "--out", kept},
         Arguments{"make-log", "no-such-scenario", "--out", kept},
+        Arguments{"log", "cut", "no.mcap", "--out", kept},
         Arguments{"receive", "tcp://127.0.0.1:1", "--frames", "1", "--json", kept},
         Arguments{"bench", "budget", "--scene", "no-such-scenario", "--json", kept}}) {
     write_text(kept, "kept");

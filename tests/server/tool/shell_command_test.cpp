@@ -83,10 +83,13 @@ TEST_F(BashCompletion, offers_every_command_and_every_suite) {
   ASSERT_GT(suites.size(), 8U);
   EXPECT_EQ(candidates({"bench", ""}), std::set<std::string>(suites.begin(), suites.end()));
   EXPECT_EQ(candidates({"bench", "pap"}), std::set<std::string>{"paper"});
+  EXPECT_EQ(candidates({"log", ""}), (std::set<std::string>{"info", "cut", "merge", "export"}));
+  EXPECT_EQ(candidates({"log", "export", ""}), std::set<std::string>{"csv"});
 }
 
 TEST_F(BashCompletion, offers_the_options_of_the_command_in_the_line) {
-  for (const Words& command : {Words{"render"}, Words{"serve"}, Words{"bench", "paper"}}) {
+  for (const Words& command :
+       {Words{"render"}, Words{"serve"}, Words{"bench", "paper"}, Words{"log", "export", "csv"}}) {
     Words words = command;
     words.emplace_back("--");
     const std::set<std::string> offered = candidates(words);
@@ -185,8 +188,12 @@ class ManPages : public testing::Test {
 TEST_F(ManPages, there_is_one_for_every_command_and_for_the_daemon) {
   std::set<std::string> expected{"emit.1", "emitd.8"};
   for (const std::string& command : commands_in_help()) expected.insert("emit-" + command + ".1");
-  for (const std::string& suite : commands_in_help({"bench"})) {
-    expected.insert("emit-bench-" + suite + ".1");
+  for (const Words& group : {Words{"bench"}, Words{"log"}, Words{"log", "export"}}) {
+    std::string name = "emit-";
+    for (const std::string& word : group) name += word + "-";
+    for (const std::string& command : commands_in_help(group)) {
+      expected.insert(name + command + ".1");
+    }
   }
   EXPECT_EQ(files_, expected);
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "emit/physics/check.hpp"
 #include "emit/physics/error.hpp"
@@ -54,6 +55,11 @@ enum FrameFlags : std::uint32_t {
   /// why.
   kFlagMotionFault = 1u << 15,
 };
+/// Names of the flags by bit, as docs/wire.md section 3 has them.
+inline constexpr std::array<std::string_view, 16> kFrameFlagNames{
+    "late",          "repeated", "stale",        "degraded",    "partial", "hold",
+    "non_finite",    "clamped",  "extrapolated", "gap_before",  "canned",  "time_unset",
+    "trigger_fault", "corrupt",  "lost_before",  "motion_fault"};
 /// Flags that only a receiver may set. A receiver clears them where a sender set them.
 inline constexpr std::uint32_t kReceiverFlags = kFlagPartial | kFlagCorrupt | kFlagLostBefore;
 

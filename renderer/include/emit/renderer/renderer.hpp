@@ -184,7 +184,9 @@ class Renderer {
   /// false when the store is full. RT-safe.
   virtual bool apply_weather(const scene::WeatherSample& sample) noexcept = 0;
 
-  /// Forgets all poses and weather from the host: the state after create(). RT-safe.
+  /// Forgets all poses and weather from the host. With thermal.method = "cached" the samples of the
+  /// surface stay, so that frames of a later run may differ in the last bits from those of a new
+  /// renderer. RT-safe.
   virtual void reset() noexcept = 0;
 
   /// Does the work that frames from `first` on need once. With thermal.method = "cached" it samples

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -23,6 +24,15 @@ struct McapChannel {
   std::uint16_t schema_id = 0;  ///< 0 = none
   std::string topic;
   std::string message_encoding;
+};
+/// Facts that an MCAP file states beside its messages.
+struct McapFacts {
+  std::string profile;            ///< empty: none
+  std::string library;            ///< name of the writing software
+  std::uint64_t file_bytes = 0;   ///< size of the file when it was opened
+  std::uint64_t chunks = 0;       ///< chunks read so far
+  std::uint64_t attachments = 0;  ///< attachments passed so far
+  std::uint64_t metadata = 0;     ///< metadata records passed so far
 };
 /// Message of an MCAP file.
 struct McapMessage {
@@ -57,6 +67,14 @@ class McapReader {
   /// Returns the channel or schema of an id that a message carried; nullptr when the id is unknown.
   [[nodiscard]] const McapChannel* channel(std::uint16_t id) const noexcept;
   [[nodiscard]] const McapSchema* schema(std::uint16_t id) const noexcept;
+
+  /// Returns all channels and schemas that were read so far, by id.
+  [[nodiscard]] const std::map<std::uint16_t, McapChannel>& channels() const noexcept;
+  [[nodiscard]] const std::map<std::uint16_t, McapSchema>& schemas() const noexcept;
+  /// Returns what the file says of itself, as far as it was read. The header is read by the first
+  /// call of next().
+  [[nodiscard]] const McapFacts& facts() const noexcept;
+  [[nodiscard]] const std::filesystem::path& path() const noexcept;
 
   /// Returns a description of what is missing, with its offset, at the end of a file that has no
   /// footer or ends within a record.
