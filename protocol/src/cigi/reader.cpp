@@ -54,7 +54,6 @@ bool Reader::fail(Fault::Kind kind, double value, double lowest, double highest)
 
 Step Reader::refuse(Fault::Kind kind) noexcept {
   static_cast<void>(fail(kind));
-  ++refused_;
   return Step::refused;
 }
 
@@ -107,9 +106,9 @@ bool Reader::check_size() noexcept {
   return sound;
 }
 
-Step Reader::read_known(std::span<const std::byte> bytes, Packet& packet) noexcept {
+Step Reader::read_known(Packet& packet) noexcept {
   Step step = Step::end;
-  with_packet_type(std::to_integer<std::uint8_t>(bytes[0]), [&]<class P>(const P*) {
+  with_packet_type(std::to_integer<std::uint8_t>(bytes_[0]), [&]<class P>(const P*) {
     if (P::kSender != sender_) {
       step = refuse(Fault::Kind::sender);
       return;
@@ -119,7 +118,7 @@ Step Reader::read_known(std::span<const std::byte> bytes, Packet& packet) noexce
       return;
     }
     P read;
-    FieldReader io(bytes, order_);
+    FieldReader io(bytes_, order_);
     layout(io, read);
     if (!io.text_ended()) {
       step = refuse(Fault::Kind::text);
@@ -148,12 +147,14 @@ Step Reader::next(Packet& packet) noexcept {
       break;
     }
     const std::size_t size = byte_of(message_, offset_ + 1);
-    Step step = read_known(message_.subspan(offset_, size), packet);
+    bytes_ = message_.subspan(offset_, size);
+    Step step = read_known(packet);
     if (step == Step::refused && offset_ == 0) {
       // The first packet holds for all others, so that nothing of the message is left.
       broken_ = true;
       step = Step::broken;
     }
+    if (step == Step::refused) ++refused_;
     const bool skipped = step == Step::end;
     if (skipped) {
       ++skipped_;

@@ -53,7 +53,7 @@ struct EntityControl {
   float roll_deg = 0.0f;
   float pitch_deg = 0.0f;
   float yaw_deg = 0.0f;
-  Place place;  ///< offset from the parent's reference point if attached, else geodetic
+  Place place{};  ///< offset from the parent's reference point if attached, else geodetic
   bool operator==(const EntityControl&) const = default;
 };
 
@@ -244,7 +244,7 @@ struct WeatherControl {
   bool random_lightning = false;
   std::uint8_t cloud_type = 0;  ///< 0 none to 10 stratus; 11 to 15 are free. At most 15.
   WeatherScope scope = WeatherScope::global;
-  /// At most 7, which fits the field. A narrower range of the document is not in our sources.
+  /// The field holds 0 to 7. A narrower range of the document is not in our sources.
   std::uint8_t severity = 0;
   float air_temperature_c = 0.0f;
   float visibility_m = 0.0f;         ///< not negative
@@ -370,7 +370,7 @@ struct HatHotRequest {
   bool relative_to_entity = false;        ///< `place` is an offset in the frame of `entity_id`
   std::uint8_t update_period_frames = 0;  ///< 0: one answer, else one every so many frames
   std::uint16_t entity_id = 0;
-  Place place;
+  Place place{};
   bool operator==(const HatHotRequest&) const = default;
 };
 
@@ -387,8 +387,8 @@ struct LosSegmentRequest {
   bool destination_entity_valid = false;  ///< `destination_entity_id` holds the destination
   std::uint8_t alpha_threshold = 0;
   std::uint16_t entity_id = 0;
-  Place source;
-  Place destination;
+  Place source{};
+  Place destination{};
   std::uint32_t material_mask = 0;
   std::uint8_t update_period_frames = 0;  ///< 0: one answer
   std::uint16_t destination_entity_id = 0;
@@ -410,7 +410,7 @@ struct LosVectorRequest {
   float elevation_deg = 0.0f;  ///< -90 to 90
   float min_range_m = 0.0f;    ///< not negative
   float max_range_m = 0.0f;    ///< not negative
-  Place source;
+  Place source{};
   std::uint32_t material_mask = 0;
   std::uint8_t update_period_frames = 0;  ///< 0: one answer
   bool operator==(const LosVectorRequest&) const = default;

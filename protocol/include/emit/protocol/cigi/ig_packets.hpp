@@ -90,7 +90,7 @@ struct LosExtendedResponse {
   double range_m = 0.0;
   /// Point that was hit. The request says whether it is geodetic, and this packet does not repeat
   /// it. Therefore the three numbers need only be finite.
-  Place place;
+  Place place{};
   std::uint8_t red = 0;
   std::uint8_t green = 0;
   std::uint8_t blue = 0;
@@ -154,7 +154,7 @@ struct PositionResponse {
   std::uint8_t part_id = 0;
   ObjectClass object_class = ObjectClass::entity;
   PositionFrame frame = PositionFrame::geodetic;
-  Place place;
+  Place place{};
   float roll_deg = 0.0f;
   float pitch_deg = 0.0f;
   float yaw_deg = 0.0f;

@@ -62,7 +62,7 @@ struct Fault {
 };
 
 /// Length that is enough for every text of fault_text(), bytes.
-inline constexpr std::size_t kFaultTextBytes = 192;
+inline constexpr std::size_t kFaultTextBytes = 256;
 /// Writes for example "packet 3 (id 2, Entity Control) at byte 72: yaw_deg is nan, must be -180 to
 /// 360". Returns the part of `buffer` that it used; a text that is too long is cut off. RT-safe.
 [[nodiscard]] std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept;

@@ -39,8 +39,12 @@ class Reader {
 
   /// Returns the fault of the latest `refused` or `broken`.
   [[nodiscard]] const Fault& fault() const noexcept { return fault_; }
-  /// Returns the sender's byte order. It holds if the first step was a packet.
+  /// Returns the sender's byte order, from the construction on. It means nothing if the first step
+  /// is `broken`.
   [[nodiscard]] ByteOrder byte_order() const noexcept { return order_; }
+  /// Returns the bytes of the packet that the latest step gave or refused. They are a part of the
+  /// message.
+  [[nodiscard]] std::span<const std::byte> packet_bytes() const noexcept { return bytes_; }
   /// Returns how many packets were skipped so far because the codec does not know their id.
   [[nodiscard]] std::size_t skipped_packets() const noexcept { return skipped_; }
   /// Returns how many of the skipped packets have a user-defined id (201 to 255).
@@ -51,12 +55,13 @@ class Reader {
  private:
   [[nodiscard]] bool open() noexcept;
   [[nodiscard]] bool check_size() noexcept;
-  [[nodiscard]] Step read_known(std::span<const std::byte> bytes, Packet& packet) noexcept;
+  [[nodiscard]] Step read_known(Packet& packet) noexcept;
   [[nodiscard]] Step refuse(Fault::Kind kind) noexcept;
   [[nodiscard]] bool fail(Fault::Kind kind, double value = 0.0, double lowest = 0.0,
                           double highest = 0.0) noexcept;
 
   std::span<const std::byte> message_;
+  std::span<const std::byte> bytes_;  ///< of the latest packet
   Sender sender_;
   ByteOrder order_ = ByteOrder::little;
   bool broken_ = false;
