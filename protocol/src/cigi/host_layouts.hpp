@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "emit/protocol/cigi/host_packets.hpp"
+#include "emit/protocol/cigi/host_requests.hpp"
 
 /// Layouts of the host's packets: offset, and for parts of a byte the first bit and the number of
 /// bits. Bits are counted from the least significant one. Fields that are not named are reserved.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "emit/protocol/cigi/host_packets.hpp"
+#include "emit/protocol/cigi/host_requests.hpp"
 #include "emit/protocol/cigi/ig_packets.hpp"
 #include "emit/protocol/cigi/message.hpp"
 #include "emit/protocol/cigi/reader.hpp"

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "emit/protocol/cigi/common.hpp"
-#include "emit/protocol/cigi/host_packets.hpp"
+#include "emit/protocol/cigi/host_requests.hpp"
 
 /// Packets of the image generator. Units, axes and ranges are those of the host's packets.
 namespace emit::protocol::cigi {

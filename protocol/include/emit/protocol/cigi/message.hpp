@@ -8,6 +8,7 @@
 
 #include "emit/protocol/cigi/common.hpp"
 #include "emit/protocol/cigi/host_packets.hpp"
+#include "emit/protocol/cigi/host_requests.hpp"
 #include "emit/protocol/cigi/ig_packets.hpp"
 
 /// Parts that reader and writer of messages share.
