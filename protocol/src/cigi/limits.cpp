@@ -5,7 +5,8 @@
 #include <concepts>
 #include <cstdint>
 #include <limits>
-#include <variant>
+
+#include "cigi/packet_types.hpp"
 
 namespace emit::protocol::cigi {
 namespace {
@@ -282,7 +283,7 @@ struct CheckPacket {
 
 Fault check_limits(const Packet& packet) noexcept {
   Limits limits;
-  std::visit(CheckPacket{limits}, packet);
+  with_packet(packet, CheckPacket{limits});
   return limits.fault();
 }
 

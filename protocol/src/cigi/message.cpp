@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "cigi/packet_types.hpp"
 #include "fixed_text.hpp"
 
 namespace emit::protocol::cigi {
@@ -103,7 +104,9 @@ std::string_view ImageGeneratorMessage::view() const noexcept {
 }
 
 std::uint8_t packet_id(const Packet& packet) noexcept {
-  return std::visit([](const auto& each) { return each.kId; }, packet);
+  std::uint8_t id = 0;
+  with_packet(packet, [&](const auto& each) { id = each.kId; });
+  return id;
 }
 
 std::string_view packet_name(std::uint8_t id) noexcept {

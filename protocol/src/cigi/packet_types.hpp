@@ -33,6 +33,15 @@ template <class P>
   }
 }
 
+/// Calls `call` with the packet that the variant holds. Unlike std::visit it cannot throw.
+template <class Call>
+void with_packet(const Packet& packet, Call&& call) {
+  [&]<std::size_t... I>(std::index_sequence<I...>) {
+    static_cast<void>(((packet.index() == I && (call(*std::get_if<I>(&packet)), true)) || ...));
+  }
+  (std::make_index_sequence<std::variant_size_v<Packet>>());
+}
+
 /// Calls `call` with a null pointer of the packet type that has this id, if the codec knows it.
 template <class Call>
 void with_packet_type(std::uint8_t id, Call&& call) {

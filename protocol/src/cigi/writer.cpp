@@ -24,41 +24,39 @@ Fault Writer::add(const Packet& packet) noexcept {
   fault.id = packet_id(packet);
   fault.offset = used_;
   if (fault) return fault;
-  std::visit(
-      [&]<class P>(P each) {
-        const bool first = P::kId == IgControl::kId || P::kId == StartOfFrame::kId;
-        if (first != (packets_ == 0)) {
-          fault.kind = first ? Fault::Kind::repeated : Fault::Kind::first_packet;
-          return;
-        }
-        if (!first && P::kSender != sender_) {
-          fault.kind = Fault::Kind::sender;
-          return;
-        }
-        const std::size_t size = bytes_of(each);
-        const std::size_t left = memory_.size() - used_;
-        if (size > left) {
-          fault.kind = Fault::Kind::no_space;
-          fault.value = static_cast<double>(size);
-          fault.highest = static_cast<double>(left);
-          return;
-        }
-        const std::span<std::byte> bytes = memory_.subspan(used_, size);
-        std::ranges::fill(bytes, std::byte{0});
-        bytes[0] = std::byte{P::kId};
-        bytes[1] = static_cast<std::byte>(size);
-        FieldWriter io(bytes, order_);
-        layout(io, each);
-        if (first) {
-          sender_ = P::kSender;
-          io.number(2, kMajorVersion);
-          io.bits(P::kSender == Sender::host ? kHostMinorAt : kIgMinorAt, 4, 4, kMinorVersion);
-          io.number(6, kByteSwapMagic);
-        }
-        used_ += size;
-        ++packets_;
-      },
-      packet);
+  with_packet(packet, [&]<class P>(P each) {
+    const bool first = P::kId == IgControl::kId || P::kId == StartOfFrame::kId;
+    if (first != (packets_ == 0)) {
+      fault.kind = first ? Fault::Kind::repeated : Fault::Kind::first_packet;
+      return;
+    }
+    if (!first && P::kSender != sender_) {
+      fault.kind = Fault::Kind::sender;
+      return;
+    }
+    const std::size_t size = bytes_of(each);
+    const std::size_t left = memory_.size() - used_;
+    if (size > left) {
+      fault.kind = Fault::Kind::no_space;
+      fault.value = static_cast<double>(size);
+      fault.highest = static_cast<double>(left);
+      return;
+    }
+    const std::span<std::byte> bytes = memory_.subspan(used_, size);
+    std::ranges::fill(bytes, std::byte{0});
+    bytes[0] = std::byte{P::kId};
+    bytes[1] = static_cast<std::byte>(size);
+    FieldWriter io(bytes, order_);
+    layout(io, each);
+    if (first) {
+      sender_ = P::kSender;
+      io.number(2, kMajorVersion);
+      io.bits(P::kSender == Sender::host ? kHostMinorAt : kIgMinorAt, 4, 4, kMinorVersion);
+      io.number(6, kByteSwapMagic);
+    }
+    used_ += size;
+    ++packets_;
+  });
   return fault;
 }
 
