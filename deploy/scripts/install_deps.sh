@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Installs the Debian 12 packages that emitd needs to build, run and pass its tests.
 # Uses sudo when not root. Prints what it installs; installs nothing that is already there.
-# Usage: install_deps.sh [--with-checkers] [--with-yardsticks]: what checks the source tree; what `emit bench
-# stream` is put beside.
+# Usage: install_deps.sh [--with-checkers] [--with-yardsticks]: what checks the source tree and reads its messages in
+# tests; what `emit bench stream` is put beside.
 set -euo pipefail
 
 build_tools=(g++ cmake ninja-build pkg-config git ca-certificates)
@@ -13,7 +13,7 @@ libraries=(libepoxy-dev libegl-dev libglfw3-dev libglm-dev libtinygltf-dev libst
            libceres-dev libmeshoptimizer-dev libisal-dev liblz4-dev libssl-dev libgtest-dev libgmock-dev
            python3-protobuf python3-numpy)
 runtime=(libegl-mesa0 libgl1-mesa-dri xvfb xauth)
-checkers=(clang-format clang-tidy clang libclang-rt-dev python3)
+checkers=(clang-format clang-tidy clang libclang-rt-dev python3 tshark)
 yardsticks=(iperf3 libzmq3-dev iceoryx libiceoryx-posh-dev)
 
 packages=("${build_tools[@]}" "${libraries[@]}" "${runtime[@]}")

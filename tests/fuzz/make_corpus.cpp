@@ -21,6 +21,7 @@
 #include "emit/scenegen/generate.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/state_world.hpp"
+#include "protocol/cigi_samples.hpp"
 #include "protocol/frames.hpp"
 #include "protocol/host_frames.hpp"
 
@@ -538,6 +539,16 @@ void make_axes_seeds() {
   keep("monitor", codec.encode(monitor));
 }
 
+void make_cigi_seeds() {
+  using protocol::cigi::ByteOrder;
+  for (const auto& [name, order] :
+       {std::pair("big", ByteOrder::big), std::pair("little", ByteOrder::little)}) {
+    const std::string end = std::string("_") + name;
+    write("cigi", ("host" + end).c_str(), test::cigi_message(test::sample_host_packets(), order));
+    write("cigi", ("ig" + end).c_str(), test::cigi_message(test::sample_ig_packets(), order));
+  }
+}
+
 void make_trigger_seeds() {
   for (const auto& [name, trigger] :
        {std::pair("stamped",
@@ -568,6 +579,7 @@ int main(int argc, char** argv) {
   make_network_seeds();
   make_loss_seeds();
   make_trigger_seeds();
+  make_cigi_seeds();
   make_axes_seeds();
   make_session_seeds();
   make_fragment_seeds();
