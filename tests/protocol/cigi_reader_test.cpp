@@ -125,6 +125,20 @@ TEST(CigiReader, UnknownPacketsAreSkippedBySizeAndCounted) {
   EXPECT_EQ(std::get<EntityControl>(out.packets[1]).entity_id, 5);
 }
 
+TEST(CigiReader, TheTailOfALongerPacketIsIgnored) {
+  auto message = message_of({IgControl{}, EntityControl{.entity_id = 5}});
+  // Eight bytes more belong to the entity, and another entity follows.
+  message[24 + 1] = static_cast<std::byte>(std::to_integer<unsigned>(message[24 + 1]) + 8);
+  message.insert(message.end(), 8, std::byte{0xEE});
+  const auto next = message_of({IgControl{}, EntityControl{.entity_id = 6}});
+  message.insert(message.end(), next.begin() + 24, next.end());
+  const Told out = told(message, Sender::host);
+  EXPECT_EQ(out.last, Step::end);
+  ASSERT_EQ(out.packets.size(), 3U);
+  EXPECT_EQ(std::get<EntityControl>(out.packets[1]).entity_id, 5);
+  EXPECT_EQ(std::get<EntityControl>(out.packets[2]).entity_id, 6);
+}
+
 TEST(CigiReader, WrongFirstPacketsBreakTheMessage) {
   const auto fault = [](CigiBytes message, Sender sender = Sender::host) {
     const Told out = told(message, sender);

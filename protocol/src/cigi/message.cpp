@@ -80,14 +80,6 @@ void add_field_fault(const Fault& fault, FixedText& out) noexcept {
   }
 }
 
-void add_size_fault(const Fault& fault, FixedText& out) noexcept {
-  if (fault.lowest < fault.highest) {
-    out.add(": states {} bytes, must be {} to {}", fault.value, fault.lowest, fault.highest);
-  } else {
-    out.add(": states {} bytes, must be {}", fault.value, fault.lowest);
-  }
-}
-
 }  // namespace
 
 ImageGeneratorMessage ImageGeneratorMessage::make(std::uint16_t message_id,
@@ -149,7 +141,7 @@ std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept
       out.add(": states {} bytes, {} are left", fault.value, fault.highest);
       break;
     case Fault::Kind::size_of_packet:
-      add_size_fault(fault, out);
+      out.add(": states {} bytes, must be {}", fault.value, fault.lowest);
       break;
     case Fault::Kind::field:
       add_field_fault(fault, out);

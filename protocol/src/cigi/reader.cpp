@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emit/protocol/cigi/reader.hpp"
 
+#include <algorithm>
 #include <type_traits>
 #include <utility>
 
@@ -98,9 +99,8 @@ bool Reader::check_size() noexcept {
   }
   bool sound = true;
   with_packet_type(std::to_integer<std::uint8_t>(message_[offset_]), [&]<class P>(const P*) {
-    if (stated < P::kBytes || stated > largest_bytes<P>()) {
-      sound = fail(Fault::Kind::size_of_packet, size, static_cast<double>(P::kBytes),
-                   static_cast<double>(largest_bytes<P>()));
+    if (stated < P::kBytes) {
+      sound = fail(Fault::Kind::size_of_packet, size, static_cast<double>(P::kBytes));
     }
   });
   return sound;
@@ -118,7 +118,8 @@ Step Reader::read_known(Packet& packet) noexcept {
       return;
     }
     P read;
-    FieldReader io(bytes_, order_);
+    // The tail of a packet that is longer than its definition belongs to another version.
+    FieldReader io(bytes_.first(std::min(bytes_.size(), largest_bytes<P>())), order_);
     layout(io, read);
     if (!io.text_ended()) {
       step = refuse(Fault::Kind::text);

@@ -42,8 +42,7 @@ struct Fault {
     size_zero,        ///< a packet states a size of less than its header
     size_alignment,   ///< a packet states a size that is not a multiple of 8
     size_beyond_end,  ///< a packet states a size of `value` bytes, `highest` are left
-    size_of_packet,   ///< a packet states `value` bytes, a packet of its id has `lowest` to
-                      ///< `highest`
+    size_of_packet,   ///< a packet states `value` bytes, a packet of its id has `lowest` or more
     field,            ///< `field` is `value`, outside `lowest` to `highest`, or not finite
     date,             ///< `field` is `value`, whose digits are no day of the calendar
     text,             ///< no zero ends the text of a message
