@@ -105,10 +105,12 @@ double excess_without_rates_m(const std::vector<TruthPose>& poses, std::size_t b
   glm::dvec3 usual(0.0);
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
+    values.reserve(around.size());
     for (const glm::dvec3& velocity : around) values.push_back(velocity[axis]);
     usual[axis] = median(std::move(values));
   }
   std::vector<double> distances;
+  distances.reserve(around.size());
   for (const glm::dvec3& velocity : around) distances.push_back(glm::length(velocity - usual));
   const double h = span_s(poses[before].sim_time_ns, poses[before + 1].sim_time_ns);
   return h * (glm::length(mean_velocity(poses, before) - usual) -

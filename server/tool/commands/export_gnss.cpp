@@ -44,6 +44,7 @@ struct GnssOptions {
   double geoid_m = 0.0;
   server::TruthLimits limits;
   std::uint16_t host_port = protocol::kDefaultHostPort;
+  std::optional<std::uint64_t> run_id;  ///< absent: the log's only one
   std::optional<std::filesystem::path> json;
 };
 
@@ -71,6 +72,7 @@ constexpr double kLowestM = -10'000.0;
 
 std::vector<std::string> format_names() {
   std::vector<std::string> out;
+  out.reserve(kFormats.size());
   for (const GnssFormat& format : kFormats) out.emplace_back(format.name);
   return out;
 }
@@ -81,22 +83,32 @@ physics::Result<std::vector<server::TruthPose>> read_poses(const GnssOptions& co
   if (!log) return tl::unexpected(log.error());
   std::vector<server::TruthPose> out;
   std::uint64_t run_id = 0;
+  std::uint64_t of_other_runs = 0;
   while (true) {
     const auto more = log->next();
     if (!more) return tl::unexpected(more.error());
     if (!*more) break;
     const protocol::HostFrameData& host = log->host();
+    if (command.run_id && host.run_id != *command.run_id) {
+      ++of_other_runs;
+      continue;
+    }
     if (!out.empty() && host.run_id != run_id) {
       return make_error(ErrorCode::invalid_argument,
-                        fmt::format("{}: another run of the host begins with pose {} at {:.6f} s: "
-                                    "a trajectory is one run",
-                                    command.log.string(), out.size() + 1,
-                                    1e-9 * static_cast<double>(host.sim_time_ns)));
+                        fmt::format("{}: run {} of the host begins with pose {} at {:.6f} s, after "
+                                    "run {}: --run-id chooses one",
+                                    command.log.string(), host.run_id, out.size() + 1,
+                                    1e-9 * static_cast<double>(host.sim_time_ns), run_id));
     }
     run_id = host.run_id;
     out.push_back({host.sim_time_ns, host.seeker, host.seeker_rates});
   }
   if (const auto notes = log->notes()) warn(*notes);
+  if (out.empty() && of_other_runs > 0) {
+    return make_error(ErrorCode::invalid_argument,
+                      fmt::format("{}: none of {} poses is of run {}", command.log.string(),
+                                  of_other_runs, *command.run_id));
+  }
   return out;
 }
 
@@ -432,6 +444,8 @@ void add_options(CommandLine& line, GnssOptions& options) {
       .type_name("PORT")
       .in_range(1, 65535)
       .show_default();
+  line.option("--run-id", options.run_id, "Run of the host in a log that holds several")
+      .type_name("N");
   add_json(line, options.json);
   line.footer(fmt::format(
       "{}\nExample: emit export gnss airfield.mcap --scenario airfield --format nmea --out "

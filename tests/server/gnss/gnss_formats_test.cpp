@@ -65,10 +65,10 @@ TEST(GnssFormats, minutes_carry_and_days_turn) {
   GnssRow row = example_row();
   row.motion.place = {physics::degrees(-(4.0 + 59.999999999 / 60.0)), physics::degrees(7.0),
                       physics::Metres(0.0)};
-  row.posix_utc_ns = 86'399 * kSecondNs + 990'000'000;
+  row.posix_utc_ns = std::int64_t{86'399} * kSecondNs + 990'000'000;
   EXPECT_EQ(gga_sentence(row, 0.0).substr(0, 47),
             "$GPGGA,235959.99,0500.00000000,S,00700.00000000");
-  row.posix_utc_ns = 2 * 86'400 * kSecondNs;
+  row.posix_utc_ns = std::int64_t{172'800} * kSecondNs;
   EXPECT_EQ(gga_sentence(row, 0.0).substr(0, 17), "$GPGGA,000000.00,");
   row.posix_utc_ns = -kSecondNs;
   EXPECT_EQ(gga_sentence(row, 0.0).substr(0, 17), "$GPGGA,235959.00,");

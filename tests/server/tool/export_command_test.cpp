@@ -8,10 +8,12 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "emit/protocol/record/log.hpp"
 #include "net/socket.hpp"
 #include "support/emit_process.hpp"
 
@@ -220,6 +222,34 @@ TEST_F(CliExportGnss, reads_the_logs_that_send_reads) {
       {"export", "gnss", made, "--scenario", "airfield", "--format", "spirent-mot", "--out", out_});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("201 rows at 100 Hz from 401 poses, velocities of the log"));
+}
+
+TEST_F(CliExportGnss, one_run_of_a_log_with_two_is_chosen) {
+  const std::string two = folder_.file("two.mcap");
+  {
+    auto writer = protocol::LogWriter::create(two);
+    ASSERT_TRUE(writer.has_value()) << writer.error().text;
+    const auto pose = std::make_unique<protocol::HostFrameData>();
+    for (std::int64_t i = 0; i < 40; ++i) {
+      pose->run_id = i < 20 ? 7 : 8;
+      pose->frame_number = static_cast<std::uint64_t>(i + 1);
+      pose->sim_time_ns = i % 20 * 100'000'000;
+      ASSERT_TRUE(writer->write_host(*pose, i));
+    }
+    ASSERT_TRUE(writer->close());
+  }
+  const auto export_two = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"export",   "gnss",    two,     "--scenario", "box",
+                                          "--format", "llh-csv", "--out", out_};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_emit(arguments);
+  };
+  EXPECT_THAT(export_two({}).err, HasSubstr("run 8 of the host begins with pose 21 at 0.000000 s, "
+                                            "after run 7: --run-id chooses one"));
+  const ProcessResult chosen = export_two({"--run-id", "8"});
+  EXPECT_EQ(chosen.exit_code, 0) << chosen.err;
+  EXPECT_THAT(chosen.out, HasSubstr("20 rows at 10 Hz from 20 poses"));
+  EXPECT_THAT(export_two({"--run-id", "9"}).err, HasSubstr("none of 40 poses is of run 9"));
 }
 
 TEST_F(CliExportGnss, warns_of_what_the_readers_cannot_take) {
