@@ -57,6 +57,7 @@ server/net: server/rt protocol renderer/physics
 server/client: server/net server/rt protocol renderer/physics
 server/pacing: protocol renderer/include renderer/physics renderer/scene
 server/motion: protocol renderer/physics
+server/gnss: protocol renderer/physics
 server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
 server/agents: server/host server/motion server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
@@ -74,7 +75,7 @@ server/bench/stability: server/tool/command_line server/tool/support renderer/im
 server/bench/accuracy: server/tool/command_line server/tool/support server/bench/stability renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/threads renderer/verify
 server/bench/frame_time: server/tool/command_line server/tool/support server/bench/accuracy server/bench/stability server/pacing renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/bench/stream: server/tool/command_line server/tool/support server/tool/streams server/agents server/client server/net server/rt config/include protocol renderer/physics
-server/tool/commands: server/tool/command_line server/tool/support server/tool/streams server/tool/view server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
+server/tool/commands: server/tool/command_line server/tool/support server/tool/streams server/tool/view server/gnss server/motion server/agents/render server/app server/client server/net server/rt config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene
 server/tool/lab: server/tool/command_line server/tool/support server/tool/commands server/bench/accuracy server/bench/frame_time server/bench/stability server/bench/stream config/include renderer/image renderer/physics renderer/reference renderer/scene renderer/verify
 server/tool: server/tool/commands server/tool/lab server/tool/support
 '

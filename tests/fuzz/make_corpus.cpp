@@ -21,7 +21,7 @@
 #include "emit/scenegen/generate.hpp"
 #include "emit/v1/control.pb.h"
 #include "fuzz/state_world.hpp"
-#include "protocol/cigi_samples.hpp"
+#include "protocol/cigi/cigi_samples.hpp"
 #include "protocol/frames.hpp"
 #include "protocol/host_frames.hpp"
 

@@ -38,6 +38,23 @@ glm::dquat world_from_body_heading_pitch_roll(double heading_rad, double pitch_r
   return glm::normalize(kEnuFromNed * ned_from_body);
 }
 
+HeadingPitchRoll heading_pitch_roll(const glm::dquat& world_from_body) noexcept {
+  const glm::dmat3 ned_from_body =
+      glm::mat3_cast(glm::normalize(glm::conjugate(kEnuFromNed) * world_from_body));
+  const glm::dvec3& forward = ned_from_body[0];
+  const glm::dvec3& right = ned_from_body[1];
+  const double cos_pitch = std::hypot(forward.x, forward.y);
+  HeadingPitchRoll out;
+  out.pitch_rad = std::atan2(-forward.z, cos_pitch);
+  if (cos_pitch > kVerticalSine) {
+    out.heading_rad = std::atan2(forward.y, forward.x);
+    out.roll_rad = std::atan2(right.z, ned_from_body[2].z);
+  } else {
+    out.heading_rad = std::atan2(-right.x, right.y);
+  }
+  return out;
+}
+
 glm::dquat world_from_body_look_at(const glm::dvec3& eye_world_m,
                                    const glm::dvec3& target_world_m) noexcept {
   EMIT_CHECK(eye_world_m != target_world_m);

@@ -236,13 +236,7 @@ SunPosition sun_position_ut1(double julian_day, double day_fraction, double tt_m
   const double clat = std::cos(place.latitude.value());
   const double slon = std::sin(place.longitude.value());
   const double clon = std::cos(place.longitude.value());
-  constexpr double e2 = kWgs84Flattening * (2.0 - kWgs84Flattening);
-  const double normal_m = kWgs84SemiMajorM / std::sqrt(1.0 - e2 * slat * slat);
-  const double height_m = place.height.value();
-  const glm::dvec3 place_ecef_m((normal_m + height_m) * clat * clon,
-                                (normal_m + height_m) * clat * slon,
-                                (normal_m * (1.0 - e2) + height_m) * slat);
-  const glm::dvec3 to_sun_m = sun_ecef_m - place_ecef_m;
+  const glm::dvec3 to_sun_m = sun_ecef_m - ecef_m(place);
   const double range_m = glm::length(to_sun_m);
   const glm::dvec3 d = to_sun_m / range_m;
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tool/command_line/common_options.hpp"
 
+#include <charconv>
+#include <cmath>
+
 #include "emit/config/load.hpp"
 
 namespace emit::tool {
@@ -22,6 +25,15 @@ void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& 
       .suggest(config::shipped_scenarios)
       .may_be_file();
   add_set(line, target.set);
+}
+
+std::optional<double> parse_speed(const std::string& text) {
+  if (text == "max") return 0.0;
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  if (!std::isfinite(value) || value <= 0.0) return std::nullopt;
+  return value;
 }
 
 void add_gpu(CommandLine& line, int& target) {

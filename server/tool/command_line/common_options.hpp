@@ -18,6 +18,8 @@ void add_json(CommandLine& line, std::optional<std::filesystem::path>& target);
 void add_set(CommandLine& line, std::vector<std::string>& target);
 /// The scenario under `name`, required, and --set.
 void add_scenario(CommandLine& line, ScenarioChoice& target, const std::string& name);
+/// Reads a multiple of a pace: a positive number, or "max", for which 0 stands. Empty: neither.
+[[nodiscard]] std::optional<double> parse_speed(const std::string& text);
 /// --gpu N.
 void add_gpu(CommandLine& line, int& target);
 /// --png-of QUANTITY: what the colours of a PNG stand for. `surface`: the frames carry temperatures

@@ -10,6 +10,7 @@ namespace emit::tool {
 
 void add_compare(CommandLine& tool);
 void add_demo(CommandLine& tool);
+void add_export(CommandLine& tool);
 void add_fms_sim(CommandLine& tool);
 void add_generate(CommandLine& tool);
 void add_inspect(CommandLine& tool);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <optional>
 
 #include "tool/command_line/common_options.hpp"
@@ -26,16 +24,6 @@ struct ReplayOptions {
   int gpu_index = -1;
   std::optional<std::filesystem::path> json;
 };
-
-/// 0 stands for "max". Empty: not a speed.
-std::optional<double> parse_speed(const std::string& text) {
-  if (text == "max") return 0.0;
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  if (!std::isfinite(value) || value <= 0.0) return std::nullopt;
-  return value;
-}
 
 int run(const ReplayOptions& command) {
   const auto speed = parse_speed(command.speed);

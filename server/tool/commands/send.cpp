@@ -203,8 +203,8 @@ int run(const SendOptions& command) {
 
 void add_options(CommandLine& line, SendOptions& options) {
   line.path("log", options.log,
-            "MCAP log with host frames, CSV with poses (*.csv), or a pcap/pcapng capture of a "
-            "host's datagrams")
+            "MCAP log with host frames, journal, CSV with poses (*.csv), or a pcap/pcapng capture "
+            "of a host's datagrams")
       .required();
   line.option("--to", options.to, "udp://host:port (host port) or tcp://host:port (control port)")
       .required()

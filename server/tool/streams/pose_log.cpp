@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tool/streams/pose_log.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
+
+#include "emit/protocol/codec.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/v1/control.pb.h"
 
 namespace emit::tool {
 bool is_pose_csv(const std::filesystem::path& file) {
@@ -34,14 +40,22 @@ physics::Result<bool> PoseLog::next() {
   auto& log = std::get<protocol::LogReader>(reader_);
   while (true) {
     auto more = log.next();
-    if (!more || !*more || log.topic() == protocol::LogTopic::host) return more;
+    if (!more || !*more) return more;
+    in_journal_ = log.topic() == protocol::LogTopic::journal;
+    if (!in_journal_) return more;
+    if (!log.journal().has_host_frame()) continue;
+    const auto status = protocol::from_proto(log.journal().host_frame(), *of_journal_);
+    if (status == protocol::DecodeStatus::ok) return more;
+    return physics::make_error(physics::ErrorCode::parse,
+                               fmt::format("entry {} of the journal: {}", log.journal().sequence(),
+                                           protocol::to_string(status)));
   }
 }
 
 const protocol::HostFrameData& PoseLog::host() const noexcept {
   if (const auto* csv = std::get_if<protocol::PoseCsvReader>(&reader_)) return csv->host();
   if (const auto* pcap = std::get_if<protocol::PosePcapReader>(&reader_)) return pcap->host();
-  return std::get_if<protocol::LogReader>(&reader_)->host();
+  return in_journal_ ? *of_journal_ : std::get_if<protocol::LogReader>(&reader_)->host();
 }
 
 std::optional<std::string> PoseLog::notes() const {

@@ -10,6 +10,8 @@
 #include <numbers>
 
 #include "bench/accuracy/bench_rules.hpp"
+#include "emit/protocol/convert.hpp"
+#include "emit/v1/control.pb.h"
 #include "tool/commands/demo_report.hpp"
 #include "tool/streams/pose_log.hpp"
 #include "tool/view/view_control.hpp"
@@ -98,6 +100,42 @@ TEST(CliPoseLog, csv_files_give_host_frames) {
   EXPECT_FALSE(log->notes().has_value());
   std::filesystem::remove(file);
   EXPECT_FALSE(PoseLog::open(file).has_value());
+}
+
+TEST(CliPoseLog, journals_give_the_host_frames_that_the_daemon_took) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "emit_cli_pose_log.mcap";
+  auto writer = protocol::LogWriter::create(file);
+  ASSERT_TRUE(writer.has_value()) << writer.error().text;
+  const auto pose = std::make_unique<protocol::HostFrameData>();
+  for (std::uint64_t k = 1; k <= 4; ++k) {
+    v1::JournalEntry entry;
+    entry.set_sequence(k);
+    entry.set_wall_time_ns(static_cast<std::int64_t>(k));
+    if (k % 2 == 0) {
+      pose->frame_number = k;
+      pose->run_id = 3;
+      pose->sim_time_ns = static_cast<std::int64_t>(k) * 5'000'000;
+      pose->seeker_rates = protocol::PoseRates{{1, 2, 3}, {4, 5, 6}};
+      protocol::to_proto(*pose, *entry.mutable_host_frame());
+    } else {
+      entry.mutable_frame()->set_frame_number(k);
+    }
+    ASSERT_TRUE(writer->write_journal(entry));
+  }
+  ASSERT_TRUE(writer->close());
+  auto log = PoseLog::open(file);
+  ASSERT_TRUE(log.has_value()) << log.error().text;
+  for (const std::int64_t time_ns : {10'000'000, 20'000'000}) {
+    const auto more = log->next();
+    ASSERT_TRUE(more.has_value()) << more.error().text;
+    ASSERT_TRUE(*more);
+    EXPECT_EQ(log->host().sim_time_ns, time_ns);
+    EXPECT_EQ(log->host().run_id, 3U);
+    ASSERT_TRUE(log->host().seeker_rates.has_value());
+    EXPECT_EQ(log->host().seeker_rates->velocity_world_m_s, glm::dvec3(1, 2, 3));
+  }
+  EXPECT_FALSE(*log->next());
+  std::filesystem::remove(file);
 }
 
 }  // namespace

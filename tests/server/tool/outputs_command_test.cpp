@@ -60,6 +60,8 @@ const std::vector<OutputCase>& output_cases() {
     add({"fit", "block-on-road"}, {"--out", "--json"});
     add({"generate", "box", "--out", "GOOD"}, {}, {"--out"});
     add({"make-log", "airfield", "--out", "GOOD"}, {"--out"});
+    add({"export", "gnss", "no.mcap", "--scenario", "box", "--format", "nmea", "--out", "GOOD"},
+        {"--out", "--json"});
     add({"send", "no.mcap", "--to", "udp://127.0.0.1:9"}, {"--json"});
     add({"latency", "tcp://127.0.0.1:1"}, {"--json"});
     add({"fms-sim", "--seconds", "0.1"}, {"--json"});

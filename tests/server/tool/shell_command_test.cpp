@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Completion scripts and manual pages, which are made from the tree of commands.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -188,7 +189,8 @@ class ManPages : public testing::Test {
 TEST_F(ManPages, there_is_one_for_every_command_and_for_the_daemon) {
   std::set<std::string> expected{"emit.1", "emitd.8"};
   for (const std::string& command : commands_in_help()) expected.insert("emit-" + command + ".1");
-  for (const Words& group : {Words{"bench"}, Words{"log"}, Words{"log", "export"}}) {
+  for (const Words& group :
+       {Words{"bench"}, Words{"log"}, Words{"log", "export"}, Words{"export"}}) {
     std::string name = "emit-";
     for (const std::string& word : group) name += word + "-";
     for (const std::string& command : commands_in_help(group)) {

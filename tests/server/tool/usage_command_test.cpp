@@ -22,7 +22,8 @@ INSTANTIATE_TEST_SUITE_P(Commands, CliHelp,
                          testing::Values("render", "receive", "send", "stat", "record", "replay",
                                          "demo", "view", "compare", "inspect", "evaluate",
                                          "generate", "log", "make-log", "bench", "latency",
-                                         "trigger", "trace", "solve", "fit", "fms-sim", "man"));
+                                         "trigger", "trace", "solve", "fit", "fms-sim", "man",
+                                         "export"));
 
 TEST(CliUsage, commands_of_emit_lab_are_those_of_emit) {
   const std::string folder = EMIT_TEST_BIN_DIR;

@@ -26,6 +26,17 @@ struct Pose {
 [[nodiscard]] glm::dquat world_from_body_heading_pitch_roll(double heading_rad, double pitch_rad,
                                                             double roll_rad) noexcept;
 
+/// Heading, pitch and roll as world_from_body_heading_pitch_roll() takes them.
+struct HeadingPitchRoll {
+  double heading_rad = 0.0;  ///< [-pi, pi]
+  double pitch_rad = 0.0;    ///< [-pi/2, pi/2]
+  double roll_rad = 0.0;     ///< [-pi, pi]
+};
+
+/// Returns heading, pitch and roll of an attitude. Where the body's x axis is within 1e-9 rad of
+/// the vertical, the roll is 0 and the heading holds the whole turn about it.
+[[nodiscard]] HeadingPitchRoll heading_pitch_roll(const glm::dquat& world_from_body) noexcept;
+
 /// Returns the attitude whose body x axis points from `eye` to `target`, with the least roll. A
 /// direction within 1e-9 rad of the vertical has north at the top of the image.
 /// @pre the points differ.

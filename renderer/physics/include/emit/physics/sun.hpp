@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <glm/ext/vector_double3.hpp>
 
+#include "emit/physics/geodesy.hpp"
 #include "emit/physics/units.hpp"
 
 /// Position of the sun (physics.md section 7). The model has truncated VSOP87 for the earth, the
@@ -12,13 +13,6 @@
 /// 0.01 deg for 1950..2050. UTC used in place of UT1 adds at most 0.004 deg. Any thread. RT-safe:
 /// no allocation, a few microseconds.
 namespace emit::physics {
-
-/// A geodetic place, WGS-84.
-struct GeoPlace {
-  Radians latitude;   ///< north positive
-  Radians longitude;  ///< east positive
-  Metres height;      ///< above the ellipsoid
-};
 
 /// Direction and distance of the sun, seen from a place.
 struct SunPosition {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "emit/protocol/cigi.hpp"
-#include "protocol/cigi_samples.hpp"
+#include "protocol/cigi/cigi_samples.hpp"
 #include "support/emit_process.hpp"
 
 namespace emit::protocol::cigi {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "emit/protocol/cigi.hpp"
-#include "protocol/cigi_samples.hpp"
+#include "protocol/cigi/cigi_samples.hpp"
 #include "protocol/hex.hpp"
 
 namespace emit::protocol::cigi {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "emit/protocol/cigi.hpp"
-#include "protocol/cigi_samples.hpp"
+#include "protocol/cigi/cigi_samples.hpp"
 #include "protocol/hex.hpp"
 #include "support/heap_counter.hpp"
 
