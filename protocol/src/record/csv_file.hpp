@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "emit/physics/error.hpp"
-#include "record/part_file.hpp"
+#include "emit/protocol/record/part_file.hpp"
 
 namespace emit::protocol {
 

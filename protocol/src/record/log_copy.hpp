@@ -12,7 +12,7 @@
 
 #include "emit/protocol/record/mcap_reader.hpp"
 #include "emit/protocol/record/mcap_writer.hpp"
-#include "record/part_file.hpp"
+#include "emit/protocol/record/part_file.hpp"
 
 namespace emit::protocol {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/part_file.hpp"
+#include "emit/protocol/record/part_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

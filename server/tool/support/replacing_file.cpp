@@ -2,7 +2,6 @@
 #include "tool/support/replacing_file.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <system_error>
@@ -11,33 +10,34 @@
 namespace emit::tool {
 
 physics::Result<ReplacingFile> ReplacingFile::create(const std::filesystem::path& target) {
-  if (target == "-") return ReplacingFile(target, {}, stdout);
-  std::error_code error;
-  // A link stays one: the file that it leads to is replaced.
-  std::filesystem::path file = std::filesystem::canonical(target, error);
-  if (error) file = target;
-  const std::filesystem::file_status status = std::filesystem::status(file, error);
-  std::filesystem::path written;
-  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) {
-    written = file;
-    written += fmt::format(".{}.part", ::getpid());
+  ReplacingFile out(target);
+  if (target == "-") {
+    out.file_ = stdout;
+    return out;
   }
-  std::FILE* stream = std::fopen((written.empty() ? file : written).c_str(), "wb");
-  ReplacingFile out(file, written, stream);
-  if (stream == nullptr) return out.failure(errno);
+  std::error_code none;
+  const std::filesystem::file_status status = std::filesystem::status(target, none);
+  std::filesystem::path written = target;
+  if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) {
+    auto part = protocol::PartFile::begin(target, {});
+    if (!part) return tl::unexpected<physics::Error>(std::move(part.error()));
+    written = part->path();
+    out.part_.emplace(std::move(*part));
+  }
+  out.file_ = std::fopen(written.c_str(), "wb");
+  if (out.file_ == nullptr) return out.failure(errno);
   return out;
 }
 
 ReplacingFile::ReplacingFile(ReplacingFile&& other) noexcept
     : target_(std::move(other.target_)),
-      written_(std::move(other.written_)),
-      file_(std::exchange(other.file_, nullptr)) {}
+      part_(std::move(other.part_)),
+      file_(std::exchange(other.file_, nullptr)) {
+  other.part_.reset();
+}
 
 ReplacingFile::~ReplacingFile() {
-  if (file_ == nullptr) return;
-  if (file_ != stdout) std::fclose(file_);
-  std::error_code ignored;
-  if (!written_.empty()) std::filesystem::remove(written_, ignored);
+  if (file_ != nullptr && file_ != stdout) std::fclose(file_);
 }
 
 tl::unexpected<physics::Error> ReplacingFile::failure(int error_number) const {
@@ -54,15 +54,9 @@ physics::Result<void> ReplacingFile::write(std::string_view bytes) {
 physics::Result<void> ReplacingFile::commit() {
   if (std::fflush(file_) != 0) return failure(errno);
   std::FILE* const file = std::exchange(file_, nullptr);
-  std::error_code error;
-  if (file != stdout && std::fclose(file) != 0) {
-    error = std::error_code(errno, std::generic_category());
-  }
-  if (!written_.empty() && !error) std::filesystem::rename(written_, target_, error);
-  if (!error) return {};
-  std::error_code ignored;
-  if (!written_.empty()) std::filesystem::remove(written_, ignored);
-  return failure(error.value());
+  if (file != stdout && std::fclose(file) != 0) return failure(errno);
+  if (part_) return part_->commit();
+  return {};
 }
 
 }  // namespace emit::tool

@@ -2,10 +2,12 @@
 #pragma once
 #include <cstdio>
 #include <filesystem>
-#include <memory>
+#include <optional>
 #include <string_view>
+#include <utility>
 
 #include "emit/physics/error.hpp"
+#include "emit/protocol/record/part_file.hpp"
 
 namespace emit::tool {
 
@@ -27,12 +29,11 @@ class ReplacingFile {
   [[nodiscard]] physics::Result<void> commit();
 
  private:
-  ReplacingFile(std::filesystem::path target, std::filesystem::path written, std::FILE* file)
-      : target_(std::move(target)), written_(std::move(written)), file_(file) {}
+  explicit ReplacingFile(std::filesystem::path target) : target_(std::move(target)) {}
   [[nodiscard]] tl::unexpected<physics::Error> failure(int error_number) const;
 
   std::filesystem::path target_;
-  std::filesystem::path written_;  ///< empty: the target itself is written
+  std::optional<protocol::PartFile> part_;  ///< absent: the target itself is written
   std::FILE* file_ = nullptr;
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <span>
+#include <utility>
 
 #include "emit/physics/error.hpp"
 
