@@ -42,7 +42,7 @@ int RenderAgent::do_work(std::int64_t now_ns) noexcept {
   if (finish_oldest()) {
     ++work;
   }
-  if (take_job(now_ns)) {
+  if (take_job()) {
     ++work;
   }
   if (work == 0 && count_ > 0) {
@@ -55,7 +55,7 @@ int RenderAgent::do_work(std::int64_t now_ns) noexcept {
   return work;
 }
 
-bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
+bool RenderAgent::take_job() noexcept {
   RenderJob* job = context_.jobs.front();
   if (job == nullptr) {
     return false;
@@ -77,7 +77,10 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
                                 std::span(job->entities.data(), job->entity_count));
         job_prepared_ = true;
       }
-      const double expected_ms = choose_quality_level(*job, now_ns);
+      // The job may have come after this turn began.
+      const std::int64_t submitted_ns = context_.clock.tai_ns();
+      const double expected_ms = choose_quality_level(*job, submitted_ns);
+
       bool warmed_up = false;
       const auto slot = context_.of_slots.look([&] { return submit(job->request, warmed_up); });
       if (!slot) {
@@ -90,7 +93,7 @@ bool RenderAgent::take_job(std::int64_t now_ns) noexcept {
       }
       starved_ = false;
       job_prepared_ = false;
-      in_flight_[(first_ + count_) % kDepth] = {*slot,    now_ns,        expected_ms,
+      in_flight_[(first_ + count_) % kDepth] = {*slot,    submitted_ns,  expected_ms,
                                                 begun_ns, job->channels, warmed_up};
       ++count_;
       context_.counters.add(Counter::frames_submitted);

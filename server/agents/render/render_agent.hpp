@@ -55,7 +55,7 @@ class RenderAgent final : public Agent {
   static constexpr std::uint32_t kMaxFailures = 30;
   static constexpr std::int64_t kLongestFrameNs = 60'000'000'000;
 
-  bool take_job(std::int64_t now_ns) noexcept;
+  bool take_job() noexcept;
   /// Hands a frame to the source; no slot: every slot is in use. `warmed_up` becomes true where the
   /// surface warmed up again, which is then counted and logged.
   [[nodiscard]] std::optional<renderer::SlotIndex> submit(const renderer::FrameRequest& request,
