@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "emit/v1/axes.pb.h"
@@ -164,6 +165,29 @@ TEST(Axes, a_monitor_needs_as_many_demands_as_measurements) {
   message.mutable_measured()->RemoveLast();
   message.set_state(v1::AxesMonitor::STATE_UNSPECIFIED);
   EXPECT_EQ(codec.decode(bytes_of(message, space), out), AxesFault::malformed);
+}
+
+TEST(Axes, instants_out_of_range_are_refused_in_both_messages) {
+  AxesCodec codec;
+  const auto verdicts = [&](std::int64_t time_ns) {
+    AxesCommand command = full_command();
+    command.time_ns = time_ns;
+    const std::span<const std::byte> sent = codec.encode(command);
+    const std::vector<std::byte> command_bytes(sent.begin(), sent.end());
+    AxesMonitor monitor = full_monitor();
+    monitor.time_ns = time_ns;
+    const std::span<const std::byte> answered = codec.encode(monitor);
+    const std::vector<std::byte> monitor_bytes(answered.begin(), answered.end());
+    return std::pair(codec.decode(command_bytes, command), codec.decode(monitor_bytes, monitor));
+  };
+  using Verdicts = std::pair<AxesFault, AxesFault>;
+  constexpr std::int64_t kLeast = std::numeric_limits<std::int64_t>::min();
+  for (const std::int64_t time_ns : {kLeast, std::int64_t{-1}, kMaxAxesTimeNs + 1, ~kLeast}) {
+    EXPECT_EQ(verdicts(time_ns), Verdicts(AxesFault::value, AxesFault::value)) << time_ns;
+  }
+  for (const std::int64_t time_ns : {std::int64_t{0}, kMaxAxesTimeNs}) {
+    EXPECT_EQ(verdicts(time_ns), Verdicts(AxesFault::none, AxesFault::none)) << time_ns;
+  }
 }
 
 TEST(Axes, coding_takes_no_memory) {
