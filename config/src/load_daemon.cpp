@@ -87,7 +87,7 @@ void check_motion(const Node& table, const MotionConfig& motion, Diagnostics& di
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
   Diagnostics reported_before;  // section() has reported wrong kinds
   const Node& pacing = section(root, "pacing", reported_before);
-  if (daemon.pacing.mode != PacingMode::host_step &&
+  if ((daemon.pacing.mode != PacingMode::host_step || daemon.motion.enabled()) &&
       daemon.pacing.display_delay_ns > daemon.pacing.horizon_ns) {
     diagnostics.add(key_location(pacing, "display_delay_ms"),
                     fmt::format("'display_delay_ms' ({}) is beyond 'horizon_ms' ({}): every frame "
@@ -113,7 +113,20 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
   check_endpoint(section(root, "metrics", reported_before), "listen", daemon.metrics.listen, true,
                  diagnostics);
   if (daemon.motion.enabled()) {
-    check_motion(section(root, "motion", reported_before), daemon.motion, diagnostics);
+    const Node& motion = section(root, "motion", reported_before);
+    check_motion(motion, daemon.motion, diagnostics);
+    // Each measurement and each prediction has to last until the next command.
+    const auto least_ns = static_cast<std::int64_t>(2e9 / daemon.motion.rate_hz);
+    const auto too_short = [&](const Node& table, const char* key, std::int64_t value_ns) {
+      if (value_ns >= least_ns) return;
+      diagnostics.add(
+          key_location(table, key),
+          fmt::format("'{}' ({}) is less than two periods of 'motion.rate_hz' ({})", key,
+                      static_cast<double>(value_ns) / 1e6, static_cast<double>(least_ns) / 1e6));
+    };
+    too_short(motion, "feedback_timeout_ms", daemon.motion.feedback_timeout_ns);
+    too_short(motion, "host_timeout_ms", daemon.motion.host_timeout_ns);
+    too_short(pacing, "horizon_ms", daemon.pacing.horizon_ns);
   }
   check_access(root, daemon, diagnostics);
   if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {

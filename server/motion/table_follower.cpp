@@ -296,7 +296,14 @@ void TableFollower::follow(std::int64_t now_ns, std::int64_t time_ns) noexcept {
   bool limited = false;
   bool reached = true;
   for (std::size_t i = 0; i < profiles_.size(); ++i) {
-    const AxisMotion demand = sum(course[i], blends_[i].at(blended_s));
+    AxisMotion demand = sum(course[i], blends_[i].at(blended_s));
+    // A number that is none would stay in the commands for ever.
+    if (!std::isfinite(demand.angle_rad + demand.rate_rad_s + demand.acceleration_rad_s2)) {
+      demand = {profiles_[i].motion().angle_rad, 0.0, 0.0};
+      blends_[i].clear();
+      limited = true;
+    }
+
     const AxisProfile::Command command = profiles_[i].step(demand, step_s, share(now_ns));
     command_.axes[i] = command.motion;
     limited = limited || command.limited();

@@ -195,6 +195,13 @@ TEST_F(ConfigTest, a_motion_simulator_is_read_printed_and_checked) {
   ASSERT_TRUE(second.has_value()) << second.error().text;
   EXPECT_EQ(print_daemon(*second), printed);
 
+  EXPECT_THAT(daemon_error(motion_section(3, "rate_hz = 50\n")),
+              ::testing::HasSubstr("'feedback_timeout_ms' (20) is less than two periods of "
+                                   "'motion.rate_hz' (40)"));
+  EXPECT_THAT(daemon_error(motion_section(3) + "[pacing]\nhorizon_ms = 0\n"),
+              ::testing::HasSubstr("'horizon_ms' (0) is less than two periods"));
+  EXPECT_THAT(daemon_error(motion_section(3) + "[pacing]\ndisplay_delay_ms = 60\n"),
+              ::testing::HasSubstr("'display_delay_ms' (60) is beyond 'horizon_ms' (50)"));
   EXPECT_THAT(daemon_error(motion_section(5)),
               ::testing::HasSubstr("'axes' has 5 axes, must have 3: three rings of the unit"));
   EXPECT_THAT(

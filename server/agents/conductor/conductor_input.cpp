@@ -99,9 +99,13 @@ void Conductor::store(const HostFrameData& frame) noexcept {
   for (const EntityStateData& state : frame.entity_span()) {
     entities_.store(state, frame.sim_time_ns, !slots_);
   }
-  // The axes of a run that is stopped park when no poses come.
-  if (motion_ && control_.running()) {
-    motion_->take_pose(frame);
+  // The axes of a run that is stopped park when no poses come. Where the target went meanwhile must
+  // not get lost.
+  if (motion_) {
+    motion_->take_target(frame);
+    if (control_.running()) {
+      motion_->take_pose(frame);
+    }
   }
   if (frame.environment) {
     store_weather(*frame.environment, frame.sim_time_ns);

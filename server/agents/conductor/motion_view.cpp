@@ -53,6 +53,7 @@ void MotionView::push(const MotionInput& input) noexcept {
 }
 
 void MotionView::take_target(const protocol::HostFrameData& frame) noexcept {
+  if (!plan_.target_entity) return;
   MotionInput input;
   input.kind = MotionInput::Kind::target;
   input.target.sim_time_ns = frame.sim_time_ns;
@@ -74,7 +75,6 @@ void MotionView::take_target(const protocol::HostFrameData& frame) noexcept {
 }
 
 void MotionView::take_pose(const protocol::HostFrameData& frame) noexcept {
-  if (plan_.target_entity) take_target(frame);
   MotionInput input;
   input.received_ns = frame.received_ns;
   input.pose = {frame.sim_time_ns, frame.seeker, frame.seeker_rates};

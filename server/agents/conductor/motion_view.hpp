@@ -27,7 +27,9 @@ class MotionView {
   void start_run() noexcept;
   /// Asks the motion agent to close the interlock, because the host has reset the run.
   void reset() noexcept;
-  /// Hands a pose of the host, and where its target is, to the motion agent.
+  /// Hands the place of the target to the motion agent, if target rings point to one.
+  void take_target(const protocol::HostFrameData& frame) noexcept;
+  /// Hands a pose of the host to the motion agent.
   void take_pose(const protocol::HostFrameData& frame) noexcept;
   /// Takes the reports of the motion agent. One that is silent counts as a lack of measurements.
   /// @return the number of reports taken
@@ -60,7 +62,6 @@ class MotionView {
   void keep(const protocol::FrameHeader& header, const FrameLedger::Issued::Motion& motion,
             const glm::dvec2& shift) noexcept;
   void judge_shown() noexcept;
-  void take_target(const protocol::HostFrameData& frame) noexcept;
   void push(const MotionInput& input) noexcept;
   /// Hands over what must not get lost: the begin of a run.
   void push_pending() noexcept;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <optional>
@@ -70,9 +71,11 @@ class TableFollowerTest : public ::testing::Test {
   void run(std::int64_t for_ns) {
     for (std::int64_t end_ns = now_ns_ + for_ns; now_ns_ < end_ns;) {
       now_ns_ += kMs;
-      if (host_speaks_ && now_ns_ % (10 * kMs) == 0) speak();
+      if (host_speaks_ && now_ns_ % interval_ns_ == 0) speak();
       protocol::AxesMonitor monitor = table_->step(now_ns_);
       monitor.time_ns += controller_offset_ns_;
+      measured_ = monitor.measured;
+
       if (controller_answers_) static_cast<void>(follower_->take(monitor, now_ns_));
       const protocol::AxesCommand& command = follower_->step(now_ns_);
       // After its clock was set, a controller takes none until the latest one is old.
@@ -129,8 +132,11 @@ class TableFollowerTest : public ::testing::Test {
   bool speaks_of_target_ = true;
   bool controller_answers_ = true;
   std::int64_t controller_offset_ns_ = 0;
-  bool deaf_ = false;  ///< the controller takes no command
+  bool deaf_ = false;                    ///< the controller takes no command
+  std::int64_t interval_ns_ = 10 * kMs;  ///< between two poses
+  std::array<AxisMotion, protocol::kMaxAxes> measured_{};
   AxesMode mode_ = AxesMode::off;
+
   protocol::AxesCommand last_;
   Extremes extremes_;
 };
@@ -151,6 +157,13 @@ TEST_F(TableFollowerTest, sets_off_softly_and_follows_without_a_jump) {
   EXPECT_LT(extremes.jump_rad, 1e-8);
   EXPECT_LT(worst_rad, 1e-3);
   EXPECT_GT(worst_rad, 0.0);
+}
+
+TEST_F(TableFollowerTest, poses_that_come_seldom_give_the_axes_no_kick) {
+  interval_ns_ = 40 * kMs;
+  set_off();
+  run(5'000 * kMs);
+  EXPECT_LT(take_extremes().acceleration_rad_s2, 3.0) << "the swing itself asks for 1.6 rad/s2";
 }
 
 TEST_F(TableFollowerTest, commands_that_were_left_out_bring_no_limit_and_no_jump) {
@@ -253,7 +266,12 @@ TEST_F(TableFollowerTest, parks_when_the_measurements_stop) {
   controller_answers_ = true;
   run(kMs);
   EXPECT_EQ(follower_->status().state, MotionState::capturing);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_GT(std::abs(measured_[i].rate_rad_s), 0.05) << "the axes still move";
+    EXPECT_NEAR(last_.axes[i].rate_rad_s, measured_[i].rate_rad_s, 1.01e-3 * kMostRadS2);
+  }
   run(300 * kMs);
+
   expect_soft(take_extremes(), 0);
   set_off();
 }
@@ -330,6 +348,19 @@ TEST_F(TableFollowerTest, a_full_circle_beyond_the_travel_comes_back_softly_at_i
   }
   EXPECT_LT(take_extremes().jump_rad, 1e-8);
   EXPECT_TRUE(came_back) << "a ring of limited travel must not rest at its end for ever";
+}
+
+TEST_F(TableFollowerTest, a_pose_that_is_no_number_does_not_stay_in_the_commands) {
+  set_off();
+  SeekerPose broken = pose();
+  broken.sim_time_ns += kMs;
+  broken.seeker.world_from_body.x = std::nan("");
+  static_cast<void>(follower_->take(broken, now_ns_));
+  for (int i = 0; i < 9; ++i) {
+    run(kMs);
+    for (const AxisMotion& axis : last_.axes) EXPECT_TRUE(std::isfinite(axis.angle_rad));
+  }
+  set_off();
 }
 
 TEST_F(TableFollowerTest, target_rings_wait_for_a_target) {

@@ -76,7 +76,7 @@ enum class MotionState : std::uint8_t {
 /// Reasons why the axes do not show what a frame assumes, as bits.
 enum MotionFaults : std::uint8_t {
   kMotionNoFeedback = 1u << 0,       ///< no measurement for longer than motion.feedback_timeout_ms
-  kMotionNoHost = 1u << 1,           ///< no pose for longer than motion.host_timeout_ms
+  kMotionNoHost = 1u << 1,           ///< no pose for longer than pacing.horizon_ms
   kMotionInterlock = 1u << 2,        ///< the controller has switched the motors off
   kMotionLimit = 1u << 3,            ///< an axis is at a limit and cannot meet its demand
   kMotionLock = 1u << 4,             ///< two axes are nearly parallel, and rates are damped

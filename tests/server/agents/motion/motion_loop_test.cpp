@@ -376,12 +376,20 @@ TEST(MotionLoop, an_agent_that_hangs_is_seen_in_the_frames) {
 TEST(MotionLoop, a_stopped_run_parks_the_axes_and_a_reset_closes_the_interlock) {
   Loop loop({});
   loop.run(8 * kSecondNs);
+  const double elevation_rad = loop.monitors.back().demanded[4].angle_rad;
   loop.rig().command(CommandKind::stop);
+  // The target rises by 1.5 degrees while the run is stopped, and is not told of again.
+  loop.target_m = kTargetM + glm::dvec3(0.0, 0.0, 40.0);
   loop.run(500 * kMs);
   EXPECT_EQ(loop.last_mode, protocol::AxesMode::park);
+  loop.target_every = 1'000'000;
+
   loop.rig().command(CommandKind::start);
   loop.run(8 * kSecondNs);
   EXPECT_EQ(loop.last_mode, protocol::AxesMode::follow);
+  EXPECT_GT(std::abs(loop.monitors.back().demanded[4].angle_rad - elevation_rad), 0.01)
+      << "the rings point to where it went";
+
   // A host that was started anew does not close an open interlock; the command does.
   loop.table().set_fault(0, AxisFault::runaway);
   loop.run(2 * kSecondNs);
@@ -423,7 +431,7 @@ TEST(MotionLoop, a_target_that_comes_seldom_or_teleports_leaves_the_axes_calm) {
   EXPECT_EQ(loop.rig().frames.back().header.motion_state, MotionState::following);
 }
 
-TEST(MotionLoop, repeated_frames_keep_their_faults_and_are_not_judged) {
+TEST(MotionLoop, a_repeated_frame_is_shown_in_its_own_slot) {
   Loop loop({});
   loop.run(30 * kMs);
   EXPECT_NE(loop.rig().frames.back().header.flags & protocol::kFlagMotionFault, 0U);
