@@ -14,8 +14,8 @@ namespace {
 using physics::ErrorCode;
 using physics::make_error;
 
-constexpr std::array<std::string_view, 6> kAgents{"receiver", "conductor", "render",
-                                                  "sender",   "recorder",  "motion"};
+constexpr std::array<std::string_view, 7> kAgents{"receiver", "conductor", "render", "sender",
+                                                  "recorder", "motion",    "gateway"};
 
 std::string_view trimmed(std::string_view text) noexcept {
   const std::size_t from = text.find_first_not_of(' ');

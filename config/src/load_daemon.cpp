@@ -84,6 +84,21 @@ void check_motion(const Node& table, const MotionConfig& motion, Diagnostics& di
   }
 }
 
+/// Checks that every entity of the host has one number, and the other way round.
+void check_cigi(const Node& table, const CigiConfig& cigi, Diagnostics& diagnostics) {
+  check_endpoint(table, "listen", cigi.listen, false, diagnostics);
+  check_endpoint(table, "host", cigi.host, false, diagnostics);
+  for (std::size_t i = 0; i < cigi.entities.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const bool same_id = cigi.entities[i].id == cigi.entities[k].id;
+      if (!same_id && cigi.entities[i].entity != cigi.entities[k].entity) continue;
+      diagnostics.add(key_location(table, "entities"),
+                      fmt::format("'entities': {} {} stands twice", same_id ? "id" : "entity",
+                                  same_id ? cigi.entities[i].id : cigi.entities[i].entity));
+    }
+  }
+}
+
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
   Diagnostics reported_before;  // section() has reported wrong kinds
   const Node& pacing = section(root, "pacing", reported_before);
@@ -127,6 +142,9 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
     too_short(motion, "feedback_timeout_ms", daemon.motion.feedback_timeout_ns);
     too_short(motion, "host_timeout_ms", daemon.motion.host_timeout_ns);
     too_short(pacing, "horizon_ms", daemon.pacing.horizon_ns);
+  }
+  if (daemon.cigi.enabled()) {
+    check_cigi(section(root, "cigi", reported_before), daemon.cigi, diagnostics);
   }
   check_access(root, daemon, diagnostics);
   if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {
@@ -193,6 +211,7 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   read_table(section(root, "pacing", diagnostics), pacing_keys(), daemon.pacing, diagnostics);
   read_table(section(root, "trigger", diagnostics), trigger_keys(), daemon.trigger, diagnostics);
   read_table(section(root, "motion", diagnostics), motion_keys(), daemon.motion, diagnostics);
+  read_table(section(root, "cigi", diagnostics), cigi_keys(), daemon.cigi, diagnostics);
   read_table(section(root, "clock", diagnostics), clock_keys(), daemon.clock, diagnostics);
   read_table(section(root, "realtime", diagnostics), realtime_keys(), daemon.realtime, diagnostics);
   read_table(section(root, "host", diagnostics), host_keys(), daemon.host, diagnostics);

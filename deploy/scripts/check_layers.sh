@@ -59,14 +59,16 @@ server/pacing: protocol renderer/include renderer/physics renderer/scene
 server/motion: protocol renderer/physics
 server/gnss: protocol renderer/physics
 server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
-server/agents: server/host server/motion server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/gateway: server/host server/net server/rt server/telemetry config/include protocol renderer/physics renderer/reference renderer/scene
+server/agents: server/gateway server/host server/motion server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/receiver: server/agents server/agents/sender server/net server/rt config/include protocol renderer/physics
-server/agents/conductor: server/agents server/motion server/net server/pacing server/rt config/include protocol renderer/physics
+server/agents/conductor: server/agents server/gateway server/motion server/net server/pacing server/rt config/include protocol renderer/physics
 server/agents/recorder: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/render: server/agents server/pacing renderer/image renderer/physics
 server/agents/motion: server/agents server/motion server/net server/rt config/include protocol renderer/physics renderer/scene
-server/app: server/host server/agents server/agents/conductor server/agents/motion server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/motion server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
+server/agents/gateway: server/agents server/gateway server/net server/rt config/include protocol renderer/physics renderer/scene
+server/app: server/host server/agents server/agents/conductor server/agents/gateway server/gateway server/agents/motion server/agents/receiver server/agents/recorder server/agents/render server/agents/sender server/motion server/net server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/tool/support: server/app server/pacing server/telemetry config/include protocol renderer/image renderer/include renderer/physics renderer/reference renderer/scene renderer/scene/generate
 server/tool/command_line: server/tool/support config/include renderer/physics
 server/tool/streams: server/tool/command_line server/tool/support server/app server/client server/rt protocol renderer/image renderer/physics renderer/scene

@@ -153,6 +153,40 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out) {
   if (frame.environment) to_proto(*frame.environment, *out.mutable_environment());
 }
 
+DecodeStatus check_pose(const physics::Pose& pose, const std::optional<PoseRates>& rates,
+                        DecodeFault* fault) noexcept {
+  RangeCheck check(fault);
+  const bool valid =
+      check.in_range({"position_m.x", "position_m.y", "position_m.z"}, pose.position_world_m,
+                     kMaxPositionM) &&
+      (!rates ||
+       (check.in_range({"velocity_m_s.x", "velocity_m_s.y", "velocity_m_s.z"},
+                       rates->velocity_world_m_s, kMaxSpeedMS) &&
+        check.in_range({"angular_rate_rad_s.x", "angular_rate_rad_s.y", "angular_rate_rad_s.z"},
+                       rates->angular_rate_body_rad_s, kMaxAngularRateRadS)));
+  return valid ? DecodeStatus::ok : DecodeStatus::invalid_pose;
+}
+
+DecodeStatus check_environment(const EnvironmentData& out, DecodeFault* fault) noexcept {
+  // The ranges are those of a scenario's weather, so that live weather can do nothing that a
+  // scenario cannot.
+  RangeCheck check(fault);
+  const bool valid =
+      check.in_range("direct_normal_w_m2", out.direct_normal_w_m2, limits::kDirectNormalWM2) &&
+      check.in_range("diffuse_horizontal_w_m2", out.diffuse_horizontal_w_m2,
+                     limits::kDiffuseHorizontalWM2) &&
+      check.in_range("longwave_down_w_m2", out.longwave_down_w_m2, limits::kLongwaveDownWM2) &&
+      check.in_range("air_k", out.air_k, limits::kAirK) &&
+      check.in_range("wind_m_s", out.wind_m_s, limits::kWindMS) &&
+      check.in_range("cloud_frac", out.cloud_frac, limits::kCloudFrac) &&
+      (!out.environment_k ||
+       check.in_range("environment_k", *out.environment_k, limits::kEnvironmentK)) &&
+      (!out.film_w_m2_k || check.in_range("film_w_m2_k", *out.film_w_m2_k, limits::kFilmWM2K));
+  if (valid) return DecodeStatus::ok;
+  set_part(fault, DecodeFault::Part::environment);
+  return DecodeStatus::invalid_environment;
+}
+
 DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose, std::optional<PoseRates>& rates,
                         DecodeFault* fault) noexcept {
   RangeCheck check(fault);
@@ -161,26 +195,20 @@ DecodeStatus from_proto(const v1::Pose& in, physics::Pose& pose, std::optional<P
     return DecodeStatus::invalid_pose;
   }
   pose.position_world_m = from(in.position_m());
-  if (!check.in_range({"position_m.x", "position_m.y", "position_m.z"}, pose.position_world_m,
-                      kMaxPositionM) ||
+  pose.world_from_body = glm::dquat(1.0, 0.0, 0.0, 0.0);
+  rates.reset();
+  if (check_pose(pose, rates, fault) != DecodeStatus::ok ||
       !read_attitude(in.world_from_body(), pose.world_from_body, check)) {
     return DecodeStatus::invalid_pose;
   }
-  rates.reset();
   const bool has_rates = in.has_velocity_m_s() || in.has_angular_rate_rad_s();
   if (has_rates) {
     if (!check.present("velocity_m_s beside angular_rate_rad_s", in.has_velocity_m_s()) ||
         !check.present("angular_rate_rad_s beside velocity_m_s", in.has_angular_rate_rad_s())) {
       return DecodeStatus::invalid_pose;
     }
-    const PoseRates read{from(in.velocity_m_s()), from(in.angular_rate_rad_s())};
-    if (!check.in_range({"velocity_m_s.x", "velocity_m_s.y", "velocity_m_s.z"},
-                        read.velocity_world_m_s, kMaxSpeedMS) ||
-        !check.in_range({"angular_rate_rad_s.x", "angular_rate_rad_s.y", "angular_rate_rad_s.z"},
-                        read.angular_rate_body_rad_s, kMaxAngularRateRadS)) {
-      return DecodeStatus::invalid_pose;
-    }
-    rates = read;
+    rates = PoseRates{from(in.velocity_m_s()), from(in.angular_rate_rad_s())};
+    return check_pose(pose, rates, fault);
   }
   return DecodeStatus::ok;
 }
@@ -209,23 +237,7 @@ DecodeStatus from_proto(const v1::Environment& in, EnvironmentData& out,
   out.cloud_frac = in.cloud_frac();
   if (in.has_environment_k()) out.environment_k = in.environment_k();
   if (in.has_film_w_m2_k()) out.film_w_m2_k = in.film_w_m2_k();
-  // The ranges are those of a scenario's weather, so that live weather can do nothing that a
-  // scenario cannot.
-  RangeCheck check(fault);
-  const bool valid =
-      check.in_range("direct_normal_w_m2", out.direct_normal_w_m2, limits::kDirectNormalWM2) &&
-      check.in_range("diffuse_horizontal_w_m2", out.diffuse_horizontal_w_m2,
-                     limits::kDiffuseHorizontalWM2) &&
-      check.in_range("longwave_down_w_m2", out.longwave_down_w_m2, limits::kLongwaveDownWM2) &&
-      check.in_range("air_k", out.air_k, limits::kAirK) &&
-      check.in_range("wind_m_s", out.wind_m_s, limits::kWindMS) &&
-      check.in_range("cloud_frac", out.cloud_frac, limits::kCloudFrac) &&
-      (!out.environment_k ||
-       check.in_range("environment_k", *out.environment_k, limits::kEnvironmentK)) &&
-      (!out.film_w_m2_k || check.in_range("film_w_m2_k", *out.film_w_m2_k, limits::kFilmWM2K));
-  if (valid) return DecodeStatus::ok;
-  set_part(fault, DecodeFault::Part::environment);
-  return DecodeStatus::invalid_environment;
+  return check_environment(out, fault);
 }
 
 DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out, DecodeFault* fault) noexcept {

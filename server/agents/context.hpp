@@ -9,6 +9,7 @@
 #include "agents/channel_table.hpp"
 #include "agents/messages.hpp"
 #include "emit/protocol/resend.hpp"
+#include "gateway/host_gateway.hpp"
 #include "rt/byte_ring.hpp"
 #include "rt/client_counts.hpp"
 #include "rt/clock.hpp"
@@ -65,6 +66,7 @@ struct Doorbells {
   Doorbell sender;
   Doorbell recorder;
   Doorbell motion;
+  Doorbell gateway;
 };
 
 /// Objects that more than one agent uses: rings, counters and what is fixed after start.
@@ -108,23 +110,26 @@ struct Context {
   /// Memory of the entries that are kept for recorders that connect later.
   std::atomic<std::uint64_t> journal_memory_bytes{0};
 
-  SpscRing<HostInput> host_inputs{32};         // receiver -> conductor
-  SpscRing<StatusReply> replies{256};          // conductor -> receiver
-  SpscRing<RenderJob> jobs{16};                // conductor -> render
-  SpscRing<RenderDone> done{16};               // render -> conductor
-  SpscRing<PublishFrame> published{16};        // conductor -> sender
-  SpscRing<MotionInput> motion_inputs{64};     // conductor -> motion
-  SpscRing<MotionReport> motion_reports{256};  // motion -> conductor
-  ByteRing journal;                            // conductor -> recorder
-  SpscRing<ClientCommand> to_sender;           // receiver -> sender
-  SpscRing<ClientReleased> from_sender;        // sender -> receiver
-  SpscRing<ResendCommand> resends{64};         // receiver -> sender
-  SpscRing<RecorderCommand> to_recorder;       // receiver -> recorder
-  SpscRing<RecorderReleased> from_recorder;    // recorder -> receiver
+  SpscRing<HostInput> host_inputs{32};          // receiver -> conductor
+  SpscRing<StatusReply> replies{256};           // conductor -> receiver
+  SpscRing<RenderJob> jobs{16};                 // conductor -> render
+  SpscRing<RenderDone> done{16};                // render -> conductor
+  SpscRing<PublishFrame> published{16};         // conductor -> sender
+  SpscRing<MotionInput> motion_inputs{64};      // conductor -> motion
+  SpscRing<MotionReport> motion_reports{256};   // motion -> conductor
+  SpscRing<HostInput> gateway_inputs{32};       // gateway -> conductor
+  SpscRing<GatewayReport> gateway_reports{64};  // conductor -> gateway
+  ByteRing journal;                             // conductor -> recorder
+  SpscRing<ClientCommand> to_sender;            // receiver -> sender
+  SpscRing<ClientReleased> from_sender;         // sender -> receiver
+  SpscRing<ResendCommand> resends{64};          // receiver -> sender
+  SpscRing<RecorderCommand> to_recorder;        // receiver -> recorder
+  SpscRing<RecorderReleased> from_recorder;     // recorder -> receiver
 
-  Shortage of_room;    ///< on `published`: the conductor waits for the sender
-  Shortage of_slots;   ///< of the source: render waits for whoever releases one
-  Shortage of_inputs;  ///< on `host_inputs`: the receiver waits for the conductor
+  Shortage of_room;          ///< on `published`: the conductor waits for the sender
+  Shortage of_slots;         ///< of the source: render waits for whoever releases one
+  Shortage of_inputs;        ///< on `host_inputs`: the receiver waits for the conductor
+  Shortage of_gateway_room;  ///< on `gateway_inputs`: the gateway waits for the conductor
 
   EventLog conductor_events{256, counters};
   EventLog receiver_events{256, counters};
@@ -133,6 +138,7 @@ struct Context {
   EventLog recorder_events{64, counters};
   EventLog metrics_events{64, counters};
   EventLog motion_events{64, counters};
+  EventLog gateway_events{64, counters};
 
  private:
   std::size_t client_places_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "agents/gateway/gateway_setup.hpp"
 #include "agents/motion/motion_setup.hpp"
 #include "app/replay.hpp"
 #include "emit/physics/check.hpp"
@@ -131,11 +132,24 @@ physics::Result<void> AgentSet::make_motion() {
   return {};
 }
 
+physics::Result<void> AgentSet::make_gateway() {
+  if (!config_.cigi.enabled()) {
+    return {};
+  }
+  auto made = make_cigi_agent(context_, config_, scenario_);
+  if (!made) {
+    return tl::unexpected<Error>(std::move(made.error()).with_context(config_.file.string()));
+  }
+  gateway_ = std::move(*made);
+  return {};
+}
+
 void AgentSet::make_conductor(TriggerInput* triggers) {
   Conductor::Options options;
   options.pacing = config_.pacing;
   options.canned = source().canned;
   options.first_time_ns = config_.source.first_time_ns;
+  options.gateway = gateway_ != nullptr;
   options.motion = motion_plan_ ? &*motion_plan_ : nullptr;
   conductor_ = std::make_unique<Conductor>(context_, tracks_, options, triggers);
 }
@@ -148,6 +162,9 @@ physics::Result<void> AgentSet::make_runners() {
   receiver_runner_ = std::make_unique<AgentRunner>(receiver(), context_.clock);
   if (motion_) {
     motion_runner_ = std::make_unique<AgentRunner>(*motion_, context_.clock);
+  }
+  if (gateway_) {
+    gateway_runner_ = std::make_unique<AgentRunner>(*gateway_, context_.clock);
   }
   for (AgentRunner* runner : serving_order()) {
     if (runner == nullptr) {

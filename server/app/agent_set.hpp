@@ -8,6 +8,7 @@
 
 #include "agents/conductor/conductor.hpp"
 #include "agents/context.hpp"
+#include "agents/gateway/gateway_agent.hpp"
 #include "agents/motion/motion_agent.hpp"
 #include "agents/receiver/receiver.hpp"
 #include "agents/recorder/recorder.hpp"
@@ -23,9 +24,9 @@
 
 namespace emit::server {
 
-/// The agents of the daemon with their runners: five, and one more with a motion simulator, and the
-/// orders in which they are started, stepped and stopped. Setup calls the functions from
-/// open_receiver() to make_runners() in their order. Thread: main.
+/// The agents of the daemon with their runners: five, one more with a motion simulator and one more
+/// with a gateway, and the orders in which they are started, stepped and stopped. Setup calls the
+/// functions from open_receiver() to make_runners() in their order. Thread: main.
 class AgentSet {
  public:
   /// The arguments outlive the set. `stepped`: no threads, the caller runs the agents with step().
@@ -58,6 +59,9 @@ class AgentSet {
   /// (the controller's address).
   /// @pre context.channels is filled
   [[nodiscard]] physics::Result<void> make_motion();
+  /// Makes the gateway agent where the configuration has a host that needs one. Errors: config, io
+  /// (an address, a glTF file), internal (Embree).
+  [[nodiscard]] physics::Result<void> make_gateway();
   /// `triggers` outlives the set; pacing mode trigger needs it, the other modes take null.
   /// @pre start_render() succeeded
   void make_conductor(TriggerInput* triggers);
@@ -92,33 +96,36 @@ class AgentSet {
   [[nodiscard]] Recorder& recorder() const;
   [[nodiscard]] Sender& sender() const;
   [[nodiscard]] Conductor& conductor() const;
+  /// Returns the gateway agent; null: there is none.
+  [[nodiscard]] const GatewayAgent* gateway() const noexcept { return gateway_.get(); }
 
  private:
-  // A runner is null before it is made, and that of the motion agent without a motion simulator.
+  // A runner is null before it is made, and those of motion and gateway without one.
 
   /// Returns the runners that start after the render agent's, in the order of their start.
-  [[nodiscard]] std::array<AgentRunner*, 5> serving_order() const noexcept {
-    return {recorder_runner_.get(), sender_runner_.get(), motion_runner_.get(),
-            conductor_runner_.get(), receiver_runner_.get()};
+  [[nodiscard]] std::array<AgentRunner*, 6> serving_order() const noexcept {
+    return {recorder_runner_.get(),  sender_runner_.get(),   motion_runner_.get(),
+            conductor_runner_.get(), receiver_runner_.get(), gateway_runner_.get()};
   }
   /// Returns the runners in the order of a frame's way; the conductor has two turns, one before and
   /// one after rendering.
-  [[nodiscard]] std::array<AgentRunner*, 7> step_order() const noexcept {
-    return {receiver_runner_.get(), motion_runner_.get(),    conductor_runner_.get(),
-            render_runner_.get(),   conductor_runner_.get(), sender_runner_.get(),
-            recorder_runner_.get()};
+  [[nodiscard]] std::array<AgentRunner*, 8> step_order() const noexcept {
+    return {receiver_runner_.get(),  gateway_runner_.get(), motion_runner_.get(),
+            conductor_runner_.get(), render_runner_.get(),  conductor_runner_.get(),
+            sender_runner_.get(),    recorder_runner_.get()};
   }
   /// Returns the runners in the order in which /metrics and the log name them.
-  [[nodiscard]] std::array<AgentRunner*, 6> label_order() const noexcept {
+  [[nodiscard]] std::array<AgentRunner*, 7> label_order() const noexcept {
     return {receiver_runner_.get(), conductor_runner_.get(), render_runner_.get(),
-            sender_runner_.get(),   recorder_runner_.get(),  motion_runner_.get()};
+            sender_runner_.get(),   recorder_runner_.get(),  motion_runner_.get(),
+            gateway_runner_.get()};
   }
   /// Returns the runners in the order of their stop, without render. It is against the flow of what
   /// is lent: slots go back to the source before it ends, and descriptors to the receiver before it
   /// closes them.
-  [[nodiscard]] std::array<AgentRunner*, 5> stop_order() const noexcept {
-    return {conductor_runner_.get(), motion_runner_.get(), sender_runner_.get(),
-            recorder_runner_.get(), receiver_runner_.get()};
+  [[nodiscard]] std::array<AgentRunner*, 6> stop_order() const noexcept {
+    return {conductor_runner_.get(), motion_runner_.get(),   sender_runner_.get(),
+            recorder_runner_.get(),  receiver_runner_.get(), gateway_runner_.get()};
   }
   void plan_realtime(AgentRunner& runner) const;
 
@@ -135,12 +142,14 @@ class AgentSet {
   std::unique_ptr<Sender> sender_;
   std::optional<MotionPlan> motion_plan_;
   std::unique_ptr<MotionAgent> motion_;
+  std::unique_ptr<GatewayAgent> gateway_;
   std::unique_ptr<Conductor> conductor_;
   std::unique_ptr<AgentRunner> receiver_runner_;
   std::unique_ptr<AgentRunner> render_runner_;
   std::unique_ptr<AgentRunner> recorder_runner_;
   std::unique_ptr<AgentRunner> sender_runner_;
   std::unique_ptr<AgentRunner> motion_runner_;
+  std::unique_ptr<AgentRunner> gateway_runner_;
   std::unique_ptr<AgentRunner> conductor_runner_;
   NamedDutyCycles duty_cycles_;
 };

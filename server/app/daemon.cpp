@@ -95,7 +95,10 @@ physics::Result<void> DaemonImpl::setup() {
   if (!options_.stepped) {
     // Ask with the privileges that stay, and before anything large is made, so that it comes from
     // memory that is locked.
-    realtime_ = ask_for_realtime(config_.realtime, config_.motion.enabled());
+    std::vector<std::string_view> more_agents;
+    if (config_.motion.enabled()) more_agents.emplace_back("motion");
+    if (config_.cigi.enabled()) more_agents.emplace_back("gateway");
+    realtime_ = ask_for_realtime(config_.realtime, more_agents);
     if (auto checked = check_realtime(); !checked) {
       return checked;
     }
@@ -149,6 +152,9 @@ physics::Result<void> DaemonImpl::make_agents() {
   if (auto made = agents_.make_motion(); !made) {
     return made;
   }
+  if (auto made = agents_.make_gateway(); !made) {
+    return made;
+  }
   agents_.make_conductor(triggers_.get());
   log_start(names);
   if (auto made = agents_.make_runners(); !made) {
@@ -181,6 +187,10 @@ void DaemonImpl::log_start(const ProcessNames& names) {
   log_.scene(source.scene);
   if (!privileges_.empty()) {
     log_.write(LogLevel::info, privileges_);
+  }
+  if (const GatewayAgent* gateway = agents_.gateway()) {
+    log_.write(LogLevel::info, fmt::format("event=gateway listen={} {}",
+                                           to_string(gateway->address()), gateway->notes()));
   }
   if (!config_.stream.shm.empty()) {
     log_.shared_memory(config_.stream);

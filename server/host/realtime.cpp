@@ -25,8 +25,12 @@ namespace {
 
 /// Difference between the conductor's priority and that of an agent. An agent without an entry is
 /// not real-time.
-constexpr std::array<std::pair<std::string_view, int>, 5> kBelow{
-    {{"conductor", 0}, {"motion", 0}, {"receiver", 1}, {"sender", 2}, {"render", 3}}};
+constexpr std::array<std::pair<std::string_view, int>, 6> kBelow{{{"conductor", 0},
+                                                                  {"motion", 0},
+                                                                  {"receiver", 1},
+                                                                  {"gateway", 1},
+                                                                  {"sender", 2},
+                                                                  {"render", 3}}};
 
 constexpr std::size_t kPageBytes = 4096;
 /// Deeper than any agent's loop goes.
@@ -130,15 +134,17 @@ std::string RealtimeReport::refusals() const {
   return out;
 }
 
-RealtimeReport ask_for_realtime(const config::RealtimeConfig& config, bool with_motion) {
+RealtimeReport ask_for_realtime(const config::RealtimeConfig& config,
+                                std::span<const std::string_view> more_agents) {
   RealtimeReport report;
   if (config.lock_memory) {
     std::string why = lock_memory(config.heap_touch_mib);
     const bool granted = why.empty();
     report.add({"lock_memory", "", granted, std::move(why)});
   }
-  for (const char* agent : {"conductor", "motion", "receiver", "sender", "render", "recorder"}) {
-    if (agent == std::string_view("motion") && !with_motion) continue;
+  std::vector<std::string_view> agents{"conductor", "receiver", "sender", "render", "recorder"};
+  agents.insert(agents.end(), more_agents.begin(), more_agents.end());
+  for (const std::string_view agent : agents) {
     const ThreadRealtime wish = thread_realtime(config, agent);
     if (!wish.fifo && wish.cpus.empty()) continue;
     std::optional<int> cpus;
@@ -149,7 +155,8 @@ RealtimeReport ask_for_realtime(const config::RealtimeConfig& config, bool with_
     }).join();
     for (const auto& [setting, error] : {std::pair("cpus", cpus), std::pair("fifo", fifo)}) {
       if (!error) continue;
-      report.add({setting, agent, *error == 0, *error == 0 ? "" : remedy(setting, *error)});
+      report.add(
+          {setting, std::string(agent), *error == 0, *error == 0 ? "" : remedy(setting, *error)});
     }
   }
   return report;

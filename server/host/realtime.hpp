@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -58,6 +59,6 @@ class RealtimeReport {
 /// Locks memory where that is asked for, and tries what the agents' threads will ask for on a
 /// thread that ends again, so that a start can be given up before anything serves. Allocates.
 [[nodiscard]] RealtimeReport ask_for_realtime(const config::RealtimeConfig& config,
-                                              bool with_motion = false);
+                                              std::span<const std::string_view> more_agents = {});
 
 }  // namespace emit::server

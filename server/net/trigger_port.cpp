@@ -5,9 +5,6 @@
 #include <fmt/format.h>
 #include <sys/socket.h>
 
-#include <cstring>
-#include <ctime>
-
 #include "net/ip_address.hpp"
 
 namespace emit::server {
@@ -52,8 +49,7 @@ physics::Result<std::unique_ptr<TriggerPort>> TriggerPort::open(
   const SocketContext context;
   auto socket = UdpSocket::open_bound(context, *address);
   if (!socket) return named(socket.error(), "trigger.udp");
-  socket->set_option(SOL_SOCKET, SO_TIMESTAMPNS, 1);
-  socket->set_option(SOL_SOCKET, SO_RXQ_OVFL, 1);
+  StampedReceiver::prepare(*socket);
   return std::unique_ptr<TriggerPort>(
       new TriggerPort(std::move(*socket), from, std::move(seal), clock, counters));
 }
@@ -103,40 +99,14 @@ bool TriggerPort::accept(std::span<const std::byte> datagram, const protocol::Ip
 
 std::optional<ReceivedTrigger> TriggerPort::next() noexcept {
   for (int i = 0; i < kMaxPerCall; ++i) {
-    std::array<std::byte, protocol::kSealedTriggerBytes + 1> bytes;
-    alignas(cmsghdr) std::array<char, 128> control;
-    sockaddr_storage from{};
-    iovec piece{bytes.data(), bytes.size()};
-    msghdr message{};
-    message.msg_name = &from;
-    message.msg_namelen = sizeof from;
-    message.msg_iov = &piece;
-    message.msg_iovlen = 1;
-    message.msg_control = control.data();
-    message.msg_controllen = control.size();
-    // Natively, for the arrival time.
-    const ssize_t size = ::recvmsg(socket_.fd(), &message, MSG_DONTWAIT);
-    if (size < 0) return std::nullopt;
-    const std::int64_t now_ns = clock_.tai_ns();
+    std::array<std::byte, protocol::kSealedTriggerBytes + 1> space;
+    const auto datagram = receiver_.receive(socket_, space, clock_);
+    if (!datagram) return std::nullopt;
     ReceivedTrigger out;
-    out.received_ns = now_ns;
-    for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr;
-         header = CMSG_NXTHDR(&message, header)) {
-      if (header->cmsg_level != SOL_SOCKET) continue;
-      if (header->cmsg_type == SCM_TIMESTAMPNS) {
-        timespec stamp{};
-        std::memcpy(&stamp, CMSG_DATA(header), sizeof stamp);
-        out.received_ns = clock_.tai_from_kernel_stamp_ns(
-            std::int64_t{stamp.tv_sec} * 1'000'000'000 + stamp.tv_nsec);
-      } else if (header->cmsg_type == SO_RXQ_OVFL) {
-        std::uint32_t drops = 0;
-        std::memcpy(&drops, CMSG_DATA(header), sizeof drops);
-        counters_.add(Counter::trigger_os_drops, drops - os_drops_seen_);
-        os_drops_seen_ = drops;
-      }
-    }
+    out.received_ns = datagram->received_ns;
+    counters_.add(Counter::trigger_os_drops, datagram->os_drops);
     counters_.add(Counter::triggers);
-    if (accept({bytes.data(), static_cast<std::size_t>(size)}, ip_of(from), out)) return out;
+    if (accept(datagram->bytes, ip_of(datagram->from), out)) return out;
   }
   return std::nullopt;
 }

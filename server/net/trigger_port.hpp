@@ -14,6 +14,7 @@
 #include "emit/protocol/trigger.hpp"
 #include "emit/protocol/trigger_seal.hpp"
 #include "net/socket.hpp"
+#include "net/stamped_receive.hpp"
 #include "rt/clock.hpp"
 #include "rt/counters.hpp"
 
@@ -74,13 +75,13 @@ class TriggerPort final : public TriggerInput {
               ReceivedTrigger& out) noexcept;
 
   UdpSocket socket_;
+  StampedReceiver receiver_;
   std::optional<protocol::IpAddress> peer_;  // none: any
   std::optional<protocol::TriggerSeal> seal_;
   std::optional<protocol::IpAddress> unauthenticated_;
   std::array<char, 46> text_{};  // what take_unauthenticated() gave away
   const Clock& clock_;
   Counters& counters_;
-  std::uint32_t os_drops_seen_ = 0;
 };
 
 }  // namespace emit::server

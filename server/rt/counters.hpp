@@ -91,6 +91,21 @@ namespace emit::server {
   X(axes_interlocks, "times its interlock was open")                                       \
   X(axes_commands_ignored, "times it did not take or follow commands for 0.5 s")           \
   X(axes_clock_jumps, "jumps of simulation time against time, seen by the axes")           \
+  X(gateway_datagrams, "datagrams of a host that speaks CIGI")                             \
+  X(gateway_peers_refused, "such datagrams dropped: not from the host's address")          \
+  X(gateway_messages_refused, "its messages refused: malformed, or without a time")        \
+  X(gateway_messages_old, "its messages left out: repeated, or overtaken by a newer one")  \
+  X(gateway_packets_refused, "its packets refused: malformed, or out of range")            \
+  X(gateway_packets_skipped, "its packets of unknown kinds")                               \
+  X(gateway_packets_unused, "its packets without effect")                                  \
+  X(gateway_unknown_entities, "its entities that the scenario does not have")              \
+  X(gateway_questions_dropped, "its questions without an answer: too many at a time")      \
+  X(gateway_answers, "answers to its questions")                                           \
+  X(gateway_texts_dropped, "texts that it was not told: too many at a time")               \
+  X(gateway_messages_sent, "messages sent to it")                                          \
+  X(gateway_send_errors, "messages to it that the kernel refused to send")                 \
+  X(gateway_os_drops, "its datagrams dropped by the kernel for want of buffer space")      \
+  X(gateway_reports_dropped, "reports of frames that it was not told of in time")          \
   X(frames_motion_fault, "frames flagged motion_fault")                                    \
   X(no_free_slot, "attempts to render while every slot was in use")                        \
   X(frames_sent, "frames sent completely, all clients")                                    \

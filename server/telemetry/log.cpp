@@ -300,6 +300,16 @@ EventText describe(const Event& event) {
           "source, its link, trigger.peer\"");
     case EventKind::motion_changed:
       return describe_motion(event);
+    case EventKind::gateway_mode: {
+      static constexpr std::array kModes{"standby", "operate", "debug"};
+      return info(fmt::format("event=gateway_mode mode={}",
+                              event.a < kModes.size() ? kModes[event.a] : "?"));
+    }
+    case EventKind::gateway_time:
+      return info(fmt::format("event=gateway_time sim_time_s={:.3f} effect=\"a new run\"",
+                              1e-9 * static_cast<double>(static_cast<std::int64_t>(event.a))));
+    case EventKind::gateway_refused:
+      return distinct_warn(fmt::format("event=gateway_refused why=\"{}\"", text));
     case EventKind::host_session:
       return info(fmt::format("event=host_session peer={}", text));
   }

@@ -25,12 +25,12 @@ class Daemon:
     """Starts emitd and waits for its ready line; kills it at the end if need be."""
 
     def __init__(self, width_px=64, height_px=48, pacing='mode = "host-step"', host_more="", more="",
-                 address="127.0.0.1"):
+                 address="127.0.0.1", head=""):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="emitd_test_"))
         self.shm = f"test-{uuid.uuid4().hex[:12]}"
         config = self.folder / "daemon.toml"
         config.write_text(
-            f'[source]\nkind = "canned"\ncanned_width_px = {width_px}\ncanned_height_px = {height_px}\n'
+            f'{head}[source]\nkind = "canned"\ncanned_width_px = {width_px}\ncanned_height_px = {height_px}\n'
             f'canned_frames = 8\n[pacing]\n{pacing}\n[host]\nudp = "{address}:0"\n{host_more}\n'
             f'[control]\ntcp = "{address}:0"\n'
             f'[stream]\nshm = "{self.shm}"\n{more}')

@@ -33,7 +33,7 @@ class ConductorRig {
   explicit ConductorRig(config::PacingConfig pacing = {},
                         std::optional<scene::ScenarioDesc> scenario = std::nullopt,
                         bool canned = false, const server::MotionPlan* motion = nullptr,
-                        std::int64_t first_time_ns = 0)
+                        std::int64_t first_time_ns = 0, bool gateway = false)
       : scenario_(std::move(scenario)),
         tracks_(scenario_),
         context_(clock, 1u << 20, 4),
@@ -42,7 +42,7 @@ class ConductorRig {
                   return physics::Result<std::unique_ptr<server::FrameSource>>(
                       std::make_unique<ScriptedSource>(script, 8, 4, 7));
                 }),
-        conductor_(context_, tracks_, options(pacing, canned, motion, first_time_ns),
+        conductor_(context_, tracks_, options(pacing, canned, motion, first_time_ns, gateway),
                    pacing.mode == config::PacingMode::trigger ? &triggers_ : nullptr) {
     EXPECT_TRUE(render_.on_start());
     auto table = *server::make_channels(std::nullopt, *render_.source_info());
@@ -112,6 +112,17 @@ class ConductorRig {
     input.command = kind;
     context_.host_inputs.commit();
   }
+  /// Sends a host frame of the gateway.
+  void send_from_gateway(std::uint64_t number, std::int64_t sim_ns, std::uint64_t run = 1) {
+    server::HostInput& input = context_.gateway_inputs.claim_reserved();
+    input = {};
+    input.origin.kind = server::Origin::Kind::gateway;
+    input.frame.frame_number = number;
+    input.frame.sim_time_ns = sim_ns;
+    input.frame.run_id = run;
+    input.frame.received_ns = clock.tai_ns();
+    context_.gateway_inputs.commit();
+  }
   ConductorRig& with(std::function<void(protocol::HostFrameData&)> edit) {
     edit_ = std::move(edit);
     return *this;
@@ -141,8 +152,9 @@ class ConductorRig {
  private:
   static server::Conductor::Options options(config::PacingConfig pacing, bool canned,
                                             const server::MotionPlan* motion,
-                                            std::int64_t first_time_ns) {
+                                            std::int64_t first_time_ns, bool gateway) {
     server::Conductor::Options out;
+    out.gateway = gateway;
     out.first_time_ns = first_time_ns;
     out.motion = motion;
     out.canned = canned;

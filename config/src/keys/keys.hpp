@@ -106,6 +106,7 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<AccessConfig>& access_keys();
 [[nodiscard]] const KeyTable<TlsConfig>& tls_keys();
 [[nodiscard]] const KeyTable<MotionConfig>& motion_keys();
+[[nodiscard]] const KeyTable<CigiConfig>& cigi_keys();
 [[nodiscard]] const KeyTable<JournalConfig>& journal_keys();
 [[nodiscard]] const KeyTable<DeviceConfig>& device_keys();
 [[nodiscard]] const KeyTable<LogConfig>& log_keys();

@@ -75,6 +75,10 @@ const std::vector<SectionDoc>& daemon_sections() {
                   "The flight motion simulator that emitd drives "
                   "([motion.md](../server/docs/motion.md)).",
                   motion_keys(), MotionConfig{}),
+      section_doc("cigi", false,
+                  "A host that speaks CIGI ([cigi.md](../server/docs/cigi.md)). With one, host "
+                  "frames of others are refused.",
+                  cigi_keys(), CigiConfig{}),
       section_doc("clock", false, "Source of the clock's time.", clock_keys(), ClockConfig{}),
       section_doc("realtime", false,
                   "Real-time settings of the agents. `deploy/scripts/check_host.sh` shows what the "

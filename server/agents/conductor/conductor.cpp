@@ -266,6 +266,9 @@ bool Conductor::publish_image(const RenderDone& done, std::int64_t now_ns) noexc
                                                                         done.readback_end_ns)));
   hand_over(ledger_.shown());
   record_times(ledger_.shown());
+  if (options_.gateway) {
+    report({GatewayReport::Kind::published, ledger_.shown().host_frame_number});
+  }
   journal_.frame(ledger_.shown(), ledger_.shown_for_journal(), true, issued.entity_span(), now_ns);
   ledger_.pop_oldest();
   return true;

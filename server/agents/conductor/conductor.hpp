@@ -32,6 +32,7 @@ class Conductor final : public Agent {
     bool canned = false;                 ///< frames carry kFlagCanned
     const MotionPlan* motion = nullptr;  ///< the motion simulator, where there is one
     std::int64_t first_time_ns = 0;      ///< simulation time that is shown before the first pose
+    bool gateway = false;  ///< host frames come from the gateway, and those of others are refused
   };
   /// @param triggers  where pacing mode trigger reads its triggers, on the agent's thread; that
   ///                  mode needs it
@@ -51,6 +52,7 @@ class Conductor final : public Agent {
  private:
   // Inputs (conductor_input.cpp).
   int take_inputs(std::int64_t now_ns) noexcept;
+  int take_inputs(SpscRing<HostInput>& inputs, std::int64_t now_ns) noexcept;
   /// Returns false when the input must wait for frames in work. So does take_command().
   bool take_frame(HostInput& input, std::int64_t now_ns) noexcept;
   bool take_command(const HostInput& input, std::int64_t now_ns) noexcept;
@@ -66,6 +68,10 @@ class Conductor final : public Agent {
               std::uint64_t detail = 0) noexcept;
   void reply(const Origin& origin, StatusCode code, std::uint64_t host_frame_number,
              std::uint64_t count, std::uint64_t detail) noexcept;
+  /// Tells the gateway what has become of its host frame.
+  void report_input(StatusCode code, std::uint64_t host_frame_number,
+                    std::uint64_t detail) noexcept;
+  void report(const GatewayReport& report) noexcept;
 
   // Frames (conductor.cpp).
   [[nodiscard]] bool draining() const noexcept { return draining_.load(std::memory_order_acquire); }

@@ -9,10 +9,22 @@ using protocol::EntityStateData;
 using protocol::HostFrameData;
 
 int Conductor::take_inputs(std::int64_t now_ns) noexcept {
+  int work = take_inputs(context_.host_inputs, now_ns);
+  if (work > 0 && context_.of_inputs.end()) {
+    context_.bells.receiver.ring();
+  }
+  const int from_gateway = take_inputs(context_.gateway_inputs, now_ns);
+  if (from_gateway > 0 && context_.of_gateway_room.end()) {
+    context_.bells.gateway.ring();
+  }
+  return work + from_gateway;
+}
+
+int Conductor::take_inputs(SpscRing<HostInput>& inputs, std::int64_t now_ns) noexcept {
   int work = 0;
   constexpr int kMaxPerTurn = 8;
   while (work < kMaxPerTurn) {
-    HostInput* input = context_.host_inputs.front();
+    HostInput* input = inputs.front();
     if (input == nullptr) {
       break;
     }
@@ -21,10 +33,7 @@ int Conductor::take_inputs(std::int64_t now_ns) noexcept {
     if (!taken) {
       break;  // waits for frames in work; the inputs behind it keep their order
     }
-    context_.host_inputs.pop();
-    if (context_.of_inputs.end()) {
-      context_.bells.receiver.ring();
-    }
+    inputs.pop();
     ++work;
   }
   return work;
@@ -50,6 +59,11 @@ bool Conductor::refuse_frame(const HostInput& input, GateVerdict verdict) noexce
 
 bool Conductor::take_frame(HostInput& input, std::int64_t now_ns) noexcept {
   HostFrameData& frame = input.frame;
+  // Two hosts would turn the run over and over.
+  if (options_.gateway && input.origin.kind != Origin::Kind::gateway) {
+    refuse(input.origin, StatusCode::not_allowed, frame.frame_number);
+    return true;
+  }
   const InputGate::Result gate = gate_.check(frame);
   if (refuse_frame(input, gate.verdict)) {
     return true;
@@ -201,11 +215,33 @@ void Conductor::reply(const Origin& origin, StatusCode code, std::uint64_t host_
   if (origin.kind == Origin::Kind::none) {
     return;
   }
+  if (origin.kind == Origin::Kind::gateway) {
+    report_input(code, host_frame_number, detail);
+    return;
+  }
   if (!context_.replies.push({origin, code, host_frame_number, count, detail})) {
     context_.counters.add(Counter::statuses_suppressed);
     return;
   }
   context_.bells.receiver.ring();
+}
+
+void Conductor::report_input(StatusCode code, std::uint64_t host_frame_number,
+                             std::uint64_t detail) noexcept {
+  // Entities that are refused do not keep the image from coming.
+  if (code == StatusCode::unknown_entity || code == StatusCode::overloaded) {
+    return;
+  }
+  const bool unused = code == StatusCode::ok && detail == protocol::kDetailStopped;
+  report({unused ? GatewayReport::Kind::unused : GatewayReport::Kind::refused, host_frame_number});
+}
+
+void Conductor::report(const GatewayReport& report) noexcept {
+  if (!context_.gateway_reports.push(report)) {
+    context_.counters.add(Counter::gateway_reports_dropped);
+    return;
+  }
+  context_.bells.gateway.ring();
 }
 
 }  // namespace emit::server

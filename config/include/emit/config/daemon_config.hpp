@@ -79,6 +79,25 @@ struct MotionConfig {
   [[nodiscard]] bool enabled() const noexcept { return !controller.empty(); }
 };
 
+/// An entity of a CIGI host.
+struct CigiEntityConfig {
+  std::uint32_t id = 0;      ///< number that the host has for it
+  std::uint32_t entity = 0;  ///< number in the scenario
+};
+
+/// A host that speaks CIGI.
+struct CigiConfig {
+  std::string listen;          ///< address:port for its messages; empty: there is none
+  std::string host;            ///< address:port where it listens
+  double rate_hz = 60.0;       ///< host_step: Start Of Frame a second
+  std::uint32_t seeker = 0;    ///< entity that carries the sensor
+  std::uint32_t view = 0;      ///< view that is the sensor
+  std::uint32_t database = 1;  ///< number of the scenario among the host's databases; 0: none
+  std::vector<CigiEntityConfig> entities;
+
+  [[nodiscard]] bool enabled() const noexcept { return !listen.empty(); }
+};
+
 /// Real-time settings of the agents. Everything is off by default.
 struct RealtimeConfig {
   SchedulerKind scheduler = SchedulerKind::other;
@@ -95,8 +114,8 @@ struct AgentCpus {
   std::vector<std::uint32_t> cpus;  ///< ascending, not empty
 };
 /// Reads a text such as "conductor=2, receiver=2, render=4-7". Agents are receiver, conductor,
-/// render, sender, recorder and motion, each at most once. Cores are below kMaxCpus. Errors
-/// (config) name the part at fault.
+/// render, sender, recorder, motion and gateway, each at most once. Cores are below kMaxCpus.
+/// Errors (config) name the part at fault.
 [[nodiscard]] physics::Result<std::vector<AgentCpus>> parse_agent_cpus(std::string_view text);
 inline constexpr std::uint32_t kMaxCpus = 1024;
 
@@ -184,6 +203,7 @@ struct DaemonConfig {
   PacingConfig pacing;
   TriggerConfig trigger;
   MotionConfig motion;
+  CigiConfig cigi;
   ClockConfig clock;
   RealtimeConfig realtime;
   HostConfig host;

@@ -41,6 +41,15 @@ void to_proto(const HostFrameData& frame, v1::HostFrame& out);
 [[nodiscard]] DecodeStatus from_proto(const v1::HostFrame& in, HostFrameData& out,
                                       DecodeFault* fault = nullptr) noexcept;
 
+/// Checks position and rates as decode_host_frame() does; the attitude has to be of unit length.
+/// `fault`, where it is not null, names the field at fault. RT-safe.
+[[nodiscard]] DecodeStatus check_pose(const physics::Pose& pose,
+                                      const std::optional<PoseRates>& rates,
+                                      DecodeFault* fault = nullptr) noexcept;
+/// Checks weather as decode_host_frame() does. RT-safe.
+[[nodiscard]] DecodeStatus check_environment(const EnvironmentData& environment,
+                                             DecodeFault* fault = nullptr) noexcept;
+
 /// Appends a record header and the message to `out`, ready for a TCP connection (docs/wire.md
 /// section 2).
 void append_control_record(const v1::ControlRecord& message, std::vector<std::byte>& out);

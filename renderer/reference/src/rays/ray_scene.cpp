@@ -62,6 +62,14 @@ Result<void> check(const RaySceneDesc& desc) {
   return {};
 }
 
+/// Returns the set of an entity at a pose.
+PlacedEntity placed_at(const RaySet& set, const physics::Pose& pose, bool on) {
+  PlacedEntity placed{.set = &set, .pose = pose, .on = on};
+  placed.world_from_body = glm::mat3_cast(glm::normalize(pose.world_from_body));
+  placed.centre_world_m = pose.position_world_m + placed.world_from_body * set.origin_m();
+  return placed;
+}
+
 }  // namespace
 
 RaySceneDesc ray_scene_desc(const scene::ScenarioDesc& scenario,
@@ -162,15 +170,10 @@ Result<RayScene> RayScene::create(RaySceneDesc desc, RayArithmetic arithmetic) {
 SceneInstant RayScene::at(std::int64_t sim_time_ns) const {
   auto instant = std::make_shared<SceneInstant::Impl>();
   instant->scene = impl_.get();
-  // Place every entity at its pose and find the centre of its set.
   for (std::size_t i = 0; i < impl_->entities.size(); ++i) {
     const scene::TrajectoryState state =
         scene::trajectory_at(impl_->desc.entities[i].poses, sim_time_ns);
-    PlacedEntity placed{.set = impl_->entities[i].get(), .pose = state.pose, .on = state.on};
-    placed.world_from_body = glm::mat3_cast(glm::normalize(state.pose.world_from_body));
-    placed.centre_world_m =
-        state.pose.position_world_m + placed.world_from_body * placed.set->origin_m();
-    instant->entities.push_back(placed);
+    instant->entities.push_back(placed_at(*impl_->entities[i], state.pose, state.on));
   }
   return SceneInstant(std::move(instant));
 }
@@ -190,6 +193,11 @@ std::size_t RayScene::dropped_triangles() const noexcept {
 const physics::Pose& SceneInstant::entity_pose(std::uint32_t entity) const {
   EMIT_CHECK_OP(entity, <, impl_->entities.size());
   return impl_->entities[entity].pose;
+}
+void SceneInstant::place(std::uint32_t entity, const physics::Pose& pose, bool on) {
+  EMIT_CHECK_OP(entity, <, impl_->entities.size());
+  if (impl_.use_count() > 1) impl_ = std::make_shared<Impl>(*impl_);
+  impl_->entities[entity] = placed_at(*impl_->entities[entity].set, pose, on);
 }
 bool SceneInstant::entity_on(std::uint32_t entity) const {
   EMIT_CHECK_OP(entity, <, impl_->entities.size());

@@ -13,7 +13,7 @@ namespace {
 
 using test::kMs;
 using Rig = test::ConductorRig;
-using Verdict = TriggerGate::Verdict;
+using TriggerVerdict = TriggerGate::Verdict;
 
 /// The sync source sends triggers at 100 Hz.
 config::PacingConfig triggered() {
@@ -29,24 +29,24 @@ TEST(TriggerGate, JudgesNumbersAndDistances) {
                          std::int64_t edge_ns = 0) {
     return gate.check({run, number, edge_ns}, at_ms * kMs);
   };
-  EXPECT_EQ(check(5, 7, 1000).verdict, Verdict::use);
-  EXPECT_EQ(check(5, 7, 1010).verdict, Verdict::duplicate);
-  EXPECT_EQ(check(5, 6, 1010).verdict, Verdict::duplicate) << "out of order";
+  EXPECT_EQ(check(5, 7, 1000).verdict, TriggerVerdict::use);
+  EXPECT_EQ(check(5, 7, 1010).verdict, TriggerVerdict::duplicate);
+  EXPECT_EQ(check(5, 6, 1010).verdict, TriggerVerdict::duplicate) << "out of order";
   const auto next = check(5, 8, 1010);
-  EXPECT_EQ(next.verdict, Verdict::use);
+  EXPECT_EQ(next.verdict, TriggerVerdict::use);
   EXPECT_EQ(next.missing, 0U);
   EXPECT_FALSE(next.late);
-  EXPECT_EQ(check(5, 9, 1015).verdict, Verdict::too_fast);
+  EXPECT_EQ(check(5, 9, 1015).verdict, TriggerVerdict::too_fast);
   const auto gap = check(5, 12, 1050);
-  EXPECT_EQ(gap.verdict, Verdict::use);
+  EXPECT_EQ(gap.verdict, TriggerVerdict::use);
   EXPECT_EQ(gap.missing, 2U) << "the one that came too fast is not missing";
   EXPECT_FALSE(gap.late);
   EXPECT_TRUE(check(5, 13, 1066).late);
   EXPECT_FALSE(check(5, 14, 1076, 1075 * kMs).late);
   EXPECT_TRUE(check(5, 15, 1086, 1080 * kMs).late) << "6 ms on the way at a period of 10";
-  EXPECT_EQ(check(4, 99, 1096).verdict, Verdict::duplicate) << "of a run that was replaced";
-  EXPECT_EQ(check(6, 1, 1096).verdict, Verdict::use);
-  EXPECT_EQ(check(6, 2, 1000).verdict, Verdict::use) << "the clock was set back";
+  EXPECT_EQ(check(4, 99, 1096).verdict, TriggerVerdict::duplicate) << "of a run that was replaced";
+  EXPECT_EQ(check(6, 1, 1096).verdict, TriggerVerdict::use);
+  EXPECT_EQ(check(6, 2, 1000).verdict, TriggerVerdict::use) << "the clock was set back";
 }
 
 TEST(TriggerPacing, BeginsAFrameWithEachTriggerOnTheNewestPose) {

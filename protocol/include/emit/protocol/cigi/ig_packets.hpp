@@ -29,6 +29,9 @@ struct StartOfFrame {
   bool operator==(const StartOfFrame&) const = default;
 };
 
+/// StartOfFrame::database of an image generator that does not have the database.
+inline constexpr std::int8_t kDatabaseMissing = -128;
+
 /// Answer to a HatHotRequest for one height (id 102).
 struct HatHotResponse {
   static constexpr std::uint8_t kId = 102;

@@ -194,6 +194,10 @@ class SceneInstant {
   /// Returns true if the entity is switched on at this instant.
   /// @pre entity is less than the number of entities.
   [[nodiscard]] bool entity_on(std::uint32_t entity) const;
+  /// Moves an entity, or takes it out of the scene. Copies of this handle keep theirs where it was.
+  /// It allocates where such copies exist.
+  /// @pre entity is less than the number of entities.
+  void place(std::uint32_t entity, const physics::Pose& pose, bool on);
 
   /// Corners of a triangle in world axes.
   struct Corners {
@@ -207,8 +211,8 @@ class SceneInstant {
 
  private:
   friend class RayScene;
-  explicit SceneInstant(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
-  std::shared_ptr<const Impl> impl_;
+  explicit SceneInstant(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+  std::shared_ptr<Impl> impl_;
 };
 
 /// Geometry that is ready for rays: one hierarchy for everything static, built once, and one per

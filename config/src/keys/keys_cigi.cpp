@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "keys.hpp"
+
+/// Keys of a host that speaks CIGI.
+namespace emit::config {
+namespace {
+
+constexpr std::int64_t kMaxId = 65535;
+
+const KeyTable<CigiEntityConfig>& cigi_entity_keys() {
+  static const KeyTable<CigiEntityConfig> keys = {
+      required(integer<CigiEntityConfig>("id", "", 0, kMaxId, EMIT_FIELD(id),
+                                         "Number that the host has for the entity.")),
+      required(integer<CigiEntityConfig>("entity", "", 1, 4294967295, EMIT_FIELD(entity),
+                                         "Number of the entity in the scenario.")),
+  };
+  return keys;
+}
+
+}  // namespace
+
+const KeyTable<CigiConfig>& cigi_keys() {
+  static const KeyTable<CigiConfig> keys = {
+      text<CigiConfig>("listen", EMIT_FIELD(listen),
+                       "`address:port` for the messages of the host. When it is empty, there is no "
+                       "such host."),
+      text<CigiConfig>("host", EMIT_FIELD(host),
+                       "`address:port` where the host listens. Messages of other addresses are "
+                       "dropped."),
+      number<CigiConfig>("rate_hz", "Hz", between(0.1, 2000), EMIT_FIELD(rate_hz),
+                         "Start Of Frame a second with pacing mode host-step, which is CIGI's "
+                         "synchronous operation. Other modes take `pacing.rate_hz`."),
+      integer<CigiConfig>("seeker", "", 0, kMaxId, EMIT_FIELD(seeker),
+                          "Entity of the host that carries the sensor."),
+      integer<CigiConfig>("view", "", 0, kMaxId, EMIT_FIELD(view),
+                          "View of the host that is the sensor. View Control mounts it on an "
+                          "entity."),
+      integer<CigiConfig>("database", "", 0, 127, EMIT_FIELD(database),
+                          "Number of the scenario among the databases of the host. 0: emitd says "
+                          "that databases are its own business."),
+      custom<CigiConfig>(
+          {"entities", "array of tables", "", "",
+           "Entities whose number differs: `id` of the host, `entity` of the scenario. Others have "
+           "one number in both.",
+           false},
+          [](CigiConfig& out, const Node& node, Diagnostics& diagnostics) {
+            read_array(node, "entities", cigi_entity_keys(), CigiEntityConfig{}, out.entities,
+                       diagnostics);
+          },
+          [](const CigiConfig& in) { return write_array(in.entities, cigi_entity_keys()); }),
+  };
+  return keys;
+}
+
+}  // namespace emit::config

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "agents/gateway/gateway_agent.hpp"
+
+namespace emit::server {
+namespace {
+
+/// Datagrams taken in a turn, so that a flood does not delay what goes to the host.
+constexpr int kMostPerTurn = 16;
+
+}  // namespace
+
+int GatewayAgent::do_work(std::int64_t now_ns) noexcept {
+  int work = take_reports() + take_datagrams();
+  if (const auto message = gateway_->message(now_ns); !message.empty()) {
+    port_.send(message);
+    ++work;
+  }
+  return work;
+}
+
+int GatewayAgent::take_reports() noexcept {
+  int work = 0;
+  for (const GatewayReport* report = context_.gateway_reports.front(); report != nullptr;
+       report = context_.gateway_reports.front()) {
+    gateway_->report(*report);
+    context_.gateway_reports.pop();
+    ++work;
+  }
+  return work;
+}
+
+int GatewayAgent::take_datagrams() noexcept {
+  int work = 0;
+  for (; work < kMostPerTurn; ++work) {
+    // A datagram is read only when there is room for what comes of it; until then it waits in the
+    // kernel. The conductor rings when it has made room.
+    HostInput* input =
+        context_.of_gateway_room.look([this] { return context_.gateway_inputs.claim(); });
+    waits_for_room_ = input == nullptr;
+    if (waits_for_room_) break;
+    const auto datagram = port_.receive();
+    if (!datagram) break;
+    gateway_->take(datagram->bytes, datagram->received_ns);
+    if (!gateway_->next(input->frame)) continue;
+    input->kind = HostInput::Kind::frame;
+    input->origin = Origin{.kind = Origin::Kind::gateway};
+    context_.gateway_inputs.commit();
+    context_.bells.conductor.ring();
+  }
+  return work;
+}
+
+}  // namespace emit::server

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gateway/cigi_entities.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "emit/physics/constants.hpp"
+
+namespace emit::server {
+
+namespace cigi = protocol::cigi;
+using physics::kDegree;
+using physics::Pose;
+
+namespace {
+
+/// Returns the turn of a body by yaw about z, pitch about y and roll about x, in this order.
+glm::dquat turn_of(double yaw_rad, double pitch_rad, double roll_rad) noexcept {
+  return glm::angleAxis(yaw_rad, glm::dvec3(0.0, 0.0, 1.0)) *
+         glm::angleAxis(pitch_rad, glm::dvec3(0.0, 1.0, 0.0)) *
+         glm::angleAxis(roll_rad, glm::dvec3(1.0, 0.0, 0.0));
+}
+
+/// Returns the pose of a body that is fixed to another one.
+Pose attached(const Pose& parent, const glm::dvec3& offset_body_m,
+              const glm::dquat& turn) noexcept {
+  return {parent.position_world_m + parent.world_from_body * offset_body_m,
+          glm::normalize(parent.world_from_body * turn)};
+}
+
+/// Returns the attitude that is tilted so that the body stands on a slope.
+glm::dquat tilted(const glm::dquat& world_from_body, const glm::dvec3& up,
+                  const glm::dvec3& normal) noexcept {
+  const glm::dvec3 axis = glm::cross(up, normal);
+  const double sine = glm::length(axis);
+  if (sine < 1e-12) return world_from_body;
+  const double angle_rad = std::atan2(sine, glm::dot(up, normal));
+  return glm::normalize(glm::angleAxis(angle_rad, axis / sine) * world_from_body);
+}
+
+physics::GeoPlace place_of(const cigi::Place& place) noexcept {
+  return {physics::degrees(place.latitude_deg_or_x_m), physics::degrees(place.longitude_deg_or_y_m),
+          physics::Metres(place.altitude_m_or_z_m)};
+}
+
+}  // namespace
+
+CigiEntities::CigiEntities(const Georeference& earth, SceneQuery* scene, Options options)
+    : earth_(earth),
+      scene_(scene),
+      options_(std::move(options)),
+      places_(std::make_unique<std::array<std::uint16_t, 65536>>()) {
+  entities_.reserve(kMaxEntities);
+  clear();
+}
+
+void CigiEntities::clear() noexcept {
+  entities_.clear();
+  places_->fill(kNone);
+  next_ = 0;
+  carrier_ = options_.seeker;
+  view_offset_body_m_ = glm::dvec3(0.0);
+  view_yaw_pitch_roll_rad_ = glm::dvec3(0.0);
+  if (scene_ != nullptr) scene_->reset();
+}
+
+void CigiEntities::mark_all() noexcept {
+  for (Entity& entity : entities_) entity.marked = entity.jumps = true;
+}
+
+CigiEntities::Entity* CigiEntities::find(std::uint16_t id) noexcept {
+  const std::uint16_t place = (*places_)[id];
+  return place == kNone ? nullptr : &entities_[place];
+}
+const CigiEntities::Entity* CigiEntities::find(std::uint16_t id) const noexcept {
+  const std::uint16_t place = (*places_)[id];
+  return place == kNone ? nullptr : &entities_[place];
+}
+
+bool CigiEntities::take(const cigi::EntityControl& packet) noexcept {
+  Entity* entity = find(packet.entity_id);
+  if (entity == nullptr) {
+    if (entities_.size() == kMaxEntities) return false;
+    (*places_)[packet.entity_id] = static_cast<std::uint16_t>(entities_.size());
+    entity = &entities_.emplace_back();
+    entity->id = packet.entity_id;
+    entity->scenario_id = packet.entity_id;
+    for (const auto& [host_id, scenario_id] : options_.entities) {
+      if (host_id == packet.entity_id) entity->scenario_id = scenario_id;
+    }
+    // The carrier of the sensor need not be seen, and 0 means scenery in a scenario.
+    entity->known = entity->scenario_id != 0 && options_.known(entity->scenario_id);
+    entity->told = entity->known || packet.entity_id == carrier_;
+  }
+  // An entity that comes back, or hangs on another one, is somewhere else at once.
+  if (entity->control.state != packet.state || entity->control.attached != packet.attached ||
+      entity->control.parent_id != packet.parent_id) {
+    entity->jumps = true;
+  }
+  entity->control = packet;
+  entity->changed = true;
+  return true;
+}
+
+bool CigiEntities::take(const cigi::RateControl& packet) noexcept {
+  Entity* entity = find(packet.entity_id);
+  if (entity == nullptr || packet.applies_to_part) return false;
+  entity->rates = packet;
+  entity->changed = true;
+  return true;
+}
+
+bool CigiEntities::take(const cigi::ViewControl& packet) noexcept {
+  if (packet.group_id != 0 || packet.view_id != options_.view) return false;
+  carrier_ = packet.entity_id;
+  const auto set = [](bool enabled, double& value, double to) {
+    if (enabled) value = to;
+  };
+  set(packet.x_enabled, view_offset_body_m_.x, packet.x_m);
+  set(packet.y_enabled, view_offset_body_m_.y, packet.y_m);
+  set(packet.z_enabled, view_offset_body_m_.z, packet.z_m);
+  set(packet.yaw_enabled, view_yaw_pitch_roll_rad_.x, packet.yaw_deg * kDegree);
+  set(packet.pitch_enabled, view_yaw_pitch_roll_rad_.y, packet.pitch_deg * kDegree);
+  set(packet.roll_enabled, view_yaw_pitch_roll_rad_.z, packet.roll_deg * kDegree);
+  return true;
+}
+
+Pose CigiEntities::pose_on_earth(const Entity& entity) const noexcept {
+  const cigi::EntityControl& control = entity.control;
+  const physics::HeadingPitchRoll attitude = {
+      control.yaw_deg * kDegree, control.pitch_deg * kDegree, control.roll_deg * kDegree};
+  const physics::GeoPlace place = place_of(control.place);
+  if (control.clamp == cigi::Clamp::none || scene_ == nullptr) {
+    return earth_.world_pose(place, attitude);
+  }
+  // The altitude of a clamped entity is its height above the ground, and its pitch and roll refer
+  // to the ground if the clamp is conformal. Where there is no ground, they stay as they are.
+  const physics::GeoPlace foot = {place.latitude, place.longitude, physics::Metres(0.0)};
+  const glm::dvec3 up = earth_.world_from_enu(foot)[2];
+  const auto ground = scene_->ground(earth_.position_world_m(foot), up);
+  Pose pose = earth_.world_pose(ground ? foot : place, attitude);
+  if (!ground) return pose;
+  pose.position_world_m = ground->position_world_m + up * control.place.altitude_m_or_z_m;
+  if (control.clamp == cigi::Clamp::conformal) {
+    pose.world_from_body = tilted(pose.world_from_body, up, ground->normal_world);
+  }
+  return pose;
+}
+
+std::optional<Pose> CigiEntities::pose_of(const Entity& entity, int parents) const noexcept {
+  const cigi::EntityControl& control = entity.control;
+  if (control.state == cigi::EntityState::destroyed) return std::nullopt;
+  if (!control.attached) return pose_on_earth(entity);
+  const Entity* parent = find(control.parent_id);
+  if (parent == nullptr || parents == kMaxParents) return std::nullopt;
+  const auto pose = pose_of(*parent, parents + 1);
+  if (!pose) return std::nullopt;
+  return attached(
+      *pose,
+      {control.place.latitude_deg_or_x_m, control.place.longitude_deg_or_y_m,
+       control.place.altitude_m_or_z_m},
+      turn_of(control.yaw_deg * kDegree, control.pitch_deg * kDegree, control.roll_deg * kDegree));
+}
+
+std::optional<Pose> CigiEntities::pose_of(std::uint16_t id) const noexcept {
+  const Entity* entity = find(id);
+  return entity != nullptr ? pose_of(*entity, 0) : std::nullopt;
+}
+
+std::optional<Pose> CigiEntities::seeker_pose() const noexcept {
+  const auto carrier = pose_of(carrier_);
+  if (!carrier) return std::nullopt;
+  const glm::dvec3& turn = view_yaw_pitch_roll_rad_;
+  return attached(*carrier, view_offset_body_m_, turn_of(turn.x, turn.y, turn.z));
+}
+
+std::optional<std::uint16_t> CigiEntities::parent_of(std::uint16_t id) const noexcept {
+  const Entity* entity = find(id);
+  if (entity == nullptr || !entity->control.attached) return std::nullopt;
+  return entity->control.parent_id;
+}
+
+std::uint16_t CigiEntities::host_id_of(std::uint32_t entity_id) const noexcept {
+  for (const auto& [host_id, scenario_id] : options_.entities) {
+    if (scenario_id == entity_id) return host_id;
+  }
+  return static_cast<std::uint16_t>(entity_id);
+}
+
+std::optional<std::uint16_t> CigiEntities::take_unknown() noexcept {
+  for (Entity& entity : entities_) {
+    if (!std::exchange(entity.told, true)) return entity.id;
+  }
+  return std::nullopt;
+}
+
+std::optional<protocol::PoseRates> CigiEntities::rates_of(const Entity& entity,
+                                                          const Pose& pose) const noexcept {
+  if (!entity.rates || entity.control.attached) return std::nullopt;
+  const cigi::RateControl& rates = *entity.rates;
+  const glm::dvec3 linear_m_s{rates.x_m_s, rates.y_m_s, rates.z_m_s};
+  const glm::dvec3 angular_rad_s =
+      glm::dvec3{rates.roll_deg_s, rates.pitch_deg_s, rates.yaw_deg_s} * kDegree;
+  if (rates.local) return protocol::PoseRates{pose.world_from_body * linear_m_s, angular_rad_s};
+  // Rates in the frame of the world are along north, east and down where the entity is.
+  const glm::dmat3 world_from_enu = earth_.world_from_enu(earth_.place_of(pose.position_world_m));
+  const auto world_of = [&](const glm::dvec3& ned) {
+    return world_from_enu * glm::dvec3{ned.y, ned.x, -ned.z};
+  };
+  return protocol::PoseRates{world_of(linear_m_s),
+                             glm::conjugate(pose.world_from_body) * world_of(angular_rad_s)};
+}
+
+bool CigiEntities::has_moved(const Entity& entity) const noexcept {
+  const Entity* link = &entity;
+  for (int parents = 0; parents <= kMaxParents; ++parents) {
+    if (link->changed) return true;
+    if (!link->control.attached) return false;
+    link = find(link->control.parent_id);
+    if (link == nullptr) return false;
+  }
+  return false;
+}
+
+bool CigiEntities::is_on(const Entity& entity) const noexcept {
+  const Entity* link = &entity;
+  for (int parents = 0; parents <= kMaxParents; ++parents) {
+    if (link->control.state != cigi::EntityState::active) return false;
+    if (!link->control.attached) return true;
+    link = find(link->control.parent_id);
+    if (link == nullptr) return false;
+  }
+  return false;
+}
+
+void CigiEntities::fill(protocol::HostFrameData& frame) noexcept {
+  frame.seeker = *seeker_pose();
+  frame.seeker_rates.reset();
+  const glm::dvec3 zero(0.0);
+  // Rates of the carrier are those of the sensor only where it sits in the carrier's origin.
+  if (const Entity* carrier = find(carrier_);
+      carrier != nullptr && view_offset_body_m_ == zero && view_yaw_pitch_roll_rad_ == zero) {
+    frame.seeker_rates = rates_of(*carrier, frame.seeker);
+  }
+  for (Entity& entity : entities_) entity.marked |= has_moved(entity);
+  for (Entity& entity : entities_) entity.changed = false;
+  frame.entity_count = 0;
+  const std::size_t count = entities_.size();
+  for (std::size_t i = 0; i < count && frame.entity_count < protocol::kMaxEntitiesPerFrame; ++i) {
+    const std::size_t place = (next_ + i) % count;
+    Entity& entity = entities_[place];
+    if (!entity.marked || !entity.known) continue;
+    protocol::EntityStateData& out = frame.entities[frame.entity_count++];
+    out = {};
+    out.entity_id = entity.scenario_id;
+    const auto pose = pose_of(entity, 0);
+    out.has_pose = pose.has_value();
+    out.on = pose && is_on(entity);
+    if (pose) {
+      out.pose = *pose;
+      out.rates = rates_of(entity, *pose);
+      out.teleport = std::exchange(entity.jumps, false);
+    }
+    entity.marked = false;
+    if (frame.entity_count == protocol::kMaxEntitiesPerFrame) next_ = (place + 1) % count;
+  }
+}
+
+void CigiEntities::place_in_scene() noexcept {
+  if (scene_ == nullptr) return;
+  for (const Entity& entity : entities_) {
+    if (!entity.known) continue;
+    const auto pose = pose_of(entity, 0);
+    scene_->place(entity.scenario_id, pose.value_or(Pose{}), pose && is_on(entity));
+  }
+}
+
+}  // namespace emit::server

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "emit/physics/frames.hpp"
+#include "emit/protocol/cigi/host_packets.hpp"
+#include "emit/protocol/host_frame.hpp"
+#include "gateway/georeference.hpp"
+#include "gateway/scene_query.hpp"
+
+namespace emit::server {
+
+/// Entities of a CIGI host with their parents, rates and clamps, and the view that is the sensor.
+/// What a host does not send again keeps its last value.
+///
+/// Thread: one owner. Real time: RT-safe after construction.
+class CigiEntities {
+ public:
+  /// Largest number of entities, of the scenario or not.
+  static constexpr std::size_t kMaxEntities = 2048;
+  /// Parents above an entity that are followed.
+  static constexpr int kMaxParents = 16;
+
+  struct Options {
+    std::uint16_t seeker = 0;  ///< entity that carries the sensor until View Control says otherwise
+    std::uint16_t view = 0;    ///< view that is the sensor
+    /// Entities of the host with their number in the scenario. Others have the same number there.
+    std::vector<std::pair<std::uint16_t, std::uint32_t>> entities;
+    /// Says whether the scenario has an entity.
+    std::function<bool(std::uint32_t entity_id)> known;
+  };
+  /// `scene` may be null: nothing is clamped to the ground then. Both arguments outlive the object.
+  CigiEntities(const Georeference& earth, SceneQuery* scene, Options options);
+
+  /// Forgets every entity, and the offsets of the view.
+  void clear() noexcept;
+  /// Marks every entity, so that the next frames carry all of them.
+  void mark_all() noexcept;
+
+  /// Takes a packet. Returns false where it has no effect: there is no room for one more entity.
+  bool take(const protocol::cigi::EntityControl& packet) noexcept;
+  /// Returns false where it has no effect: no such entity, or rates of a part.
+  bool take(const protocol::cigi::RateControl& packet) noexcept;
+  /// Returns false where it has no effect: another view, or a group of views.
+  bool take(const protocol::cigi::ViewControl& packet) noexcept;
+
+  /// Returns true where the entity that carries the sensor has a pose.
+  [[nodiscard]] bool has_seeker() const noexcept { return seeker_pose().has_value(); }
+  /// Writes sensor and moved entities into a host frame, at most kMaxEntitiesPerFrame of them.
+  /// Those without room come with the next frames. Entities that the scenario does not have are
+  /// left out.
+  /// @pre has_seeker()
+  void fill(protocol::HostFrameData& frame) noexcept;
+  /// Moves the entities of the scene for rays to where they are now.
+  void place_in_scene() noexcept;
+
+  /// Returns the pose of an entity of the host; none: unknown, destroyed, or its parents are.
+  [[nodiscard]] std::optional<physics::Pose> pose_of(std::uint16_t id) const noexcept;
+  /// Returns the pose of the sensor; none: its entity has none.
+  [[nodiscard]] std::optional<physics::Pose> seeker_pose() const noexcept;
+  /// Returns the parent of an entity; none: it has none.
+  [[nodiscard]] std::optional<std::uint16_t> parent_of(std::uint16_t id) const noexcept;
+  /// Returns the number that the host has for an entity of the scenario.
+  [[nodiscard]] std::uint16_t host_id_of(std::uint32_t entity_id) const noexcept;
+  /// Returns an entity that the scenario does not have, which the host has sent since the last
+  /// call; each comes once.
+  [[nodiscard]] std::optional<std::uint16_t> take_unknown() noexcept;
+
+ private:
+  struct Entity {
+    std::uint16_t id = 0;
+    protocol::cigi::EntityControl control;
+    std::optional<protocol::cigi::RateControl> rates;
+    std::uint32_t scenario_id = 0;
+    bool known = false;    ///< the scenario has it
+    bool told = false;     ///< take_unknown() has given it
+    bool changed = false;  ///< its own packets came since the last fill()
+    bool marked = false;   ///< a frame must still carry it
+    bool jumps = true;     ///< the next update is a jump
+  };
+  [[nodiscard]] Entity* find(std::uint16_t id) noexcept;
+  [[nodiscard]] const Entity* find(std::uint16_t id) const noexcept;
+  [[nodiscard]] std::optional<physics::Pose> pose_of(const Entity& entity,
+                                                     int parents) const noexcept;
+  [[nodiscard]] physics::Pose pose_on_earth(const Entity& entity) const noexcept;
+  [[nodiscard]] std::optional<protocol::PoseRates> rates_of(
+      const Entity& entity, const physics::Pose& pose) const noexcept;
+  [[nodiscard]] bool has_moved(const Entity& entity) const noexcept;
+  [[nodiscard]] bool is_on(const Entity& entity) const noexcept;
+
+  const Georeference& earth_;
+  SceneQuery* scene_;
+  Options options_;
+  std::vector<Entity> entities_;  ///< reserved at the start
+  static constexpr std::uint16_t kNone = 0xffff;
+  std::unique_ptr<std::array<std::uint16_t, 65536>> places_;  ///< by id, in `entities_`
+  std::size_t next_ = 0;  ///< where the next frame goes on among those that are marked
+  std::uint16_t carrier_ = 0;
+  glm::dvec3 view_offset_body_m_{0.0};
+  glm::dvec3 view_yaw_pitch_roll_rad_{0.0};
+};
+
+}  // namespace emit::server

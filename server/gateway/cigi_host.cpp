@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gateway/cigi_host.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "emit/physics/constants.hpp"
+#include "emit/protocol/convert.hpp"
+
+namespace emit::server {
+
+namespace cigi = protocol::cigi;
+using cigi::IgMode;
+
+namespace {
+
+constexpr std::int64_t kMinuteNs = 60'000'000'000;
+/// A frame that takes longer does not keep the host from hearing of emitd.
+constexpr std::int64_t kLongestWaitNs = 5'000'000'000;
+/// A clock of the host that is off by less than this beyond its minutes is not set.
+constexpr std::int64_t kClockSlackNs = 1'000'000'000;
+
+physics::GeoPlace origin_of(const scene::ScenarioDesc* scenario) noexcept {
+  if (scenario == nullptr) return {};
+  return {physics::Radians(scenario->place.lat_rad), physics::Radians(scenario->place.lon_rad),
+          physics::Metres(scenario->place.height_m)};
+}
+
+CigiEntities::Options entity_options(const CigiHost::Options& options) {
+  CigiEntities::Options out;
+  out.seeker = static_cast<std::uint16_t>(options.cigi.seeker);
+  out.view = static_cast<std::uint16_t>(options.cigi.view);
+  for (const config::CigiEntityConfig& entity : options.cigi.entities) {
+    out.entities.emplace_back(static_cast<std::uint16_t>(entity.id), entity.entity);
+  }
+  out.known = [scenario = options.scenario](std::uint32_t id) {
+    return scenario == nullptr ||
+           std::ranges::any_of(scenario->objects, [id](const scene::ObjectDesc& object) {
+             return object.entity_id == id;
+           });
+  };
+  return out;
+}
+
+/// Returns the POSIX instant of a date and a time of day, ns UTC.
+/// @pre the date exists, as the reader makes sure
+std::int64_t utc_of(const cigi::CelestialSphereControl& packet) noexcept {
+  using namespace std::chrono;
+  const std::uint32_t date = packet.date_mmddyyyy;
+  const sys_days day{year{static_cast<int>(date % 10000)} / static_cast<int>(date / 1'000'000) /
+                     static_cast<int>(date / 10000 % 100)};
+  return nanoseconds(day.time_since_epoch() + hours(packet.hour_utc) + minutes(packet.minute_utc))
+      .count();
+}
+
+}  // namespace
+
+CigiHost::CigiHost(const Options& options, std::unique_ptr<SceneQuery> scene, Counters& counters,
+                   EventLog& events)
+    : options_(options),
+      counters_(counters),
+      events_(events),
+      earth_(origin_of(options.scenario)),
+      scene_(std::move(scene)),
+      period_ns_(static_cast<std::int64_t>(1e9 / options.rate_hz)),
+      clock_(options.synchronous ? period_ns_ : 0),
+      entities_(earth_, scene_.get(), entity_options(options)),
+      queries_(earth_, entities_, scene_.get()),
+      weather_(options.scenario) {}
+
+void CigiHost::take(std::span<const std::byte> datagram, std::int64_t received_ns) noexcept {
+  cigi::Reader reader(datagram, cigi::Sender::host);
+  cigi::Packet packet;
+  if (reader.next(packet) != cigi::Step::packet) {
+    counters_.add(Counter::gateway_messages_refused);
+    refuse(reader.fault());
+    return;
+  }
+  order_ = reader.byte_order();
+  if (!take_control(std::get<cigi::IgControl>(packet), received_ns)) return;
+  bool more = true;
+  while (more) {
+    switch (reader.next(packet)) {
+      case cigi::Step::packet:
+        take_packet(packet);
+        break;
+      case cigi::Step::refused:
+        counters_.add(Counter::gateway_packets_refused);
+        refuse(reader.fault());
+        break;
+      case cigi::Step::broken:
+        counters_.add(Counter::gateway_packets_refused);
+        refuse(reader.fault());
+        more = false;
+        break;
+      case cigi::Step::end:
+        more = false;
+        break;
+    }
+  }
+  counters_.add(Counter::gateway_packets_skipped, reader.skipped_packets());
+  tell_unknown_entities();
+  entities_.place_in_scene();
+  frame_pending_ = entities_.has_seeker();
+  if (!frame_pending_ && !std::exchange(told_no_seeker_, true)) {
+    tell("no image: the entity that carries the sensor has no pose");
+  }
+}
+
+bool CigiHost::take_control(const cigi::IgControl& control, std::int64_t received_ns) noexcept {
+  received_ns_ = received_ns;
+  if (control.mode == IgMode::standby) {
+    host_frame_ = control.host_frame;
+    if (mode_ != IgMode::standby) {
+      mode_ = IgMode::standby;
+      database_ = 0;
+      forget();
+      events_.push(EventKind::gateway_mode, static_cast<std::uint64_t>(mode_));
+    }
+    return false;
+  }
+  if (mode_ == IgMode::standby) {
+    begin_run(received_ns, options_.first_time_ns);
+    events_.push(EventKind::gateway_mode, static_cast<std::uint64_t>(control.mode));
+  }
+  mode_ = control.mode;
+  if (!take_time(control, received_ns)) return false;
+  host_frame_ = control.host_frame;
+  take_database(control.database);
+  return true;
+}
+
+bool CigiHost::take_time(const cigi::IgControl& control, std::int64_t received_ns) noexcept {
+  CigiClock::Verdict verdict = clock_.take(control);
+  if (verdict == CigiClock::Verdict::restart) {
+    // The host has begun anew without saying so.
+    begin_run(received_ns, options_.first_time_ns);
+    verdict = clock_.take(control);
+  }
+  switch (verdict) {
+    case CigiClock::Verdict::accept:
+      return true;
+    case CigiClock::Verdict::repeated:
+    case CigiClock::Verdict::old:
+      counters_.add(Counter::gateway_messages_old);
+      return false;
+    case CigiClock::Verdict::timeless:
+    case CigiClock::Verdict::restart:
+      break;
+  }
+  counters_.add(Counter::gateway_messages_refused);
+  if (!std::exchange(told_timeless_, true)) {
+    tell("message without a time stamp: asynchronous operation needs one");
+    events_.push(EventKind::gateway_refused, 0, 0,
+                 "IG Control without a valid time stamp, which asynchronous operation needs");
+  }
+  return false;
+}
+
+void CigiHost::take_database(std::int8_t wanted) noexcept {
+  if (options_.cigi.database == 0) return;  // emitd says that the loading is its own business
+  const auto mine = static_cast<std::int8_t>(options_.cigi.database);
+  if (wanted > 0 && wanted != mine) {
+    database_ = cigi::kDatabaseMissing;
+  } else if (wanted > 0 && database_ != mine) {
+    database_ = static_cast<std::int8_t>(-mine);
+    database_told_ = true;
+  } else if (wanted == 0 && database_told_) {
+    // The host knows that the database is loaded, which it was from the start.
+    database_ = mine;
+    database_told_ = false;
+  }
+}
+
+void CigiHost::begin_run(std::int64_t received_ns, std::int64_t first_time_ns) noexcept {
+  forget();
+  clock_.start(first_time_ns);
+  run_id_ = static_cast<std::uint64_t>(received_ns);
+}
+
+void CigiHost::forget() noexcept {
+  entities_.clear();
+  queries_.clear();
+  weather_.clear();
+  told_.reset();
+  told_no_seeker_ = told_timeless_ = false;
+  frame_pending_ = false;
+  awaits_ = false;
+}
+
+void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
+  const auto ask = [this](const auto& request) {
+    if (!queries_.take(request, host_frame_)) {
+      counters_.add(Counter::gateway_questions_dropped);
+      no_effect(request.kId, "too many questions wait for answers");
+    }
+  };
+  std::visit(
+      [&](const auto& in) {
+        using T = std::decay_t<decltype(in)>;
+        if constexpr (std::is_same_v<T, cigi::EntityControl>) {
+          if (!entities_.take(in)) no_effect(in.kId, "too many entities");
+        } else if constexpr (std::is_same_v<T, cigi::RateControl>) {
+          if (!entities_.take(in)) no_effect(in.kId, "no such entity, or rates of a part");
+        } else if constexpr (std::is_same_v<T, cigi::ViewControl>) {
+          if (!entities_.take(in)) no_effect(in.kId, "another view than the sensor's");
+        } else if constexpr (std::is_same_v<T, cigi::AtmosphereControl>) {
+          if (!weather_.take(in)) no_effect(in.kId, "air temperature or wind is out of range");
+        } else if constexpr (std::is_same_v<T, cigi::WeatherControl>) {
+          if (!weather_.take(in)) no_effect(in.kId, "only global cloud layers 1 to 3 count");
+        } else if constexpr (std::is_same_v<T, cigi::ComponentControl>) {
+          if (!weather_.take(in)) no_effect(in.kId, "unknown component, or out of range");
+        } else if constexpr (std::is_same_v<T, cigi::CelestialSphereControl>) {
+          take_sky(in);
+        } else if constexpr (std::is_same_v<T, cigi::HatHotRequest> ||
+                             std::is_same_v<T, cigi::LosSegmentRequest> ||
+                             std::is_same_v<T, cigi::LosVectorRequest> ||
+                             std::is_same_v<T, cigi::PositionRequest>) {
+          ask(in);
+        } else if constexpr (std::is_same_v<T, cigi::ShortComponentControl>) {
+          no_effect(in.kId, "unknown component");
+        } else if constexpr (std::is_same_v<T, cigi::EarthReferenceModel>) {
+          if (in.custom_enabled) no_effect(in.kId, "the ellipsoid stays WGS-84");
+        } else if constexpr (std::is_same_v<T, cigi::SensorControl>) {
+          // Gain and polarity are for people who look at a picture; frames are radiance.
+          no_effect(in.kId, "frames are radiance, which gain and polarity do not change");
+        } else if constexpr (std::is_same_v<T, cigi::ViewDefinition>) {
+          take_view(in);
+        } else if constexpr (std::is_same_v<T, cigi::ArticulatedPartControl> ||
+                             std::is_same_v<T, cigi::ShortArticulatedPartControl>) {
+          no_effect(in.kId, "entities have no moving parts");
+        } else if constexpr (std::is_same_v<T, cigi::EnvironmentalRegionControl>) {
+          no_effect(in.kId, "there are no regions");
+        } else if constexpr (std::is_same_v<T, cigi::EnvironmentalConditionsRequest>) {
+          no_effect(in.kId, "there is no answer to this question");
+        }
+      },
+      packet);
+}
+
+void CigiHost::take_view(const cigi::ViewDefinition& packet) noexcept {
+  if (packet.group_id != 0 || packet.view_id != options_.cigi.view || packet.orthographic) {
+    no_effect(packet.kId, "another view than the sensor's");
+    return;
+  }
+  if (options_.scenario == nullptr) return;
+  // The scenario fixes the field of view. A host that thinks of another one has to know.
+  const scene::SensorDesc& sensor = options_.scenario->sensor;
+  const double half_h_deg = 0.5 * sensor.fov_h_rad / physics::kDegree;
+  const double half_v_deg =
+      std::atan(std::tan(0.5 * sensor.fov_h_rad) * sensor.height_px / sensor.width_px) /
+      physics::kDegree;
+  const auto differs = [](bool enabled, double value_deg, double wanted_deg) {
+    constexpr double kToleranceDeg = 0.01;
+    return enabled && std::abs(value_deg - wanted_deg) > kToleranceDeg;
+  };
+  if (differs(packet.left_enabled, packet.left_deg, -half_h_deg) ||
+      differs(packet.right_enabled, packet.right_deg, half_h_deg) ||
+      differs(packet.top_enabled, packet.top_deg, half_v_deg) ||
+      differs(packet.bottom_enabled, packet.bottom_deg, -half_v_deg)) {
+    no_effect(packet.kId, "the scenario fixes another field of view");
+  }
+  if (packet.mirror != cigi::Mirror::none) no_effect(packet.kId, "channels say how they mirror");
+}
+
+void CigiHost::take_sky(const cigi::CelestialSphereControl& packet) noexcept {
+  if (!packet.sun_enabled) no_effect(packet.kId, "the sun stays on");
+  // A host may set the minutes itself, so that a sun which stands still without it would be wrong.
+  if (!packet.ephemeris_enabled) no_effect(packet.kId, "time of day goes on by itself");
+  if (!packet.date_valid || options_.scenario == nullptr) return;
+  // The packet counts whole minutes, so that a clock within the minute is right.
+  const std::int64_t wanted_ns = utc_of(packet) - options_.scenario->epoch_utc_ns;
+  const std::int64_t ahead_ns = clock_.time_ns() - wanted_ns;
+  if (ahead_ns >= -kClockSlackNs && ahead_ns < kMinuteNs + kClockSlackNs) return;
+  clock_.shift(-ahead_ns);
+  // Another time is another run, in which everything stands where it stood.
+  ++run_id_;
+  entities_.mark_all();
+  weather_.mark();
+  events_.push(EventKind::gateway_time, static_cast<std::uint64_t>(clock_.time_ns()));
+}
+
+void CigiHost::tell_unknown_entities() noexcept {
+  while (const auto id = entities_.take_unknown()) {
+    counters_.add(Counter::gateway_unknown_entities);
+    std::array<char, 96> text{};
+    const int length =
+        std::snprintf(text.data(), text.size(), "entity %u: the scenario has none of this number",
+                      static_cast<unsigned>(*id));
+    tell({text.data(), static_cast<std::size_t>(length)});
+    events_.push(EventKind::gateway_refused, *id, 0,
+                 {text.data(), static_cast<std::size_t>(length)});
+  }
+}
+
+void CigiHost::no_effect(std::uint8_t packet_id, std::string_view why) noexcept {
+  counters_.add(Counter::gateway_packets_unused);
+  if (told_[packet_id]) return;
+  told_[packet_id] = true;
+  std::array<char, 128> text{};
+  const std::string_view name = cigi::packet_name(packet_id);
+  const int length =
+      std::snprintf(text.data(), text.size(), "%.*s: %.*s", static_cast<int>(name.size()),
+                    name.data(), static_cast<int>(why.size()), why.data());
+  const std::string_view whole(text.data(),
+                               std::min(static_cast<std::size_t>(length), text.size() - 1));
+  tell(whole);
+  events_.push(EventKind::gateway_refused, packet_id, 0, whole);
+}
+
+void CigiHost::refuse(const cigi::Fault& fault) noexcept {
+  std::array<char, cigi::kFaultTextBytes> buffer;
+  const std::string_view text = cigi::fault_text(fault, buffer);
+  events_.push(EventKind::gateway_refused, fault.id, static_cast<std::uint64_t>(fault.kind), text);
+  tell(text);
+}
+
+void CigiHost::tell(std::string_view text) noexcept {
+  if (text_count_ == kMaxTexts) {
+    counters_.add(Counter::gateway_texts_dropped);
+    return;
+  }
+  texts_[text_count_++] = cigi::ImageGeneratorMessage::make(0, text);
+}
+
+bool CigiHost::next(protocol::HostFrameData& frame) noexcept {
+  if (!std::exchange(frame_pending_, false)) return false;
+  frame.frame_number = clock_.number();
+  frame.sim_time_ns = clock_.time_ns();
+  frame.run_id = run_id_;
+  frame.received_ns = received_ns_;
+  entities_.fill(frame);
+  frame.environment = weather_.take_change(frame.sim_time_ns);
+  if (!check(frame)) return false;
+  if (options_.synchronous) {
+    awaits_ = true;
+    awaited_number_ = frame.frame_number;
+    awaited_since_ns_ = received_ns_;
+  }
+  return true;
+}
+
+bool CigiHost::check(protocol::HostFrameData& frame) noexcept {
+  protocol::DecodeFault fault;
+  if (protocol::check_pose(frame.seeker, frame.seeker_rates, &fault) !=
+      protocol::DecodeStatus::ok) {
+    counters_.add(Counter::gateway_packets_refused);
+    no_effect(cigi::EntityControl::kId, "the sensor is too far away, or too fast");
+    return false;
+  }
+  std::uint32_t kept = 0;
+  for (std::uint32_t i = 0; i < frame.entity_count; ++i) {
+    const protocol::EntityStateData& state = frame.entities[i];
+    if (state.has_pose &&
+        protocol::check_pose(state.pose, state.rates, &fault) != protocol::DecodeStatus::ok) {
+      counters_.add(Counter::gateway_packets_refused);
+      no_effect(cigi::EntityControl::kId, "an entity is too far away, or too fast");
+      continue;
+    }
+    if (kept != i) frame.entities[kept] = state;
+    ++kept;
+  }
+  frame.entity_count = kept;
+  return true;
+}
+
+void CigiHost::report(const GatewayReport& report) noexcept {
+  if (awaits_ && report.host_frame_number >= awaited_number_) awaits_ = false;
+}
+
+bool CigiHost::waits(std::int64_t now_ns) const noexcept {
+  return awaits_ && now_ns - awaited_since_ns_ < kLongestWaitNs;
+}
+
+std::int64_t CigiHost::wake_at_ns() const noexcept {
+  return awaits_ ? std::max(due_ns_, awaited_since_ns_ + kLongestWaitNs) : due_ns_;
+}
+
+std::span<const std::byte> CigiHost::message(std::int64_t now_ns) noexcept {
+  // Somebody has set the clock back: the next frame is not due in hours.
+  if (due_ns_ - now_ns > 2 * period_ns_) due_ns_ = now_ns;
+  if (now_ns < due_ns_ || waits(now_ns)) return {};
+  // A message that is late shifts the ones after it; none is sent to catch up.
+  due_ns_ =
+      due_ns_ == 0 || now_ns - due_ns_ > period_ns_ ? now_ns + period_ns_ : due_ns_ + period_ns_;
+  cigi::Writer writer(memory_, order_);
+  cigi::StartOfFrame start;
+  start.database = mode_ == IgMode::standby ? std::int8_t{0} : database_;
+  start.mode = mode_;
+  start.timestamp_valid = true;
+  start.ig_frame = ++ig_frame_;
+  start.timestamp_ticks = cigi::timestamp_ticks(now_ns);
+  start.last_host_frame = host_frame_;
+  static_cast<void>(writer.add(start));  // an empty message has room
+  for (std::size_t i = 0; i < text_count_; ++i) static_cast<void>(writer.add(texts_[i]));
+  text_count_ = 0;
+  counters_.add(Counter::gateway_answers, queries_.answer(writer));
+  return writer.message();
+}
+
+}  // namespace emit::server

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <memory>
+#include <numbers>
+#include <set>
+
+#include "emit/physics/constants.hpp"
+#include "gateway/cigi_entities.hpp"
+
+namespace emit::server {
+namespace {
+
+namespace cigi = protocol::cigi;
+using physics::kDegree;
+
+const physics::GeoPlace kOrigin{physics::degrees(-33.9), physics::degrees(151.2),
+                                physics::Metres(20.0)};
+
+cigi::EntityControl entity_at(std::uint16_t id, const physics::GeoPlace& place,
+                              float yaw_deg = 0.0F) {
+  cigi::EntityControl out;
+  out.entity_id = id;
+  out.state = cigi::EntityState::active;
+  out.yaw_deg = yaw_deg;
+  out.place = {physics::to_degrees(place.latitude), physics::to_degrees(place.longitude),
+               place.height.value()};
+  return out;
+}
+cigi::EntityControl child_of(std::uint16_t parent, std::uint16_t id, const glm::dvec3& offset_m,
+                             float yaw_deg = 0.0F) {
+  cigi::EntityControl out;
+  out.entity_id = id;
+  out.state = cigi::EntityState::active;
+  out.attached = true;
+  out.parent_id = parent;
+  out.yaw_deg = yaw_deg;
+  out.place = {offset_m.x, offset_m.y, offset_m.z};
+  return out;
+}
+
+class CigiEntitiesTest : public testing::Test {
+ protected:
+  CigiEntities make(std::set<std::uint32_t> known) {
+    CigiEntities::Options options;
+    options.known = [known = std::move(known)](std::uint32_t id) { return known.contains(id); };
+    return {earth_, nullptr, std::move(options)};
+  }
+  const protocol::HostFrameData& fill(CigiEntities& entities) {
+    entities.fill(*frame_);
+    return *frame_;
+  }
+  Georeference earth_{kOrigin};
+  std::unique_ptr<protocol::HostFrameData> frame_ = std::make_unique<protocol::HostFrameData>();
+};
+
+TEST_F(CigiEntitiesTest, ABodyAtTheOriginHasTheAttitudeOfItsAngles) {
+  CigiEntities entities = make({});
+  auto packet = entity_at(0, kOrigin, 90.0F);
+  packet.pitch_deg = 30.0F;
+  ASSERT_TRUE(entities.take(packet));
+  const auto pose = entities.seeker_pose();
+  ASSERT_TRUE(pose);
+  EXPECT_LT(glm::length(pose->position_world_m), 1e-6);
+  const glm::dvec3 nose = pose->world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+  EXPECT_NEAR(nose.x, std::cos(30.0 * kDegree), 1e-9) << "east";
+  EXPECT_NEAR(nose.y, 0.0, 1e-9);
+  EXPECT_NEAR(nose.z, 0.5, 1e-9) << "up";
+}
+
+TEST_F(CigiEntitiesTest, LevelFlightFarAwayIsLevelThere) {
+  CigiEntities entities = make({});
+  // A quarter of the way round the Earth to the north, the vertical is the north of the origin.
+  const physics::GeoPlace far{physics::degrees(56.1), physics::degrees(151.2),
+                              physics::Metres(0.0)};
+  ASSERT_TRUE(entities.take(entity_at(0, far)));
+  const auto pose = entities.seeker_pose();
+  ASSERT_TRUE(pose);
+  const glm::dvec3 down = pose->world_from_body * glm::dvec3(0.0, 0.0, 1.0);
+  EXPECT_NEAR(down.y, -1.0, 1e-9);
+  const glm::dvec3 nose = pose->world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+  EXPECT_NEAR(nose.z, -1.0, 1e-9);
+}
+
+TEST_F(CigiEntitiesTest, ChildrenFollowTheirParentsInTheirFrame) {
+  CigiEntities entities = make({2, 3});
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(entity_at(2, kOrigin, 90.0F)));
+  ASSERT_TRUE(entities.take(child_of(2, 3, {10.0, 2.0, -1.0}, 90.0F)));
+  EXPECT_EQ(fill(entities).entity_count, 2U);
+  const auto child = entities.pose_of(std::uint16_t{3});
+  ASSERT_TRUE(child);
+  // The parent looks east: forward is east, right is south, up is up.
+  EXPECT_LT(glm::distance(child->position_world_m, glm::dvec3(10.0, -2.0, 1.0)), 1e-6);
+  const glm::dvec3 nose = child->world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+  EXPECT_LT(glm::distance(nose, glm::dvec3(0.0, -1.0, 0.0)), 1e-9);
+  // A frame carries the child of a parent that has moved, and nobody else.
+  EXPECT_EQ(fill(entities).entity_count, 0U);
+  ASSERT_TRUE(entities.take(entity_at(2, kOrigin, 0.0F)));
+  const auto& moved = fill(entities);
+  ASSERT_EQ(moved.entity_count, 2U);
+  EXPECT_LT(glm::distance(moved.entities[1].pose.position_world_m, glm::dvec3(2.0, 10.0, 1.0)),
+            1e-6);
+}
+
+TEST_F(CigiEntitiesTest, ParentsInACircleHaveNoPose) {
+  CigiEntities entities = make({2, 3});
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  ASSERT_TRUE(entities.take(child_of(3, 2, {1.0, 0.0, 0.0})));
+  ASSERT_TRUE(entities.take(child_of(2, 3, {1.0, 0.0, 0.0})));
+  EXPECT_FALSE(entities.pose_of(std::uint16_t{2}));
+  const auto& frame = fill(entities);
+  ASSERT_EQ(frame.entity_count, 2U);
+  EXPECT_FALSE(frame.entities[0].has_pose);
+  EXPECT_FALSE(frame.entities[0].on);
+}
+
+TEST_F(CigiEntitiesTest, StandbyHidesAndAReturnIsAJump) {
+  CigiEntities entities = make({5});
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  auto packet = entity_at(5, kOrigin);
+  ASSERT_TRUE(entities.take(packet));
+  EXPECT_TRUE(fill(entities).entities[0].teleport) << "it was nowhere before";
+  ASSERT_TRUE(entities.take(packet));
+  EXPECT_FALSE(fill(entities).entities[0].teleport);
+  packet.state = cigi::EntityState::destroyed;
+  ASSERT_TRUE(entities.take(packet));
+  EXPECT_FALSE(fill(entities).entities[0].on);
+  packet.state = cigi::EntityState::active;
+  ASSERT_TRUE(entities.take(packet));
+  EXPECT_TRUE(fill(entities).entities[0].on);
+  EXPECT_TRUE(frame_->entities[0].teleport);
+}
+
+TEST_F(CigiEntitiesTest, MoreThanFitsComesWithTheNextFrames) {
+  std::set<std::uint32_t> known;
+  for (std::uint32_t id = 1; id <= 300; ++id) known.insert(id);
+  CigiEntities entities = make(known);
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin)));
+  for (std::uint16_t id = 1; id <= 300; ++id) ASSERT_TRUE(entities.take(entity_at(id, kOrigin)));
+  std::set<std::uint32_t> seen;
+  for (int frame = 0; frame < 3; ++frame) {
+    for (const auto& state : fill(entities).entity_span()) seen.insert(state.entity_id);
+  }
+  EXPECT_EQ(seen, known);
+  EXPECT_EQ(fill(entities).entity_count, 0U);
+}
+
+TEST_F(CigiEntitiesTest, RatesAreThoseOfTheirFrame) {
+  CigiEntities entities = make({});
+  ASSERT_TRUE(entities.take(entity_at(0, kOrigin, 90.0F)));
+  cigi::RateControl rates;
+  rates.x_m_s = 100.0F;
+  rates.z_m_s = 5.0F;
+  rates.yaw_deg_s = 10.0F;
+  ASSERT_TRUE(entities.take(rates));
+  const auto world = fill(entities).seeker_rates;
+  ASSERT_TRUE(world);
+  EXPECT_LT(glm::distance(world->velocity_world_m_s, glm::dvec3(0.0, 100.0, -5.0)), 1e-6)
+      << "north and down";
+  EXPECT_LT(glm::distance(world->angular_rate_body_rad_s, glm::dvec3(0.0, 0.0, 10.0 * kDegree)),
+            1e-9);
+  rates.local = true;
+  ASSERT_TRUE(entities.take(rates));
+  const auto local = fill(entities).seeker_rates;
+  EXPECT_LT(glm::distance(local->velocity_world_m_s, glm::dvec3(100.0, 0.0, -5.0)), 1e-6)
+      << "forward is east, the z axis is down";
+}
+
+TEST_F(CigiEntitiesTest, AViewIsMountedOnItsEntity) {
+  CigiEntities entities = make({4});
+  ASSERT_TRUE(entities.take(entity_at(4, kOrigin, 180.0F)));
+  EXPECT_FALSE(entities.has_seeker());
+  cigi::ViewControl view;
+  view.entity_id = 4;
+  view.x_enabled = view.yaw_enabled = true;
+  view.x_m = 3.0F;
+  view.y_m = 100.0F;  // not enabled
+  view.yaw_deg = 90.0F;
+  ASSERT_TRUE(entities.take(view));
+  const auto pose = entities.seeker_pose();
+  ASSERT_TRUE(pose);
+  EXPECT_LT(glm::distance(pose->position_world_m, glm::dvec3(0.0, -3.0, 0.0)), 1e-6);
+  const glm::dvec3 nose = pose->world_from_body * glm::dvec3(1.0, 0.0, 0.0);
+  EXPECT_LT(glm::distance(nose, glm::dvec3(-1.0, 0.0, 0.0)), 1e-9) << "from south to west";
+  view.view_id = 1;
+  EXPECT_FALSE(entities.take(view)) << "another view";
+}
+
+TEST_F(CigiEntitiesTest, ThereIsAnEndToEntities) {
+  CigiEntities entities = make({});
+  for (std::uint32_t id = 0; id < CigiEntities::kMaxEntities; ++id) {
+    ASSERT_TRUE(entities.take(entity_at(static_cast<std::uint16_t>(id), kOrigin)));
+  }
+  EXPECT_FALSE(entities.take(entity_at(60'000, kOrigin)));
+  EXPECT_TRUE(entities.take(entity_at(7, kOrigin))) << "one that is there already";
+  entities.clear();
+  EXPECT_TRUE(entities.take(entity_at(60'000, kOrigin)));
+}
+
+}  // namespace
+}  // namespace emit::server

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "gateway/cigi_host.hpp"
+#include "support/heap_counter.hpp"
+
+namespace emit::server {
+namespace {
+
+namespace cigi = protocol::cigi;
+
+constexpr std::int64_t kFrameNs = 10'000'000;
+constexpr std::int64_t kStartNs = 1'800'000'000'000'000'000;
+
+/// A gateway with a host on a clock that the test moves.
+class CigiHostTest : public testing::Test {
+ protected:
+  void make(bool synchronous = true) {
+    CigiHost::Options options;
+    options.cigi.listen = options.cigi.host = "127.0.0.1:1";
+    options.synchronous = synchronous;
+    options.rate_hz = 1e9 / static_cast<double>(kFrameNs);
+    gateway_ = std::make_unique<CigiHost>(options, nullptr, counters_, events_);
+  }
+  /// Sends a message of the host that arrives now.
+  void send(cigi::IgMode mode, const std::vector<cigi::Packet>& packets = {}, bool stamp = false) {
+    std::array<std::byte, 4096> memory;
+    cigi::Writer writer(memory, cigi::ByteOrder::big);
+    cigi::IgControl control;
+    control.mode = mode;
+    control.host_frame = ++host_frame_;
+    control.timestamp_valid = stamp;
+    control.timestamp_ticks = cigi::timestamp_ticks(now_ns_ - kStartNs);
+    EXPECT_FALSE(writer.add(control));
+    for (const cigi::Packet& packet : packets) EXPECT_FALSE(writer.add(packet));
+    gateway_->take(writer.message(), now_ns_);
+  }
+  /// Returns the message that is due now; none: there is none.
+  std::optional<cigi::StartOfFrame> receive() {
+    const auto message = gateway_->message(now_ns_);
+    if (message.empty()) return std::nullopt;
+    cigi::Reader reader(message, cigi::Sender::ig);
+    cigi::Packet packet;
+    EXPECT_EQ(reader.next(packet), cigi::Step::packet);
+    const auto start = std::get<cigi::StartOfFrame>(packet);
+    while (reader.next(packet) == cigi::Step::packet) {
+      if (const auto* text = std::get_if<cigi::ImageGeneratorMessage>(&packet)) {
+        texts_.emplace_back(text->view());
+      }
+    }
+    return start;
+  }
+  bool next() { return gateway_->next(*frame_); }
+  static cigi::EntityControl seeker() {
+    cigi::EntityControl out;
+    out.state = cigi::EntityState::active;
+    out.place.altitude_m_or_z_m = 100.0;
+    return out;
+  }
+
+  Counters counters_;
+  EventLog events_{256, counters_};
+  std::unique_ptr<CigiHost> gateway_;
+  std::unique_ptr<protocol::HostFrameData> frame_ = std::make_unique<protocol::HostFrameData>();
+  std::int64_t now_ns_ = kStartNs;
+  std::uint32_t host_frame_ = 0;
+  std::vector<std::string> texts_;
+};
+
+TEST_F(CigiHostTest, StartOfFrameWaitsForTheImageAndThenComesAtOnce) {
+  make();
+  ASSERT_TRUE(receive());
+  send(cigi::IgMode::operate, {seeker()});
+  ASSERT_TRUE(next());
+  for (int period = 0; period < 3; ++period) {
+    now_ns_ += kFrameNs;
+    EXPECT_FALSE(receive()) << "the image is not there";
+  }
+  now_ns_ += 1;
+  gateway_->report({GatewayReport::Kind::published, frame_->frame_number});
+  EXPECT_LE(gateway_->wake_at_ns(), now_ns_);
+  const auto start = receive();
+  ASSERT_TRUE(start);
+  EXPECT_EQ(start->last_host_frame, host_frame_);
+  EXPECT_FALSE(receive()) << "none is sent to catch up";
+  now_ns_ += kFrameNs;
+  EXPECT_TRUE(receive());
+}
+
+TEST_F(CigiHostTest, AnImageThatNeverComesDoesNotSilenceTheImageGenerator) {
+  make();
+  ASSERT_TRUE(receive());
+  send(cigi::IgMode::operate, {seeker()});
+  ASSERT_TRUE(next());
+  now_ns_ = gateway_->wake_at_ns();
+  EXPECT_TRUE(receive());
+  EXPECT_LT(now_ns_ - kStartNs, 10'000'000'000);
+}
+
+TEST_F(CigiHostTest, AsynchronouslyNobodyWaits) {
+  make(false);
+  ASSERT_TRUE(receive());
+  send(cigi::IgMode::operate, {seeker()}, true);
+  ASSERT_TRUE(next());
+  now_ns_ += kFrameNs;
+  EXPECT_TRUE(receive());
+}
+
+TEST_F(CigiHostTest, WhatWaitsForNothingNeedsNoReport) {
+  make();
+  ASSERT_TRUE(receive());
+  // There is no sensor, hence no host frame and no image.
+  send(cigi::IgMode::operate);
+  EXPECT_FALSE(next());
+  now_ns_ += kFrameNs;
+  EXPECT_TRUE(receive());
+}
+
+TEST_F(CigiHostTest, TheClockOfTheMachineMaySetBack) {
+  make();
+  ASSERT_TRUE(receive());
+  now_ns_ -= 3'600'000'000'000;
+  EXPECT_TRUE(receive());
+}
+
+TEST_F(CigiHostTest, ADatabaseThatIsNotThereIsSaidSo) {
+  make();
+  std::array<std::byte, 64> memory;
+  const auto wish = [&](std::int8_t database) {
+    cigi::Writer writer(memory, cigi::ByteOrder::little);
+    cigi::IgControl control;
+    control.mode = cigi::IgMode::operate;
+    control.host_frame = ++host_frame_;
+    control.database = database;
+    EXPECT_FALSE(writer.add(control));
+    gateway_->take(writer.message(), now_ns_);
+    now_ns_ += kFrameNs;
+    return receive().value().database;
+  };
+  EXPECT_EQ(wish(0), 0);
+  EXPECT_EQ(wish(9), -128);
+  EXPECT_EQ(wish(1), -1);
+  EXPECT_EQ(wish(1), -1) << "until the host answers";
+  EXPECT_EQ(wish(0), 1);
+  EXPECT_EQ(wish(0), 1);
+}
+
+TEST_F(CigiHostTest, AStrayNumberOfTheHostBeginsARunOfItsOwn) {
+  make();
+  send(cigi::IgMode::operate, {seeker()});
+  ASSERT_TRUE(next());
+  const std::uint64_t first = frame_->run_id;
+  host_frame_ += 1000;
+  send(cigi::IgMode::operate, {seeker()});
+  ASSERT_TRUE(next());
+  EXPECT_EQ(frame_->run_id, first);
+  EXPECT_EQ(frame_->sim_time_ns, 1001 * kFrameNs);
+  host_frame_ = 0;
+  int lost = 0;
+  for (bool came = false; !came; came = next()) {
+    ++now_ns_;
+    send(cigi::IgMode::operate, {seeker()});
+    ASSERT_LT(++lost, 20);
+  }
+  EXPECT_NE(frame_->run_id, first);
+  EXPECT_EQ(frame_->sim_time_ns, 0);
+}
+
+TEST_F(CigiHostTest, NothingAllocatesWhileItServes) {
+  make();
+  static_cast<void>(receive());
+  send(cigi::IgMode::operate, {seeker()});
+  ASSERT_TRUE(next());
+  std::array<std::byte, 4096> memory;
+  cigi::Writer writer(memory, cigi::ByteOrder::big);
+  cigi::IgControl control;
+  control.mode = cigi::IgMode::operate;
+  cigi::EntityControl unknown = seeker();
+  unknown.entity_id = 50;
+  cigi::HatHotRequest question;
+  question.update_period_frames = 1;
+  const std::uint64_t before = test::heap_request_count();
+  for (std::uint32_t frame = 0; frame < 100; ++frame) {
+    writer.clear();
+    control.host_frame = ++host_frame_;
+    static_cast<void>(writer.add(control));
+    static_cast<void>(writer.add(seeker()));
+    static_cast<void>(writer.add(unknown));
+    static_cast<void>(writer.add(question));
+    now_ns_ += kFrameNs;
+    gateway_->take(writer.message(), now_ns_);
+    ASSERT_TRUE(gateway_->next(*frame_));
+    gateway_->report({GatewayReport::Kind::published, frame_->frame_number});
+    ASSERT_FALSE(gateway_->message(now_ns_).empty());
+  }
+  EXPECT_EQ(test::heap_request_count(), before);
+  EXPECT_EQ(counters_.get(Counter::gateway_answers), 100U);
+}
+
+}  // namespace
+}  // namespace emit::server

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <limits>
+
+#include "gateway/cigi_weather.hpp"
+
+namespace emit::server {
+namespace {
+
+namespace cigi = protocol::cigi;
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+scene::ScenarioDesc scenario_at_noon() {
+  scene::ScenarioDesc out;
+  out.place = {0.84, 0.2, 300.0};
+  out.epoch_utc_ns = 1'781'956'800 * kSecondNs;  // 2026-06-20, 12:00
+  return out;
+}
+
+TEST(CigiWeather, WithoutAPacketTheScenariosWeatherHolds) {
+  const scene::ScenarioDesc scenario = scenario_at_noon();
+  CigiWeather weather(&scenario);
+  EXPECT_FALSE(weather.take_change(0));
+  EXPECT_FALSE(weather.take_change(3600 * kSecondNs));
+}
+
+TEST(CigiWeather, AirAndWindReplaceThoseOfTheClearSky) {
+  const scene::ScenarioDesc scenario = scenario_at_noon();
+  CigiWeather weather(&scenario);
+  cigi::AtmosphereControl packet;
+  packet.air_temperature_c = 7.0F;
+  packet.horizontal_wind_m_s = 4.0F;
+  ASSERT_TRUE(weather.take(packet));
+  const auto change = weather.take_change(0);
+  ASSERT_TRUE(change);
+  EXPECT_NEAR(change->air_k, 280.15, 1e-4);
+  EXPECT_EQ(change->wind_m_s, 4.0);
+  EXPECT_GT(change->direct_normal_w_m2, 600.0);
+  EXPECT_FALSE(weather.take_change(30 * kSecondNs));
+  // The sun moves on, and with it the weather.
+  const auto later = weather.take_change(8 * 3600 * kSecondNs);
+  ASSERT_TRUE(later);
+  EXPECT_LT(later->direct_normal_w_m2, 100.0);
+  EXPECT_NEAR(later->air_k, 280.15, 1e-4);
+  weather.clear();
+  EXPECT_FALSE(weather.take_change(9 * 3600 * kSecondNs));
+}
+
+TEST(CigiWeather, CloudsCoverAndWarmTheSky) {
+  const scene::ScenarioDesc scenario = scenario_at_noon();
+  CigiWeather clear(&scenario);
+  CigiWeather covered(&scenario);
+  cigi::AtmosphereControl air;
+  air.air_temperature_c = 15.0F;
+  ASSERT_TRUE(clear.take(air));
+  ASSERT_TRUE(covered.take(air));
+  cigi::WeatherControl layer;
+  layer.layer_id = 1;
+  layer.enabled = true;
+  layer.coverage_percent = 50.0F;
+  ASSERT_TRUE(covered.take(layer));
+  layer.layer_id = 2;
+  ASSERT_TRUE(covered.take(layer));
+  const auto without = clear.take_change(0);
+  const auto with = covered.take_change(0);
+  EXPECT_NEAR(with->cloud_frac, 0.75, 1e-9) << "layers overlap at random";
+  EXPECT_GT(with->longwave_down_w_m2, without->longwave_down_w_m2 + 10.0);
+  layer.enabled = false;
+  ASSERT_TRUE(covered.take(layer));
+  EXPECT_NEAR(covered.take_change(0)->cloud_frac, 0.5, 1e-9);
+  layer.scope = cigi::WeatherScope::entity;
+  EXPECT_FALSE(covered.take(layer));
+  layer.scope = cigi::WeatherScope::global;
+  layer.layer_id = 4;
+  EXPECT_FALSE(covered.take(layer)) << "rain";
+}
+
+TEST(CigiWeather, AComponentStatesAllOfIt) {
+  CigiWeather weather(nullptr);
+  cigi::ComponentControl packet;
+  packet.component_class = cigi::ComponentClass::atmosphere;
+  packet.component_id = CigiWeather::kRadiationComponent;
+  const std::array<float, 6> values{800.0F, 90.0F, 310.0F, 295.0F, 3.0F, 0.25F};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    packet.data[i] = std::bit_cast<std::uint32_t>(values[i]);
+  }
+  ASSERT_TRUE(weather.take(packet));
+  const auto change = weather.take_change(0);
+  ASSERT_TRUE(change);
+  EXPECT_EQ(change->direct_normal_w_m2, 800.0);
+  EXPECT_EQ(change->diffuse_horizontal_w_m2, 90.0);
+  EXPECT_EQ(change->longwave_down_w_m2, 310.0);
+  EXPECT_EQ(change->air_k, 295.0);
+  EXPECT_EQ(change->wind_m_s, 3.0);
+  EXPECT_EQ(change->cloud_frac, 0.25);
+  EXPECT_FALSE(weather.take_change(7200 * kSecondNs)) << "the host says what changes";
+  packet.data[3] = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::quiet_NaN());
+  EXPECT_FALSE(weather.take(packet));
+  packet.component_id = 77;
+  EXPECT_FALSE(weather.take(packet));
+}
+
+TEST(CigiWeather, ImpossibleAirIsRefused) {
+  CigiWeather weather(nullptr);
+  cigi::AtmosphereControl packet;
+  packet.air_temperature_c = -300.0F;
+  EXPECT_FALSE(weather.take(packet));
+  EXPECT_FALSE(weather.take_change(0));
+}
+
+}  // namespace
+}  // namespace emit::server
