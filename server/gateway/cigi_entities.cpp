@@ -79,28 +79,57 @@ const CigiEntities::Entity* CigiEntities::find(std::uint16_t id) const noexcept 
   return place == kNone ? nullptr : &entities_[place];
 }
 
-bool CigiEntities::take(const cigi::EntityControl& packet) noexcept {
-  Entity* entity = find(packet.entity_id);
-  if (entity == nullptr) {
-    if (entities_.size() == kMaxEntities) return false;
-    (*places_)[packet.entity_id] = static_cast<std::uint16_t>(entities_.size());
-    entity = &entities_.emplace_back();
-    entity->id = packet.entity_id;
-    entity->scenario_id = packet.entity_id;
-    for (const auto& [host_id, scenario_id] : options_.entities) {
-      if (host_id == packet.entity_id) entity->scenario_id = scenario_id;
-    }
-    // The carrier of the sensor need not be seen, and 0 means scenery in a scenario.
-    entity->known = entity->scenario_id != 0 && options_.known(entity->scenario_id);
-    entity->told = entity->known || packet.entity_id == carrier_;
+CigiEntities::Entity* CigiEntities::find_or_make(std::uint16_t id) noexcept {
+  if (Entity* entity = find(id)) return entity;
+  if (entities_.size() == kMaxEntities) return nullptr;
+  (*places_)[id] = static_cast<std::uint16_t>(entities_.size());
+  Entity& entity = entities_.emplace_back();
+  entity.id = entity.control.entity_id = id;
+  entity.scenario_id = id;
+  for (const auto& [host_id, scenario_id] : options_.entities) {
+    if (host_id == id) entity.scenario_id = scenario_id;
   }
+  // The carrier of the sensor need not be seen, and 0 means scenery in a scenario.
+  entity.known = entity.scenario_id != 0 && options_.known(entity.scenario_id);
+  entity.told = entity.known || id == carrier_;
+  return &entity;
+}
+
+bool CigiEntities::take(const cigi::EntityControl& packet) noexcept {
+  Entity* entity = find_or_make(packet.entity_id);
+  if (entity == nullptr) return false;
   // An entity that comes back, or hangs on another one, is somewhere else at once.
   if (entity->control.state != packet.state || entity->control.attached != packet.attached ||
       entity->control.parent_id != packet.parent_id) {
     entity->jumps = true;
   }
   entity->control = packet;
-  entity->changed = true;
+  entity->has_place = entity->changed = true;
+  return true;
+}
+
+bool CigiEntities::take(const cigi::EntityPosition& packet) noexcept {
+  Entity* entity = find_or_make(packet.entity_id);
+  if (entity == nullptr) return false;
+  cigi::EntityControl whole = entity->control;
+  whole.attached = packet.attached;
+  whole.clamp = packet.clamp;
+  whole.parent_id = packet.parent_id;
+  whole.roll_deg = packet.roll_deg;
+  whole.pitch_deg = packet.pitch_deg;
+  whole.yaw_deg = packet.yaw_deg;
+  whole.place = packet.place;
+  return take(whole);
+}
+
+bool CigiEntities::take(const cigi::EntityControl40& packet) noexcept {
+  Entity* entity = find_or_make(packet.entity_id);
+  if (entity == nullptr) return false;
+  const bool has_place = entity->has_place;
+  cigi::EntityControl whole = entity->control;
+  whole.state = packet.state;
+  static_cast<void>(take(whole));
+  entity->has_place = has_place;
   return true;
 }
 
@@ -151,7 +180,7 @@ Pose CigiEntities::pose_on_earth(const Entity& entity) const noexcept {
 
 std::optional<Pose> CigiEntities::pose_of(const Entity& entity, int parents) const noexcept {
   const cigi::EntityControl& control = entity.control;
-  if (control.state == cigi::EntityState::destroyed) return std::nullopt;
+  if (!entity.has_place || control.state == cigi::EntityState::destroyed) return std::nullopt;
   if (!control.attached) return pose_on_earth(entity);
   const Entity* parent = find(control.parent_id);
   if (parent == nullptr || parents == kMaxParents) return std::nullopt;

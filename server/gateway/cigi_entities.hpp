@@ -46,6 +46,10 @@ class CigiEntities {
 
   /// Takes a packet. Returns false where it has no effect: there is no room for one more entity.
   bool take(const protocol::cigi::EntityControl& packet) noexcept;
+  /// The two halves of Entity Control in version 4.0. An entity has a pose once the first has come,
+  /// and is seen once the second says so.
+  bool take(const protocol::cigi::EntityPosition& packet) noexcept;
+  bool take(const protocol::cigi::EntityControl40& packet) noexcept;
   /// Returns false where it has no effect: no such entity, or rates of a part.
   bool take(const protocol::cigi::RateControl& packet) noexcept;
   /// Returns false where it has no effect: another view, or a group of views.
@@ -79,12 +83,15 @@ class CigiEntities {
     protocol::cigi::EntityControl control;
     std::optional<protocol::cigi::RateControl> rates;
     std::uint32_t scenario_id = 0;
-    bool known = false;    ///< the scenario has it
-    bool told = false;     ///< take_unknown() has given it
-    bool changed = false;  ///< its own packets came since the last fill()
-    bool marked = false;   ///< a frame must still carry it
-    bool jumps = true;     ///< the next update is a jump
+    bool has_place = false;  ///< the host has said where it is
+    bool known = false;      ///< the scenario has it
+    bool told = false;       ///< take_unknown() has given it
+    bool changed = false;    ///< its own packets came since the last fill()
+    bool marked = false;     ///< a frame must still carry it
+    bool jumps = true;       ///< the next update is a jump
   };
+  /// Returns the entity, made anew if there is none; null: there is no room.
+  [[nodiscard]] Entity* find_or_make(std::uint16_t id) noexcept;
   [[nodiscard]] Entity* find(std::uint16_t id) noexcept;
   [[nodiscard]] const Entity* find(std::uint16_t id) const noexcept;
   [[nodiscard]] std::optional<physics::Pose> pose_of(const Entity& entity,

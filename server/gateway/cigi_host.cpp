@@ -55,7 +55,8 @@ std::int64_t utc_of(const cigi::CelestialSphereControl& packet) noexcept {
   const sys_days day{year{static_cast<int>(date % 10000)} / static_cast<int>(date / 1'000'000) /
                      static_cast<int>(date / 10000 % 100)};
   return nanoseconds(day.time_since_epoch() + hours(packet.hour_utc) + minutes(packet.minute_utc))
-      .count();
+             .count() +
+         std::llround(1e9 * packet.second_utc);
 }
 
 }  // namespace
@@ -81,6 +82,7 @@ void CigiHost::take(std::span<const std::byte> datagram, std::int64_t received_n
     refuse(reader.fault());
     return;
   }
+  version_ = reader.version();
   order_ = reader.byte_order();
   if (!take_control(std::get<cigi::IgControl>(packet), received_ns)) return;
   bool more = true;
@@ -197,24 +199,26 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
   const auto ask = [this](const auto& request) {
     if (!queries_.take(request, host_frame_)) {
       counters_.add(Counter::gateway_questions_dropped);
-      no_effect(request.kId, "too many questions wait for answers");
+      no_effect(request, "too many questions wait for answers");
     }
   };
   std::visit(
       [&](const auto& in) {
         using T = std::decay_t<decltype(in)>;
-        if constexpr (std::is_same_v<T, cigi::EntityControl>) {
-          if (!entities_.take(in)) no_effect(in.kId, "too many entities");
+        if constexpr (std::is_same_v<T, cigi::EntityControl> ||
+                      std::is_same_v<T, cigi::EntityPosition> ||
+                      std::is_same_v<T, cigi::EntityControl40>) {
+          if (!entities_.take(in)) no_effect(in, "too many entities");
         } else if constexpr (std::is_same_v<T, cigi::RateControl>) {
-          if (!entities_.take(in)) no_effect(in.kId, "no such entity, or rates of a part");
+          if (!entities_.take(in)) no_effect(in, "no such entity, or rates of a part");
         } else if constexpr (std::is_same_v<T, cigi::ViewControl>) {
-          if (!entities_.take(in)) no_effect(in.kId, "another view than the sensor's");
+          if (!entities_.take(in)) no_effect(in, "another view than the sensor's");
         } else if constexpr (std::is_same_v<T, cigi::AtmosphereControl>) {
-          if (!weather_.take(in)) no_effect(in.kId, "air temperature or wind is out of range");
+          if (!weather_.take(in)) no_effect(in, "air temperature or wind is out of range");
         } else if constexpr (std::is_same_v<T, cigi::WeatherControl>) {
-          if (!weather_.take(in)) no_effect(in.kId, "only global cloud layers 1 to 3 count");
+          if (!weather_.take(in)) no_effect(in, "only global cloud layers 1 to 3 count");
         } else if constexpr (std::is_same_v<T, cigi::ComponentControl>) {
-          if (!weather_.take(in)) no_effect(in.kId, "unknown component, or out of range");
+          if (!weather_.take(in)) no_effect(in, "unknown component, or out of range");
         } else if constexpr (std::is_same_v<T, cigi::CelestialSphereControl>) {
           take_sky(in);
         } else if constexpr (std::is_same_v<T, cigi::HatHotRequest> ||
@@ -223,21 +227,25 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
                              std::is_same_v<T, cigi::PositionRequest>) {
           ask(in);
         } else if constexpr (std::is_same_v<T, cigi::ShortComponentControl>) {
-          no_effect(in.kId, "unknown component");
+          no_effect(in, "unknown component");
         } else if constexpr (std::is_same_v<T, cigi::EarthReferenceModel>) {
-          if (in.custom_enabled) no_effect(in.kId, "the ellipsoid stays WGS-84");
+          if (in.custom_enabled) no_effect(in, "the ellipsoid stays WGS-84");
         } else if constexpr (std::is_same_v<T, cigi::SensorControl>) {
           // Gain and polarity are for people who look at a picture; frames are radiance.
-          no_effect(in.kId, "frames are radiance, which gain and polarity do not change");
+          no_effect(in, "frames are radiance, which gain and polarity do not change");
         } else if constexpr (std::is_same_v<T, cigi::ViewDefinition>) {
           take_view(in);
         } else if constexpr (std::is_same_v<T, cigi::ArticulatedPartControl> ||
                              std::is_same_v<T, cigi::ShortArticulatedPartControl>) {
-          no_effect(in.kId, "entities have no moving parts");
+          no_effect(in, "entities have no moving parts");
+        } else if constexpr (std::is_same_v<T, cigi::AnimationControl>) {
+          no_effect(in, "entities have no animations");
+        } else if constexpr (std::is_same_v<T, cigi::AccelerationControl>) {
+          no_effect(in, "accelerations come from the differences of rates");
         } else if constexpr (std::is_same_v<T, cigi::EnvironmentalRegionControl>) {
-          no_effect(in.kId, "there are no regions");
+          no_effect(in, "there are no regions");
         } else if constexpr (std::is_same_v<T, cigi::EnvironmentalConditionsRequest>) {
-          no_effect(in.kId, "there is no answer to this question");
+          no_effect(in, "there is no answer to this question");
         }
       },
       packet);
@@ -245,7 +253,7 @@ void CigiHost::take_packet(const cigi::Packet& packet) noexcept {
 
 void CigiHost::take_view(const cigi::ViewDefinition& packet) noexcept {
   if (packet.group_id != 0 || packet.view_id != options_.cigi.view || packet.orthographic) {
-    no_effect(packet.kId, "another view than the sensor's");
+    no_effect(packet, "another view than the sensor's");
     return;
   }
   if (options_.scenario == nullptr) return;
@@ -263,20 +271,21 @@ void CigiHost::take_view(const cigi::ViewDefinition& packet) noexcept {
       differs(packet.right_enabled, packet.right_deg, half_h_deg) ||
       differs(packet.top_enabled, packet.top_deg, half_v_deg) ||
       differs(packet.bottom_enabled, packet.bottom_deg, -half_v_deg)) {
-    no_effect(packet.kId, "the scenario fixes another field of view");
+    no_effect(packet, "the scenario fixes another field of view");
   }
-  if (packet.mirror != cigi::Mirror::none) no_effect(packet.kId, "channels say how they mirror");
+  if (packet.mirror != cigi::Mirror::none) no_effect(packet, "channels say how they mirror");
 }
 
 void CigiHost::take_sky(const cigi::CelestialSphereControl& packet) noexcept {
-  if (!packet.sun_enabled) no_effect(packet.kId, "the sun stays on");
+  if (!packet.sun_enabled) no_effect(packet, "the sun stays on");
   // A host may set the minutes itself, so that a sun which stands still without it would be wrong.
-  if (!packet.ephemeris_enabled) no_effect(packet.kId, "time of day goes on by itself");
+  if (!packet.ephemeris_enabled) no_effect(packet, "time of day goes on by itself");
   if (!packet.date_valid || options_.scenario == nullptr) return;
-  // The packet counts whole minutes, so that a clock within the minute is right.
+  // Version 3.3 counts whole minutes, so that a clock within the minute is right.
+  const std::int64_t width_ns = version_ == cigi::Version::v3_3 ? kMinuteNs : 0;
   const std::int64_t wanted_ns = utc_of(packet) - options_.scenario->epoch_utc_ns;
   const std::int64_t ahead_ns = clock_.time_ns() - wanted_ns;
-  if (ahead_ns >= -kClockSlackNs && ahead_ns < kMinuteNs + kClockSlackNs) return;
+  if (ahead_ns >= -kClockSlackNs && ahead_ns < width_ns + kClockSlackNs) return;
   clock_.shift(-ahead_ns);
   // Another time is another run, in which everything stands where it stood.
   ++run_id_;
@@ -298,12 +307,12 @@ void CigiHost::tell_unknown_entities() noexcept {
   }
 }
 
-void CigiHost::no_effect(std::uint8_t packet_id, std::string_view why) noexcept {
+void CigiHost::no_effect(std::uint16_t packet_id, std::string_view why) noexcept {
   counters_.add(Counter::gateway_packets_unused);
   if (told_[packet_id]) return;
   told_[packet_id] = true;
   std::array<char, 128> text{};
-  const std::string_view name = cigi::packet_name(packet_id);
+  const std::string_view name = cigi::packet_name(packet_id, version_);
   const int length =
       std::snprintf(text.data(), text.size(), "%.*s: %.*s", static_cast<int>(name.size()),
                     name.data(), static_cast<int>(why.size()), why.data());
@@ -350,7 +359,7 @@ bool CigiHost::check(protocol::HostFrameData& frame) noexcept {
   if (protocol::check_pose(frame.seeker, frame.seeker_rates, &fault) !=
       protocol::DecodeStatus::ok) {
     counters_.add(Counter::gateway_packets_refused);
-    no_effect(cigi::EntityControl::kId, "the sensor is too far away, or too fast");
+    no_effect(cigi::EntityControl::kWire.v3_3.id, "the sensor is too far away, or too fast");
     return false;
   }
   std::uint32_t kept = 0;
@@ -359,7 +368,7 @@ bool CigiHost::check(protocol::HostFrameData& frame) noexcept {
     if (state.has_pose &&
         protocol::check_pose(state.pose, state.rates, &fault) != protocol::DecodeStatus::ok) {
       counters_.add(Counter::gateway_packets_refused);
-      no_effect(cigi::EntityControl::kId, "an entity is too far away, or too fast");
+      no_effect(cigi::EntityControl::kWire.v3_3.id, "an entity is too far away, or too fast");
       continue;
     }
     if (kept != i) frame.entities[kept] = state;
@@ -388,7 +397,7 @@ std::span<const std::byte> CigiHost::message(std::int64_t now_ns) noexcept {
   // A message that is late shifts the ones after it; none is sent to catch up.
   due_ns_ =
       due_ns_ == 0 || now_ns - due_ns_ > period_ns_ ? now_ns + period_ns_ : due_ns_ + period_ns_;
-  cigi::Writer writer(memory_, order_);
+  cigi::Writer writer(memory_, version_, order_);
   cigi::StartOfFrame start;
   start.database = mode_ == IgMode::standby ? std::int8_t{0} : database_;
   start.mode = mode_;

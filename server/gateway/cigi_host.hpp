@@ -64,7 +64,11 @@ class CigiHost final : public HostGateway {
   void forget() noexcept;
   void tell_unknown_entities() noexcept;
   /// Counts a packet without effect, and says so to the host and in the log once a run.
-  void no_effect(std::uint8_t packet_id, std::string_view why) noexcept;
+  template <class Packet>
+  void no_effect(const Packet& /*packet*/, std::string_view why) noexcept {
+    no_effect(Packet::kWire.of(version_).id, why);
+  }
+  void no_effect(std::uint16_t packet_id, std::string_view why) noexcept;
   void refuse(const protocol::cigi::Fault& fault) noexcept;
   /// Keeps a text for the host. The newest is left out when there are too many.
   void tell(std::string_view text) noexcept;
@@ -99,13 +103,14 @@ class CigiHost final : public HostGateway {
   std::uint64_t awaited_number_ = 0;
   std::int64_t awaited_since_ns_ = 0;
 
+  protocol::cigi::Version version_ = protocol::cigi::Version::v3_3;
   protocol::cigi::ByteOrder order_ = protocol::cigi::ByteOrder::little;
   std::uint32_t ig_frame_ = 0;
   std::int64_t due_ns_ = 0;  ///< of the next Start Of Frame, wall; 0: now
   std::array<std::byte, kMessageBytes> memory_;
   std::array<protocol::cigi::ImageGeneratorMessage, kMaxTexts> texts_;
   std::size_t text_count_ = 0;
-  std::bitset<256> told_;  ///< packet ids that no_effect() has spoken of in this run
+  std::bitset<65536> told_;  ///< packet ids that no_effect() has spoken of in this run
   bool told_no_seeker_ = false;
   bool told_timeless_ = false;
 };

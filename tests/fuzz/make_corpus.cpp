@@ -541,11 +541,17 @@ void make_axes_seeds() {
 
 void make_cigi_seeds() {
   using protocol::cigi::ByteOrder;
+  using protocol::cigi::Version;
   for (const auto& [name, order] :
        {std::pair("big", ByteOrder::big), std::pair("little", ByteOrder::little)}) {
-    const std::string end = std::string("_") + name;
-    write("cigi", ("host" + end).c_str(), test::cigi_message(test::sample_host_packets(), order));
-    write("cigi", ("ig" + end).c_str(), test::cigi_message(test::sample_ig_packets(), order));
+    for (const auto& [number, version] :
+         {std::pair("", Version::v3_3), std::pair("_v4", Version::v4_0)}) {
+      const std::string end = std::string(number) + "_" + name;
+      write("cigi", ("host" + end).c_str(),
+            test::cigi_message(test::sample_host_packets(version), order, version));
+      write("cigi", ("ig" + end).c_str(),
+            test::cigi_message(test::sample_ig_packets(version), order, version));
+    }
   }
 }
 

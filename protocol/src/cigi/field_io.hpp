@@ -44,12 +44,16 @@ class FieldReader {
     const auto byte = std::to_integer<unsigned>(packet_[offset]);
     value = static_cast<T>((byte >> first) & ((1u << count) - 1u));
   }
-  /// Reads a text up to its zero from the rest of the packet and fills the array with zeros.
+  /// Returns the offset of the upper byte of a word of 16 bits.
+  [[nodiscard]] std::size_t high_byte(std::size_t offset) const noexcept {
+    return offset + byte_at(1, 2, order_);
+  }
+  /// Reads a text up to its zero from the rest of the packet and fills the array with zeros. The
+  /// text has no end if the zero comes later than the array can hold it.
   template <std::size_t N>
   void text(std::size_t offset, std::array<char, N>& value) noexcept {
-    EMIT_DCHECK_OP(packet_.size() - offset, <=, N);
     value.fill('\0');
-    for (std::size_t i = offset; i < packet_.size(); ++i) {
+    for (std::size_t i = offset; i < packet_.size() && i - offset < N; ++i) {
       const char letter = std::to_integer<char>(packet_[i]);
       if (letter == '\0') return;
       value[i - offset] = letter;
@@ -84,10 +88,12 @@ class FieldWriter {
     const unsigned part = (static_cast<unsigned>(value) & ((1u << count) - 1u)) << first;
     packet_[offset] |= static_cast<std::byte>(part);
   }
+  [[nodiscard]] std::size_t high_byte(std::size_t offset) const noexcept {
+    return offset + byte_at(1, 2, order_);
+  }
   template <std::size_t N>
   void text(std::size_t offset, const std::array<char, N>& value) const noexcept {
-    EMIT_DCHECK_OP(packet_.size() - offset, <=, N);
-    for (std::size_t i = offset; i < packet_.size(); ++i) {
+    for (std::size_t i = offset; i < packet_.size() && i - offset < N; ++i) {
       packet_[i] = static_cast<std::byte>(value[i - offset]);
     }
   }

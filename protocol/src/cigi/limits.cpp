@@ -5,6 +5,7 @@
 #include <concepts>
 #include <cstdint>
 #include <limits>
+#include <variant>
 
 #include "cigi/packet_types.hpp"
 
@@ -56,6 +57,7 @@ class Limits {
     if (fault_ || (month <= 12 && day.ok())) return;
     fault_ = {.kind = Fault::Kind::date, .field = field, .value = static_cast<double>(mmddyyyy)};
   }
+  void wind(double value_deg) noexcept { within("wind_from_deg", value_deg, -180.0, 360.0); }
   void text_without_end() noexcept {
     if (!fault_) fault_ = {.kind = Fault::Kind::text, .field = "text"};
   }
@@ -83,7 +85,7 @@ void check_air(Limits& limits, const P& p) {
   limits.not_negative("visibility_m", p.visibility_m);
   limits.not_negative("horizontal_wind_m_s", p.horizontal_wind_m_s);
   limits.finite("vertical_wind_m_s", p.vertical_wind_m_s);
-  limits.within("wind_from_deg", p.wind_from_deg, 0.0, 360.0);
+  limits.wind(p.wind_from_deg);
   limits.not_negative("pressure_hpa", p.pressure_hpa);
 }
 
@@ -117,6 +119,25 @@ struct CheckPacket {
     limits.pitch(p.pitch_deg);
     limits.yaw(p.yaw_deg);
     limits.place(p.place, !p.attached);
+  }
+  void operator()(const EntityPosition& p) const {
+    limits.one_of("clamp", p.clamp, Clamp::conformal);
+    limits.roll(p.roll_deg);
+    limits.pitch(p.pitch_deg);
+    limits.yaw(p.yaw_deg);
+    limits.place(p.place, !p.attached);
+  }
+  void operator()(const EntityControl40& p) const {
+    limits.one_of("state", p.state, EntityState::destroyed);
+  }
+  void operator()(const AnimationControl& p) const { limits.finite("speed", p.speed); }
+  void operator()(const AccelerationControl& p) const {
+    limits.finite("x_m_s2", p.x_m_s2);
+    limits.finite("y_m_s2", p.y_m_s2);
+    limits.finite("z_m_s2", p.z_m_s2);
+    limits.finite("roll_deg_s2", p.roll_deg_s2);
+    limits.finite("pitch_deg_s2", p.pitch_deg_s2);
+    limits.finite("yaw_deg_s2", p.yaw_deg_s2);
   }
   template <class P>
   requires std::same_as<P, ComponentControl> || std::same_as<P, ShortComponentControl>
@@ -152,9 +173,11 @@ struct CheckPacket {
   }
   void operator()(const CelestialSphereControl& p) const {
     limits.within("star_intensity_percent", p.star_intensity_percent, 0.0, 100.0);
+    limits.finite("second_utc", p.second_utc);
     if (!p.date_valid) return;
     limits.within("hour_utc", p.hour_utc, 0.0, 23.0);
     limits.within("minute_utc", p.minute_utc, 0.0, 59.0);
+    limits.within("second_utc", p.second_utc, 0.0, 60.0);
     limits.date("date_mmddyyyy", p.date_mmddyyyy);
   }
   void operator()(const AtmosphereControl& p) const { check_air(limits, p); }
@@ -179,6 +202,8 @@ struct CheckPacket {
     limits.not_negative("thickness_m", p.thickness_m);
     limits.not_negative("transition_m", p.transition_m);
     limits.not_negative("aerosol_g_m3", p.aerosol_g_m3);
+    limits.within("top_scud_percent", p.top_scud_percent, 0.0, 100.0);
+    limits.not_negative("top_transition_m", p.top_transition_m);
   }
   void operator()(const ViewControl& p) const { check_pose(limits, p); }
   void operator()(const SensorControl& p) const {
@@ -279,7 +304,41 @@ struct CheckPacket {
   }
 };
 
+/// Returns the name of the first value that the version cannot carry, or nullptr.
+[[nodiscard]] const char* foreign_field(const Packet& packet, Version version) noexcept {
+  if (version == Version::v4_0) {
+    const auto* frame = std::get_if<StartOfFrame>(&packet);
+    return frame != nullptr && frame->ig_status != 0 ? "ig_status" : nullptr;
+  }
+  if (const auto* p = std::get_if<IgControl>(&packet)) {
+    return p->type_substitution_enabled ? "type_substitution_enabled" : nullptr;
+  }
+  if (const auto* p = std::get_if<StartOfFrame>(&packet)) {
+    if (p->overframing) return "overframing";
+    if (p->paging) return "paging";
+    return p->excessive_variable_data ? "excessive_variable_data" : nullptr;
+  }
+  if (const auto* p = std::get_if<CelestialSphereControl>(&packet)) {
+    return p->second_utc != 0.0f ? "second_utc" : nullptr;
+  }
+  if (const auto* p = std::get_if<WeatherControl>(&packet)) {
+    if (p->top_scud_enabled) return "top_scud_enabled";
+    if (p->top_scud_percent != 0.0f) return "top_scud_percent";
+    return p->top_transition_m != 0.0f ? "top_transition_m" : nullptr;
+  }
+  return nullptr;
+}
+
 }  // namespace
+
+Fault check_version(const Packet& packet, Version version) noexcept {
+  bool exists = false;
+  with_packet(packet, [&]<class P>(const P&) { exists = P::kWire.exists(version); });
+  if (!exists) return {.kind = Fault::Kind::not_in_version};
+  const char* field = foreign_field(packet, version);
+  if (field != nullptr) return {.kind = Fault::Kind::not_in_version, .field = field};
+  return {};
+}
 
 Fault check_limits(const Packet& packet) noexcept {
   Limits limits;

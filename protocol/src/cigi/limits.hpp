@@ -8,4 +8,8 @@ namespace emit::protocol::cigi {
 /// kind `field` or `text` for the first one that is wrong, without its place in a message. RT-safe.
 [[nodiscard]] Fault check_limits(const Packet& packet) noexcept;
 
+/// Checks that a version has the packet and all values in it that differ from their defaults.
+/// Returns a fault of kind `not_in_version` otherwise, without its place in a message. RT-safe.
+[[nodiscard]] Fault check_version(const Packet& packet, Version version) noexcept;
+
 }  // namespace emit::protocol::cigi

@@ -68,6 +68,63 @@ constexpr std::string_view kIgNames[] = {
     "Image Generator Message",
 };
 
+// Names of the ids of version 4.0 from 0x00 to 0x26, and from 0x0FFF downwards.
+constexpr std::string_view kHostNamesV4[] = {
+    "IG Control",
+    "Entity Position",
+    "Conformal Clamped Entity Position",
+    "Component Control",
+    "Short Component Control",
+    "Articulated Part Control",
+    "Short Articulated Part Control",
+    "Velocity Control",
+    "Celestial Sphere Control",
+    "Atmosphere Control",
+    "Environmental Region Control",
+    "Weather Control",
+    "Maritime Surface Conditions Control",
+    "Wave Control",
+    "Terrestrial Surface Conditions Control",
+    "View Control",
+    "Sensor Control",
+    "Motion Tracker Control",
+    "Earth Reference Model Definition",
+    "Acceleration Control",
+    "View Definition",
+    "Collision Detection Segment Definition",
+    "Collision Detection Volume Definition",
+    "HAT/HOT Request",
+    "Line of Sight Segment Request",
+    "Line of Sight Vector Request",
+    "Position Request",
+    "Environmental Conditions Request",
+    "Symbol Surface Definition",
+    "Symbol Text Definition",
+    "Symbol Circle Definition",
+    "Symbol Polygon Definition",
+    "Symbol Clone",
+    "Symbol Control",
+    "Short Symbol Control",
+    "Symbol Textured Circle Definition",
+    "Symbol Textured Polygon Definition",
+    "Entity Control",
+    "Animation Control",
+};
+
+[[nodiscard]] std::string_view name_v4(std::uint16_t id) noexcept {
+  if (id < std::size(kHostNamesV4)) return kHostNamesV4[id];
+  if (id == StartOfFrame::kWire.v4_0.id) return kIgNames[0];
+  if (id <= 0x0FFF && id >= 0x0FF0) return kIgNames[0x0FFF - id + 1];
+  if (id >= 0x1000 && id < kFirstUserDefinedIdV4) return "registered";
+  return user_defined(id, Version::v4_0) ? "user defined" : "unknown";
+}
+
+/// Returns whether a fault knows the id of its packet.
+[[nodiscard]] bool has_id(const Fault& fault) noexcept {
+  if (fault.kind == Fault::Kind::too_short) return fault.version == Version::v3_3;
+  return fault.kind != Fault::Kind::not_in_version || *fault.field != '\0';
+}
+
 void add_field_fault(const Fault& fault, FixedText& out) noexcept {
   constexpr double kLargest = std::numeric_limits<double>::max();
   out.add(": {} is {}", fault.field, fault.value);
@@ -95,16 +152,17 @@ std::string_view ImageGeneratorMessage::view() const noexcept {
   return {text.data(), static_cast<std::size_t>(end - text.begin())};
 }
 
-std::uint8_t packet_id(const Packet& packet) noexcept {
-  std::uint8_t id = 0;
-  with_packet(packet, [&](const auto& each) { id = each.kId; });
+std::uint16_t packet_id(const Packet& packet, Version version) noexcept {
+  std::uint16_t id = 0;
+  with_packet(packet, [&]<class P>(const P&) { id = P::kWire.of(version).id; });
   return id;
 }
 
-std::string_view packet_name(std::uint8_t id) noexcept {
+std::string_view packet_name(std::uint16_t id, Version version) noexcept {
+  if (version == Version::v4_0) return name_v4(id);
   if (id >= 1 && id <= std::size(kHostNames)) return kHostNames[id - 1];
   if (id >= 101 && id <= 100 + std::size(kIgNames)) return kIgNames[id - 101];
-  return id >= 201 ? "user defined" : "unknown";
+  return user_defined(id, version) ? "user defined" : "unknown";
 }
 
 std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept {
@@ -113,8 +171,11 @@ std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept
     out.add("no fault");
     return out.text();
   }
-  out.add("packet {} (id {}, {}) at byte {}", fault.packet, fault.id, packet_name(fault.id),
-          fault.offset);
+  out.add("packet {}", fault.packet);
+  const std::string_view name = packet_name(fault.id, fault.version);
+  if (has_id(fault) && fault.version == Version::v3_3) out.add(" (id {}, {})", fault.id, name);
+  if (has_id(fault) && fault.version == Version::v4_0) out.add(" (id {:#06x}, {})", fault.id, name);
+  out.add(" at byte {}", fault.offset);
   switch (fault.kind) {
     case Fault::Kind::none:
       break;
@@ -125,7 +186,7 @@ std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept
       out.add(": the message must begin with IG Control or Start Of Frame");
       break;
     case Fault::Kind::version:
-      out.add(": CIGI version {}.{}, must be 3.3", fault.value, fault.lowest);
+      out.add(": CIGI version {}.{}, must be 3.3 or 4.0", fault.value, fault.lowest);
       break;
     case Fault::Kind::byte_order:
       out.add(": byte swap magic number {:#06x}, must be 0x8000 or 0x0080",
@@ -160,6 +221,13 @@ std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept
       break;
     case Fault::Kind::no_space:
       out.add(": it has {} bytes, {} are free", fault.value, fault.highest);
+      break;
+    case Fault::Kind::not_in_version:
+      if (*fault.field == '\0') {
+        out.add(": the version has no such packet");
+      } else {
+        out.add(": the version has no {}", fault.field);
+      }
       break;
   }
   return out.text();

@@ -181,9 +181,10 @@ Result<LogOutline> outline_log(const std::filesystem::path& path, const LogProgr
   for (const auto& [id, channel] : reader->channels()) {
     const McapSchema* schema = reader->schema(channel.schema_id);
     const std::string message = schema != nullptr ? schema->name : std::string();
-    const bool listed = std::ranges::any_of(out.topics, [&](const LogTopicOutline& topic) {
-      return topic.topic == channel.topic && topic.message == message;
-    });
+    const bool listed = std::ranges::any_of(
+        out.topics, [&name = channel.topic, &message](const LogTopicOutline& topic) {
+          return topic.topic == name && topic.message == message;
+        });
     if (!listed) {
       LogTopicOutline& topic = out.topics.emplace_back();
       topic.topic = channel.topic;

@@ -17,7 +17,7 @@ physics::Result<std::unique_ptr<GatewayAgent>> make_cigi_agent(
                                 context.counters);
   if (!port) return tl::unexpected<physics::Error>(std::move(port.error()));
   std::unique_ptr<SceneQuery> scene;
-  std::string notes = "protocol=cigi-3.3";
+  std::string notes = "protocol=cigi";
   if (scenario) {
     auto query = SceneQuery::create(*scenario);
     if (!query) return tl::unexpected<physics::Error>(std::move(query.error()));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fuzz target: one CIGI message of a host or of an image generator.
+// Fuzz target: one CIGI message of a host or of an image generator, version 3.3 or 4.0.
 #include <algorithm>
 #include <array>
 #include <vector>
@@ -28,8 +28,8 @@ void check_message(std::span<const std::byte> message, Sender sender) {
   Reader reader(message, sender);
   std::vector<std::byte> memory(message.size());
   std::vector<Packet> packets;
-  // The writer begins when the byte order is known.
-  Writer writer(memory, reader.byte_order());
+  // The writer begins when version and byte order are known.
+  Writer writer(memory, reader.version(), reader.byte_order());
   Packet packet;
   Step step = Step::packet;
   for (std::size_t steps = 0; step == Step::packet || step == Step::refused; ++steps) {
@@ -52,7 +52,8 @@ void check_message(std::span<const std::byte> message, Sender sender) {
                   "what was said again is the same");
   }
   if (!packets.empty()) {
-    fuzz::require(again.next(packet) == Step::end && again.byte_order() == reader.byte_order(),
+    fuzz::require(again.next(packet) == Step::end && again.byte_order() == reader.byte_order() &&
+                      again.version() == reader.version(),
                   "nothing was added");
   }
 }

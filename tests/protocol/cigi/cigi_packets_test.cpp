@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "emit/protocol/cigi.hpp"
+#include "protocol/cigi/cigi_bytes.hpp"
 #include "protocol/cigi/cigi_samples.hpp"
 #include "protocol/hex.hpp"
 
@@ -117,69 +118,18 @@ std::vector<Packet> all_samples() {
   return packets;
 }
 
-Sender sender_of(const Packet& packet) {
-  return std::visit([](const auto& each) { return each.kSender; }, packet);
-}
-
-bool begins_message(const Packet& packet) {
-  return std::holds_alternative<IgControl>(packet) || std::holds_alternative<StartOfFrame>(packet);
-}
-
-/// Returns the bytes that come before a packet in a message: those of its side's first packet.
-std::vector<std::byte> head_for(const Packet& packet, ByteOrder order) {
-  if (begins_message(packet)) return {};
-  const Packet first = sender_of(packet) == Sender::host ? Packet(IgControl{.database = 1})
-                                                         : Packet(StartOfFrame{.database = 1});
-  return test::cigi_message(std::span(&first, 1), order);
-}
-
-/// Returns the bytes of one packet alone.
-std::vector<std::byte> bytes_alone(const Packet& packet, ByteOrder order) {
-  std::array<std::byte, 256> memory;
-  Writer writer(memory, order);
-  std::size_t before = 0;
-  if (!begins_message(packet)) {
-    const bool host = sender_of(packet) == Sender::host;
-    EXPECT_FALSE(host ? writer.add(IgControl{}) : writer.add(StartOfFrame{}));
-    before = writer.message().size();
-  }
-  const Fault fault = writer.add(packet);
-  EXPECT_FALSE(fault) << fault.field;
-  const auto part = writer.message().subspan(before);
-  return {part.begin(), part.end()};
-}
-
-/// Reads one packet after the first one of its side.
-Packet read_alone(std::span<const std::byte> bytes, Sender sender, const Packet& like,
-                  ByteOrder order) {
-  auto message = head_for(like, order);
-  const bool alone = message.empty();
-  message.insert(message.end(), bytes.begin(), bytes.end());
-  Reader reader(message, sender);
-  Packet out;
-  EXPECT_EQ(reader.next(out), Step::packet);
-  EXPECT_EQ(reader.byte_order(), order);
-  if (!alone) {
-    EXPECT_EQ(reader.next(out), Step::packet);
-  }
-  Packet none;
-  EXPECT_EQ(reader.next(none), Step::end);
-  return out;
-}
-
 TEST(CigiPackets, EveryPacketHasItsGoldenBytesInBothOrders) {
   const auto samples = all_samples();
   ASSERT_EQ(samples.size(), std::size(kGoldenPackets));
-  ASSERT_EQ(samples.size(), std::variant_size_v<Packet>);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const GoldenPacket& golden = kGoldenPackets[i];
     SCOPED_TRACE(golden.name);
     EXPECT_EQ(samples[i].index(), i);
     for (const ByteOrder order : {ByteOrder::big, ByteOrder::little}) {
       const auto text = order == ByteOrder::big ? golden.big : golden.little;
-      EXPECT_EQ(test::to_hex(bytes_alone(samples[i], order)), text);
-      EXPECT_TRUE(read_alone(test::from_hex(text), sender_of(samples[i]), samples[i], order) ==
-                  samples[i]);
+      EXPECT_EQ(test::to_hex(test::bytes_alone(samples[i], order)), text);
+      EXPECT_TRUE(test::read_alone(test::from_hex(text), test::sender_of(samples[i]), samples[i],
+                                   order) == samples[i]);
     }
   }
 }
@@ -189,11 +139,11 @@ TEST(CigiPackets, DefaultsHaveOnlyIdSizeAndVersion) {
     std::visit(
         [](const auto& each) {
           using P = std::decay_t<decltype(each)>;
-          const auto bytes = bytes_alone(P{}, ByteOrder::little);
-          ASSERT_EQ(bytes.size(), P::kBytes);
-          EXPECT_EQ(std::to_integer<unsigned>(bytes[0]), P::kId);
-          EXPECT_EQ(std::to_integer<unsigned>(bytes[1]), P::kBytes);
-          if (P::kId == 1 || P::kId == 101) return;
+          const auto bytes = test::bytes_alone(P{}, ByteOrder::little);
+          ASSERT_EQ(bytes.size(), P::kWire.v3_3.bytes);
+          EXPECT_EQ(std::to_integer<unsigned>(bytes[0]), P::kWire.v3_3.id);
+          EXPECT_EQ(std::to_integer<unsigned>(bytes[1]), P::kWire.v3_3.bytes);
+          if (test::begins_message(each)) return;
           EXPECT_TRUE(std::ranges::all_of(bytes.begin() + 2, bytes.end(),
                                           [](std::byte b) { return b == std::byte{0}; }));
         },
@@ -322,20 +272,20 @@ std::vector<BitCase> bit_cases() {
 TEST(CigiPackets, EveryFlagSetsItsOwnBits) {
   for (const BitCase& each : bit_cases()) {
     SCOPED_TRACE(each.name);
-    const auto bytes = bytes_alone(each.packet, ByteOrder::big);
+    const auto bytes = test::bytes_alone(each.packet, ByteOrder::big);
     EXPECT_EQ(std::to_integer<unsigned>(bytes[each.offset]), each.bits);
-    EXPECT_TRUE(read_alone(bytes, sender_of(each.packet), each.packet, ByteOrder::big) ==
-                each.packet);
+    EXPECT_TRUE(test::read_alone(bytes, test::sender_of(each.packet), each.packet,
+                                 ByteOrder::big) == each.packet);
   }
 }
 
 TEST(CigiPackets, ReservedBitsAreIgnored) {
-  auto bytes = bytes_alone(EntityControl{.entity_id = 9}, ByteOrder::big);
+  auto bytes = test::bytes_alone(EntityControl{.entity_id = 9}, ByteOrder::big);
   bytes[4] |= std::byte{0x80};
   bytes[5] |= std::byte{0xE0};
   bytes[7] = std::byte{0xFF};
   const Packet like = EntityControl{.entity_id = 9};
-  EXPECT_TRUE(read_alone(bytes, Sender::host, like, ByteOrder::big) == like);
+  EXPECT_TRUE(test::read_alone(bytes, Sender::host, like, ByteOrder::big) == like);
 }
 
 TEST(CigiPackets, TextsTakeWholeMultiplesOfEightBytes) {
@@ -344,9 +294,9 @@ TEST(CigiPackets, TextsTakeWholeMultiplesOfEightBytes) {
     const auto message = ImageGeneratorMessage::make(7, text);
     const std::size_t kept = std::min<std::size_t>(length, 99);
     EXPECT_EQ(message.view(), text.substr(0, kept));
-    const auto bytes = bytes_alone(message, ByteOrder::little);
+    const auto bytes = test::bytes_alone(message, ByteOrder::little);
     EXPECT_EQ(bytes.size(), (4 + kept + 1 + 7) / 8 * 8);
-    EXPECT_TRUE(read_alone(bytes, Sender::ig, message, ByteOrder::little) == Packet(message));
+    EXPECT_TRUE(test::read_alone(bytes, Sender::ig, message, ByteOrder::little) == Packet(message));
   }
   EXPECT_EQ(ImageGeneratorMessage::make(7, std::string_view("ab\0cd", 5)).view(), "ab");
 }

@@ -22,12 +22,39 @@ using CigiBytes = std::vector<std::byte>;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::vector<Packet> samples_of(Sender sender) {
-  return sender == Sender::host ? test::sample_host_packets() : test::sample_ig_packets();
+std::vector<Packet> samples_of(Sender sender, Version version = Version::v3_3) {
+  return sender == Sender::host ? test::sample_host_packets(version)
+                                : test::sample_ig_packets(version);
 }
 
-CigiBytes message_of(std::initializer_list<Packet> packets, ByteOrder order = ByteOrder::big) {
-  return test::cigi_message(std::vector<Packet>(packets), order);
+CigiBytes message_of(std::initializer_list<Packet> packets, ByteOrder order = ByteOrder::big,
+                     Version version = Version::v3_3) {
+  return test::cigi_message(std::vector<Packet>(packets), order, version);
+}
+
+/// Every sender, byte order and version of a message.
+struct Way {
+  Sender sender;
+  ByteOrder order;
+  Version version;
+};
+std::vector<Way> all_ways() {
+  std::vector<Way> ways;
+  for (const Sender sender : {Sender::host, Sender::ig}) {
+    for (const ByteOrder order : {ByteOrder::big, ByteOrder::little}) {
+      for (const Version version : {Version::v3_3, Version::v4_0}) {
+        ways.push_back({sender, order, version});
+      }
+    }
+  }
+  return ways;
+}
+
+/// Returns the size that the packet at an offset states.
+std::size_t stated_size(const CigiBytes& message, std::size_t at, const Way& way) {
+  const auto byte = [&](std::size_t i) { return std::to_integer<std::size_t>(message[at + i]); };
+  if (way.version == Version::v3_3) return byte(1);
+  return way.order == ByteOrder::big ? 256 * byte(0) + byte(1) : byte(0) + 256 * byte(1);
 }
 
 /// All that a reader says about a message.
@@ -84,16 +111,17 @@ CigiBytes with_bytes(std::string_view hex) {
 }
 
 TEST(CigiReader, MessagesOfAllPacketsSurviveInBothOrders) {
-  for (const Sender sender : {Sender::host, Sender::ig}) {
-    for (const ByteOrder order : {ByteOrder::big, ByteOrder::little}) {
-      const auto samples = samples_of(sender);
-      const auto message = test::cigi_message(samples, order);
-      const Told out = told(message, sender);
-      EXPECT_EQ(out.last, Step::end);
-      EXPECT_TRUE(out.packets == samples);
-      EXPECT_TRUE(out.refused.empty());
-      EXPECT_EQ(out.skipped, 0U);
-    }
+  for (const Way& way : all_ways()) {
+    const auto samples = samples_of(way.sender, way.version);
+    const auto message = test::cigi_message(samples, way.order, way.version);
+    const Told out = told(message, way.sender);
+    EXPECT_EQ(out.last, Step::end);
+    EXPECT_TRUE(out.packets == samples);
+    EXPECT_TRUE(out.refused.empty());
+    EXPECT_EQ(out.skipped, 0U);
+    const Reader reader(message, way.sender);
+    EXPECT_EQ(reader.version(), way.version);
+    EXPECT_EQ(reader.byte_order(), way.order);
   }
 }
 
@@ -159,9 +187,9 @@ TEST(CigiReader, WrongFirstPacketsBreakTheMessage) {
   EXPECT_EQ(fault(changed(1, 16)).kind, Fault::Kind::size_of_packet);
   EXPECT_EQ(fault(changed(1, 32)).kind, Fault::Kind::size_beyond_end);
   EXPECT_EQ(text_of(fault(changed(2, 2))),
-            "packet 0 (id 1, IG Control) at byte 0: CIGI version 2.0, must be 3.3");
+            "packet 0 (id 1, IG Control) at byte 0: CIGI version 2.0, must be 3.3 or 4.0");
   EXPECT_EQ(text_of(fault(changed(4, 0x20))),
-            "packet 0 (id 1, IG Control) at byte 0: CIGI version 3.2, must be 3.3");
+            "packet 0 (id 1, IG Control) at byte 0: CIGI version 3.2, must be 3.3 or 4.0");
   EXPECT_EQ(text_of(fault(changed(6, 0x70))),
             "packet 0 (id 1, IG Control) at byte 0: byte swap magic number 0x7000, must be 0x8000 "
             "or 0x0080");
@@ -169,11 +197,12 @@ TEST(CigiReader, WrongFirstPacketsBreakTheMessage) {
             "packet 0 (id 1, IG Control) at byte 0: mode is 3, must be 0 to 2");
   // CIGI 3.1 has 16 bytes and no minor version; CIGI 4 begins with a size of 16 bits.
   EXPECT_EQ(text_of(fault(test::from_hex("01100300000080000000000000000000"))),
-            "packet 0 (id 1, IG Control) at byte 0: CIGI version 3.0, must be 3.3");
-  for (const char* later : {"18000000040000000000", "00180000040000000000"}) {
-    EXPECT_NE(text_of(fault(test::from_hex(later))).find("version 4.0"), std::string::npos);
+            "packet 0 (id 1, IG Control) at byte 0: CIGI version 3.0, must be 3.3 or 4.0");
+  for (const char* later : {"18000000050000000000", "00180000050000000000"}) {
+    EXPECT_EQ(text_of(fault(test::from_hex(later))),
+              "packet 0 (id 0x0000, IG Control) at byte 0: CIGI version 5.0, must be 3.3 or 4.0");
   }
-  EXPECT_NE(text_of(fault(test::from_hex("1800ffff040000000000"), Sender::ig)).find("version 4.0"),
+  EXPECT_NE(text_of(fault(test::from_hex("1800ffff040000100000"), Sender::ig)).find("version 4.1"),
             std::string::npos);
 }
 
@@ -262,7 +291,7 @@ TEST(CigiReader, OffsetsOfChildrenAreNoGeodeticPositions) {
   EntityControl top = child;
   top.attached = false;
   std::array<std::byte, 256> memory;
-  Writer writer(memory, ByteOrder::big);
+  Writer writer(memory, Version::v3_3, ByteOrder::big);
   EXPECT_FALSE(writer.add(IgControl{}));
   EXPECT_EQ(writer.add(top).kind, Fault::Kind::field);
 }
@@ -270,7 +299,7 @@ TEST(CigiReader, OffsetsOfChildrenAreNoGeodeticPositions) {
 TEST(CigiReader, DatesMustBeDaysOfTheCalendarIfValid) {
   const auto kind = [](std::uint32_t date, bool valid) {
     std::array<std::byte, 256> memory;
-    Writer writer(memory, ByteOrder::big);
+    Writer writer(memory, Version::v3_3, ByteOrder::big);
     EXPECT_FALSE(writer.add(IgControl{}));
     return writer.add(CelestialSphereControl{.date_valid = valid, .date_mmddyyyy = date}).kind;
   };
@@ -309,48 +338,47 @@ TEST(CigiReader, TextsWithoutAnEndAreRefused) {
 }
 
 TEST(CigiReader, EveryPrefixGivesThePacketsThatItHolds) {
-  for (const Sender sender : {Sender::host, Sender::ig}) {
-    for (const ByteOrder order : {ByteOrder::big, ByteOrder::little}) {
-      const auto samples = samples_of(sender);
-      const auto message = test::cigi_message(samples, order);
-      std::vector<std::size_t> ends = {0};
-      while (ends.back() < message.size()) {
-        ends.push_back(ends.back() + std::to_integer<std::size_t>(message[ends.back() + 1]));
-      }
-      for (std::size_t length = 0; length < message.size(); ++length) {
-        const Told out = told(std::span(message).first(length), sender);
-        const auto whole = static_cast<std::size_t>(
-            std::upper_bound(ends.begin(), ends.end(), length) - ends.begin() - 1);
-        ASSERT_EQ(out.packets.size(), whole) << length;
-        EXPECT_TRUE(std::equal(out.packets.begin(), out.packets.end(), samples.begin()));
-        EXPECT_TRUE(out.refused.empty());
-        const bool at_an_end = whole > 0 && ends[whole] == length;
-        EXPECT_EQ(out.last, at_an_end ? Step::end : Step::broken) << length;
-        if (!at_an_end) {
-          EXPECT_EQ(out.fault.offset, ends[whole]);
-        }
+  for (const Way& way : all_ways()) {
+    const auto samples = samples_of(way.sender, way.version);
+    const auto message = test::cigi_message(samples, way.order, way.version);
+    std::vector<std::size_t> ends = {0};
+    while (ends.back() < message.size()) {
+      ends.push_back(ends.back() + stated_size(message, ends.back(), way));
+    }
+    for (std::size_t length = 0; length < message.size(); ++length) {
+      const Told out = told(std::span(message).first(length), way.sender);
+      const auto whole = static_cast<std::size_t>(
+          std::upper_bound(ends.begin(), ends.end(), length) - ends.begin() - 1);
+      ASSERT_EQ(out.packets.size(), whole) << length;
+      EXPECT_TRUE(std::equal(out.packets.begin(), out.packets.end(), samples.begin()));
+      EXPECT_TRUE(out.refused.empty());
+      const bool at_an_end = whole > 0 && ends[whole] == length;
+      EXPECT_EQ(out.last, at_an_end ? Step::end : Step::broken) << length;
+      if (!at_an_end) {
+        EXPECT_EQ(out.fault.offset, ends[whole]);
       }
     }
   }
 }
 
 TEST(CigiReader, EveryFlippedBitHarmsItsOwnPacketAlone) {
-  for (const Sender sender : {Sender::host, Sender::ig}) {
-    const auto samples = samples_of(sender);
-    const auto message = test::cigi_message(samples, ByteOrder::little);
+  for (const Way& way : all_ways()) {
+    const auto samples = samples_of(way.sender, way.version);
+    const auto message = test::cigi_message(samples, way.order, way.version);
+    const std::size_t header = way.version == Version::v3_3 ? 2 : 4;
     std::size_t begin = 0;
     for (std::size_t hit = 0; hit < samples.size(); ++hit) {
-      const auto size = std::to_integer<std::size_t>(message[begin + 1]);
+      const auto size = stated_size(message, begin, way);
       for (std::size_t bit = 0; bit < 8 * size; ++bit) {
         auto bytes = message;
         bytes[begin + bit / 8] ^= static_cast<std::byte>(1u << (bit % 8));
-        const Told out = told(bytes, sender);
+        const Told out = told(bytes, way.sender);
         // Packets in front are what they were. Those behind are too, if the size still holds.
         ASSERT_GE(out.packets.size(), hit);
         for (std::size_t i = 0; i < std::min(hit, out.packets.size()); ++i) {
           EXPECT_TRUE(out.packets[i] == samples[i]);
         }
-        if (bit / 8 < 2 || (hit == 0 && out.last == Step::broken)) continue;
+        if (bit / 8 < header || (hit == 0 && out.last == Step::broken)) continue;
         ASSERT_EQ(out.last, Step::end) << hit << ' ' << bit;
         ASSERT_EQ(out.packets.size() + out.refused.size(), samples.size());
         for (std::size_t k = 1; k < samples.size() - hit; ++k) {
@@ -364,28 +392,28 @@ TEST(CigiReader, EveryFlippedBitHarmsItsOwnPacketAlone) {
 
 TEST(CigiReader, RandomDamageEndsWithAFaultOrSoundPackets) {
   std::mt19937 random(7);
-  for (std::size_t round = 0; round < 20'000; ++round) {
-    const Sender sender = random() % 2 == 0 ? Sender::host : Sender::ig;
-    const ByteOrder order = random() % 2 == 0 ? ByteOrder::big : ByteOrder::little;
-    auto bytes = test::cigi_message(samples_of(sender), order);
+  const auto ways = all_ways();
+  for (std::size_t round = 0; round < 40'000; ++round) {
+    const Way& way = ways[random() % ways.size()];
+    auto bytes = test::cigi_message(samples_of(way.sender, way.version), way.order, way.version);
     for (std::size_t k = 1 + random() % 6; k > 0; --k) {
       bytes[24 + random() % (bytes.size() - 24)] = static_cast<std::byte>(random() & 0xFFu);
     }
     bytes.resize(24 + random() % (bytes.size() - 23));
-    const Told out = told(bytes, sender);
+    const Told out = told(bytes, way.sender);
     std::array<std::byte, 4096> memory;
-    Writer writer(memory, order);
+    Writer writer(memory, way.version, way.order);
     for (const Packet& packet : out.packets) {
       ASSERT_FALSE(writer.add(packet)) << "what was read can be written";
     }
-    const Told again = told(writer.message(), sender);
+    const Told again = told(writer.message(), way.sender);
     ASSERT_TRUE(again.packets == out.packets);
   }
 }
 
 TEST(CigiWriter, RefusesWhatAReaderWouldRefuse) {
   std::array<std::byte, 80> memory;
-  Writer writer(memory, ByteOrder::big);
+  Writer writer(memory, Version::v3_3, ByteOrder::big);
   EXPECT_EQ(writer.add(EntityControl{}).kind, Fault::Kind::first_packet);
   EXPECT_EQ(writer.add(IgControl{.mode = IgMode::maintenance}).kind, Fault::Kind::field);
   EXPECT_EQ(writer.add(IgControl{.database = -1}).kind, Fault::Kind::field);
@@ -419,7 +447,7 @@ TEST(CigiWriter, NothingAllocates) {
   std::size_t read = 0;
   std::size_t texts = 0;
   const auto before = test::heap_request_count();
-  Writer writer(memory, ByteOrder::big);
+  Writer writer(memory, Version::v3_3, ByteOrder::big);
   for (const Packet& each : samples) static_cast<void>(writer.add(each));
   const Fault fault = writer.add(RateControl{.x_m_s = kNan});
   texts += fault_text(fault, text).size();
@@ -445,12 +473,13 @@ TEST(CigiFaults, TextsFitAndAreCutOff) {
   EXPECT_LT(text_of(longest).size(), kFaultTextBytes);
   std::array<char, 10> small;
   EXPECT_EQ(fault_text(longest, small), "packet 819");
-  EXPECT_EQ(packet_name(0), "unknown");
-  EXPECT_EQ(packet_name(35), "Short Symbol Control");
-  EXPECT_EQ(packet_name(36), "unknown");
-  EXPECT_EQ(packet_name(117), "Image Generator Message");
-  EXPECT_EQ(packet_name(200), "unknown");
-  EXPECT_EQ(packet_name(201), "user defined");
+  const auto name = [](std::uint16_t id) { return packet_name(id, Version::v3_3); };
+  EXPECT_EQ(name(0), "unknown");
+  EXPECT_EQ(name(35), "Short Symbol Control");
+  EXPECT_EQ(name(36), "unknown");
+  EXPECT_EQ(name(117), "Image Generator Message");
+  EXPECT_EQ(name(200), "unknown");
+  EXPECT_EQ(name(201), "user defined");
 }
 
 }  // namespace

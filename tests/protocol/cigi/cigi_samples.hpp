@@ -9,11 +9,11 @@
 #include "emit/physics/check.hpp"
 #include "emit/protocol/cigi.hpp"
 
-/// One sound packet of each kind, in which every field differs from its default, as the bytes of
-/// the golden vectors say. The first of each side is the one that begins a message.
+/// One sound packet of each kind that a version has, in which every field differs from its default,
+/// as the bytes of the golden vectors say. The first of each side is the one that begins a message.
 namespace emit::test {
 
-inline std::vector<protocol::cigi::Packet> sample_host_packets() {
+inline std::vector<protocol::cigi::Packet> sample_host_packets_v3() {
   using namespace protocol::cigi;
   return {
       IgControl{.mode = IgMode::operate,
@@ -203,7 +203,7 @@ inline std::vector<protocol::cigi::Packet> sample_host_packets() {
   };
 }
 
-inline std::vector<protocol::cigi::Packet> sample_ig_packets() {
+inline std::vector<protocol::cigi::Packet> sample_ig_packets_v3() {
   using namespace protocol::cigi;
   return {
       StartOfFrame{.database = -5,
@@ -292,12 +292,81 @@ inline std::vector<protocol::cigi::Packet> sample_ig_packets() {
   };
 }
 
+inline std::vector<protocol::cigi::Packet> sample_host_packets(
+    protocol::cigi::Version version = protocol::cigi::Version::v3_3) {
+  using namespace protocol::cigi;
+  auto packets = sample_host_packets_v3();
+  if (version == Version::v3_3) return packets;
+  std::erase_if(packets,
+                [](const Packet& each) { return std::holds_alternative<EntityControl>(each); });
+  for (Packet& each : packets) {
+    if (auto* control = std::get_if<IgControl>(&each)) control->type_substitution_enabled = true;
+    if (auto* sky = std::get_if<CelestialSphereControl>(&each)) sky->second_utc = 56.5f;
+    if (auto* weather = std::get_if<WeatherControl>(&each)) {
+      weather->top_scud_enabled = true;
+      weather->wind_from_deg = -50.0f;
+      weather->top_scud_percent = 37.5f;
+      weather->top_transition_m = 75.0f;
+    }
+  }
+  packets.emplace_back(EntityPosition{.entity_id = 0x1122,
+                                      .attached = true,
+                                      .clamp = Clamp::non_conformal,
+                                      .parent_id = 0x5566,
+                                      .roll_deg = -12.5f,
+                                      .pitch_deg = 7.25f,
+                                      .yaw_deg = 271.5f,
+                                      .place = {-1.5, 2000.25, -3.75}});
+  packets.emplace_back(EntityControl40{.entity_id = 0x1122,
+                                       .state = EntityState::active,
+                                       .collision_detection = true,
+                                       .smoothing_enabled = true,
+                                       .alpha = 200,
+                                       .type = {.extended = true,
+                                                .kind = 1,
+                                                .domain = 2,
+                                                .country_or_type = 225,
+                                                .category = 3,
+                                                .subcategory = 4,
+                                                .specific = 5,
+                                                .extra = 6}});
+  packets.emplace_back(AnimationControl{.entity_id = 0x3132,
+                                        .animation_id = 0x3334,
+                                        .playing = true,
+                                        .loop = true,
+                                        .alpha = 201,
+                                        .speed = -1.75f});
+  packets.emplace_back(AccelerationControl{.entity_id = 0x3536,
+                                           .part_id = 55,
+                                           .applies_to_part = true,
+                                           .x_m_s2 = -9.75f,
+                                           .y_m_s2 = 10.5f,
+                                           .z_m_s2 = -11.25f,
+                                           .roll_deg_s2 = 12.5f,
+                                           .pitch_deg_s2 = -13.5f,
+                                           .yaw_deg_s2 = 14.5f});
+  return packets;
+}
+
+inline std::vector<protocol::cigi::Packet> sample_ig_packets(
+    protocol::cigi::Version version = protocol::cigi::Version::v3_3) {
+  using namespace protocol::cigi;
+  auto packets = sample_ig_packets_v3();
+  if (version == Version::v3_3) return packets;
+  auto& frame = std::get<StartOfFrame>(packets.front());
+  frame.ig_status = 0;
+  frame.overframing = true;
+  frame.excessive_variable_data = true;
+  return packets;
+}
+
 /// Returns a message of these packets.
 /// @pre each of them can be written
-inline std::vector<std::byte> cigi_message(std::span<const protocol::cigi::Packet> packets,
-                                           protocol::cigi::ByteOrder order) {
+inline std::vector<std::byte> cigi_message(
+    std::span<const protocol::cigi::Packet> packets, protocol::cigi::ByteOrder order,
+    protocol::cigi::Version version = protocol::cigi::Version::v3_3) {
   std::array<std::byte, 4096> memory;
-  protocol::cigi::Writer writer(memory, order);
+  protocol::cigi::Writer writer(memory, version, order);
   for (const auto& packet : packets) EMIT_CHECK(!writer.add(packet));
   return {writer.message().begin(), writer.message().end()};
 }

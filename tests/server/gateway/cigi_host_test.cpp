@@ -29,7 +29,7 @@ class CigiHostTest : public testing::Test {
   /// Sends a message of the host that arrives now.
   void send(cigi::IgMode mode, const std::vector<cigi::Packet>& packets = {}, bool stamp = false) {
     std::array<std::byte, 4096> memory;
-    cigi::Writer writer(memory, cigi::ByteOrder::big);
+    cigi::Writer writer(memory, cigi::Version::v3_3, cigi::ByteOrder::big);
     cigi::IgControl control;
     control.mode = mode;
     control.host_frame = ++host_frame_;
@@ -131,7 +131,7 @@ TEST_F(CigiHostTest, ADatabaseThatIsNotThereIsSaidSo) {
   make();
   std::array<std::byte, 64> memory;
   const auto wish = [&](std::int8_t database) {
-    cigi::Writer writer(memory, cigi::ByteOrder::little);
+    cigi::Writer writer(memory, cigi::Version::v3_3, cigi::ByteOrder::little);
     cigi::IgControl control;
     control.mode = cigi::IgMode::operate;
     control.host_frame = ++host_frame_;
@@ -176,7 +176,7 @@ TEST_F(CigiHostTest, NothingAllocatesWhileItServes) {
   send(cigi::IgMode::operate, {seeker()});
   ASSERT_TRUE(next());
   std::array<std::byte, 4096> memory;
-  cigi::Writer writer(memory, cigi::ByteOrder::big);
+  cigi::Writer writer(memory, cigi::Version::v3_3, cigi::ByteOrder::big);
   cigi::IgControl control;
   control.mode = cigi::IgMode::operate;
   cigi::EntityControl unknown = seeker();

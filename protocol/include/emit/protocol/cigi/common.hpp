@@ -6,9 +6,10 @@
 /// Constants and small types that packets of both directions share.
 namespace emit::protocol::cigi {
 
-inline constexpr std::uint8_t kMajorVersion = 3;
-inline constexpr std::uint8_t kMinorVersion = 3;
-/// Byte Swap Magic Number of IG Control and Start Of Frame, in the sender's byte order.
+/// Version of the interface. A message has one, which its first packet says.
+enum class Version : std::uint8_t { v3_3, v4_0 };
+/// Byte Swap Magic Number of IG Control and Start Of Frame of version 3.3, in the sender's byte
+/// order. Version 4.0 has none: its size word of 24 shows the order.
 inline constexpr std::uint16_t kByteSwapMagic = 0x8000;
 /// Length of a tick of the time stamps, ns.
 inline constexpr std::int64_t kTimestampTickNs = 10'000;
@@ -17,6 +18,25 @@ inline constexpr std::int64_t kTimestampTickNs = 10'000;
 enum class Sender : std::uint8_t { host, ig };
 /// Byte order of a sender. A message has one order from its first packet to its last.
 enum class ByteOrder : std::uint8_t { little, big };
+
+/// Id and smallest size of a packet in one version.
+struct WireForm {
+  std::uint16_t id;
+  std::uint16_t bytes;  ///< 0: the version has no such packet
+};
+/// Forms of a packet in both versions.
+struct WireForms {
+  WireForm v3_3;
+  WireForm v4_0;
+  /// Returns the form in a version. RT-safe.
+  [[nodiscard]] constexpr const WireForm& of(Version version) const noexcept {
+    return version == Version::v3_3 ? v3_3 : v4_0;
+  }
+  /// Returns whether a version has the packet. RT-safe.
+  [[nodiscard]] constexpr bool exists(Version version) const noexcept {
+    return of(version).bytes > 0;
+  }
+};
 
 /// Operational mode of the image generator. Only an image generator says `maintenance`.
 enum class IgMode : std::uint8_t { standby = 0, operate = 1, debug = 2, maintenance = 3 };

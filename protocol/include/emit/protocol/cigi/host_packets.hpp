@@ -6,21 +6,27 @@
 
 #include "emit/protocol/cigi/common.hpp"
 
-/// Packets of the host. Every packet has the numbers of the interface control document, in its
-/// units. Angles of attitude are degrees, applied in the order yaw, pitch, roll: yaw clockwise from
-/// true north, pitch nose up, roll right wing down. They have the ranges yaw -180 to 360, pitch -90
-/// to 90, roll -180 to 180. The document allows yaw from 0 only; hosts send negative yaw too.
-/// Numbers that are not finite or out of range are refused, whether a flag enables them or not.
+/// Packets of the host that version 3.3 has; host_packets4.hpp holds those that 4.0 adds. `kWire`
+/// says the ids and sizes of a packet in both versions, and the ids of the comments are those of
+/// 3.3. A member that one version does not have is marked with the other one: it is at its default
+/// when a message of that version is read, and a writer of that version refuses other values.
+///
+/// Every packet has the numbers of the interface control document, in its units. Angles of attitude
+/// are degrees, applied in the order yaw, pitch, roll: yaw clockwise from true north, pitch nose
+/// up, roll right wing down. They have the ranges yaw -180 to 360, pitch -90 to 90, roll -180 to
+/// 180. The document allows yaw from 0 only; hosts send negative yaw too. Numbers that are not
+/// finite or out of range are refused, whether a flag enables them or not.
 namespace emit::protocol::cigi {
 
 /// First packet of each message of a host (id 1).
 struct IgControl {
-  static constexpr std::uint8_t kId = 1;
-  static constexpr std::size_t kBytes = 24;
+  static constexpr WireForms kWire{{1, 24}, {0x0000, 24}};
   static constexpr Sender kSender = Sender::host;
-  IgMode mode = IgMode::standby;      ///< demanded mode: standby, operate or debug
-  bool timestamp_valid = false;       ///< must be set in asynchronous operation
-  bool smoothing_enabled = false;     ///< extrapolation and interpolation are allowed
+  IgMode mode = IgMode::standby;   ///< demanded mode: standby, operate or debug
+  bool timestamp_valid = false;    ///< must be set in asynchronous operation
+  bool smoothing_enabled = false;  ///< extrapolation and interpolation are allowed
+  /// 4.0: an entity type that is not known may be shown by one that resembles it.
+  bool type_substitution_enabled = false;
   std::int8_t database = 0;           ///< database to load, 1 to 127; 0: none
   std::uint32_t host_frame = 0;       ///< counts up by one with each message of the host
   std::uint32_t timestamp_ticks = 0;  ///< ticks of 10 us since any epoch; it wraps
@@ -32,10 +38,10 @@ enum class EntityState : std::uint8_t { standby = 0, active = 1, destroyed = 2 }
 enum class Clamp : std::uint8_t { none = 0, non_conformal = 1, conformal = 2 };
 enum class Animation : std::uint8_t { stop = 0, pause = 1, play = 2, proceed = 3 };
 
-/// State and pose of an entity (id 2).
+/// State and pose of an entity (id 2). Version 4.0 splits it into EntityPosition, EntityControl40
+/// and AnimationControl.
 struct EntityControl {
-  static constexpr std::uint8_t kId = 2;
-  static constexpr std::size_t kBytes = 48;
+  static constexpr WireForms kWire{{2, 48}, {0, 0}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t entity_id = 0;  ///< 0: ownship
   EntityState state = EntityState::standby;
@@ -79,8 +85,7 @@ enum class ComponentClass : std::uint8_t {
 
 /// State and data of a component of an entity, a view, a sensor and so on (id 4).
 struct ComponentControl {
-  static constexpr std::uint8_t kId = 4;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{4, 32}, {0x0003, 40}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t component_id = 0;
   std::uint16_t instance_id = 0;  ///< id of the entity, view and so on that the class names
@@ -94,8 +99,7 @@ struct ComponentControl {
 
 /// Component Control with two words (id 5).
 struct ShortComponentControl {
-  static constexpr std::uint8_t kId = 5;
-  static constexpr std::size_t kBytes = 16;
+  static constexpr WireForms kWire{{5, 16}, {0x0004, 24}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t component_id = 0;
   std::uint16_t instance_id = 0;
@@ -108,8 +112,7 @@ struct ShortComponentControl {
 /// Pose of an articulated part of an entity (id 6). Values whose flag is not set keep their last
 /// value.
 struct ArticulatedPartControl {
-  static constexpr std::uint8_t kId = 6;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{6, 32}, {0x0005, 32}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t entity_id = 0;
   std::uint8_t part_id = 0;
@@ -142,18 +145,16 @@ struct PartMotion {
 
 /// Up to two degrees of freedom of articulated parts of one entity (id 7).
 struct ShortArticulatedPartControl {
-  static constexpr std::uint8_t kId = 7;
-  static constexpr std::size_t kBytes = 16;
+  static constexpr WireForms kWire{{7, 16}, {0x0006, 24}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t entity_id = 0;
   std::array<PartMotion, 2> motions{};
   bool operator==(const ShortArticulatedPartControl&) const = default;
 };
 
-/// Velocity of an entity or of an articulated part (id 8).
+/// Velocity of an entity or of an articulated part (id 8). Version 4.0 calls it Velocity Control.
 struct RateControl {
-  static constexpr std::uint8_t kId = 8;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{8, 32}, {0x0007, 32}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t entity_id = 0;
   std::uint8_t part_id = 0;
@@ -170,11 +171,11 @@ struct RateControl {
 
 /// Date, time of day and bodies of the sky (id 9).
 struct CelestialSphereControl {
-  static constexpr std::uint8_t kId = 9;
-  static constexpr std::size_t kBytes = 16;
+  static constexpr WireForms kWire{{9, 16}, {0x0008, 24}};
   static constexpr Sender kSender = Sender::host;
   std::uint8_t hour_utc = 0;       ///< 0 to 23; not checked without `date_valid`
   std::uint8_t minute_utc = 0;     ///< 0 to 59; not checked without `date_valid`
+  float second_utc = 0.0f;         ///< 4.0: 0 to 60; must be finite without `date_valid`
   bool ephemeris_enabled = false;  ///< time of day goes on; otherwise it stands still
   bool sun_enabled = false;
   bool moon_enabled = false;
@@ -189,8 +190,7 @@ struct CelestialSphereControl {
 
 /// Atmosphere where no layer or region says otherwise (id 10).
 struct AtmosphereControl {
-  static constexpr std::uint8_t kId = 10;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{10, 32}, {0x0009, 32}};
   static constexpr Sender kSender = Sender::host;
   bool model_enabled = false;         ///< radiance and transmission come from an atmospheric model
   std::uint8_t humidity_percent = 0;  ///< 0 to 100
@@ -198,8 +198,9 @@ struct AtmosphereControl {
   float visibility_m = 0.0f;         ///< not negative
   float horizontal_wind_m_s = 0.0f;  ///< not negative
   float vertical_wind_m_s = 0.0f;    ///< the sign of up is not in our sources
-  float wind_from_deg = 0.0f;        ///< direction that the wind comes from, 0 to 360
-  float pressure_hpa = 0.0f;         ///< not negative
+  /// Direction that the wind comes from, -180 to 360. Hosts count from -180 or from 0.
+  float wind_from_deg = 0.0f;
+  float pressure_hpa = 0.0f;  ///< not negative
   bool operator==(const AtmosphereControl&) const = default;
 };
 
@@ -207,8 +208,7 @@ enum class RegionState : std::uint8_t { inactive = 0, active = 1, destroyed = 2 
 
 /// Rounded rectangle on the ground with an environment of its own (id 11).
 struct EnvironmentalRegionControl {
-  static constexpr std::uint8_t kId = 11;
-  static constexpr std::size_t kBytes = 48;
+  static constexpr WireForms kWire{{11, 48}, {0x000A, 48}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t region_id = 0;
   RegionState state = RegionState::inactive;
@@ -230,8 +230,7 @@ enum class WeatherScope : std::uint8_t { global = 0, regional = 1, entity = 2 };
 
 /// One weather layer, or the weather of an entity (id 12).
 struct WeatherControl {
-  static constexpr std::uint8_t kId = 12;
-  static constexpr std::size_t kBytes = 56;
+  static constexpr WireForms kWire{{12, 56}, {0x000B, 72}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t entity_or_region_id = 0;  ///< after `scope`
   /// 0 ground fog, 1 to 3 cloud layers, 4 rain, 5 snow, 6 sleet, 7 hail, 8 sand, 9 dust; the image
@@ -242,7 +241,8 @@ struct WeatherControl {
   bool scud_enabled = false;
   bool random_winds = false;
   bool random_lightning = false;
-  std::uint8_t cloud_type = 0;  ///< 0 none to 10 stratus; 11 to 15 are free. At most 15.
+  bool top_scud_enabled = false;  ///< 4.0: scud at the top of the layer
+  std::uint8_t cloud_type = 0;    ///< 0 none to 10 stratus; 11 to 15 are free. At most 15.
   WeatherScope scope = WeatherScope::global;
   /// The field holds 0 to 7. A narrower range of the document is not in our sources.
   std::uint8_t severity = 0;
@@ -255,17 +255,18 @@ struct WeatherControl {
   float transition_m = 0.0f;         ///< bands above and below the layer, not negative
   float horizontal_wind_m_s = 0.0f;  ///< not negative
   float vertical_wind_m_s = 0.0f;
-  float wind_from_deg = 0.0f;  ///< 0 to 360
-  float pressure_hpa = 0.0f;   ///< not negative
-  float aerosol_g_m3 = 0.0f;   ///< not negative
+  float wind_from_deg = 0.0f;     ///< -180 to 360
+  float pressure_hpa = 0.0f;      ///< not negative
+  float aerosol_g_m3 = 0.0f;      ///< not negative
+  float top_scud_percent = 0.0f;  ///< 4.0: 0 to 100
+  float top_transition_m = 0.0f;  ///< 4.0: band above the layer alone, not negative
   bool operator==(const WeatherControl&) const = default;
 };
 
 /// Place of a view, or of all views of a group, on its entity (id 16). Values whose flag is not set
 /// keep their last value.
 struct ViewControl {
-  static constexpr std::uint8_t kId = 16;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{16, 32}, {0x000F, 40}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t view_id = 0;  ///< counts if `group_id` is 0
   std::uint8_t group_id = 0;  ///< 0: the packet is for one view
@@ -296,8 +297,7 @@ enum class TrackMode : std::uint8_t {
 
 /// Settings of a sensor (id 17).
 struct SensorControl {
-  static constexpr std::uint8_t kId = 17;
-  static constexpr std::size_t kBytes = 24;
+  static constexpr WireForms kWire{{17, 24}, {0x0010, 32}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t view_id = 0;
   std::uint8_t sensor_id = 0;
@@ -317,8 +317,7 @@ struct SensorControl {
 
 /// Ellipsoid to which geodetic positions refer (id 19).
 struct EarthReferenceModel {
-  static constexpr std::uint8_t kId = 19;
-  static constexpr std::size_t kBytes = 24;
+  static constexpr WireForms kWire{{19, 24}, {0x0012, 24}};
   static constexpr Sender kSender = Sender::host;
   bool custom_enabled = false;       ///< otherwise WGS 84
   double equatorial_radius_m = 0.0;  ///< not negative
@@ -330,8 +329,7 @@ enum class Mirror : std::uint8_t { none = 0, horizontal = 1, vertical = 2, both 
 
 /// Projection of a view (id 21). Values whose flag is not set keep their last value.
 struct ViewDefinition {
-  static constexpr std::uint8_t kId = 21;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{21, 32}, {0x0014, 40}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t view_id = 0;
   std::uint8_t group_id = 0;

@@ -13,8 +13,7 @@ enum class HatHotType : std::uint8_t { height_above = 0, height_of = 1, extended
 
 /// Question for the terrain below a point (id 24).
 struct HatHotRequest {
-  static constexpr std::uint8_t kId = 24;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{24, 32}, {0x0017, 40}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t request_id = 0;
   HatHotType type = HatHotType::height_above;
@@ -27,8 +26,7 @@ struct HatHotRequest {
 
 /// Question whether something stands between two points (id 25).
 struct LosSegmentRequest {
-  static constexpr std::uint8_t kId = 25;
-  static constexpr std::size_t kBytes = 64;
+  static constexpr WireForms kWire{{25, 64}, {0x0018, 72}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t request_id = 0;
   bool extended = false;
@@ -48,8 +46,7 @@ struct LosSegmentRequest {
 
 /// Question what a ray meets (id 26).
 struct LosVectorRequest {
-  static constexpr std::uint8_t kId = 26;
-  static constexpr std::size_t kBytes = 56;
+  static constexpr WireForms kWire{{26, 56}, {0x0019, 64}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t request_id = 0;
   bool extended = false;
@@ -78,8 +75,7 @@ enum class PositionFrame : std::uint8_t { geodetic = 0, parent = 1, submodel = 2
 
 /// Question for the position of an object (id 27).
 struct PositionRequest {
-  static constexpr std::uint8_t kId = 27;
-  static constexpr std::size_t kBytes = 8;
+  static constexpr WireForms kWire{{27, 8}, {0x001A, 8}};
   static constexpr Sender kSender = Sender::host;
   std::uint16_t object_id = 0;
   std::uint8_t part_id = 0;
@@ -91,8 +87,7 @@ struct PositionRequest {
 
 /// Question for the environment at a point (id 28).
 struct EnvironmentalConditionsRequest {
-  static constexpr std::uint8_t kId = 28;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{28, 32}, {0x001B, 32}};
   static constexpr Sender kSender = Sender::host;
   bool maritime = false;
   bool terrestrial = false;

@@ -13,19 +13,21 @@ namespace emit::protocol::cigi {
 
 /// First packet of each message of an image generator (id 101).
 struct StartOfFrame {
-  static constexpr std::uint8_t kId = 101;
-  static constexpr std::size_t kBytes = 24;
+  static constexpr WireForms kWire{{101, 24}, {0xFFFF, 24}};
   static constexpr Sender kSender = Sender::ig;
   /// n: database n is loaded; -n: it is being loaded; 0: the image generator decides; -128: the
   /// database is not available.
   std::int8_t database = 0;
-  std::uint8_t ig_status = 0;  ///< 0: no error; the image generator defines other values
+  std::uint8_t ig_status = 0;  ///< 3.3: 0 is no error; the image generator defines other values
   IgMode mode = IgMode::standby;
   bool timestamp_valid = false;
-  bool custom_earth = false;          ///< the host's Earth Reference Model is in use, else WGS 84
-  std::uint32_t ig_frame = 0;         ///< counts up by one with each message
-  std::uint32_t timestamp_ticks = 0;  ///< ticks of 10 us since any epoch; it wraps
-  std::uint32_t last_host_frame = 0;  ///< IgControl::host_frame that was received last
+  bool custom_earth = false;  ///< the host's Earth Reference Model is in use, else WGS 84
+  bool overframing = false;   ///< 4.0: frames take longer than they may
+  bool paging = false;        ///< 4.0: the database cannot be loaded fast enough
+  bool excessive_variable_data = false;  ///< 4.0: too many packets of variable length
+  std::uint32_t ig_frame = 0;            ///< counts up by one with each message
+  std::uint32_t timestamp_ticks = 0;     ///< ticks of 10 us since any epoch; it wraps
+  std::uint32_t last_host_frame = 0;     ///< IgControl::host_frame that was received last
   bool operator==(const StartOfFrame&) const = default;
 };
 
@@ -34,8 +36,7 @@ inline constexpr std::int8_t kDatabaseMissing = -128;
 
 /// Answer to a HatHotRequest for one height (id 102).
 struct HatHotResponse {
-  static constexpr std::uint8_t kId = 102;
-  static constexpr std::size_t kBytes = 16;
+  static constexpr WireForms kWire{{102, 16}, {0x0FFF, 16}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t request_id = 0;
   bool valid = false;               ///< `height_m` holds
@@ -47,8 +48,7 @@ struct HatHotResponse {
 
 /// Extended answer to a HatHotRequest (id 103).
 struct HatHotExtendedResponse {
-  static constexpr std::uint8_t kId = 103;
-  static constexpr std::size_t kBytes = 40;
+  static constexpr WireForms kWire{{103, 40}, {0x0FFE, 40}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t request_id = 0;
   bool valid = false;
@@ -63,8 +63,7 @@ struct HatHotExtendedResponse {
 
 /// Answer to a request for a line of sight (id 104).
 struct LosResponse {
-  static constexpr std::uint8_t kId = 104;
-  static constexpr std::size_t kBytes = 16;
+  static constexpr WireForms kWire{{104, 16}, {0x0FFD, 24}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t request_id = 0;
   bool valid = false;         ///< `range_m` holds
@@ -79,8 +78,7 @@ struct LosResponse {
 
 /// Extended answer to a request for a line of sight (id 105).
 struct LosExtendedResponse {
-  static constexpr std::uint8_t kId = 105;
-  static constexpr std::size_t kBytes = 56;
+  static constexpr WireForms kWire{{105, 56}, {0x0FFC, 64}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t request_id = 0;
   bool valid = false;
@@ -113,8 +111,7 @@ enum class TrackState : std::uint8_t {
 
 /// State of a sensor's tracker (id 106).
 struct SensorResponse {
-  static constexpr std::uint8_t kId = 106;
-  static constexpr std::size_t kBytes = 24;
+  static constexpr WireForms kWire{{106, 24}, {0x0FFB, 24}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t view_id = 0;
   std::uint8_t sensor_id = 0;
@@ -129,8 +126,7 @@ struct SensorResponse {
 
 /// State of a sensor's tracker with the point that it tracks (id 107).
 struct SensorExtendedResponse {
-  static constexpr std::uint8_t kId = 107;
-  static constexpr std::size_t kBytes = 48;
+  static constexpr WireForms kWire{{107, 48}, {0x0FFA, 56}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t view_id = 0;
   std::uint8_t sensor_id = 0;
@@ -150,8 +146,7 @@ struct SensorExtendedResponse {
 
 /// Answer to a PositionRequest (id 108).
 struct PositionResponse {
-  static constexpr std::uint8_t kId = 108;
-  static constexpr std::size_t kBytes = 48;
+  static constexpr WireForms kWire{{108, 48}, {0x0FF9, 48}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t object_id = 0;
   std::uint8_t part_id = 0;
@@ -166,8 +161,7 @@ struct PositionResponse {
 
 /// Answer to an EnvironmentalConditionsRequest for weather (id 109).
 struct WeatherConditionsResponse {
-  static constexpr std::uint8_t kId = 109;
-  static constexpr std::size_t kBytes = 32;
+  static constexpr WireForms kWire{{109, 32}, {0x0FF8, 32}};
   static constexpr Sender kSender = Sender::ig;
   std::uint8_t request_id = 0;
   std::uint8_t humidity_percent = 0;  ///< 0 to 100
@@ -175,26 +169,24 @@ struct WeatherConditionsResponse {
   float visibility_m = 0.0f;         ///< not negative
   float horizontal_wind_m_s = 0.0f;  ///< not negative
   float vertical_wind_m_s = 0.0f;
-  float wind_from_deg = 0.0f;  ///< 0 to 360
+  float wind_from_deg = 0.0f;  ///< -180 to 360
   float pressure_hpa = 0.0f;   ///< not negative
   bool operator==(const WeatherConditionsResponse&) const = default;
 };
 
 /// Notice that something happened (id 116).
 struct EventNotification {
-  static constexpr std::uint8_t kId = 116;
-  static constexpr std::size_t kBytes = 16;
+  static constexpr WireForms kWire{{116, 16}, {0x0FF1, 24}};
   static constexpr Sender kSender = Sender::ig;
   std::uint16_t event_id = 0;
   std::array<std::uint32_t, 3> data{};  ///< swapped as words of 32 bits
   bool operator==(const EventNotification&) const = default;
 };
 
-/// Text for the host's log (id 117). Its size follows the text: 8 to 104 bytes.
+/// Text for the host's log (id 117). Its size follows the text: 8 to 104 bytes, in 4.0 16 to 112.
+/// Version 4.0 allows longer texts; a reader refuses a text without a zero in its first 100 bytes.
 struct ImageGeneratorMessage {
-  static constexpr std::uint8_t kId = 117;
-  static constexpr std::size_t kBytes = 8;  ///< smallest size
-  static constexpr std::size_t kMaxBytes = 104;
+  static constexpr WireForms kWire{{117, 8}, {0x0FF0, 16}};
   static constexpr Sender kSender = Sender::ig;
   static constexpr std::size_t kTextBytes = 100;  ///< with the zero that ends the text
   std::uint16_t message_id = 0;

@@ -8,6 +8,7 @@
 
 #include "emit/protocol/cigi/common.hpp"
 #include "emit/protocol/cigi/host_packets.hpp"
+#include "emit/protocol/cigi/host_packets4.hpp"
 #include "emit/protocol/cigi/host_requests.hpp"
 #include "emit/protocol/cigi/ig_packets.hpp"
 
@@ -22,13 +23,15 @@ using Packet = std::variant<
     ViewDefinition, HatHotRequest, LosSegmentRequest, LosVectorRequest, PositionRequest,
     EnvironmentalConditionsRequest, StartOfFrame, HatHotResponse, HatHotExtendedResponse,
     LosResponse, LosExtendedResponse, SensorResponse, SensorExtendedResponse, PositionResponse,
-    WeatherConditionsResponse, EventNotification, ImageGeneratorMessage>;
+    WeatherConditionsResponse, EventNotification, ImageGeneratorMessage, EntityPosition,
+    EntityControl40, AnimationControl, AccelerationControl>;
 
-/// Returns the id of a packet. RT-safe.
-[[nodiscard]] std::uint8_t packet_id(const Packet& packet) noexcept;
-/// Returns the name of an id in the interface control document, also for packets that the codec
-/// skips. Ids 201 to 255 are "user defined"; the rest is "unknown". RT-safe.
-[[nodiscard]] std::string_view packet_name(std::uint8_t id) noexcept;
+/// Returns the id of a packet in a version, 0 for a packet that the version does not have. RT-safe.
+[[nodiscard]] std::uint16_t packet_id(const Packet& packet, Version version) noexcept;
+/// Returns the name of an id in the document of a version, also for packets that the codec skips.
+/// Ids that users define (201 to 255, in 4.0 from 0x8000 to 0xFFFE) are "user defined", those that
+/// SISO registers (4.0, 0x1000 to 0x7FFF) are "registered", and the rest is "unknown". RT-safe.
+[[nodiscard]] std::string_view packet_name(std::uint16_t id, Version version) noexcept;
 
 /// A reason why bytes or a packet were refused, with its place. A plain struct: filling it
 /// allocates nothing.
@@ -37,7 +40,7 @@ struct Fault {
     none,
     too_short,        ///< fewer bytes are left than a packet of its kind has
     first_packet,     ///< the message does not begin with IG Control or Start Of Frame
-    version,          ///< `value`.`lowest` is the version, which is not 3.3
+    version,          ///< `value`.`lowest` is the version, neither 3.3 nor 4.0
     byte_order,       ///< the magic number is `value`, neither 0x8000 nor 0x0080
     size_zero,        ///< a packet states a size of less than its header
     size_alignment,   ///< a packet states a size that is not a multiple of 8
@@ -49,10 +52,12 @@ struct Fault {
     repeated,         ///< a second IG Control or Start Of Frame in one message
     sender,           ///< the other side sends packets of this id
     no_space,         ///< writer only: the packet does not fit the memory
+    not_in_version,   ///< writer only: the version has no such packet, or no `field` in it
   };
   Kind kind = Kind::none;
   std::size_t packet = 0;  ///< number of the packet in the message; the first is 0
-  std::uint8_t id = 0;     ///< id of the packet
+  std::uint16_t id = 0;    ///< id of the packet in its version
+  Version version = Version::v3_3;
   std::size_t offset = 0;  ///< first byte of the packet in the message
   const char* field = "";  ///< name of the struct's member, static storage
   double value = 0.0;
