@@ -11,6 +11,7 @@
 
 #include "emit/physics/frames.hpp"
 #include "emit/protocol/cigi/host_packets.hpp"
+#include "emit/protocol/cigi/host_packets4.hpp"
 #include "emit/protocol/host_frame.hpp"
 #include "gateway/georeference.hpp"
 #include "gateway/scene_query.hpp"

@@ -6,6 +6,7 @@
 #include <optional>
 #include <variant>
 
+#include "emit/protocol/cigi/host_requests.hpp"
 #include "emit/protocol/cigi/writer.hpp"
 #include "gateway/cigi_entities.hpp"
 #include "gateway/georeference.hpp"

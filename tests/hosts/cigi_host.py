@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A host that speaks CIGI 3.3, written from the published layouts alone: it shares no code with emitd."""
+"""Hosts that speak CIGI 3.3 and 4.0, written from the published layouts alone: they share no code with emitd."""
 import select
 import socket
 import struct
@@ -31,6 +31,21 @@ class CigiHost:
     def receive(self):
         """Takes a message of the image generator. Returns its Start Of Frame as a dict."""
         data = self.socket.recv(65536)
+        # Until emitd has heard of its host, it speaks 3.3.
+        start, packets = self._open(data) if data[2] != 255 else self._open4(data)
+        frame = start["frame"]
+        if self.ig_frame is not None:
+            assert frame == (self.ig_frame + 1) % 2**32, f"frame {frame} after {self.ig_frame}"
+        self.ig_frame = frame
+        self.answers = []
+        for answer in packets:
+            if isinstance(answer, str):
+                self.texts.append(answer)
+            else:
+                self.answers.append(answer)
+        return start
+
+    def _open(self, data):
         order = "<" if data[6:8] == b"\x00\x80" else ">"
         packets, at = [], 0
         while at < len(data):
@@ -41,17 +56,49 @@ class CigiHost:
         assert first[0] == 101 and len(first) == 24 and first[2] == 3, first.hex()
         frame, ticks, last_host = struct.unpack(order + "III", first[8:20])
         start = {"database": struct.unpack("b", first[3:4])[0], "mode": first[5] & 3, "frame": frame, "ticks": ticks,
-                 "last_host": last_host, "order": order}
-        if self.ig_frame is not None:
-            assert frame == (self.ig_frame + 1) % 2**32, f"frame {frame} after {self.ig_frame}"
-        self.ig_frame = frame
-        self.answers = []
-        for packet in packets[1:]:
-            if packet[0] == 117:
-                self.texts.append(packet[4:].split(b"\0")[0].decode())
-            else:
-                self.answers.append(self._answer(order, packet))
-        return start
+                 "last_host": last_host, "order": order, "version": 3}
+        return start, [packet[4:].split(b"\0")[0].decode() if packet[0] == 117 else self._answer(order, packet)
+                       for packet in packets[1:]]
+
+    def _open4(self, data):
+        order = "<" if data[:2] == b"\x18\x00" else ">"
+        packets, at = [], 0
+        while at < len(data):
+            size, = struct.unpack_from(order + "H", data, at)
+            assert size >= 8 and size % 8 == 0, f"size {size} at byte {at}"
+            packets.append(data[at:at + size])
+            at += size
+        first = packets[0]
+        assert first[2:4] == b"\xff\xff" and len(first) == 24 and first[4] == 4, first.hex()
+        frame, ticks, last_host = struct.unpack_from(order + "III", first, 8)
+        start = {"database": struct.unpack("b", first[5:6])[0], "mode": first[7] & 3, "frame": frame, "ticks": ticks,
+                 "last_host": last_host, "order": order, "version": 4}
+        return start, [self._answer4(order, packet) for packet in packets[1:]]
+
+    def _answer4(self, order, packet):
+        def read(code, at):
+            return struct.unpack_from(order + code, packet, at)[0]
+
+        kind = read("H", 2)
+        if kind == 0x0FF0:
+            return packet[6:].split(b"\0")[0].decode()
+        if kind == 0x0FFF:
+            return {"id": 102, "request": read("H", 6), "valid": bool(packet[4] & 1), "lsn": packet[4] >> 4,
+                    "hot": bool(packet[4] & 2), "height_m": read("d", 8)}
+        if kind == 0x0FFE:
+            return {"id": 103, "request": read("H", 6), "valid": bool(packet[4] & 1), "lsn": packet[4] >> 4,
+                    "hat_m": read("d", 8), "hot_m": read("d", 16), "material": read("I", 24),
+                    "azimuth_deg": read("f", 28), "elevation_deg": read("f", 32)}
+        if kind == 0x0FFD:
+            return {"id": 104, "request": read("H", 4), "valid": bool(packet[8] & 1), "lsn": packet[8] >> 4,
+                    "entity": read("H", 6) if packet[8] & 2 else None, "visible": bool(packet[8] & 4),
+                    "count": packet[9], "range_m": read("d", 16)}
+        if kind == 0x0FFC:
+            return {"id": 105, "request": read("H", 4), "valid": bool(packet[8] & 1), "lsn": packet[8] >> 4,
+                    "entity": read("H", 6) if packet[8] & 2 else None, "visible": bool(packet[8] & 8),
+                    "range_m": read("d", 16), "place": struct.unpack_from(order + "ddd", packet, 24),
+                    "material": read("I", 52), "azimuth_deg": read("f", 56), "elevation_deg": read("f", 60)}
+        raise AssertionError(f"answer {kind:#06x}")
 
     def drain(self):
         """Takes the messages that have arrived, without waiting."""
@@ -154,3 +201,44 @@ class CigiHost:
             if start["mode"] == mode:
                 return start
         raise AssertionError("no answer to the mode")
+
+
+class CigiHost4(CigiHost):
+    """The same host in version 4.0."""
+
+    def _packet(self, kind, code, *values):
+        body = struct.pack(self.order + code, *values)
+        return struct.pack(self.order + "HH", len(body) + 4, kind) + body
+
+    def control(self, mode, database=0, ticks=None, skip=0):
+        self.host_frame = (self.host_frame + 1 + skip) % 2**32
+        return self._packet(0x0000, "BbBBIII4x", 4, database, 0, mode | (0 if ticks is None else 4), self.host_frame,
+                            self.ig_frame or 0, (ticks or 0) % 2**32)
+
+    def entity(self, entity_id, place, yaw_pitch_roll_deg=(0.0, 0.0, 0.0), state=1, parent=None, clamp=0):
+        yaw, pitch, roll = yaw_pitch_roll_deg
+        return (self._packet(0x0001, "BxHH2xfffddd", (0 if parent is None else 1) | clamp << 1, entity_id, parent or 0,
+                             roll, pitch, yaw, *place) +
+                self._packet(0x0025, "BBHBBHBBBB", state, 255, entity_id, 0, 0, 0, 0, 0, 0, 0))
+
+    def height_request(self, request, kind, place, period=0, entity=None):
+        return self._packet(0x0017, "HHBB6xddd", request, entity or 0, kind | (0 if entity is None else 4), period, *place)
+
+    def vector_request(self, request, source, azimuth_deg, elevation_deg, min_m=0.0, max_m=1e6, extended=False, entity=None,
+                       response_relative=False):
+        flags = extended | (0 if entity is None else 2) | (4 if response_relative else 0)
+        return self._packet(0x0019, "HHBBB5xffffdddI4x", request, entity or 0, flags, 0, 0, azimuth_deg, elevation_deg,
+                            min_m, max_m, *source, 0)
+
+    def segment_request(self, request, source, destination, extended=False, destination_entity=None,
+                        destination_relative=False):
+        flags = extended | (4 if destination_relative else 0) | (0 if destination_entity is None else 16)
+        return self._packet(0x0018, "HHBBHB3xddddddI4x", request, 0, flags, 0, destination_entity or 0, 0, *source,
+                            *destination, 0)
+
+    def sky(self, hour, minute, month, day, year, second=0.0):
+        return self._packet(0x0008, "BxBBfIf4x", 1 | 2 | 16, hour, minute, second, month * 1000000 + day * 10000 + year,
+                            0.0)
+
+    def unknown(self):
+        return self._packet(0x9000, "I", 2)

@@ -9,7 +9,7 @@ import time
 import unittest
 import urllib.request
 
-from cigi_host import OPERATE, STANDBY, CigiHost
+from cigi_host import OPERATE, STANDBY, CigiHost, CigiHost4
 from daemon import Daemon
 from emit_client import FrameClient
 from wgs84 import World, axes, dot
@@ -52,10 +52,10 @@ def glb(boxes):
             struct.pack("<I4s", len(data), b"BIN\0") + data)
 
 
-def rig(order="<", pacing='mode = "host-step"', rate_hz=2000.0, scenario=None, entities="[]"):
+def rig(order="<", pacing='mode = "host-step"', rate_hz=2000.0, scenario=None, entities="[]", kind=CigiHost):
     """Starts emitd with canned frames, and a host beside it."""
     listen = free_port()
-    host = CigiHost(("127.0.0.1", listen), order)
+    host = kind(("127.0.0.1", listen), order)
     more = (f'[cigi]\nlisten = "127.0.0.1:{listen}"\nhost = "127.0.0.1:{host.port}"\nrate_hz = {rate_hz}\n'
             f'entities = {entities}\n[metrics]\nlisten = "127.0.0.1:0"\n')
     return Daemon(16, 12, pacing=pacing, more=more, head=f'scenario = "{scenario}"\n' if scenario else ""), host
@@ -77,9 +77,9 @@ def counter(daemon, name):
 
 
 class Synchronous(unittest.TestCase):
-    def run_frames(self, order, count, lost_every, stamped):
+    def run_frames(self, order, count, lost_every, stamped, kind=CigiHost):
         """Every Start Of Frame is answered by a pose. Returns the headers of the frames."""
-        daemon, host = rig(order)
+        daemon, host = rig(order, kind=kind)
         with daemon:
             try:
                 client = subscribed(self, daemon)
@@ -100,7 +100,7 @@ class Synchronous(unittest.TestCase):
                         start = host.receive()
                     self.assertEqual(start["last_host"], host.host_frame)
                     self.assertEqual(start["mode"], OPERATE)
-                    self.assertEqual(start["order"], order)
+                    self.assertEqual((start["order"], start["version"]), (order, 4 if kind is CigiHost4 else 3))
                     headers.append(client.receive(20.0).header)
                 self.assertEqual([header.host_frame_number for header in headers], sent)
                 self.assertEqual(counter(daemon, "gateway_packets_skipped"), count)
@@ -115,6 +115,17 @@ class Synchronous(unittest.TestCase):
         for number, header in zip(sent, headers):
             # The clock starts with the first message in mode operate, which is number 2; a frame has 0.5 ms.
             self.assertEqual(header.sim_time_ns, (number - 2) * 500_000)
+
+    def test_ten_thousand_frames_of_version_4_echo_every_counter(self):
+        sent, headers = self.run_frames("<", 10000, 0, False, CigiHost4)
+        for number, header in zip(sent, headers):
+            self.assertEqual(header.sim_time_ns, (number - 2) * 500_000)
+
+    def test_big_endian_version_4_with_time_stamps_that_wrap_and_messages_that_get_lost(self):
+        sent, headers = self.run_frames(">", 1500, 7, True, CigiHost4)
+        base = headers[0].sim_time_ns - 70 * 10_000 * sent[0]
+        for number, header in zip(sent, headers):
+            self.assertEqual(header.sim_time_ns, base + 70 * 10_000 * number)
 
     def test_big_endian_with_time_stamps_that_wrap_and_messages_that_get_lost(self):
         sent, headers = self.run_frames(">", 1500, 7, True)
@@ -217,6 +228,7 @@ class Asynchronous(unittest.TestCase):
 
 class Questions(unittest.TestCase):
     """Ground 4 km wide at height 0, a block 10 m high 100 m to the north, and entity 7: a cube of 2 m."""
+    kind = CigiHost
 
     @classmethod
     def setUpClass(cls):
@@ -239,7 +251,8 @@ class Questions(unittest.TestCase):
             '[[object]]\nname = "ground"\ngltf = "ground.glb"\nmaterial = "soil"\n'
             '[[object]]\nname = "block"\ngltf = "block.glb"\nmaterial = "brick"\n'
             '[[object]]\nname = "cube"\ngltf = "cube.glb"\nmaterial = "brick"\nentity_id = 3\n')
-        self.daemon, self.host = rig(scenario=scenario, rate_hz=200.0, entities="[{ id = 7, entity = 3 }]")
+        self.daemon, self.host = rig(scenario=scenario, rate_hz=200.0, entities="[{ id = 7, entity = 3 }]",
+                                     kind=self.kind)
         self.addCleanup(self.host.close)
         self.addCleanup(self.daemon.close)
         self.host.begin()
@@ -373,3 +386,19 @@ class Questions(unittest.TestCase):
         self.assertEqual(sum("entity 99" in text for text in self.host.texts), 1, self.host.texts)
         self.assertEqual(counter(self.daemon, "gateway_packets_unused"), 3)
         self.assertEqual(counter(self.daemon, "gateway_unknown_entities"), 1)
+
+
+class QuestionsInVersion4(unittest.TestCase):
+    """The same scene with a host of version 4.0."""
+    kind = CigiHost4
+    setUpClass = classmethod(Questions.setUpClass.__func__)
+    setUp, ask, drop = Questions.setUp, Questions.ask, Questions.drop
+    test_heights = Questions.test_heights_are_right_to_a_millimetre
+    test_block = Questions.test_the_block_is_ground_and_hides_what_is_behind_it
+
+    def test_a_date_counts_seconds(self):
+        client = subscribed(self, self.daemon)
+        self.ask()
+        client.receive(20.0)
+        self.ask(self.host.sky(13, 30, 6, 1, 2026, 12.5))
+        self.assertEqual(client.receive(20.0).header.sim_time_ns, int((3.5 * 3600 + 12.5) * 1e9))
