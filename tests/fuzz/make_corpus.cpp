@@ -22,6 +22,7 @@
 #include "emit/v1/control.pb.h"
 #include "fuzz/state_world.hpp"
 #include "protocol/cigi/cigi_samples.hpp"
+#include "protocol/dis/dis_samples.hpp"
 #include "protocol/frames.hpp"
 #include "protocol/host_frames.hpp"
 
@@ -555,6 +556,16 @@ void make_cigi_seeds() {
   }
 }
 
+void make_dis_seeds() {
+  const auto samples = test::sample_pdus();
+  write("dis", "bundle_v6", test::dis_datagram(samples, 6));
+  write("dis", "bundle_v7", test::dis_datagram(samples, 7));
+  const char* names[] = {"state", "fire", "detonation", "start", "stop", "update"};
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    write("dis", names[i], test::dis_datagram(std::span(&samples[i], 1), 7));
+  }
+}
+
 void make_trigger_seeds() {
   for (const auto& [name, trigger] :
        {std::pair("stamped",
@@ -586,6 +597,7 @@ int main(int argc, char** argv) {
   make_loss_seeds();
   make_trigger_seeds();
   make_cigi_seeds();
+  make_dis_seeds();
   make_axes_seeds();
   make_session_seeds();
   make_fragment_seeds();

@@ -159,7 +159,7 @@ class SummaryReader {
   }
 
   bool take_statistics(Input& fields) {
-    McapSummary::Statistics& statistics = out_.statistics.emplace();
+    McapStatistics& statistics = out_.statistics.emplace();
     statistics.messages = fields.number<std::uint64_t>();
     static_cast<void>(fields.number<std::uint16_t>());                              // schemas
     for (int i = 0; i < 4; ++i) static_cast<void>(fields.number<std::uint32_t>());  // other counts

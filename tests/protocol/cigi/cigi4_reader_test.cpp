@@ -272,6 +272,27 @@ TEST(Cigi4Writer, SecondsMustBeOfAMinuteIfTheDateIsValid) {
   EXPECT_TRUE(refused(std::numeric_limits<float>::quiet_NaN(), false));
 }
 
+TEST(Cigi4Writer, RefusesNumbersOutOfRange) {
+  constexpr float kBad = std::numeric_limits<float>::infinity();
+  std::array<std::byte, 512> memory;
+  const auto field = [&](const Packet& packet) {
+    Writer writer(memory, Version::v4_0, ByteOrder::big);
+    EXPECT_FALSE(writer.add(IgControl{}));
+    const Fault fault = writer.add(packet);
+    return std::string(fault.kind == Fault::Kind::field ? fault.field : "none");
+  };
+  EXPECT_EQ(field(WeatherControl{.top_scud_percent = 100.5f}), "top_scud_percent");
+  EXPECT_EQ(field(WeatherControl{.top_transition_m = -0.5f}), "top_transition_m");
+  EXPECT_EQ(field(WeatherControl{.wind_from_deg = -180.5f}), "wind_from_deg");
+  EXPECT_EQ(field(WeatherControl{.wind_from_deg = 360.5f}), "wind_from_deg");
+  EXPECT_EQ(field(AnimationControl{.speed = kBad}), "speed");
+  EXPECT_EQ(field(AccelerationControl{.z_m_s2 = kBad}), "z_m_s2");
+  EXPECT_EQ(field(AccelerationControl{.yaw_deg_s2 = kBad}), "yaw_deg_s2");
+  EXPECT_EQ(field(EntityPosition{.yaw_deg = 361.0f}), "yaw_deg");
+  EXPECT_EQ(field(EntityPosition{.attached = true, .place = {500.0, 0.0, 0.0}}), "none");
+  EXPECT_EQ(field(EntityPosition{.place = {500.0, 0.0, 0.0}}), "latitude_deg");
+}
+
 TEST(Cigi4Writer, NothingAllocates) {
   const auto samples = test::sample_host_packets(Version::v4_0);
   std::array<std::byte, 4096> memory;

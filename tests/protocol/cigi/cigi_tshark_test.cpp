@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "emit/protocol/cigi.hpp"
+#include "protocol/capture.hpp"
 #include "protocol/cigi/cigi_samples.hpp"
 #include "support/emit_process.hpp"
 
@@ -343,42 +344,6 @@ constexpr NamedValue kIgFields[] = {
     {"image_generator_message.message", "hello, host"},
 };
 
-void add_number(std::string& out, std::uint64_t value, std::size_t bytes, bool big) {
-  for (std::size_t i = 0; i < bytes; ++i) {
-    const std::size_t shift = 8 * (big ? bytes - 1 - i : i);
-    out += static_cast<char>((value >> shift) & 0xFFu);
-  }
-}
-
-/// Returns a record of a capture file: an IPv4 packet with a datagram between two ports.
-std::string capture_record(std::span<const std::byte> message, std::uint16_t from,
-                           std::uint16_t to) {
-  std::string packet("\x45\0", 2);
-  add_number(packet, 28 + message.size(), 2, true);
-  packet += std::string("\0\0\0\0\x40\x11\0\0", 8);  // no fragment, UDP, checksum not computed
-  packet += std::string("\x7F\0\0\1\x7F\0\0\1", 8);
-  add_number(packet, from, 2, true);
-  add_number(packet, to, 2, true);
-  add_number(packet, 8 + message.size(), 2, true);
-  add_number(packet, 0, 2, true);
-  for (const std::byte each : message) packet += static_cast<char>(each);
-  std::string record(8, '\0');
-  add_number(record, packet.size(), 4, false);
-  add_number(record, packet.size(), 4, false);
-  return record + packet;
-}
-
-std::string capture_head() {
-  std::string head;
-  add_number(head, 0xA1B2C3D4, 4, false);
-  add_number(head, 2, 2, false);
-  add_number(head, 4, 2, false);
-  add_number(head, 0, 8, false);
-  add_number(head, 65535, 4, false);
-  add_number(head, 101, 4, false);  // packets begin with the IP header
-  return head;
-}
-
 /// Returns the lines that tshark prints with these fields, one per message.
 std::vector<std::string> dissected(const std::string& file, std::span<const NamedValue> fields) {
   std::vector<std::string> command = {
@@ -402,9 +367,9 @@ void expect_fields(std::span<const Packet> packets, std::uint16_t from, std::uin
   const test::TemporaryFolder folder;
   const std::string file = folder.file("cigi.pcap");
   std::ofstream out(file, std::ios::binary);
-  out << capture_head();
+  out << test::capture_head();
   for (const ByteOrder order : {ByteOrder::big, ByteOrder::little}) {
-    out << capture_record(test::cigi_message(packets, order), from, to);
+    out << test::capture_record(test::cigi_message(packets, order), from, to);
   }
   out.close();
   const auto lines = dissected(file, fields);
@@ -423,13 +388,8 @@ void expect_fields(std::span<const Packet> packets, std::uint16_t from, std::uin
   }
 }
 
-bool tshark_is_here() {
-  const auto result = test::run_process({"tshark", "--version"});
-  return result.exit_code == 0 && result.out.find("TShark") != std::string::npos;
-}
-
 TEST(CigiTshark, ReadsTheMessagesOfBothSidesInBothOrders) {
-  if (!tshark_is_here()) GTEST_SKIP() << "tshark is not installed";
+  if (!test::tshark_is_here()) GTEST_SKIP() << "tshark is not installed";
   expect_fields(test::sample_host_packets(), kHostPort, kIgPort, kHostFields);
   expect_fields(test::sample_ig_packets(), kIgPort, kHostPort, kIgFields);
 }

@@ -11,6 +11,14 @@
 
 namespace emit::protocol {
 
+/// Statistics record of an MCAP file: number of messages and their log times, ns.
+struct McapStatistics {
+  std::uint64_t messages = 0;
+  std::uint64_t first_ns = 0;
+  std::uint64_t last_ns = 0;
+  std::map<std::uint16_t, std::uint64_t> messages_of_channel;
+};
+
 /// Summary at the end of an MCAP file: what its writer wrote on close.
 struct McapSummary {
   enum class State : std::uint8_t {
@@ -21,14 +29,7 @@ struct McapSummary {
   State state = State::none;
   std::string problem{};  ///< file, offset and reason, unless the state is complete
 
-  /// Statistics record: number of messages and their log times, ns.
-  struct Statistics {
-    std::uint64_t messages = 0;
-    std::uint64_t first_ns = 0;
-    std::uint64_t last_ns = 0;
-    std::map<std::uint16_t, std::uint64_t> messages_of_channel;
-  };
-  std::optional<Statistics> statistics;
+  std::optional<McapStatistics> statistics;
   std::map<std::uint16_t, McapSchema> schemas;
   std::map<std::uint16_t, McapChannel> channels;
   /// Number of chunks in the index, by the name of their compression; "" is none.
