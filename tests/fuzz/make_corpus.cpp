@@ -13,6 +13,7 @@
 #include "emit/protocol/axes.hpp"
 #include "emit/protocol/convert.hpp"
 #include "emit/protocol/host_session.hpp"
+#include "emit/protocol/net_fdm.hpp"
 #include "emit/protocol/pixel_codec.hpp"
 #include "emit/protocol/record/log.hpp"
 #include "emit/protocol/resend.hpp"
@@ -566,6 +567,22 @@ void make_dis_seeds() {
   }
 }
 
+void make_net_fdm_seeds() {
+  Bytes bytes(protocol::net_fdm::kBytes);
+  protocol::net_fdm::encode({.longitude_rad = 0.125,
+                             .latitude_rad = 0.75,
+                             .altitude_m = 900.0,
+                             .heading_rad = 1.5f,
+                             .heading_rate_rad_s = 0.25f,
+                             .velocity_ned_m_s = {100.0, -20.0, 3.0},
+                             .pilot_specific_force_m_s2 = {0.0, 0.0, -9.75},
+                             .unix_time_s = 1'700'000'000},
+                            std::span(bytes).first<protocol::net_fdm::kBytes>());
+  write("net_fdm", "flight", bytes);
+  bytes[3] = std::byte{25};
+  write("net_fdm", "version_25", bytes);
+}
+
 void make_trigger_seeds() {
   for (const auto& [name, trigger] :
        {std::pair("stamped",
@@ -598,6 +615,7 @@ int main(int argc, char** argv) {
   make_trigger_seeds();
   make_cigi_seeds();
   make_dis_seeds();
+  make_net_fdm_seeds();
   make_axes_seeds();
   make_session_seeds();
   make_fragment_seeds();

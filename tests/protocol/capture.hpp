@@ -20,7 +20,7 @@ inline void add_number(std::string& out, std::uint64_t value, std::size_t bytes,
 
 /// Returns a record of a capture file: an IPv4 packet with a datagram between two ports.
 inline std::string capture_record(std::span<const std::byte> message, std::uint16_t from,
-                           std::uint16_t to) {
+                                  std::uint16_t to) {
   std::string packet("\x45\0", 2);
   add_number(packet, 28 + message.size(), 2, true);
   packet += std::string("\0\0\0\0\x40\x11\0\0", 8);  // no fragment, UDP, checksum not computed

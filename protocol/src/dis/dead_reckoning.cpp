@@ -34,16 +34,15 @@ template <class Ratio>
   const double square = angle * angle;
   if (std::abs(angle) < 0.5) {
     return {
-        .a1 = alternating_sum(1.0, square,
-                              [](double k) { return 1.0 / (2 * k * (2 * k + 1)); }),
+        .a1 = alternating_sum(1.0, square, [](double k) { return 1.0 / (2 * k * (2 * k + 1)); }),
         .b1 = alternating_sum(1.0 / 2, square,
                               [](double k) { return 1.0 / ((2 * k + 1) * (2 * k + 2)); }),
         .c1 = alternating_sum(1.0 / 6, square,
                               [](double k) { return 1.0 / ((2 * k + 2) * (2 * k + 3)); }),
         .a2 = alternating_sum(1.0 / 2, square,
                               [](double k) { return 1.0 / ((2 * k - 1) * (2 * k + 2)); }),
-        .b2 = alternating_sum(1.0 / 3, square,
-                              [](double k) { return 1.0 / (2 * k * (2 * k + 3)); }),
+        .b2 =
+            alternating_sum(1.0 / 3, square, [](double k) { return 1.0 / (2 * k * (2 * k + 3)); }),
         .c2 = alternating_sum(1.0 / 8, square,
                               [](double k) { return 1.0 / ((2 * k + 1) * (2 * k + 4)); }),
     };
@@ -100,10 +99,9 @@ glm::dmat3 body_from_ecef(const EulerAngles& orientation) noexcept {
   const double st = std::sin(theta), ct = std::cos(theta);
   const double sf = std::sin(phi), cf = std::cos(phi);
   // The columns are the ECEF axes in the body frame.
-  return glm::dmat3(
-      glm::dvec3(cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf),
-      glm::dvec3(sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf),
-      glm::dvec3(-st, ct * sf, ct * cf));
+  return glm::dmat3(glm::dvec3(cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf),
+                    glm::dvec3(sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf),
+                    glm::dvec3(-st, ct * sf, ct * cf));
 }
 
 EulerAnglesF64 euler_angles(const glm::dmat3& body_from_ecef) noexcept {
@@ -139,8 +137,7 @@ Motion motion_of(const EntityState& state) noexcept {
 
 Predicted predict(const Motion& motion, double dt_s) noexcept {
   using enum DeadReckoningModel;
-  Predicted out{.position_ecef_m = motion.position_ecef_m,
-                .body_from_ecef = motion.body_from_ecef};
+  Predicted out{.position_ecef_m = motion.position_ecef_m, .body_from_ecef = motion.body_from_ecef};
   if (motion.model == other || motion.model == stationary) return out;
   const double t = dt_s;
   const glm::dvec3 v = motion.velocity_m_s;
@@ -149,8 +146,8 @@ Predicted predict(const Motion& motion, double dt_s) noexcept {
   // The body turns by exp(S t), so that its view of the earth turns by the inverse.
   if (turns(motion.model)) out.body_from_ecef = turn(-w, t) * motion.body_from_ecef;
 
-  const bool world_axes = motion.model == fpw || motion.model == rpw || motion.model == rvw ||
-                          motion.model == fvw;
+  const bool world_axes =
+      motion.model == fpw || motion.model == rpw || motion.model == rvw || motion.model == fvw;
   if (world_axes) {
     out.position_ecef_m += v * t + a * (t * t / 2);
     out.velocity_ecef_m_s = v + a * t;

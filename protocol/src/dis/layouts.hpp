@@ -167,7 +167,9 @@ void layout(Io& io, VariableParameter& p) {
 /// Returns whether PDUs of a type have variable parameters.
 template <class P>
 [[nodiscard]] constexpr bool has_parameters() noexcept {
-  return requires(P p) { p.parameter_count; };
+  return requires(P p) {
+    p.parameter_count;
+  };
 }
 
 /// Returns the number of bytes that a PDU's fields and parameters take.

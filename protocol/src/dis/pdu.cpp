@@ -181,7 +181,8 @@ std::string_view fault_text(const Fault& fault, std::span<char> buffer) noexcept
       if (fault.highest < kLargest) {
         out.add(", must be {} to {}", fault.lowest, fault.highest);
       } else {
-        out.add("{}", fault.lowest < 0.0 ? ", must be finite" : ", must be finite and not negative");
+        out.add("{}",
+                fault.lowest < 0.0 ? ", must be finite" : ", must be finite and not negative");
       }
       break;
     case Fault::Kind::no_space:

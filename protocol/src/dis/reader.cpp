@@ -42,8 +42,7 @@ Step Reader::refuse(Fault fault) noexcept {
 
 Step Reader::read_body(Pdu& pdu) noexcept {
   if (header_.version != 6 && header_.version != 7) {
-    return refuse(
-        {.kind = Fault::Kind::version, .value = static_cast<double>(header_.version)});
+    return refuse({.kind = Fault::Kind::version, .value = static_cast<double>(header_.version)});
   }
   Step step = Step::pdu;
   const bool known = with_pdu_type(header_.type, [&]<class P>(const P*) {

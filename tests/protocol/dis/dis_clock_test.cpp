@@ -84,7 +84,8 @@ TEST(DisClock, TheLocalClockSaysHowManyHoursASilentSenderLetPass) {
     static_cast<void>(clock.read(timestamp_of(begin_ns, true), 50));
     const std::int64_t end_ns = begin_ns + silence_s * kSecondNs;
     // The local clock runs 1 % fast and the PDU came 80 ms late.
-    const auto local_ns = static_cast<std::int64_t>(1.01e9 * static_cast<double>(silence_s)) + 80'000'000;
+    const auto local_ns =
+        static_cast<std::int64_t>(1.01e9 * static_cast<double>(silence_s)) + 80'000'000;
     const auto reading = clock.read(timestamp_of(end_ns, true), local_ns);
     EXPECT_EQ(reading.order, Order::next) << silence_s;
     EXPECT_LE(std::abs(reading.time_ns - end_ns), kStampErrorNs) << silence_s;

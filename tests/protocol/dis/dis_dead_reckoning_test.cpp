@@ -25,16 +25,16 @@ double distance_of(const Mat& a, const Mat& b) {
 /// Rotations about single axes, written from their definition: they turn the axes, so that a vector
 /// gets the components in the turned frame.
 Mat about_x(double angle) {
-  return glm::transpose(
-      Mat(Vec(1, 0, 0), Vec(0, std::cos(angle), std::sin(angle)), Vec(0, -std::sin(angle), std::cos(angle))));
+  return glm::transpose(Mat(Vec(1, 0, 0), Vec(0, std::cos(angle), std::sin(angle)),
+                            Vec(0, -std::sin(angle), std::cos(angle))));
 }
 Mat about_y(double angle) {
-  return glm::transpose(
-      Mat(Vec(std::cos(angle), 0, -std::sin(angle)), Vec(0, 1, 0), Vec(std::sin(angle), 0, std::cos(angle))));
+  return glm::transpose(Mat(Vec(std::cos(angle), 0, -std::sin(angle)), Vec(0, 1, 0),
+                            Vec(std::sin(angle), 0, std::cos(angle))));
 }
 Mat about_z(double angle) {
-  return glm::transpose(
-      Mat(Vec(std::cos(angle), std::sin(angle), 0), Vec(-std::sin(angle), std::cos(angle), 0), Vec(0, 0, 1)));
+  return glm::transpose(Mat(Vec(std::cos(angle), std::sin(angle), 0),
+                            Vec(-std::sin(angle), std::cos(angle), 0), Vec(0, 0, 1)));
 }
 
 /// Integrates the motion by Runge and Kutta's rule of fourth order: the attitude turns with the
@@ -55,7 +55,8 @@ Predicted integrated(const Motion& m, double dt_s, int steps) {
     if (rotating) {
       // A column is a body axis in ECEF; it moves with omega x axis, omega being along body axes.
       const Vec omega_ecef = s.ecef_from_body * m.angular_velocity_rad_s;
-      for (int c = 0; c < 3; ++c) out.ecef_from_body[c] = glm::cross(omega_ecef, s.ecef_from_body[c]);
+      for (int c = 0; c < 3; ++c)
+        out.ecef_from_body[c] = glm::cross(omega_ecef, s.ecef_from_body[c]);
     }
     return out;
   };
@@ -92,7 +93,8 @@ TEST(DisFrames, EulerAnglesAreThreeTurnsOfTheAxes) {
       for (const double phi : {-2.9, 0.3, 3.1}) {
         const EulerAngles angles{static_cast<float>(psi), static_cast<float>(theta),
                                  static_cast<float>(phi)};
-        const Mat expected = about_x(angles.phi_rad) * about_y(angles.theta_rad) * about_z(angles.psi_rad);
+        const Mat expected =
+            about_x(angles.phi_rad) * about_y(angles.theta_rad) * about_z(angles.psi_rad);
         const Mat matrix = body_from_ecef(angles);
         EXPECT_LT(distance_of(matrix, expected), 1e-15);
         const auto back = euler_angles(matrix);
@@ -115,14 +117,16 @@ TEST(DisFrames, AVerticalAxisHasNoPhi) {
 }
 
 TEST(DisFrames, LevelFlightHasItsHeadingAgainstNorthEastDown) {
-  const physics::GeoPlace place{physics::Radians(47.0 * kPi / 180), physics::Radians(8.0 * kPi / 180),
-                                physics::Metres(1000.0)};
+  const physics::GeoPlace place{physics::Radians(47.0 * kPi / 180),
+                                physics::Radians(8.0 * kPi / 180), physics::Metres(1000.0)};
   // The attitude is built from the axes: the nose points to the heading, the z axis down.
   const Mat ned = ecef_from_ned(place);
-  EXPECT_LT(glm::length(ned[2] + glm::normalize(Vec(std::cos(place.latitude.value()) * std::cos(place.longitude.value()),
-                                                    std::cos(place.latitude.value()) * std::sin(place.longitude.value()),
-                                                    std::sin(place.latitude.value())))),
-            1e-12);
+  EXPECT_LT(
+      glm::length(ned[2] + glm::normalize(Vec(
+                               std::cos(place.latitude.value()) * std::cos(place.longitude.value()),
+                               std::cos(place.latitude.value()) * std::sin(place.longitude.value()),
+                               std::sin(place.latitude.value())))),
+      1e-12);
   EXPECT_LT(std::abs(ned[1].z), 1e-15) << "east is along the equator's plane";
   EXPECT_GT(ned[0].z, 0.0) << "north goes towards the pole";
   EXPECT_LT(glm::length(glm::cross(ned[0], ned[1]) - ned[2]), 1e-15);
@@ -144,9 +148,12 @@ TEST(DisDeadReckoning, EveryModelAgreesWithNumericalIntegration) {
     for (const double dt_s : {-1.5, -0.01, 0.0, 0.02, 0.3, 5.0}) {
       const Predicted got = predict(motion, dt_s);
       const Predicted expected = integrated(motion, dt_s, 4000);
-      EXPECT_LT(glm::length(got.position_ecef_m - expected.position_ecef_m), 1e-7) << model << ' ' << dt_s;
-      EXPECT_LT(glm::length(got.velocity_ecef_m_s - expected.velocity_ecef_m_s), 1e-7) << model << ' ' << dt_s;
-      EXPECT_LT(distance_of(got.body_from_ecef, expected.body_from_ecef), 1e-9) << model << ' ' << dt_s;
+      EXPECT_LT(glm::length(got.position_ecef_m - expected.position_ecef_m), 1e-7)
+          << model << ' ' << dt_s;
+      EXPECT_LT(glm::length(got.velocity_ecef_m_s - expected.velocity_ecef_m_s), 1e-7)
+          << model << ' ' << dt_s;
+      EXPECT_LT(distance_of(got.body_from_ecef, expected.body_from_ecef), 1e-9)
+          << model << ' ' << dt_s;
     }
   }
 }
@@ -176,12 +183,13 @@ TEST(DisDeadReckoning, ATurnAtConstantSpeedIsACircle) {
   const Predicted quarter = predict(motion, kPi / 2 / 0.5);
   EXPECT_LT(glm::length(quarter.position_ecef_m - Vec(600.0, 600.0, 0.0)), 1e-9);
   // Body x now points along ECEF y.
-  EXPECT_LT(glm::length(glm::transpose(quarter.body_from_ecef) * Vec(1, 0, 0) - Vec(0, 1, 0)), 1e-12);
+  EXPECT_LT(glm::length(glm::transpose(quarter.body_from_ecef) * Vec(1, 0, 0) - Vec(0, 1, 0)),
+            1e-12);
 }
 
 TEST(DisDeadReckoning, FixedModelsIgnoreTheirRates) {
   for (const auto& [fixed, world] : {std::pair(DeadReckoningModel::fpb, DeadReckoningModel::fpw),
-                                    std::pair(DeadReckoningModel::fvb, DeadReckoningModel::fvw)}) {
+                                     std::pair(DeadReckoningModel::fvb, DeadReckoningModel::fvw)}) {
     const Motion body = sample_motion(fixed);
     Motion straight = sample_motion(world);
     straight.velocity_m_s = glm::transpose(body.body_from_ecef) * body.velocity_m_s;
@@ -195,8 +203,8 @@ TEST(DisDeadReckoning, FixedModelsIgnoreTheirRates) {
 }
 
 TEST(DisDeadReckoning, ModelsOfFirstOrderIgnoreTheirAcceleration) {
-  for (const auto model : {DeadReckoningModel::fpw, DeadReckoningModel::rpw, DeadReckoningModel::fpb,
-                           DeadReckoningModel::rpb}) {
+  for (const auto model : {DeadReckoningModel::fpw, DeadReckoningModel::rpw,
+                           DeadReckoningModel::fpb, DeadReckoningModel::rpb}) {
     Motion motion = sample_motion(model);
     const Predicted with = predict(motion, 2.0);
     motion.acceleration_m_s2 = Vec(0.0);
@@ -210,7 +218,8 @@ TEST(DisDeadReckoning, SmallRatesJoinTheStraightLineWithoutAStep) {
   for (const auto model : {DeadReckoningModel::rpb, DeadReckoningModel::rvb}) {
     Motion motion = sample_motion(model);
     const Vec direction = glm::normalize(motion.angular_velocity_rad_s);
-    for (const double rate : {0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 0.1, 0.2499999, 0.2500001, 0.26}) {
+    for (const double rate :
+         {0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, 0.1, 0.2499999, 0.2500001, 0.26}) {
       motion.angular_velocity_rad_s = direction * rate;
       const Predicted got = predict(motion, 2.0);
       const Predicted expected = integrated(motion, 2.0, 2000);
@@ -221,8 +230,8 @@ TEST(DisDeadReckoning, SmallRatesJoinTheStraightLineWithoutAStep) {
 }
 
 TEST(DisDeadReckoning, TheBodysAccelerationHasNoPartOfTheTurn) {
-  // A coordinated turn whose body velocity stays the same has an acceleration of omega x V in space.
-  // In our reading Ab is 0 then, and model 8 gives what model 7 gives.
+  // A coordinated turn whose body velocity stays the same has an acceleration of omega x V in
+  // space. In our reading Ab is 0 then, and model 8 gives what model 7 gives.
   Motion turn = sample_motion(DeadReckoningModel::rvb);
   turn.acceleration_m_s2 = Vec(0.0);
   Motion plain = turn;

@@ -257,7 +257,8 @@ TEST(DisReader, FaultsInsideAPduLeaveOutThatOneAlone) {
   };
   const std::string state = "PDU 0 (type 1, Entity State) at byte 0: ";
   EXPECT_EQ(refused(EntityState{}, set(0, std::uint8_t{5})), state + "version 5, must be 6 or 7");
-  EXPECT_EQ(refused(EntityState{}, set(19, std::uint8_t{1})), state + "states 144 bytes, needs 160");
+  EXPECT_EQ(refused(EntityState{}, set(19, std::uint8_t{1})),
+            state + "states 144 bytes, needs 160");
   EXPECT_EQ(refused(EntityState{}, set(36, kNan)), state + "velocity_m_s is nan, must be finite");
   EXPECT_EQ(refused(EntityState{}, set(56, 2e8)),
             state + "location_ecef_m is 200000000, must be -100000000 to 100000000");
@@ -266,22 +267,27 @@ TEST(DisReader, FaultsInsideAPduLeaveOutThatOneAlone) {
   EXPECT_EQ(refused(EntityState{}, set(72, kNan)), state + "psi_rad is nan, must be finite");
   EXPECT_EQ(refused(EntityState{}, set(76, kNan)), state + "theta_rad is nan, must be finite");
   EXPECT_EQ(refused(EntityState{}, set(80, kNan)), state + "phi_rad is nan, must be finite");
-  EXPECT_EQ(refused(EntityState{}, set(88, std::uint8_t{10})), state + "model is 10, must be 0 to 9");
+  EXPECT_EQ(refused(EntityState{}, set(88, std::uint8_t{10})),
+            state + "model is 10, must be 0 to 9");
   EXPECT_EQ(refused(EntityState{}, set(112, kNan)),
             state + "acceleration_m_s2 is nan, must be finite");
   EXPECT_EQ(refused(EntityState{}, set(124, kNan)),
             state + "angular_velocity_rad_s is nan, must be finite");
   const std::string update = "PDU 0 (type 67, Entity State Update) at byte 0: ";
-  EXPECT_EQ(refused(EntityStateUpdate{}, set(28, kNan)), update + "velocity_m_s is nan, must be finite");
+  EXPECT_EQ(refused(EntityStateUpdate{}, set(28, kNan)),
+            update + "velocity_m_s is nan, must be finite");
   EXPECT_EQ(refused(EntityStateUpdate{}, set(64, kNan)), update + "phi_rad is nan, must be finite");
-  EXPECT_EQ(refused(EntityStateUpdate{}, set(19, std::uint8_t{2})), update + "states 72 bytes, needs 104");
+  EXPECT_EQ(refused(EntityStateUpdate{}, set(19, std::uint8_t{2})),
+            update + "states 72 bytes, needs 104");
   const std::string fire = "PDU 0 (type 2, Fire) at byte 0: ";
-  EXPECT_EQ(refused(Fire{}, set(92, -1.0f)), fire + "range_m is -1, must be finite and not negative");
+  EXPECT_EQ(refused(Fire{}, set(92, -1.0f)),
+            fire + "range_m is -1, must be finite and not negative");
   EXPECT_EQ(refused(Fire{}, set(80, kNan)), fire + "velocity_ecef_m_s is nan, must be finite");
   const std::string detonation = "PDU 0 (type 3, Detonation) at byte 0: ";
   EXPECT_EQ(refused(Detonation{}, set(96, kNan)),
             detonation + "location_in_target_m is nan, must be finite");
-  EXPECT_EQ(refused(Detonation{}, set(101, std::uint8_t{1})), detonation + "states 104 bytes, needs 120");
+  EXPECT_EQ(refused(Detonation{}, set(101, std::uint8_t{1})),
+            detonation + "states 104 bytes, needs 120");
   // A header without a body is too small for its type.
   DisBytes header = one_pdu(StopFreeze{});
   header.resize(12);
@@ -299,8 +305,8 @@ TEST(DisReader, EveryPrefixGivesThePdusThatItHolds) {
   }
   for (std::size_t length = 0; length < datagram.size(); ++length) {
     const auto out = read_all(std::span(datagram).first(length));
-    const auto whole = static_cast<std::size_t>(
-        std::upper_bound(ends.begin(), ends.end(), length) - ends.begin() - 1);
+    const auto whole = static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), length) -
+                                                ends.begin() - 1);
     ASSERT_EQ(out.pdus.size(), whole) << length;
     EXPECT_EQ(out.last, ends[whole] == length ? Step::end : Step::broken) << length;
   }
@@ -473,12 +479,14 @@ TEST(DisTshark, ReadsThePdusOfBothVersions) {
     std::ofstream out(file, std::ios::binary);
     out << test::capture_head();
     for (const std::uint8_t version : {std::uint8_t{6}, std::uint8_t{7}}) {
-      out << test::capture_record(test::dis_datagram(std::span(&samples[i], 1), version), 3000, 3000);
+      out << test::capture_record(test::dis_datagram(std::span(&samples[i], 1), version), 3000,
+                                  3000);
     }
     out.close();
-    std::vector<std::string> command = {"tshark", "-n", "-r", file,      "-T", "fields",
-                                        "-E",     "separator=|",         "-E", "aggregator=,",
-                                        "-e",     "_ws.malformed",       "-e", "dis.proto_ver"};
+    std::vector<std::string> command = {"tshark", "-n",           "-r", file,
+                                        "-T",     "fields",       "-E", "separator=|",
+                                        "-E",     "aggregator=,", "-e", "_ws.malformed",
+                                        "-e",     "dis.proto_ver"};
     for (const DisField& field : tshark_fields()[i]) {
       command.emplace_back("-e");
       command.emplace_back(field.name);

@@ -18,8 +18,8 @@ inline constexpr std::int64_t kUnitsPerHour = 2'147'483'647;
 /// Returns the stamp of a time, rounded to a unit; whole hours are left out. RT-safe.
 [[nodiscard]] std::uint32_t timestamp_of(std::int64_t time_ns, bool absolute) noexcept;
 
-/// Turns the stamps of one sender into a time that does not wrap. Every reading is computed from the
-/// number of units since the first full hour, so that neither rounding nor lost PDUs shift it.
+/// Turns the stamps of one sender into a time that does not wrap. Every reading is computed from
+/// the number of units since the first full hour, so that neither rounding nor lost PDUs shift it.
 /// Thread: one owner.  Real time: nothing allocates.
 class DisClock {
  public:

@@ -14,8 +14,8 @@ namespace emit::protocol::dis {
 [[nodiscard]] glm::dmat3 body_from_ecef(const EulerAngles& orientation) noexcept;
 
 /// Returns psi, theta and phi of an attitude in double precision: psi and phi within [-pi, pi],
-/// theta within [-pi/2, pi/2]. Where the body's x axis is within 1e-9 rad of the ECEF z axis, phi is
-/// 0 and psi holds the whole turn about it.
+/// theta within [-pi/2, pi/2]. Where the body's x axis is within 1e-9 rad of the ECEF z axis, phi
+/// is 0 and psi holds the whole turn about it.
 struct EulerAnglesF64 {
   double psi_rad = 0.0;
   double theta_rad = 0.0;
@@ -37,8 +37,8 @@ struct Motion {
   DeadReckoningModel model = DeadReckoningModel::other;
   glm::dvec3 position_ecef_m{0.0};
   glm::dmat3 body_from_ecef{1.0};
-  glm::dvec3 velocity_m_s{0.0};       ///< along ECEF axes; along the body's with models 6 to 9
-  glm::dvec3 acceleration_m_s2{0.0};  ///< along the axes of the velocity
+  glm::dvec3 velocity_m_s{0.0};            ///< along ECEF axes; along the body's with models 6 to 9
+  glm::dvec3 acceleration_m_s2{0.0};       ///< along the axes of the velocity
   glm::dvec3 angular_velocity_rad_s{0.0};  ///< along the body's axes
 };
 /// Returns the motion that an EntityState says.

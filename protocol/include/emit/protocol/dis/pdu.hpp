@@ -29,8 +29,8 @@ enum class PduType : std::uint8_t {
 struct Header {
   std::uint8_t version = 7;  ///< 6 or 7
   std::uint8_t exercise_id = 0;
-  std::uint8_t type = 0;    ///< PduType, or one that the codec does not know
-  std::uint8_t family = 0;  ///< protocol family: 1 entity information, 2 warfare, 5 management
+  std::uint8_t type = 0;        ///< PduType, or one that the codec does not know
+  std::uint8_t family = 0;      ///< protocol family: 1 entity information, 2 warfare, 5 management
   std::uint32_t timestamp = 0;  ///< see DisClock
   std::uint16_t length = 0;     ///< of the PDU with this header, bytes
   std::uint8_t status = 0;      ///< version 7 only
@@ -104,10 +104,10 @@ struct EntityState {
   std::uint32_t appearance = 0;  ///< bits whose meaning depends on the type
   DeadReckoningModel model = DeadReckoningModel::other;
   std::array<std::uint8_t, 15> other_parameters{};
-  glm::vec3 acceleration_m_s2{0.0f};        ///< along the axes of the velocity
-  glm::vec3 angular_velocity_rad_s{0.0f};   ///< along the body's axes
-  std::uint8_t marking_character_set = 0;   ///< 1: ASCII
-  std::array<char, 11> marking{};           ///< not ended by a zero if it fills the array
+  glm::vec3 acceleration_m_s2{0.0f};       ///< along the axes of the velocity
+  glm::vec3 angular_velocity_rad_s{0.0f};  ///< along the body's axes
+  std::uint8_t marking_character_set = 0;  ///< 1: ASCII
+  std::array<char, 11> marking{};          ///< not ended by a zero if it fills the array
   std::uint32_t capabilities = 0;
   /// Returns the marking up to its first zero. It is valid as long as this object. RT-safe.
   [[nodiscard]] std::string_view marking_text() const noexcept;
@@ -166,12 +166,13 @@ struct Detonation {
   glm::dvec3 location_ecef_m{0.0};
   MunitionDescriptor descriptor{};
   glm::vec3 location_in_target_m{0.0f};  ///< in the body frame of the target
-  std::uint8_t result = 0;               ///< 1 entity impact, 3 ground impact, 5 detonation and so on
+  std::uint8_t result = 0;  ///< 1 entity impact, 3 ground impact, 5 detonation and so on
   std::uint8_t parameter_count = 0;
   bool operator==(const Detonation&) const = default;
 };
 
-/// Time of a clock: hours since 1970-01-01 UTC, and the time past the hour in the units of DisClock.
+/// Time of a clock: hours since 1970-01-01 UTC, and the time past the hour in the units of
+/// DisClock.
 struct ClockTime {
   std::int32_t hours = 0;
   std::uint32_t timestamp = 0;
@@ -216,8 +217,8 @@ struct VariableParameter {
   static constexpr std::uint8_t kAttachedPart = 1;
   std::uint8_t record_type = kArticulatedPart;
   std::uint8_t change_indicator = 0;  ///< counts up with each change; attached parts: 1 is detached
-  std::uint16_t attached_to = 0;      ///< number of the parameter that carries the part; 0: the body
-  std::uint32_t type = 0;             ///< articulated parts: see above; attached parts: the station
+  std::uint16_t attached_to = 0;  ///< number of the parameter that carries the part; 0: the body
+  std::uint32_t type = 0;         ///< articulated parts: see above; attached parts: the station
   /// Articulated parts only: the metric's value in m, m/s, rad or rad/s. It may be any number, also
   /// none, so that a caller must check it.
   float value = 0.0f;

@@ -17,8 +17,8 @@ enum class Step : std::uint8_t {
   broken,   ///< fault() says why nothing more of the datagram can be read
 };
 
-/// Reads the PDUs of one datagram in their order. A PDU begins where the one in front ends, or after
-/// bytes of zero up to the next multiple of 8, by which version 7 aligns bundled PDUs.
+/// Reads the PDUs of one datagram in their order. A PDU begins where the one in front ends, or
+/// after bytes of zero up to the next multiple of 8, by which version 7 aligns bundled PDUs.
 ///
 /// A length that cannot be ends the datagram (`broken`), and PDUs that came before stay good. A
 /// fault inside a PDU leaves out that one alone (`refused`): another version, fewer bytes than its
@@ -31,8 +31,8 @@ class Reader {
   /// Begins with a datagram. The bytes must outlive the reader.
   explicit Reader(std::span<const std::byte> datagram) noexcept : datagram_(datagram) {}
 
-  /// Reads the next PDU. `pdu` is written only when the result is `pdu`. After `end` or `broken` the
-  /// result stays the same. A datagram without bytes is at its end.
+  /// Reads the next PDU. `pdu` is written only when the result is `pdu`. After `end` or `broken`
+  /// the result stays the same. A datagram without bytes is at its end.
   [[nodiscard]] Step next(Pdu& pdu) noexcept;
 
   /// Returns the header of the PDU of the latest `pdu`, `other` or `refused`.

@@ -46,8 +46,8 @@ void check_prediction(const EntityState& state) {
     const Predicted p = predict(motion_of(state), dt_s);
     bool finite = true;
     for (int i = 0; i < 3; ++i) {
-      finite = finite && std::isfinite(p.position_ecef_m[i]) &&
-               std::isfinite(p.velocity_ecef_m_s[i]);
+      finite =
+          finite && std::isfinite(p.position_ecef_m[i]) && std::isfinite(p.velocity_ecef_m_s[i]);
       for (int k = 0; k < 3; ++k) finite = finite && std::isfinite(p.body_from_ecef[i][k]);
     }
     fuzz::require(finite, "a prediction is finite");
