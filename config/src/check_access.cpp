@@ -28,6 +28,7 @@ bool is_protected(const DaemonConfig& daemon, Port port) noexcept {
     case Port::host:
       return daemon.authenticated_host();
     case Port::metrics:
+    case Port::gateway:
       break;
   }
   return false;
@@ -40,6 +41,7 @@ std::string_view protections_of(Port port) noexcept {
     case Port::host:
       return "'access.allow', 'host.key_file' or '[tls]'";
     case Port::metrics:
+    case Port::gateway:
       break;
   }
   return "'access.allow'";
@@ -58,6 +60,9 @@ void check_access(const Node& root, const DaemonConfig& daemon, Diagnostics& dia
   check(Port::control, "control", "tcp", daemon.control.tcp);
   check(Port::host, "host", "udp", daemon.host.udp);
   check(Port::metrics, "metrics", "listen", daemon.metrics.listen);
+  // The port of a CIGI host takes messages from the address of that host alone.
+  check(Port::gateway, "dis", "listen", daemon.dis.listen);
+  check(Port::gateway, "net_fdm", "listen", daemon.net_fdm.listen);
 
   const TlsConfig& tls = daemon.tls;
   const Node& table = section(root, "tls", reported_before);

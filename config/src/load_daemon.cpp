@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include "emit/protocol/host_frame.hpp"
 #include "emit/protocol/shared_ring.hpp"
 #include "keys/data_files.hpp"
 #include "overrides.hpp"
@@ -99,6 +100,55 @@ void check_cigi(const Node& table, const CigiConfig& cigi, Diagnostics& diagnost
   }
 }
 
+void check_dis(const Node& table, const DisConfig& dis, Diagnostics& diagnostics) {
+  check_endpoint(table, "listen", dis.listen, false, diagnostics);
+  const auto check_id = [&](const char* key, const std::string& id) {
+    if (parse_dis_id(id)) return;
+    diagnostics.add(
+        key_location(table, key),
+        fmt::format("'{}': '{}' must be site:application:entity, each 0 to 65535", key, id));
+  };
+  check_id("seeker", dis.seeker);
+  if (dis.entities.size() > protocol::kMaxEntitiesPerFrame) {
+    diagnostics.add(key_location(table, "entities"),
+                    fmt::format("'entities' has {} entities, must have {} at most",
+                                dis.entities.size(), protocol::kMaxEntitiesPerFrame));
+  }
+  for (std::size_t i = 0; i < dis.entities.size(); ++i) {
+    check_id("entities", dis.entities[i].id);
+    for (std::size_t k = 0; k < i; ++k) {
+      const bool same_id = dis.entities[i].id == dis.entities[k].id;
+      if (!same_id && dis.entities[i].entity != dis.entities[k].entity) continue;
+      diagnostics.add(key_location(table, "entities"),
+                      fmt::format("'entities': {} stands twice",
+                                  same_id ? dis.entities[i].id
+                                          : fmt::format("entity {}", dis.entities[i].entity)));
+    }
+  }
+}
+
+/// Checks the hosts that do not speak emitd's own messages, of which there is one at most.
+void check_gateways(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
+  Diagnostics reported_before;
+  const Node& net_fdm = section(root, "net_fdm", reported_before);
+  if (daemon.cigi.enabled()) {
+    check_cigi(section(root, "cigi", reported_before), daemon.cigi, diagnostics);
+  }
+  if (daemon.dis.enabled()) {
+    check_dis(section(root, "dis", reported_before), daemon.dis, diagnostics);
+  }
+  if (daemon.net_fdm.enabled()) {
+    check_endpoint(net_fdm, "listen", daemon.net_fdm.listen, false, diagnostics);
+  }
+  const int count =
+      int{daemon.cigi.enabled()} + int{daemon.dis.enabled()} + int{daemon.net_fdm.enabled()};
+  if (count > 1) {
+    diagnostics.add(root.at,
+                    "more than one of 'cigi.listen', 'dis.listen' and 'net_fdm.listen' is set: a "
+                    "run has one host");
+  }
+}
+
 void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostics& diagnostics) {
   Diagnostics reported_before;  // section() has reported wrong kinds
   const Node& pacing = section(root, "pacing", reported_before);
@@ -143,9 +193,7 @@ void check_combinations(const Node& root, const DaemonConfig& daemon, Diagnostic
     too_short(motion, "host_timeout_ms", daemon.motion.host_timeout_ns);
     too_short(pacing, "horizon_ms", daemon.pacing.horizon_ns);
   }
-  if (daemon.cigi.enabled()) {
-    check_cigi(section(root, "cigi", reported_before), daemon.cigi, diagnostics);
-  }
+  check_gateways(root, daemon, diagnostics);
   check_access(root, daemon, diagnostics);
   if (daemon.source.kind == SourceKind::canned && !daemon.source.canned_dir.empty()) {
     std::error_code code;
@@ -173,6 +221,20 @@ bool is_endpoint(std::string_view text) {
   unsigned value = 0;
   const auto parsed = std::from_chars(port.data(), port.data() + port.size(), value);
   return parsed.ec == std::errc() && parsed.ptr == port.data() + port.size() && value <= 65535;
+}
+
+std::optional<std::array<std::uint16_t, 3>> parse_dis_id(std::string_view text) {
+  std::array<std::uint16_t, 3> out{};
+  const char* at = text.data();
+  const char* const end = text.data() + text.size();
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (i > 0 && (at == end || *at++ != ':')) return std::nullopt;
+    const auto parsed = std::from_chars(at, end, out[i]);
+    if (parsed.ec != std::errc()) return std::nullopt;
+    at = parsed.ptr;
+  }
+  if (at != end) return std::nullopt;
+  return out;
 }
 
 Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
@@ -212,6 +274,8 @@ Result<DaemonConfig> load_daemon(const std::filesystem::path& file,
   read_table(section(root, "trigger", diagnostics), trigger_keys(), daemon.trigger, diagnostics);
   read_table(section(root, "motion", diagnostics), motion_keys(), daemon.motion, diagnostics);
   read_table(section(root, "cigi", diagnostics), cigi_keys(), daemon.cigi, diagnostics);
+  read_table(section(root, "dis", diagnostics), dis_keys(), daemon.dis, diagnostics);
+  read_table(section(root, "net_fdm", diagnostics), net_fdm_keys(), daemon.net_fdm, diagnostics);
   read_table(section(root, "clock", diagnostics), clock_keys(), daemon.clock, diagnostics);
   read_table(section(root, "realtime", diagnostics), realtime_keys(), daemon.realtime, diagnostics);
   read_table(section(root, "host", diagnostics), host_keys(), daemon.host, diagnostics);

@@ -59,7 +59,7 @@ server/pacing: protocol renderer/include renderer/physics renderer/scene
 server/motion: protocol renderer/physics
 server/gnss: protocol renderer/physics
 server/telemetry: server/host server/net server/rt config/include protocol renderer/physics
-server/gateway: server/host server/net server/rt server/telemetry config/include protocol renderer/physics renderer/reference renderer/scene
+server/gateway: server/host server/motion server/net server/rt server/telemetry config/include protocol renderer/physics renderer/reference renderer/scene
 server/agents: server/gateway server/host server/motion server/pacing server/rt server/telemetry config/include protocol renderer/include renderer/physics renderer/scene
 server/agents/sender: server/agents server/net server/rt config/include protocol renderer/physics
 server/agents/receiver: server/agents server/agents/sender server/net server/rt config/include protocol renderer/physics

@@ -133,10 +133,7 @@ physics::Result<void> AgentSet::make_motion() {
 }
 
 physics::Result<void> AgentSet::make_gateway() {
-  if (!config_.cigi.enabled()) {
-    return {};
-  }
-  auto made = make_cigi_agent(context_, config_, scenario_);
+  auto made = make_gateway_agent(context_, config_, scenario_);
   if (!made) {
     return tl::unexpected<Error>(std::move(made.error()).with_context(config_.file.string()));
   }

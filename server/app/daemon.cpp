@@ -97,7 +97,7 @@ physics::Result<void> DaemonImpl::setup() {
     // memory that is locked.
     std::vector<std::string_view> more_agents;
     if (config_.motion.enabled()) more_agents.emplace_back("motion");
-    if (config_.cigi.enabled()) more_agents.emplace_back("gateway");
+    if (config_.has_gateway()) more_agents.emplace_back("gateway");
     realtime_ = ask_for_realtime(config_.realtime, more_agents);
     if (auto checked = check_realtime(); !checked) {
       return checked;

@@ -25,12 +25,6 @@ constexpr std::int64_t kLongestWaitNs = 5'000'000'000;
 /// A clock of the host that is off by less than this beyond its minutes is not set.
 constexpr std::int64_t kClockSlackNs = 1'000'000'000;
 
-physics::GeoPlace origin_of(const scene::ScenarioDesc* scenario) noexcept {
-  if (scenario == nullptr) return {};
-  return {physics::Radians(scenario->place.lat_rad), physics::Radians(scenario->place.lon_rad),
-          physics::Metres(scenario->place.height_m)};
-}
-
 CigiEntities::Options entity_options(const CigiHost::Options& options) {
   CigiEntities::Options out;
   out.seeker = static_cast<std::uint16_t>(options.cigi.seeker);
@@ -337,7 +331,7 @@ void CigiHost::tell(std::string_view text) noexcept {
   texts_[text_count_++] = cigi::ImageGeneratorMessage::make(0, text);
 }
 
-bool CigiHost::next(protocol::HostFrameData& frame) noexcept {
+bool CigiHost::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) noexcept {
   if (!std::exchange(frame_pending_, false)) return false;
   frame.frame_number = clock_.number();
   frame.sim_time_ns = clock_.time_ns();

@@ -45,7 +45,7 @@ class CigiHost final : public HostGateway {
            EventLog& events);
 
   void take(std::span<const std::byte> datagram, std::int64_t received_ns) noexcept override;
-  [[nodiscard]] bool next(protocol::HostFrameData& frame) noexcept override;
+  [[nodiscard]] bool next(protocol::HostFrameData& frame, std::int64_t now_ns) noexcept override;
   void report(const GatewayReport& report) noexcept override;
   [[nodiscard]] std::span<const std::byte> message(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::int64_t wake_at_ns() const noexcept override;

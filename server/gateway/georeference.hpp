@@ -7,8 +7,17 @@
 
 #include "emit/physics/frames.hpp"
 #include "emit/physics/geodesy.hpp"
+#include "emit/scene/scene_desc.hpp"
 
 namespace emit::server {
+
+/// Returns the place of the world's origin. Without a scenario it is where the equator meets the
+/// prime meridian.
+[[nodiscard]] inline physics::GeoPlace origin_of(const scene::ScenarioDesc* scenario) noexcept {
+  if (scenario == nullptr) return {};
+  return {physics::Radians(scenario->place.lat_rad), physics::Radians(scenario->place.lon_rad),
+          physics::Metres(scenario->place.height_m)};
+}
 
 /// Place of the scenario's world on the WGS-84 ellipsoid. The world is the east-north-up frame at
 /// its origin, so that its ground does not follow the curvature: 1 km away the ellipsoid is 8 cm

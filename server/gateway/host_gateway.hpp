@@ -31,14 +31,14 @@ class HostGateway {
   /// Takes a datagram that arrived at `received_ns`, wall.
   /// @pre next() has returned false since the last call
   virtual void take(std::span<const std::byte> datagram, std::int64_t received_ns) noexcept = 0;
-  /// Writes all of the next host frame. Returns false when there is none.
-  [[nodiscard]] virtual bool next(protocol::HostFrameData& frame) noexcept = 0;
+  /// Writes all of the next host frame. Returns false when there is none at this instant.
+  [[nodiscard]] virtual bool next(protocol::HostFrameData& frame, std::int64_t now_ns) noexcept = 0;
   /// Takes a report of the conductor.
   virtual void report(const GatewayReport& report) noexcept = 0;
   /// Returns the message to send to the host now; empty: none. It is valid until the next call.
   [[nodiscard]] virtual std::span<const std::byte> message(std::int64_t now_ns) noexcept = 0;
-  /// Returns the instant at which message() will have something, wall; kNeverNs: not before the
-  /// next datagram or report.
+  /// Returns the instant at which next() or message() will have something, wall; the largest
+  /// number: not before the next datagram or report.
   [[nodiscard]] virtual std::int64_t wake_at_ns() const noexcept = 0;
 };
 

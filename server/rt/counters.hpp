@@ -91,8 +91,8 @@ namespace emit::server {
   X(axes_interlocks, "times its interlock was open")                                       \
   X(axes_commands_ignored, "times it did not take or follow commands for 0.5 s")           \
   X(axes_clock_jumps, "jumps of simulation time against time, seen by the axes")           \
-  X(gateway_datagrams, "datagrams of a host that speaks CIGI")                             \
-  X(gateway_peers_refused, "such datagrams dropped: not from the host's address")          \
+  X(gateway_datagrams, "datagrams of a host that speaks CIGI, DIS or net_fdm")             \
+  X(gateway_peers_refused, "such datagrams dropped: their sender is not allowed")          \
   X(gateway_messages_refused, "its messages refused: malformed, or without a time")        \
   X(gateway_messages_old, "its messages left out: repeated, or overtaken by a newer one")  \
   X(gateway_packets_refused, "its packets refused: malformed, or out of range")            \

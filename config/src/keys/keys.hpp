@@ -107,6 +107,8 @@ struct DaemonHead {
 [[nodiscard]] const KeyTable<TlsConfig>& tls_keys();
 [[nodiscard]] const KeyTable<MotionConfig>& motion_keys();
 [[nodiscard]] const KeyTable<CigiConfig>& cigi_keys();
+[[nodiscard]] const KeyTable<DisConfig>& dis_keys();
+[[nodiscard]] const KeyTable<NetFdmConfig>& net_fdm_keys();
 [[nodiscard]] const KeyTable<JournalConfig>& journal_keys();
 [[nodiscard]] const KeyTable<DeviceConfig>& device_keys();
 [[nodiscard]] const KeyTable<LogConfig>& log_keys();

@@ -125,6 +125,8 @@ std::string print_daemon(const DaemonConfig& daemon) {
   print_section("[trigger]", daemon.trigger, trigger_keys(), out);
   print_section("[motion]", daemon.motion, motion_keys(), out);
   print_section("[cigi]", daemon.cigi, cigi_keys(), out);
+  print_section("[dis]", daemon.dis, dis_keys(), out);
+  print_section("[net_fdm]", daemon.net_fdm, net_fdm_keys(), out);
   print_section("[clock]", daemon.clock, clock_keys(), out);
   print_section("[realtime]", daemon.realtime, realtime_keys(), out);
   print_section("[host]", daemon.host, host_keys(), out);

@@ -79,6 +79,15 @@ const std::vector<SectionDoc>& daemon_sections() {
                   "A host that speaks CIGI ([cigi.md](../server/docs/cigi.md)). With one, host "
                   "frames of others are refused.",
                   cigi_keys(), CigiConfig{}),
+      section_doc("dis", false,
+                  "A DIS exercise that emitd listens to ([dis.md](../server/docs/dis.md)). With "
+                  "one, host frames of others are refused.",
+                  dis_keys(), DisConfig{}),
+      section_doc("net_fdm", false,
+                  "A flight dynamics model, such as JSBSim, that sends FlightGear's native FDM "
+                  "datagrams ([dis.md](../server/docs/dis.md#flight-dynamics-models)). With one, "
+                  "host frames of others are refused.",
+                  net_fdm_keys(), NetFdmConfig{}),
       section_doc("clock", false, "Source of the clock's time.", clock_keys(), ClockConfig{}),
       section_doc("realtime", false,
                   "Real-time settings of the agents. `deploy/scripts/check_host.sh` shows what the "

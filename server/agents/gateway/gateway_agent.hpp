@@ -35,7 +35,7 @@ class GatewayAgent final : public Agent {
 
  private:
   int take_reports() noexcept;
-  int take_datagrams() noexcept;
+  int take_inputs(std::int64_t now_ns) noexcept;
 
   Context& context_;
   GatewayPort port_;

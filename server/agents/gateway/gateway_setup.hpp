@@ -9,10 +9,10 @@
 
 namespace emit::server {
 
-/// Makes the agent of a host that speaks CIGI, with the scene that its questions are about. The
-/// arguments outlive the agent.
-/// Errors: config, io (cigi.listen, cigi.host, a glTF file), internal (Embree).
-[[nodiscard]] physics::Result<std::unique_ptr<GatewayAgent>> make_cigi_agent(
+/// Makes the agent of a host that does not speak emitd's own messages; null: the configuration has
+/// none. The arguments outlive the agent.
+/// Errors: config, io (an address, a glTF file), internal (Embree).
+[[nodiscard]] physics::Result<std::unique_ptr<GatewayAgent>> make_gateway_agent(
     Context& context, const config::DaemonConfig& config,
     const std::optional<scene::ScenarioDesc>& scenario);
 

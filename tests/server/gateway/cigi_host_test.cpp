@@ -54,7 +54,7 @@ class CigiHostTest : public testing::Test {
     }
     return start;
   }
-  bool next() { return gateway_->next(*frame_); }
+  bool next() { return gateway_->next(*frame_, now_ns_); }
   static cigi::EntityControl seeker() {
     cigi::EntityControl out;
     out.state = cigi::EntityState::active;
@@ -193,7 +193,7 @@ TEST_F(CigiHostTest, NothingAllocatesWhileItServes) {
     static_cast<void>(writer.add(question));
     now_ns_ += kFrameNs;
     gateway_->take(writer.message(), now_ns_);
-    ASSERT_TRUE(gateway_->next(*frame_));
+    ASSERT_TRUE(gateway_->next(*frame_, now_ns_));
     gateway_->report({GatewayReport::Kind::published, frame_->frame_number});
     ASSERT_FALSE(gateway_->message(now_ns_).empty());
   }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -94,6 +95,35 @@ struct CigiConfig {
   std::uint32_t view = 0;      ///< view that is the sensor
   std::uint32_t database = 1;  ///< number of the scenario among the host's databases; 0: none
   std::vector<CigiEntityConfig> entities;
+
+  [[nodiscard]] bool enabled() const noexcept { return !listen.empty(); }
+};
+
+/// An entity of a DIS exercise.
+struct DisEntityConfig {
+  std::string id;            ///< site:application:entity
+  std::uint32_t entity = 0;  ///< number in the scenario
+};
+
+/// A DIS exercise that emitd listens to.
+struct DisConfig {
+  std::string listen;          ///< address:port for its datagrams; empty: there is none
+  std::string group;           ///< multicast group; empty: none
+  std::uint32_t exercise = 0;  ///< number of the exercise; 0: any
+  std::string seeker;          ///< site:application:entity of what carries the sensor
+  double rate_hz = 100.0;      ///< rate of the poses that are predicted
+  double timeout_s = 12.0;     ///< after so long without a PDU an entity is hidden
+  std::vector<DisEntityConfig> entities;
+
+  [[nodiscard]] bool enabled() const noexcept { return !listen.empty(); }
+};
+
+/// Reads "site:application:entity", each 0 to 65535; none: the text is no such id.
+[[nodiscard]] std::optional<std::array<std::uint16_t, 3>> parse_dis_id(std::string_view text);
+
+/// A flight dynamics model that sends FlightGear's native FDM datagrams.
+struct NetFdmConfig {
+  std::string listen;  ///< address:port for its datagrams; empty: there is none
 
   [[nodiscard]] bool enabled() const noexcept { return !listen.empty(); }
 };
@@ -204,6 +234,8 @@ struct DaemonConfig {
   TriggerConfig trigger;
   MotionConfig motion;
   CigiConfig cigi;
+  DisConfig dis;
+  NetFdmConfig net_fdm;
   ClockConfig clock;
   RealtimeConfig realtime;
   HostConfig host;
@@ -216,6 +248,10 @@ struct DaemonConfig {
   DeviceConfig device;
   LogConfig log;
 
+  /// True when the host speaks another protocol than emitd's own.
+  [[nodiscard]] bool has_gateway() const noexcept {
+    return cigi.enabled() || dis.enabled() || net_fdm.enabled();
+  }
   /// True when host datagrams have to belong to an authenticated session.
   [[nodiscard]] bool authenticated_host() const noexcept {
     return !host.key_file.empty() || tls.enabled();
@@ -223,7 +259,7 @@ struct DaemonConfig {
 };
 
 /// A listening port of the daemon.
-enum class Port : std::uint8_t { control, host, metrics };
+enum class Port : std::uint8_t { control, host, metrics, gateway };
 /// True when something protects this port, so that other hosts may reach it.
 [[nodiscard]] bool is_protected(const DaemonConfig& daemon, Port port) noexcept;
 /// Keys that protect such a port, for messages.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "keys.hpp"
 
-/// Keys of a host that speaks CIGI.
+/// Keys of hosts that do not speak emitd's own messages.
 namespace emit::config {
 namespace {
 
@@ -17,7 +17,52 @@ const KeyTable<CigiEntityConfig>& cigi_entity_keys() {
   return keys;
 }
 
+const KeyTable<DisEntityConfig>& dis_entity_keys() {
+  static const KeyTable<DisEntityConfig> keys = {
+      required(text<DisEntityConfig>("id", EMIT_FIELD(id),
+                                     "`site:application:entity` of the exercise.")),
+      required(integer<DisEntityConfig>("entity", "", 1, 4294967295, EMIT_FIELD(entity),
+                                        "Number of the entity in the scenario.")),
+  };
+  return keys;
+}
+
 }  // namespace
+
+const KeyTable<DisConfig>& dis_keys() {
+  static const KeyTable<DisConfig> keys = {
+      text<DisConfig>("listen", EMIT_FIELD(listen),
+                      "`address:port` for datagrams, by custom port 3000. When it is empty, there "
+                      "is no exercise."),
+      text<DisConfig>("group", EMIT_FIELD(group), "Multicast group to join."),
+      integer<DisConfig>("exercise", "", 0, 255, EMIT_FIELD(exercise),
+                         "Number of the exercise. 0: any."),
+      text<DisConfig>("seeker", EMIT_FIELD(seeker),
+                      "`site:application:entity` of the entity that carries the sensor."),
+      number<DisConfig>("rate_hz", "Hz", between(1, 2000), EMIT_FIELD(rate_hz),
+                        "Rate at which poses are predicted between PDUs. It should be that of the "
+                        "frames or more."),
+      number<DisConfig>("timeout_s", "s", between(0.1, 3600), EMIT_FIELD(timeout_s),
+                        "An entity without a PDU for so long is hidden."),
+      custom<DisConfig>(
+          {"entities", "array of tables", "", "",
+           "Entities of the exercise that the scenario has: `id`, `entity`.", false},
+          [](DisConfig& out, const Node& node, Diagnostics& diagnostics) {
+            read_array(node, "entities", dis_entity_keys(), DisEntityConfig{}, out.entities,
+                       diagnostics);
+          },
+          [](const DisConfig& in) { return write_array(in.entities, dis_entity_keys()); }),
+  };
+  return keys;
+}
+
+const KeyTable<NetFdmConfig>& net_fdm_keys() {
+  static const KeyTable<NetFdmConfig> keys = {
+      text<NetFdmConfig>("listen", EMIT_FIELD(listen),
+                         "`address:port` for datagrams. When it is empty, there is no model."),
+  };
+  return keys;
+}
 
 const KeyTable<CigiConfig>& cigi_keys() {
   static const KeyTable<CigiConfig> keys = {
