@@ -229,7 +229,7 @@ TEST_F(DisExerciseTest, WhatIsNotForThisExerciseIsCountedAndLeftOut) {
   send(state(77, 0.0), kWallNs, kWallNs);
   EXPECT_EQ(counters_.get(Counter::gateway_packets_unused), 2U);
   auto wild = state(3, 0.0);
-  wild.location_ecef_m.x = 9e8;
+  wild.velocity_m_s.x = 1e7F;
   send(wild, kWallNs, kWallNs);
   EXPECT_FALSE(exercise_->next(*frame_, kWallNs));
   const std::array<std::byte, 5> rest{std::byte{7}};
