@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "emit/physics/constants.hpp"
+#include "emit/protocol/codec.hpp"
 #include "emit/protocol/convert.hpp"
 
 namespace emit::server {
@@ -19,11 +20,12 @@ using cigi::IgMode;
 
 namespace {
 
-constexpr std::int64_t kMinuteNs = 60'000'000'000;
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr std::int64_t kMinuteNs = 60 * kSecondNs;
 /// A frame that takes longer does not keep the host from hearing of emitd.
 constexpr std::int64_t kLongestWaitNs = 5'000'000'000;
 /// A clock of the host that is off by less than this beyond its minutes is not set.
-constexpr std::int64_t kClockSlackNs = 1'000'000'000;
+constexpr std::int64_t kClockSlackNs = kSecondNs;
 
 CigiEntities::Options entity_options(const CigiHost::Options& options) {
   CigiEntities::Options out;
@@ -41,16 +43,15 @@ CigiEntities::Options entity_options(const CigiHost::Options& options) {
   return out;
 }
 
-/// Returns the POSIX instant of a date and a time of day, ns UTC.
+/// Returns the POSIX instant of a date and a time of day without its seconds, s UTC.
 /// @pre the date exists, as the reader makes sure
-std::int64_t utc_of(const cigi::CelestialSphereControl& packet) noexcept {
+std::int64_t utc_minute_s_of(const cigi::CelestialSphereControl& packet) noexcept {
   using namespace std::chrono;
   const std::uint32_t date = packet.date_mmddyyyy;
   const sys_days day{year{static_cast<int>(date % 10000)} / static_cast<int>(date / 1'000'000) /
                      static_cast<int>(date / 10000 % 100)};
-  return nanoseconds(day.time_since_epoch() + hours(packet.hour_utc) + minutes(packet.minute_utc))
-             .count() +
-         std::llround(1e9 * packet.second_utc);
+  return seconds(sys_seconds(day).time_since_epoch()).count() + 3600 * packet.hour_utc +
+         60 * packet.minute_utc;
 }
 
 }  // namespace
@@ -277,7 +278,16 @@ void CigiHost::take_sky(const cigi::CelestialSphereControl& packet) noexcept {
   if (!packet.date_valid || options_.scenario == nullptr) return;
   // Version 3.3 counts whole minutes, so that a clock within the minute is right.
   const std::int64_t width_ns = version_ == cigi::Version::v3_3 ? kMinuteNs : 0;
-  const std::int64_t wanted_ns = utc_of(packet) - options_.scenario->epoch_utc_ns;
+  // Whole nanoseconds end in the year 2262, and dates do not.
+  const std::int64_t epoch_s = options_.scenario->epoch_utc_ns / kSecondNs;
+  const std::int64_t wanted_s = utc_minute_s_of(packet) - epoch_s;
+  if (std::abs(wanted_s) >= protocol::kMaxSimTimeNs / kSecondNs) {
+    no_effect(packet, "the date is too far from that of the scenario");
+    return;
+  }
+  const std::int64_t wanted_ns = wanted_s * kSecondNs +
+                                 std::llround(1e9 * double{packet.second_utc}) -
+                                 options_.scenario->epoch_utc_ns % kSecondNs;
   const std::int64_t ahead_ns = clock_.time_ns() - wanted_ns;
   if (ahead_ns >= -kClockSlackNs && ahead_ns < width_ns + kClockSlackNs) return;
   clock_.shift(-ahead_ns);
@@ -350,6 +360,11 @@ bool CigiHost::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) noe
 
 bool CigiHost::check(protocol::HostFrameData& frame) noexcept {
   protocol::DecodeFault fault;
+  if (std::abs(frame.sim_time_ns) > protocol::kMaxSimTimeNs) {
+    counters_.add(Counter::gateway_messages_refused);
+    no_effect(cigi::IgControl::kWire.v3_3.id, "its time is too far from that of the scenario");
+    return false;
+  }
   if (protocol::check_pose(frame.seeker, frame.seeker_rates, &fault) !=
       protocol::DecodeStatus::ok) {
     counters_.add(Counter::gateway_packets_refused);

@@ -157,8 +157,7 @@ void DisExercise::take_update(const dis::EntityStateUpdate& update, std::uint32_
   entity->on = (update.appearance & kDeactivated) == 0;
 }
 
-std::int64_t DisExercise::sender_time_ns(const Entity& entity,
-                                         std::int64_t now_ns) const noexcept {
+std::int64_t DisExercise::sender_time_ns(const Entity& entity, std::int64_t now_ns) const noexcept {
   return senders_[entity.sender].arrivals.sim_time_ns(now_ns);
 }
 
@@ -169,9 +168,8 @@ bool DisExercise::is_silent(const Entity& entity, std::int64_t now_ns) const noe
 bool DisExercise::place(const Entity& entity, std::int64_t now_ns, physics::Pose& pose,
                         std::optional<protocol::PoseRates>& rates) noexcept {
   const double since_s =
-      entity.frozen
-          ? 0.0
-          : 1e-9 * static_cast<double>(sender_time_ns(entity, now_ns) - entity.stamp_ns);
+      entity.frozen ? 0.0
+                    : 1e-9 * static_cast<double>(sender_time_ns(entity, now_ns) - entity.stamp_ns);
   const dis::Predicted at = dis::predict(entity.motion, since_s);
   pose.position_world_m = earth_.world_from_ecef_m(at.position_ecef_m);
   const glm::dmat3 world_from_ecef = earth_.world_from_ecef();

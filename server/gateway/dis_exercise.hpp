@@ -20,8 +20,8 @@ namespace emit::server {
 ///
 /// Between two PDUs an entity goes on by its dead-reckoning model. The instants are those of the
 /// sender's time stamps: the earliest of the latest arrivals ties them to this clock, so that
-/// neither the delay of a PDU nor the loss of others shifts time. Host frames with all entities come
-/// at a fixed rate.
+/// neither the delay of a PDU nor the loss of others shifts time. Host frames with all entities
+/// come at a fixed rate.
 class DisExercise final : public HostGateway {
  public:
   /// Senders (site and application) that are told apart.

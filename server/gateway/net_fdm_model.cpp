@@ -45,8 +45,7 @@ bool NetFdmModel::next(protocol::HostFrameData& frame, std::int64_t /*now_ns*/) 
   const physics::GeoPlace place = {physics::Radians(state_.latitude_rad),
                                    physics::Radians(state_.longitude_rad),
                                    physics::Metres(state_.altitude_m)};
-  frame.seeker =
-      earth_.world_pose(place, {state_.heading_rad, state_.pitch_rad, state_.roll_rad});
+  frame.seeker = earth_.world_pose(place, {state_.heading_rad, state_.pitch_rad, state_.roll_rad});
   const glm::dvec3& ned = state_.velocity_ned_m_s;
   frame.seeker_rates =
       protocol::PoseRates{earth_.world_from_enu(place) * glm::dvec3{ned.y, ned.x, -ned.z},

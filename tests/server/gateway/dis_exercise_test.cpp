@@ -78,8 +78,8 @@ class DisExerciseTest : public testing::Test {
     out.velocity_m_s = glm::vec3(ecef_from_world * Circle::velocity_m_s(t_s + shift_s));
     out.acceleration_m_s2 = glm::vec3(ecef_from_world * Circle::acceleration_m_s2(t_s + shift_s));
     out.angular_velocity_rad_s = {0.0F, 0.0F, static_cast<float>(kTurnRadS)};
-    const dis::EulerAnglesF64 angles = dis::euler_angles(
-        glm::transpose(ecef_from_world * glm::mat3_cast(pose.world_from_body)));
+    const dis::EulerAnglesF64 angles =
+        dis::euler_angles(glm::transpose(ecef_from_world * glm::mat3_cast(pose.world_from_body)));
     out.orientation = {static_cast<float>(angles.psi_rad), static_cast<float>(angles.theta_rad),
                        static_cast<float>(angles.phi_rad)};
     return out;
@@ -131,8 +131,8 @@ TEST_F(DisExerciseTest, LossAndDelayShiftNothing) {
     if (t_ns < 20 * kOneSecondNs) continue;
     EXPECT_NEAR(static_cast<double>(frame_->sim_time_ns - t_ns - offset_ns), 0.0, 30e6);
     const physics::Pose truth = Circle::pose(true_s - 0.002);
-    most_m = std::max(
-        most_m, glm::distance(frame_->seeker.position_world_m, truth.position_world_m));
+    most_m =
+        std::max(most_m, glm::distance(frame_->seeker.position_world_m, truth.position_world_m));
     const glm::dvec3 nose = frame_->seeker.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
     const glm::dvec3 wanted = truth.world_from_body * glm::dvec3(1.0, 0.0, 0.0);
     most_rad = std::max(most_rad, glm::length(glm::cross(nose, wanted)));
