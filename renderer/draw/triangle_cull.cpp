@@ -206,7 +206,7 @@ void TriangleCull::add(const scene::Mesh& mesh, std::span<const scene::Cluster> 
     const auto indices = std::span(mesh_indices_).subspan(cluster.first_index, cluster.index_count);
     own.assign(indices.begin(), indices.end());
     std::ranges::sort(own);
-    own.erase(std::ranges::unique(own).begin(), own.end());
+    own.erase(std::unique(own.begin(), own.end()), own.end());
     if (own.size() > kMaxVertices || !std::isfinite(cluster.radius_m)) continue;
     local = {static_cast<std::uint32_t>(x_m_.size()), static_cast<std::uint32_t>(own.size())};
     for (const std::uint32_t v : own) {

@@ -50,7 +50,7 @@ Local localised(const scene::Mesh& mesh, std::span<const std::uint32_t> indices)
   Local local;
   local.global.assign(indices.begin(), indices.end());
   std::ranges::sort(local.global);
-  local.global.erase(std::ranges::unique(local.global).begin(), local.global.end());
+  local.global.erase(std::unique(local.global.begin(), local.global.end()), local.global.end());
   for (const std::uint32_t v : local.global) local.positions_m.push_back(mesh.positions_m[v]);
   local.indices.reserve(indices.size());
   for (const std::uint32_t v : indices) {
@@ -251,7 +251,7 @@ std::vector<Node> Builder::build(std::span<const std::uint32_t> indices) const {
       Indices& places = members[n].places;
       for (const std::uint32_t v : nodes[n].indices) places.push_back(place_[v]);
       std::ranges::sort(places);
-      places.erase(std::ranges::unique(places).begin(), places.end());
+      places.erase(std::unique(places.begin(), places.end()), places.end());
       members[n].centre_m = nodes[n].bounds.centre_m;
       before += nodes[n].indices.size();
     }
@@ -317,7 +317,7 @@ ClusterLevels build_cluster_levels(scene::Mesh& mesh, const VertexValues& values
     // Put the finest clusters first: they keep the submesh's range of indices.
     std::uint32_t place = submesh.first_index;
     std::vector<Node>& nodes = built[k];
-    std::ranges::stable_partition(nodes, &Node::finest);
+    std::stable_partition(nodes.begin(), nodes.end(), [](const Node& node) { return node.finest; });
     for (Node& node : nodes) {
       const auto count = static_cast<std::uint32_t>(node.indices.size());
       node.bounds.index_count = count;

@@ -152,9 +152,10 @@ void LocalSteps::take_turn(std::size_t turn, std::int64_t at_ns, const Window& w
   bring(blocks, at_ns, window, inputs);
   // Return blocks that nothing touched in this interval, but not right before the interval ends.
   const bool may_leave = window.after.at_ns - at_ns > turn_ns_;
-  const auto leaving = std::ranges::partition(
-      blocks, [&](std::uint32_t b) { return !may_leave || touched_ns_[b] >= window.before.at_ns; });
-  const std::size_t stay = blocks.size() - leaving.size();
+  const auto leaving = std::partition(blocks.begin(), blocks.end(), [&](std::uint32_t b) {
+    return !may_leave || touched_ns_[b] >= window.before.at_ns;
+  });
+  const auto stay = static_cast<std::size_t>(leaving - blocks.begin());
   show(std::span(blocks).first(stay), turn, at_ns, window, inputs);
   hand_back(std::span(blocks).subspan(stay), at_ns, window, inputs);
   blocks.resize(stay);

@@ -99,7 +99,7 @@ std::int64_t time_ns(double time_s) {
 template <class Value>
 void sort_unique(std::vector<Value>& values) {
   std::ranges::sort(values);
-  values.erase(std::ranges::unique(values).begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
 /// Errors: invalid_argument (a time that is none, a band that the scenario does not have).

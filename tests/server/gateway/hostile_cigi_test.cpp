@@ -38,16 +38,15 @@ class HostileHost {
         memory_[pick(static_cast<std::uint32_t>(bytes))] ^= std::byte{1} << pick(8);
       }
     }
-    return std::span<const std::byte>(memory_).first(pick(20) == 0 ? pick(static_cast<std::uint32_t>(bytes)) : bytes);
+    return std::span<const std::byte>(memory_).first(
+        pick(20) == 0 ? pick(static_cast<std::uint32_t>(bytes)) : bytes);
   }
 
  private:
   std::uint32_t bits() { return static_cast<std::uint32_t>(random_()); }
   std::uint32_t pick(std::uint32_t below) { return below == 0 ? 0 : bits() % below; }
   std::uint16_t id() { return static_cast<std::uint16_t>(pick(3) == 0 ? bits() : pick(6)); }
-  float angle(float most) {
-    return std::uniform_real_distribution<float>(-most, most)(random_);
-  }
+  float angle(float most) { return std::uniform_real_distribution<float>(-most, most)(random_); }
   /// Returns any finite number.
   float wild() { return std::ldexp(angle(1.0F), static_cast<int>(pick(254)) - 126); }
   cigi::Place place(bool offset) {
